@@ -1,0 +1,39 @@
+# Compiler settings that every target shares, and the one way to declare a library.
+
+set(CMAKE_CXX_STANDARD 20)
+set(CMAKE_CXX_STANDARD_REQUIRED ON)
+set(CMAKE_CXX_EXTENSIONS OFF)
+set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
+set(CMAKE_RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bin)
+
+# Asserts stay alive: they are cheap beside a physics step, and they guard our own mistakes.
+set(CMAKE_CXX_FLAGS_RELEASE "-O2 -g1")
+# Results are part of the interface (docs/determinism.md): no contraction, no reassociation.
+add_compile_options(-ffp-contract=off)
+add_compile_options(-Wall -Wextra -Wshadow -Wnon-virtual-dtor -Wcast-align)
+if(GAPFARM_WERROR)
+  add_compile_options(-Werror)
+endif()
+if(GAPFARM_SANITIZE)
+  add_compile_options(-fsanitize=${GAPFARM_SANITIZE} -fno-omit-frame-pointer)
+  add_link_options(-fsanitize=${GAPFARM_SANITIZE})
+endif()
+
+find_program(CCACHE ccache)
+if(CCACHE)
+  set(CMAKE_CXX_COMPILER_LAUNCHER ${CCACHE})
+endif()
+
+# gapfarm_library(NAME SOURCES a.cc b.cc DEPS x y): one library a folder, sources listed by hand.
+function(gapfarm_library name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;DEPS" ${ARGN})
+  if(ARG_SOURCES)
+    add_library(${name} STATIC ${ARG_SOURCES})
+    target_include_directories(${name} PUBLIC ${PROJECT_SOURCE_DIR} ${PROJECT_BINARY_DIR})
+    target_link_libraries(${name} PUBLIC ${ARG_DEPS})
+  else()
+    add_library(${name} INTERFACE)
+    target_include_directories(${name} INTERFACE ${PROJECT_SOURCE_DIR} ${PROJECT_BINARY_DIR})
+    target_link_libraries(${name} INTERFACE ${ARG_DEPS})
+  endif()
+endfunction()

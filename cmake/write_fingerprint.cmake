@@ -1,0 +1,18 @@
+file(GLOB_RECURSE sources RELATIVE ${SOURCE_DIR}
+     ${SOURCE_DIR}/proto/*.proto ${SOURCE_DIR}/common/*.h ${SOURCE_DIR}/common/*.cc
+     ${SOURCE_DIR}/worker/*.h ${SOURCE_DIR}/worker/*.cc)
+list(SORT sources)
+set(all "${COMPILER};${BULLET};${EIGEN};${BUILD_TYPE};${SANITIZE}")
+foreach(source IN LISTS sources)
+  file(SHA256 ${SOURCE_DIR}/${source} digest)
+  string(APPEND all ";${source}=${digest}")
+endforeach()
+string(SHA256 fingerprint "${all}")
+string(SUBSTRING ${fingerprint} 0 16 fingerprint)
+set(text "#pragma once\n#define GAPFARM_VERSION \"${VERSION}\"\n#define GAPFARM_FINGERPRINT \"${fingerprint}\"\n#define GAPFARM_COMPILER \"${COMPILER}\"\n#define GAPFARM_BULLET \"${BULLET}\"\n#define GAPFARM_BUILD_TYPE \"${BUILD_TYPE}\"\n")
+if(EXISTS ${OUT})
+  file(READ ${OUT} old)
+endif()
+if(NOT "${old}" STREQUAL "${text}")
+  file(WRITE ${OUT} "${text}")
+endif()

@@ -1,0 +1,49 @@
+// THE effect catalogue: what the base simulation leaves out, by name, with units, bounds and the
+// neutral value at which an effect does nothing, exactly.  What each does lives in worker/effects.
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace gapfarm {
+
+// Where in the chain from duty to logged pose an effect acts.
+enum class EffectStage { kDrive, kFloor, kCamera };
+
+// What an effect looks at beside the command itself; conditions are shared over the rest.
+enum EffectContext : unsigned {
+  kNoContext = 0,
+  kStartHeading = 1u << 0,  // heading in the world before the trial
+  kStartPlace = 1u << 1,    // position in the world before the trial
+  kSessionTime = 1u << 2,   // time since the session began
+  kLastDirection = 1u << 3, // sign of each side's last duty in the session
+  kUnrecordedMove = 1u << 4,  // whether the robot was moved before the trial
+};
+
+struct EffectParameter {
+  std::string key;   // within the effect
+  std::string unit;  // "-" when it has none
+  double neutral = 0;
+  double lower = 0;
+  double upper = 0;
+  std::string summary;
+  std::vector<std::string> choices;  // not empty: the value is an index into these
+};
+
+struct Effect {
+  std::string name;
+  EffectStage stage = EffectStage::kDrive;
+  unsigned context = kNoContext;
+  std::string summary;
+  std::vector<EffectParameter> parameters;
+  // How many of `parameters`, from the first, must be neutral for the effect to do nothing; the
+  // others (a direction, a place) mean nothing then.
+  std::size_t strengths = 1;
+};
+
+// The catalogue of scenario `srv1`, in a fixed order.
+std::span<const Effect> srv1_effects();
+
+}  // namespace gapfarm

@@ -1,0 +1,97 @@
+// THE parameter table of a scenario.  Config keys, genes, wire format, documentation and report
+// labels all derive from its rows; effect parameters are rows of it too ("battery_sag.rate").
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "common/base/result.h"
+#include "common/effects/catalogue.h"
+
+namespace gapfarm {
+
+enum class ParameterKind { kReal, kInteger, kBoolean, kChoice };
+enum class ParameterScale { kLinear, kLog };
+
+struct Parameter {
+  std::string key;   // "mass", "battery_sag.rate"
+  std::string unit;  // SI; "-" when it has none
+  ParameterKind kind = ParameterKind::kReal;
+  ParameterScale scale = ParameterScale::kLinear;
+  double lower = 0;    // bounds of what the simulation accepts
+  double upper = 0;
+  double nominal = 0;  // for an effect's parameter: the neutral value
+  std::string summary;
+  std::vector<std::string> choices;  // kChoice only; the value is an index
+  std::string effect;                // name of the effect it belongs to; empty: base
+};
+
+// One value a row.  Booleans are 0 or 1, choices are indices, integers are whole.
+using ParameterValues = std::vector<double>;
+
+class ParameterTable {
+ public:
+  ParameterTable(std::vector<Parameter> base, std::span<const Effect> effects);
+
+  std::size_t size() const { return rows_.size(); }
+  const Parameter& operator[](std::size_t row) const { return rows_[row]; }
+  const std::vector<Parameter>& rows() const { return rows_; }
+  std::span<const Effect> effects() const { return effects_; }
+
+  std::optional<std::size_t> find(std::string_view key) const;
+  // REQUIRES: the key exists.
+  std::size_t row(std::string_view key) const;
+  // First row of effect `e`'s parameters; they follow one another in the catalogue's order.
+  std::size_t effect_row(std::size_t e) const { return effect_rows_[e]; }
+
+  ParameterValues nominal() const;
+  // Whether effect `e` does nothing at `values`.
+  bool is_neutral(std::size_t e, const ParameterValues& values) const;
+
+  // OK when `value` is one the row accepts; the error names key, value, unit and bounds.
+  Status check(std::size_t row, double value) const;
+  // "0.35 kg", "sphere", "true".
+  std::string format(std::size_t row, double value) const;
+
+ private:
+  std::vector<Parameter> rows_;
+  std::span<const Effect> effects_;
+  std::vector<std::size_t> effect_rows_;
+};
+
+// Base rows of scenario `srv1`, in table order; `values[row_of(Srv1::kMass)]` is the mass.
+enum class Srv1 : std::size_t {
+  kRobot,               // choice: treads, wheels
+  kMass,                // kg
+  kContactLength,       // m, front to rear contact
+  kTrackGauge,          // m, left to right contact
+  kFriction,            // -, along the treads
+  kFrictionRatio,       // -, lateral over longitudinal friction
+  kFullSpeed,           // m/s at full duty
+  kDriveNoiseCommon,    // -, per-trial s.d. of both sides' speed
+  kDriveNoiseSide,      // -, per-trial s.d. of each side's speed
+  kPoseNoisePosition,   // m, s.d. of a measured x and y
+  kPoseNoiseHeading,    // rad, s.d. of a measured heading
+  kGravity,             // m/s^2
+  kStepRate,            // Hz
+  kSubSteps,            // -
+  kSolverIterations,    // -
+  kRestitution,         // -
+  kLinearDamping,       // 1/s as Bullet's fraction per second
+  kAngularDamping,      // same
+  kWheelShape,          // choice: sphere, cylinder, box, hull (wheels)
+  kMaximumVelocity,     // rad/s of a wheel at full duty (wheels)
+  kMotorTorque,         // N m a wheel (wheels)
+  kCount
+};
+constexpr std::size_t row_of(Srv1 p) { return static_cast<std::size_t>(p); }
+
+// The table of a scenario; an error names the known scenarios.
+Result<const ParameterTable*> parameter_table(std::string_view scenario);
+const ParameterTable& srv1_table();
+
+}  // namespace gapfarm

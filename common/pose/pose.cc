@@ -1,0 +1,59 @@
+#include "common/pose/pose.h"
+
+#include <cmath>
+#include <numbers>
+
+namespace gapfarm {
+
+double wrap_angle(double angle) {
+  constexpr double kTwoPi = 2 * std::numbers::pi;
+  double wrapped = std::remainder(angle, kTwoPi);  // [-pi, pi]
+  if (wrapped <= -std::numbers::pi) wrapped += kTwoPi;
+  return wrapped;
+}
+
+Pose operator*(const Pose& X_AB, const Pose& X_BC) {
+  const double c = std::cos(X_AB.theta);
+  const double s = std::sin(X_AB.theta);
+  return {X_AB.x + c * X_BC.x - s * X_BC.y, X_AB.y + s * X_BC.x + c * X_BC.y,
+          wrap_angle(X_AB.theta + X_BC.theta)};
+}
+
+Pose inverse(const Pose& X_AB) {
+  const double c = std::cos(X_AB.theta);
+  const double s = std::sin(X_AB.theta);
+  return {-c * X_AB.x - s * X_AB.y, s * X_AB.x - c * X_AB.y, wrap_angle(-X_AB.theta)};
+}
+
+Pose between(const Pose& X_AB, const Pose& X_AC) {
+  const double c = std::cos(X_AB.theta);
+  const double s = std::sin(X_AB.theta);
+  const double dx = X_AC.x - X_AB.x;
+  const double dy = X_AC.y - X_AB.y;
+  return {c * dx + s * dy, -s * dx + c * dy, wrap_angle(X_AC.theta - X_AB.theta)};
+}
+
+Pose exp(const Twist& xi) {
+  const double theta = xi[2];
+  // sin(t)/t and (1-cos(t))/t by their series near zero, where the quotients lose digits.
+  const bool small = std::abs(theta) < 1e-4;
+  const double a = small ? 1 - theta * theta / 6 : std::sin(theta) / theta;
+  const double b = small ? theta / 2 - theta * theta * theta / 24 : (1 - std::cos(theta)) / theta;
+  return {a * xi[0] - b * xi[1], b * xi[0] + a * xi[1], wrap_angle(theta)};
+}
+
+Twist log(const Pose& X) {
+  const double theta = wrap_angle(X.theta);
+  const double half = theta / 2;
+  const double cot = std::abs(theta) < 1e-4 ? 1 - theta * theta / 12 : half / std::tan(half);
+  return {cot * X.x + half * X.y, -half * X.x + cot * X.y, theta};
+}
+
+Eigen::Vector3d local_difference(const Pose& predicted, const Pose& measured) {
+  const Pose d = between(predicted, measured);
+  return {d.x, d.y, d.theta};
+}
+
+Pose mirrored(const Pose& X) { return {X.x, -X.y, wrap_angle(-X.theta)}; }
+
+}  // namespace gapfarm

@@ -1,0 +1,81 @@
+// A problem: scenario + trial log + enabled effects + fitness.  Everything a worker needs but the
+// genome, with a hash that names it.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "common/base/result.h"
+#include "common/parameters/genome.h"
+#include "common/parameters/table.h"
+#include "common/trials/trial.h"
+#include "gapfarm/v1/problem.pb.h"
+
+namespace gapfarm {
+
+// An atomic command: what the motors are told when a trial does not say otherwise.
+struct CommandSpec {
+  std::string name;
+  double left = 0;   // duty, [-1, 1]
+  double right = 0;
+  double duration_s = 1;
+};
+
+enum class FitnessKind { kLogScore, kRobustMahalanobis, kEnergyScore };
+
+struct FitnessSettings {
+  FitnessKind kind = FitnessKind::kLogScore;
+  double outlier_share = 0.02;   // weight of the predictive density's heavy tail, [0, 0.5]
+  double roll_penalty = 1;       // per rad of the greatest roll of a motion
+  double pitch_penalty = 1;      // per rad
+  double heave_penalty = 10;     // per m
+  double rest_penalty = 1;       // per s beyond rest_limit_s
+  double rest_limit_s = 1;       // after the motors stop
+};
+
+// Whether a greater fitness is the better one.
+bool higher_is_better(FitnessKind kind);
+const char* fitness_name(FitnessKind kind);
+
+enum class SpreadKind { kCubature, kSampled };
+
+struct SpreadSettings {
+  SpreadKind kind = SpreadKind::kCubature;
+  unsigned replicates = 16;  // kSampled only
+};
+
+struct Problem {
+  std::string scenario = "srv1";
+  ParameterValues values;   // one a row of the table
+  std::vector<Gene> genes;
+  std::vector<CommandSpec> commands;
+  FitnessSettings fitness;
+  SpreadSettings spread;
+  TrialLog log;
+
+  const ParameterTable& table() const;  // REQUIRES: a known scenario
+  // The problem's values with the genes of `genome` put in; an empty genome changes nothing.
+  ParameterValues values_of(const Genome& genome) const;
+  // REQUIRES: the command exists.
+  const CommandSpec& command(std::string_view name) const;
+};
+
+// The scenario's commands in canonical order with their default duties and durations.
+// srv1: forward, backward, turn_ccw, turn_cw, wide_ccw, wide_cw.
+std::vector<CommandSpec> default_commands(std::string_view scenario);
+
+// Extra columns of the log stay behind: no simulation depends on them.
+v1::Problem to_proto(const Problem& problem);
+// Checks scenario, sizes, bounds, commands and finiteness; the error names the field.
+Result<Problem> from_proto(const v1::Problem& message);
+
+v1::Pose to_proto(const Pose& pose);
+Pose from_proto(const v1::Pose& pose);
+v1::Trial to_proto(const Trial& trial);
+Trial from_proto(const v1::Trial& trial);
+
+// Deterministic bytes and their content hash.
+std::string serialise(const v1::Problem& message);
+std::string problem_hash(const v1::Problem& message);
+
+}  // namespace gapfarm

@@ -1,0 +1,67 @@
+// Ask/tell optimisers over genes in [0, 1].  Nobody else knows how they work.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "common/parameters/genome.h"
+#include "gapfarm/v1/task.pb.h"
+
+namespace gapfarm {
+
+// One evaluation that the optimiser wants.  (birth_id, replicate) name its random stream.
+struct Candidate {
+  std::uint64_t birth_id = 0;
+  std::uint64_t replicate = 0;
+  Genome genome;
+};
+
+// The answer to a candidate.  `cost` is lower-is-better and meaningful only when `outcome` is OK;
+// any other outcome ranks behind every OK, in the enum's order.
+struct Score {
+  v1::Outcome outcome = v1::OUTCOME_UNSPECIFIED;
+  double cost = 0;
+};
+
+// A member of a committed generation, for the run store and reports.
+struct Member {
+  std::uint64_t birth_id = 0;
+  Genome genome;
+  v1::Outcome outcome = v1::OUTCOME_UNSPECIFIED;
+  double cost = 0;          // mean over `scores`
+  unsigned scores = 0;
+  std::vector<std::uint64_t> parents;
+  std::string operators;    // "blend+gaussian", "elite", "random", "nominal"
+};
+
+struct NamedNumber {
+  std::string name;
+  double value = 0;
+};
+
+class Optimiser {
+ public:
+  virtual ~Optimiser() = default;
+
+  // The next generation's evaluations; may be empty when every child is a duplicate.
+  virtual std::vector<Candidate> ask() = 0;
+  // Scores in the order of the last ask().  Completes the generation.
+  virtual void tell(std::span<const Score> scores) = 0;
+
+  virtual std::uint64_t generation() const = 0;   // completed generations
+  virtual std::uint64_t evaluations() const = 0;  // scores told since the start
+  virtual std::uint64_t last_improvement() const = 0;  // generation
+  virtual std::vector<Member> members() const = 0;     // best first
+  virtual const Member& best() const = 0;              // REQUIRES: generation() > 0
+  // Mean distance of the members' genes from their mean, in [0, 1].
+  virtual double diversity() const = 0;
+  virtual std::vector<NamedNumber> operator_probabilities() const = 0;
+
+  // Everything ask() and tell() depend on; restoring it continues bit for bit.
+  virtual std::string state() const = 0;
+};
+
+}  // namespace gapfarm

@@ -1,0 +1,48 @@
+// What the rest of the master sees of the farm: tasks in, results out, in the tasks' order.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "common/base/result.h"
+#include "gapfarm/v1/problem.pb.h"
+#include "gapfarm/v1/task.pb.h"
+
+namespace gapfarm {
+
+struct WorkerStatus {
+  std::string name;
+  std::string host;
+  std::string state;  // "idle", "busy", "gone"
+  unsigned jobs = 0;
+  std::uint64_t finished = 0;
+};
+
+struct FarmProgress {
+  std::size_t done = 0;
+  std::size_t total = 0;
+};
+
+class Farm {
+ public:
+  virtual ~Farm() = default;
+
+  // Makes a problem known to the farm; workers fetch it once.  Returns its hash.
+  virtual std::string add_problem(const v1::Problem& problem) = 0;
+
+  // Runs every task and returns the results in the tasks' order.  `on_progress` (may be empty) is
+  // called now and then from this thread.  Errors: stopped by request, or no worker can be had.
+  virtual Result<std::vector<v1::TaskResult>> run(
+      const std::string& problem_hash, const std::vector<v1::Task>& tasks,
+      const std::function<void(const FarmProgress&)>& on_progress = {}) = 0;
+
+  virtual std::vector<WorkerStatus> workers() const = 0;
+  // Jobs given out a second time because their worker went.
+  virtual std::uint64_t retries() const = 0;
+};
+
+// The message of the error that run() returns when a stop was requested.
+inline constexpr const char* kStopRequested = "stopped by request";
+
+}  // namespace gapfarm

@@ -1,0 +1,38 @@
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+#include "common/base/hash.h"
+#include "common/base/result.h"
+#include "common/base/suggest.h"
+
+namespace gapfarm {
+namespace {
+
+TEST(Hash, TellsBoundariesAndBitsApart) {
+  EXPECT_EQ(content_hash("abc"), content_hash("abc"));
+  EXPECT_EQ(content_hash("abc").size(), 32u);
+  EXPECT_NE(Hasher().add("ab").add("c").finish(), Hasher().add("a").add("bc").finish());
+  EXPECT_NE(Hasher().add(0.0).finish(), Hasher().add(-0.0).finish());
+}
+
+TEST(Suggest, OffersTheNearestWordOnly) {
+  const std::vector<std::string> known = {"forward", "backward", "turn_cw"};
+  EXPECT_EQ(nearest_word("foward", known), "forward");
+  EXPECT_EQ(nearest_word("zzz", known), "");
+  EXPECT_EQ(suggestion("bakward", known), "; did you mean 'backward'?");
+  EXPECT_EQ(suggestion("q", known), "; known: forward, backward, turn_cw");
+}
+
+TEST(Result, CarriesAValueOrAnError) {
+  const Result<int> good = 3;
+  const Result<int> bad = Error{"no"};
+  ASSERT_TRUE(good.ok());
+  EXPECT_EQ(*good, 3);
+  ASSERT_FALSE(bad.ok());
+  EXPECT_EQ(bad.error().message, "no");
+}
+
+}  // namespace
+}  // namespace gapfarm

@@ -1,0 +1,86 @@
+// What is simulated: one command of the robot from rest to rest, in the start frame S (origin at
+// the turning centre on the floor, x ahead, y left, z up).  Plain data; only worker/sim/*.cc know
+// Bullet.
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "common/pose/pose.h"
+
+namespace gapfarm {
+
+enum class RobotModel { kTreads, kWheels };
+enum class WheelShape { kSphere, kCylinder, kBox, kHull };
+
+// Builds the world and the robot; changing any of it means a new simulator.
+struct SimSettings {
+  RobotModel robot = RobotModel::kTreads;
+  double mass_kg = 0.35;
+  double contact_length_m = 0.07;  // front to rear contact, centre to centre
+  double track_gauge_m = 0.085;    // left to right contact
+  double friction = 0.6;           // along the treads
+  double friction_ratio = 1;       // lateral over longitudinal
+  double gravity_m_s2 = 9.81;
+  double step_rate_hz = 240;
+  int sub_steps = 1;               // physics steps a step of 1/step_rate
+  int solver_iterations = 10;
+  double restitution = 0;
+  double linear_damping = 0;       // Bullet's: share lost a second, [0, 1]
+  double angular_damping = 0;
+  double com_x_m = 0;              // centre of mass ahead of the tread centre
+  double com_y_m = 0;              // and to its left
+  // wheels only
+  WheelShape wheel_shape = WheelShape::kSphere;
+  double maximum_velocity_rad_s = 20;  // of a wheel at full duty
+  double motor_torque_n_m = 0.05;      // a wheel
+
+  bool operator==(const SimSettings&) const = default;
+};
+
+// One side's motor during one command.
+struct SideDrive {
+  double speed_m_s = 0;      // surface speed that the side settles at while the motors run
+  double lag_s = 0;          // time constant of the first-order response, also when stopping
+  double dead_travel_m = 0;  // tread travel (absolute) swallowed before the surface moves
+};
+
+struct DriveInput {
+  SideDrive left, right;
+  double duration_s = 1;  // the motors run this long, then are told zero speed
+};
+
+// What the floor does, seen from S.
+struct Floor {
+  double tilt_rad = 0;            // the floor falls away toward tilt_direction_rad
+  double tilt_direction_rad = 0;
+  double nap_strength = 0;        // drag as a share of weight times (1 - cos(angle between the
+  double nap_direction_rad = 0;   //  velocity and the nap)) / 2
+  double rolling_resistance = 0;  // drag opposing motion along the body's x, share of weight
+  double patch_x_m = 0, patch_y_m = 0, patch_radius_m = 0;
+  double patch_ratio = 1;         // friction inside the disc over friction outside
+};
+
+enum class MotionOutcome { kOk, kDiverged, kFellOver, kNeverRested };
+const char* outcome_name(MotionOutcome outcome);
+
+struct MotionSample {
+  double t_s = 0;
+  Pose X_SB;  // turning centre
+  double height_m = 0;  // of the body's origin above its resting height
+  double roll_rad = 0;
+  double pitch_rad = 0;
+  double kinetic_energy_j = 0;
+};
+
+struct Motion {
+  MotionOutcome outcome = MotionOutcome::kOk;
+  Pose X_SE;              // end pose of the tread centre, start frame; the heading is unwrapped
+                          // by nothing: it lies in (-pi, pi]
+  double rest_time_s = 0; // from the motors' stop to rest
+  double duration_s = 0;  // simulated time
+  double max_roll_rad = 0, max_pitch_rad = 0, max_heave_m = 0;
+};
+
+}  // namespace gapfarm
