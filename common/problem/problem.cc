@@ -1,0 +1,41 @@
+#include "common/problem/problem.h"
+
+#include <cassert>
+#include <string>
+
+namespace gapfarm {
+
+bool higher_is_better(FitnessKind kind) { return kind == FitnessKind::kLogScore; }
+
+const char* fitness_name(FitnessKind kind) {
+  switch (kind) {
+    case FitnessKind::kLogScore: return "log_score";
+    case FitnessKind::kRobustMahalanobis: return "robust_mahalanobis";
+    case FitnessKind::kEnergyScore: return "energy_score";
+  }
+  return "?";
+}
+
+const ParameterTable& Problem::table() const { return *parameter_table(scenario).value(); }
+
+ParameterValues Problem::values_of(const Genome& genome) const {
+  ParameterValues all = values;
+  if (!genome.empty()) decode(table(), genes, genome, all);
+  return all;
+}
+
+const CommandSpec& Problem::command(std::string_view name) const {
+  for (const CommandSpec& spec : commands) {
+    if (spec.name == name) return spec;
+  }
+  assert(false && "commands are checked when trials are read");
+  return commands.front();
+}
+
+std::vector<CommandSpec> default_commands(std::string_view scenario) {
+  if (scenario != "srv1") return {};
+  return {{"forward", 1, 1, 1},        {"backward", -1, -1, 1},   {"turn_ccw", -0.3, 0.3, 1},
+          {"turn_cw", 0.3, -0.3, 1},   {"wide_ccw", 0.4, 1.0, 1}, {"wide_cw", 1.0, 0.4, 1}};
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,201 @@
+// Problems to protobuf and back.
+
+#include <google/protobuf/io/coded_stream.h>
+#include <google/protobuf/io/zero_copy_stream_impl_lite.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "common/base/hash.h"
+#include "common/base/suggest.h"
+#include "common/problem/problem.h"
+
+namespace gapfarm {
+namespace {
+
+Error invalid(const std::string& what) { return Error{"problem: " + what}; }
+
+bool finite(const Pose& X) {
+  return std::isfinite(X.x) && std::isfinite(X.y) && std::isfinite(X.theta);
+}
+
+void write_fitness(const FitnessSettings& from, v1::Fitness* to) {
+  to->set_kind(static_cast<v1::Fitness::Kind>(from.kind));
+  to->set_outlier_share(from.outlier_share);
+  to->set_roll_penalty(from.roll_penalty);
+  to->set_pitch_penalty(from.pitch_penalty);
+  to->set_heave_penalty(from.heave_penalty);
+  to->set_rest_penalty(from.rest_penalty);
+  to->set_rest_limit(from.rest_limit_s);
+}
+
+FitnessSettings read_fitness(const v1::Fitness& from) {
+  return {static_cast<FitnessKind>(from.kind()), from.outlier_share(), from.roll_penalty(),
+          from.pitch_penalty(), from.heave_penalty(), from.rest_penalty(), from.rest_limit()};
+}
+
+Status read_values(const v1::Problem& message, Problem* problem) {
+  const ParameterTable& table = problem->table();
+  if (static_cast<std::size_t>(message.values_size()) != table.size()) {
+    return invalid(std::to_string(message.values_size()) + " parameter values, but scenario '" +
+                   problem->scenario + "' has " + std::to_string(table.size()) +
+                   "; master and worker must be the same build");
+  }
+  for (std::size_t i = 0; i < table.size(); ++i) {
+    problem->values.push_back(message.values(static_cast<int>(i)));
+    if (Status s = table.check(i, problem->values.back()); !s) return s.error();
+  }
+  for (const v1::Gene& gene : message.genes()) {
+    if (gene.parameter() >= table.size()) {
+      return invalid("gene of parameter row " + std::to_string(gene.parameter()));
+    }
+    if (Status s = table.check(gene.parameter(), gene.lower()); !s) return s.error();
+    if (Status s = table.check(gene.parameter(), gene.upper()); !s) return s.error();
+    if (gene.lower() > gene.upper() || (gene.log_scale() && gene.lower() <= 0)) {
+      return invalid("gene " + table[gene.parameter()].key + " has an empty range");
+    }
+    problem->genes.push_back({gene.parameter(), gene.lower(), gene.upper(),
+                              gene.log_scale() ? ParameterScale::kLog : ParameterScale::kLinear});
+  }
+  return {};
+}
+
+Status read_commands(const v1::Problem& message, Problem* problem) {
+  for (const v1::Command& c : message.commands()) {
+    const bool duties = std::abs(c.left()) <= 1 && std::abs(c.right()) <= 1;
+    if (!duties || !(c.duration() >= 0 && c.duration() <= 60)) {
+      return invalid("command '" + c.name() + "' needs duties in [-1, 1] and a duration in [0, 60] s");
+    }
+    problem->commands.push_back({c.name(), c.left(), c.right(), c.duration()});
+  }
+  if (problem->commands.empty()) return invalid("no commands");
+  return {};
+}
+
+Status read_trials(const v1::Problem& message, Problem* problem) {
+  std::vector<std::string> names;
+  for (const CommandSpec& c : problem->commands) names.push_back(c.name);
+  for (const v1::Trial& t : message.trials()) {
+    Trial trial = from_proto(t);
+    const std::string where = "trial " + trial.session + "/" + std::to_string(trial.trial);
+    if (std::find(names.begin(), names.end(), trial.command) == names.end()) {
+      return invalid(where + ": unknown command '" + trial.command + "'" +
+                     suggestion(trial.command, names));
+    }
+    if (!finite(trial.X_WS) || !finite(trial.X_WE)) return invalid(where + ": a pose is not finite");
+    const bool bounded = std::abs(trial.left.value_or(0)) <= 1 &&
+                         std::abs(trial.right.value_or(0)) <= 1 &&
+                         trial.duration_s.value_or(0) >= 0 && trial.duration_s.value_or(0) <= 60;
+    if (!bounded || !std::isfinite(trial.t_s.value_or(0))) {
+      return invalid(where + ": needs duties in [-1, 1], a duration in [0, 60] s and a finite t");
+    }
+    problem->log.trials.push_back(std::move(trial));
+  }
+  return {};
+}
+
+}  // namespace
+
+v1::Pose to_proto(const Pose& pose) {
+  v1::Pose message;
+  message.set_x(pose.x);
+  message.set_y(pose.y);
+  message.set_theta(pose.theta);
+  return message;
+}
+
+Pose from_proto(const v1::Pose& pose) { return {pose.x(), pose.y(), pose.theta()}; }
+
+v1::Trial to_proto(const Trial& trial) {
+  v1::Trial message;
+  message.set_session(trial.session);
+  message.set_trial(trial.trial);
+  if (trial.t_s) message.set_t(*trial.t_s);
+  message.set_command(trial.command);
+  if (trial.left) message.set_left(*trial.left);
+  if (trial.right) message.set_right(*trial.right);
+  if (trial.duration_s) message.set_duration(*trial.duration_s);
+  *message.mutable_start() = to_proto(trial.X_WS);
+  *message.mutable_end() = to_proto(trial.X_WE);
+  for (const PathSample& sample : trial.path) {
+    v1::PathSample* to = message.add_path();
+    to->set_t(sample.t_s);
+    *to->mutable_pose() = to_proto(sample.pose);
+  }
+  return message;
+}
+
+Trial from_proto(const v1::Trial& message) {
+  Trial trial;
+  trial.session = message.session();
+  trial.trial = message.trial();
+  if (message.has_t()) trial.t_s = message.t();
+  trial.command = message.command();
+  if (message.has_left()) trial.left = message.left();
+  if (message.has_right()) trial.right = message.right();
+  if (message.has_duration()) trial.duration_s = message.duration();
+  trial.X_WS = from_proto(message.start());
+  trial.X_WE = from_proto(message.end());
+  for (const v1::PathSample& sample : message.path()) {
+    trial.path.push_back({sample.t(), from_proto(sample.pose())});
+  }
+  return trial;
+}
+
+v1::Problem to_proto(const Problem& problem) {
+  v1::Problem message;
+  message.set_scenario(problem.scenario);
+  for (double value : problem.values) message.add_values(value);
+  for (const Gene& gene : problem.genes) {
+    v1::Gene* to = message.add_genes();
+    to->set_parameter(static_cast<std::uint32_t>(gene.row));
+    to->set_lower(gene.lower);
+    to->set_upper(gene.upper);
+    to->set_log_scale(gene.scale == ParameterScale::kLog);
+  }
+  for (const CommandSpec& command : problem.commands) {
+    v1::Command* to = message.add_commands();
+    to->set_name(command.name);
+    to->set_left(command.left);
+    to->set_right(command.right);
+    to->set_duration(command.duration_s);
+  }
+  write_fitness(problem.fitness, message.mutable_fitness());
+  message.mutable_spread()->set_kind(static_cast<v1::Spread::Kind>(problem.spread.kind));
+  message.mutable_spread()->set_replicates(problem.spread.replicates);
+  for (const Trial& trial : problem.log.trials) *message.add_trials() = to_proto(trial);
+  return message;
+}
+
+Result<Problem> from_proto(const v1::Problem& message) {
+  Problem problem;
+  problem.scenario = message.scenario();
+  if (auto table = parameter_table(problem.scenario); !table) return table.error();
+  if (Status s = read_values(message, &problem); !s) return s.error();
+  if (Status s = read_commands(message, &problem); !s) return s.error();
+  if (!v1::Fitness::Kind_IsValid(message.fitness().kind()) ||
+      !v1::Spread::Kind_IsValid(message.spread().kind())) {
+    return invalid("unknown kind of fitness or spread; master and worker must be the same build");
+  }
+  problem.fitness = read_fitness(message.fitness());
+  problem.spread = {static_cast<SpreadKind>(message.spread().kind()),
+                    message.spread().replicates()};
+  if (Status s = read_trials(message, &problem); !s) return s.error();
+  return problem;
+}
+
+std::string serialise(const v1::Problem& message) {
+  std::string bytes;
+  {
+    google::protobuf::io::StringOutputStream stream(&bytes);
+    google::protobuf::io::CodedOutputStream coded(&stream);
+    coded.SetSerializationDeterministic(true);
+    message.SerializeToCodedStream(&coded);
+  }
+  return bytes;
+}
+
+std::string problem_hash(const v1::Problem& message) { return content_hash(serialise(message)); }
+
+}  // namespace gapfarm
