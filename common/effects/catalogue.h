@@ -15,10 +15,10 @@ enum class EffectStage { kDrive, kFloor, kCamera };
 // What an effect looks at beside the command itself; conditions are shared over the rest.
 enum EffectContext : unsigned {
   kNoContext = 0,
-  kStartHeading = 1u << 0,  // heading in the world before the trial
-  kStartPlace = 1u << 1,    // position in the world before the trial
-  kSessionTime = 1u << 2,   // time since the session began
-  kLastDirection = 1u << 3, // sign of each side's last duty in the session
+  kStartHeading = 1u << 0,    // heading in the world before the trial
+  kStartPlace = 1u << 1,      // position in the world before the trial
+  kSessionTime = 1u << 2,     // time since the session began
+  kLastDirection = 1u << 3,   // sign of each side's last duty in the session
   kUnrecordedMove = 1u << 4,  // whether the robot was moved before the trial
 };
 

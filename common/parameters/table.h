@@ -22,7 +22,7 @@ struct Parameter {
   std::string unit;  // SI; "-" when it has none
   ParameterKind kind = ParameterKind::kReal;
   ParameterScale scale = ParameterScale::kLinear;
-  double lower = 0;    // bounds of what the simulation accepts
+  double lower = 0;  // bounds of what the simulation accepts
   double upper = 0;
   double nominal = 0;  // for an effect's parameter: the neutral value
   std::string summary;
@@ -65,27 +65,27 @@ class ParameterTable {
 
 // Base rows of scenario `srv1`, in table order; `values[row_of(Srv1::kMass)]` is the mass.
 enum class Srv1 : std::size_t {
-  kRobot,               // choice: treads, wheels
-  kMass,                // kg
-  kContactLength,       // m, front to rear contact
-  kTrackGauge,          // m, left to right contact
-  kFriction,            // -, along the treads
-  kFrictionRatio,       // -, lateral over longitudinal friction
-  kFullSpeed,           // m/s at full duty
-  kDriveNoiseCommon,    // -, per-trial s.d. of both sides' speed
-  kDriveNoiseSide,      // -, per-trial s.d. of each side's speed
-  kPoseNoisePosition,   // m, s.d. of a measured x and y
-  kPoseNoiseHeading,    // rad, s.d. of a measured heading
-  kGravity,             // m/s^2
-  kStepRate,            // Hz
-  kSubSteps,            // -
-  kSolverIterations,    // -
-  kRestitution,         // -
-  kLinearDamping,       // 1/s as Bullet's fraction per second
-  kAngularDamping,      // same
-  kWheelShape,          // choice: sphere, cylinder, box, hull (wheels)
-  kMaximumVelocity,     // rad/s of a wheel at full duty (wheels)
-  kMotorTorque,         // N m a wheel (wheels)
+  kRobot,              // choice: treads, wheels
+  kMass,               // kg
+  kContactLength,      // m, front to rear contact
+  kTrackGauge,         // m, left to right contact
+  kFriction,           // -, along the treads
+  kFrictionRatio,      // -, lateral over longitudinal friction
+  kFullSpeed,          // m/s at full duty
+  kDriveNoiseCommon,   // -, per-trial s.d. of both sides' speed
+  kDriveNoiseSide,     // -, per-trial s.d. of each side's speed
+  kPoseNoisePosition,  // m, s.d. of a measured x and y
+  kPoseNoiseHeading,   // rad, s.d. of a measured heading
+  kGravity,            // m/s^2
+  kStepRate,           // Hz
+  kSubSteps,           // -
+  kSolverIterations,   // -
+  kRestitution,        // -
+  kLinearDamping,      // 1/s as Bullet's fraction per second
+  kAngularDamping,     // same
+  kWheelShape,         // choice: sphere, cylinder, box, hull (wheels)
+  kMaximumVelocity,    // rad/s of a wheel at full duty (wheels)
+  kMotorTorque,        // N m a wheel (wheels)
   kCount
 };
 constexpr std::size_t row_of(Srv1 p) { return static_cast<std::size_t>(p); }

@@ -9,9 +9,12 @@ bool higher_is_better(FitnessKind kind) { return kind == FitnessKind::kLogScore;
 
 const char* fitness_name(FitnessKind kind) {
   switch (kind) {
-    case FitnessKind::kLogScore: return "log_score";
-    case FitnessKind::kRobustMahalanobis: return "robust_mahalanobis";
-    case FitnessKind::kEnergyScore: return "energy_score";
+    case FitnessKind::kLogScore:
+      return "log_score";
+    case FitnessKind::kRobustMahalanobis:
+      return "robust_mahalanobis";
+    case FitnessKind::kEnergyScore:
+      return "energy_score";
   }
   return "?";
 }
@@ -34,8 +37,8 @@ const CommandSpec& Problem::command(std::string_view name) const {
 
 std::vector<CommandSpec> default_commands(std::string_view scenario) {
   if (scenario != "srv1") return {};
-  return {{"forward", 1, 1, 1},        {"backward", -1, -1, 1},   {"turn_ccw", -0.3, 0.3, 1},
-          {"turn_cw", 0.3, -0.3, 1},   {"wide_ccw", 0.4, 1.0, 1}, {"wide_cw", 1.0, 0.4, 1}};
+  return {{"forward", 1, 1, 1},      {"backward", -1, -1, 1},   {"turn_ccw", -0.3, 0.3, 1},
+          {"turn_cw", 0.3, -0.3, 1}, {"wide_ccw", 0.4, 1.0, 1}, {"wide_cw", 1.0, 0.4, 1}};
 }
 
 }  // namespace gapfarm

@@ -16,7 +16,7 @@ namespace gapfarm {
 // An atomic command: what the motors are told when a trial does not say otherwise.
 struct CommandSpec {
   std::string name;
-  double left = 0;   // duty, [-1, 1]
+  double left = 0;  // duty, [-1, 1]
   double right = 0;
   double duration_s = 1;
 };
@@ -25,12 +25,12 @@ enum class FitnessKind { kLogScore, kRobustMahalanobis, kEnergyScore };
 
 struct FitnessSettings {
   FitnessKind kind = FitnessKind::kLogScore;
-  double outlier_share = 0.02;   // weight of the predictive density's heavy tail, [0, 0.5]
-  double roll_penalty = 1;       // per rad of the greatest roll of a motion
-  double pitch_penalty = 1;      // per rad
-  double heave_penalty = 10;     // per m
-  double rest_penalty = 1;       // per s beyond rest_limit_s
-  double rest_limit_s = 1;       // after the motors stop
+  double outlier_share = 0.02;  // weight of the predictive density's heavy tail, [0, 0.5]
+  double roll_penalty = 1;      // per rad of the greatest roll of a motion
+  double pitch_penalty = 1;     // per rad
+  double heave_penalty = 10;    // per m
+  double rest_penalty = 1;      // per s beyond rest_limit_s
+  double rest_limit_s = 1;      // after the motors stop
 };
 
 // Whether a greater fitness is the better one.
@@ -46,7 +46,7 @@ struct SpreadSettings {
 
 struct Problem {
   std::string scenario = "srv1";
-  ParameterValues values;   // one a row of the table
+  ParameterValues values;  // one a row of the table
   std::vector<Gene> genes;
   std::vector<CommandSpec> commands;
   FitnessSettings fitness;

@@ -31,8 +31,13 @@ void write_fitness(const FitnessSettings& from, v1::Fitness* to) {
 }
 
 FitnessSettings read_fitness(const v1::Fitness& from) {
-  return {static_cast<FitnessKind>(from.kind()), from.outlier_share(), from.roll_penalty(),
-          from.pitch_penalty(), from.heave_penalty(), from.rest_penalty(), from.rest_limit()};
+  return {static_cast<FitnessKind>(from.kind()),
+          from.outlier_share(),
+          from.roll_penalty(),
+          from.pitch_penalty(),
+          from.heave_penalty(),
+          from.rest_penalty(),
+          from.rest_limit()};
 }
 
 Status read_values(const v1::Problem& message, Problem* problem) {
@@ -65,7 +70,8 @@ Status read_commands(const v1::Problem& message, Problem* problem) {
   for (const v1::Command& c : message.commands()) {
     const bool duties = std::abs(c.left()) <= 1 && std::abs(c.right()) <= 1;
     if (!duties || !(c.duration() >= 0 && c.duration() <= 60)) {
-      return invalid("command '" + c.name() + "' needs duties in [-1, 1] and a duration in [0, 60] s");
+      return invalid("command '" + c.name() +
+                     "' needs duties in [-1, 1] and a duration in [0, 60] s");
     }
     problem->commands.push_back({c.name(), c.left(), c.right(), c.duration()});
   }
@@ -83,7 +89,8 @@ Status read_trials(const v1::Problem& message, Problem* problem) {
       return invalid(where + ": unknown command '" + trial.command + "'" +
                      suggestion(trial.command, names));
     }
-    if (!finite(trial.X_WS) || !finite(trial.X_WE)) return invalid(where + ": a pose is not finite");
+    if (!finite(trial.X_WS) || !finite(trial.X_WE))
+      return invalid(where + ": a pose is not finite");
     const bool bounded = std::abs(trial.left.value_or(0)) <= 1 &&
                          std::abs(trial.right.value_or(0)) <= 1 &&
                          trial.duration_s.value_or(0) >= 0 && trial.duration_s.value_or(0) <= 60;

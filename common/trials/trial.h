@@ -33,6 +33,8 @@ struct Trial {
 struct TrialLog {
   std::vector<Trial> trials;
   std::vector<std::string> extra_columns;
+  // What reading left out and why, one sentence each with file:line:column; show them to the user.
+  std::vector<std::string> notes;
 
   bool has_paths() const {
     for (const Trial& trial : trials) {

@@ -1,0 +1,90 @@
+#include <algorithm>
+#include <cassert>
+
+#include "worker/effects/behaviour.h"
+
+namespace gapfarm {
+
+ActiveEffects::ActiveEffects(const ParameterTable& table, const ParameterValues& values) {
+  const auto behaviours = effect_behaviours();
+  assert(behaviours.size() == table.effects().size());
+  for (std::size_t e = 0; e < behaviours.size(); ++e) {
+    if (table.is_neutral(e, values)) continue;
+    const Effect& effect = table.effects()[e];
+    const auto first = values.begin() + static_cast<std::ptrdiff_t>(table.effect_row(e));
+    active_.push_back(
+        {behaviours[e], {first, first + static_cast<std::ptrdiff_t>(effect.parameters.size())}});
+    if (effect.stage != EffectStage::kCamera) motion_context_ |= effect.context;
+  }
+}
+
+void ActiveEffects::settings(SimSettings& settings) const {
+  for (const Active& a : active_) {
+    if (a.behaviour->settings) a.behaviour->settings(a.values, settings);
+  }
+}
+
+void ActiveEffects::drive(const Situation& situation, DriveState& drive) const {
+  for (const Active& a : active_) {
+    if (a.behaviour->drive) a.behaviour->drive(a.values, situation, drive);
+  }
+}
+
+void ActiveEffects::floor(const Situation& situation, Floor& floor) const {
+  for (const Active& a : active_) {
+    if (a.behaviour->floor) a.behaviour->floor(a.values, situation, floor);
+  }
+}
+
+Pose ActiveEffects::observe(Pose X_WR) const {
+  // From the robot outward: what is fixed to it (marker, heading) comes before the lens and the
+  // seam, so the catalogue's camera rows are walked from the marker's end.
+  for (auto a = active_.rbegin(); a != active_.rend(); ++a) {
+    if (a->behaviour->observe) X_WR = a->behaviour->observe(a->values, X_WR);
+  }
+  return X_WR;
+}
+
+Pose ActiveEffects::recover(Pose X_WM) const {
+  for (const Active& a : active_) {
+    if (a.behaviour->recover) X_WM = a.behaviour->recover(a.values, X_WM);
+  }
+  return X_WM;
+}
+
+std::vector<DriveBranch> ActiveEffects::branches() const {
+  std::vector<DriveBranch> all = {DriveBranch{}};
+  for (const Active& a : active_) {
+    if (!a.behaviour->branches) continue;
+    std::vector<DriveBranch> combined;
+    for (const DriveBranch& outer : all) {
+      for (const DriveBranch& inner : a.behaviour->branches(a.values)) {
+        combined.push_back({outer.weight * inner.weight, outer.left_gain * inner.left_gain,
+                            outer.right_gain * inner.right_gain});
+      }
+    }
+    all = std::move(combined);
+  }
+  return all;
+}
+
+DriveBranch ActiveEffects::draw(Stream& stream) const {
+  DriveBranch drawn;
+  for (const Active& a : active_) {
+    if (!a.behaviour->draw) continue;
+    const DriveBranch branch = a.behaviour->draw(a.values, stream);
+    drawn.left_gain *= branch.left_gain;
+    drawn.right_gain *= branch.right_gain;
+  }
+  return drawn;
+}
+
+Reading ActiveEffects::reading() const {
+  Reading reading;
+  for (const Active& a : active_) {
+    if (a.behaviour->reading) a.behaviour->reading(a.values, reading);
+  }
+  return reading;
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,21 @@
+#include "worker/effects/behaviour.h"
+#include "worker/effects/table.h"
+
+namespace gapfarm::effects {
+namespace {
+
+// A side that has not moved yet in the session has no direction to differ from.
+void take_up(double travel, int last, SideState& side) {
+  if (last != 0 && side.duty * last < 0) side.dead_travel_m += travel;
+}
+
+void drive(EffectValues p, const Situation& situation, DriveState& drive) {
+  take_up(p[0], situation.last_left, drive.left);
+  take_up(p[0], situation.last_right, drive.right);
+}
+
+}  // namespace
+
+const EffectBehaviour backlash{.name = "backlash", .drive = drive};
+
+}  // namespace gapfarm::effects

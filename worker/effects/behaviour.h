@@ -1,0 +1,106 @@
+// What each effect of the catalogue does.  One file an effect; table.cc lists them.
+//
+// A trial runs through three stages.  Drive effects change what the motors do, floor effects what
+// the floor does to the robot, camera effects what is logged of a pose.  An effect fills only the
+// hooks of its stage; every hook gets the effect's parameters in the catalogue's order and is
+// called only when they are not neutral.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "common/effects/catalogue.h"
+#include "common/parameters/table.h"
+#include "common/pose/pose.h"
+#include "common/random/stream.h"
+#include "worker/sim/motion.h"
+
+namespace gapfarm {
+
+using EffectValues = std::span<const double>;
+
+// What an effect may look at beside the command (EffectContext).
+struct Situation {
+  Pose X_WR;  // the robot's true pose before the trial
+  double session_time_s = 0;
+  int last_left = 0;  // sign of each side's last duty in the session; 0: none yet
+  int last_right = 0;
+  bool moved = false;  // an unrecorded move came before the trial
+};
+
+// One side's motor on its way from duty to SideDrive.
+struct SideState {
+  double duty = 0;  // [-1, 1]
+  double gain = 1;  // of the surface speed
+  double lag_s = 0;
+  double dead_travel_m = 0;
+
+  bool operator==(const SideState&) const = default;
+};
+
+struct DriveState {
+  SideState left, right;
+  double duration_s = 0;
+
+  bool operator==(const DriveState&) const = default;
+};
+
+// An alternative that a random drive effect may draw for a trial.
+struct DriveBranch {
+  double weight = 1;
+  double left_gain = 1;
+  double right_gain = 1;
+};
+
+// How logged poses are read.
+struct Reading {
+  double stale_share = 0;  // chance that an end pose is stale
+  double stale_age_s = 0;  // how old a stale pose is
+  double quantum_m = 0;    // grid that positions are rounded to; 0: none
+};
+
+struct EffectBehaviour {
+  const char* name;
+  void (*settings)(EffectValues p, SimSettings& settings) = nullptr;
+  void (*drive)(EffectValues p, const Situation& situation, DriveState& drive) = nullptr;
+  void (*floor)(EffectValues p, const Situation& situation, Floor& floor) = nullptr;
+  // True pose to logged pose, without noise, and back.
+  Pose (*observe)(EffectValues p, const Pose& X_WR) = nullptr;
+  Pose (*recover)(EffectValues p, const Pose& X_WM) = nullptr;
+  // Random drive effects: all alternatives with their weights, and one drawn.
+  std::vector<DriveBranch> (*branches)(EffectValues p) = nullptr;
+  DriveBranch (*draw)(EffectValues p, Stream& stream) = nullptr;
+  void (*reading)(EffectValues p, Reading& reading) = nullptr;
+};
+
+// One row an effect, in the catalogue's order.
+std::span<const EffectBehaviour* const> effect_behaviours();
+
+// The effects that are not neutral at some parameter values, ready to be applied.
+class ActiveEffects {
+ public:
+  ActiveEffects(const ParameterTable& table, const ParameterValues& values);
+
+  // Union of EffectContext over the active drive and floor effects: what the motion depends on.
+  unsigned motion_context() const { return motion_context_; }
+  bool any() const { return !active_.empty(); }
+
+  void settings(SimSettings& settings) const;
+  void drive(const Situation& situation, DriveState& drive) const;
+  void floor(const Situation& situation, Floor& floor) const;
+  Pose observe(Pose X_WR) const;
+  Pose recover(Pose X_WM) const;
+  std::vector<DriveBranch> branches() const;  // at least the one in which nothing happens
+  DriveBranch draw(Stream& stream) const;
+  Reading reading() const;
+
+ private:
+  struct Active {
+    const EffectBehaviour* behaviour;
+    std::vector<double> values;
+  };
+  std::vector<Active> active_;
+  unsigned motion_context_ = kNoContext;
+};
+
+}  // namespace gapfarm

@@ -1,0 +1,32 @@
+#include <cmath>
+
+#include "worker/effects/behaviour.h"
+#include "worker/effects/table.h"
+
+namespace gapfarm::effects {
+namespace {
+
+// Lengths along y are logged p[0] times as long as along x; the geometric mean of the scales stays
+// 1, since a common scale is the base's speed.  The marker is seen by the same camera, so its
+// heading is the direction of its logged axis.
+Pose scaled(const Pose& X, double x_scale, double y_scale) {
+  return {X.x * x_scale, X.y * y_scale,
+          std::atan2(y_scale * std::sin(X.theta), x_scale * std::cos(X.theta))};
+}
+
+Pose observe(EffectValues p, const Pose& X_WR) {
+  const double root = std::sqrt(p[0]);
+  return scaled(X_WR, 1 / root, root);
+}
+
+Pose recover(EffectValues p, const Pose& X_WM) {
+  const double root = std::sqrt(p[0]);
+  return scaled(X_WM, root, 1 / root);
+}
+
+}  // namespace
+
+const EffectBehaviour camera_aspect{
+    .name = "camera_aspect", .observe = observe, .recover = recover};
+
+}  // namespace gapfarm::effects

@@ -1,0 +1,41 @@
+#include "worker/effects/behaviour.h"
+#include "worker/effects/table.h"
+
+namespace gapfarm::effects {
+namespace {
+
+// The shift at a place, beyond the line; it is nothing at the near side.
+struct Shift {
+  double x = 0;
+  double y = 0;
+};
+
+Shift shift_at(EffectValues p, double x, double y) {
+  const bool crosses_x = p[5] == 0;
+  const double across = crosses_x ? x : y;
+  const double along = crosses_x ? y : x;
+  if (across <= p[4]) return {};
+  return {p[0] + p[2] * along, p[1] + p[3] * along};
+}
+
+Pose observe(EffectValues p, const Pose& X_WR) {
+  const Shift shift = shift_at(p, X_WR.x, X_WR.y);
+  return {X_WR.x + shift.x, X_WR.y + shift.y, X_WR.theta};
+}
+
+// Beyond the line in the log is taken to be beyond it in the world; within a shift's width of the
+// line both sides may be logged alike, and the far side is tried first.
+Pose recover(EffectValues p, const Pose& X_WM) {
+  Pose X_WR = X_WM;
+  for (int round = 0; round < 3; ++round) {
+    const Shift shift = shift_at(p, round == 0 ? X_WM.x : X_WR.x, round == 0 ? X_WM.y : X_WR.y);
+    X_WR = {X_WM.x - shift.x, X_WM.y - shift.y, X_WM.theta};
+  }
+  return X_WR;
+}
+
+}  // namespace
+
+const EffectBehaviour camera_seam{.name = "camera_seam", .observe = observe, .recover = recover};
+
+}  // namespace gapfarm::effects

@@ -1,0 +1,16 @@
+#include "worker/effects/behaviour.h"
+#include "worker/effects/table.h"
+
+namespace gapfarm::effects {
+namespace {
+
+void settings(EffectValues p, SimSettings& settings) {
+  settings.com_x_m += p[0];
+  settings.com_y_m += p[1];
+}
+
+}  // namespace
+
+const EffectBehaviour com_offset{.name = "com_offset", .settings = settings};
+
+}  // namespace gapfarm::effects

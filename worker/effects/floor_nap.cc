@@ -1,0 +1,16 @@
+#include "worker/effects/behaviour.h"
+#include "worker/effects/table.h"
+
+namespace gapfarm::effects {
+namespace {
+
+void floor(EffectValues p, const Situation& situation, Floor& floor) {
+  floor.nap_strength = p[0];
+  floor.nap_direction_rad = wrap_angle(p[1] - situation.X_WR.theta);
+}
+
+}  // namespace
+
+const EffectBehaviour floor_nap{.name = "floor_nap", .floor = floor};
+
+}  // namespace gapfarm::effects

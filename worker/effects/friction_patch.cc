@@ -1,0 +1,19 @@
+#include "worker/effects/behaviour.h"
+#include "worker/effects/table.h"
+
+namespace gapfarm::effects {
+namespace {
+
+void floor(EffectValues p, const Situation& situation, Floor& floor) {
+  const Pose centre_S = between(situation.X_WR, {p[1], p[2], 0});
+  floor.patch_x_m = centre_S.x;
+  floor.patch_y_m = centre_S.y;
+  floor.patch_radius_m = p[3];
+  floor.patch_ratio = p[0];
+}
+
+}  // namespace
+
+const EffectBehaviour friction_patch{.name = "friction_patch", .floor = floor};
+
+}  // namespace gapfarm::effects

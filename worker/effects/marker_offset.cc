@@ -1,0 +1,16 @@
+#include "worker/effects/behaviour.h"
+#include "worker/effects/table.h"
+
+namespace gapfarm::effects {
+namespace {
+
+Pose observe(EffectValues p, const Pose& X_WR) { return X_WR * Pose{p[0], p[1], 0}; }
+
+Pose recover(EffectValues p, const Pose& X_WM) { return X_WM * Pose{-p[0], -p[1], 0}; }
+
+}  // namespace
+
+const EffectBehaviour marker_offset{
+    .name = "marker_offset", .observe = observe, .recover = recover};
+
+}  // namespace gapfarm::effects

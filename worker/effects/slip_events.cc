@@ -1,0 +1,46 @@
+#include <array>
+#include <cmath>
+
+#include "worker/effects/behaviour.h"
+#include "worker/effects/table.h"
+
+namespace gapfarm::effects {
+namespace {
+
+struct SideCase {
+  double weight;
+  double gain;
+};
+
+// One side: nothing happens, or a loss uniform in [0, p[1]], by three-point Gauss-Legendre nodes.
+std::array<SideCase, 4> side_cases(EffectValues p) {
+  const double offset = std::sqrt(0.6) / 2;
+  return {{{1 - p[0], 1},
+           {p[0] * 5 / 18, 1 - p[1] * (0.5 - offset)},
+           {p[0] * 8 / 18, 1 - p[1] * 0.5},
+           {p[0] * 5 / 18, 1 - p[1] * (0.5 + offset)}}};
+}
+
+// Both sides slipping in one trial is kept: at large probabilities it is not rare.
+std::vector<DriveBranch> branches(EffectValues p) {
+  std::vector<DriveBranch> all;
+  for (const SideCase& left : side_cases(p)) {
+    for (const SideCase& right : side_cases(p)) {
+      all.push_back({left.weight * right.weight, left.gain, right.gain});
+    }
+  }
+  return all;
+}
+
+DriveBranch draw(EffectValues p, Stream& stream) {
+  DriveBranch branch;
+  if (stream.bernoulli(p[0])) branch.left_gain = 1 - p[1] * stream.uniform();
+  if (stream.bernoulli(p[0])) branch.right_gain = 1 - p[1] * stream.uniform();
+  return branch;
+}
+
+}  // namespace
+
+const EffectBehaviour slip_events{.name = "slip_events", .branches = branches, .draw = draw};
+
+}  // namespace gapfarm::effects

@@ -1,0 +1,17 @@
+#include <algorithm>
+
+#include "worker/effects/behaviour.h"
+#include "worker/effects/table.h"
+
+namespace gapfarm::effects {
+namespace {
+
+void drive(EffectValues p, const Situation&, DriveState& drive) {
+  drive.duration_s = std::max(0.0, drive.duration_s + p[0]);
+}
+
+}  // namespace
+
+const EffectBehaviour timing_offset{.name = "timing_offset", .drive = drive};
+
+}  // namespace gapfarm::effects
