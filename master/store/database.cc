@@ -1,0 +1,215 @@
+#include "master/store/database.h"
+
+#include <sqlite3.h>
+
+#include <cmath>
+
+namespace gapfarm {
+namespace {
+
+// `gapfarm status` holds the file for milliseconds, but somebody may look around in it by hand.
+constexpr int kBusyTimeout_ms = 60000;
+
+const char* remedy(int code) {
+  switch (code & 0xff) {
+    case SQLITE_NOTADB:
+      return "it is not a SQLite file; give the folder of a gapfarm run";
+    case SQLITE_CORRUPT:
+      return "the file is damaged; restore a copy, or save what is left with "
+             "`sqlite3 run.sqlite .recover`";
+    case SQLITE_BUSY:
+    case SQLITE_LOCKED:
+      return "another program holds the file; close it and try again";
+    case SQLITE_FULL:
+      return "free some disk space and resume the run";
+    case SQLITE_READONLY:
+      return (code == SQLITE_READONLY_ROLLBACK || code == SQLITE_READONLY_RECOVERY)
+                 ? "a crash left a half-written generation that must be rolled back: run the "
+                   "command once where the run folder can be written"
+                 : "make the run folder writable";
+    case SQLITE_CANTOPEN:
+    case SQLITE_PERM:
+    case SQLITE_AUTH:
+      return "check that the file exists and that you may read it and write its folder";
+    case SQLITE_IOERR:
+      return "check the disk or the network mount";
+    default:
+      return "check the file with `sqlite3 run.sqlite 'PRAGMA integrity_check'`";
+  }
+}
+
+Error sql_error(const std::string& file, const std::string& operation, int code, const char* text) {
+  return Error{file + ": cannot " + operation + ": " + text + "; " + remedy(code)};
+}
+
+}  // namespace
+
+SqlStatement::SqlStatement(sqlite3_stmt* statement, std::string file, std::string operation)
+    : statement_(statement), file_(std::move(file)), operation_(std::move(operation)) {}
+
+SqlStatement::SqlStatement(SqlStatement&& other) noexcept { *this = std::move(other); }
+
+SqlStatement& SqlStatement::operator=(SqlStatement&& other) noexcept {
+  std::swap(statement_, other.statement_);
+  std::swap(file_, other.file_);
+  std::swap(operation_, other.operation_);
+  std::swap(bind_result_, other.bind_result_);
+  return *this;
+}
+
+SqlStatement::~SqlStatement() { sqlite3_finalize(statement_); }
+
+SqlStatement& SqlStatement::bind(int index, std::int64_t value) {
+  bind_result_ |= sqlite3_bind_int64(statement_, index, value);
+  return *this;
+}
+
+SqlStatement& SqlStatement::bind(int index, double value) {
+  bind_result_ |= sqlite3_bind_double(statement_, index, value);
+  return *this;
+}
+
+SqlStatement& SqlStatement::bind(int index, std::optional<double> value) {
+  bind_result_ |=
+      value ? sqlite3_bind_double(statement_, index, *value) : sqlite3_bind_null(statement_, index);
+  return *this;
+}
+
+SqlStatement& SqlStatement::bind_text(int index, std::string_view value) {
+  bind_result_ |= sqlite3_bind_text64(statement_, index, value.data() ? value.data() : "",
+                                      value.size(), SQLITE_TRANSIENT, SQLITE_UTF8);
+  return *this;
+}
+
+SqlStatement& SqlStatement::bind_blob(int index, std::string_view value) {
+  bind_result_ |= sqlite3_bind_blob64(statement_, index, value.data() ? value.data() : "",
+                                      value.size(), SQLITE_TRANSIENT);
+  return *this;
+}
+
+Result<bool> SqlStatement::step() {
+  sqlite3* handle = sqlite3_db_handle(statement_);
+  if (bind_result_ != SQLITE_OK) {
+    return sql_error(file_, operation_, bind_result_, "a value could not be bound");
+  }
+  const int code = sqlite3_step(statement_);
+  if (code == SQLITE_ROW) return true;
+  if (code == SQLITE_DONE) return false;
+  Error error =
+      sql_error(file_, operation_, sqlite3_extended_errcode(handle), sqlite3_errmsg(handle));
+  sqlite3_reset(statement_);
+  return error;
+}
+
+Status SqlStatement::run() {
+  const Result<bool> stepped = step();
+  if (!stepped) return stepped.error();
+  sqlite3_reset(statement_);
+  sqlite3_clear_bindings(statement_);
+  return {};
+}
+
+std::int64_t SqlStatement::integer(int column) const {
+  return sqlite3_column_int64(statement_, column);
+}
+
+double SqlStatement::real(int column) const { return sqlite3_column_double(statement_, column); }
+
+std::optional<double> SqlStatement::optional_real(int column) const {
+  if (sqlite3_column_type(statement_, column) == SQLITE_NULL) return std::nullopt;
+  return real(column);
+}
+
+std::string SqlStatement::text(int column) const {
+  const auto* bytes = reinterpret_cast<const char*>(sqlite3_column_text(statement_, column));
+  if (!bytes) return {};
+  return {bytes, static_cast<std::size_t>(sqlite3_column_bytes(statement_, column))};
+}
+
+std::string SqlStatement::blob(int column) const {
+  const auto* bytes = static_cast<const char*>(sqlite3_column_blob(statement_, column));
+  if (!bytes) return {};
+  return {bytes, static_cast<std::size_t>(sqlite3_column_bytes(statement_, column))};
+}
+
+Result<Database> Database::open(const std::filesystem::path& file, Mode mode) {
+  // Query-only connections are opened for writing too where that is possible, since only such a one
+  // can roll back what a crashed master left half-written.  SQLite falls back to read-only.
+  int flags = SQLITE_OPEN_READWRITE | SQLITE_OPEN_NOMUTEX;
+  if (mode == Mode::kCreate) flags |= SQLITE_OPEN_CREATE;
+  sqlite3* handle = nullptr;
+  const int code = sqlite3_open_v2(file.c_str(), &handle, flags, nullptr);
+  Database database(handle, file);
+  if (code != SQLITE_OK) {
+    return sql_error(file.string(), "open the run store", code,
+                     handle ? sqlite3_errmsg(handle) : sqlite3_errstr(code));
+  }
+  sqlite3_extended_result_codes(handle, 1);
+  sqlite3_busy_timeout(handle, kBusyTimeout_ms);
+  if (mode == Mode::kQueryOnly) {
+    if (Status s = database.exec("PRAGMA query_only = ON", "open the run store"); !s) {
+      return s.error();
+    }
+    return database;
+  }
+  if (Status s = database.exec(
+          "PRAGMA journal_mode = DELETE; PRAGMA synchronous = FULL; PRAGMA foreign_keys = ON",
+          "open the run store");
+      !s) {
+    return s.error();
+  }
+  return database;
+}
+
+Database::Database(Database&& other) noexcept { *this = std::move(other); }
+
+Database& Database::operator=(Database&& other) noexcept {
+  std::swap(handle_, other.handle_);
+  std::swap(file_, other.file_);
+  return *this;
+}
+
+Database::~Database() { sqlite3_close_v2(handle_); }
+
+Status Database::exec(const std::string& sql, const std::string& operation) {
+  if (sqlite3_exec(handle_, sql.c_str(), nullptr, nullptr, nullptr) != SQLITE_OK) {
+    return sql_error(file_.string(), operation, sqlite3_extended_errcode(handle_),
+                     sqlite3_errmsg(handle_));
+  }
+  return {};
+}
+
+Result<SqlStatement> Database::prepare(const std::string& sql, const std::string& operation) const {
+  sqlite3_stmt* statement = nullptr;
+  if (sqlite3_prepare_v2(handle_, sql.c_str(), -1, &statement, nullptr) != SQLITE_OK) {
+    return sql_error(file_.string(), operation, sqlite3_extended_errcode(handle_),
+                     sqlite3_errmsg(handle_));
+  }
+  return SqlStatement(statement, file_.string(), operation);
+}
+
+Result<std::int64_t> Database::integer(const std::string& sql, const std::string& operation) const {
+  Result<SqlStatement> statement = prepare(sql, operation);
+  if (!statement) return statement.error();
+  const Result<bool> row = statement->step();
+  if (!row) return row.error();
+  return *row ? statement->integer(0) : 0;
+}
+
+Result<SqlTransaction> SqlTransaction::begin(Database& database) {
+  if (Status s = database.exec("BEGIN IMMEDIATE", "begin a transaction"); !s) return s.error();
+  return SqlTransaction(database);
+}
+
+Status SqlTransaction::commit() {
+  if (Status s = database_->exec("COMMIT", "commit"); !s) return s;
+  database_ = nullptr;
+  return {};
+}
+
+SqlTransaction::~SqlTransaction() {
+  // Nothing can be done about an error here: the next open rolls back as well.
+  if (database_) static_cast<void>(database_->exec("ROLLBACK", "roll back"));
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,79 @@
+#include "master/store/records.h"
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <numeric>
+
+#include "common/base/hash.h"
+
+namespace gapfarm {
+
+const char* run_state_name(RunState state) {
+  switch (state) {
+    case RunState::kRunning:
+      return "running";
+    case RunState::kFinished:
+      return "finished";
+    case RunState::kStopped:
+      return "stopped";
+  }
+  return "stopped";
+}
+
+std::string readable_values(const Problem& problem, const Genome& genome) {
+  const ParameterTable& table = problem.table();
+  const ParameterValues values = problem.values_of(genome);
+  nlohmann::ordered_json json = nlohmann::ordered_json::object();
+  for (const Gene& gene : problem.genes) {
+    const Parameter& row = table[gene.row];
+    const double value = values[gene.row];
+    switch (row.kind) {
+      case ParameterKind::kReal:
+        json[row.key] = value;
+        break;
+      case ParameterKind::kInteger:
+        json[row.key] = static_cast<std::int64_t>(value);
+        break;
+      case ParameterKind::kBoolean:
+        json[row.key] = value != 0;
+        break;
+      case ParameterKind::kChoice:
+        json[row.key] = row.choices.at(static_cast<std::size_t>(value));
+        break;
+    }
+  }
+  return json.dump();
+}
+
+void summarise_fitness(StoredGeneration& generation, bool higher_is_better) {
+  std::vector<double> fitness;
+  for (const StoredIndividual& individual : generation.individuals) {
+    if (individual.fitness) fitness.push_back(*individual.fitness);
+  }
+  generation.best = generation.mean = generation.median = generation.worst = std::nullopt;
+  if (fitness.empty()) return;
+  std::sort(fitness.begin(), fitness.end());
+  const std::size_t n = fitness.size();
+  generation.best = higher_is_better ? fitness.back() : fitness.front();
+  generation.worst = higher_is_better ? fitness.front() : fitness.back();
+  generation.mean = std::accumulate(fitness.begin(), fitness.end(), 0.0) / static_cast<double>(n);
+  generation.median = 0.5 * (fitness[(n - 1) / 2] + fitness[n / 2]);
+}
+
+std::string generation_digest(const std::string& previous, const StoredGeneration& generation) {
+  Hasher hasher;
+  hasher.add(std::string_view(previous)).add(generation.generation);
+  hasher.add(static_cast<std::uint64_t>(generation.individuals.size()));
+  for (const StoredIndividual& individual : generation.individuals) {
+    hasher.add(individual.birth_id);
+    hasher.add(static_cast<std::uint64_t>(individual.genome.size()));
+    for (const double gene : individual.genome) hasher.add(gene);
+    hasher.add(std::string_view(individual.outcome));
+    hasher.add(static_cast<std::uint64_t>(individual.fitness.has_value()));
+    hasher.add(individual.fitness.value_or(0.0));
+    hasher.add(static_cast<std::uint64_t>(individual.scores));
+  }
+  return hasher.finish();
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,92 @@
+// What the run store keeps, as plain data (docs/run_store.md gives the tables behind it).
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "common/problem/problem.h"
+
+namespace gapfarm {
+
+// Fixed when a run is created.
+struct RunInfo {
+  std::string program_version;  // create() fills in this build's when empty
+  std::string fingerprint;      // same
+  std::string created;          // UTC, ISO 8601; filled in by create()
+  std::string config_path;      // as given
+  std::string config_text;
+  std::string overrides = "{}";  // JSON: command-line options that outrank the config
+  std::string problem;           // serialised v1::Problem
+  std::string problem_hash;
+  std::uint64_t seed = 0;
+  std::string numeric_class;
+  std::string fitness;       // "log_score"
+  std::string fitness_unit;  // "nats/trial"; "-" when it has none
+  bool higher_is_better = true;
+};
+
+struct StoredIndividual {
+  std::uint64_t birth_id = 0;
+  std::vector<double> genome;     // genes in [0, 1]
+  std::string values = "{}";      // JSON object: parameter key to value (readable_values())
+  std::string outcome = "OK";     // name of a v1::Outcome
+  std::optional<double> fitness;  // in the fitness's own sense and unit; none unless OK
+  unsigned scores = 0;            // evaluations behind `fitness`
+  std::vector<std::uint64_t> parents;
+  std::string operators;  // "blend+gaussian", "elite", ...
+};
+
+// One completed generation.  Fitness figures are over its OK individuals; none when it has none.
+struct StoredGeneration {
+  std::uint64_t generation = 0;
+  std::optional<double> best, mean, median, worst;
+  double diversity = 0;  // mean distance of the genes from their mean, [0, 1]
+  std::vector<std::pair<std::string, double>> operator_probabilities;
+  std::uint64_t evaluations = 0;              // since the run began
+  double wall_s = 0;                          // spent on this generation
+  unsigned quarantined = 0;                   // tasks given up in this generation
+  std::string optimiser_state;                // continues the run bit for bit
+  std::vector<StoredIndividual> individuals;  // best first
+  std::string digest;  // set by the store; covers all generations up to this one
+};
+
+enum class RunState { kRunning, kFinished, kStopped };
+const char* run_state_name(RunState state);
+
+struct StoredWorker {
+  std::string name;
+  std::string host;
+  std::string state;  // "idle", "busy", "gone"
+  unsigned jobs = 0;  // in its hands
+  std::uint64_t finished = 0;
+};
+
+// The live part: what a running master last said about itself.
+struct Progress {
+  RunState state = RunState::kRunning;
+  std::string stop_reason;  // empty while running
+  double rate_per_s = 0;    // evaluations
+  std::optional<double> time_left_s;
+  std::uint64_t done = 0, total = 0;  // tasks of the generation in work
+  std::vector<StoredWorker> workers;
+  // Set by the store:
+  std::int64_t pid = 0;
+  std::string host;
+  double heartbeat_unix_s = 0;
+  std::uint64_t epoch = 0;  // masters that have written to this run, this one included
+};
+
+// {"mass": 0.35, "wheel_shape": "sphere"}: every searched parameter at `genome`.
+std::string readable_values(const Problem& problem, const Genome& genome);
+
+// The fitness figures of `individuals`, into `generation`.
+void summarise_fitness(StoredGeneration& generation, bool higher_is_better);
+
+// Digest of `generation` after `previous`: its number and each individual's birth id, genome,
+// outcome, fitness and number of scores, by their bits.  Times and workers are left out.
+std::string generation_digest(const std::string& previous, const StoredGeneration& generation);
+
+}  // namespace gapfarm

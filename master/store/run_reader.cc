@@ -1,0 +1,157 @@
+#include "master/store/run_reader.h"
+
+#include <cstring>
+#include <nlohmann/json.hpp>
+
+#include "master/store/schema.h"
+
+namespace gapfarm {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+// What was written by hand or damaged reads as empty: status is no place to die over it.
+Json parse(const std::string& text) { return Json::parse(text, nullptr, false); }
+
+std::vector<double> genome_of(const std::string& blob) {
+  std::vector<double> genome(blob.size() / sizeof(double));
+  std::memcpy(genome.data(), blob.data(), genome.size() * sizeof(double));
+  return genome;
+}
+
+RunState state_of(const std::string& name) {
+  for (const RunState state : {RunState::kRunning, RunState::kFinished}) {
+    if (name == run_state_name(state)) return state;
+  }
+  return RunState::kStopped;
+}
+
+std::vector<StoredWorker> workers_of(const std::string& text) {
+  std::vector<StoredWorker> workers;
+  const Json json = parse(text);
+  if (!json.is_array()) return workers;
+  for (const Json& entry : json) {
+    if (!entry.is_object()) continue;
+    StoredWorker worker;
+    worker.name = entry.value("name", "");
+    worker.host = entry.value("host", "");
+    worker.state = entry.value("state", "");
+    worker.jobs = entry.value("jobs", 0u);
+    worker.finished = entry.value("finished", std::uint64_t{0});
+    workers.push_back(std::move(worker));
+  }
+  return workers;
+}
+
+}  // namespace
+
+Result<RunReader> RunReader::open(const std::filesystem::path& run) {
+  const std::filesystem::path file = run_store_file(run);
+  std::error_code ignored;
+  if (!std::filesystem::exists(file, ignored)) {
+    return Error{run.string() +
+                 ": holds no run (there is no run.sqlite); give the folder that "
+                 "`gapfarm evolve --out` wrote"};
+  }
+  Result<Database> database = Database::open(file, Database::Mode::kQueryOnly);
+  if (!database) return database.error();
+  if (Status s = check_run_store(*database); !s) return s.error();
+  Result<RunInfo> info = load_run_info(*database);
+  if (!info) return info.error();
+  RunReader reader(run, std::move(*database));
+  reader.info_ = std::move(*info);
+  return reader;
+}
+
+Result<std::vector<StoredGeneration>> RunReader::generations() const {
+  Result<SqlStatement> select = database_.prepare(
+      "SELECT generation, best, mean, median, worst, diversity, operator_probabilities, "
+      "evaluations, wall_s, quarantined, digest FROM generations ORDER BY generation",
+      "read the generations");
+  if (!select) return select.error();
+  std::vector<StoredGeneration> generations;
+  for (;;) {
+    const Result<bool> row = select->step();
+    if (!row) return row.error();
+    if (!*row) return generations;
+    StoredGeneration& generation = generations.emplace_back();
+    generation.generation = static_cast<std::uint64_t>(select->integer(0));
+    generation.best = select->optional_real(1);
+    generation.mean = select->optional_real(2);
+    generation.median = select->optional_real(3);
+    generation.worst = select->optional_real(4);
+    generation.diversity = select->real(5);
+    const Json operators = parse(select->text(6));
+    for (const auto& [name, probability] : operators.items()) {
+      if (probability.is_number()) {
+        generation.operator_probabilities.emplace_back(name, probability.get<double>());
+      }
+    }
+    generation.evaluations = static_cast<std::uint64_t>(select->integer(7));
+    generation.wall_s = select->real(8);
+    generation.quarantined = static_cast<unsigned>(select->integer(9));
+    generation.digest = select->text(10);
+  }
+}
+
+Result<std::vector<StoredIndividual>> RunReader::individuals(std::uint64_t generation) const {
+  Result<SqlStatement> select = database_.prepare(
+      "SELECT birth_id, genome, parameters, outcome, fitness, scores, parents, operators FROM "
+      "individuals WHERE generation = ? ORDER BY rank",
+      "read the individuals");
+  if (!select) return select.error();
+  select->bind(1, static_cast<std::int64_t>(generation));
+  std::vector<StoredIndividual> individuals;
+  for (;;) {
+    const Result<bool> row = select->step();
+    if (!row) return row.error();
+    if (!*row) return individuals;
+    StoredIndividual& individual = individuals.emplace_back();
+    individual.birth_id = static_cast<std::uint64_t>(select->integer(0));
+    individual.genome = genome_of(select->blob(1));
+    individual.values = select->text(2);
+    individual.outcome = select->text(3);
+    individual.fitness = select->optional_real(4);
+    individual.scores = static_cast<unsigned>(select->integer(5));
+    for (const Json& parent : parse(select->text(6))) {
+      if (parent.is_number_unsigned()) individual.parents.push_back(parent.get<std::uint64_t>());
+    }
+    individual.operators = select->text(7);
+  }
+}
+
+Result<std::optional<StoredIndividual>> RunReader::best() const {
+  const Result<std::int64_t> last =
+      database_.integer("SELECT max(generation) FROM generations", "read the generations");
+  if (!last) return last.error();
+  Result<std::vector<StoredIndividual>> all = individuals(static_cast<std::uint64_t>(*last));
+  if (!all) return all.error();
+  if (all->empty()) return std::optional<StoredIndividual>{};
+  return std::optional<StoredIndividual>(std::move(all->front()));
+}
+
+Result<Progress> RunReader::progress() const {
+  Result<SqlStatement> select = database_.prepare(
+      "SELECT state, stop_reason, pid, host, heartbeat, rate_per_s, time_left_s, done, total, "
+      "workers, epoch FROM progress",
+      "read the progress");
+  if (!select) return select.error();
+  const Result<bool> row = select->step();
+  if (!row) return row.error();
+  Progress progress;
+  if (!*row) return progress;
+  progress.state = state_of(select->text(0));
+  progress.stop_reason = select->text(1);
+  progress.pid = select->integer(2);
+  progress.host = select->text(3);
+  progress.heartbeat_unix_s = select->real(4);
+  progress.rate_per_s = select->real(5);
+  progress.time_left_s = select->optional_real(6);
+  progress.done = static_cast<std::uint64_t>(select->integer(7));
+  progress.total = static_cast<std::uint64_t>(select->integer(8));
+  progress.workers = workers_of(select->text(9));
+  progress.epoch = static_cast<std::uint64_t>(select->integer(10));
+  return progress;
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,43 @@
+// Reads a run, live or dead, without ever getting in its master's way.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/base/result.h"
+#include "master/store/database.h"
+#include "master/store/records.h"
+
+namespace gapfarm {
+
+class RunReader {
+ public:
+  // `run` is a run folder or a store file (one that truncate_after() kept, say).  Works on a
+  // read-only folder.  Errors: nothing there, not a run store, damaged, written by a newer program.
+  static Result<RunReader> open(const std::filesystem::path& run);
+
+  const RunInfo& info() const { return info_; }
+  const std::filesystem::path& run() const { return run_; }
+
+  // Every generation in order, without individuals and optimiser states.
+  Result<std::vector<StoredGeneration>> generations() const;
+  // Best first; empty when there is no such generation.
+  Result<std::vector<StoredIndividual>> individuals(std::uint64_t generation) const;
+  // The best of the last generation; none when nothing was committed yet.
+  Result<std::optional<StoredIndividual>> best() const;
+  // As the master last wrote it.  What it says of a master that crashed is stale: run_status().
+  Result<Progress> progress() const;
+
+ private:
+  RunReader(std::filesystem::path run, Database database)
+      : run_(std::move(run)), database_(std::move(database)) {}
+
+  std::filesystem::path run_;
+  Database database_;
+  RunInfo info_;
+};
+
+}  // namespace gapfarm

@@ -1,0 +1,150 @@
+#include "master/store/schema.h"
+
+#include <charconv>
+#include <system_error>
+
+namespace gapfarm {
+namespace {
+
+// Comments inside the statements stay in the file and show in `.schema`.
+constexpr const char* kTables = R"sql(
+CREATE TABLE run (             -- one row: what was fixed when the run was created
+  id INTEGER PRIMARY KEY CHECK (id = 1),
+  program_version TEXT NOT NULL,
+  fingerprint TEXT NOT NULL,   -- of the build
+  created TEXT NOT NULL,       -- UTC
+  config_path TEXT NOT NULL,
+  config TEXT NOT NULL,        -- the file's text
+  overrides TEXT NOT NULL,     -- JSON, command-line options
+  problem BLOB NOT NULL,       -- gapfarm.v1.Problem
+  problem_hash TEXT NOT NULL,
+  seed TEXT NOT NULL,          -- unsigned 64 bits, decimal
+  numeric_class TEXT NOT NULL,
+  fitness TEXT NOT NULL,
+  fitness_unit TEXT NOT NULL,
+  higher_is_better INTEGER NOT NULL
+) STRICT;
+CREATE TABLE generations (
+  generation INTEGER PRIMARY KEY,
+  best REAL, mean REAL, median REAL, worst REAL,  -- fitness over the OK individuals
+  diversity REAL NOT NULL,
+  operator_probabilities TEXT NOT NULL,           -- JSON object
+  evaluations INTEGER NOT NULL,                   -- since the run began
+  wall_s REAL NOT NULL,                           -- of this generation
+  quarantined INTEGER NOT NULL,
+  optimiser_state BLOB NOT NULL,                  -- after this generation
+  digest TEXT NOT NULL                            -- over this and all earlier generations
+) STRICT;
+CREATE TABLE individuals (
+  generation INTEGER NOT NULL REFERENCES generations ON DELETE CASCADE,
+  rank INTEGER NOT NULL,       -- 0: best
+  birth_id INTEGER NOT NULL,
+  genome BLOB NOT NULL,        -- doubles in [0, 1], the machine's byte order
+  parameters TEXT NOT NULL,    -- JSON object: parameter to value
+  outcome TEXT NOT NULL,
+  fitness REAL,                -- NULL unless the outcome is OK
+  scores INTEGER NOT NULL,     -- evaluations behind the fitness
+  parents TEXT NOT NULL,       -- JSON array of birth ids
+  operators TEXT NOT NULL,
+  PRIMARY KEY (generation, rank)
+) STRICT;
+CREATE INDEX individuals_by_birth ON individuals (birth_id);
+CREATE TABLE progress (        -- one row: what the master last said about itself
+  id INTEGER PRIMARY KEY CHECK (id = 1),
+  state TEXT NOT NULL,
+  stop_reason TEXT NOT NULL,
+  pid INTEGER NOT NULL,
+  host TEXT NOT NULL,
+  heartbeat REAL NOT NULL,     -- Unix time
+  rate_per_s REAL NOT NULL,
+  time_left_s REAL,
+  done INTEGER NOT NULL,       -- tasks of the generation in work
+  total INTEGER NOT NULL,
+  workers TEXT NOT NULL,       -- JSON array
+  epoch INTEGER NOT NULL       -- masters that have written to this run
+) STRICT;
+)sql";
+
+}  // namespace
+
+std::filesystem::path run_store_file(const std::filesystem::path& run) {
+  std::error_code ignored;
+  return std::filesystem::is_regular_file(run, ignored) ? run : run / "run.sqlite";
+}
+
+Status create_run_tables(Database& database) {
+  const std::string operation = "create the run store";
+  if (Status s = database.exec(kTables, operation); !s) return s;
+  return database.exec("PRAGMA application_id = " + std::to_string(kRunStoreApplicationId) +
+                           "; PRAGMA user_version = " + std::to_string(kRunStoreSchema),
+                       operation);
+}
+
+Status check_run_store(const Database& database) {
+  const std::string file = database.file().string();
+  std::error_code ignored;
+  if (std::filesystem::file_size(database.file(), ignored) == 0 && !ignored) {
+    return Error{file + ": is empty: creating the run was interrupted; delete it and start again"};
+  }
+  const Result<std::int64_t> id = database.integer("PRAGMA application_id", "read the run store");
+  if (!id) return id.error();
+  if (*id != kRunStoreApplicationId) {
+    return Error{file + ": is a SQLite file of another program (application id " +
+                 std::to_string(*id) + ", a run store has " +
+                 std::to_string(kRunStoreApplicationId) + "); give the folder of a gapfarm run"};
+  }
+  const Result<std::int64_t> schema = database.integer("PRAGMA user_version", "read the run store");
+  if (!schema) return schema.error();
+  if (*schema > kRunStoreSchema) {
+    return Error{file + ": was written by a newer gapfarm (schema " + std::to_string(*schema) +
+                 "; this program knows up to " + std::to_string(kRunStoreSchema) +
+                 "); use the newer program"};
+  }
+  return {};
+}
+
+Status insert_run_info(Database& database, const RunInfo& info) {
+  Result<SqlStatement> insert = database.prepare(
+      "INSERT INTO run VALUES (1, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)", "create the run store");
+  if (!insert) return insert.error();
+  insert->bind_text(1, info.program_version).bind_text(2, info.fingerprint);
+  insert->bind_text(3, info.created).bind_text(4, info.config_path);
+  insert->bind_text(5, info.config_text).bind_text(6, info.overrides);
+  insert->bind_blob(7, info.problem).bind_text(8, info.problem_hash);
+  insert->bind_text(9, std::to_string(info.seed)).bind_text(10, info.numeric_class);
+  insert->bind_text(11, info.fitness).bind_text(12, info.fitness_unit);
+  insert->bind(13, std::int64_t{info.higher_is_better});
+  return insert->run();
+}
+
+Result<RunInfo> load_run_info(const Database& database) {
+  Result<SqlStatement> select = database.prepare(
+      "SELECT program_version, fingerprint, created, config_path, config, overrides, problem, "
+      "problem_hash, seed, numeric_class, fitness, fitness_unit, higher_is_better FROM run",
+      "read the run store");
+  if (!select) return select.error();
+  const Result<bool> row = select->step();
+  if (!row) return row.error();
+  if (!*row) {
+    return Error{database.file().string() +
+                 ": table run is empty: the file was changed by hand; restore a copy"};
+  }
+  RunInfo info;
+  info.program_version = select->text(0);
+  info.fingerprint = select->text(1);
+  info.created = select->text(2);
+  info.config_path = select->text(3);
+  info.config_text = select->text(4);
+  info.overrides = select->text(5);
+  info.problem = select->blob(6);
+  info.problem_hash = select->text(7);
+  const std::string seed = select->text(8);
+  std::from_chars(seed.data(), seed.data() + seed.size(), info.seed);
+  info.numeric_class = select->text(9);
+  info.fitness = select->text(10);
+  info.fitness_unit = select->text(11);
+  info.higher_is_better = select->integer(12) != 0;
+  return info;
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,109 @@
+#include "master/store/run_status.h"
+
+#include <gmock/gmock.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <nlohmann/json.hpp>
+
+#include "tests/unit/store/store_fixture.h"
+
+namespace gapfarm {
+namespace {
+
+using ::testing::HasSubstr;
+
+class RunStatusTest : public StoreTest {
+ protected:
+  RunStatus status(double later_s = 0) const {
+    const Result<RunReader> reader = RunReader::open(run());
+    EXPECT_TRUE(reader.ok());
+    Result<RunStatus> result = run_status(*reader, reader->progress()->heartbeat_unix_s + later_s);
+    EXPECT_TRUE(result.ok());
+    return std::move(*result);
+  }
+};
+
+TEST_F(RunStatusTest, IsRunningWhileTheMasterHoldsTheLock) {
+  Result<RunStore> store = RunStore::create(run(), example_info());
+  ASSERT_TRUE(store.ok());
+  EXPECT_EQ(status().state, RunState::kRunning);
+  EXPECT_EQ(status().generation, 0u);
+
+  ASSERT_TRUE(store->commit(example_generation(1)).ok());
+  Progress progress;
+  progress.rate_per_s = 210;
+  progress.time_left_s = 12;
+  progress.workers = {{"w1", "here", "busy", 2, 40}};
+  ASSERT_TRUE(store->set_progress(progress).ok());
+  // However long its last word is ago: it may sit in one long evaluation.
+  const RunStatus now = status(3600);
+  EXPECT_EQ(now.state, RunState::kRunning);
+  EXPECT_EQ(now.rate_per_s, 210);
+  EXPECT_EQ(now.time_left_s, 12);
+  ASSERT_EQ(now.progress.workers.size(), 1u);
+  EXPECT_EQ(now.progress.workers[0].finished, 40u);
+}
+
+TEST_F(RunStatusTest, TellsACrashFromAnEnd) {
+  {
+    Result<RunStore> store = RunStore::create(run(), example_info());
+    ASSERT_TRUE(store->commit(example_generation(1)).ok());
+  }
+  EXPECT_EQ(status().state, RunState::kStopped);
+  EXPECT_THAT(status().stop_reason, HasSubstr("crashed"));
+  {
+    Result<RunStore> store = RunStore::open(run());
+    Progress progress;
+    progress.state = RunState::kFinished;
+    progress.stop_reason = "generations: 1 of 1";
+    ASSERT_TRUE(store->set_progress(progress).ok());
+    EXPECT_EQ(status().state, RunState::kFinished);
+  }
+  EXPECT_EQ(status().state, RunState::kFinished);
+  EXPECT_EQ(status().stop_reason, "generations: 1 of 1");
+  EXPECT_EQ(status().time_left_s, 0);
+  EXPECT_DOUBLE_EQ(status().rate_per_s, 3 / 0.5);
+}
+
+// A master on another host whose lock cannot be seen from here is judged by its heartbeat.
+TEST_F(RunStatusTest, TrustsAFreshHeartbeatOfAnotherHost) {
+  { Result<RunStore> store = RunStore::create(run(), example_info()); }
+  {
+    Result<Database> database = Database::open(file(), Database::Mode::kWrite);
+    ASSERT_TRUE(database->exec("UPDATE progress SET host = 'elsewhere'", "test").ok());
+  }
+  EXPECT_EQ(status(5).state, RunState::kRunning);
+  EXPECT_EQ(status(120).state, RunState::kStopped);
+}
+
+TEST_F(RunStatusTest, JsonHasTheFieldsOfTheContract) {
+  Result<RunStore> store = RunStore::create(run(), example_info());
+  nlohmann::ordered_json json = to_json(status());
+  EXPECT_TRUE(json["best_fitness"].is_null());
+  EXPECT_EQ(json["digest"], "");
+  const std::string digest = *store->commit(example_generation(1));
+  Progress progress;
+  progress.workers = {{"w1", "here", "busy", 3, 40}};
+  ASSERT_TRUE(store->set_progress(progress).ok());
+
+  json = to_json(status());
+  EXPECT_EQ(json["state"], "running");
+  EXPECT_EQ(json["stop_reason"], "");
+  EXPECT_EQ(json["generation"], 1);
+  EXPECT_EQ(json["evaluations"], 3);
+  EXPECT_EQ(json["best_fitness"], 1.0);
+  EXPECT_EQ(json["mean_fitness"], 0.5);
+  EXPECT_EQ(json["worst_fitness"], 0.0);
+  EXPECT_EQ(json["digest"], digest);
+  EXPECT_EQ(json["quarantined"], 0);
+  EXPECT_TRUE(json.contains("rate_per_s"));
+  EXPECT_TRUE(json.contains("time_left_s"));
+  EXPECT_EQ(json["workers"][0]["name"], "w1");
+  EXPECT_EQ(json["workers"][0]["state"], "busy");
+  EXPECT_EQ(json["workers"][0]["jobs"], 3);
+  EXPECT_EQ(json["best"]["values"]["mass"], 0.35);
+}
+
+}  // namespace
+}  // namespace gapfarm
