@@ -1,0 +1,226 @@
+#include "common/process/process_pool.h"
+
+#include <poll.h>
+#include <signal.h>
+#include <spawn.h>
+#include <string.h>
+#include <sys/pidfd.h>
+#include <sys/prctl.h>
+#include <sys/wait.h>
+#include <time.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <limits>
+
+extern char** environ;
+
+namespace gapfarm {
+namespace {
+
+EndCause cause_of(int status) {
+  if (WIFEXITED(status)) return WEXITSTATUS(status) == 0 ? EndCause::kLeft : EndCause::kCrashed;
+  switch (WTERMSIG(status)) {
+    case SIGTERM:
+    case SIGINT:
+    case SIGHUP:
+      return EndCause::kLeft;
+    case SIGKILL:
+      return EndCause::kKilled;
+    default:
+      return EndCause::kCrashed;
+  }
+}
+
+std::string text_of(const std::string& name, pid_t pid, int status) {
+  const std::string who = name + " (pid " + std::to_string(pid) + ")";
+  if (WIFEXITED(status)) return who + " exited with status " + std::to_string(WEXITSTATUS(status));
+  const int signal = WTERMSIG(status);
+  return who + " was killed by signal " + std::to_string(signal) + " (" + strsignal(signal) + ")";
+}
+
+}  // namespace
+
+double monotonic_seconds() {
+  timespec t = {};
+  clock_gettime(CLOCK_MONOTONIC, &t);
+  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+}
+
+bool die_with_parent(pid_t pid) {
+  prctl(PR_SET_PDEATHSIG, SIGKILL);
+  // The parent may have died before the line above: then this is somebody else's child by now.
+  return getppid() == pid;
+}
+
+std::string executable_folder() {
+  char path[4096];
+  const ssize_t size = readlink("/proc/self/exe", path, sizeof path);
+  if (size <= 0) return "";
+  const std::string full(path, static_cast<std::size_t>(size));
+  return full.substr(0, full.rfind('/') + 1);
+}
+
+ProcessPool::ProcessPool(ProcessPoolOptions options)
+    : options_(std::move(options)), places_(options_.count) {}
+
+ProcessPool::~ProcessPool() {
+  signal_all(SIGKILL);
+  for (Place& place : places_) {
+    if (place.pid != 0) waitpid(place.pid, nullptr, 0);
+    if (place.pidfd >= 0) close(place.pidfd);
+  }
+}
+
+Status ProcessPool::start(double now) {
+  for (unsigned i = 0; i < places_.size(); ++i) {
+    places_[i].start_at = now;
+    if (Status status = start_place(places_[i], i); !status) return status;
+  }
+  return {};
+}
+
+Status ProcessPool::start_place(Place& place, unsigned index) {
+  place.name =
+      options_.name_prefix + "-" + std::to_string(index + 1) + "." + std::to_string(++place.starts);
+  std::vector<std::string> words =
+      options_.arguments(place.name, place.replaced ? &*place.replaced : nullptr);
+  words.insert(words.begin(), options_.program);
+  std::vector<char*> argv;
+  for (std::string& word : words) argv.push_back(word.data());
+  argv.push_back(nullptr);
+
+  posix_spawn_file_actions_t files;
+  posix_spawn_file_actions_init(&files);
+  posix_spawn_file_actions_addopen(&files, STDIN_FILENO, "/dev/null", 0, 0);
+  // Standard output is the parent's answer to its user; children may only complain.
+  posix_spawn_file_actions_adddup2(&files, STDERR_FILENO, STDOUT_FILENO);
+  posix_spawnattr_t attributes;
+  posix_spawnattr_init(&attributes);
+  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF);
+  sigset_t defaults;
+  sigemptyset(&defaults);
+  for (int signal : {SIGINT, SIGTERM, SIGHUP, SIGPIPE, SIGCHLD}) sigaddset(&defaults, signal);
+  posix_spawnattr_setsigdefault(&attributes, &defaults);
+  // Blocked until the child's own handlers stand (StopOnSignals unblocks).
+  sigset_t mask;
+  sigemptyset(&mask);
+  sigaddset(&mask, SIGINT);
+  posix_spawnattr_setsigmask(&attributes, &mask);
+  pid_t pid = 0;
+  const int failed =
+      posix_spawn(&pid, options_.program.c_str(), &files, &attributes, argv.data(), environ);
+  posix_spawn_file_actions_destroy(&files);
+  posix_spawnattr_destroy(&attributes);
+  if (failed != 0) {
+    place.gave_up = true;
+    return Error{"cannot start " + options_.program + ": " + strerror(failed)};
+  }
+  place.pid = pid;
+  place.pidfd = pidfd_open(pid, 0);
+  place.replaced.reset();
+  return {};
+}
+
+ProcessEnded ProcessPool::ended(Place& place, int status, double now) {
+  ProcessEnded end;
+  end.name = place.name;
+  end.pid = place.pid;
+  end.cause = cause_of(status);
+  end.text = text_of(place.name, place.pid, status);
+  if (place.pidfd >= 0) close(place.pidfd);
+  place.pidfd = -1;
+  place.pid = 0;
+  ++place.failures;
+  const bool hopeless =
+      WIFEXITED(status) && (WEXITSTATUS(status) == kExitUsage ||
+                            WEXITSTATUS(status) == kExitRefused || WEXITSTATUS(status) == 127);
+  if (hopeless || (options_.failure_limit && place.failures >= *options_.failure_limit)) {
+    place.gave_up = true;
+    end.gave_up = true;
+  }
+  const double wait =
+      place.failures <= 1 ? 0 : options_.backoff_s * std::pow(2.0, place.failures - 2.0);
+  place.start_at = now + std::min(wait, options_.backoff_max_s);
+  place.replaced = end;
+  return end;
+}
+
+std::vector<ProcessEnded> ProcessPool::reap(double now) {
+  std::vector<ProcessEnded> ends;
+  for (unsigned i = 0; i < places_.size(); ++i) {
+    Place& place = places_[i];
+    int status = 0;
+    if (place.pid != 0 && waitpid(place.pid, &status, WNOHANG) == place.pid) {
+      ends.push_back(ended(place, status, now));
+    }
+    if (place.pid != 0 || place.gave_up || retired_ || place.start_at > now) continue;
+    if (Status started = start_place(place, i); !started) {
+      ProcessEnded end;
+      end.name = place.name;
+      end.gave_up = true;
+      end.text = started.error().message;
+      ends.push_back(end);
+    }
+  }
+  return ends;
+}
+
+double ProcessPool::next_start() const {
+  double next = std::numeric_limits<double>::infinity();
+  for (const Place& place : places_) {
+    if (place.pid == 0 && !place.gave_up && !retired_) next = std::min(next, place.start_at);
+  }
+  return next;
+}
+
+void ProcessPool::confirm(const std::string& name) {
+  for (Place& place : places_) {
+    if (place.name == name) place.failures = 0;
+  }
+}
+
+bool ProcessPool::exhausted() const {
+  return std::all_of(places_.begin(), places_.end(), [this](const Place& place) {
+    return place.pid == 0 && (place.gave_up || retired_);
+  });
+}
+
+std::size_t ProcessPool::running() const {
+  return static_cast<std::size_t>(std::count_if(places_.begin(), places_.end(),
+                                                [](const Place& place) { return place.pid != 0; }));
+}
+
+std::vector<int> ProcessPool::fds() const {
+  std::vector<int> fds;
+  for (const Place& place : places_) {
+    if (place.pidfd >= 0) fds.push_back(place.pidfd);
+  }
+  return fds;
+}
+
+void ProcessPool::signal_all(int signal) {
+  for (const Place& place : places_) {
+    if (place.pid != 0) kill(place.pid, signal);
+  }
+}
+
+bool ProcessPool::wait_all(double timeout_s) {
+  retire();
+  const double deadline = monotonic_seconds() + timeout_s;
+  for (;;) {
+    reap(monotonic_seconds());
+    if (running() == 0) return true;
+    const double left = deadline - monotonic_seconds();
+    if (left <= 0) return false;
+    std::vector<pollfd> polled;
+    for (int fd : fds()) polled.push_back({fd, POLLIN, 0});
+    // Without pidfds (an old kernel) ends are found by looking again.
+    const double wait = polled.size() == running() ? left : std::min(left, 0.01);
+    poll(polled.data(), polled.size(), static_cast<int>(std::ceil(wait * 1000)));
+  }
+}
+
+}  // namespace gapfarm

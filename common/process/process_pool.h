@@ -1,0 +1,108 @@
+// A fixed number of child processes of one program, started again when they end.
+#pragma once
+
+#include <sys/types.h>
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/base/result.h"
+
+namespace gapfarm {
+
+// How a process ended, as far as blame goes.
+enum class EndCause {
+  kLeft,     // exit status 0, or a signal that asks to leave: nobody's fault
+  kKilled,   // SIGKILL: from outside or out of memory
+  kCrashed,  // any other signal or exit status
+};
+
+// Exit status of a child that starting again would not help: wrong usage, or refused for good.
+inline constexpr int kExitUsage = 2;
+inline constexpr int kExitRefused = 78;
+
+struct ProcessEnded {
+  std::string name;
+  pid_t pid = 0;
+  EndCause cause = EndCause::kLeft;
+  bool gave_up = false;  // its place stays empty
+  std::string text;      // "local-1 (pid 42) was killed by signal 11 (Segmentation fault)"
+};
+
+struct ProcessPoolOptions {
+  std::string program;  // path
+  unsigned count = 1;
+  std::string name_prefix;  // names are prefix-PLACE.START, never used twice
+  // Arguments after the program.  `replaced` is the end that this start makes up for, or null.
+  std::function<std::vector<std::string>(const std::string& name, const ProcessEnded* replaced)>
+      arguments;
+  // A place is given up after so many ends in a row without a confirm(); none: never.
+  std::optional<unsigned> failure_limit = 3;
+  double backoff_s = 0.1;  // before the second start in a row without a confirm(), then doubled
+  double backoff_max_s = 30;
+};
+
+// Children die with the thread that starts them (they are told its pid and ask the kernel for it,
+// see die_with_parent), so start and reap from a thread that lives as long as the pool.
+// Times are seconds of one monotonic clock that the caller reads.
+class ProcessPool {
+ public:
+  explicit ProcessPool(ProcessPoolOptions options);
+  // Kills what is left.
+  ~ProcessPool();
+  ProcessPool(const ProcessPool&) = delete;
+  ProcessPool& operator=(const ProcessPool&) = delete;
+
+  Status start(double now);
+  // Collects the children that ended and starts those that are due.
+  std::vector<ProcessEnded> reap(double now);
+  // When reap() has something to start; infinity: never.
+  double next_start() const;
+  // The child does useful work: its failures so far are forgotten.
+  void confirm(const std::string& name);
+  // No child runs and none will be started.
+  bool exhausted() const;
+  std::size_t running() const;
+
+  // Readable when a child has ended; for poll().
+  std::vector<int> fds() const;
+
+  // From now on nothing is started again.
+  void retire() { retired_ = true; }
+  // REQUIRES: a signal number.  Sends it to every running child.
+  void signal_all(int signal);
+  // Waits until all have ended; false after `timeout_s`.  Retires the pool.
+  bool wait_all(double timeout_s);
+
+ private:
+  struct Place {
+    std::string name;
+    pid_t pid = 0;  // 0: not running
+    int pidfd = -1;
+    unsigned starts = 0;
+    unsigned failures = 0;  // ends in a row without a confirm()
+    double start_at = 0;    // when not running
+    bool gave_up = false;
+    std::optional<ProcessEnded> replaced;
+  };
+  Status start_place(Place& place, unsigned index);
+  ProcessEnded ended(Place& place, int status, double now);
+
+  ProcessPoolOptions options_;
+  std::vector<Place> places_;
+  bool retired_ = false;
+};
+
+// In a child: die when the parent dies.  False when the parent `pid` is gone already.
+bool die_with_parent(pid_t pid);
+
+// The folder of the running executable, with a trailing slash; empty when /proc is missing.
+std::string executable_folder();
+
+// Seconds of CLOCK_MONOTONIC: for timeouts and schedules only, never in a result.
+double monotonic_seconds();
+
+}  // namespace gapfarm

@@ -1,0 +1,71 @@
+#include "common/process/stop.h"
+
+#include <signal.h>
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+#include <cassert>
+#include <cerrno>
+#include <cstdint>
+
+namespace gapfarm {
+namespace {
+
+// A handler takes no argument, so the one instance that signals go to has to be global.
+std::atomic<StopSource*> signal_target{nullptr};
+
+void handle(int signal) {
+  const int saved_errno = errno;
+  if (StopSource* stop = signal_target.load()) stop->request(signal);
+  errno = saved_errno;
+}
+
+}  // namespace
+
+StopSource::StopSource() : fd_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) { assert(fd_ >= 0); }
+
+StopSource::~StopSource() { close(fd_); }
+
+void StopSource::request(int signal) {
+  signal_.store(signal);
+  requests_.fetch_add(1);
+  const std::uint64_t one = 1;
+  // A full counter is readable already, so nothing is lost when the write fails.
+  [[maybe_unused]] const ssize_t written = write(fd_, &one, sizeof one);
+}
+
+void StopSource::acknowledge() {
+  std::uint64_t count = 0;
+  [[maybe_unused]] const ssize_t got = read(fd_, &count, sizeof count);
+}
+
+struct StopOnSignals::Saved {
+  struct sigaction interrupt;
+  struct sigaction terminate;
+};
+
+StopOnSignals::StopOnSignals(StopSource* stop, bool ignore_interrupt) : saved_(new Saved) {
+  assert(signal_target.load() == nullptr);
+  signal_target.store(stop);
+  struct sigaction action = {};
+  sigemptyset(&action.sa_mask);
+  action.sa_handler = handle;  // without SA_RESTART, so that blocking calls return
+  sigaction(SIGTERM, &action, &saved_->terminate);
+  if (ignore_interrupt) action.sa_handler = SIG_IGN;
+  sigaction(SIGINT, &action, &saved_->interrupt);
+  // A parent may have blocked them until the handlers stood.
+  sigset_t set;
+  sigemptyset(&set);
+  sigaddset(&set, SIGINT);
+  sigaddset(&set, SIGTERM);
+  pthread_sigmask(SIG_UNBLOCK, &set, nullptr);
+}
+
+StopOnSignals::~StopOnSignals() {
+  sigaction(SIGINT, &saved_->interrupt, nullptr);
+  sigaction(SIGTERM, &saved_->terminate, nullptr);
+  signal_target.store(nullptr);
+  delete saved_;
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,48 @@
+// A request to stop that interrupts a poll: from a signal, or from another thread.
+#pragma once
+
+#include <atomic>
+
+namespace gapfarm {
+
+class StopSource {
+ public:
+  StopSource();
+  ~StopSource();
+  StopSource(const StopSource&) = delete;
+  StopSource& operator=(const StopSource&) = delete;
+
+  // Async-signal-safe and thread-safe.  `signal` is kept for the exit status; 0: no signal.
+  void request(int signal = 0);
+  bool requested() const { return requests() > 0; }
+  // How often: a second request usually means "at once".
+  unsigned requests() const { return requests_.load(); }
+  int signal() const { return signal_.load(); }  // of the last request
+
+  // Readable once requested, until acknowledge(); for poll().
+  int fd() const { return fd_; }
+  // Makes fd() wait for the next request; requests() keeps its count.
+  void acknowledge();
+
+ private:
+  int fd_;
+  std::atomic<unsigned> requests_{0};
+  std::atomic<int> signal_{0};
+};
+
+// While it lives, SIGINT and SIGTERM go to `stop`; afterwards the old handlers are back.  With
+// `ignore_interrupt` SIGINT is ignored: a terminal's Ctrl-C also reaches the children of the
+// process it is meant for.  At most one at a time (signal handlers are the process's own).
+class StopOnSignals {
+ public:
+  explicit StopOnSignals(StopSource* stop, bool ignore_interrupt = false);
+  ~StopOnSignals();
+  StopOnSignals(const StopOnSignals&) = delete;
+  StopOnSignals& operator=(const StopOnSignals&) = delete;
+
+ private:
+  struct Saved;
+  Saved* saved_;
+};
+
+}  // namespace gapfarm
