@@ -1,0 +1,77 @@
+#include "common/trials/files.h"
+
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <system_error>
+
+namespace gapfarm {
+namespace {
+
+Status write_all(int fd, std::string_view bytes, const std::string& path) {
+  while (!bytes.empty()) {
+    const ssize_t n = ::write(fd, bytes.data(), bytes.size());
+    if (n < 0 && errno == EINTR) continue;
+    if (n < 0) return Error{path + ": cannot be written: " + std::strerror(errno)};
+    bytes.remove_prefix(static_cast<std::size_t>(n));
+  }
+  // The rename may not reach the disk before the bytes do.
+  if (::fsync(fd) != 0) return Error{path + ": cannot be flushed: " + std::strerror(errno)};
+  return {};
+}
+
+}  // namespace
+
+Result<std::string> read_text_file(const std::string& path) {
+  std::error_code code;
+  const auto status = std::filesystem::status(path, code);
+  if (!std::filesystem::exists(status)) {
+    return Error{path + ": no such file; check the path (it is taken from the current folder)"};
+  }
+  if (std::filesystem::is_directory(status)) {
+    return Error{path + ": is a folder, expected a file; name the files in it"};
+  }
+  std::ifstream in(path, std::ios::binary);
+  std::ostringstream bytes;
+  if (in && in.peek() != std::ifstream::traits_type::eof()) bytes << in.rdbuf();
+  if (!in && !in.eof()) {
+    return Error{path + ": cannot be read: " + std::strerror(errno) + "; check its permissions"};
+  }
+  return std::move(bytes).str();
+}
+
+Status write_file_atomically(const std::string& path, std::string_view bytes) {
+  const std::filesystem::path target(path);
+  std::error_code code;
+  if (target.has_parent_path()) {
+    std::filesystem::create_directories(target.parent_path(), code);
+    if (code) {
+      return Error{target.parent_path().string() + ": cannot be made: " + code.message()};
+    }
+  }
+  std::string temporary = path + ".XXXXXX";
+  const int fd = ::mkstemp(temporary.data());
+  if (fd < 0) {
+    return Error{path + ": cannot be written: " + std::strerror(errno) +
+                 "; check the folder and its permissions"};
+  }
+  Status written = write_all(fd, bytes, path);
+  // mkstemp makes files for the owner alone; give what a plain open would have given.
+  const mode_t mask = ::umask(0);
+  ::umask(mask);
+  ::fchmod(fd, 0666 & ~mask);
+  ::close(fd);
+  if (written.ok() && ::rename(temporary.c_str(), path.c_str()) != 0) {
+    written = Error{path + ": cannot be replaced: " + std::strerror(errno)};
+  }
+  if (!written.ok()) ::unlink(temporary.c_str());
+  return written;
+}
+
+}  // namespace gapfarm

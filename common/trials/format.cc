@@ -1,0 +1,124 @@
+#include "common/trials/format.h"
+
+#include <algorithm>
+#include <vector>
+
+#include "common/trials/csv.h"
+
+namespace gapfarm {
+namespace {
+
+// The first line that is not blank, without its byte-order mark.
+std::string_view first_line(std::string_view text) {
+  if (text.substr(0, 3) == "\xEF\xBB\xBF") text.remove_prefix(3);
+  const std::size_t begin = text.find_first_not_of(" \t\r\n");
+  if (begin == text.npos) return {};
+  text.remove_prefix(begin);
+  return text.substr(0, text.find_first_of("\r\n"));
+}
+
+bool has(std::string_view text, std::string_view part) { return text.find(part) != text.npos; }
+
+// Names between commas, blanks and quotes cut off.
+std::vector<std::string> names_of(std::string_view line) {
+  const auto rows = parse_csv(line, "");
+  std::vector<std::string> names;
+  if (!rows.ok() || rows->empty()) return names;
+  for (const CsvField& field : rows->front().fields) names.push_back(field.text);
+  return names;
+}
+
+TextFormat sniff_table(std::string_view line) {
+  const std::vector<std::string> names = names_of(line);
+  const auto column = [&](std::string_view name) {
+    return std::find(names.begin(), names.end(), name) != names.end();
+  };
+  if (column("millisecond") && column("x")) return TextFormat::kRacquetball;
+  if (column("cov_xx")) return TextFormat::kPrediction;
+  if (column("object")) return TextFormat::kPushLog;
+  // A trial log with a column missing is still a trial log: the reader says what is missing.
+  int of_trials = 0;
+  for (const char* name :
+       {"command", "left", "right", "duration", "x0", "y0", "theta0", "x1", "y1", "theta1"}) {
+    of_trials += column(name) ? 1 : 0;
+  }
+  if (of_trials >= 2) return TextFormat::kTrialLog;
+  if (column("session") && column("trial") && column("x")) {
+    return column("theta") ? TextFormat::kPaths : TextFormat::kTips;
+  }
+  return column("session") || column("trial") ? TextFormat::kTrialLog : TextFormat::kUnknown;
+}
+
+struct FormatWords {
+  TextFormat format;
+  const char* name;
+  const char* remedy;  // $FILE stands for the file
+};
+
+constexpr FormatWords kWords[] = {
+    {TextFormat::kEmpty, "an empty file", "check that the log was written"},
+    {TextFormat::kTrialLog, "a trial log", "give it as a trial file, it needs no import"},
+    {TextFormat::kPaths, "the paths of a trial log",
+     "name the trials.csv beside it; its paths.csv is read with it"},
+    {TextFormat::kPushLog, "a push log", "it belongs to scenario push, not to this one"},
+    {TextFormat::kTips, "the finger paths of a push log", "name the pushes.csv beside it"},
+    {TextFormat::kBbautotune, "a bbautotune log", "run 'gapfarm import bbautotune $FILE'"},
+    {TextFormat::kBlendersim, "a blendersim way-point log",
+     "it holds no commands, so no trials can be had from it"},
+    {TextFormat::kRacquetball, "a racquetball trajectory",
+     "it belongs to scenario racquetball, not to this one"},
+    {TextFormat::kPrediction, "a prediction", "name the trial log that it was made for"},
+    {TextFormat::kToml, "a config or a model", "give it as CONFIG or MODEL"},
+    {TextFormat::kJson, "JSON", "export the log as CSV"},
+    {TextFormat::kHtml, "HTML", "export the log as CSV"},
+    {TextFormat::kRunStore, "a run store", "give it as RUN"},
+    {TextFormat::kOtherSeparator, "a table without commas",
+     "separate columns by commas and write decimals with a point"},
+    {TextFormat::kUtf16, "UTF-16 text", "save it as UTF-8"},
+    {TextFormat::kBinary, "binary data", "export the log as CSV"},
+    {TextFormat::kUnknown, "text of an unknown format",
+     "a trial log begins with a line of column names (docs/formats.md)"},
+};
+
+const FormatWords& words_of(TextFormat format) {
+  for (const FormatWords& words : kWords) {
+    if (words.format == format) return words;
+  }
+  return kWords[std::size(kWords) - 1];
+}
+
+}  // namespace
+
+TextFormat sniff_format(std::string_view text) {
+  if (text.substr(0, 15) == "SQLite format 3") return TextFormat::kRunStore;
+  const std::string_view mark = text.substr(0, 2);
+  if (mark == "\xFF\xFE" || mark == "\xFE\xFF") return TextFormat::kUtf16;
+  if (text.substr(0, 4096).find('\0') != text.npos) return TextFormat::kBinary;
+  const std::string_view line = first_line(text);
+  if (line.empty()) return TextFormat::kEmpty;
+  if (has(line, "CAMPOSE") || has(line, "WAYPOINTS")) return TextFormat::kBlendersim;
+  if (line[0] == '<') return TextFormat::kHtml;
+  if (line[0] == '{') return TextFormat::kJson;
+  const bool table_head = line[0] == '[' && has(line, "]");
+  const bool key_value = has(line, " = ") || (line[0] == '#' && has(text, " = "));
+  if (table_head || key_value) return TextFormat::kToml;
+  if (has(line, "move(")) return TextFormat::kBbautotune;
+  const bool header = has(line, "session") || has(line, "trial");
+  if (header && !has(line, ",") && line.find_first_of(";\t") != line.npos) {
+    return TextFormat::kOtherSeparator;
+  }
+  if (has(line, ";") && !header) return TextFormat::kBbautotune;
+  return sniff_table(line);
+}
+
+std::string format_name(TextFormat format) { return words_of(format).name; }
+
+Error wrong_format(std::string_view file, TextFormat found, std::string_view expected) {
+  const FormatWords& words = words_of(found);
+  std::string remedy = words.remedy;
+  const std::size_t at = remedy.find("$FILE");
+  if (at != remedy.npos) remedy.replace(at, 5, file);
+  return text_error(file, {}, words.name, expected, remedy);
+}
+
+}  // namespace gapfarm

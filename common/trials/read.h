@@ -1,0 +1,34 @@
+// Reads trial logs (docs/formats.md).  Nothing is half-read: a log comes back whole or not at all.
+#pragma once
+
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "common/base/result.h"
+#include "common/trials/trial.h"
+
+namespace gapfarm {
+
+// `commands`: the scenario's command names; another command in a log is an error.  Every error
+// reads "file:line:column: found X, expected Y; remedy".
+
+// The text of a trials.csv.  `file` stands in the errors.
+Result<TrialLog> parse_trials(std::string_view text, const std::string& file,
+                              std::span<const std::string> commands);
+
+// Adds the text of a paths.csv to the trials it names.  Rows of trials that `log` does not hold are
+// left out, with a note: a log may be split while its paths are not.  On an error `log` is
+// unchanged.
+Status parse_paths(std::string_view text, const std::string& file, TrialLog& log);
+
+// A trials.csv with the paths.csv beside it, when there is one.
+Result<TrialLog> read_trials(const std::string& path, std::span<const std::string> commands);
+
+// Several files as one log, in the order given; each may be a trials.csv or a bbautotune run, told
+// apart by content.  A session split over files is put together in trial order.  Errors beside the
+// formats' own: no files, a (session, trial) in two files, a file of another format.
+Result<TrialLog> read_trial_files(std::span<const std::string> paths,
+                                  std::span<const std::string> commands);
+
+}  // namespace gapfarm

@@ -1,0 +1,112 @@
+#include "common/trials/write.h"
+
+#include <cmath>
+#include <filesystem>
+#include <set>
+#include <string_view>
+#include <utility>
+
+#include "common/trials/columns.h"
+#include "common/trials/csv.h"
+#include "common/trials/files.h"
+
+namespace gapfarm {
+namespace {
+
+std::string header(const std::vector<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "" : ",") + csv_field(name);
+  return text;
+}
+
+std::string optional_double(const std::optional<double>& value) {
+  return value ? format_double(*value) : std::string();
+}
+
+std::string pose_fields(const Pose& pose) {
+  return format_double(pose.x) + "," + format_double(pose.y) + "," + format_double(pose.theta);
+}
+
+bool is_finite(const Pose& pose) {
+  return std::isfinite(pose.x) && std::isfinite(pose.y) && std::isfinite(pose.theta);
+}
+
+bool is_finite(const Trial& trial) {
+  for (const auto& value : {trial.t_s, trial.left, trial.right, trial.duration_s}) {
+    if (value && !std::isfinite(*value)) return false;
+  }
+  for (const PathSample& sample : trial.path) {
+    if (!std::isfinite(sample.t_s) || !is_finite(sample.pose)) return false;
+  }
+  return is_finite(trial.X_WS) && is_finite(trial.X_WE);
+}
+
+Status check(const TrialLog& log, const std::string& path) {
+  if (log.trials.empty()) return Error{path + ": there are no trials to write"};
+  std::set<std::pair<std::string, std::int64_t>> seen;
+  for (const Trial& trial : log.trials) {
+    const std::string name = path + ": trial " + std::to_string(trial.trial) + " of session " +
+                             quoted_word(trial.session);
+    if (trial.session.empty()) return Error{name + " needs a session name"};
+    if (!seen.emplace(trial.session, trial.trial).second) {
+      return Error{name + " occurs twice; number the trials of a session"};
+    }
+    if (trial.extra.size() > log.extra_columns.size()) {
+      return Error{name + " has " + std::to_string(trial.extra.size()) + " extra values for " +
+                   std::to_string(log.extra_columns.size()) + " columns"};
+    }
+    if (!is_finite(trial)) return Error{name + " holds NaN or infinity; leave such trials out"};
+  }
+  return {};
+}
+
+}  // namespace
+
+std::string format_trials(const TrialLog& log) {
+  std::string text = header(trial_columns());
+  for (const std::string& name : log.extra_columns) text += "," + csv_field(name);
+  text += "\n";
+  for (const Trial& trial : log.trials) {
+    text += csv_field(trial.session) + "," + std::to_string(trial.trial) + "," +
+            optional_double(trial.t_s) + "," + csv_field(trial.command) + "," +
+            optional_double(trial.left) + "," + optional_double(trial.right) + "," +
+            optional_double(trial.duration_s) + "," + pose_fields(trial.X_WS) + "," +
+            pose_fields(trial.X_WE);
+    for (std::size_t i = 0; i < log.extra_columns.size(); ++i) {
+      text += "," + (i < trial.extra.size() ? csv_field(trial.extra[i]) : std::string());
+    }
+    text += "\n";
+  }
+  return text;
+}
+
+std::string format_paths(const TrialLog& log) {
+  std::string text = header(path_columns()) + "\n";
+  for (const Trial& trial : log.trials) {
+    const std::string key = csv_field(trial.session) + "," + std::to_string(trial.trial) + ",";
+    for (const PathSample& sample : trial.path) {
+      text += key + format_double(sample.t_s) + "," + pose_fields(sample.pose) + "\n";
+    }
+  }
+  return text;
+}
+
+Status write_trials(const TrialLog& log, const std::string& path) {
+  Status good = check(log, path);
+  if (!good.ok()) return good;
+  const std::filesystem::path beside = std::filesystem::path(path).parent_path() / "paths.csv";
+  if (beside == std::filesystem::path(path)) {
+    return Error{path + ": paths.csv holds the paths beside a trial log; choose another name"};
+  }
+  if (log.has_paths()) {
+    // Paths first: a reader that finds the new trials then finds their paths too.
+    Status status = write_file_atomically(beside.string(), format_paths(log));
+    if (!status.ok()) return status;
+  } else if (std::filesystem::exists(beside)) {
+    return Error{beside.string() + ": paths of another log would be read with " + path +
+                 "; remove them or write to another folder"};
+  }
+  return write_file_atomically(path, format_trials(log));
+}
+
+}  // namespace gapfarm
