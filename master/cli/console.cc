@@ -1,0 +1,114 @@
+#include "master/cli/console.h"
+
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdlib>
+
+namespace gapfarm {
+namespace {
+
+bool colour_wanted() {
+  const char* no_color = std::getenv("NO_COLOR");
+  const char* term = std::getenv("TERM");
+  return !(no_color && *no_color) && !(term && std::string_view(term) == "dumb");
+}
+
+void write_all(std::FILE* file, std::string_view text) {
+  std::fwrite(text.data(), 1, text.size(), file);
+  std::fflush(file);
+}
+
+template <class... Values>
+std::string formatted(const char* format, Values... values) {
+  char text[64];
+  std::snprintf(text, sizeof text, format, values...);
+  return text;
+}
+
+}  // namespace
+
+Console::Console(std::FILE* out, std::FILE* err)
+    : out_(out),
+      err_(err),
+      out_is_terminal_(::isatty(::fileno(out)) == 1),
+      err_is_terminal_(::isatty(::fileno(err)) == 1),
+      colour_(out_is_terminal_ && colour_wanted()) {}
+
+Console::~Console() { clear_progress(); }
+
+void Console::print(std::string_view text) {
+  clear_progress();
+  write_all(out_, text);
+}
+
+void Console::note(std::string_view text) {
+  clear_progress();
+  write_all(err_, std::string(text) + "\n");
+}
+
+void Console::error(const Error& error) { note("gapfarm: " + error.message); }
+
+void Console::progress(std::string_view text) {
+  if (!err_is_terminal_) return;
+  const double now =
+      std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+  if (progress_shown_ && now - last_progress_s_ < 0.1) return;
+  last_progress_s_ = now;
+  progress_shown_ = true;
+  // A line that wraps could not be taken back.
+  write_all(err_, "\r\x1b[K" + std::string(text.substr(0, std::max(1u, width()) - 1)));
+}
+
+void Console::clear_progress() {
+  if (!progress_shown_) return;
+  progress_shown_ = false;
+  write_all(err_, "\r\x1b[K");
+}
+
+unsigned Console::width() const {
+  winsize size{};
+  const int fd = ::fileno(out_is_terminal_ ? out_ : err_);
+  if (::ioctl(fd, TIOCGWINSZ, &size) == 0 && size.ws_col > 0) return size.ws_col;
+  return 80;
+}
+
+std::string Console::styled(std::string_view text, const char* code) const {
+  if (!colour_) return std::string(text);
+  return "\x1b[" + std::string(code) + "m" + std::string(text) + "\x1b[0m";
+}
+
+std::string format_duration(double seconds) {
+  if (!(seconds >= 0) || seconds > 1e9) return "?";
+  if (seconds < 9.95) return formatted("%.1f s", seconds);
+  const long whole = std::lround(seconds);
+  if (whole < 60) return formatted("%ld s", whole);
+  if (whole < 3600) return formatted("%ld min %02ld s", whole / 60, whole % 60);
+  return formatted("%ld h %02ld min", whole / 3600, whole / 60 % 60);
+}
+
+std::string format_number(const std::optional<double>& value, int digits) {
+  return value ? formatted("%.*g", digits, *value) : "-";
+}
+
+std::string progress_text(std::string_view what, double rate_per_s,
+                          std::optional<double> time_left_s) {
+  std::string text(what);
+  text += ", " + formatted("%.3g", rate_per_s) + "/s";
+  if (time_left_s) text += ", " + format_duration(*time_left_s) + " left";
+  return text;
+}
+
+std::string printable(std::string_view text) {
+  std::string result(text);
+  for (char& c : result) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (byte < 0x20 || byte == 0x7f) c = '?';
+  }
+  return result;
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,61 @@
+// Words for people: results on stdout, everything else on stderr.
+#pragma once
+
+#include <cstdio>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "common/base/result.h"
+
+namespace gapfarm {
+
+class Console {
+ public:
+  explicit Console(std::FILE* out = stdout, std::FILE* err = stderr);
+  ~Console();
+  Console(const Console&) = delete;
+  Console& operator=(const Console&) = delete;
+
+  // Results, to stdout, as they are and at once.
+  void print(std::string_view text);
+  // A line to stderr.
+  void note(std::string_view text);
+  // "gapfarm: MESSAGE" to stderr.
+  void error(const Error& error);
+
+  // Shows `text` on the last line of the terminal in place of the last progress; at most ten times
+  // a second, and never where stderr is no terminal.
+  void progress(std::string_view text);
+  void clear_progress();
+
+  bool out_is_terminal() const { return out_is_terminal_; }
+  bool err_is_terminal() const { return err_is_terminal_; }
+  // Columns of the terminal on stdout; 80 where there is none.
+  unsigned width() const;
+
+  // `text` in a colour ("1" bold, "2" faint, "31" red, ...) where stdout is a terminal and NO_COLOR
+  // is not set (https://no-color.org).
+  std::string styled(std::string_view text, const char* code) const;
+
+ private:
+  std::FILE* out_;
+  std::FILE* err_;
+  bool out_is_terminal_;
+  bool err_is_terminal_;
+  bool colour_;
+  bool progress_shown_ = false;
+  double last_progress_s_ = -1;
+};
+
+// "1 h 02 min", "3 min 20 s", "12 s", "0.4 s".
+std::string format_duration(double seconds);
+// Six significant digits, "-" for none.
+std::string format_number(const std::optional<double>& value, int digits = 6);
+// "generation 41 of 100, 210/s, 12 s left": the text of a progress line.
+std::string progress_text(std::string_view what, double rate_per_s,
+                          std::optional<double> time_left_s);
+// `text` with control bytes as '?': what came from elsewhere cannot steer the terminal.
+std::string printable(std::string_view text);
+
+}  // namespace gapfarm

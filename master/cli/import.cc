@@ -1,0 +1,109 @@
+// gapfarm import FORMAT FILES: other programs' logs to the trial format.
+#include <filesystem>
+#include <memory>
+#include <set>
+
+#include "common/base/suggest.h"
+#include "common/problem/problem.h"
+#include "common/trials/files.h"
+#include "common/trials/format.h"
+#include "common/trials/read.h"
+#include "common/trials/write.h"
+#include "master/cli/subcommand.h"
+
+namespace gapfarm {
+namespace {
+
+struct ImportFormat {
+  const char* name;
+  TextFormat format;
+  const char* scenario;  // whose commands the log is in
+};
+
+constexpr ImportFormat kFormats[] = {{"bbautotune", TextFormat::kBbautotune, "srv1"}};
+
+struct ImportOptions {
+  std::string format;
+  std::vector<std::string> files;
+  std::string out;
+  bool force = false;
+};
+
+const ImportFormat* find_format(const std::string& name) {
+  for (const ImportFormat& format : kFormats) {
+    if (name == format.name) return &format;
+  }
+  return nullptr;
+}
+
+// OK when every file is what the user says it is.
+Status check_formats(const ImportOptions& options, const ImportFormat& wanted) {
+  for (const std::string& file : options.files) {
+    const Result<std::string> text = read_text_file(file);
+    if (!text) return text.error();
+    const TextFormat found = sniff_format(*text);
+    if (found != wanted.format) return wrong_format(file, found, format_name(wanted.format));
+  }
+  return {};
+}
+
+int run_import(const ImportOptions& options, CliContext& context) {
+  Console& console = context.console;
+  const ImportFormat* format = find_format(options.format);
+  if (!format) {
+    std::vector<std::string> known;
+    for (const ImportFormat& row : kFormats) known.emplace_back(row.name);
+    console.error(
+        Error{"unknown format '" + options.format + "'" + suggestion(options.format, known)});
+    return kExitBadUsage;
+  }
+  const bool to_stdout = options.out == "-";
+  std::error_code ignored;
+  if (!to_stdout && !options.force && std::filesystem::exists(options.out, ignored)) {
+    console.error(Error{options.out + ": exists already; give another --out, or --force to "
+                                      "replace it"});
+    return kExitBadUsage;
+  }
+  if (Status s = check_formats(options, *format); !s) {
+    console.error(s.error());
+    return kExitFailed;
+  }
+  std::vector<std::string> commands;
+  for (const CommandSpec& command : default_commands(format->scenario)) {
+    commands.push_back(command.name);
+  }
+  const Result<TrialLog> log = read_trial_files(options.files, commands);
+  if (!log) {
+    console.error(log.error());
+    return kExitFailed;
+  }
+  if (to_stdout) {
+    console.print(format_trials(*log));
+  } else if (Status s = write_trials(*log, options.out); !s) {
+    console.error(s.error());
+    return kExitFailed;
+  }
+  std::set<std::string> sessions;
+  for (const Trial& trial : log->trials) sessions.insert(trial.session);
+  console.note(std::to_string(log->trials.size()) + " trials in " +
+               std::to_string(sessions.size()) + " sessions" +
+               (to_stdout ? "" : " written to " + options.out));
+  return kExitDone;
+}
+
+}  // namespace
+
+SubcommandRun setup_import(CLI::App& app) {
+  auto options = std::make_shared<ImportOptions>();
+  app.add_option("FORMAT", options->format, "Format of the files: bbautotune")->required();
+  app.add_option("FILES", options->files, "Logs; each becomes a session")->required();
+  app.add_option("-o,--out", options->out, "Trial log to write; - for standard output")->required();
+  app.add_flag("--force", options->force, "Replace an existing trial log");
+  app.footer(
+      "Examples:\n"
+      "  gapfarm import bbautotune logs/*.dat --out trials.csv\n"
+      "  gapfarm import bbautotune logs/run1.dat --out - | head");
+  return [options](CliContext& context) { return run_import(*options, context); };
+}
+
+}  // namespace gapfarm

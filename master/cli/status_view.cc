@@ -1,0 +1,142 @@
+#include "master/cli/status_view.h"
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+namespace gapfarm {
+namespace {
+
+constexpr std::size_t kMostWorkers = 8;
+constexpr std::size_t kMostParameters = 12;
+
+const char* state_style(const RunStatus& status) {
+  switch (status.state) {
+    case RunState::kRunning:
+      return "1;32";
+    case RunState::kFinished:
+      return "1;34";
+    case RunState::kStopped:
+      return "1;33";
+  }
+  return "0";
+}
+
+std::string label(const Console& console, const std::string& name) {
+  return console.styled(name + std::string(name.size() < 12 ? 12 - name.size() : 1, ' '), "2");
+}
+
+std::string best_values(const RunStatus& status, const Console& console) {
+  if (!status.best_individual) return {};
+  const auto values = nlohmann::ordered_json::parse(status.best_individual->values, nullptr, false);
+  if (!values.is_object() || values.empty()) return {};
+  std::size_t widest = 0, shown = 0;
+  for (const auto& [key, value] : values.items()) widest = std::max(widest, key.size());
+  std::string text;
+  for (const auto& [key, value] : values.items()) {
+    if (shown++ == kMostParameters) {
+      text += label(console, "") + "... " + std::to_string(values.size() - kMostParameters) +
+              " more with --json\n";
+      break;
+    }
+    const std::string shown_value =
+        value.is_number_float() ? format_number(value.get<double>())
+                                : (value.is_string() ? value.get<std::string>() : value.dump());
+    text += label(console, shown == 1 ? "best" : "") + printable(key) +
+            std::string(widest - key.size() + 2, ' ') + printable(shown_value) + "\n";
+  }
+  return text;
+}
+
+std::string worker_lines(const RunStatus& status, const Console& console) {
+  std::string text;
+  const std::vector<StoredWorker>& workers = status.progress.workers;
+  for (std::size_t i = 0; i < workers.size(); ++i) {
+    if (i == kMostWorkers) {
+      text +=
+          label(console, "") + "... " + std::to_string(workers.size() - i) + " more with --json\n";
+      break;
+    }
+    const StoredWorker& worker = workers[i];
+    text += label(console, i == 0 ? "workers" : "") + printable(worker.name) + " on " +
+            printable(worker.host) + ": " + printable(worker.state) + ", " +
+            std::to_string(worker.jobs) + " in hand, " + std::to_string(worker.finished) +
+            " done\n";
+  }
+  return text;
+}
+
+}  // namespace
+
+std::string sparkline(const std::vector<std::optional<double>>& values, std::size_t width,
+                      bool higher_is_better) {
+  static constexpr const char* kBlocks[] = {"▁", "▂", "▃", "▄", "▅", "▆", "▇", "█"};
+  std::vector<double> sorted;
+  for (const std::optional<double>& value : values) {
+    if (value && std::isfinite(*value)) sorted.push_back(*value);
+  }
+  std::sort(sorted.begin(), sorted.end());
+  if (sorted.empty() || width == 0) return {};
+  const std::size_t tenth = sorted.size() / 10;
+  const double low = sorted[higher_is_better ? tenth : 0];
+  const double high = sorted[sorted.size() - 1 - (higher_is_better ? 0 : tenth)];
+
+  const std::size_t columns = std::min(width, values.size());
+  std::string line;
+  for (std::size_t c = 0; c < columns; ++c) {
+    const std::optional<double>& value = values[(c + 1) * values.size() / columns - 1];
+    if (!value || !std::isfinite(*value)) {
+      line += ' ';
+      continue;
+    }
+    const double share = high > low ? std::clamp((*value - low) / (high - low), 0.0, 1.0) : 0.5;
+    line += kBlocks[std::min(7, static_cast<int>(share * 8))];
+  }
+  return line;
+}
+
+std::string status_screen(const RunStatus& status, const std::string& run, const Console& console) {
+  std::string text = console.styled(run, "1") + "  " +
+                     console.styled(run_state_name(status.state), state_style(status));
+  if (!status.stop_reason.empty()) text += ": " + printable(status.stop_reason);
+  text += "\n";
+
+  text += label(console, "generation") + std::to_string(status.generation);
+  if (status.state == RunState::kRunning && status.progress.total > 0) {
+    text += ", and " + std::to_string(status.progress.done) + " of " +
+            std::to_string(status.progress.total) + " tasks of the next";
+  }
+  text += "\n" + label(console, "evaluations") + std::to_string(status.evaluations) + ", " +
+          format_number(status.rate_per_s, 3) + "/s";
+  if (status.state == RunState::kRunning && status.time_left_s) {
+    text += ", " + format_duration(*status.time_left_s) + " left";
+  }
+  if (status.state != RunState::kRunning) text += ", in " + format_duration(status.wall_s);
+  text += "\n" + label(console, "fitness") + status.info.fitness;
+  if (status.info.fitness_unit != "-") text += " (" + status.info.fitness_unit + ")";
+  text += status.info.higher_is_better ? ", higher is better" : ", lower is better";
+  if (status.generation > 0) {
+    text += "\n" + label(console, "") + "best " + format_number(status.best) + ", mean " +
+            format_number(status.mean) + ", worst " + format_number(status.worst);
+    const std::size_t columns = std::min<std::size_t>(60, std::max(20u, console.width()) - 13);
+    text += "\n" + label(console, "") +
+            sparkline(status.best_by_generation, columns, status.info.higher_is_better) +
+            console.styled(" best by generation", "2");
+  }
+  text += "\n";
+  text += best_values(status, console) + worker_lines(status, console);
+  if (status.state == RunState::kRunning && status.heartbeat_age_s > 5) {
+    text += label(console, "heartbeat") + format_duration(status.heartbeat_age_s) + " ago\n";
+  }
+  if (status.quarantined > 0) {
+    text += label(console, "given up") + std::to_string(status.quarantined) + " tasks\n";
+  }
+  text += label(console, "seed") + std::to_string(status.info.seed) + "\n";
+  if (!status.digest.empty()) text += label(console, "digest") + status.digest + "\n";
+  if (status.state == RunState::kStopped) {
+    text += label(console, "go on with") + "gapfarm resume " + run + "\n";
+  }
+  return text;
+}
+
+}  // namespace gapfarm

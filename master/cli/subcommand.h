@@ -1,0 +1,45 @@
+// What a subcommand is.  Adding one takes its file with a setup function, that function's
+// declaration here, and a row in the table of subcommands.cc.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <functional>
+#include <span>
+
+#include "common/process/stop.h"
+#include "master/cli/console.h"
+
+namespace gapfarm {
+
+enum ExitCode : int {
+  kExitDone = 0,
+  kExitFailed = 1,
+  kExitBadUsage = 2,      // wrong usage or config
+  kExitQuarantined = 3,   // done, but some tasks were given up
+  kExitResumable = 85,    // stopped at a checkpoint
+  kExitSignalBase = 128,  // + the signal: 130, 143
+};
+
+struct CliContext {
+  Console& console;
+  StopSource& stop;  // requested by SIGINT and SIGTERM; a second one ends the program at once
+};
+
+// Runs after the command line was parsed; returns an ExitCode.
+using SubcommandRun = std::function<int(CliContext&)>;
+
+struct Subcommand {
+  const char* name;
+  const char* summary;  // one line
+  const char* group;    // heading in `gapfarm --help`
+  // Declares options and examples on `app` and returns what to run; the options live in it.
+  SubcommandRun (*setup)(CLI::App& app);
+};
+
+std::span<const Subcommand> subcommands();
+
+SubcommandRun setup_check(CLI::App& app);
+SubcommandRun setup_import(CLI::App& app);
+SubcommandRun setup_status(CLI::App& app);
+
+}  // namespace gapfarm
