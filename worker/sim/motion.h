@@ -24,13 +24,13 @@ struct SimSettings {
   double friction_ratio = 1;       // lateral over longitudinal
   double gravity_m_s2 = 9.81;
   double step_rate_hz = 240;
-  int sub_steps = 1;               // physics steps a step of 1/step_rate
-  int solver_iterations = 10;
+  int sub_steps = 1;           // physics steps a step of 1/step_rate
+  int solver_iterations = 10;  // sweeps a physics step; the wheel model makes three times as many
   double restitution = 0;
-  double linear_damping = 0;       // Bullet's: share lost a second, [0, 1]
+  double linear_damping = 0;  // Bullet's: share lost a second, [0, 1]
   double angular_damping = 0;
-  double com_x_m = 0;              // centre of mass ahead of the tread centre
-  double com_y_m = 0;              // and to its left
+  double com_x_m = 0;  // centre of mass ahead of the tread centre
+  double com_y_m = 0;  // and to its left
   // wheels only
   WheelShape wheel_shape = WheelShape::kSphere;
   double maximum_velocity_rad_s = 20;  // of a wheel at full duty
@@ -53,13 +53,13 @@ struct DriveInput {
 
 // What the floor does, seen from S.
 struct Floor {
-  double tilt_rad = 0;            // the floor falls away toward tilt_direction_rad
+  double tilt_rad = 0;  // the floor falls away toward tilt_direction_rad
   double tilt_direction_rad = 0;
   double nap_strength = 0;        // drag as a share of weight times (1 - cos(angle between the
   double nap_direction_rad = 0;   //  velocity and the nap)) / 2
   double rolling_resistance = 0;  // drag opposing motion along the body's x, share of weight
   double patch_x_m = 0, patch_y_m = 0, patch_radius_m = 0;
-  double patch_ratio = 1;         // friction inside the disc over friction outside
+  double patch_ratio = 1;  // friction inside the disc over friction outside
 };
 
 enum class MotionOutcome { kOk, kDiverged, kFellOver, kNeverRested };
@@ -67,7 +67,7 @@ const char* outcome_name(MotionOutcome outcome);
 
 struct MotionSample {
   double t_s = 0;
-  Pose X_SB;  // turning centre
+  Pose X_SB;            // turning centre
   double height_m = 0;  // of the body's origin above its resting height
   double roll_rad = 0;
   double pitch_rad = 0;
@@ -76,10 +76,10 @@ struct MotionSample {
 
 struct Motion {
   MotionOutcome outcome = MotionOutcome::kOk;
-  Pose X_SE;              // end pose of the tread centre, start frame; the heading is unwrapped
-                          // by nothing: it lies in (-pi, pi]
-  double rest_time_s = 0; // from the motors' stop to rest
-  double duration_s = 0;  // simulated time
+  Pose X_SE;               // end pose of the tread centre, start frame; the heading is unwrapped
+                           // by nothing: it lies in (-pi, pi]
+  double rest_time_s = 0;  // from the motors' stop to rest
+  double duration_s = 0;   // simulated time
   double max_roll_rad = 0, max_pitch_rad = 0, max_heave_m = 0;
 };
 

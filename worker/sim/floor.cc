@@ -1,0 +1,41 @@
+#include "worker/sim/floor.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace gapfarm {
+
+Eigen::Vector3d gravity_in_start_frame(const Floor& floor, double gravity_m_s2) {
+  const double along = gravity_m_s2 * std::sin(floor.tilt_rad);
+  return {along * std::cos(floor.tilt_direction_rad), along * std::sin(floor.tilt_direction_rad),
+          -gravity_m_s2 * std::cos(floor.tilt_rad)};
+}
+
+double patch_factor(const Floor& floor, double x_m, double y_m) {
+  if (floor.patch_radius_m <= 0 || floor.patch_ratio == 1) return 1;
+  const double distance = std::hypot(x_m - floor.patch_x_m, y_m - floor.patch_y_m);
+  const double inside =
+      std::clamp((floor.patch_radius_m - distance) / kPatchEdge_m + 0.5, 0.0, 1.0);
+  return 1 + (floor.patch_ratio - 1) * inside * inside * (3 - 2 * inside);
+}
+
+Eigen::Vector2d drag_acceleration(const Floor& floor, double gravity_m_s2,
+                                  const Eigen::Vector2d& velocity, const Eigen::Vector2d& ahead,
+                                  double dt_s) {
+  Eigen::Vector2d drag = Eigen::Vector2d::Zero();
+  if (floor.nap_strength != 0) {
+    const double speed = std::sqrt(velocity.squaredNorm() + kDragSpeed_m_s * kDragSpeed_m_s);
+    const Eigen::Vector2d nap(std::cos(floor.nap_direction_rad), std::sin(floor.nap_direction_rad));
+    const double against = (1 - velocity.dot(nap) / speed) / 2;
+    const double k = floor.nap_strength * gravity_m_s2 * against;
+    drag -= k / (speed + k * dt_s) * velocity;
+  }
+  if (floor.rolling_resistance != 0) {
+    const double v = velocity.dot(ahead);
+    const double k = floor.rolling_resistance * gravity_m_s2;
+    drag -= k * v / (std::sqrt(v * v + kDragSpeed_m_s * kDragSpeed_m_s) + k * dt_s) * ahead;
+  }
+  return drag;
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,204 @@
+#include "worker/sim/solver.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace gapfarm {
+namespace {
+
+// The moving side of a contact row; the floor's side has neither mass nor velocity.
+struct MovingSide {
+  btSolverBody& body;
+  const btVector3& linear;   // direction of the row
+  const btVector3& torque;   // its moment about the body's centre
+  const btVector3& angular;  // inverse inertia times that
+
+  // Velocity along the row that the impulses of this solve have made so far, m/s.
+  double velocity() const {
+    return linear.dot(body.internalGetDeltaLinearVelocity()) +
+           torque.dot(body.internalGetDeltaAngularVelocity());
+  }
+  double push_velocity() const {
+    return linear.dot(body.internalGetPushVelocity()) + torque.dot(body.internalGetTurnVelocity());
+  }
+  void apply(double impulse) const {
+    const double inverse_mass = body.internalGetInvMass().x();
+    body.internalGetDeltaLinearVelocity() += linear * (inverse_mass * impulse);
+    body.internalGetDeltaAngularVelocity() += angular * impulse;
+  }
+  void apply_push(double impulse) const {
+    const double inverse_mass = body.internalGetInvMass().x();
+    body.internalGetPushVelocity() += linear * (inverse_mass * impulse);
+    body.internalGetTurnVelocity() += angular * impulse;
+  }
+};
+
+MovingSide moving_side(btAlignedObjectArray<btSolverBody>& bodies, const btSolverConstraint& row) {
+  btSolverBody& a = bodies[row.m_solverBodyIdA];
+  if (a.m_originalBody != nullptr) {
+    return {a, row.m_contactNormal1, row.m_relpos1CrossNormal, row.m_angularComponentA};
+  }
+  return {bodies[row.m_solverBodyIdB], row.m_contactNormal2, row.m_relpos2CrossNormal,
+          row.m_angularComponentB};
+}
+
+// The impulses (p1, p2) that minimise a1 (p1 - free1)^2 + a2 (p2 - free2)^2, where a is the inverse
+// effective mass along a row, within p1^2 + (p2 / ratio)^2 <= radius^2.  Outside the ellipse the
+// multiplier solves a secular equation; two steps of Newton on 1/|u| (More and Sorensen 1983) are
+// exact for a1 = ratio^2 a2 and good to a fraction of a percent otherwise, and the last line puts
+// the result onto the ellipse whatever the multiplier's error.
+void project_onto_ellipse(double a1, double a2, double ratio, double radius, double& p1,
+                          double& p2) {
+  double u1 = p1;
+  double u2 = p2 / ratio;
+  double length_2 = u1 * u1 + u2 * u2;
+  if (length_2 <= radius * radius) return;
+  if (radius <= 0) {
+    p1 = p2 = 0;
+    return;
+  }
+  const double h1 = a1;
+  const double h2 = a2 * ratio * ratio;
+  const double g1 = h1 * u1;
+  const double g2 = h2 * u2;
+  double multiplier = 0;
+  for (int i = 0; i < 2; ++i) {
+    const double slope = u1 * u1 / (h1 + multiplier) + u2 * u2 / (h2 + multiplier);
+    multiplier += length_2 / slope * (std::sqrt(length_2) / radius - 1);
+    u1 = g1 / (h1 + multiplier);
+    u2 = g2 / (h2 + multiplier);
+    length_2 = u1 * u1 + u2 * u2;
+  }
+  const double scale = radius / std::sqrt(length_2);
+  p1 = u1 * scale;
+  p2 = u2 * scale * ratio;
+}
+
+}  // namespace
+
+void EllipseFrictionSolver::convertContacts(btPersistentManifold** manifolds, int count,
+                                            const btContactSolverInfo& info) {
+  btSequentialImpulseConstraintSolver::convertContacts(manifolds, count, info);
+  for (int c = 0; c < m_tmpSolverContactConstraintPool.size(); ++c) {
+    const btSolverConstraint& normal = m_tmpSolverContactConstraintPool[c];
+    const auto& point = *static_cast<const btManifoldPoint*>(normal.m_originalContactPoint);
+    for (int d = 0; d < 2; ++d) {
+      btSolverConstraint& row =
+          m_tmpSolverContactFrictionConstraintPool[normal.m_frictionIndex + d];
+      row.m_appliedImpulse = info.m_warmstartingFactor * (d == 0 ? point.m_appliedImpulseLateral1
+                                                                 : point.m_appliedImpulseLateral2);
+      moving_side(m_tmpSolverBodyPool, row).apply(row.m_appliedImpulse);
+    }
+  }
+}
+
+void EllipseFrictionSolver::convertJoints(btTypedConstraint** constraints, int count,
+                                          const btContactSolverInfo& info) {
+  btSequentialImpulseConstraintSolver::convertJoints(constraints, count, info);
+  btConstraintArray& rows = m_tmpSolverNonContactConstraintPool;
+  if (static_cast<int>(joint_impulses_.size()) != rows.size()) return;
+  for (int j = 0; j < rows.size(); ++j) {
+    btSolverConstraint& row = rows[j];
+    row.m_appliedImpulse = std::clamp(joint_impulses_[j], row.m_lowerLimit, row.m_upperLimit);
+    btSolverBody& a = m_tmpSolverBodyPool[row.m_solverBodyIdA];
+    btSolverBody& b = m_tmpSolverBodyPool[row.m_solverBodyIdB];
+    a.internalApplyImpulse(row.m_contactNormal1 * a.internalGetInvMass(), row.m_angularComponentA,
+                           row.m_appliedImpulse);
+    b.internalApplyImpulse(row.m_contactNormal2 * b.internalGetInvMass(), row.m_angularComponentB,
+                           row.m_appliedImpulse);
+  }
+}
+
+btScalar EllipseFrictionSolver::solveGroupCacheFriendlyFinish(btCollisionObject** bodies,
+                                                              int body_count,
+                                                              const btContactSolverInfo& info) {
+  const btConstraintArray& rows = m_tmpSolverNonContactConstraintPool;
+  joint_impulses_.resize(rows.size());
+  for (int j = 0; j < rows.size(); ++j) joint_impulses_[j] = rows[j].m_appliedImpulse;
+  return btSequentialImpulseConstraintSolver::solveGroupCacheFriendlyFinish(bodies, body_count,
+                                                                            info);
+}
+
+void EllipseFrictionSolver::reset() {
+  btSequentialImpulseConstraintSolver::reset();
+  joint_impulses_.clear();
+}
+
+double EllipseFrictionSolver::solve_normals() {
+  double residual = 0;
+  for (int c = 0; c < m_tmpSolverContactConstraintPool.size(); ++c) {
+    btSolverConstraint& row = m_tmpSolverContactConstraintPool[c];
+    const MovingSide side = moving_side(m_tmpSolverBodyPool, row);
+    const double old = row.m_appliedImpulse;
+    const double free = old + row.m_rhs - old * row.m_cfm - side.velocity() * row.m_jacDiagABInv;
+    const double impulse = std::max(0.0, free);
+    row.m_appliedImpulse = impulse;
+    side.apply(impulse - old);
+    residual = std::max(residual, std::abs(impulse - old) / row.m_jacDiagABInv);
+  }
+  return residual;
+}
+
+double EllipseFrictionSolver::solve_friction() {
+  double residual = 0;
+  for (int c = 0; c < m_tmpSolverContactConstraintPool.size(); ++c) {
+    const btSolverConstraint& normal = m_tmpSolverContactConstraintPool[c];
+    btSolverConstraint* rows = &m_tmpSolverContactFrictionConstraintPool[normal.m_frictionIndex];
+    const MovingSide side_1 = moving_side(m_tmpSolverBodyPool, rows[0]);
+    const MovingSide side_2 = moving_side(m_tmpSolverBodyPool, rows[1]);
+    const double old_1 = rows[0].m_appliedImpulse;
+    const double old_2 = rows[1].m_appliedImpulse;
+    double p1 = old_1 + rows[0].m_rhs - side_1.velocity() * rows[0].m_jacDiagABInv;
+    double p2 = old_2 + rows[1].m_rhs - side_2.velocity() * rows[1].m_jacDiagABInv;
+    const double a1 = 1 / rows[0].m_jacDiagABInv;
+    const double a2 = 1 / rows[1].m_jacDiagABInv;
+    project_onto_ellipse(a1, a2, ratio_, rows[0].m_friction * normal.m_appliedImpulse, p1, p2);
+    rows[0].m_appliedImpulse = p1;
+    rows[1].m_appliedImpulse = p2;
+    side_1.apply(p1 - old_1);
+    side_2.apply(p2 - old_2);
+    residual = std::max({residual, std::abs(p1 - old_1) * a1, std::abs(p2 - old_2) * a2});
+  }
+  return residual;
+}
+
+btScalar EllipseFrictionSolver::solveSingleIteration(
+    int /*iteration*/, btCollisionObject** /*bodies*/, int /*body_count*/,
+    btPersistentManifold** /*manifolds*/, int /*manifold_count*/,
+    btTypedConstraint** /*constraints*/, int /*constraint_count*/,
+    const btContactSolverInfo& /*info*/, btIDebugDraw* /*drawer*/) {
+  double residual = 0;
+  for (int j = 0; j < m_tmpSolverNonContactConstraintPool.size(); ++j) {
+    const btSolverConstraint& row = m_tmpSolverNonContactConstraintPool[j];
+    const double change = resolveSingleConstraintRowGeneric(
+        m_tmpSolverBodyPool[row.m_solverBodyIdA], m_tmpSolverBodyPool[row.m_solverBodyIdB], row);
+    residual = std::max(residual, std::abs(change));
+  }
+  residual = std::max(residual, solve_normals());
+  residual = std::max(residual, solve_friction());
+  return residual * residual;
+}
+
+void EllipseFrictionSolver::solveGroupCacheFriendlySplitImpulseIterations(
+    btCollisionObject** /*bodies*/, int /*body_count*/, btPersistentManifold** /*manifolds*/,
+    int /*manifold_count*/, btTypedConstraint** /*constraints*/, int /*constraint_count*/,
+    const btContactSolverInfo& info, btIDebugDraw* /*drawer*/) {
+  for (int iteration = 0; iteration < info.m_numIterations; ++iteration) {
+    double residual = 0;
+    for (int c = 0; c < m_tmpSolverContactConstraintPool.size(); ++c) {
+      btSolverConstraint& row = m_tmpSolverContactConstraintPool[c];
+      if (row.m_rhsPenetration == 0) continue;
+      const MovingSide side = moving_side(m_tmpSolverBodyPool, row);
+      const double old = row.m_appliedPushImpulse;
+      const double free =
+          old + row.m_rhsPenetration - old * row.m_cfm - side.push_velocity() * row.m_jacDiagABInv;
+      const double impulse = std::max(0.0, free);
+      row.m_appliedPushImpulse = impulse;
+      side.apply_push(impulse - old);
+      residual = std::max(residual, std::abs(impulse - old) / row.m_jacDiagABInv);
+    }
+    if (residual * residual <= info.m_leastSquaresResidualThreshold) return;
+  }
+}
+
+}  // namespace gapfarm

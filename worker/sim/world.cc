@@ -1,0 +1,152 @@
+#include "worker/sim/world.h"
+
+#include "worker/sim/floor.h"
+
+namespace gapfarm {
+namespace {
+
+// Contacts give a little: load sharing among four supports has one answer instead of many.
+constexpr double kContactSoftness = 1e-3;
+// Velocity change, squared, (m/s)^2, below which the solver stops iterating early.
+constexpr double kConverged = 1e-20;
+
+// Sweeps of the wheel model for each of the setting's: with its joints to satisfy it takes three
+// to reach the same left/right mirror error.
+constexpr int kJointIterations = 3;
+
+btDefaultCollisionConstructionInfo small_pools() {
+  btDefaultCollisionConstructionInfo info;
+  info.m_defaultMaxPersistentManifoldPoolSize = 32;
+  info.m_defaultMaxCollisionAlgorithmPoolSize = 32;
+  return info;
+}
+
+void configure(btContactSolverInfo& info, const SimSettings& settings) {
+  info.m_solverMode = SOLVER_USE_WARMSTARTING | SOLVER_USE_2_FRICTION_DIRECTIONS |
+                      SOLVER_ENABLE_FRICTION_DIRECTION_CACHING;
+  info.m_warmstartingFactor = 1;
+  const bool joints = settings.robot == RobotModel::kWheels;
+  info.m_numIterations = settings.solver_iterations * (joints ? kJointIterations : 1);
+  info.m_leastSquaresResidualThreshold = kConverged;
+  info.m_globalCfm = 0;  // joints are stiff, contacts carry their own softness
+  info.m_splitImpulse = 1;
+  info.m_splitImpulsePenetrationThreshold = 0;
+}
+
+}  // namespace
+
+double body_kinetic_energy(const btRigidBody& body) {
+  const btVector3 w = body.getAngularVelocity() * body.getWorldTransform().getBasis();
+  const btVector3& inverse = body.getInvInertiaDiagLocal();
+  double energy = body.getLinearVelocity().length2() / body.getInvMass();
+  for (int i = 0; i < 3; ++i) energy += w[i] * w[i] / inverse[i];
+  return energy / 2;
+}
+
+WorldParts::WorldParts(const SimSettings& settings)
+    : configuration(small_pools()), dispatcher(&configuration), solver(settings.friction_ratio) {
+  dispatcher.setDispatcherFlags(0);  // breaking distance absolute: it must not depend on shapes
+}
+
+RobotWorld::RobotWorld(const SimSettings& settings)
+    : WorldParts(settings),
+      btDiscreteDynamicsWorld(&dispatcher, &broadphase, &solver, &configuration),
+      settings_(settings),
+      step_s_(1 / (settings.step_rate_hz * settings.sub_steps)),
+      damped_(settings.linear_damping > 0 || settings.angular_damping > 0),
+      plane_(btVector3(0, 0, 1), 0),
+      robot_(settings.robot == RobotModel::kTreads ? make_treads(settings)
+                                                   : make_wheels(settings)) {
+  getDispatchInfo().m_useContinuous = false;
+  configure(getSolverInfo(), settings);
+}
+
+RobotWorld::~RobotWorld() { clear(); }
+
+void RobotWorld::clear() {
+  if (!occupied_) return;
+  robot_->leave(*this);
+  removeRigidBody(floor_body_.get());
+  occupied_ = false;
+}
+
+void RobotWorld::reset(const Floor& floor) {
+  clear();
+  broadphase.resetPool(&dispatcher);
+  solver.reset();
+  floor_ = floor;
+  const Eigen::Vector3d gravity = gravity_in_start_frame(floor, settings_.gravity_m_s2);
+  setGravity(btVector3(gravity.x(), gravity.y(), gravity.z()));
+
+  btRigidBody::btRigidBodyConstructionInfo info(0, nullptr, &plane_);
+  info.m_restitution = 1;  // restitutions multiply: the robot's is the setting
+  floor_body_ = std::make_unique<btRigidBody>(info);
+  addRigidBody(floor_body_.get(), kFloorGroup, kContactGroup);
+  robot_->enter(*this);
+  occupied_ = true;
+}
+
+void RobotWorld::step(const SideSpeeds& speeds) {
+  robot_->drive(speeds, step_s_);
+  if (floor_.nap_strength != 0 || floor_.rolling_resistance != 0) apply_drag();
+  stepSimulation(step_s_, 0);
+}
+
+void RobotWorld::apply_drag() {
+  btRigidBody& body = robot_->body();
+  const btVector3 forward = body.getWorldTransform().getBasis().getColumn(0);
+  const Eigen::Vector2d ahead = Eigen::Vector2d(forward.x(), forward.y()).normalized();
+  const btVector3& velocity = body.getLinearVelocity();
+  const Eigen::Vector2d drag = drag_acceleration(floor_, settings_.gravity_m_s2,
+                                                 {velocity.x(), velocity.y()}, ahead, step_s_);
+  body.applyCentralForce(settings_.mass_kg * btVector3(drag.x(), drag.y(), 0));
+}
+
+void RobotWorld::predictUnconstraintMotion(btScalar dt_s) {
+  if (!damped_) return;
+  for (int i = 0; i < m_nonStaticRigidBodies.size(); ++i) {
+    m_nonStaticRigidBodies[i]->applyDamping(dt_s);
+  }
+}
+
+// Writes friction and the surface's own speed into every contact with the floor.
+void RobotWorld::prepare_contacts() {
+  const btRigidBody& body = robot_->body();
+  const SideSpeeds speeds = robot_->contact_speeds();
+  const double middle_y = robot_->turning_centre().y();
+  btVector3 ahead = body.getWorldTransform().getBasis().getColumn(0);
+  ahead.setZ(0);
+  // Standing on its end the robot has fallen over and the run ends; any direction will do.
+  ahead = ahead.length2() > 1e-12 ? ahead.normalized() : btVector3(1, 0, 0);
+  const btVector3 left(-ahead.y(), ahead.x(), 0);
+  for (int m = 0; m < dispatcher.getNumManifolds(); ++m) {
+    btPersistentManifold* manifold = dispatcher.getInternalManifoldPointer()[m];
+    const bool floor_is_second = manifold->getBody1() == floor_body_.get();
+    for (int i = 0; i < manifold->getNumContacts(); ++i) {
+      btManifoldPoint& point = manifold->getContactPoint(i);
+      const btVector3& on_robot = floor_is_second ? point.m_localPointA : point.m_localPointB;
+      const double speed = on_robot.y() > middle_y ? speeds.left : speeds.right;
+      const btVector3& on_floor = point.getPositionWorldOnB();
+      point.m_lateralFrictionDir1 = ahead;
+      point.m_lateralFrictionDir2 = left;
+      // Wanted velocity of the first body over the second where they touch.
+      point.m_contactMotion1 = floor_is_second ? speed : -speed;
+      point.m_contactCFM = kContactSoftness;
+      point.m_contactERP = getSolverInfo().m_erp2;
+      point.m_contactPointFlags |=
+          BT_CONTACT_FLAG_LATERAL_FRICTION_INITIALIZED | BT_CONTACT_FLAG_HAS_CONTACT_CFM;
+      point.m_combinedFriction =
+          settings_.friction * patch_factor(floor_, on_floor.x(), on_floor.y());
+    }
+  }
+}
+
+void RobotWorld::solveConstraints(btContactSolverInfo& info) {
+  prepare_contacts();
+  solver.solveGroup(&m_collisionObjects[0], m_collisionObjects.size(),
+                    dispatcher.getInternalManifoldPointer(), dispatcher.getNumManifolds(),
+                    m_constraints.size() > 0 ? &m_constraints[0] : nullptr, m_constraints.size(),
+                    info, nullptr, &dispatcher);
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,98 @@
+// A Bullet world for one robot on one plane, and what a robot must offer to live in it.
+#pragma once
+
+#include <memory>
+
+#include "worker/sim/bullet.h"
+#include "worker/sim/motion.h"
+#include "worker/sim/solver.h"
+
+namespace gapfarm {
+
+// Surface speeds of the two sides, m/s, positive when they drive the robot ahead.
+struct SideSpeeds {
+  double left = 0;
+  double right = 0;
+};
+
+// Broadphase groups: the floor meets the parts that touch it, and nothing else meets anything.
+inline constexpr int kFloorGroup = 1;
+inline constexpr int kContactGroup = 2;
+inline constexpr int kGhostGroup = 4;
+
+// Rigid bodies and joints.  enter() makes all of them anew, so nothing survives from an earlier
+// run.
+class Robot {
+ public:
+  virtual ~Robot() = default;
+  // Adds the robot at rest, turning centre at the origin of S, heading along x.
+  virtual void enter(btDiscreteDynamicsWorld& world) = 0;
+  virtual void leave(btDiscreteDynamicsWorld& world) = 0;
+  // Told before every physics step of `dt_s`.
+  virtual void drive(const SideSpeeds& speeds, double dt_s) = 0;
+  // Speeds that the floor contacts themselves impose; zero for a robot that drives by joints.
+  virtual SideSpeeds contact_speeds() const = 0;
+  // REQUIRES for these: the robot is in a world.
+  virtual btRigidBody& body() = 0;
+  virtual double kinetic_energy() const = 0;  // J
+  // The turning centre (on the floor when at rest) in the body's frame, m.
+  virtual btVector3 turning_centre() const = 0;
+};
+
+std::unique_ptr<Robot> make_treads(const SimSettings& settings);
+std::unique_ptr<Robot> make_wheels(const SimSettings& settings);
+
+// m_invInertia of a body in its own frame apart: 1/2 m v^2 + 1/2 w I w, J.
+double body_kinetic_energy(const btRigidBody& body);
+
+// What Bullet's world is built from; a base class so that it outlives the world.
+struct WorldParts {
+  explicit WorldParts(const SimSettings& settings);
+
+  btDefaultCollisionConfiguration configuration;
+  btCollisionDispatcher dispatcher;
+  btDbvtBroadphase broadphase;
+  EllipseFrictionSolver solver;
+};
+
+// Bullet's step without what one robot on an unbounded plane never needs: no islands, no sleeping,
+// no motion states, and no search for new pairs (every pair has the plane, whose bounding box is
+// unbounded, so pairs last from insertion to removal).
+class RobotWorld final : private WorldParts, public btDiscreteDynamicsWorld {
+ public:
+  explicit RobotWorld(const SimSettings& settings);
+  ~RobotWorld() override;
+
+  // Puts the robot at the start, in a state that no earlier run has touched.
+  void reset(const Floor& floor);
+  // One physics step of 1 / (step_rate * sub_steps) seconds.
+  void step(const SideSpeeds& speeds);
+
+  Robot& robot() { return *robot_; }
+  double step_s() const { return step_s_; }
+
+ private:
+  void solveConstraints(btContactSolverInfo& info) override;
+  void predictUnconstraintMotion(btScalar dt_s) override;
+  void createPredictiveContacts(btScalar /*dt_s*/) override {}
+  void calculateSimulationIslands() override {}
+  void updateActivationState(btScalar /*dt_s*/) override {}
+  void synchronizeMotionStates() override {}
+  void updateAabbs() override {}
+  void computeOverlappingPairs() override {}
+
+  void clear();
+  void apply_drag();
+  void prepare_contacts();
+
+  SimSettings settings_;
+  double step_s_;
+  bool damped_;
+  Floor floor_;
+  btStaticPlaneShape plane_;
+  std::unique_ptr<btRigidBody> floor_body_;
+  std::unique_ptr<Robot> robot_;
+  bool occupied_ = false;
+};
+
+}  // namespace gapfarm
