@@ -188,9 +188,12 @@ bool ProcessPool::exhausted() const {
   });
 }
 
-std::size_t ProcessPool::running() const {
-  return static_cast<std::size_t>(std::count_if(places_.begin(), places_.end(),
-                                                [](const Place& place) { return place.pid != 0; }));
+std::vector<pid_t> ProcessPool::pids() const {
+  std::vector<pid_t> pids;
+  for (const Place& place : places_) {
+    if (place.pid != 0) pids.push_back(place.pid);
+  }
+  return pids;
 }
 
 std::vector<int> ProcessPool::fds() const {

@@ -65,7 +65,8 @@ class ProcessPool {
   void confirm(const std::string& name);
   // No child runs and none will be started.
   bool exhausted() const;
-  std::size_t running() const;
+  std::size_t running() const { return pids().size(); }
+  std::vector<pid_t> pids() const;  // of the running children
 
   // Readable when a child has ended; for poll().
   std::vector<int> fds() const;

@@ -1,0 +1,216 @@
+#include "master/farm/socket_farm.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <random>
+
+#include "common/base/build_info.h"
+#include "common/net/envelope.h"
+#include "common/net/socket.h"
+#include "common/problem/problem.h"
+#include "master/farm/local_workers.h"
+#include "master/farm/pump.h"
+
+namespace gapfarm {
+namespace {
+
+constexpr double kProgressInterval = 0.1;  // s
+constexpr double kReapInterval = 0.05;     // s, while messages keep the loop busy
+
+void complain(const FarmEvent& event) {
+  switch (event.kind) {
+    case FarmEvent::kJoined:
+    case FarmEvent::kReturned:
+    case FarmEvent::kLeft:
+      return;
+    default:
+      std::fprintf(stderr, "gapfarm: worker %s: %s\n",
+                   event.worker.empty() ? "(unknown)" : event.worker.c_str(), event.text.c_str());
+  }
+}
+
+std::uint64_t draw_epoch() {
+  std::random_device device;
+  return (std::uint64_t{device()} << 32 | device()) | 1;
+}
+
+}  // namespace
+
+struct SocketFarm::Impl {
+  SocketFarmOptions options;
+  // Ends in the reverse order: workers first, then the socket, then the folder it lives in.
+  std::unique_ptr<PrivateFolder> folder;
+  std::unique_ptr<RouterSocket> socket;
+  std::unique_ptr<LocalWorkers> locals;
+  std::unique_ptr<Scheduler> scheduler;
+  std::vector<std::string> endpoints;
+  std::string last_trouble;  // why workers do not come
+  Status bad_problem;        // of the latest add_problem()
+  double next_reap = 0;
+
+  Status open();
+  Status open_local();
+  void on_event(const FarmEvent& event);
+  void reap(double now);
+  Status workers_can_be_had();
+  void sleep(double now);
+  Status loop(const std::function<void(const FarmProgress&)>& on_progress);
+};
+
+void SocketFarm::Impl::on_event(const FarmEvent& event) {
+  if (event.kind == FarmEvent::kJoined && locals) locals->pool().confirm(event.worker);
+  if (event.kind == FarmEvent::kRefused) last_trouble = event.text;
+  (options.on_event ? options.on_event : complain)(event);
+}
+
+Status SocketFarm::Impl::open() {
+  if (options.local_workers == 0 && options.listen.empty()) {
+    return Error{"the farm has no local workers and listens nowhere; give it one or the other"};
+  }
+  SchedulerOptions settings;
+  settings.epoch = options.epoch != 0 ? options.epoch : draw_epoch();
+  settings.admittance = {build_info().fingerprint, options.numeric_class,
+                         options.allow_mixed_numeric_classes};
+  settings.window = options.window;
+  settings.heartbeat_interval_s = options.heartbeat_interval_s;
+  settings.silence_limit_s = options.silence_limit_s;
+  settings.shuffle_seed = options.shuffle_seed;
+  settings.on_event = [this](const FarmEvent& event) { on_event(event); };
+  scheduler = std::make_unique<Scheduler>(std::move(settings));
+
+  auto made = RouterSocket::create();
+  if (!made) return made.error();
+  socket = std::move(made).value();
+  for (const std::string& endpoint : options.listen) {
+    auto bound = socket->bind(endpoint);
+    if (!bound) return bound.error();
+    endpoints.push_back(*bound);
+  }
+  return options.local_workers > 0 ? open_local() : Status{};
+}
+
+Status SocketFarm::Impl::open_local() {
+  auto program = options.worker_program.empty() ? find_worker_program()
+                                                : Result<std::string>(options.worker_program);
+  if (!program) return program.error();
+  auto made = PrivateFolder::make();
+  if (!made) return made.error();
+  folder = std::move(made).value();
+  auto endpoint = socket->bind("ipc://" + folder->socket_path());
+  if (!endpoint) return endpoint.error();
+  locals = std::make_unique<LocalWorkers>(*program, options.local_workers, *endpoint);
+  return locals->start();
+}
+
+void SocketFarm::Impl::reap(double now) {
+  if (!locals) return;
+  next_reap = now + kReapInterval;
+  for (const ProcessEnded& end : locals->pool().reap(now)) {
+    scheduler->on_process_end(end.name, end.cause, end.text);
+    if (end.gave_up) {
+      if (last_trouble.empty()) last_trouble = end.text;
+      on_event({FarmEvent::kDied, end.name, end.text + "; it is not started again"});
+    }
+  }
+}
+
+Status SocketFarm::Impl::workers_can_be_had() {
+  if (!options.listen.empty() || !locals || !locals->pool().exhausted()) return {};
+  return Error{"no worker can be had: " + last_trouble};
+}
+
+void SocketFarm::Impl::sleep(double now) {
+  std::vector<int> fds;
+  if (locals) fds = locals->pool().fds();
+  if (options.stop != nullptr) fds.push_back(options.stop->fd());
+  double until = now + std::min(options.heartbeat_interval_s, kProgressInterval);
+  if (locals) until = std::min(until, locals->pool().next_start());
+  socket->wait(fds, std::max(0.0, until - now));
+}
+
+Status SocketFarm::Impl::loop(const std::function<void(const FarmProgress&)>& on_progress) {
+  double next_progress = 0;
+  bool busy = false;
+  for (;;) {
+    if (options.stop != nullptr && options.stop->requested()) return Error{kStopRequested};
+    const double now = monotonic_seconds();
+    if (!busy || now >= next_reap) reap(now);
+    busy = pump(*socket, *scheduler, now);
+    if (scheduler->finished()) break;
+    if (on_progress && now >= next_progress) {
+      on_progress(scheduler->progress());
+      next_progress = now + kProgressInterval;
+    }
+    if (Status status = workers_can_be_had(); !status) return status;
+    if (!busy) sleep(now);
+  }
+  if (on_progress) on_progress(scheduler->progress());
+  return {};
+}
+
+SocketFarm::SocketFarm(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+
+Result<std::unique_ptr<SocketFarm>> SocketFarm::create(SocketFarmOptions options) {
+  auto impl = std::make_unique<Impl>();
+  impl->options = std::move(options);
+  if (Status status = impl->open(); !status) return status.error();
+  return std::unique_ptr<SocketFarm>(new SocketFarm(std::move(impl)));
+}
+
+SocketFarm::~SocketFarm() {
+  impl_->scheduler->say_goodbye("the run is over");
+  pump(*impl_->socket, *impl_->scheduler, monotonic_seconds());
+}
+
+std::string SocketFarm::add_problem(const v1::Problem& problem) {
+  std::string bytes = serialise(problem);
+  std::string hash = problem_hash(problem);
+  impl_->bad_problem = {};
+  if (bytes.size() > kMaxMessageBytes / 2) {
+    impl_->bad_problem =
+        Error{"the problem has " + std::to_string(bytes.size()) + " bytes and a message at most " +
+              std::to_string(kMaxMessageBytes / 2) + "; split the trial log or thin its paths"};
+  }
+  impl_->scheduler->add_problem(hash, std::move(bytes));
+  return hash;
+}
+
+Result<std::vector<v1::TaskResult>> SocketFarm::run(
+    const std::string& problem_hash, const std::vector<v1::Task>& tasks,
+    const std::function<void(const FarmProgress&)>& on_progress) {
+  if (!impl_->bad_problem) return impl_->bad_problem.error();
+  for (std::size_t i = 0; i < tasks.size(); ++i) {
+    const std::size_t size = tasks[i].ByteSizeLong();
+    if (size <= kMaxMessageBytes / 2) continue;
+    return Error{"task " + std::to_string(i) + " has " + std::to_string(size) +
+                 " bytes and a message at most " + std::to_string(kMaxMessageBytes / 2) +
+                 "; split it"};
+  }
+  impl_->scheduler->start(problem_hash, tasks);
+  if (Status status = impl_->loop(on_progress); !status) {
+    impl_->scheduler->abandon();
+    pump(*impl_->socket, *impl_->scheduler, monotonic_seconds());
+    return status.error();
+  }
+  return impl_->scheduler->finish();
+}
+
+std::vector<WorkerStatus> SocketFarm::workers() const {
+  return impl_->scheduler->workers().status();
+}
+
+std::uint64_t SocketFarm::retries() const { return impl_->scheduler->counts().retries; }
+
+const std::vector<std::string>& SocketFarm::endpoints() const { return impl_->endpoints; }
+
+const SchedulerCounts& SocketFarm::counts() const { return impl_->scheduler->counts(); }
+
+const std::string& SocketFarm::numeric_class() const {
+  return impl_->scheduler->workers().numeric_class();
+}
+
+std::vector<int> SocketFarm::local_pids() const {
+  return impl_->locals ? impl_->locals->pool().pids() : std::vector<int>{};
+}
+
+}  // namespace gapfarm

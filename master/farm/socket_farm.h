@@ -1,0 +1,66 @@
+// The farm over ZeroMQ: local worker processes, remote workers, or both.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/base/result.h"
+#include "common/process/stop.h"
+#include "master/farm/farm.h"
+#include "master/farm/scheduler.h"
+
+namespace gapfarm {
+
+struct SocketFarmOptions {
+  unsigned local_workers = 0;       // processes to start on this machine
+  std::vector<std::string> listen;  // endpoints for workers that come by themselves
+  std::string worker_program;       // empty: find_worker_program()
+  std::uint64_t epoch = 0;          // of this life of the master; 0: drawn
+  std::string numeric_class;        // of the run; empty: the first worker's
+  bool allow_mixed_numeric_classes = false;
+  unsigned window = 2;
+  double heartbeat_interval_s = 1;
+  double silence_limit_s = 10;
+  std::optional<std::uint64_t> shuffle_seed;       // jobs go out in shuffled order
+  StopSource* stop = nullptr;                      // ends run(); not owned, outlives the farm
+  std::function<void(const FarmEvent&)> on_event;  // empty: what went wrong goes to stderr
+};
+
+// Belongs to the thread that made it, which must live as long: the local workers die with it.
+class SocketFarm : public Farm {
+ public:
+  // Listens and starts the local workers.  Errors: an endpoint that cannot be bound, no worker
+  // program, neither local workers nor an endpoint.
+  static Result<std::unique_ptr<SocketFarm>> create(SocketFarmOptions options);
+  // Says goodbye to all workers and ends the local ones.
+  ~SocketFarm() override;
+
+  std::string add_problem(const v1::Problem& problem) override;
+  // Also fails when a task or the problem is larger than a message may be, and when every local
+  // worker is gone for good and nobody else can come.
+  Result<std::vector<v1::TaskResult>> run(
+      const std::string& problem_hash, const std::vector<v1::Task>& tasks,
+      const std::function<void(const FarmProgress&)>& on_progress = {}) override;
+
+  std::vector<WorkerStatus> workers() const override;
+  std::uint64_t retries() const override;
+
+  // As bound: ports are filled in.
+  const std::vector<std::string>& endpoints() const;
+  const SchedulerCounts& counts() const;
+  // Of the run; empty before the first worker.
+  const std::string& numeric_class() const;
+  // Pids of the running local workers.
+  std::vector<int> local_pids() const;
+
+ private:
+  struct Impl;
+  explicit SocketFarm(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace gapfarm

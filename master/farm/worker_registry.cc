@@ -1,0 +1,123 @@
+#include "master/farm/worker_registry.h"
+
+namespace gapfarm {
+namespace {
+
+constexpr std::size_t kGoneKept = 200;
+constexpr std::size_t kNameLimit = 200;  // bytes; names go to logs and status
+
+WorkerStatus status_of(const WorkerRecord& worker, const char* state) {
+  WorkerStatus status;
+  status.name = worker.name;
+  status.host = worker.host;
+  status.state = state;
+  status.jobs = static_cast<unsigned>(worker.holds.size());
+  status.finished = worker.finished;
+  return status;
+}
+
+}  // namespace
+
+std::string WorkerRegistry::refusal(const v1::Hello& hello) const {
+  if (hello.name().empty() || hello.name().size() > kNameLimit ||
+      hello.host().size() > kNameLimit) {
+    return "the worker's name must have 1 to 200 bytes and its host's at most 200";
+  }
+  if (hello.fingerprint() != admittance_.fingerprint) {
+    return "the worker's build " + hello.fingerprint() + " is not the master's " +
+           admittance_.fingerprint + "; build both from the same sources with the same compiler";
+  }
+  if (hello.numeric_class().empty()) return "the worker names no numeric class";
+  if (!admittance_.allow_mixed_numeric_classes && !admittance_.numeric_class.empty() &&
+      hello.numeric_class() != admittance_.numeric_class) {
+    return "the worker's numeric class " + hello.numeric_class() + " is not the run's " +
+           admittance_.numeric_class +
+           ": its machine computes other last bits; use machines of one kind or set "
+           "allow_mixed_numeric_classes in [farm] and lose bit-identical runs";
+  }
+  return "";
+}
+
+WorkerRegistry::Admission WorkerRegistry::admit(const std::string& peer, const v1::Hello& hello,
+                                                double now) {
+  Admission admission;
+  admission.refusal = refusal(hello);
+  if (!admission.refusal.empty()) return admission;
+  if (admittance_.numeric_class.empty()) admittance_.numeric_class = hello.numeric_class();
+
+  WorkerRecord* worker = find_name(hello.name());
+  admission.returning = worker != nullptr;
+  if (worker == nullptr) {
+    auto record = std::make_unique<WorkerRecord>();
+    record->id = next_id_++;
+    record->name = hello.name();
+    record->host = hello.host();
+    worker = record.get();
+    by_name_[worker->name] = worker;
+    workers_[worker->id] = std::move(record);
+  } else {
+    by_peer_.erase(worker->peer);
+  }
+  // One connection is one worker: whoever spoke on it before has given its place to this one.
+  if (WorkerRecord* before = find_peer(peer); before != nullptr && before != worker) {
+    before->peer.clear();
+  }
+  worker->peer = peer;
+  by_peer_[peer] = worker;
+  worker->asked_window = hello.window();
+  worker->last_heard = now;
+  admission.worker = worker;
+  return admission;
+}
+
+WorkerRecord* WorkerRegistry::find_peer(const std::string& peer) {
+  const auto found = by_peer_.find(peer);
+  return found == by_peer_.end() ? nullptr : found->second;
+}
+
+WorkerRecord* WorkerRegistry::find_name(const std::string& name) {
+  const auto found = by_name_.find(name);
+  return found == by_name_.end() ? nullptr : found->second;
+}
+
+WorkerRecord* WorkerRegistry::find(WorkerId id) {
+  const auto found = workers_.find(id);
+  return found == workers_.end() ? nullptr : found->second.get();
+}
+
+std::vector<WorkerId> WorkerRegistry::silent_since(double now, double limit) const {
+  std::vector<WorkerId> silent;
+  for (const auto& [id, worker] : workers_) {
+    if (now - worker->last_heard > limit) silent.push_back(id);
+  }
+  return silent;
+}
+
+void WorkerRegistry::forgive(double now) {
+  for (auto& [id, worker] : workers_) worker->last_heard = now;
+}
+
+void WorkerRegistry::remove(WorkerId id) {
+  const auto found = workers_.find(id);
+  if (found == workers_.end()) return;
+  const WorkerRecord& worker = *found->second;
+  gone_.push_back(status_of(worker, "gone"));
+  if (gone_.size() > kGoneKept) gone_.erase(gone_.begin());
+  by_name_.erase(worker.name);
+  if (const auto at = by_peer_.find(worker.peer);
+      at != by_peer_.end() && at->second == found->second.get()) {
+    by_peer_.erase(at);
+  }
+  workers_.erase(found);
+}
+
+std::vector<WorkerStatus> WorkerRegistry::status() const {
+  std::vector<WorkerStatus> all;
+  for (const auto& [id, worker] : workers_) {
+    all.push_back(status_of(*worker, worker->holds.empty() ? "idle" : "busy"));
+  }
+  all.insert(all.end(), gone_.begin(), gone_.end());
+  return all;
+}
+
+}  // namespace gapfarm
