@@ -18,6 +18,7 @@ constexpr double kSettleLimit_s = 3;
 // Faster than any parameter could make the robot: the integration has failed.
 constexpr double kDivergedSpeed_m_s = 20;
 constexpr double kDivergedTurn_rad_s = 500;
+constexpr double kLeastFittedSteps = 8;
 const double kFallenSine = std::sin(M_PI / 4);  // of roll or pitch
 
 // NaN and infinity fail every comparison that holds.
@@ -40,6 +41,16 @@ bool is_still(const btTransform& before, const btTransform& now, double dt_s) {
   return (now.getOrigin() - before.getOrigin()).length2() < shift * shift &&
          (R1.getColumn(0) - R0.getColumn(0)).length2() < turn * turn &&
          (R1.getColumn(2) - R0.getColumn(2)).length2() < turn * turn;
+}
+
+// Length of a physics step: the rate's, stretched by a fraction of a percent so that the motors
+// stop between two steps.  Sliding friction does not feel how fast the surface is, so a stop within
+// a step would be rounded to a whole step, and the end pose would be a staircase over duration.
+// Commands of a few steps keep the rate's step.
+double fitted_step(const SimSettings& settings, double duration_s) {
+  const double step_s = 1 / (settings.step_rate_hz * settings.sub_steps);
+  const double steps = std::round(duration_s / step_s);
+  return steps >= kLeastFittedSteps ? duration_s / steps : step_s;
 }
 
 double clamped_asin(double sine) { return std::asin(std::clamp(sine, -1.0, 1.0)); }
@@ -105,7 +116,7 @@ Motion Simulator::Impl::run(const DriveInput& drive, const Floor& floor,
   const SideMotion left(drive.left, drive.duration_s);
   const SideMotion right(drive.right, drive.duration_s);
   const double still_s = std::max(left.still_time(), right.still_time());
-  const double dt = world_.step_s();
+  const double dt = fitted_step(settings_, drive.duration_s);
   const btRigidBody& body = world_.robot().body();
   const btVector3 centre = world_.robot().turning_centre();
 
@@ -125,7 +136,7 @@ Motion Simulator::Impl::run(const DriveInput& drive, const Floor& floor,
   for (std::uint64_t n = 0; t < still_s + kSettleLimit_s; ++n) {
     const btTransform before = body.getWorldTransform();
     t = static_cast<double>(n) * dt;
-    world_.step({left.mean_speed(t, dt), right.mean_speed(t, dt)});
+    world_.step({left.mean_speed(t, dt), right.mean_speed(t, dt)}, dt);
     ++steps_;
     const bool stopped = t >= still_s;
     t = static_cast<double>(n + 1) * dt;

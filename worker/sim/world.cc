@@ -52,7 +52,6 @@ RobotWorld::RobotWorld(const SimSettings& settings)
     : WorldParts(settings),
       btDiscreteDynamicsWorld(&dispatcher, &broadphase, &solver, &configuration),
       settings_(settings),
-      step_s_(1 / (settings.step_rate_hz * settings.sub_steps)),
       damped_(settings.linear_damping > 0 || settings.angular_damping > 0),
       plane_(btVector3(0, 0, 1), 0),
       robot_(settings.robot == RobotModel::kTreads ? make_treads(settings)
@@ -86,19 +85,19 @@ void RobotWorld::reset(const Floor& floor) {
   occupied_ = true;
 }
 
-void RobotWorld::step(const SideSpeeds& speeds) {
-  robot_->drive(speeds, step_s_);
-  if (floor_.nap_strength != 0 || floor_.rolling_resistance != 0) apply_drag();
-  stepSimulation(step_s_, 0);
+void RobotWorld::step(const SideSpeeds& speeds, double dt_s) {
+  robot_->drive(speeds, dt_s);
+  if (floor_.nap_strength != 0 || floor_.rolling_resistance != 0) apply_drag(dt_s);
+  stepSimulation(dt_s, 0);
 }
 
-void RobotWorld::apply_drag() {
+void RobotWorld::apply_drag(double dt_s) {
   btRigidBody& body = robot_->body();
   const btVector3 forward = body.getWorldTransform().getBasis().getColumn(0);
   const Eigen::Vector2d ahead = Eigen::Vector2d(forward.x(), forward.y()).normalized();
   const btVector3& velocity = body.getLinearVelocity();
-  const Eigen::Vector2d drag = drag_acceleration(floor_, settings_.gravity_m_s2,
-                                                 {velocity.x(), velocity.y()}, ahead, step_s_);
+  const Eigen::Vector2d drag =
+      drag_acceleration(floor_, settings_.gravity_m_s2, {velocity.x(), velocity.y()}, ahead, dt_s);
   body.applyCentralForce(settings_.mass_kg * btVector3(drag.x(), drag.y(), 0));
 }
 

@@ -65,11 +65,10 @@ class RobotWorld final : private WorldParts, public btDiscreteDynamicsWorld {
 
   // Puts the robot at the start, in a state that no earlier run has touched.
   void reset(const Floor& floor);
-  // One physics step of 1 / (step_rate * sub_steps) seconds.
-  void step(const SideSpeeds& speeds);
+  // One physics step.  REQUIRES: every step after a reset has the same length.
+  void step(const SideSpeeds& speeds, double dt_s);
 
   Robot& robot() { return *robot_; }
-  double step_s() const { return step_s_; }
 
  private:
   void solveConstraints(btContactSolverInfo& info) override;
@@ -82,11 +81,10 @@ class RobotWorld final : private WorldParts, public btDiscreteDynamicsWorld {
   void computeOverlappingPairs() override {}
 
   void clear();
-  void apply_drag();
+  void apply_drag(double dt_s);
   void prepare_contacts();
 
   SimSettings settings_;
-  double step_s_;
   bool damped_;
   Floor floor_;
   btStaticPlaneShape plane_;
