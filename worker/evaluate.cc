@@ -1,0 +1,235 @@
+#include "worker/evaluate.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <exception>
+#include <utility>
+
+#include "common/base/hash.h"
+#include "common/score/fitness.h"
+#include "worker/fitness.h"
+#include "worker/scenarios/scenario.h"
+
+namespace gapfarm {
+namespace {
+
+class Prepared : public PreparedProblem {
+ public:
+  Prepared(Problem problem, const Scenario& scenario) : problem_(std::move(problem)) {
+    model_ = scenario.prepare(problem_);
+  }
+
+  const Problem& problem() const override { return problem_; }
+  const ScenarioModel& model() const { return *model_; }
+  const FitnessReference& reference() const { return reference_; }
+  void set_reference(FitnessReference reference) { reference_ = std::move(reference); }
+
+ private:
+  Problem problem_;
+  std::unique_ptr<ScenarioModel> model_;
+  FitnessReference reference_;
+};
+
+v1::TaskResult failed(v1::Outcome outcome, const std::string& message) {
+  v1::TaskResult result;
+  result.set_outcome(outcome);
+  result.set_message(message);
+  return result;
+}
+
+v1::TaskResult invalid(const std::string& message) { return failed(v1::INVALID_REQUEST, message); }
+
+Result<ParameterValues> values_at(const Problem& problem, const v1::Point& point) {
+  const Genome genome(point.genome().begin(), point.genome().end());
+  if (!genome.empty() && genome.size() != problem.genes.size()) {
+    return Error{"a genome of " + std::to_string(genome.size()) + " genes, but the problem has " +
+                 std::to_string(problem.genes.size())};
+  }
+  for (double g : genome) {
+    if (!(g >= 0 && g <= 1)) return Error{"a gene of " + std::to_string(g) + " is not in [0, 1]"};
+  }
+  ParameterValues values = problem.values_of(genome);
+  for (const v1::Override& override : point.overrides()) {
+    if (override.parameter() >= values.size()) {
+      return Error{"an override of parameter row " + std::to_string(override.parameter()) +
+                   ", but the table has " + std::to_string(values.size())};
+    }
+    if (Status s = problem.table().check(override.parameter(), override.value()); !s) {
+      return s.error();
+    }
+    values[override.parameter()] = override.value();
+  }
+  return values;
+}
+
+v1::TaskResult run(const Prepared& p, const ParameterValues& values, const v1::EvaluateTask& task) {
+  PredictOptions options;
+  options.stream = task.stream();
+  // The thesis's fitness compares one nominal motion; spread would only cost time.
+  options.means_only = p.problem().fitness.kind == FitnessKind::kRobustMahalanobis;
+  const Prediction prediction = p.model().predict(values, options);
+  if (prediction.outcome != v1::OK) return failed(prediction.outcome, prediction.message);
+  auto fitness = fitness_of(p.problem(), p.reference(), prediction);
+  if (!fitness) return failed(v1::DIVERGED, fitness.error().message);
+  v1::TaskResult result;
+  result.set_outcome(v1::OK);
+  *result.mutable_evaluate() = *fitness;
+  result.set_simulated(prediction.simulated_s);
+  return result;
+}
+
+void write_covariance(const Eigen::Matrix3d& cov, v1::Predicted* to) {
+  for (const auto& [row, column] : {std::pair{0, 0}, {0, 1}, {0, 2}, {1, 1}, {1, 2}, {2, 2}}) {
+    to->add_cov(cov(row, column));
+  }
+}
+
+v1::TaskResult run(const Prepared& p, const ParameterValues& values, const v1::PredictTask& task) {
+  const auto& trials = p.problem().log.trials;
+  for (std::uint32_t i : task.trials()) {
+    if (i >= trials.size()) return invalid("there is no trial " + std::to_string(i));
+  }
+  PredictOptions options;
+  options.trials = {task.trials().data(), static_cast<std::size_t>(task.trials_size())};
+  options.means_only = task.means_only();
+  options.stream = task.stream();
+  const Prediction prediction = p.model().predict(values, options);
+  if (prediction.outcome != v1::OK) return failed(prediction.outcome, prediction.message);
+  v1::TaskResult result;
+  result.set_outcome(v1::OK);
+  result.set_simulated(prediction.simulated_s);
+  for (std::size_t k = 0; k < prediction.trials.size(); ++k) {
+    const std::uint32_t i =
+        options.trials.empty() ? static_cast<std::uint32_t>(k) : options.trials[k];
+    v1::Predicted* to = result.mutable_predict()->add_predictions();
+    to->set_trial(i);
+    const Alternative whole = collapsed(prediction.trials[k]);
+    *to->mutable_end() = to_proto(whole.X_WM);
+    if (options.means_only) continue;
+    write_covariance(whole.cov, to);
+    const auto score =
+        log_score_of(prediction.trials[k], trials[i].X_WE, p.problem().fitness.outlier_share);
+    if (!score) return failed(v1::DIVERGED, score.error().message);
+    to->set_log_score(*score);
+  }
+  return result;
+}
+
+v1::TaskResult run(const Prepared& p, const ParameterValues& values, const v1::SimulateTask& task) {
+  const std::vector<CommandSpec>& known = p.problem().commands;
+  for (const v1::PlannedTrial& planned : task.plan()) {
+    const Trial trial = from_proto(planned.trial());
+    const bool named = std::any_of(known.begin(), known.end(),
+                                   [&](const CommandSpec& c) { return c.name == trial.command; });
+    if (!named) return invalid("unknown command '" + trial.command + "' in a plan");
+    const bool duties =
+        std::abs(trial.left.value_or(0)) <= 1 && std::abs(trial.right.value_or(0)) <= 1;
+    const double duration = trial.duration_s.value_or(0);
+    if (!duties || !(duration >= 0 && duration <= 60)) {
+      return invalid("a plan needs duties in [-1, 1] and durations in [0, 60] s");
+    }
+  }
+  return p.model().simulate(values, task);
+}
+
+v1::TaskResult run(const Prepared& p, const ParameterValues& values, const v1::TraceTask& task) {
+  const v1::Command& c = task.command();
+  const bool duties = std::abs(c.left()) <= 1 && std::abs(c.right()) <= 1;
+  if (!duties || !(c.duration() >= 0 && c.duration() <= 60) || !(task.interval() > 0)) {
+    return invalid(
+        "a trace needs duties in [-1, 1], a duration in [0, 60] s and an interval above 0");
+  }
+  return p.model().trace(values, task);
+}
+
+// Answers with its payload after computing for a while; what it computes is thrown away.
+v1::TaskResult echo(const v1::EchoTask& task) {
+  const auto until = std::chrono::steady_clock::now() + std::chrono::microseconds(task.busy_us());
+  while (std::chrono::steady_clock::now() < until) {
+  }
+  v1::TaskResult result;
+  result.set_outcome(v1::OK);
+  result.set_echo(task.payload());
+  return result;
+}
+
+template <class T>
+v1::TaskResult at_point(const Prepared& prepared, const T& task) {
+  const auto values = values_at(prepared.problem(), task.point());
+  if (!values) return invalid(values.error().message);
+  return run(prepared, *values, task);
+}
+
+v1::TaskResult dispatch(const Prepared* prepared, const v1::Task& task) {
+  if (task.kind_case() == v1::Task::kEcho) return echo(task.echo());
+  if (prepared == nullptr) return invalid("the task needs a problem");
+  switch (task.kind_case()) {
+    case v1::Task::kEvaluate:
+      return at_point(*prepared, task.evaluate());
+    case v1::Task::kPredict:
+      return at_point(*prepared, task.predict());
+    case v1::Task::kSimulate:
+      return at_point(*prepared, task.simulate());
+    case v1::Task::kTrace:
+      return at_point(*prepared, task.trace());
+    default:
+      return invalid("a task of unknown kind; master and worker must be the same build");
+  }
+}
+
+std::string golden_simulation() {
+  Problem problem;
+  problem.values = problem.table().nominal();
+  problem.commands = default_commands(problem.scenario);
+  const auto prepared = prepare(to_proto(problem));
+  Hasher hasher;
+  for (const CommandSpec& command : problem.commands) {
+    v1::Task task;
+    v1::Command* c = task.mutable_trace()->mutable_command();
+    c->set_name(command.name);
+    c->set_left(command.left);
+    c->set_right(command.right);
+    c->set_duration(0.2);
+    task.mutable_trace()->set_interval(0.1);
+    const v1::TaskResult result = evaluate(prepared->get(), task);
+    for (const v1::TraceSample& sample : result.trace().samples()) {
+      hasher.add(sample.pose().x()).add(sample.pose().y()).add(sample.pose().theta());
+    }
+  }
+  return hasher.finish();
+}
+
+}  // namespace
+
+Result<std::unique_ptr<PreparedProblem>> prepare(const v1::Problem& message) {
+  auto problem = from_proto(message);
+  if (!problem) return problem.error();
+  for (const Scenario& scenario : scenarios()) {
+    if (problem->scenario != scenario.name) continue;
+    auto prepared = std::make_unique<Prepared>(std::move(*problem), scenario);
+    if (!prepared->problem().log.trials.empty()) {
+      auto reference = fitness_reference(prepared->problem());
+      if (!reference) return reference.error();
+      prepared->set_reference(std::move(*reference));
+    }
+    return std::unique_ptr<PreparedProblem>(std::move(prepared));
+  }
+  return Error{"scenario '" + problem->scenario + "' has no simulation in this build"};
+}
+
+v1::TaskResult evaluate(const PreparedProblem* prepared, const v1::Task& task) {
+  // Nothing of ours throws; a library out of memory may.
+  try {
+    return dispatch(static_cast<const Prepared*>(prepared), task);
+  } catch (const std::exception& e) {
+    return failed(v1::INVALID_REQUEST, std::string("exception: ") + e.what());
+  }
+}
+
+const std::string& numeric_class() {
+  static const std::string hash = golden_simulation();
+  return hash;
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,162 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <set>
+#include <string>
+
+#include "common/effects/catalogue.h"
+#include "common/parameters/table.h"
+#include "common/random/stream.h"
+#include "worker/effects/behaviour.h"
+
+namespace gapfarm {
+namespace {
+
+TEST(EffectTable, HasOneImplementationForEveryRowOfTheCatalogueInItsOrder) {
+  const auto behaviours = effect_behaviours();
+  const auto catalogue = srv1_effects();
+  ASSERT_EQ(behaviours.size(), catalogue.size());
+  for (std::size_t i = 0; i < catalogue.size(); ++i)
+    EXPECT_EQ(behaviours[i]->name, catalogue[i].name);
+}
+
+TEST(EffectTable, HooksBelongToTheEffectsStage) {
+  const auto behaviours = effect_behaviours();
+  const auto catalogue = srv1_effects();
+  for (std::size_t i = 0; i < catalogue.size(); ++i) {
+    const EffectBehaviour& b = *behaviours[i];
+    const bool drive = b.drive || b.branches;
+    const bool floor = b.floor || b.settings;
+    const bool camera = b.observe || b.reading;
+    EXPECT_EQ(drive, catalogue[i].stage == EffectStage::kDrive) << b.name;
+    EXPECT_EQ(floor, catalogue[i].stage == EffectStage::kFloor) << b.name;
+    EXPECT_EQ(camera, catalogue[i].stage == EffectStage::kCamera) << b.name;
+    EXPECT_EQ(b.observe != nullptr, b.recover != nullptr) << b.name;
+    EXPECT_EQ(b.branches != nullptr, b.draw != nullptr) << b.name;
+  }
+}
+
+TEST(EffectCatalogue, NeutralValuesLieWithinTheirBounds) {
+  for (const Parameter& row : srv1_table().rows()) {
+    EXPECT_LE(row.lower, row.nominal) << row.key;
+    EXPECT_GE(row.upper, row.nominal) << row.key;
+    EXPECT_FALSE(row.summary.empty()) << row.key;
+  }
+}
+
+TEST(EffectCatalogue, StrengthsAloneDecideWhetherAnEffectIsNeutral) {
+  const ParameterTable& table = srv1_table();
+  for (std::size_t e = 0; e < table.effects().size(); ++e) {
+    const Effect& effect = table.effects()[e];
+    ParameterValues values = table.nominal();
+    for (std::size_t i = effect.strengths; i < effect.parameters.size(); ++i) {
+      values[table.effect_row(e) + i] = effect.parameters[i].upper;
+    }
+    EXPECT_FALSE(ActiveEffects(table, values).any()) << effect.name;
+    values[table.effect_row(e)] = effect.parameters[0].upper;
+    EXPECT_TRUE(ActiveEffects(table, values).any()) << effect.name;
+  }
+}
+
+// Camera effects are undone by recover() wherever the robot is.
+TEST(CameraEffects, RecoverUndoesObserve) {
+  ParameterValues values = srv1_table().nominal();
+  const auto set = [&](const char* key, double v) { values[srv1_table().row(key)] = v; };
+  set("camera_aspect.ratio", 0.9);
+  set("camera_distortion.k1", 0.04);
+  set("camera_distortion.x", 1);
+  set("camera_distortion.y", 0.8);
+  set("heading_offset.angle", 0.07);
+  set("marker_offset.x", 0.006);
+  set("marker_offset.y", -0.004);
+  const ActiveEffects effects(srv1_table(), values);
+  Stream stream({1, Purpose::kTest, 0, 0, 0});
+  for (int i = 0; i < 100; ++i) {
+    const Pose X{stream.uniform(0, 2), stream.uniform(0, 2), stream.uniform(-3.1, 3.1)};
+    const Pose back = effects.recover(effects.observe(X));
+    EXPECT_NEAR(back.x, X.x, 1e-9);
+    EXPECT_NEAR(back.y, X.y, 1e-9);
+    EXPECT_NEAR(wrap_angle(back.theta - X.theta), 0, 1e-9);
+  }
+}
+
+// Beyond the line poses shift by offset + slope * place along it; before it nothing happens.
+TEST(CameraEffects, SeamShiftsTheFarSideOnly) {
+  ParameterValues values = srv1_table().nominal();
+  const auto set = [&](const char* key, double v) { values[srv1_table().row(key)] = v; };
+  set("camera_seam.offset_x", 0.02);
+  set("camera_seam.slope_y", 0.05);
+  set("camera_seam.position", 1);
+  const ActiveEffects effects(srv1_table(), values);
+  EXPECT_EQ(effects.observe({0.9, 0.5, 0.1}), (Pose{0.9, 0.5, 0.1}));
+  const Pose far = effects.observe({1.2, 0.5, 0.1});
+  EXPECT_NEAR(far.x, 1.22, 1e-12);
+  EXPECT_NEAR(far.y, 0.525, 1e-12);
+  const Pose back = effects.recover(far);
+  EXPECT_NEAR(back.x, 1.2, 1e-4);
+  EXPECT_NEAR(back.y, 0.5, 1e-4);
+}
+
+// A marker ahead of the turning centre circles it: turning in place by a moves the log by
+// (R(a) - I) (x, y).
+TEST(CameraEffects, MarkerOffsetCirclesTheTurningCentre) {
+  ParameterValues values = srv1_table().nominal();
+  values[srv1_table().row("marker_offset.x")] = 0.01;
+  const ActiveEffects effects(srv1_table(), values);
+  const Pose before = effects.observe({1, 1, 0});
+  const Pose after = effects.observe({1, 1, 1.5});
+  EXPECT_NEAR(after.x - before.x, 0.01 * (std::cos(1.5) - 1), 1e-12);
+  EXPECT_NEAR(after.y - before.y, 0.01 * std::sin(1.5), 1e-12);
+}
+
+TEST(DriveEffects, BranchesAreADistributionWithTheDrawsMean) {
+  ParameterValues values = srv1_table().nominal();
+  values[srv1_table().row("slip_events.probability")] = 0.2;
+  values[srv1_table().row("slip_events.loss")] = 0.6;
+  const ActiveEffects effects(srv1_table(), values);
+  double weight = 0, left = 0, right = 0;
+  for (const DriveBranch& b : effects.branches()) {
+    weight += b.weight;
+    left += b.weight * b.left_gain;
+    right += b.weight * b.right_gain;
+  }
+  EXPECT_NEAR(weight, 1, 1e-12);
+  EXPECT_NEAR(left, 1 - 0.2 * 0.3, 1e-12);
+  EXPECT_NEAR(right, left, 1e-12);
+  Stream stream({1, Purpose::kTest, 0, 0, 0});
+  double drawn = 0;
+  constexpr int n = 100000;
+  for (int i = 0; i < n; ++i) drawn += effects.draw(stream).left_gain / n;
+  EXPECT_NEAR(drawn, left, 5 * 0.17 / std::sqrt(n));
+}
+
+TEST(DriveEffects, ActOnTheDriveAsTheCatalogueSays) {
+  ParameterValues values = srv1_table().nominal();
+  const auto set = [&](const char* key, double v) { values[srv1_table().row(key)] = v; };
+  set("motor_asymmetry.ratio", 0.04);
+  set("motor_deadband.duty", 0.1);
+  set("motor_lag.tau", 0.05);
+  set("timing_offset.offset", 0.03);
+  set("battery_sag.rate", 0.01);
+  set("backlash.travel", 0.004);
+  Situation situation;
+  situation.session_time_s = 120;
+  situation.last_left = -1;
+  situation.last_right = 1;
+  DriveState drive;
+  drive.left.duty = 0.5;
+  drive.right.duty = 0.05;
+  drive.duration_s = 1;
+  ActiveEffects(srv1_table(), values).drive(situation, drive);
+  EXPECT_NEAR(drive.right.gain / drive.left.gain, 1.04, 1e-12);
+  EXPECT_NEAR((drive.right.gain + drive.left.gain) / 2, 0.98, 1e-12);  // two minutes of sag
+  EXPECT_NEAR(drive.left.duty, 0.4, 1e-12);
+  EXPECT_EQ(drive.right.duty, 0);
+  EXPECT_NEAR(drive.left.lag_s, 0.05, 1e-12);
+  EXPECT_NEAR(drive.duration_s, 1.03, 1e-12);
+  EXPECT_NEAR(drive.left.dead_travel_m, 0.004, 1e-12);  // it reversed
+  EXPECT_EQ(drive.right.dead_travel_m, 0);
+}
+
+}  // namespace
+}  // namespace gapfarm

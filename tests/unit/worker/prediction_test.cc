@@ -1,0 +1,200 @@
+// Predictions against the simulation itself.
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+
+#include "common/score/motion_model.h"
+#include "tests/unit/worker/problems.h"
+#include "worker/evaluate.h"
+#include "worker/scenarios/srv1_robot.h"
+
+namespace gapfarm {
+namespace {
+
+using gapfarm::testing::empty_problem;
+using gapfarm::testing::small_problem;
+using gapfarm::testing::value;
+
+v1::TaskResult predict(const Problem& problem, bool means_only = false) {
+  v1::Task task;
+  task.mutable_predict()->set_means_only(means_only);
+  auto prepared = prepare(to_proto(problem));
+  EXPECT_TRUE(prepared.ok()) << (prepared.ok() ? "" : prepared.error().message);
+  const v1::TaskResult result = evaluate(prepared->get(), task);
+  EXPECT_EQ(result.outcome(), v1::OK) << result.message();
+  return result;
+}
+
+// At its neutral value an effect changes no bit, wherever its other parameters stand.
+TEST(Prediction, NeutralEffectsChangeNothingToTheBit) {
+  const Problem base = small_problem(12);
+  const std::string expected = predict(base).SerializeAsString();
+  const ParameterTable& table = srv1_table();
+  for (std::size_t e = 0; e < table.effects().size(); ++e) {
+    Problem problem = base;
+    const Effect& effect = table.effects()[e];
+    for (std::size_t i = effect.strengths; i < effect.parameters.size(); ++i) {
+      problem.values[table.effect_row(e) + i] = effect.parameters[i].upper;
+    }
+    EXPECT_EQ(predict(problem).SerializeAsString(), expected) << effect.name;
+  }
+}
+
+// Greatest distance (m, and rad taken alike) between predicted ends and simulating each trial alone.
+double worst_sharing_error(const Problem& problem) {
+  const v1::TaskResult result = predict(problem, true);
+  Srv1Robot robot(problem.values);
+  double worst = 0;
+  for (std::size_t i = 0; i < problem.log.trials.size(); ++i) {
+    const Trial& trial = problem.log.trials[i];
+    const CommandSpec c = resolved_command(trial, problem.commands);
+    Situation situation;
+    situation.X_WR = trial.X_WS;
+    situation.session_time_s = *trial.t_s;
+    const Motion direct = robot.run({c.left, c.right, c.duration_s}, situation, {});
+    const Pose got = from_proto(result.predict().predictions(static_cast<int>(i)).end());
+    const Eigen::Vector3d d = local_difference(trial.X_WS * direct.X_SE, got);
+    worst = std::max(worst, d.cwiseAbs().maxCoeff());
+  }
+  return worst;
+}
+
+// What is interpolated over headings and times is what simulating each trial alone would give: to
+// a tenth of a camera's noise for one, and to a quarter where two strong effects meet, since
+// headings and times are taken to add.
+TEST(Prediction, SharedConditionsMatchSimulatingEachTrial) {
+  Problem plain = small_problem(24);
+  value(plain, "drive_noise_common") = 0;
+  value(plain, "drive_noise_side") = 0;
+  EXPECT_LT(worst_sharing_error(plain), 1e-12);
+
+  Problem floor = plain;
+  value(floor, "floor_tilt.angle") = 0.05;
+  value(floor, "floor_tilt.direction") = 0.7;
+  value(floor, "floor_nap.strength") = 0.2;
+  value(floor, "floor_nap.direction") = -2;
+  EXPECT_LT(worst_sharing_error(floor), 2e-4);
+
+  Problem sag = plain;
+  value(sag, "battery_sag.rate") = 0.05;
+  EXPECT_LT(worst_sharing_error(sag), 2e-4);
+
+  value(floor, "battery_sag.rate") = 0.02;
+  EXPECT_LT(worst_sharing_error(floor), 2e-3);
+}
+
+// A patch changes the trials that cross it and no others.
+TEST(Prediction, AFrictionPatchActsWhereItIs) {
+  Problem problem = empty_problem();
+  for (int i = 0; i < 2; ++i) {
+    Trial trial;
+    trial.session = "s";
+    trial.trial = i;
+    trial.command = "wide_ccw";
+    trial.X_WS = i == 0 ? Pose{0.5, 0.5, 0} : Pose{1.8, 1.8, 0};
+    trial.X_WE = trial.X_WS;
+    problem.log.trials.push_back(trial);
+  }
+  const v1::TaskResult without = predict(problem, true);
+  value(problem, "friction_patch.ratio") = 0.2;
+  value(problem, "friction_patch.x") = 0.45;
+  value(problem, "friction_patch.y") = 0.6;
+  value(problem, "friction_patch.radius") = 0.12;
+  const v1::TaskResult with = predict(problem, true);
+  const auto moved = [&](int i) {
+    return local_difference(from_proto(without.predict().predictions(i).end()),
+                            from_proto(with.predict().predictions(i).end()))
+        .norm();
+  };
+  EXPECT_GT(moved(0), 1e-3);
+  EXPECT_EQ(moved(1), 0);
+}
+
+v1::TaskResult simulate(const Problem& problem, const std::string& command, int count) {
+  v1::Task task;
+  v1::SimulateTask* simulate = task.mutable_simulate();
+  simulate->mutable_stream()->set_run_seed(5);
+  for (int i = 0; i < count; ++i) {
+    v1::PlannedTrial* planned = simulate->add_plan();
+    planned->set_moved(true);
+    planned->mutable_trial()->set_session("s");
+    planned->mutable_trial()->set_trial(i);
+    planned->mutable_trial()->set_command(command);
+    planned->mutable_trial()->mutable_start()->set_x(1);
+    planned->mutable_trial()->mutable_start()->set_y(1);
+    planned->mutable_trial()->mutable_start()->set_theta(0.4);
+  }
+  auto prepared = prepare(to_proto(problem));
+  EXPECT_TRUE(prepared.ok());
+  return evaluate(prepared->get(), task);
+}
+
+// The predictive distribution is that of simulated logs: whitened residuals of a thousand simulated
+// trials a command have mean 0 and covariance I within five standard errors.
+TEST(Prediction, CovarianceIsThatOfSimulatedLogs) {
+  for (const char* command : {"forward", "turn_ccw", "wide_cw"}) {
+    Problem problem = empty_problem();
+    constexpr int n = 1000;
+    const v1::TaskResult simulated = simulate(problem, command, n);
+    ASSERT_EQ(simulated.outcome(), v1::OK) << simulated.message();
+    for (const v1::Trial& t : simulated.simulate().trials()) {
+      problem.log.trials.push_back(from_proto(t));
+    }
+    const v1::TaskResult predicted = predict(problem);
+    Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+    Eigen::Matrix3d second = Eigen::Matrix3d::Zero();
+    for (const v1::Predicted& p : predicted.predict().predictions()) {
+      Eigen::Matrix3d cov;
+      cov << p.cov(0), p.cov(1), p.cov(2), p.cov(1), p.cov(3), p.cov(4), p.cov(2), p.cov(4),
+          p.cov(5);
+      const Eigen::Vector3d r =
+          local_difference(from_proto(p.end()), problem.log.trials[p.trial()].X_WE);
+      const Eigen::Vector3d z = cov.llt().matrixL().solve(r);
+      mean += z / n;
+      second += z * z.transpose() / n;
+    }
+    EXPECT_LT(mean.cwiseAbs().maxCoeff(), 5 / std::sqrt(n)) << command;
+    EXPECT_LT((second - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff(), 5 * std::sqrt(2.0 / n))
+        << command << "\n"
+        << second;
+  }
+}
+
+// The mirror image of the robot driving the mirrored command ends at the mirrored pose.
+TEST(Prediction, MirroredCommandsEndMirrored) {
+  Srv1Robot robot(empty_problem().values);
+  const Motion left = robot.run({0.4, 1.0, 1}, {}, {});
+  const Motion right = robot.run({1.0, 0.4, 1}, {}, {});
+  const Eigen::Vector3d d = local_difference(mirrored(left.X_SE), right.X_SE);
+  EXPECT_LT(d.head<2>().norm(), 1e-4);
+  EXPECT_LT(std::abs(d[2]), 1e-3);
+}
+
+TEST(Simulate, TrialsOfAChainShareThePoseBetweenThem) {
+  Problem problem = empty_problem();
+  value(problem, "pose_noise_position") = 1e-5;
+  value(problem, "pose_noise_heading") = 1e-5;
+  v1::Task task;
+  for (int i = 0; i < 4; ++i) {
+    v1::PlannedTrial* planned = task.mutable_simulate()->add_plan();
+    planned->mutable_trial()->set_session("s");
+    planned->mutable_trial()->set_trial(i);
+    planned->mutable_trial()->set_command(i % 2 == 0 ? "forward" : "turn_cw");
+    planned->mutable_trial()->mutable_start();
+  }
+  task.mutable_simulate()->set_path_interval(0.1);
+  auto prepared = prepare(to_proto(problem));
+  const v1::TaskResult result = evaluate(prepared->get(), task);
+  ASSERT_EQ(result.outcome(), v1::OK);
+  for (int i = 1; i < 4; ++i) {
+    const Pose before = from_proto(result.simulate().trials(i - 1).end());
+    const Pose after = from_proto(result.simulate().trials(i).start());
+    EXPECT_LT(local_difference(before, after).norm(), 1e-4);
+    EXPECT_GT(result.simulate().trials(i).path_size(), 9);
+  }
+}
+
+}  // namespace
+}  // namespace gapfarm

@@ -1,0 +1,157 @@
+#include "worker/evaluation_thread.h"
+
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cassert>
+#include <list>
+#include <string>
+#include <utility>
+
+#include "common/process/process_pool.h"
+#include "worker/evaluate.h"
+
+namespace gapfarm {
+namespace {
+
+// Problems that are ready for work, the latest used first.  Belongs to the evaluating thread: it is
+// work to prepare one.
+class PreparedProblems {
+ public:
+  using Entry = Result<std::unique_ptr<PreparedProblem>>;
+
+  const Entry& get(const std::string& hash, const std::string& bytes) {
+    const auto found = std::find_if(entries_.begin(), entries_.end(),
+                                    [&](const auto& entry) { return entry.first == hash; });
+    if (found != entries_.end()) {
+      entries_.splice(entries_.begin(), entries_, found);
+      return entries_.front().second;
+    }
+    entries_.emplace_front(hash, prepare_bytes(bytes));
+    if (entries_.size() > kKept) entries_.pop_back();
+    return entries_.front().second;
+  }
+
+ private:
+  static constexpr std::size_t kKept = 4;
+
+  static Entry prepare_bytes(const std::string& bytes) {
+    v1::Problem problem;
+    if (!problem.ParseFromString(bytes)) return Error{"the problem's bytes are not a problem"};
+    return prepare(problem);
+  }
+
+  std::list<std::pair<std::string, Entry>> entries_;
+};
+
+v1::JobResult work_on(const Work& work, PreparedProblems& problems) {
+  v1::JobResult result;
+  result.set_job_id(work.job.job_id());
+  result.set_attempt_id(work.job.attempt_id());
+  result.set_epoch(work.job.epoch());
+  const double begun = monotonic_seconds();
+  const PreparedProblem* prepared = nullptr;
+  std::string trouble;
+  if (work.problem) {
+    const auto& entry = problems.get(work.job.problem_hash(), *work.problem);
+    if (entry) {
+      prepared = entry.value().get();
+    } else {
+      trouble = entry.error().message;
+    }
+  }
+  if (trouble.empty()) {
+    *result.mutable_result() = evaluate(prepared, work.job.task());
+  } else {
+    result.mutable_result()->set_outcome(v1::INVALID_REQUEST);
+    result.mutable_result()->set_message(trouble);
+  }
+  result.set_wall(monotonic_seconds() - begun);
+  return result;
+}
+
+}  // namespace
+
+EvaluationThread::EvaluationThread()
+    : fd_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)), thread_([this] { run(); }) {
+  assert(fd_ >= 0);
+}
+
+EvaluationThread::~EvaluationThread() {
+  {
+    const std::lock_guard lock(mutex_);
+    stop_ = true;
+    queue_.clear();
+  }
+  wake_.notify_one();
+  thread_.join();
+  close(fd_);
+}
+
+void EvaluationThread::run() {
+  PreparedProblems problems;
+  std::unique_lock lock(mutex_);
+  for (;;) {
+    wake_.wait(lock, [this] { return stop_ || !queue_.empty(); });
+    if (stop_) return;
+    const Work work = std::move(queue_.front());
+    queue_.pop_front();
+    begun_ = monotonic_seconds();
+    lock.unlock();
+    v1::JobResult result = work_on(work, problems);
+    lock.lock();
+    begun_ = -1;
+    finished_.push_back(std::move(result));
+    if (finished_.size() > 1) continue;  // the other thread has been told
+    const std::uint64_t one = 1;
+    [[maybe_unused]] const ssize_t written = write(fd_, &one, sizeof one);
+  }
+}
+
+void EvaluationThread::give(std::vector<Work> work) {
+  if (work.empty()) return;
+  {
+    const std::lock_guard lock(mutex_);
+    for (Work& one : work) queue_.push_back(std::move(one));
+  }
+  wake_.notify_one();
+}
+
+std::vector<AttemptKey> EvaluationThread::drop(const std::vector<AttemptKey>& keys) {
+  std::vector<AttemptKey> dropped;
+  if (keys.empty()) return dropped;
+  const std::lock_guard lock(mutex_);
+  std::erase_if(queue_, [&](const Work& work) {
+    const AttemptKey key{work.job.epoch(), work.job.attempt_id()};
+    if (std::find(keys.begin(), keys.end(), key) == keys.end()) return false;
+    dropped.push_back(key);
+    return true;
+  });
+  return dropped;
+}
+
+void EvaluationThread::drop_all() {
+  const std::lock_guard lock(mutex_);
+  queue_.clear();
+}
+
+std::vector<v1::JobResult> EvaluationThread::take_finished() {
+  const std::lock_guard lock(mutex_);
+  if (finished_.empty()) return {};
+  std::uint64_t count = 0;
+  [[maybe_unused]] const ssize_t got = read(fd_, &count, sizeof count);
+  return std::exchange(finished_, {});
+}
+
+bool EvaluationThread::idle() {
+  const std::lock_guard lock(mutex_);
+  return begun_ < 0 && queue_.empty() && finished_.empty();
+}
+
+double EvaluationThread::current_job_age() {
+  const std::lock_guard lock(mutex_);
+  return begun_ < 0 ? 0 : monotonic_seconds() - begun_;
+}
+
+}  // namespace gapfarm

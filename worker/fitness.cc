@@ -1,0 +1,155 @@
+#include "worker/fitness.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/score/density.h"
+#include "common/score/fitness.h"
+
+namespace gapfarm {
+namespace {
+
+bool same_command(const CommandSpec& a, const CommandSpec& b) {
+  return a.name == b.name && a.left == b.left && a.right == b.right && a.duration_s == b.duration_s;
+}
+
+// Mean simulated displacement of some trials, each seen from its measured start.
+Pose mean_displacement(const Problem& problem, const Prediction& prediction,
+                       const std::vector<std::size_t>& members) {
+  Eigen::Vector4d sum = Eigen::Vector4d::Zero();  // x, y, cos, sin
+  for (std::size_t i : members) {
+    const Pose X_WM = collapsed(prediction.trials[i]).X_WM;
+    const Pose d = between(problem.log.trials[i].X_WS, X_WM);
+    sum += Eigen::Vector4d(d.x, d.y, std::cos(d.theta), std::sin(d.theta));
+  }
+  sum /= static_cast<double>(members.size());
+  return {sum[0], sum[1], std::atan2(sum[3], sum[2])};
+}
+
+Result<double> mean_log_score(const Problem& problem, const Prediction& prediction) {
+  double sum = 0;
+  for (std::size_t i = 0; i < prediction.trials.size(); ++i) {
+    const auto score = log_score_of(prediction.trials[i], problem.log.trials[i].X_WE,
+                                    problem.fitness.outlier_share);
+    if (!score) return score.error();
+    sum += *score;
+  }
+  return sum / static_cast<double>(prediction.trials.size());
+}
+
+Result<double> mean_energy_score(const Problem& problem, const Prediction& prediction) {
+  std::vector<ScoredTrial> trials;
+  for (std::size_t i = 0; i < prediction.trials.size(); ++i) {
+    const Alternative whole = collapsed(prediction.trials[i]);
+    trials.push_back({local_difference(whole.X_WM, problem.log.trials[i].X_WE), whole.cov});
+  }
+  return energy_score(trials);
+}
+
+Result<RobustFitness> robust_score(const Problem& problem, const FitnessReference& reference,
+                                   const Prediction& prediction) {
+  std::vector<SimulatedMotion> simulated;
+  for (std::size_t g = 0; g < reference.real.size(); ++g) {
+    const MotionFacts& facts = prediction.facts[reference.command[g]];
+    simulated.push_back({mean_displacement(problem, prediction, reference.members[g]),
+                         facts.roll_rad, facts.pitch_rad, facts.heave_m, facts.rest_time_s});
+  }
+  return robust_fitness(reference.real, simulated, problem.fitness);
+}
+
+}  // namespace
+
+Result<FitnessReference> fitness_reference(const Problem& problem) {
+  FitnessReference reference;
+  if (problem.fitness.kind != FitnessKind::kRobustMahalanobis) return reference;
+  auto model = MotionModel::mine(problem.log, problem.commands);
+  if (!model) return model.error();
+  for (const CommandMotion& motion : model->commands()) {
+    if (motion.trials < MotionModelSettings{}.least_trials) continue;
+    reference.real.push_back({motion.command.name, motion.motion.mean, motion.motion.covariance});
+    reference.members.emplace_back();
+    for (std::size_t i = 0; i < problem.log.trials.size(); ++i) {
+      const CommandSpec c = resolved_command(problem.log.trials[i], problem.commands);
+      if (same_command(c, motion.command)) reference.members.back().push_back(i);
+    }
+    const auto named =
+        std::find_if(problem.commands.begin(), problem.commands.end(),
+                     [&](const CommandSpec& c) { return c.name == motion.command.name; });
+    reference.command.push_back(static_cast<std::size_t>(named - problem.commands.begin()));
+  }
+  if (reference.real.empty()) {
+    return Error{"fitness robust_mahalanobis needs at least " +
+                 std::to_string(MotionModelSettings{}.least_trials) +
+                 " trials of one command at one duty and duration; add trials or choose log_score"};
+  }
+  return reference;
+}
+
+Alternative collapsed(const TrialPrediction& prediction) {
+  const Alternative& first = prediction.alternatives.front();
+  if (prediction.alternatives.size() == 1) return first;
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (const Alternative& a : prediction.alternatives) {
+    mean += a.weight * local_difference(first.X_WM, a.X_WM);
+  }
+  Alternative whole;
+  whole.X_WM = first.X_WM * Pose{mean[0], mean[1], mean[2]};
+  for (const Alternative& a : prediction.alternatives) {
+    const Eigen::Vector3d d = local_difference(whole.X_WM, a.X_WM);
+    const Eigen::Matrix3d turned = rotate_covariance(a.cov, a.X_WM.theta - whole.X_WM.theta);
+    whole.cov += a.weight * (turned + d * d.transpose());
+  }
+  return whole;
+}
+
+Result<double> log_score_of(const TrialPrediction& prediction, const Pose& X_WM,
+                            double outlier_share) {
+  double greatest = -INFINITY;
+  std::vector<double> terms;
+  for (const Alternative& a : prediction.alternatives) {
+    if (a.weight <= 0) continue;
+    const auto cov = Covariance3::factorise(a.cov);
+    if (!cov) return cov.error();
+    terms.push_back(std::log(a.weight) +
+                    log_predictive_density(local_difference(a.X_WM, X_WM), *cov, outlier_share));
+    greatest = std::max(greatest, terms.back());
+  }
+  double sum = 0;
+  for (double term : terms) sum += std::exp(term - greatest);
+  return greatest + std::log(sum);
+}
+
+Result<v1::EvaluateResult> fitness_of(const Problem& problem, const FitnessReference& reference,
+                                      const Prediction& prediction) {
+  v1::EvaluateResult result;
+  result.set_conditions(prediction.conditions);
+  switch (problem.fitness.kind) {
+    case FitnessKind::kLogScore: {
+      const auto score = mean_log_score(problem, prediction);
+      if (!score) return score.error();
+      result.set_fitness(*score);
+      result.set_log_score(*score);
+      break;
+    }
+    case FitnessKind::kEnergyScore: {
+      const auto score = mean_energy_score(problem, prediction);
+      if (!score) return score.error();
+      result.set_fitness(*score);
+      break;
+    }
+    case FitnessKind::kRobustMahalanobis: {
+      const auto score = robust_score(problem, reference, prediction);
+      if (!score) return score.error();
+      result.set_fitness(score->fitness);
+      result.set_robust_distance(score->distance);
+      result.set_penalty(score->penalty);
+      break;
+    }
+  }
+  if (!std::isfinite(result.fitness())) {
+    return Error{"the fitness is not finite; a pose of the log may lie impossibly far away"};
+  }
+  return result;
+}
+
+}  // namespace gapfarm

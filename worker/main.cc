@@ -1,0 +1,122 @@
+// gapfarm-worker: evaluates what a master sends.
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdio>
+#include <string>
+#include <thread>
+
+#include "common/base/build_info.h"
+#include "common/process/process_pool.h"
+#include "worker/evaluate.h"
+#include "worker/service.h"
+#include "worker/supervisor.h"
+
+namespace gapfarm {
+namespace {
+
+constexpr const char* kExamples = R"(Examples:
+  gapfarm-worker --connect tcp://10.0.0.5:5555
+      one worker process a core, for the master at that address; they reconnect when it restarts
+  gapfarm-worker --connect tcp://10.0.0.5:5555 --processes 4 --name rack3
+      four processes whose names begin with rack3
+
+SIGTERM or Ctrl-C: finish the job in hand, then leave.  A second one: leave at once.
+Exit status: 0 stopped as asked, 1 failed, 2 wrong usage, 78 refused by the master for good.)";
+
+struct Arguments {
+  std::string endpoint;
+  std::string name;
+  unsigned window = 0;
+  unsigned processes = std::max(1u, std::thread::hardware_concurrency());
+  bool local = false;
+  int parent = 0;
+  std::string replaces;
+  std::string replaced_end = "left";
+};
+
+void describe(CLI::App& app, Arguments* arguments) {
+  app.footer(kExamples);
+  app.set_version_flag("--version", build_summary("gapfarm-worker"));
+  app.add_option("--connect", arguments->endpoint, "The master: tcp://HOST:PORT or ipc://PATH")
+      ->required()
+      ->type_name("ENDPOINT");
+  app.add_option("--name", arguments->name, "Begin of the workers' names (default: the host's)");
+  app.add_option("--window", arguments->window,
+                 "Jobs in hand, the one in work included (default: as the master likes)")
+      ->check(CLI::Range(1, 1000));
+  app.add_option("--processes", arguments->processes, "Worker processes")
+      ->check(CLI::Range(1, 4096))
+      ->capture_default_str();
+  // For the processes that start this one; no user needs them.
+  app.add_flag("--local", arguments->local)->group("");
+  app.add_option("--parent", arguments->parent)->group("");
+  app.add_option("--replaces", arguments->replaces)->group("");
+  app.add_option("--replaced-end", arguments->replaced_end)
+      ->check(CLI::IsMember({"left", "killed", "crashed"}))
+      ->group("");
+}
+
+int complain(const Error& error, int status) {
+  std::fprintf(stderr, "gapfarm-worker: %s\n", error.message.c_str());
+  return status;
+}
+
+// One worker, child of a master or a supervisor.
+int work(const Arguments& arguments) {
+  if (!die_with_parent(arguments.parent)) return 0;
+  StopSource stop;
+  // Ctrl-C reaches the whole terminal's group; what it means is the parent's to decide.
+  const StopOnSignals signals(&stop, /*ignore_interrupt=*/true);
+  ServiceOptions options;
+  options.endpoint = arguments.endpoint;
+  options.local = arguments.local;
+  options.session.name = arguments.name;
+  options.session.host = host_name();
+  options.session.pid = getpid();
+  options.session.fingerprint = build_info().fingerprint;
+  options.session.numeric_class = numeric_class();
+  options.session.window = arguments.window;
+  options.session.replaces = arguments.replaces;
+  options.session.replaced_end = arguments.replaced_end == "crashed"  ? v1::PROCESS_CRASHED
+                                 : arguments.replaced_end == "killed" ? v1::PROCESS_KILLED
+                                                                      : v1::PROCESS_LEFT;
+  EvaluationThread evaluation;
+  const Result<ServiceEnd> end = serve(options, evaluation, stop);
+  const int status = end ? 0 : complain(end.error(), kExitRefused);
+  // The thread's destructor would wait for a job whose answer nobody wants.
+  if (!evaluation.idle()) _exit(status);
+  return status;
+}
+
+int start_workers(const Arguments& arguments) {
+  StopSource stop;
+  const StopOnSignals signals(&stop);
+  SupervisorOptions options;
+  options.program = "/proc/self/exe";
+  options.name = unique_worker_name(arguments.name);
+  options.processes = arguments.processes;
+  options.arguments = {"--connect", arguments.endpoint};
+  if (arguments.window > 0) {
+    options.arguments.insert(options.arguments.end(),
+                             {"--window", std::to_string(arguments.window)});
+  }
+  const Status status = supervise(options, stop);
+  return status ? 0 : complain(status.error(), 1);
+}
+
+}  // namespace
+}  // namespace gapfarm
+
+int main(int argc, char** argv) {
+  CLI::App app("Evaluates what a gapfarm master sends.", "gapfarm-worker");
+  gapfarm::Arguments arguments;
+  gapfarm::describe(app, &arguments);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : gapfarm::kExitUsage;
+  }
+  return arguments.parent > 0 ? gapfarm::work(arguments) : gapfarm::start_workers(arguments);
+}

@@ -1,0 +1,16 @@
+// Moves messages between a transport and the worker's session.
+#pragma once
+
+#include "common/net/transport.h"
+#include "worker/session.h"
+
+namespace gapfarm {
+
+// Handles what has arrived.  True: something had.
+bool pump_in(Transport& transport, WorkerSession& session, double now);
+// One message, whatever comes of it.
+void send(Transport& transport, v1::Envelope* envelope);
+// Sends what is to be said.
+void pump_out(Transport& transport, WorkerSession& session);
+
+}  // namespace gapfarm

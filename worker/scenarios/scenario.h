@@ -1,0 +1,71 @@
+// Scenarios: what can be simulated.  The rest of the worker knows them by this interface only.
+#pragma once
+
+#include <Eigen/Core>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "common/base/result.h"
+#include "common/problem/problem.h"
+#include "gapfarm/v1/task.pb.h"
+
+namespace gapfarm {
+
+// One way in which a trial may end.
+struct Alternative {
+  double weight = 1;
+  Pose X_WM;                                      // mean of the measured end pose, world frame
+  Eigen::Matrix3d cov = Eigen::Matrix3d::Zero();  // in X_WM's own axes: m, m, rad
+};
+
+// The predictive distribution of a trial's measured end pose: a mixture whose weights sum to 1.
+struct TrialPrediction {
+  std::vector<Alternative> alternatives;
+};
+
+// The worst of a command's simulated motions.
+struct MotionFacts {
+  double roll_rad = 0;
+  double pitch_rad = 0;
+  double heave_m = 0;
+  double rest_time_s = 0;  // after the motors' stop
+};
+
+struct Prediction {
+  v1::Outcome outcome = v1::OK;  // the first simulation that did not end well decides
+  std::string message;
+  std::vector<TrialPrediction> trials;  // as asked for
+  std::vector<MotionFacts> facts;       // one a command of the problem
+  unsigned conditions = 0;              // distinct motions that had to be simulated
+  double simulated_s = 0;
+};
+
+struct PredictOptions {
+  std::span<const std::uint32_t> trials;  // indices into the problem's log; empty: all
+  bool means_only = false;                // one alternative a trial, no covariance
+  v1::StreamKey stream;                   // only SpreadKind::kSampled draws from it
+};
+
+// A scenario with a problem's trials prepared for many genomes.  Const methods are pure.
+class ScenarioModel {
+ public:
+  virtual ~ScenarioModel() = default;
+  virtual Prediction predict(const ParameterValues& values,
+                             const PredictOptions& options) const = 0;
+  virtual v1::TaskResult simulate(const ParameterValues& values,
+                                  const v1::SimulateTask& task) const = 0;
+  virtual v1::TaskResult trace(const ParameterValues& values, const v1::TraceTask& task) const = 0;
+};
+
+struct Scenario {
+  const char* name;
+  const char* summary;
+  // `problem` outlives the model.
+  std::unique_ptr<ScenarioModel> (*prepare)(const Problem& problem);
+};
+
+std::span<const Scenario> scenarios();
+
+}  // namespace gapfarm

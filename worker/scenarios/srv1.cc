@@ -1,0 +1,208 @@
+#include "worker/scenarios/srv1.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+#include <tuple>
+
+#include "common/score/fitness.h"
+#include "common/score/motion_model.h"
+#include "common/trials/context.h"
+#include "worker/scenarios/srv1_motions.h"
+#include "worker/scenarios/srv1_simulate.h"
+
+namespace gapfarm {
+namespace {
+
+// Trials sorted into groups that share their motion.
+struct Grouping {
+  std::vector<ConditionGroup> groups;
+  std::vector<std::size_t> of_trial;
+};
+
+struct PreparedTrial {
+  DrivenCommand drive;
+  TrialContext context;
+  std::size_t command = 0;
+  Pose X_WS;
+};
+
+Grouping group_trials(const std::vector<PreparedTrial>& trials, bool by_last_direction) {
+  Grouping grouping;
+  std::map<std::tuple<double, double, double, int, int, std::size_t>, std::size_t> index;
+  for (const PreparedTrial& trial : trials) {
+    const int last_left = by_last_direction ? trial.context.last_left : 0;
+    const int last_right = by_last_direction ? trial.context.last_right : 0;
+    const double time = trial.context.session_time_s;
+    const auto [entry, fresh] =
+        index.try_emplace({trial.drive.left, trial.drive.right, trial.drive.duration_s, last_left,
+                           last_right, trial.command},
+                          grouping.groups.size());
+    if (fresh) {
+      grouping.groups.push_back({trial.drive, last_left, last_right, time, time, trial.command});
+    }
+    ConditionGroup& group = grouping.groups[entry->second];
+    group.first_time_s = std::min(group.first_time_s, time);
+    group.last_time_s = std::max(group.last_time_s, time);
+    grouping.of_trial.push_back(entry->second);
+  }
+  return grouping;
+}
+
+// Whether a disc of floor can matter to a motion that ends at X_SE: it comes within the robot's
+// size of the way there.
+bool patch_in_reach(const Floor& floor, const Pose& X_SE) {
+  if (floor.patch_ratio == 1) return false;
+  constexpr double kRobotReach_m = 0.12;  // half its diagonal, and an arc's sagitta
+  const Eigen::Vector2d centre(floor.patch_x_m, floor.patch_y_m);
+  const Eigen::Vector2d end(X_SE.x, X_SE.y);
+  const double length2 = end.squaredNorm();
+  const double share = length2 > 0 ? std::clamp(centre.dot(end) / length2, 0.0, 1.0) : 0.0;
+  return (centre - share * end).norm() < floor.patch_radius_m + kRobotReach_m;
+}
+
+class Srv1Model : public ScenarioModel {
+ public:
+  explicit Srv1Model(const Problem& problem) : problem_(problem) {
+    std::vector<DrivenCommand> driven;
+    for (const Trial& trial : problem.log.trials) {
+      const CommandSpec c = resolved_command(trial, problem.commands);
+      driven.push_back({c.left, c.right, c.duration_s});
+    }
+    const std::vector<TrialContext> contexts = trial_contexts(problem.log, driven);
+    for (std::size_t i = 0; i < driven.size(); ++i) {
+      const Trial& trial = problem.log.trials[i];
+      trials_.push_back({driven[i], contexts[i], command_index(trial.command), trial.X_WS});
+    }
+    by_drive_ = group_trials(trials_, false);
+    by_drive_and_last_ = group_trials(trials_, true);
+  }
+
+  Prediction predict(const ParameterValues& values, const PredictOptions& options) const override;
+
+  v1::TaskResult simulate(const ParameterValues& values,
+                          const v1::SimulateTask& task) const override {
+    return simulate_session(problem_, values, task);
+  }
+
+  v1::TaskResult trace(const ParameterValues& values, const v1::TraceTask& task) const override {
+    return trace_command(values, task);
+  }
+
+ private:
+  std::size_t command_index(const std::string& name) const {
+    std::size_t i = 0;
+    while (problem_.commands[i].name != name) ++i;
+    return i;
+  }
+
+  std::vector<Gains> draws(const Srv1Robot& robot, const PredictOptions& options,
+                           std::size_t group) const;
+  TrialPrediction observe(const Srv1Robot& robot, const GroupMotion& motion, const Pose& X_SE,
+                          const Pose& X_WR, bool means_only) const;
+
+  const Problem& problem_;
+  std::vector<PreparedTrial> trials_;
+  Grouping by_drive_;
+  Grouping by_drive_and_last_;
+};
+
+std::vector<Gains> Srv1Model::draws(const Srv1Robot& robot, const PredictOptions& options,
+                                    std::size_t group) const {
+  if (problem_.spread.kind != SpreadKind::kSampled) return {};
+  // The group's number shares a word with the replicate's, so that groups draw independently.
+  Stream stream({options.stream.run_seed(), Purpose::kEvaluation, options.stream.generation(),
+                 options.stream.birth_id(),
+                 options.stream.replicate() | static_cast<std::uint64_t>(group + 1) << 32});
+  std::vector<Gains> gains;
+  for (unsigned i = 0; i < problem_.spread.replicates; ++i) {
+    gains.push_back(draw_gains(robot.noise(), stream));
+  }
+  return gains;
+}
+
+// From the motion in the start frame to the logged end pose, with the noise of both readings.
+TrialPrediction Srv1Model::observe(const Srv1Robot& robot, const GroupMotion& motion,
+                                   const Pose& X_SE, const Pose& X_WR, bool means_only) const {
+  TrialPrediction prediction;
+  const Pose X_WE = X_WR * X_SE;
+  if (means_only) return {{{1, robot.effects().observe(X_WE), Eigen::Matrix3d::Zero()}}};
+  PoseNoise noise = robot.noise().pose;
+  // Rounding to a grid adds the variance of a uniform error.
+  noise.position_m =
+      std::hypot(noise.position_m, robot.effects().reading().quantum_m / std::sqrt(12.0));
+  for (const GroupMotion::Branch& branch : motion.branches()) {
+    const Pose X_SA = X_SE * branch.X_EA;
+    prediction.alternatives.push_back({branch.weight, robot.effects().observe(X_WE * branch.X_EA),
+                                       predictive_covariance(X_SA, motion.drive_cov(), noise)});
+  }
+  return prediction;
+}
+
+Prediction Srv1Model::predict(const ParameterValues& values, const PredictOptions& options) const {
+  Prediction prediction;
+  prediction.facts.resize(problem_.commands.size());
+  Srv1Robot robot(values);
+  const unsigned context = robot.effects().motion_context();
+  const Grouping& grouping = (context & kLastDirection) ? by_drive_and_last_ : by_drive_;
+
+  std::vector<std::uint32_t> wanted(options.trials.begin(), options.trials.end());
+  if (wanted.empty()) {
+    for (std::uint32_t i = 0; i < trials_.size(); ++i) wanted.push_back(i);
+  }
+  std::set<std::size_t> needed;
+  for (std::uint32_t i : wanted) needed.insert(grouping.of_trial[i]);
+
+  const auto give_up = [&](v1::Outcome outcome, const ConditionGroup& group) {
+    prediction.outcome = outcome;
+    prediction.message = "command " + problem_.commands[group.command].name;
+    prediction.trials.clear();
+    prediction.simulated_s = robot.simulated_s();
+    return prediction;
+  };
+
+  std::map<std::size_t, GroupMotion> motions;
+  for (std::size_t g : needed) {
+    GroupResult result =
+        simulate_group(robot, grouping.groups[g], options.means_only, draws(robot, options, g));
+    if (result.outcome != v1::OK) return give_up(result.outcome, grouping.groups[g]);
+    const MotionFacts& f = result.motion.facts();
+    MotionFacts& worst = prediction.facts[grouping.groups[g].command];
+    worst = {std::max(worst.roll_rad, f.roll_rad), std::max(worst.pitch_rad, f.pitch_rad),
+             std::max(worst.heave_m, f.heave_m), std::max(worst.rest_time_s, f.rest_time_s)};
+    motions.emplace(g, std::move(result.motion));
+  }
+
+  for (std::uint32_t i : wanted) {
+    const PreparedTrial& trial = trials_[i];
+    const ConditionGroup& group = grouping.groups[grouping.of_trial[i]];
+    const GroupMotion& motion = motions.at(grouping.of_trial[i]);
+    const Pose X_WR = robot.effects().recover(trial.X_WS);
+    Pose X_SE = motion.end(X_WR.theta, trial.context.session_time_s);
+    if (context & kStartPlace) {
+      Situation situation = reference_situation(group);
+      situation.X_WR = X_WR;
+      situation.session_time_s = trial.context.session_time_s;
+      Floor floor;
+      robot.effects().floor(situation, floor);
+      if (patch_in_reach(floor, X_SE)) {
+        const Motion direct = robot.run(group.drive, situation, {});
+        if (direct.outcome != MotionOutcome::kOk) return give_up(to_outcome(direct.outcome), group);
+        X_SE = direct.X_SE;
+      }
+    }
+    prediction.trials.push_back(observe(robot, motion, X_SE, X_WR, options.means_only));
+  }
+  prediction.conditions = robot.runs();
+  prediction.simulated_s = robot.simulated_s();
+  return prediction;
+}
+
+}  // namespace
+
+std::unique_ptr<ScenarioModel> prepare_srv1(const Problem& problem) {
+  return std::make_unique<Srv1Model>(problem);
+}
+
+}  // namespace gapfarm

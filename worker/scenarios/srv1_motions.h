@@ -1,0 +1,71 @@
+// Motions shared by trials: one simulation a distinct condition, not one a trial.
+//
+// On a flat floor the motion does not depend on where it starts, so trials with the same duties and
+// duration share theirs.  An effect that looks at the heading or at the time makes the motion a
+// smooth function of it: that is simulated at nodes and interpolated.  One that looks at the place
+// is simulated trial by trial, where the place can matter.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "worker/scenarios/scenario.h"
+#include "worker/scenarios/srv1_robot.h"
+
+namespace gapfarm {
+
+// What trials of a group share.
+struct ConditionGroup {
+  DrivenCommand drive;
+  int last_left = 0;  // 0 in groups that ignore the last direction
+  int last_right = 0;
+  double first_time_s = 0;  // of the session, over the group's trials
+  double last_time_s = 0;
+  std::size_t command = 0;  // of the problem
+};
+
+// The main motion's end, what it depends on, and what may happen instead.
+class GroupMotion {
+ public:
+  // Mean end pose in the start frame for a trial that starts at this heading and time.
+  Pose end(double heading_rad, double session_time_s) const;
+
+  // From the main end to each alternative's; the first is the main one itself.
+  struct Branch {
+    double weight = 1;
+    Pose X_EA;
+  };
+  const std::vector<Branch>& branches() const { return branches_; }
+  const Eigen::Matrix3d& drive_cov() const { return drive_cov_; }  // in the end's axes
+  const MotionFacts& facts() const { return facts_; }
+  const Pose& reference() const { return reference_; }
+  // Greatest difference between half the heading nodes' interpolant and the other half, in m and
+  // rad taken alike: a bound on the error of the whole set.
+  double heading_error() const { return heading_error_; }
+
+ private:
+  friend class GroupSimulation;
+  Pose reference_;
+  Eigen::Vector3d drive_shift_ = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d drive_cov_ = Eigen::Matrix3d::Zero();
+  std::vector<Eigen::Vector3d> by_heading_;  // at heading_nodes(), relative to reference_
+  std::vector<double> times_;
+  std::vector<Eigen::Vector3d> by_time_;  // at times_, relative to reference_
+  std::vector<Branch> branches_;
+  MotionFacts facts_;
+  double heading_error_ = 0;
+};
+
+struct GroupResult {
+  v1::Outcome outcome = v1::OK;
+  GroupMotion motion;
+};
+
+// Simulates a group's motion.  `draws` empty: cubature; otherwise these gains' sample moments.
+GroupResult simulate_group(Srv1Robot& robot, const ConditionGroup& group, bool means_only,
+                           const std::vector<Gains>& draws);
+
+// A situation that no patch of floor reaches.
+Situation reference_situation(const ConditionGroup& group);
+
+}  // namespace gapfarm

@@ -1,0 +1,109 @@
+#include "worker/scenarios/srv1_robot.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace gapfarm {
+namespace {
+
+double at(const ParameterValues& values, Srv1 row) { return values[row_of(row)]; }
+int whole(const ParameterValues& values, Srv1 row) { return static_cast<int>(at(values, row)); }
+
+SideDrive side_drive(const SideState& side, double full_speed_m_s, double noise_gain) {
+  return {side.duty * full_speed_m_s * side.gain * noise_gain, side.lag_s, side.dead_travel_m};
+}
+
+}  // namespace
+
+SimSettings sim_settings(const ParameterValues& values, const ActiveEffects& effects) {
+  SimSettings s;
+  s.robot = static_cast<RobotModel>(whole(values, Srv1::kRobot));
+  s.mass_kg = at(values, Srv1::kMass);
+  s.contact_length_m = at(values, Srv1::kContactLength);
+  s.track_gauge_m = at(values, Srv1::kTrackGauge);
+  s.friction = at(values, Srv1::kFriction);
+  s.friction_ratio = at(values, Srv1::kFrictionRatio);
+  s.gravity_m_s2 = at(values, Srv1::kGravity);
+  s.step_rate_hz = at(values, Srv1::kStepRate);
+  s.sub_steps = whole(values, Srv1::kSubSteps);
+  s.solver_iterations = whole(values, Srv1::kSolverIterations);
+  s.restitution = at(values, Srv1::kRestitution);
+  s.linear_damping = at(values, Srv1::kLinearDamping);
+  s.angular_damping = at(values, Srv1::kAngularDamping);
+  s.wheel_shape = static_cast<WheelShape>(whole(values, Srv1::kWheelShape));
+  s.maximum_velocity_rad_s = at(values, Srv1::kMaximumVelocity);
+  s.motor_torque_n_m = at(values, Srv1::kMotorTorque);
+  effects.settings(s);
+  return s;
+}
+
+std::vector<Gains> cubature_points(const NoiseSettings& noise) {
+  // Gains (l, r) have variance c^2 + s^2 and covariance c^2; along (1, 1)/sqrt(2) that is
+  // s^2 + 2 c^2, along (1, -1)/sqrt(2) it is s^2.  The factors sqrt(2) and 1/sqrt(2) cancel.
+  const double together = std::hypot(noise.drive_side, std::sqrt(2.0) * noise.drive_common);
+  const double apart = noise.drive_side;
+  if (together == 0) return {};
+  return {{1 + together, 1 + together},
+          {1 - together, 1 - together},
+          {1 + apart, 1 - apart},
+          {1 - apart, 1 + apart}};
+}
+
+Gains draw_gains(const NoiseSettings& noise, Stream& stream) {
+  const double common = noise.drive_common * stream.normal();
+  const double left = noise.drive_side * stream.normal();
+  const double right = noise.drive_side * stream.normal();
+  return {1 + common + left, 1 + common + right};
+}
+
+Srv1Robot::Srv1Robot(const ParameterValues& values)
+    : effects_(srv1_table(), values),
+      noise_{at(values, Srv1::kDriveNoiseCommon),
+             at(values, Srv1::kDriveNoiseSide),
+             {at(values, Srv1::kPoseNoisePosition), at(values, Srv1::kPoseNoiseHeading)}},
+      full_speed_m_s_(at(values, Srv1::kFullSpeed)),
+      simulator_(sim_settings(values, effects_)) {}
+
+Motion Srv1Robot::run(const DrivenCommand& drive, const Situation& situation, const Gains& gains,
+                      std::vector<MotionSample>* path, double interval_s) {
+  DriveState state;
+  state.left.duty = drive.left;
+  state.right.duty = drive.right;
+  state.duration_s = drive.duration_s;
+  effects_.drive(situation, state);
+  Floor floor;
+  effects_.floor(situation, floor);
+  const DriveInput input{side_drive(state.left, full_speed_m_s_, gains.left),
+                         side_drive(state.right, full_speed_m_s_, gains.right), state.duration_s};
+  const Motion motion = simulator_.run(input, floor, path, interval_s);
+  simulated_s_ += motion.duration_s;
+  ++runs_;
+  return motion;
+}
+
+v1::Outcome to_outcome(MotionOutcome outcome) {
+  switch (outcome) {
+    case MotionOutcome::kOk:
+      return v1::OK;
+    case MotionOutcome::kDiverged:
+      return v1::DIVERGED;
+    case MotionOutcome::kFellOver:
+      return v1::FELL_OVER;
+    case MotionOutcome::kNeverRested:
+      return v1::NEVER_RESTED;
+  }
+  return v1::DIVERGED;
+}
+
+Pose pose_before_end(const std::vector<MotionSample>& path, double age_s) {
+  const double when = path.back().t_s - age_s;
+  const auto after = std::upper_bound(path.begin(), path.end(), when,
+                                      [](double t, const MotionSample& s) { return t < s.t_s; });
+  if (after == path.begin()) return path.front().X_SB;
+  if (after == path.end()) return path.back().X_SB;
+  const MotionSample& a = *(after - 1);
+  const double share = (when - a.t_s) / (after->t_s - a.t_s);
+  return a.X_SB * exp(share * log(between(a.X_SB, after->X_SB)));
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,62 @@
+// From parameter values to what the simulator is built from, and one driven command.
+#pragma once
+
+#include <vector>
+
+#include "common/parameters/table.h"
+#include "common/score/fitness.h"
+#include "common/trials/context.h"
+#include "gapfarm/v1/task.pb.h"
+#include "worker/effects/behaviour.h"
+#include "worker/sim/simulator.h"
+
+namespace gapfarm {
+
+struct NoiseSettings {
+  double drive_common = 0;  // s.d. of both sides' gain, per trial
+  double drive_side = 0;    // s.d. of each side's gain, per trial
+  PoseNoise pose;
+};
+
+// Gains of the two sides' speed in one trial.
+struct Gains {
+  double left = 1;
+  double right = 1;
+};
+
+// Third-degree cubature of the drive noise (Arasaratnam and Haykin 2009, sec. III): equally
+// weighted points at +-sqrt(2) standard deviations along the two principal axes.  Empty without
+// noise.
+std::vector<Gains> cubature_points(const NoiseSettings& noise);
+Gains draw_gains(const NoiseSettings& noise, Stream& stream);
+
+// One robot at one set of parameter values, with the effects that are active there.
+class Srv1Robot {
+ public:
+  explicit Srv1Robot(const ParameterValues& values);
+
+  const ActiveEffects& effects() const { return effects_; }
+  const NoiseSettings& noise() const { return noise_; }
+
+  Motion run(const DrivenCommand& drive, const Situation& situation, const Gains& gains,
+             std::vector<MotionSample>* path = nullptr, double interval_s = 0);
+  double simulated_s() const { return simulated_s_; }
+  unsigned runs() const { return runs_; }
+
+ private:
+  ActiveEffects effects_;
+  NoiseSettings noise_;
+  double full_speed_m_s_ = 0;
+  Simulator simulator_;
+  double simulated_s_ = 0;
+  unsigned runs_ = 0;
+};
+
+SimSettings sim_settings(const ParameterValues& values, const ActiveEffects& effects);
+v1::Outcome to_outcome(MotionOutcome outcome);
+
+// Pose `age_s` before the end of a path sampled from the start to rest, by interpolation; before
+// the first sample the robot stood at the first.
+Pose pose_before_end(const std::vector<MotionSample>& path, double age_s);
+
+}  // namespace gapfarm

@@ -1,0 +1,128 @@
+#include "worker/scenarios/srv1_simulate.h"
+
+#include <cmath>
+
+#include "common/score/motion_model.h"
+#include "worker/scenarios/srv1_robot.h"
+
+namespace gapfarm {
+namespace {
+
+constexpr double kReadingInterval_s = 0.02;  // between the poses that a stale reading may find
+
+int sign(double duty) { return (duty > 0) - (duty < 0); }
+
+double rounded(double value, double quantum) {
+  return quantum > 0 ? std::round(value / quantum) * quantum : value;
+}
+
+// A robot in the world, seen by a camera.
+class Session {
+ public:
+  Session(const Problem& problem, const ParameterValues& values, const v1::SimulateTask& task)
+      : problem_(problem), task_(task), robot_(values), reading_(robot_.effects().reading()) {}
+
+  v1::TaskResult drive() {
+    v1::TaskResult result;
+    v1::SimulateResult* log = result.mutable_simulate();
+    result.set_outcome(v1::OK);
+    for (int i = 0; i < task_.plan_size(); ++i) {
+      const v1::Outcome outcome = trial(i, log->add_trials());
+      if (outcome != v1::OK) {
+        result.set_outcome(outcome);
+        result.set_message("trial " + std::to_string(task_.plan(i).trial().trial()) + ", command " +
+                           task_.plan(i).trial().command());
+        break;
+      }
+    }
+    result.set_simulated(robot_.simulated_s());
+    return result;
+  }
+
+ private:
+  v1::Outcome trial(int i, v1::Trial* logged) {
+    const v1::PlannedTrial& planned = task_.plan(i);
+    Trial trial = from_proto(planned.trial());
+    const CommandSpec command = resolved_command(trial, problem_.commands);
+    // A stream of its own for every trial, so that a plan's first trials do not depend on its rest.
+    stream_ = Stream({task_.stream().run_seed(), Purpose::kSimulation, task_.stream().generation(),
+                      task_.stream().birth_id(), static_cast<std::uint64_t>(i)});
+    const bool moved = planned.moved() || i == 0;
+    if (moved) situation_.X_WR = trial.X_WS;
+    situation_.moved = moved;
+    situation_.session_time_s = trial.t_s.value_or(0);
+
+    Gains gains = draw_gains(robot_.noise(), stream_);
+    const DriveBranch event = robot_.effects().draw(stream_);
+    gains.left *= event.left_gain;
+    gains.right *= event.right_gain;
+    const bool stale = stream_.bernoulli(reading_.stale_share);
+    const bool sampled = task_.path_interval() > 0;
+    std::vector<MotionSample> path;
+    const Motion motion = robot_.run({command.left, command.right, command.duration_s}, situation_,
+                                     gains, sampled || stale ? &path : nullptr,
+                                     sampled ? task_.path_interval() : kReadingInterval_s);
+    if (motion.outcome != MotionOutcome::kOk) return to_outcome(motion.outcome);
+
+    const Pose X_WS = situation_.X_WR;
+    const Pose X_SE = stale ? pose_before_end(path, reading_.stale_age_s) : motion.X_SE;
+    trial.X_WS = measured(X_WS);
+    trial.X_WE = measured(X_WS * X_SE);
+    if (sampled) {
+      for (const MotionSample& s : path) trial.path.push_back({s.t_s, measured(X_WS * s.X_SB)});
+    }
+    *logged = to_proto(trial);
+
+    situation_.X_WR = X_WS * motion.X_SE;
+    if (command.left != 0) situation_.last_left = sign(command.left);
+    if (command.right != 0) situation_.last_right = sign(command.right);
+    return v1::OK;
+  }
+
+  Pose measured(const Pose& X_WR) {
+    const PoseNoise& noise = robot_.noise().pose;
+    const Pose X_WM = robot_.effects().observe(X_WR);
+    const double x = X_WM.x + noise.position_m * stream_.normal();
+    const double y = X_WM.y + noise.position_m * stream_.normal();
+    return {rounded(x, reading_.quantum_m), rounded(y, reading_.quantum_m),
+            wrap_angle(X_WM.theta + noise.heading_rad * stream_.normal())};
+  }
+
+  const Problem& problem_;
+  const v1::SimulateTask& task_;
+  Srv1Robot robot_;
+  Reading reading_;
+  Situation situation_;
+  Stream stream_{StreamKey{}};
+};
+
+}  // namespace
+
+v1::TaskResult simulate_session(const Problem& problem, const ParameterValues& values,
+                                const v1::SimulateTask& task) {
+  return Session(problem, values, task).drive();
+}
+
+v1::TaskResult trace_command(const ParameterValues& values, const v1::TraceTask& task) {
+  v1::TaskResult result;
+  Srv1Robot robot(values);
+  std::vector<MotionSample> path;
+  const v1::Command& c = task.command();
+  const Motion motion =
+      robot.run({c.left(), c.right(), c.duration()}, {}, {}, &path, task.interval());
+  result.set_outcome(to_outcome(motion.outcome));
+  result.set_simulated(motion.duration_s);
+  v1::TraceResult* trace = result.mutable_trace();
+  trace->set_rest_time(motion.rest_time_s);
+  for (const MotionSample& s : path) {
+    v1::TraceSample* sample = trace->add_samples();
+    sample->set_t(s.t_s);
+    *sample->mutable_pose() = to_proto(s.X_SB);
+    sample->set_height(s.height_m);
+    sample->set_roll(s.roll_rad);
+    sample->set_pitch(s.pitch_rad);
+  }
+  return result;
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,107 @@
+#include "worker/service.h"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <random>
+#include <string>
+
+#include "common/net/socket.h"
+#include "common/process/process_pool.h"
+#include "worker/pump.h"
+
+namespace gapfarm {
+namespace {
+
+class Service {
+ public:
+  Service(const ServiceOptions& options, DealerSocket& socket, EvaluationThread& evaluation,
+          StopSource& stop)
+      : local_(options.local),
+        session_(options.session),
+        socket_(socket),
+        evaluation_(evaluation),
+        stop_(stop) {}
+
+  Result<ServiceEnd> run() {
+    for (;;) {
+      const double now = monotonic_seconds();
+      notice_stop();
+      const bool received = pump_in(socket_, session_, now);
+      hand_over(now);
+      pump_out(socket_, session_);
+      if (session_.state() == WorkerSession::State::kRefused) return Error{session_.reason()};
+      if (session_.state() == WorkerSession::State::kDismissed) {
+        if (local_) return ServiceEnd::kDismissed;
+        session_.restart(now);
+      }
+      if (stops_ >= 2) return leave(ServiceEnd::kStoppedNow);
+      if (stops_ == 1 && evaluation_.idle()) return leave(ServiceEnd::kStopped);
+      if (!received) sleep(now);
+    }
+  }
+
+ private:
+  void notice_stop() {
+    if (stop_.requests() == stops_) return;
+    stops_ = stop_.requests();
+    stop_.acknowledge();
+    evaluation_.drop_all();
+  }
+
+  // Between the session and the evaluating thread.
+  void hand_over(double now) {
+    for (v1::JobResult& result : evaluation_.take_finished()) {
+      session_.on_finished(std::move(result));
+    }
+    session_.set_current_job_age(evaluation_.current_job_age());
+    session_.on_tick(now);
+    for (const AttemptKey& key : evaluation_.drop(session_.take_cancelled())) {
+      session_.on_dropped(key);
+    }
+    std::vector<Work> work = session_.take_work();
+    if (stops_ == 0) evaluation_.give(std::move(work));
+  }
+
+  Result<ServiceEnd> leave(ServiceEnd end) {
+    v1::Envelope goodbye = session_.goodbye("asked to stop");
+    send(socket_, &goodbye);
+    return end;
+  }
+
+  void sleep(double now) {
+    const std::array<int, 2> fds = {evaluation_.fd(), stop_.fd()};
+    socket_.wait(fds, std::clamp(session_.next_tick() - now, 0.001, 60.0));
+  }
+
+  bool local_;
+  unsigned stops_ = 0;
+  WorkerSession session_;
+  DealerSocket& socket_;
+  EvaluationThread& evaluation_;
+  StopSource& stop_;
+};
+
+}  // namespace
+
+std::string host_name() {
+  char name[256] = {};
+  return gethostname(name, sizeof name - 1) == 0 ? name : "unknown";
+}
+
+std::string unique_worker_name(const std::string& prefix) {
+  char tail[16];
+  std::snprintf(tail, sizeof tail, "%06x", std::random_device{}() & 0xffffffu);
+  return (prefix.empty() ? host_name() : prefix) + "-" + std::to_string(getpid()) + "-" + tail;
+}
+
+Result<ServiceEnd> serve(const ServiceOptions& options, EvaluationThread& evaluation,
+                         StopSource& stop) {
+  auto socket = DealerSocket::connect(options.endpoint);
+  if (!socket) return socket.error();
+  return Service(options, **socket, evaluation, stop).run();
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,37 @@
+// The worker's socket and evaluate loop.
+#pragma once
+
+#include <string>
+
+#include "common/base/result.h"
+#include "common/process/stop.h"
+#include "worker/evaluation_thread.h"
+#include "worker/session.h"
+
+namespace gapfarm {
+
+struct ServiceOptions {
+  std::string endpoint;  // the master's
+  SessionOptions session;
+  // Belongs to the master's own process tree: ends when the master says goodbye, without finishing
+  // the job in hand.  Otherwise waits for the next master.
+  bool local = false;
+};
+
+enum class ServiceEnd {
+  kStopped,     // by request, with the job in hand finished and its result sent
+  kStoppedNow,  // by a second request
+  kDismissed,   // by the master; local workers only
+};
+
+// A name for this process that no other has: PREFIX (or the host) + pid + random tail.
+std::string unique_worker_name(const std::string& prefix);
+std::string host_name();
+
+// Works until told otherwise: one stop request finishes the job in hand, a second leaves at once.
+// Errors: a bad endpoint; refused by the master, with its reason.  `evaluation` may still have work
+// in hand afterwards (its destructor would wait for that), but nobody wants it.
+Result<ServiceEnd> serve(const ServiceOptions& options, EvaluationThread& evaluation,
+                         StopSource& stop);
+
+}  // namespace gapfarm

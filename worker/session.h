@@ -1,0 +1,121 @@
+// The worker's half of the protocol: fed with messages and a clock, it says what to work on and
+// what to send.  No sockets, no threads.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <list>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "gapfarm/v1/farm.pb.h"
+
+namespace gapfarm {
+
+struct SessionOptions {
+  std::string name;  // unique among all workers of a master
+  std::string host;
+  std::int64_t pid = 0;
+  std::string fingerprint;
+  std::string numeric_class;
+  unsigned window = 0;   // jobs wanted in hand; 0: as the master likes
+  std::string replaces;  // the process that this one makes up for, or empty
+  v1::ProcessEnd replaced_end = v1::PROCESS_LEFT;
+  double hello_min_s = 0.2;  // between two hellos without an answer, doubled up to the maximum
+  double hello_max_s = 5;
+};
+
+// Attempt ids are the master's; another life of it may use them again.
+struct AttemptKey {
+  std::uint64_t epoch = 0;
+  std::uint64_t attempt = 0;
+  bool operator==(const AttemptKey&) const = default;
+};
+
+// A job that can be worked on.
+struct Work {
+  v1::Job job;
+  std::shared_ptr<const std::string> problem;  // checked bytes; null: the task needs none
+};
+
+// Times are seconds of the caller's clock.
+class WorkerSession {
+ public:
+  enum class State {
+    kGreeting,  // no master, or it has not been heard of for too long
+    kWorking,
+    kDismissed,  // the master said goodbye
+    kRefused,    // for good; reason() says why
+  };
+
+  explicit WorkerSession(SessionOptions options) : options_(std::move(options)) {}
+
+  // Events.  `envelope` is left in a valid but unknown state.
+  void on_message(v1::Envelope* envelope, double now);
+  void on_other_protocol(std::uint32_t protocol);
+  // An answer, with its job's three ids.
+  void on_finished(v1::JobResult result);
+  // Work that was taken with take_work() will not be done.
+  void on_dropped(const AttemptKey& key);
+  void on_tick(double now);
+  // `envelope` of the outbox did not go out.
+  void on_unsent(v1::Envelope* envelope);
+  // After kDismissed: looks for a new master.
+  void restart(double now);
+
+  // Work taken earlier that is not wanted any more; then jobs to begin, in this order.
+  std::vector<AttemptKey> take_cancelled();
+  std::vector<Work> take_work();
+  // To be sent in order.
+  std::vector<v1::Envelope> take_outbox();
+  // The last words; jobs not answered go to others.
+  v1::Envelope goodbye(const std::string& reason) const;
+
+  State state() const { return state_; }
+  const std::string& reason() const { return reason_; }
+  std::size_t in_hand() const { return in_hand_.size(); }
+  double next_tick() const;
+  void set_current_job_age(double age) { current_job_age_ = age; }
+
+ private:
+  void on_welcome(const v1::Welcome& welcome, double now);
+  void on_job(v1::Job* job);
+  void on_cancel(std::uint64_t attempt);
+  void on_problem(v1::ProblemReply* reply);
+  void answer_unknown(const std::string& hash);
+  void ready(v1::Job* job, std::shared_ptr<const std::string> problem);
+  void request_problem(const std::string& hash);
+  void greet(double now);
+  void drop_everything();
+  std::shared_ptr<const std::string> known_problem(const std::string& hash);
+
+  SessionOptions options_;
+  State state_ = State::kGreeting;
+  std::string reason_;
+  std::uint64_t epoch_ = 0;  // of the master; 0: never welcomed
+  double heartbeat_interval_ = 1;
+  double silence_limit_ = 10;
+  double last_heard_ = 0;
+  double next_hello_ = 0;
+  double hello_wait_ = 0;
+  double next_heartbeat_ = 0;
+  double current_job_age_ = 0;
+  std::uint64_t sequence_ = 0;
+  std::uint64_t finished_ = 0;
+
+  std::map<std::uint64_t, std::uint64_t> in_hand_;      // attempt -> job; waiting, parked or begun
+  std::map<std::string, std::vector<v1::Job>> parked_;  // by the problem that they wait for
+  struct KnownProblem {
+    std::string hash;
+    std::shared_ptr<const std::string> bytes;
+  };
+  std::list<KnownProblem> problems_;  // latest used first
+  std::vector<Work> work_;
+  std::vector<AttemptKey> cancelled_;
+  std::deque<v1::JobResult> results_;  // not sent yet
+  std::vector<v1::Envelope> outbox_;
+};
+
+}  // namespace gapfarm

@@ -1,0 +1,72 @@
+#include "worker/supervisor.h"
+
+#include <poll.h>
+#include <signal.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "common/process/process_pool.h"
+
+namespace gapfarm {
+namespace {
+
+const char* word(EndCause cause) {
+  return cause == EndCause::kCrashed ? "crashed" : cause == EndCause::kKilled ? "killed" : "left";
+}
+
+ProcessPoolOptions pool_options(const SupervisorOptions& options) {
+  ProcessPoolOptions pool;
+  pool.program = options.program;
+  pool.count = options.processes;
+  pool.name_prefix = options.name;
+  pool.failure_limit = {};
+  pool.arguments = [arguments = options.arguments, parent = std::to_string(getpid())](
+                       const std::string& name, const ProcessEnded* replaced) {
+    std::vector<std::string> all = arguments;
+    all.insert(all.end(), {"--name", name, "--parent", parent});
+    if (replaced != nullptr) {
+      all.insert(all.end(),
+                 {"--replaces", replaced->name, "--replaced-end", word(replaced->cause)});
+    }
+    return all;
+  };
+  return pool;
+}
+
+void wait_for(const ProcessPool& pool, const StopSource& stop, double timeout_s) {
+  std::vector<pollfd> polled = {{stop.fd(), POLLIN, 0}};
+  for (int fd : pool.fds()) polled.push_back({fd, POLLIN, 0});
+  poll(polled.data(), polled.size(), static_cast<int>(std::ceil(timeout_s * 1000)));
+}
+
+}  // namespace
+
+Status supervise(const SupervisorOptions& options, StopSource& stop) {
+  ProcessPool pool(pool_options(options));
+  if (Status status = pool.start(monotonic_seconds()); !status) return status;
+  unsigned stops = 0;
+  std::string last_end;
+  while (!pool.exhausted()) {
+    if (stop.requests() != stops) {
+      stops = stop.requests();
+      stop.acknowledge();
+      pool.retire();
+      pool.signal_all(SIGTERM);
+    }
+    const double now = monotonic_seconds();
+    for (const ProcessEnded& end : pool.reap(now)) {
+      if (stops > 0) continue;
+      last_end = end.text;
+      std::fprintf(stderr, "gapfarm-worker: %s%s\n", end.text.c_str(),
+                   end.gave_up ? "; it is not started again" : "");
+    }
+    wait_for(pool, stop, std::clamp(pool.next_start() - now, 0.0, 1.0));
+  }
+  if (stops > 0) return {};
+  return Error{"no worker process can be kept alive: " + last_end};
+}
+
+}  // namespace gapfarm

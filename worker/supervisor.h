@@ -1,0 +1,24 @@
+// Keeps worker processes alive on a machine that no master runs on.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "common/base/result.h"
+#include "common/process/stop.h"
+
+namespace gapfarm {
+
+struct SupervisorOptions {
+  std::string program;                 // this executable
+  std::string name;                    // prefix of the workers' names, unique on the farm
+  std::vector<std::string> arguments;  // for every worker, beside --name and --parent
+  unsigned processes = 1;
+};
+
+// Starts the workers, and starts them again when they end; the new one tells the master how the old
+// one ended, so that a task that kills workers is found out.  Passes a first and a second stop
+// request on.  Returns when asked to stop and all have ended; error: none could be kept alive.
+Status supervise(const SupervisorOptions& options, StopSource& stop);
+
+}  // namespace gapfarm
