@@ -94,7 +94,7 @@ int start_workers(const Arguments& arguments) {
   StopSource stop;
   const StopOnSignals signals(&stop);
   SupervisorOptions options;
-  options.program = "/proc/self/exe";
+  options.program = executable_path();
   options.name = unique_worker_name(arguments.name);
   options.processes = arguments.processes;
   options.arguments = {"--connect", arguments.endpoint};

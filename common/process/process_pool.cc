@@ -55,12 +55,11 @@ bool die_with_parent(pid_t pid) {
   return getppid() == pid;
 }
 
-std::string executable_folder() {
+std::string executable_path() {
   char path[4096];
   const ssize_t size = readlink("/proc/self/exe", path, sizeof path);
   if (size <= 0) return "";
-  const std::string full(path, static_cast<std::size_t>(size));
-  return full.substr(0, full.rfind('/') + 1);
+  return std::string(path, static_cast<std::size_t>(size));
 }
 
 ProcessPool::ProcessPool(ProcessPoolOptions options)
@@ -133,6 +132,7 @@ ProcessEnded ProcessPool::ended(Place& place, int status, double now) {
   if (place.pidfd >= 0) close(place.pidfd);
   place.pidfd = -1;
   place.pid = 0;
+  if (now - place.start_at >= options_.healthy_s) place.failures = 0;
   ++place.failures;
   const bool hopeless =
       WIFEXITED(status) && (WEXITSTATUS(status) == kExitUsage ||
@@ -157,6 +157,7 @@ std::vector<ProcessEnded> ProcessPool::reap(double now) {
       ends.push_back(ended(place, status, now));
     }
     if (place.pid != 0 || place.gave_up || retired_ || place.start_at > now) continue;
+    place.start_at = now;
     if (Status started = start_place(place, i); !started) {
       ProcessEnded end;
       end.name = place.name;

@@ -41,6 +41,7 @@ struct ProcessPoolOptions {
       arguments;
   // A place is given up after so many ends in a row without a confirm(); none: never.
   std::optional<unsigned> failure_limit = 3;
+  double healthy_s = 10;   // a child that lived so long counts as confirmed
   double backoff_s = 0.1;  // before the second start in a row without a confirm(), then doubled
   double backoff_max_s = 30;
 };
@@ -85,7 +86,7 @@ class ProcessPool {
     int pidfd = -1;
     unsigned starts = 0;
     unsigned failures = 0;  // ends in a row without a confirm()
-    double start_at = 0;    // when not running
+    double start_at = 0;    // when it started, or will when it does not run
     bool gave_up = false;
     std::optional<ProcessEnded> replaced;
   };
@@ -100,8 +101,8 @@ class ProcessPool {
 // In a child: die when the parent dies.  False when the parent `pid` is gone already.
 bool die_with_parent(pid_t pid);
 
-// The folder of the running executable, with a trailing slash; empty when /proc is missing.
-std::string executable_folder();
+// Of the running executable; empty when /proc is missing.
+std::string executable_path();
 
 // Seconds of CLOCK_MONOTONIC: for timeouts and schedules only, never in a result.
 double monotonic_seconds();

@@ -34,9 +34,10 @@ ProcessPoolOptions pool_options(std::string program, unsigned count, std::string
 
 Result<std::string> find_worker_program() {
   const char* named = getenv("GAPFARM_WORKER");
+  const std::string self = executable_path();
   const std::string path = named != nullptr && *named != '\0'
                                ? std::string(named)
-                               : executable_folder() + "gapfarm-worker";
+                               : self.substr(0, self.rfind('/') + 1) + "gapfarm-worker";
   if (access(path.c_str(), X_OK) == 0) return path;
   return Error{"cannot run the worker program '" + path + "': " + strerror(errno) +
                "; put gapfarm-worker beside gapfarm or name it in GAPFARM_WORKER"};

@@ -173,11 +173,15 @@ void Scheduler::keep_only(WorkerRecord& worker, const List& keeps, double held_s
 }
 
 void Scheduler::on_heartbeat(WorkerRecord& worker, const v1::Heartbeat& heartbeat, double now) {
+  if (heartbeat.epoch() != options_.epoch) {
+    // It missed its welcome and takes this master for an earlier one.
+    post(worker.peer).mutable_hello_request();
+    return;
+  }
   post(worker.peer).mutable_heartbeat()->set_sequence(heartbeat.sequence());
   // Messages do get lost when links break.  A job that should have arrived long ago and is not
   // there, while its answer is not here, is out of the world.
-  const bool same_life = heartbeat.epoch() == options_.epoch;
-  if (same_life) keep_only(worker, heartbeat.attempts(), now - options_.silence_limit_s);
+  keep_only(worker, heartbeat.attempts(), now - options_.silence_limit_s);
 }
 
 void Scheduler::on_result(WorkerRecord& worker, v1::JobResult* result) {

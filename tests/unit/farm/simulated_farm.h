@@ -1,0 +1,91 @@
+// A farm in virtual time: the real scheduler, the real worker sessions and the real wire format
+// over a network that loses, doubles, delays and reorders, with workers that die, hang and come
+// back. Everything follows from one seed.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <map>
+#include <memory>
+#include <queue>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "common/net/transport.h"
+#include "master/farm/pump.h"
+#include "worker/pump.h"
+
+namespace gapfarm {
+
+struct FaultPlan {
+  double drop = 0;          // probability of a message to get lost
+  double duplicate = 0;     // and to arrive twice
+  double delay_s = 0.002;   // mean of the exponential time a message takes; reorders
+  unsigned deaths = 0;      // worker processes that end, at random times
+  unsigned hangs = 0;       // workers that stop for a while and go on
+  unsigned partitions = 0;  // workers cut off for a while
+  unsigned master_pauses = 0;
+  unsigned master_restarts = 0;
+  double span_s = 5;  // within which all of that happens
+};
+
+class SimulatedFarm {
+ public:
+  SimulatedFarm(std::uint64_t seed, unsigned workers, const FaultPlan& faults);
+  ~SimulatedFarm();
+
+  // Runs the tasks to the end in virtual time.  Echo tasks only; busy_us is how long they take, and
+  // the payload "crash" ends the process that works on it.  Empty: not done within `limit_s`.
+  std::vector<v1::TaskResult> run(const std::vector<v1::Task>& tasks, double limit_s = 2000);
+
+  Scheduler& scheduler() { return *scheduler_; }
+  double now() const { return now_; }
+  // Answers taken from workers, of the present life of the master.
+  std::uint64_t answers_taken() const;
+
+ private:
+  struct Worker;
+  struct MasterEnd;
+  struct WorkerEnd;
+  using Event = std::function<void()>;
+
+  void at(double time, Event event);
+  double uniform(double low, double high);
+  bool chance(double probability);
+  void carry(const std::function<void()>& deliver);
+  void plan_faults(const FaultPlan& faults);
+  void start_master();
+  void start_worker(unsigned place, const std::string& replaces, v1::ProcessEnd end);
+  void end_worker(const std::shared_ptr<Worker>& worker, v1::ProcessEnd end);
+  void step_master();
+  void master_clock();
+  void step_worker(const std::shared_ptr<Worker>& worker);
+  void begin_next(const std::shared_ptr<Worker>& worker);
+  std::shared_ptr<Worker> any_worker();
+
+  struct Entry {
+    double time;
+    std::uint64_t order;
+    Event event;
+    bool operator>(const Entry& other) const {
+      return time != other.time ? time > other.time : order > other.order;
+    }
+  };
+  std::priority_queue<Entry, std::vector<Entry>, std::greater<>> events_;
+  std::mt19937_64 random_;
+  FaultPlan faults_;
+  double now_ = 0;
+  std::uint64_t order_ = 0;
+  std::uint64_t epoch_ = 0;
+  double master_away_until_ = 0;
+  unsigned names_ = 0;
+  std::vector<v1::Task> tasks_;
+  std::unique_ptr<Scheduler> scheduler_;
+  std::unique_ptr<MasterEnd> master_end_;
+  std::map<std::string, std::shared_ptr<Worker>> by_peer_;  // connections
+  std::vector<std::shared_ptr<Worker>> places_;
+};
+
+}  // namespace gapfarm
