@@ -1,0 +1,120 @@
+#include "common/score/density.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <sstream>
+
+namespace gapfarm {
+namespace {
+
+constexpr double kLogTwoPi = 1.8378770664093454836;
+
+Eigen::Vector3d in_metres(const Eigen::Vector3d& residual) {
+  return {residual[0], residual[1], kHeadingLength_m * residual[2]};
+}
+
+}  // namespace
+
+Result<Covariance3> Covariance3::factorise(const Eigen::Matrix3d& covariance) {
+  const Eigen::LLT<Eigen::Matrix3d> factor(covariance);
+  Covariance3 result;
+  result.lower_ = factor.matrixL();
+  if (factor.info() != Eigen::Success || !result.lower_.allFinite() ||
+      result.lower_.diagonal().minCoeff() <= 0) {
+    std::ostringstream text;
+    text << "covariance [" << covariance.format(Eigen::IOFormat(6, Eigen::DontAlignCols, " ", "; "))
+         << "] is not positive definite; add pose noise or a measurement resolution to it";
+    return Error{text.str()};
+  }
+  result.log_determinant_ = 2 * result.lower_.diagonal().array().log().sum();
+  return result;
+}
+
+double Covariance3::squared_distance(const Eigen::Vector3d& residual) const {
+  return lower_.triangularView<Eigen::Lower>().solve(residual).squaredNorm();
+}
+
+double log_normal_density(const Eigen::Vector3d& residual, const Covariance3& covariance) {
+  return -0.5 *
+         (3 * kLogTwoPi + covariance.log_determinant() + covariance.squared_distance(residual));
+}
+
+double log_tail_density(const Eigen::Vector3d& residual, const Covariance3& covariance) {
+  // log Gamma((nu + 3) / 2) - log Gamma(nu / 2) for nu = 3: Gamma(3) = 2, Gamma(3/2) = sqrt(pi)/2.
+  static_assert(kTailFreedom == 3);
+  const double log_gammas = std::log(4 / std::sqrt(std::numbers::pi));
+  const double q = covariance.squared_distance(residual) / (kTailScale * kTailFreedom);
+  return log_gammas - 1.5 * std::log(kTailFreedom * std::numbers::pi) -
+         0.5 * (covariance.log_determinant() + 3 * std::log(kTailScale)) -
+         0.5 * (kTailFreedom + 3) * std::log1p(q);
+}
+
+double log_predictive_density(const Eigen::Vector3d& residual, const Covariance3& covariance,
+                              double outlier_share) {
+  assert(outlier_share >= 0 && outlier_share < 1);
+  const double normal = std::log1p(-outlier_share) + log_normal_density(residual, covariance);
+  if (outlier_share == 0) return normal;
+  const double tail = std::log(outlier_share) + log_tail_density(residual, covariance);
+  const double greater = std::max(normal, tail);
+  return greater + std::log1p(std::exp(std::min(normal, tail) - greater));
+}
+
+double expected_norm(const Eigen::Ref<const Eigen::VectorXd>& mean,
+                     const Eigen::Ref<const Eigen::MatrixXd>& covariance) {
+  const double mean_square = mean.squaredNorm() + covariance.trace();
+  if (!(mean_square > 0)) return 0;
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(covariance);
+  const Eigen::ArrayXd variances = solver.eigenvalues().cwiseMax(0).array() / mean_square;
+  const Eigen::ArrayXd squares =
+      (solver.eigenvectors().transpose() * mean).array().square() / mean_square;
+
+  // With Q of mean 1 and t = e^u the integrand (1 - E exp(-t Q)) e^(-u/2) falls like e^(-|u|/2) on
+  // both sides and is analytic in a strip, so the trapezoid rule converges exponentially; its tails
+  // beyond +-kEnd are geometric sums.
+  constexpr double kStep = 0.5;
+  constexpr double kEnd = 18;
+  const auto integrand = [&](double u) {
+    const double t = std::exp(u);
+    double exponent = 0;
+    for (Eigen::Index i = 0; i < variances.size(); ++i) {
+      const double spread = 1 + 2 * t * variances[i];
+      exponent -= 0.5 * std::log(spread) + t * squares[i] / spread;
+    }
+    return -std::expm1(exponent) * std::exp(-0.5 * u);
+  };
+  const int nodes = static_cast<int>(2 * kEnd / kStep);
+  double sum = 0;
+  for (int i = 0; i <= nodes; ++i) sum += integrand(-kEnd + i * kStep);
+  const double tail = 1 / std::expm1(0.5 * kStep);
+  sum += tail * (integrand(-kEnd) + integrand(kEnd));
+  return std::sqrt(mean_square) * kStep * sum / (2 * std::sqrt(std::numbers::pi));
+}
+
+double gaussian_energy_score(const Eigen::Vector3d& residual, const Eigen::Matrix3d& covariance) {
+  const Eigen::Vector3d units(1, 1, kHeadingLength_m);
+  const Eigen::Matrix3d scaled = units.asDiagonal() * covariance * units.asDiagonal();
+  // X - X' ~ N(0, 2 S), and E||X - X'|| / 2 = E||X|| / sqrt(2).
+  return expected_norm(in_metres(residual), scaled) -
+         expected_norm(Eigen::Vector3d::Zero(), scaled) * std::numbers::sqrt2 / 2;
+}
+
+double ensemble_energy_score(const Eigen::Vector3d& residual,
+                             const std::vector<Eigen::Vector3d>& ensemble) {
+  assert(!ensemble.empty());
+  const auto count = static_cast<double>(ensemble.size());
+  double to_residual = 0, among = 0;
+  for (std::size_t i = 0; i < ensemble.size(); ++i) {
+    to_residual += in_metres(ensemble[i] - residual).norm();
+    for (std::size_t j = i + 1; j < ensemble.size(); ++j) {
+      among += in_metres(ensemble[i] - ensemble[j]).norm();
+    }
+  }
+  return to_residual / count - among / (count * count);
+}
+
+}  // namespace gapfarm

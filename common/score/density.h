@@ -1,0 +1,60 @@
+// Predictive densities and proper scores of a residual (x, y, theta) in (m, m, rad).
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "common/base/result.h"
+
+namespace gapfarm {
+
+// A symmetric positive definite 3x3 matrix, factorised.
+class Covariance3 {
+ public:
+  // Uses the lower triangle.  Error: not finite or not positive definite; the message shows the
+  // matrix and says so.
+  static Result<Covariance3> factorise(const Eigen::Matrix3d& covariance);
+
+  double log_determinant() const { return log_determinant_; }
+  // r^T S^-1 r.
+  double squared_distance(const Eigen::Vector3d& residual) const;
+  const Eigen::Matrix3d& lower() const { return lower_; }  // S = L L^T
+
+ private:
+  Eigen::Matrix3d lower_;
+  double log_determinant_ = 0;
+};
+
+// The heavy tail of the predictive density: multivariate t.
+constexpr double kTailFreedom = 3;
+constexpr double kTailScale = 9;  // scale matrix over the Gaussian's covariance
+
+// Log density in nats; the units of the density are 1 / (m^2 rad).
+double log_normal_density(const Eigen::Vector3d& residual, const Covariance3& covariance);
+// Multivariate t with kTailFreedom degrees of freedom and scale matrix kTailScale * S.
+double log_tail_density(const Eigen::Vector3d& residual, const Covariance3& covariance);
+// (1 - share) N(0, S) + share t, by log-sum-exp: finite for every finite residual when share > 0.
+// `outlier_share` in [0, 1).
+double log_predictive_density(const Eigen::Vector3d& residual, const Covariance3& covariance,
+                              double outlier_share);
+
+// The energy score needs one norm for positions and headings: a heading of 1 rad counts as this
+// many metres, about the distance from the turning centre to a corner of the robot.
+constexpr double kHeadingLength_m = 0.1;
+
+// E||X|| of X ~ N(mean, covariance), any dimension, covariance positive semidefinite; to about
+// 1e-7 of itself.  By E sqrt(Q) = 1 / (2 sqrt(pi)) Int_0^inf (1 - E exp(-t Q)) t^(-3/2) dt with the
+// Laplace transform of a Gaussian quadratic form, so it is deterministic.
+double expected_norm(const Eigen::Ref<const Eigen::VectorXd>& mean,
+                     const Eigen::Ref<const Eigen::MatrixXd>& covariance);
+
+// Energy score E||X - r|| - E||X - X'|| / 2, in m, lower is better (Gneiting and Raftery 2007), of
+// a prediction X ~ N(0, S) for the residual r, headings scaled by kHeadingLength_m.
+double gaussian_energy_score(const Eigen::Vector3d& residual, const Eigen::Matrix3d& covariance);
+
+// The same of an ensemble of predicted residuals (x, y, theta not wrapped here), all pairs.
+// REQUIRES: not empty.
+double ensemble_energy_score(const Eigen::Vector3d& residual,
+                             const std::vector<Eigen::Vector3d>& ensemble);
+
+}  // namespace gapfarm

@@ -1,0 +1,105 @@
+#include "common/score/motion_model.h"
+
+#include <algorithm>
+#include <cassert>
+#include <sstream>
+
+#include "common/score/density.h"
+#include "common/score/fitness.h"
+
+namespace gapfarm {
+namespace {
+
+using Key = std::tuple<std::string, double, double, double>;
+
+Key key_of(const CommandSpec& command) {
+  return {command.name, command.left, command.right, command.duration_s};
+}
+
+std::string describe(const CommandSpec& command) {
+  std::ostringstream text;
+  text << "command '" << command.name << "' at duties (" << command.left << ", " << command.right
+       << ") for " << command.duration_s << " s";
+  return text.str();
+}
+
+const CommandSpec* find_command(std::span<const CommandSpec> commands, const std::string& name) {
+  const auto found = std::find_if(commands.begin(), commands.end(),
+                                  [&](const CommandSpec& spec) { return spec.name == name; });
+  return found == commands.end() ? nullptr : &*found;
+}
+
+}  // namespace
+
+CommandSpec resolved_command(const Trial& trial, std::span<const CommandSpec> commands) {
+  const CommandSpec* spec = find_command(commands, trial.command);
+  assert(spec != nullptr);
+  return {spec->name, trial.left.value_or(spec->left), trial.right.value_or(spec->right),
+          trial.duration_s.value_or(spec->duration_s)};
+}
+
+Result<MotionModel> MotionModel::mine(const TrialLog& log, std::span<const CommandSpec> commands,
+                                      const MotionModelSettings& settings) {
+  if (log.trials.empty()) {
+    return Error{"a motion model needs trials, but the log is empty; pass a trial file"};
+  }
+  std::map<Key, std::vector<Pose>> ends;
+  for (const Trial& trial : log.trials) {
+    if (find_command(commands, trial.command) == nullptr) {
+      return Error{"session '" + trial.session + "', trial " + std::to_string(trial.trial) +
+                   ": command '" + trial.command + "' is not one of the scenario's"};
+    }
+    ends[key_of(resolved_command(trial, commands))].push_back(between(trial.X_WS, trial.X_WE));
+  }
+  MotionModel model;
+  model.least_trials_ = std::max<std::size_t>(settings.least_trials, 1);
+  for (const auto& [key, poses] : ends) {
+    const auto& [name, left, right, duration_s] = key;
+    CommandMotion motion;
+    motion.command = {name, left, right, duration_s};
+    motion.trials = poses.size();
+    if (poses.size() >= model.least_trials_) {
+      Stream stream({.run_seed = settings.seed,
+                     .purpose = Purpose::kStatistics,
+                     .birth_id = model.commands_.size()});
+      motion.motion = robust_pose(poses, settings.mcd, stream);
+    }
+    model.commands_.push_back(std::move(motion));
+  }
+  return model;
+}
+
+Result<const CommandMotion*> MotionModel::find(const CommandSpec& command) const {
+  const auto found = std::find_if(
+      commands_.begin(), commands_.end(),
+      [&](const CommandMotion& motion) { return key_of(motion.command) == key_of(command); });
+  const std::size_t trials = found == commands_.end() ? 0 : found->trials;
+  if (trials < least_trials_) {
+    return Error{describe(command) + ": the log has " + std::to_string(trials) +
+                 " trials, but a motion model needs " + std::to_string(least_trials_) +
+                 "; log more of them or predict with a simulated model"};
+  }
+  return &*found;
+}
+
+Result<PosePrediction> MotionModel::predict(const Pose& X_WS, const CommandSpec& command) const {
+  const Result<const CommandMotion*> found = find(command);
+  if (!found) return found.error();
+  const RobustPose& motion = (*found)->motion;
+  return PosePrediction{X_WS * motion.mean, rotate_covariance(motion.covariance, X_WS.theta)};
+}
+
+Result<double> MotionModel::log_density(const Pose& X_WS, const CommandSpec& command,
+                                        const Pose& X_WE, double outlier_share) const {
+  const Result<const CommandMotion*> found = find(command);
+  if (!found) return found.error();
+  const RobustPose& motion = (*found)->motion;
+  const Result<Covariance3> covariance = Covariance3::factorise(motion.covariance);
+  if (!covariance) return Error{describe(command) + ": " + covariance.error().message};
+  const Pose end = between(X_WS, X_WE);
+  const Eigen::Vector3d residual(end.x - motion.mean.x, end.y - motion.mean.y,
+                                 wrap_angle(end.theta - motion.mean.theta));
+  return log_predictive_density(residual, *covariance, outlier_share);
+}
+
+}  // namespace gapfarm

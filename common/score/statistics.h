@@ -1,0 +1,66 @@
+// Summary statistics, resampling and corrections for many looks.  Pure functions; randomness is
+// passed in.
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <span>
+#include <vector>
+
+#include "common/random/stream.h"
+
+namespace gapfarm {
+
+// The median; the mean of the middle two for an even count.  REQUIRES: not empty, all finite.
+double median(std::span<const double> values);
+
+// Median absolute deviation from the median, times 1.4826: the s.d. of a normal sample.
+// REQUIRES: not empty, all finite.
+double mad(std::span<const double> values);
+
+// Sample quantile, linear between order statistics (type 7 of Hyndman and Fan 1996).
+// REQUIRES: not empty, all finite, `share` in [0, 1].
+double quantile(std::span<const double> values, double share);
+
+// Direction of the summed unit vectors, rad in (-pi, pi]; 0 for no angles or a sum of zero.
+double circular_mean(std::span<const double> angles_rad);
+
+// A centre to measure headings from: the circular mean, moved twice to the median of the wrapped
+// deviations from it, so that a minority of wild headings hardly shifts it.  rad in (-pi, pi].
+double circular_centre(std::span<const double> angles_rad);
+
+struct MeanCovariance {
+  Eigen::VectorXd mean;
+  Eigen::MatrixXd covariance;
+};
+
+// Mean and covariance of the columns of `points` (dimension x count) under weights >= 0.  The
+// covariance is divided by V1 - V2 / V1 (V1, V2: sums of the weights and of their squares), which
+// is n - 1 for unit weights; a zero matrix when that is not positive.
+// REQUIRES: one weight a point and a positive sum.
+MeanCovariance weighted_mean_covariance(const Eigen::MatrixXd& points,
+                                        std::span<const double> weights);
+
+// Indices of one bootstrap sample that draws whole blocks with replacement until as many blocks are
+// drawn as there are; `blocks[i]` lists the indices of block i (a session, say).
+std::vector<std::size_t> resample_blocks(std::span<const std::vector<std::size_t>> blocks,
+                                         Stream& stream);
+
+struct Interval {
+  double lower = 0;
+  double upper = 0;
+};
+
+// Percentile interval of `statistic` over `repeats` block bootstrap samples (Efron 1979; Kuensch
+// 1989).  `coverage` in (0, 1).  REQUIRES: blocks and repeats are not empty / zero.
+Interval bootstrap_interval(std::span<const std::vector<std::size_t>> blocks,
+                            const std::function<double(std::span<const std::size_t>)>& statistic,
+                            double coverage, unsigned repeats, Stream& stream);
+
+// Adjusted p-values in the input's order, each in [0, 1]: rejecting those below a level keeps the
+// family-wise error (Holm 1979) or, under independence, the false discovery rate (Benjamini and
+// Hochberg 1995) at that level.
+std::vector<double> holm(std::span<const double> p_values);
+std::vector<double> benjamini_hochberg(std::span<const double> p_values);
+
+}  // namespace gapfarm
