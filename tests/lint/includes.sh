@@ -1,0 +1,48 @@
+#!/usr/bin/env bash
+# Includes run one way, proto <- common <- {worker, master}, and each third-party library that owns
+# an idea of the program (transport, physics, storage, config) is seen by one folder alone.
+set -euo pipefail
+cd "$1"
+failures=0
+
+# forbid FOLDER... -- PATTERN REASON: no include in the folders may match.
+forbid() {
+  local folders=()
+  while [[ $1 != -- ]]; do folders+=("$1"); shift; done
+  local found
+  found=$(grep -rnE --include='*.h' --include='*.cc' "^#include [<\"]$2" "${folders[@]}" || true)
+  if [[ -n "$found" ]]; then
+    printf '%s\n    %s\n' "$found" "$3"
+    failures=$((failures + 1))
+  fi
+}
+
+forbid common -- '(worker|master|tests)/' 'common includes neither worker nor master'
+forbid worker -- '(master|tests)/' 'worker does not include master'
+forbid master -- '(worker|tests)/' 'master does not include worker: ask for a job instead'
+
+# outside FOLDER PATTERN REASON: only that folder may include it.
+outside() {
+  local found
+  found=$(grep -rnE --include='*.h' --include='*.cc' "^#include [<\"]$2" common worker master \
+    | grep -v "^$1/" || true)
+  if [[ -n "$found" ]]; then
+    printf '%s\n    %s\n' "$found" "$3"
+    failures=$((failures + 1))
+  fi
+}
+
+outside common/net 'zmq' 'only common/net includes ZeroMQ'
+outside worker/sim '(bullet|Bullet|LinearMath|btBullet)' 'only worker/sim includes Bullet'
+outside master/store 'sqlite3' 'only master/store includes SQLite'
+outside common/config 'toml' 'only common/config includes toml++'
+
+globs=$(grep -rnE --include=CMakeLists.txt 'file\((GLOB|GLOB_RECURSE)' common worker master tests \
+  proto || true)
+if [[ -n "$globs" ]]; then
+  printf '%s\n    %s\n' "$globs" 'list sources by hand'
+  failures=$((failures + 1))
+fi
+
+if [[ $failures -gt 0 ]]; then exit 1; fi
+echo 'includes: fine'
