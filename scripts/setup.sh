@@ -1,0 +1,33 @@
+#!/usr/bin/env bash
+# Installs the Debian 12 packages that gapfarm is built from.  Does nothing when all are there.
+#   scripts/setup.sh [--tests]     --tests: also what only the lint tests need
+set -euo pipefail
+
+packages=(
+  build-essential ccache cmake git ninja-build pkg-config
+  cppzmq-dev libbenchmark-dev libboost-dev libbullet-dev libcli11-dev libeigen3-dev libgmock-dev
+  libgtest-dev libnlopt-cxx-dev libprotobuf-dev librandom123-dev librapidcheck-dev libsodium-dev
+  libspdlog-dev libsqlite3-dev libtomlplusplus-dev libzmq3-dev nlohmann-json3-dev
+  protobuf-compiler
+)
+if [[ "${1:-}" == --tests ]]; then packages+=(clang-format); fi
+
+missing=()
+for package in "${packages[@]}"; do
+  status=$(dpkg-query --show --showformat '${db:Status-Status}' "$package" 2>/dev/null || true)
+  if [[ "$status" != installed ]]; then missing+=("$package"); fi
+done
+if [[ ${#missing[@]} -eq 0 ]]; then exit 0; fi
+
+as_root=()
+if [[ $(id -u) -ne 0 ]]; then
+  if ! command -v sudo >/dev/null; then
+    echo "setup: run as root, or install sudo; missing packages: ${missing[*]}" >&2
+    exit 1
+  fi
+  as_root=(sudo)
+fi
+echo "setup: installing ${missing[*]}"
+"${as_root[@]}" apt-get update -qq
+"${as_root[@]}" env DEBIAN_FRONTEND=noninteractive \
+  apt-get install -y -qq --no-install-recommends "${missing[@]}"
