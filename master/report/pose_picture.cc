@@ -226,9 +226,10 @@ std::string pose_picture(const std::vector<PosePanel>& panels, const std::string
   svg.text({kMargin, 50}, subtitle, {.size = 12.5, .colour = kFaint});
   if (!panels.empty()) draw_legend(svg, panels, {kMargin, 74});
   for (std::size_t i = 0; i < panels.size(); ++i) {
+    const std::size_t row = i / columns;
     draw_panel(svg, panels[i],
                {kMargin + kLeft + static_cast<double>(i % columns) * cell_width,
-                kHeader + kTop + static_cast<double>(i / columns) * cell_height});
+                kHeader + kTop + static_cast<double>(row) * cell_height});
   }
   return svg.finish();
 }
