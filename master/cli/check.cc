@@ -1,0 +1,208 @@
+// gapfarm check CONFIG: everything that a run would need, without running it.
+#include <algorithm>
+#include <map>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <thread>
+#include <tuple>
+
+#include "common/base/suggest.h"
+#include "common/config/config.h"
+#include "common/trials/context.h"
+#include "common/trials/read.h"
+#include "master/cli/subcommand.h"
+
+namespace gapfarm {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+struct CheckOptions {
+  std::string config;
+  std::vector<std::string> trials;
+  bool json = false;
+};
+
+struct Summary {
+  std::size_t trials = 0;
+  std::size_t sessions = 0;
+  std::map<std::string, std::size_t> commands;
+  std::size_t conditions = 0;
+  std::vector<std::string> effects;  // enabled: not neutral, or searched
+};
+
+// Effects that are on in the config's own values or that a gene may turn on.
+std::vector<std::size_t> enabled_effects(const Problem& problem) {
+  const ParameterTable& table = problem.table();
+  std::vector<std::size_t> enabled;
+  for (std::size_t e = 0; e < table.effects().size(); ++e) {
+    const std::size_t first = table.effect_row(e);
+    const std::size_t past = first + table.effects()[e].parameters.size();
+    const bool searched =
+        std::any_of(problem.genes.begin(), problem.genes.end(),
+                    [&](const Gene& gene) { return gene.row >= first && gene.row < past; });
+    if (searched || !table.is_neutral(e, problem.values)) enabled.push_back(e);
+  }
+  return enabled;
+}
+
+// Trials that differ in nothing that the enabled effects look at share one condition.
+std::size_t count_conditions(const Problem& problem, unsigned context) {
+  std::vector<DrivenCommand> driven;
+  for (const Trial& trial : problem.log.trials) {
+    const CommandSpec& spec = problem.command(trial.command);
+    driven.push_back({trial.left.value_or(spec.left), trial.right.value_or(spec.right),
+                      trial.duration_s.value_or(spec.duration_s)});
+  }
+  const std::vector<TrialContext> around = trial_contexts(problem.log, driven);
+  std::set<std::vector<double>> conditions;
+  for (std::size_t i = 0; i < driven.size(); ++i) {
+    const Trial& trial = problem.log.trials[i];
+    std::vector<double> key = {driven[i].left, driven[i].right, driven[i].duration_s};
+    if (context & kStartHeading) key.push_back(trial.X_WS.theta);
+    if (context & kStartPlace) key.insert(key.end(), {trial.X_WS.x, trial.X_WS.y});
+    if (context & kSessionTime) key.push_back(around[i].session_time_s);
+    if (context & kLastDirection) {
+      key.insert(key.end(), {double(around[i].last_left), double(around[i].last_right)});
+    }
+    if (context & kUnrecordedMove) key.push_back(around[i].moved ? 1 : 0);
+    conditions.insert(std::move(key));
+  }
+  return conditions.size();
+}
+
+Summary summarise(const Problem& problem) {
+  Summary summary;
+  std::set<std::string> sessions;
+  for (const Trial& trial : problem.log.trials) {
+    sessions.insert(trial.session);
+    ++summary.commands[trial.command];
+  }
+  summary.trials = problem.log.trials.size();
+  summary.sessions = sessions.size();
+  unsigned context = kNoContext;
+  for (const std::size_t e : enabled_effects(problem)) {
+    const Effect& effect = problem.table().effects()[e];
+    context |= effect.context;
+    summary.effects.push_back(effect.name);
+  }
+  summary.conditions = count_conditions(problem, context);
+  return summary;
+}
+
+Json to_json(const Config& config, const Summary& summary, unsigned workers) {
+  Json genes = Json::array();
+  for (const Gene& gene : config.problem.genes) {
+    const Parameter& row = config.problem.table()[gene.row];
+    genes.push_back({{"parameter", row.key},
+                     {"unit", row.unit},
+                     {"lower", gene.lower},
+                     {"upper", gene.upper},
+                     {"log_scale", gene.scale == ParameterScale::kLog}});
+  }
+  return {{"config", config.path},
+          {"scenario", config.problem.scenario},
+          {"fitness", fitness_name(config.problem.fitness.kind)},
+          {"problem", problem_hash(to_proto(config.problem))},
+          {"trials", summary.trials},
+          {"sessions", summary.sessions},
+          {"commands", summary.commands},
+          {"conditions", summary.conditions},
+          {"effects", summary.effects},
+          {"genes", genes},
+          {"population", config.evolution.population},
+          {"generations", config.evolution.generations},
+          {"workers", workers},
+          {"seed", config.seed}};
+}
+
+std::string describe(const Config& config, const Summary& summary, unsigned workers) {
+  const Problem& problem = config.problem;
+  std::string text = config.path + ": fine\n";
+  text += "scenario     " + problem.scenario + ", robot " +
+          problem.table().format(row_of(Srv1::kRobot), problem.values[row_of(Srv1::kRobot)]) + "\n";
+  text += "trials       " + std::to_string(summary.trials) + " in " +
+          std::to_string(summary.sessions) + " sessions:";
+  for (const auto& [command, count] : summary.commands) {
+    text += " " + std::to_string(count) + " " + command;
+  }
+  text += "\nconditions   " + std::to_string(summary.conditions) +
+          " distinct, each simulated once " + "an evaluation";
+  text += "\neffects      ";
+  if (summary.effects.empty()) text += "none";
+  for (std::size_t i = 0; i < summary.effects.size(); ++i) {
+    text += (i ? ", " : "") + summary.effects[i];
+  }
+  text += "\nfitness      " + std::string(fitness_name(problem.fitness.kind)) +
+          (higher_is_better(problem.fitness.kind) ? ", higher is better" : ", lower is better");
+  text += "\ngenes        " + std::to_string(problem.genes.size()) + "\n";
+  for (const Gene& gene : problem.genes) {
+    const Parameter& row = problem.table()[gene.row];
+    text += "             " + row.key + " in [" + problem.table().format(gene.row, gene.lower) +
+            ", " + problem.table().format(gene.row, gene.upper) + "]" +
+            (gene.scale == ParameterScale::kLog ? ", log scale" : "") + "\n";
+  }
+  text += "evolution    " + std::to_string(config.evolution.population) + " individuals, at most " +
+          std::to_string(config.evolution.generations) + " generations, seed " +
+          std::to_string(config.seed) + "\n";
+  text += "farm         " + std::to_string(workers) + " local workers";
+  if (config.farm.listen) text += ", and remote ones at " + *config.farm.listen;
+  text += "\nproblem      " + problem_hash(to_proto(problem)) + "\n";
+  return text;
+}
+
+int run_check(const CheckOptions& options, CliContext& context) {
+  Console& console = context.console;
+  Result<Config> config = read_config(options.config);
+  if (!config) {
+    console.error(config.error());
+    return kExitBadUsage;
+  }
+  if (Status s = check_evolvable(*config); !s) {
+    console.error(s.error());
+    return kExitBadUsage;
+  }
+  const std::vector<std::string>& files =
+      options.trials.empty() ? config->trial_files : options.trials;
+  if (files.empty()) {
+    console.error(Error{options.config + ": names no trial files; add them to the config or give "
+                                         "--trials FILE"});
+    return kExitBadUsage;
+  }
+  std::vector<std::string> commands;
+  for (const CommandSpec& command : config->problem.commands) commands.push_back(command.name);
+  Result<TrialLog> log = read_trial_files(files, commands);
+  if (!log) {
+    console.error(log.error());
+    return kExitBadUsage;
+  }
+  config->problem.log = std::move(*log);
+  const Result<Problem> sound = from_proto(to_proto(config->problem));
+  if (!sound) {
+    console.error(sound.error());
+    return kExitBadUsage;
+  }
+  const unsigned workers =
+      config->farm.workers.value_or(std::max(1u, std::thread::hardware_concurrency()));
+  const Summary summary = summarise(config->problem);
+  console.print(options.json ? to_json(*config, summary, workers).dump(2) + "\n"
+                             : describe(*config, summary, workers));
+  return kExitDone;
+}
+
+}  // namespace
+
+SubcommandRun setup_check(CLI::App& app) {
+  auto options = std::make_shared<CheckOptions>();
+  app.add_option("CONFIG", options->config, "Config file (TOML)")->required();
+  app.add_option("--trials", options->trials, "Trial logs in place of the config's");
+  app.add_flag("--json", options->json, "Print JSON");
+  app.footer(
+      "Examples:\n"
+      "  gapfarm check configs/demo.toml\n"
+      "  gapfarm check configs/srv1_forward.toml --trials logs/*.dat");
+  return [options](CliContext& context) { return run_check(*options, context); };
+}
+
+}  // namespace gapfarm
