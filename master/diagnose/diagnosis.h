@@ -1,0 +1,113 @@
+// What a diagnosis says: the plain data behind diagnosis.json (docs/formats.md) and the report.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "common/pose/pose.h"
+
+namespace gapfarm {
+
+enum class Verdict { kEffect, kNone, kUnknown, kEffectAndUnknown };
+const char* verdict_name(Verdict verdict);  // "effect", "none", "unknown", "effect+unknown"
+
+struct Estimate {
+  std::string key;  // within the effect: "rate"
+  double value = 0;
+  double lo = 0;  // 90 % interval
+  double hi = 0;
+  std::string unit;
+};
+
+// An effect that the data show, in the order in which they were found.
+struct NamedEffect {
+  std::string name;
+  std::vector<std::string> aliases;  // at most three effects that these data cannot tell from it
+  std::string alias_reason;          // one sentence; empty without aliases
+  double confidence = 0;             // that it, or one of its aliases, is there, [0, 1]
+  std::vector<Estimate> parameters;
+  // Mean log score lost against the floor, nats a trial, on trials that the fit did not see.
+  double gap_before = 0;
+  double gap_after = 0;
+  double closed = 0;  // share of the explainable gap (tuned minus floor) that adding it removed
+  double closed_lo = 0;
+  double closed_hi = 0;
+  std::string text;  // one sentence for a person
+};
+
+struct GapFigures {
+  double tuned = 0;
+  double final_ = 0;
+  double floor = 0;
+};
+
+// A dependence of the tuned model's residuals.
+struct Where {
+  std::string command;    // "all" when it shows in every command alike
+  std::string component;  // "x", "y", "theta"
+  std::string kind;       // "bias", "spread", "trend", "outliers"
+  std::string covariate;  // "time", "start heading", ...; empty for a plain bias or spread
+  double size = 0;        // mm, or mrad for theta
+  double share = 0;       // of the explainable gap
+  double p = 1;           // corrected for all the looks
+  std::string text;       // one plain sentence
+};
+
+// One row of the screening table.
+struct Screened {
+  std::string effect;
+  double gain = 0;        // log-likelihood gained by the best strength, nats over all trials
+  double p = 1;           // against the null distribution of this effect's own gain
+  std::string estimate;   // "rate 0.0035 1/min": the parameters at that gain
+  std::vector<std::string> alias_set;  // effects whose remaining signatures are parallel
+  std::optional<double> held_out;      // nats a trial gained on held-out trials, when refitted
+  std::optional<double> held_out_se;
+  std::string note;       // why it cannot be seen in these data, or what it is an alias of
+};
+
+struct NextExperiment {
+  std::string text;
+  std::vector<std::string> separates;
+  std::uint64_t trials = 0;  // needed to tell them apart with 95 % power
+};
+
+// One trial for the plots.  Ends are seen from the measured start.
+struct DiagnosedTrial {
+  std::string session;
+  std::int64_t trial = 0;
+  std::string command;
+  double session_time_s = 0;
+  double duration_s = 0;
+  double level = 0;  // greater of the two sides' duties
+  int place_in_run = 0;
+  bool held_out = false;
+  Pose X_WS;
+  Pose measured, tuned, final_;       // X_SE
+  Eigen::Matrix3d tuned_cov, final_cov;  // in the predicted end's own axes
+  Eigen::Vector3d tuned_residual, final_residual;  // m, m, rad, in the predicted end's own axes
+  double tuned_score = 0, final_score = 0;         // nats
+};
+
+struct Diagnosis {
+  Verdict verdict = Verdict::kNone;
+  std::string headline;  // one sentence
+  std::vector<NamedEffect> effects;
+  GapFigures gap;            // nats/trial
+  GapFigures position_mm;    // root mean square
+  GapFigures heading_mrad;
+  std::vector<Where> where;        // of the tuned base model
+  std::vector<Where> unexplained;  // of the final model
+  std::vector<Screened> screening;
+  std::vector<NextExperiment> next;
+  std::vector<std::string> cautions;  // thin data and the like, one sentence each
+  std::vector<DiagnosedTrial> trials;
+  // Label and value: files, hashes, counts, program, seeds, the run stores behind the numbers.
+  std::vector<std::pair<std::string, std::string>> provenance;
+  std::vector<std::pair<std::string, double>> timing_s;  // stage and wall seconds
+};
+
+}  // namespace gapfarm

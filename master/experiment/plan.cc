@@ -1,0 +1,104 @@
+#include "master/experiment/plan.h"
+
+#include <algorithm>
+#include <map>
+#include <numbers>
+#include <string>
+
+#include "common/random/stream.h"
+#include "common/score/motion_model.h"
+#include "common/trials/context.h"
+
+namespace gapfarm {
+namespace {
+
+template <class T>
+const T& pick(const std::vector<T>& from, Stream& stream) {
+  return from[stream.below(from.size())];
+}
+
+std::vector<CommandSpec> driven_commands(const Problem& problem, const SimulateSettings& settings) {
+  if (settings.commands.empty()) return problem.commands;
+  std::vector<CommandSpec> chosen;
+  for (const std::string& name : settings.commands) chosen.push_back(problem.command(name));
+  return chosen;
+}
+
+}  // namespace
+
+std::vector<std::vector<v1::PlannedTrial>> draw_plan(const Problem& problem,
+                                                     const SimulateSettings& settings,
+                                                     std::uint64_t seed) {
+  const std::vector<CommandSpec> commands = driven_commands(problem, settings);
+  std::vector<std::vector<v1::PlannedTrial>> plan(settings.sessions);
+  for (unsigned s = 0; s < settings.sessions; ++s) {
+    // The last word keeps the plan's draws apart from those of the trials' noise.
+    Stream stream({seed, Purpose::kSimulation, 1, s, ~std::uint64_t{0}});
+    double t_s = 0;
+    for (unsigned i = 0; i < settings.trials_per_session; ++i) {
+      v1::PlannedTrial planned;
+      planned.set_moved(i % std::max(1u, settings.chain) == 0);
+      const CommandSpec& command = pick(commands, stream);
+      const double level = pick(settings.levels, stream);
+      Trial trial;
+      trial.session = "s" + std::to_string(s + 1);
+      trial.trial = i;
+      trial.t_s = t_s;
+      trial.command = command.name;
+      trial.left = level * command.left;
+      trial.right = level * command.right;
+      trial.duration_s =
+          settings.durations_s.empty() ? command.duration_s : pick(settings.durations_s, stream);
+      const double lower = 0.15 * settings.arena_m;
+      const double upper = 0.85 * settings.arena_m;
+      trial.X_WS.x = stream.uniform(lower, upper);
+      trial.X_WS.y = stream.uniform(lower, upper);
+      trial.X_WS.theta = stream.uniform(-std::numbers::pi, std::numbers::pi);
+      t_s += *trial.duration_s + settings.pause_s * stream.uniform(0.75, 1.25);
+      *planned.mutable_trial() = to_proto(trial);
+      plan[s].push_back(std::move(planned));
+    }
+  }
+  return plan;
+}
+
+std::vector<std::vector<v1::PlannedTrial>> plan_of(const Problem& problem, const TrialLog& log) {
+  std::vector<DrivenCommand> driven;
+  for (const Trial& trial : log.trials) {
+    const CommandSpec c = resolved_command(trial, problem.commands);
+    driven.push_back({c.left, c.right, c.duration_s});
+  }
+  const std::vector<TrialContext> contexts = trial_contexts(log, driven);
+  std::vector<std::vector<v1::PlannedTrial>> plan;
+  std::map<std::string, std::size_t> sessions;
+  for (std::size_t i = 0; i < log.trials.size(); ++i) {
+    const auto [entry, fresh] = sessions.try_emplace(log.trials[i].session, plan.size());
+    if (fresh) plan.emplace_back();
+    v1::PlannedTrial planned;
+    planned.set_moved(contexts[i].moved);
+    Trial trial = log.trials[i];
+    trial.path.clear();
+    *planned.mutable_trial() = to_proto(trial);
+    plan[entry->second].push_back(std::move(planned));
+  }
+  return plan;
+}
+
+std::vector<v1::Task> simulate_tasks(const std::vector<std::vector<v1::PlannedTrial>>& plan,
+                                     const std::vector<v1::Override>& overrides,
+                                     std::uint64_t seed, double path_interval_s) {
+  std::vector<v1::Task> tasks;
+  for (std::size_t s = 0; s < plan.size(); ++s) {
+    v1::Task task;
+    v1::SimulateTask* simulate = task.mutable_simulate();
+    simulate->mutable_point()->mutable_overrides()->Add(overrides.begin(), overrides.end());
+    simulate->mutable_stream()->set_run_seed(seed);
+    simulate->mutable_stream()->set_birth_id(s);
+    simulate->mutable_plan()->Add(plan[s].begin(), plan[s].end());
+    simulate->set_path_interval(path_interval_s);
+    tasks.push_back(std::move(task));
+  }
+  return tasks;
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,31 @@
+// Plans of experiments: which commands to drive, from where, in which order.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "common/config/settings.h"
+#include "common/problem/problem.h"
+#include "gapfarm/v1/task.pb.h"
+
+namespace gapfarm {
+
+// One session's trials in driving order.  Every `chain` trials the robot is put down somewhere else
+// in the arena, in any heading; between, each trial starts where the one before ended.  Commands,
+// levels and durations are drawn evenly.  Sessions are named s1, s2, ...; all draws come from
+// (seed, session).
+std::vector<std::vector<v1::PlannedTrial>> draw_plan(const Problem& problem,
+                                                     const SimulateSettings& settings,
+                                                     std::uint64_t seed);
+
+// The plan that repeats a log: its commands, duties, durations and times; a trial before which the
+// robot was moved starts at its logged pose.
+std::vector<std::vector<v1::PlannedTrial>> plan_of(const Problem& problem, const TrialLog& log);
+
+// One task a session of the plan, at parameter values that differ from the problem's in
+// `overrides`.
+std::vector<v1::Task> simulate_tasks(const std::vector<std::vector<v1::PlannedTrial>>& plan,
+                                     const std::vector<v1::Override>& overrides,
+                                     std::uint64_t seed, double path_interval_s);
+
+}  // namespace gapfarm
