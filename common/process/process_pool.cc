@@ -4,8 +4,8 @@
 #include <signal.h>
 #include <spawn.h>
 #include <string.h>
-#include <sys/pidfd.h>
 #include <sys/prctl.h>
+#include <sys/syscall.h>
 #include <sys/wait.h>
 #include <time.h>
 #include <unistd.h>
@@ -118,7 +118,8 @@ Status ProcessPool::start_place(Place& place, unsigned index) {
     return Error{"cannot start " + options_.program + ": " + strerror(failed)};
   }
   place.pid = pid;
-  place.pidfd = pidfd_open(pid, 0);
+  // By number: glibc 2.36 declares pidfd_open without C linkage.
+  place.pidfd = static_cast<int>(syscall(SYS_pidfd_open, pid, 0));
   place.replaced.reset();
   return {};
 }
