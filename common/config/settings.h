@@ -15,7 +15,8 @@ namespace gapfarm {
 enum class SelectionKind { kTournament, kRank };
 enum class CrossoverKind { kOnePoint, kUniform, kBlend };
 enum class MutationKind { kGaussian, kUniformReset };
-// Separately: a child comes from crossover or from mutation.  In sequence: crossover, then mutation.
+// Separately: a child comes from crossover or from mutation.  In sequence: crossover, then
+// mutation.
 enum class VariationOrder { kSeparate, kSequence };
 
 struct EvolutionSettings {
@@ -29,12 +30,13 @@ struct EvolutionSettings {
   VariationOrder order = VariationOrder::kSequence;
   double crossover_probability = 0.8;  // start value when self-adapted
   double mutation_probability = 0.5;   // same; per child
-  double gene_mutation_share = 0.0;    // share of the genes a mutation changes; 0: one gene on average
-  double mutation_sigma = 0.1;         // of a Gaussian mutation, in gene units
-  double blend_alpha = 0.5;            // BLX-alpha (Eshelman and Schaffer 1993)
+  double gene_mutation_share =
+      0.0;                      // share of the genes a mutation changes; 0: one gene on average
+  double mutation_sigma = 0.1;  // of a Gaussian mutation, in gene units
+  double blend_alpha = 0.5;     // BLX-alpha (Eshelman and Schaffer 1993)
   bool self_adaptation = true;
-  double probability_floor = 0.1;      // of a self-adapted operator
-  unsigned elite_replicates = 8;       // at most so many scores an elite, when scores are noisy
+  double probability_floor = 0.1;  // of a self-adapted operator
+  unsigned elite_replicates = 8;   // at most so many scores an elite, when scores are noisy
   // Seeds the first generation with the config's own values as one individual.
   bool seed_nominal = true;
   // Stop conditions; the first that holds stops the run.
@@ -48,9 +50,9 @@ struct EvolutionSettings {
 };
 
 struct FarmSettings {
-  std::optional<unsigned> workers;  // local processes; none: one a core
+  std::optional<unsigned> workers;    // local processes; none: one a core
   std::optional<std::string> listen;  // endpoint for remote workers
-  unsigned window = 2;              // jobs in a worker's hand
+  unsigned window = 2;                // jobs in a worker's hand
   double heartbeat_interval_s = 1;
   double silence_limit_s = 10;
   bool allow_mixed_numeric_classes = false;
@@ -60,19 +62,19 @@ struct FarmSettings {
 struct SimulateSettings {
   unsigned sessions = 3;
   unsigned trials_per_session = 100;
-  unsigned chain = 4;              // trials between unrecorded moves
-  double pause_s = 4;              // between commands
-  double arena_m = 2;              // the robot is put down within [0.15, 0.85] of a square this wide
-  std::vector<double> levels = {1.0};      // factors of the commands' duties
-  std::vector<double> durations_s;         // empty: each command's own
-  std::vector<std::string> commands;       // empty: all
-  double path_interval_s = 0;              // 0: no paths
+  unsigned chain = 4;  // trials between unrecorded moves
+  double pause_s = 4;  // between commands
+  double arena_m = 2;  // the robot is put down within [0.15, 0.85] of a square this wide
+  std::vector<double> levels = {1.0};  // factors of the commands' duties
+  std::vector<double> durations_s;     // empty: each command's own
+  std::vector<std::string> commands;   // empty: all
+  double path_interval_s = 0;          // 0: no paths
 };
 
 struct Config {
-  std::string path;      // of the file
-  std::string text;      // the file itself, kept in the run store
-  Problem problem;       // its log is empty until trials are read
+  std::string path;  // of the file
+  std::string text;  // the file itself, kept in the run store
+  Problem problem;   // its log is empty until trials are read
   EvolutionSettings evolution;
   FarmSettings farm;
   SimulateSettings simulate;

@@ -1,0 +1,85 @@
+#include "common/config/config.h"
+
+#include <filesystem>
+
+#include "common/base/suggest.h"
+#include "common/config/sections.h"
+#include "common/trials/csv.h"
+#include "common/trials/files.h"
+#include "common/trials/format.h"
+
+namespace gapfarm {
+namespace {
+
+const std::vector<std::string> kScenarios = {"srv1"};
+
+std::string beside(const std::string& config, const std::string& file) {
+  const std::filesystem::path path(file);
+  if (path.is_absolute()) return file;
+  return (std::filesystem::path(config).parent_path() / path).lexically_normal().string();
+}
+
+void read_top(TomlSection& top, Config& config) {
+  config.problem.scenario = kScenarios[top.choice("scenario", kScenarios).value_or(0)];
+  top.read("seed", config.seed, 0);
+  if (const auto files = top.strings("trials")) {
+    for (const std::string& file : *files) {
+      if (file.empty()) top.fail("trials", "trials names an empty file, expected paths");
+      config.trial_files.push_back(beside(config.path, file));
+    }
+  }
+}
+
+}  // namespace
+
+Result<Config> parse_config(std::string_view text, const std::string& path) {
+  auto parsed = parse_toml(text, path);
+  if (!parsed.ok()) {
+    const TextFormat format = sniff_format(text);
+    const bool told = format != TextFormat::kToml && format != TextFormat::kUnknown;
+    return told ? wrong_format(path, format, "a config") : parsed.error();
+  }
+  if (parsed->contains("model")) {
+    return text_error(path, {}, "a model", "a config",
+                      "predict and simulate take models; evolving needs a config");
+  }
+  Config config;
+  config.path = path;
+  config.text = text;
+  TomlErrors errors(path);
+  TomlSection top(*parsed, "", errors);
+  read_top(top, config);
+  Problem& problem = config.problem;
+  const ParameterTable& table = problem.table();
+  problem.values = table.nominal();
+  problem.commands = default_commands(problem.scenario);
+  read_parameters(top, table, problem.values);
+  read_effects(top, table, problem.values);
+  read_genes(top, table, problem.genes);
+  read_commands(top, problem.commands);
+  read_fitness(top, problem.fitness);
+  read_spread(top, problem.spread);
+  read_evolution(top, config.evolution);
+  read_farm(top, config.farm);
+  read_simulate(top, problem.commands, config.simulate);
+  top.finish();
+  if (!errors.empty()) return errors.error();
+  return config;
+}
+
+Result<Config> read_config(const std::string& path) {
+  auto text = read_text_file(path);
+  if (!text.ok()) return text.error();
+  return parse_config(*text, path);
+}
+
+Status check_evolvable(const Config& config) {
+  if (config.problem.genes.empty()) {
+    return Error{config.path +
+                 ": there are no genes to evolve; add a section such as\n  [genes]\n"
+                 "  friction = [0.1, 1.5]"};
+  }
+  return {};
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,183 @@
+// [genes]: which rows are searched, and where.
+#include <algorithm>
+
+#include "common/base/suggest.h"
+#include "common/config/sections.h"
+#include "common/trials/csv.h"
+
+namespace gapfarm {
+namespace {
+
+const std::vector<std::string> kScaleWords = {"linear", "log"};
+constexpr const char* kForms =
+    "[lower, upper], {range = [lower, upper], scale = \"log\"} or \"table\"";
+
+// Reads the genes of one scenario.
+class GeneReader {
+ public:
+  GeneReader(const ParameterTable& table, TomlErrors& errors, std::vector<Gene>& genes)
+      : table_(table), errors_(errors), genes_(genes) {}
+
+  void read_table(const toml::table& section) {
+    for (const auto& [key, node] : section) {
+      const std::string word(key.str());
+      if (const auto row = table_.find(word)) {
+        read_gene(*row, node);
+      } else if (const auto effect = effect_of(word)) {
+        read_effect(*effect, node);
+      } else {
+        unknown(key, word, known_words());
+      }
+    }
+  }
+
+ private:
+  std::optional<std::size_t> effect_of(const std::string& name) const {
+    for (std::size_t e = 0; e < table_.effects().size(); ++e) {
+      if (table_.effects()[e].name == name) return e;
+    }
+    return {};
+  }
+
+  std::vector<std::string> known_words() const {
+    std::vector<std::string> words;
+    for (const Parameter& row : table_.rows()) words.push_back(row.key);
+    return words;
+  }
+
+  void unknown(const toml::key& key, const std::string& word,
+               const std::vector<std::string>& words) {
+    errors_.add(key.source().begin, "unknown gene " + quoted_word(word) + suggestion(word, words));
+  }
+
+  // [genes.motor_asymmetry] ratio = [...]
+  void read_effect(std::size_t e, const toml::node& node) {
+    const Effect& effect = table_.effects()[e];
+    const toml::table* section = node.as_table();
+    if (section == nullptr) {
+      errors_.add(node, effect.name + " is " + toml_type_name(node) +
+                            ", expected the section [genes." + effect.name +
+                            "] with its parameters");
+      return;
+    }
+    std::vector<std::string> words;
+    for (const EffectParameter& parameter : effect.parameters) words.push_back(parameter.key);
+    for (const auto& [key, value] : *section) {
+      const std::string word(key.str());
+      const auto row = table_.find(effect.name + "." + word);
+      if (row) {
+        read_gene(*row, value);
+      } else {
+        unknown(key, word, words);
+      }
+    }
+  }
+
+  void read_gene(std::size_t row, const toml::node& node) {
+    const Parameter& parameter = table_[row];
+    const bool twice = std::any_of(genes_.begin(), genes_.end(),
+                                   [&](const Gene& gene) { return gene.row == row; });
+    if (twice) {
+      errors_.add(node, "gene " + parameter.key + " is written twice; remove one");
+      return;
+    }
+    Gene gene{row, parameter.lower, parameter.upper, parameter.scale};
+    if (node.is_string() && node.as_string()->get() == "table") {
+      genes_.push_back(gene);
+    } else if (node.is_array()) {
+      if (read_range(*node.as_array(), gene)) genes_.push_back(gene);
+    } else if (const toml::table* table = node.as_table()) {
+      TomlSection section(*table, "[genes." + parameter.key + "]", errors_);
+      if (read_spelled_out(section, gene)) genes_.push_back(gene);
+    } else {
+      errors_.add(node,
+                  "gene " + parameter.key + " is " + toml_type_name(node) + ", expected " + kForms);
+    }
+  }
+
+  bool read_spelled_out(TomlSection& section, Gene& gene) {
+    if (const auto scale = section.choice("scale", kScaleWords)) {
+      gene.scale = *scale == 1 ? ParameterScale::kLog : ParameterScale::kLinear;
+    }
+    const toml::node* range = section.find("range");
+    section.finish();
+    if (range == nullptr) return check_scale(section.table(), gene);
+    if (const toml::array* array = range->as_array()) return read_range(*array, gene);
+    if (range->is_string() && range->as_string()->get() == "table") {
+      return check_scale(*range, gene);
+    }
+    errors_.add(*range, "range is " + toml_type_name(*range) + ", expected [lower, upper]");
+    return false;
+  }
+
+  bool read_range(const toml::array& range, Gene& gene) {
+    const Parameter& parameter = table_[gene.row];
+    std::vector<double> ends;
+    for (const toml::node& element : range) {
+      const auto value = row_value(element, table_, gene.row, errors_);
+      if (!value) return false;
+      ends.push_back(*value);
+    }
+    if (parameter.kind == ParameterKind::kChoice) return read_choices(range, std::move(ends), gene);
+    if (ends.size() != 2) {
+      errors_.add(range, "gene " + parameter.key + " has a range of " +
+                             std::to_string(ends.size()) + " values, expected " + kForms);
+      return false;
+    }
+    gene.lower = ends[0];
+    gene.upper = ends[1];
+    if (gene.lower >= gene.upper) {
+      errors_.add(range, "gene " + parameter.key + " has the empty range [" +
+                             table_.format(gene.row, gene.lower) + ", " +
+                             table_.format(gene.row, gene.upper) +
+                             "], expected lower < upper; fix a value in [parameters] instead");
+      return false;
+    }
+    return check_scale(range, gene);
+  }
+
+  // A gene holds a run of neighbouring choices.
+  bool read_choices(const toml::array& range, std::vector<double> ends, Gene& gene) {
+    std::sort(ends.begin(), ends.end());
+    bool run = ends.size() >= 2;
+    for (std::size_t i = 1; i < ends.size(); ++i) run = run && ends[i] == ends[i - 1] + 1;
+    if (!run) {
+      std::string words;
+      for (const std::string& word : table_[gene.row].choices) {
+        words += (words.empty() ? "" : ", ") + word;
+      }
+      errors_.add(range,
+                  "gene " + table_[gene.row].key +
+                      " needs two or more different choices that are neighbours in: " + words);
+      return false;
+    }
+    gene.lower = ends.front();
+    gene.upper = ends.back();
+    return true;
+  }
+
+  bool check_scale(const toml::node& node, const Gene& gene) {
+    if (gene.scale == ParameterScale::kLinear || gene.lower > 0) return true;
+    errors_.add(node, "gene " + table_[gene.row].key + " begins at " +
+                          table_.format(gene.row, gene.lower) +
+                          ", which a log scale cannot hold; begin above 0 or write {range = "
+                          "[...], scale = \"linear\"}");
+    return false;
+  }
+
+  const ParameterTable& table_;
+  TomlErrors& errors_;
+  std::vector<Gene>& genes_;
+};
+
+}  // namespace
+
+void read_genes(TomlSection& top, const ParameterTable& table, std::vector<Gene>& genes) {
+  auto section = top.section("genes");
+  if (!section) return;
+  GeneReader(table, section->errors(), genes).read_table(section->table());
+  // The order in the file must not matter: the genome's order is part of every result.
+  std::sort(genes.begin(), genes.end(), [](const Gene& a, const Gene& b) { return a.row < b.row; });
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,211 @@
+// Reading models.
+#include "common/config/model.h"
+
+#include <charconv>
+#include <limits>
+
+#include "common/base/build_info.h"
+#include "common/config/sections.h"
+#include "common/trials/csv.h"
+#include "common/trials/files.h"
+#include "common/trials/format.h"
+
+namespace gapfarm {
+namespace {
+
+const std::vector<std::string> kScenarios = {"srv1"};
+
+// key = { value, unit, lo, hi }, or the bare value.
+void read_entry(TomlSection& section, const std::string& key, std::size_t row, Model& model) {
+  const toml::node* node = section.find(key);
+  if (node == nullptr) return;
+  const Parameter& parameter = model.table()[row];
+  const toml::table* table = node->as_table();
+  if (table == nullptr) {
+    model.values[row] =
+        row_value(*node, model.table(), row, section.errors()).value_or(model.values[row]);
+    return;
+  }
+  TomlSection entry(*table, "[" + key + "]", section.errors());
+  const toml::node* value = entry.find("value");
+  if (value == nullptr) {
+    section.errors().add(*node, parameter.key + " has no value, expected {value = ...}");
+  } else {
+    model.values[row] =
+        row_value(*value, model.table(), row, section.errors()).value_or(model.values[row]);
+  }
+  const auto unit = entry.string("unit");
+  if (unit && *unit != parameter.unit) {
+    entry.fail("unit", "unit of " + parameter.key + " is " + quoted_word(*unit) + ", expected " +
+                           quoted_word(parameter.unit) + "; convert the value");
+  }
+  const auto lower = entry.number("lo", -kUnbounded, kUnbounded);
+  const auto upper = entry.number("hi", -kUnbounded, kUnbounded);
+  if (lower.has_value() != upper.has_value()) {
+    section.errors().add(*node, parameter.key + " has one end of an interval, expected lo and hi");
+  } else if (lower && *lower > *upper) {
+    entry.fail("lo", "the interval of " + parameter.key + " has lo above hi");
+  } else if (lower) {
+    model.intervals.resize(model.values.size());
+    model.intervals[row] = Interval{*lower, *upper};
+  }
+  entry.finish();
+}
+
+// A hand that moves a row between [parameters] and [noise] does no harm.
+void read_base(TomlSection& top, const char* name, Model& model) {
+  auto section = top.section(name);
+  if (!section) return;
+  for (std::size_t row = 0; row < model.table().size(); ++row) {
+    const Parameter& parameter = model.table()[row];
+    if (parameter.effect.empty()) read_entry(*section, parameter.key, row, model);
+  }
+  section->finish();
+}
+
+void read_model_effects(TomlSection& top, Model& model) {
+  auto section = top.section("effects");
+  if (!section) return;
+  const ParameterTable& table = model.table();
+  for (std::size_t e = 0; e < table.effects().size(); ++e) {
+    const Effect& effect = table.effects()[e];
+    auto own = section->section(effect.name);
+    if (!own) continue;
+    for (std::size_t i = 0; i < effect.parameters.size(); ++i) {
+      read_entry(*own, effect.parameters[i].key, table.effect_row(e) + i, model);
+    }
+    own->finish();
+  }
+  section->finish();
+}
+
+void read_model_fitness(TomlSection& top, Model& model) {
+  auto section = top.section("fitness");
+  if (!section) return;
+  FitnessSettings& fitness = model.fitness;
+  if (const auto kind = section->choice("kind", fitness_words())) {
+    fitness.kind = static_cast<FitnessKind>(*kind);
+  }
+  // A failed run's best may be infinitely bad; that is no reason not to read its model.
+  if (const toml::node* value = section->find("value")) {
+    model.score = value->is_number() ? value->value<double>() : std::nullopt;
+    if (!model.score)
+      section->fail("value", "value is " + toml_type_name(*value) + ", expected a number");
+  }
+  section->read("outlier_share", fitness.outlier_share, 0, 0.5);
+  section->read("roll_penalty", fitness.roll_penalty, 0, kUnbounded);
+  section->read("pitch_penalty", fitness.pitch_penalty, 0, kUnbounded);
+  section->read("heave_penalty", fitness.heave_penalty, 0, kUnbounded);
+  section->read("rest_penalty", fitness.rest_penalty, 0, kUnbounded);
+  section->read("rest_limit", fitness.rest_limit_s, 0, 60, "s");
+  section->finish();
+}
+
+// A seed beyond TOML's integers is written as a string.
+void read_seed(TomlSection& run, std::uint64_t& seed) {
+  const toml::node* node = run.find("seed");
+  if (node == nullptr || !node->is_string()) {
+    run.read("seed", seed, 0);
+    return;
+  }
+  const std::string& text = node->as_string()->get();
+  const auto [end, code] = std::from_chars(text.data(), text.data() + text.size(), seed);
+  if (code != std::errc{} || end != text.data() + text.size()) {
+    run.fail("seed", "seed is " + quoted_word(text) + ", expected an integer");
+  }
+}
+
+void read_origin(TomlSection& top, Model& model) {
+  if (auto data = top.section("data")) {
+    data->read("hash", model.data.hash);
+    data->read("trials", model.data.trials, 0);
+    model.data.files = data->strings("files").value_or(std::vector<std::string>());
+    data->finish();
+  }
+  if (auto program = top.section("program")) {
+    program->read("version", model.version);
+    program->read("fingerprint", model.fingerprint);
+    program->finish();
+  }
+  if (auto run = top.section("run")) {
+    run->read("path", model.origin.run);
+    read_seed(*run, model.origin.seed);
+    run->read("generation", model.origin.generation, 0);
+    run->read("evaluations", model.origin.evaluations, 0);
+    run->finish();
+  }
+}
+
+}  // namespace
+
+const ParameterTable& Model::table() const { return *parameter_table(scenario).value(); }
+
+Result<Model> nominal_model(std::string_view scenario) {
+  auto table = parameter_table(scenario);
+  if (!table.ok()) return table.error();
+  Model model;
+  model.scenario = scenario;
+  model.version = build_info().version;
+  model.fingerprint = build_info().fingerprint;
+  model.values = (*table)->nominal();
+  model.commands = default_commands(scenario);
+  return model;
+}
+
+Problem problem_of(const Model& model) {
+  Problem problem;
+  problem.scenario = model.scenario;
+  problem.values = model.values;
+  problem.commands = model.commands;
+  problem.fitness = model.fitness;
+  problem.spread = model.spread;
+  return problem;
+}
+
+bool is_model(std::string_view text) {
+  const auto parsed = parse_toml(text, "");
+  return parsed.ok() && parsed->contains("model");
+}
+
+Result<Model> parse_model(std::string_view text, const std::string& path) {
+  auto parsed = parse_toml(text, path);
+  if (!parsed.ok()) {
+    const TextFormat format = sniff_format(text);
+    const bool told = format != TextFormat::kToml && format != TextFormat::kUnknown;
+    return told ? wrong_format(path, format, "a model") : parsed.error();
+  }
+  if (!parsed->contains("model")) {
+    return text_error(path, {}, "no key 'model'", "a model",
+                      "a config is evolved into one by 'gapfarm evolve'");
+  }
+  TomlErrors errors(path);
+  TomlSection top(*parsed, "", errors);
+  if (top.count("model", 0, std::numeric_limits<std::uint64_t>::max()).value_or(1) != 1) {
+    top.fail("model",
+             "model is of another format version, expected 1; use the program that "
+             "wrote it");
+  }
+  const std::string scenario = kScenarios[top.choice("scenario", kScenarios).value_or(0)];
+  Model model = *nominal_model(scenario);
+  model.version.clear();
+  model.fingerprint.clear();
+  top.read("kind", model.kind);
+  read_base(top, "parameters", model);
+  read_base(top, "noise", model);
+  read_model_effects(top, model);
+  read_commands(top, model.commands);
+  read_model_fitness(top, model);
+  read_spread(top, model.spread);
+  read_origin(top, model);
+  top.finish();
+  if (!errors.empty()) return errors.error();
+  return model;
+}
+
+Result<Model> read_model(const std::string& path) {
+  auto text = read_text_file(path);
+  if (!text.ok()) return text.error();
+  return parse_model(*text, path);
+}
+
+}  // namespace gapfarm

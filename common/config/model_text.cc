@@ -1,0 +1,163 @@
+// Writing models.
+#include <cmath>
+#include <limits>
+
+#include "common/config/model.h"
+#include "common/config/sections.h"
+#include "common/trials/csv.h"
+#include "common/trials/files.h"
+
+namespace gapfarm {
+namespace {
+
+// A TOML float: integers would lose the sign of -0.
+std::string toml_number(double value) {
+  std::string text = format_double(value);
+  if (std::isfinite(value) && text.find_first_of(".e") == text.npos) text += ".0";
+  return text;
+}
+
+std::string toml_string(std::string_view text) {
+  constexpr char kHex[] = "0123456789abcdef";
+  std::string quoted = "\"";
+  for (const char c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (c == '"' || c == '\\') {
+      quoted += {'\\', c};
+    } else if (byte < 0x20 || byte == 0x7f) {
+      quoted += std::string("\\u00") + kHex[byte >> 4] + kHex[byte & 15];
+    } else {
+      quoted += c;
+    }
+  }
+  return quoted + '"';
+}
+
+// TOML integers end at 2^63 - 1; seeds do not.
+std::string toml_count(std::uint64_t value) {
+  const std::string text = std::to_string(value);
+  return value > std::numeric_limits<std::int64_t>::max() ? toml_string(text) : text;
+}
+
+// Numbers of integer rows, words of choices, true and false.
+std::string row_text(const Parameter& row, double value) {
+  if (row.kind == ParameterKind::kReal) return toml_number(value);
+  if (row.kind == ParameterKind::kBoolean) return value != 0 ? "true" : "false";
+  const auto index = static_cast<std::size_t>(value);
+  if (row.kind == ParameterKind::kChoice) return toml_string(row.choices[index]);
+  return format_double(value);
+}
+
+std::string entry(const Model& model, std::size_t row, const std::string& key) {
+  const Parameter& parameter = model.table()[row];
+  std::string text = key + " = { value = " + row_text(parameter, model.values[row]);
+  if (parameter.kind == ParameterKind::kReal) text += ", unit = " + toml_string(parameter.unit);
+  if (row < model.intervals.size() && model.intervals[row]) {
+    text += ", lo = " + toml_number(model.intervals[row]->lower) +
+            ", hi = " + toml_number(model.intervals[row]->upper);
+  }
+  return text + " }  # " + parameter.summary + "\n";
+}
+
+bool is_noise(const Parameter& row) {
+  return row.key.rfind("drive_noise", 0) == 0 || row.key.rfind("pose_noise", 0) == 0;
+}
+
+std::string base_section(const Model& model, const char* name, bool noise) {
+  std::string text = std::string("\n[") + name + "]\n";
+  const ParameterTable& table = model.table();
+  for (std::size_t row = 0; row < table.size(); ++row) {
+    if (!table[row].effect.empty() || is_noise(table[row]) != noise) continue;
+    text += entry(model, row, table[row].key);
+  }
+  return text;
+}
+
+// Effects with a parameter or an interval of their own; the others do nothing.
+std::string effect_sections(const Model& model) {
+  const ParameterTable& table = model.table();
+  std::string text;
+  for (std::size_t e = 0; e < table.effects().size(); ++e) {
+    const Effect& effect = table.effects()[e];
+    bool own = false;
+    std::string entries;
+    for (std::size_t i = 0; i < effect.parameters.size(); ++i) {
+      const std::size_t row = table.effect_row(e) + i;
+      own = own || model.values[row] != table[row].nominal ||
+            (row < model.intervals.size() && model.intervals[row]);
+      entries += entry(model, row, effect.parameters[i].key);
+    }
+    if (own) text += "\n[effects." + effect.name + "]  # " + effect.summary + "\n" + entries;
+  }
+  return text;
+}
+
+std::string command_sections(const Model& model) {
+  std::string text;
+  for (const CommandSpec& command : model.commands) {
+    text += "\n[commands." + command.name + "]\nleft = " + toml_number(command.left) +
+            "\nright = " + toml_number(command.right) +
+            "\nduration = " + toml_number(command.duration_s) + "\n";
+  }
+  return text;
+}
+
+std::string score_sections(const Model& model) {
+  const FitnessSettings& fitness = model.fitness;
+  std::string text = std::string("\n[fitness]\nkind = ") + toml_string(fitness_name(fitness.kind));
+  if (model.score) text += "\nvalue = " + toml_number(*model.score);
+  text += "\noutlier_share = " + toml_number(fitness.outlier_share) +
+          "\nroll_penalty = " + toml_number(fitness.roll_penalty) +
+          "\npitch_penalty = " + toml_number(fitness.pitch_penalty) +
+          "\nheave_penalty = " + toml_number(fitness.heave_penalty) +
+          "\nrest_penalty = " + toml_number(fitness.rest_penalty) +
+          "\nrest_limit = " + toml_number(fitness.rest_limit_s) + "\n";
+  text += "\n[spread]\nkind = " +
+          toml_string(spread_words()[static_cast<std::size_t>(model.spread.kind)]) + "\n";
+  if (model.spread.kind == SpreadKind::kSampled) {
+    text += "replicates = " + std::to_string(model.spread.replicates) + "\n";
+  }
+  return text;
+}
+
+std::string origin_sections(const Model& model) {
+  std::string files;
+  for (const std::string& file : model.data.files) {
+    files += (files.empty() ? "" : ", ") + toml_string(file);
+  }
+  return "\n[data]\nhash = " + toml_string(model.data.hash) +
+         "\ntrials = " + std::to_string(model.data.trials) + "\nfiles = [" + files + "]\n" +
+         "\n[program]\nversion = " + toml_string(model.version) +
+         "\nfingerprint = " + toml_string(model.fingerprint) + "\n" +
+         "\n[run]\npath = " + toml_string(model.origin.run) +
+         "\nseed = " + toml_count(model.origin.seed) +
+         "\ngeneration = " + std::to_string(model.origin.generation) +
+         "\nevaluations = " + std::to_string(model.origin.evaluations) + "\n";
+}
+
+}  // namespace
+
+std::string format_model(const Model& model) {
+  return "# A gapfarm model: 'gapfarm predict' and 'gapfarm simulate' take it.\nmodel = 1\n"
+         "scenario = " +
+         toml_string(model.scenario) + "\nkind = " + toml_string(model.kind) + "\n" +
+         base_section(model, "parameters", false) + base_section(model, "noise", true) +
+         effect_sections(model) + command_sections(model) + score_sections(model) +
+         origin_sections(model);
+}
+
+Status write_model(const Model& model, const std::string& path) {
+  if (auto known = parameter_table(model.scenario); !known.ok()) return known.error();
+  const ParameterTable& table = model.table();
+  if (model.values.size() != table.size()) {
+    return Error{path + ": the model has " + std::to_string(model.values.size()) +
+                 " values, expected " + std::to_string(table.size())};
+  }
+  for (std::size_t row = 0; row < table.size(); ++row) {
+    const Status accepted = table.check(row, model.values[row]);
+    if (!accepted.ok()) return Error{path + ": " + accepted.error().message};
+  }
+  return write_file_atomically(path, format_model(model));
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,61 @@
+// [commands], [fitness] and [spread]: the rest of the problem.
+#include "common/config/sections.h"
+
+namespace gapfarm {
+
+const std::vector<std::string>& fitness_words() {
+  static const std::vector<std::string> words = {fitness_name(FitnessKind::kLogScore),
+                                                 fitness_name(FitnessKind::kRobustMahalanobis),
+                                                 fitness_name(FitnessKind::kEnergyScore)};
+  return words;
+}
+
+const std::vector<std::string>& spread_words() {
+  static const std::vector<std::string> words = {"cubature", "sampled"};
+  return words;
+}
+
+void read_commands(TomlSection& top, std::vector<CommandSpec>& commands) {
+  auto section = top.section("commands");
+  if (!section) return;
+  for (CommandSpec& command : commands) {
+    auto own = section->section(command.name);
+    if (!own) continue;
+    own->read("left", command.left, -1, 1, "(duty)");
+    own->read("right", command.right, -1, 1, "(duty)");
+    own->read("duration", command.duration_s, 0, 60, "s");
+    own->finish();
+  }
+  section->finish();
+}
+
+void read_fitness(TomlSection& top, FitnessSettings& fitness) {
+  auto section = top.section("fitness");
+  if (!section) return;
+  if (const auto kind = section->choice("kind", fitness_words())) {
+    fitness.kind = static_cast<FitnessKind>(*kind);
+  }
+  section->read("outlier_share", fitness.outlier_share, 0, 0.5);
+  section->read("roll_penalty", fitness.roll_penalty, 0, kUnbounded, "per rad");
+  section->read("pitch_penalty", fitness.pitch_penalty, 0, kUnbounded, "per rad");
+  section->read("heave_penalty", fitness.heave_penalty, 0, kUnbounded, "per m");
+  section->read("rest_penalty", fitness.rest_penalty, 0, kUnbounded, "per s");
+  section->read("rest_limit", fitness.rest_limit_s, 0, 60, "s");
+  section->finish();
+}
+
+void read_spread(TomlSection& top, SpreadSettings& spread) {
+  auto section = top.section("spread");
+  if (!section) return;
+  if (const auto kind = section->choice("kind", spread_words())) {
+    spread.kind = static_cast<SpreadKind>(*kind);
+  }
+  section->read("replicates", spread.replicates, 2, 100000);
+  if (spread.kind == SpreadKind::kCubature && section->table().contains("replicates")) {
+    section->fail("replicates",
+                  "replicates belong to kind = \"sampled\"; cubature has fixed points");
+  }
+  section->finish();
+}
+
+}  // namespace gapfarm

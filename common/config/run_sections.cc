@@ -1,0 +1,159 @@
+// [evolution], [farm] and [simulate]: how a run goes.
+#include <algorithm>
+
+#include "common/config/sections.h"
+#include "common/trials/csv.h"
+
+namespace gapfarm {
+namespace {
+
+const std::vector<std::string> kSelectionWords = {"tournament", "rank"};
+const std::vector<std::string> kCrossoverWords = {"one_point", "uniform", "blend"};
+const std::vector<std::string> kMutationWords = {"gaussian", "uniform_reset"};
+const std::vector<std::string> kOrderWords = {"separate", "sequence"};
+
+constexpr unsigned kMany = 1000000;
+
+template <class Kind>
+void read_kinds(TomlSection& section, const char* key, const std::vector<std::string>& words,
+                std::vector<Kind>& to) {
+  const auto found = section.choices(key, words);
+  if (!found) return;
+  if (found->empty()) section.fail(key, std::string(key) + " is empty, expected at least one");
+  to.clear();
+  for (const std::size_t index : *found) to.push_back(static_cast<Kind>(index));
+}
+
+void read_stop(TomlSection& evolution, EvolutionSettings& to) {
+  auto stop = evolution.section("stop");
+  if (!stop) return;
+  stop->read("generations", to.generations, 1);
+  stop->read("evaluations", to.evaluations, 1);
+  stop->read("time", to.time_s, 1e-3, kUnbounded, "s");
+  stop->read("target_fitness", to.target_fitness, -kUnbounded, kUnbounded);
+  stop->read("stagnation_generations", to.stagnation_generations, 1);
+  stop->finish();
+}
+
+// Values that are fine alone but not together.  Compares with defaults too, so that a population
+// below the default elitism is noticed where it is written.
+void check_evolution(TomlSection& section, const EvolutionSettings& evolution) {
+  const auto blame = [&](const char* key, const std::string& sentence) {
+    section.fail(section.table().contains(key) ? key : "population", sentence);
+  };
+  const std::string population = std::to_string(evolution.population);
+  if (evolution.elitism >= evolution.population) {
+    blame("elitism", "elitism is " + std::to_string(evolution.elitism) +
+                         ", expected less than the population (" + population + ")");
+  }
+  if (evolution.selection == SelectionKind::kTournament &&
+      evolution.tournament_size > evolution.population) {
+    blame("tournament_size", "tournament_size is " + std::to_string(evolution.tournament_size) +
+                                 ", expected at most the population (" + population + ")");
+  }
+  if (evolution.restart_generations && evolution.stagnation_generations &&
+      *evolution.restart_generations >= *evolution.stagnation_generations) {
+    blame("restart_generations", "restart_generations is " +
+                                     std::to_string(*evolution.restart_generations) +
+                                     ", expected less than stop.stagnation_generations (" +
+                                     std::to_string(*evolution.stagnation_generations) +
+                                     "), or the run stops before it restarts");
+  }
+}
+
+void check_commands(TomlSection& section, const std::vector<CommandSpec>& commands,
+                    SimulateSettings& simulate) {
+  std::vector<std::string> names;
+  for (const CommandSpec& command : commands) names.push_back(command.name);
+  const auto found = section.choices("commands", names);
+  if (!found) return;
+  simulate.commands.clear();
+  for (const std::size_t index : *found) simulate.commands.push_back(names[index]);
+}
+
+bool is_endpoint(const std::string& text) {
+  return text.rfind("tcp://", 0) == 0 || text.rfind("ipc://", 0) == 0;
+}
+
+}  // namespace
+
+void read_evolution(TomlSection& top, EvolutionSettings& to) {
+  auto section = top.section("evolution");
+  if (!section) return;
+  section->read("population", to.population, 2, kMany);
+  section->read("elitism", to.elitism, 0, kMany);
+  if (const auto kind = section->choice("selection", kSelectionWords)) {
+    to.selection = static_cast<SelectionKind>(*kind);
+  }
+  section->read("tournament_size", to.tournament_size, 1, kMany);
+  section->read("rank_pressure", to.rank_pressure, 1.01, 2);
+  read_kinds(*section, "crossovers", kCrossoverWords, to.crossovers);
+  read_kinds(*section, "mutations", kMutationWords, to.mutations);
+  if (const auto order = section->choice("order", kOrderWords)) {
+    to.order = static_cast<VariationOrder>(*order);
+  }
+  section->read("crossover_probability", to.crossover_probability, 0, 1);
+  section->read("mutation_probability", to.mutation_probability, 0, 1);
+  section->read("gene_mutation_share", to.gene_mutation_share, 0, 1);
+  section->read("mutation_sigma", to.mutation_sigma, 1e-6, 1);
+  section->read("blend_alpha", to.blend_alpha, 0, 2);
+  section->read("self_adaptation", to.self_adaptation);
+  section->read("probability_floor", to.probability_floor, 0, 0.5);
+  section->read("elite_replicates", to.elite_replicates, 1, 10000);
+  section->read("seed_nominal", to.seed_nominal);
+  section->read("restart_generations", to.restart_generations, 1);
+  read_stop(*section, to);
+  check_evolution(*section, to);
+  section->finish();
+}
+
+void read_farm(TomlSection& top, FarmSettings& to) {
+  auto section = top.section("farm");
+  if (!section) return;
+  if (const auto workers = section->count("workers", 0, 1024)) {
+    to.workers = static_cast<unsigned>(*workers);
+  }
+  if (auto listen = section->string("listen")) {
+    if (!is_endpoint(*listen)) {
+      section->fail("listen", "listen is " + quoted_word(*listen) +
+                                  ", expected an endpoint such as \"tcp://0.0.0.0:5555\"");
+    }
+    to.listen = std::move(*listen);
+  }
+  section->read("window", to.window, 1, 1024);
+  // ZeroMQ's own heartbeat time-to-live overflows above 65.5 s.
+  section->read("heartbeat_interval", to.heartbeat_interval_s, 0.01, 60, "s");
+  section->read("silence_limit", to.silence_limit_s, 0.05, 3600, "s");
+  if (to.silence_limit_s <= to.heartbeat_interval_s) {
+    const char* key =
+        section->table().contains("silence_limit") ? "silence_limit" : "heartbeat_interval";
+    section->fail(key, "silence_limit is " + format_double(to.silence_limit_s) +
+                           " s, expected more than heartbeat_interval (" +
+                           format_double(to.heartbeat_interval_s) + " s)");
+  }
+  section->read("allow_mixed_numeric_classes", to.allow_mixed_numeric_classes);
+  section->finish();
+}
+
+void read_simulate(TomlSection& top, const std::vector<CommandSpec>& commands,
+                   SimulateSettings& to) {
+  auto section = top.section("simulate");
+  if (!section) return;
+  section->read("sessions", to.sessions, 1, kMany);
+  section->read("trials_per_session", to.trials_per_session, 1, kMany);
+  section->read("chain", to.chain, 1, kMany);
+  section->read("pause", to.pause_s, 0, 3600, "s");
+  section->read("arena", to.arena_m, 0.1, 100, "m");
+  if (auto levels = section->numbers("levels", 0, 1)) {
+    if (levels->empty()) section->fail("levels", "levels is empty, expected at least one");
+    to.levels = std::move(*levels);
+  }
+  if (auto durations = section->numbers("durations", 0, 60, "s")) {
+    to.durations_s = std::move(*durations);
+  }
+  check_commands(*section, commands, to);
+  section->read("path_interval", to.path_interval_s, 0, 60, "s");
+  section->finish();
+}
+
+}  // namespace gapfarm

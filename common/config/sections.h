@@ -1,0 +1,30 @@
+// The sections of a config, one function each.  Internal to common/config.
+#pragma once
+
+#include "common/config/settings.h"
+#include "common/config/toml_section.h"
+
+namespace gapfarm {
+
+// Each reads its section of `top` (when it is there) into the settings and reports what is wrong.
+void read_parameters(TomlSection& top, const ParameterTable& table, ParameterValues& values);
+void read_effects(TomlSection& top, const ParameterTable& table, ParameterValues& values);
+void read_genes(TomlSection& top, const ParameterTable& table, std::vector<Gene>& genes);
+void read_commands(TomlSection& top, std::vector<CommandSpec>& commands);
+void read_fitness(TomlSection& top, FitnessSettings& fitness);
+void read_spread(TomlSection& top, SpreadSettings& spread);
+void read_evolution(TomlSection& top, EvolutionSettings& evolution);
+void read_farm(TomlSection& top, FarmSettings& farm);
+void read_simulate(TomlSection& top, const std::vector<CommandSpec>& commands,
+                   SimulateSettings& simulate);
+
+// The value of a row as TOML writes it: a number, a boolean or a choice's word.  None when it is
+// not one that the row accepts; the error is reported.
+std::optional<double> row_value(const toml::node& node, const ParameterTable& table,
+                                std::size_t row, TomlErrors& errors);
+
+// Words of the enums, in their order.
+const std::vector<std::string>& fitness_words();
+const std::vector<std::string>& spread_words();
+
+}  // namespace gapfarm

@@ -1,0 +1,265 @@
+#include "common/config/toml_section.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/base/suggest.h"
+#include "common/trials/csv.h"
+
+namespace gapfarm {
+
+void TomlErrors::add(const toml::source_position& place, const std::string& sentence) {
+  found_.push_back({place, sentence});
+}
+
+Error TomlErrors::error() const {
+  std::vector<Found> sorted = found_;
+  std::stable_sort(sorted.begin(), sorted.end(),
+                   [](const Found& a, const Found& b) { return a.place < b.place; });
+  std::string text;
+  for (const Found& found : sorted) {
+    text += (text.empty() ? "" : "\n") + file_ + ":" + std::to_string(found.place.line) + ":" +
+            std::to_string(found.place.column) + ": " + found.sentence;
+  }
+  return {text};
+}
+
+Result<toml::table> parse_toml(std::string_view text, const std::string& file) {
+  try {
+    return toml::parse(text);
+  } catch (const toml::parse_error& error) {
+    TomlErrors errors(file);
+    errors.add(error.source().begin, std::string(error.description()));
+    return errors.error();
+  }
+}
+
+std::string toml_type_name(const toml::node& node) {
+  switch (node.type()) {
+    case toml::node_type::table:
+      return "a section";
+    case toml::node_type::array:
+      return "an array";
+    case toml::node_type::string:
+      return "a string";
+    case toml::node_type::integer:
+      return "an integer";
+    case toml::node_type::floating_point:
+      return "a number";
+    case toml::node_type::boolean:
+      return "a boolean";
+    default:
+      return "a date or time";
+  }
+}
+
+std::string number_range(double lower, double upper, std::string_view unit) {
+  std::string text = "a number";
+  if (std::isfinite(lower) && std::isfinite(upper)) {
+    text += " in [" + format_double(lower) + ", " + format_double(upper) + "]";
+  } else if (std::isfinite(lower)) {
+    text += " of at least " + format_double(lower);
+  }
+  if (!unit.empty()) text += " " + std::string(unit);
+  return text;
+}
+
+const toml::node* TomlSection::find(std::string_view key) {
+  known_.emplace_back(key);
+  return table_->get(key);
+}
+
+void TomlSection::wrong_type(std::string_view key, const toml::node& node,
+                             const std::string& expected) {
+  errors_->add(node, std::string(key) + " is " + toml_type_name(node) + ", expected " + expected);
+}
+
+std::vector<const toml::node*> TomlSection::elements(const toml::node& node) {
+  const toml::array* array = node.as_array();
+  if (array == nullptr) return {&node};
+  std::vector<const toml::node*> all;
+  for (const toml::node& element : *array) all.push_back(&element);
+  return all;
+}
+
+std::optional<double> TomlSection::number_of(std::string_view key, const toml::node& node,
+                                             double lower, double upper, std::string_view unit) {
+  if (!node.is_number()) {
+    wrong_type(key, node, number_range(lower, upper, unit));
+    return {};
+  }
+  const double value = *node.value<double>();
+  if (std::isfinite(value) && value >= lower && value <= upper) return value;
+  errors_->add(node, std::string(key) + " is " + format_double(value) + ", expected " +
+                         number_range(lower, upper, unit));
+  return {};
+}
+
+std::optional<std::size_t> TomlSection::choice_of(std::string_view key, const toml::node& node,
+                                                  std::span<const std::string> words) {
+  const auto* word = node.as_string();
+  if (word == nullptr) {
+    std::string list;
+    for (const std::string& known : words) list += (list.empty() ? "\"" : ", \"") + known + "\"";
+    wrong_type(key, node, "one of " + list);
+    return {};
+  }
+  const auto found = std::find(words.begin(), words.end(), word->get());
+  if (found != words.end()) return static_cast<std::size_t>(found - words.begin());
+  errors_->add(node, "unknown " + std::string(key) + " " + quoted_word(word->get()) +
+                         suggestion(word->get(), words));
+  return {};
+}
+
+std::optional<double> TomlSection::number(std::string_view key, double lower, double upper,
+                                          std::string_view unit) {
+  const toml::node* node = find(key);
+  if (node == nullptr) return {};
+  return number_of(key, *node, lower, upper, unit);
+}
+
+std::optional<std::uint64_t> TomlSection::count(std::string_view key, std::uint64_t lower,
+                                                std::uint64_t upper) {
+  const toml::node* node = find(key);
+  if (node == nullptr) return {};
+  const bool unbounded = upper == std::numeric_limits<std::uint64_t>::max();
+  const std::string expected =
+      unbounded ? "an integer of at least " + std::to_string(lower)
+                : "an integer in [" + std::to_string(lower) + ", " + std::to_string(upper) + "]";
+  const auto* value = node->as_integer();
+  if (value == nullptr) {
+    wrong_type(key, *node, expected);
+    return {};
+  }
+  const std::int64_t found = value->get();
+  if (found >= 0 && static_cast<std::uint64_t>(found) >= lower &&
+      static_cast<std::uint64_t>(found) <= upper) {
+    return static_cast<std::uint64_t>(found);
+  }
+  errors_->add(*node, std::string(key) + " is " + std::to_string(found) + ", expected " + expected);
+  return {};
+}
+
+std::optional<bool> TomlSection::boolean(std::string_view key) {
+  const toml::node* node = find(key);
+  if (node == nullptr) return {};
+  if (const auto* value = node->as_boolean()) return value->get();
+  wrong_type(key, *node, "true or false");
+  return {};
+}
+
+std::optional<std::string> TomlSection::string(std::string_view key) {
+  const toml::node* node = find(key);
+  if (node == nullptr) return {};
+  if (const auto* value = node->as_string()) return value->get();
+  wrong_type(key, *node, "a string");
+  return {};
+}
+
+std::optional<std::size_t> TomlSection::choice(std::string_view key,
+                                               std::span<const std::string> words) {
+  const toml::node* node = find(key);
+  if (node == nullptr) return {};
+  return choice_of(key, *node, words);
+}
+
+std::optional<std::vector<std::string>> TomlSection::strings(std::string_view key) {
+  const toml::node* node = find(key);
+  if (node == nullptr) return {};
+  std::vector<std::string> all;
+  for (const toml::node* element : elements(*node)) {
+    const auto* value = element->as_string();
+    if (value == nullptr) {
+      wrong_type(key, *element, "strings");
+      return {};
+    }
+    all.push_back(value->get());
+  }
+  return all;
+}
+
+std::optional<std::vector<std::size_t>> TomlSection::choices(std::string_view key,
+                                                             std::span<const std::string> words) {
+  const toml::node* node = find(key);
+  if (node == nullptr) return {};
+  std::vector<std::size_t> all;
+  for (const toml::node* element : elements(*node)) {
+    const auto value = choice_of(key, *element, words);
+    if (!value) return {};
+    if (std::find(all.begin(), all.end(), *value) != all.end()) {
+      errors_->add(*element, std::string(key) + " names " + quoted_word(words[*value]) + " twice");
+      return {};
+    }
+    all.push_back(*value);
+  }
+  return all;
+}
+
+std::optional<std::vector<double>> TomlSection::numbers(std::string_view key, double lower,
+                                                        double upper, std::string_view unit) {
+  const toml::node* node = find(key);
+  if (node == nullptr) return {};
+  std::vector<double> all;
+  for (const toml::node* element : elements(*node)) {
+    const auto value = number_of(key, *element, lower, upper, unit);
+    if (!value) return {};
+    all.push_back(*value);
+  }
+  return all;
+}
+
+std::optional<TomlSection> TomlSection::section(std::string_view key) {
+  const toml::node* node = find(key);
+  if (node == nullptr) return {};
+  std::string name =
+      name_.empty() ? std::string(key) : name_.substr(1, name_.size() - 2) + "." + std::string(key);
+  name = "[" + name + "]";
+  if (const toml::table* table = node->as_table()) return TomlSection(*table, name, *errors_);
+  wrong_type(key, *node, "the section " + name);
+  return {};
+}
+
+void TomlSection::read(std::string_view key, double& to, double lower, double upper,
+                       std::string_view unit) {
+  to = number(key, lower, upper, unit).value_or(to);
+}
+
+void TomlSection::read(std::string_view key, std::optional<double>& to, double lower, double upper,
+                       std::string_view unit) {
+  if (const auto value = number(key, lower, upper, unit)) to = value;
+}
+
+void TomlSection::read(std::string_view key, unsigned& to, unsigned lower, unsigned upper) {
+  to = static_cast<unsigned>(count(key, lower, upper).value_or(to));
+}
+
+void TomlSection::read(std::string_view key, std::uint64_t& to, std::uint64_t lower) {
+  to = count(key, lower, std::numeric_limits<std::uint64_t>::max()).value_or(to);
+}
+
+void TomlSection::read(std::string_view key, std::optional<std::uint64_t>& to,
+                       std::uint64_t lower) {
+  if (const auto value = count(key, lower, std::numeric_limits<std::uint64_t>::max())) to = value;
+}
+
+void TomlSection::read(std::string_view key, bool& to) { to = boolean(key).value_or(to); }
+
+void TomlSection::read(std::string_view key, std::string& to) {
+  if (auto value = string(key)) to = std::move(*value);
+}
+
+void TomlSection::fail(std::string_view key, const std::string& sentence) {
+  if (const toml::node* node = table_->get(key)) errors_->add(*node, sentence);
+}
+
+void TomlSection::finish() {
+  for (const auto& [key, node] : *table_) {
+    if (std::find(known_.begin(), known_.end(), key.str()) != known_.end()) continue;
+    const std::string kind = node.is_table() ? "unknown section " : "unknown key ";
+    const std::string where = name_.empty() ? "" : " in " + name_;
+    errors_->add(key.source().begin,
+                 kind + quoted_word(key.str()) + where + suggestion(key.str(), known_));
+  }
+}
+
+}  // namespace gapfarm

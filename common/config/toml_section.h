@@ -1,0 +1,114 @@
+// Typed reading of TOML with places: what a section asks for is what it knows, so everything else
+// in the file is an unknown key.  The only header that includes toml++.
+#pragma once
+
+#include <toml++/toml.h>
+
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "common/base/result.h"
+
+namespace gapfarm {
+
+// Everything that is wrong with a file, "file:line:column: sentence" each.
+class TomlErrors {
+ public:
+  explicit TomlErrors(std::string file) : file_(std::move(file)) {}
+
+  void add(const toml::source_position& place, const std::string& sentence);
+  void add(const toml::node& node, const std::string& sentence) {
+    add(node.source().begin, sentence);
+  }
+  bool empty() const { return found_.empty(); }
+  // REQUIRES: !empty().  One line each, in the file's order.
+  Error error() const;
+
+ private:
+  struct Found {
+    toml::source_position place;
+    std::string sentence;
+  };
+  std::string file_;
+  std::vector<Found> found_;
+};
+
+// Debian's toml++ is built to throw; its exceptions end here.
+Result<toml::table> parse_toml(std::string_view text, const std::string& file);
+
+// "a string", "an array", for sentences.
+std::string toml_type_name(const toml::node& node);
+// "a number in [0, 1] s", with either end open when it is infinite.
+std::string number_range(double lower, double upper, std::string_view unit);
+
+inline constexpr double kUnbounded = std::numeric_limits<double>::infinity();
+
+// One table of the file.  A reader asks for every key it knows; a value of the wrong type or out of
+// range becomes an error and counts as absent.
+class TomlSection {
+ public:
+  // `name` stands in the errors: "[evolution]", or empty at the top.
+  TomlSection(const toml::table& table, std::string name, TomlErrors& errors)
+      : table_(&table), name_(std::move(name)), errors_(&errors) {}
+
+  const toml::table& table() const { return *table_; }
+  const std::string& name() const { return name_; }
+  TomlErrors& errors() { return *errors_; }
+
+  // The node at `key`, or null.  The key counts as known from now on.
+  const toml::node* find(std::string_view key);
+
+  std::optional<double> number(std::string_view key, double lower, double upper,
+                               std::string_view unit = "");
+  std::optional<std::uint64_t> count(std::string_view key, std::uint64_t lower,
+                                     std::uint64_t upper);
+  std::optional<bool> boolean(std::string_view key);
+  std::optional<std::string> string(std::string_view key);
+  // Index of the value in `words`.
+  std::optional<std::size_t> choice(std::string_view key, std::span<const std::string> words);
+  // Lists; a single value counts as a list of one.
+  std::optional<std::vector<std::string>> strings(std::string_view key);
+  std::optional<std::vector<std::size_t>> choices(std::string_view key,
+                                                  std::span<const std::string> words);
+  std::optional<std::vector<double>> numbers(std::string_view key, double lower, double upper,
+                                             std::string_view unit = "");
+  std::optional<TomlSection> section(std::string_view key);
+
+  // The same, put where they belong when the key is there.
+  void read(std::string_view key, double& to, double lower, double upper,
+            std::string_view unit = "");
+  void read(std::string_view key, std::optional<double>& to, double lower, double upper,
+            std::string_view unit = "");
+  void read(std::string_view key, unsigned& to, unsigned lower, unsigned upper);
+  void read(std::string_view key, std::uint64_t& to, std::uint64_t lower);
+  void read(std::string_view key, std::optional<std::uint64_t>& to, std::uint64_t lower);
+  void read(std::string_view key, bool& to);
+  void read(std::string_view key, std::string& to);
+
+  // An error at the value of `key`, which must exist.
+  void fail(std::string_view key, const std::string& sentence);
+
+  // An error for every key that nobody asked for, with a suggestion.
+  void finish();
+
+ private:
+  void wrong_type(std::string_view key, const toml::node& node, const std::string& expected);
+  std::optional<double> number_of(std::string_view key, const toml::node& node, double lower,
+                                  double upper, std::string_view unit);
+  std::optional<std::size_t> choice_of(std::string_view key, const toml::node& node,
+                                       std::span<const std::string> words);
+  // The elements of an array, or the node alone.
+  static std::vector<const toml::node*> elements(const toml::node& node);
+
+  const toml::table* table_;
+  std::string name_;
+  TomlErrors* errors_;
+  std::vector<std::string> known_;
+};
+
+}  // namespace gapfarm
