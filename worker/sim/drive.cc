@@ -27,4 +27,16 @@ double SideMotion::travel(double t_s) const {
   return std::copysign(std::max(0.0, std::abs(travel) - drive_.dead_travel_m), travel);
 }
 
+double SideMotion::onset_time() const {
+  const double dead = drive_.dead_travel_m;
+  if (dead <= 0 || std::abs(motor_travel(still_s_)) <= dead) return 0;
+  double before = 0;
+  double after = still_s_;
+  for (int i = 0; i < 60; ++i) {  // to the last bit: travel is monotonic
+    const double middle = (before + after) / 2;
+    (std::abs(motor_travel(middle)) > dead ? after : before) = middle;
+  }
+  return after;
+}
+
 }  // namespace gapfarm

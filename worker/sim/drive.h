@@ -20,6 +20,8 @@ class SideMotion {
   double mean_speed(double t_s, double dt_s) const {
     return (travel(t_s + dt_s) - travel(t_s)) / dt_s;
   }
+  // Time at which the surface begins to move, s: 0 without dead travel, or when it never does.
+  double onset_time() const;
   // Time after which the motor runs slower than kStillSpeed_m_s, s; at least the duration.
   double still_time() const { return still_s_; }
 

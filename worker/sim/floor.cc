@@ -22,18 +22,20 @@ double patch_factor(const Floor& floor, double x_m, double y_m) {
 Eigen::Vector2d drag_acceleration(const Floor& floor, double gravity_m_s2,
                                   const Eigen::Vector2d& velocity, const Eigen::Vector2d& ahead,
                                   double dt_s) {
+  const double g = gravity_m_s2;
+  const auto over_speed = [dt_s](double k, double speed_squared) {
+    return k / std::sqrt(speed_squared + kDragSpeed_m_s * kDragSpeed_m_s + k * dt_s * k * dt_s);
+  };
   Eigen::Vector2d drag = Eigen::Vector2d::Zero();
   if (floor.nap_strength != 0) {
-    const double speed = std::sqrt(velocity.squaredNorm() + kDragSpeed_m_s * kDragSpeed_m_s);
     const Eigen::Vector2d nap(std::cos(floor.nap_direction_rad), std::sin(floor.nap_direction_rad));
+    const double speed = std::sqrt(velocity.squaredNorm() + kDragSpeed_m_s * kDragSpeed_m_s);
     const double against = (1 - velocity.dot(nap) / speed) / 2;
-    const double k = floor.nap_strength * gravity_m_s2 * against;
-    drag -= k / (speed + k * dt_s) * velocity;
+    drag -= over_speed(floor.nap_strength * g * against, velocity.squaredNorm()) * velocity;
   }
   if (floor.rolling_resistance != 0) {
     const double v = velocity.dot(ahead);
-    const double k = floor.rolling_resistance * gravity_m_s2;
-    drag -= k * v / (std::sqrt(v * v + kDragSpeed_m_s * kDragSpeed_m_s) + k * dt_s) * ahead;
+    drag -= over_speed(floor.rolling_resistance * g, v * v) * v * ahead;
   }
   return drag;
 }

@@ -17,7 +17,7 @@ inline constexpr double kPatchEdge_m = 0.008;
 
 // Deceleration by nap and rolling resistance, m/s^2, of a robot that moves at `velocity` (m/s) and
 // heads along the unit vector `ahead`, for a step of `dt_s`.  Drag k against v is taken as
-//     a = -k v / (sqrt(|v|^2 + kDragSpeed_m_s^2) + k dt):
+//     a = -k v / sqrt(|v|^2 + kDragSpeed_m_s^2 + (k dt)^2):
 // smooth through rest, and the drag alone can shrink |v| over a step but never turn it round, so
 // it never adds energy.
 Eigen::Vector2d drag_acceleration(const Floor& floor, double gravity_m_s2,

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "worker/sim/drive.h"
+#include "worker/sim/step_plan.h"
 #include "worker/sim/world.h"
 
 namespace gapfarm {
@@ -13,12 +14,12 @@ namespace {
 constexpr double kRestSpeed_m_s = 1e-3;
 constexpr double kRestTurn_rad_s = 1e-2;
 constexpr double kRestTime_s = 0.05;
+constexpr double kTimeSlack_s = 1e-9;  // rounding of step times
 // A robot that still moves this long after its treads have stopped never rests.
 constexpr double kSettleLimit_s = 3;
 // Faster than any parameter could make the robot: the integration has failed.
 constexpr double kDivergedSpeed_m_s = 20;
 constexpr double kDivergedTurn_rad_s = 500;
-constexpr double kLeastFittedSteps = 8;
 const double kFallenSine = std::sin(M_PI / 4);  // of roll or pitch
 
 // NaN and infinity fail every comparison that holds.
@@ -41,16 +42,6 @@ bool is_still(const btTransform& before, const btTransform& now, double dt_s) {
   return (now.getOrigin() - before.getOrigin()).length2() < shift * shift &&
          (R1.getColumn(0) - R0.getColumn(0)).length2() < turn * turn &&
          (R1.getColumn(2) - R0.getColumn(2)).length2() < turn * turn;
-}
-
-// Length of a physics step: the rate's, stretched by a fraction of a percent so that the motors
-// stop between two steps.  Sliding friction does not feel how fast the surface is, so a stop within
-// a step would be rounded to a whole step, and the end pose would be a staircase over duration.
-// Commands of a few steps keep the rate's step.
-double fitted_step(const SimSettings& settings, double duration_s) {
-  const double step_s = 1 / (settings.step_rate_hz * settings.sub_steps);
-  const double steps = std::round(duration_s / step_s);
-  return steps >= kLeastFittedSteps ? duration_s / steps : step_s;
 }
 
 double clamped_asin(double sine) { return std::asin(std::clamp(sine, -1.0, 1.0)); }
@@ -116,7 +107,7 @@ Motion Simulator::Impl::run(const DriveInput& drive, const Floor& floor,
   const SideMotion left(drive.left, drive.duration_s);
   const SideMotion right(drive.right, drive.duration_s);
   const double still_s = std::max(left.still_time(), right.still_time());
-  const double dt = fitted_step(settings_, drive.duration_s);
+  StepPlan plan(1 / (settings_.step_rate_hz * settings_.sub_steps), left, right, drive.duration_s);
   const btRigidBody& body = world_.robot().body();
   const btVector3 centre = world_.robot().turning_centre();
 
@@ -133,13 +124,15 @@ Motion Simulator::Impl::run(const DriveInput& drive, const Floor& floor,
   double max_pitch_sine = 0;
   double rest_s = 0;
   double t = 0;
-  for (std::uint64_t n = 0; t < still_s + kSettleLimit_s; ++n) {
+  while (t < still_s + kSettleLimit_s) {
     const btTransform before = body.getWorldTransform();
-    t = static_cast<double>(n) * dt;
+    plan.advance();
+    t = plan.start_s();
+    const double dt = plan.length_s();
     world_.step({left.mean_speed(t, dt), right.mean_speed(t, dt)}, dt);
     ++steps_;
-    const bool stopped = t >= still_s;
-    t = static_cast<double>(n + 1) * dt;
+    const bool stopped = t >= still_s - kTimeSlack_s;
+    t = plan.end_s();
     const btTransform& now = body.getWorldTransform();
     if (!is_sane(body)) {
       motion.outcome = MotionOutcome::kDiverged;

@@ -99,7 +99,8 @@ void EllipseFrictionSolver::convertJoints(btTypedConstraint** constraints, int c
   if (static_cast<int>(joint_impulses_.size()) != rows.size()) return;
   for (int j = 0; j < rows.size(); ++j) {
     btSolverConstraint& row = rows[j];
-    row.m_appliedImpulse = std::clamp(joint_impulses_[j], row.m_lowerLimit, row.m_upperLimit);
+    row.m_appliedImpulse = std::clamp(info.m_warmstartingFactor * joint_impulses_[j],
+                                      row.m_lowerLimit, row.m_upperLimit);
     btSolverBody& a = m_tmpSolverBodyPool[row.m_solverBodyIdA];
     btSolverBody& b = m_tmpSolverBodyPool[row.m_solverBodyIdB];
     a.internalApplyImpulse(row.m_contactNormal1 * a.internalGetInvMass(), row.m_angularComponentA,

@@ -7,6 +7,9 @@ namespace {
 
 // Contacts give a little: load sharing among four supports has one answer instead of many.
 constexpr double kContactSoftness = 1e-3;
+// Share of a joint's or contact's position error that a step of full length repairs; a shorter one
+// repairs less, or it would have to move fast.
+constexpr double kErrorReduction = 0.2;
 // Velocity change, squared, (m/s)^2, below which the solver stops iterating early.
 constexpr double kConverged = 1e-20;
 
@@ -24,7 +27,6 @@ btDefaultCollisionConstructionInfo small_pools() {
 void configure(btContactSolverInfo& info, const SimSettings& settings) {
   info.m_solverMode = SOLVER_USE_WARMSTARTING | SOLVER_USE_2_FRICTION_DIRECTIONS |
                       SOLVER_ENABLE_FRICTION_DIRECTION_CACHING;
-  info.m_warmstartingFactor = 1;
   const bool joints = settings.robot == RobotModel::kWheels;
   info.m_numIterations = settings.solver_iterations * (joints ? kJointIterations : 1);
   info.m_leastSquaresResidualThreshold = kConverged;
@@ -74,6 +76,7 @@ void RobotWorld::reset(const Floor& floor) {
   broadphase.resetPool(&dispatcher);
   solver.reset();
   floor_ = floor;
+  last_step_s_ = 0;
   const Eigen::Vector3d gravity = gravity_in_start_frame(floor, settings_.gravity_m_s2);
   setGravity(btVector3(gravity.x(), gravity.y(), gravity.z()));
 
@@ -88,6 +91,11 @@ void RobotWorld::reset(const Floor& floor) {
 void RobotWorld::step(const SideSpeeds& speeds, double dt_s) {
   robot_->drive(speeds, dt_s);
   if (floor_.nap_strength != 0 || floor_.rolling_resistance != 0) apply_drag(dt_s);
+  getSolverInfo().m_warmstartingFactor = last_step_s_ > 0 ? dt_s / last_step_s_ : 1;
+  last_step_s_ = dt_s;
+  const double erp = kErrorReduction * dt_s * settings_.step_rate_hz * settings_.sub_steps;
+  getSolverInfo().m_erp = erp;
+  getSolverInfo().m_erp2 = erp;
   stepSimulation(dt_s, 0);
 }
 

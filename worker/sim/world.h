@@ -65,7 +65,7 @@ class RobotWorld final : private WorldParts, public btDiscreteDynamicsWorld {
 
   // Puts the robot at the start, in a state that no earlier run has touched.
   void reset(const Floor& floor);
-  // One physics step.  REQUIRES: every step after a reset has the same length.
+  // One physics step; the last one's impulses, in proportion to the lengths, start the solver.
   void step(const SideSpeeds& speeds, double dt_s);
 
   Robot& robot() { return *robot_; }
@@ -85,6 +85,7 @@ class RobotWorld final : private WorldParts, public btDiscreteDynamicsWorld {
   void prepare_contacts();
 
   SimSettings settings_;
+  double last_step_s_ = 0;  // 0: none since the reset
   bool damped_;
   Floor floor_;
   btStaticPlaneShape plane_;
