@@ -23,7 +23,7 @@ struct SessionOptions {
   unsigned window = 0;   // jobs wanted in hand; 0: as the master likes
   std::string replaces;  // the process that this one makes up for, or empty
   v1::ProcessEnd replaced_end = v1::PROCESS_LEFT;
-  double hello_min_s = 0.2;  // between two hellos without an answer, doubled up to the maximum
+  double hello_min_s = 0.02;  // between two hellos without an answer, doubled up to the maximum
   double hello_max_s = 5;
 };
 

@@ -23,10 +23,32 @@ void JobQueue::start(std::string problem_hash, std::vector<v1::Task> tasks,
   pending_.assign(order.begin(), order.end());
 }
 
-bool JobQueue::take(WorkerId worker, v1::Job* job) {
-  if (pending_.empty()) return false;
-  const std::size_t index = pending_.front();
-  pending_.pop_front();
+bool JobQueue::suspect(const Job& job) const {
+  return job.crashes + 1 >= limits_.crashes || job.kills + 1 >= limits_.kills;
+}
+
+void JobQueue::wait_in_line(std::size_t index) {
+  jobs_[index].waiting = true;
+  if (suspect(jobs_[index])) {
+    suspects_.push_back(index);
+  } else {
+    pending_.push_front(index);
+  }
+}
+
+void JobQueue::leave_line(std::size_t index) {
+  if (!jobs_[index].waiting) return;
+  jobs_[index].waiting = false;
+  std::erase(pending_, index);
+  std::erase(suspects_, index);
+}
+
+JobQueue::Taken JobQueue::take(WorkerId worker, bool empty_handed, v1::Job* job) {
+  const bool alone = empty_handed && !suspects_.empty();
+  std::deque<std::size_t>& line = alone ? suspects_ : pending_;
+  if (line.empty()) return Taken::kNone;
+  const std::size_t index = line.front();
+  line.pop_front();
   Job& taken = jobs_[index];
   taken.waiting = false;
   ++taken.out;
@@ -34,8 +56,8 @@ bool JobQueue::take(WorkerId worker, v1::Job* job) {
   job->set_attempt_id(first_attempt_ + attempts_.size());
   job->set_problem_hash(problem_hash_);
   *job->mutable_task() = taken.task;
-  attempts_.push_back({index, worker, true});
-  return true;
+  attempts_.push_back({index, worker, true, alone});
+  return alone ? Taken::kSuspect : Taken::kJob;
 }
 
 JobQueue::Attempt* JobQueue::find(WorkerId worker, std::uint64_t attempt) {
@@ -61,11 +83,8 @@ Commit JobQueue::commit(WorkerId worker, v1::JobResult* result) {
 void JobQueue::complete(Job& job) {
   job.done = true;
   ++committed_;
-  if (!job.waiting) return;
-  // Its attempt was given up too early and answered after all.
-  const std::size_t index = static_cast<std::size_t>(&job - jobs_.data());
-  std::erase(pending_, index);
-  job.waiting = false;
+  // It waits when its attempt was given up too early and answered after all.
+  leave_line(static_cast<std::size_t>(&job - jobs_.data()));
 }
 
 bool JobQueue::give_back(WorkerId worker, std::uint64_t attempt_id) {
@@ -75,8 +94,7 @@ bool JobQueue::give_back(WorkerId worker, std::uint64_t attempt_id) {
   Job& job = jobs_[attempt->job];
   --job.out;
   if (job.done || job.waiting || job.out > 0) return false;
-  job.waiting = true;
-  pending_.push_front(attempt->job);
+  wait_in_line(attempt->job);
   return true;
 }
 
@@ -86,8 +104,16 @@ bool JobQueue::blame(WorkerId worker, std::uint64_t attempt_id, EndCause cause) 
   Job& job = jobs_[attempt->job];
   if (job.done) return false;
   const bool crashed = cause == EndCause::kCrashed;
-  const unsigned count = crashed ? ++job.crashes : ++job.kills;
-  if (count < (crashed ? limits_.crashes : limits_.kills)) return false;
+  unsigned& count = crashed ? job.crashes : job.kills;
+  const unsigned limit = crashed ? limits_.crashes : limits_.kills;
+  if (count + 1 < limit || attempt->alone) ++count;
+  if (count < limit) {
+    if (job.waiting) {
+      leave_line(attempt->job);
+      wait_in_line(attempt->job);
+    }
+    return false;
+  }
   job.result.set_outcome(v1::WORKER_FAILED);
   job.result.set_message(std::to_string(job.crashes) + " worker processes crashed and " +
                          std::to_string(job.kills) + " were killed while they worked on this task");
@@ -109,6 +135,7 @@ void JobQueue::abandon() {
   jobs_.clear();
   attempts_.clear();
   pending_.clear();
+  suspects_.clear();
   committed_ = 0;
 }
 

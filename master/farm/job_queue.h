@@ -38,13 +38,16 @@ class JobQueue {
   void start(std::string problem_hash, std::vector<v1::Task> tasks,
              std::optional<std::uint64_t> shuffle_seed = {});
 
-  bool has_pending() const { return !pending_.empty(); }
+  bool has_pending() const { return !pending_.empty() || !suspects_.empty(); }
   std::size_t total() const { return jobs_.size(); }
   std::size_t committed() const { return committed_; }
   std::size_t unfinished() const { return jobs_.size() - committed_; }
 
-  // Gives the next job to `worker`: fills `job` but for its epoch.  False: none is pending.
-  bool take(WorkerId worker, v1::Job* job);
+  enum class Taken { kNone, kJob, kSuspect };
+  // Gives the next job to `worker`: fills `job` but for its epoch.  A job that one more death would
+  // quarantine is a suspect: it goes only to an empty-handed worker, who gets nothing else until it
+  // has answered, because of a worker that dies with several jobs one cannot tell which did it.
+  Taken take(WorkerId worker, bool empty_handed, v1::Job* job);
 
   // Takes the answer out of `result` when it is the job's first.  The outcome of an answer without
   // one is UNSPECIFIED and makes it foreign.
@@ -68,7 +71,7 @@ class JobQueue {
     v1::Task task;
     v1::TaskResult result;
     bool done = false;
-    bool waiting = true;  // in pending_
+    bool waiting = true;  // in pending_ or suspects_
     unsigned out = 0;     // live attempts
     unsigned crashes = 0;
     unsigned kills = 0;
@@ -77,8 +80,12 @@ class JobQueue {
     std::size_t job;
     WorkerId worker;
     bool live;
+    bool alone;  // the worker's only job
   };
   Attempt* find(WorkerId worker, std::uint64_t attempt);
+  bool suspect(const Job& job) const;
+  void wait_in_line(std::size_t index);
+  void leave_line(std::size_t index);
   void complete(Job& job);
 
   JobLimits limits_;
@@ -88,6 +95,7 @@ class JobQueue {
   std::vector<Job> jobs_;
   std::vector<Attempt> attempts_;
   std::deque<std::size_t> pending_;
+  std::deque<std::size_t> suspects_;
   std::size_t committed_ = 0;
 };
 

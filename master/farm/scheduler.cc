@@ -140,8 +140,11 @@ void Scheduler::on_hello(const std::string& peer, const v1::Hello& hello, double
   }
   if (admission.returning) {
     // Whatever else was under way to it, or its answers on the way here, may be lost.
-    const bool same_life = hello.epoch() == options_.epoch;
-    keep_only(worker, same_life ? hello.attempts() : decltype(hello.attempts()){}, kForever);
+    if (hello.epoch() == options_.epoch) {
+      keep_only(worker, hello.attempts(), kForever);
+    } else {
+      keep_only(worker, std::vector<std::uint64_t>{}, kForever);
+    }
   }
   report(admission.returning ? FarmEvent::kReturned : FarmEvent::kJoined, worker.name,
          (admission.returning ? "is back on " : "joined from ") + worker.host);
@@ -282,25 +285,31 @@ void Scheduler::dispatch(double now) {
     std::size_t bytes;
   };
   std::unordered_map<WorkerId, Open> open;
+  v1::Job job;
   while (queue_.has_pending() && !line_.empty()) {
     WorkerRecord* worker = registry_.find(line_.front());
     line_.pop_front();
     if (worker == nullptr) continue;
-    if (worker->peer.empty() || worker->holds.size() >= credit(*worker)) {
+    const bool empty_handed = worker->holds.empty();
+    const bool full = worker->peer.empty() || worker->holds.size() >= credit(*worker) ||
+                      (worker->alone && !empty_handed);
+    const JobQueue::Taken taken =
+        full ? JobQueue::Taken::kNone : queue_.take(worker->id, empty_handed, &job);
+    if (taken == JobQueue::Taken::kNone) {
       worker->in_line = false;
       continue;
     }
     line_.push_back(worker->id);
+    worker->alone = taken == JobQueue::Taken::kSuspect;
+    job.set_epoch(options_.epoch);
+    worker->holds.push_back({job.attempt_id(), now});
     auto [batch, fresh] = open.try_emplace(worker->id, Open{0, 0});
     if (fresh || batch->second.bytes > kBatchBytes) {
       post(worker->peer);
       batch->second = {outbox_.size() - 1, 0};
     }
-    v1::Job* job = outbox_[batch->second.at].envelope.mutable_batch()->add_jobs();
-    queue_.take(worker->id, job);
-    job->set_epoch(options_.epoch);
-    batch->second.bytes += job->ByteSizeLong();
-    worker->holds.push_back({job->attempt_id(), now});
+    batch->second.bytes += job.ByteSizeLong();
+    outbox_[batch->second.at].envelope.mutable_batch()->add_jobs()->Swap(&job);
   }
 }
 

@@ -36,6 +36,7 @@ struct WorkerRecord {
   std::vector<Holding> holds;  // oldest first: a worker works in this order
   std::uint64_t finished = 0;
   double mean_wall = -1;  // s a task, lately; negative: unknown
+  bool alone = false;     // the scheduler's: holds a suspect and gets nothing beside it
   bool in_line = false;   // the scheduler's: waits in line for jobs
 };
 

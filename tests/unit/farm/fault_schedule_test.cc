@@ -1,5 +1,5 @@
-// Thousands of seeded fault schedules.  One alone: GAPFARM_FARM_SEED=17 test_farm
-// --gtest_filter=FaultSchedules.*
+// Thousands of seeded fault schedules (GAPFARM_FARM_SCHEDULES: how many).  One alone:
+// GAPFARM_FARM_SEED=17 test_farm --gtest_filter=FaultSchedules.*
 #include <gtest/gtest.h>
 
 #include <cstdlib>
@@ -57,7 +57,10 @@ std::string trouble_of(std::uint64_t seed) {
 TEST(FaultSchedules, LoseNothingCommitNothingTwiceAndEnd) {
   const char* alone = std::getenv("GAPFARM_FARM_SEED");
   const std::uint64_t first = alone != nullptr ? std::strtoull(alone, nullptr, 10) : 1;
-  const std::uint64_t last = alone != nullptr ? first : 3000;
+  const char* count = std::getenv("GAPFARM_FARM_SCHEDULES");
+  const std::uint64_t last = alone != nullptr   ? first
+                             : count != nullptr ? std::strtoull(count, nullptr, 10)
+                                                : 3000;
   for (std::uint64_t seed = first; seed <= last; ++seed) {
     ASSERT_EQ(trouble_of(seed), "")
         << "replay: GAPFARM_FARM_SEED=" << seed << " test_farm --gtest_filter=FaultSchedules.*";

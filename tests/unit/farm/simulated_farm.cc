@@ -36,9 +36,9 @@ struct SimulatedFarm::WorkerEnd : Transport {
   WorkerEnd(SimulatedFarm& owner, Worker& self) : farm(owner), worker(self) {}
   SendStatus send(const std::string&, const std::string& bytes) override {
     if (farm.now_ < worker.cut_off_until) return SendStatus::kSent;  // and lost
-    farm.carry([this, peer = worker.peer, bytes] {
-      farm.master_end_->inbox.push_back({peer, bytes});
-      farm.step_master();
+    farm.carry([&to = farm, peer = worker.peer, bytes] {  // may arrive after the sender's end
+      to.master_end_->inbox.push_back({peer, bytes});
+      to.step_master();
     });
     return SendStatus::kSent;
   }

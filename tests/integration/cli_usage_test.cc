@@ -1,0 +1,137 @@
+// Manners of the command line that every subcommand shares.
+#include <gmock/gmock.h>
+
+#include "common/base/build_info.h"
+#include "tests/integration/run_program.h"
+
+namespace gapfarm {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+TEST(CliUsage, SaysWhatItIs) {
+  const Finished version = gapfarm_command({"--version"});
+  EXPECT_EQ(version.exit_code, 0);
+  EXPECT_EQ(version.out, build_summary("gapfarm") + "\n");
+}
+
+TEST(CliUsage, HelpFitsAScreenAndHasExamplesEverywhere) {
+  const Finished help = gapfarm_command({"--help"});
+  EXPECT_EQ(help.exit_code, 0);
+  EXPECT_LE(std::count(help.out.begin(), help.out.end(), '\n'), 40);
+  for (const char* command : {"status", "check", "import"}) {
+    EXPECT_THAT(help.out, HasSubstr(command));
+    const Finished one = gapfarm_command({command, "--help"});
+    EXPECT_EQ(one.exit_code, 0) << command;
+    EXPECT_THAT(one.out, HasSubstr("Examples:\n  gapfarm " + std::string(command))) << command;
+    EXPECT_LE(std::count(one.out.begin(), one.out.end(), '\n'), 40) << command;
+  }
+}
+
+TEST(CliUsage, WrongWordsExitWithTwoAndASuggestion) {
+  const Finished command = gapfarm_command({"statsu", "run"});
+  EXPECT_EQ(command.exit_code, 2);
+  EXPECT_THAT(command.err, HasSubstr("unknown command 'statsu'; did you mean 'status'?"));
+  const Finished option = gapfarm_command({"status", "run", "--jsno"});
+  EXPECT_EQ(option.exit_code, 2);
+  EXPECT_THAT(option.err, HasSubstr("'--jsno'; did you mean '--json'?"));
+  EXPECT_THAT(option.err, HasSubstr("gapfarm status --help"));
+  const Finished missing = gapfarm_command({"import", "bbautotune"});
+  EXPECT_EQ(missing.exit_code, 2);
+  EXPECT_THAT(missing.err, HasSubstr("FILES"));
+  const Finished nothing = gapfarm_command({});
+  EXPECT_EQ(nothing.exit_code, 2);
+  EXPECT_THAT(nothing.err, HasSubstr("Usage:"));
+  EXPECT_EQ(nothing.out, "");
+}
+
+TEST(CliImport, TurnsRunsIntoATrialLog) {
+  const TemporaryFolder folder;
+  const std::string first =
+      folder.write("run1.dat", "10.0;20.0;0.5;move(25.000000, 0.000000, 0.000000);30.0;25.0;0.4\n");
+  const std::string second = folder.write(
+      "run2.dat", "1.0; 2.0; 0.1; move(25.000000, 0.000000, 0.000000) 26.0; 2.0; 0.1\n");
+  const std::string out = folder / "trials.csv";
+  const Finished done = gapfarm_command({"import", "bbautotune", first, second, "--out", out});
+  EXPECT_EQ(done.exit_code, 0) << done.err;
+  EXPECT_THAT(done.err, HasSubstr("2 trials in 2 sessions"));
+
+  const Finished shown = gapfarm_command({"import", "bbautotune", first, second, "--out", "-"});
+  EXPECT_THAT(shown.out, StartsWith("session,trial,t,command,left,right,duration,x0,y0,theta0"));
+  EXPECT_THAT(shown.out, HasSubstr("run1,0,,forward,,,,0.1,0.2,0.5,0.3,0.25,0.4"));
+
+  const Finished again = gapfarm_command({"import", "bbautotune", first, "--out", out});
+  EXPECT_EQ(again.exit_code, 2);
+  EXPECT_THAT(again.err, HasSubstr("exists already"));
+  EXPECT_EQ(gapfarm_command({"import", "bbautotune", first, "--out", out, "--force"}).exit_code, 0);
+
+  // Its own output is not a bbautotune log.
+  const Finished wrong = gapfarm_command({"import", "bbautotune", out, "--out", folder / "x.csv"});
+  EXPECT_EQ(wrong.exit_code, 1);
+  EXPECT_THAT(wrong.err, HasSubstr("trials.csv:1:1: found a trial log"));
+  EXPECT_FALSE(std::filesystem::exists(folder / "x.csv"));
+
+  const Finished unknown = gapfarm_command({"import", "bbautotun", first, "--out", "-"});
+  EXPECT_EQ(unknown.exit_code, 2);
+  EXPECT_THAT(unknown.err, HasSubstr("did you mean 'bbautotune'?"));
+}
+
+class CliCheck : public ::testing::Test {
+ protected:
+  const TemporaryFolder folder_;
+  const std::string trials_ = folder_.write("trials.csv",
+                                            "session,trial,t,command,left,right,duration,"
+                                            "x0,y0,theta0,x1,y1,theta1\n"
+                                            "a,1,0,forward,,,,0,0,0,0.25,0,0\n"
+                                            "a,2,5,forward,,,,0.25,0,0,0.5,0,0\n"
+                                            "b,1,0,turn_ccw,,,,0,0,0,0,0,1.5\n");
+};
+
+TEST_F(CliCheck, CountsWhatARunWouldNeed) {
+  const std::string config = folder_.write("c.toml",
+                                           "scenario = \"srv1\"\nseed = 7\n"
+                                           "trials = [\"trials.csv\"]\n"
+                                           "[genes]\nfriction = [0.2, 1.0]\n");
+  const Finished text = gapfarm_command({"check", config});
+  EXPECT_EQ(text.exit_code, 0) << text.err;
+  EXPECT_THAT(text.out, HasSubstr("3 in 2 sessions"));
+  EXPECT_THAT(text.out, HasSubstr("conditions   2 distinct"));
+  const Finished json = gapfarm_command({"check", config, "--json"});
+  EXPECT_THAT(json.out, HasSubstr("\"conditions\": 2"));
+  EXPECT_THAT(json.out, HasSubstr("\"parameter\": \"friction\""));
+  EXPECT_THAT(json.out, HasSubstr("\"seed\": 7"));
+}
+
+// An effect that looks at the time makes every time of a session a condition of its own.
+TEST_F(CliCheck, CountsConditionsByWhatTheEffectsLookAt) {
+  const std::string config = folder_.write("c.toml",
+                                           "[genes]\nfriction = [0.2, 1.0]\n"
+                                           "[genes.battery_sag]\nrate = [0.0, 0.01]\n");
+  const Finished text = gapfarm_command({"check", config, "--trials", trials_});
+  EXPECT_EQ(text.exit_code, 0) << text.err;
+  EXPECT_THAT(text.out, HasSubstr("conditions   3 distinct"));
+  EXPECT_THAT(text.out, HasSubstr("battery_sag"));
+}
+
+TEST_F(CliCheck, PointsAtWhatIsWrong) {
+  const std::string typo = folder_.write("typo.toml", "[genes]\nfrictoin = [0.2, 1.0]\n");
+  const Finished config = gapfarm_command({"check", typo, "--trials", trials_});
+  EXPECT_EQ(config.exit_code, 2);
+  EXPECT_THAT(config.err, HasSubstr("typo.toml:2:1: "));
+  EXPECT_THAT(config.err, HasSubstr("did you mean 'friction'?"));
+
+  const std::string good = folder_.write("good.toml", "[genes]\nfriction = [0.2, 1.0]\n");
+  const Finished none = gapfarm_command({"check", good});
+  EXPECT_EQ(none.exit_code, 2);
+  EXPECT_THAT(none.err, HasSubstr("--trials FILE"));
+  const Finished absent = gapfarm_command({"check", good, "--trials", folder_ / "absent.csv"});
+  EXPECT_EQ(absent.exit_code, 2);
+  EXPECT_THAT(absent.err, HasSubstr("absent.csv"));
+
+  const std::string no_genes = folder_.write("still.toml", "seed = 1\n");
+  EXPECT_EQ(gapfarm_command({"check", no_genes, "--trials", trials_}).exit_code, 2);
+}
+
+}  // namespace
+}  // namespace gapfarm

@@ -1,0 +1,85 @@
+#include "tests/integration/run_program.h"
+
+#include <fcntl.h>
+#include <signal.h>
+#include <stdlib.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <fstream>
+#include <sstream>
+
+namespace gapfarm {
+namespace {
+
+std::string content(const std::filesystem::path& path) {
+  std::ifstream in(path, std::ios::binary);
+  std::ostringstream text;
+  text << in.rdbuf();
+  return text.str();
+}
+
+std::filesystem::path fresh_folder() {
+  std::string pattern = (std::filesystem::temp_directory_path() / "gapfarm-test-XXXXXX").string();
+  return mkdtemp(pattern.data());
+}
+
+}  // namespace
+
+RunningProgram::RunningProgram(const std::string& program,
+                               const std::vector<std::string>& arguments,
+                               const std::vector<std::string>& environment)
+    : folder_(fresh_folder()) {
+  const std::string path = std::string(GAPFARM_BIN_DIR) + "/" + program;
+  const std::string out = folder_ / "out", err = folder_ / "err";
+  std::vector<char*> argv = {const_cast<char*>(path.c_str())};
+  for (const std::string& argument : arguments) argv.push_back(const_cast<char*>(argument.c_str()));
+  argv.push_back(nullptr);
+  pid_ = ::fork();
+  if (pid_ != 0) return;
+  for (const std::string& entry : environment) ::putenv(const_cast<char*>(entry.c_str()));
+  ::dup2(::open("/dev/null", O_RDONLY), 0);
+  ::dup2(::open(out.c_str(), O_WRONLY | O_CREAT, 0600), 1);
+  ::dup2(::open(err.c_str(), O_WRONLY | O_CREAT, 0600), 2);
+  ::execv(path.c_str(), argv.data());
+  ::_exit(127);
+}
+
+RunningProgram::~RunningProgram() {
+  if (pid_ > 0) {
+    ::kill(pid_, SIGKILL);
+    ::waitpid(pid_, nullptr, 0);
+  }
+  std::filesystem::remove_all(folder_);
+}
+
+void RunningProgram::send(int signal) const { ::kill(pid_, signal); }
+
+std::string RunningProgram::out() const { return content(folder_ / "out"); }
+
+Finished RunningProgram::wait() {
+  int status = 0;
+  ::waitpid(pid_, &status, 0);
+  pid_ = -1;
+  Finished finished;
+  finished.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+  finished.out = content(folder_ / "out");
+  finished.err = content(folder_ / "err");
+  return finished;
+}
+
+Finished run_program(const std::string& program, const std::vector<std::string>& arguments,
+                     const std::vector<std::string>& environment) {
+  return RunningProgram(program, arguments, environment).wait();
+}
+
+TemporaryFolder::TemporaryFolder() : path_(fresh_folder()) {}
+
+TemporaryFolder::~TemporaryFolder() { std::filesystem::remove_all(path_); }
+
+std::string TemporaryFolder::write(const std::string& name, const std::string& text) const {
+  std::ofstream(path_ / name, std::ios::binary) << text;
+  return (path_ / name).string();
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,64 @@
+// Runs gapfarm as a user would, and says what came of it.
+#pragma once
+
+#include <sys/types.h>
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace gapfarm {
+
+struct Finished {
+  int exit_code = -1;  // 128 + signal when a signal ended it
+  std::string out;
+  std::string err;
+};
+
+// A program that is running; destroying it kills it.
+class RunningProgram {
+ public:
+  // `program` is looked for beside the tests' own programs.  `environment`: "NAME=value" to add.
+  RunningProgram(const std::string& program, const std::vector<std::string>& arguments,
+                 const std::vector<std::string>& environment = {});
+  ~RunningProgram();
+  RunningProgram(const RunningProgram&) = delete;
+  RunningProgram& operator=(const RunningProgram&) = delete;
+
+  pid_t pid() const { return pid_; }
+  void send(int signal) const;
+  // Everything written to stdout so far.
+  std::string out() const;
+  Finished wait();
+
+ private:
+  pid_t pid_ = -1;
+  std::filesystem::path folder_;
+};
+
+Finished run_program(const std::string& program, const std::vector<std::string>& arguments,
+                     const std::vector<std::string>& environment = {});
+
+inline Finished gapfarm_command(const std::vector<std::string>& arguments,
+                                const std::vector<std::string>& environment = {}) {
+  return run_program("gapfarm", arguments, environment);
+}
+
+// A fresh folder that goes with its owner.
+class TemporaryFolder {
+ public:
+  TemporaryFolder();
+  ~TemporaryFolder();
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+
+  const std::filesystem::path& path() const { return path_; }
+  std::string operator/(const std::string& name) const { return (path_ / name).string(); }
+  // Writes a file into it and returns its path.
+  std::string write(const std::string& name, const std::string& text) const;
+
+ private:
+  std::filesystem::path path_;
+};
+
+}  // namespace gapfarm
