@@ -101,7 +101,7 @@ TEST(Farm, SurvivesKillNineInTheMiddleOfABatch) {
                              }),
                 tasks);
   EXPECT_EQ(killed, 3);
-  EXPECT_GE((*farm)->retries(), 3u);
+  EXPECT_GE((*farm)->retries(), 1u);  // some may have been killed empty-handed
 }
 
 TEST(Farm, QuarantinesATaskThatCrashesItsWorkers) {
