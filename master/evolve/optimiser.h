@@ -31,10 +31,10 @@ struct Member {
   std::uint64_t birth_id = 0;
   Genome genome;
   v1::Outcome outcome = v1::OUTCOME_UNSPECIFIED;
-  double cost = 0;          // mean over `scores`
+  double cost = 0;  // mean over `scores`
   unsigned scores = 0;
   std::vector<std::uint64_t> parents;
-  std::string operators;    // "blend+gaussian", "elite", "random", "nominal"
+  std::string operators;  // "blend+gaussian", "elite", "random", "nominal"
 };
 
 struct NamedNumber {
@@ -51,8 +51,8 @@ class Optimiser {
   // Scores in the order of the last ask().  Completes the generation.
   virtual void tell(std::span<const Score> scores) = 0;
 
-  virtual std::uint64_t generation() const = 0;   // completed generations
-  virtual std::uint64_t evaluations() const = 0;  // scores told since the start
+  virtual std::uint64_t generation() const = 0;        // completed generations
+  virtual std::uint64_t evaluations() const = 0;       // scores told since the start
   virtual std::uint64_t last_improvement() const = 0;  // generation
   virtual std::vector<Member> members() const = 0;     // best first
   virtual const Member& best() const = 0;              // REQUIRES: generation() > 0
@@ -61,6 +61,7 @@ class Optimiser {
   virtual std::vector<NamedNumber> operator_probabilities() const = 0;
 
   // Everything ask() and tell() depend on; restoring it continues bit for bit.
+  // REQUIRES: every ask() has had its tell().
   virtual std::string state() const = 0;
 };
 

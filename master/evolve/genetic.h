@@ -1,0 +1,39 @@
+// A genetic algorithm with elitism, self-adapted operators and restarts.
+//
+// Randomness: child `birth_id` of generation g draws from Stream{run_seed, kEvolution, g, birth_id,
+// 0} and nothing else, so a generation does not depend on how many draws another child made.
+//
+// Noise: when scores are noisy, two elites at least are kept (if any), and each elite is scored
+// until it has `elite_replicates`.  Only fully scored individuals compete for best(): the lucky
+// single score leads to a re-score, not to the title.
+#pragma once
+
+#include <memory>
+#include <string_view>
+
+#include "common/base/result.h"
+#include "common/config/settings.h"
+#include "master/evolve/optimiser.h"
+
+namespace gapfarm {
+
+struct GeneticSetup {
+  EvolutionSettings settings;
+  const ParameterTable* table = nullptr;  // outlives the optimiser
+  std::vector<Gene> genes;
+  Genome nominal;  // of the config's own values; empty: unknown
+  std::uint64_t run_seed = 0;
+  bool noisy = false;  // scores differ between replicates (SpreadKind::kSampled)
+};
+
+// Errors: no genes, a population below 2 or not above the elites, no operators, a probability
+// outside [0, 1], a nominal genome of another length.
+Result<std::unique_ptr<Optimiser>> make_genetic(const GeneticSetup& setup);
+
+// The optimiser whose state() gave `state`.  Settings may differ from the run's (a larger
+// population, say), genes and operators may not.  Errors: as above, and a state that is damaged or
+// belongs to other genes or operators.
+Result<std::unique_ptr<Optimiser>> restore_genetic(const GeneticSetup& setup,
+                                                   std::string_view state);
+
+}  // namespace gapfarm

@@ -1,0 +1,92 @@
+#include "master/evolve/individual.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "common/base/hash.h"
+
+namespace gapfarm {
+namespace {
+
+int outcome_rank(v1::Outcome outcome) {
+  return outcome == v1::OUTCOME_UNSPECIFIED ? std::numeric_limits<int>::max()
+                                            : static_cast<int>(outcome);
+}
+
+}  // namespace
+
+std::string origin_name(unsigned origin) {
+  constexpr std::array kNames = {"one_point",     "uniform", "blend",  "gaussian",
+                                 "uniform_reset", "elite",   "random", "nominal"};
+  std::string text;
+  for (std::size_t bit = 0; bit < kNames.size(); ++bit) {
+    if ((origin & (1U << bit)) == 0) continue;
+    if (!text.empty()) text += '+';
+    text += kNames[bit];
+  }
+  return text;
+}
+
+void Standing::add(const Score& score) {
+  const bool usable = score.outcome == v1::OK && std::isfinite(score.cost);
+  const v1::Outcome told = score.outcome == v1::OK && !usable ? v1::DIVERGED : score.outcome;
+  if (scores == 0 || outcome_rank(told) > outcome_rank(outcome)) outcome = told;
+  ++scores;
+  if (outcome != v1::OK) {
+    cost = 0;
+    m2 = 0;
+    return;
+  }
+  const double before = score.cost - cost;  // Welford's running mean
+  cost += before / scores;
+  m2 += before * (score.cost - cost);
+}
+
+bool better(const Standing& a, const Standing& b) {
+  if (a.outcome != b.outcome) return outcome_rank(a.outcome) < outcome_rank(b.outcome);
+  return a.outcome == v1::OK && a.cost < b.cost;
+}
+
+void sort_best_first(std::vector<Individual>& individuals) {
+  std::sort(individuals.begin(), individuals.end(), [](const Individual& a, const Individual& b) {
+    if (better(a.standing, b.standing)) return true;
+    if (better(b.standing, a.standing)) return false;
+    return a.birth_id < b.birth_id;
+  });
+}
+
+Member to_member(const Individual& individual) {
+  return {individual.birth_id,           individual.genome,          individual.standing.outcome,
+          individual.standing.cost,      individual.standing.scores, individual.parents,
+          origin_name(individual.origin)};
+}
+
+std::uint64_t SeenGenomes::key(const Genome& genome) {
+  Hasher hasher;
+  for (double gene : genome) hasher.add(gene);
+  return std::stoull(hasher.finish().substr(0, 16), nullptr, 16);
+}
+
+const Standing* SeenGenomes::find(const Genome& genome) const {
+  const auto found = standings_.find(key(genome));
+  return found == standings_.end() ? nullptr : &found->second;
+}
+
+void SeenGenomes::remember(const Genome& genome, const Standing& standing) {
+  restore(key(genome), standing);
+}
+
+void SeenGenomes::restore(std::uint64_t key, const Standing& standing) {
+  if (standings_.insert_or_assign(key, standing).second) order_.push_back(key);
+}
+
+void SeenGenomes::trim() {
+  if (order_.size() <= kLimit) return;
+  const auto end = order_.end() - static_cast<std::ptrdiff_t>(kLimit);
+  for (auto key = order_.begin(); key != end; ++key) standings_.erase(*key);
+  order_.erase(order_.begin(), end);
+}
+
+}  // namespace gapfarm

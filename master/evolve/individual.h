@@ -1,0 +1,78 @@
+// An individual of the genetic algorithm, and which of two is the better.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include "master/evolve/optimiser.h"
+
+namespace gapfarm {
+
+// Bits of Individual::origin.
+enum Origin : unsigned {
+  kOnePoint = 1u << 0,
+  kUniform = 1u << 1,
+  kBlend = 1u << 2,
+  kGaussian = 1u << 3,
+  kUniformReset = 1u << 4,
+  kElite = 1u << 5,
+  kRandom = 1u << 6,
+  kNominal = 1u << 7,
+};
+std::string origin_name(unsigned origin);  // "blend+gaussian"
+
+// What is known of a genome's cost.
+struct Standing {
+  v1::Outcome outcome = v1::OUTCOME_UNSPECIFIED;  // the worst of its scores
+  double cost = 0;                                // mean over its OK scores
+  double m2 = 0;                                  // sum of their squared deviations
+  unsigned scores = 0;
+
+  // Takes one more score.  An OK score whose cost is not finite counts as DIVERGED.
+  void add(const Score& score);
+};
+
+// OK by cost, then the other outcomes in the enum's order, unspecified last.  A strict weak order:
+// no NaN gets here.
+bool better(const Standing& a, const Standing& b);
+
+struct Individual {
+  std::uint64_t birth_id = 0;
+  Genome genome;
+  Standing standing;
+  std::vector<std::uint64_t> parents;
+  unsigned origin = 0;
+};
+
+// Best first; equal standings in order of birth, which makes the order total.
+void sort_best_first(std::vector<Individual>& individuals);
+
+Member to_member(const Individual& individual);
+
+// Genomes scored in this run, so that a duplicate costs nothing.  Keyed by 64 bits of a hash of
+// the genome's bits: with kLimit genomes two differ in less than that with a chance of 1e-11.
+class SeenGenomes {
+ public:
+  // The last so many genomes are kept, which bounds the optimiser's state to some 500 kB.
+  static constexpr std::size_t kLimit = 16384;
+
+  static std::uint64_t key(const Genome& genome);
+
+  const Standing* find(const Genome& genome) const;
+  void remember(const Genome& genome, const Standing& standing);
+  // Forgets the oldest beyond kLimit.
+  void trim();
+
+  std::size_t size() const { return order_.size(); }
+  const std::vector<std::uint64_t>& order() const { return order_; }  // oldest first
+  const Standing& at(std::uint64_t key) const { return standings_.at(key); }
+  void restore(std::uint64_t key, const Standing& standing);
+
+ private:
+  std::vector<std::uint64_t> order_;
+  std::unordered_map<std::uint64_t, Standing> standings_;
+};
+
+}  // namespace gapfarm

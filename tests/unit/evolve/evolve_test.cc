@@ -1,0 +1,198 @@
+#include "master/evolve/evolve.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/unit/evolve/toy_problems.h"
+
+namespace gapfarm {
+namespace {
+
+class FakeClock : public EvolveClock {
+ public:
+  double now_s() const override { return now; }
+  double now = 100;
+};
+
+// Scores by a toy; each generation takes 2 s of the fake clock.
+class ToyBackend : public EvaluationBackend {
+ public:
+  ToyBackend(const ToyRun& run, FakeClock& clock) : run_(run), clock_(clock) {}
+  Result<std::vector<Score>> evaluate(std::span<const Candidate> candidates) override {
+    clock_.now += 2;
+    if (on_call) on_call();
+    if (fail) return Error{"no worker can be had"};
+    std::vector<Score> scores;
+    for (const Candidate& candidate : candidates) scores.push_back(run_.score(candidate));
+    if (lose_one) scores.pop_back();
+    return scores;
+  }
+  std::function<void()> on_call;
+  bool fail = false;
+  bool lose_one = false;
+
+ private:
+  const ToyRun& run_;
+  FakeClock& clock_;
+};
+
+class KeepingSink : public GenerationSink {
+ public:
+  Status commit(const GenerationRecord& record) override {
+    if (record.generation == refuse) return Error{"disk full"};
+    records.push_back(record);
+    return {};
+  }
+  std::vector<GenerationRecord> records;
+  std::uint64_t refuse = 0;
+};
+
+class EvolveTest : public testing::Test {
+ protected:
+  explicit EvolveTest() : backend_(run_, clock_) {
+    options_.settings = run_.setup().settings;
+    options_.settings.generations = 12;
+    options_.fitness = FitnessKind::kEnergyScore;
+  }
+  Result<EvolveSummary> go() {
+    return evolve(run_.optimiser(), backend_, sink_, clock_, options_, [this] { return stop_; });
+  }
+
+  ToyRun run_{sphere(3), EvolutionSettings{}, 1};
+  FakeClock clock_;
+  ToyBackend backend_;
+  KeepingSink sink_;
+  EvolveOptions options_;
+  bool stop_ = false;
+};
+
+TEST_F(EvolveTest, StopsAfterItsGenerations) {
+  const EvolveSummary summary = go().value();
+  EXPECT_EQ(summary.reason, StopReason::kGenerations);
+  EXPECT_EQ(summary.text, "completed 12 of 12 generations");
+  EXPECT_EQ(summary.generations, 12U);
+  EXPECT_EQ(sink_.records.size(), 12U);
+  EXPECT_EQ(summary.wall_s, 24);
+  EXPECT_EQ(summary.digest, sink_.records.back().digest);
+  EXPECT_EQ(summary.best->cost, run_.optimiser().best().cost);
+}
+
+TEST_F(EvolveTest, StopsAtItsEvaluations) {
+  options_.settings.evaluations = 100;
+  const EvolveSummary summary = go().value();
+  EXPECT_EQ(summary.reason, StopReason::kEvaluations);
+  EXPECT_GE(summary.evaluations, 100U);
+  EXPECT_LT(summary.evaluations, 140U);
+}
+
+TEST_F(EvolveTest, StopsAtItsTimeIncludingWhatWasSpentBefore) {
+  options_.settings.time_s = 20;
+  options_.spent_s = 13;
+  const EvolveSummary summary = go().value();
+  EXPECT_EQ(summary.reason, StopReason::kTime);
+  EXPECT_EQ(summary.generations, 4U);  // 13 + 4 * 2 >= 20
+}
+
+TEST_F(EvolveTest, StopsAtItsTargetInTheFitnesssOwnSense) {
+  options_.settings.target_fitness = 0.5;
+  options_.settings.generations = 1000;
+  EvolveSummary summary = go().value();
+  EXPECT_EQ(summary.reason, StopReason::kTargetFitness);
+  EXPECT_LE(summary.best->cost, 0.5);
+  EXPECT_THAT(summary.text, testing::HasSubstr("the target was 0.5"));
+
+  // For a log score of -cost the same target is -0.5.
+  ToyRun other(sphere(3), EvolutionSettings{}, 1);
+  options_.fitness = FitnessKind::kLogScore;
+  options_.settings.target_fitness = -0.5;
+  EXPECT_EQ(evolve(other.optimiser(), backend_, sink_, clock_, options_).value().generations,
+            summary.generations);
+}
+
+TEST_F(EvolveTest, StopsAtStagnation) {
+  run_.scorer = [](const Candidate&) { return Score{v1::OK, 1}; };
+  options_.settings.stagnation_generations = 3;
+  const EvolveSummary summary = go().value();
+  EXPECT_EQ(summary.reason, StopReason::kStagnation);
+  EXPECT_EQ(summary.generations, 4U);
+}
+
+TEST_F(EvolveTest, StopsOnRequestAfterACommittedGeneration) {
+  int calls = 0;
+  backend_.on_call = [&] { stop_ = ++calls == 3; };
+  const EvolveSummary summary = go().value();
+  EXPECT_EQ(summary.reason, StopReason::kRequested);
+  EXPECT_EQ(summary.generations, 3U);
+  EXPECT_EQ(sink_.records.size(), 3U);
+}
+
+TEST_F(EvolveTest, ARequestThatInterruptsAGenerationDropsIt) {
+  int calls = 0;
+  backend_.on_call = [&] { stop_ = backend_.fail = ++calls == 3; };
+  const EvolveSummary summary = go().value();
+  EXPECT_EQ(summary.reason, StopReason::kRequested);
+  EXPECT_EQ(summary.generations, 2U);
+  EXPECT_EQ(sink_.records.size(), 2U);
+}
+
+TEST_F(EvolveTest, ErrorsEndTheRun) {
+  backend_.fail = true;
+  EXPECT_EQ(go().error().message, "no worker can be had");
+  backend_.fail = false;
+  backend_.lose_one = true;
+  EXPECT_EQ(go().error().message, "asked for 40 scores, but got 39");
+  backend_.lose_one = false;
+  sink_.refuse = 2;
+  EXPECT_EQ(go().error().message, "disk full");
+  EXPECT_EQ(sink_.records.size(), 1U);
+}
+
+TEST_F(EvolveTest, ResumingFromAnyGenerationGivesTheSameDigests) {
+  const std::string whole = go().value().digest;
+  const std::vector<GenerationRecord> records = sink_.records;
+  for (const GenerationRecord& from : records) {
+    auto optimiser = restore_genetic(run_.setup(), from.optimiser_state).value();
+    EvolveOptions options = options_;
+    options.digest = from.digest;
+    KeepingSink rest;
+    const EvolveSummary summary = evolve(*optimiser, backend_, rest, clock_, options).value();
+    EXPECT_EQ(summary.digest, whole) << from.generation;
+    EXPECT_EQ(rest.records.size(), records.size() - from.generation);
+  }
+}
+
+TEST_F(EvolveTest, DigestsIgnoreTimeAndTellSeedsApart) {
+  const std::string digest = go().value().digest;
+  ToyRun same(sphere(3), EvolutionSettings{}, 1), other(sphere(3), EvolutionSettings{}, 2);
+  backend_.on_call = [&] { clock_.now += 5; };
+  EXPECT_EQ(evolve(same.optimiser(), backend_, sink_, clock_, options_).value().digest, digest);
+  EXPECT_NE(evolve(other.optimiser(), backend_, sink_, clock_, options_).value().digest, digest);
+}
+
+TEST_F(EvolveTest, RecordsSayWhatHappened) {
+  ASSERT_TRUE(go().ok());
+  std::uint64_t expected = 1;
+  for (const GenerationRecord& record : sink_.records) {
+    EXPECT_EQ(record.generation, expected++);
+    EXPECT_EQ(record.wall_s, 2);
+    ASSERT_TRUE(record.costs);
+    EXPECT_LE(record.costs->best, record.costs->median);
+    EXPECT_LE(record.costs->median, record.costs->worst);
+    EXPECT_EQ(record.costs->best, record.members.front().cost);
+    EXPECT_GE(record.diversity, 0);
+    EXPECT_LE(record.diversity, 1);
+    EXPECT_FALSE(record.operator_probabilities.empty());
+  }
+  EXPECT_GT(sink_.records.front().diversity, sink_.records.back().diversity);
+  EXPECT_EQ(sink_.records.back().evaluations, run_.optimiser().evaluations());
+}
+
+TEST_F(EvolveTest, AGenerationOfFailuresHasNoCosts) {
+  run_.scorer = [](const Candidate&) { return Score{v1::DIVERGED, 0}; };
+  options_.settings.target_fitness = 5;
+  ASSERT_TRUE(go().ok());
+  EXPECT_FALSE(sink_.records.back().costs);
+}
+
+}  // namespace
+}  // namespace gapfarm
