@@ -1,6 +1,7 @@
 // One world with one robot, used again and again.
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <vector>
 

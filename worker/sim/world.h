@@ -42,7 +42,7 @@ class Robot {
 std::unique_ptr<Robot> make_treads(const SimSettings& settings);
 std::unique_ptr<Robot> make_wheels(const SimSettings& settings);
 
-// m_invInertia of a body in its own frame apart: 1/2 m v^2 + 1/2 w I w, J.
+// 1/2 m v^2 + 1/2 w I w, J.
 double body_kinetic_energy(const btRigidBody& body);
 
 // What Bullet's world is built from; a base class so that it outlives the world.
