@@ -5,6 +5,8 @@
 
 #include <filesystem>
 
+#include "common/trials/files.h"
+
 namespace gapfarm {
 namespace {
 
@@ -238,6 +240,30 @@ TEST(Config, ShippedConfigsAreRead) {
     EXPECT_TRUE(check_evolvable(*config).ok()) << entry.path();
   }
   EXPECT_GE(files, 4);
+}
+
+// The example of every key must stay true, and the table must list every row.
+TEST(Config, TheDocumentationIsTrue) {
+  const auto page = read_text_file(std::string(GAPFARM_SOURCE_DIR) + "/docs/configuration.md");
+  ASSERT_TRUE(page.ok());
+  const std::size_t begin = page->find("```toml\n") + 8;
+  const auto config = parse_config(page->substr(begin, page->find("```\n", begin) - begin), "docs");
+  ASSERT_TRUE(config.ok()) << config.error().message;
+  const EvolutionSettings defaults;
+  EXPECT_EQ(config->evolution.population, defaults.population);
+  EXPECT_EQ(config->evolution.crossovers, defaults.crossovers);
+  EXPECT_EQ(config->evolution.mutation_probability, defaults.mutation_probability);
+  EXPECT_EQ(config->evolution.generations, defaults.generations);
+  EXPECT_EQ(config->farm.silence_limit_s, FarmSettings{}.silence_limit_s);
+  EXPECT_EQ(config->simulate.trials_per_session, SimulateSettings{}.trials_per_session);
+  EXPECT_EQ(config->problem.fitness.heave_penalty, FitnessSettings{}.heave_penalty);
+  for (const Parameter& row : srv1_table().rows()) {
+    if (!row.effect.empty()) continue;
+    EXPECT_THAT(*page, HasSubstr("| " + row.key + " |"));
+    if (row.kind == ParameterKind::kReal) {
+      EXPECT_THAT(*page, HasSubstr("| " + row.key + " | " + row.unit + " | "));
+    }
+  }
 }
 
 }  // namespace
