@@ -33,6 +33,8 @@ struct NamedEffect {
   // Mean log score lost against the floor, nats a trial, on trials that the fit did not see.
   double gap_before = 0;
   double gap_after = 0;
+  // The same trials' root mean squares once the effect was added; empty when not measured.
+  std::optional<double> position_mm_after, heading_mrad_after;
   double closed = 0;  // share of the explainable gap (tuned minus floor) that adding it removed
   double closed_lo = 0;
   double closed_hi = 0;
@@ -60,13 +62,13 @@ struct Where {
 // One row of the screening table.
 struct Screened {
   std::string effect;
-  double gain = 0;        // log-likelihood gained by the best strength, nats over all trials
-  double p = 1;           // against the null distribution of this effect's own gain
-  std::string estimate;   // "rate 0.0035 1/min": the parameters at that gain
+  double gain = 0;       // log-likelihood gained by the best strength, nats over all trials
+  double p = 1;          // against the null distribution of this effect's own gain
+  std::string estimate;  // "rate 0.0035 1/min": the parameters at that gain
   std::vector<std::string> alias_set;  // effects whose remaining signatures are parallel
   std::optional<double> held_out;      // nats a trial gained on held-out trials, when refitted
   std::optional<double> held_out_se;
-  std::string note;       // why it cannot be seen in these data, or what it is an alias of
+  std::string note;  // why it cannot be seen in these data, or what it is an alias of
 };
 
 struct NextExperiment {
@@ -86,8 +88,8 @@ struct DiagnosedTrial {
   int place_in_run = 0;
   bool held_out = false;
   Pose X_WS;
-  Pose measured, tuned, final_;       // X_SE
-  Eigen::Matrix3d tuned_cov, final_cov;  // in the predicted end's own axes
+  Pose measured, tuned, final_;                    // X_SE
+  Eigen::Matrix3d tuned_cov, final_cov;            // in the predicted end's own axes
   Eigen::Vector3d tuned_residual, final_residual;  // m, m, rad, in the predicted end's own axes
   double tuned_score = 0, final_score = 0;         // nats
 };
@@ -96,8 +98,8 @@ struct Diagnosis {
   Verdict verdict = Verdict::kNone;
   std::string headline;  // one sentence
   std::vector<NamedEffect> effects;
-  GapFigures gap;            // nats/trial
-  GapFigures position_mm;    // root mean square
+  GapFigures gap;          // nats/trial
+  GapFigures position_mm;  // root mean square
   GapFigures heading_mrad;
   std::vector<Where> where;        // of the tuned base model
   std::vector<Where> unexplained;  // of the final model

@@ -1,0 +1,355 @@
+#include "master/diagnose/diagnosis_json.h"
+
+#include <array>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <type_traits>
+
+namespace gapfarm {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr int kVersion = 1;
+constexpr std::array<std::pair<Verdict, const char*>, 4> kVerdicts = {
+    {{Verdict::kEffect, "effect"},
+     {Verdict::kNone, "none"},
+     {Verdict::kUnknown, "unknown"},
+     {Verdict::kEffectAndUnknown, "effect+unknown"}}};
+
+std::string dump(const Json& json, int indent) {
+  return json.dump(indent, ' ', false, Json::error_handler_t::replace);
+}
+
+Json effect_json(const NamedEffect& effect) {
+  Json parameters = Json::object();
+  for (const Estimate& e : effect.parameters) {
+    parameters[e.key] = {{"value", e.value}, {"lo", e.lo}, {"hi", e.hi}, {"unit", e.unit}};
+  }
+  Json json = {{"name", effect.name},
+               {"aliases", effect.aliases},
+               {"alias_reason", effect.alias_reason},
+               {"confidence", effect.confidence},
+               {"parameters", std::move(parameters)},
+               {"gap_before", effect.gap_before},
+               {"gap_after", effect.gap_after}};
+  if (effect.position_mm_after) json["position_mm_after"] = *effect.position_mm_after;
+  if (effect.heading_mrad_after) json["heading_mrad_after"] = *effect.heading_mrad_after;
+  json["closed"] = effect.closed;
+  json["closed_lo"] = effect.closed_lo;
+  json["closed_hi"] = effect.closed_hi;
+  json["text"] = effect.text;
+  return json;
+}
+
+Json figures_json(const GapFigures& figures) {
+  return {{"tuned", figures.tuned}, {"final", figures.final_}, {"floor", figures.floor}};
+}
+
+Json where_json(const std::vector<Where>& findings) {
+  Json list = Json::array();
+  for (const Where& w : findings) {
+    list.push_back({{"command", w.command},
+                    {"component", w.component},
+                    {"kind", w.kind},
+                    {"covariate", w.covariate},
+                    {"size", w.size},
+                    {"share", w.share},
+                    {"p", w.p},
+                    {"text", w.text}});
+  }
+  return list;
+}
+
+Json screening_json(const std::vector<Screened>& screening) {
+  Json list = Json::array();
+  for (const Screened& s : screening) {
+    Json row = {{"effect", s.effect},
+                {"gain", s.gain},
+                {"p", s.p},
+                {"estimate", s.estimate},
+                {"alias_set", s.alias_set}};
+    if (s.held_out) row["held_out"] = *s.held_out;
+    if (s.held_out_se) row["held_out_se"] = *s.held_out_se;
+    row["note"] = s.note;
+    list.push_back(std::move(row));
+  }
+  return list;
+}
+
+// Reads fields of one object; the first thing that does not fit is kept as a sentence.
+class Fields {
+ public:
+  Fields(const Json& json, std::string path, std::string& error)
+      : json_(json), path_(std::move(path)), error_(error) {
+    if (!json.is_object()) complain("", json, "an object");
+  }
+
+  template <class T>
+  void read(const char* key, T& field) {
+    if (!json_.is_object() || !json_.contains(key)) {
+      return fail(name(key) + " is missing; was this written by gapfarm diagnose?");
+    }
+    convert(key, json_[key], field);
+  }
+
+  // A field that an earlier version, or another program, may leave out.
+  template <class T>
+  void read_if_there(const char* key, T& field) {
+    if (json_.is_object() && json_.contains(key)) convert(key, json_[key], field);
+  }
+
+  // Calls each(item, path) for the list under `key`, when there is one.
+  template <class Each>
+  void for_each(const char* key, const Each& each) {
+    if (!json_.is_object() || !json_.contains(key)) return;
+    const Json& list = json_[key];
+    if (!list.is_array() && !list.is_object()) return complain(key, list, "a list");
+    std::size_t index = 0;
+    for (const auto& [item_key, item] : list.items()) {
+      const std::string place =
+          list.is_array() ? "[" + std::to_string(index++) + "]" : "." + item_key;
+      each(item, name(key) + place, item_key);
+    }
+  }
+
+  std::string name(const std::string& key) const { return path_.empty() ? key : path_ + "." + key; }
+  void complain(const std::string& key, const Json& found, const char* expected) {
+    fail(name(key) + " is " + dump(found, -1).substr(0, 60) + ", expected " + expected);
+  }
+  std::string& error() { return error_; }
+
+ private:
+  void convert(const char* key, const Json& json, double& field) {
+    if (json.is_null()) {
+      field = std::numeric_limits<double>::quiet_NaN();
+    } else if (json.is_number()) {
+      field = json.get<double>();
+    } else {
+      complain(key, json, "a number");
+    }
+  }
+  void convert(const char* key, const Json& json, std::optional<double>& field) {
+    convert(key, json, field.emplace());
+  }
+  void convert(const char* key, const Json& json, std::uint64_t& field) {
+    if (!json.is_number_unsigned()) return complain(key, json, "a count");
+    field = json.get<std::uint64_t>();
+  }
+  void convert(const char* key, const Json& json, std::string& field) {
+    if (!json.is_string()) return complain(key, json, "a text");
+    field = json.get<std::string>();
+  }
+  void convert(const char* key, const Json& json, std::vector<std::string>& field) {
+    if (!json.is_array()) return complain(key, json, "a list of texts");
+    field.clear();
+    for (const Json& item : json) convert(key, item, field.emplace_back());
+  }
+  void fail(const std::string& sentence) {
+    if (error_.empty()) error_ = "diagnosis.json: " + sentence;
+  }
+
+  const Json& json_;
+  std::string path_;
+  std::string& error_;
+};
+
+NamedEffect read_effect(const Json& json, const std::string& path, std::string& error) {
+  NamedEffect effect;
+  Fields fields(json, path, error);
+  fields.read("name", effect.name);
+  fields.read("aliases", effect.aliases);
+  fields.read_if_there("alias_reason", effect.alias_reason);
+  fields.read("confidence", effect.confidence);
+  fields.for_each("parameters", [&](const Json& item, const std::string& where, const auto& key) {
+    Estimate& estimate = effect.parameters.emplace_back();
+    estimate.key = key;
+    Fields parameter(item, where, error);
+    parameter.read("value", estimate.value);
+    parameter.read("lo", estimate.lo);
+    parameter.read("hi", estimate.hi);
+    parameter.read("unit", estimate.unit);
+  });
+  fields.read("gap_before", effect.gap_before);
+  fields.read("gap_after", effect.gap_after);
+  fields.read_if_there("position_mm_after", effect.position_mm_after);
+  fields.read_if_there("heading_mrad_after", effect.heading_mrad_after);
+  fields.read("closed", effect.closed);
+  fields.read("closed_lo", effect.closed_lo);
+  fields.read("closed_hi", effect.closed_hi);
+  fields.read_if_there("text", effect.text);
+  return effect;
+}
+
+GapFigures read_figures(const Json& json, const std::string& path, std::string& error) {
+  GapFigures figures;
+  Fields fields(json, path, error);
+  fields.read("tuned", figures.tuned);
+  fields.read("final", figures.final_);
+  fields.read("floor", figures.floor);
+  return figures;
+}
+
+void read_findings(Fields& root, const char* key, std::vector<Where>& findings) {
+  root.for_each(key, [&](const Json& item, const std::string& path, const auto&) {
+    Where& w = findings.emplace_back();
+    Fields fields(item, path, root.error());
+    fields.read("command", w.command);
+    fields.read("component", w.component);
+    fields.read("kind", w.kind);
+    fields.read("covariate", w.covariate);
+    fields.read_if_there("size", w.size);
+    fields.read("share", w.share);
+    fields.read("p", w.p);
+    fields.read("text", w.text);
+  });
+}
+
+void read_screening(Fields& root, Diagnosis& diagnosis) {
+  root.for_each("screening", [&](const Json& item, const std::string& path, const auto&) {
+    Screened& s = diagnosis.screening.emplace_back();
+    Fields fields(item, path, root.error());
+    fields.read("effect", s.effect);
+    fields.read("gain", s.gain);
+    fields.read("p", s.p);
+    fields.read_if_there("estimate", s.estimate);
+    fields.read_if_there("alias_set", s.alias_set);
+    fields.read_if_there("held_out", s.held_out);
+    fields.read_if_there("held_out_se", s.held_out_se);
+    fields.read_if_there("note", s.note);
+  });
+}
+
+void read_gap(const Json& json, Fields& root, Diagnosis& diagnosis) {
+  if (!json.contains("gap")) return root.complain("gap", Json(), "an object");
+  const Json& gap = json["gap"];
+  diagnosis.gap = read_figures(gap, "gap", root.error());
+  if (!gap.is_object()) return;
+  const auto figures = [&](const char* key, GapFigures& into) {
+    if (gap.contains(key)) into = read_figures(gap[key], std::string("gap.") + key, root.error());
+  };
+  figures("position_mm", diagnosis.position_mm);
+  figures("heading_mrad", diagnosis.heading_mrad);
+}
+
+// The lists that FORMATS leaves to us.
+void read_remainder(Fields& root, Diagnosis& diagnosis) {
+  root.for_each("next_experiment", [&](const Json& item, const std::string& path, const auto&) {
+    NextExperiment& next = diagnosis.next.emplace_back();
+    Fields fields(item, path, root.error());
+    fields.read("text", next.text);
+    fields.read("separates", next.separates);
+    fields.read_if_there("trials", next.trials);
+  });
+  root.read_if_there("cautions", diagnosis.cautions);
+  root.for_each("provenance", [&](const Json& item, const std::string& path, const auto&) {
+    auto& [label, value] = diagnosis.provenance.emplace_back();
+    Fields fields(item, path, root.error());
+    fields.read("label", label);
+    fields.read("value", value);
+  });
+  root.for_each("timing", [&](const Json& item, const std::string& path, const auto&) {
+    auto& [stage, seconds] = diagnosis.timing_s.emplace_back();
+    Fields fields(item, path, root.error());
+    fields.read("stage", stage);
+    fields.read("seconds", seconds);
+  });
+}
+
+}  // namespace
+
+const char* verdict_name(Verdict verdict) {
+  for (const auto& [value, name] : kVerdicts) {
+    if (value == verdict) return name;
+  }
+  return "unknown";
+}
+
+Json summary_json(const Diagnosis& diagnosis) {
+  Json effects = Json::array();
+  for (const NamedEffect& effect : diagnosis.effects) effects.push_back(effect_json(effect));
+  Json gap = {{"unit", "nats/trial"}};
+  gap.update(figures_json(diagnosis.gap));
+  gap["position_mm"] = figures_json(diagnosis.position_mm);
+  gap["heading_mrad"] = figures_json(diagnosis.heading_mrad);
+  Json next = Json::array();
+  for (const NextExperiment& n : diagnosis.next) {
+    next.push_back({{"text", n.text}, {"separates", n.separates}, {"trials", n.trials}});
+  }
+  Json provenance = Json::array();
+  for (const auto& [label, value] : diagnosis.provenance) {
+    provenance.push_back({{"label", label}, {"value", value}});
+  }
+  Json timing = Json::array();
+  for (const auto& [stage, seconds] : diagnosis.timing_s) {
+    timing.push_back({{"stage", stage}, {"seconds", seconds}});
+  }
+  return {{"version", kVersion},
+          {"verdict", verdict_name(diagnosis.verdict)},
+          {"headline", diagnosis.headline},
+          {"effects", std::move(effects)},
+          {"gap", std::move(gap)},
+          {"where", where_json(diagnosis.where)},
+          {"unexplained", where_json(diagnosis.unexplained)},
+          {"screening", screening_json(diagnosis.screening)},
+          {"next_experiment", std::move(next)},
+          {"cautions", diagnosis.cautions},
+          {"provenance", std::move(provenance)},
+          {"timing", std::move(timing)}};
+}
+
+std::string to_json(const Diagnosis& diagnosis) {
+  std::string text = dump(summary_json(diagnosis), 2);
+  text.resize(text.size() - 2);  // the closing "\n}", so that the trials follow, a line each
+  const Json table = trials_json(diagnosis.trials);
+  text +=
+      ",\n  \"trials\": {\n    \"columns\": " + dump(table["columns"], -1) + ",\n    \"rows\": [";
+  const char* separator = "\n";
+  for (const Json& row : table["rows"]) {
+    text += separator + ("      " + dump(row, -1));
+    separator = ",\n";
+  }
+  return text + "\n    ]\n  }\n}\n";
+}
+
+Result<Diagnosis> parse_diagnosis(std::string_view text) {
+  const Json json = Json::parse(text, nullptr, false);
+  if (json.is_discarded()) return Error{"diagnosis.json: not JSON; is the file complete?"};
+  std::string error;
+  Fields root(json, "", error);
+  double version = 0;
+  root.read("version", version);
+  if (error.empty() && version != kVersion) {
+    return Error{"diagnosis.json: version is " + dump(json["version"], -1) +
+                 ", this program reads version " + std::to_string(kVersion)};
+  }
+  Diagnosis diagnosis;
+  std::string verdict;
+  root.read("verdict", verdict);
+  bool known = false;
+  for (const auto& [value, name] : kVerdicts) {
+    if (verdict == name) diagnosis.verdict = value, known = true;
+  }
+  if (error.empty() && !known) {
+    root.complain("verdict", json["verdict"], "effect, none, unknown or effect+unknown");
+  }
+  if (!error.empty()) return Error{error};
+  root.read_if_there("headline", diagnosis.headline);
+  root.for_each("effects", [&](const Json& item, const std::string& path, const auto&) {
+    diagnosis.effects.push_back(read_effect(item, path, error));
+  });
+  read_gap(json, root, diagnosis);
+  read_findings(root, "where", diagnosis.where);
+  read_findings(root, "unexplained", diagnosis.unexplained);
+  read_screening(root, diagnosis);
+  read_remainder(root, diagnosis);
+  if (!error.empty()) return Error{error};
+  if (json.contains("trials")) {
+    auto trials = parse_trials(json["trials"]);
+    if (!trials) return trials.error();
+    diagnosis.trials = std::move(*trials);
+  }
+  return diagnosis;
+}
+
+}  // namespace gapfarm

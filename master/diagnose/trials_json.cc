@@ -1,0 +1,148 @@
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <type_traits>
+
+#include "master/diagnose/diagnosis_json.h"
+
+namespace gapfarm {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+// Calls visit(name, field) for every column in order, so that writing and reading cannot disagree.
+// `Trial` is DiagnosedTrial or const DiagnosedTrial.
+template <class Trial, class Visit>
+void visit_columns(Trial& trial, const Visit& visit) {
+  visit("session", trial.session);
+  visit("trial", trial.trial);
+  visit("command", trial.command);
+  visit("session_time_s", trial.session_time_s);
+  visit("duration_s", trial.duration_s);
+  visit("level", trial.level);
+  visit("place_in_run", trial.place_in_run);
+  visit("held_out", trial.held_out);
+  const auto pose = [&](const std::string& name, auto& X) {
+    visit(name + "_x", X.x);
+    visit(name + "_y", X.y);
+    visit(name + "_theta", X.theta);
+  };
+  pose("start", trial.X_WS);
+  pose("measured", trial.measured);
+  pose("tuned", trial.tuned);
+  pose("final", trial.final_);
+  const auto covariance = [&](const std::string& name, auto& cov) {
+    const char* axes = "xyt";
+    for (int row = 0; row < 3; ++row) {
+      for (int column = row; column < 3; ++column) {
+        visit(name + "_cov_" + axes[row] + axes[column], cov(row, column));
+      }
+    }
+  };
+  covariance("tuned", trial.tuned_cov);
+  covariance("final", trial.final_cov);
+  const auto residual = [&](const std::string& name, auto& r) {
+    visit(name + "_residual_x", r.x());
+    visit(name + "_residual_y", r.y());
+    visit(name + "_residual_theta", r.z());
+  };
+  residual("tuned", trial.tuned_residual);
+  residual("final", trial.final_residual);
+  visit("tuned_score", trial.tuned_score);
+  visit("final_score", trial.final_score);
+}
+
+DiagnosedTrial blank_trial() {
+  DiagnosedTrial trial;
+  trial.tuned_cov = trial.final_cov = Eigen::Matrix3d::Zero();
+  trial.tuned_residual = trial.final_residual = Eigen::Vector3d::Zero();
+  return trial;
+}
+
+double rounded(double value, int digits) {
+  if (digits <= 0 || !std::isfinite(value)) return value;
+  char text[40];
+  std::snprintf(text, sizeof text, "%.*g", digits, value);
+  return std::strtod(text, nullptr);
+}
+
+// Whether `json` fits `field`; sets it when so.
+template <class Field>
+bool read_cell(const Json& json, Field& field) {
+  if constexpr (std::is_same_v<Field, std::string>) {
+    if (!json.is_string()) return false;
+  } else if constexpr (std::is_same_v<Field, bool>) {
+    if (!json.is_boolean()) return false;
+  } else if constexpr (std::is_integral_v<Field>) {
+    if (!json.is_number_integer()) return false;
+  } else if (json.is_null()) {
+    field = std::numeric_limits<double>::quiet_NaN();
+    return true;
+  } else if (!json.is_number()) {
+    return false;
+  }
+  field = json.get<Field>();
+  return true;
+}
+
+}  // namespace
+
+Json trials_json(const std::vector<DiagnosedTrial>& trials, int digits) {
+  Json columns = Json::array();
+  const DiagnosedTrial blank = blank_trial();
+  visit_columns(blank, [&](const std::string& name, const auto&) { columns.push_back(name); });
+  Json rows = Json::array();
+  for (const DiagnosedTrial& trial : trials) {
+    Json row = Json::array();
+    visit_columns(trial, [&](const std::string&, const auto& field) {
+      if constexpr (std::is_same_v<std::decay_t<decltype(field)>, double>) {
+        row.push_back(rounded(field, digits));
+      } else {
+        row.push_back(field);
+      }
+    });
+    rows.push_back(std::move(row));
+  }
+  return {{"columns", std::move(columns)}, {"rows", std::move(rows)}};
+}
+
+Result<std::vector<DiagnosedTrial>> parse_trials(const Json& table) {
+  const Json expected = trials_json({})["columns"];
+  if (!table.is_object() || !table.contains("columns") || !table.contains("rows") ||
+      !table["rows"].is_array()) {
+    return Error{"diagnosis.json: \"trials\" must be an object with \"columns\" and \"rows\""};
+  }
+  if (table["columns"] != expected) {
+    return Error{
+        "diagnosis.json: \"trials.columns\" are not those of this version; diagnose again"};
+  }
+  std::vector<DiagnosedTrial> trials;
+  trials.reserve(table["rows"].size());
+  for (const Json& row : table["rows"]) {
+    const std::string where = "diagnosis.json: trials.rows[" + std::to_string(trials.size()) + "]";
+    if (!row.is_array() || row.size() != expected.size()) {
+      return Error{where + " must be a list of " + std::to_string(expected.size()) + " cells"};
+    }
+    DiagnosedTrial trial = blank_trial();
+    std::size_t column = 0;
+    std::string error;
+    visit_columns(trial, [&](const std::string& name, auto& field) {
+      const Json& cell = row[column++];
+      if (error.empty() && !read_cell(cell, field)) {
+        error = where + ": " + name + " is " +
+                cell.dump(-1, ' ', false, Json::error_handler_t::replace) +
+                ", which is not of its column's type";
+      }
+    });
+    if (!error.empty()) return Error{error};
+    for (Eigen::Matrix3d* cov : {&trial.tuned_cov, &trial.final_cov}) {
+      cov->triangularView<Eigen::StrictlyLower>() = cov->transpose();
+    }
+    trials.push_back(std::move(trial));
+  }
+  return trials;
+}
+
+}  // namespace gapfarm
