@@ -23,7 +23,7 @@ constexpr const char* kExamples = R"(Examples:
       four processes whose names begin with rack3
 
 SIGTERM or Ctrl-C: finish the job in hand, then leave.  A second one: leave at once.
-Exit status: 0 stopped as asked, 1 failed, 2 wrong usage, 78 refused by the master for good.)";
+Exit status: 0 stopped as asked, 2 wrong usage, 78 no master that would have this worker.)";
 
 struct Arguments {
   std::string endpoint;
@@ -103,7 +103,7 @@ int start_workers(const Arguments& arguments) {
                              {"--window", std::to_string(arguments.window)});
   }
   const Status status = supervise(options, stop);
-  return status ? 0 : complain(status.error(), 1);
+  return status ? 0 : complain(status.error(), kExitRefused);
 }
 
 }  // namespace

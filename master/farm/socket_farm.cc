@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <map>
 #include <random>
+#include <string>
+#include <vector>
 
 #include "common/base/build_info.h"
 #include "common/net/envelope.h"
@@ -44,8 +47,8 @@ struct SocketFarm::Impl {
   std::unique_ptr<LocalWorkers> locals;
   std::unique_ptr<Scheduler> scheduler;
   std::vector<std::string> endpoints;
-  std::string last_trouble;  // why workers do not come
-  Status bad_problem;        // of the latest add_problem()
+  std::string last_trouble;                       // why workers do not come
+  std::map<std::string, std::string> unsendable;  // problems by hash: what is wrong
   double next_reap = 0;
 
   Status open();
@@ -165,11 +168,10 @@ SocketFarm::~SocketFarm() {
 std::string SocketFarm::add_problem(const v1::Problem& problem) {
   std::string bytes = serialise(problem);
   std::string hash = problem_hash(problem);
-  impl_->bad_problem = {};
   if (bytes.size() > kMaxMessageBytes / 2) {
-    impl_->bad_problem =
-        Error{"the problem has " + std::to_string(bytes.size()) + " bytes and a message at most " +
-              std::to_string(kMaxMessageBytes / 2) + "; split the trial log or thin its paths"};
+    impl_->unsendable[hash] =
+        "the problem has " + std::to_string(bytes.size()) + " bytes and a message at most " +
+        std::to_string(kMaxMessageBytes / 2) + "; split the trial log or thin its paths";
   }
   impl_->scheduler->add_problem(hash, std::move(bytes));
   return hash;
@@ -178,7 +180,9 @@ std::string SocketFarm::add_problem(const v1::Problem& problem) {
 Result<std::vector<v1::TaskResult>> SocketFarm::run(
     const std::string& problem_hash, const std::vector<v1::Task>& tasks,
     const std::function<void(const FarmProgress&)>& on_progress) {
-  if (!impl_->bad_problem) return impl_->bad_problem.error();
+  if (const auto found = impl_->unsendable.find(problem_hash); found != impl_->unsendable.end()) {
+    return Error{found->second};
+  }
   for (std::size_t i = 0; i < tasks.size(); ++i) {
     const std::size_t size = tasks[i].ByteSizeLong();
     if (size <= kMaxMessageBytes / 2) continue;
