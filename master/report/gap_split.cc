@@ -1,0 +1,223 @@
+#include "master/report/gap_split.h"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "master/report/html.h"
+
+namespace gapfarm {
+namespace {
+
+constexpr std::array<GapUnit, 3> kUnits = {GapUnit::kNats, GapUnit::kMillimetres,
+                                           GapUnit::kMilliradians};
+constexpr double kLeastScaleNats = 0.2;
+constexpr int kHatches = 5;  // as many as the page defines
+
+const GapFigures& figures(const Diagnosis& diagnosis, GapUnit unit) {
+  switch (unit) {
+    case GapUnit::kNats:
+      return diagnosis.gap;
+    case GapUnit::kMillimetres:
+      return diagnosis.position_mm;
+    case GapUnit::kMilliradians:
+      return diagnosis.heading_mrad;
+  }
+  return diagnosis.gap;
+}
+
+std::optional<double> level_after(const NamedEffect& effect, GapUnit unit) {
+  switch (unit) {
+    case GapUnit::kNats:
+      return effect.gap_after;
+    case GapUnit::kMillimetres:
+      return effect.position_mm_after;
+    case GapUnit::kMilliradians:
+      return effect.heading_mrad_after;
+  }
+  return std::nullopt;
+}
+
+struct UnitWords {
+  const char* title;
+  const char* unit;
+};
+
+UnitWords words(GapUnit unit) {
+  switch (unit) {
+    case GapUnit::kNats:
+      return {"Log score lost a trial", "nats"};
+    case GapUnit::kMillimetres:
+      return {"Position, root mean square", "mm"};
+    case GapUnit::kMilliradians:
+      return {"Heading, root mean square", "mrad"};
+  }
+  return {"", ""};
+}
+
+// Class and badge of a part; effects count from 1.
+struct Look {
+  std::string css_class;
+  std::string badge;
+};
+
+Look look(const GapPart& part, int effect) {
+  switch (part.kind) {
+    case GapPart::Kind::kFloor:
+      return {"part-floor", "F"};
+    case GapPart::Kind::kUnexplained:
+      return {"part-unexplained", "?"};
+    case GapPart::Kind::kEffect:
+      break;
+  }
+  return {fmt::format("part-effect-{}", (effect - 1) % kHatches + 1), std::to_string(effect)};
+}
+
+double drawn(const GapPart& part) {
+  return std::isfinite(part.amount) ? std::max(part.amount, 0.0) : 0;
+}
+
+double drawn_total(const GapSplit& split, bool before) {
+  double total = 0;
+  for (const GapPart& part : split.parts) {
+    if (before || part.kind != GapPart::Kind::kEffect) total += drawn(part);
+  }
+  return total;
+}
+
+// One stacked bar; its parts also stand in the table below, so it is hidden from screen readers.
+std::string stacked_bar(const GapSplit& split, bool before, double scale) {
+  std::string svg =
+      R"(<svg class="stack" aria-hidden="true"><rect class="track" width="100%" height="100%"/>)";
+  double at = 0;
+  int effect = 0;
+  for (const GapPart& part : split.parts) {
+    const bool is_effect = part.kind == GapPart::Kind::kEffect;
+    if (is_effect) ++effect;
+    const double width = scale > 0 ? 100 * drawn(part) / scale : 0;
+    if ((is_effect && !before) || width <= 0) continue;
+    const Look l = look(part, effect);
+    svg += fmt::format(
+        R"(<svg x="{:.3f}%" width="{:.3f}%"><rect class="part {}" width="100%" height="100%"/>)",
+        at, width, l.css_class);
+    // A name is drawn where the bar is surely wide enough for it, a badge where that fits.
+    const double share = width / 100;
+    const auto middle = [&](const char* css_class, const std::string& words) {
+      svg += fmt::format(R"(<text class="{}" x="50%" y="50%">{}</text>)", css_class, words);
+    };
+    if (share > 0.03 + 0.0135 * static_cast<double>(part.label.size())) {
+      middle("wide", html_escaped(part.label));
+      middle("narrow", l.badge);
+    } else if (share > 0.05) {
+      middle("badge", l.badge);
+    }
+    svg += "</svg>";
+    at += width;
+  }
+  return svg + "</svg>";
+}
+
+std::string bars(const GapSplit& split) {
+  // A gap of next to nothing shall not fill the bar.
+  const double least = split.unit == GapUnit::kNats ? kLeastScaleNats : 0;
+  const double scale = std::max({drawn_total(split, true), drawn_total(split, false), least});
+  const UnitWords w = words(split.unit);
+  return fmt::format(
+      R"(<div class="split"><h3>{}</h3>)"
+      R"(<div class="split-row"><span class="split-name">before</span>{}<span class="split-value">{} {}</span></div>)"
+      R"(<div class="split-row"><span class="split-name">after</span>{}<span class="split-value">{} {}</span></div></div>)",
+      w.title, stacked_bar(split, true, scale), number_text(split.tuned), w.unit,
+      stacked_bar(split, false, scale), number_text(split.final_), w.unit);
+}
+
+const GapPart* find_part(const GapSplit& split, const GapPart& like) {
+  for (const GapPart& part : split.parts) {
+    if (part.kind == like.kind && part.label == like.label) return &part;
+  }
+  return nullptr;
+}
+
+// Rows in the order of the cause of most interest: effects, unexplained, floor.
+std::string parts_table(const std::vector<GapSplit>& splits) {
+  std::string rows;
+  const auto& parts = splits.front().parts;
+  std::vector<std::pair<const GapPart*, int>> order;
+  int effect = 0;
+  for (const GapPart& part : parts) {
+    if (part.kind == GapPart::Kind::kEffect) order.emplace_back(&part, ++effect);
+  }
+  order.emplace_back(&parts[1], 0);
+  order.emplace_back(&parts[0], 0);
+  for (const auto& [part, number] : order) {
+    const Look l = look(*part, number);
+    rows += fmt::format(
+        R"(<tr><th scope="row"><svg class="swatch" aria-hidden="true"><rect class="part {}" width="100%" height="100%"/>)"
+        R"(<text class="badge" x="50%" y="50%">{}</text></svg>{}</th>)",
+        l.css_class, l.badge, html_escaped(part->label));
+    for (const GapSplit& split : splits) {
+      const GapPart* same = find_part(split, *part);
+      const UnitWords w = words(split.unit);
+      rows += fmt::format(R"(<td class="number" data-label="{}">{}</td>)", w.unit,
+                          same ? number_text(same->amount) : "with the others");
+    }
+    rows += "</tr>";
+  }
+  rows += R"(<tr class="sum"><th scope="row">tuned model, in all</th>)";
+  for (const GapSplit& split : splits) {
+    rows += fmt::format(R"(<td class="number" data-label="{}">{}</td>)", words(split.unit).unit,
+                        number_text(split.tuned));
+  }
+  return R"(<table class="parts"><caption class="unseen">The gap by cause</caption><thead><tr><th scope="col">part</th>)"
+         R"(<th scope="col" class="number">nats a trial</th><th scope="col" class="number">position, mm</th>)"
+         R"(<th scope="col" class="number">heading, mrad</th></tr></thead><tbody>)" +
+         rows + "</tr></tbody></table>";
+}
+
+}  // namespace
+
+GapSplit split_gap(const Diagnosis& diagnosis, GapUnit unit) {
+  const GapFigures& f = figures(diagnosis, unit);
+  GapSplit split{unit, f.tuned, f.final_, {}};
+  split.parts.push_back({GapPart::Kind::kFloor, "floor (repeats of a trial)", f.floor});
+  split.parts.push_back({GapPart::Kind::kUnexplained, "unexplained", f.final_ - f.floor});
+  const auto& effects = diagnosis.effects;
+  if (effects.empty()) {
+    split.parts[1].amount = f.tuned - f.floor;
+    return split;
+  }
+  bool measured = true;
+  for (std::size_t i = 0; i + 1 < effects.size(); ++i) {
+    const auto level = level_after(effects[i], unit);
+    measured = measured && level && std::isfinite(*level);
+  }
+  if (!measured) {
+    split.parts.push_back({GapPart::Kind::kEffect, "effects together", f.tuned - f.final_});
+    return split;
+  }
+  double level = f.tuned;
+  for (std::size_t i = 0; i < effects.size(); ++i) {
+    const double after = i + 1 == effects.size() ? f.final_ : *level_after(effects[i], unit);
+    split.parts.push_back({GapPart::Kind::kEffect, effects[i].name, level - after});
+    level = after;
+  }
+  return split;
+}
+
+std::string gap_split_html(const Diagnosis& diagnosis) {
+  std::vector<GapSplit> splits;
+  std::string html;
+  for (const GapUnit unit : kUnits) {
+    splits.push_back(split_gap(diagnosis, unit));
+    html += bars(splits.back());
+  }
+  return R"(<figure class="gap-split"><div class="splits">)" + html + "</div><figcaption>" +
+         "Before: the tuned base model. After: with the named effects. An effect's part is how "
+         "much the gap fell when it was added, in the order found, on trials that the fit did not "
+         "see. The floor is what repeating a trial on the real robot varies by; the log score is "
+         "counted from it.</figcaption></figure>" +
+         parts_table(splits);
+}
+
+}  // namespace gapfarm

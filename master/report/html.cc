@@ -1,0 +1,127 @@
+#include "master/report/html.h"
+
+#include <sodium.h>
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace gapfarm {
+namespace {
+
+constexpr const char* kDash = "–";
+constexpr const char* kMinus = "−";
+
+double clamped_percent(double share) {
+  return std::isfinite(share) ? 100 * std::clamp(share, 0.0, 1.0) : 0;
+}
+
+}  // namespace
+
+std::string html_escaped(std::string_view text) {
+  std::string out;
+  out.reserve(text.size());
+  for (const char c : text) {
+    switch (c) {
+      case '&':
+        out += "&amp;";
+        break;
+      case '<':
+        out += "&lt;";
+        break;
+      case '>':
+        out += "&gt;";
+        break;
+      case '"':
+        out += "&quot;";
+        break;
+      case '\'':
+        out += "&#39;";
+        break;
+      default:
+        if (static_cast<unsigned char>(c) < 0x20 && c != '\t' && c != '\n') {
+          out += "\xEF\xBF\xBD";
+        } else {
+          out += c;
+        }
+    }
+  }
+  return out;
+}
+
+std::string script_safe(std::string json) {
+  std::string out;
+  out.reserve(json.size());
+  for (const char c : json) {
+    if (c == '<') {
+      out += "\\u003c";
+    } else if (c == '>') {
+      out += "\\u003e";
+    } else if (c == '&') {
+      out += "\\u0026";
+    } else {
+      out += c;
+    }
+  }
+  return out;
+}
+
+std::string number_text(double value, int digits) {
+  if (!std::isfinite(value)) return kDash;
+  const double size = std::abs(value);
+  std::string text;
+  if (size >= 1000 && size < 1e15) {
+    text = fmt::format("{:.0f}", size);
+    for (std::size_t at = text.size(); at > 3;) text.insert(at -= 3, ",");
+  } else {
+    text = fmt::format("{:.{}g}", size, digits);
+  }
+  return (value < 0 && text != "0" ? kMinus : "") + text;
+}
+
+std::string percent_text(double share) {
+  if (!std::isfinite(share)) return kDash;
+  const double percent = std::round(100 * share);
+  return (percent < 0 ? kMinus : "") + fmt::format("{:.0f} %", std::abs(percent));
+}
+
+std::string p_text(double p) {
+  if (!std::isfinite(p)) return kDash;
+  return p < 1e-4 ? "< 0.0001" : fmt::format("{:.2g}", p);
+}
+
+std::string csp_hash(std::string_view content) {
+  std::array<unsigned char, crypto_hash_sha256_BYTES> digest;
+  crypto_hash_sha256(digest.data(), reinterpret_cast<const unsigned char*>(content.data()),
+                     content.size());
+  std::array<char,
+             sodium_base64_ENCODED_LEN(crypto_hash_sha256_BYTES, sodium_base64_VARIANT_ORIGINAL)>
+      text{};
+  sodium_bin2base64(text.data(), text.size(), digest.data(), digest.size(),
+                    sodium_base64_VARIANT_ORIGINAL);
+  return std::string("sha256-") + text.data();
+}
+
+std::string bar_svg(double share, std::string_view css_class) {
+  return fmt::format(
+      R"(<svg class="bar" aria-hidden="true"><rect class="track" width="100%" height="100%"/>)"
+      R"(<rect class="{}" width="{:.2f}%" height="100%"/></svg>)",
+      css_class, clamped_percent(share));
+}
+
+std::string interval_svg(double value, double lo, double hi) {
+  const double from = clamped_percent(lo), to = clamped_percent(hi);
+  return fmt::format(
+      R"(<svg class="interval" aria-hidden="true"><line class="axis" x1="0" x2="100%" y1="50%" y2="50%"/>)"
+      R"(<line class="tick" x1="0" x2="0" y1="20%" y2="80%"/>)"
+      R"(<line class="tick" x1="50%" x2="50%" y1="30%" y2="70%"/>)"
+      R"(<line class="tick" x1="100%" x2="100%" y1="20%" y2="80%"/>)"
+      R"(<line class="range" x1="{0:.2f}%" x2="{1:.2f}%" y1="50%" y2="50%"/>)"
+      R"(<line class="range" x1="{0:.2f}%" x2="{0:.2f}%" y1="25%" y2="75%"/>)"
+      R"(<line class="range" x1="{1:.2f}%" x2="{1:.2f}%" y1="25%" y2="75%"/>)"
+      R"(<circle class="value" cx="{2:.2f}%" cy="50%" r="5"/></svg>)",
+      from, to, clamped_percent(value));
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,35 @@
+// Words and numbers for a page: everything that is not markup goes through here.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+namespace gapfarm {
+
+// Safe as text and within quoted attributes.  Control characters other than tab and newline, which
+// HTML does not allow, become U+FFFD.
+std::string html_escaped(std::string_view text);
+
+// JSON that can stand inside a <script> element: nothing in it can end the element or open a
+// comment.  Still the same JSON.
+std::string script_safe(std::string json);
+
+// "0.412", "1,230", "−3.2": about three significant digits; "–" when not finite.
+std::string number_text(double value, int digits = 3);
+
+// "88 %"; "–" when not finite.
+std::string percent_text(double share);
+
+// "0.03", "< 0.0001".
+std::string p_text(double p);
+
+// "sha256-<base64>", as a content security policy names an inline script or style.
+std::string csp_hash(std::string_view content);
+
+// A bar of `share` of the width, [0, 1], hidden from screen readers: the number stands beside it.
+std::string bar_svg(double share, std::string_view css_class);
+
+// An interval on the scale from 0 to 1, with its estimate.
+std::string interval_svg(double value, double lo, double hi);
+
+}  // namespace gapfarm

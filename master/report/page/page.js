@@ -1,0 +1,81 @@
+"use strict";
+// Controls, theme and print; starts the plots.
+
+function labelled(parent, input, text) {
+  const label = parent.appendChild(document.createElement("label"));
+  label.append(input, text);
+  return input;
+}
+
+function fieldset(parent, title) {
+  const set = parent.appendChild(document.createElement("fieldset"));
+  set.appendChild(document.createElement("legend")).textContent = title;
+  return set;
+}
+
+// Each control returns a function that reads it.
+function radios(parent, title, options, changed) {
+  const set = fieldset(parent, title);
+  const inputs = options.map(({ key, label }, i) => {
+    const input = Object.assign(document.createElement("input"), { type: "radio", name: title, value: key, checked: !i });
+    input.addEventListener("change", changed);
+    return labelled(set, input, label);
+  });
+  return () => inputs.find((input) => input.checked).value;
+}
+
+function checks(parent, title, keys, changed) {
+  const set = fieldset(parent, title);
+  const inputs = keys.map((key) => {
+    const input = Object.assign(document.createElement("input"), { type: "checkbox", value: key, checked: true });
+    input.addEventListener("change", changed);
+    return labelled(set, input, key);
+  });
+  return () => inputs.filter((input) => input.checked).map((input) => input.value);
+}
+
+function choice(parent, title, options, changed) {
+  const label = parent.appendChild(document.createElement("label"));
+  const select = document.createElement("select");
+  for (const [value, text] of options) select.add(new Option(text, value));
+  select.addEventListener("change", changed);
+  label.append(`${title} `, select);
+  const read = () => select.value;
+  read.set = (value) => { select.value = value; };
+  return read;
+}
+
+function startTheme() {
+  const root = document.documentElement;
+  const dark = matchMedia("(prefers-color-scheme: dark)");
+  const button = document.getElementById("theme");
+  let chosen = null;
+  const apply = (theme) => {
+    root.dataset.theme = theme;
+    button.textContent = theme === "dark" ? "Light" : "Dark";
+    button.setAttribute("aria-label", `Use ${theme === "dark" ? "light" : "dark"} colours`);
+    redrawAll();
+  };
+  const current = () => chosen ?? (dark.matches ? "dark" : "light");
+  button.addEventListener("click", () => {
+    chosen = current() === "dark" ? "light" : "dark";
+    apply(chosen);
+  });
+  dark.addEventListener("change", () => apply(current()));
+  addEventListener("beforeprint", () => apply("light"));
+  addEventListener("afterprint", () => apply(current()));
+  button.hidden = false;
+  apply(current());
+}
+
+startTheme();
+const pageTrials = readTrials();
+if (pageTrials.length) {
+  startPoses(pageTrials);
+  startResiduals(pageTrials, readJson("diagnosis").where);
+} else {
+  for (const id of ["pose-plots", "residual-plots"]) {
+    document.getElementById(id).textContent = "This diagnosis was kept without its trials.";
+  }
+}
+document.documentElement.dataset.ready = window.uPlot ? "uplot" : "svg";

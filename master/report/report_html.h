@@ -1,0 +1,15 @@
+// The diagnosis as one self-contained page: no network, its own scripts and styles only.
+#pragma once
+
+#include <string>
+
+#include "master/diagnose/diagnosis.h"
+
+namespace gapfarm {
+
+// The whole file, UTF-8.  It holds the diagnosis as JSON too (see script_safe() for how), plots it
+// with scripts whose hashes its content security policy names, and reads as text without them.
+// The same diagnosis gives the same bytes.
+std::string report_html(const Diagnosis& diagnosis);
+
+}  // namespace gapfarm

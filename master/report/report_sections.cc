@@ -1,0 +1,307 @@
+#include "master/report/report_sections.h"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "master/report/html.h"
+
+namespace gapfarm {
+namespace {
+
+struct VerdictWords {
+  const char* css_class;
+  const char* sign;
+  const char* title;
+  const char* meaning;  // when the diagnosis has no headline of its own
+};
+
+VerdictWords verdict_words(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::kEffect:
+      return {"verdict-effect", "◆", "Effect found", "A known effect explains the gap."};
+    case Verdict::kNone:
+      return {"verdict-none", "●", "No effect",
+              "The tuned simulation is as good as these data can show."};
+    case Verdict::kUnknown:
+      return {"verdict-unknown", "▲", "Cause unknown",
+              "There is a gap, and nothing in the catalogue explains it."};
+    case Verdict::kEffectAndUnknown:
+      return {"verdict-both", "◆▲", "Effect found, more remains",
+              "A known effect explains a part of the gap; something else is there too."};
+  }
+  return {"", "", "", ""};
+}
+
+std::string names(const std::vector<std::string>& list, const char* separator = ", ") {
+  std::string out;
+  for (const std::string& name : list) {
+    if (!out.empty()) out += separator;
+    out += "<code>" + html_escaped(name) + "</code>";
+  }
+  return out;
+}
+
+std::string tile(const char* title, const GapFigures& figures, bool changed, const char* unit) {
+  const std::string from =
+      changed ? fmt::format(R"(<span class="from">{}</span> <span aria-label="to">→</span> )",
+                            number_text(figures.tuned))
+              : "";
+  return fmt::format(
+      R"(<div class="tile"><dt>{}</dt><dd>{}<strong>{}</strong> {}<small>floor {}</small></dd></div>)",
+      title, from, number_text(changed ? figures.final_ : figures.tuned), unit,
+      number_text(figures.floor));
+}
+
+std::string cell(const char* label, const std::string& html, const char* css_class = "") {
+  // Where rows become cards, on a narrow screen, cells without content are left out.
+  const char* empty = html.empty() || html == "–" ? " empty" : "";
+  return fmt::format(R"(<td class="{}{}" data-label="{}">{}</td>)", css_class, empty, label, html);
+}
+
+// A bar with its number.
+std::string meter(double share, const char* css_class, const std::string& number) {
+  return R"(<span class="meter">)" + bar_svg(share, css_class) + "<span>" + number +
+         "</span></span>";
+}
+
+std::string heads(std::initializer_list<std::pair<const char*, bool>> columns) {
+  std::string html = "<thead><tr>";
+  for (const auto& [title, is_number] : columns) {
+    html +=
+        fmt::format(R"(<th scope="col"{}>{}</th>)", is_number ? R"( class="number")" : "", title);
+  }
+  return html + "</tr></thead>";
+}
+
+std::string with_unit(double value, const std::string& unit) {
+  const std::string text = number_text(value);
+  return unit.empty() || unit == "-" ? text : text + " " + html_escaped(unit);
+}
+
+std::string estimates(const NamedEffect& effect) {
+  std::string rows;
+  for (const Estimate& e : effect.parameters) {
+    rows += fmt::format(
+        R"(<tr><th scope="row"><code>{}</code></th><td class="number">{}</td><td class="number">{} to {}</td></tr>)",
+        html_escaped(e.key), with_unit(e.value, e.unit), number_text(e.lo), number_text(e.hi));
+  }
+  if (rows.empty()) return "";
+  return R"(<table class="plain"><thead><tr><th scope="col">parameter</th><th scope="col" class="number">estimate</th>)"
+         R"(<th scope="col" class="number">90 % interval</th></tr></thead><tbody>)" +
+         rows + "</tbody></table>";
+}
+
+std::string effect_card(const NamedEffect& effect, std::size_t number) {
+  std::string html = fmt::format(
+      R"(<article class="effect"><h3><span class="count">{}</span> <code>{}</code></h3>)", number,
+      html_escaped(effect.name));
+  if (!effect.text.empty()) html += "<p>" + html_escaped(effect.text) + "</p>";
+  html += fmt::format(
+      R"(<div class="closed"><span class="closed-value"><strong>{}</strong> of the explainable gap closed)"
+      R"(<small>90 % interval {} to {}</small></span>{}<span class="scale" aria-hidden="true"><span>0 %</span><span>50 %</span><span>100 %</span></span></div>)",
+      percent_text(effect.closed), percent_text(effect.closed_lo), percent_text(effect.closed_hi),
+      interval_svg(effect.closed, effect.closed_lo, effect.closed_hi));
+  html += fmt::format(
+      R"(<dl class="facts"><div><dt>held-out gap</dt><dd>{} → {} nats/trial</dd></div><div><dt>confidence</dt><dd>{}</dd></div>)",
+      number_text(effect.gap_before), number_text(effect.gap_after),
+      percent_text(effect.confidence));
+  if (!effect.aliases.empty()) {
+    html +=
+        R"(<div class="wide"><dt>or, just as well on these data</dt><dd>)" + names(effect.aliases);
+    if (!effect.alias_reason.empty()) {
+      html += "<br><small>" + html_escaped(effect.alias_reason) + "</small>";
+    }
+    html += "</dd></div>";
+  }
+  return html + "</dl>" + estimates(effect) + "</article>";
+}
+
+bool is_named(const Diagnosis& diagnosis, const std::string& effect) {
+  return std::any_of(diagnosis.effects.begin(), diagnosis.effects.end(),
+                     [&](const NamedEffect& e) { return e.name == effect; });
+}
+
+// "◆ named", "◇ instead of floor_tilt", or nothing.
+std::string standing(const Diagnosis& diagnosis, const std::string& effect) {
+  for (const NamedEffect& e : diagnosis.effects) {
+    if (e.name == effect) return R"( <span class="tag">◆ named</span>)";
+    if (std::find(e.aliases.begin(), e.aliases.end(), effect) != e.aliases.end()) {
+      return R"( <span class="tag">◇ or instead of )" + html_escaped(e.name) + "</span>";
+    }
+  }
+  return "";
+}
+
+std::string screened_row(const Diagnosis& diagnosis, const Screened& s, double largest) {
+  const bool named = is_named(diagnosis, s.effect);
+  std::string held_out = "–";
+  if (s.held_out) {
+    held_out = number_text(*s.held_out, 2);
+    if (s.held_out_se) held_out += " ± " + number_text(*s.held_out_se, 2);
+  }
+  std::string note = html_escaped(s.note);
+  if (!s.alias_set.empty()) {
+    note =
+        "<span>looks like " + names(s.alias_set) + (note.empty() ? "" : "<br>") + note + "</span>";
+  }
+  return fmt::format(R"(<tr class="{}"><th scope="row"><code>{}</code>{}</th>)",
+                     named ? "named" : "", html_escaped(s.effect), standing(diagnosis, s.effect)) +
+         cell("gain, nats",
+              meter(largest > 0 ? s.gain / largest : 0, named ? "fill-named" : "fill",
+                    number_text(s.gain)),
+              "number with-bar") +
+         cell("p", p_text(s.p), "number") + cell("held out, nats a trial", held_out, "number") +
+         cell("best strength", html_escaped(s.estimate)) + cell("remarks", note) + "</tr>";
+}
+
+}  // namespace
+
+std::string summary_section(const Diagnosis& diagnosis) {
+  const VerdictWords words = verdict_words(diagnosis.verdict);
+  std::string html = fmt::format(
+      R"(<section id="summary"><p class="verdict {}"><span aria-hidden="true">{}</span> {}</p><h1>{}</h1>)",
+      words.css_class, words.sign, words.title,
+      html_escaped(diagnosis.headline.empty() ? words.meaning : diagnosis.headline));
+  const bool changed = !diagnosis.effects.empty();
+  html += R"(<dl class="tiles">)" + tile("Gap, held out", diagnosis.gap, changed, "nats/trial") +
+          tile("Position, rms", diagnosis.position_mm, changed, "mm") +
+          tile("Heading, rms", diagnosis.heading_mrad, changed, "mrad") + "</dl>";
+  if (!diagnosis.cautions.empty()) {
+    html += fmt::format(
+        R"(<p class="caution-link">▲ <a href="#cautions">{} caution{}</a> to read before relying on this.</p>)",
+        diagnosis.cautions.size(), diagnosis.cautions.size() == 1 ? "" : "s");
+  }
+  return html + "</section>";
+}
+
+std::string where_table(const std::vector<Where>& findings, const char* caption) {
+  std::string rows;
+  for (const Where& w : findings) {
+    const char* unit = w.component == "theta" ? "mrad" : "mm";
+    const std::string covariate = w.covariate.empty() ? "–" : html_escaped(w.covariate);
+    rows +=
+        R"(<tr><th scope="row">)" + html_escaped(w.text) +
+        fmt::format(
+            R"(<button type="button" class="show" hidden data-command="{}" data-component="{}" data-covariate="{}">Show in the plots</button></th>)",
+            html_escaped(w.command), html_escaped(w.component), html_escaped(w.covariate)) +
+        cell("command", html_escaped(w.command)) +
+        cell("part", html_escaped(w.component + " " + w.kind)) + cell("depends on", covariate) +
+        cell("size", number_text(w.size, 2) + " " + unit, "number") +
+        cell("share", meter(w.share, "fill", percent_text(w.share)), "number with-bar") +
+        cell("p", p_text(w.p), "number") + "</tr>";
+  }
+  return fmt::format(R"(<table class="cards findings"><caption class="unseen">{}</caption>)",
+                     caption) +
+         heads({{"finding", false},
+                {"command", false},
+                {"part", false},
+                {"depends on", false},
+                {"size", true},
+                {"share of the gap", true},
+                {"p, corrected", true}}) +
+         "<tbody>" + rows + "</tbody></table>";
+}
+
+std::string screening_section(const Diagnosis& diagnosis) {
+  if (diagnosis.screening.empty()) return "";
+  std::vector<const Screened*> order;
+  double largest = 0;
+  for (const Screened& s : diagnosis.screening) {
+    order.push_back(&s);
+    if (std::isfinite(s.gain)) largest = std::max(largest, s.gain);
+  }
+  // A gain that is not a number sorts last, so that the comparison stays an order.
+  const auto key = [](const Screened* s) { return std::isfinite(s->gain) ? s->gain : -1e300; };
+  std::stable_sort(order.begin(), order.end(),
+                   [&](const auto* a, const auto* b) { return key(a) > key(b); });
+  std::string rows;
+  for (const Screened* s : order) rows += screened_row(diagnosis, *s, largest);
+  return R"(<section id="screening"><h2>Which effect: the whole catalogue</h2><p>What each effect could add to the )"
+         R"(tuned model once everything that retuning absorbs is taken out. The p-value is against that effect's own luck )"
+         R"(on data with nothing to find. Effects that look alike leave parallel traces in these data.</p>)"
+         R"(<table class="cards screening"><caption class="unseen">Screening of the catalogue</caption>)" +
+         heads({{"effect", false},
+                {"gain, nats in all", true},
+                {"p", true},
+                {"held out, nats a trial", true},
+                {"best strength", false},
+                {"remarks", false}}) +
+         "<tbody>" + rows + "</tbody></table></section>";
+}
+
+std::string shrinkage_section(const Diagnosis& diagnosis) {
+  std::string html = R"(<section id="shrinkage"><h2>How far the gap shrinks</h2>)";
+  if (diagnosis.effects.empty()) {
+    return html + "<p>No effect was added, so nothing shrinks.</p></section>";
+  }
+  html +=
+      R"(<p>On trials that the fit did not see; the interval is from resampling sessions or blocks of trials.</p><div class="effects">)";
+  for (std::size_t i = 0; i < diagnosis.effects.size(); ++i) {
+    html += effect_card(diagnosis.effects[i], i + 1);
+  }
+  return html + "</div></section>";
+}
+
+std::string next_section(const Diagnosis& diagnosis) {
+  std::string html = R"(<section id="next"><h2>What to try next</h2>)";
+  if (diagnosis.next.empty()) return html + "<p>Nothing in particular.</p></section>";
+  html += R"(<ol class="next">)";
+  for (const NextExperiment& n : diagnosis.next) {
+    html += "<li><p>" + html_escaped(n.text) + "</p>";
+    if (!n.separates.empty()) {
+      html += "<p class=\"detail\">" +
+              (n.separates.size() > 1 ? "separates " + names(n.separates, " from ")
+                                      : "shows " + names(n.separates)) +
+              "</p>";
+    }
+    if (n.trials > 0) {
+      html +=
+          fmt::format(R"(<p class="detail">about <strong>{}</strong> trials for 95 % power</p>)",
+                      number_text(static_cast<double>(n.trials)));
+    }
+    html += "</li>";
+  }
+  return html + "</ol></section>";
+}
+
+std::string cautions_section(const Diagnosis& diagnosis) {
+  if (diagnosis.cautions.empty()) return "";
+  std::string html = R"(<section id="cautions"><h2>Cautions</h2><ul class="cautions">)";
+  for (const std::string& caution : diagnosis.cautions) {
+    html += "<li>" + html_escaped(caution) + "</li>";
+  }
+  return html + "</ul></section>";
+}
+
+std::string provenance_section(const Diagnosis& diagnosis) {
+  std::string html = R"(<section id="provenance"><h2>What went in</h2>)";
+  if (!diagnosis.provenance.empty()) {
+    html += R"(<dl class="provenance">)";
+    for (const auto& [label, value] : diagnosis.provenance) {
+      html += "<div><dt>" + html_escaped(label) + "</dt><dd>" + html_escaped(value) + "</dd></div>";
+    }
+    html += "</dl>";
+  }
+  double total = 0;
+  for (const auto& [stage, seconds] : diagnosis.timing_s) {
+    if (std::isfinite(seconds)) total += seconds;
+  }
+  if (total > 0) {
+    html +=
+        R"(<h3>Time</h3><table class="plain timing"><caption class="unseen">Wall time by stage</caption>)" +
+        heads({{"stage", false}, {"share", false}, {"s", true}}) + "<tbody>";
+    for (const auto& [stage, seconds] : diagnosis.timing_s) {
+      html +=
+          fmt::format(R"(<tr><th scope="row">{}</th><td>{}</td><td class="number">{}</td></tr>)",
+                      html_escaped(stage), bar_svg(seconds / total, "fill"), number_text(seconds));
+    }
+    html += fmt::format(
+        R"(<tr class="sum"><th scope="row">in all</th><td></td><td class="number">{}</td></tr></tbody></table>)",
+        number_text(total));
+  }
+  return html + "</section>";
+}
+
+}  // namespace gapfarm
