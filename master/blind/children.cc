@@ -1,0 +1,192 @@
+#include "master/blind/children.h"
+
+#include <fcntl.h>
+#include <poll.h>
+#include <signal.h>
+#include <sys/syscall.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+#include <optional>
+
+#include "common/process/process_pool.h"
+#include "master/farm/farm.h"
+
+namespace gapfarm {
+namespace {
+
+constexpr double kGrace_s = 5;  // between asking and making a child end
+constexpr int kTick_ms = 250;
+
+struct Child {
+  const ChildJob* job = nullptr;
+  pid_t pid = 0;
+  int pidfd = -1;
+  double started_s = 0;
+  std::optional<double> asked_s;  // to end, beyond its limit
+};
+
+// Only calls that are safe between fork and exec.  Returns on failure.
+void become(char* const* argv, int log, pid_t parent) {
+  setpgid(0, 0);
+  if (!die_with_parent(parent)) return;
+  const int null = open("/dev/null", O_RDONLY);
+  dup2(null, STDIN_FILENO);
+  dup2(log, STDOUT_FILENO);
+  dup2(log, STDERR_FILENO);
+  syscall(SYS_close_range, 3u, ~0u, 0u);
+  for (int s : {SIGINT, SIGTERM, SIGHUP, SIGPIPE, SIGCHLD}) signal(s, SIG_DFL);
+  sigset_t none;
+  sigemptyset(&none);
+  sigprocmask(SIG_SETMASK, &none, nullptr);
+  execv(argv[0], argv);
+}
+
+Result<Child> start_child(const ChildJob& job) {
+  const int log = open(job.log_path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+  if (log < 0) return Error{job.log_path + ": cannot be written: " + std::strerror(errno)};
+  std::vector<std::string> words = job.argv;
+  std::vector<char*> argv;
+  for (std::string& word : words) argv.push_back(word.data());
+  argv.push_back(nullptr);
+  if (access(argv[0], X_OK) != 0) {
+    close(log);
+    return Error{"cannot start " + job.argv[0] + ": " + std::strerror(errno)};
+  }
+  const pid_t parent = getpid();
+  const pid_t pid = fork();
+  if (pid == 0) {
+    become(argv.data(), log, parent);
+    _exit(127);
+  }
+  close(log);
+  if (pid < 0) return Error{std::string("cannot start a process: ") + std::strerror(errno)};
+  setpgid(pid, pid);  // whichever of the two comes first
+  Child child;
+  child.job = &job;
+  child.pid = pid;
+  child.pidfd = static_cast<int>(syscall(SYS_pidfd_open, pid, 0));
+  child.started_s = monotonic_seconds();
+  return child;
+}
+
+ChildEnd end_of(const Child& child, int status, const ChildrenOptions& options) {
+  ChildEnd end;
+  end.wall_s = monotonic_seconds() - child.started_s;
+  if (child.asked_s) {
+    end.state = ChildState::kTimedOut;
+    end.text = "did not end within " + std::to_string(std::lround(options.time_limit_s)) + " s";
+  } else if (WIFEXITED(status)) {
+    end.status = WEXITSTATUS(status);
+    if (!options.done(end.status)) {
+      end.state = ChildState::kFailed;
+      end.text = "exited with status " + std::to_string(end.status);
+    }
+  } else {
+    end.state = ChildState::kCrashed;
+    end.status = WTERMSIG(status);
+    end.text = std::string("was killed by signal ") + std::to_string(end.status) + " (" +
+               strsignal(end.status) + ")";
+  }
+  return end;
+}
+
+// The children that run now.
+class Crowd {
+ public:
+  explicit Crowd(const ChildrenOptions& options) : options_(options) {}
+  ~Crowd() {
+    for (const Child& child : children_) kill(-child.pid, SIGTERM);
+    const double until = monotonic_seconds() + kGrace_s;
+    for (Child& child : children_) {
+      pollfd waiting = {child.pidfd, POLLIN, 0};
+      poll(&waiting, 1, static_cast<int>(1000 * std::max(0.0, until - monotonic_seconds())));
+      kill(-child.pid, SIGKILL);
+      waitpid(child.pid, nullptr, 0);
+      close(child.pidfd);
+    }
+  }
+  Crowd(const Crowd&) = delete;
+  Crowd& operator=(const Crowd&) = delete;
+
+  std::size_t size() const { return children_.size(); }
+  void add(const Child& child) { children_.push_back(child); }
+
+  // Until a child ends, a stop is requested or a tick has passed.
+  void wait() const {
+    std::vector<pollfd> fds;
+    for (const Child& child : children_) fds.push_back({child.pidfd, POLLIN, 0});
+    if (options_.stop) fds.push_back({options_.stop->fd(), POLLIN, 0});
+    poll(fds.data(), fds.size(), kTick_ms);
+  }
+
+  // Reports the children that ended; returns how many.
+  std::size_t reap() {
+    std::size_t ended = 0;
+    for (std::size_t i = 0; i < children_.size();) {
+      int status = 0;
+      if (waitpid(children_[i].pid, &status, WNOHANG) != children_[i].pid) {
+        ++i;
+        continue;
+      }
+      const Child child = children_[i];
+      children_.erase(children_.begin() + static_cast<long>(i));
+      kill(-child.pid, SIGKILL);  // what it left behind
+      close(child.pidfd);
+      ++ended;
+      const ChildEnd end = end_of(child, status, options_);
+      if (options_.on_end) options_.on_end(*child.job, end);
+    }
+    return ended;
+  }
+
+  void enforce_limit() {
+    const double now = monotonic_seconds();
+    for (Child& child : children_) {
+      if (!child.asked_s && now - child.started_s > options_.time_limit_s) {
+        child.asked_s = now;
+        kill(-child.pid, SIGTERM);
+      } else if (child.asked_s && now - *child.asked_s > kGrace_s) {
+        kill(-child.pid, SIGKILL);
+      }
+    }
+  }
+
+ private:
+  const ChildrenOptions& options_;
+  std::vector<Child> children_;
+};
+
+}  // namespace
+
+const char* child_state_name(ChildState state) {
+  static constexpr const char* kNames[] = {"done", "failed", "crashed", "timeout"};
+  return kNames[static_cast<std::size_t>(state)];
+}
+
+Status run_children(const std::vector<ChildJob>& jobs, const ChildrenOptions& options) {
+  Crowd crowd(options);
+  const double begin = monotonic_seconds();
+  std::size_t started = 0;
+  std::size_t ended = 0;
+  while (ended < jobs.size()) {
+    if (options.stop && options.stop->requested()) return Error{kStopRequested};
+    while (started < jobs.size() && crowd.size() < std::max(1u, options.at_once)) {
+      const Result<Child> child = start_child(jobs[started]);
+      if (!child) return child.error();
+      crowd.add(*child);
+      ++started;
+    }
+    crowd.wait();
+    ended += crowd.reap();
+    crowd.enforce_limit();
+    if (options.on_tick) options.on_tick(ended, monotonic_seconds() - begin);
+  }
+  return {};
+}
+
+}  // namespace gapfarm

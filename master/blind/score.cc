@@ -1,0 +1,154 @@
+#include "master/blind/score.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <set>
+
+#include "common/effects/catalogue.h"
+
+namespace gapfarm {
+namespace {
+
+using Family = std::set<std::string>;
+
+Family family_of(const SaidEffect& effect) {
+  Family family = {effect.name};
+  const std::size_t count = std::min(effect.aliases.size(), kMaxAliases);
+  family.insert(effect.aliases.begin(), effect.aliases.begin() + static_cast<long>(count));
+  return family;
+}
+
+std::string names_of(const Said& said) {
+  std::string text;
+  for (const SaidEffect& effect : said.effects) text += (text.empty() ? "" : "+") + effect.name;
+  return text.empty() ? said.verdict : said.verdict + " " + text;
+}
+
+std::string names_of(const Truth& truth) {
+  std::string text;
+  for (const TrueEffect& effect : truth.effects) text += (text.empty() ? "" : "+") + effect.name;
+  return text;
+}
+
+Judgement judge_effects(const Truth& truth, const Said& said) {
+  const std::string what = names_of(truth);
+  if (said.verdict != "effect" && said.verdict != "effect+unknown") {
+    return {false, what + "; said " + said.verdict};
+  }
+  std::vector<Family> left;
+  for (const SaidEffect& effect : said.effects) left.push_back(family_of(effect));
+  for (const TrueEffect& effect : truth.effects) {
+    const auto hit = std::find_if(left.begin(), left.end(), [&](const Family& family) {
+      return family.count(effect.name) > 0;
+    });
+    if (hit == left.end()) {
+      return {false, what + "; missed " + effect.name + ", said " + names_of(said)};
+    }
+    left.erase(hit);
+  }
+  if (truth.effects.size() == 1 &&
+      family_of(said.effects.front()).count(truth.effects.front().name) == 0) {
+    return {false, what + "; named after " + said.effects.front().name};
+  }
+  if (!left.empty()) return {false, what + "; also said more: " + names_of(said)};
+  return {true, what + "; said " + names_of(said)};
+}
+
+const Effect* catalogue_entry(const std::string& name) {
+  for (const Effect& effect : srv1_effects()) {
+    if (effect.name == name) return &effect;
+  }
+  return nullptr;
+}
+
+// Strengths all neutral: places and directions mean nothing.
+bool does_nothing(const Effect& entry, const TrueEffect& effect) {
+  for (std::size_t i = 0; i < entry.strengths; ++i) {
+    const auto found = effect.parameters.find(entry.parameters[i].key);
+    if (found != effect.parameters.end() && found->second != entry.parameters[i].neutral) {
+      return false;
+    }
+  }
+  return true;
+}
+
+bool holds(double lo, double hi, double value, bool angle) {
+  if (!angle) return value >= lo && value <= hi;
+  constexpr double kTurn = 2 * std::numbers::pi;
+  // The turn of `value` that is the first at or above lo.
+  return value + kTurn * std::ceil((lo - value) / kTurn) <= hi;
+}
+
+}  // namespace
+
+Judgement judge(const Truth& truth, const Said& said) {
+  for (const SaidEffect& effect : said.effects) {
+    if (effect.aliases.size() > kMaxAliases) {
+      return {false, "more than " + std::to_string(kMaxAliases) + " aliases say nothing"};
+    }
+  }
+  switch (truth.kind) {
+    case CaseKind::kNull:
+      return {said.verdict == "none" && said.effects.empty(), "null; said " + names_of(said)};
+    case CaseKind::kOutside:
+      return {
+          (said.verdict == "unknown" || said.verdict == "effect+unknown") && said.effects.empty(),
+          "outside the catalogue; said " + names_of(said)};
+    case CaseKind::kSingle:
+    case CaseKind::kPair:
+      break;
+  }
+  return judge_effects(truth, said);
+}
+
+std::string first_said(const Said& said) {
+  return said.effects.empty() ? said.verdict : said.effects.front().name;
+}
+
+std::vector<Coverage> coverage_of(const Truth& truth, const Said& said) {
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  std::vector<Coverage> all;
+  for (const TrueEffect& effect : truth.effects) {
+    const auto named = std::find_if(said.effects.begin(), said.effects.end(),
+                                    [&](const SaidEffect& s) { return s.name == effect.name; });
+    const Effect* entry = catalogue_entry(effect.name);
+    if (named == said.effects.end() || !entry) continue;
+    const bool neutral = does_nothing(*entry, effect);
+    for (std::size_t i = 0; i < entry->parameters.size(); ++i) {
+      const EffectParameter& p = entry->parameters[i];
+      const auto value = effect.parameters.find(p.key);
+      if (value == effect.parameters.end() || !p.choices.empty()) continue;
+      if (neutral && i >= entry->strengths) continue;
+      Coverage coverage{effect.name, p.key, value->second, kNone, kNone, false};
+      for (const SaidParameter& s : named->parameters) {
+        if (s.key != p.key) continue;
+        coverage.lo = s.lo;
+        coverage.hi = s.hi;
+        coverage.covered = holds(s.lo, s.hi, value->second, p.unit == "rad");
+      }
+      all.push_back(coverage);
+    }
+  }
+  return all;
+}
+
+double promised_shrinkage(const Said& said) {
+  double sum = 0;
+  for (const SaidEffect& effect : said.effects) sum += effect.closed;
+  return sum;
+}
+
+RateInterval wilson_interval(const Rate& rate, double z) {
+  if (rate.total == 0) return {};
+  const double n = rate.total;
+  const double p = rate.share();
+  const double z2 = z * z;
+  const double centre = (p + z2 / (2 * n)) / (1 + z2 / n);
+  const double half = z / (1 + z2 / n) * std::sqrt(p * (1 - p) / n + z2 / (4 * n * n));
+  return {rate.hits == 0 ? 0 : std::max(0.0, centre - half),
+          rate.hits == rate.total ? 1 : std::min(1.0, centre + half)};
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,237 @@
+// gapfarm blind-check CONFIG: the diagnosis against sealed truths.
+#include "master/blind/blind_check.h"
+
+#include <algorithm>
+#include <memory>
+#include <thread>
+
+#include "common/base/build_info.h"
+#include "common/config/config.h"
+#include "common/process/process_pool.h"
+#include "common/trials/files.h"
+#include "common/trials/read.h"
+#include "master/cli/inputs.h"
+#include "master/experiment/plan.h"
+
+namespace gapfarm {
+namespace {
+
+struct BlindCheckOptions {
+  std::string config;
+  std::string out;
+  std::string foreign, truth, like, model, key;
+  std::vector<std::string> effects;
+  std::vector<std::string> sizes = {"clear", "subtle"};
+  unsigned nulls = 60, pairs = 19, left_out = 19, per_effect = 1;
+  std::optional<unsigned> trials, workers, jobs;
+  std::optional<std::uint64_t> seed;
+  double time_limit_s = 1800;
+  bool resume = false, dry_run = false, json = false;
+};
+
+std::string command_line() {
+  const Result<std::string> bytes = read_text_file("/proc/self/cmdline");
+  if (!bytes) return "gapfarm blind-check";
+  std::string text = *bytes;
+  if (!text.empty() && text.back() == '\0') text.pop_back();
+  std::replace(text.begin(), text.end(), '\0', ' ');
+  const std::size_t slash = text.substr(0, text.find(' ')).rfind('/');
+  return slash == text.npos ? text : text.substr(slash + 1);
+}
+
+Result<DesignSettings> design_of(const BlindCheckOptions& options, const Config& config) {
+  DesignSettings design;
+  design.effects = options.effects;
+  for (const std::string& word : options.sizes) {
+    const Result<SizeLevel> level = size_level(word);
+    if (!level) return level.error();
+    design.sizes.push_back(*level);
+  }
+  design.per_effect = options.per_effect;
+  design.nulls = options.nulls;
+  design.pairs = options.pairs;
+  design.left_out = options.left_out;
+  design.seed = config.seed;
+  return design;
+}
+
+Result<Config> config_of(const BlindCheckOptions& options, SessionPlans& plan) {
+  Result<Config> config = read_config(options.config);
+  if (!config) return config;
+  if (options.seed) config->seed = *options.seed;
+  SimulateSettings& simulate = config->simulate;
+  if (options.trials) {
+    simulate.trials_per_session = (*options.trials + simulate.sessions - 1) / simulate.sessions;
+  }
+  if (!options.like.empty()) {
+    const std::vector<std::string> files = {options.like};
+    const auto log = read_trial_files(files, command_names(config->problem.commands));
+    if (!log) return log.error();
+    plan = plan_of(config->problem, *log);
+  }
+  return config;
+}
+
+DiagnoseSettings diagnose_of(const BlindCheckOptions& options) {
+  const unsigned cores = std::max(1u, std::thread::hardware_concurrency());
+  DiagnoseSettings diagnose;
+  diagnose.command = {executable_path(), "diagnose"};
+  diagnose.config_path = options.config;
+  diagnose.model_path = options.model;
+  diagnose.jobs = options.jobs.value_or(std::max(1u, cores / 2));
+  diagnose.workers = options.workers.value_or(std::max(1u, cores / diagnose.jobs));
+  diagnose.time_limit_s = options.time_limit_s;
+  return diagnose;
+}
+
+Result<std::unique_ptr<SocketFarm>> start(const BlindCheckOptions& options, const Config& config,
+                                          CliContext& context) {
+  // Cases are made and scored while no diagnosis runs: with all the workers together.
+  FarmOptions farm;
+  const DiagnoseSettings diagnose = diagnose_of(options);
+  farm.workers = static_cast<int>(diagnose.workers * diagnose.jobs);
+  return start_farm(farm, config.farm, context);
+}
+
+BlindCheckHooks hooks_of(const BlindCheckOptions& options, const Config& config,
+                         CliContext& context) {
+  BlindCheckHooks hooks;
+  hooks.stop = &context.stop;
+  hooks.start_farm = [&options, &config, &context]() -> Result<std::unique_ptr<Farm>> {
+    auto farm = start(options, config, context);
+    if (!farm) return farm.error();
+    return std::unique_ptr<Farm>(std::move(*farm));
+  };
+  hooks.note = [&context](const std::string& sentence) { context.console.note(sentence); };
+  hooks.progress = [&context](const std::string& what, std::size_t done, std::size_t total,
+                              double elapsed_s) {
+    const double rate = elapsed_s > 0 ? static_cast<double>(done) / elapsed_s : 0;
+    std::optional<double> left_s;
+    if (done > 0)
+      left_s = elapsed_s * static_cast<double>(total - done) / static_cast<double>(done);
+    context.console.progress(progress_text(
+        what + " " + std::to_string(done) + " of " + std::to_string(total), rate, left_s));
+  };
+  return hooks;
+}
+
+int dry_run(const BlindCheckOptions& options, const Config& config, const SessionPlans& plan,
+            DesignSettings design, CliContext& context) {
+  const auto farm = start(options, config, context);
+  if (!farm) return failed(farm.error(), context);
+  const auto planned = planned_problem(config, plan, config.seed, **farm);
+  if (!planned) return failed(planned.error(), context);
+  // The rest is made of the same effects and robots.
+  design.nulls = design.pairs = design.left_out = 0;
+  const BlindCheckHooks hooks = hooks_of(options, config, context);
+  const double begin = monotonic_seconds();
+  const auto drawn = draw_design(*planned, design, **farm,
+                                 [&](const std::string& what, std::size_t done, std::size_t total) {
+                                   hooks.progress(what, done, total, monotonic_seconds() - begin);
+                                 });
+  if (!drawn) return failed(drawn.error(), context);
+  context.console.print(std::to_string(planned->log.trials.size()) +
+                        " trials a case.  A case of every effect and "
+                        "size, with the strength that this experiment takes:\n\n" +
+                        format_design(*drawn, planned->table()) + "\nBeside these " +
+                        std::to_string(options.nulls) + " nulls, " + std::to_string(options.pairs) +
+                        " pairs and " + std::to_string(options.left_out) +
+                        " effects left out of the catalogue.\n");
+  return kExitDone;
+}
+
+int finish(const Result<BlindReport>& report, const BlindCheckOptions& options,
+           CliContext& context) {
+  if (!report) {
+    if (context.stop.requested() && report.error().message == kStopRequested) {
+      context.console.clear_progress();
+      return kExitResumable;
+    }
+    return failed(report.error(), context);
+  }
+  context.console.print(options.json ? format_blind_json(*report) : format_blind_summary(*report));
+  context.console.note("tables: " + options.out + "/blind_check.md");
+  return kExitDone;
+}
+
+int run_blind(const BlindCheckOptions& options, CliContext& context) {
+  BlindCheckSettings settings;
+  const Result<Config> config = config_of(options, settings.plan);
+  const auto design = config ? design_of(options, *config) : Result<DesignSettings>(config.error());
+  if (!design) {
+    context.console.error(design.error());
+    return kExitBadUsage;
+  }
+  if (options.dry_run && options.foreign.empty()) {
+    return dry_run(options, *config, settings.plan, *design, context);
+  }
+  if (options.out.empty()) {
+    context.console.error(Error{"--out DIR is missing: the folder for cases, seals and result"});
+    return kExitBadUsage;
+  }
+  settings.design = *design;
+  settings.diagnose = diagnose_of(options);
+  settings.out = options.out;
+  settings.key_path = options.key;
+  settings.resume = options.resume;
+  settings.provenance = {
+      {"command", command_line()},
+      {"program", "gapfarm " + build_info().version + ", build " + build_info().fingerprint},
+      {"seed", std::to_string(config->seed)}};
+  const BlindCheckHooks hooks = hooks_of(options, *config, context);
+  return finish(options.foreign.empty()
+                    ? run_blind_check(*config, settings, hooks)
+                    : run_foreign_check(options.foreign, options.truth, settings, hooks),
+                options, context);
+}
+
+void declare_cases(CLI::App& app, BlindCheckOptions& options) {
+  app.add_option("--effects", options.effects, "Only these effects of the catalogue");
+  app.add_option("--sizes", options.sizes,
+                 "clear (5), subtle (1.6) or numbers: mean squared shift of the end poses in units "
+                 "of their spread; 1 is nothing")
+      ->delimiter(',');
+  app.add_option("--per-effect", options.per_effect, "Cases an effect and size");
+  app.add_option("--nulls", options.nulls, "Cases without any effect");
+  app.add_option("--pairs", options.pairs, "Cases with two effects");
+  app.add_option("--left-out", options.left_out,
+                 "Cases whose effect the diagnosis has to do without");
+  app.add_option("--trials", options.trials, "Trials a case (default: as [simulate] says)")
+      ->check(CLI::Range(1, 1000000));
+  app.add_option("--like", options.like, "Repeat the plan of this trial log");
+  app.add_option("--foreign", options.foreign, "Diagnose the cases FOLDER/CASE/trials.csv instead");
+  app.add_option("--truth", options.truth, "Truths of the foreign cases, FOLDER/CASE.json");
+}
+
+}  // namespace
+
+SubcommandRun setup_blind_check(CLI::App& app) {
+  auto options = std::make_shared<BlindCheckOptions>();
+  app.add_option("CONFIG", options->config, "Config file (TOML)")->required();
+  app.add_option("--out", options->out, "Folder for cases, seals, diagnoses and result");
+  declare_cases(app, *options);
+  app.add_option("--model", options->model, "Base model for every diagnosis");
+  app.add_option("--seed", options->seed, "Of robots, effects, plans and noise");
+  app.add_option("--workers", options->workers, "Worker processes of each diagnosis")
+      ->check(CLI::Range(1, 4096));
+  app.add_option("--jobs", options->jobs, "Diagnoses at a time (default: half the cores)")
+      ->check(CLI::Range(1, 4096));
+  app.add_option("--time-limit", options->time_limit_s, "s; a slower diagnosis counts as failed")
+      ->check(CLI::PositiveNumber);
+  app.add_option("--key", options->key,
+                 "Keep the truths' key in this file, outside the folder, so that even a killed "
+                 "check can be resumed (default: OUT.key, written when stopped)");
+  app.add_flag("--resume", options->resume, "Go on with the check in the folder");
+  app.add_flag("--dry-run", options->dry_run,
+               "Only say which strengths would be needed for every effect to be that large");
+  app.add_flag("--json", options->json, "Print JSON");
+  app.footer(
+      "Examples:\n"
+      "  gapfarm blind-check configs/srv1.toml --dry-run\n"
+      "  gapfarm blind-check configs/srv1.toml --out run/blind --seed 7\n"
+      "  gapfarm blind-check configs/srv1.toml --out run/foreign --foreign logs/cases \\\n"
+      "      --truth logs/cases/truth");
+  return [options](CliContext& context) { return run_blind(*options, context); };
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,51 @@
+#include "tests/unit/blind/worker_farm.h"
+
+#include <stdlib.h>
+
+#include <cassert>
+
+namespace gapfarm::testing {
+
+std::string WorkerFarm::add_problem(const v1::Problem& problem) {
+  const std::string hash = problem_hash(problem);
+  auto prepared = prepare(problem);
+  assert(prepared.ok());
+  problems_[hash] = std::move(*prepared);
+  return hash;
+}
+
+Result<std::vector<v1::TaskResult>> WorkerFarm::run(
+    const std::string& problem_hash, const std::vector<v1::Task>& tasks,
+    const std::function<void(const FarmProgress&)>& on_progress) {
+  std::vector<v1::TaskResult> results;
+  for (const v1::Task& task : tasks) {
+    results.push_back(evaluate(problems_.at(problem_hash).get(), task));
+    if (on_progress) on_progress({results.size(), tasks.size()});
+  }
+  return results;
+}
+
+Config small_config() {
+  Config config;
+  config.text = "# small";
+  config.path = "small.toml";
+  config.problem.values = srv1_table().nominal();
+  config.problem.values[row_of(Srv1::kStepRate)] = 120;
+  config.problem.commands = default_commands("srv1");
+  config.simulate.sessions = 2;
+  config.simulate.trials_per_session = 12;
+  config.simulate.durations_s = {0.7, 1.0};
+  return config;
+}
+
+Folder::Folder() {
+  std::string name = (std::filesystem::temp_directory_path() / "gapfarm-blind-XXXXXX").string();
+  path_ = ::mkdtemp(name.data());
+}
+
+Folder::~Folder() {
+  std::error_code ignored;
+  std::filesystem::remove_all(path_, ignored);
+}
+
+}  // namespace gapfarm::testing
