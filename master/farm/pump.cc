@@ -33,14 +33,14 @@ int receive_some(Transport& transport, Scheduler& scheduler, double now) {
 bool send_all(Transport& transport, Scheduler& scheduler) {
   std::vector<Outgoing> outgoing;
   outgoing.swap(scheduler.outbox());
-  bool all = true;
+  std::vector<Outgoing> unsent;
   for (Outgoing& out : outgoing) {
-    if (transport.send(out.peer, encode(&out.envelope)) == SendStatus::kSent) continue;
-    // A peer that does not take its messages off the line is as good as gone.
-    scheduler.on_unreachable(out.peer);
-    all = false;
+    if (transport.send(out.peer, encode(&out.envelope)) != SendStatus::kSent) {
+      unsent.push_back(std::move(out));
+    }
   }
-  return all;
+  scheduler.on_unsent(unsent);
+  return unsent.empty();
 }
 
 }  // namespace

@@ -73,6 +73,7 @@ void Scheduler::cancel_all() {
     v1::Cancel* cancel = post(worker->peer).mutable_cancel();
     for (const Holding& holding : worker->holds) cancel->add_attempt_ids(holding.attempt);
     worker->holds.clear();
+    worker->doubtful_since = last_tick_;
   }
 }
 
@@ -172,7 +173,9 @@ void Scheduler::keep_only(WorkerRecord& worker, const List& keeps, double held_s
   for (auto attempt = lost.rbegin(); attempt != lost.rend(); ++attempt) {
     if (queue_.give_back(worker.id, *attempt)) ++counts_.retries;
   }
-  if (!lost.empty()) line_up(worker);
+  if (lost.empty()) return;
+  worker.doubtful_since = last_tick_;
+  line_up(worker);
 }
 
 void Scheduler::on_heartbeat(WorkerRecord& worker, const v1::Heartbeat& heartbeat, double now) {
@@ -185,6 +188,11 @@ void Scheduler::on_heartbeat(WorkerRecord& worker, const v1::Heartbeat& heartbea
   // Messages do get lost when links break.  A job that should have arrived long ago and is not
   // there, while its answer is not here, is out of the world.
   keep_only(worker, heartbeat.attempts(), now - options_.silence_limit_s);
+  // By now nothing that was under way to it then can still arrive.
+  if (heartbeat.attempts().empty() && now - worker.doubtful_since > options_.silence_limit_s) {
+    worker.doubtful_since = kForever;
+    line_up(worker);
+  }
 }
 
 void Scheduler::on_result(WorkerRecord& worker, v1::JobResult* result) {
@@ -214,9 +222,21 @@ void Scheduler::on_problem_request(const WorkerRecord& worker, const std::string
   if (found != problems_.end()) reply->set_problem(found->second);
 }
 
-void Scheduler::on_unreachable(const std::string& peer) {
-  WorkerRecord* worker = registry_.find_peer(peer);
-  if (worker != nullptr) dismiss(*worker, FarmEvent::kLeft, "cannot be reached");
+void Scheduler::on_unsent(const std::vector<Outgoing>& messages) {
+  // Whatever ended a worker, it was not the jobs that never reached it; so they leave its hands
+  // before it is dismissed with what it holds.
+  for (const Outgoing& message : messages) {
+    WorkerRecord* worker = registry_.find_peer(message.peer);
+    if (worker == nullptr) continue;
+    for (const v1::Job& job : message.envelope.batch().jobs()) {
+      drop_holding(*worker, job.attempt_id());
+      if (queue_.give_back(worker->id, job.attempt_id())) ++counts_.retries;
+    }
+  }
+  for (const Outgoing& message : messages) {
+    WorkerRecord* worker = registry_.find_peer(message.peer);
+    if (worker != nullptr) dismiss(*worker, FarmEvent::kLeft, "cannot be reached");
+  }
 }
 
 void Scheduler::dismiss(WorkerRecord& worker, FarmEvent::Kind kind, const std::string& text) {
@@ -290,9 +310,9 @@ void Scheduler::dispatch(double now) {
     WorkerRecord* worker = registry_.find(line_.front());
     line_.pop_front();
     if (worker == nullptr) continue;
-    const bool empty_handed = worker->holds.empty();
+    const bool empty_handed = worker->holds.empty() && worker->doubtful_since == kForever;
     const bool full = worker->peer.empty() || worker->holds.size() >= credit(*worker) ||
-                      (worker->alone && !empty_handed);
+                      (worker->alone && !worker->holds.empty());
     const JobQueue::Taken taken =
         full ? JobQueue::Taken::kNone : queue_.take(worker->id, empty_handed, &job);
     if (taken == JobQueue::Taken::kNone) {

@@ -70,8 +70,8 @@ class Scheduler {
   void on_message(const std::string& peer, v1::Envelope* envelope, double now);
   void on_malformed(const std::string& peer);
   void on_other_protocol(const std::string& peer, std::uint32_t protocol);
-  // A message to `peer` did not go out.
-  void on_unreachable(const std::string& peer);
+  // These messages did not go out: nobody is there, or does not take its messages any more.
+  void on_unsent(const std::vector<Outgoing>& messages);
   void on_process_end(const std::string& name, EndCause cause, const std::string& text);
   // Gives out jobs, without judging anybody.
   void dispatch(double now);

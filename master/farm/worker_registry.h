@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <map>
 #include <memory>
 #include <string>
@@ -36,8 +37,11 @@ struct WorkerRecord {
   std::vector<Holding> holds;  // oldest first: a worker works in this order
   std::uint64_t finished = 0;
   double mean_wall = -1;  // s a task, lately; negative: unknown
-  bool alone = false;     // the scheduler's: holds a suspect and gets nothing beside it
-  bool in_line = false;   // the scheduler's: waits in line for jobs
+  // Since when it may work on something that was taken back from it (infinity: it does not).  Until
+  // it has said, long enough after, that its hands are empty, its death says nothing about one job.
+  double doubtful_since = std::numeric_limits<double>::infinity();
+  bool alone = false;    // the scheduler's: holds a suspect and gets nothing beside it
+  bool in_line = false;  // the scheduler's: waits in line for jobs
 };
 
 // Times are seconds of the caller's clock.

@@ -224,7 +224,7 @@ TEST(Scheduler, QuarantinesOnlyTheJobThatEndsItsWorkers) {
       for (const v1::Job& job : jobs) dies |= job.task().echo().payload() == "1";
       if (dies) {
         // The link is found broken first; how the process ended comes out later.
-        desk.scheduler.on_unreachable(name);
+        desk.scheduler.on_unsent({Outgoing{name, {}}});
         desk.scheduler.on_process_end(name, EndCause::kCrashed, "signal 11");
         break;
       }

@@ -89,7 +89,8 @@ void SimulatedFarm::at(double time, Event event) {
 void SimulatedFarm::carry(const Event& deliver) {
   const int copies = (chance(faults_.drop) ? 0 : 1) + (chance(faults_.duplicate) ? 1 : 0);
   for (int i = 0; i < copies; ++i) {
-    at(now_ - faults_.delay_s * std::log(1 - uniform(0, 1)), deliver);
+    // Never longer than half the silence limit: a link that holds messages back for longer is cut.
+    at(now_ + std::min(0.5, -faults_.delay_s * std::log(1 - uniform(0, 1))), deliver);
   }
 }
 
