@@ -38,8 +38,13 @@ struct Subcommand {
 
 std::span<const Subcommand> subcommands();
 
+SubcommandRun setup_blind_check(CLI::App& app);
 SubcommandRun setup_check(CLI::App& app);
+SubcommandRun setup_evolve(CLI::App& app);
 SubcommandRun setup_import(CLI::App& app);
+SubcommandRun setup_predict(CLI::App& app);
+SubcommandRun setup_resume(CLI::App& app);
+SubcommandRun setup_simulate(CLI::App& app);
 SubcommandRun setup_status(CLI::App& app);
 
 }  // namespace gapfarm

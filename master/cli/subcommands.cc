@@ -4,8 +4,14 @@ namespace gapfarm {
 
 std::span<const Subcommand> subcommands() {
   static constexpr Subcommand kTable[] = {
+      {"evolve", "evolve parameters until the robot moves like the logged one", "Runs",
+       setup_evolve},
+      {"resume", "continue a run, bit for bit", "Runs", setup_resume},
       {"status", "say how a run is doing, live or dead", "Runs", setup_status},
-      // {"check", "validate everything that a run would need; run nothing", "Data", setup_check},
+      {"simulate", "make a trial log from a parameter set", "Models", setup_simulate},
+      {"predict", "say where every trial of a log should have ended", "Models", setup_predict},
+      {"blind-check", "the diagnosis against sealed truths", "Diagnosis", setup_blind_check},
+      {"check", "validate everything that a run would need; run nothing", "Data", setup_check},
       {"import", "turn other programs' logs into a trial log", "Data", setup_import},
   };
   return kTable;

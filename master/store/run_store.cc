@@ -218,6 +218,17 @@ Status RunStore::insert_individuals(const StoredGeneration& generation) {
   return {};
 }
 
+Status RunStore::set_numeric_class(const std::string& numeric_class) {
+  if (!info_.numeric_class.empty()) return {};
+  Result<SqlStatement> update = database_.prepare(
+      "UPDATE run SET numeric_class = ? WHERE numeric_class = ''", "keep the numeric class");
+  if (!update) return update.error();
+  update->bind_text(1, numeric_class);
+  if (Status s = update->run(); !s) return s;
+  info_.numeric_class = numeric_class;
+  return {};
+}
+
 Status RunStore::set_progress(const Progress& progress) {
   Result<SqlStatement> update = database_.prepare(
       "UPDATE progress SET state = ?, stop_reason = ?, pid = ?, host = ?, heartbeat = ?, "

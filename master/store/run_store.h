@@ -36,6 +36,9 @@ class RunStore {
   const std::filesystem::path& run() const { return run_; }
   std::uint64_t epoch() const { return epoch_; }
 
+  // The numeric class that the first worker brought.  Once set it stays.
+  Status set_numeric_class(const std::string& numeric_class);
+
   // Commits a generation with all its individuals and the state after it in one transaction, on
   // disk when it returns.  Generations follow one another without gaps.  Returns the run's digest.
   Result<std::string> commit(const StoredGeneration& generation);

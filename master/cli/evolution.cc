@@ -1,0 +1,168 @@
+#include "master/cli/evolution.h"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <chrono>
+#include <nlohmann/json.hpp>
+
+#include "master/cli/evolution_farm.h"
+#include "master/cli/leave_behind.h"
+#include "master/evolve/evolve.h"
+#include "master/evolve/genetic.h"
+
+namespace gapfarm {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+class SteadyClock : public EvolveClock {
+ public:
+  double now_s() const override {
+    const auto now = std::chrono::steady_clock::now().time_since_epoch();
+    return std::chrono::duration<double>(now).count();
+  }
+};
+
+GeneticSetup genetic_setup(const EvolutionRun& run) {
+  GeneticSetup setup;
+  setup.settings = run.config.evolution;
+  setup.table = &run.problem.table();
+  setup.genes = run.problem.genes;
+  setup.run_seed = run.config.seed;
+  setup.noisy = run.problem.spread.kind == SpreadKind::kSampled &&
+                run.problem.fitness.kind != FitnessKind::kRobustMahalanobis;
+  for (const Gene& gene : setup.genes) {
+    setup.nominal.push_back(encode_gene(*setup.table, gene, run.problem.values[gene.row]));
+  }
+  return setup;
+}
+
+Result<std::unique_ptr<Optimiser>> optimiser_at(const std::optional<Checkpoint>& checkpoint,
+                                                const EvolutionRun& run) {
+  const GeneticSetup setup = genetic_setup(run);
+  return checkpoint ? restore_genetic(setup, checkpoint->optimiser_state) : make_genetic(setup);
+}
+
+// Says how the run ended, in the store and to the user.
+Status conclude(RunStore& store, const EvolveSummary& summary, const FarmProgressWriter& writer) {
+  Progress progress = writer.last();
+  const bool requested = summary.reason == StopReason::kRequested;
+  progress.state = requested ? RunState::kStopped : RunState::kFinished;
+  progress.stop_reason = summary.text;
+  progress.rate_per_s = 0;
+  progress.time_left_s.reset();
+  return store.set_progress(progress);
+}
+
+std::string outcome_line(const EvolutionRun& run, const EvolveSummary& summary) {
+  std::string text = summary.text;
+  if (summary.best && summary.best->outcome == v1::OK) {
+    text += fmt::format("; best {} {:.6g}", fitness_name(run.problem.fitness.kind),
+                        fitness_of_cost(run.problem.fitness.kind, summary.best->cost));
+  }
+  return text + fmt::format(" after {} generations, {} evaluations, {}", summary.generations,
+                            summary.evaluations, format_duration(summary.wall_s));
+}
+
+}  // namespace
+
+void EvolutionOverrides::declare(CLI::App& app) {
+  app.add_option("--generations", generations, "Stop after so many generations");
+  app.add_option("--evaluations", evaluations, "Stop after so many evaluations");
+  app.add_option("--time", time_s, "Stop after so many seconds")->check(CLI::PositiveNumber);
+  app.add_option("--target", target_fitness, "Stop at this fitness");
+  app.add_option("--population", population, "Individuals")->check(CLI::Range(2, 1000000));
+}
+
+void EvolutionOverrides::apply(EvolutionSettings& settings) const {
+  if (generations) settings.generations = *generations;
+  if (evaluations) settings.evaluations = *evaluations;
+  if (time_s) settings.time_s = *time_s;
+  if (target_fitness) settings.target_fitness = *target_fitness;
+  if (population) settings.population = *population;
+}
+
+void EvolutionOverrides::merge(const EvolutionOverrides& later) {
+  if (later.generations) generations = later.generations;
+  if (later.evaluations) evaluations = later.evaluations;
+  if (later.time_s) time_s = later.time_s;
+  if (later.target_fitness) target_fitness = later.target_fitness;
+  if (later.population) population = later.population;
+}
+
+std::string EvolutionOverrides::to_json() const {
+  Json json = Json::object();
+  if (generations) json["generations"] = *generations;
+  if (evaluations) json["evaluations"] = *evaluations;
+  if (time_s) json["time_s"] = *time_s;
+  if (target_fitness) json["target_fitness"] = *target_fitness;
+  if (population) json["population"] = *population;
+  return json.dump();
+}
+
+EvolutionOverrides EvolutionOverrides::from_json(const std::string& text) {
+  EvolutionOverrides overrides;
+  const Json json = Json::parse(text, nullptr, false);
+  if (!json.is_object()) return overrides;
+  const auto read = [&](const char* key, auto& to) {
+    using Value = typename std::decay_t<decltype(to)>::value_type;
+    if (json.contains(key) && json[key].is_number()) to = json[key].get<Value>();
+  };
+  read("generations", overrides.generations);
+  read("evaluations", overrides.evaluations);
+  read("time_s", overrides.time_s);
+  read("target_fitness", overrides.target_fitness);
+  read("population", overrides.population);
+  return overrides;
+}
+
+int run_evolution(RunStore& store, const EvolutionRun& run, CliContext& context) {
+  const auto checkpoint = store.checkpoint();
+  if (!checkpoint) return failed(checkpoint.error(), context);
+  auto optimiser = optimiser_at(*checkpoint, run);
+  if (!optimiser) return failed(optimiser.error(), context);
+
+  SocketFarmOptions base;
+  base.epoch = store.epoch();
+  base.numeric_class = store.info().numeric_class;
+  base.shuffle_seed = run.shuffle_seed;
+  auto farm = start_farm(run.farm, run.config.farm, context, base);
+  if (!farm) return failed(farm.error(), context);
+  for (const std::string& endpoint : (*farm)->endpoints()) {
+    if (endpoint.rfind("ipc://", 0) != 0) {
+      context.console.note("listening for workers: gapfarm-worker --connect " + endpoint);
+    }
+  }
+
+  const SteadyClock clock;
+  FarmProgressWriter progress(store, **farm, run.config.evolution, clock, context.console);
+  FarmBackend backend(**farm, run.problem, run.config.seed, progress);
+  StoreSink sink(store, run.problem, **farm, progress);
+  EvolveOptions options;
+  options.settings = run.config.evolution;
+  options.fitness = run.problem.fitness.kind;
+  if (*checkpoint) {
+    options.digest = (*checkpoint)->digest;
+    options.spent_s = (*checkpoint)->wall_s;
+  }
+  const auto summary =
+      evolve(**optimiser, backend, sink, clock, options, [&] { return context.stop.requested(); });
+  context.console.clear_progress();
+  if (!summary) return failed(summary.error(), context);
+  if (Status s = conclude(store, *summary, progress); !s) return failed(s.error(), context);
+  context.console.note(outcome_line(run, *summary));
+  if (summary->reason == StopReason::kRequested) {
+    context.console.note("continue with: gapfarm resume " + store.run().string());
+    return kExitResumable;
+  }
+  if (summary->best && summary->best->outcome == v1::OK) {
+    const Status left = leave_behind(store, run.problem, run.config, *summary, **farm);
+    if (!left) return failed(left.error(), context);
+    context.console.note("left behind: " + (store.run() / "model.toml").string() + ", " +
+                         (store.run() / "poses.svg").string() + ", " +
+                         (store.run() / "fitness.svg").string());
+  }
+  return (*farm)->counts().quarantined > 0 ? kExitQuarantined : kExitDone;
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,129 @@
+#include "master/cli/evolution_farm.h"
+
+#include <algorithm>
+
+namespace gapfarm {
+namespace {
+
+constexpr double kWriteInterval_s = 1;  // each costs a disk write
+
+}  // namespace
+
+FarmProgressWriter::FarmProgressWriter(RunStore& store, const SocketFarm& farm,
+                                       const EvolutionSettings& settings, const EvolveClock& clock,
+                                       Console& console)
+    : store_(store),
+      farm_(farm),
+      settings_(settings),
+      clock_(clock),
+      console_(console),
+      began_s_(clock.now_s()) {}
+
+void FarmProgressWriter::on_progress(const FarmProgress& progress) {
+  last_.done = progress.done;
+  last_.total = progress.total;
+  refresh(clock_.now_s());
+}
+
+void FarmProgressWriter::on_generation(const GenerationRecord& record, const std::string& best) {
+  evaluations_before_ += last_.done;
+  last_.done = last_.total = 0;
+  ++generations_;
+  generation_ = record.generation;
+  best_ = best;
+  refresh(clock_.now_s());
+}
+
+void FarmProgressWriter::refresh(double now_s) {
+  const double spent_s = now_s - began_s_;
+  const std::uint64_t done = evaluations_before_ + last_.done;
+  last_.rate_per_s = spent_s > 0 ? static_cast<double>(done) / spent_s : 0;
+  last_.time_left_s.reset();
+  if (generations_ > 0 && settings_.generations > generation_) {
+    const auto left = static_cast<double>(settings_.generations - generation_);
+    last_.time_left_s = left * spent_s / static_cast<double>(generations_);
+    if (settings_.time_s)
+      last_.time_left_s = std::min(*last_.time_left_s, *settings_.time_s - spent_s);
+  }
+  console_.progress(progress_text("generation " + std::to_string(generation_ + 1) + " of " +
+                                      std::to_string(settings_.generations) +
+                                      (best_.empty() ? "" : ", best " + best_),
+                                  last_.rate_per_s, last_.time_left_s));
+  if (now_s - written_s_ < kWriteInterval_s) return;
+  written_s_ = now_s;
+  last_.workers.clear();
+  for (const WorkerStatus& w : farm_.workers()) {
+    last_.workers.push_back({w.name, w.host, w.state, w.jobs, w.finished});
+  }
+  // The live row is a courtesy: a run goes on when it cannot be written, and a commit that cannot
+  // be written stops it with the reason.
+  if (Status s = store_.set_progress(last_); !s) console_.error(s.error());
+}
+
+FarmBackend::FarmBackend(SocketFarm& farm, const Problem& problem, std::uint64_t seed,
+                         FarmProgressWriter& progress)
+    : farm_(farm), fitness_(problem.fitness.kind), seed_(seed), progress_(progress) {
+  problem_hash_ = farm.add_problem(to_proto(problem));
+}
+
+Result<std::vector<Score>> FarmBackend::evaluate(std::span<const Candidate> candidates) {
+  std::vector<v1::Task> tasks;
+  for (const Candidate& candidate : candidates) {
+    v1::Task task;
+    v1::EvaluateTask* evaluate = task.mutable_evaluate();
+    evaluate->mutable_point()->mutable_genome()->Assign(candidate.genome.begin(),
+                                                        candidate.genome.end());
+    evaluate->mutable_stream()->set_run_seed(seed_);
+    evaluate->mutable_stream()->set_birth_id(candidate.birth_id);
+    evaluate->mutable_stream()->set_replicate(candidate.replicate);
+    tasks.push_back(std::move(task));
+  }
+  const auto results =
+      farm_.run(problem_hash_, tasks, [&](const FarmProgress& p) { progress_.on_progress(p); });
+  if (!results) return results.error();
+  std::vector<Score> scores;
+  for (const v1::TaskResult& result : *results) {
+    if (result.outcome() == v1::INVALID_REQUEST) {
+      return Error{"a worker refused the evaluation: " + result.message()};
+    }
+    const bool ok = result.outcome() == v1::OK;
+    scores.push_back(
+        {result.outcome(), ok ? cost_of_fitness(fitness_, result.evaluate().fitness()) : 0});
+  }
+  return scores;
+}
+
+Status StoreSink::commit(const GenerationRecord& record) {
+  if (Status s = store_.set_numeric_class(farm_.numeric_class()); !s) return s;
+  StoredGeneration stored;
+  stored.generation = record.generation;
+  stored.diversity = record.diversity;
+  for (const NamedNumber& p : record.operator_probabilities) {
+    stored.operator_probabilities.emplace_back(p.name, p.value);
+  }
+  stored.evaluations = record.evaluations;
+  stored.wall_s = record.wall_s;
+  stored.quarantined = static_cast<unsigned>(farm_.counts().quarantined - quarantined_);
+  quarantined_ = farm_.counts().quarantined;
+  stored.optimiser_state = record.optimiser_state;
+  const FitnessKind kind = problem_.fitness.kind;
+  for (const Member& member : record.members) {
+    StoredIndividual individual;
+    individual.birth_id = member.birth_id;
+    individual.genome = member.genome;
+    individual.values = readable_values(problem_, member.genome);
+    individual.outcome = v1::Outcome_Name(member.outcome);
+    if (member.outcome == v1::OK) individual.fitness = fitness_of_cost(kind, member.cost);
+    individual.scores = member.scores;
+    individual.parents = member.parents;
+    individual.operators = member.operators;
+    stored.individuals.push_back(std::move(individual));
+  }
+  summarise_fitness(stored, higher_is_better(kind));
+  const Result<std::string> digest = store_.commit(stored);
+  if (!digest) return digest.error();
+  progress_.on_generation(record, format_number(stored.best));
+  return {};
+}
+
+}  // namespace gapfarm

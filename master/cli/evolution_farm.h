@@ -1,0 +1,71 @@
+// Where the evolution loop meets the farm and the run store.
+#pragma once
+
+#include <string>
+
+#include "common/problem/problem.h"
+#include "master/cli/console.h"
+#include "master/evolve/evolve.h"
+#include "master/farm/socket_farm.h"
+#include "master/store/run_store.h"
+
+namespace gapfarm {
+
+// Keeps the store's live row and the terminal's progress line fresh, about once a second.
+class FarmProgressWriter {
+ public:
+  FarmProgressWriter(RunStore& store, const SocketFarm& farm, const EvolutionSettings& settings,
+                     const EvolveClock& clock, Console& console);
+
+  void on_progress(const FarmProgress& progress);
+  void on_generation(const GenerationRecord& record, const std::string& best);
+  const Progress& last() const { return last_; }
+
+ private:
+  void refresh(double now_s);
+
+  RunStore& store_;
+  const SocketFarm& farm_;
+  const EvolutionSettings& settings_;
+  const EvolveClock& clock_;
+  Console& console_;
+  double began_s_;
+  double written_s_ = -1e9;
+  std::uint64_t evaluations_before_ = 0;  // of this life of the master, generations done
+  std::uint64_t generations_ = 0;         // of this life of the master
+  std::uint64_t generation_ = 0;          // of the run
+  std::string best_;
+  Progress last_;
+};
+
+// Candidates to EvaluateTasks and back.
+class FarmBackend : public EvaluationBackend {
+ public:
+  FarmBackend(SocketFarm& farm, const Problem& problem, std::uint64_t seed,
+              FarmProgressWriter& progress);
+  Result<std::vector<Score>> evaluate(std::span<const Candidate> candidates) override;
+
+ private:
+  SocketFarm& farm_;
+  FitnessKind fitness_;
+  std::uint64_t seed_;
+  FarmProgressWriter& progress_;
+  std::string problem_hash_;
+};
+
+class StoreSink : public GenerationSink {
+ public:
+  StoreSink(RunStore& store, const Problem& problem, const SocketFarm& farm,
+            FarmProgressWriter& progress)
+      : store_(store), problem_(problem), farm_(farm), progress_(progress) {}
+  Status commit(const GenerationRecord& record) override;
+
+ private:
+  RunStore& store_;
+  const Problem& problem_;
+  const SocketFarm& farm_;
+  FarmProgressWriter& progress_;
+  std::uint64_t quarantined_ = 0;
+};
+
+}  // namespace gapfarm

@@ -1,0 +1,78 @@
+// gapfarm evolve CONFIG: evolve parameters against a trial log.
+#include <memory>
+
+#include "common/config/config.h"
+#include "master/cli/evolution.h"
+
+namespace gapfarm {
+namespace {
+
+struct EvolveCommand {
+  std::string config;
+  std::vector<std::string> trials;
+  std::string out;
+  std::optional<std::uint64_t> seed;
+  std::optional<std::uint64_t> shuffle;
+  EvolutionOverrides overrides;
+  FarmOptions farm;
+};
+
+RunInfo run_info(const Config& config, const EvolutionOverrides& overrides) {
+  const v1::Problem problem = to_proto(config.problem);
+  const FitnessKind kind = config.problem.fitness.kind;
+  RunInfo info;
+  info.config_path = config.path;
+  info.config_text = config.text;
+  info.overrides = overrides.to_json();
+  info.problem = serialise(problem);
+  info.problem_hash = problem_hash(problem);
+  info.seed = config.seed;
+  info.fitness = fitness_name(kind);
+  info.fitness_unit = kind == FitnessKind::kLogScore      ? "nats/trial"
+                      : kind == FitnessKind::kEnergyScore ? "m"
+                                                          : "-";
+  info.higher_is_better = higher_is_better(kind);
+  return info;
+}
+
+int run_evolve(const EvolveCommand& command, CliContext& context) {
+  Result<Config> config = read_config_and_trials(command.config, command.trials);
+  if (config) {
+    command.overrides.apply(config->evolution);
+    if (command.seed) config->seed = *command.seed;
+    if (Status s = check_evolvable(*config); !s) config = s.error();
+  }
+  if (!config) {
+    context.console.error(config.error());
+    return kExitBadUsage;
+  }
+  Result<RunStore> store = RunStore::create(command.out, run_info(*config, command.overrides));
+  if (!store) return failed(store.error(), context);
+  context.console.note(command.out + ": evolving " + std::to_string(config->problem.genes.size()) +
+                       " parameters on " + std::to_string(config->problem.log.trials.size()) +
+                       " trials, seed " + std::to_string(config->seed));
+  return run_evolution(*store, {*config, config->problem, command.farm, command.shuffle}, context);
+}
+
+}  // namespace
+
+SubcommandRun setup_evolve(CLI::App& app) {
+  auto command = std::make_shared<EvolveCommand>();
+  app.add_option("CONFIG", command->config, "Config file (TOML)")->required();
+  app.add_option("--trials", command->trials, "Trial logs in place of the config's");
+  app.add_option("--out", command->out, "Run folder to make")->required();
+  app.add_option("--seed", command->seed, "In place of the config's");
+  command->overrides.declare(app);
+  command->farm.declare(app, true);
+  app.add_option("--shuffle", command->shuffle,
+                 "Hand jobs out in an order shuffled by this seed; the results do not change");
+  app.footer(
+      "Examples:\n"
+      "  gapfarm evolve configs/demo.toml --out run/demo\n"
+      "  gapfarm evolve configs/srv1.toml --trials monday.csv tuesday.csv --out run/srv1\n"
+      "  gapfarm evolve configs/srv1.toml --trials log.csv --out run/big --workers 0 \\\n"
+      "      --listen tcp://0.0.0.0:5555     # then: gapfarm-worker --connect tcp://HOST:5555");
+  return [command](CliContext& context) { return run_evolve(*command, context); };
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,44 @@
+// What several subcommands read and start in the same way.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "common/base/result.h"
+#include "common/config/model.h"
+#include "common/config/settings.h"
+#include "master/cli/subcommand.h"
+#include "master/farm/socket_farm.h"
+
+namespace gapfarm {
+
+std::vector<std::string> command_names(const std::vector<CommandSpec>& commands);
+
+// A config with its trials read: those given, else the config's own.  Errors: neither names any
+// file, and whatever reading either finds.
+Result<Config> read_config_and_trials(const std::string& config_path,
+                                      const std::vector<std::string>& trial_files);
+
+// A model file, or the model.toml of a run folder.
+Result<Model> read_model_of(const std::string& run_or_model);
+
+// --workers, --listen and what goes with them.
+struct FarmOptions {
+  int workers = -1;  // -1: as the config says, else one a core
+  std::vector<std::string> listen;
+
+  void declare(CLI::App& app, bool remote);
+};
+
+unsigned local_workers(const FarmOptions& options, const FarmSettings& settings);
+
+// Starts the farm, or says why not.
+Result<std::unique_ptr<SocketFarm>> start_farm(const FarmOptions& options,
+                                               const FarmSettings& settings, CliContext& context,
+                                               SocketFarmOptions base = {});
+
+// 130 or 143 after a signal, else kExitFailed; the error is shown unless it was the user's wish.
+int failed(const Error& error, CliContext& context);
+
+}  // namespace gapfarm

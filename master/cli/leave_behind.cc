@@ -1,0 +1,83 @@
+#include "master/cli/leave_behind.h"
+
+#include <spdlog/fmt/fmt.h>
+
+#include "common/base/build_info.h"
+#include "common/config/model.h"
+#include "common/trials/files.h"
+#include "master/report/fitness_chart.h"
+#include "master/report/pose_panels.h"
+#include "master/report/pose_picture.h"
+#include "master/store/run_reader.h"
+
+namespace gapfarm {
+namespace {
+
+Model model_of(const RunStore& store, const Problem& problem, const Config& config,
+               const EvolveSummary& summary) {
+  Model model;
+  model.scenario = problem.scenario;
+  model.version = build_info().version;
+  model.fingerprint = build_info().fingerprint;
+  model.values = problem.values_of(summary.best->genome);
+  model.commands = problem.commands;
+  model.fitness = problem.fitness;
+  model.spread = problem.spread;
+  model.score = fitness_of_cost(problem.fitness.kind, summary.best->cost);
+  model.data = {store.info().problem_hash, problem.log.trials.size(), config.trial_files};
+  model.origin = {store.run().string(), config.seed, summary.generations, summary.evaluations};
+  return model;
+}
+
+v1::Task predict_task(const Genome& genome) {
+  v1::Task task;
+  task.mutable_predict()->mutable_point()->mutable_genome()->Assign(genome.begin(), genome.end());
+  return task;
+}
+
+Status write_poses(const RunStore& store, const Problem& problem, const EvolveSummary& summary,
+                   Farm& farm) {
+  // As the config had them, and as evolved.
+  const auto results = farm.run(farm.add_problem(to_proto(problem)),
+                                {predict_task({}), predict_task(summary.best->genome)});
+  if (!results) return results.error();
+  std::vector<PredictionOfLog> predictions;
+  const char* const labels[] = {"before", "after"};
+  for (std::size_t i = 0; i < results->size(); ++i) {
+    if ((*results)[i].outcome() != v1::OK) continue;  // a nominal robot may fall over
+    predictions.push_back({labels[i], (*results)[i].predict()});
+  }
+  const std::string title = fmt::format(
+      "End poses seen from the start: {} measured trials, simulated before and after evolution",
+      problem.log.trials.size());
+  return write_file_atomically((store.run() / "poses.svg").string(),
+                               pose_picture(pose_panels(problem, predictions), title,
+                                            "Ellipses hold 90 % of the simulated positions"));
+}
+
+Status write_fitness(const RunStore& store) {
+  const auto reader = RunReader::open(store.run());
+  if (!reader) return reader.error();
+  const auto generations = reader->generations();
+  if (!generations) return generations.error();
+  std::vector<FitnessPoint> points;
+  for (const StoredGeneration& g : *generations) {
+    points.push_back({g.generation, g.best, g.median, g.worst});
+  }
+  const RunInfo& info = store.info();
+  return write_file_atomically((store.run() / "fitness.svg").string(),
+                               fitness_chart(points, "Fitness by generation", info.fitness,
+                                             info.fitness_unit, info.higher_is_better));
+}
+
+}  // namespace
+
+Status leave_behind(const RunStore& store, const Problem& problem, const Config& config,
+                    const EvolveSummary& summary, Farm& farm) {
+  const Model model = model_of(store, problem, config, summary);
+  if (Status s = write_model(model, (store.run() / "model.toml").string()); !s) return s;
+  if (Status s = write_poses(store, problem, summary, farm); !s) return s;
+  return write_fitness(store);
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,68 @@
+// gapfarm resume RUN: continue a run from its last generation, or from an earlier one.
+#include <memory>
+
+#include "common/config/config.h"
+#include "master/cli/evolution.h"
+
+namespace gapfarm {
+namespace {
+
+struct ResumeCommand {
+  std::string run;
+  std::optional<std::uint64_t> generation;
+  std::optional<std::uint64_t> shuffle;
+  EvolutionOverrides overrides;
+  FarmOptions farm;
+};
+
+// The run's config and problem as they were stored.
+Result<Config> stored_config(const RunInfo& info, const EvolutionOverrides& overrides) {
+  Result<Config> config = parse_config(info.config_text, info.config_path);
+  if (!config) return config.error();
+  v1::Problem message;
+  if (!message.ParseFromString(info.problem)) {
+    return Error{"the stored problem cannot be read; the run store is damaged"};
+  }
+  Result<Problem> problem = from_proto(message);
+  if (!problem) return problem.error();
+  config->problem = std::move(*problem);
+  config->seed = info.seed;
+  EvolutionOverrides all = EvolutionOverrides::from_json(info.overrides);
+  all.merge(overrides);
+  all.apply(config->evolution);
+  return config;
+}
+
+int run_resume(const ResumeCommand& command, CliContext& context) {
+  Result<RunStore> store = RunStore::open(command.run);
+  if (!store) return failed(store.error(), context);
+  const Result<Config> config = stored_config(store->info(), command.overrides);
+  if (!config) return failed(Error{command.run + ": " + config.error().message}, context);
+  if (command.generation) {
+    const auto kept = store->truncate_after(*command.generation);
+    if (!kept) return failed(kept.error(), context);
+    if (!kept->empty()) context.console.note("later generations are kept in " + kept->string());
+  }
+  return run_evolution(*store, {*config, config->problem, command.farm, command.shuffle}, context);
+}
+
+}  // namespace
+
+SubcommandRun setup_resume(CLI::App& app) {
+  auto command = std::make_shared<ResumeCommand>();
+  app.add_option("RUN", command->run, "Folder of the run")->required();
+  app.add_option("--generation", command->generation,
+                 "Continue after this generation; later ones are moved to a file of their own");
+  command->overrides.declare(app);
+  command->farm.declare(app, true);
+  app.add_option("--shuffle", command->shuffle,
+                 "Hand jobs out in an order shuffled by this seed; the results do not change");
+  app.footer(
+      "Examples:\n"
+      "  gapfarm resume run/demo\n"
+      "  gapfarm resume run/demo --generations 200    # evolve a finished run further\n"
+      "  gapfarm resume run/demo --generation 20      # from an earlier generation");
+  return [command](CliContext& context) { return run_resume(*command, context); };
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,170 @@
+// gapfarm simulate CONFIG|MODEL: make a trial log from a parameter set.
+#include <memory>
+
+#include "common/base/suggest.h"
+#include "common/config/config.h"
+#include "common/trials/files.h"
+#include "common/trials/read.h"
+#include "common/trials/write.h"
+#include "master/cli/inputs.h"
+#include "master/experiment/plan.h"
+
+namespace gapfarm {
+namespace {
+
+struct SimulateOptions {
+  std::string source;
+  std::string out;
+  std::string like;
+  std::vector<std::string> set;
+  std::optional<std::uint64_t> seed;
+  std::optional<unsigned> sessions, trials, chain;
+  std::vector<double> levels, durations;
+  std::vector<std::string> commands;
+  std::optional<double> path_interval_s;
+  FarmOptions farm;
+};
+
+// A config or a model as a config without trials.
+Result<Config> read_source(const std::string& path) {
+  const Result<std::string> text = read_text_file(path);
+  if (!text) return text.error();
+  if (!is_model(*text)) return parse_config(*text, path);
+  const Result<Model> model = parse_model(*text, path);
+  if (!model) return model.error();
+  Config config;
+  config.problem = problem_of(*model);
+  return config;
+}
+
+// "battery_sag.rate=0.01", "robot=wheels" into the problem's values.
+Status apply_setting(const std::string& setting, Problem& problem) {
+  const ParameterTable& table = problem.table();
+  const std::size_t equals = setting.find('=');
+  const std::string key = setting.substr(0, equals);
+  std::vector<std::string> known;
+  for (const Parameter& row : table.rows()) known.push_back(row.key);
+  const auto row = table.find(key);
+  if (!row || equals == std::string::npos) {
+    return Error{"--set " + setting + ": expected PARAMETER=VALUE" +
+                 (row ? "" : ", and there is no parameter '" + key + "'" + suggestion(key, known))};
+  }
+  const std::string text = setting.substr(equals + 1);
+  const std::vector<std::string>& choices = table[*row].choices;
+  const auto choice = std::find(choices.begin(), choices.end(), text);
+  double value = static_cast<double>(choice - choices.begin());
+  if (choice == choices.end() && !CLI::detail::lexical_cast(text, value)) {
+    return Error{"--set " + setting + ": '" + text + "' is not a number" +
+                 (choices.empty() ? "" : suggestion(text, choices))};
+  }
+  if (Status s = table.check(*row, value); !s)
+    return Error{"--set " + setting + ": " + s.error().message};
+  problem.values[*row] = value;
+  return {};
+}
+
+Status apply_options(const SimulateOptions& options, Config& config) {
+  SimulateSettings& s = config.simulate;
+  for (const std::string& setting : options.set) {
+    if (Status status = apply_setting(setting, config.problem); !status) return status;
+  }
+  if (options.seed) config.seed = *options.seed;
+  if (options.sessions) s.sessions = *options.sessions;
+  if (options.trials) s.trials_per_session = *options.trials;
+  if (options.chain) s.chain = *options.chain;
+  if (!options.levels.empty()) s.levels = options.levels;
+  if (!options.durations.empty()) s.durations_s = options.durations;
+  if (!options.commands.empty()) s.commands = options.commands;
+  if (options.path_interval_s) s.path_interval_s = *options.path_interval_s;
+  const std::vector<std::string> known = command_names(config.problem.commands);
+  for (const std::string& name : s.commands) {
+    if (std::find(known.begin(), known.end(), name) == known.end()) {
+      return Error{"unknown command '" + name + "'" + suggestion(name, known)};
+    }
+  }
+  return {};
+}
+
+Result<TrialLog> simulate(const SimulateOptions& options, const Config& config,
+                          CliContext& context) {
+  std::vector<std::vector<v1::PlannedTrial>> plan;
+  if (options.like.empty()) {
+    plan = draw_plan(config.problem, config.simulate, config.seed);
+  } else {
+    const std::vector<std::string> files = {options.like};
+    const Result<TrialLog> log = read_trial_files(files, command_names(config.problem.commands));
+    if (!log) return log.error();
+    plan = plan_of(config.problem, *log);
+  }
+  auto farm = start_farm(options.farm, config.farm, context);
+  if (!farm) return farm.error();
+  Problem problem = config.problem;
+  problem.log = {};
+  problem.genes.clear();
+  problem.fitness.kind = FitnessKind::kLogScore;
+  const std::string hash = (*farm)->add_problem(to_proto(problem));
+  const auto results =
+      (*farm)->run(hash, simulate_tasks(plan, {}, config.seed, config.simulate.path_interval_s));
+  if (!results) return results.error();
+  TrialLog log;
+  for (const v1::TaskResult& result : *results) {
+    if (result.outcome() != v1::OK) {
+      return Error{"the simulation ended with " + v1::Outcome_Name(result.outcome()) + " (" +
+                   result.message() + "); these parameters do not make a robot that drives"};
+    }
+    for (const v1::Trial& trial : result.simulate().trials())
+      log.trials.push_back(from_proto(trial));
+  }
+  return log;
+}
+
+int run_simulate(const SimulateOptions& options, CliContext& context) {
+  Result<Config> config = read_source(options.source);
+  if (config) {
+    if (Status s = apply_options(options, *config); !s) config = s.error();
+  }
+  if (!config) {
+    context.console.error(config.error());
+    return kExitBadUsage;
+  }
+  const Result<TrialLog> log = simulate(options, *config, context);
+  if (!log) return failed(log.error(), context);
+  if (options.out == "-") {
+    context.console.print(format_trials(*log));
+    return kExitDone;
+  }
+  if (Status s = write_trials(*log, options.out); !s) return failed(s.error(), context);
+  context.console.note(options.out + ": " + std::to_string(log->trials.size()) +
+                       " simulated trials, seed " + std::to_string(config->seed));
+  return kExitDone;
+}
+
+}  // namespace
+
+SubcommandRun setup_simulate(CLI::App& app) {
+  auto options = std::make_shared<SimulateOptions>();
+  app.add_option("CONFIG|MODEL", options->source, "What to simulate")->required();
+  app.add_option("--out", options->out, "Trial log to write; - for stdout")->required();
+  app.add_option("--like", options->like, "Repeat the plan of this trial log");
+  app.add_option("--set", options->set, "PARAMETER=VALUE, effects included; may repeat");
+  app.add_option("--seed", options->seed, "Of plan and noise");
+  app.add_option("--sessions", options->sessions, "Sessions")->check(CLI::Range(1, 10000));
+  app.add_option("--trials", options->trials, "Trials a session")->check(CLI::Range(1, 100000));
+  app.add_option("--chain", options->chain, "Trials between unrecorded moves")
+      ->check(CLI::Range(1, 100000));
+  app.add_option("--levels", options->levels, "Factors of the commands' duties")
+      ->check(CLI::Range(0.0, 1.0));
+  app.add_option("--durations", options->durations, "s")->check(CLI::Range(0.0, 60.0));
+  app.add_option("--commands", options->commands, "Only these commands");
+  app.add_option("--paths", options->path_interval_s, "s between samples of paths.csv; 0: none")
+      ->check(CLI::Range(0.0, 10.0));
+  options->farm.declare(app, false);
+  app.footer(
+      "Examples:\n"
+      "  gapfarm simulate configs/srv1.toml --out trials.csv --sessions 3 --trials 100\n"
+      "  gapfarm simulate run/demo/model.toml --out sag.csv --set battery_sag.rate=0.01\n"
+      "  gapfarm simulate configs/srv1.toml --like logs/trials.csv --out again.csv --seed 2");
+  return [options](CliContext& context) { return run_simulate(*options, context); };
+}
+
+}  // namespace gapfarm
