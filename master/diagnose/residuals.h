@@ -1,0 +1,65 @@
+// A trial log beside the base model's predictions: what every step of the diagnosis works on.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "common/pose/pose.h"
+#include "common/problem/problem.h"
+#include "common/score/fitness.h"
+#include "common/trials/context.h"
+
+namespace gapfarm {
+
+// How the two sides run against each other.
+enum class DriveKind { kStraight, kTurn, kWide };
+
+// Trials with the same command, duties and duration.
+struct Cell {
+  CommandSpec command;
+  DriveKind kind = DriveKind::kStraight;
+  double level = 1;  // duty over the command's own in the config
+  double path = 1;   // level times duration: what the motion grows with
+  int mirror = 1;    // -1 for the mirror image of the other one: backward, clockwise
+  std::size_t trials = 0;
+};
+
+// One trial as the regressions see it.  Vectors are (x, y, heading) in m, m, rad in the axes of the
+// predicted end.
+struct ResidualTrial {
+  std::size_t cell = 0;
+  std::size_t session = 0;  // index in order of appearance
+  std::size_t command = 0;  // of the problem
+  TrialContext context;
+  Pose X_WS, X_WE;          // measured
+  Pose X_WP;                // predicted measured end
+  Eigen::Vector3d residual = Eigen::Vector3d::Zero();
+  // Change of the predicted end for a unit change of each side's gain.
+  Eigen::Vector3d left = Eigen::Vector3d::Zero();
+  Eigen::Vector3d right = Eigen::Vector3d::Zero();
+};
+
+// Standard deviations of everything random, per trial.
+struct NoiseEstimate {
+  PoseNoise pose;           // of one reading
+  double drive_common = 0;  // of both sides' gain
+  double drive_side = 0;    // of each side's gain
+};
+
+// Covariance of the two readings in the predicted end's axes, without the drive's part.
+Eigen::Matrix3d reading_covariance(const ResidualTrial& trial, const PoseNoise& noise);
+// With it: common^2 (l + r)(l + r)' + side^2 (l l' + r r').
+Eigen::Matrix3d trial_covariance(const ResidualTrial& trial, const NoiseEstimate& noise);
+
+// Between the end reading of the trial before and the start reading of trial `i`, in the frame of
+// the first; only where the robot was not moved in between.
+struct ReadingGap {
+  std::size_t trial = 0;     // the one that starts after the gap
+  std::size_t previous = 0;
+  Eigen::Vector3d gap = Eigen::Vector3d::Zero();
+};
+std::vector<ReadingGap> reading_gaps(const TrialLog& log, const std::vector<TrialContext>& contexts);
+
+}  // namespace gapfarm
