@@ -157,15 +157,18 @@ void draw_measured_mark(Svg& svg, SvgPoint p, double theta) {
   svg.circle(p, 2.3, {.fill = kMeasured, .opacity = 0.7});
 }
 
-void draw_cloud(Svg& svg, const PoseCloud& cloud, const CloudLook& look, const Window& window) {
+// `heading_px`: length of the heading's line; longer ones below show beside shorter ones on top.
+void draw_cloud(Svg& svg, const PoseCloud& cloud, const CloudLook& look, double heading_px,
+                const Window& window) {
   std::vector<SvgPoint> outline;
   for (const SvgPoint& point : ellipse_mm(cloud)) outline.push_back(window.at(point.x, point.y));
   svg.polyline(outline, {.fill = look.colour, .opacity = 0.09}, true);
   svg.polyline(outline, {.stroke = "#ffffff", .stroke_width = 4, .opacity = 0.7}, true);
   svg.polyline(outline, {.stroke = look.colour, .stroke_width = 2, .dash = look.dash}, true);
   const SvgPoint p = window.at(1000 * cloud.mean.x, 1000 * cloud.mean.y);
-  svg.line(p, along(p, cloud.mean.theta, 22), {.stroke = "#ffffff", .stroke_width = 4.5});
-  svg.line(p, along(p, cloud.mean.theta, 21), {.stroke = look.colour, .stroke_width = 2.2});
+  svg.line(p, along(p, cloud.mean.theta, heading_px + 1),
+           {.stroke = "#ffffff", .stroke_width = 4.5});
+  svg.line(p, along(p, cloud.mean.theta, heading_px), {.stroke = look.colour, .stroke_width = 2.2});
   draw_mark(svg, p, look);
 }
 
@@ -183,7 +186,8 @@ void draw_panel(Svg& svg, const PosePanel& panel, SvgPoint corner) {
     draw_measured_mark(svg, window.at(x, y), pose.theta);
   }
   for (std::size_t i = 0; i < panel.clouds.size(); ++i) {
-    draw_cloud(svg, panel.clouds[i], kLooks[i % kPoseCloudStyles], window);
+    const double heading_px = 21 + 14 * static_cast<double>(panel.clouds.size() - 1 - i);
+    draw_cloud(svg, panel.clouds[i], kLooks[i % kPoseCloudStyles], heading_px, window);
   }
   svg.end_clip();
   std::string note = std::to_string(panel.measured.size()) + " trials";
