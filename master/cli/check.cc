@@ -4,13 +4,10 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <set>
-#include <thread>
-#include <tuple>
 
-#include "common/base/suggest.h"
 #include "common/config/config.h"
 #include "common/trials/context.h"
-#include "common/trials/read.h"
+#include "master/cli/inputs.h"
 #include "master/cli/subcommand.h"
 
 namespace gapfarm {
@@ -154,7 +151,7 @@ std::string describe(const Config& config, const Summary& summary, unsigned work
 
 int run_check(const CheckOptions& options, CliContext& context) {
   Console& console = context.console;
-  Result<Config> config = read_config(options.config);
+  const Result<Config> config = read_config_and_trials(options.config, options.trials);
   if (!config) {
     console.error(config.error());
     return kExitBadUsage;
@@ -163,28 +160,7 @@ int run_check(const CheckOptions& options, CliContext& context) {
     console.error(s.error());
     return kExitBadUsage;
   }
-  const std::vector<std::string>& files =
-      options.trials.empty() ? config->trial_files : options.trials;
-  if (files.empty()) {
-    console.error(Error{options.config + ": names no trial files; add them to the config or give "
-                                         "--trials FILE"});
-    return kExitBadUsage;
-  }
-  std::vector<std::string> commands;
-  for (const CommandSpec& command : config->problem.commands) commands.push_back(command.name);
-  Result<TrialLog> log = read_trial_files(files, commands);
-  if (!log) {
-    console.error(log.error());
-    return kExitBadUsage;
-  }
-  config->problem.log = std::move(*log);
-  const Result<Problem> sound = from_proto(to_proto(config->problem));
-  if (!sound) {
-    console.error(sound.error());
-    return kExitBadUsage;
-  }
-  const unsigned workers =
-      config->farm.workers.value_or(std::max(1u, std::thread::hardware_concurrency()));
+  const unsigned workers = local_workers({}, config->farm);
   const Summary summary = summarise(config->problem);
   console.print(options.json ? to_json(*config, summary, workers).dump(2) + "\n"
                              : describe(*config, summary, workers));
