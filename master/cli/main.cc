@@ -10,6 +10,7 @@ namespace {
 
 constexpr const char* kExamples =
     "Examples:\n"
+    "  gapfarm evolve configs/demo.toml --out run/demo\n"
     "  gapfarm check configs/srv1.toml --trials trials.csv\n"
     "  gapfarm import bbautotune logs/*.dat --out trials.csv\n"
     "  gapfarm status run/demo\n"
