@@ -46,18 +46,20 @@ struct Sizing {
   bool out_of_reach = false;
 };
 
+std::vector<std::string> effect_names(const ParameterTable& table) {
+  std::vector<std::string> names;
+  for (const Effect& effect : table.effects()) names.push_back(effect.name);
+  return names;
+}
+
+// REQUIRES: check_effects() accepts the names.
 std::vector<std::size_t> chosen_effects(const ParameterTable& table,
-                                        const std::vector<std::string>& names, Status& status) {
-  std::vector<std::string> known;
-  for (const Effect& effect : table.effects()) known.push_back(effect.name);
+                                        const std::vector<std::string>& names) {
+  const std::vector<std::string> known = effect_names(table);
   std::vector<std::size_t> chosen;
   for (const std::string& name : names.empty() ? known : names) {
     const auto found = std::find(known.begin(), known.end(), name);
-    if (found == known.end()) {
-      status = Error{"unknown effect '" + name + "'" + suggestion(name, known)};
-    } else {
-      chosen.push_back(static_cast<std::size_t>(found - known.begin()));
-    }
+    chosen.push_back(static_cast<std::size_t>(found - known.begin()));
   }
   return chosen;
 }
@@ -242,6 +244,15 @@ Design deal(const ParameterTable& table, const DesignSettings& settings, Drafts 
 
 }  // namespace
 
+Status check_effects(const ParameterTable& table, const std::vector<std::string>& names) {
+  const std::vector<std::string> known = effect_names(table);
+  for (const std::string& name : names) {
+    if (std::find(known.begin(), known.end(), name) != known.end()) continue;
+    return Error{"unknown effect '" + name + "'" + suggestion(name, known)};
+  }
+  return {};
+}
+
 Result<SizeLevel> size_level(const std::string& word) {
   if (word == "clear") return SizeLevel{word, 5};
   if (word == "subtle") return SizeLevel{word, 1.6};
@@ -274,13 +285,13 @@ std::map<std::string, double> draw_robot(const Problem& problem, Stream& stream)
 
 Result<Design> draw_design(const Problem& planned, const DesignSettings& settings, Farm& farm,
                            const DesignProgress& progress) {
-  Status known;
-  const auto effects = chosen_effects(planned.table(), settings.effects, known);
-  if (!known) return known.error();
+  const ParameterTable& table = planned.table();
+  if (Status s = check_effects(table, settings.effects); !s) return s.error();
+  const std::vector<std::size_t> effects = chosen_effects(table, settings.effects);
   Drafts drafts(planned, settings);
   draft_cases(settings, effects, drafts);
   if (Status s = search_strengths(planned, drafts, farm, progress); !s) return s.error();
-  return deal(planned.table(), settings, std::move(drafts));
+  return deal(table, settings, std::move(drafts));
 }
 
 std::vector<v1::Override> overrides_of(const ParameterTable& table, const Truth& truth) {

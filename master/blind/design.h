@@ -44,6 +44,9 @@ struct Design {
   std::vector<OutOfReach> out_of_reach;
 };
 
+// Error: an effect that the table does not have, with a suggestion.
+Status check_effects(const ParameterTable& table, const std::vector<std::string>& names);
+
 using DesignProgress =
     std::function<void(const std::string& what, std::size_t done, std::size_t total)>;
 

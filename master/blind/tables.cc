@@ -1,5 +1,6 @@
 #include "master/blind/tables.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <nlohmann/json.hpp>
@@ -207,6 +208,20 @@ std::string said_text(const ScoredCase& c) {
   return text;
 }
 
+// In the catalogue's order, the larger sizes first.
+std::vector<Truth> by_effect(std::vector<Truth> cases, const ParameterTable& table) {
+  const auto rank = [&table](const Truth& truth) {
+    if (truth.effects.empty()) return std::pair(table.size(), 0.0);
+    const TrueEffect& effect = truth.effects.front();
+    std::size_t e = 0;
+    while (e < table.effects().size() && table.effects()[e].name != effect.name) ++e;
+    return std::pair(e, -std::round(10 * effect.size));
+  };
+  std::stable_sort(cases.begin(), cases.end(),
+                   [&](const Truth& a, const Truth& b) { return rank(a) < rank(b); });
+  return cases;
+}
+
 std::string cases_markdown(const std::vector<ScoredCase>& cases) {
   std::string text = table_head(
       {"case", "kind", "level", "truth", "said", "right", "covered", "promised", "realised", "s"});
@@ -298,7 +313,7 @@ std::string format_design(const Design& design, const ParameterTable& table) {
   std::map<std::string, unsigned> kinds;
   std::string text = formatted("%-9s %-8s %-8s %6s  %s\n", "case", "kind", "level", "size",
                                "effect and parameters");
-  for (const Truth& truth : design.cases) {
+  for (const Truth& truth : by_effect(design.cases, table)) {
     ++kinds[case_kind_name(truth.kind)];
     for (const TrueEffect& effect : truth.effects) {
       text += formatted("%-9s %-8s %-8s %6.2f  ", truth.id.c_str(), case_kind_name(truth.kind),

@@ -40,6 +40,7 @@ std::string command_line() {
 }
 
 Result<DesignSettings> design_of(const BlindCheckOptions& options, const Config& config) {
+  if (Status s = check_effects(config.problem.table(), options.effects); !s) return s.error();
   DesignSettings design;
   design.effects = options.effects;
   for (const std::string& word : options.sizes) {

@@ -162,6 +162,49 @@ TEST(Design, SizesAreWhatWasAskedForAndShuffled) {
   EXPECT_NE(unknown.error().message.find("battery_sag"), std::string::npos);
 }
 
+// Mean r^T S^-1 r / 3 of the case's log, S of the robot without its effects.
+double residual_moment(const Config& config, const Truth& truth, bool with_effects, Farm& farm) {
+  Truth base = truth;
+  base.effects.clear();
+  const auto logs = simulate_cases(config, {with_effects ? truth : base}, {}, 0, farm);
+  EXPECT_TRUE(logs.ok());
+  Problem problem = config.problem;
+  problem.log = logs->front();
+  v1::Task task;
+  for (const v1::Override& o : overrides_of(problem.table(), base)) {
+    *task.mutable_predict()->mutable_point()->add_overrides() = o;
+  }
+  const auto results = farm.run(farm.add_problem(to_proto(problem)), {task});
+  v1::PredictResult measured = results->front().predict();
+  for (int i = 0; i < measured.predictions_size(); ++i) {
+    *measured.mutable_predictions(i)->mutable_end() =
+        to_proto(problem.log.trials[static_cast<std::size_t>(i)].X_WE);
+  }
+  return *size_of(results->front().predict(), measured, false) - 1;
+}
+
+TEST(Design, SizesShowInSimulatedResiduals) {
+  testing::WorkerFarm farm;
+  Config config = testing::small_config();
+  config.simulate.trials_per_session = 200;
+  const auto planned = planned_problem(config, {}, 5, farm);
+  ASSERT_TRUE(planned.ok());
+  DesignSettings settings;
+  settings.effects = {"marker_offset", "slip_events", "pose_latency", "pose_quantisation"};
+  settings.sizes = {{"clear", 5}};
+  settings.nulls = settings.pairs = settings.left_out = 0;
+  const auto design = draw_design(*planned, settings, farm);
+  ASSERT_TRUE(design.ok());
+  EXPECT_EQ(design->cases.size(), 4u);
+  for (const Truth& truth : design->cases) {
+    const double base = residual_moment(config, truth, false, farm);
+    const double with = residual_moment(config, truth, true, farm);
+    EXPECT_NEAR(base, 1, 0.15) << truth.effects[0].name;
+    // Rare events: some thirty of them carry the moment.
+    EXPECT_NEAR((with - base) / 4, 1, 0.4) << truth.effects[0].name;
+  }
+}
+
 TEST(SizeLevel, WordsAndNumbers) {
   EXPECT_EQ(size_level("clear")->size, 5);
   EXPECT_EQ(size_level("subtle")->size, 1.6);

@@ -1,0 +1,56 @@
+// gapfarm blind-check as a user runs it.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/integration/run_program.h"
+
+namespace gapfarm {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr const char* kConfig = R"(scenario = "srv1"
+[parameters]
+step_rate = 120
+[simulate]
+sessions = 2
+trials_per_session = 20
+)";
+
+TEST(BlindCheckCli, DryRunSaysHowStrongEffectsHaveToBe) {
+  const TemporaryFolder folder;
+  const Finished finished =
+      gapfarm_command({"blind-check", folder.write("c.toml", kConfig), "--dry-run", "--effects",
+                       "motor_asymmetry", "pose_quantisation", "--workers", "1"});
+  EXPECT_EQ(finished.exit_code, 0) << finished.err;
+  EXPECT_THAT(finished.out, HasSubstr("40 trials a case"));
+  EXPECT_THAT(finished.out, HasSubstr("motor_asymmetry ratio"));
+  EXPECT_THAT(finished.out, HasSubstr("4 single"));
+}
+
+TEST(BlindCheckCli, WrongUsageIsSaidBeforeAnythingIsRun) {
+  const TemporaryFolder folder;
+  const std::string config = folder.write("c.toml", kConfig);
+  const Finished no_out = gapfarm_command({"blind-check", config});
+  EXPECT_EQ(no_out.exit_code, 2);
+  EXPECT_THAT(no_out.err, HasSubstr("--out"));
+  const Finished unknown =
+      gapfarm_command({"blind-check", config, "--dry-run", "--effects", "batery_sag"});
+  EXPECT_EQ(unknown.exit_code, 2);
+  EXPECT_THAT(unknown.err, HasSubstr("battery_sag"));
+  const Finished size = gapfarm_command({"blind-check", config, "--dry-run", "--sizes", "huge"});
+  EXPECT_EQ(size.exit_code, 2);
+  EXPECT_THAT(size.err, HasSubstr("subtle"));
+}
+
+TEST(BlindCheckCli, ForeignFolderWithoutCasesIsNamed) {
+  const TemporaryFolder folder;
+  const Finished finished =
+      gapfarm_command({"blind-check", folder.write("c.toml", kConfig), "--out", folder / "out",
+                       "--foreign", folder / "nothing"});
+  EXPECT_EQ(finished.exit_code, 1);
+  EXPECT_THAT(finished.err, HasSubstr("nothing"));
+}
+
+}  // namespace
+}  // namespace gapfarm
