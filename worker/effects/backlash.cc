@@ -4,7 +4,8 @@
 namespace gapfarm::effects {
 namespace {
 
-// A side that has not moved yet in the session has no direction to differ from.
+// A side has no direction to differ from before its first command in the session, nor after an
+// unrecorded move: a hand that puts the robot down elsewhere turns its treads.
 void take_up(double travel, int last, SideState& side) {
   if (last != 0 && side.duty * last < 0) side.dead_travel_m += travel;
 }

@@ -7,11 +7,10 @@ namespace gapfarm::effects {
 namespace {
 
 // Lengths along y are logged p[0] times as long as along x; the geometric mean of the scales stays
-// 1, since a common scale is the base's speed.  The marker is seen by the same camera, so its
-// heading is the direction of its logged axis.
+// 1, since a common scale is the base's speed.  Headings are logged as they are: a tracker reads
+// them off the marker's own pattern, over a few centimetres.
 Pose scaled(const Pose& X, double x_scale, double y_scale) {
-  return {X.x * x_scale, X.y * y_scale,
-          std::atan2(y_scale * std::sin(X.theta), x_scale * std::cos(X.theta))};
+  return {X.x * x_scale, X.y * y_scale, X.theta};
 }
 
 Pose observe(EffectValues p, const Pose& X_WR) {

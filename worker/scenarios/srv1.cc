@@ -70,7 +70,10 @@ class Srv1Model : public ScenarioModel {
       const CommandSpec c = resolved_command(trial, problem.commands);
       driven.push_back({c.left, c.right, c.duration_s});
     }
-    const std::vector<TrialContext> contexts = trial_contexts(problem.log, driven);
+    std::vector<TrialContext> contexts = trial_contexts(problem.log, driven);
+    for (TrialContext& context : contexts) {
+      if (context.moved) context.last_left = context.last_right = 0;  // see backlash.cc
+    }
     for (std::size_t i = 0; i < driven.size(); ++i) {
       const Trial& trial = problem.log.trials[i];
       trials_.push_back({driven[i], contexts[i], command_index(trial.command), trial.X_WS});

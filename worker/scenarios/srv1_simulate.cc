@@ -48,7 +48,10 @@ class Session {
     stream_ = Stream({task_.stream().run_seed(), Purpose::kSimulation, task_.stream().generation(),
                       task_.stream().birth_id(), static_cast<std::uint64_t>(i)});
     const bool moved = planned.moved() || i == 0;
-    if (moved) situation_.X_WR = trial.X_WS;
+    if (moved) {
+      situation_.X_WR = trial.X_WS;
+      situation_.last_left = situation_.last_right = 0;  // see backlash.cc
+    }
     situation_.moved = moved;
     situation_.session_time_s = trial.t_s.value_or(0);
 
