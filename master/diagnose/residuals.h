@@ -33,8 +33,8 @@ struct ResidualTrial {
   std::size_t session = 0;  // index in order of appearance
   std::size_t command = 0;  // of the problem
   TrialContext context;
-  Pose X_WS, X_WE;          // measured
-  Pose X_WP;                // predicted measured end
+  Pose X_WS, X_WE;  // measured
+  Pose X_WP;        // predicted measured end
   Eigen::Vector3d residual = Eigen::Vector3d::Zero();
   // Change of the predicted end for a unit change of each side's gain.
   Eigen::Vector3d left = Eigen::Vector3d::Zero();
@@ -56,10 +56,11 @@ Eigen::Matrix3d trial_covariance(const ResidualTrial& trial, const NoiseEstimate
 // Between the end reading of the trial before and the start reading of trial `i`, in the frame of
 // the first; only where the robot was not moved in between.
 struct ReadingGap {
-  std::size_t trial = 0;     // the one that starts after the gap
+  std::size_t trial = 0;  // the one that starts after the gap
   std::size_t previous = 0;
   Eigen::Vector3d gap = Eigen::Vector3d::Zero();
 };
-std::vector<ReadingGap> reading_gaps(const TrialLog& log, const std::vector<TrialContext>& contexts);
+std::vector<ReadingGap> reading_gaps(const TrialLog& log,
+                                     const std::vector<TrialContext>& contexts);
 
 }  // namespace gapfarm

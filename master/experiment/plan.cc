@@ -85,8 +85,8 @@ std::vector<std::vector<v1::PlannedTrial>> plan_of(const Problem& problem, const
 }
 
 std::vector<v1::Task> simulate_tasks(const std::vector<std::vector<v1::PlannedTrial>>& plan,
-                                     const std::vector<v1::Override>& overrides,
-                                     std::uint64_t seed, double path_interval_s) {
+                                     const std::vector<v1::Override>& overrides, std::uint64_t seed,
+                                     double path_interval_s) {
   std::vector<v1::Task> tasks;
   for (std::size_t s = 0; s < plan.size(); ++s) {
     v1::Task task;

@@ -25,7 +25,7 @@ std::vector<std::vector<v1::PlannedTrial>> plan_of(const Problem& problem, const
 // One task a session of the plan, at parameter values that differ from the problem's in
 // `overrides`.
 std::vector<v1::Task> simulate_tasks(const std::vector<std::vector<v1::PlannedTrial>>& plan,
-                                     const std::vector<v1::Override>& overrides,
-                                     std::uint64_t seed, double path_interval_s);
+                                     const std::vector<v1::Override>& overrides, std::uint64_t seed,
+                                     double path_interval_s);
 
 }  // namespace gapfarm

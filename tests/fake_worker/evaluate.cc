@@ -1,9 +1,9 @@
 // worker/evaluate.h without Bullet: answers at once, or ends the process when told to.
+#include "worker/evaluate.h"
+
 #include <time.h>
 
 #include <cstdlib>
-
-#include "worker/evaluate.h"
 
 namespace gapfarm {
 namespace {

@@ -42,7 +42,8 @@ TEST(Prediction, NeutralEffectsChangeNothingToTheBit) {
   }
 }
 
-// Greatest distance (m, and rad taken alike) between predicted ends and simulating each trial alone.
+// Greatest distance (m, and rad taken alike) between predicted ends and simulating each trial
+// alone.
 double worst_sharing_error(const Problem& problem) {
   const v1::TaskResult result = predict(problem, true);
   Srv1Robot robot(problem.values);
