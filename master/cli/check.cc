@@ -160,6 +160,7 @@ int run_check(const CheckOptions& options, CliContext& context) {
     console.error(s.error());
     return kExitBadUsage;
   }
+  show_notes(config->problem.log, console);
   const unsigned workers = local_workers({}, config->farm);
   const Summary summary = summarise(config->problem);
   console.print(options.json ? to_json(*config, summary, workers).dump(2) + "\n"

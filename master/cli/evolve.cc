@@ -46,6 +46,7 @@ int run_evolve(const EvolveCommand& command, CliContext& context) {
     context.console.error(config.error());
     return kExitBadUsage;
   }
+  show_notes(config->problem.log, context.console);
   Result<RunStore> store = RunStore::create(command.out, run_info(*config, command.overrides));
   if (!store) return failed(store.error(), context);
   context.console.note(command.out + ": evolving " + std::to_string(config->problem.genes.size()) +

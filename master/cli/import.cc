@@ -9,6 +9,7 @@
 #include "common/trials/format.h"
 #include "common/trials/read.h"
 #include "common/trials/write.h"
+#include "master/cli/inputs.h"
 #include "master/cli/subcommand.h"
 
 namespace gapfarm {
@@ -77,6 +78,7 @@ int run_import(const ImportOptions& options, CliContext& context) {
     console.error(log.error());
     return kExitFailed;
   }
+  show_notes(*log, console);
   if (to_stdout) {
     console.print(format_trials(*log));
   } else if (Status s = write_trials(*log, options.out); !s) {

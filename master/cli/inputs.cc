@@ -33,6 +33,10 @@ Result<Config> read_config_and_trials(const std::string& config_path,
   return config;
 }
 
+void show_notes(const TrialLog& log, Console& console) {
+  for (const std::string& note : log.notes) console.note(note);
+}
+
 Result<Model> read_model_of(const std::string& run_or_model) {
   const std::filesystem::path path(run_or_model);
   std::error_code ignored;

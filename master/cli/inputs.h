@@ -20,6 +20,9 @@ std::vector<std::string> command_names(const std::vector<CommandSpec>& commands)
 Result<Config> read_config_and_trials(const std::string& config_path,
                                       const std::vector<std::string>& trial_files);
 
+// Tells the user what the readers left out of a log.
+void show_notes(const TrialLog& log, Console& console);
+
 // A model file, or the model.toml of a run folder.
 Result<Model> read_model_of(const std::string& run_or_model);
 

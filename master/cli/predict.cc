@@ -78,6 +78,7 @@ int run_predict(const PredictOptions& options, CliContext& context) {
     console.error(log.error());
     return kExitBadUsage;
   }
+  show_notes(*log, console);
   const auto predictions = options.mined.empty() ? predict_by_model(*model, *log, options, context)
                                                  : predict_by_log(*log, options);
   if (!predictions) return failed(predictions.error(), context);
