@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Installs the Debian 12 packages that gapfarm is built from.  Does nothing when all are there.
-#   scripts/setup.sh [--tests]     --tests: also what only the lint tests need
+#   scripts/setup.sh [--tests]     --tests: also what only the tests need (format, browser)
 set -euo pipefail
 
 packages=(
@@ -10,7 +10,9 @@ packages=(
   libspdlog-dev libsqlite3-dev libtomlplusplus-dev libzmq3-dev nlohmann-json3-dev
   protobuf-compiler
 )
-if [[ "${1:-}" == --tests ]]; then packages+=(clang-format); fi
+if [[ "${1:-}" == --tests ]]; then packages+=(chromium clang-format fonts-dejavu-core); fi
+# npm packs the report's plotting library at build time; without it reports fall back to plain SVG.
+if ! command -v npm >/dev/null; then packages+=(npm); fi
 
 missing=()
 for package in "${packages[@]}"; do
