@@ -1,0 +1,321 @@
+#include "master/diagnose/findings.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <map>
+#include <numbers>
+#include <set>
+
+#include "common/score/statistics.h"
+
+namespace gapfarm {
+namespace {
+
+constexpr int kSectors = 12;
+constexpr std::size_t kFewTrials = 60;
+constexpr double kFewInCell = 4;
+
+// How a parameter is told: the words around its value in a unit that people use.
+struct Telling {
+  const char* key;
+  double factor;
+  const char* unit;
+};
+
+struct EffectWords {
+  const char* sentence;  // %1, %2, ...: the tellings' values with their intervals
+  std::vector<Telling> parameters;
+};
+
+const std::map<std::string, EffectWords, std::less<>>& effect_words() {
+  constexpr double kDegrees = 180 / std::numbers::pi;
+  static const std::map<std::string, EffectWords, std::less<>> words = {
+      {"motor_asymmetry",
+       {"The right side runs faster than the left by %1", {{"ratio", 100, " %"}}}},
+      {"motor_deadband", {"Duty below %1 moves nothing and is lost above it", {{"duty", 1, ""}}}},
+      {"motor_lag", {"The motors follow their duty with a lag of %1", {{"tau", 1000, " ms"}}}},
+      {"timing_offset", {"The motors run longer than told by %1", {{"offset", 1000, " ms"}}}},
+      {"battery_sag", {"The battery loses %1 of its speed a minute", {{"rate", 100, " %"}}}},
+      {"backlash",
+       {"A side that changes direction first loses %1 of travel", {{"travel", 1000, " mm"}}}},
+      {"slip_events",
+       {"In %1 of the trials a side slips and loses up to %2 of its speed",
+        {{"probability", 100, " %"}, {"loss", 100, " %"}}}},
+      {"floor_tilt",
+       {"The floor falls by %1 toward %2",
+        {{"angle", 1000, " mrad"}, {"direction", kDegrees, " degrees"}}}},
+      {"floor_nap",
+       {"The floor has a nap that drags with %1 of the weight against %2",
+        {{"strength", 100, " %"}, {"direction", kDegrees, " degrees"}}}},
+      {"friction_patch",
+       {"A patch of floor around x = %2, y = %3 of radius %4 has %1 times the friction",
+        {{"ratio", 1, ""}, {"x", 1, " m"}, {"y", 1, " m"}, {"radius", 1000, " mm"}}}},
+      {"rolling_resistance", {"Rolling drags with %1 of the weight", {{"coefficient", 100, " %"}}}},
+      {"com_offset",
+       {"The centre of mass lies %1 ahead and %2 left of the treads' centre",
+        {{"x", 1000, " mm"}, {"y", 1000, " mm"}}}},
+      {"camera_aspect", {"The camera's y scale is %1 times its x scale", {{"ratio", 1, ""}}}},
+      {"camera_distortion",
+       {"The lens distorts radially with k1 = %1 about x = %2, y = %3",
+        {{"k1", 1, " 1/m^2"}, {"x", 1, " m"}, {"y", 1, " m"}}}},
+      {"camera_seam",
+       {"Beyond a seam at %1 the poses are shifted by %2 in x and %3 in y",
+        {{"position", 1, " m"}, {"offset_x", 1000, " mm"}, {"offset_y", 1000, " mm"}}}},
+      {"heading_offset",
+       {"The marker's heading is %1 to the left of the robot's", {{"angle", 1000, " mrad"}}}},
+      {"marker_offset",
+       {"The marker sits %1 ahead and %2 left of the turning centre",
+        {{"x", 1000, " mm"}, {"y", 1000, " mm"}}}},
+      {"pose_latency",
+       {"In %1 of the trials a pose is %2 old", {{"share", 100, " %"}, {"latency", 1000, " ms"}}}},
+      {"pose_quantisation", {"Positions are rounded to a grid of %1", {{"step", 1000, " mm"}}}}};
+  return words;
+}
+
+std::string told(const Estimate& e, double factor, const std::string& unit) {
+  std::string text = plain_number(factor * e.value) + unit;
+  if (!std::isfinite(e.lo) || !std::isfinite(e.hi) || !(e.lo < e.hi)) return text;
+  return text + " (" + plain_number(factor * e.lo) + " to " + plain_number(factor * e.hi) + ")";
+}
+
+const Estimate* find(const NamedEffect& effect, std::string_view key) {
+  for (const Estimate& e : effect.parameters) {
+    if (e.key == key) return &e;
+  }
+  return nullptr;
+}
+
+// Without the words of a table: "name with key value unit, ...".
+std::string plain_claim(const NamedEffect& effect) {
+  std::vector<std::string> values;
+  for (const Estimate& e : effect.parameters) {
+    values.push_back(e.key + " " + told(e, 1, e.unit.empty() || e.unit == "-" ? "" : " " + e.unit));
+  }
+  return "The data show " + effect.name + (values.empty() ? "" : " with " + listed(values));
+}
+
+std::string claim(const NamedEffect& effect) {
+  const auto found = effect_words().find(effect.name);
+  if (found == effect_words().end()) return plain_claim(effect);
+  const EffectWords& words = found->second;
+  std::string text;
+  for (const char* c = words.sentence; *c != 0; ++c) {
+    if (*c != '%') {
+      text += *c;
+      continue;
+    }
+    const Telling& telling = words.parameters[static_cast<std::size_t>(*++c - '1')];
+    const Estimate* e = find(effect, telling.key);
+    if (e == nullptr) return plain_claim(effect);
+    text += told(*e, telling.factor, telling.unit);
+  }
+  return text;
+}
+
+std::string percent(double share) {
+  return std::to_string(std::lround(100 * std::clamp(share, 0.0, 1.0))) + " %";
+}
+
+std::string counted(std::size_t count, const std::string& one, const std::string& many) {
+  return std::to_string(count) + " " + (count == 1 ? one : many);
+}
+
+std::vector<std::string> names_of(const Diagnosis& diagnosis) {
+  std::vector<std::string> names;
+  for (const NamedEffect& effect : diagnosis.effects) names.push_back(effect.name);
+  return names;
+}
+
+}  // namespace
+
+std::string plain_number(double value) {
+  if (!std::isfinite(value)) return "an unknown number";
+  char text[32];
+  const double size = std::abs(value);
+  if (size >= 1000 && size < 1e7) {
+    std::snprintf(text, sizeof text, "%.0f", value);
+  } else {
+    std::snprintf(text, sizeof text, "%.3g", value);
+  }
+  return std::string(text) == "-0" ? "0" : text;
+}
+
+std::string listed(std::span<const std::string> words, std::string_view last) {
+  std::string text;
+  for (std::size_t i = 0; i < words.size(); ++i) {
+    if (i > 0) text += i + 1 == words.size() ? " " + std::string(last) + " " : ", ";
+    text += words[i];
+  }
+  return text;
+}
+
+std::string effect_sentence(const NamedEffect& effect) {
+  std::string text = claim(effect);
+  if (std::isfinite(effect.closed) && effect.closed > 0) {
+    text += "; adding that closes " + percent(effect.closed) + " of the gap";
+  }
+  return text + ".";
+}
+
+std::string headline(const Diagnosis& diagnosis) {
+  const std::vector<std::string> names = names_of(diagnosis);
+  const double gap = diagnosis.gap.tuned - diagnosis.gap.floor;
+  const double closed = gap > 0 ? (diagnosis.gap.tuned - diagnosis.gap.final_) / gap : 0;
+  std::string where;
+  if (!diagnosis.unexplained.empty()) where = diagnosis.unexplained.front().text;
+  if (where.empty() && !diagnosis.where.empty()) where = diagnosis.where.front().text;
+  switch (diagnosis.verdict) {
+    case Verdict::kNone:
+      return "Nothing is missing that these data could show: the tuned model predicts them as well "
+             "as their own noise allows.";
+    case Verdict::kUnknown:
+      return "Something is missing from the simulation that no effect of the catalogue explains." +
+             (where.empty() ? "" : " " + where);
+    case Verdict::kEffect:
+      if (diagnosis.effects.size() == 1) return effect_sentence(diagnosis.effects.front());
+      return "The gap comes from " + listed(names) + "; adding them closes " + percent(closed) +
+             " of it.";
+    case Verdict::kEffectAndUnknown:
+      return "Adding " + listed(names) + " closes " + percent(closed) +
+             " of the gap, but something remains that no effect of the catalogue explains." +
+             (where.empty() ? "" : " " + where);
+  }
+  return "";
+}
+
+LogVariety log_variety(std::span<const ResidualTrial> trials, std::span<const Cell> cells,
+                       const TrialLog& log) {
+  LogVariety v;
+  v.trials = trials.size();
+  v.paths = log.has_paths();
+  for (const Trial& trial : log.trials) v.times = v.times || trial.t_s.has_value();
+  std::set<std::size_t> sessions, commands;
+  std::set<int> sectors;
+  std::set<long> durations, levels;
+  double x0 = INFINITY, x1 = -INFINITY, y0 = INFINITY, y1 = -INFINITY;
+  for (const ResidualTrial& t : trials) {
+    sessions.insert(t.session);
+    commands.insert(t.command);
+    durations.insert(std::lround(1000 * cells[t.cell].command.duration_s));
+    levels.insert(std::lround(1000 * cells[t.cell].level));
+    const double turn = (t.X_WS.theta + std::numbers::pi) / (2 * std::numbers::pi);
+    sectors.insert(static_cast<int>(std::floor(turn * kSectors)) % kSectors);
+    x0 = std::min(x0, t.X_WS.x), x1 = std::max(x1, t.X_WS.x);
+    y0 = std::min(y0, t.X_WS.y), y1 = std::max(y1, t.X_WS.y);
+    v.longest_min = std::max(v.longest_min, t.context.session_time_s / 60);
+    if (!t.context.moved) ++v.followers;
+  }
+  v.sessions = sessions.size();
+  v.commands = commands.size();
+  v.durations = durations.size();
+  v.levels = levels.size();
+  v.headings = sectors.size();
+  if (!trials.empty()) v.width_m = std::max(x1 - x0, y1 - y0);
+  std::vector<double> counts;
+  for (const Cell& cell : cells) {
+    if (cell.trials > 0) counts.push_back(double(cell.trials));
+  }
+  if (!counts.empty()) v.typical_cell = median(counts);
+  return v;
+}
+
+std::vector<std::string> lacking(const LogVariety& v) {
+  std::vector<std::string> lacks;
+  if (v.commands < 3) lacks.emplace_back("several commands");
+  if (v.durations < 2) lacks.emplace_back("several durations");
+  if (v.levels < 2) lacks.emplace_back("several levels");
+  if (v.headings < 4) lacks.emplace_back("several start headings");
+  if (v.width_m < 0.3) lacks.emplace_back("several start places");
+  if (v.followers == 0) lacks.emplace_back("trials that start where the one before ended");
+  if (!v.times) lacks.emplace_back("times");
+  if (!v.paths) lacks.emplace_back("paths");
+  return lacks;
+}
+
+std::string alias_sentence(std::string_view effect, std::span<const AliasReason> aliases,
+                           const LogVariety& variety) {
+  if (aliases.empty()) return "";
+  std::vector<std::string> names;
+  double least = 1;
+  for (const AliasReason& alias : aliases) {
+    names.push_back(alias.name);
+    least = std::min(least, std::abs(alias.cosine));
+  }
+  char cosine[16];
+  std::snprintf(cosine, sizeof cosine, "%.2f", std::floor(100 * least) / 100);
+  std::string text = "In these data " + std::string(effect) + " and " + listed(names, "or") +
+                     " change the end poses alike (|cos| " +
+                     (aliases.size() > 1 ? "at least " : "") + cosine + " after retuning the base)";
+  const std::vector<std::string> lacks = lacking(variety);
+  if (!lacks.empty()) text += "; the log lacks " + listed(lacks);
+  return text + ".";
+}
+
+std::vector<std::string> cautions(std::span<const ResidualTrial> trials,
+                                  std::span<const Cell> cells, const TrialLog& log) {
+  const LogVariety v = log_variety(trials, cells, log);
+  std::vector<std::string> text;
+  if (v.trials < kFewTrials) {
+    text.push_back("There " + std::string(v.trials == 1 ? "is " : "are ") +
+                   counted(v.trials, "trial", "trials") + "; below " + std::to_string(kFewTrials) +
+                   " only large effects show, and no claim is sure.");
+  }
+  if (v.trials == 0) return text;
+  if (v.typical_cell < kFewInCell) {
+    text.push_back("Most conditions were driven " +
+                   (v.typical_cell <= 1 ? std::string("once")
+                                        : "about " + plain_number(v.typical_cell) + " times") +
+                   ", so what repeating one varies by is hardly known, and noise may pass for an "
+                   "effect or hide one.");
+  }
+  if (v.sessions == 1) {
+    text.emplace_back(
+        "All trials are of one session: what would differ in another session cannot "
+        "be seen, and held-out trials are from the same one.");
+  }
+  if (v.commands == 1) {
+    text.push_back("All trials drive one command (" + cells[trials.front().cell].command.name +
+                   "): effects that differ between straight drives and turns cannot be told "
+                   "apart.");
+  }
+  if (v.durations == 1) {
+    text.emplace_back(
+        "Every command lasts equally long: motor_lag, timing_offset and backlash look "
+        "like another speed.");
+  }
+  if (v.levels == 1) {
+    text.emplace_back(
+        "Every command runs at one level: motor_deadband and rolling_resistance look "
+        "like another speed.");
+  }
+  if (v.headings < 4) {
+    text.push_back("All trials start in " + counted(v.headings, "direction", "directions") +
+                   " (of twelve): floor_tilt, floor_nap and camera_aspect need several headings.");
+  }
+  if (v.width_m < 0.3) {
+    text.push_back("All starts lie within " + plain_number(1000 * v.width_m) +
+                   " mm: friction_patch, camera_seam and camera_distortion need several places.");
+  }
+  if (v.followers == 0) {
+    text.emplace_back(
+        "No trial starts where the one before ended: backlash, a stale start pose and "
+        "the noise of one reading cannot be seen.");
+  }
+  if (!v.times) {
+    text.emplace_back(
+        "The log has no times; they were guessed from the order of the trials, so the "
+        "rate of battery_sag is rough.");
+  } else if (v.longest_min < 3) {
+    text.push_back("The longest session lasts " + plain_number(v.longest_min) +
+                   " minutes: battery_sag needs longer ones.");
+  }
+  if (!v.paths) {
+    text.emplace_back(
+        "Start and end poses only: what happens on the way (motor_lag, the moment at "
+        "which a pose was read) shows only by where the robot ends.");
+  }
+  return text;
+}
+
+}  // namespace gapfarm

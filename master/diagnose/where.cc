@@ -1,0 +1,496 @@
+#include "master/diagnose/where.h"
+
+#include <algorithm>
+#include <boost/math/distributions/binomial.hpp>
+#include <boost/math/distributions/chi_squared.hpp>
+#include <cassert>
+#include <cmath>
+#include <functional>
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+
+#include "common/score/statistics.h"
+#include "master/diagnose/findings.h"
+#include "master/diagnose/trend_test.h"
+
+namespace gapfarm {
+namespace {
+
+using boost::math::cdf;
+using boost::math::complement;
+
+constexpr double kOutlierSds = 3.2905;  // square root of the 0.999 quantile of chi2, 1 dof
+constexpr double kOutlierShare = 0.001;
+constexpr double kTrialsForCells = 4;  // a cell, on average, for cell means to be worth their cost
+constexpr std::size_t kFewestTrials = 8;
+constexpr double kClearMotion = 5;  // s.d.s of the end by which a unit gain must move it
+constexpr int kMostRounds = 12;     // dependences taken out of one component
+const char* const kComponents[] = {"x", "y", "theta"};
+
+struct Covariate {
+  std::string name;
+  Eigen::MatrixXd columns = {};  // of all trials
+  bool with_motion = false;      // multiplied by the path
+  bool within_cells = true;
+  double unit = 1;        // of the sentence, in units of the column
+  std::string each = {};  // "with every minute of the session"; empty: no slope to tell
+};
+
+// One component of one selection of trials.
+struct Selection {
+  std::string command;
+  int component = 0;
+  bool along_motion = false;  // signs turned so that positive is too much motion
+  std::vector<std::size_t> trials;
+  std::vector<double> sign;
+};
+
+std::string plural(const std::string& command) {
+  static const std::map<std::string, std::string> kWords = {
+      {"all", "All motions"},
+      {"forward", "Forward drives"},
+      {"backward", "Backward drives"},
+      {"turn_ccw", "Counter-clockwise turns"},
+      {"turn_cw", "Clockwise turns"},
+      {"wide_ccw", "Wide counter-clockwise arcs"},
+      {"wide_cw", "Wide clockwise arcs"}};
+  const auto found = kWords.find(command);
+  return found != kWords.end() ? found->second : "Trials of " + command;
+}
+
+std::string quantity(double size, int component) {
+  return plain_number(std::abs(size)) + (component == 2 ? " mrad" : " mm");
+}
+
+// "end 3.1 mm too far to the left" or, as a trend, "end 3.1 mm farther to the left".
+std::string deviation(const Selection& s, double size, bool trend) {
+  const std::string much = quantity(size, s.component);
+  const bool positive = size > 0;
+  if (s.along_motion) {
+    const std::string verb = s.component == 2 ? "turn " : "travel ";
+    if (trend) return verb + much + (positive ? " more" : " less");
+    return verb + much + (positive ? " too far" : " too little");
+  }
+  const std::string far = trend ? "farther" : "too far";
+  if (s.component == 0) return "end " + much + " " + far + (positive ? " ahead" : " back");
+  const std::string side = positive ? "left" : "right";
+  if (s.component == 1) return "end " + much + " " + far + " to the " + side;
+  return "end turned " + much + " " + far + " to the " + side;
+}
+
+std::string meaning(int component) {
+  if (component == 2) return "heading";
+  return component == 0 ? "end along its heading" : "end across its heading";
+}
+
+std::vector<double> middle(std::span<const ResidualTrial> trials) {
+  double x0 = INFINITY, x1 = -INFINITY, y0 = INFINITY, y1 = -INFINITY;
+  for (const ResidualTrial& t : trials) {
+    x0 = std::min(x0, t.X_WS.x), x1 = std::max(x1, t.X_WS.x);
+    y0 = std::min(y0, t.X_WS.y), y1 = std::max(y1, t.X_WS.y);
+  }
+  return {(x0 + x1) / 2, (y0 + y1) / 2};
+}
+
+class Looker {
+ public:
+  Looker(std::span<const ResidualTrial> trials, std::span<const Eigen::Vector3d> residuals,
+         std::span<const Eigen::Matrix3d> covariances, std::span<const Cell> cells)
+      : trials_(trials),
+        residuals_(residuals),
+        covariances_(covariances),
+        cells_(cells),
+        left_(residuals.begin(), residuals.end()),
+        spent_(residuals.size(), Eigen::Vector3d::Zero()) {
+    double squares = 0;
+    for (std::size_t i = 0; i < trials.size(); ++i) {
+      for (int k = 0; k < 3; ++k) squares += std::pow(residuals[i][k] / sd(i, k), 2);
+    }
+    const auto n = static_cast<double>(trials.size());
+    excess_ = std::max(squares - 3 * n, std::sqrt(6 * n));
+    add_covariates();
+  }
+
+  // All rows whose corrected p is at most `level`.
+  std::vector<Where> look(const Problem& problem, double level) {
+    std::vector<std::vector<Selection>> selections;
+    for (int k = 0; k < 3; ++k) selections.push_back(selections_of(k, problem));
+    for (const auto& component : selections) {
+      for (const Selection& s : component) looks_ += covariates_.size() + (s.along_motion ? 1 : 3);
+    }
+    for (const auto& component : selections) {
+      look_for_means(component, level);
+      look_at_scatter(component, level);
+    }
+    return std::move(rows_);
+  }
+
+ private:
+  double sd(std::size_t trial, int k) const { return std::sqrt(covariances_[trial](k, k)); }
+  double path(std::size_t trial) const { return cells_[trials_[trial].cell].path; }
+
+  void add(Covariate covariate, const std::function<std::vector<double>(std::size_t)>& values) {
+    const std::size_t width = values(0).size();
+    covariate.columns.resize(static_cast<Eigen::Index>(trials_.size()),
+                             static_cast<Eigen::Index>(width));
+    for (std::size_t i = 0; i < trials_.size(); ++i) {
+      const std::vector<double> row = values(i);
+      for (std::size_t j = 0; j < width; ++j) {
+        covariate.columns(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) = row[j];
+      }
+    }
+    covariate.columns.rowwise() -= covariate.columns.colwise().mean().eval();
+    covariates_.push_back(std::move(covariate));
+  }
+
+  void add_covariates() {
+    using V = std::vector<double>;
+    const auto& t = trials_;
+    const auto cell = [this](std::size_t i) -> const Cell& { return cells_[trials_[i].cell]; };
+    add({"time", {}, true, true, 60, "with every minute of the session"},
+        [&](std::size_t i) { return V{t[i].context.session_time_s}; });
+    add({"duration", {}, false, false, 1, "with every second that the command lasts"},
+        [&](std::size_t i) { return V{cell(i).command.duration_s}; });
+    add({"level", {}, false, false, 0.1, "with every tenth of the level"},
+        [&](std::size_t i) { return V{cell(i).level}; });
+    add({"place in run", {}, true, true, 1, "with every trial since the robot was put down"},
+        [&](std::size_t i) { return V{double(t[i].context.place_in_run)}; });
+    add({"direction change", {}}, [&](std::size_t i) {
+      return V{t[i].context.last_left * cell(i).command.left < 0 ? 1.0 : 0.0,
+               t[i].context.last_right * cell(i).command.right < 0 ? 1.0 : 0.0};
+    });
+    const char* const heading[] = {"start heading", "start heading, 2nd harmonic",
+                                   "start heading, 4th harmonic"};
+    for (int h = 0; h < 3; ++h) {
+      const int order = 1 << h;
+      add({heading[h], {}, true}, [&t, order](std::size_t i) {
+        return V{std::cos(order * t[i].X_WS.theta), std::sin(order * t[i].X_WS.theta)};
+      });
+    }
+    const V centre = middle(trials_);
+    add({"start x", {}, true, true, 0.1, "with every 100 mm that they start farther along x"},
+        [&](std::size_t i) { return V{t[i].X_WS.x - centre[0]}; });
+    add({"start y", {}, true, true, 0.1, "with every 100 mm that they start farther along y"},
+        [&](std::size_t i) { return V{t[i].X_WS.y - centre[1]}; });
+    add({"radius from the middle",
+         {},
+         true,
+         true,
+         0.1,
+         "with every 100 mm that they start farther from the arena's middle"},
+        [&](std::size_t i) {
+          return V{std::hypot(t[i].X_WS.x - centre[0], t[i].X_WS.y - centre[1])};
+        });
+    std::size_t sessions = 0;
+    for (const ResidualTrial& trial : t) sessions = std::max(sessions, trial.session + 1);
+    if (sessions > 1) {
+      add({"session", {}, true}, [&](std::size_t i) {
+        V one(sessions - 1, 0.0);
+        if (t[i].session > 0) one[t[i].session - 1] = 1;
+        return one;
+      });
+    }
+    add({"previous residual", {}}, [&](std::size_t i) {
+      const auto& before = t[i].context.previous;
+      if (!before || t[i].context.moved) return V{0, 0, 0};
+      const Eigen::Vector3d& r = residuals_[*before];
+      return V{r[0], r[1], r[2]};
+    });
+    add({"unrecorded move", {}, true, true, 1, "when the robot was put down by hand just before"},
+        [&](std::size_t i) { return V{t[i].context.moved ? 1.0 : 0.0}; });
+  }
+
+  std::vector<Selection> selections_of(int k, const Problem& problem) const {
+    Selection all{"all", k, false, {}, {}};
+    Selection motion{"all", k, true, {}, {}};
+    std::map<std::size_t, Selection> commands;
+    for (std::size_t i = 0; i < trials_.size(); ++i) {
+      const std::size_t c = trials_[i].command;
+      Selection& own =
+          commands.try_emplace(c, Selection{problem.commands[c].name, k, false, {}, {}})
+              .first->second;
+      for (Selection* s : {&all, &own}) {
+        s->trials.push_back(i);
+        s->sign.push_back(1);
+      }
+      const double moved = (trials_[i].left + trials_[i].right)[k];
+      if (std::abs(moved) < kClearMotion * sd(i, k)) continue;
+      motion.trials.push_back(i);
+      motion.sign.push_back(moved > 0 ? 1 : -1);
+    }
+    std::vector<Selection> some;
+    if (commands.size() > 1) some = {all, motion};
+    for (const auto& [c, own] : commands) some.push_back(own);
+    std::erase_if(some, [](const Selection& s) { return s.trials.size() < kFewestTrials; });
+    return some;
+  }
+
+  // The clearest dependence of the component is told and taken out, then the next clearest.
+  void look_for_means(const std::vector<Selection>& selections, double level) {
+    for (int round = 0; round < kMostRounds; ++round) {
+      std::optional<Found> best;
+      for (const Selection& s : selections) {
+        const View v = view(s);
+        const auto offer = [&](const Covariate* covariate, TrendTest test) {
+          if (test.dimensions == 0) return;
+          const bool clearer = !best || test.p < best->test.p ||
+                               (test.p == best->test.p && test.squares > best->test.squares);
+          if (clearer) best = Found{&s, covariate, std::move(test)};
+        };
+        const std::vector<int> none(s.trials.size(), -1);
+        offer(nullptr, trend_test(v.u, mean_column(s), v.scale, none));
+        for (const Covariate& c : covariates_) {
+          offer(&c,
+                trend_test(v.u, columns_of(c, s), v.scale, c.within_cells ? v.groups : v.commands));
+        }
+      }
+      if (!best || corrected(best->test.p) > level) return;
+      tell(*best);
+      const Selection& s = *best->selection;
+      // With the part that the cells' means took: covariates are centred over all trials.
+      const Eigen::VectorXd fitted =
+          (best->covariate == nullptr ? mean_column(s) : columns_of(*best->covariate, s)) *
+          best->test.coefficients;
+      for (std::size_t i = 0; i < s.trials.size(); ++i) {
+        left_[s.trials[i]][s.component] -= s.sign[i] * fitted[static_cast<Eigen::Index>(i)];
+        spent_[s.trials[i]][s.component] += best->test.dimensions / double(s.trials.size());
+      }
+    }
+  }
+
+  struct View {
+    Eigen::VectorXd u, scale;
+    std::vector<int> commands, groups;
+  };
+  struct Found {
+    const Selection* selection = nullptr;
+    const Covariate* covariate = nullptr;  // null: the mean
+    TrendTest test;
+  };
+
+  View view(const Selection& s) const {
+    const auto n = static_cast<Eigen::Index>(s.trials.size());
+    View v{Eigen::VectorXd(n), Eigen::VectorXd(n), {}, {}};
+    std::set<int> seen;
+    for (std::size_t i = 0; i < s.trials.size(); ++i) {
+      const std::size_t trial = s.trials[i];
+      const auto at = static_cast<Eigen::Index>(i);
+      v.scale[at] = sd(trial, s.component);
+      v.u[at] = s.sign[i] * left_[trial][s.component] / v.scale[at];
+      v.commands.push_back(static_cast<int>(trials_[trial].command));
+      v.groups.push_back(static_cast<int>(trials_[trial].cell));
+      seen.insert(v.groups.back());
+    }
+    if (double(n) < kTrialsForCells * double(seen.size())) v.groups = v.commands;
+    return v;
+  }
+
+  // Holm's step-down: the rows already told are not looked at again.
+  double corrected(double p) const {
+    return std::min(1.0, p * double(looks_ - std::min(looks_ - 1, rows_.size())));
+  }
+
+  // What a dependence that grows with the motion is multiplied by: the motion itself where signs
+  // are turned along it (m, m, rad for the whole of it), else the path.
+  double motion(const Selection& s, std::size_t trial) const {
+    const ResidualTrial& t = trials_[trial];
+    return s.along_motion ? std::abs((t.left + t.right)[s.component]) : path(trial);
+  }
+
+  double mean_motion(const Selection& s) const {
+    double sum = 0;
+    for (const std::size_t i : s.trials) sum += motion(s, i);
+    return sum / double(s.trials.size());
+  }
+
+  Eigen::MatrixXd columns_of(const Covariate& covariate, const Selection& s) const {
+    Eigen::MatrixXd columns(static_cast<Eigen::Index>(s.trials.size()), covariate.columns.cols());
+    for (std::size_t i = 0; i < s.trials.size(); ++i) {
+      columns.row(static_cast<Eigen::Index>(i)) =
+          covariate.columns.row(static_cast<Eigen::Index>(s.trials[i])) *
+          (covariate.with_motion ? motion(s, s.trials[i]) : 1.0);
+    }
+    return columns;
+  }
+
+  Eigen::MatrixXd mean_column(const Selection& s) const {
+    Eigen::MatrixXd column(static_cast<Eigen::Index>(s.trials.size()), 1);
+    for (std::size_t i = 0; i < s.trials.size(); ++i) {
+      column(static_cast<Eigen::Index>(i), 0) = s.along_motion ? motion(s, s.trials[i]) : 1.0;
+    }
+    return column;
+  }
+
+  void push(const Selection& s, const char* kind, const std::string& covariate, double size,
+            double squares, double p, std::string text) {
+    rows_.push_back({s.command, kComponents[s.component], kind, covariate, size,
+                     std::clamp(squares / excess_, 0.0, 1.0), corrected(p), std::move(text)});
+  }
+
+  void tell(const Found& found) {
+    const Selection& s = *found.selection;
+    if (found.covariate != nullptr) {
+      tell_trend(s, *found.covariate, found.test, view(s).scale);
+      return;
+    }
+    const double mean = 1000 * found.test.coefficients[0] * (s.along_motion ? mean_motion(s) : 1.0);
+    push(s, "bias", "", std::abs(mean), found.test.squares - 1, found.test.p,
+         plural(s.command) + " " + deviation(s, mean, false) + " on average.");
+  }
+
+  void tell_trend(const Selection& s, const Covariate& covariate, const TrendTest& test,
+                  const Eigen::VectorXd& scale) {
+    const Eigen::VectorXd fitted = test.fitted.cwiseProduct(scale);
+    const double size = 1000 * std::sqrt(fitted.squaredNorm() / double(fitted.size()));
+    double slope = 1000 * test.coefficients[0] * covariate.unit;
+    if (covariate.with_motion) slope *= mean_motion(s);
+    std::string text = plural(s.command) + " ";
+    if (!covariate.each.empty()) {
+      text += deviation(s, slope, true) + " " + covariate.each + ".";
+    } else {
+      text +=
+          "differ in " + meaning(s.component) + " by " + quantity(size, s.component) +
+          " (s.d.) with the " +
+          (covariate.name == "previous residual" ? "error of the trial before" : covariate.name) +
+          ".";
+    }
+    push(s, "trend", covariate.name, size, test.squares - test.dimensions, test.p, text);
+  }
+
+  // What is left about the means, apart from outliers.
+  struct Scatter {
+    Selection selection;
+    double count = 0, freedom = 0, squares = 0, wild = 0, variance = 0;
+    std::vector<double> beyond;  // sizes of the outliers, mm or mrad
+    double p_spread = 1, p_outliers = 1;
+  };
+
+  Scatter scatter_of(const Selection& s) const {
+    Scatter scatter;
+    scatter.selection = s;
+    const View v = view(s);
+    scatter.count = double(s.trials.size());
+    scatter.freedom =
+        scatter.count - double(std::set<int>(v.groups.begin(), v.groups.end()).size());
+    for (const std::size_t i : s.trials) scatter.freedom -= spent_[i][s.component];
+    scatter.variance = 1e6 * v.scale.squaredNorm();
+    // Outliers must not pull the means that they are judged by: they are put onto them.
+    Eigen::VectorXd clean = v.u, left;
+    double limit = 0;
+    for (int round = 0; round < 4; ++round) {
+      const Eigen::VectorXd means = group_means(clean, v.scale, v.groups);
+      left = v.u - means;
+      std::vector<double> sizes;
+      for (const double value : left) sizes.push_back(std::abs(value));
+      limit = kOutlierSds * std::max(1.0, 1.4826 * median(sizes));
+      for (Eigen::Index i = 0; i < left.size(); ++i) {
+        clean[i] = std::abs(left[i]) > limit ? means[i] : v.u[i];
+      }
+    }
+    for (Eigen::Index i = 0; i < left.size(); ++i) {
+      if (std::abs(left[i]) > limit) {
+        scatter.beyond.push_back(1000 * std::abs(left[i]) * v.scale[i]);
+        scatter.wild += left[i] * left[i] - 1;
+      } else {
+        scatter.squares += left[i] * left[i];
+      }
+    }
+    scatter.freedom -= double(scatter.beyond.size());
+    return scatter;
+  }
+
+  static void judge(Scatter& s) {
+    if (s.freedom < 4) return;
+    const boost::math::chi_squared law(s.freedom);
+    s.p_spread = std::min(1.0, 2 * std::min(cdf(law, s.squares), cdf(complement(law, s.squares))));
+    if (s.beyond.empty()) return;
+    s.p_outliers =
+        cdf(complement(boost::math::binomial(s.count, kOutlierShare), double(s.beyond.size()) - 1));
+  }
+
+  // The commands one by one, and all of them pooled; all when most of them scatter so.
+  void look_at_scatter(const std::vector<Selection>& selections, double level) {
+    std::vector<Scatter> single;
+    Scatter pooled;
+    for (const Selection& s : selections) {
+      if (s.command == "all") {
+        pooled.selection = s.along_motion ? pooled.selection : s;
+        continue;
+      }
+      single.push_back(scatter_of(s));
+      Scatter& one = single.back();
+      judge(one);
+      pooled.count += one.count;
+      pooled.freedom += one.freedom;
+      pooled.squares += one.squares;
+      pooled.wild += one.wild;
+      pooled.variance += one.variance;
+      pooled.beyond.insert(pooled.beyond.end(), one.beyond.begin(), one.beyond.end());
+    }
+    judge(pooled);
+    const bool several = single.size() > 1;
+    for (double Scatter::*p : {&Scatter::p_spread, &Scatter::p_outliers}) {
+      const auto clear = [&](const Scatter& s) { return corrected(s.*p) <= level; };
+      const auto count = std::count_if(single.begin(), single.end(), clear);
+      const bool most = 2 * static_cast<std::size_t>(count) > single.size();
+      if (several && clear(pooled) && (most || count == 0)) {
+        tell_scatter(pooled, p == &Scatter::p_spread);
+        continue;
+      }
+      for (const Scatter& s : single) {
+        if (clear(s)) tell_scatter(s, p == &Scatter::p_spread);
+      }
+    }
+  }
+
+  void tell_scatter(const Scatter& scatter, bool spread) {
+    const Selection& s = scatter.selection;
+    const std::string what = meaning(s.component);
+    if (!spread) {
+      const std::string of = std::to_string(std::lround(scatter.count));
+      push(s, "outliers", "", median(scatter.beyond), scatter.wild, scatter.p_outliers,
+           plural(s.command) + ": " + std::to_string(scatter.beyond.size()) + " of " + of +
+               " are far off in " + what + ", where " +
+               plain_number(kOutlierShare * scatter.count) + " would be by chance.");
+      return;
+    }
+    const double ratio = scatter.squares / scatter.freedom;
+    const double size =
+        std::sqrt(scatter.variance / scatter.count) * std::sqrt(std::abs(ratio - 1));
+    push(s, "spread", "", size, scatter.squares - scatter.freedom, scatter.p_spread,
+         plural(s.command) + " scatter " + plain_number(std::sqrt(ratio)) + " times as much in " +
+             what + " as the noise allows (" + quantity(size, s.component) +
+             (ratio > 1 ? " beyond it)." : " below it)."));
+  }
+
+  std::span<const ResidualTrial> trials_;
+  std::span<const Eigen::Vector3d> residuals_;
+  std::span<const Eigen::Matrix3d> covariances_;
+  std::span<const Cell> cells_;
+  double excess_ = 1;
+  std::vector<Covariate> covariates_;
+  std::vector<Eigen::Vector3d> left_;   // residuals without what was told
+  std::vector<Eigen::Vector3d> spent_;  // degrees of freedom that took
+  std::size_t looks_ = 0;
+  std::vector<Where> rows_;
+};
+
+}  // namespace
+
+std::vector<Where> where(std::span<const ResidualTrial> trials,
+                         std::span<const Eigen::Vector3d> residuals,
+                         std::span<const Eigen::Matrix3d> covariances, std::span<const Cell> cells,
+                         const Problem& problem, const WhereOptions& options) {
+  assert(trials.size() == residuals.size() && trials.size() == covariances.size());
+  if (trials.empty()) return {};
+  std::vector<Where> rows =
+      Looker(trials, residuals, covariances, cells).look(problem, options.level);
+  std::stable_sort(rows.begin(), rows.end(),
+                   [](const Where& a, const Where& b) { return a.share > b.share; });
+  if (rows.size() > options.most) rows.resize(options.most);
+  return rows;
+}
+
+}  // namespace gapfarm
