@@ -150,6 +150,44 @@ std::string listed(std::span<const std::string> words, std::string_view last) {
   return text;
 }
 
+std::string motions_of(const std::string& command) {
+  static const std::map<std::string, std::string> words = {
+      {"all", "All motions"},
+      {"forward", "Forward drives"},
+      {"backward", "Backward drives"},
+      {"turn_ccw", "Counter-clockwise turns"},
+      {"turn_cw", "Clockwise turns"},
+      {"wide_ccw", "Wide counter-clockwise arcs"},
+      {"wide_cw", "Wide clockwise arcs"}};
+  const auto found = words.find(command);
+  return found != words.end() ? found->second : "Trials of " + command;
+}
+
+std::string amount_words(double size, int component) {
+  return plain_number(std::abs(size)) + (component == 2 ? " mrad" : " mm");
+}
+
+std::string component_words(int component) {
+  if (component == 2) return "heading";
+  return component == 0 ? "end along its heading" : "end across its heading";
+}
+
+std::string deviation_words(int component, double size, bool along_motion, bool trend) {
+  const std::string much = amount_words(size, component);
+  const bool positive = size > 0;
+  if (along_motion) {
+    const std::string verb = component == 2 ? "turn " : "travel ";
+    const std::string aside = component == 1 ? " sideways" : "";
+    if (trend) return verb + much + (positive ? " more" : " less") + aside;
+    return verb + much + (positive ? " too far" : " too little") + aside;
+  }
+  const std::string far = trend ? "farther" : "too far";
+  if (component == 0) return "end " + much + " " + far + (positive ? " ahead" : " back");
+  const std::string side = positive ? "left" : "right";
+  if (component == 1) return "end " + much + " " + far + " to the " + side;
+  return "end turned " + much + " " + far + " to the " + side;
+}
+
 std::string effect_sentence(const NamedEffect& effect) {
   std::string text = claim(effect);
   if (std::isfinite(effect.closed) && effect.closed > 0) {

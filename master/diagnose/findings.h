@@ -18,6 +18,16 @@ std::string plain_number(double value);
 // "a", "a and b", "a, b and c".
 std::string listed(std::span<const std::string> words, std::string_view last = "and");
 
+// "Forward drives", "Clockwise turns"; "all": "All motions".
+std::string motions_of(const std::string& command);
+// "3.1 mm", "0.9 mrad": without its sign.  Components are 0, 1, 2 for x, y, theta here and below.
+std::string amount_words(double size, int component);
+// "heading", "end along its heading", "end across its heading".
+std::string component_words(int component);
+// "end 3.1 mm too far to the left" for a residual or, as a trend, "end 3.1 mm farther to the left";
+// along the motion "turn 0.9 mrad too little" or "turn 0.9 mrad less".
+std::string deviation_words(int component, double size, bool along_motion, bool trend);
+
 // "The battery loses 0.35 % of its speed a minute (0.31 to 0.4); adding that closes 88 % of the
 // gap."  Effects outside the catalogue, or without their parameters, are named with what is there.
 std::string effect_sentence(const NamedEffect& effect);

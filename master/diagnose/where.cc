@@ -47,42 +47,8 @@ struct Selection {
   std::vector<double> sign;
 };
 
-std::string plural(const std::string& command) {
-  static const std::map<std::string, std::string> kWords = {
-      {"all", "All motions"},
-      {"forward", "Forward drives"},
-      {"backward", "Backward drives"},
-      {"turn_ccw", "Counter-clockwise turns"},
-      {"turn_cw", "Clockwise turns"},
-      {"wide_ccw", "Wide counter-clockwise arcs"},
-      {"wide_cw", "Wide clockwise arcs"}};
-  const auto found = kWords.find(command);
-  return found != kWords.end() ? found->second : "Trials of " + command;
-}
-
-std::string quantity(double size, int component) {
-  return plain_number(std::abs(size)) + (component == 2 ? " mrad" : " mm");
-}
-
-// "end 3.1 mm too far to the left" or, as a trend, "end 3.1 mm farther to the left".
 std::string deviation(const Selection& s, double size, bool trend) {
-  const std::string much = quantity(size, s.component);
-  const bool positive = size > 0;
-  if (s.along_motion) {
-    const std::string verb = s.component == 2 ? "turn " : "travel ";
-    if (trend) return verb + much + (positive ? " more" : " less");
-    return verb + much + (positive ? " too far" : " too little");
-  }
-  const std::string far = trend ? "farther" : "too far";
-  if (s.component == 0) return "end " + much + " " + far + (positive ? " ahead" : " back");
-  const std::string side = positive ? "left" : "right";
-  if (s.component == 1) return "end " + much + " " + far + " to the " + side;
-  return "end turned " + much + " " + far + " to the " + side;
-}
-
-std::string meaning(int component) {
-  if (component == 2) return "heading";
-  return component == 0 ? "end along its heading" : "end across its heading";
+  return deviation_words(s.component, size, s.along_motion, trend);
 }
 
 std::vector<double> middle(std::span<const ResidualTrial> trials) {
@@ -337,7 +303,7 @@ class Looker {
     }
     const double mean = 1000 * found.test.coefficients[0] * (s.along_motion ? mean_motion(s) : 1.0);
     push(s, "bias", "", std::abs(mean), found.test.squares - 1, found.test.p,
-         plural(s.command) + " " + deviation(s, mean, false) + " on average.");
+         motions_of(s.command) + " " + deviation(s, mean, false) + " on average.");
   }
 
   void tell_trend(const Selection& s, const Covariate& covariate, const TrendTest& test,
@@ -346,12 +312,12 @@ class Looker {
     const double size = 1000 * std::sqrt(fitted.squaredNorm() / double(fitted.size()));
     double slope = 1000 * test.coefficients[0] * covariate.unit;
     if (covariate.with_motion) slope *= mean_motion(s);
-    std::string text = plural(s.command) + " ";
+    std::string text = motions_of(s.command) + " ";
     if (!covariate.each.empty()) {
       text += deviation(s, slope, true) + " " + covariate.each + ".";
     } else {
       text +=
-          "differ in " + meaning(s.component) + " by " + quantity(size, s.component) +
+          "differ in " + component_words(s.component) + " by " + amount_words(size, s.component) +
           " (s.d.) with the " +
           (covariate.name == "previous residual" ? "error of the trial before" : covariate.name) +
           ".";
@@ -447,11 +413,11 @@ class Looker {
 
   void tell_scatter(const Scatter& scatter, bool spread) {
     const Selection& s = scatter.selection;
-    const std::string what = meaning(s.component);
+    const std::string what = component_words(s.component);
     if (!spread) {
       const std::string of = std::to_string(std::lround(scatter.count));
       push(s, "outliers", "", median(scatter.beyond), scatter.wild, scatter.p_outliers,
-           plural(s.command) + ": " + std::to_string(scatter.beyond.size()) + " of " + of +
+           motions_of(s.command) + ": " + std::to_string(scatter.beyond.size()) + " of " + of +
                " are far off in " + what + ", where " +
                plain_number(kOutlierShare * scatter.count) + " would be by chance.");
       return;
@@ -460,9 +426,9 @@ class Looker {
     const double size =
         std::sqrt(scatter.variance / scatter.count) * std::sqrt(std::abs(ratio - 1));
     push(s, "spread", "", size, scatter.squares - scatter.freedom, scatter.p_spread,
-         plural(s.command) + " scatter " + plain_number(std::sqrt(ratio)) + " times as much in " +
-             what + " as the noise allows (" + quantity(size, s.component) +
-             (ratio > 1 ? " beyond it)." : " below it)."));
+         motions_of(s.command) + " scatter " + plain_number(std::sqrt(ratio)) +
+             " times as much in " + what + " as the noise allows (" +
+             amount_words(size, s.component) + (ratio > 1 ? " beyond it)." : " below it)."));
   }
 
   std::span<const ResidualTrial> trials_;

@@ -80,8 +80,10 @@ bool is_command(const Data& d, const ResidualTrial& t, const char* name) {
 
 TEST(Where, SaysNothingOfPureNoise) {
   int alarms = 0;
-  for (std::uint64_t seed = 0; seed < 20; ++seed) alarms += make_data(seed).look().empty() ? 0 : 1;
-  EXPECT_LE(alarms, 2);
+  for (std::uint64_t seed = 0; seed < 100; ++seed)
+    alarms += make_data(100 + seed).look().empty() ? 0 : 1;
+  RecordProperty("alarms", alarms);
+  EXPECT_LE(alarms, 4);  // one in a hundred is promised
 }
 
 TEST(Where, TellsTheBiasOfOneCommandInMillimetres) {
@@ -121,8 +123,8 @@ TEST(Where, FindsTheTrendOfASaggingBatteryInEveryMotion) {
   for (const Where& row : rows) {
     EXPECT_EQ(row.command, "all");
     EXPECT_EQ(row.covariate, "time") << row.text;
-    EXPECT_NE(row.text.find("less with every minute of the session"), std::string::npos)
-        << row.text;
+    EXPECT_NE(row.text.find("with every minute of the session"), std::string::npos);
+    EXPECT_NE(row.text.find(" less "), std::string::npos) << row.text;
   }
 }
 
