@@ -40,9 +40,11 @@ std::span<const Subcommand> subcommands();
 
 SubcommandRun setup_blind_check(CLI::App& app);
 SubcommandRun setup_check(CLI::App& app);
+SubcommandRun setup_diagnose(CLI::App& app);
 SubcommandRun setup_evolve(CLI::App& app);
 SubcommandRun setup_import(CLI::App& app);
 SubcommandRun setup_predict(CLI::App& app);
+SubcommandRun setup_report(CLI::App& app);
 SubcommandRun setup_resume(CLI::App& app);
 SubcommandRun setup_simulate(CLI::App& app);
 SubcommandRun setup_status(CLI::App& app);

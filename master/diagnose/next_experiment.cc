@@ -23,12 +23,14 @@ constexpr double kEarly_s = 30;
 constexpr double kLate_s = 1200;
 constexpr std::uint64_t kFewestTrials = 3;
 constexpr double kAlikeFromAnywhere = 0.7;  // least over mean divergence of the starts
+constexpr double kWorthTheTrouble = 1.5;    // divergence of a special way over the ordinary one's
 
 struct Design {
   CommandSpec command;
   double level = 1;
   Way way = Way::kManyStarts;
   std::vector<std::uint32_t> trials;  // of the synthetic log, to be predicted
+  std::uint32_t ordinary = 0;         // trial from the same start, early and after nothing
 };
 
 struct Experiment {
@@ -104,12 +106,15 @@ Experiment make_experiment(const Problem& problem, const NextExperimentOptions& 
   for (const CommandSpec& own : problem.commands) {
     for (const double duration : options.durations_s) {
       for (const double level : options.levels) {
+        std::uint32_t ordinary = 0;
         for (const Way way : {Way::kManyStarts, Way::kAfterOpposite, Way::kLate}) {
-          Design design{own, level, way, {}};
+          Design design{own, level, way, {}, 0};
           design.command.left *= level;
           design.command.right *= level;
           design.command.duration_s = duration;
           add_trials(starts, experiment, design);
+          if (way == Way::kManyStarts) ordinary = design.trials.front();
+          design.ordinary = ordinary;
           experiment.designs.push_back(std::move(design));
         }
       }
@@ -191,6 +196,11 @@ std::optional<Separation> separation(const Design& design, const Predictions& a,
     least = std::min(least, d);
   }
   const double mean = sum / static_cast<double>(design.trials.size());
+  // A special way has one start only; it must tell by what is special about it.
+  if (design.way != Way::kManyStarts) {
+    const std::uint32_t i = design.ordinary;
+    if (!a[i] || !b[i] || mean < kWorthTheTrouble * divergence(*a[i], *b[i])) return std::nullopt;
+  }
   const std::uint64_t needed = trials_needed(mean);
   if (needed > most) return std::nullopt;
   const bool many = design.trials.size() > 1 && least < kAlikeFromAnywhere * mean;

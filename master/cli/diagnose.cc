@@ -1,0 +1,164 @@
+// gapfarm diagnose CONFIG: where the gap lies, which effect causes it, how far it shrinks.
+#include "master/diagnose/diagnose.h"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <filesystem>
+#include <memory>
+#include <set>
+
+#include "common/base/build_info.h"
+#include "common/trials/files.h"
+#include "master/cli/inputs.h"
+#include "master/diagnose/diagnosis_json.h"
+#include "master/report/report_html.h"
+
+namespace gapfarm {
+namespace {
+
+struct DiagnoseCommand {
+  std::string config;
+  std::vector<std::string> trials;
+  std::string out;
+  std::string model;
+  std::vector<std::string> leave_out;
+  std::optional<std::uint64_t> seed;
+  FarmOptions farm;
+};
+
+Model model_of(const Config& config, const ParameterValues& values, const std::string& kind) {
+  Model model;
+  model.scenario = config.problem.scenario;
+  model.kind = kind;
+  model.version = build_info().version;
+  model.fingerprint = build_info().fingerprint;
+  model.values = values;
+  model.commands = config.problem.commands;
+  model.fitness = config.problem.fitness;
+  model.spread = config.problem.spread;
+  model.data = {problem_hash(to_proto(config.problem)), config.problem.log.trials.size(),
+                config.trial_files};
+  return model;
+}
+
+void add_provenance(const Config& config, const DiagnoseCommand& command, Diagnosis* diagnosis) {
+  auto& to = diagnosis->provenance;
+  const TrialLog& log = config.problem.log;
+  std::set<std::string> sessions;
+  for (const Trial& trial : log.trials) sessions.insert(trial.session);
+  to.emplace_back("config", config.path);
+  for (const std::string& file : config.trial_files) to.emplace_back("trials", file);
+  to.emplace_back("problem", problem_hash(to_proto(config.problem)));
+  to.emplace_back("trials read",
+                  fmt::format("{} in {} sessions", log.trials.size(), sessions.size()));
+  to.emplace_back("base model", command.model.empty() ? "tuned on this log" : command.model);
+  for (const std::string& effect : command.leave_out) {
+    to.emplace_back("left out of the catalogue", effect);
+  }
+  to.emplace_back("program", build_summary("gapfarm"));
+  to.emplace_back("seed", std::to_string(config.seed));
+}
+
+Status write_all(const Config& config, const DiagnoseCommand& command,
+                 const DiagnosisResult& result) {
+  const std::filesystem::path out(command.out);
+  std::error_code code;
+  std::filesystem::create_directories(out, code);
+  if (code) return Error{command.out + ": cannot make the folder: " + code.message()};
+  Model model = model_of(config, result.final_, "diagnosed");
+  model.intervals.resize(model.values.size());
+  for (std::size_t i = 0; i < result.intervals.size(); ++i) {
+    const auto& [lo, hi] = result.intervals[i];
+    if (lo < hi) model.intervals[i] = Interval{lo, hi};
+  }
+  if (Status s = write_model(model, (out / "model.toml").string()); !s) return s;
+  const Model tuned = model_of(config, result.tuned, "tuned");
+  if (Status s = write_model(tuned, (out / "tuned.toml").string()); !s) return s;
+  if (Status s =
+          write_file_atomically((out / "report.html").string(), report_html(result.diagnosis));
+      !s) {
+    return s;
+  }
+  // Last: whoever sees it sees the rest.
+  return write_file_atomically((out / "diagnosis.json").string(), to_json(result.diagnosis));
+}
+
+std::string summary(const Diagnosis& d) {
+  std::string text = d.headline + "\n";
+  for (const NamedEffect& e : d.effects) {
+    text += fmt::format("  {}: confidence {:.2f}, closes {:.0f} % [{:.0f}, {:.0f}] of the gap",
+                        e.name, e.confidence, 100 * e.closed, 100 * e.closed_lo, 100 * e.closed_hi);
+    for (const Estimate& p : e.parameters) {
+      text += fmt::format(", {} {:.4g} [{:.4g}, {:.4g}] {}", p.key, p.value, p.lo, p.hi, p.unit);
+    }
+    for (std::size_t i = 0; i < e.aliases.size(); ++i) {
+      text += (i == 0 ? "; not told from " : ", ") + e.aliases[i];
+    }
+    text += "\n";
+  }
+  text += fmt::format(
+      "  gap {:.3f} nats a trial tuned, {:.3f} final; {:.1f} mm and {:.1f} mrad tuned, {:.1f} and "
+      "{:.1f} final, {:.1f} and {:.1f} at the floor\n",
+      d.gap.tuned, d.gap.final_, d.position_mm.tuned, d.heading_mrad.tuned, d.position_mm.final_,
+      d.heading_mrad.final_, d.position_mm.floor, d.heading_mrad.floor);
+  for (const std::string& caution : d.cautions) text += "  note: " + caution + "\n";
+  return text;
+}
+
+Result<Config> read_inputs(const DiagnoseCommand& command) {
+  Result<Config> config = read_config_and_trials(command.config, command.trials);
+  if (!config) return config;
+  if (command.seed) config->seed = *command.seed;
+  if (!command.model.empty()) {
+    const Result<Model> model = read_model_of(command.model);
+    if (!model) return model.error();
+    config->problem.values = model->values;
+  }
+  config->problem.genes.clear();
+  config->problem.fitness.kind = FitnessKind::kLogScore;
+  return config;
+}
+
+int run_diagnose(const DiagnoseCommand& command, CliContext& context) {
+  const Result<Config> config = read_inputs(command);
+  if (!config) {
+    context.console.error(config.error());
+    return kExitBadUsage;
+  }
+  for (const std::string& note : config->problem.log.notes) context.console.note(note);
+  auto farm = start_farm(command.farm, config->farm, context);
+  if (!farm) return failed(farm.error(), context);
+  DiagnoseOptions options;
+  options.keep_base = !command.model.empty();
+  options.left_out = command.leave_out;
+  options.seed = config->seed;
+  options.on_stage = [&](const std::string& stage) { context.console.progress(stage); };
+  auto result = diagnose(**farm, config->problem, options);
+  context.console.clear_progress();
+  if (!result) return failed(result.error(), context);
+  add_provenance(*config, command, &result->diagnosis);
+  if (Status s = write_all(*config, command, *result); !s) return failed(s.error(), context);
+  context.console.print(summary(result->diagnosis));
+  context.console.note("left behind: " + command.out + "/report.html, diagnosis.json, model.toml");
+  return (*farm)->counts().quarantined > 0 ? kExitQuarantined : kExitDone;
+}
+
+}  // namespace
+
+SubcommandRun setup_diagnose(CLI::App& app) {
+  auto command = std::make_shared<DiagnoseCommand>();
+  app.add_option("CONFIG", command->config, "Config file (TOML)")->required();
+  app.add_option("--trials", command->trials, "Trial logs in place of the config's");
+  app.add_option("--out", command->out, "Folder for report, diagnosis and models")->required();
+  app.add_option("--model", command->model, "Base model (run or model.toml); default: tuned here");
+  app.add_option("--leave-out", command->leave_out, "Effects that the catalogue is to be without");
+  app.add_option("--seed", command->seed, "Of the bootstrap");
+  command->farm.declare(app, true);
+  app.footer(
+      "Examples:\n"
+      "  gapfarm diagnose configs/srv1.toml --trials log.csv --out diagnosis\n"
+      "  gapfarm diagnose configs/srv1.toml --trials log.csv --out d2 --model run/srv1");
+  return [command](CliContext& context) { return run_diagnose(*command, context); };
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,355 @@
+// Refits, figures and words.
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "common/random/stream.h"
+#include "common/score/density.h"
+#include "common/score/statistics.h"
+#include "master/diagnose/diagnose_steps.h"
+#include "master/diagnose/findings.h"
+#include "master/diagnose/next_experiment.h"
+#include "master/diagnose/where.h"
+
+namespace gapfarm {
+namespace {
+
+constexpr double kNormal90 = 1.645;
+constexpr int kBootstraps = 400;
+
+double mean_of(const std::vector<double>& values) {
+  double sum = 0;
+  for (double v : values) sum += v;
+  return values.empty() ? 0 : sum / static_cast<double>(values.size());
+}
+
+// Evidence to confidence: the least gain that names an effect is an even bet.
+double confidence_of(double gain) { return 1 / (1 + std::exp(-(gain - kLeastGain + 1.5))); }
+
+struct RootMeanSquare {
+  double position_mm = 0;
+  double heading_mrad = 0;
+};
+
+RootMeanSquare root_mean_square(const std::vector<Eigen::Vector3d>& residuals) {
+  double position = 0, heading = 0;
+  for (const Eigen::Vector3d& r : residuals) {
+    position += r.head<2>().squaredNorm() / static_cast<double>(residuals.size());
+    heading += r[2] * r[2] / static_cast<double>(residuals.size());
+  }
+  return {1e3 * std::sqrt(position), 1e3 * std::sqrt(heading)};
+}
+
+}  // namespace
+
+Overrides DiagnosisRun::start_of(std::size_t count) const {
+  Overrides at = study_.base;
+  for (std::size_t k = 0; k < count; ++k) {
+    std::vector<const Signature*> others;
+    for (const Signature& s : first_) others.push_back(&s);
+    for (std::size_t j = 0; j < chosen_.size(); ++j) {
+      if (j != k) others.push_back(&chosen_[j].candidate.signature);
+    }
+    const Regression explained = selector_->with(others);
+    for (const auto& [key, value] :
+         start_values(study_, explained, chosen_[k].candidate.signature)) {
+      at[problem_.table().row(key)] = value;
+    }
+  }
+  return at;
+}
+
+// Base alone, with the first effect, with the first two, ...: each fitted without nuisances, since
+// these are what a user's predictions will come from.
+Status DiagnosisRun::refit_nested() {
+  const Eigen::MatrixXd none(static_cast<Eigen::Index>(3 * study_.size()), 0);
+  for (std::size_t count = 0; count <= chosen_.size(); ++count) {
+    std::vector<Candidate> effects;
+    for (std::size_t k = 0; k < count; ++k) effects.push_back(chosen_[k].candidate);
+    const int rounds = options_.keep_base && count == 0 ? 0 : 2;
+    auto fit = fit_jointly(predictor_, study_, effects, start_of(count), none, rounds);
+    if (!fit) return fit.error();
+    nested_.push_back(std::move(*fit));
+  }
+  return {};
+}
+
+Status DiagnosisRun::refit() {
+  if (Status s = refit_nested(); !s) return s;
+  if (!chosen_.empty()) {
+    std::vector<Candidate> effects;
+    for (const ChosenEffect& c : chosen_) effects.push_back(c.candidate);
+    auto fit = fit_jointly(predictor_, study_, effects, nested_.back().at, nuisances_, 2);
+    if (!fit) return fit.error();
+    estimates_ = std::move(*fit);
+  }
+  const double share = problem_.fitness.outlier_share;
+  const std::vector<std::size_t> folds = folds_of(study_);
+  for (const JointFit& fit : nested_) {
+    nested_scores_.push_back(held_out_scores(study_, fit, folds, share));
+  }
+  floor_ = floor_score(study_, share);
+  return {};
+}
+
+void DiagnosisRun::spread_effects(Overrides* at) const {
+  const auto set = [&](const char* key, double value) { (*at)[problem_.table().row(key)] = value; };
+  (*at)[row_of(Srv1::kDriveNoiseCommon)] = study_.noise.drive_common;
+  (*at)[row_of(Srv1::kDriveNoiseSide)] = study_.noise.drive_side;
+  (*at)[row_of(Srv1::kPoseNoisePosition)] = std::max(1e-5, study_.noise.pose.position_m);
+  (*at)[row_of(Srv1::kPoseNoiseHeading)] = std::max(1e-5, study_.noise.pose.heading_rad);
+  for (const Signature& s : first_) {
+    for (const auto& [key, value] : s.fixed) set(key.c_str(), value);
+  }
+  if (slip_.gain > 0) {
+    set("slip_events.probability", std::clamp(slip_.probability, 0.0, 0.5));
+    set("slip_events.loss", std::clamp(slip_.loss, 0.0, 1.0));
+    (*at)[row_of(Srv1::kDriveNoiseCommon)] = slip_.noise.drive_common;
+    (*at)[row_of(Srv1::kDriveNoiseSide)] = slip_.noise.drive_side;
+  }
+}
+
+// Share of the explainable gap, with an interval from a bootstrap over the chains between
+// unrecorded moves, whose trials share a start.
+void DiagnosisRun::set_closed(NamedEffect* effect, const std::vector<double>& gained) const {
+  std::vector<std::vector<std::size_t>> chains;
+  for (std::size_t i = 0; i < study_.size(); ++i) {
+    if (chains.empty() || study_.trials[i].context.moved) chains.emplace_back();
+    chains.back().push_back(i);
+  }
+  const std::vector<double>& base = nested_scores_.front();
+  const auto share = [&](const std::vector<std::size_t>& drawn) {
+    double gain = 0, gap = 0;
+    for (std::size_t c : drawn) {
+      for (std::size_t i : chains[c]) {
+        gain += gained[i];
+        gap += floor_ - base[i];
+      }
+    }
+    return gap > 0 ? std::clamp(gain / gap, -1.0, 1.5) : 0.0;
+  };
+  std::vector<std::size_t> all(chains.size());
+  for (std::size_t c = 0; c < all.size(); ++c) all[c] = c;
+  effect->closed = share(all);
+  Stream stream({options_.seed, Purpose::kStatistics, 3, 0, 0});
+  std::vector<double> shares;
+  for (int b = 0; b < kBootstraps; ++b) {
+    for (std::size_t& c : all) c = stream.below(chains.size());
+    shares.push_back(share(all));
+  }
+  effect->closed_lo = quantile(shares, 0.05);
+  effect->closed_hi = quantile(shares, 0.95);
+}
+
+NamedEffect DiagnosisRun::named(std::size_t k, const JointFit& estimates) const {
+  const ChosenEffect& chosen = chosen_[k];
+  NamedEffect effect;
+  effect.name = chosen.candidate.signature.effect;
+  std::vector<AliasReason> reasons;
+  for (const Alias& alias : chosen.aliases) {
+    effect.aliases.push_back(alias.effect);
+    reasons.push_back({alias.effect, std::abs(alias.cosine)});
+  }
+  effect.alias_reason =
+      alias_sentence(effect.name, reasons, log_variety(study_.trials, study_.cells, problem_.log));
+  effect.confidence = confidence_of(chosen.candidate.gain);
+  for (const auto& [row, value] : estimates.at) {
+    const Parameter& p = problem_.table()[row];
+    if (p.effect != effect.name || p.kind != ParameterKind::kReal) continue;
+    Estimate e{p.key.substr(p.key.find('.') + 1), value, value, value, p.unit};
+    for (const FittedParameter& fitted : estimates.parameters) {
+      if (fitted.row != row) continue;
+      const double half = kNormal90 * fitted.standard_error * std::sqrt(scale_);
+      e.lo = value - half;
+      e.hi = value + half;
+    }
+    effect.parameters.push_back(e);
+  }
+  effect.gap_before = floor_ - mean_of(nested_scores_[k]);
+  effect.gap_after = floor_ - mean_of(nested_scores_[k + 1]);
+  std::vector<double> gained = nested_scores_[k + 1];
+  for (std::size_t i = 0; i < gained.size(); ++i) gained[i] -= nested_scores_[k][i];
+  set_closed(&effect, gained);
+  const RootMeanSquare after =
+      root_mean_square(held_out_residuals(study_, nested_[k + 1], folds_of(study_)));
+  effect.position_mm_after = after.position_mm;
+  effect.heading_mrad_after = after.heading_mrad;
+  effect.text = effect_sentence(effect);
+  return effect;
+}
+
+// Effects that widen the distribution rather than move it: their gain is that of the mixture.
+void DiagnosisRun::name_spread_effect(const std::string& name, double gain,
+                                      std::vector<Estimate> estimates) {
+  NamedEffect effect;
+  effect.name = name;
+  effect.confidence = confidence_of(gain);
+  effect.parameters = std::move(estimates);
+  const std::vector<NamedEffect>& before = result_.diagnosis.effects;
+  effect.gap_before =
+      before.empty() ? floor_ - mean_of(nested_scores_.front()) : before.back().gap_after;
+  const double per_trial = gain / static_cast<double>(study_.size());
+  effect.gap_after = effect.gap_before - per_trial;
+  set_closed(&effect, std::vector<double>(study_.size(), per_trial));
+  effect.text = effect_sentence(effect);
+  result_.diagnosis.effects.push_back(std::move(effect));
+}
+
+void DiagnosisRun::name_effects() {
+  std::vector<NamedEffect>& effects = result_.diagnosis.effects;
+  for (std::size_t k = 0; k < chosen_.size(); ++k) effects.push_back(named(k, *estimates_));
+  if (!first_.empty()) {
+    name_spread_effect(
+        "pose_latency", latency_.gain,
+        {{"latency", latency_.latency_s, 0.8 * latency_.latency_s, 1.25 * latency_.latency_s, "s"},
+         {"share", latency_.share, 0.7 * latency_.share, std::min(1.0, 1.4 * latency_.share),
+          "-"}});
+  }
+  if (slip_.gain > 0) {
+    name_spread_effect(
+        "slip_events", slip_.gain,
+        {{"probability", slip_.probability, 0.6 * slip_.probability, 1.6 * slip_.probability, "-"},
+         {"loss", slip_.loss, 0.7 * slip_.loss, 1.4 * slip_.loss, "-"}});
+  }
+  if (study_.quantum_m > 0) {
+    const double q = study_.quantum_m;
+    name_spread_effect("pose_quantisation", 0.02 * static_cast<double>(study_.size()) + 20,
+                       {{"step", q, 0.99 * q, 1.01 * q, "m"}});
+  }
+}
+
+void DiagnosisRun::fill_gap() {
+  Diagnosis& d = result_.diagnosis;
+  const std::vector<std::size_t> folds = folds_of(study_);
+  d.gap.tuned = floor_ - mean_of(nested_scores_.front());
+  d.gap.final_ = d.effects.empty() ? d.gap.tuned : d.effects.back().gap_after;
+  d.gap.floor = 0;
+  const RootMeanSquare tuned = root_mean_square(held_out_residuals(study_, nested_.front(), folds));
+  const RootMeanSquare last = root_mean_square(held_out_residuals(study_, nested_.back(), folds));
+  double position = 0, heading = 0;
+  for (const Eigen::Matrix3d& cov : study_.covariances()) {
+    position += (cov(0, 0) + cov(1, 1)) / static_cast<double>(study_.size());
+    heading += cov(2, 2) / static_cast<double>(study_.size());
+  }
+  d.position_mm = {tuned.position_mm, last.position_mm, 1e3 * std::sqrt(position)};
+  d.heading_mrad = {tuned.heading_mrad, last.heading_mrad, 1e3 * std::sqrt(heading)};
+}
+
+void DiagnosisRun::fill_trials() {
+  const JointFit& tuned = nested_.front();
+  const JointFit& last = nested_.back();
+  const std::vector<Eigen::Matrix3d> covariances = study_.covariances();
+  for (std::size_t i = 0; i < study_.size(); ++i) {
+    const ResidualTrial& t = study_.trials[i];
+    const Cell& cell = study_.cells[t.cell];
+    DiagnosedTrial to;
+    to.session = problem_.log.trials[i].session;
+    to.trial = problem_.log.trials[i].trial;
+    to.command = cell.command.name;
+    to.session_time_s = t.context.session_time_s;
+    to.duration_s = cell.command.duration_s;
+    to.level = cell.level;
+    to.place_in_run = t.context.place_in_run;
+    to.held_out = true;  // every trial's scores come from the other folds
+    to.X_WS = t.X_WS;
+    to.measured = between(t.X_WS, t.X_WE);
+    to.tuned = between(t.X_WS, tuned.ends[i]);
+    to.final_ = between(t.X_WS, last.ends[i]);
+    to.tuned_cov = to.final_cov = covariances[i];
+    to.tuned_residual = tuned.residuals[i];
+    to.final_residual = last.residuals[i];
+    to.tuned_score = nested_scores_.front()[i];
+    to.final_score = nested_scores_.back()[i];
+    result_.diagnosis.trials.push_back(std::move(to));
+  }
+}
+
+void DiagnosisRun::fill_values() {
+  const auto values_at = [&](Overrides at, bool with_effects) {
+    if (with_effects) {
+      spread_effects(&at);
+    } else {
+      at[row_of(Srv1::kDriveNoiseCommon)] = study_.noise.drive_common;
+      at[row_of(Srv1::kDriveNoiseSide)] = study_.noise.drive_side;
+      at[row_of(Srv1::kPoseNoisePosition)] = study_.noise.pose.position_m;
+      at[row_of(Srv1::kPoseNoiseHeading)] = study_.noise.pose.heading_rad;
+    }
+    ParameterValues values = problem_.values;
+    for (const auto& [row, value] : at) values[row] = value;
+    return values;
+  };
+  result_.tuned = values_at(nested_.front().at, false);
+  result_.final_ = values_at(nested_.back().at, true);
+  result_.intervals.assign(problem_.values.size(), {1, 0});
+  for (const NamedEffect& effect : result_.diagnosis.effects) {
+    for (const Estimate& e : effect.parameters) {
+      const std::size_t row = problem_.table().row(effect.name + "." + e.key);
+      const Parameter& p = problem_.table()[row];
+      if (e.lo < e.hi) result_.intervals[row] = {std::max(e.lo, p.lower), std::min(e.hi, p.upper)};
+    }
+  }
+}
+
+// Every named effect against its aliases, each at its best linear fit.
+Status DiagnosisRun::plan_next() {
+  for (std::size_t k = 0; k < chosen_.size(); ++k) {
+    if (chosen_[k].aliases.empty()) continue;
+    std::vector<const Signature*> others;
+    for (std::size_t j = 0; j < chosen_.size(); ++j) {
+      if (j != k) others.push_back(&chosen_[j].candidate.signature);
+    }
+    const Regression explained = selector_->with(others);
+    auto candidates = selector_->candidates(explained, {});
+    if (!candidates) return candidates.error();
+    Rivals rivals;
+    for (const Candidate& c : *candidates) {
+      const std::string& name = c.signature.effect;
+      const bool alias = std::any_of(chosen_[k].aliases.begin(), chosen_[k].aliases.end(),
+                                     [&](const Alias& a) { return a.effect == name; });
+      if (!alias && name != chosen_[k].candidate.signature.effect) continue;
+      Overrides at = study_.base;
+      for (const auto& [key, value] : start_values(study_, explained, c.signature)) {
+        at[problem_.table().row(key)] = value;
+      }
+      Rival rival{name, {}};
+      for (const auto& [row, value] : at) {
+        rival.overrides.emplace_back();
+        rival.overrides.back().set_parameter(static_cast<std::uint32_t>(row));
+        rival.overrides.back().set_value(value);
+      }
+      rivals.push_back(std::move(rival));
+    }
+    auto next = next_experiments(farm_, problem_, rivals);
+    if (!next) return next.error();
+    auto& to = result_.diagnosis.next;
+    to.insert(to.end(), next->begin(), next->end());
+  }
+  return {};
+}
+
+Status DiagnosisRun::report() {
+  name_effects();
+  fill_gap();
+  fill_trials();
+  fill_values();
+  Diagnosis& d = result_.diagnosis;
+  const std::vector<Eigen::Matrix3d> covariances = study_.covariances();
+  const auto look = [&](const std::vector<Eigen::Vector3d>& residuals) {
+    return where(study_.trials, residuals, covariances, study_.cells, problem_, {});
+  };
+  d.where = look(nested_.front().residuals);
+  const bool unexplained =
+      d.verdict == Verdict::kUnknown || d.verdict == Verdict::kEffectAndUnknown;
+  if (unexplained) d.unexplained = look(nested_.back().residuals);
+  d.cautions = cautions(study_.trials, study_.cells, problem_.log);
+  for (const Leftover& l : leftovers_) {
+    if (l.log10_p < kUnknownLog10P) {
+      d.cautions.push_back("What is left still depends on " + l.covariate + ".");
+    }
+  }
+  d.headline = headline(d);
+  return plan_next();
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,80 @@
+// The steps of diagnose(), each on what the ones before left in the run.
+#pragma once
+
+#include <chrono>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "master/diagnose/covariates.h"
+#include "master/diagnose/diagnose.h"
+#include "master/diagnose/distribution.h"
+#include "master/diagnose/estimate.h"
+#include "master/diagnose/selection.h"
+#include "master/diagnose/slip.h"
+#include "master/diagnose/study.h"
+#include "master/diagnose/verdict.h"
+
+namespace gapfarm {
+
+class DiagnosisRun {
+ public:
+  DiagnosisRun(Farm& farm, const Problem& problem, const DiagnoseOptions& options)
+      : problem_(problem), options_(options), farm_(farm), predictor_(farm, problem) {}
+
+  // Ends the stage before, if any, and begins one; "" only ends.
+  void stage(const std::string& name);
+
+  Status tune();
+  Status measure_noise();
+  Status screen();
+  void judge();
+  Status refit();
+  Status report();
+  DiagnosisResult take() { return std::move(result_); }
+
+ private:
+  bool left_out(const std::string& effect) const;
+  Status rebuild_nuisances();
+  Status look_for_latency();
+  void fill_screening(const std::vector<Candidate>& candidates);
+  void look_for_slip(const Regression& explained);
+  // Base and the first `count` chosen effects at their best linear fit.
+  Overrides start_of(std::size_t count) const;
+  void spread_effects(Overrides* at) const;
+  Status refit_nested();
+  void name_effects();
+  void name_spread_effect(const std::string& effect, double gain, std::vector<Estimate> estimates);
+  NamedEffect named(std::size_t k, const JointFit& estimates) const;
+  void set_closed(NamedEffect* effect, const std::vector<double>& gained) const;
+  Status plan_next();
+  void fill_gap();
+  void fill_trials();
+  void fill_values();
+
+  const Problem& problem_;
+  const DiagnoseOptions& options_;
+  Farm& farm_;
+  Predictor predictor_;
+  Study study_;
+  Eigen::MatrixXd nuisances_;
+  std::vector<CovariateBlock> blocks_;
+  std::unique_ptr<Regression> base_;  // nuisances only
+  std::unique_ptr<Selector> selector_;
+  LatencyFit latency_;
+  SlipFit slip_;
+  std::vector<Signature> first_;  // explained before anything else
+  std::vector<ChosenEffect> chosen_;
+  std::vector<Leftover> leftovers_;
+  std::vector<JointFit> nested_;                    // base, base + first effect, ...
+  std::optional<JointFit> estimates_;               // with nuisances: for values and intervals
+  std::vector<std::vector<double>> nested_scores_;  // held out, one a trial
+  double scale_ = 1;                                // leftover variance over the noise's
+  double floor_ = 0;
+  DiagnosisResult result_;
+  std::string stage_;
+  std::chrono::steady_clock::time_point began_;
+};
+
+}  // namespace gapfarm

@@ -1,0 +1,18 @@
+// Drive noise by maximum likelihood.
+#pragma once
+
+#include <Eigen/Core>
+#include <span>
+
+#include "master/diagnose/residuals.h"
+
+namespace gapfarm {
+
+// Robust maximum likelihood over the drive's two standard deviations (and the readings' two, with
+// `fit_pose`): squared distances beyond 14 count by their logarithm, so that rare events do not
+// pass for noise.  `residuals`: one a trial, m, m, rad.
+NoiseEstimate refit_drive_noise(std::span<const ResidualTrial> trials,
+                                std::span<const Eigen::Vector3d> residuals,
+                                const NoiseEstimate& start, bool fit_pose);
+
+}  // namespace gapfarm

@@ -1,0 +1,238 @@
+#include "master/diagnose/estimate.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+
+#include "common/score/density.h"
+
+namespace gapfarm {
+namespace {
+
+// Step of a finite difference in a parameter: a hundredth of its value, but no less than what the
+// catalogue's bounds make a small change.
+double step_of(const Parameter& row, double value) {
+  return std::max(0.01 * std::abs(value), 0.002 * (row.upper - row.lower) / 2);
+}
+
+std::vector<FittedParameter> parameters_of(const ParameterTable& table, const Overrides& start,
+                                           const std::vector<Candidate>& effects,
+                                           std::size_t* base_count) {
+  std::vector<FittedParameter> parameters;
+  for (const BaseParameter& p : tuned_base_parameters()) {
+    parameters.push_back({p.row, start.at(p.row), 0});
+  }
+  *base_count = parameters.size();
+  for (const Candidate& effect : effects) {
+    for (const auto& [row, value] : start) {
+      const Parameter& p = table[row];
+      // Where a seam runs is searched, not sloped: residuals jump as a trial changes sides.
+      const bool jumps = p.kind != ParameterKind::kReal || p.key == "camera_seam.position";
+      if (p.effect == effect.signature.effect && !jumps) parameters.push_back({row, value, 0});
+    }
+  }
+  return parameters;
+}
+
+// Predictions at `fit.at` and their derivatives.
+Status linearise(Predictor& predictor, const Study& study, JointFit* fit) {
+  const ParameterTable& table = predictor.problem().table();
+  std::vector<PredictionRequest> requests = {{fit->at, {}}};
+  std::vector<double> steps;
+  for (const FittedParameter& p : fit->parameters) {
+    const Parameter& row = table[p.row];
+    double step = step_of(row, p.value);
+    if (p.value + step > row.upper) step = -step;
+    Overrides moved = fit->at;
+    moved[p.row] = p.value + step;
+    requests.push_back({moved, {}});
+    steps.push_back(step);
+  }
+  const auto ends = predictor.ends(requests);
+  if (!ends) return ends.error();
+  fit->ends = ends->front();
+  fit->residuals.clear();
+  for (std::size_t i = 0; i < study.size(); ++i) {
+    fit->residuals.push_back(local_difference(fit->ends[i], study.trials[i].X_WE));
+  }
+  fit->jacobian.resize(static_cast<Eigen::Index>(3 * study.size()),
+                       static_cast<Eigen::Index>(fit->parameters.size()));
+  for (std::size_t k = 0; k < steps.size(); ++k) {
+    std::vector<Eigen::Vector3d> d;
+    for (std::size_t i = 0; i < study.size(); ++i) {
+      d.push_back(local_difference(fit->ends[i], (*ends)[k + 1][i]) / steps[k]);
+    }
+    fit->jacobian.col(static_cast<Eigen::Index>(k)) = study.whiten(d);
+  }
+  return {};
+}
+
+struct Normal {
+  Eigen::MatrixXd matrix;
+  Eigen::VectorXd right;
+};
+
+// Prior of the base parameters about the tuned base, in their own units.
+void add_prior(const Study& study, const JointFit& fit, Normal* normal) {
+  const std::vector<BaseParameter> base = tuned_base_parameters();
+  for (std::size_t k = 0; k < fit.base_parameters; ++k) {
+    const double sd = base[k].prior_log_sd * study.base.at(base[k].row);
+    const auto i = static_cast<Eigen::Index>(k);
+    normal->matrix(i, i) += 1 / (sd * sd);
+    normal->right[i] += (study.base.at(base[k].row) - fit.parameters[k].value) / (sd * sd);
+  }
+  // Keeps a direction that the data do not see where it is.
+  const double scale = normal->matrix.diagonal().maxCoeff();
+  normal->matrix.diagonal().array() += 1e-12 * scale;
+}
+
+// One step, with bounded weights for trials far out; fills in the standard errors.
+void step(const Problem& problem, const Study& study, const Eigen::MatrixXd& nuisances,
+          JointFit* fit) {
+  const Eigen::Index p = fit->jacobian.cols(), q = nuisances.cols();
+  Eigen::MatrixXd all(fit->jacobian.rows(), p + q);
+  all << fit->jacobian, nuisances;
+  Eigen::VectorXd z = study.whiten(fit->residuals);
+  Eigen::VectorXd weight(z.size());
+  for (Eigen::Index i = 0; i < z.size(); i += 3) {
+    const double d2 = z.segment<3>(i).squaredNorm();
+    weight.segment<3>(i).setConstant(d2 > 16 ? std::sqrt(16 / d2) : 1);
+  }
+  Normal normal{all.transpose() * weight.asDiagonal() * all,
+                all.transpose() * weight.asDiagonal() * z};
+  normal.matrix.diagonal().tail(q).array() += 1;
+  add_prior(study, *fit, &normal);
+  const Eigen::LDLT<Eigen::MatrixXd> factor(normal.matrix);
+  const Eigen::VectorXd delta = factor.solve(normal.right);
+  const Eigen::MatrixXd inverse = factor.solve(Eigen::MatrixXd::Identity(p + q, p + q));
+  for (Eigen::Index k = 0; k < p; ++k) {
+    FittedParameter& parameter = fit->parameters[static_cast<std::size_t>(k)];
+    const Parameter& row = problem.table()[parameter.row];
+    const double most = 0.3 * (row.upper - row.lower);
+    parameter.value =
+        std::clamp(parameter.value + std::clamp(delta[k], -most, most), row.lower, row.upper);
+    parameter.standard_error = std::sqrt(std::max(0.0, inverse(k, k)));
+    fit->at[parameter.row] = parameter.value;
+  }
+}
+
+double trial_score(const Study& study, std::size_t i, const Eigen::Vector3d& residual,
+                   double outlier_share) {
+  const auto cov = Covariance3::factorise(trial_covariance(study.trials[i], study.noise));
+  return cov ? log_predictive_density(residual, *cov, outlier_share) : -1e3;
+}
+
+}  // namespace
+
+std::map<std::string, double> start_values(const Study& study, const Regression& others,
+                                           const Signature& signature) {
+  // Coefficients of the columns, given everything else.
+  const Eigen::VectorXd data = others.left();
+  Eigen::MatrixXd columns = signature.columns;
+  const Eigen::MatrixXd normal = columns.transpose() * columns;
+  Eigen::MatrixXd ridged = normal;
+  ridged.diagonal() *= 1 + 1e-6;
+  const Eigen::VectorXd c = ridged.ldlt().solve(columns.transpose() * data);
+  std::map<std::string, double> values = signature.fixed;
+  const std::string& e = signature.effect;
+  if (e == "floor_tilt") {
+    values["floor_tilt.angle"] = std::hypot(c[0], c[1]);
+    values["floor_tilt.direction"] = std::atan2(c[1], c[0]);
+  } else if (e == "camera_distortion") {
+    const Eigen::Vector2d middle = middle_of(study);
+    const double k1 = std::abs(c[0]) > 1e-6 ? c[0] : 1e-6;
+    values["camera_distortion.k1"] = k1;
+    values["camera_distortion.x"] = middle.x() + std::clamp(c[1] / k1, -1.0, 1.0);
+    values["camera_distortion.y"] = middle.y() + std::clamp(c[2] / k1, -1.0, 1.0);
+  } else {
+    for (std::size_t k = 0; k < signature.parameters.size(); ++k) {
+      values[signature.parameters[k]] = c[static_cast<Eigen::Index>(k)];
+    }
+  }
+  if (e == "camera_aspect") values["camera_aspect.ratio"] += 1;
+  if (e == "camera_seam") {
+    // Slopes were about the middle; the catalogue's are about zero.
+    const Eigen::Vector2d middle = middle_of(study);
+    const double along = signature.fixed.at("camera_seam.axis") == 0 ? middle.y() : middle.x();
+    values["camera_seam.offset_x"] -= along * values["camera_seam.slope_x"];
+    values["camera_seam.offset_y"] -= along * values["camera_seam.slope_y"];
+  }
+  const ParameterTable& table = srv1_table();
+  for (auto& [key, value] : values) {
+    const Parameter& row = table[table.row(key)];
+    value = std::clamp(value, row.lower, row.upper);
+  }
+  return values;
+}
+
+Result<JointFit> fit_jointly(Predictor& predictor, const Study& study,
+                             const std::vector<Candidate>& effects, const Overrides& start,
+                             const Eigen::MatrixXd& nuisances, int rounds) {
+  JointFit fit;
+  fit.at = start;
+  fit.parameters = parameters_of(predictor.problem().table(), start, effects, &fit.base_parameters);
+  for (int round = 0; round < rounds; ++round) {
+    if (Status s = linearise(predictor, study, &fit); !s) return s.error();
+    step(predictor.problem(), study, nuisances, &fit);
+  }
+  if (Status s = linearise(predictor, study, &fit); !s) return s.error();
+  return fit;
+}
+
+std::vector<Eigen::Vector3d> held_out_residuals(const Study& study, const JointFit& fit,
+                                                const std::vector<std::size_t>& fold_of) {
+  const Eigen::VectorXd z = study.whiten(fit.residuals);
+  const std::size_t folds = 1 + *std::max_element(fold_of.begin(), fold_of.end());
+  Eigen::VectorXd left = z;
+  for (std::size_t f = 0; f < folds; ++f) {
+    Normal normal{Eigen::MatrixXd::Zero(fit.jacobian.cols(), fit.jacobian.cols()),
+                  Eigen::VectorXd::Zero(fit.jacobian.cols())};
+    for (std::size_t i = 0; i < study.size(); ++i) {
+      if (fold_of[i] == f && folds > 1) continue;
+      const auto at = static_cast<Eigen::Index>(3 * i);
+      const double d2 = z.segment<3>(at).squaredNorm();
+      const double weight = d2 > 16 ? std::sqrt(16 / d2) : 1;
+      const auto rows = fit.jacobian.middleRows(at, 3);
+      normal.matrix += weight * rows.transpose() * rows;
+      normal.right += weight * rows.transpose() * z.segment<3>(at);
+    }
+    add_prior(study, fit, &normal);
+    const Eigen::VectorXd delta = normal.matrix.ldlt().solve(normal.right);
+    for (std::size_t i = 0; i < study.size(); ++i) {
+      if (fold_of[i] != f) continue;
+      const auto at = static_cast<Eigen::Index>(3 * i);
+      left.segment<3>(at) -= fit.jacobian.middleRows(at, 3) * delta;
+    }
+  }
+  return study.unwhiten(left);
+}
+
+std::vector<double> held_out_scores(const Study& study, const JointFit& fit,
+                                    const std::vector<std::size_t>& fold_of, double outlier_share) {
+  const std::vector<Eigen::Vector3d> residuals = held_out_residuals(study, fit, fold_of);
+  std::vector<double> scores;
+  for (std::size_t i = 0; i < study.size(); ++i) {
+    scores.push_back(trial_score(study, i, residuals[i], outlier_share));
+  }
+  return scores;
+}
+
+std::vector<std::size_t> folds_of(const Study& study) {
+  std::vector<std::size_t> folds;
+  for (std::size_t i = 0; i < study.size(); ++i) {
+    folds.push_back(study.sessions > 1 ? study.trials[i].session : i * 5 / study.size());
+  }
+  return folds;
+}
+
+double floor_score(const Study& study, double outlier_share) {
+  double sum = 0;
+  for (const Eigen::Matrix3d& cov : study.covariances()) {
+    // Gaussian: -(3 log 2 pi + log det S + 3) / 2, and the share of the tail, which adds little.
+    sum += -0.5 * (3 * std::log(2 * M_PI) + std::log(cov.determinant()) + 3) +
+           std::log1p(-outlier_share);
+  }
+  return sum / static_cast<double>(study.size());
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,55 @@
+// How large the chosen effects are, and how far the gap shrinks with them.
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "common/base/result.h"
+#include "master/diagnose/regression.h"
+#include "master/diagnose/selection.h"
+
+namespace gapfarm {
+
+struct FittedParameter {
+  std::size_t row = 0;
+  double value = 0;
+  double standard_error = 0;
+};
+
+// The base and some effects, fitted together.
+struct JointFit {
+  Overrides at;                             // base and effects
+  std::vector<FittedParameter> parameters;  // the base's first
+  std::size_t base_parameters = 0;
+  std::vector<Eigen::Vector3d> residuals;  // in the fit's own predicted ends' axes
+  std::vector<Pose> ends;
+  Eigen::MatrixXd jacobian;  // whitened rows by parameters
+};
+
+// Gauss-Newton on the predictions, `rounds` re-linearisations, with the prior of the base
+// parameters; `nuisances` (may have no columns) take part and are thrown away.
+Result<JointFit> fit_jointly(Predictor& predictor, const Study& study,
+                             const std::vector<Candidate>& effects, const Overrides& start,
+                             const Eigen::MatrixXd& nuisances, int rounds);
+
+// Parameter values at which a refinement of the effect begins.
+std::map<std::string, double> start_values(const Study& study, const Regression& others,
+                                           const Signature& signature);
+
+// Log scores (nats) of every trial, predicted from a fit to the other folds' trials alone: the
+// joint fit's linearisation is solved again without the fold.
+std::vector<double> held_out_scores(const Study& study, const JointFit& fit,
+                                    const std::vector<std::size_t>& fold_of, double outlier_share);
+
+// Residuals of every trial under those fits.
+std::vector<Eigen::Vector3d> held_out_residuals(const Study& study, const JointFit& fit,
+                                                const std::vector<std::size_t>& fold_of);
+
+// Sessions when there are several, else five contiguous blocks.
+std::vector<std::size_t> folds_of(const Study& study);
+
+// What a trial scores on average when its prediction is perfect and its noise is as estimated.
+double floor_score(const Study& study, double outlier_share);
+
+}  // namespace gapfarm

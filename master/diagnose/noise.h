@@ -1,0 +1,19 @@
+// How much the drive varies, from what no smooth function of the covariates explains.
+#pragma once
+
+#include <vector>
+
+#include "master/diagnose/covariates.h"
+#include "master/diagnose/regression.h"
+
+namespace gapfarm {
+
+// Leftover residuals with their degrees of freedom given back: three whitened rows a trial.
+Eigen::VectorXd studentised(const Regression& explained, double least_freedom);
+
+// Sets the study's drive noise (and the readings' too, when the log shares one reading between
+// trials), so that an effect that is not yet named does not pass for noise.
+void estimate_noise(const Regression& nuisances, const std::vector<CovariateBlock>& blocks,
+                    Study* study);
+
+}  // namespace gapfarm

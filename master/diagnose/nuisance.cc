@@ -1,0 +1,105 @@
+#include "master/diagnose/nuisance.h"
+
+#include <cmath>
+#include <set>
+#include <tuple>
+
+namespace gapfarm {
+namespace {
+
+// Speed at which the misfits below were measured, m/s.
+constexpr double kMeasuredSpeed = 0.28;
+
+struct Misfit {
+  DriveKind kind;
+  int component;   // 0 x, 1 y, 2 heading
+  double fixed;    // m or rad
+  double growing;  // per second at full level
+};
+
+constexpr Misfit kMisfits[] = {
+    {DriveKind::kStraight, 0, 0.0002, 0.0003}, {DriveKind::kTurn, 2, 0.002, 0.005},
+    {DriveKind::kWide, 0, 0.0005, 0.0025},     {DriveKind::kWide, 1, 0.0005, 0.0025},
+    {DriveKind::kWide, 2, 0.003, 0.008},
+};
+
+void add_column(const Study& study, const std::vector<Eigen::Vector3d>& values, double prior,
+                std::vector<Eigen::VectorXd>* columns) {
+  columns->push_back(prior * study.whiten(values));
+}
+
+// A misfit of one kind of drive at one level and duration.
+void add_misfits(const Study& study, std::vector<Eigen::VectorXd>* columns) {
+  std::set<std::tuple<DriveKind, double, double>> conditions;
+  for (const Cell& c : study.cells) {
+    conditions.insert({c.kind, std::round(c.level * 100) / 100, c.command.duration_s});
+  }
+  for (const auto& [kind, level, duration_s] : conditions) {
+    for (const Misfit& misfit : kMisfits) {
+      if (misfit.kind != kind) continue;
+      std::vector<Eigen::Vector3d> values(study.size(), Eigen::Vector3d::Zero());
+      for (std::size_t i = 0; i < study.size(); ++i) {
+        const Cell& c = study.cells[study.trials[i].cell];
+        const bool here = c.kind == kind && std::abs(c.level - level) < 0.006 &&
+                          c.command.duration_s == duration_s;
+        if (!here) continue;
+        const bool mirrors = misfit.component != 0 || kind == DriveKind::kStraight;
+        values[i][misfit.component] = mirrors ? c.mirror : 1;
+      }
+      const double path = level * duration_s;
+      const double size = misfit.fixed + misfit.growing * path;
+      add_column(study, values, size * study.speed_m_s / kMeasuredSpeed, columns);
+    }
+  }
+}
+
+}  // namespace
+
+Result<Eigen::MatrixXd> nuisance_columns(Predictor& predictor, const Study& study) {
+  constexpr double kStep = 0.05;
+  constexpr double kLagStep = 0.02;  // s
+  struct Retuned {
+    std::size_t row;
+    double prior;  // log s.d.
+  };
+  const Retuned retuned[] = {{row_of(Srv1::kContactLength), 0.5},
+                             {row_of(Srv1::kFrictionRatio), 0.5},
+                             {row_of(Srv1::kFriction), 0.5},
+                             {row_of(Srv1::kTrackGauge), 0.2}};
+  std::vector<PredictionRequest> requests;
+  for (const Retuned& r : retuned) {
+    Overrides up = study.base, down = study.base;
+    up[r.row] *= 1 + kStep;
+    down[r.row] *= 1 - kStep;
+    requests.push_back({up, {}});
+    requests.push_back({down, {}});
+  }
+  Overrides lagging = study.base;
+  lagging[predictor.problem().table().row("motor_lag.tau")] = kLagStep;
+  requests.push_back({lagging, {}});
+  const auto ends = predictor.ends(requests);
+  if (!ends) return ends.error();
+
+  std::vector<Eigen::VectorXd> columns;
+  std::vector<Eigen::Vector3d> faster;
+  for (const ResidualTrial& t : study.trials) faster.push_back(t.left + t.right);
+  add_column(study, faster, 0.3, &columns);
+  for (std::size_t r = 0; r < std::size(retuned); ++r) {
+    std::vector<Eigen::Vector3d> d;
+    for (std::size_t i = 0; i < study.size(); ++i) {
+      d.push_back(local_difference((*ends)[2 * r + 1][i], (*ends)[2 * r][i]) / (2 * kStep));
+    }
+    add_column(study, d, retuned[r].prior, &columns);
+  }
+  // Motors of some hundredths of a second are part of any robot.
+  add_column(study, differences(study, ends->back(), kLagStep), 0.02, &columns);
+  add_misfits(study, &columns);
+
+  Eigen::MatrixXd all(static_cast<Eigen::Index>(3 * study.size()),
+                      static_cast<Eigen::Index>(columns.size()));
+  for (std::size_t k = 0; k < columns.size(); ++k)
+    all.col(static_cast<Eigen::Index>(k)) = columns[k];
+  return all;
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,19 @@
+// What no effect may claim: directions in which the base model can be retuned, and small
+// systematic misfits that any simulation of a tracked robot has.
+#pragma once
+
+#include <Eigen/Core>
+
+#include "common/base/result.h"
+#include "master/diagnose/study.h"
+
+namespace gapfarm {
+
+// Whitened columns scaled to a prior standard deviation of 1: retuning of the base (free within its
+// bounds), and, for each kind of drive, level and duration, an offset that is alike for a command
+// and its mirror image (saturation of slip, starting and stopping), a fraction of a per cent of the
+// motion.  The sizes were measured between two simulations of different physics
+// (docs/diagnosis.md).
+Result<Eigen::MatrixXd> nuisance_columns(Predictor& predictor, const Study& study);
+
+}  // namespace gapfarm

@@ -1,0 +1,85 @@
+#include "master/diagnose/regression.h"
+
+#include <Eigen/Dense>
+#include <cmath>
+
+namespace gapfarm {
+namespace {
+
+constexpr double kAbsorbed = 1e-4;       // of a column's squares: no longer its own
+constexpr double kWeakDirection = 0.02;  // of the strongest singular value
+
+}  // namespace
+
+Regression::Regression(const Eigen::MatrixXd& nuisances, const Eigen::VectorXd& data)
+    : rows_(data.size()) {
+  const Eigen::Index k = nuisances.cols();
+  Eigen::MatrixXd all(rows_ + k, k);
+  all << nuisances, Eigen::MatrixXd::Identity(k, k);
+  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(all);
+  basis_ = qr.householderQ() * Eigen::MatrixXd::Identity(rows_ + k, k);
+  left_ = Eigen::VectorXd::Zero(rows_ + k);
+  left_.head(rows_) = data;
+  left_ -= basis_ * (basis_.transpose() * left_);
+}
+
+// Columns of unit length, less what the basis holds of them.
+Eigen::MatrixXd Regression::cut(const Eigen::MatrixXd& columns) const {
+  Eigen::MatrixXd c = Eigen::MatrixXd::Zero(basis_.rows(), columns.cols());
+  Eigen::Index kept = 0;
+  for (Eigen::Index j = 0; j < columns.cols(); ++j) {
+    const double length = columns.col(j).norm();
+    if (length > 0) c.col(kept++).head(rows_) = columns.col(j) / length;
+  }
+  c.conservativeResize(Eigen::NoChange, kept);
+  c -= basis_ * (basis_.transpose() * c);
+  return c;
+}
+
+Gain Regression::gain(const Eigen::MatrixXd& columns) const {
+  const Eigen::MatrixXd c = cut(columns);
+  if (c.cols() == 0) return {};
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(c.transpose() * c);
+  const Eigen::VectorXd b = eigen.eigenvectors().transpose() * (c.transpose() * left_);
+  Gain gain;
+  for (Eigen::Index i = 0; i < b.size(); ++i) {
+    if (eigen.eigenvalues()[i] <= kAbsorbed) continue;
+    gain.squares += b[i] * b[i] / eigen.eigenvalues()[i];
+    ++gain.dimensions;
+  }
+  return gain;
+}
+
+Eigen::MatrixXd Regression::directions(const Eigen::MatrixXd& columns) const {
+  const Eigen::MatrixXd c = cut(columns);
+  if (c.cols() == 0) return c;
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(c.transpose() * c);
+  const Eigen::VectorXd& values = eigen.eigenvalues();  // ascending
+  const double least =
+      std::max(kAbsorbed, kWeakDirection * kWeakDirection * values[values.size() - 1]);
+  Eigen::Index first = 0;
+  while (first < values.size() && values[first] <= least) ++first;
+  const Eigen::Index count = values.size() - first;
+  return c * eigen.eigenvectors().rightCols(count) *
+         values.tail(count).cwiseSqrt().cwiseInverse().asDiagonal();
+}
+
+Eigen::VectorXd Regression::explained(const Eigen::MatrixXd& columns) const {
+  const Eigen::MatrixXd u = directions(columns);
+  return u * (u.transpose() * left_);
+}
+
+void Regression::add(const Eigen::MatrixXd& columns) {
+  Eigen::MatrixXd u = directions(columns);
+  if (u.cols() == 0) return;
+  // Once more, for the digits lost where little was left of a column.
+  u -= basis_ * (basis_.transpose() * u);
+  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(u);
+  u = qr.householderQ() * Eigen::MatrixXd::Identity(u.rows(), u.cols());
+  left_ -= u * (u.transpose() * left_);
+  const Eigen::Index before = basis_.cols();
+  basis_.conservativeResize(Eigen::NoChange, before + u.cols());
+  basis_.rightCols(u.cols()) = u;
+}
+
+}  // namespace gapfarm

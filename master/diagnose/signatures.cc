@@ -1,0 +1,289 @@
+#include "master/diagnose/signatures.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+namespace gapfarm {
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+
+Eigen::MatrixXd stack(const std::vector<Eigen::VectorXd>& columns) {
+  Eigen::MatrixXd all(columns.front().size(), static_cast<Eigen::Index>(columns.size()));
+  for (std::size_t k = 0; k < columns.size(); ++k)
+    all.col(static_cast<Eigen::Index>(k)) = columns[k];
+  return all;
+}
+
+// One finite difference: an effect's parameters at `plus`, less those at `minus` (empty: neutral).
+struct Probe {
+  std::string effect;
+  std::map<std::string, double> plus, minus;
+  double scale = 1;
+};
+
+std::vector<Probe> probes(const Eigen::Vector2d& middle) {
+  std::vector<Probe> all;
+  const auto slope = [&](const std::string& effect, const std::string& key, double step,
+                         bool central, double neutral = 0) {
+    const std::string row = effect + "." + key;
+    if (central) {
+      all.push_back({effect, {{row, neutral + step}}, {{row, neutral - step}}, 2 * step});
+    } else {
+      all.push_back({effect, {{row, neutral + step}}, {}, step});
+    }
+  };
+  slope("motor_asymmetry", "ratio", 0.02, true);
+  slope("motor_deadband", "duty", 0.005, false);
+  slope("motor_lag", "tau", 0.1, false);
+  slope("timing_offset", "offset", 0.02, true);
+  slope("battery_sag", "rate", 0.002, true);
+  slope("backlash", "travel", 0.004, false);
+  slope("rolling_resistance", "coefficient", 0.05, false);
+  slope("com_offset", "x", 0.003, true);
+  slope("com_offset", "y", 0.003, true);
+  slope("camera_aspect", "ratio", 0.02, true, 1);
+  slope("heading_offset", "angle", 0.02, true);
+  slope("marker_offset", "x", 0.005, true);
+  slope("marker_offset", "y", 0.005, true);
+  const auto tilt = [](double direction) {
+    return std::map<std::string, double>{{"floor_tilt.angle", 0.05},
+                                         {"floor_tilt.direction", direction}};
+  };
+  all.push_back({"floor_tilt", tilt(0), {}, 0.05});
+  all.push_back({"floor_tilt", tilt(kPi / 2), {}, 0.05});
+  for (double direction : {0.0, 2 * kPi / 3, -2 * kPi / 3}) {
+    all.push_back({"floor_nap",
+                   {{"floor_nap.strength", 0.15}, {"floor_nap.direction", direction}},
+                   {},
+                   0.15});
+  }
+  constexpr double k1 = 0.02, away = 0.1;
+  const auto lens = [&](double dx, double dy) {
+    return std::map<std::string, double>{{"camera_distortion.k1", k1},
+                                         {"camera_distortion.x", middle.x() + dx},
+                                         {"camera_distortion.y", middle.y() + dy}};
+  };
+  all.push_back({"camera_distortion", lens(0, 0), {}, k1});
+  all.push_back({"camera_distortion", lens(away, 0), lens(-away, 0), 2 * away * k1});
+  all.push_back({"camera_distortion", lens(0, away), lens(0, -away), 2 * away * k1});
+  return all;
+}
+
+Overrides at(const Predictor& predictor, const Study& study,
+             const std::map<std::string, double>& values) {
+  Overrides overrides = study.base;
+  for (const auto& [key, value] : values) overrides[predictor.problem().table().row(key)] = value;
+  return overrides;
+}
+
+// Whether a drive sticks: Coulomb treads then give way to no small force, real ones creep in
+// proportion to it.
+bool straight(const Study& study, std::size_t i) {
+  return study.cells[study.trials[i].cell].kind == DriveKind::kStraight;
+}
+
+// Creep of straight drives under a force per weight that points along (cx, cy) in the world, per
+// metre of path, in the predicted end's axes.
+std::vector<Eigen::Vector3d> creep(const Study& study, double cx, double cy) {
+  std::vector<Eigen::Vector3d> d(study.size(), Eigen::Vector3d::Zero());
+  for (std::size_t i = 0; i < d.size(); ++i) {
+    if (!straight(study, i)) continue;
+    const ResidualTrial& t = study.trials[i];
+    const double length = study.cells[t.cell].path * study.speed_m_s;
+    const double c = std::cos(t.X_WP.theta), s = std::sin(t.X_WP.theta);
+    d[i] = length * Eigen::Vector3d(c * cx + s * cy, -s * cx + c * cy, 0);
+  }
+  return d;
+}
+
+// Straight drives slowed by (1 - cos(travel - nap)) / 2 of their path.
+std::vector<Eigen::Vector3d> nap_creep(const Study& study, double direction) {
+  std::vector<Eigen::Vector3d> d(study.size(), Eigen::Vector3d::Zero());
+  for (std::size_t i = 0; i < d.size(); ++i) {
+    if (!straight(study, i)) continue;
+    const ResidualTrial& t = study.trials[i];
+    const Cell& cell = study.cells[t.cell];
+    const double travel = t.X_WP.theta + (cell.mirror < 0 ? kPi : 0);
+    const double against = (1 - std::cos(travel - direction)) / 2;
+    d[i].x() = -cell.mirror * against * cell.path * study.speed_m_s;
+  }
+  return d;
+}
+
+std::vector<Signature> nap_signatures(const Study& study,
+                                      const std::array<std::vector<Eigen::Vector3d>, 3>& probe) {
+  // Linear in the strength and in (1, cos, sin) of the direction: three directions give all.
+  std::array<Eigen::VectorXd, 3> turning;
+  for (int k = 0; k < 3; ++k) {
+    std::vector<Eigen::Vector3d> d(study.size(), Eigen::Vector3d::Zero());
+    for (std::size_t i = 0; i < d.size(); ++i) {
+      if (straight(study, i)) continue;
+      const Eigen::Vector3d a = probe[0][i], b = probe[1][i], c = probe[2][i];
+      if (k == 0) d[i] = (a + b + c) / 3;
+      if (k == 1) d[i] = (2 * a - b - c) / 3;
+      if (k == 2) d[i] = (b - c) / std::sqrt(3.0);
+    }
+    turning[static_cast<std::size_t>(k)] = study.whiten(d);
+  }
+  std::vector<Signature> all;
+  for (int k = 0; k < 24; ++k) {
+    const double direction = wrap_angle(k * kPi / 12);
+    Signature s;
+    s.effect = "floor_nap";
+    s.columns =
+        stack({turning[0] + std::cos(direction) * turning[1] + std::sin(direction) * turning[2],
+               study.whiten(nap_creep(study, direction))});
+    s.parameters = {"floor_nap.strength"};
+    s.fixed = {{"floor_nap.direction", direction}};
+    s.penalty = 2;
+    all.push_back(std::move(s));
+  }
+  return all;
+}
+
+}  // namespace
+
+Eigen::Vector2d middle_of(const Study& study) {
+  Eigen::Vector2d middle = Eigen::Vector2d::Zero();
+  for (const ResidualTrial& t : study.trials) {
+    middle += Eigen::Vector2d(t.X_WS.x, t.X_WS.y) / static_cast<double>(study.size());
+  }
+  return middle;
+}
+
+Result<std::vector<Signature>> signatures(Predictor& predictor, const Study& study,
+                                          const std::vector<std::string>& left_out) {
+  const Eigen::Vector2d middle = middle_of(study);
+  const std::vector<Probe> all = probes(middle);
+  std::vector<PredictionRequest> requests;
+  for (const Probe& probe : all) {
+    requests.push_back({at(predictor, study, probe.plus), {}});
+    if (!probe.minus.empty()) requests.push_back({at(predictor, study, probe.minus), {}});
+  }
+  const auto ends = predictor.ends(requests);
+  if (!ends) return ends.error();
+
+  std::map<std::string, std::vector<std::vector<Eigen::Vector3d>>> slopes;
+  std::vector<std::string> order;
+  std::size_t next = 0;
+  for (const Probe& probe : all) {
+    std::vector<Eigen::Vector3d> d = differences(study, (*ends)[next++], probe.scale);
+    if (!probe.minus.empty()) {
+      const std::vector<Eigen::Vector3d> minus = differences(study, (*ends)[next++], probe.scale);
+      for (std::size_t i = 0; i < d.size(); ++i) d[i] -= minus[i];
+    }
+    if (slopes[probe.effect].empty()) order.push_back(probe.effect);
+    slopes[probe.effect].push_back(std::move(d));
+  }
+
+  std::vector<Signature> found;
+  for (const std::string& effect : order) {
+    const auto& own = slopes[effect];
+    if (effect == "floor_nap") {
+      const std::vector<Signature> naps = nap_signatures(study, {own[0], own[1], own[2]});
+      found.insert(found.end(), naps.begin(), naps.end());
+      continue;
+    }
+    Signature s;
+    s.effect = effect;
+    std::vector<Eigen::VectorXd> columns;
+    for (const auto& d : own) columns.push_back(study.whiten(d));
+    if (effect == "floor_tilt") {
+      columns.push_back(study.whiten(creep(study, 1, 0)));
+      columns.push_back(study.whiten(creep(study, 0, 1)));
+    }
+    s.columns = stack(columns);
+    s.penalty = 0.5 * static_cast<double>(own.size());
+    for (const Probe& probe : all) {
+      if (probe.effect == effect && probe.plus.size() == 1)
+        s.parameters.push_back(probe.plus.begin()->first);
+    }
+    found.push_back(std::move(s));
+  }
+  for (int axis = 0; axis < 2; ++axis) {
+    std::vector<double> places;
+    for (const ResidualTrial& t : study.trials) places.push_back(axis == 0 ? t.X_WS.x : t.X_WS.y);
+    std::sort(places.begin(), places.end());
+    const double lower = places[places.size() * 8 / 100], upper = places[places.size() * 92 / 100];
+    for (int k = 0; upper > lower && k < 29; ++k) {
+      found.push_back(seam_signature(study, axis, lower + (upper - lower) * k / 28));
+    }
+  }
+  std::erase_if(found, [&](const Signature& s) {
+    return std::find(left_out.begin(), left_out.end(), s.effect) != left_out.end();
+  });
+  return found;
+}
+
+Signature seam_signature(const Study& study, int axis, double position_m) {
+  const Eigen::Vector2d middle = middle_of(study);
+  std::vector<Eigen::VectorXd> columns;
+  for (bool sloped : {false, true}) {
+    for (int component = 0; component < 2; ++component) {
+      std::vector<Eigen::Vector3d> d(study.size(), Eigen::Vector3d::Zero());
+      const auto shift = [&](const Pose& X) {
+        if ((axis == 0 ? X.x : X.y) <= position_m) return 0.0;
+        return sloped ? (axis == 0 ? X.y - middle.y() : X.x - middle.x()) : 1.0;
+      };
+      for (std::size_t i = 0; i < d.size(); ++i) {
+        const ResidualTrial& t = study.trials[i];
+        const double jump = shift(t.X_WP) - shift(t.X_WS);
+        const double c = std::cos(t.X_WP.theta), s = std::sin(t.X_WP.theta);
+        d[i] = component == 0 ? Eigen::Vector3d(c * jump, -s * jump, 0)
+                              : Eigen::Vector3d(s * jump, c * jump, 0);
+      }
+      columns.push_back(study.whiten(d));
+    }
+  }
+  Signature s;
+  s.effect = "camera_seam";
+  s.columns = stack(columns);
+  s.parameters = {"camera_seam.offset_x", "camera_seam.offset_y", "camera_seam.slope_x",
+                  "camera_seam.slope_y"};
+  s.fixed = {{"camera_seam.axis", axis}, {"camera_seam.position", position_m}};
+  s.penalty = 6.5;
+  return s;
+}
+
+Result<std::vector<Signature>> patch_signatures(Predictor& predictor, const Study& study,
+                                                const std::vector<std::array<double, 4>>& places) {
+  std::vector<PredictionRequest> requests;
+  std::vector<std::map<std::string, double>> values;
+  for (const auto& [x, y, radius, ratio] : places) {
+    PredictionRequest request;
+    for (std::size_t i = 0; i < study.size(); ++i) {
+      const Pose& X = study.trials[i].X_WS;
+      if (std::hypot(X.x - x, X.y - y) < radius + 0.5)
+        request.trials.push_back(static_cast<std::uint32_t>(i));
+    }
+    values.push_back({{"friction_patch.ratio", ratio},
+                      {"friction_patch.x", x},
+                      {"friction_patch.y", y},
+                      {"friction_patch.radius", radius}});
+    request.at = at(predictor, study, values.back());
+    if (request.trials.empty()) request.trials.push_back(0);
+    requests.push_back(std::move(request));
+  }
+  const auto ends = predictor.ends(requests);
+  if (!ends) return ends.error();
+  std::vector<Signature> all;
+  for (std::size_t k = 0; k < requests.size(); ++k) {
+    std::vector<Eigen::Vector3d> d(study.size(), Eigen::Vector3d::Zero());
+    for (std::size_t j = 0; j < requests[k].trials.size(); ++j) {
+      const std::size_t i = requests[k].trials[j];
+      d[i] = local_difference(study.trials[i].X_WP, (*ends)[k][j]);
+    }
+    Signature s;
+    s.effect = "friction_patch";
+    s.columns = stack({study.whiten(d)});
+    s.fixed = values[k];
+    s.penalty = 6;
+    all.push_back(std::move(s));
+  }
+  return all;
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,41 @@
+// What each effect of the catalogue would do to the residuals, to first order.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "common/base/result.h"
+#include "master/diagnose/study.h"
+
+namespace gapfarm {
+
+// A way in which an effect may show.  Effects with a place or a direction that no slope leads to
+// have several, one a place.
+struct Signature {
+  std::string effect;
+  Eigen::MatrixXd columns;              // whitened; the first ones belong to `parameters`
+  std::vector<std::string> parameters;  // table keys whose values the fitted coefficients are, or
+                                        // empty: see start_values() in estimate.h
+  std::map<std::string, double> fixed;  // other parameters of the effect at this signature
+  double penalty = 0.5;                 // nats that its best fit gains by luck
+};
+
+// All of the catalogue but `left_out`: by finite differences of predictions, one batch of farm
+// work.
+Result<std::vector<Signature>> signatures(Predictor& predictor, const Study& study,
+                                          const std::vector<std::string>& left_out);
+
+// Shift of the readings beyond a line: two offsets, then two slopes along it about `middle`.
+Signature seam_signature(const Study& study, int axis, double position_m);
+
+// Discs of floor {x, y, radius, ratio}; simulated trial by trial where they can matter.
+Result<std::vector<Signature>> patch_signatures(Predictor& predictor, const Study& study,
+                                                const std::vector<std::array<double, 4>>& places);
+
+// Middle of the start places along each axis.
+Eigen::Vector2d middle_of(const Study& study);
+
+}  // namespace gapfarm

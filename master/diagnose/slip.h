@@ -1,0 +1,26 @@
+// Now and then a side loses some of its speed for a trial: a mixture against one Gaussian.
+#pragma once
+
+#include <Eigen/Core>
+#include <span>
+#include <vector>
+
+#include "master/diagnose/residuals.h"
+
+namespace gapfarm {
+
+struct SlipFit {
+  double gain = 0;  // nats over all trials
+  double probability = 0;
+  double loss = 0;
+  NoiseEstimate noise;  // with the events taken out
+};
+
+// Both hypotheses with the drive's noise refitted.  Trials with a false `mask` do not count.
+SlipFit fit_slip(std::span<const ResidualTrial> trials, std::span<const Eigen::Vector3d> residuals,
+                 const std::vector<bool>& mask, const NoiseEstimate& noise);
+
+// Mean fourth power over squared mean square: 3 for a Gaussian.
+double residual_kurtosis(const Eigen::VectorXd& whitened);
+
+}  // namespace gapfarm

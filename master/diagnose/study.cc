@@ -1,0 +1,263 @@
+#include "master/diagnose/study.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <tuple>
+
+#include "common/score/motion_model.h"
+#include "common/score/statistics.h"
+#include "master/diagnose/distribution.h"
+
+namespace gapfarm {
+namespace {
+
+constexpr int kTuningRounds = 6;
+constexpr double kRelativeStep = 0.02;
+constexpr double kLargestLogStep = 0.4;
+// Before anything is known of the drive's noise.
+constexpr double kFirstCommon = 0.012;
+constexpr double kFirstSide = 0.010;
+
+DriveKind kind_of(double left, double right) {
+  if (left == right) return DriveKind::kStraight;
+  return left == -right ? DriveKind::kTurn : DriveKind::kWide;
+}
+
+Cell make_cell(const CommandSpec& driven, const CommandSpec& own) {
+  Cell cell;
+  cell.command = driven;
+  cell.kind = kind_of(driven.left, driven.right);
+  const double most = std::max(std::abs(own.left), std::abs(own.right));
+  const double duty = std::max(std::abs(driven.left), std::abs(driven.right));
+  cell.level = most > 0 ? duty / most : duty;
+  cell.path = cell.level * driven.duration_s;
+  const double sense = cell.kind == DriveKind::kStraight ? driven.left : driven.right - driven.left;
+  cell.mirror = sense < 0 ? -1 : 1;
+  return cell;
+}
+
+// The cell's median residual, and where its derivatives are looked up.
+struct CellResidual {
+  Eigen::Vector3d median = Eigen::Vector3d::Zero();
+  std::size_t trial = 0;  // any of it
+  double count = 0;
+};
+
+std::vector<CellResidual> cell_residuals(const Study& study) {
+  std::vector<std::array<std::vector<double>, 3>> values(study.cells.size());
+  std::vector<CellResidual> cells(study.cells.size());
+  for (std::size_t i = 0; i < study.size(); ++i) {
+    const ResidualTrial& t = study.trials[i];
+    for (int k = 0; k < 3; ++k)
+      values[t.cell][static_cast<std::size_t>(k)].push_back(t.residual[k]);
+    cells[t.cell].trial = i;
+    cells[t.cell].count += 1;
+  }
+  for (std::size_t c = 0; c < cells.size(); ++c) {
+    for (int k = 0; k < 3; ++k) cells[c].median[k] = median(values[c][static_cast<std::size_t>(k)]);
+  }
+  return cells;
+}
+
+void set_predictions(const std::vector<Pose>& ends, Study* study) {
+  for (std::size_t i = 0; i < study->size(); ++i) {
+    ResidualTrial& t = study->trials[i];
+    t.X_WP = ends[i];
+    t.residual = local_difference(t.X_WP, t.X_WE);
+  }
+}
+
+Overrides scaled(const Overrides& at, std::size_t row, double factor) {
+  Overrides moved = at;
+  moved[row] *= factor;
+  return moved;
+}
+
+// One Gauss-Newton step on the logarithms of the base parameters; returns its length.
+double tuning_step(const Problem& problem, const std::vector<BaseParameter>& parameters,
+                   const std::vector<std::vector<Pose>>& ends, Study* study) {
+  const auto p = static_cast<Eigen::Index>(parameters.size());
+  Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(p, p);
+  Eigen::VectorXd right = Eigen::VectorXd::Zero(p);
+  for (const CellResidual& cell : cell_residuals(*study)) {
+    if (cell.count == 0) continue;
+    Eigen::MatrixXd j(3, p);
+    for (Eigen::Index k = 0; k < p; ++k) {
+      j.col(k) = local_difference(study->trials[cell.trial].X_WP,
+                                  ends[static_cast<std::size_t>(k) + 1][cell.trial]) /
+                 std::log1p(kRelativeStep);
+    }
+    const Eigen::Matrix3d& w = study->whitener[cell.trial];
+    const Eigen::Vector3d z = std::sqrt(cell.count) * (w * cell.median);
+    // Soft L1 beyond three standard errors: a cell that the base cannot fit must not rule.
+    const double weight = cell.count / std::sqrt(1 + z.squaredNorm() / 27);
+    normal += weight * (w * j).transpose() * (w * j);
+    right += weight * (w * j).transpose() * (w * cell.median);
+  }
+  for (Eigen::Index k = 0; k < p; ++k) {
+    const BaseParameter& parameter = parameters[static_cast<std::size_t>(k)];
+    const double precision = 1 / (parameter.prior_log_sd * parameter.prior_log_sd);
+    const double away = std::log(study->base[parameter.row] / problem.values[parameter.row]);
+    normal(k, k) += precision;
+    right[k] -= precision * away;
+  }
+  const Eigen::VectorXd step = normal.ldlt().solve(right);
+  for (Eigen::Index k = 0; k < p; ++k) {
+    const std::size_t row = parameters[static_cast<std::size_t>(k)].row;
+    const Parameter& bounds = problem.table()[row];
+    double& value = study->base[row];
+    value *= std::exp(std::clamp(step[k], -kLargestLogStep, kLargestLogStep));
+    value = std::clamp(value, bounds.lower * 1.1, bounds.upper * 0.9);
+  }
+  return step.cwiseAbs().maxCoeff();
+}
+
+}  // namespace
+
+std::vector<BaseParameter> tuned_base_parameters() {
+  return {{row_of(Srv1::kFullSpeed), 1},
+          {row_of(Srv1::kContactLength), 0.5},
+          {row_of(Srv1::kFrictionRatio), 0.2},
+          {row_of(Srv1::kFriction), 0.5},
+          {row_of(Srv1::kTrackGauge), 0.05}};
+}
+
+Eigen::VectorXd Study::whiten(const std::vector<Eigen::Vector3d>& values) const {
+  Eigen::VectorXd rows(static_cast<Eigen::Index>(3 * values.size()));
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    rows.segment<3>(static_cast<Eigen::Index>(3 * i)) = whitener[i] * values[i];
+  }
+  return rows;
+}
+
+Eigen::VectorXd Study::whitened_residuals() const {
+  std::vector<Eigen::Vector3d> residuals;
+  for (const ResidualTrial& t : trials) residuals.push_back(t.residual);
+  return whiten(residuals);
+}
+
+std::vector<Eigen::Vector3d> Study::unwhiten(const Eigen::VectorXd& rows) const {
+  std::vector<Eigen::Vector3d> values;
+  for (std::size_t i = 0; i < size(); ++i) {
+    const Eigen::Vector3d z = rows.segment<3>(static_cast<Eigen::Index>(3 * i));
+    values.push_back(whitener[i].triangularView<Eigen::Lower>().solve(z));
+  }
+  return values;
+}
+
+std::vector<Eigen::Matrix3d> Study::covariances() const {
+  std::vector<Eigen::Matrix3d> all;
+  for (const ResidualTrial& t : trials) all.push_back(trial_covariance(t, noise));
+  return all;
+}
+
+void Study::use_noise(const NoiseEstimate& estimate) {
+  noise = estimate;
+  whitener.clear();
+  for (const ResidualTrial& t : trials) {
+    const Eigen::Matrix3d lower = trial_covariance(t, noise).llt().matrixL();
+    whitener.push_back(lower.triangularView<Eigen::Lower>().solve(Eigen::Matrix3d::Identity()));
+  }
+}
+
+Result<Study> make_study(const Problem& problem) {
+  if (problem.log.trials.empty())
+    return Error{"the trial log is empty; there is nothing to explain"};
+  Study study;
+  std::vector<DrivenCommand> driven;
+  for (const Trial& trial : problem.log.trials) {
+    const CommandSpec c = resolved_command(trial, problem.commands);
+    driven.push_back({c.left, c.right, c.duration_s});
+  }
+  const std::vector<TrialContext> contexts = trial_contexts(problem.log, driven);
+  std::map<std::tuple<std::string, double, double, double>, std::size_t> cells;
+  std::map<std::string, std::size_t> sessions;
+  for (std::size_t i = 0; i < driven.size(); ++i) {
+    const Trial& trial = problem.log.trials[i];
+    const CommandSpec c = resolved_command(trial, problem.commands);
+    const auto [cell, fresh] =
+        cells.try_emplace({c.name, c.left, c.right, c.duration_s}, study.cells.size());
+    if (fresh) study.cells.push_back(make_cell(c, problem.command(c.name)));
+    ++study.cells[cell->second].trials;
+    ResidualTrial t;
+    t.cell = cell->second;
+    t.session = sessions.try_emplace(trial.session, sessions.size()).first->second;
+    while (problem.commands[t.command].name != c.name) ++t.command;
+    t.context = contexts[i];
+    t.X_WS = trial.X_WS;
+    t.X_WE = trial.X_WE;
+    study.trials.push_back(t);
+  }
+  study.sessions = sessions.size();
+  study.gaps = reading_gaps(problem.log, contexts);
+  study.quantum_m = quantisation_step(problem.log.trials);
+  study.noise.pose = reading_noise(study.gaps, study.quantum_m);
+  // Logs whose trials share one reading say nothing of it.
+  if (study.noise.pose.position_m <= 0) {
+    study.noise.pose.position_m = std::max(problem.values[row_of(Srv1::kPoseNoisePosition)],
+                                           study.quantum_m / std::sqrt(12.0));
+  }
+  if (study.noise.pose.heading_rad <= 0) {
+    study.noise.pose.heading_rad = problem.values[row_of(Srv1::kPoseNoiseHeading)];
+  }
+  study.noise.drive_common = kFirstCommon;
+  study.noise.drive_side = kFirstSide;
+  return study;
+}
+
+std::vector<Eigen::Vector3d> differences(const Study& study, const std::vector<Pose>& ends,
+                                         double scale) {
+  std::vector<Eigen::Vector3d> d;
+  for (std::size_t i = 0; i < study.size(); ++i) {
+    d.push_back(local_difference(study.trials[i].X_WP, ends[i]) / scale);
+  }
+  return d;
+}
+
+Status tune_base(Predictor& predictor, bool keep, Study* study) {
+  const Problem& problem = predictor.problem();
+  const std::vector<BaseParameter> parameters = tuned_base_parameters();
+  for (const BaseParameter& p : parameters) study->base[p.row] = problem.values[p.row];
+  for (int round = 0; !keep && round < kTuningRounds; ++round) {
+    std::vector<PredictionRequest> requests = {{study->base, {}}};
+    for (const BaseParameter& p : parameters) {
+      requests.push_back({scaled(study->base, p.row, 1 + kRelativeStep), {}});
+    }
+    const auto ends = predictor.ends(requests);
+    if (!ends) return ends.error();
+    set_predictions(ends->front(), study);
+    study->use_noise(study->noise);
+    if (tuning_step(problem, parameters, *ends, study) < 1e-3) break;
+  }
+  study->speed_m_s = study->base[row_of(Srv1::kFullSpeed)];
+
+  // Both sides faster, and the right side faster than the left: from these, each side's derivative.
+  constexpr double kGainStep = 0.02;
+  const std::size_t asymmetry = problem.table().row("motor_asymmetry.ratio");
+  const auto with = [&](double ratio) {
+    Overrides at = study->base;
+    at[asymmetry] = ratio;
+    return at;
+  };
+  const std::size_t speed = row_of(Srv1::kFullSpeed);
+  const auto ends = predictor.ends({{study->base, {}},
+                                    {scaled(study->base, speed, 1 + kGainStep), {}},
+                                    {scaled(study->base, speed, 1 - kGainStep), {}},
+                                    {with(kGainStep), {}},
+                                    {with(-kGainStep), {}}});
+  if (!ends) return ends.error();
+  set_predictions(ends->front(), study);
+  for (std::size_t i = 0; i < study->size(); ++i) {
+    ResidualTrial& t = study->trials[i];
+    const Eigen::Vector3d both = local_difference((*ends)[2][i], (*ends)[1][i]) / (2 * kGainStep);
+    const Eigen::Vector3d apart = local_difference((*ends)[4][i], (*ends)[3][i]) / (2 * kGainStep);
+    t.right = both / 2 + apart;
+    t.left = both / 2 - apart;
+  }
+  study->use_noise(study->noise);
+  return {};
+}
+
+}  // namespace gapfarm

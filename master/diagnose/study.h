@@ -1,0 +1,57 @@
+// The tuned base model beside the log: the first steps of a diagnosis.
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/base/result.h"
+#include "master/diagnose/predictor.h"
+#include "master/diagnose/residuals.h"
+
+namespace gapfarm {
+
+// A base parameter that tuning moves, with a weak prior on the logarithm of its value: the data
+// cannot tell some of them apart, and the prior keeps those where the config had them.
+struct BaseParameter {
+  std::size_t row = 0;
+  double prior_log_sd = 1;
+};
+std::vector<BaseParameter> tuned_base_parameters();
+
+struct Study {
+  std::vector<Cell> cells;
+  std::vector<ResidualTrial> trials;
+  std::vector<ReadingGap> gaps;
+  std::size_t sessions = 0;
+  double quantum_m = 0;  // grid of the logged positions
+  NoiseEstimate noise;
+  Overrides base;                         // tuned values
+  double speed_m_s = 0;                   // tuned full speed
+  std::vector<Eigen::Matrix3d> whitener;  // L^-1 of each trial's covariance L L'
+
+  std::size_t size() const { return trials.size(); }
+  // Three rows a trial.
+  Eigen::VectorXd whiten(const std::vector<Eigen::Vector3d>& values) const;
+  Eigen::VectorXd whitened_residuals() const;
+  // From whitened rows back to metres and radians.
+  std::vector<Eigen::Vector3d> unwhiten(const Eigen::VectorXd& rows) const;
+  std::vector<Eigen::Matrix3d> covariances() const;
+  // Whitener and covariances from the present noise.
+  void use_noise(const NoiseEstimate& estimate);
+};
+
+// Cells, contexts and reading noise of the problem's log.  Errors: an empty log.
+Result<Study> make_study(const Problem& problem);
+
+// Tunes the base parameters on the cells' medians (Gauss-Newton, robust), or keeps those of the
+// problem, and fills in predictions, residuals and gain derivatives.
+Status tune_base(Predictor& predictor, bool keep, Study* study);
+
+// Predictions with `extra` on top of the tuned base, as differences from the base's in the axes of
+// the base's ends, divided by `scale`.
+std::vector<Eigen::Vector3d> differences(const Study& study, const std::vector<Pose>& ends,
+                                         double scale);
+
+}  // namespace gapfarm

@@ -1,0 +1,40 @@
+#include "master/diagnose/verdict.h"
+
+#include <algorithm>
+#include <boost/math/distributions/chi_squared.hpp>
+#include <cmath>
+
+#include "common/score/statistics.h"
+
+namespace gapfarm {
+
+std::vector<Leftover> leftovers(const Regression& explained,
+                                const std::vector<CovariateBlock>& blocks) {
+  const Eigen::VectorXd left = explained.left();
+  std::vector<double> squares(left.data(), left.data() + left.size());
+  for (double& s : squares) s *= s;
+  const double scale = std::clamp(median(squares) / 0.455, 0.9, 1.4);
+  std::vector<Leftover> all;
+  for (const CovariateBlock& block : blocks) {
+    const Gain gain = explained.gain(block.columns);
+    if (gain.dimensions == 0) continue;
+    const boost::math::chi_squared chance(gain.dimensions);
+    const double p = boost::math::cdf(boost::math::complement(chance, gain.squares / scale));
+    all.push_back({block.name, std::log10(std::max(p, 1e-300)),
+                   std::max(0.0, (gain.squares - gain.dimensions * scale) / 2)});
+  }
+  std::stable_sort(all.begin(), all.end(),
+                   [](const Leftover& a, const Leftover& b) { return a.log10_p < b.log10_p; });
+  return all;
+}
+
+Verdict judge_verdict(bool named, double explained_nats, const std::vector<Leftover>& left) {
+  const bool unknown = !left.empty() && left.front().log10_p < kUnknownLog10P;
+  if (!unknown) return named ? Verdict::kEffect : Verdict::kNone;
+  if (!named || left.front().excess > kWrongShare * std::max(explained_nats, 1.0)) {
+    return Verdict::kUnknown;
+  }
+  return Verdict::kEffectAndUnknown;
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,35 @@
+// From what was chosen and what is left to the words of the verdict.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "master/diagnose/covariates.h"
+#include "master/diagnose/diagnosis.h"
+#include "master/diagnose/regression.h"
+
+namespace gapfarm {
+
+// How strongly the leftover residuals still depend on a block of covariates.
+struct Leftover {
+  std::string covariate;
+  double log10_p = 0;
+  double excess = 0;  // nats over all trials beyond what chance explains
+};
+
+// Most significant first.
+std::vector<Leftover> leftovers(const Regression& explained,
+                                const std::vector<CovariateBlock>& blocks);
+
+// A leftover dependence below this is not chance: the least p of twelve blocks was 10^-3.8 in 400
+// null logs (docs/diagnosis.md).
+inline constexpr double kUnknownLog10P = -4.2;
+// Leftovers beyond this share of what the named effects explain mean that they are not the cause.
+// Right effects left 1 to 4 %, effects outside the catalogue under a wrong name 18 % and more.
+inline constexpr double kWrongShare = 0.15;
+
+// `explained_nats`: by the named effects.  Whether they are to be believed at all is the caller's
+// to drop when the verdict is kUnknown.
+Verdict judge_verdict(bool named, double explained_nats, const std::vector<Leftover>& left);
+
+}  // namespace gapfarm
