@@ -1,6 +1,7 @@
 #include "master/diagnose/drive_noise.h"
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cmath>
 #include <nlopt.hpp>
 #include <vector>
@@ -8,6 +9,8 @@
 namespace gapfarm {
 namespace {
 
+constexpr double kLeast = 1e-4;  // keeps logarithms and covariances finite
+constexpr double kMost = 0.5;
 constexpr double kFarSquared = 14;  // chi-square with 3 degrees of freedom: one in 340
 
 struct Likelihood {
@@ -42,9 +45,14 @@ NoiseEstimate refit_drive_noise(std::span<const ResidualTrial> trials,
                                 std::span<const Eigen::Vector3d> residuals,
                                 const NoiseEstimate& start, bool fit_pose) {
   const Likelihood likelihood{trials, residuals, start, fit_pose};
-  std::vector<double> x = {std::log(start.drive_common), std::log(start.drive_side)};
+  // An unknown value (0) begins at that of a small tracked robot under a good camera.
+  const auto first = [](double value, double unknown) {
+    return std::log(std::clamp(value > 0 ? value : unknown, kLeast, kMost));
+  };
+  std::vector<double> x = {first(start.drive_common, 0.01), first(start.drive_side, 0.01)};
   if (fit_pose) {
-    x.insert(x.end(), {std::log(start.pose.position_m), std::log(start.pose.heading_rad)});
+    x.push_back(first(start.pose.position_m, 0.0015));
+    x.push_back(first(start.pose.heading_rad, 0.008));
   }
   nlopt::opt search(nlopt::LN_NELDERMEAD, static_cast<unsigned>(x.size()));
   search.set_min_objective(
@@ -53,16 +61,16 @@ NoiseEstimate refit_drive_noise(std::span<const ResidualTrial> trials,
         return l->negative(l->at(std::vector<double>(at, at + n)));
       },
       const_cast<Likelihood*>(&likelihood));
-  search.set_lower_bounds(std::vector<double>(x.size(), std::log(1e-4)));
-  search.set_upper_bounds(std::vector<double>(x.size(), std::log(0.5)));
+  search.set_lower_bounds(std::vector<double>(x.size(), std::log(kLeast)));
+  search.set_upper_bounds(std::vector<double>(x.size(), std::log(kMost)));
   search.set_initial_step(0.3);
-  search.set_xtol_abs(0.01);
-  search.set_maxeval(200);
+  search.set_xtol_abs(0.005);
+  search.set_maxeval(300);
   double value = 0;
   try {
     search.optimize(x, value);
   } catch (const std::exception&) {
-    return start;  // roundoff stops the search where nothing is left to gain
+    // Roundoff stops the search where nothing is left to gain; x holds the best point so far.
   }
   return likelihood.at(x);
 }

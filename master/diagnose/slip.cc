@@ -1,6 +1,7 @@
 #include "master/diagnose/slip.h"
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <nlopt.hpp>
@@ -8,8 +9,9 @@
 namespace gapfarm {
 namespace {
 
-constexpr int kNodes = 6;        // midpoints of equal shares of (0, loss)
-constexpr double kWorthFitting = 4;
+constexpr int kNodes = 6;             // midpoints of equal shares of (0, loss)
+constexpr double kWorthFitting = 4;   // nats; noise alone gains about one a parameter
+constexpr double kLeastDrive = 1e-4;  // its logarithm is searched
 
 struct Event {
   double weight;
@@ -44,20 +46,27 @@ class Mixture {
     noise.drive_side = side;
     const std::vector<Event> events =
         probability > 0 ? events_of(probability, loss) : std::vector<Event>{{1, 0, 0}};
+    std::vector<double> exponents(events.size());
     double sum = 0;
     for (std::size_t i = 0; i < trials_.size(); ++i) {
       if (!mask_[i]) continue;
       const ResidualTrial& t = trials_[i];
-      const Eigen::Matrix3d cov = trial_covariance(t, noise);
-      const Eigen::Matrix3d inverse = cov.inverse();
+      const Eigen::LLT<Eigen::Matrix3d> factor(trial_covariance(t, noise));
       // The mean loss was taken out with the rest by the fit.
       const Eigen::Vector3d centred = residuals_[i] - probability * loss / 2 * (t.left + t.right);
-      double density = 0;
-      for (const Event& e : events) {
-        const Eigen::Vector3d r = centred - e.left * t.left - e.right * t.right;
-        density += e.weight * std::exp(-0.5 * r.dot(inverse * r));
+      const auto lower = factor.matrixL();
+      const Eigen::Vector3d r = lower.solve(centred);
+      const Eigen::Vector3d left = lower.solve(t.left), right = lower.solve(t.right);
+      for (std::size_t k = 0; k < events.size(); ++k) {
+        exponents[k] = -0.5 * (r - events[k].left * left - events[k].right * right).squaredNorm();
       }
-      sum += std::log(std::max(density, 1e-300)) - 0.5 * std::log(cov.determinant());
+      // Far trials underflow in every event: measured from the nearest one.
+      const double greatest = *std::max_element(exponents.begin(), exponents.end());
+      double density = 0;
+      for (std::size_t k = 0; k < events.size(); ++k) {
+        density += events[k].weight * std::exp(exponents[k] - greatest);
+      }
+      sum += greatest + std::log(density) - factor.matrixLLT().diagonal().array().log().sum();
     }
     return sum;
   }
@@ -94,7 +103,10 @@ double maximise(const std::function<double(const std::vector<double>&)>& f, int 
 }  // namespace
 
 SlipFit fit_slip(std::span<const ResidualTrial> trials, std::span<const Eigen::Vector3d> residuals,
-                 const std::vector<bool>& mask, const NoiseEstimate& noise) {
+                 const std::vector<bool>& mask, const NoiseEstimate& start) {
+  NoiseEstimate noise = start;
+  noise.drive_common = std::max(noise.drive_common, kLeastDrive);
+  noise.drive_side = std::max(noise.drive_side, kLeastDrive);
   const Mixture mixture(trials, residuals, mask, noise);
   std::vector<double> plain = {std::log(noise.drive_common), std::log(noise.drive_side)};
   const double base = maximise(
@@ -115,8 +127,8 @@ SlipFit fit_slip(std::span<const ResidualTrial> trials, std::span<const Eigen::V
     }
   }
   if (fit.gain < kWorthFitting) return fit;
-  std::vector<double> x = {plain[0], plain[1],
-                           std::log(fit.probability / (1 - fit.probability)), std::log(fit.loss)};
+  std::vector<double> x = {plain[0], plain[1], std::log(fit.probability / (1 - fit.probability)),
+                           std::log(fit.loss)};
   const auto probability = [](const std::vector<double>& q) {
     return std::min(0.5, 1 / (1 + std::exp(-q[2])));
   };
@@ -135,7 +147,8 @@ SlipFit fit_slip(std::span<const ResidualTrial> trials, std::span<const Eigen::V
 }
 
 double residual_kurtosis(const Eigen::VectorXd& whitened) {
-  const double second = whitened.array().square().mean();
+  const double second = whitened.size() > 0 ? whitened.array().square().mean() : 0;
+  if (second <= 0) return 3;
   return whitened.array().pow(4).mean() / (second * second);
 }
 
