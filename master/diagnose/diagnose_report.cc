@@ -80,7 +80,7 @@ Status DiagnosisRun::refit() {
   if (!chosen_.empty()) {
     std::vector<Candidate> effects;
     for (const ChosenEffect& c : chosen_) effects.push_back(c.candidate);
-    auto fit = fit_jointly(predictor_, study_, effects, nested_.back().at, nuisances_, 2);
+    auto fit = fit_jointly(predictor_, study_, effects, nested_.back().at, nuisances_, 1);
     if (!fit) return fit.error();
     estimates_ = std::move(*fit);
   }

@@ -9,7 +9,8 @@
 namespace gapfarm {
 namespace {
 
-constexpr double kWorthRefining = 8;   // nats before the penalty
+constexpr double kWorthRefining = 8;         // nats before the penalty
+constexpr double kWorthRefiningShare = 0.3;  // of the best: no search of places makes up for less
 constexpr double kSecondAlias = 0.8;   // cosine beyond which a further effect is the first again,
 constexpr double kSecondShare = 0.25;  // unless it gains this share of all that is explained
 
@@ -130,8 +131,11 @@ Result<std::vector<Candidate>> Selector::candidates(const Regression& explained,
     const auto [entry, fresh] = best.try_emplace(s.effect, Candidate{gain, s});
     if (!fresh && gain > entry->second.gain) entry->second = {gain, s};
   }
+  double most = 0;
+  for (const auto& [effect, candidate] : best) most = std::max(most, candidate.gain);
   for (auto& [effect, candidate] : best) {
     if (candidate.gain + candidate.signature.penalty < kWorthRefining) continue;
+    if (candidate.gain < kWorthRefiningShare * most) continue;
     if (effect == "camera_seam") candidate = refine_seam(explained, candidate);
     if (effect == "friction_patch") {
       auto refined = refine_patch(explained, candidate);

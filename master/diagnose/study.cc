@@ -116,12 +116,12 @@ double tuning_step(const Problem& problem, const std::vector<BaseParameter>& par
 
 }  // namespace
 
+// Gauge and friction stay: turns depend on them as on length and ratio, and rest poses of another
+// robot's physics would drag them away from anything real.
 std::vector<BaseParameter> tuned_base_parameters() {
   return {{row_of(Srv1::kFullSpeed), 1},
           {row_of(Srv1::kContactLength), 0.5},
-          {row_of(Srv1::kFrictionRatio), 0.2},
-          {row_of(Srv1::kFriction), 0.5},
-          {row_of(Srv1::kTrackGauge), 0.05}};
+          {row_of(Srv1::kFrictionRatio), 0.3}};
 }
 
 Eigen::VectorXd Study::whiten(const std::vector<Eigen::Vector3d>& values) const {
@@ -220,6 +220,9 @@ Status tune_base(Predictor& predictor, bool keep, Study* study) {
   const Problem& problem = predictor.problem();
   const std::vector<BaseParameter> parameters = tuned_base_parameters();
   for (const BaseParameter& p : parameters) study->base[p.row] = problem.values[p.row];
+  for (Srv1 kept : {Srv1::kFriction, Srv1::kTrackGauge}) {
+    study->base[row_of(kept)] = problem.values[row_of(kept)];
+  }
   for (int round = 0; !keep && round < kTuningRounds; ++round) {
     std::vector<PredictionRequest> requests = {{study->base, {}}};
     for (const BaseParameter& p : parameters) {

@@ -11,9 +11,9 @@ namespace {
 // Effects on the floor turn the motion by a few mm and mrad, and their harmonics fall quickly:
 // eight headings settle almost all, and the check against every second one says when not.
 constexpr std::size_t kFewestHeadings = 8;
-constexpr std::size_t kMostHeadings = 32;
+constexpr std::size_t kMostHeadings = 16;
 constexpr double kHeadingTolerance =
-    2e-3;  // m and rad, of half the nodes; the whole set's is far less
+    4e-3;  // m and rad, of half the nodes; the whole set's is far less
 // Motion is nearly linear in the speed that a time-dependent effect changes.
 constexpr std::size_t kTimes = 4;
 constexpr double kFarAway = 1e6;  // m

@@ -88,6 +88,11 @@ void EllipseFrictionSolver::convertContacts(btPersistentManifold** manifolds, in
       row.m_appliedImpulse = info.m_warmstartingFactor * (d == 0 ? point.m_appliedImpulseLateral1
                                                                  : point.m_appliedImpulseLateral2);
       moving_side(m_tmpSolverBodyPool, row).apply(row.m_appliedImpulse);
+      // m_frictionCFM: slip velocity per impulse.  Bullet leaves it out of the diagonal.
+      const double softened = 1 / (1 / row.m_jacDiagABInv + row.m_cfm);
+      row.m_rhs *= softened / row.m_jacDiagABInv;
+      row.m_cfm *= softened;
+      row.m_jacDiagABInv = softened;
     }
   }
 }
@@ -149,8 +154,10 @@ double EllipseFrictionSolver::solve_friction() {
     const MovingSide side_2 = moving_side(m_tmpSolverBodyPool, rows[1]);
     const double old_1 = rows[0].m_appliedImpulse;
     const double old_2 = rows[1].m_appliedImpulse;
-    double p1 = old_1 + rows[0].m_rhs - side_1.velocity() * rows[0].m_jacDiagABInv;
-    double p2 = old_2 + rows[1].m_rhs - side_2.velocity() * rows[1].m_jacDiagABInv;
+    double p1 =
+        old_1 + rows[0].m_rhs - old_1 * rows[0].m_cfm - side_1.velocity() * rows[0].m_jacDiagABInv;
+    double p2 =
+        old_2 + rows[1].m_rhs - old_2 * rows[1].m_cfm - side_2.velocity() * rows[1].m_jacDiagABInv;
     const double a1 = 1 / rows[0].m_jacDiagABInv;
     const double a2 = 1 / rows[1].m_jacDiagABInv;
     project_onto_ellipse(a1, a2, ratio_, rows[0].m_friction * normal.m_appliedImpulse, p1, p2);

@@ -1,11 +1,14 @@
 #include "worker/sim/world.h"
 
+#include <cmath>
+
 #include "worker/sim/floor.h"
 
 namespace gapfarm {
 namespace {
 
 // Contacts give a little: load sharing among four supports has one answer instead of many.
+constexpr double kCreepAtRest_m_s = 1.5e-3;  // keeps creep's share finite for a standing tread
 constexpr double kContactSoftness = 1e-3;
 // Share of a joint's or contact's position error that a step of full length repairs; a shorter one
 // repairs less, or it would have to move fast.
@@ -116,8 +119,16 @@ void RobotWorld::predictUnconstraintMotion(btScalar dt_s) {
   }
 }
 
+// Slip velocity per friction impulse at which a tread creeps by its share of its speed under full
+// traction of a quarter of the weight.
+double RobotWorld::creep_softness(double friction, double speed_m_s, double dt_s) const {
+  if (settings_.tread_creep == 0) return 0;
+  const double traction = friction * settings_.mass_kg * settings_.gravity_m_s2 / 4 * dt_s;
+  return settings_.tread_creep * (std::abs(speed_m_s) + kCreepAtRest_m_s) / traction;
+}
+
 // Writes friction and the surface's own speed into every contact with the floor.
-void RobotWorld::prepare_contacts() {
+void RobotWorld::prepare_contacts(double dt_s) {
   const btRigidBody& body = robot_->body();
   const SideSpeeds speeds = robot_->contact_speeds();
   const double middle_y = robot_->turning_centre().y();
@@ -144,12 +155,13 @@ void RobotWorld::prepare_contacts() {
           BT_CONTACT_FLAG_LATERAL_FRICTION_INITIALIZED | BT_CONTACT_FLAG_HAS_CONTACT_CFM;
       point.m_combinedFriction =
           settings_.friction * patch_factor(floor_, on_floor.x(), on_floor.y());
+      point.m_frictionCFM = creep_softness(point.m_combinedFriction, speed, dt_s);
     }
   }
 }
 
 void RobotWorld::solveConstraints(btContactSolverInfo& info) {
-  prepare_contacts();
+  prepare_contacts(info.m_timeStep);
   solver.solveGroup(&m_collisionObjects[0], m_collisionObjects.size(),
                     dispatcher.getInternalManifoldPointer(), dispatcher.getNumManifolds(),
                     m_constraints.size() > 0 ? &m_constraints[0] : nullptr, m_constraints.size(),
