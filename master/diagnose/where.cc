@@ -14,6 +14,7 @@
 #include "common/score/statistics.h"
 #include "master/diagnose/findings.h"
 #include "master/diagnose/trend_test.h"
+#include "master/diagnose/where_covariates.h"
 
 namespace gapfarm {
 namespace {
@@ -29,15 +30,6 @@ constexpr double kClearMotion = 5;  // s.d.s of the end by which a unit gain mus
 constexpr int kMostRounds = 12;     // dependences taken out of one component
 const char* const kComponents[] = {"x", "y", "theta"};
 
-struct Covariate {
-  std::string name;
-  Eigen::MatrixXd columns = {};  // of all trials
-  bool with_motion = false;      // multiplied by the path
-  bool within_cells = true;
-  double unit = 1;        // of the sentence, in units of the column
-  std::string each = {};  // "with every minute of the session"; empty: no slope to tell
-};
-
 // One component of one selection of trials.
 struct Selection {
   std::string command;
@@ -49,15 +41,6 @@ struct Selection {
 
 std::string deviation(const Selection& s, double size, bool trend) {
   return deviation_words(s.component, size, s.along_motion, trend);
-}
-
-std::vector<double> middle(std::span<const ResidualTrial> trials) {
-  double x0 = INFINITY, x1 = -INFINITY, y0 = INFINITY, y1 = -INFINITY;
-  for (const ResidualTrial& t : trials) {
-    x0 = std::min(x0, t.X_WS.x), x1 = std::max(x1, t.X_WS.x);
-    y0 = std::min(y0, t.X_WS.y), y1 = std::max(y1, t.X_WS.y);
-  }
-  return {(x0 + x1) / 2, (y0 + y1) / 2};
 }
 
 class Looker {
@@ -76,7 +59,7 @@ class Looker {
     }
     const auto n = static_cast<double>(trials.size());
     excess_ = std::max(squares - 3 * n, std::sqrt(6 * n));
-    add_covariates();
+    covariates_ = where_covariates(trials, residuals, cells);
   }
 
   // All rows whose corrected p is at most `level`.
@@ -96,77 +79,6 @@ class Looker {
  private:
   double sd(std::size_t trial, int k) const { return std::sqrt(covariances_[trial](k, k)); }
   double path(std::size_t trial) const { return cells_[trials_[trial].cell].path; }
-
-  void add(Covariate covariate, const std::function<std::vector<double>(std::size_t)>& values) {
-    const std::size_t width = values(0).size();
-    covariate.columns.resize(static_cast<Eigen::Index>(trials_.size()),
-                             static_cast<Eigen::Index>(width));
-    for (std::size_t i = 0; i < trials_.size(); ++i) {
-      const std::vector<double> row = values(i);
-      for (std::size_t j = 0; j < width; ++j) {
-        covariate.columns(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) = row[j];
-      }
-    }
-    covariate.columns.rowwise() -= covariate.columns.colwise().mean().eval();
-    covariates_.push_back(std::move(covariate));
-  }
-
-  void add_covariates() {
-    using V = std::vector<double>;
-    const auto& t = trials_;
-    const auto cell = [this](std::size_t i) -> const Cell& { return cells_[trials_[i].cell]; };
-    add({"time", {}, true, true, 60, "with every minute of the session"},
-        [&](std::size_t i) { return V{t[i].context.session_time_s}; });
-    add({"duration", {}, false, false, 1, "with every second that the command lasts"},
-        [&](std::size_t i) { return V{cell(i).command.duration_s}; });
-    add({"level", {}, false, false, 0.1, "with every tenth of the level"},
-        [&](std::size_t i) { return V{cell(i).level}; });
-    add({"place in run", {}, true, true, 1, "with every trial since the robot was put down"},
-        [&](std::size_t i) { return V{double(t[i].context.place_in_run)}; });
-    add({"direction change", {}}, [&](std::size_t i) {
-      return V{t[i].context.last_left * cell(i).command.left < 0 ? 1.0 : 0.0,
-               t[i].context.last_right * cell(i).command.right < 0 ? 1.0 : 0.0};
-    });
-    const char* const heading[] = {"start heading", "start heading, 2nd harmonic",
-                                   "start heading, 4th harmonic"};
-    for (int h = 0; h < 3; ++h) {
-      const int order = 1 << h;
-      add({heading[h], {}, true}, [&t, order](std::size_t i) {
-        return V{std::cos(order * t[i].X_WS.theta), std::sin(order * t[i].X_WS.theta)};
-      });
-    }
-    const V centre = middle(trials_);
-    add({"start x", {}, true, true, 0.1, "with every 100 mm that they start farther along x"},
-        [&](std::size_t i) { return V{t[i].X_WS.x - centre[0]}; });
-    add({"start y", {}, true, true, 0.1, "with every 100 mm that they start farther along y"},
-        [&](std::size_t i) { return V{t[i].X_WS.y - centre[1]}; });
-    add({"radius from the middle",
-         {},
-         true,
-         true,
-         0.1,
-         "with every 100 mm that they start farther from the arena's middle"},
-        [&](std::size_t i) {
-          return V{std::hypot(t[i].X_WS.x - centre[0], t[i].X_WS.y - centre[1])};
-        });
-    std::size_t sessions = 0;
-    for (const ResidualTrial& trial : t) sessions = std::max(sessions, trial.session + 1);
-    if (sessions > 1) {
-      add({"session", {}, true}, [&](std::size_t i) {
-        V one(sessions - 1, 0.0);
-        if (t[i].session > 0) one[t[i].session - 1] = 1;
-        return one;
-      });
-    }
-    add({"previous residual", {}}, [&](std::size_t i) {
-      const auto& before = t[i].context.previous;
-      if (!before || t[i].context.moved) return V{0, 0, 0};
-      const Eigen::Vector3d& r = residuals_[*before];
-      return V{r[0], r[1], r[2]};
-    });
-    add({"unrecorded move", {}, true, true, 1, "when the robot was put down by hand just before"},
-        [&](std::size_t i) { return V{t[i].context.moved ? 1.0 : 0.0}; });
-  }
 
   std::vector<Selection> selections_of(int k, const Problem& problem) const {
     Selection all{"all", k, false, {}, {}};
@@ -199,7 +111,7 @@ class Looker {
       std::optional<Found> best;
       for (const Selection& s : selections) {
         const View v = view(s);
-        const auto offer = [&](const Covariate* covariate, TrendTest test) {
+        const auto offer = [&](const WhereCovariate* covariate, TrendTest test) {
           if (test.dimensions == 0) return;
           const bool clearer = !best || test.p < best->test.p ||
                                (test.p == best->test.p && test.squares > best->test.squares);
@@ -207,7 +119,7 @@ class Looker {
         };
         const std::vector<int> none(s.trials.size(), -1);
         offer(nullptr, trend_test(v.u, mean_column(s), v.scale, none));
-        for (const Covariate& c : covariates_) {
+        for (const WhereCovariate& c : covariates_) {
           offer(&c,
                 trend_test(v.u, columns_of(c, s), v.scale, c.within_cells ? v.groups : v.commands));
         }
@@ -232,7 +144,7 @@ class Looker {
   };
   struct Found {
     const Selection* selection = nullptr;
-    const Covariate* covariate = nullptr;  // null: the mean
+    const WhereCovariate* covariate = nullptr;  // null: the mean
     TrendTest test;
   };
 
@@ -271,7 +183,7 @@ class Looker {
     return sum / double(s.trials.size());
   }
 
-  Eigen::MatrixXd columns_of(const Covariate& covariate, const Selection& s) const {
+  Eigen::MatrixXd columns_of(const WhereCovariate& covariate, const Selection& s) const {
     Eigen::MatrixXd columns(static_cast<Eigen::Index>(s.trials.size()), covariate.columns.cols());
     for (std::size_t i = 0; i < s.trials.size(); ++i) {
       columns.row(static_cast<Eigen::Index>(i)) =
@@ -306,7 +218,7 @@ class Looker {
          motions_of(s.command) + " " + deviation(s, mean, false) + " on average.");
   }
 
-  void tell_trend(const Selection& s, const Covariate& covariate, const TrendTest& test,
+  void tell_trend(const Selection& s, const WhereCovariate& covariate, const TrendTest& test,
                   const Eigen::VectorXd& scale) {
     const Eigen::VectorXd fitted = test.fitted.cwiseProduct(scale);
     const double size = 1000 * std::sqrt(fitted.squaredNorm() / double(fitted.size()));
@@ -436,7 +348,7 @@ class Looker {
   std::span<const Eigen::Matrix3d> covariances_;
   std::span<const Cell> cells_;
   double excess_ = 1;
-  std::vector<Covariate> covariates_;
+  std::vector<WhereCovariate> covariates_;
   std::vector<Eigen::Vector3d> left_;   // residuals without what was told
   std::vector<Eigen::Vector3d> spent_;  // degrees of freedom that took
   std::size_t looks_ = 0;

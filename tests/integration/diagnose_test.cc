@@ -1,0 +1,113 @@
+// gapfarm diagnose as a user runs it, on logs whose truth is known because they are simulated.
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <sstream>
+
+#include "tests/integration/run_program.h"
+
+namespace gapfarm {
+namespace {
+
+constexpr const char* kConfig = R"(scenario = "srv1"
+[parameters]
+step_rate = 60
+tread_creep = 0.05
+drive_noise_common = 0.012
+drive_noise_side = 0.01
+pose_noise_position = 0.0015
+pose_noise_heading = 0.008
+[simulate]
+sessions = 2
+levels = [0.5, 1.0]
+durations_s = [0.5, 1.0]
+)";
+
+using Json = nlohmann::json;
+
+std::string text_of(const std::string& path) {
+  std::ifstream file(path);
+  std::stringstream text;
+  text << file.rdbuf();
+  return text.str();
+}
+
+class Diagnose : public ::testing::Test {
+ protected:
+  void simulate(int trials, const std::vector<std::string>& set, const std::string& seed = "3") {
+    config_ = folder_.write("c.toml", kConfig);
+    std::vector<std::string> arguments = {"simulate", config_, "--out", folder_ / "trials.csv",
+                                          "--trials", std::to_string(trials), "--seed", seed};
+    for (const std::string& s : set) arguments.insert(arguments.end(), {"--set", s});
+    const Finished made = gapfarm_command(arguments);
+    ASSERT_EQ(made.exit_code, 0) << made.err;
+  }
+
+  Json diagnose(const std::vector<std::string>& more = {}) {
+    std::vector<std::string> arguments = {"diagnose", config_, "--trials", folder_ / "trials.csv",
+                                          "--out", folder_ / "d"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const Finished finished = gapfarm_command(arguments);
+    EXPECT_EQ(finished.exit_code, 0) << finished.err;
+    EXPECT_NE(text_of(folder_ / "d/report.html").find("</html>"), std::string::npos);
+    return Json::parse(text_of(folder_ / "d/diagnosis.json"), nullptr, false);
+  }
+
+  TemporaryFolder folder_;
+  std::string config_;
+};
+
+TEST_F(Diagnose, NamesAnEffectWithAnIntervalAndClosesTheGap) {
+  simulate(120, {"motor_asymmetry.ratio=0.05"});
+  const Json d = diagnose();
+  EXPECT_EQ(d["verdict"], "effect") << d["headline"];
+  ASSERT_EQ(d["effects"].size(), 1u);
+  EXPECT_EQ(d["effects"][0]["name"], "motor_asymmetry");
+  const Json& ratio = d["effects"][0]["parameters"]["ratio"];
+  EXPECT_LT(ratio["lo"], 0.052);
+  EXPECT_GT(ratio["hi"], 0.048);
+  EXPECT_GT(d["effects"][0]["closed"], 0.7);
+  EXPECT_LT(d["gap"]["final"], d["gap"]["tuned"]);
+  // The model left behind predicts the log that it was made for.
+  const Finished predicted = gapfarm_command(
+      {"predict", folder_ / "d/model.toml", "--trials", folder_ / "trials.csv", "--out", "-"});
+  EXPECT_EQ(predicted.exit_code, 0) << predicted.err;
+}
+
+TEST_F(Diagnose, SaysNoneWhenNothingIsMissing) {
+  simulate(120, {});
+  const Json d = diagnose();
+  EXPECT_EQ(d["verdict"], "none") << d["headline"];
+  EXPECT_TRUE(d["effects"].empty());
+}
+
+TEST_F(Diagnose, WithoutTheEffectInTheCatalogueItIsNotGivenAnotherName) {
+  simulate(120, {"battery_sag.rate=0.03"});
+  const Json with = diagnose();
+  ASSERT_EQ(with["effects"].size(), 1u) << with["headline"];
+  EXPECT_EQ(with["effects"][0]["name"], "battery_sag");
+  const Json without = diagnose({"--leave-out", "battery_sag"});
+  EXPECT_EQ(without["verdict"], "unknown") << without["headline"];
+  EXPECT_TRUE(without["effects"].empty());
+}
+
+TEST_F(Diagnose, ThinDataGiveCautionsNotClaims) {
+  simulate(5, {"motor_asymmetry.ratio=0.02"});
+  const Json d = diagnose();
+  EXPECT_EQ(d["verdict"], "none") << d["headline"];
+  EXPECT_GT(d["cautions"].size(), 1u);
+}
+
+TEST_F(Diagnose, UnknownEffectToLeaveOutIsRefused) {
+  simulate(5, {});
+  const Finished finished =
+      gapfarm_command({"diagnose", config_, "--trials", folder_ / "trials.csv", "--out",
+                       folder_ / "d", "--leave-out", "batery_sag"});
+  EXPECT_NE(finished.exit_code, 0);
+  EXPECT_NE(finished.err.find("did you mean 'battery_sag'?"), std::string::npos) << finished.err;
+}
+
+}  // namespace
+}  // namespace gapfarm
