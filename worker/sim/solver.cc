@@ -88,6 +88,7 @@ void EllipseFrictionSolver::convertContacts(btPersistentManifold** manifolds, in
       row.m_appliedImpulse = info.m_warmstartingFactor * (d == 0 ? point.m_appliedImpulseLateral1
                                                                  : point.m_appliedImpulseLateral2);
       moving_side(m_tmpSolverBodyPool, row).apply(row.m_appliedImpulse);
+      if (row.m_cfm == 0) continue;
       // m_frictionCFM: slip velocity per impulse.  Bullet leaves it out of the diagonal.
       const double softened = 1 / (1 / row.m_jacDiagABInv + row.m_cfm);
       row.m_rhs *= softened / row.m_jacDiagABInv;
