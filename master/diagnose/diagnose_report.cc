@@ -342,7 +342,8 @@ Status DiagnosisRun::report() {
   const bool unexplained =
       d.verdict == Verdict::kUnknown || d.verdict == Verdict::kEffectAndUnknown;
   if (unexplained) d.unexplained = look(nested_.back().residuals);
-  d.cautions = cautions(study_.trials, study_.cells, problem_.log);
+  const std::vector<std::string> thin = cautions(study_.trials, study_.cells, problem_.log);
+  d.cautions.insert(d.cautions.end(), thin.begin(), thin.end());
   for (const Leftover& l : leftovers_) {
     if (l.log10_p < kUnknownLog10P) {
       d.cautions.push_back("What is left still depends on " + l.covariate + ".");

@@ -17,6 +17,8 @@ namespace {
 constexpr double kLeastLatencyGain = 14;  // nats; the share and the age are searched on a grid
 constexpr double kLeastSlipGain = 11;
 constexpr double kLeastQuantum_m = 4e-4;
+// Of fewer trials, a place or a direction that is searched for explains any of them.
+constexpr std::size_t kFewestTrials = 40;
 
 }  // namespace
 
@@ -162,7 +164,21 @@ void DiagnosisRun::look_for_slip(const Regression& explained) {
   slip_ = fit_slip(study_.trials, study_.unwhiten(z), mask, study_.noise);
 }
 
+// Names nothing where the data are too few for a claim, and says so.
+bool DiagnosisRun::too_thin() {
+  if (study_.size() >= kFewestTrials) return false;
+  first_.clear();
+  chosen_.clear();
+  study_.quantum_m = 0;
+  result_.diagnosis.verdict = Verdict::kNone;
+  result_.diagnosis.cautions.push_back(
+      "Fewer than " + std::to_string(kFewestTrials) +
+      " trials: the catalogue was screened, but no effect is named on so few.");
+  return true;
+}
+
 void DiagnosisRun::judge() {
+  if (too_thin()) return;
   std::vector<const Signature*> all;
   for (const Signature& s : first_) all.push_back(&s);
   for (const ChosenEffect& c : chosen_) all.push_back(&c.candidate.signature);

@@ -36,6 +36,7 @@ class DiagnosisRun {
 
  private:
   bool left_out(const std::string& effect) const;
+  bool too_thin();
   Status rebuild_nuisances();
   Status look_for_latency();
   void fill_screening(const std::vector<Candidate>& candidates);

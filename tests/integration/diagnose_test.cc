@@ -22,7 +22,7 @@ pose_noise_heading = 0.008
 [simulate]
 sessions = 2
 levels = [0.5, 1.0]
-durations_s = [0.5, 1.0]
+durations = [0.5, 1.0]
 )";
 
 using Json = nlohmann::json;
@@ -38,16 +38,17 @@ class Diagnose : public ::testing::Test {
  protected:
   void simulate(int trials, const std::vector<std::string>& set, const std::string& seed = "3") {
     config_ = folder_.write("c.toml", kConfig);
-    std::vector<std::string> arguments = {"simulate", config_, "--out", folder_ / "trials.csv",
-                                          "--trials", std::to_string(trials), "--seed", seed};
+    std::vector<std::string> arguments = {
+        "simulate", config_, "--out", folder_ / "trials.csv", "--trials", std::to_string(trials),
+        "--seed",   seed};
     for (const std::string& s : set) arguments.insert(arguments.end(), {"--set", s});
     const Finished made = gapfarm_command(arguments);
     ASSERT_EQ(made.exit_code, 0) << made.err;
   }
 
   Json diagnose(const std::vector<std::string>& more = {}) {
-    std::vector<std::string> arguments = {"diagnose", config_, "--trials", folder_ / "trials.csv",
-                                          "--out", folder_ / "d"};
+    std::vector<std::string> arguments = {
+        "diagnose", config_, "--trials", folder_ / "trials.csv", "--out", folder_ / "d"};
     arguments.insert(arguments.end(), more.begin(), more.end());
     const Finished finished = gapfarm_command(arguments);
     EXPECT_EQ(finished.exit_code, 0) << finished.err;
