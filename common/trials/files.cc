@@ -1,5 +1,6 @@
 #include "common/trials/files.h"
 
+#include <fcntl.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -46,9 +47,32 @@ Result<std::string> read_text_file(const std::string& path) {
   return std::move(bytes).str();
 }
 
-Status write_file_atomically(const std::string& path, std::string_view bytes) {
-  const std::filesystem::path target(path);
+namespace {
+
+// Devices and pipes are written to, never renamed over: root could replace /dev/null.
+Status write_in_place(const std::string& path, std::string_view bytes) {
+  const int fd = ::open(path.c_str(), O_WRONLY | O_CLOEXEC);
+  if (fd < 0) return Error{path + ": cannot be written: " + std::strerror(errno)};
+  const Status written = write_all(fd, bytes, path);
+  ::close(fd);
+  return written;
+}
+
+}  // namespace
+
+Status write_file_atomically(const std::string& given, std::string_view bytes) {
   std::error_code code;
+  // Through a link, so that the link stays one.
+  std::filesystem::path target(given);
+  if (std::filesystem::is_symlink(target, code)) {
+    target = std::filesystem::weakly_canonical(target, code);
+    if (code) return Error{given + ": cannot be followed: " + code.message()};
+  }
+  const std::string path = target.string();
+  if (std::filesystem::exists(target, code) && !std::filesystem::is_regular_file(target, code) &&
+      !std::filesystem::is_directory(target, code)) {
+    return write_in_place(path, bytes);
+  }
   if (target.has_parent_path()) {
     std::filesystem::create_directories(target.parent_path(), code);
     if (code) {

@@ -1,9 +1,14 @@
 #include "common/trials/write.h"
 
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include <cmath>
+#include <filesystem>
+#include <fstream>
 #include <limits>
 
 #include "common/trials/files.h"
@@ -124,6 +129,29 @@ TEST(WriteFile, NamesTheFileThatCannotBeWritten) {
   const Status status = write_file_atomically("/proc/nowhere/trials.csv", "x");
   ASSERT_FALSE(status.ok());
   EXPECT_THAT(status.error().message, HasSubstr("/proc/nowhere"));
+}
+
+// Root may rename over anything: a predictions file named /dev/null once took the device's place.
+TEST(WriteFile, WritesIntoPipesAndThroughLinksWithoutReplacingThem) {
+  const std::filesystem::path folder =
+      std::filesystem::path(testing::TempDir()) / ("gapfarm-write-" + std::to_string(::getpid()));
+  std::filesystem::create_directories(folder);
+  const std::string pipe = (folder / "pipe").string();
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  const int reader = ::open(pipe.c_str(), O_RDONLY | O_NONBLOCK);
+  ASSERT_TRUE(write_file_atomically(pipe, "through").ok());
+  char text[16] = {};
+  EXPECT_EQ(::read(reader, text, sizeof text), 7);
+  ::close(reader);
+  EXPECT_TRUE(std::filesystem::is_fifo(pipe));
+
+  const std::filesystem::path link = folder / "link";
+  std::filesystem::create_symlink(folder / "file", link);
+  std::ofstream(folder / "file") << "old";
+  ASSERT_TRUE(write_file_atomically(link.string(), "new").ok());
+  EXPECT_TRUE(std::filesystem::is_symlink(link));
+  EXPECT_EQ(*read_text_file((folder / "file").string()), "new");
+  std::filesystem::remove_all(folder);
 }
 
 }  // namespace
