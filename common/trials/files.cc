@@ -22,8 +22,6 @@ Status write_all(int fd, std::string_view bytes, const std::string& path) {
     if (n < 0) return Error{path + ": cannot be written: " + std::strerror(errno)};
     bytes.remove_prefix(static_cast<std::size_t>(n));
   }
-  // The rename may not reach the disk before the bytes do.
-  if (::fsync(fd) != 0) return Error{path + ": cannot be flushed: " + std::strerror(errno)};
   return {};
 }
 
@@ -86,6 +84,10 @@ Status write_file_atomically(const std::string& given, std::string_view bytes) {
                  "; check the folder and its permissions"};
   }
   Status written = write_all(fd, bytes, path);
+  // The rename may not reach the disk before the bytes do.
+  if (written.ok() && ::fsync(fd) != 0) {
+    written = Error{path + ": cannot be flushed: " + std::strerror(errno)};
+  }
   // mkstemp makes files for the owner alone; give what a plain open would have given.
   const mode_t mask = ::umask(0);
   ::umask(mask);
