@@ -125,7 +125,7 @@ int run_diagnose(const DiagnoseCommand& command, CliContext& context) {
     context.console.error(config.error());
     return kExitBadUsage;
   }
-  for (const std::string& note : config->problem.log.notes) context.console.note(note);
+  show_notes(config->problem.log, context.console);
   auto farm = start_farm(command.farm, config->farm, context);
   if (!farm) return failed(farm.error(), context);
   DiagnoseOptions options;
