@@ -60,6 +60,7 @@ Result<Config> parse_config(std::string_view text, const std::string& path) {
   read_fitness(top, problem.fitness);
   read_spread(top, problem.spread);
   read_evolution(top, config.evolution);
+  read_optimiser(top, config.evolution.optimiser);
   read_farm(top, config.farm);
   read_simulate(top, problem.commands, config.simulate);
   top.finish();

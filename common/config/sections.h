@@ -14,6 +14,7 @@ void read_commands(TomlSection& top, std::vector<CommandSpec>& commands);
 void read_fitness(TomlSection& top, FitnessSettings& fitness);
 void read_spread(TomlSection& top, SpreadSettings& spread);
 void read_evolution(TomlSection& top, EvolutionSettings& evolution);
+void read_optimiser(TomlSection& top, OptimiserSettings& optimiser);
 void read_farm(TomlSection& top, FarmSettings& farm);
 void read_simulate(TomlSection& top, const std::vector<CommandSpec>& commands,
                    SimulateSettings& simulate);
@@ -26,5 +27,6 @@ std::optional<double> row_value(const toml::node& node, const ParameterTable& ta
 // Words of the enums, in their order.
 const std::vector<std::string>& fitness_words();
 const std::vector<std::string>& spread_words();
+const std::vector<std::string>& optimiser_words();
 
 }  // namespace gapfarm

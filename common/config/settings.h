@@ -19,7 +19,34 @@ enum class MutationKind { kGaussian, kUniformReset };
 // mutation.
 enum class VariationOrder { kSeparate, kSequence };
 
+// Rows of master/evolve/optimisers.cc, in their order.
+enum class OptimiserKind {
+  kGenetic,
+  kDifferentialEvolution,
+  kCmaEs,
+  kLocal,
+  kDeSimplex,
+  kRandom,
+};
+enum class LocalSearchKind { kNelderMead, kSubplex, kBobyqa, kCobyla };
+
+// What [optimiser] says.  The genetic algorithm is set up by the rest of EvolutionSettings.
+struct OptimiserSettings {
+  OptimiserKind kind = OptimiserKind::kGenetic;
+  // Individuals a generation; none: as the method has it (30 for differential evolution, 4 + 3 ln n
+  // for CMA-ES over n genes, the evolution's population for random search).
+  std::optional<unsigned> population;
+  double differential_weight = 0.8;  // F of DE/rand/1/bin (Storn and Price 1997)
+  double crossover_rate = 0.9;       // CR of the same
+  double sigma = 0.3;                // CMA-ES: first s.d., share of a gene's range
+  unsigned iterations = 100;         // de_simplex: of differential evolution before the simplex
+  LocalSearchKind local = LocalSearchKind::kNelderMead;
+  double step = 0.1;               // local search: first step, share of a gene's range
+  unsigned local_evaluations = 0;  // of one local search; 0: 100 a gene
+};
+
 struct EvolutionSettings {
+  OptimiserSettings optimiser;
   unsigned population = 40;
   unsigned elitism = 2;
   SelectionKind selection = SelectionKind::kTournament;

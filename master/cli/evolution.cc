@@ -8,7 +8,7 @@
 #include "master/cli/evolution_farm.h"
 #include "master/cli/leave_behind.h"
 #include "master/evolve/evolve.h"
-#include "master/evolve/genetic.h"
+#include "master/evolve/optimisers.h"
 
 namespace gapfarm {
 namespace {
@@ -23,8 +23,8 @@ class SteadyClock : public EvolveClock {
   }
 };
 
-GeneticSetup genetic_setup(const EvolutionRun& run) {
-  GeneticSetup setup;
+OptimiserSetup optimiser_setup(const EvolutionRun& run) {
+  OptimiserSetup setup;
   setup.settings = run.config.evolution;
   setup.table = &run.problem.table();
   setup.genes = run.problem.genes;
@@ -39,8 +39,8 @@ GeneticSetup genetic_setup(const EvolutionRun& run) {
 
 Result<std::unique_ptr<Optimiser>> optimiser_at(const std::optional<Checkpoint>& checkpoint,
                                                 const EvolutionRun& run) {
-  const GeneticSetup setup = genetic_setup(run);
-  return checkpoint ? restore_genetic(setup, checkpoint->optimiser_state) : make_genetic(setup);
+  const OptimiserSetup setup = optimiser_setup(run);
+  return checkpoint ? restore_optimiser(setup, checkpoint->optimiser_state) : make_optimiser(setup);
 }
 
 // Says how the run ended, in the store and to the user.
@@ -80,6 +80,7 @@ void EvolutionOverrides::apply(EvolutionSettings& settings) const {
   if (time_s) settings.time_s = *time_s;
   if (target_fitness) settings.target_fitness = *target_fitness;
   if (population) settings.population = *population;
+  if (population) settings.optimiser.population = *population;
 }
 
 void EvolutionOverrides::merge(const EvolutionOverrides& later) {

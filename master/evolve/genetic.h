@@ -12,28 +12,19 @@
 #include <string_view>
 
 #include "common/base/result.h"
-#include "common/config/settings.h"
 #include "master/evolve/optimiser.h"
+#include "master/evolve/setup.h"
 
 namespace gapfarm {
 
-struct GeneticSetup {
-  EvolutionSettings settings;
-  const ParameterTable* table = nullptr;  // outlives the optimiser
-  std::vector<Gene> genes;
-  Genome nominal;  // of the config's own values; empty: unknown
-  std::uint64_t run_seed = 0;
-  bool noisy = false;  // scores differ between replicates (SpreadKind::kSampled)
-};
-
 // Errors: no genes, a population below 2 or not above the elites, no operators, a probability
 // outside [0, 1], a nominal genome of another length.
-Result<std::unique_ptr<Optimiser>> make_genetic(const GeneticSetup& setup);
+Result<std::unique_ptr<Optimiser>> make_genetic(const OptimiserSetup& setup);
 
 // The optimiser whose state() gave `state`.  Settings may differ from the run's (a larger
 // population, say), genes and operators may not.  Errors: as above, and a state that is damaged or
 // belongs to other genes or operators.
-Result<std::unique_ptr<Optimiser>> restore_genetic(const GeneticSetup& setup,
+Result<std::unique_ptr<Optimiser>> restore_genetic(const OptimiserSetup& setup,
                                                    std::string_view state);
 
 }  // namespace gapfarm

@@ -7,7 +7,7 @@
 
 namespace gapfarm {
 
-GeneticAlgorithm::GeneticAlgorithm(const GeneticSetup& setup)
+GeneticAlgorithm::GeneticAlgorithm(const OptimiserSetup& setup)
     : settings_(setup.settings),
       breeder_(setup.settings, GeneSpace(*setup.table, setup.genes)),
       nominal_(setup.nominal),
@@ -226,19 +226,7 @@ const Member& GeneticAlgorithm::best() const {
   return best_member_;
 }
 
-double GeneticAlgorithm::diversity() const {
-  if (population_.empty() || breeder_.space().size() == 0) return 0;
-  const auto count = static_cast<double>(population_.size());
-  double sum = 0;
-  for (std::size_t gene = 0; gene < breeder_.space().size(); ++gene) {
-    double mean = 0;
-    for (const Individual& individual : population_) mean += individual.genome[gene] / count;
-    for (const Individual& individual : population_) {
-      sum += std::abs(individual.genome[gene] - mean);
-    }
-  }
-  return sum / (count * static_cast<double>(breeder_.space().size()));
-}
+double GeneticAlgorithm::diversity() const { return diversity_of(population_); }
 
 std::vector<NamedNumber> GeneticAlgorithm::operator_probabilities() const {
   return breeder_.probabilities();

@@ -11,7 +11,7 @@ namespace gapfarm {
 
 class GeneticAlgorithm final : public Optimiser {
  public:
-  explicit GeneticAlgorithm(const GeneticSetup& setup);
+  explicit GeneticAlgorithm(const OptimiserSetup& setup);
 
   std::vector<Candidate> ask() override;
   void tell(std::span<const Score> scores) override;

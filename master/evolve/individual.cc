@@ -19,7 +19,8 @@ int outcome_rank(v1::Outcome outcome) {
 
 std::string origin_name(unsigned origin) {
   constexpr std::array kNames = {"one_point",     "uniform", "blend",  "gaussian",
-                                 "uniform_reset", "elite",   "random", "nominal"};
+                                 "uniform_reset", "elite",   "random", "nominal",
+                                 "difference",    "sampled", "local"};
   std::string text;
   for (std::size_t bit = 0; bit < kNames.size(); ++bit) {
     if ((origin & (1U << bit)) == 0) continue;
@@ -55,6 +56,20 @@ void sort_best_first(std::vector<Individual>& individuals) {
     if (better(b.standing, a.standing)) return false;
     return a.birth_id < b.birth_id;
   });
+}
+
+double diversity_of(const std::vector<Individual>& individuals) {
+  if (individuals.empty() || individuals.front().genome.empty()) return 0;
+  const auto count = static_cast<double>(individuals.size());
+  const std::size_t genes = individuals.front().genome.size();
+  double sum = 0;
+  for (std::size_t gene = 0; gene < genes; ++gene) {
+    double mean = 0;
+    for (const Individual& individual : individuals) mean += individual.genome[gene] / count;
+    for (const Individual& individual : individuals)
+      sum += std::abs(individual.genome[gene] - mean);
+  }
+  return sum / (count * static_cast<double>(genes));
 }
 
 Member to_member(const Individual& individual) {

@@ -20,6 +20,9 @@ enum Origin : unsigned {
   kElite = 1u << 5,
   kRandom = 1u << 6,
   kNominal = 1u << 7,
+  kDifference = 1u << 8,  // a trial vector of differential evolution
+  kSampled = 1u << 9,     // from CMA-ES's distribution
+  kLocal = 1u << 10,      // a step of a local search
 };
 std::string origin_name(unsigned origin);  // "blend+gaussian"
 
@@ -48,6 +51,9 @@ struct Individual {
 
 // Best first; equal standings in order of birth, which makes the order total.
 void sort_best_first(std::vector<Individual>& individuals);
+
+// Mean distance of the genes from their mean over the individuals, in [0, 1]; 0 for none.
+double diversity_of(const std::vector<Individual>& individuals);
 
 Member to_member(const Individual& individual);
 

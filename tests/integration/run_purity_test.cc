@@ -198,5 +198,34 @@ TEST_F(RunPurity, HoldsWhenWorkersAreKilled) {
   EXPECT_THAT(digests(folder_ / "run"), ElementsAreArray(whole));
 }
 
+// Each row of the table of optimisers beside the genetic algorithm, with every phase of it.
+class OptimiserPurity : public RunPurity, public testing::WithParamInterface<const char*> {};
+
+std::string kind_name(const testing::TestParamInfo<const char*>& kind) { return kind.param; }
+
+INSTANTIATE_TEST_SUITE_P(Kinds, OptimiserPurity,
+                         testing::Values("differential_evolution", "cma_es", "local", "de_simplex",
+                                         "random"),
+                         kind_name);
+
+TEST_P(OptimiserPurity, HoldsForAnyNumberOfWorkersAndWhenKilled) {
+  std::ofstream(config_, std::ios::app)
+      << "[optimiser]\nkind = \"" << GetParam() << "\"\npopulation = 6\niterations = 4\n";
+  const Digests one = evolved("one", {"--workers", "1"});
+  ASSERT_THAT(one, SizeIs(kGenerations));
+  EXPECT_THAT(evolved("two", {"--workers", "2"}), ElementsAreArray(one));
+  EXPECT_THAT(evolved("four", {"--workers", "4", "--shuffle", "5"}), ElementsAreArray(one));
+  {
+    RunningProgram master("gapfarm", evolve("run", {"--generations", "10000", "--workers", "2"}));
+    ASSERT_TRUE(half_way("run"));
+    master.send(SIGKILL);
+    master.wait();
+  }
+  // Generations of one evaluation go by faster than a signal comes: what was not asked for is cut.
+  const std::string last = std::to_string(std::min(digests(folder_ / "run").size(), kGenerations));
+  EXPECT_THAT(resumed("run", {"--generation", last, "--generations", std::to_string(kGenerations)}),
+              ElementsAreArray(one));
+}
+
 }  // namespace
 }  // namespace gapfarm

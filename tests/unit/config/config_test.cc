@@ -79,6 +79,11 @@ mutations = "gaussian"
 order = "separate"
 self_adaptation = false
 restart_generations = 20
+[optimiser]
+kind = "cma_es"
+population = 12
+sigma = 0.2
+local = "bobyqa"
 [evolution.stop]
 generations = 500
 time = 60
@@ -130,6 +135,10 @@ commands = ["forward", "turn_cw"]
   EXPECT_EQ(evolution.order, VariationOrder::kSeparate);
   EXPECT_FALSE(evolution.self_adaptation);
   EXPECT_EQ(evolution.generations, 500u);
+  EXPECT_EQ(evolution.optimiser.kind, OptimiserKind::kCmaEs);
+  EXPECT_EQ(evolution.optimiser.population, 12u);
+  EXPECT_EQ(evolution.optimiser.sigma, 0.2);
+  EXPECT_EQ(evolution.optimiser.local, LocalSearchKind::kBobyqa);
   EXPECT_EQ(evolution.time_s, 60);
   EXPECT_EQ(evolution.target_fitness, 0.05);
   EXPECT_EQ(evolution.stagnation_generations, 50u);

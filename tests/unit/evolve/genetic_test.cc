@@ -92,7 +92,7 @@ TEST(Genetic, WithoutElitesTheBestIsStillRemembered) {
 TEST(Genetic, TheNominalGenomeIsBornFirst) {
   Toy toy = mixed();
   const ParameterTable table = toy.table();
-  GeneticSetup setup;
+  OptimiserSetup setup;
   setup.settings = settings_with(10);
   setup.table = &table;
   setup.genes = toy.genes();
@@ -110,13 +110,13 @@ TEST(Genetic, TheNominalGenomeIsBornFirst) {
 TEST(Genetic, SetupErrorsSayWhatIsWrong) {
   const Toy toy = sphere(2);
   const ParameterTable table = toy.table();
-  GeneticSetup good;
+  OptimiserSetup good;
   good.settings = settings_with(10);
   good.table = &table;
   good.genes = toy.genes();
   EXPECT_TRUE(make_genetic(good).ok());
   const auto message = [&](auto change) {
-    GeneticSetup setup = good;
+    OptimiserSetup setup = good;
     change(setup);
     const auto made = make_genetic(setup);
     return made.ok() ? std::string("none") : made.error().message;
@@ -219,7 +219,7 @@ TEST(SaveAndRestore, DamagedOrForeignStatesAreRefused) {
   run.generation();
   const std::string state = run.optimiser().state();
   EXPECT_FALSE(restore_genetic(run.setup(), state.substr(0, state.size() / 2)).ok());
-  GeneticSetup other = run.setup();
+  OptimiserSetup other = run.setup();
   other.genes.pop_back();
   EXPECT_THAT(restore_genetic(other, state).error().message, testing::HasSubstr("3 genes"));
   other = run.setup();

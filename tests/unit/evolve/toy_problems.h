@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "master/evolve/genetic.h"
+#include "master/evolve/optimisers.h"
 
 namespace gapfarm {
 
@@ -43,6 +44,20 @@ inline Toy sphere(std::size_t dimension) {
   toy.cost = [](const ParameterValues& x) {
     double sum = 0;
     for (double value : x) sum += value * value;
+    return sum;
+  };
+  return toy;
+}
+
+inline Toy rosenbrock(std::size_t dimension) {
+  Toy toy;
+  toy.rows.assign(dimension, toy_row(ParameterKind::kReal, -2, 3));
+  toy.cost = [](const ParameterValues& x) {
+    double sum = 0;
+    for (std::size_t i = 0; i + 1 < x.size(); ++i) {
+      const double valley = x[i + 1] - x[i] * x[i];
+      sum += 100 * valley * valley + (1 - x[i]) * (1 - x[i]);
+    }
     return sum;
   };
   return toy;
@@ -89,7 +104,7 @@ class ToyRun {
     setup_.genes = toy_.genes();
     setup_.run_seed = seed;
     setup_.noisy = noisy;
-    optimiser_ = make_genetic(setup_).value();
+    optimiser_ = make_optimiser(setup_).value();
   }
 
   ParameterValues values(const Genome& genome) const {
@@ -116,17 +131,17 @@ class ToyRun {
   }
 
   // Goes on from the saved state in a new optimiser.
-  void reload() { optimiser_ = restore_genetic(setup_, optimiser_->state()).value(); }
+  void reload() { optimiser_ = restore_optimiser(setup_, optimiser_->state()).value(); }
 
   Optimiser& optimiser() { return *optimiser_; }
-  const GeneticSetup& setup() const { return setup_; }
+  const OptimiserSetup& setup() const { return setup_; }
 
   std::function<Score(const Candidate&)> scorer;  // instead of the toy's own cost
 
  private:
   Toy toy_;
   ParameterTable table_;
-  GeneticSetup setup_;
+  OptimiserSetup setup_;
   std::unique_ptr<Optimiser> optimiser_;
 };
 

@@ -1,0 +1,38 @@
+// [optimiser]: who searches.
+#include "common/config/sections.h"
+
+namespace gapfarm {
+namespace {
+
+const std::vector<std::string> kLocalWords = {"nelder_mead", "subplex", "bobyqa", "cobyla"};
+
+}  // namespace
+
+const std::vector<std::string>& optimiser_words() {
+  static const std::vector<std::string> words = {
+      "genetic", "differential_evolution", "cma_es", "local", "de_simplex", "random"};
+  return words;
+}
+
+void read_optimiser(TomlSection& top, OptimiserSettings& to) {
+  auto section = top.section("optimiser");
+  if (!section) return;
+  if (const auto kind = section->choice("kind", optimiser_words())) {
+    to.kind = static_cast<OptimiserKind>(*kind);
+  }
+  if (const auto population = section->count("population", 4, 1000000)) {
+    to.population = static_cast<unsigned>(*population);
+  }
+  section->read("differential_weight", to.differential_weight, 0.01, 2);
+  section->read("crossover_rate", to.crossover_rate, 0, 1);
+  section->read("sigma", to.sigma, 1e-4, 1);
+  section->read("iterations", to.iterations, 1, 1000000);
+  if (const auto local = section->choice("local", kLocalWords)) {
+    to.local = static_cast<LocalSearchKind>(*local);
+  }
+  section->read("step", to.step, 1e-6, 0.5);
+  section->read("local_evaluations", to.local_evaluations, 0, 1000000);
+  section->finish();
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,83 @@
+#include "master/evolve/optimisers.h"
+
+#include <array>
+#include <cassert>
+
+#include "master/evolve/cma_es.h"
+#include "master/evolve/de_simplex.h"
+#include "master/evolve/genetic.h"
+#include "master/evolve/random_search.h"
+#include "master/evolve/search_optimiser.h"
+
+namespace gapfarm {
+namespace {
+
+Result<std::unique_ptr<SearchOptimiser>> wrapped(const OptimiserSetup& setup, auto make_method) {
+  if (setup.genes.empty()) {
+    return Error{"there is nothing to evolve: no gene; give at least one parameter a search range"};
+  }
+  if (!setup.nominal.empty() && setup.nominal.size() != setup.genes.size()) {
+    return Error{"the nominal genome has " + std::to_string(setup.nominal.size()) +
+                 " genes instead of " + std::to_string(setup.genes.size())};
+  }
+  const EvolutionSettings& settings = setup.settings;
+  const MethodSetup method{settings.optimiser, settings.population,
+                           GeneSpace(*setup.table, setup.genes),
+                           settings.seed_nominal ? setup.nominal : Genome{}};
+  const auto row = static_cast<std::size_t>(settings.optimiser.kind);
+  return std::make_unique<SearchOptimiser>(optimisers()[row].name, setup, make_method(method));
+}
+
+template <class Method>
+Result<std::unique_ptr<Optimiser>> make(const OptimiserSetup& setup) {
+  auto made = wrapped(setup, [](const MethodSetup& m) { return std::make_unique<Method>(m); });
+  if (!made) return made.error();
+  return std::unique_ptr<Optimiser>(*std::move(made));
+}
+
+template <class Method>
+Result<std::unique_ptr<Optimiser>> restore(const OptimiserSetup& setup, std::string_view state) {
+  auto made = wrapped(setup, [](const MethodSetup& m) { return std::make_unique<Method>(m); });
+  if (!made) return made.error();
+  if (Status s = (*made)->restore(state); !s) return s.error();
+  return std::unique_ptr<Optimiser>(*std::move(made));
+}
+
+template <class Method>
+constexpr OptimiserRow row(OptimiserKind kind, const char* name, const char* summary) {
+  return {kind, name, summary, make<Method>, restore<Method>};
+}
+
+const OptimiserRow& row_of(const OptimiserSetup& setup) {
+  assert(setup.table != nullptr);
+  return optimisers()[static_cast<std::size_t>(setup.settings.optimiser.kind)];
+}
+
+}  // namespace
+
+std::span<const OptimiserRow> optimisers() {
+  using Kind = OptimiserKind;
+  static constexpr std::array rows = {
+      OptimiserRow{Kind::kGenetic, "genetic", "genetic algorithm with self-adapted operators",
+                   make_genetic, restore_genetic},
+      row<DifferentialEvolution>(Kind::kDifferentialEvolution, "differential_evolution",
+                                 "DE/rand/1/bin"),
+      row<CmaEs>(Kind::kCmaEs, "cma_es", "CMA-ES, restarted with growing populations"),
+      row<LocalSearch>(Kind::kLocal, "local", "local search of NLopt, begun again at random"),
+      row<DeSimplex>(Kind::kDeSimplex, "de_simplex",
+                     "differential evolution, then a simplex from its best"),
+      row<RandomSearch>(Kind::kRandom, "random", "uniform draws, the baseline"),
+  };
+  return rows;
+}
+
+Result<std::unique_ptr<Optimiser>> make_optimiser(const OptimiserSetup& setup) {
+  return row_of(setup).make(setup);
+}
+
+Result<std::unique_ptr<Optimiser>> restore_optimiser(const OptimiserSetup& setup,
+                                                     std::string_view state) {
+  return row_of(setup).restore(setup, state);
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,21 @@
+#include "master/evolve/random_search.h"
+
+namespace gapfarm {
+
+std::vector<Genome> RandomSearch::propose(const StreamOf& stream_of) const {
+  std::vector<Genome> proposed;
+  if (!begun_ && !setup_.start.empty()) proposed.push_back(setup_.start);
+  while (proposed.size() < setup_.settings.population.value_or(setup_.population)) {
+    Stream stream = stream_of(proposed.size());
+    proposed.push_back(setup_.space.random(stream));
+  }
+  return proposed;
+}
+
+Status RandomSearch::restore(const v1::MethodState& message) {
+  if (message.counts_size() != 1) return damaged_method_state("random search");
+  begun_ = message.counts(0) != 0;
+  return {};
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,54 @@
+// What one search does with ranks alone: the part of an optimiser that knows a method's name.
+//
+// A method proposes points and learns how they stand.  Counting, naming, scoring again under noise,
+// recognising what was scored before and remembering the best are SearchOptimiser's.
+#pragma once
+
+#include <functional>
+#include <span>
+#include <vector>
+
+#include "common/base/result.h"
+#include "common/config/settings.h"
+#include "gapfarm/v1/record.pb.h"
+#include "master/evolve/gene_space.h"
+#include "master/evolve/individual.h"
+
+namespace gapfarm {
+
+struct MethodSetup {
+  OptimiserSettings settings;
+  unsigned population = 40;  // when the settings leave it to the evolution
+  GeneSpace space;
+  Genome start;  // where to begin; empty: anywhere
+};
+
+// The stream of a generation's k-th proposal.
+using StreamOf = std::function<Stream(std::size_t)>;
+
+class SearchMethod {
+ public:
+  virtual ~SearchMethod() = default;
+
+  // Points to score next, at least one.  They may leave [0, 1] and lie between levels: what is
+  // scored is placed() of them, and learn() gets them back as they are.
+  virtual std::vector<Genome> propose(const StreamOf& stream_of) const = 0;
+  virtual void learn(std::span<const Genome> proposed, std::span<const Standing> standings) = 0;
+
+  virtual unsigned origin() const = 0;  // of the next proposals
+  // For the run store's table of operators: step sizes, phases.
+  virtual std::vector<NamedNumber> figures() const { return {}; }
+
+  virtual void save(v1::MethodState& message) const = 0;
+  // Error: the message is not one that save() made for this setup.
+  virtual Status restore(const v1::MethodState& message) = 0;
+};
+
+// Mirrored into [0, 1] gene by gene, as if mirrors stood at both ends, then snapped.  A function
+// seen through it has no bounds and no jump at them.
+Genome placed(const GeneSpace& space, const Genome& proposed);
+
+// The error of restore().
+Error damaged_method_state(const std::string& method);
+
+}  // namespace gapfarm
