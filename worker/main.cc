@@ -8,6 +8,7 @@
 #include <thread>
 
 #include "common/base/build_info.h"
+#include "common/net/keys.h"
 #include "common/process/process_pool.h"
 #include "worker/evaluate.h"
 #include "worker/service.h"
@@ -19,6 +20,7 @@ namespace {
 constexpr const char* kExamples = R"(Examples:
   gapfarm-worker --connect tcp://10.0.0.5:5555
       one worker process a core, for the master at that address; they reconnect when it restarts
+      (needs keys: `gapfarm keys --help`)
   gapfarm-worker --connect tcp://10.0.0.5:5555 --processes 4 --name rack3
       four processes whose names begin with rack3
 
@@ -28,6 +30,8 @@ Exit status: 0 stopped as asked, 2 wrong usage, 78 no master that would have thi
 struct Arguments {
   std::string endpoint;
   std::string name;
+  std::string keys = KeyFolder::default_path();
+  bool insecure = false;
   unsigned window = 0;
   unsigned processes = std::max(1u, std::thread::hardware_concurrency());
   bool local = false;
@@ -43,6 +47,12 @@ void describe(CLI::App& app, Arguments* arguments) {
       ->required()
       ->type_name("ENDPOINT");
   app.add_option("--name", arguments->name, "Begin of the workers' names (default: the host's)");
+  app.add_option("--keys", arguments->keys,
+                 "Folder with worker.key and master.pub, which tcp:// needs (docs/security.md)")
+      ->type_name("FOLDER")
+      ->capture_default_str();
+  app.add_flag("--insecure", arguments->insecure,
+               "Talk to a master that has no keys: unencrypted, and to whoever answers");
   app.add_option("--window", arguments->window,
                  "Jobs in hand, the one in work included (default: as the master likes)")
       ->check(CLI::Range(1, 1000));
@@ -63,14 +73,26 @@ int complain(const Error& error, int status) {
   return status;
 }
 
+// A worker that was told to trust whoever answers may do so anywhere: the endpoint names the place.
+Result<LinkSecurity> link_security(const Arguments& arguments) {
+  LinkSecurity security;
+  if (arguments.endpoint.rfind("tcp://", 0) != 0) return security;
+  if (!arguments.insecure) return worker_security(arguments.keys);
+  security.open = OpenLinks::kAnywhere;
+  return security;
+}
+
 // One worker, child of a master or a supervisor.
 int work(const Arguments& arguments) {
   if (!die_with_parent(arguments.parent)) return 0;
+  Result<LinkSecurity> security = link_security(arguments);
+  if (!security) return complain(security.error(), kExitRefused);
   StopSource stop;
   // Ctrl-C reaches the whole terminal's group; what it means is the parent's to decide.
   const StopOnSignals signals(&stop, /*ignore_interrupt=*/true);
   ServiceOptions options;
   options.endpoint = arguments.endpoint;
+  options.security = std::move(*security);
   options.local = arguments.local;
   options.session.name = arguments.name;
   options.session.host = host_name();
@@ -91,13 +113,21 @@ int work(const Arguments& arguments) {
 }
 
 int start_workers(const Arguments& arguments) {
+  if (const auto security = link_security(arguments); !security) {
+    return complain(security.error(), kExitUsage);
+  }
+  if (arguments.insecure) {
+    std::fprintf(stderr, "gapfarm-worker: insecure: working for whoever answers at %s\n",
+                 arguments.endpoint.c_str());
+  }
   StopSource stop;
   const StopOnSignals signals(&stop);
   SupervisorOptions options;
   options.program = executable_path();
   options.name = unique_worker_name(arguments.name);
   options.processes = arguments.processes;
-  options.arguments = {"--connect", arguments.endpoint};
+  options.arguments = {"--connect", arguments.endpoint, "--keys", arguments.keys};
+  if (arguments.insecure) options.arguments.push_back("--insecure");
   if (arguments.window > 0) {
     options.arguments.insert(options.arguments.end(),
                              {"--window", std::to_string(arguments.window)});

@@ -29,6 +29,7 @@ class Service {
     for (;;) {
       const double now = monotonic_seconds();
       notice_stop();
+      notice_trouble();
       const bool received = pump_in(socket_, session_, now);
       hand_over(now);
       pump_out(socket_, session_);
@@ -49,6 +50,13 @@ class Service {
     stops_ = stop_.requests();
     stop_.acknowledge();
     evaluation_.drop_all();
+  }
+
+  void notice_trouble() const {
+    const std::string trouble = socket_.take_trouble();
+    if (!trouble.empty()) {
+      std::fprintf(stderr, "gapfarm-worker: %s; trying again\n", trouble.c_str());
+    }
   }
 
   // Between the session and the evaluating thread.
@@ -99,7 +107,9 @@ std::string unique_worker_name(const std::string& prefix) {
 
 Result<ServiceEnd> serve(const ServiceOptions& options, EvaluationThread& evaluation,
                          StopSource& stop) {
-  auto socket = DealerSocket::connect(options.endpoint);
+  SocketOptions settings;
+  settings.security = options.security;
+  auto socket = DealerSocket::connect(options.endpoint, settings);
   if (!socket) return socket.error();
   return Service(options, **socket, evaluation, stop).run();
 }

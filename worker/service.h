@@ -4,6 +4,7 @@
 #include <string>
 
 #include "common/base/result.h"
+#include "common/net/keys.h"
 #include "common/process/stop.h"
 #include "worker/evaluation_thread.h"
 #include "worker/session.h"
@@ -11,7 +12,8 @@
 namespace gapfarm {
 
 struct ServiceOptions {
-  std::string endpoint;  // the master's
+  std::string endpoint;   // the master's
+  LinkSecurity security;  // for a tcp:// endpoint
   SessionOptions session;
   // Belongs to the master's own process tree: ends when the master says goodbye, without finishing
   // the job in hand.  Otherwise waits for the next master.

@@ -1,5 +1,7 @@
 #include "common/net/socket.h"
 
+#include <sys/resource.h>
+#include <sys/stat.h>
 #include <sys/un.h>
 
 #include <algorithm>
@@ -7,6 +9,8 @@
 #include <zmq.hpp>
 
 #include "common/net/envelope.h"
+#include "common/net/handshake_watch.h"
+#include "common/net/link_guard.h"
 
 namespace gapfarm {
 namespace {
@@ -49,6 +53,56 @@ Status check_endpoint(const std::string& endpoint) {
   return Error{"endpoint '" + endpoint + "' is neither tcp://HOST:PORT nor ipc://PATH"};
 }
 
+bool is_tcp(const std::string& endpoint) { return endpoint.rfind("tcp://", 0) == 0; }
+
+bool is_loopback(const std::string& endpoint) {
+  const std::string host = endpoint.substr(6, endpoint.rfind(':') - 6);
+  return host == "localhost" ||
+         (host.rfind("127.", 0) == 0 && host.find_first_not_of("0123456789.") == std::string::npos);
+}
+
+// Thousands of peers need more descriptors than the usual 1,024.  Returns how many there may be.
+std::size_t raise_descriptor_limit() {
+  rlimit limit = {};
+  if (getrlimit(RLIMIT_NOFILE, &limit) != 0) return 1024;
+  if (limit.rlim_cur < limit.rlim_max) {
+    const rlim_t before = limit.rlim_cur;
+    limit.rlim_cur = limit.rlim_max;
+    if (setrlimit(RLIMIT_NOFILE, &limit) != 0) limit.rlim_cur = before;
+  }
+  return limit.rlim_cur;
+}
+
+// Descriptors that are not connections: run store, children, logs.
+constexpr std::size_t kReservedDescriptors = 200;
+
+LinkLimits within_descriptors(LinkLimits limits) {
+  const std::size_t most = raise_descriptor_limit();
+  const std::size_t usable =
+      most > 2 * kReservedDescriptors ? most - kReservedDescriptors : most / 2;
+  limits.connections = std::min(limits.connections, usable);
+  return limits;
+}
+
+// Applies to the endpoints bound from now on.  Without a ZAP handler ZeroMQ would let any key in;
+// the guard's is bound before the first endpoint, stays as long as the socket is used, and lets in
+// nobody of another domain.
+void secure_server(zmq::socket_t& socket, const LinkSecurity& security, bool curve) {
+  socket.set(zmq::sockopt::curve_server, curve);
+  if (curve) {
+    socket.set(zmq::sockopt::zap_domain, kZapDomain);
+    socket.set(zmq::sockopt::curve_secretkey, security.own->secret_key);
+  } else {
+    zmq_setsockopt(socket.handle(), ZMQ_ZAP_DOMAIN, nullptr, 0);  // empty
+  }
+}
+
+void secure_client(zmq::socket_t& socket, const LinkSecurity& security) {
+  socket.set(zmq::sockopt::curve_serverkey, security.master_key);
+  socket.set(zmq::sockopt::curve_publickey, security.own->public_key);
+  socket.set(zmq::sockopt::curve_secretkey, security.own->secret_key);
+}
+
 // The rest of a message whose first parts were read.  True when there were none.
 bool discard_parts(zmq::socket_t& socket, const zmq::message_t& last) {
   bool more = last.more();
@@ -72,10 +126,33 @@ void poll_socket(zmq::socket_t& socket, std::span<const int> fds, double timeout
   zmq_poll(items.data(), static_cast<int>(items.size()), timeout_ms);  // EINTR: the caller looks
 }
 
+Error needs_keys(const std::string& endpoint) {
+  return Error{"'" + endpoint + "' needs keys, and none were given; make them with `gapfarm keys " +
+               "make`, or ask for an open link with --insecure"};
+}
+
 }  // namespace
 
-struct RouterSocket::Impl : OwnedSocket {};
-struct DealerSocket::Impl : OwnedSocket {};
+Status may_listen(const std::string& endpoint, const LinkSecurity& security) {
+  if (Status status = check_endpoint(endpoint); !status) return status;
+  if (!is_tcp(endpoint) || security.open == OpenLinks::kAnywhere) return {};
+  if (security.open == OpenLinks::kLoopback) {
+    if (is_loopback(endpoint)) return {};
+    return Error{"--insecure keeps to this machine (127.0.0.1), and '" + endpoint +
+                 "' is open to others: anybody could send forged results; make keys with `gapfarm "
+                 "keys make`, or add --insecure-anywhere on a network that you trust wholly"};
+  }
+  if (security.own && !security.listed.empty()) return {};
+  return needs_keys(endpoint);
+}
+
+struct RouterSocket::Impl : OwnedSocket {
+  LinkSecurity security;
+  std::unique_ptr<LinkGuard> guard;
+};
+struct DealerSocket::Impl : OwnedSocket {
+  std::unique_ptr<HandshakeWatch> watch;
+};
 
 RouterSocket::RouterSocket(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 RouterSocket::~RouterSocket() = default;
@@ -86,6 +163,9 @@ Result<std::unique_ptr<RouterSocket>> RouterSocket::create(const SocketOptions& 
     impl->socket = zmq::socket_t(impl->context, zmq::socket_type::router);
     configure(impl->socket, options);
     impl->socket.set(zmq::sockopt::router_mandatory, true);
+    impl->security = options.security;
+    impl->guard = std::make_unique<LinkGuard>(impl->context, impl->socket, options.security,
+                                              within_descriptors(options.limits));
     return std::unique_ptr<RouterSocket>(new RouterSocket(std::move(impl)));
   } catch (const zmq::error_t& error) {
     return Error{std::string("cannot make a socket: ") + error.what()};
@@ -93,9 +173,13 @@ Result<std::unique_ptr<RouterSocket>> RouterSocket::create(const SocketOptions& 
 }
 
 Result<std::string> RouterSocket::bind(const std::string& endpoint) {
-  if (Status status = check_endpoint(endpoint); !status) return status.error();
+  const LinkSecurity& security = impl_->security;
+  if (Status status = may_listen(endpoint, security); !status) return status.error();
   try {
+    secure_server(impl_->socket, security, is_tcp(endpoint) && security.open == OpenLinks::kNever);
+    const mode_t mask = umask(0077);  // nobody else may connect to a socket in the file system
     impl_->socket.bind(endpoint);
+    umask(mask);
     return impl_->socket.get(zmq::sockopt::last_endpoint);
   } catch (const zmq::error_t& error) {
     const std::string remedy = error.num() == EADDRINUSE
@@ -125,6 +209,7 @@ bool RouterSocket::receive(Message* message) {
       if (!impl_->socket.recv(peer, zmq::recv_flags::dontwait)) return false;
       if (!peer.more() || !impl_->socket.recv(bytes, zmq::recv_flags::dontwait)) continue;
       if (!discard_parts(impl_->socket, bytes)) continue;
+      impl_->guard->heard(bytes);
       message->peer.assign(static_cast<const char*>(peer.data()), peer.size());
       message->bytes.assign(static_cast<const char*>(bytes.data()), bytes.size());
       return true;
@@ -138,17 +223,28 @@ void RouterSocket::wait(std::span<const int> fds, double timeout_s) {
   poll_socket(impl_->socket, fds, timeout_s);
 }
 
+LinkCounts RouterSocket::link_counts() const { return impl_->guard->counts(); }
+
+std::vector<std::string> RouterSocket::take_complaints() { return impl_->guard->take_complaints(); }
+
 DealerSocket::DealerSocket(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 DealerSocket::~DealerSocket() = default;
 
 Result<std::unique_ptr<DealerSocket>> DealerSocket::connect(const std::string& endpoint,
                                                             const SocketOptions& options) {
   if (Status status = check_endpoint(endpoint); !status) return status.error();
+  const LinkSecurity& security = options.security;
+  const bool has_keys = security.own.has_value() && !security.master_key.empty();
+  const bool open = security.open != OpenLinks::kNever;
+  if (is_tcp(endpoint) && !open && !has_keys) return needs_keys(endpoint);
   try {
     auto impl = std::make_unique<Impl>();
     impl->socket = zmq::socket_t(impl->context, zmq::socket_type::dealer);
     configure(impl->socket, options);
     impl->socket.set(zmq::sockopt::immediate, true);
+    if (is_tcp(endpoint) && !open) secure_client(impl->socket, security);
+    impl->watch = std::make_unique<HandshakeWatch>(impl->context, impl->socket, endpoint,
+                                                   options.reconnect_max_s);
     impl->socket.connect(endpoint);
     return std::unique_ptr<DealerSocket>(new DealerSocket(std::move(impl)));
   } catch (const zmq::error_t& error) {
@@ -164,6 +260,7 @@ SendStatus DealerSocket::send(const std::string& /*peer*/, const std::string& by
 bool DealerSocket::receive(Message* message) {
   zmq::message_t bytes;
   try {
+    impl_->watch->look();
     for (;;) {
       if (!impl_->socket.recv(bytes, zmq::recv_flags::dontwait)) return false;
       if (!discard_parts(impl_->socket, bytes)) continue;
@@ -179,5 +276,7 @@ bool DealerSocket::receive(Message* message) {
 void DealerSocket::wait(std::span<const int> fds, double timeout_s) {
   poll_socket(impl_->socket, fds, timeout_s);
 }
+
+std::string DealerSocket::take_trouble() { return impl_->watch->take_trouble(); }
 
 }  // namespace gapfarm

@@ -40,7 +40,9 @@ int run_evolve(const EvolveCommand& command, CliContext& context) {
   if (config) {
     command.overrides.apply(config->evolution);
     if (command.seed) config->seed = *command.seed;
-    if (Status s = check_evolvable(*config); !s) config = s.error();
+    Status sound = check_evolvable(*config);
+    if (sound) sound = check_farm(command.farm, config->farm);
+    if (!sound) config = sound.error();
   }
   if (!config) {
     context.console.error(config.error());

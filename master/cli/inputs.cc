@@ -53,6 +53,45 @@ void FarmOptions::declare(CLI::App& app, bool remote) {
       ->check(CLI::Range(0, 4096));
   if (!remote) return;
   app.add_option("--listen", listen, "Endpoint for remote workers, tcp://HOST:PORT; may repeat");
+  app.add_option("--keys", keys, "Folder of the keys that tcp:// needs (`gapfarm keys --help`)")
+      ->type_name("FOLDER");
+  CLI::Option* open = app.add_flag(
+      "--insecure", insecure,
+      "Listen without keys: unencrypted, and open to whoever connects; on this machine only");
+  app.add_flag("--insecure-anywhere", insecure_anywhere,
+               "With --insecure: on every network that --listen names")
+      ->needs(open);
+}
+
+namespace {
+
+bool is_tcp(const std::string& endpoint) { return endpoint.rfind("tcp://", 0) == 0; }
+
+// Where the farm listens, and how it is protected there.
+Result<LinkSecurity> link_security(const FarmOptions& options,
+                                   const std::vector<std::string>& endpoints) {
+  LinkSecurity security;
+  if (std::none_of(endpoints.begin(), endpoints.end(), is_tcp)) return security;
+  if (!options.insecure) return master_security(options.keys);
+  security.open = options.insecure_anywhere ? OpenLinks::kAnywhere : OpenLinks::kLoopback;
+  return security;
+}
+
+std::vector<std::string> endpoints_of(const FarmOptions& options, const FarmSettings& settings) {
+  if (options.listen.empty() && settings.listen) return {*settings.listen};
+  return options.listen;
+}
+
+}  // namespace
+
+Status check_farm(const FarmOptions& options, const FarmSettings& settings) {
+  const std::vector<std::string> endpoints = endpoints_of(options, settings);
+  const Result<LinkSecurity> security = link_security(options, endpoints);
+  if (!security) return security.error();
+  for (const std::string& endpoint : endpoints) {
+    if (Status s = may_listen(endpoint, *security); !s) return s;
+  }
+  return {};
 }
 
 unsigned local_workers(const FarmOptions& options, const FarmSettings& settings) {
@@ -64,8 +103,15 @@ Result<std::unique_ptr<SocketFarm>> start_farm(const FarmOptions& options,
                                                const FarmSettings& settings, CliContext& context,
                                                SocketFarmOptions base) {
   base.local_workers = local_workers(options, settings);
-  base.listen = options.listen;
-  if (base.listen.empty() && settings.listen) base.listen = {*settings.listen};
+  base.listen = endpoints_of(options, settings);
+  Result<LinkSecurity> security = link_security(options, base.listen);
+  if (!security) return security.error();
+  base.security = std::move(*security);
+  if (base.security.open != OpenLinks::kNever) {
+    context.console.note(
+        "insecure: links are neither encrypted nor authenticated; whoever reaches this machine's "
+        "port gets jobs and may answer them falsely");
+  }
   base.window = settings.window;
   base.heartbeat_interval_s = settings.heartbeat_interval_s;
   base.silence_limit_s = settings.silence_limit_s;

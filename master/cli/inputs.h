@@ -8,6 +8,7 @@
 #include "common/base/result.h"
 #include "common/config/model.h"
 #include "common/config/settings.h"
+#include "common/net/keys.h"
 #include "master/cli/subcommand.h"
 #include "master/farm/socket_farm.h"
 
@@ -30,11 +31,17 @@ Result<Model> read_model_of(const std::string& run_or_model);
 struct FarmOptions {
   int workers = -1;  // -1: as the config says, else one a core
   std::vector<std::string> listen;
+  std::string keys = KeyFolder::default_path();
+  bool insecure = false;
+  bool insecure_anywhere = false;
 
   void declare(CLI::App& app, bool remote);
 };
 
 unsigned local_workers(const FarmOptions& options, const FarmSettings& settings);
+
+// What can be said before anything is made: keys that are missing, endpoints that would be open.
+Status check_farm(const FarmOptions& options, const FarmSettings& settings);
 
 // Starts the farm, or says why not.
 Result<std::unique_ptr<SocketFarm>> start_farm(const FarmOptions& options,

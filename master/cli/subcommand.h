@@ -43,6 +43,7 @@ SubcommandRun setup_check(CLI::App& app);
 SubcommandRun setup_diagnose(CLI::App& app);
 SubcommandRun setup_evolve(CLI::App& app);
 SubcommandRun setup_import(CLI::App& app);
+SubcommandRun setup_keys(CLI::App& app);
 SubcommandRun setup_predict(CLI::App& app);
 SubcommandRun setup_report(CLI::App& app);
 SubcommandRun setup_resume(CLI::App& app);

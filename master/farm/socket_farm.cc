@@ -27,8 +27,9 @@ void complain(const FarmEvent& event) {
     case FarmEvent::kLeft:
       return;
     default:
-      std::fprintf(stderr, "gapfarm: worker %s: %s\n",
-                   event.worker.empty() ? "(unknown)" : event.worker.c_str(), event.text.c_str());
+      std::fprintf(stderr, "gapfarm: %s%s\n",
+                   event.worker.empty() ? "" : ("worker " + event.worker + ": ").c_str(),
+                   event.text.c_str());
   }
 }
 
@@ -81,7 +82,10 @@ Status SocketFarm::Impl::open() {
   settings.on_event = [this](const FarmEvent& event) { on_event(event); };
   scheduler = std::make_unique<Scheduler>(std::move(settings));
 
-  auto made = RouterSocket::create();
+  SocketOptions links;
+  links.security = options.security;
+  links.limits = options.limits;
+  auto made = RouterSocket::create(links);
   if (!made) return made.error();
   socket = std::move(made).value();
   for (const std::string& endpoint : options.listen) {
@@ -106,8 +110,11 @@ Status SocketFarm::Impl::open_local() {
 }
 
 void SocketFarm::Impl::reap(double now) {
-  if (!locals) return;
   next_reap = now + kReapInterval;
+  for (std::string& text : socket->take_complaints()) {
+    on_event({FarmEvent::kRefused, "", std::move(text)});
+  }
+  if (!locals) return;
   for (const ProcessEnded& end : locals->pool().reap(now)) {
     scheduler->on_process_end(end.name, end.cause, end.text);
     if (end.gave_up) {
@@ -208,6 +215,8 @@ std::uint64_t SocketFarm::retries() const { return impl_->scheduler->counts().re
 const std::vector<std::string>& SocketFarm::endpoints() const { return impl_->endpoints; }
 
 const SchedulerCounts& SocketFarm::counts() const { return impl_->scheduler->counts(); }
+
+LinkCounts SocketFarm::link_counts() const { return impl_->socket->link_counts(); }
 
 const std::string& SocketFarm::numeric_class() const {
   return impl_->scheduler->workers().numeric_class();

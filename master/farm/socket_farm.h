@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "common/base/result.h"
+#include "common/net/socket.h"
 #include "common/process/stop.h"
 #include "master/farm/farm.h"
 #include "master/farm/scheduler.h"
@@ -18,9 +19,11 @@ namespace gapfarm {
 struct SocketFarmOptions {
   unsigned local_workers = 0;       // processes to start on this machine
   std::vector<std::string> listen;  // endpoints for workers that come by themselves
-  std::string worker_program;       // empty: find_worker_program()
-  std::uint64_t epoch = 0;          // of this life of the master; 0: drawn
-  std::string numeric_class;        // of the run; empty: the first worker's
+  LinkSecurity security;            // of tcp:// endpoints; without it they cannot be listened on
+  LinkLimits limits;
+  std::string worker_program;  // empty: find_worker_program()
+  std::uint64_t epoch = 0;     // of this life of the master; 0: drawn
+  std::string numeric_class;   // of the run; empty: the first worker's
   bool allow_mixed_numeric_classes = false;
   unsigned window = 2;
   double heartbeat_interval_s = 1;
@@ -52,6 +55,7 @@ class SocketFarm : public Farm {
   // As bound: ports are filled in.
   const std::vector<std::string>& endpoints() const;
   const SchedulerCounts& counts() const;
+  LinkCounts link_counts() const;
   // Of the run; empty before the first worker.
   const std::string& numeric_class() const;
   // Pids of the running local workers.

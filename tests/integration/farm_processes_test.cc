@@ -57,6 +57,7 @@ SocketFarmOptions local(unsigned workers) {
 SocketFarmOptions listening(const std::string& endpoint = "tcp://127.0.0.1:*") {
   SocketFarmOptions options = quiet();
   options.listen = {endpoint};
+  options.security.open = OpenLinks::kLoopback;
   return options;
 }
 
@@ -66,7 +67,7 @@ std::unique_ptr<ProcessPool> remote_worker(const std::string& endpoint) {
   options.program = kWorkerProgram;
   options.name_prefix = "remote";
   options.arguments = [endpoint](const std::string&, const ProcessEnded*) {
-    return std::vector<std::string>{"--connect", endpoint, "--processes", "1"};
+    return std::vector<std::string>{"--connect", endpoint, "--processes", "1", "--insecure"};
   };
   auto pool = std::make_unique<ProcessPool>(std::move(options));
   EXPECT_TRUE(pool->start(monotonic_seconds()).ok());
@@ -225,6 +226,7 @@ TEST(Farm, RefusesAWorkerOfAnotherBuild) {
   ASSERT_TRUE(farm.ok()) << farm.error().message;
   ServiceOptions service;
   service.endpoint = (*farm)->endpoints().at(0);
+  service.security.open = OpenLinks::kLoopback;
   service.session.name = "stranger";
   service.session.fingerprint = "another build";
   service.session.numeric_class = "fake";
@@ -254,7 +256,9 @@ TEST(Farm, GarbageDoesNotDisturb) {
   address.sin_port =
       htons(static_cast<std::uint16_t>(std::stoi(endpoint.substr(endpoint.rfind(':') + 1))));
   ASSERT_EQ(connect(raw, reinterpret_cast<sockaddr*>(&address), sizeof address), 0);
-  auto rude = DealerSocket::connect(endpoint);
+  SocketOptions open;
+  open.security.open = OpenLinks::kLoopback;
+  auto rude = DealerSocket::connect(endpoint, open);
   ASSERT_TRUE(rude.ok());
   const auto tasks = echo_tasks(500, 1000);
   std::uint64_t said = 0;

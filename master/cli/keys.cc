@@ -1,0 +1,210 @@
+// gapfarm keys: who may work for this user's masters.
+#include "common/net/keys.h"
+
+#include <unistd.h>
+
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "master/cli/subcommand.h"
+
+namespace gapfarm {
+namespace {
+
+struct KeysOptions {
+  std::string folder = KeyFolder::default_path();
+  std::string name;
+  std::string file;
+  std::string key;
+  std::string out;
+  bool worker_only = false;
+  bool json = false;
+};
+
+std::string host_name() {
+  char name[65] = {};
+  if (gethostname(name, sizeof name - 1) != 0 || !is_key_name(name)) return "worker";
+  return name;
+}
+
+int failed_with(const Error& error, CliContext& context) {
+  context.console.error(error);
+  return kExitFailed;
+}
+
+// A worker's pair in `folder`: the one that is there, else a new one.
+Result<KeyPair> worker_pair(const KeyFolder& folder, const std::string& name) {
+  if (folder.has_pair("worker")) return folder.pair("worker");
+  const KeyPair pair = make_key_pair(name);
+  if (Status s = folder.add_pair("worker", pair); !s) return s.error();
+  return pair;
+}
+
+Status make_master(const KeyFolder& folder, Console& console) {
+  if (folder.has_pair("master")) {
+    console.note("master.key is there already and stays");
+  } else if (Status s = folder.add_pair("master", make_key_pair("master")); !s) {
+    return s;
+  }
+  const Result<KeyPair> pair = folder.pair("master");
+  if (!pair) return pair.error();
+  return folder.add_master_public({"master", pair->public_key});
+}
+
+int run_make(const KeysOptions& options, CliContext& context) {
+  Console& console = context.console;
+  const Result<KeyFolder> folder = KeyFolder::open_or_make(options.folder);
+  if (!folder) return failed_with(folder.error(), context);
+  if (folder->has_pair("worker")) console.note("worker.key is there already and stays");
+  const Result<KeyPair> worker =
+      worker_pair(*folder, options.name.empty() ? host_name() : options.name);
+  if (!worker) return failed_with(worker.error(), context);
+  if (options.worker_only) {
+    console.print("made the key of worker '" + worker->name + "' in " + folder->path() +
+                  "\nput master.pub of the master's key folder there, and list the worker on the "
+                  "master with\n"
+                  "  gapfarm keys allow " +
+                  worker->name + " --key '" + worker->public_key + "'\n");
+    return kExitDone;
+  }
+  if (Status s = make_master(*folder, console); !s) return failed_with(s.error(), context);
+  if (Status s = folder->list({worker->name, worker->public_key}); !s) {
+    return failed_with(s.error(), context);
+  }
+  console.print("keys of a master, and of the workers of this user on '" + worker->name +
+                "' (and wherever this folder is shared), are in " + folder->path() +
+                "\nfor another machine: gapfarm keys worker NAME --out FOLDER\n");
+  return kExitDone;
+}
+
+// Key folder of a worker elsewhere, made here.
+int run_worker(const KeysOptions& options, CliContext& context) {
+  const Result<KeyFolder> folder = KeyFolder::open(options.folder);
+  if (!folder) return failed_with(folder.error(), context);
+  const Result<PublicKey> master = folder->master_public();
+  if (!master) return failed_with(master.error(), context);
+  const Result<KeyFolder> other = KeyFolder::open_or_make(options.out);
+  if (!other) return failed_with(other.error(), context);
+  const Result<KeyPair> worker = worker_pair(*other, options.name);
+  if (!worker) return failed_with(worker.error(), context);
+  if (Status s = other->add_master_public(*master); !s) return failed_with(s.error(), context);
+  if (Status s = folder->list({options.name, worker->public_key}); !s) {
+    return failed_with(s.error(), context);
+  }
+  context.console.print("listed worker '" + options.name +
+                        "'; copy its folder over and remove it "
+                        "here:\n  scp -rp " +
+                        options.out + " HOST:.config/gapfarm/keys && rm -r " + options.out + "\n");
+  return kExitDone;
+}
+
+int run_allow(const KeysOptions& options, CliContext& context) {
+  if (options.file.empty() == options.key.empty()) {
+    context.console.error(Error{"give either the worker's public key file or --key KEY"});
+    return kExitBadUsage;
+  }
+  const Result<KeyFolder> folder = KeyFolder::open(options.folder);
+  if (!folder) return failed_with(folder.error(), context);
+  PublicKey key{options.name, options.key};
+  if (!options.file.empty()) {
+    const Result<PublicKey> read = read_public_key(options.file);
+    if (!read) return failed_with(read.error(), context);
+    key.key = read->key;
+  }
+  if (Status s = folder->list(key); !s) return failed_with(s.error(), context);
+  context.console.print("listed worker '" + options.name + "'\n");
+  return kExitDone;
+}
+
+int run_revoke(const KeysOptions& options, CliContext& context) {
+  const Result<KeyFolder> folder = KeyFolder::open(options.folder);
+  if (!folder) return failed_with(folder.error(), context);
+  if (Status s = folder->unlist(options.name); !s) return failed_with(s.error(), context);
+  context.console.print("worker '" + options.name +
+                        "' is not listed any more; links that stand go on until they break or the "
+                        "master restarts\n");
+  return kExitDone;
+}
+
+int run_list(const KeysOptions& options, CliContext& context) {
+  const Result<KeyFolder> folder = KeyFolder::open(options.folder);
+  if (!folder) return failed_with(folder.error(), context);
+  nlohmann::ordered_json rows = nlohmann::ordered_json::array();
+  std::vector<std::string> trouble;
+  const auto row = [&](const char* role, const std::string& name, const std::string& key) {
+    rows.push_back({{"role", role}, {"name", name}, {"public", key}});
+  };
+  for (const char* role : {"master", "worker"}) {
+    if (!folder->has_pair(role)) continue;
+    const Result<KeyPair> pair = folder->pair(role);
+    if (pair) {
+      row(role, pair->name, pair->public_key);
+    } else {
+      trouble.push_back(pair.error().message);
+    }
+  }
+  const auto listed = folder->listed(&trouble);
+  if (!listed) return failed_with(listed.error(), context);
+  for (const PublicKey& key : *listed) row("listed", key.name, key.key);
+  if (options.json) {
+    context.console.print(rows.dump(2) + "\n");
+  } else {
+    for (const auto& entry : rows) {
+      const std::string role = entry["role"], name = entry["name"], key = entry["public"];
+      context.console.print(role + std::string(8 - role.size(), ' ') + key + "  " +
+                            printable(name) + "\n");
+    }
+    if (rows.empty()) context.console.note("no keys in " + folder->path());
+  }
+  for (const std::string& text : trouble) context.console.error(Error{text});
+  return trouble.empty() ? kExitDone : kExitFailed;
+}
+
+using KeysRun = int (*)(const KeysOptions&, CliContext&);
+
+}  // namespace
+
+SubcommandRun setup_keys(CLI::App& app) {
+  auto options = std::make_shared<KeysOptions>();
+  auto chosen = std::make_shared<KeysRun>(nullptr);
+  const auto add = [&](const char* name, const char* summary, KeysRun run) {
+    CLI::App* sub = app.add_subcommand(name, summary);
+    sub->add_option("--keys", options->folder, "Key folder (default: ~/.config/gapfarm/keys)")
+        ->type_name("FOLDER");
+    sub->callback([chosen, run] { *chosen = run; });
+    return sub;
+  };
+  const CLI::Validator name(
+      [](const std::string& text) {
+        return is_key_name(text) ? "" : "'" + text + "' is not 1 to 64 of A-Z a-z 0-9 . _ -";
+      },
+      "NAME");
+  CLI::App* make = add("make", "make the keys of a master and of this machine's workers", run_make);
+  make->add_flag("--worker", options->worker_only, "Only those of this machine's workers");
+  make->add_option("--name", options->name, "The worker's name (default: the host's)")->check(name);
+  CLI::App* worker = add("worker", "make the key folder of another machine's workers", run_worker);
+  worker->add_option("NAME", options->name, "Of the worker")->required()->check(name);
+  worker->add_option("--out", options->out, "Folder to make")->required();
+  CLI::App* allow = add("allow", "let in a worker that has made its own key", run_allow);
+  allow->add_option("NAME", options->name, "Of the worker")->required()->check(name);
+  allow->add_option("FILE", options->file, "Public key file");
+  allow->add_option("--key", options->key, "The public key itself (40 characters)");
+  CLI::App* revoke = add("revoke", "let a worker in no more", run_revoke);
+  revoke->add_option("NAME", options->name, "Of the worker")->required()->check(name);
+  CLI::App* list = add("list", "show public keys and who is let in", run_list);
+  list->add_flag("--json", options->json, "Print JSON");
+  app.require_subcommand(1);
+  app.footer(
+      "Examples:\n"
+      "  gapfarm keys make                                 # once, for master and local workers\n"
+      "  gapfarm keys worker rack3 --out /tmp/rack3        # then copy the folder to rack3\n"
+      "  gapfarm keys allow rack4 rack4.pub                # rack4 ran `gapfarm keys make "
+      "--worker`\n"
+      "  gapfarm keys list\n"
+      "Secret keys stay in files of mode 0600 in a folder of mode 0700; nothing else is accepted.\n"
+      "A running master notices changes of the list within a second.");
+  return [options, chosen](CliContext& context) { return (*chosen)(*options, context); };
+}
+
+}  // namespace gapfarm
