@@ -21,7 +21,7 @@ TEST(CliUsage, HelpFitsAScreenAndHasExamplesEverywhere) {
   EXPECT_EQ(help.exit_code, 0);
   EXPECT_LE(std::count(help.out.begin(), help.out.end(), '\n'), 40);
   for (const char* command :
-       {"evolve", "resume", "status", "simulate", "predict", "check", "import"}) {
+       {"evolve", "resume", "status", "simulate", "predict", "check", "import", "keys"}) {
     EXPECT_THAT(help.out, HasSubstr(command));
     const Finished one = gapfarm_command({command, "--help"});
     EXPECT_EQ(one.exit_code, 0) << command;
