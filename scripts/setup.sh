@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Installs the Debian 12 packages that gapfarm is built from.  Does nothing when all are there.
-#   scripts/setup.sh [--tests]     --tests: also what only the tests need (format, browser)
+#   scripts/setup.sh [--tests]     --tests: also what only the tests need (format, browser, Slurm,
+#                                sshd)
 set -euo pipefail
 
 packages=(
@@ -10,7 +11,11 @@ packages=(
   libspdlog-dev libsqlite3-dev libtomlplusplus-dev libzmq3-dev nlohmann-json3-dev
   protobuf-compiler
 )
-if [[ "${1:-}" == --tests ]]; then packages+=(chromium clang-format fonts-dejavu-core); fi
+if [[ "${1:-}" == --tests ]]; then
+  packages+=(chromium clang-format fonts-dejavu-core)
+  # Farms over Slurm and ssh, and Kubernetes' types (tests/launch).
+  packages+=(iproute2 munge openssh-client openssh-server python3-kubernetes python3-yaml slurm-wlm)
+fi
 # npm packs the report's plotting library at build time; without it reports fall back to plain SVG.
 if ! command -v npm >/dev/null; then packages+=(npm); fi
 
