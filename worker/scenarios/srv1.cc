@@ -50,16 +50,41 @@ Grouping group_trials(const std::vector<PreparedTrial>& trials, bool by_last_dir
   return grouping;
 }
 
-// Whether a disc of floor can matter to a motion that ends at X_SE: it comes within the robot's
-// size of the way there.
-bool patch_in_reach(const Floor& floor, const Pose& X_SE) {
+// An unrecorded move takes up what a side's last direction left open (backlash.cc), also for trials
+// after it in which the side has not run since.
+void forget_over_moves(const std::vector<DrivenCommand>& driven,
+                       std::vector<TrialContext>* contexts) {
+  for (TrialContext& context : *contexts) {
+    if (context.moved) {
+      context.last_left = context.last_right = 0;
+      continue;
+    }
+    const std::size_t previous = *context.previous;
+    if (driven[previous].left == 0) context.last_left = (*contexts)[previous].last_left;
+    if (driven[previous].right == 0) context.last_right = (*contexts)[previous].last_right;
+  }
+}
+
+// Whether a disc of floor can matter to a motion that ends at X_SE.
+bool patch_in_reach(const Floor& floor, const GroupMotion& motion, const Pose& X_SE) {
   if (floor.patch_ratio == 1) return false;
-  constexpr double kRobotReach_m = 0.12;  // half its diagonal, and an arc's sagitta
-  const Eigen::Vector2d centre(floor.patch_x_m, floor.patch_y_m);
-  const Eigen::Vector2d end(X_SE.x, X_SE.y);
-  const double length2 = end.squaredNorm();
-  const double share = length2 > 0 ? std::clamp(centre.dot(end) / length2, 0.0, 1.0) : 0.0;
-  return (centre - share * end).norm() < floor.patch_radius_m + kRobotReach_m;
+  // The farthest contact that the parameter table allows (107 mm), half the way between two samples
+  // of the way at the greatest speed, and half the patch's rim.
+  constexpr double kRobotReach_m = 0.12;
+  const Pose& end = motion.reference();
+  const double astray = std::hypot(X_SE.x - end.x, X_SE.y - end.y);
+  return motion.distance_from_way({floor.patch_x_m, floor.patch_y_m}) <
+         floor.patch_radius_m + kRobotReach_m + astray;
+}
+
+// Whether what trials share says too little of one of them.
+bool simulate_alone(const Srv1Robot& robot, const GroupMotion& motion, const Situation& situation,
+                    const Pose& X_SE) {
+  if (motion.jumps_over_heading()) return true;
+  if (!(robot.effects().motion_context() & kStartPlace)) return false;
+  Floor floor;
+  robot.effects().floor(situation, floor);
+  return patch_in_reach(floor, motion, X_SE);
 }
 
 class Srv1Model : public ScenarioModel {
@@ -71,9 +96,7 @@ class Srv1Model : public ScenarioModel {
       driven.push_back({c.left, c.right, c.duration_s});
     }
     std::vector<TrialContext> contexts = trial_contexts(problem.log, driven);
-    for (TrialContext& context : contexts) {
-      if (context.moved) context.last_left = context.last_right = 0;  // see backlash.cc
-    }
+    forget_over_moves(driven, &contexts);
     for (std::size_t i = 0; i < driven.size(); ++i) {
       const Trial& trial = problem.log.trials[i];
       trials_.push_back({driven[i], contexts[i], command_index(trial.command), trial.X_WS});
@@ -183,17 +206,13 @@ Prediction Srv1Model::predict(const ParameterValues& values, const PredictOption
     const GroupMotion& motion = motions.at(grouping.of_trial[i]);
     const Pose X_WR = robot.effects().recover(trial.X_WS);
     Pose X_SE = motion.end(X_WR.theta, trial.context.session_time_s);
-    if (context & kStartPlace) {
-      Situation situation = reference_situation(group);
-      situation.X_WR = X_WR;
-      situation.session_time_s = trial.context.session_time_s;
-      Floor floor;
-      robot.effects().floor(situation, floor);
-      if (patch_in_reach(floor, X_SE)) {
-        const Motion direct = robot.run(group.drive, situation, {});
-        if (direct.outcome != MotionOutcome::kOk) return give_up(to_outcome(direct.outcome), group);
-        X_SE = direct.X_SE;
-      }
+    Situation situation = reference_situation(group);
+    situation.X_WR = X_WR;
+    situation.session_time_s = trial.context.session_time_s;
+    if (simulate_alone(robot, motion, situation, X_SE)) {
+      const Motion direct = robot.run(group.drive, situation, {});
+      if (direct.outcome != MotionOutcome::kOk) return give_up(to_outcome(direct.outcome), group);
+      X_SE = motion.spread_end(direct.X_SE);
     }
     prediction.trials.push_back(observe(robot, motion, X_SE, X_WR, options.means_only));
   }

@@ -11,9 +11,12 @@ namespace {
 // Effects on the floor turn the motion by a few mm and mrad, and their harmonics fall quickly:
 // eight headings settle almost all, and the check against every second one says when not.
 constexpr std::size_t kFewestHeadings = 8;
-constexpr std::size_t kMostHeadings = 16;
-constexpr double kHeadingTolerance =
-    4e-3;  // m and rad, of half the nodes; the whole set's is far less
+constexpr std::size_t kMostHeadings = 32;
+// m and rad, of half the nodes; the whole set's is far less.
+constexpr double kHeadingTolerance = 4e-3;
+// Beyond this the motion jumps at some heading, which no interpolation follows: a drag that only
+// just leaves the treads their grip.
+constexpr double kHeadingJump = 1e-2;
 // Motion is nearly linear in the speed that a time-dependent effect changes.
 constexpr std::size_t kTimes = 4;
 constexpr double kFarAway = 1e6;  // m
@@ -35,6 +38,18 @@ Pose GroupMotion::end(double heading_rad, double session_time_s) const {
   if (!by_heading_.empty()) d += interpolate_heading(by_heading_, heading_rad);
   if (!by_time_.empty()) d += interpolate_chebyshev(times_, by_time_, session_time_s);
   return reference_ * Pose{d[0], d[1], d[2]};
+}
+
+bool GroupMotion::jumps_over_heading() const { return heading_error_ > kHeadingJump; }
+
+Pose GroupMotion::spread_end(const Pose& X_SE) const {
+  return X_SE * Pose{drive_shift_[0], drive_shift_[1], drive_shift_[2]};
+}
+
+double GroupMotion::distance_from_way(const Eigen::Vector2d& place) const {
+  double nearest = place.norm();  // from the start
+  for (const Eigen::Vector2d& p : way_) nearest = std::min(nearest, (place - p).norm());
+  return nearest;
 }
 
 // The steps of simulate_group; each returns false when a simulation did not end well.
@@ -122,6 +137,10 @@ class GroupSimulation {
     to.push_back({reading.stale_share, between(result_.motion.reference_, X_SA)});
   }
 
+  void keep_way() {
+    for (const MotionSample& s : path_) result_.motion.way_.emplace_back(s.X_SB.x, s.X_SB.y);
+  }
+
   GroupResult take() { return std::move(result_); }
 
  private:
@@ -168,7 +187,9 @@ GroupResult simulate_group(Srv1Robot& robot, const ConditionGroup& group, bool m
   GroupSimulation simulation(robot, group);
   const ActiveEffects& effects = robot.effects();
   const Reading reading = effects.reading();
-  bool ok = simulation.reference(reading.stale_share != 0);
+  const bool by_place = effects.motion_context() & kStartPlace;
+  bool ok = simulation.reference(by_place || reading.stale_share != 0);
+  if (ok && by_place) simulation.keep_way();
   if (ok && (effects.motion_context() & kStartHeading)) ok = simulation.headings();
   if (ok && (effects.motion_context() & kSessionTime)) ok = simulation.times();
   if (ok && !means_only) {

@@ -3,7 +3,7 @@
 // On a flat floor the motion does not depend on where it starts, so trials with the same duties and
 // duration share theirs.  An effect that looks at the heading or at the time makes the motion a
 // smooth function of it: that is simulated at nodes and interpolated.  One that looks at the place
-// is simulated trial by trial, where the place can matter.
+// is simulated trial by trial, where the place can matter, and so is a motion that is not smooth.
 #pragma once
 
 #include <Eigen/Core>
@@ -40,8 +40,16 @@ class GroupMotion {
   const MotionFacts& facts() const { return facts_; }
   const Pose& reference() const { return reference_; }
   // Greatest difference between half the heading nodes' interpolant and the other half, in m and
-  // rad taken alike: a bound on the error of the whole set.
+  // rad taken alike; the error of the whole set is far less where the motion is smooth.
   double heading_error() const { return heading_error_; }
+  // Whether it is not: end() is then off by as much as heading_error(), and a trial is better
+  // simulated by itself.
+  bool jumps_over_heading() const;
+  // Mean end over the drive noise of a trial whose motion without noise ends at X_SE.
+  Pose spread_end(const Pose& X_SE) const;
+  // Distance (m) of a place in the start frame from where the turning centre goes.  Effects of
+  // place only; apart from samples 20 ms apart.
+  double distance_from_way(const Eigen::Vector2d& place) const;
 
  private:
   friend class GroupSimulation;
@@ -54,6 +62,7 @@ class GroupMotion {
   std::vector<Branch> branches_;
   MotionFacts facts_;
   double heading_error_ = 0;
+  std::vector<Eigen::Vector2d> way_;  // with effects of place only
 };
 
 struct GroupResult {

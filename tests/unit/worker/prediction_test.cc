@@ -27,21 +27,6 @@ v1::TaskResult predict(const Problem& problem, bool means_only = false) {
   return result;
 }
 
-// At its neutral value an effect changes no bit, wherever its other parameters stand.
-TEST(Prediction, NeutralEffectsChangeNothingToTheBit) {
-  const Problem base = small_problem(12);
-  const std::string expected = predict(base).SerializeAsString();
-  const ParameterTable& table = srv1_table();
-  for (std::size_t e = 0; e < table.effects().size(); ++e) {
-    Problem problem = base;
-    const Effect& effect = table.effects()[e];
-    for (std::size_t i = effect.strengths; i < effect.parameters.size(); ++i) {
-      problem.values[table.effect_row(e) + i] = effect.parameters[i].upper;
-    }
-    EXPECT_EQ(predict(problem).SerializeAsString(), expected) << effect.name;
-  }
-}
-
 // Greatest distance (m, and rad taken alike) between predicted ends and simulating each trial
 // alone.
 double worst_sharing_error(const Problem& problem) {
@@ -111,6 +96,68 @@ TEST(Prediction, AFrictionPatchActsWhereItIs) {
   };
   EXPECT_GT(moved(0), 1e-3);
   EXPECT_EQ(moved(1), 0);
+}
+
+// A motion that jumps at some heading is simulated trial by trial.
+TEST(Prediction, ANapThatTakesTheGripIsSimulatedTrialByTrial) {
+  Problem problem = small_problem(24);
+  value(problem, "drive_noise_common") = 0;
+  value(problem, "drive_noise_side") = 0;
+  value(problem, "floor_nap.strength") = 0.5;
+  value(problem, "floor_nap.direction") = 2.5;
+  EXPECT_LT(worst_sharing_error(problem), 2e-3);
+}
+
+// A wide turn that goes nearly round ends near its start; a patch lies on the far side of it.
+TEST(Prediction, AFrictionPatchIsFoundOnTheFarSideOfACircle) {
+  Problem problem = empty_problem();
+  value(problem, "drive_noise_common") = 0;
+  value(problem, "drive_noise_side") = 0;
+  Trial trial;
+  trial.session = "s";
+  trial.command = "wide_ccw";
+  trial.t_s = 0;
+  trial.duration_s = 6;
+  problem.log.trials.push_back(trial);
+  Srv1Robot robot(problem.values);
+  std::vector<MotionSample> path;
+  const CommandSpec& wide = problem.command("wide_ccw");
+  const Motion motion = robot.run({wide.left, wide.right, 6}, {}, {}, &path, 0.1);
+  const auto far = std::max_element(path.begin(), path.end(), [](const auto& a, const auto& b) {
+    return std::hypot(a.X_SB.x, a.X_SB.y) < std::hypot(b.X_SB.x, b.X_SB.y);
+  });
+  ASSERT_GT(std::hypot(far->X_SB.x, far->X_SB.y), 2 * std::hypot(motion.X_SE.x, motion.X_SE.y));
+  value(problem, "friction_patch.ratio") = 0.1;
+  value(problem, "friction_patch.x") = far->X_SB.x;
+  value(problem, "friction_patch.y") = far->X_SB.y;
+  value(problem, "friction_patch.radius") = 0.1;
+  EXPECT_GT(local_difference(motion.X_SE,
+                             Srv1Robot(problem.values).run({wide.left, wide.right, 6}, {}, {}).X_SE)
+                .norm(),
+            1e-3)
+      << "the patch matters";
+  EXPECT_LT(worst_sharing_error(problem), 1e-9);
+}
+
+// The robot backs, is put down elsewhere, runs its right side alone, and drives ahead: nobody knows
+// how its left tread lies, so backlash costs it nothing.
+TEST(Prediction, BacklashIsForgottenOverAMoveUntilTheSideRunsAgain) {
+  Problem problem = empty_problem();
+  for (int i = 0; i < 3; ++i) {
+    Trial trial;
+    trial.session = "s";
+    trial.trial = i;
+    trial.command = i == 0 ? "backward" : "forward";
+    if (i == 1) trial.left = 0;
+    trial.X_WS = {i == 0 ? 0.0 : 2.0, 0, 0};
+    trial.X_WE = trial.X_WS;
+    problem.log.trials.push_back(trial);
+  }
+  const v1::TaskResult without = predict(problem, true);
+  value(problem, "backlash.travel") = 0.02;
+  const v1::TaskResult with = predict(problem, true);
+  EXPECT_EQ(from_proto(with.predict().predictions(2).end()),
+            from_proto(without.predict().predictions(2).end()));
 }
 
 v1::TaskResult simulate(const Problem& problem, const std::string& command, int count) {
