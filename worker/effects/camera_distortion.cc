@@ -1,8 +1,13 @@
+#include <algorithm>
+#include <cmath>
+
 #include "worker/effects/behaviour.h"
 #include "worker/effects/table.h"
 
 namespace gapfarm::effects {
 namespace {
+
+constexpr int kMostRounds = 60;
 
 // r -> r (1 + k1 r^2) about the centre; headings are logged as they are (camera_aspect.cc).
 Pose observe(EffectValues p, const Pose& X_WR) {
@@ -12,16 +17,24 @@ Pose observe(EffectValues p, const Pose& X_WR) {
   return {p[1] + stretch * dx, p[2] + stretch * dy, X_WR.theta};
 }
 
-// Fixed point of the inverse map; contracts while |3 k1 r^2| < 1, far inside the table's bounds for
-// an arena of metres.  Twenty rounds reach machine precision at |k1| r^2 = 0.1.
+// Newton on r (1 + k1 r^2) = seen, from the side where it cannot overshoot.  A barrel (k1 < 0)
+// folds at r^2 = 1 / (3 |k1|): what is logged beyond the image of that circle is seen nowhere and
+// is taken to lie on it.
 Pose recover(EffectValues p, const Pose& X_WM) {
-  Pose X_WR = X_WM;
-  for (int round = 0; round < 20; ++round) {
-    const Pose seen = observe(p, X_WR);
-    X_WR.x += X_WM.x - seen.x;
-    X_WR.y += X_WM.y - seen.y;
+  const double dx = X_WM.x - p[1];
+  const double dy = X_WM.y - p[2];
+  const double seen = std::hypot(dx, dy);
+  if (seen == 0) return X_WM;
+  const double fold = p[0] < 0 ? 1 / std::sqrt(-3 * p[0]) : INFINITY;
+  // From `seen`: beyond the root of a convex function (k1 > 0), before that of a concave one.
+  double r = seen >= fold * 2 / 3 ? fold : seen;
+  for (int round = 0; round < kMostRounds && r < fold; ++round) {
+    const double next = r - (r * (1 + p[0] * r * r) - seen) / (1 + 3 * p[0] * r * r);
+    if (next == r) break;
+    r = std::min(next, fold);
   }
-  return X_WR;
+  const double shrink = r / seen;
+  return {p[1] + shrink * dx, p[2] + shrink * dy, X_WM.theta};
 }
 
 }  // namespace

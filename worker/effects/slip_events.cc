@@ -21,8 +21,12 @@ std::array<SideCase, 4> side_cases(EffectValues p) {
            {p[0] * 5 / 18, 1 - p[1] * (0.5 + offset)}}};
 }
 
+// Either parameter alone does nothing.
+bool never(EffectValues p) { return p[0] == 0 || p[1] == 0; }
+
 // Both sides slipping in one trial is kept: at large probabilities it is not rare.
 std::vector<DriveBranch> branches(EffectValues p) {
+  if (never(p)) return {DriveBranch{}};
   std::vector<DriveBranch> all;
   for (const SideCase& left : side_cases(p)) {
     for (const SideCase& right : side_cases(p)) {
@@ -34,6 +38,7 @@ std::vector<DriveBranch> branches(EffectValues p) {
 
 DriveBranch draw(EffectValues p, Stream& stream) {
   DriveBranch branch;
+  if (never(p)) return branch;
   if (stream.bernoulli(p[0])) branch.left_gain = 1 - p[1] * stream.uniform();
   if (stream.bernoulli(p[0])) branch.right_gain = 1 - p[1] * stream.uniform();
   return branch;
