@@ -129,6 +129,13 @@ v1::TaskResult run(const Prepared& p, const ParameterValues& values, const v1::S
     if (!duties || !(duration >= 0 && duration <= 60)) {
       return invalid("a plan needs duties in [-1, 1] and durations in [0, 60] s");
     }
+    const Pose& X = trial.X_WS;
+    const double sum = X.x + X.y + X.theta + trial.t_s.value_or(0);
+    if (!std::isfinite(sum)) return invalid("a plan needs finite start poses and times");
+  }
+  const double interval = task.path_interval();
+  if (!(interval == 0 || interval >= kLeastPathInterval_s)) {
+    return invalid("a plan's path interval is 0 (no path) or at least 0.0001 s");
   }
   return p.model().simulate(values, task);
 }
@@ -136,9 +143,11 @@ v1::TaskResult run(const Prepared& p, const ParameterValues& values, const v1::S
 v1::TaskResult run(const Prepared& p, const ParameterValues& values, const v1::TraceTask& task) {
   const v1::Command& c = task.command();
   const bool duties = std::abs(c.left()) <= 1 && std::abs(c.right()) <= 1;
-  if (!duties || !(c.duration() >= 0 && c.duration() <= 60) || !(task.interval() > 0)) {
+  const bool lasts = c.duration() >= 0 && c.duration() <= 60;
+  if (!duties || !lasts || !(task.interval() >= kLeastPathInterval_s)) {
     return invalid(
-        "a trace needs duties in [-1, 1], a duration in [0, 60] s and an interval above 0");
+        "a trace needs duties in [-1, 1], a duration in [0, 60] s and an interval of at least "
+        "0.0001 s");
   }
   return p.model().trace(values, task);
 }

@@ -153,6 +153,10 @@ void read_simulate(TomlSection& top, const std::vector<CommandSpec>& commands,
   }
   check_commands(*section, commands, to);
   section->read("path_interval", to.path_interval_s, 0, 60, "s");
+  if (to.path_interval_s != 0 && to.path_interval_s < kLeastPathInterval_s) {
+    section->fail("path_interval",
+                  "path_interval is too fine, expected 0 (no paths) or at least 0.0001 s");
+  }
   section->finish();
 }
 

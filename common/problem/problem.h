@@ -44,6 +44,9 @@ struct SpreadSettings {
   unsigned replicates = 16;  // kSampled only
 };
 
+// Least time between the samples of a simulated path, s: a finer one would only fill the memory.
+inline constexpr double kLeastPathInterval_s = 1e-4;
+
 struct Problem {
   std::string scenario = "srv1";
   ParameterValues values;  // one a row of the table

@@ -76,6 +76,9 @@ Status apply_options(const SimulateOptions& options, Config& config) {
   if (!options.durations.empty()) s.durations_s = options.durations;
   if (!options.commands.empty()) s.commands = options.commands;
   if (options.path_interval_s) s.path_interval_s = *options.path_interval_s;
+  if (s.path_interval_s != 0 && s.path_interval_s < kLeastPathInterval_s) {
+    return Error{"--paths is too fine, expected 0 (no paths) or at least 0.0001 s"};
+  }
   const std::vector<std::string> known = command_names(config.problem.commands);
   for (const std::string& name : s.commands) {
     if (std::find(known.begin(), known.end(), name) == known.end()) {

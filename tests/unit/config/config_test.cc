@@ -217,6 +217,7 @@ TEST(Config, RefusesWhatDoesNotFitTogether) {
                        "stagnation_generations = 9\n"),
               HasSubstr("or the run stops before it restarts"));
   EXPECT_THAT(error_of("[simulate]\ncommands = [\"forward\", \"forward\"]\n"), HasSubstr("twice"));
+  EXPECT_THAT(error_of("[simulate]\npath_interval = 1e-9\n"), HasSubstr("at least 0.0001 s"));
   EXPECT_THAT(error_of("[evolution]\ncrossovers = []\n"), HasSubstr("is empty"));
 }
 

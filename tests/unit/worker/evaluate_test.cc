@@ -86,6 +86,24 @@ TEST(Evaluate, MalformedTasksAreAnsweredNotCrashedOn) {
       << result.message();
 }
 
+TEST(Evaluate, PlansAndTracesThatNoMemoryHoldsOrNoNumberNamesAreRefused) {
+  const auto p = prepared(with_genes());
+  v1::Task trace;
+  trace.mutable_trace()->mutable_command()->set_duration(60);
+  trace.mutable_trace()->set_interval(1e-12);
+  EXPECT_EQ(evaluate(p.get(), trace).outcome(), v1::INVALID_REQUEST);
+  v1::Task plan;
+  plan.mutable_simulate()->add_plan()->mutable_trial()->set_command("forward");
+  EXPECT_EQ(evaluate(p.get(), plan).outcome(), v1::OK);
+  for (const double interval : {1e-12, -1.0, std::numeric_limits<double>::quiet_NaN()}) {
+    plan.mutable_simulate()->set_path_interval(interval);
+    EXPECT_EQ(evaluate(p.get(), plan).outcome(), v1::INVALID_REQUEST) << interval;
+  }
+  plan.mutable_simulate()->set_path_interval(0);
+  plan.mutable_simulate()->mutable_plan(0)->mutable_trial()->mutable_start()->set_x(INFINITY);
+  EXPECT_EQ(evaluate(p.get(), plan).outcome(), v1::INVALID_REQUEST);
+}
+
 TEST(Evaluate, MalformedProblemsAreNamed) {
   v1::Problem message = to_proto(with_genes());
   message.mutable_values()->RemoveLast();
