@@ -151,16 +151,9 @@ std::string describe(const Config& config, const Summary& summary, unsigned work
 
 int run_check(const CheckOptions& options, CliContext& context) {
   Console& console = context.console;
-  const Result<Config> config = read_config_and_trials(options.config, options.trials);
-  if (!config) {
-    console.error(config.error());
-    return kExitBadUsage;
-  }
-  if (Status s = check_evolvable(*config); !s) {
-    console.error(s.error());
-    return kExitBadUsage;
-  }
-  show_notes(config->problem.log, console);
+  const auto config = open_config(options.config, options.trials, console,
+                                  [](const Config& read) { return check_evolvable(read); });
+  if (!config) return kExitBadUsage;
   const unsigned workers = local_workers({}, config->farm);
   const Summary summary = summarise(config->problem);
   console.print(options.json ? to_json(*config, summary, workers).dump(2) + "\n"

@@ -105,27 +105,23 @@ std::string summary(const Diagnosis& d) {
   return text;
 }
 
-Result<Config> read_inputs(const DiagnoseCommand& command) {
-  Result<Config> config = read_config_and_trials(command.config, command.trials);
-  if (!config) return config;
-  if (command.seed) config->seed = *command.seed;
+// What the command line says of the problem, on top of the config.
+Status apply_options(const DiagnoseCommand& command, Config& config) {
+  if (command.seed) config.seed = *command.seed;
   if (!command.model.empty()) {
     const Result<Model> model = read_model_of(command.model);
     if (!model) return model.error();
-    config->problem.values = model->values;
+    config.problem.values = model->values;
   }
-  config->problem.genes.clear();
-  config->problem.fitness.kind = FitnessKind::kLogScore;
-  return config;
+  config.problem.genes.clear();
+  config.problem.fitness.kind = FitnessKind::kLogScore;
+  return {};
 }
 
 int run_diagnose(const DiagnoseCommand& command, CliContext& context) {
-  const Result<Config> config = read_inputs(command);
-  if (!config) {
-    context.console.error(config.error());
-    return kExitBadUsage;
-  }
-  show_notes(config->problem.log, context.console);
+  const auto config = open_config(command.config, command.trials, context.console,
+                                  [&](Config& read) { return apply_options(command, read); });
+  if (!config) return kExitBadUsage;
   auto farm = start_farm(command.farm, config->farm, context);
   if (!farm) return failed(farm.error(), context);
   DiagnoseOptions options;

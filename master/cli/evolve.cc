@@ -36,19 +36,14 @@ RunInfo run_info(const Config& config, const EvolutionOverrides& overrides) {
 }
 
 int run_evolve(const EvolveCommand& command, CliContext& context) {
-  Result<Config> config = read_config_and_trials(command.config, command.trials);
-  if (config) {
-    command.overrides.apply(config->evolution);
-    if (command.seed) config->seed = *command.seed;
-    Status sound = check_evolvable(*config);
-    if (sound) sound = check_farm(command.farm, config->farm);
-    if (!sound) config = sound.error();
-  }
-  if (!config) {
-    context.console.error(config.error());
-    return kExitBadUsage;
-  }
-  show_notes(config->problem.log, context.console);
+  const auto config =
+      open_config(command.config, command.trials, context.console, [&](Config& read) {
+        command.overrides.apply(read.evolution);
+        if (command.seed) read.seed = *command.seed;
+        if (Status s = check_evolvable(read); !s) return s;
+        return check_farm(command.farm, read.farm);
+      });
+  if (!config) return kExitBadUsage;
   Result<RunStore> store = RunStore::create(command.out, run_info(*config, command.overrides));
   if (!store) return failed(store.error(), context);
   context.console.note(command.out + ": evolving " + std::to_string(config->problem.genes.size()) +

@@ -33,6 +33,21 @@ Result<Config> read_config_and_trials(const std::string& config_path,
   return config;
 }
 
+std::optional<Config> open_config(const std::string& config_path,
+                                  const std::vector<std::string>& trial_files, Console& console,
+                                  const std::function<Status(Config&)>& finish) {
+  Result<Config> config = read_config_and_trials(config_path, trial_files);
+  if (config) {
+    if (Status s = finish(*config); !s) config = s.error();
+  }
+  if (!config) {
+    console.error(config.error());
+    return std::nullopt;
+  }
+  show_notes(config->problem.log, console);
+  return std::move(*config);
+}
+
 void show_notes(const TrialLog& log, Console& console) {
   for (const std::string& note : log.notes) console.note(note);
 }

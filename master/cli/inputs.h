@@ -1,7 +1,9 @@
 // What several subcommands read and start in the same way.
 #pragma once
 
+#include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -20,6 +22,13 @@ std::vector<std::string> command_names(const std::vector<CommandSpec>& commands)
 // file, and whatever reading either finds.
 Result<Config> read_config_and_trials(const std::string& config_path,
                                       const std::vector<std::string>& trial_files);
+
+// The config that a command works on, with its trials and the log's notes shown.  `finish` puts in
+// what the command line changes and checks what the command needs.  Nothing when any of it went
+// wrong: that was shown, and the command is to end with kExitBadUsage.
+std::optional<Config> open_config(const std::string& config_path,
+                                  const std::vector<std::string>& trial_files, Console& console,
+                                  const std::function<Status(Config&)>& finish);
 
 // Tells the user what the readers left out of a log.
 void show_notes(const TrialLog& log, Console& console);
