@@ -14,6 +14,8 @@ std::span<const Subcommand> subcommands() {
        setup_diagnose},
       {"report", "draw the report of a diagnosis again", "Diagnosis", setup_report},
       {"blind-check", "the diagnosis against sealed truths", "Diagnosis", setup_blind_check},
+      {"effects", "list the catalogue of effects, or draw what each does", "Diagnosis",
+       setup_effects},
       {"keys", "make and list the keys of masters and workers", "Farm", setup_keys},
       {"check", "validate everything that a run would need; run nothing", "Data", setup_check},
       {"import", "turn other programs' logs into a trial log", "Data", setup_import},

@@ -20,8 +20,8 @@ TEST(CliUsage, HelpFitsAScreenAndHasExamplesEverywhere) {
   const Finished help = gapfarm_command({"--help"});
   EXPECT_EQ(help.exit_code, 0);
   EXPECT_LE(std::count(help.out.begin(), help.out.end(), '\n'), 40);
-  for (const char* command :
-       {"evolve", "resume", "status", "simulate", "predict", "check", "import", "keys"}) {
+  for (const char* command : {"evolve", "resume", "status", "simulate", "predict", "effects",
+                              "check", "import", "keys"}) {
     EXPECT_THAT(help.out, HasSubstr(command));
     const Finished one = gapfarm_command({command, "--help"});
     EXPECT_EQ(one.exit_code, 0) << command;

@@ -1,0 +1,48 @@
+// gapfarm effects: the catalogue in words, for programs, and in pictures.
+#include <gmock/gmock.h>
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "common/effects/catalogue.h"
+#include "tests/integration/run_program.h"
+
+namespace gapfarm {
+namespace {
+
+using ::testing::HasSubstr;
+
+TEST(CliEffects, ListsEveryRowWithItsParameters) {
+  const Finished list = gapfarm_command({"effects"});
+  EXPECT_EQ(list.exit_code, 0) << list.err;
+  const Finished machine = gapfarm_command({"effects", "--json"});
+  const auto json = nlohmann::json::parse(machine.out);
+  ASSERT_EQ(json.size(), srv1_effects().size());
+  for (std::size_t e = 0; e < json.size(); ++e) {
+    const Effect& effect = srv1_effects()[e];
+    EXPECT_THAT(list.out, HasSubstr(effect.name + " ("));
+    EXPECT_EQ(json[e]["name"], effect.name);
+    ASSERT_EQ(json[e]["parameters"].size(), effect.parameters.size());
+    for (std::size_t i = 0; i < effect.parameters.size(); ++i) {
+      EXPECT_EQ(json[e]["parameters"][i]["upper"], effect.parameters[i].upper) << effect.name;
+    }
+  }
+}
+
+TEST(CliEffects, DrawsAPictureOfEach) {
+  const TemporaryFolder folder;
+  const std::string pictures = folder / "pictures";
+  const Finished drawn = gapfarm_command({"effects", "--figures", pictures});
+  EXPECT_EQ(drawn.exit_code, 0) << drawn.err;
+  for (const Effect& effect : srv1_effects()) {
+    const auto path = std::filesystem::path(pictures) / (effect.name + ".svg");
+    ASSERT_TRUE(std::filesystem::exists(path)) << effect.name;
+    EXPECT_LT(std::filesystem::file_size(path), 15000u) << effect.name;
+  }
+  const Finished wrong = gapfarm_command({"effects", folder / "none.toml", "--figures", pictures});
+  EXPECT_EQ(wrong.exit_code, 2);
+  EXPECT_THAT(wrong.err, HasSubstr("none.toml"));
+}
+
+}  // namespace
+}  // namespace gapfarm
