@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <cctype>
 #include <cmath>
 #include <set>
 #include <string>
@@ -18,6 +19,28 @@ TEST(EffectTable, HasOneImplementationForEveryRowOfTheCatalogueInItsOrder) {
   ASSERT_EQ(behaviours.size(), catalogue.size());
   for (std::size_t i = 0; i < catalogue.size(); ++i)
     EXPECT_EQ(behaviours[i]->name, catalogue[i].name);
+}
+
+// "floor_tilt" is tested by EffectSignature.FloorTilt...
+TEST(EffectTable, EveryRowHasATestOfItsSignature) {
+  std::set<std::string> names;
+  const ::testing::UnitTest& all = *::testing::UnitTest::GetInstance();
+  for (int s = 0; s < all.total_test_suite_count(); ++s) {
+    const ::testing::TestSuite& suite = *all.GetTestSuite(s);
+    if (std::string(suite.name()) != "EffectSignature") continue;
+    for (int t = 0; t < suite.total_test_count(); ++t) names.insert(suite.GetTestInfo(t)->name());
+  }
+  for (const Effect& effect : srv1_effects()) {
+    std::string camel;
+    for (std::size_t i = 0; i < effect.name.size(); ++i) {
+      const char c = effect.name[i];
+      if (c == '_') continue;
+      const bool first = i == 0 || effect.name[i - 1] == '_';
+      camel += first ? static_cast<char>(std::toupper(c)) : c;
+    }
+    const auto at = names.lower_bound(camel);
+    EXPECT_TRUE(at != names.end() && at->rfind(camel, 0) == 0) << effect.name;
+  }
 }
 
 TEST(EffectTable, HooksBelongToTheEffectsStage) {
@@ -56,57 +79,6 @@ TEST(EffectCatalogue, StrengthsAloneDecideWhetherAnEffectIsNeutral) {
     values[table.effect_row(e)] = effect.parameters[0].upper;
     EXPECT_TRUE(ActiveEffects(table, values).any()) << effect.name;
   }
-}
-
-// Camera effects are undone by recover() wherever the robot is.
-TEST(CameraEffects, RecoverUndoesObserve) {
-  ParameterValues values = srv1_table().nominal();
-  const auto set = [&](const char* key, double v) { values[srv1_table().row(key)] = v; };
-  set("camera_aspect.ratio", 0.9);
-  set("camera_distortion.k1", 0.04);
-  set("camera_distortion.x", 1);
-  set("camera_distortion.y", 0.8);
-  set("heading_offset.angle", 0.07);
-  set("marker_offset.x", 0.006);
-  set("marker_offset.y", -0.004);
-  const ActiveEffects effects(srv1_table(), values);
-  Stream stream({1, Purpose::kTest, 0, 0, 0});
-  for (int i = 0; i < 100; ++i) {
-    const Pose X{stream.uniform(0, 2), stream.uniform(0, 2), stream.uniform(-3.1, 3.1)};
-    const Pose back = effects.recover(effects.observe(X));
-    EXPECT_NEAR(back.x, X.x, 1e-9);
-    EXPECT_NEAR(back.y, X.y, 1e-9);
-    EXPECT_NEAR(wrap_angle(back.theta - X.theta), 0, 1e-9);
-  }
-}
-
-// Beyond the line poses shift by offset + slope * place along it; before it nothing happens.
-TEST(CameraEffects, SeamShiftsTheFarSideOnly) {
-  ParameterValues values = srv1_table().nominal();
-  const auto set = [&](const char* key, double v) { values[srv1_table().row(key)] = v; };
-  set("camera_seam.offset_x", 0.02);
-  set("camera_seam.slope_y", 0.05);
-  set("camera_seam.position", 1);
-  const ActiveEffects effects(srv1_table(), values);
-  EXPECT_EQ(effects.observe({0.9, 0.5, 0.1}), (Pose{0.9, 0.5, 0.1}));
-  const Pose far = effects.observe({1.2, 0.5, 0.1});
-  EXPECT_NEAR(far.x, 1.22, 1e-12);
-  EXPECT_NEAR(far.y, 0.525, 1e-12);
-  const Pose back = effects.recover(far);
-  EXPECT_NEAR(back.x, 1.2, 1e-4);
-  EXPECT_NEAR(back.y, 0.5, 1e-4);
-}
-
-// A marker ahead of the turning centre circles it: turning in place by a moves the log by
-// (R(a) - I) (x, y).
-TEST(CameraEffects, MarkerOffsetCirclesTheTurningCentre) {
-  ParameterValues values = srv1_table().nominal();
-  values[srv1_table().row("marker_offset.x")] = 0.01;
-  const ActiveEffects effects(srv1_table(), values);
-  const Pose before = effects.observe({1, 1, 0});
-  const Pose after = effects.observe({1, 1, 1.5});
-  EXPECT_NEAR(after.x - before.x, 0.01 * (std::cos(1.5) - 1), 1e-12);
-  EXPECT_NEAR(after.y - before.y, 0.01 * std::sin(1.5), 1e-12);
 }
 
 TEST(DriveEffects, BranchesAreADistributionWithTheDrawsMean) {
