@@ -14,6 +14,8 @@
 namespace gapfarm {
 namespace {
 
+constexpr unsigned kMostReplicates = 100000;
+
 Error invalid(const std::string& what) { return Error{"problem: " + what}; }
 
 bool finite(const Pose& X) {
@@ -38,6 +40,25 @@ FitnessSettings read_fitness(const v1::Fitness& from) {
           from.heave_penalty(),
           from.rest_penalty(),
           from.rest_limit()};
+}
+
+// What config files are held to (common/config/model.cc); a message may come from anywhere.
+Status check_score(const FitnessSettings& fitness, const SpreadSettings& spread) {
+  if (!(fitness.outlier_share >= 0 && fitness.outlier_share <= 0.5)) {
+    return invalid("the outlier share must be in [0, 0.5]");
+  }
+  for (const double value : {fitness.roll_penalty, fitness.pitch_penalty, fitness.heave_penalty,
+                             fitness.rest_penalty, fitness.rest_limit_s}) {
+    if (!(std::isfinite(value) && value >= 0)) {
+      return invalid("penalties and the rest limit must be finite and not negative");
+    }
+  }
+  if (spread.kind == SpreadKind::kSampled &&
+      !(spread.replicates >= 2 && spread.replicates <= kMostReplicates)) {
+    return invalid("sampled spread needs between 2 and " + std::to_string(kMostReplicates) +
+                   " replicates");
+  }
+  return {};
 }
 
 Status read_values(const v1::Problem& message, Problem* problem) {
@@ -188,6 +209,7 @@ Result<Problem> from_proto(const v1::Problem& message) {
   problem.fitness = read_fitness(message.fitness());
   problem.spread = {static_cast<SpreadKind>(message.spread().kind()),
                     message.spread().replicates()};
+  if (Status s = check_score(problem.fitness, problem.spread); !s) return s.error();
   if (Status s = read_trials(message, &problem); !s) return s.error();
   return problem;
 }

@@ -115,6 +115,22 @@ TEST(Evaluate, MalformedProblemsAreNamed) {
   EXPECT_NE(unknown.error().message.find("did you mean 'forward'"), std::string::npos);
 }
 
+TEST(Evaluate, ProblemsWithoutAScoreAreRefused) {
+  const v1::Problem sound = to_proto(with_genes());
+  v1::Problem message = sound;
+  message.mutable_fitness()->set_outlier_share(1);
+  EXPECT_FALSE(prepare(message).ok());
+  message = sound;
+  message.mutable_fitness()->set_heave_penalty(std::numeric_limits<double>::quiet_NaN());
+  EXPECT_FALSE(prepare(message).ok());
+  message = sound;
+  message.mutable_spread()->set_kind(v1::Spread::SAMPLED);
+  for (const unsigned replicates : {0u, 1u, 4000000000u}) {
+    message.mutable_spread()->set_replicates(replicates);
+    EXPECT_FALSE(prepare(message).ok()) << replicates;
+  }
+}
+
 TEST(Evaluate, ProblemsSurviveTheWire) {
   const v1::Problem message = to_proto(with_genes());
   const auto back = from_proto(message);
