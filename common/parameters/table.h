@@ -71,7 +71,8 @@ enum class Srv1 : std::size_t {
   kTrackGauge,         // m, left to right contact
   kFriction,           // -, along the treads
   kFrictionRatio,      // -, lateral over longitudinal friction
-  kTreadCreep,         // -, slip over tread speed at full traction (treads)
+  kTreadCreep,         // -, slip over tread speed at 0.7 of full traction (treads)
+  kMassHeight,         // m, centre of mass over the floor
   kFullSpeed,          // m/s at full duty
   kDriveNoiseCommon,   // -, per-trial s.d. of both sides' speed
   kDriveNoiseSide,     // -, per-trial s.d. of each side's speed

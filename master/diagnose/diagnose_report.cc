@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <set>
 
 #include "common/random/stream.h"
@@ -17,6 +18,15 @@ namespace {
 
 constexpr double kNormal90 = 1.645;
 constexpr int kBootstraps = 400;
+
+// Relative standard deviation of an effect's size between simulations that share the effect but not
+// the contact of treads and floor (docs/diagnosis.md); of others it is below the data's own.
+const std::map<std::string, double> kModelError = {
+    {"backlash", 0.1},      {"camera_aspect", 0.02},     {"camera_distortion", 0.03},
+    {"camera_seam", 0.05},  {"com_offset", 0.15},        {"floor_nap", 0.2},
+    {"floor_tilt", 0.3},    {"heading_offset", 0.03},    {"motor_deadband", 0.1},
+    {"motor_lag", 0.4},     {"rolling_resistance", 0.3}, {"timing_offset", 0.06},
+    {"marker_offset", 0.03}};
 
 double mean_of(const std::vector<double>& values) {
   double sum = 0;
@@ -43,17 +53,16 @@ RootMeanSquare root_mean_square(const std::vector<Eigen::Vector3d>& residuals) {
 
 }  // namespace
 
-Overrides DiagnosisRun::start_of(std::size_t count) const {
+Overrides DiagnosisRun::start_of(const std::vector<Candidate>& effects) const {
   Overrides at = study_.base;
-  for (std::size_t k = 0; k < count; ++k) {
+  for (std::size_t k = 0; k < effects.size(); ++k) {
     std::vector<const Signature*> others;
     for (const Signature& s : first_) others.push_back(&s);
-    for (std::size_t j = 0; j < chosen_.size(); ++j) {
-      if (j != k) others.push_back(&chosen_[j].candidate.signature);
+    for (std::size_t j = 0; j < effects.size(); ++j) {
+      if (j != k) others.push_back(&effects[j].signature);
     }
     const Regression explained = selector_->with(others);
-    for (const auto& [key, value] :
-         start_values(study_, explained, chosen_[k].candidate.signature)) {
+    for (const auto& [key, value] : start_values(study_, explained, effects[k].signature)) {
       at[problem_.table().row(key)] = value;
     }
   }
@@ -64,11 +73,21 @@ Overrides DiagnosisRun::start_of(std::size_t count) const {
 // these are what a user's predictions will come from.
 Status DiagnosisRun::refit_nested() {
   const Eigen::MatrixXd none(static_cast<Eigen::Index>(3 * study_.size()), 0);
+  std::set<std::string> names;
+  std::vector<Candidate> effects;
   for (std::size_t count = 0; count <= chosen_.size(); ++count) {
-    std::vector<Candidate> effects;
-    for (std::size_t k = 0; k < count; ++k) effects.push_back(chosen_[k].candidate);
+    if (count > 0) {
+      effects.push_back(chosen_[count - 1].candidate);
+      names.insert(effects.back().signature.effect);
+    }
+    Overrides start = study_.base;
+    for (const auto& [row, value] : estimates_ ? estimates_->at : Overrides{}) {
+      const std::string& effect = problem_.table()[row].effect;
+      if (count > 0 && (effect.empty() || names.count(effect))) start[row] = value;
+    }
     const int rounds = options_.keep_base && count == 0 ? 0 : 2;
-    auto fit = fit_jointly(predictor_, study_, effects, start_of(count), none, rounds);
+    auto fit =
+        fit_jointly(predictor_, study_, effects, start, BaseParameters::kFitted, none, rounds);
     if (!fit) return fit.error();
     nested_.push_back(std::move(*fit));
   }
@@ -76,14 +95,14 @@ Status DiagnosisRun::refit_nested() {
 }
 
 Status DiagnosisRun::refit() {
-  if (Status s = refit_nested(); !s) return s;
   if (!chosen_.empty()) {
     std::vector<Candidate> effects;
     for (const ChosenEffect& c : chosen_) effects.push_back(c.candidate);
-    auto fit = fit_jointly(predictor_, study_, effects, nested_.back().at, nuisances_, 1);
+    auto fit = estimate(effects, estimates_ ? 1 : 2);
     if (!fit) return fit.error();
     estimates_ = std::move(*fit);
   }
+  if (Status s = refit_nested(); !s) return s;
   const double share = problem_.fitness.outlier_share;
   const std::vector<std::size_t> folds = folds_of(study_);
   for (const JointFit& fit : nested_) {
@@ -160,7 +179,11 @@ NamedEffect DiagnosisRun::named(std::size_t k, const JointFit& estimates) const 
     Estimate e{p.key.substr(p.key.find('.') + 1), value, value, value, p.unit};
     for (const FittedParameter& fitted : estimates.parameters) {
       if (fitted.row != row) continue;
-      const double half = kNormal90 * fitted.standard_error * std::sqrt(scale_);
+      const double model = kModelError.count(effect.name) ? kModelError.at(effect.name) : 0;
+      const double half = kNormal90 * std::hypot(fitted.standard_error * std::sqrt(scale_),
+                                                 p.unit == "rad" && p.key != "floor_tilt.angle"
+                                                     ? 0.0
+                                                     : model * (value - p.nominal));
       e.lo = value - half;
       e.hi = value + half;
     }
@@ -175,47 +198,64 @@ NamedEffect DiagnosisRun::named(std::size_t k, const JointFit& estimates) const 
       root_mean_square(held_out_residuals(study_, nested_[k + 1], folds_of(study_)));
   effect.position_mm_after = after.position_mm;
   effect.heading_mrad_after = after.heading_mrad;
-  effect.text = effect_sentence(effect);
   return effect;
 }
 
 // Effects that widen the distribution rather than move it: their gain is that of the mixture.
-void DiagnosisRun::name_spread_effect(const std::string& name, double gain,
-                                      std::vector<Estimate> estimates) {
-  NamedEffect effect;
-  effect.name = name;
-  effect.confidence = confidence_of(gain);
-  effect.parameters = std::move(estimates);
-  const std::vector<NamedEffect>& before = result_.diagnosis.effects;
-  effect.gap_before =
-      before.empty() ? floor_ - mean_of(nested_scores_.front()) : before.back().gap_after;
-  const double per_trial = gain / static_cast<double>(study_.size());
-  effect.gap_after = effect.gap_before - per_trial;
-  set_closed(&effect, std::vector<double>(study_.size(), per_trial));
-  effect.text = effect_sentence(effect);
-  result_.diagnosis.effects.push_back(std::move(effect));
-}
-
-void DiagnosisRun::name_effects() {
-  std::vector<NamedEffect>& effects = result_.diagnosis.effects;
-  for (std::size_t k = 0; k < chosen_.size(); ++k) effects.push_back(named(k, *estimates_));
+std::vector<DiagnosisRun::SpreadEffect> DiagnosisRun::spread_effects_found() const {
+  std::vector<SpreadEffect> found;
   if (!first_.empty()) {
-    name_spread_effect(
-        "pose_latency", latency_.gain,
-        {{"latency", latency_.latency_s, 0.8 * latency_.latency_s, 1.25 * latency_.latency_s, "s"},
-         {"share", latency_.share, 0.7 * latency_.share, std::min(1.0, 1.4 * latency_.share),
-          "-"}});
+    const double age = latency_.latency_s, share = latency_.share;
+    found.push_back({"pose_latency",
+                     latency_.gain,
+                     {{"latency", age, 0.8 * age, 1.25 * age, "s"},
+                      {"share", share, 0.7 * share, std::min(1.0, 1.4 * share), "-"}}});
   }
   if (slip_.gain > 0) {
-    name_spread_effect(
-        "slip_events", slip_.gain,
-        {{"probability", slip_.probability, 0.6 * slip_.probability, 1.6 * slip_.probability, "-"},
-         {"loss", slip_.loss, 0.7 * slip_.loss, 1.4 * slip_.loss, "-"}});
+    const double p = slip_.probability, loss = slip_.loss;
+    found.push_back(
+        {"slip_events",
+         slip_.gain,
+         {{"probability", p, 0.6 * p, 1.6 * p, "-"}, {"loss", loss, 0.7 * loss, 1.4 * loss, "-"}}});
   }
   if (study_.quantum_m > 0) {
     const double q = study_.quantum_m;
-    name_spread_effect("pose_quantisation", 0.02 * static_cast<double>(study_.size()) + 20,
-                       {{"step", q, 0.99 * q, 1.01 * q, "m"}});
+    found.push_back({"pose_quantisation",
+                     0.02 * static_cast<double>(study_.size()) + 20,
+                     {{"step", q, 0.99 * q, 1.01 * q, "m"}}});
+  }
+  return found;
+}
+
+NamedEffect DiagnosisRun::named(const SpreadEffect& found) const {
+  NamedEffect effect;
+  effect.name = found.name;
+  effect.confidence = confidence_of(found.gain);
+  effect.parameters = found.estimates;
+  const double per_trial = found.gain / static_cast<double>(study_.size());
+  effect.gap_after = -per_trial;
+  set_closed(&effect, std::vector<double>(study_.size(), per_trial));
+  return effect;
+}
+
+// Greatest gain first; each one's gap goes on from the one before.
+void DiagnosisRun::name_effects() {
+  std::vector<std::pair<double, NamedEffect>> all;
+  for (std::size_t k = 0; k < chosen_.size(); ++k) {
+    all.emplace_back(chosen_[k].candidate.gain, named(k, *estimates_));
+  }
+  for (const SpreadEffect& found : spread_effects_found()) {
+    all.emplace_back(found.gain, named(found));
+  }
+  std::stable_sort(all.begin(), all.end(),
+                   [](const auto& a, const auto& b) { return a.first > b.first; });
+  double gap = floor_ - mean_of(nested_scores_.front());
+  for (auto& [gain, effect] : all) {
+    const double change = effect.gap_after - effect.gap_before;
+    effect.gap_before = gap;
+    effect.gap_after = gap += change;
+    effect.text = effect_sentence(effect);
+    result_.diagnosis.effects.push_back(std::move(effect));
   }
 }
 
@@ -309,8 +349,14 @@ Status DiagnosisRun::plan_next() {
                                      [&](const Alias& a) { return a.effect == name; });
       if (!alias && name != chosen_[k].candidate.signature.effect) continue;
       Overrides at = study_.base;
-      for (const auto& [key, value] : start_values(study_, explained, c.signature)) {
-        at[problem_.table().row(key)] = value;
+      if (alias) {
+        for (const auto& [key, value] : start_values(study_, explained, c.signature)) {
+          at[problem_.table().row(key)] = value;
+        }
+      } else {
+        for (const auto& [row, value] : estimates_->at) {
+          if (problem_.table()[row].effect == name) at[row] = value;
+        }
       }
       Rival rival{name, {}};
       for (const auto& [row, value] : at) {

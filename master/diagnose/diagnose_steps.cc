@@ -16,6 +16,8 @@ namespace {
 
 constexpr double kLeastLatencyGain = 14;  // nats; the share and the age are searched on a grid
 constexpr double kLeastSlipGain = 11;
+constexpr double kLeastSlipShare = 0.03;  // of what the effects on the means explain
+constexpr double kSlippedSquared = 11.5;  // squared distance with 3 degrees of freedom: one in 110
 constexpr double kLeastQuantum_m = 4e-4;
 // Of fewer trials, a place or a direction that is searched for explains any of them.
 constexpr std::size_t kFewestTrials = 40;
@@ -99,10 +101,96 @@ Status DiagnosisRun::screen() {
   auto all = selector_->candidates(selector_->with(first), {});
   if (!all) return all.error();
   fill_screening(*all);
-  auto chosen = selector_->select(first_);
+  if (Status s = select(); !s) return s;
+  const Regression explained = this->explained();
+  look_for_slip(explained);
+  return slip_.gain > 0 ? select_without_slips(explained) : Status{};
+}
+
+Status DiagnosisRun::select() {
+  estimates_.reset();
+  auto chosen = selector_->select(
+      first_, first_.empty() ? 0 : latency_.gain,
+      [&](const std::vector<Candidate>& effects) { return relinearise(effects); });
   if (!chosen) return chosen.error();
   chosen_ = std::move(*chosen);
   return {};
+}
+
+// The effects fitted together, base and nuisances beside them to first order.
+Result<JointFit> DiagnosisRun::estimate(const std::vector<Candidate>& effects, int rounds) {
+  Overrides start = start_of(effects);
+  for (const Candidate& effect : effects) {
+    for (const auto& [row, value] : estimates_ ? estimates_->at : Overrides{}) {
+      if (problem_.table()[row].effect == effect.signature.effect) start[row] = value;
+    }
+  }
+  return fit_jointly(predictor_, study_, effects, start, BaseParameters::kHeld, nuisances_, rounds);
+}
+
+Result<Relinearised> DiagnosisRun::relinearise(const std::vector<Candidate>& effects) {
+  auto fit = estimate(effects, 2);
+  if (!fit) return fit.error();
+  estimates_ = std::move(*fit);
+  std::vector<PredictionRequest> without;
+  for (const Candidate& effect : effects) {
+    without.push_back({estimates_->at, {}});
+    std::erase_if(without.back().at, [&](const auto& entry) {
+      return problem_.table()[entry.first].effect == effect.signature.effect;
+    });
+  }
+  const auto ends = predictor_.ends(without);
+  if (!ends) return ends.error();
+  Relinearised at_estimate{study_.whiten(estimates_->residuals), {}};
+  for (std::size_t k = 0; k < effects.size(); ++k) {
+    std::vector<Eigen::Vector3d> contribution;
+    for (std::size_t i = 0; i < study_.size(); ++i) {
+      contribution.push_back(local_difference((*ends)[k][i], estimates_->ends[i]));
+    }
+    std::vector<Eigen::Index> own;
+    for (std::size_t p = 0; p < estimates_->parameters.size(); ++p) {
+      const Parameter& row = problem_.table()[estimates_->parameters[p].row];
+      if (row.effect == effects[k].signature.effect) own.push_back(static_cast<Eigen::Index>(p));
+    }
+    Eigen::MatrixXd columns(at_estimate.data.size(), static_cast<Eigen::Index>(own.size()) + 1);
+    columns.col(0) = study_.whiten(contribution);
+    columns.rightCols(columns.cols() - 1) = estimates_->jacobian(Eigen::all, own);
+    at_estimate.data += columns.col(0);
+    if (depends_on_contact(effects[k].signature.effect)) columns = split_by_kind(study_, columns);
+    study_.drop_ignored(columns);
+    at_estimate.columns.push_back(std::move(columns));
+  }
+  study_.drop_ignored(at_estimate.data);
+  return at_estimate;
+}
+
+// Trials in which a side slipped pull on every mean: the effects are looked for again without them.
+Status DiagnosisRun::select_without_slips(const Regression& explained) {
+  const Eigen::VectorXd z = studentised(explained, 0.2);
+  study_.ignored.assign(study_.size(), false);
+  for (std::size_t i = 0; i < study_.size(); ++i) {
+    study_.ignored[i] =
+        z.segment<3>(static_cast<Eigen::Index>(3 * i)).squaredNorm() > kSlippedSquared;
+  }
+  Eigen::VectorXd residuals = study_.whitened_residuals();
+  study_.drop_ignored(residuals);
+  study_.drop_ignored(nuisances_);
+  for (CovariateBlock& block : blocks_) study_.drop_ignored(block.columns);
+  for (Signature& s : first_) study_.drop_ignored(s.columns);
+  base_ = std::make_unique<Regression>(nuisances_, residuals);
+  selector_->recount(*base_);
+  return select();
+}
+
+Regression DiagnosisRun::explained() const {
+  std::vector<const Signature*> all;
+  for (const Signature& s : first_) all.push_back(&s);
+  for (const ChosenEffect& c : chosen_) all.push_back(&c.candidate.signature);
+  return selector_->with(all);
+}
+
+double DiagnosisRun::explained_nats(const Regression& explained) const {
+  return (selector_->nothing_explained().left_squares() - explained.left_squares()) / 2;
 }
 
 void DiagnosisRun::fill_screening(const std::vector<Candidate>& candidates) {
@@ -123,6 +211,7 @@ void DiagnosisRun::fill_screening(const std::vector<Candidate>& candidates) {
           boost::math::complement(boost::math::chi_squared(gain.dimensions), gain.squares));
     }
     for (const auto& [key, value] : start_values(study_, *base_, s)) {
+      if (key.rfind(s.effect + ".", 0) != 0) continue;
       const std::size_t at = problem_.table().row(key);
       row.estimate += (row.estimate.empty() ? "" : ", ") + key.substr(key.find('.') + 1) + " " +
                       problem_.table().format(at, std::round(value * 1e5) / 1e5);
@@ -145,23 +234,45 @@ void DiagnosisRun::look_for_slip(const Regression& explained) {
   std::size_t far = 0;
   for (Eigen::Index i = 0; i < z.size(); i += 3) far += z.segment<3>(i).squaredNorm() > 13 ? 1 : 0;
   if (far <= 4 && residual_kurtosis(z) <= 3.2) return;
-  std::vector<bool> mask(study_.size(), true);
+  slip_ = fit_slip(study_.trials, study_.unwhiten(z), tells_of_slips(), study_.noise);
+  if (slip_.gain < std::max(kLeastSlipGain, kLeastSlipShare * explained_nats(explained)))
+    slip_ = {};
+}
+
+// False where something else that was chosen makes single trials stray.
+std::vector<bool> DiagnosisRun::tells_of_slips() const {
+  std::vector<bool> tells(study_.size(), true);
   for (const ChosenEffect& effect : chosen_) {
-    if (effect.candidate.signature.effect != "camera_seam") continue;
     const auto& at = effect.candidate.signature.fixed;
-    const bool x = at.at("camera_seam.axis") == 0;
     for (std::size_t i = 0; i < study_.size(); ++i) {
       const ResidualTrial& t = study_.trials[i];
-      const double position = at.at("camera_seam.position");
-      // Which camera saw a pose on the line is not known.
-      mask[i] = std::abs((x ? t.X_WP.x : t.X_WP.y) - position) > 0.03 &&
-                std::abs((x ? t.X_WS.x : t.X_WS.y) - position) > 0.01;
+      if (effect.candidate.signature.effect == "camera_seam") {
+        const bool x = at.at("camera_seam.axis") == 0;
+        const double position = at.at("camera_seam.position");
+        // Which camera saw a pose on the line is not known.
+        if (std::abs((x ? t.X_WP.x : t.X_WP.y) - position) < 0.03 ||
+            std::abs((x ? t.X_WS.x : t.X_WS.y) - position) < 0.01) {
+          tells[i] = false;
+        }
+      }
+      if (effect.candidate.signature.effect == "friction_patch") {
+        // At the edge of a patch a small error of its place is a large one of the motion.
+        constexpr double kEdge_m = 0.1;
+        const Eigen::Vector2d start(t.X_WS.x, t.X_WS.y);
+        const Eigen::Vector2d way = Eigen::Vector2d(t.X_WP.x, t.X_WP.y) - start;
+        const Eigen::Vector2d centre(at.at("friction_patch.x"), at.at("friction_patch.y"));
+        const double length2 = std::max(way.squaredNorm(), 1e-12);
+        const double share = std::clamp((centre - start).dot(way) / length2, 0.0, 1.0);
+        if ((start + share * way - centre).norm() < at.at("friction_patch.radius") + kEdge_m) {
+          tells[i] = false;
+        }
+      }
     }
   }
   for (std::size_t i = 0; !first_.empty() && i < study_.size(); ++i) {
-    if (study_.trials[i].context.moved) mask[i] = false;
+    if (study_.trials[i].context.moved) tells[i] = false;
   }
-  slip_ = fit_slip(study_.trials, study_.unwhiten(z), mask, study_.noise);
+  return tells;
 }
 
 // Names nothing where the data are too few for a claim, and says so.
@@ -178,29 +289,25 @@ bool DiagnosisRun::too_thin() {
 }
 
 void DiagnosisRun::judge() {
+  for (const SelectionStep& step : selector_->steps()) {
+    result_.diagnosis.steps.push_back({step.explained, step.offered});
+  }
   if (too_thin()) return;
-  std::vector<const Signature*> all;
-  for (const Signature& s : first_) all.push_back(&s);
-  for (const ChosenEffect& c : chosen_) all.push_back(&c.candidate.signature);
-  const Regression explained = selector_->with(all);
-  look_for_slip(explained);
+  const Regression explained = this->explained();
   leftovers_ = leftovers(explained, blocks_);
-  const Eigen::VectorXd left = explained.left();
-  std::vector<double> squares(left.data(), left.data() + left.size());
-  for (double& s : squares) s *= s;
-  scale_ = std::clamp(median(squares) / 0.455, 0.9, 1.4);
-
-  const double nats = (base_->left_squares() - explained.left_squares()) / 2;
-  const bool slips = slip_.gain > kLeastSlipGain;
+  scale_ = leftover_scale(explained);
+  const double nats = explained_nats(explained) + slip_.gain;
+  for (const Leftover& l : leftovers_) {
+    result_.diagnosis.checks.push_back({l.covariate, l.log10_p, l.excess});
+  }
   const bool rounded = study_.quantum_m > kLeastQuantum_m && !left_out("pose_quantisation");
-  const bool named = !first_.empty() || !chosen_.empty() || slips || rounded;
-  result_.diagnosis.verdict = judge_verdict(named, nats + (slips ? slip_.gain : 0), leftovers_);
+  const bool named = !first_.empty() || !chosen_.empty() || slip_.gain > 0 || rounded;
+  result_.diagnosis.verdict = judge_verdict(named, nats, leftovers_);
   if (result_.diagnosis.verdict == Verdict::kUnknown) {
     first_.clear();
     chosen_.clear();
     slip_ = {};
   }
-  if (!slips) slip_ = {};
   if (!rounded || result_.diagnosis.verdict == Verdict::kUnknown) study_.quantum_m = 0;
 }
 

@@ -40,14 +40,29 @@ class DiagnosisRun {
   Status rebuild_nuisances();
   Status look_for_latency();
   void fill_screening(const std::vector<Candidate>& candidates);
+  Regression explained() const;  // what is left once all that was chosen is explained
+  double explained_nats(const Regression& explained) const;
   void look_for_slip(const Regression& explained);
-  // Base and the first `count` chosen effects at their best linear fit.
-  Overrides start_of(std::size_t count) const;
+  std::vector<bool> tells_of_slips() const;
+  Status select();
+  Result<JointFit> estimate(const std::vector<Candidate>& effects, int rounds);
+  Result<Relinearised> relinearise(const std::vector<Candidate>& effects);
+  Status select_without_slips(const Regression& explained);
+  // Base and these effects at their best linear fit.
+  Overrides start_of(const std::vector<Candidate>& effects) const;
   void spread_effects(Overrides* at) const;
   Status refit_nested();
   void name_effects();
-  void name_spread_effect(const std::string& effect, double gain, std::vector<Estimate> estimates);
+  // An effect on the spread: gain in nats over all trials.
+  struct SpreadEffect {
+    std::string name;
+    double gain = 0;
+    std::vector<Estimate> estimates;
+  };
+  std::vector<SpreadEffect> spread_effects_found() const;
+  // Without words, and with a gap that only its change counts of.
   NamedEffect named(std::size_t k, const JointFit& estimates) const;
+  NamedEffect named(const SpreadEffect& found) const;
   void set_closed(NamedEffect* effect, const std::vector<double>& gained) const;
   Status plan_next();
   void fill_gap();
@@ -69,7 +84,7 @@ class DiagnosisRun {
   std::vector<ChosenEffect> chosen_;
   std::vector<Leftover> leftovers_;
   std::vector<JointFit> nested_;                    // base, base + first effect, ...
-  std::optional<JointFit> estimates_;               // with nuisances: for values and intervals
+  std::optional<JointFit> estimates_;               // base held, beside nuisances
   std::vector<std::vector<double>> nested_scores_;  // held out, one a trial
   double scale_ = 1;                                // leftover variance over the noise's
   double floor_ = 0;

@@ -71,6 +71,19 @@ struct Screened {
   std::string note;  // why it cannot be seen in these data, or what it is an alias of
 };
 
+// What the final model's residuals still depend on, or not.
+struct ResidualCheck {
+  std::string covariate;
+  double log10_p = 0;
+  double excess = 0;  // nats over all trials beyond what chance explains
+};
+
+// One step of the selection: net gain (nats) of the best effects, given what is explained.
+struct SelectionRecord {
+  std::vector<std::string> explained;
+  std::vector<std::pair<std::string, double>> offered;
+};
+
 struct NextExperiment {
   std::string text;
   std::vector<std::string> separates;
@@ -104,6 +117,8 @@ struct Diagnosis {
   std::vector<Where> where;        // of the tuned base model
   std::vector<Where> unexplained;  // of the final model
   std::vector<Screened> screening;
+  std::vector<SelectionRecord> steps;
+  std::vector<ResidualCheck> checks;  // most significant first
   std::vector<NextExperiment> next;
   std::vector<std::string> cautions;  // thin data and the like, one sentence each
   std::vector<DiagnosedTrial> trials;

@@ -77,6 +77,24 @@ Json screening_json(const std::vector<Screened>& screening) {
   return list;
 }
 
+Json steps_json(const std::vector<SelectionRecord>& steps) {
+  Json list = Json::array();
+  for (const SelectionRecord& step : steps) {
+    Json offered = Json::object();
+    for (const auto& [effect, gain] : step.offered) offered[effect] = gain;
+    list.push_back({{"explained", step.explained}, {"offered", std::move(offered)}});
+  }
+  return list;
+}
+
+Json checks_json(const std::vector<ResidualCheck>& checks) {
+  Json list = Json::array();
+  for (const ResidualCheck& c : checks) {
+    list.push_back({{"covariate", c.covariate}, {"log10_p", c.log10_p}, {"excess", c.excess}});
+  }
+  return list;
+}
+
 // Reads fields of one object; the first thing that does not fit is kept as a sentence.
 class Fields {
  public:
@@ -241,6 +259,22 @@ void read_remainder(Fields& root, Diagnosis& diagnosis) {
     fields.read("separates", next.separates);
     fields.read_if_there("trials", next.trials);
   });
+  root.for_each("steps", [&](const Json& item, const std::string& path, const auto&) {
+    SelectionRecord& step = diagnosis.steps.emplace_back();
+    Fields fields(item, path, root.error());
+    fields.read("explained", step.explained);
+    fields.for_each("offered", [&](const Json&, const std::string&, const auto& effect) {
+      Fields gains(item["offered"], path + ".offered", root.error());
+      gains.read(effect.c_str(), step.offered.emplace_back(effect, 0).second);
+    });
+  });
+  root.for_each("checks", [&](const Json& item, const std::string& path, const auto&) {
+    ResidualCheck& check = diagnosis.checks.emplace_back();
+    Fields fields(item, path, root.error());
+    fields.read("covariate", check.covariate);
+    fields.read("log10_p", check.log10_p);
+    fields.read("excess", check.excess);
+  });
   root.read_if_there("cautions", diagnosis.cautions);
   root.for_each("provenance", [&](const Json& item, const std::string& path, const auto&) {
     auto& [label, value] = diagnosis.provenance.emplace_back();
@@ -292,6 +326,8 @@ Json summary_json(const Diagnosis& diagnosis) {
           {"where", where_json(diagnosis.where)},
           {"unexplained", where_json(diagnosis.unexplained)},
           {"screening", screening_json(diagnosis.screening)},
+          {"steps", steps_json(diagnosis.steps)},
+          {"checks", checks_json(diagnosis.checks)},
           {"next_experiment", std::move(next)},
           {"cautions", diagnosis.cautions},
           {"provenance", std::move(provenance)},

@@ -9,6 +9,8 @@
 namespace gapfarm {
 namespace {
 
+constexpr int kMostHalvings = 4;
+
 // Step of a finite difference in a parameter: a hundredth of its value, but no less than what the
 // catalogue's bounds make a small change.
 double step_of(const Parameter& row, double value) {
@@ -17,10 +19,12 @@ double step_of(const Parameter& row, double value) {
 
 std::vector<FittedParameter> parameters_of(const ParameterTable& table, const Overrides& start,
                                            const std::vector<Candidate>& effects,
-                                           std::size_t* base_count) {
+                                           BaseParameters base, std::size_t* base_count) {
   std::vector<FittedParameter> parameters;
-  for (const BaseParameter& p : tuned_base_parameters()) {
-    parameters.push_back({p.row, start.at(p.row), 0});
+  if (base == BaseParameters::kFitted) {
+    for (const BaseParameter& p : tuned_base_parameters()) {
+      parameters.push_back({p.row, start.at(p.row), 0});
+    }
   }
   *base_count = parameters.size();
   for (const Candidate& effect : effects) {
@@ -86,6 +90,13 @@ void add_prior(const Study& study, const JointFit& fit, Normal* normal) {
   normal->matrix.diagonal().array() += 1e-12 * scale;
 }
 
+// Bounded for trials far out.
+double weight_of(const Study& study, Eigen::Index trial, const Eigen::VectorXd& z) {
+  if (study.ignores(static_cast<std::size_t>(trial))) return 0;
+  const double d2 = z.segment<3>(3 * trial).squaredNorm();
+  return d2 > 16 ? std::sqrt(16 / d2) : 1;
+}
+
 // One step, with bounded weights for trials far out; fills in the standard errors.
 void step(const Problem& problem, const Study& study, const Eigen::MatrixXd& nuisances,
           JointFit* fit) {
@@ -95,8 +106,7 @@ void step(const Problem& problem, const Study& study, const Eigen::MatrixXd& nui
   Eigen::VectorXd z = study.whiten(fit->residuals);
   Eigen::VectorXd weight(z.size());
   for (Eigen::Index i = 0; i < z.size(); i += 3) {
-    const double d2 = z.segment<3>(i).squaredNorm();
-    weight.segment<3>(i).setConstant(d2 > 16 ? std::sqrt(16 / d2) : 1);
+    weight.segment<3>(i).setConstant(weight_of(study, i / 3, z));
   }
   Normal normal{all.transpose() * weight.asDiagonal() * all,
                 all.transpose() * weight.asDiagonal() * z};
@@ -167,15 +177,28 @@ std::map<std::string, double> start_values(const Study& study, const Regression&
 
 Result<JointFit> fit_jointly(Predictor& predictor, const Study& study,
                              const std::vector<Candidate>& effects, const Overrides& start,
-                             const Eigen::MatrixXd& nuisances, int rounds) {
+                             BaseParameters base, const Eigen::MatrixXd& nuisances, int rounds) {
   JointFit fit;
   fit.at = start;
-  fit.parameters = parameters_of(predictor.problem().table(), start, effects, &fit.base_parameters);
-  for (int round = 0; round < rounds; ++round) {
-    if (Status s = linearise(predictor, study, &fit); !s) return s.error();
-    step(predictor.problem(), study, nuisances, &fit);
-  }
+  fit.parameters =
+      parameters_of(predictor.problem().table(), start, effects, base, &fit.base_parameters);
   if (Status s = linearise(predictor, study, &fit); !s) return s.error();
+  for (int round = 0; round < rounds; ++round) {
+    JointFit next = fit;
+    step(predictor.problem(), study, nuisances, &next);
+    // A step may lead to where the robot falls over: half of it, then.
+    Status linearised = linearise(predictor, study, &next);
+    for (int half = 0; !linearised && predictor.simulation_failed() && half < kMostHalvings;
+         ++half) {
+      for (std::size_t k = 0; k < next.parameters.size(); ++k) {
+        FittedParameter& p = next.parameters[k];
+        next.at[p.row] = p.value = (p.value + fit.parameters[k].value) / 2;
+      }
+      linearised = linearise(predictor, study, &next);
+    }
+    if (!linearised) return linearised.error();
+    fit = std::move(next);
+  }
   return fit;
 }
 
@@ -190,8 +213,7 @@ std::vector<Eigen::Vector3d> held_out_residuals(const Study& study, const JointF
     for (std::size_t i = 0; i < study.size(); ++i) {
       if (fold_of[i] == f && folds > 1) continue;
       const auto at = static_cast<Eigen::Index>(3 * i);
-      const double d2 = z.segment<3>(at).squaredNorm();
-      const double weight = d2 > 16 ? std::sqrt(16 / d2) : 1;
+      const double weight = weight_of(study, at / 3, z);
       const auto rows = fit.jacobian.middleRows(at, 3);
       normal.matrix += weight * rows.transpose() * rows;
       normal.right += weight * rows.transpose() * z.segment<3>(at);

@@ -27,11 +27,13 @@ struct JointFit {
   Eigen::MatrixXd jacobian;  // whitened rows by parameters
 };
 
-// Gauss-Newton on the predictions, `rounds` re-linearisations, with the prior of the base
-// parameters; `nuisances` (may have no columns) take part and are thrown away.
+enum class BaseParameters { kHeld, kFitted };
+
+// Gauss-Newton on the predictions, `rounds` re-linearisations; fitted base parameters have their
+// prior; `nuisances` (may have no columns) take part and are thrown away.
 Result<JointFit> fit_jointly(Predictor& predictor, const Study& study,
                              const std::vector<Candidate>& effects, const Overrides& start,
-                             const Eigen::MatrixXd& nuisances, int rounds);
+                             BaseParameters base, const Eigen::MatrixXd& nuisances, int rounds);
 
 // Parameter values at which a refinement of the effect begins.
 std::map<std::string, double> start_values(const Study& study, const Regression& others,

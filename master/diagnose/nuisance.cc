@@ -23,6 +23,10 @@ constexpr Misfit kMisfits[] = {
     {DriveKind::kWide, 2, 0.003, 0.008},
 };
 
+double misfit_size(const Misfit& misfit, double path, double speed_m_s) {
+  return (misfit.fixed + misfit.growing * path) * speed_m_s / kMeasuredSpeed;
+}
+
 void add_column(const Study& study, const std::vector<Eigen::Vector3d>& values, double prior,
                 std::vector<Eigen::VectorXd>* columns) {
   columns->push_back(prior * study.whiten(values));
@@ -46,14 +50,20 @@ void add_misfits(const Study& study, std::vector<Eigen::VectorXd>* columns) {
         const bool mirrors = misfit.component != 0 || kind == DriveKind::kStraight;
         values[i][misfit.component] = mirrors ? c.mirror : 1;
       }
-      const double path = level * duration_s;
-      const double size = misfit.fixed + misfit.growing * path;
-      add_column(study, values, size * study.speed_m_s / kMeasuredSpeed, columns);
+      add_column(study, values, misfit_size(misfit, level * duration_s, study.speed_m_s), columns);
     }
   }
 }
 
 }  // namespace
+
+Eigen::Vector3d misfit_sd(const Cell& cell, double speed_m_s) {
+  Eigen::Vector3d sd = Eigen::Vector3d::Zero();
+  for (const Misfit& misfit : kMisfits) {
+    if (misfit.kind == cell.kind) sd[misfit.component] = misfit_size(misfit, cell.path, speed_m_s);
+  }
+  return sd;
+}
 
 Result<Eigen::MatrixXd> nuisance_columns(Predictor& predictor, const Study& study) {
   constexpr double kStep = 0.05;
@@ -62,10 +72,10 @@ Result<Eigen::MatrixXd> nuisance_columns(Predictor& predictor, const Study& stud
     std::size_t row;
     double prior;  // log s.d.
   };
-  const Retuned retuned[] = {{row_of(Srv1::kContactLength), 0.5},
-                             {row_of(Srv1::kFrictionRatio), 0.5},
-                             {row_of(Srv1::kFriction), 0.5},
-                             {row_of(Srv1::kTrackGauge), 0.2}};
+  const Retuned retuned[] = {
+      {row_of(Srv1::kContactLength), 0.5}, {row_of(Srv1::kFrictionRatio), 0.5},
+      {row_of(Srv1::kFriction), 0.5},      {row_of(Srv1::kTrackGauge), 0.2},
+      {row_of(Srv1::kTreadCreep), 1},      {row_of(Srv1::kMassHeight), 1}};
   std::vector<PredictionRequest> requests;
   for (const Retuned& r : retuned) {
     Overrides up = study.base, down = study.base;

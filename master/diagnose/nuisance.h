@@ -9,6 +9,10 @@
 
 namespace gapfarm {
 
+// Standard deviation (m, m, rad) of what a simulation of other physics gets wrong of a cell's mean
+// motion, in ways that are alike for its mirror image; 0 where symmetry forbids it.
+Eigen::Vector3d misfit_sd(const Cell& cell, double speed_m_s);
+
 // Whitened columns scaled to a prior standard deviation of 1: retuning of the base (free within its
 // bounds), and, for each kind of drive, level and duration, an offset that is alike for a command
 // and its mirror image (saturation of slip, starting and stopping), a fraction of a per cent of the

@@ -33,13 +33,17 @@ Result<std::vector<std::vector<Pose>>> Predictor::ends(
     tasks.back().mutable_predict()->mutable_trials()->Add(request.trials.begin(),
                                                           request.trials.end());
   }
+  simulation_failed_ = false;
   const auto results = farm_.run(hash_, tasks);
   if (!results) return results.error();
   predictions_ += requests.size();
   std::vector<std::vector<Pose>> ends;
   for (std::size_t k = 0; k < requests.size(); ++k) {
     const v1::TaskResult& result = (*results)[k];
-    if (result.outcome() != v1::OK) return bad_point(problem_, requests[k].at, result);
+    if (result.outcome() != v1::OK) {
+      simulation_failed_ = true;
+      return bad_point(problem_, requests[k].at, result);
+    }
     std::vector<Pose>& to = ends.emplace_back();
     for (const v1::Predicted& p : result.predict().predictions()) to.push_back(from_proto(p.end()));
   }

@@ -32,6 +32,8 @@ class Predictor {
   // Predicted measured end poses, one a trial asked for, of each request.  Errors: the farm's, and
   // a simulation that did not end well (its point is named).
   Result<std::vector<std::vector<Pose>>> ends(const std::vector<PredictionRequest>& requests);
+  // Whether the last error of ends() was a simulation's rather than the farm's.
+  bool simulation_failed() const { return simulation_failed_; }
 
   // Log scores of every trial under the worker's own predictive distribution.
   Result<std::vector<double>> log_scores(const Overrides& at);
@@ -41,6 +43,7 @@ class Predictor {
   const Problem& problem_;
   std::string hash_;
   std::uint64_t predictions_ = 0;
+  bool simulation_failed_ = false;
 };
 
 }  // namespace gapfarm

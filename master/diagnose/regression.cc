@@ -18,7 +18,11 @@ Regression::Regression(const Eigen::MatrixXd& nuisances, const Eigen::VectorXd& 
   all << nuisances, Eigen::MatrixXd::Identity(k, k);
   const Eigen::HouseholderQR<Eigen::MatrixXd> qr(all);
   basis_ = qr.householderQ() * Eigen::MatrixXd::Identity(rows_ + k, k);
-  left_ = Eigen::VectorXd::Zero(rows_ + k);
+  restart(data);
+}
+
+void Regression::restart(const Eigen::VectorXd& data) {
+  left_ = Eigen::VectorXd::Zero(basis_.rows());
   left_.head(rows_) = data;
   left_ -= basis_ * (basis_.transpose() * left_);
 }

@@ -25,6 +25,8 @@ class Regression {
   Gain gain(const Eigen::MatrixXd& columns) const;
   // The part of the data that `columns` explain beyond the basis.
   Eigen::VectorXd explained(const Eigen::MatrixXd& columns) const;
+  // Other data for the same basis.
+  void restart(const Eigen::VectorXd& data);
   // Takes `columns` into the basis.
   void add(const Eigen::MatrixXd& columns);
 

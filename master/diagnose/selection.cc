@@ -14,19 +14,38 @@ constexpr double kWorthRefiningShare = 0.3;  // of the best: no search of places
 constexpr double kSecondAlias = 0.8;   // cosine beyond which a further effect is the first again,
 constexpr double kSecondShare = 0.25;  // unless it gains this share of all that is explained
 
-// Effects that change how far a command drives, whatever else: of these a second one must gain a
-// good part of what the first did.
-const std::set<std::string> kReach = {"motor_deadband", "rolling_resistance", "timing_offset",
-                                      "motor_lag"};
-constexpr double kReachShare = 0.4;
+// Effects whose difference is small beside what one contact model and another make of them: of
+// these a second one must gain a good part of what the first did.
+struct Family {
+  std::set<std::string> effects;
+  double share;
+};
+const Family kFamilies[] = {
+    {{"motor_deadband", "rolling_resistance", "timing_offset", "motor_lag"}, 0.75},
+    {{"floor_tilt", "floor_nap"}, 0.15},
+};
+constexpr int kMostPatchSearches = 4;
+constexpr double kWorthRelinearising = 40;  // nats: curvature of weaker effects is below the noise
+constexpr int kMostRelinearised = 4;
+constexpr std::size_t kOffered = 6;  // candidates kept of a step
 // Turn alike in any data of rest poses.
 constexpr std::pair<const char*, const char*> kAlwaysAliases[] = {
-    {"motor_deadband", "rolling_resistance"}, {"com_offset", "marker_offset"}};
+    {"motor_deadband", "rolling_resistance"},
+    {"com_offset", "marker_offset"},
+    {"timing_offset", "motor_lag"}};  // how hard the motors brake decides what lag leaves behind
 
 bool always_aliases(const std::string& a, const std::string& b) {
   return std::any_of(std::begin(kAlwaysAliases), std::end(kAlwaysAliases), [&](const auto& pair) {
     return (a == pair.first && b == pair.second) || (a == pair.second && b == pair.first);
   });
+}
+
+constexpr double kScreenedRatio = 0.7;  // of the coarse grid of patches
+
+// {x, y, radius, ratio}
+std::array<double, 4> patch_of(const Signature& s) {
+  return {s.fixed.at("friction_patch.x"), s.fixed.at("friction_patch.y"),
+          s.fixed.at("friction_patch.radius"), s.fixed.at("friction_patch.ratio")};
 }
 
 double net_gain(const Regression& explained, const Signature& s) {
@@ -66,7 +85,7 @@ Status Selector::add_patches() {
     for (int j = 0; j < 4; ++j) {
       places.push_back({low[0] + (high[0] - low[0]) * (2 * i + 1) / 8,
                         low[1] + (high[1] - low[1]) * (2 * j + 1) / 8,
-                        0.28 * std::max(high[0] - low[0], high[1] - low[1]), 0.7});
+                        0.28 * std::max(high[0] - low[0], high[1] - low[1]), kScreenedRatio});
     }
   }
   auto patches = patch_signatures(predictor_, study_, places);
@@ -81,6 +100,7 @@ Candidate Selector::refine_seam(const Regression& explained, Candidate best) con
     const double position = best.signature.fixed.at("camera_seam.position");
     for (double sign : {-1.0, 1.0}) {
       Signature s = seam_signature(study_, axis, position + sign * step);
+      study_.drop_ignored(s.columns);
       const double gain = net_gain(explained, s);
       if (gain > best.gain) best = {gain, std::move(s)};
     }
@@ -88,27 +108,28 @@ Candidate Selector::refine_seam(const Regression& explained, Candidate best) con
   return best;
 }
 
-Result<Candidate> Selector::refine_patch(const Regression& explained, Candidate best) {
-  const auto place = [](const Signature& s) {
-    return std::array<double, 4>{s.fixed.at("friction_patch.x"), s.fixed.at("friction_patch.y"),
-                                 s.fixed.at("friction_patch.radius"),
-                                 s.fixed.at("friction_patch.ratio")};
-  };
+// All discs looked at join the catalogue, so that a later search starts from the best of them.
+Result<Candidate> Selector::refine_patch(const Regression& explained, const Candidate& coarse) {
+  Candidate best = coarse;
   const auto look = [&](const std::vector<std::array<double, 4>>& places) -> Status {
     auto found = patch_signatures(predictor_, study_, places);
     if (!found) return found.error();
     for (Signature& s : *found) {
+      study_.drop_ignored(s.columns);
       const double gain = net_gain(explained, s);
-      if (gain > best.gain) best = {gain, std::move(s)};
+      if (gain > best.gain) best = {gain, s};
+      catalogue_.push_back(std::move(s));
     }
     return {};
   };
-  const std::array<double, 4> coarse = place(best.signature);
-  std::vector<std::array<double, 4>> ratios;
-  for (double ratio : {0.15, 0.4, 1.8}) ratios.push_back({coarse[0], coarse[1], coarse[2], ratio});
-  if (Status s = look(ratios); !s) return s.error();
+  const std::array<double, 4> first = patch_of(best.signature);
+  if (first[3] == kScreenedRatio) {
+    std::vector<std::array<double, 4>> ratios;
+    for (double ratio : {0.15, 0.4, 1.8}) ratios.push_back({first[0], first[1], first[2], ratio});
+    if (Status s = look(ratios); !s) return s.error();
+  }
   for (double step : {0.15, 0.07, 0.03}) {
-    const auto [x, y, r, q] = place(best.signature);
+    const auto [x, y, r, q] = patch_of(best.signature);
     const Status s = look({{x + step, y, r, q},
                            {x - step, y, r, q},
                            {x, y + step, r, q},
@@ -119,7 +140,23 @@ Result<Candidate> Selector::refine_patch(const Regression& explained, Candidate 
                            {x, y, r, std::max(0.06, q / (1 + 4 * step))}});
     if (!s) return s.error();
   }
+  refined_patches_.insert(patch_of(best.signature));
   return best;
+}
+
+// The best two discs, unless a search has been there.
+std::vector<Candidate> Selector::unrefined_patches(const Regression& explained) const {
+  std::vector<Candidate> all;
+  for (const Signature& s : catalogue_) {
+    if (s.effect == "friction_patch") all.push_back({net_gain(explained, s), s});
+  }
+  std::stable_sort(all.begin(), all.end(),
+                   [](const Candidate& a, const Candidate& b) { return a.gain > b.gain; });
+  if (!all.empty() && refined_patches_.count(patch_of(all.front().signature))) return {};
+  const auto coarse = [](const Candidate& c) { return patch_of(c.signature)[3] == kScreenedRatio; };
+  std::erase_if(all, [&](const Candidate& c) { return !coarse(c); });
+  if (all.size() > 2) all.resize(2);
+  return all;
 }
 
 Result<std::vector<Candidate>> Selector::candidates(const Regression& explained,
@@ -137,10 +174,14 @@ Result<std::vector<Candidate>> Selector::candidates(const Regression& explained,
     if (candidate.gain + candidate.signature.penalty < kWorthRefining) continue;
     if (candidate.gain < kWorthRefiningShare * most) continue;
     if (effect == "camera_seam") candidate = refine_seam(explained, candidate);
-    if (effect == "friction_patch") {
-      auto refined = refine_patch(explained, candidate);
+    if (effect != "friction_patch") continue;
+    for (const Candidate& start : unrefined_patches(explained)) {
+      if (start.gain + start.signature.penalty < kWorthRefining) break;
+      if (start.gain < kWorthRefiningShare * candidate.gain) break;
+      if (patch_searches_++ >= kMostPatchSearches) break;
+      auto refined = refine_patch(explained, start);
       if (!refined) return refined.error();
-      candidate = *refined;
+      if (refined->gain > candidate.gain) candidate = *refined;
     }
   }
   std::vector<Candidate> sorted;
@@ -175,27 +216,56 @@ double Selector::alias_cosine(const std::vector<Signature>& first,
 
 bool Selector::is_new(const std::vector<Signature>& first, const std::vector<Candidate>& chosen,
                       const Candidate& candidate) const {
-  for (const Candidate& c : chosen) {
-    const bool both = kReach.count(c.signature.effect) && kReach.count(candidate.signature.effect);
-    if (both && candidate.gain < kReachShare * c.gain) return false;
+  for (const Family& family : kFamilies) {
+    if (!family.effects.count(candidate.signature.effect)) continue;
+    double gained = 0;
+    for (const Candidate& c : chosen) {
+      if (family.effects.count(c.signature.effect)) gained += c.gain;
+    }
+    if (candidate.gain < family.share * gained) return false;
   }
-  if (candidate.gain > kSecondShare * total_gain(chosen)) return true;
+  if (candidate.gain > kSecondShare * (first_gain_ + total_gain(chosen))) return true;
   for (std::size_t i = 0; i < chosen.size(); ++i) {
     if (alias_cosine(first, chosen, i, candidate) > kSecondAlias) return false;
   }
   return true;
 }
 
+void Selector::drop_weak(std::vector<Candidate>* chosen) const {
+  const double least = std::max(kLeastGain, kLeastShare * (first_gain_ + total_gain(*chosen)));
+  std::erase_if(*chosen, [&](const Candidate& c) { return c.gain <= least; });
+}
+
 // Lets every earlier choice be replaced in the light of the later ones, and drops what has become
 // too weak.
 Status Selector::replace_each(const std::vector<Signature>& first, std::vector<Candidate>* chosen) {
   for (std::size_t i = 0; i < chosen->size(); ++i) {
-    auto better = candidates(without(first, *chosen, i), names_of(*chosen, i));
+    const Regression others = without(first, *chosen, i);
+    auto better = candidates(others, names_of(*chosen, i));
     if (!better) return better.error();
-    if (!better->empty()) (*chosen)[i] = better->front();
+    Candidate& own = (*chosen)[i];
+    own.gain = net_gain(others, own.signature);
+    if (!better->empty() && better->front().gain > own.gain) own = better->front();
   }
-  const double least = std::max(kLeastGain, kLeastShare * total_gain(*chosen));
-  std::erase_if(*chosen, [&](const Candidate& c) { return c.gain <= least; });
+  drop_weak(chosen);
+  return {};
+}
+
+// Small errors of a strong effect's linear signature look like other effects.
+Status Selector::use_estimates(const std::vector<Signature>& first, const Relinearise& relinearise,
+                               std::vector<Candidate>* chosen) {
+  if (total_gain(*chosen) < kWorthRelinearising || relinearised_ == kMostRelinearised) return {};
+  ++relinearised_;
+  auto at_estimate = relinearise(*chosen);
+  if (!at_estimate) return at_estimate.error();
+  base_.restart(at_estimate->data);
+  for (std::size_t i = 0; i < chosen->size(); ++i) {
+    (*chosen)[i].signature.columns = std::move(at_estimate->columns[i]);
+  }
+  for (std::size_t i = 0; i < chosen->size(); ++i) {
+    (*chosen)[i].gain = net_gain(without(first, *chosen, i), (*chosen)[i].signature);
+  }
+  drop_weak(chosen);
   return {};
 }
 
@@ -210,8 +280,7 @@ Result<std::vector<Alias>> Selector::aliases_of(const std::vector<Signature>& fi
   for (const Candidate& other : *others) {
     const double parallel = cosine(own, r.explained(other.signature.columns));
     const bool as_good = chosen[i].gain - other.gain < 4 && other.gain > kLeastGain / 2;
-    const bool always =
-        always_aliases(chosen[i].signature.effect, other.signature.effect) && parallel > 0.3;
+    const bool always = always_aliases(chosen[i].signature.effect, other.signature.effect);
     if (parallel > kAliasCosine || as_good || always)
       aliases.push_back({other.signature.effect, parallel});
     if (aliases.size() == 3) break;
@@ -219,25 +288,46 @@ Result<std::vector<Alias>> Selector::aliases_of(const std::vector<Signature>& fi
   return aliases;
 }
 
-Result<std::vector<ChosenEffect>> Selector::select(const std::vector<Signature>& first) {
+void Selector::recount(const Regression& nuisances) {
+  base_ = nuisances;
+  for (Signature& s : catalogue_) study_.drop_ignored(s.columns);
+}
+
+Result<std::vector<ChosenEffect>> Selector::select(const std::vector<Signature>& first,
+                                                   double first_gain,
+                                                   const Relinearise& relinearise) {
+  first_gain_ = first_gain;
+  relinearised_ = 0;
+  steps_.clear();
   std::vector<Candidate> chosen;
   std::set<std::string> taken;
   for (const Signature& s : first) taken.insert(s.effect);
-  while (chosen.size() < kMostEffects) {
+  std::set<std::set<std::string>> seen;
+  // Adding and dropping could go round for ever: a set of names that was there before ends it.
+  while (chosen.size() < kMostEffects && seen.insert(names_of(chosen)).second) {
     std::set<std::string> used = names_of(chosen);
     used.insert(taken.begin(), taken.end());
     auto next = candidates(without(first, chosen, ~std::size_t{0}), used);
     if (!next) return next.error();
+    SelectionStep step;
+    step.explained.assign(used.begin(), used.end());
+    for (std::size_t i = 0; i < std::min(kOffered, next->size()); ++i) {
+      step.offered.emplace_back((*next)[i].signature.effect, (*next)[i].gain);
+    }
+    steps_.push_back(std::move(step));
     std::erase_if(*next, [&](const Candidate& c) {
       return c.gain < kLeastGain || !is_new(first, chosen, c);
     });
-    if (next->empty() || next->front().gain < kLeastShare * total_gain(chosen)) break;
-    const std::size_t before = chosen.size();
+    const double least = kLeastShare * (first_gain + total_gain(chosen));
+    if (next->empty() || next->front().gain < least) break;
     chosen.push_back(next->front());
-    if (chosen.size() == 1) continue;
-    if (Status s = replace_each(first, &chosen); !s) return s.error();
-    if (chosen.size() <= before) break;
+    if (chosen.size() > 1) {
+      if (Status s = replace_each(first, &chosen); !s) return s.error();
+    }
+    if (Status s = use_estimates(first, relinearise, &chosen); !s) return s.error();
   }
+  std::stable_sort(chosen.begin(), chosen.end(),
+                   [](const Candidate& a, const Candidate& b) { return a.gain > b.gain; });
   std::vector<ChosenEffect> effects;
   for (std::size_t i = 0; i < chosen.size(); ++i) {
     auto aliases = aliases_of(first, chosen, i);

@@ -1,8 +1,11 @@
 // Which effects the residuals call for: forward selection over the catalogue's signatures.
 #pragma once
 
+#include <array>
+#include <functional>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "common/base/result.h"
@@ -13,7 +16,7 @@ namespace gapfarm {
 
 // Net log-likelihood (nats over all trials) that an effect must gain to be named.  The best of the
 // catalogue gained 4.4 at most in 90 of 100 null logs, 6.7 in 99 (400 logs; docs/diagnosis.md).
-inline constexpr double kLeastGain = 7.5;
+inline constexpr double kLeastGain = 9;
 // A further effect must also gain this share of what the others did: small systematic errors of
 // a strong effect's model look like weaker effects.
 inline constexpr double kLeastShare = 0.02;
@@ -24,6 +27,20 @@ struct Candidate {
   double gain = 0;  // net of the signature's penalty, nats
   Signature signature;
 };
+
+// What the catalogue offered at one step: effect and net gain, best first.
+struct SelectionStep {
+  std::vector<std::string> explained;  // effects named so far
+  std::vector<std::pair<std::string, double>> offered;
+};
+
+// The chosen effects at their joint estimate, where large ones are no longer linear: data as if
+// their predictions were, and each one's contribution with its slopes.
+struct Relinearised {
+  Eigen::VectorXd data;                  // whitened
+  std::vector<Eigen::MatrixXd> columns;  // one matrix an effect
+};
+using Relinearise = std::function<Result<Relinearised>(const std::vector<Candidate>&)>;
 
 struct Alias {
   std::string effect;
@@ -48,14 +65,25 @@ class Selector {
   Result<std::vector<Candidate>> candidates(const Regression& explained,
                                             const std::set<std::string>& without);
 
-  // `first` are explained before anything else (a late camera, say).
-  Result<std::vector<ChosenEffect>> select(const std::vector<Signature>& first);
+  // `first` are explained before anything else (a late camera, say) and gained `first_gain` nats.
+  // `relinearise` fits what was chosen so far.
+  Result<std::vector<ChosenEffect>> select(const std::vector<Signature>& first, double first_gain,
+                                           const Relinearise& relinearise);
+
+  // From now on, only trials that the study does not ignore count; `nuisances` without them.
+  void recount(const Regression& nuisances);
+
+  // Only the nuisances are explained.
+  const Regression& nothing_explained() const { return base_; }
+  // Of the last select().
+  const std::vector<SelectionStep>& steps() const { return steps_; }
 
   // The nuisances and these signatures.
   Regression with(const std::vector<const Signature*>& signatures) const;
 
  private:
-  Result<Candidate> refine_patch(const Regression& explained, Candidate best);
+  Result<Candidate> refine_patch(const Regression& explained, const Candidate& coarse);
+  std::vector<Candidate> unrefined_patches(const Regression& explained) const;
   Candidate refine_seam(const Regression& explained, Candidate best) const;
   Regression without(const std::vector<Signature>& first, const std::vector<Candidate>& chosen,
                      std::size_t leave_out) const;
@@ -64,6 +92,9 @@ class Selector {
   bool is_new(const std::vector<Signature>& first, const std::vector<Candidate>& chosen,
               const Candidate& candidate) const;
   Status replace_each(const std::vector<Signature>& first, std::vector<Candidate>* chosen);
+  Status use_estimates(const std::vector<Signature>& first, const Relinearise& relinearise,
+                       std::vector<Candidate>* chosen);
+  void drop_weak(std::vector<Candidate>* chosen) const;
   Result<std::vector<Alias>> aliases_of(const std::vector<Signature>& first,
                                         const std::vector<Candidate>& chosen, std::size_t i);
 
@@ -71,6 +102,11 @@ class Selector {
   const Study& study_;
   std::vector<Signature> catalogue_;
   Regression base_;
+  std::vector<SelectionStep> steps_;
+  double first_gain_ = 0;
+  int patch_searches_ = 0;
+  int relinearised_ = 0;
+  std::set<std::array<double, 4>> refined_patches_;
 };
 
 }  // namespace gapfarm

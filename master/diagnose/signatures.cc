@@ -9,6 +9,7 @@ namespace gapfarm {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
+constexpr double kLowMass_m = 0.002;  // hardly over the floor
 
 Eigen::MatrixXd stack(const std::vector<Eigen::VectorXd>& columns) {
   Eigen::MatrixXd all(columns.front().size(), static_cast<Eigen::Index>(columns.size()));
@@ -24,7 +25,7 @@ struct Probe {
   double scale = 1;
 };
 
-std::vector<Probe> probes(const Eigen::Vector2d& middle) {
+std::vector<Probe> probes(const Eigen::Vector2d& middle, double own_height_m) {
   std::vector<Probe> all;
   const auto slope = [&](const std::string& effect, const std::string& key, double step,
                          bool central, double neutral = 0) {
@@ -48,12 +49,17 @@ std::vector<Probe> probes(const Eigen::Vector2d& middle) {
   slope("heading_offset", "angle", 0.02, true);
   slope("marker_offset", "x", 0.005, true);
   slope("marker_offset", "y", 0.005, true);
-  const auto tilt = [](double direction) {
-    return std::map<std::string, double>{{"floor_tilt.angle", 0.05},
-                                         {"floor_tilt.direction", direction}};
-  };
-  all.push_back({"floor_tilt", tilt(0), {}, 0.05});
-  all.push_back({"floor_tilt", tilt(kPi / 2), {}, 0.05});
+  // A tilt also shifts the load, the more the higher the mass lies, which no flat floor shows.
+  for (double height : {own_height_m, kLowMass_m}) {
+    for (double direction : {0.0, kPi / 2}) {
+      all.push_back({"floor_tilt",
+                     {{"floor_tilt.angle", 0.05},
+                      {"floor_tilt.direction", direction},
+                      {"mass_height", height}},
+                     {{"mass_height", height}},
+                     0.05});
+    }
+  }
   for (double direction : {0.0, 2 * kPi / 3, -2 * kPi / 3}) {
     all.push_back({"floor_nap",
                    {{"floor_nap.strength", 0.15}, {"floor_nap.direction", direction}},
@@ -83,20 +89,6 @@ Overrides at(const Predictor& predictor, const Study& study,
 // proportion to it.
 bool straight(const Study& study, std::size_t i) {
   return study.cells[study.trials[i].cell].kind == DriveKind::kStraight;
-}
-
-// Creep of straight drives under a force per weight that points along (cx, cy) in the world, per
-// metre of path, in the predicted end's axes.
-std::vector<Eigen::Vector3d> creep(const Study& study, double cx, double cy) {
-  std::vector<Eigen::Vector3d> d(study.size(), Eigen::Vector3d::Zero());
-  for (std::size_t i = 0; i < d.size(); ++i) {
-    if (!straight(study, i)) continue;
-    const ResidualTrial& t = study.trials[i];
-    const double length = study.cells[t.cell].path * study.speed_m_s;
-    const double c = std::cos(t.X_WP.theta), s = std::sin(t.X_WP.theta);
-    d[i] = length * Eigen::Vector3d(c * cx + s * cy, -s * cx + c * cy, 0);
-  }
-  return d;
 }
 
 // Straight drives slowed by (1 - cos(travel - nap)) / 2 of their path.
@@ -144,7 +136,69 @@ std::vector<Signature> nap_signatures(const Study& study,
   return all;
 }
 
+// Towards world x and y; straight and turning drives have a strength each, since how far a tread
+// that sticks gives way is another thing than how one that slides is pushed.
+Signature tilt_signature(const Study& study, const std::vector<Eigen::Vector3d>& x,
+                         const std::vector<Eigen::Vector3d>& y) {
+  std::vector<Eigen::VectorXd> columns;
+  for (bool sticks : {false, true}) {
+    for (const auto* slope : {&x, &y}) {
+      std::vector<Eigen::Vector3d> d = *slope;
+      for (std::size_t i = 0; i < d.size(); ++i) {
+        if (straight(study, i) != sticks) d[i].setZero();
+      }
+      columns.push_back(study.whiten(d));
+    }
+  }
+  Signature s;
+  s.effect = "floor_tilt";
+  s.columns = stack(columns);
+  s.penalty = 2;
+  return s;
+}
+
+// What drag costs a straight drive depends on how the treads give way: as the simulated ones do, or
+// the same on every run, whatever its length.  So straight and turning drives have a strength each.
+std::vector<Signature> rolling_signatures(const Study& study,
+                                          const std::vector<Eigen::Vector3d>& slope) {
+  std::vector<Eigen::Vector3d> along = slope, turning = slope, per_run = slope;
+  for (std::size_t i = 0; i < study.size(); ++i) {
+    (straight(study, i) ? turning : along)[i].setZero();
+    per_run[i].setZero();
+    if (straight(study, i)) per_run[i].x() = study.cells[study.trials[i].cell].mirror;
+  }
+  std::vector<Signature> all;
+  for (const auto* other : {&along, &per_run}) {
+    Signature s;
+    s.effect = "rolling_resistance";
+    s.columns = stack({study.whiten(turning), study.whiten(*other)});
+    s.parameters = {"rolling_resistance.coefficient"};
+    s.penalty = 1;
+    all.push_back(std::move(s));
+  }
+  return all;
+}
+
 }  // namespace
+
+bool depends_on_contact(const std::string& effect) {
+  return effect == "floor_tilt" || effect == "floor_nap" || effect == "rolling_resistance";
+}
+
+Eigen::MatrixXd split_by_kind(const Study& study, const Eigen::MatrixXd& columns) {
+  std::vector<Eigen::VectorXd> parts;
+  for (Eigen::Index k = 0; k < columns.cols(); ++k) {
+    for (DriveKind kind : {DriveKind::kStraight, DriveKind::kTurn, DriveKind::kWide}) {
+      Eigen::VectorXd part = columns.col(k);
+      for (std::size_t i = 0; i < study.size(); ++i) {
+        if (study.cells[study.trials[i].cell].kind != kind)
+          part.segment<3>(static_cast<Eigen::Index>(3 * i)).setZero();
+      }
+      if (part.squaredNorm() > 0) parts.push_back(std::move(part));
+    }
+  }
+  return stack(parts);
+}
 
 Eigen::Vector2d middle_of(const Study& study) {
   Eigen::Vector2d middle = Eigen::Vector2d::Zero();
@@ -157,7 +211,7 @@ Eigen::Vector2d middle_of(const Study& study) {
 Result<std::vector<Signature>> signatures(Predictor& predictor, const Study& study,
                                           const std::vector<std::string>& left_out) {
   const Eigen::Vector2d middle = middle_of(study);
-  const std::vector<Probe> all = probes(middle);
+  const std::vector<Probe> all = probes(middle, study.base.at(row_of(Srv1::kMassHeight)));
   std::vector<PredictionRequest> requests;
   for (const Probe& probe : all) {
     requests.push_back({at(predictor, study, probe.plus), {}});
@@ -187,13 +241,20 @@ Result<std::vector<Signature>> signatures(Predictor& predictor, const Study& stu
       found.insert(found.end(), naps.begin(), naps.end());
       continue;
     }
+    if (effect == "floor_tilt") {
+      found.push_back(tilt_signature(study, own[0], own[1]));
+      found.push_back(tilt_signature(study, own[2], own[3]));
+      found.back().fixed = {{"mass_height", kLowMass_m}};
+      continue;
+    }
     Signature s;
     s.effect = effect;
     std::vector<Eigen::VectorXd> columns;
     for (const auto& d : own) columns.push_back(study.whiten(d));
-    if (effect == "floor_tilt") {
-      columns.push_back(study.whiten(creep(study, 1, 0)));
-      columns.push_back(study.whiten(creep(study, 0, 1)));
+    if (effect == "rolling_resistance") {
+      const std::vector<Signature> rolling = rolling_signatures(study, own[0]);
+      found.insert(found.end(), rolling.begin(), rolling.end());
+      continue;
     }
     s.columns = stack(columns);
     s.penalty = 0.5 * static_cast<double>(own.size());

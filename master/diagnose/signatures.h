@@ -28,6 +28,12 @@ struct Signature {
 Result<std::vector<Signature>> signatures(Predictor& predictor, const Study& study,
                                           const std::vector<std::string>& left_out);
 
+// Whether it is a force, whose share in straight, turning and wide drives another contact model
+// would make another one.
+bool depends_on_contact(const std::string& effect);
+// Each column in three, one a kind of drive; those of nothing but zeros left out.
+Eigen::MatrixXd split_by_kind(const Study& study, const Eigen::MatrixXd& columns);
+
 // Shift of the readings beyond a line: two offsets, then two slopes along it about `middle`.
 Signature seam_signature(const Study& study, int axis, double position_m);
 

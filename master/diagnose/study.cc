@@ -9,6 +9,7 @@
 #include "common/score/motion_model.h"
 #include "common/score/statistics.h"
 #include "master/diagnose/distribution.h"
+#include "master/diagnose/nuisance.h"
 
 namespace gapfarm {
 namespace {
@@ -89,12 +90,18 @@ double tuning_step(const Problem& problem, const std::vector<BaseParameter>& par
                                   ends[static_cast<std::size_t>(k) + 1][cell.trial]) /
                  std::log1p(kRelativeStep);
     }
-    const Eigen::Matrix3d& w = study->whitener[cell.trial];
-    const Eigen::Vector3d z = std::sqrt(cell.count) * (w * cell.median);
+    // A cell's mean is known to its standard error, but no simulation gets it right to that.
+    const ResidualTrial& trial = study->trials[cell.trial];
+    const Eigen::Vector3d misfit = misfit_sd(study->cells[trial.cell], study->speed_m_s);
+    Eigen::Matrix3d cov = trial_covariance(trial, study->noise) / cell.count;
+    cov.diagonal() += misfit.cwiseAbs2();
+    const Eigen::LLT<Eigen::Matrix3d> factor(cov);
+    const Eigen::MatrixXd wj = factor.matrixL().solve(j);
+    const Eigen::Vector3d z = factor.matrixL().solve(cell.median);
     // Soft L1 beyond three standard errors: a cell that the base cannot fit must not rule.
-    const double weight = cell.count / std::sqrt(1 + z.squaredNorm() / 27);
-    normal += weight * (w * j).transpose() * (w * j);
-    right += weight * (w * j).transpose() * (w * cell.median);
+    const double weight = 1 / std::sqrt(1 + z.squaredNorm() / 27);
+    normal += weight * wj.transpose() * wj;
+    right += weight * wj.transpose() * z;
   }
   for (Eigen::Index k = 0; k < p; ++k) {
     const BaseParameter& parameter = parameters[static_cast<std::size_t>(k)];
@@ -117,11 +124,12 @@ double tuning_step(const Problem& problem, const std::vector<BaseParameter>& par
 }  // namespace
 
 // Gauge and friction stay: turns depend on them as on length and ratio, and rest poses of another
-// robot's physics would drag them away from anything real.
+// robot's physics would drag them away from anything real.  So would they the ratio, which trades
+// with the length: it is held close.
 std::vector<BaseParameter> tuned_base_parameters() {
   return {{row_of(Srv1::kFullSpeed), 1},
           {row_of(Srv1::kContactLength), 0.5},
-          {row_of(Srv1::kFrictionRatio), 0.3}};
+          {row_of(Srv1::kFrictionRatio), 0.1}};
 }
 
 Eigen::VectorXd Study::whiten(const std::vector<Eigen::Vector3d>& values) const {
@@ -130,6 +138,12 @@ Eigen::VectorXd Study::whiten(const std::vector<Eigen::Vector3d>& values) const 
     rows.segment<3>(static_cast<Eigen::Index>(3 * i)) = whitener[i] * values[i];
   }
   return rows;
+}
+
+void Study::drop_ignored(Eigen::Ref<Eigen::MatrixXd> rows) const {
+  for (std::size_t i = 0; i < ignored.size(); ++i) {
+    if (ignored[i]) rows.middleRows(static_cast<Eigen::Index>(3 * i), 3).setZero();
+  }
 }
 
 Eigen::VectorXd Study::whitened_residuals() const {
@@ -220,7 +234,7 @@ Status tune_base(Predictor& predictor, bool keep, Study* study) {
   const Problem& problem = predictor.problem();
   const std::vector<BaseParameter> parameters = tuned_base_parameters();
   for (const BaseParameter& p : parameters) study->base[p.row] = problem.values[p.row];
-  for (Srv1 kept : {Srv1::kFriction, Srv1::kTrackGauge}) {
+  for (Srv1 kept : {Srv1::kFriction, Srv1::kTrackGauge, Srv1::kTreadCreep, Srv1::kMassHeight}) {
     study->base[row_of(kept)] = problem.values[row_of(kept)];
   }
   for (int round = 0; !keep && round < kTuningRounds; ++round) {
@@ -231,6 +245,7 @@ Status tune_base(Predictor& predictor, bool keep, Study* study) {
     const auto ends = predictor.ends(requests);
     if (!ends) return ends.error();
     set_predictions(ends->front(), study);
+    study->speed_m_s = study->base[row_of(Srv1::kFullSpeed)];
     study->use_noise(study->noise);
     if (tuning_step(problem, parameters, *ends, study) < 1e-3) break;
   }

@@ -30,11 +30,15 @@ struct Study {
   Overrides base;                         // tuned values
   double speed_m_s = 0;                   // tuned full speed
   std::vector<Eigen::Matrix3d> whitener;  // L^-1 of each trial's covariance L L'
+  std::vector<bool> ignored;              // trials that no fit may learn from; empty: none
 
   std::size_t size() const { return trials.size(); }
   // Three rows a trial.
   Eigen::VectorXd whiten(const std::vector<Eigen::Vector3d>& values) const;
   Eigen::VectorXd whitened_residuals() const;
+  bool ignores(std::size_t trial) const { return !ignored.empty() && ignored[trial]; }
+  // Zeroes the rows of ignored trials.
+  void drop_ignored(Eigen::Ref<Eigen::MatrixXd> rows) const;
   // From whitened rows back to metres and radians.
   std::vector<Eigen::Vector3d> unwhiten(const Eigen::VectorXd& rows) const;
   std::vector<Eigen::Matrix3d> covariances() const;

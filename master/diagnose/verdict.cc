@@ -8,12 +8,17 @@
 
 namespace gapfarm {
 
+double leftover_scale(const Regression& explained) {
+  std::vector<double> squares;
+  for (double z : explained.left()) {
+    if (z != 0) squares.push_back(z * z);  // rows of ignored trials are
+  }
+  return squares.empty() ? 1 : std::clamp(median(squares) / 0.455, 0.9, 1.4);
+}
+
 std::vector<Leftover> leftovers(const Regression& explained,
                                 const std::vector<CovariateBlock>& blocks) {
-  const Eigen::VectorXd left = explained.left();
-  std::vector<double> squares(left.data(), left.data() + left.size());
-  for (double& s : squares) s *= s;
-  const double scale = std::clamp(median(squares) / 0.455, 0.9, 1.4);
+  const double scale = leftover_scale(explained);
   std::vector<Leftover> all;
   for (const CovariateBlock& block : blocks) {
     const Gain gain = explained.gain(block.columns);

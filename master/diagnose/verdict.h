@@ -17,6 +17,9 @@ struct Leftover {
   double excess = 0;  // nats over all trials beyond what chance explains
 };
 
+// Variance of what is left over the noise's: robust, and bounded since the noise was measured.
+double leftover_scale(const Regression& explained);
+
 // Most significant first.
 std::vector<Leftover> leftovers(const Regression& explained,
                                 const std::vector<CovariateBlock>& blocks);

@@ -24,6 +24,7 @@ SimSettings sim_settings(const ParameterValues& values, const ActiveEffects& eff
   s.friction = at(values, Srv1::kFriction);
   s.friction_ratio = at(values, Srv1::kFrictionRatio);
   if (s.robot == RobotModel::kTreads) s.tread_creep = at(values, Srv1::kTreadCreep);
+  s.mass_height_m = at(values, Srv1::kMassHeight);
   s.gravity_m_s2 = at(values, Srv1::kGravity);
   s.step_rate_hz = at(values, Srv1::kStepRate);
   s.sub_steps = whole(values, Srv1::kSubSteps);

@@ -22,7 +22,8 @@ struct SimSettings {
   double track_gauge_m = 0.085;    // left to right contact
   double friction = 0.6;           // along the treads
   double friction_ratio = 1;       // lateral over longitudinal
-  double tread_creep = 0;          // slip over tread speed at full traction (treads)
+  double tread_creep = 0;          // slip over tread speed at 0.7 of full traction (treads)
+  double mass_height_m = 0.03;     // centre of mass over the floor
   double gravity_m_s2 = 9.81;
   double step_rate_hz = 240;
   int sub_steps = 1;           // physics steps a step of 1/step_rate

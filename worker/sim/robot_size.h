@@ -7,8 +7,6 @@ namespace gapfarm {
 inline constexpr double kBodyLength_m = 0.12;
 inline constexpr double kBodyWidth_m = 0.10;
 inline constexpr double kBodyHeight_m = 0.08;
-// Centre of mass over the floor: treads, motors and battery lie low in the box.
-inline constexpr double kMassHeight_m = 0.03;
 // Spheres on which the tread model stands.
 inline constexpr double kContactRadius_m = 0.005;
 // Wheels of the wheel model; surface speed = radius * wheel speed.

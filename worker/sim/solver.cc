@@ -74,6 +74,39 @@ void project_onto_ellipse(double a1, double a2, double ratio, double radius, dou
   p2 = u2 * scale * ratio;
 }
 
+// The impulses of a surface that creeps: with u = (p1, p2 / ratio) / radius, the velocity that is
+// left along a row is -slip u / sqrt(1 - |u|^2) (times 1 / ratio across), so that friction grows
+// with the sliding speed and reaches the ellipse where that is large beside `slip` (m/s).  As above
+// u is a function of one multiplier, for which a secular equation is solved the same way.
+void creep_within_ellipse(double a1, double a2, double ratio, double radius, double slip,
+                          double& p1, double& p2) {
+  if (radius <= 0) {
+    p1 = p2 = 0;
+    return;
+  }
+  const double h1 = a1;
+  const double h2 = a2 * ratio * ratio;
+  const double g1 = h1 * p1 / radius;
+  const double g2 = h2 * p2 / (ratio * radius);
+  const double least = slip / radius;
+  double multiplier = least;
+  double u1 = 0, u2 = 0;
+  for (int i = 0; i < 4; ++i) {
+    u1 = g1 / (h1 + multiplier);
+    u2 = g2 / (h2 + multiplier);
+    const double rest = least / multiplier;
+    const double sum = u1 * u1 + u2 * u2 + rest * rest;
+    const double slope =
+        u1 * u1 / (h1 + multiplier) + u2 * u2 / (h2 + multiplier) + rest * rest / multiplier;
+    multiplier += sum / slope * (std::sqrt(sum) - 1);
+  }
+  u1 = g1 / (h1 + multiplier);
+  u2 = g2 / (h2 + multiplier);
+  const double scale = 1 / std::max(1.0, std::hypot(u1, u2));
+  p1 = u1 * scale * radius;
+  p2 = u2 * scale * ratio * radius;
+}
+
 }  // namespace
 
 void EllipseFrictionSolver::convertContacts(btPersistentManifold** manifolds, int count,
@@ -88,12 +121,6 @@ void EllipseFrictionSolver::convertContacts(btPersistentManifold** manifolds, in
       row.m_appliedImpulse = info.m_warmstartingFactor * (d == 0 ? point.m_appliedImpulseLateral1
                                                                  : point.m_appliedImpulseLateral2);
       moving_side(m_tmpSolverBodyPool, row).apply(row.m_appliedImpulse);
-      if (row.m_cfm == 0) continue;
-      // m_frictionCFM: slip velocity per impulse.  Bullet leaves it out of the diagonal.
-      const double softened = 1 / (1 / row.m_jacDiagABInv + row.m_cfm);
-      row.m_rhs *= softened / row.m_jacDiagABInv;
-      row.m_cfm *= softened;
-      row.m_jacDiagABInv = softened;
     }
   }
 }
@@ -155,13 +182,16 @@ double EllipseFrictionSolver::solve_friction() {
     const MovingSide side_2 = moving_side(m_tmpSolverBodyPool, rows[1]);
     const double old_1 = rows[0].m_appliedImpulse;
     const double old_2 = rows[1].m_appliedImpulse;
-    double p1 =
-        old_1 + rows[0].m_rhs - old_1 * rows[0].m_cfm - side_1.velocity() * rows[0].m_jacDiagABInv;
-    double p2 =
-        old_2 + rows[1].m_rhs - old_2 * rows[1].m_cfm - side_2.velocity() * rows[1].m_jacDiagABInv;
+    double p1 = old_1 + rows[0].m_rhs - side_1.velocity() * rows[0].m_jacDiagABInv;
+    double p2 = old_2 + rows[1].m_rhs - side_2.velocity() * rows[1].m_jacDiagABInv;
     const double a1 = 1 / rows[0].m_jacDiagABInv;
     const double a2 = 1 / rows[1].m_jacDiagABInv;
-    project_onto_ellipse(a1, a2, ratio_, rows[0].m_friction * normal.m_appliedImpulse, p1, p2);
+    const double radius = rows[0].m_friction * normal.m_appliedImpulse;
+    if (rows[0].m_cfm > 0) {
+      creep_within_ellipse(a1, a2, ratio_, radius, rows[0].m_cfm, p1, p2);
+    } else {
+      project_onto_ellipse(a1, a2, ratio_, radius, p1, p2);
+    }
     rows[0].m_appliedImpulse = p1;
     rows[1].m_appliedImpulse = p2;
     side_1.apply(p1 - old_1);

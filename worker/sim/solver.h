@@ -5,6 +5,8 @@
 // all.  Here both rows are projected together onto the ellipse
 //     (p_1 / mu)^2 + (p_2 / (ratio mu))^2 <= p_n^2
 // by maximum dissipation (Coulomb's law: friction opposes the sliding, scaled by the ellipse).
+// With m_frictionCFM (here: a sliding speed, m/s) above 0 friction does not jump to the ellipse but
+// grows towards it with the sliding speed v as v / sqrt(v^2 + speed^2): a tread that creeps.
 // Friction impulses are warm-started too, so that few iterations suffice while sliding steadily.
 #pragma once
 

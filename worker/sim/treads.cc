@@ -49,7 +49,7 @@ class Treads final : public Robot {
   btRigidBody& body() override { return *body_; }
   double kinetic_energy() const override { return body_kinetic_energy(*body_); }
   btVector3 turning_centre() const override {
-    return {-settings_.com_x_m, -settings_.com_y_m, -kMassHeight_m};
+    return {-settings_.com_x_m, -settings_.com_y_m, -settings_.mass_height_m};
   }
 
  private:

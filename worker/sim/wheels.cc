@@ -110,7 +110,7 @@ class Wheels final : public Robot {
   btVector3 turning_centre() const override {
     const double total_over_chassis = 1 / (1 - kWheels * kWheelMassShare);
     return {-settings_.com_x_m * total_over_chassis, -settings_.com_y_m * total_over_chassis,
-            -kMassHeight_m};
+            -settings_.mass_height_m};
   }
 
  private:

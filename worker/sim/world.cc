@@ -8,7 +8,7 @@ namespace gapfarm {
 namespace {
 
 // Contacts give a little: load sharing among four supports has one answer instead of many.
-constexpr double kCreepAtRest_m_s = 1.5e-3;  // keeps creep's share finite for a standing tread
+constexpr double kCreepAtRest_m_s = 1.5e-3;  // a standing tread holds, but not like rock
 constexpr double kContactSoftness = 1e-3;
 // Share of a joint's or contact's position error that a step of full length repairs; a shorter one
 // repairs less, or it would have to move fast.
@@ -109,7 +109,10 @@ void RobotWorld::apply_drag(double dt_s) {
   const btVector3& velocity = body.getLinearVelocity();
   const Eigen::Vector2d drag =
       drag_acceleration(floor_, settings_.gravity_m_s2, {velocity.x(), velocity.y()}, ahead, dt_s);
-  body.applyCentralForce(settings_.mass_kg * btVector3(drag.x(), drag.y(), 0));
+  // The floor drags at the floor: it must not pitch the robot against its own friction.  An impulse,
+  // since Bullet's friction rows know nothing of a torque that waits for the step.
+  const btVector3 floor_point(0, 0, -body.getCenterOfMassPosition().z());
+  body.applyImpulse(settings_.mass_kg * dt_s * btVector3(drag.x(), drag.y(), 0), floor_point);
 }
 
 void RobotWorld::predictUnconstraintMotion(btScalar dt_s) {
@@ -119,16 +122,8 @@ void RobotWorld::predictUnconstraintMotion(btScalar dt_s) {
   }
 }
 
-// Slip velocity per friction impulse at which a tread creeps by its share of its speed under full
-// traction of a quarter of the weight.
-double RobotWorld::creep_softness(double friction, double speed_m_s, double dt_s) const {
-  if (settings_.tread_creep == 0) return 0;
-  const double traction = friction * settings_.mass_kg * settings_.gravity_m_s2 / 4 * dt_s;
-  return settings_.tread_creep * (std::abs(speed_m_s) + kCreepAtRest_m_s) / traction;
-}
-
 // Writes friction and the surface's own speed into every contact with the floor.
-void RobotWorld::prepare_contacts(double dt_s) {
+void RobotWorld::prepare_contacts() {
   const btRigidBody& body = robot_->body();
   const SideSpeeds speeds = robot_->contact_speeds();
   const double middle_y = robot_->turning_centre().y();
@@ -155,13 +150,13 @@ void RobotWorld::prepare_contacts(double dt_s) {
           BT_CONTACT_FLAG_LATERAL_FRICTION_INITIALIZED | BT_CONTACT_FLAG_HAS_CONTACT_CFM;
       point.m_combinedFriction =
           settings_.friction * patch_factor(floor_, on_floor.x(), on_floor.y());
-      point.m_frictionCFM = creep_softness(point.m_combinedFriction, speed, dt_s);
+      point.m_frictionCFM = settings_.tread_creep * (std::abs(speed) + kCreepAtRest_m_s);
     }
   }
 }
 
 void RobotWorld::solveConstraints(btContactSolverInfo& info) {
-  prepare_contacts(info.m_timeStep);
+  prepare_contacts();
   solver.solveGroup(&m_collisionObjects[0], m_collisionObjects.size(),
                     dispatcher.getInternalManifoldPointer(), dispatcher.getNumManifolds(),
                     m_constraints.size() > 0 ? &m_constraints[0] : nullptr, m_constraints.size(),

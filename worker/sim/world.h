@@ -82,8 +82,7 @@ class RobotWorld final : private WorldParts, public btDiscreteDynamicsWorld {
 
   void clear();
   void apply_drag(double dt_s);
-  void prepare_contacts(double dt_s);
-  double creep_softness(double friction, double speed_m_s, double dt_s) const;
+  void prepare_contacts();
 
   SimSettings settings_;
   double last_step_s_ = 0;  // 0: none since the reset

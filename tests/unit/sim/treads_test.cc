@@ -214,6 +214,50 @@ TEST(Treads, DragLengthensTheStartAndShortensTheStop) {
   EXPECT_NEAR(run_once(settings, drive_at(-0.28, -0.28), floor).X_SE.x, -without, 0.03 * expected);
 }
 
+TEST(Treads, DragAtTheFloorDoesNotDependOnTheHeightOfTheMass) {
+  Floor floor;
+  floor.rolling_resistance = 0.1;
+  SimSettings settings;
+  settings.tread_creep = 0.05;
+  settings.contact_length_m = 0.04;
+  const auto lost = [&](double height_m) {
+    settings.mass_height_m = height_m;
+    return run_once(settings, drive_at(0.28, 0.28)).X_SE.x -
+           run_once(settings, drive_at(0.28, 0.28), floor).X_SE.x;
+  };
+  EXPECT_NEAR(lost(0.03), lost(0.002), 0.2 * lost(0.002));
+}
+
+TEST(Treads, CreepsByItsShareOfTheTractionThatItNeeds) {
+  // Traction share q slips at creep v q / sqrt(1 - q^2): drag coefficient over friction is q.
+  SimSettings settings;
+  settings.tread_creep = 0.05;
+  Floor floor;
+  const double v = 0.28;
+  const auto speed = [&] {  // steady: what a second more adds
+    return run_once(settings, drive_at(v, v, 3), floor).X_SE.x -
+           run_once(settings, drive_at(v, v, 2), floor).X_SE.x;
+  };
+  EXPECT_NEAR(speed(), v, 1e-4);
+  for (double coefficient : {0.06, 0.18, 0.36}) {
+    floor.rolling_resistance = coefficient;
+    const double q = coefficient / settings.friction;
+    const double slip = settings.tread_creep * v * q / std::sqrt(1 - q * q);
+    EXPECT_NEAR(v - speed(), slip, 0.03 * slip) << coefficient;
+  }
+}
+
+TEST(Treads, WithLittleCreepSlidesAsWithNone) {
+  SimSettings creeping;
+  creeping.tread_creep = 1e-4;
+  for (const Command& command : kCommands) {
+    const Pose with = run_once(creeping, drive_of(command)).X_SE;
+    const Pose without = run_once({}, drive_of(command)).X_SE;
+    EXPECT_LT(distance_m(with, without), 5e-4) << command.name;
+    EXPECT_NEAR(with.theta, without.theta, 3e-3) << command.name;
+  }
+}
+
 TEST(Treads, PatchEverywhereIsAnotherFriction) {
   SimSettings slippery;
   slippery.friction *= 0.5;
