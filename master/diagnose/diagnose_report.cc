@@ -10,7 +10,6 @@
 #include "common/score/statistics.h"
 #include "master/diagnose/diagnose_steps.h"
 #include "master/diagnose/findings.h"
-#include "master/diagnose/next_experiment.h"
 #include "master/diagnose/where.h"
 
 namespace gapfarm {
@@ -22,11 +21,11 @@ constexpr int kBootstraps = 400;
 // Relative standard deviation of an effect's size between simulations that share the effect but not
 // the contact of treads and floor (docs/diagnosis.md); of others it is below the data's own.
 const std::map<std::string, double> kModelError = {
-    {"backlash", 0.1},      {"camera_aspect", 0.02},     {"camera_distortion", 0.03},
-    {"camera_seam", 0.05},  {"com_offset", 0.15},        {"floor_nap", 0.2},
-    {"floor_tilt", 0.3},    {"heading_offset", 0.03},    {"motor_deadband", 0.1},
-    {"motor_lag", 0.4},     {"rolling_resistance", 0.3}, {"timing_offset", 0.06},
-    {"marker_offset", 0.03}};
+    {"motor_asymmetry", 0.03},   {"battery_sag", 0.03},       {"backlash", 0.1},
+    {"camera_aspect", 0.02},     {"camera_distortion", 0.03}, {"camera_seam", 0.05},
+    {"com_offset", 0.15},        {"floor_nap", 0.2},          {"floor_tilt", 0.3},
+    {"heading_offset", 0.03},    {"motor_deadband", 0.1},     {"motor_lag", 0.4},
+    {"rolling_resistance", 0.3}, {"timing_offset", 0.06},     {"marker_offset", 0.03}};
 
 double mean_of(const std::vector<double>& values) {
   double sum = 0;
@@ -329,49 +328,6 @@ void DiagnosisRun::fill_values() {
       if (e.lo < e.hi) result_.intervals[row] = {std::max(e.lo, p.lower), std::min(e.hi, p.upper)};
     }
   }
-}
-
-// Every named effect against its aliases, each at its best linear fit.
-Status DiagnosisRun::plan_next() {
-  for (std::size_t k = 0; k < chosen_.size(); ++k) {
-    if (chosen_[k].aliases.empty()) continue;
-    std::vector<const Signature*> others;
-    for (std::size_t j = 0; j < chosen_.size(); ++j) {
-      if (j != k) others.push_back(&chosen_[j].candidate.signature);
-    }
-    const Regression explained = selector_->with(others);
-    auto candidates = selector_->candidates(explained, {});
-    if (!candidates) return candidates.error();
-    Rivals rivals;
-    for (const Candidate& c : *candidates) {
-      const std::string& name = c.signature.effect;
-      const bool alias = std::any_of(chosen_[k].aliases.begin(), chosen_[k].aliases.end(),
-                                     [&](const Alias& a) { return a.effect == name; });
-      if (!alias && name != chosen_[k].candidate.signature.effect) continue;
-      Overrides at = study_.base;
-      if (alias) {
-        for (const auto& [key, value] : start_values(study_, explained, c.signature)) {
-          at[problem_.table().row(key)] = value;
-        }
-      } else {
-        for (const auto& [row, value] : estimates_->at) {
-          if (problem_.table()[row].effect == name) at[row] = value;
-        }
-      }
-      Rival rival{name, {}};
-      for (const auto& [row, value] : at) {
-        rival.overrides.emplace_back();
-        rival.overrides.back().set_parameter(static_cast<std::uint32_t>(row));
-        rival.overrides.back().set_value(value);
-      }
-      rivals.push_back(std::move(rival));
-    }
-    auto next = next_experiments(farm_, problem_, rivals);
-    if (!next) return next.error();
-    auto& to = result_.diagnosis.next;
-    to.insert(to.end(), next->begin(), next->end());
-  }
-  return {};
 }
 
 Status DiagnosisRun::report() {
