@@ -231,7 +231,9 @@ NamedEffect DiagnosisRun::named(const SpreadEffect& found) const {
   effect.name = found.name;
   effect.confidence = confidence_of(found.gain);
   effect.parameters = found.estimates;
-  const double per_trial = found.gain / static_cast<double>(study_.size());
+  // The gain is over all that the readings tell; of the gap it can close what the means left.
+  const double per_trial = std::min(found.gain / static_cast<double>(study_.size()),
+                                    std::max(0.0, floor_ - mean_of(nested_scores_.back())));
   effect.gap_after = -per_trial;
   set_closed(&effect, std::vector<double>(study_.size(), per_trial));
   return effect;

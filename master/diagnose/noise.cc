@@ -48,7 +48,7 @@ void estimate_noise(const Regression& nuisances, const std::vector<CovariateBloc
   }
   const std::vector<Eigen::Vector3d> residuals = study->unwhiten(studentised(rich, 0.1));
   NoiseEstimate noise =
-      refit_drive_noise(study->trials, residuals, study->noise, study->gaps.size() < 20);
+      refit_drive_noise(study->trials, residuals, study->noise, !study->reading_noise_known);
   noise.drive_common = std::max(noise.drive_common, kLeastDriveNoise);
   noise.drive_side = std::max(noise.drive_side, kLeastDriveNoise);
   study->use_noise(noise);

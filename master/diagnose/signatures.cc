@@ -157,6 +157,20 @@ Signature tilt_signature(const Study& study, const std::vector<Eigen::Vector3d>&
   return s;
 }
 
+// Of these, one level and one duration show nothing that another full speed would not do.
+bool changes_only_reach(const std::string& effect) {
+  return effect == "motor_deadband" || effect == "motor_lag" || effect == "timing_offset" ||
+         effect == "rolling_resistance";
+}
+
+bool one_condition(const Study& study) {
+  const auto same = [&](const Cell& c) {
+    return c.kind == study.cells.front().kind && c.level == study.cells.front().level &&
+           c.command.duration_s == study.cells.front().command.duration_s;
+  };
+  return std::all_of(study.cells.begin(), study.cells.end(), same);
+}
+
 // What drag costs a straight drive depends on how the treads give way: as the simulated ones do, or
 // the same on every run, whatever its length.  So straight and turning drives have a strength each.
 std::vector<Signature> rolling_signatures(const Study& study,
@@ -273,8 +287,10 @@ Result<std::vector<Signature>> signatures(Predictor& predictor, const Study& stu
       found.push_back(seam_signature(study, axis, lower + (upper - lower) * k / 28));
     }
   }
+  const bool only_reach = one_condition(study);
   std::erase_if(found, [&](const Signature& s) {
-    return std::find(left_out.begin(), left_out.end(), s.effect) != left_out.end();
+    return (only_reach && changes_only_reach(s.effect)) ||
+           std::find(left_out.begin(), left_out.end(), s.effect) != left_out.end();
   });
   return found;
 }

@@ -209,6 +209,7 @@ Result<Study> make_study(const Problem& problem) {
   study.quantum_m = quantisation_step(problem.log.trials);
   study.noise.pose = reading_noise(study.gaps, study.quantum_m);
   // Logs whose trials share one reading say nothing of it.
+  study.reading_noise_known = study.noise.pose.position_m > 0 && study.noise.pose.heading_rad > 0;
   if (study.noise.pose.position_m <= 0) {
     study.noise.pose.position_m = std::max(problem.values[row_of(Srv1::kPoseNoisePosition)],
                                            study.quantum_m / std::sqrt(12.0));
