@@ -40,7 +40,7 @@ bool always_aliases(const std::string& a, const std::string& b) {
   });
 }
 
-constexpr double kScreenedRatio = 0.7;  // of the coarse grid of patches
+constexpr double kScreenedRatio = 0.5;  // of the coarse grid of patches
 
 // {x, y, radius, ratio}
 std::array<double, 4> patch_of(const Signature& s) {
@@ -80,12 +80,13 @@ Status Selector::add_patches() {
     low[0] = std::min(low[0], t.X_WS.x), high[0] = std::max(high[0], t.X_WS.x);
     low[1] = std::min(low[1], t.X_WS.y), high[1] = std::max(high[1], t.X_WS.y);
   }
+  constexpr int kGrid = 5;
   std::vector<std::array<double, 4>> places;
-  for (int i = 0; i < 4; ++i) {
-    for (int j = 0; j < 4; ++j) {
-      places.push_back({low[0] + (high[0] - low[0]) * (2 * i + 1) / 8,
-                        low[1] + (high[1] - low[1]) * (2 * j + 1) / 8,
-                        0.28 * std::max(high[0] - low[0], high[1] - low[1]), kScreenedRatio});
+  for (int i = 0; i < kGrid; ++i) {
+    for (int j = 0; j < kGrid; ++j) {
+      places.push_back({low[0] + (high[0] - low[0]) * (2 * i + 1) / (2 * kGrid),
+                        low[1] + (high[1] - low[1]) * (2 * j + 1) / (2 * kGrid),
+                        0.25 * std::max(high[0] - low[0], high[1] - low[1]), kScreenedRatio});
     }
   }
   auto patches = patch_signatures(predictor_, study_, places);
@@ -125,10 +126,10 @@ Result<Candidate> Selector::refine_patch(const Regression& explained, const Cand
   const std::array<double, 4> first = patch_of(best.signature);
   if (first[3] == kScreenedRatio) {
     std::vector<std::array<double, 4>> ratios;
-    for (double ratio : {0.15, 0.4, 1.8}) ratios.push_back({first[0], first[1], first[2], ratio});
+    for (double ratio : {0.2, 1.8}) ratios.push_back({first[0], first[1], first[2], ratio});
     if (Status s = look(ratios); !s) return s.error();
   }
-  for (double step : {0.15, 0.07, 0.03}) {
+  for (double step : {0.14, 0.1, 0.07, 0.045, 0.03}) {
     const auto [x, y, r, q] = patch_of(best.signature);
     const Status s = look({{x + step, y, r, q},
                            {x - step, y, r, q},

@@ -27,7 +27,7 @@ struct Study {
   std::size_t sessions = 0;
   double quantum_m = 0;  // grid of the logged positions
   NoiseEstimate noise;
-  bool reading_noise_known = true;  // from gaps between readings, rather than the config's
+  bool reading_noise_known = true;        // from gaps between readings, rather than the config's
   Overrides base;                         // tuned values
   double speed_m_s = 0;                   // tuned full speed
   std::vector<Eigen::Matrix3d> whitener;  // L^-1 of each trial's covariance L L'

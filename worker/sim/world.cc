@@ -109,8 +109,8 @@ void RobotWorld::apply_drag(double dt_s) {
   const btVector3& velocity = body.getLinearVelocity();
   const Eigen::Vector2d drag =
       drag_acceleration(floor_, settings_.gravity_m_s2, {velocity.x(), velocity.y()}, ahead, dt_s);
-  // The floor drags at the floor: it must not pitch the robot against its own friction.  An impulse,
-  // since Bullet's friction rows know nothing of a torque that waits for the step.
+  // The floor drags at the floor: it must not pitch the robot against its own friction.  An
+  // impulse, since Bullet's friction rows know nothing of a torque that waits for the step.
   const btVector3 floor_point(0, 0, -body.getCenterOfMassPosition().z());
   body.applyImpulse(settings_.mass_kg * dt_s * btVector3(drag.x(), drag.y(), 0), floor_point);
 }

@@ -61,14 +61,14 @@ TEST(Prediction, SharedConditionsMatchSimulatingEachTrial) {
   value(floor, "floor_tilt.direction") = 0.7;
   value(floor, "floor_nap.strength") = 0.2;
   value(floor, "floor_nap.direction") = -2;
-  EXPECT_LT(worst_sharing_error(floor), 2e-4);
+  EXPECT_LT(worst_sharing_error(floor), 4e-4);
 
   Problem sag = plain;
   value(sag, "battery_sag.rate") = 0.05;
   EXPECT_LT(worst_sharing_error(sag), 2e-4);
 
   value(floor, "battery_sag.rate") = 0.02;
-  EXPECT_LT(worst_sharing_error(floor), 2e-3);
+  EXPECT_LT(worst_sharing_error(floor), 4e-3);
 }
 
 // A patch changes the trials that cross it and no others.
