@@ -63,9 +63,11 @@ Result<ParameterValues> values_at(const Problem& problem, const v1::Point& point
   return values;
 }
 
-v1::TaskResult run(const Prepared& p, const ParameterValues& values, const v1::EvaluateTask& task) {
+v1::TaskResult run(const Prepared& p, const ParameterValues& values, const v1::EvaluateTask& task,
+                   StepCounter* steps) {
   PredictOptions options;
   options.stream = task.stream();
+  options.steps = steps;
   // The thesis's fitness compares one nominal motion; spread would only cost time.
   options.means_only = p.problem().fitness.kind == FitnessKind::kRobustMahalanobis;
   const Prediction prediction = p.model().predict(values, options);
@@ -85,7 +87,8 @@ void write_covariance(const Eigen::Matrix3d& cov, v1::Predicted* to) {
   }
 }
 
-v1::TaskResult run(const Prepared& p, const ParameterValues& values, const v1::PredictTask& task) {
+v1::TaskResult run(const Prepared& p, const ParameterValues& values, const v1::PredictTask& task,
+                   StepCounter* steps) {
   const auto& trials = p.problem().log.trials;
   for (std::uint32_t i : task.trials()) {
     if (i >= trials.size()) return invalid("there is no trial " + std::to_string(i));
@@ -94,6 +97,7 @@ v1::TaskResult run(const Prepared& p, const ParameterValues& values, const v1::P
   options.trials = {task.trials().data(), static_cast<std::size_t>(task.trials_size())};
   options.means_only = task.means_only();
   options.stream = task.stream();
+  options.steps = steps;
   const Prediction prediction = p.model().predict(values, options);
   if (prediction.outcome != v1::OK) return failed(prediction.outcome, prediction.message);
   v1::TaskResult result;
@@ -116,7 +120,8 @@ v1::TaskResult run(const Prepared& p, const ParameterValues& values, const v1::P
   return result;
 }
 
-v1::TaskResult run(const Prepared& p, const ParameterValues& values, const v1::SimulateTask& task) {
+v1::TaskResult run(const Prepared& p, const ParameterValues& values, const v1::SimulateTask& task,
+                   StepCounter* steps) {
   const std::vector<CommandSpec>& known = p.problem().commands;
   for (const v1::PlannedTrial& planned : task.plan()) {
     const Trial trial = from_proto(planned.trial());
@@ -137,10 +142,11 @@ v1::TaskResult run(const Prepared& p, const ParameterValues& values, const v1::S
   if (!(interval == 0 || interval >= kLeastPathInterval_s)) {
     return invalid("a plan's path interval is 0 (no path) or at least 0.0001 s");
   }
-  return p.model().simulate(values, task);
+  return p.model().simulate(values, task, steps);
 }
 
-v1::TaskResult run(const Prepared& p, const ParameterValues& values, const v1::TraceTask& task) {
+v1::TaskResult run(const Prepared& p, const ParameterValues& values, const v1::TraceTask& task,
+                   StepCounter* steps) {
   const v1::Command& c = task.command();
   const bool duties = std::abs(c.left()) <= 1 && std::abs(c.right()) <= 1;
   const bool lasts = c.duration() >= 0 && c.duration() <= 60;
@@ -149,14 +155,13 @@ v1::TaskResult run(const Prepared& p, const ParameterValues& values, const v1::T
         "a trace needs duties in [-1, 1], a duration in [0, 60] s and an interval of at least "
         "0.0001 s");
   }
-  return p.model().trace(values, task);
+  return p.model().trace(values, task, steps);
 }
 
 // Answers with its payload after computing for a while; what it computes is thrown away.
-v1::TaskResult echo(const v1::EchoTask& task) {
+v1::TaskResult echo(const v1::EchoTask& task, StepCounter* steps) {
   const auto until = std::chrono::steady_clock::now() + std::chrono::microseconds(task.busy_us());
-  while (std::chrono::steady_clock::now() < until) {
-  }
+  while (std::chrono::steady_clock::now() < until) count_step(steps);
   v1::TaskResult result;
   result.set_outcome(v1::OK);
   result.set_echo(task.payload());
@@ -164,24 +169,24 @@ v1::TaskResult echo(const v1::EchoTask& task) {
 }
 
 template <class T>
-v1::TaskResult at_point(const Prepared& prepared, const T& task) {
+v1::TaskResult at_point(const Prepared& prepared, const T& task, StepCounter* steps) {
   const auto values = values_at(prepared.problem(), task.point());
   if (!values) return invalid(values.error().message);
-  return run(prepared, *values, task);
+  return run(prepared, *values, task, steps);
 }
 
-v1::TaskResult dispatch(const Prepared* prepared, const v1::Task& task) {
-  if (task.kind_case() == v1::Task::kEcho) return echo(task.echo());
+v1::TaskResult dispatch(const Prepared* prepared, const v1::Task& task, StepCounter* steps) {
+  if (task.kind_case() == v1::Task::kEcho) return echo(task.echo(), steps);
   if (prepared == nullptr) return invalid("the task needs a problem");
   switch (task.kind_case()) {
     case v1::Task::kEvaluate:
-      return at_point(*prepared, task.evaluate());
+      return at_point(*prepared, task.evaluate(), steps);
     case v1::Task::kPredict:
-      return at_point(*prepared, task.predict());
+      return at_point(*prepared, task.predict(), steps);
     case v1::Task::kSimulate:
-      return at_point(*prepared, task.simulate());
+      return at_point(*prepared, task.simulate(), steps);
     case v1::Task::kTrace:
-      return at_point(*prepared, task.trace());
+      return at_point(*prepared, task.trace(), steps);
     default:
       return invalid("a task of unknown kind; master and worker must be the same build");
   }
@@ -227,10 +232,10 @@ Result<std::unique_ptr<PreparedProblem>> prepare(const v1::Problem& message) {
   return Error{"scenario '" + problem->scenario + "' has no simulation in this build"};
 }
 
-v1::TaskResult evaluate(const PreparedProblem* prepared, const v1::Task& task) {
+v1::TaskResult evaluate(const PreparedProblem* prepared, const v1::Task& task, StepCounter* steps) {
   // Nothing of ours throws; a library out of memory may.
   try {
-    return dispatch(static_cast<const Prepared*>(prepared), task);
+    return dispatch(static_cast<const Prepared*>(prepared), task, steps);
   } catch (const std::exception& e) {
     return failed(v1::INVALID_REQUEST, std::string("exception: ") + e.what());
   }

@@ -7,6 +7,7 @@
 #include "common/base/result.h"
 #include "common/problem/problem.h"
 #include "gapfarm/v1/task.pb.h"
+#include "worker/sim/step_counter.h"
 
 namespace gapfarm {
 
@@ -21,8 +22,10 @@ class PreparedProblem {
 Result<std::unique_ptr<PreparedProblem>> prepare(const v1::Problem& message);
 
 // Never throws; a malformed task gives INVALID_REQUEST with a message.  `prepared` may be null for
-// tasks that need no problem.
-v1::TaskResult evaluate(const PreparedProblem* prepared, const v1::Task& task);
+// tasks that need no problem.  `steps` (may be null) counts simulation steps, or rounds of whatever
+// else takes long: who watches it takes a task that stops counting for one that hangs.
+v1::TaskResult evaluate(const PreparedProblem* prepared, const v1::Task& task,
+                        StepCounter* steps = nullptr);
 
 // Hash of a small golden simulation on this machine: equal classes give equal bits.
 const std::string& numeric_class();

@@ -45,7 +45,7 @@ class PreparedProblems {
   std::list<std::pair<std::string, Entry>> entries_;
 };
 
-v1::JobResult work_on(const Work& work, PreparedProblems& problems) {
+v1::JobResult work_on(const Work& work, PreparedProblems& problems, StepCounter* steps) {
   v1::JobResult result;
   result.set_job_id(work.job.job_id());
   result.set_attempt_id(work.job.attempt_id());
@@ -62,7 +62,7 @@ v1::JobResult work_on(const Work& work, PreparedProblems& problems) {
     }
   }
   if (trouble.empty()) {
-    *result.mutable_result() = evaluate(prepared, work.job.task());
+    *result.mutable_result() = evaluate(prepared, work.job.task(), steps);
   } else {
     result.mutable_result()->set_outcome(v1::INVALID_REQUEST);
     result.mutable_result()->set_message(trouble);
@@ -73,8 +73,10 @@ v1::JobResult work_on(const Work& work, PreparedProblems& problems) {
 
 }  // namespace
 
-EvaluationThread::EvaluationThread()
-    : fd_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)), thread_([this] { run(); }) {
+EvaluationThread::EvaluationThread(WorkerProgress* progress)
+    : progress_(progress != nullptr ? *progress : unwatched_),
+      fd_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)),
+      thread_([this] { run(); }) {
   assert(fd_ >= 0);
 }
 
@@ -99,7 +101,11 @@ void EvaluationThread::run() {
     queue_.pop_front();
     begun_ = monotonic_seconds();
     lock.unlock();
-    v1::JobResult result = work_on(work, problems);
+    // In this order: an attempt is never seen with another's epoch.
+    progress_.epoch.store(work.job.epoch());
+    progress_.attempt.store(work.job.attempt_id());
+    v1::JobResult result = work_on(work, problems, &progress_.steps);
+    progress_.attempt.store(0);
     lock.lock();
     begun_ = -1;
     finished_.push_back(std::move(result));
@@ -131,9 +137,12 @@ std::vector<AttemptKey> EvaluationThread::drop(const std::vector<AttemptKey>& ke
   return dropped;
 }
 
-void EvaluationThread::drop_all() {
+std::vector<AttemptKey> EvaluationThread::drop_all() {
+  std::vector<AttemptKey> dropped;
   const std::lock_guard lock(mutex_);
+  for (const Work& work : queue_) dropped.push_back({work.job.epoch(), work.job.attempt_id()});
   queue_.clear();
+  return dropped;
 }
 
 std::vector<v1::JobResult> EvaluationThread::take_finished() {

@@ -7,6 +7,7 @@
 #include <thread>
 #include <vector>
 
+#include "common/process/progress_page.h"
 #include "worker/session.h"
 
 namespace gapfarm {
@@ -14,7 +15,8 @@ namespace gapfarm {
 // All members may be called from one other thread.
 class EvaluationThread {
  public:
-  EvaluationThread();
+  // Publishes in `progress` what is in work and how it advances; null: nobody watches.
+  explicit EvaluationThread(WorkerProgress* progress = nullptr);
   // Waits for the job in hand.
   ~EvaluationThread();
   EvaluationThread(const EvaluationThread&) = delete;
@@ -23,7 +25,8 @@ class EvaluationThread {
   void give(std::vector<Work> work);
   // Of `keys`, those that had not begun: they will not.
   std::vector<AttemptKey> drop(const std::vector<AttemptKey>& keys);
-  void drop_all();
+  // All that had not begun: it will not.
+  std::vector<AttemptKey> drop_all();
   // Results since the last call, in the order of the work.
   std::vector<v1::JobResult> take_finished();
   // Readable when take_finished() has something.
@@ -34,6 +37,8 @@ class EvaluationThread {
  private:
   void run();
 
+  WorkerProgress unwatched_;
+  WorkerProgress& progress_;
   int fd_;
   std::mutex mutex_;
   std::condition_variable wake_;

@@ -24,7 +24,11 @@ constexpr const char* kExamples = R"(Examples:
   gapfarm-worker --connect tcp://10.0.0.5:5555 --processes 4 --name rack3
       four processes whose names begin with rack3
 
-SIGTERM or Ctrl-C: finish the job in hand, then leave.  A second one: leave at once.
+  gapfarm-worker --connect tcp://10.0.0.5:5555 --lifetime 3500
+      for an hour's allocation: begins no job that it could not finish in time
+
+SIGTERM or Ctrl-C: finish the job in work (--drain: all in hand), then leave.  A second one: leave
+at once.
 Exit status: 0 stopped as asked, 2 wrong usage, 78 no master that would have this worker.)";
 
 struct Arguments {
@@ -34,10 +38,15 @@ struct Arguments {
   bool insecure = false;
   unsigned window = 0;
   unsigned processes = std::max(1u, std::thread::hardware_concurrency());
+  bool drain = false;
+  double lifetime_s = 0;
+  ProcessLimits limits;
   bool local = false;
   int parent = 0;
   std::string replaces;
   std::string replaced_end = "left";
+  std::uint64_t replaced_epoch = 0;
+  std::uint64_t replaced_attempt = 0;
 };
 
 void describe(CLI::App& app, Arguments* arguments) {
@@ -59,13 +68,37 @@ void describe(CLI::App& app, Arguments* arguments) {
   app.add_option("--processes", arguments->processes, "Worker processes")
       ->check(CLI::Range(1, 4096))
       ->capture_default_str();
+  app.add_flag("--drain", arguments->drain,
+               "When told to stop, finish all jobs in hand instead of only the one in work");
+  app.add_option("--lifetime", arguments->lifetime_s,
+                 "Be gone after so many seconds, and begin no job that would take longer")
+      ->check(CLI::PositiveNumber)
+      ->type_name("SECONDS");
+  app.add_option("--progress-limit", arguments->limits.progress_s,
+                 "Kill a worker whose simulation makes no step for so many seconds; 0: never")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str()
+      ->type_name("SECONDS");
+  app.add_option("--answer-limit", arguments->limits.answer_s,
+                 "Kill a worker that does not respond at all for so many seconds; 0: never")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str()
+      ->type_name("SECONDS");
   // For the processes that start this one; no user needs them.
   app.add_flag("--local", arguments->local)->group("");
   app.add_option("--parent", arguments->parent)->group("");
   app.add_option("--replaces", arguments->replaces)->group("");
   app.add_option("--replaced-end", arguments->replaced_end)
-      ->check(CLI::IsMember({"left", "killed", "crashed"}))
+      ->check(CLI::IsMember({"left", "killed", "crashed", "hung"}))
       ->group("");
+  app.add_option("--replaced-epoch", arguments->replaced_epoch)->group("");
+  app.add_option("--replaced-attempt", arguments->replaced_attempt)->group("");
+}
+
+v1::ProcessEnd process_end(const std::string& word) {
+  if (word == "crashed") return v1::PROCESS_CRASHED;
+  if (word == "killed") return v1::PROCESS_KILLED;
+  return word == "hung" ? v1::PROCESS_HUNG : v1::PROCESS_LEFT;
 }
 
 int complain(const Error& error, int status) {
@@ -101,10 +134,17 @@ int work(const Arguments& arguments) {
   options.session.numeric_class = numeric_class();
   options.session.window = arguments.window;
   options.session.replaces = arguments.replaces;
-  options.session.replaced_end = arguments.replaced_end == "crashed"  ? v1::PROCESS_CRASHED
-                                 : arguments.replaced_end == "killed" ? v1::PROCESS_KILLED
-                                                                      : v1::PROCESS_LEFT;
-  EvaluationThread evaluation;
+  options.session.replaced_end = process_end(arguments.replaced_end);
+  options.session.replaced_epoch = arguments.replaced_epoch;
+  options.session.replaced_attempt = arguments.replaced_attempt;
+  if (arguments.lifetime_s > 0) {
+    options.session.deadline_s = monotonic_seconds() + arguments.lifetime_s;
+  }
+  options.drain = arguments.drain;
+  const auto page = ProgressPage::inherit();
+  if (!page) return complain(page.error(), 1);
+  options.progress = &**page;
+  EvaluationThread evaluation(options.progress);
   const Result<ServiceEnd> end = serve(options, evaluation, stop);
   const int status = end ? 0 : complain(end.error(), kExitRefused);
   // The thread's destructor would wait for a job whose answer nobody wants.
@@ -132,6 +172,9 @@ int start_workers(const Arguments& arguments) {
     options.arguments.insert(options.arguments.end(),
                              {"--window", std::to_string(arguments.window)});
   }
+  if (arguments.drain) options.arguments.push_back("--drain");
+  options.limits = arguments.limits;
+  if (arguments.lifetime_s > 0) options.deadline_s = monotonic_seconds() + arguments.lifetime_s;
   const Status status = supervise(options, stop);
   return status ? 0 : complain(status.error(), kExitRefused);
 }

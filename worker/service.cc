@@ -15,11 +15,14 @@
 namespace gapfarm {
 namespace {
 
+// Between two rounds at most, s: the parent watches that they go on.
+constexpr double kLongestSleep = 1;
+
 class Service {
  public:
   Service(const ServiceOptions& options, DealerSocket& socket, EvaluationThread& evaluation,
           StopSource& stop)
-      : local_(options.local),
+      : options_(options),
         session_(options.session),
         socket_(socket),
         evaluation_(evaluation),
@@ -27,6 +30,7 @@ class Service {
 
   Result<ServiceEnd> run() {
     for (;;) {
+      if (options_.progress != nullptr) ++options_.progress->beats;
       const double now = monotonic_seconds();
       notice_stop();
       notice_trouble();
@@ -35,11 +39,17 @@ class Service {
       pump_out(socket_, session_);
       if (session_.state() == WorkerSession::State::kRefused) return Error{session_.reason()};
       if (session_.state() == WorkerSession::State::kDismissed) {
-        if (local_) return ServiceEnd::kDismissed;
+        if (options_.local) return ServiceEnd::kDismissed;
         session_.restart(now);
       }
-      if (stops_ >= 2) return leave(ServiceEnd::kStoppedNow);
-      if (stops_ == 1 && evaluation_.idle()) return leave(ServiceEnd::kStopped);
+      if (stops_ >= 2) return leave(ServiceEnd::kStoppedNow, "asked to stop at once");
+      if (now >= options_.session.deadline_s) {
+        return leave(ServiceEnd::kStoppedNow, "its lifetime is over");
+      }
+      if (may_leave()) {
+        return stops_ > 0 ? leave(ServiceEnd::kStopped, "asked to stop")
+                          : leave(ServiceEnd::kOutOfTime, "no lifetime left for another job");
+      }
       if (!received) sleep(now);
     }
   }
@@ -49,7 +59,8 @@ class Service {
     if (stop_.requests() == stops_) return;
     stops_ = stop_.requests();
     stop_.acknowledge();
-    evaluation_.drop_all();
+    session_.leave(options_.drain && stops_ == 1 ? WorkerSession::Leaving::kAfterAll
+                                                 : WorkerSession::Leaving::kAfterCurrent);
   }
 
   void notice_trouble() const {
@@ -69,22 +80,32 @@ class Service {
     for (const AttemptKey& key : evaluation_.drop(session_.take_cancelled())) {
       session_.on_dropped(key);
     }
-    std::vector<Work> work = session_.take_work();
-    if (stops_ == 0) evaluation_.give(std::move(work));
+    evaluation_.give(session_.take_work());
+    if (session_.leaving() == WorkerSession::Leaving::kAfterCurrent) {
+      for (const AttemptKey& key : evaluation_.drop_all()) session_.on_dropped(key);
+    }
   }
 
-  Result<ServiceEnd> leave(ServiceEnd end) {
-    v1::Envelope goodbye = session_.goodbye("asked to stop");
+  bool may_leave() {
+    if (session_.leaving() == WorkerSession::Leaving::kNo || !evaluation_.idle()) return false;
+    // Without a master nobody takes the results.
+    return session_.leaving() == WorkerSession::Leaving::kAfterCurrent ||
+           session_.state() != WorkerSession::State::kWorking || session_.in_hand() == 0;
+  }
+
+  Result<ServiceEnd> leave(ServiceEnd end, const char* reason) {
+    v1::Envelope goodbye = session_.goodbye(reason);
     send(socket_, &goodbye);
     return end;
   }
 
   void sleep(double now) {
     const std::array<int, 2> fds = {evaluation_.fd(), stop_.fd()};
-    socket_.wait(fds, std::clamp(session_.next_tick() - now, 0.001, 60.0));
+    const double until = std::min(session_.next_tick(), options_.session.deadline_s);
+    socket_.wait(fds, std::clamp(until - now, 0.001, kLongestSleep));
   }
 
-  bool local_;
+  const ServiceOptions& options_;
   unsigned stops_ = 0;
   WorkerSession session_;
   DealerSocket& socket_;

@@ -18,11 +18,15 @@ struct ServiceOptions {
   // Belongs to the master's own process tree: ends when the master says goodbye, without finishing
   // the job in hand.  Otherwise waits for the next master.
   bool local = false;
+  // A stop request finishes all jobs in hand instead of the one in work.
+  bool drain = false;
+  WorkerProgress* progress = nullptr;  // shows that this thread answers; may be null
 };
 
 enum class ServiceEnd {
   kStopped,     // by request, with the job in hand finished and its result sent
-  kStoppedNow,  // by a second request
+  kStoppedNow,  // by a second request, or at the deadline with a job still in work
+  kOutOfTime,   // the session's deadline is near, and nothing is in work
   kDismissed,   // by the master; local workers only
 };
 
@@ -30,7 +34,8 @@ enum class ServiceEnd {
 std::string unique_worker_name(const std::string& prefix);
 std::string host_name();
 
-// Works until told otherwise: one stop request finishes the job in hand, a second leaves at once.
+// Works until told otherwise: one stop request finishes the job in work (or all in hand, with
+// `drain`) and sends its result, a second leaves at once.  The others go to other workers.
 // Errors: a bad endpoint; refused by the master, with its reason.  `evaluation` may still have work
 // in hand afterwards (its destructor would wait for that), but nobody wants it.
 Result<ServiceEnd> serve(const ServiceOptions& options, EvaluationThread& evaluation,

@@ -5,12 +5,24 @@
 
 #include "common/base/hash.h"
 #include "common/net/envelope.h"
+#include "common/problem/question.h"
 
 namespace gapfarm {
 namespace {
 
 constexpr std::size_t kProblemsKept = 4;
 constexpr std::size_t kResultBytes = std::size_t{1} << 20;  // a message of results
+constexpr std::size_t kAnswersKept = 256;                   // for the next master
+constexpr double kLongerThanLongest = 1.5;
+constexpr double kUnheardWait = 0.25;  // s
+
+// [0, 1), from the bits of `name` and a count: FNV-1a (Fowler, Noll and Vo).
+double jitter(const std::string& name, std::uint64_t count) {
+  std::uint64_t hash = 0xcbf29ce484222325u ^ count;
+  for (const char c : name) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3u;
+  hash = (hash ^ (hash >> 32)) * 0x9e3779b97f4a7c15u;
+  return static_cast<double>(hash >> 11) * 0x1p-53;
+}
 
 }  // namespace
 
@@ -57,18 +69,25 @@ void WorkerSession::on_other_protocol(std::uint32_t protocol) {
 }
 
 void WorkerSession::on_welcome(const v1::Welcome& welcome, double now) {
-  if (welcome.epoch() != epoch_) drop_everything();  // nobody waits for it any more
+  if (welcome.epoch() != epoch_) drop_everything();  // nobody waits for it under these ids
   epoch_ = welcome.epoch();
   heartbeat_interval_ = std::clamp(welcome.heartbeat_interval(), 0.02, 60.0);
   silence_limit_ = std::max(welcome.silence_limit(), 2 * heartbeat_interval_);
   state_ = State::kWorking;
   hello_wait_ = 0;
   next_heartbeat_ = now + heartbeat_interval_;
+  offer_kept();
 }
 
 void WorkerSession::on_job(v1::Job* job) {
   if (job->epoch() != epoch_ || epoch_ == 0) return;
-  if (!in_hand_.emplace(job->attempt_id(), job->job_id()).second) return;  // told twice
+  const auto [mine, fresh] = in_hand_.try_emplace(job->attempt_id());
+  if (!fresh) return;  // told twice
+  if (leaving_ != Leaving::kNo) {
+    on_dropped({epoch_, job->attempt_id()});
+    return;
+  }
+  mine->second = {job->job_id(), question_hash(job->problem_hash(), job->task())};
   const std::string hash = job->problem_hash();
   if (hash.empty() || job->task().has_echo()) {
     ready(job, nullptr);
@@ -125,14 +144,15 @@ void WorkerSession::on_cancel(std::uint64_t attempt) {
   }
   std::erase_if(parked_, [](const auto& entry) { return entry.second.empty(); });
   if (erased > 0) {
-    in_hand_.erase(attempt);
+    on_dropped({epoch_, attempt});
   } else {
     cancelled_.push_back({epoch_, attempt});
   }
 }
 
 void WorkerSession::on_dropped(const AttemptKey& key) {
-  if (key.epoch == epoch_) in_hand_.erase(key.attempt);
+  std::erase_if(former_, [&](const Former& former) { return former.key == key; });
+  if (key.epoch == epoch_ && in_hand_.erase(key.attempt) > 0) dropped_.push_back(key.attempt);
 }
 
 void WorkerSession::answer_unknown(const std::string& hash) {
@@ -150,22 +170,40 @@ void WorkerSession::answer_unknown(const std::string& hash) {
 }
 
 void WorkerSession::on_finished(v1::JobResult result) {
-  if (result.epoch() != epoch_ || in_hand_.count(result.attempt_id()) == 0) return;
-  ++finished_;
-  results_.push_back(std::move(result));
+  longest_wall_ = std::max(longest_wall_, result.wall());
+  if (result.epoch() == epoch_ && in_hand_.count(result.attempt_id()) != 0) {
+    ++finished_;
+    results_.push_back(std::move(result));
+    return;
+  }
+  const AttemptKey key{result.epoch(), result.attempt_id()};
+  const auto former = std::find_if(former_.begin(), former_.end(),
+                                   [&](const Former& one) { return one.key == key; });
+  if (former == former_.end()) return;
+  keep(former->question, &result);
+  former_.erase(former);
+  if (state_ == State::kWorking) offer_kept();
 }
 
 void WorkerSession::on_unsent(v1::Envelope* envelope) {
+  // Nobody is there.  Whoever is there next may be another master: first hear who it is.
+  if (state_ == State::kWorking) {
+    state_ = State::kGreeting;
+    next_hello_ = 0;
+  }
+  // A hello that nobody got is no reason to wait longer with the next.
+  if (envelope->has_hello()) hello_wait_ = std::min(hello_wait_, kUnheardWait);
   if (!envelope->has_results()) return;  // the rest is said again in time
   auto& results = *envelope->mutable_results()->mutable_results();
   for (auto result = results.rbegin(); result != results.rend(); ++result) {
-    in_hand_.emplace(result->attempt_id(), result->job_id());
+    in_hand_.insert(sending_.extract(result->attempt_id()));
     results_.push_front(std::move(*result));
   }
 }
 
 void WorkerSession::on_tick(double now) {
   if (state_ == State::kRefused || state_ == State::kDismissed) return;
+  if (leaving_ == Leaving::kNo && too_late(now)) leave(Leaving::kAfterCurrent);
   if (state_ == State::kWorking && now - last_heard_ > silence_limit_) state_ = State::kGreeting;
   if (state_ == State::kGreeting && now >= next_hello_) greet(now);
   if (epoch_ == 0 || now < next_heartbeat_) return;
@@ -176,13 +214,14 @@ void WorkerSession::on_tick(double now) {
   heartbeat->set_finished(finished_);
   heartbeat->set_current_job_age(current_job_age_);
   heartbeat->set_epoch(epoch_);
+  heartbeat->set_leaving(leaving_ != Leaving::kNo);
   for (const auto& [attempt, job] : in_hand_) heartbeat->add_attempts(attempt);
   for (const auto& [hash, jobs] : parked_) request_problem(hash);
 }
 
 void WorkerSession::greet(double now) {
   hello_wait_ = std::clamp(2 * hello_wait_, options_.hello_min_s, options_.hello_max_s);
-  next_hello_ = now + hello_wait_;
+  next_hello_ = now + hello_wait_ * (1 + 0.5 * jitter(options_.name, ++hellos_));
   v1::Hello* hello = outbox_.emplace_back().mutable_hello();
   hello->set_name(options_.name);
   hello->set_host(options_.host);
@@ -194,14 +233,70 @@ void WorkerSession::greet(double now) {
   for (const auto& [attempt, job] : in_hand_) hello->add_attempts(attempt);
   hello->set_replaces(options_.replaces);
   hello->set_replaced_end(options_.replaced_end);
+  hello->set_replaced_epoch(options_.replaced_epoch);
+  hello->set_replaced_attempt(options_.replaced_attempt);
+  hello->set_leaving(leaving_ != Leaving::kNo);
 }
 
+// The master that gave it out is gone.  What is done, or under way by now, may serve the next one.
 void WorkerSession::drop_everything() {
-  for (const auto& [attempt, job] : in_hand_) cancelled_.push_back({epoch_, attempt});
+  for (v1::JobResult& result : results_) {
+    const auto mine = in_hand_.find(result.attempt_id());
+    if (mine == in_hand_.end()) continue;
+    keep(mine->second.question, &result);
+    in_hand_.erase(mine);
+  }
+  for (const auto& [attempt, mine] : in_hand_) {
+    cancelled_.push_back({epoch_, attempt});
+    former_.push_back({{epoch_, attempt}, mine.question});
+  }
+  while (former_.size() > kAnswersKept) former_.pop_front();
   in_hand_.clear();
   parked_.clear();
   work_.clear();
   results_.clear();
+  dropped_.clear();
+}
+
+void WorkerSession::keep(const std::string& question, v1::JobResult* result) {
+  v1::Offer::Answer& answer = kept_.emplace_back();
+  answer.set_question(question);
+  answer.mutable_result()->Swap(result->mutable_result());
+  answer.set_wall(result->wall());
+  if (kept_.size() > kAnswersKept) kept_.pop_front();
+}
+
+void WorkerSession::offer_kept() {
+  while (!kept_.empty()) {
+    v1::Offer* offer = outbox_.emplace_back().mutable_offer();
+    for (std::size_t bytes = 0; !kept_.empty() && bytes < kResultBytes; kept_.pop_front()) {
+      bytes += kept_.front().ByteSizeLong();
+      offer->add_answers()->Swap(&kept_.front());
+    }
+  }
+}
+
+void WorkerSession::leave(Leaving how) {
+  leaving_ = how;
+  next_heartbeat_ = 0;  // tell at once
+  if (how == Leaving::kAfterCurrent) refuse_work();
+}
+
+// What has not been handed on for work yet.
+void WorkerSession::refuse_work() {
+  std::vector<std::uint64_t> attempts;
+  for (const Work& work : work_) attempts.push_back(work.job.attempt_id());
+  for (const auto& [hash, jobs] : parked_) {
+    for (const v1::Job& job : jobs) attempts.push_back(job.attempt_id());
+  }
+  work_.clear();
+  parked_.clear();
+  for (std::uint64_t attempt : attempts) on_dropped({epoch_, attempt});
+}
+
+bool WorkerSession::too_late(double now) const {
+  return now + kLongerThanLongest * longest_wall_ + options_.deadline_margin_s >
+         options_.deadline_s;
 }
 
 void WorkerSession::restart(double now) {
@@ -216,20 +311,29 @@ std::vector<Work> WorkerSession::take_work() { return std::exchange(work_, {}); 
 std::vector<AttemptKey> WorkerSession::take_cancelled() { return std::exchange(cancelled_, {}); }
 
 double WorkerSession::next_tick() const {
-  if (state_ == State::kWorking) return next_heartbeat_;
-  return epoch_ == 0 ? next_hello_ : std::min(next_hello_, next_heartbeat_);
+  double next = epoch_ == 0 ? next_hello_ : next_heartbeat_;
+  if (state_ != State::kWorking) next = std::min(next, next_hello_);
+  return next;
 }
 
 std::vector<v1::Envelope> WorkerSession::take_outbox() {
-  while (!results_.empty()) {
+  // Results are for the master that asked, and only a welcome says who is there.
+  sending_.clear();
+  while (state_ == State::kWorking && !results_.empty()) {
     v1::ResultBatch* batch = outbox_.emplace_back().mutable_results();
     for (std::size_t bytes = 0; !results_.empty() && bytes < kResultBytes;) {
       v1::JobResult* result = batch->add_results();
       result->Swap(&results_.front());
+      sending_.insert(in_hand_.extract(result->attempt_id()));
       results_.pop_front();
-      in_hand_.erase(result->attempt_id());
       bytes += result->ByteSizeLong();
     }
+  }
+  if (state_ == State::kWorking && !dropped_.empty()) {
+    v1::ResultBatch* batch = outbox_.emplace_back().mutable_results();
+    batch->set_epoch(epoch_);
+    batch->mutable_dropped()->Assign(dropped_.begin(), dropped_.end());
+    dropped_.clear();
   }
   return std::exchange(outbox_, {});
 }

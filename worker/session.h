@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <deque>
+#include <limits>
 #include <list>
 #include <map>
 #include <memory>
@@ -23,8 +24,17 @@ struct SessionOptions {
   unsigned window = 0;   // jobs wanted in hand; 0: as the master likes
   std::string replaces;  // the process that this one makes up for, or empty
   v1::ProcessEnd replaced_end = v1::PROCESS_LEFT;
-  double hello_min_s = 0.02;  // between two hellos without an answer, doubled up to the maximum
+  // What that process had in work; attempt 0: nothing.
+  std::uint64_t replaced_epoch = 0;
+  std::uint64_t replaced_attempt = 0;
+  // Between two hellos without an answer, doubled up to the maximum and stretched by up to a half
+  // at random, so that the workers of a restarted master do not all come at once.
+  double hello_min_s = 0.02;
   double hello_max_s = 5;
+  // When this worker must have gone (s of the caller's clock).  Work that would hardly be done by
+  // then is not begun: what it has seen take longest, half as long again, and this margin.
+  double deadline_s = std::numeric_limits<double>::infinity();
+  double deadline_margin_s = 0.5;
 };
 
 // Attempt ids are the master's; another life of it may use them again.
@@ -62,6 +72,14 @@ class WorkerSession {
   void on_tick(double now);
   // `envelope` of the outbox did not go out.
   void on_unsent(v1::Envelope* envelope);
+  enum class Leaving {
+    kNo,
+    kAfterCurrent,  // with the job that is in work; the others are dropped
+    kAfterAll,      // with all that is in hand
+  };
+  // Takes no more jobs from now on.  on_tick() does the same, kAfterCurrent, as the deadline nears.
+  void leave(Leaving how);
+  Leaving leaving() const { return leaving_; }
   // After kDismissed: looks for a new master.
   void restart(double now);
 
@@ -89,6 +107,10 @@ class WorkerSession {
   void request_problem(const std::string& hash);
   void greet(double now);
   void drop_everything();
+  void keep(const std::string& question, v1::JobResult* result);
+  void offer_kept();
+  void refuse_work();
+  bool too_late(double now) const;
   std::shared_ptr<const std::string> known_problem(const std::string& hash);
 
   SessionOptions options_;
@@ -105,7 +127,11 @@ class WorkerSession {
   std::uint64_t sequence_ = 0;
   std::uint64_t finished_ = 0;
 
-  std::map<std::uint64_t, std::uint64_t> in_hand_;      // attempt -> job; waiting, parked or begun
+  struct InHand {
+    std::uint64_t job = 0;
+    std::string question;  // question_hash()
+  };
+  std::map<std::uint64_t, InHand> in_hand_;             // by attempt; waiting, parked or begun
   std::map<std::string, std::vector<v1::Job>> parked_;  // by the problem that they wait for
   struct KnownProblem {
     std::string hash;
@@ -114,7 +140,19 @@ class WorkerSession {
   std::list<KnownProblem> problems_;  // latest used first
   std::vector<Work> work_;
   std::vector<AttemptKey> cancelled_;
-  std::deque<v1::JobResult> results_;  // not sent yet
+  std::deque<v1::JobResult> results_;        // not sent yet
+  std::map<std::uint64_t, InHand> sending_;  // of the results in the last outbox
+  std::vector<std::uint64_t> dropped_;       // not told yet
+  // Work of a master that is gone: its answers are offered to the next one by their questions.
+  struct Former {
+    AttemptKey key;
+    std::string question;
+  };
+  std::deque<Former> former_;  // not answered yet
+  std::deque<v1::Offer::Answer> kept_;
+  Leaving leaving_ = Leaving::kNo;
+  double longest_wall_ = 0;  // s
+  std::uint64_t hellos_ = 0;
   std::vector<v1::Envelope> outbox_;
 };
 

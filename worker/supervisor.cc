@@ -14,7 +14,18 @@ namespace gapfarm {
 namespace {
 
 const char* word(EndCause cause) {
-  return cause == EndCause::kCrashed ? "crashed" : cause == EndCause::kKilled ? "killed" : "left";
+  switch (cause) {
+    case EndCause::kCrashed:
+      return "crashed";
+    case EndCause::kHung:
+      return "hung";
+    case EndCause::kKilled:
+      return "killed";
+    case EndCause::kStuck:
+    case EndCause::kLeft:
+      break;
+  }
+  return "left";
 }
 
 ProcessPoolOptions pool_options(const SupervisorOptions& options) {
@@ -23,13 +34,20 @@ ProcessPoolOptions pool_options(const SupervisorOptions& options) {
   pool.count = options.processes;
   pool.name_prefix = options.name;
   pool.failure_limit = {};
-  pool.arguments = [arguments = options.arguments, parent = std::to_string(getpid())](
-                       const std::string& name, const ProcessEnded* replaced) {
+  pool.limits = options.limits;
+  pool.arguments = [arguments = options.arguments, parent = std::to_string(getpid()),
+                    deadline = options.deadline_s](const std::string& name,
+                                                   const ProcessEnded* replaced) {
     std::vector<std::string> all = arguments;
     all.insert(all.end(), {"--name", name, "--parent", parent});
     if (replaced != nullptr) {
-      all.insert(all.end(),
-                 {"--replaces", replaced->name, "--replaced-end", word(replaced->cause)});
+      all.insert(all.end(), {"--replaces", replaced->name, "--replaced-end", word(replaced->cause),
+                             "--replaced-epoch", std::to_string(replaced->epoch),
+                             "--replaced-attempt", std::to_string(replaced->attempt)});
+    }
+    if (std::isfinite(deadline)) {
+      const double left = std::max(deadline - monotonic_seconds(), 0.001);
+      all.insert(all.end(), {"--lifetime", std::to_string(left)});
     }
     return all;
   };
@@ -57,15 +75,18 @@ Status supervise(const SupervisorOptions& options, StopSource& stop) {
       pool.signal_all(SIGTERM);
     }
     const double now = monotonic_seconds();
+    if (now >= options.deadline_s) pool.retire();
     for (const ProcessEnded& end : pool.reap(now)) {
+      // It will not find the time for a job, as the one before did not.
+      if (end.cause == EndCause::kLeft && std::isfinite(options.deadline_s)) pool.retire();
       if (stops > 0) continue;
       last_end = end.text;
       std::fprintf(stderr, "gapfarm-worker: %s%s\n", end.text.c_str(),
                    end.gave_up ? "; it is not started again" : "");
     }
-    wait_for(pool, stop, std::clamp(pool.next_start() - now, 0.0, 1.0));
+    wait_for(pool, stop, std::clamp(pool.next_start() - now, 0.0, pool.look_interval()));
   }
-  if (stops > 0) return {};
+  if (stops > 0 || std::isfinite(options.deadline_s)) return {};
   return Error{"no worker process can be kept alive: " + last_end};
 }
 

@@ -131,6 +131,12 @@ void read_farm(TomlSection& top, FarmSettings& to) {
                            " s, expected more than heartbeat_interval (" +
                            format_double(to.heartbeat_interval_s) + " s)");
   }
+  section->read("progress_limit", to.progress_limit_s, 0, 1e6, "s");
+  section->read("answer_limit", to.answer_limit_s, 0, 1e6, "s");
+  section->read("failure_limit", to.failure_limit, 1, 1000);
+  section->read("kill_limit", to.kill_limit, 1, 1000000);
+  section->read("audit_share", to.audit_share, 0, 1);
+  section->read("straggler_factor", to.straggler_factor, 0, 1e6);
   section->read("allow_mixed_numeric_classes", to.allow_mixed_numeric_classes);
   section->finish();
 }

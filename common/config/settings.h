@@ -82,6 +82,12 @@ struct FarmSettings {
   unsigned window = 2;                // jobs in a worker's hand
   double heartbeat_interval_s = 1;
   double silence_limit_s = 10;
+  double progress_limit_s = 60;  // a local worker's simulation makes no step for so long; 0: off
+  double answer_limit_s = 60;    // a local worker does not respond for so long; 0: off
+  unsigned failure_limit = 3;    // workers that a genome may crash or hang
+  unsigned kill_limit = 10;      // workers that may be killed (SIGKILL) under a genome
+  double audit_share = 0.01;     // of the evaluations are done by two workers and compared
+  double straggler_factor = 3;   // times the mean evaluation, after which idle workers get a copy
   bool allow_mixed_numeric_classes = false;
 };
 

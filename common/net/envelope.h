@@ -10,7 +10,7 @@
 namespace gapfarm {
 
 // Raised whenever an older peer would misread a message.
-inline constexpr std::uint32_t kProtocol = 1;
+inline constexpr std::uint32_t kProtocol = 2;
 
 // No envelope is longer; sockets drop the connection of a peer that sends more.
 inline constexpr std::size_t kMaxMessageBytes = std::size_t{64} << 20;

@@ -91,11 +91,18 @@ Status ProcessPool::start_place(Place& place, unsigned index) {
   for (std::string& word : words) argv.push_back(word.data());
   argv.push_back(nullptr);
 
+  auto page = ProgressPage::create();
+  if (!page) {
+    place.gave_up = true;
+    return page.error();
+  }
   posix_spawn_file_actions_t files;
   posix_spawn_file_actions_init(&files);
   posix_spawn_file_actions_addopen(&files, STDIN_FILENO, "/dev/null", 0, 0);
   // Standard output is the parent's answer to its user; children may only complain.
   posix_spawn_file_actions_adddup2(&files, STDERR_FILENO, STDOUT_FILENO);
+  // To the same number it still takes close-on-exec off (POSIX.1-2024; glibc since 2.29).
+  posix_spawn_file_actions_adddup2(&files, page->fd(), ProgressPage::kInheritedFd);
   posix_spawnattr_t attributes;
   posix_spawnattr_init(&attributes);
   posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF);
@@ -121,6 +128,10 @@ Status ProcessPool::start_place(Place& place, unsigned index) {
   // By number: glibc 2.36 declares pidfd_open without C linkage.
   place.pidfd = static_cast<int>(syscall(SYS_pidfd_open, pid, 0));
   place.replaced.reset();
+  place.page.emplace(std::move(*page));
+  place.beats = place.steps = place.attempt = 0;
+  place.answered_at = place.advanced_at = place.start_at;
+  place.verdict.reset();
   return {};
 }
 
@@ -128,8 +139,15 @@ ProcessEnded ProcessPool::ended(Place& place, int status, double now) {
   ProcessEnded end;
   end.name = place.name;
   end.pid = place.pid;
-  end.cause = cause_of(status);
+  end.cause = place.verdict.value_or(cause_of(status));
   end.text = text_of(place.name, place.pid, status);
+  end.epoch = (*place.page)->epoch.load();
+  end.attempt = (*place.page)->attempt.load();
+  if (place.verdict) {
+    end.text += place.verdict == EndCause::kHung
+                    ? " by its parent: its simulation made no step for too long"
+                    : " by its parent: it did not answer for too long";
+  }
   if (place.pidfd >= 0) close(place.pidfd);
   place.pidfd = -1;
   place.pid = 0;
@@ -149,7 +167,47 @@ ProcessEnded ProcessPool::ended(Place& place, int status, double now) {
   return end;
 }
 
+double ProcessPool::shortest_limit() const {
+  const ProcessLimits& limits = options_.limits;
+  return std::min(limits.progress_s > 0 ? limits.progress_s : 1e9,
+                  limits.answer_s > 0 ? limits.answer_s : 1e9);
+}
+
+double ProcessPool::look_interval() const { return std::clamp(shortest_limit() / 8, 0.01, 1.0); }
+
+void ProcessPool::look_at(Place& place, double now) {
+  const WorkerProgress& seen = **place.page;
+  const std::uint64_t beats = seen.beats.load(), steps = seen.steps.load();
+  const std::uint64_t attempt = seen.attempt.load();
+  if (beats != place.beats) place.answered_at = now;
+  if (steps != place.steps || attempt != place.attempt || attempt == 0) place.advanced_at = now;
+  place.beats = beats;
+  place.steps = steps;
+  place.attempt = attempt;
+}
+
+void ProcessPool::watch(double now) {
+  const ProcessLimits& limits = options_.limits;
+  // This process itself was away (stopped, suspended, starved): the children may have been, too.
+  const bool was_away = now - last_look_ > shortest_limit() / 2;
+  last_look_ = now;
+  for (Place& place : places_) {
+    if (place.pid == 0 || place.verdict) continue;
+    look_at(place, now);
+    if (was_away) place.answered_at = place.advanced_at = now;
+    const double silent = now - place.answered_at, still = now - place.advanced_at;
+    if (limits.answer_s > 0 && silent > limits.answer_s) {
+      place.verdict = EndCause::kStuck;
+    } else if (limits.progress_s > 0 && still > limits.progress_s &&
+               silent < limits.progress_s / 2) {
+      place.verdict = EndCause::kHung;
+    }
+    if (place.verdict) kill(place.pid, SIGKILL);
+  }
+}
+
 std::vector<ProcessEnded> ProcessPool::reap(double now) {
+  watch(now);
   std::vector<ProcessEnded> ends;
   for (unsigned i = 0; i < places_.size(); ++i) {
     Place& place = places_[i];

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "common/base/result.h"
+#include "common/process/progress_page.h"
 
 namespace gapfarm {
 
@@ -18,6 +19,8 @@ enum class EndCause {
   kLeft,     // exit status 0, or a signal that asks to leave: nobody's fault
   kKilled,   // SIGKILL: from outside or out of memory
   kCrashed,  // any other signal or exit status
+  kStuck,    // killed by its parent: it did not answer at all, which says nothing about its work
+  kHung,     // killed by its parent: it answered, but its simulation did not advance
 };
 
 // Exit status of a child that starting again would not help: wrong usage, or refused for good.
@@ -28,8 +31,19 @@ struct ProcessEnded {
   std::string name;
   pid_t pid = 0;
   EndCause cause = EndCause::kLeft;
+  // What it had in work, by its progress page; 0: nothing.
+  std::uint64_t epoch = 0;
+  std::uint64_t attempt = 0;
   bool gave_up = false;  // its place stays empty
   std::string text;      // "local-1 (pid 42) was killed by signal 11 (Segmentation fault)"
+};
+
+// Two clocks over every child's progress page.  A child that exceeds one is killed; 0: no limit.
+struct ProcessLimits {
+  // Something is in work and no step of it is done for so long, while the process answers.
+  double progress_s = 60;
+  // The process does not answer: stopped, starved or deadlocked.  Says nothing about its work.
+  double answer_s = 60;
 };
 
 struct ProcessPoolOptions {
@@ -44,6 +58,7 @@ struct ProcessPoolOptions {
   double healthy_s = 10;   // a child that lived so long counts as confirmed
   double backoff_s = 0.1;  // before the second start in a row without a confirm(), then doubled
   double backoff_max_s = 30;
+  ProcessLimits limits;
 };
 
 // Children die with the thread that starts them (they are told its pid and ask the kernel for it,
@@ -58,8 +73,11 @@ class ProcessPool {
   ProcessPool& operator=(const ProcessPool&) = delete;
 
   Status start(double now);
-  // Collects the children that ended and starts those that are due.
+  // Kills the children that exceed a limit, collects those that ended and starts those that are
+  // due.  To be called every look_interval().
   std::vector<ProcessEnded> reap(double now);
+  // How long, s, reap() may wait at most, or it would take itself for one that was away.
+  double look_interval() const;
   // When reap() has something to start; infinity: never.
   double next_start() const;
   // The child does useful work: its failures so far are forgotten.
@@ -89,13 +107,25 @@ class ProcessPool {
     double start_at = 0;    // when it started, or will when it does not run
     bool gave_up = false;
     std::optional<ProcessEnded> replaced;
+    std::optional<ProgressPage> page;  // of the running child
+    // The page as it was seen last, and since when.
+    std::uint64_t beats = 0;
+    std::uint64_t steps = 0;
+    std::uint64_t attempt = 0;
+    double answered_at = 0;
+    double advanced_at = 0;
+    std::optional<EndCause> verdict;  // it was killed for this
   };
   Status start_place(Place& place, unsigned index);
   ProcessEnded ended(Place& place, int status, double now);
+  double shortest_limit() const;
+  void watch(double now);
+  void look_at(Place& place, double now);
 
   ProcessPoolOptions options_;
   std::vector<Place> places_;
   bool retired_ = false;
+  double last_look_ = 0;
 };
 
 // In a child: die when the parent dies.  False when the parent `pid` is gone already.

@@ -130,6 +130,10 @@ Result<std::unique_ptr<SocketFarm>> start_farm(const FarmOptions& options,
   base.window = settings.window;
   base.heartbeat_interval_s = settings.heartbeat_interval_s;
   base.silence_limit_s = settings.silence_limit_s;
+  base.local_limits = {settings.progress_limit_s, settings.answer_limit_s};
+  base.limits = {settings.failure_limit, settings.kill_limit};
+  base.copies.audit_share = settings.audit_share;
+  base.copies.straggler_factor = settings.straggler_factor;
   base.allow_mixed_numeric_classes = settings.allow_mixed_numeric_classes;
   base.stop = &context.stop;
   return SocketFarm::create(std::move(base));

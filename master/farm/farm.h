@@ -14,9 +14,10 @@ namespace gapfarm {
 struct WorkerStatus {
   std::string name;
   std::string host;
-  std::string state;  // "idle", "busy", "gone"
+  std::string state;  // "idle", "busy", "leaving", "gone"
   unsigned jobs = 0;
   std::uint64_t finished = 0;
+  double rate_per_s = 0;  // jobs, since it joined
 };
 
 struct FarmProgress {

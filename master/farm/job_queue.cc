@@ -1,11 +1,36 @@
 #include "master/farm/job_queue.h"
 
+#include <algorithm>
 #include <cassert>
+#include <cmath>
 #include <numeric>
 #include <random>
 #include <utility>
 
+#include "common/problem/question.h"
+
 namespace gapfarm {
+namespace {
+
+// Attempts of audits are numbered with the others, but belong to no job of the batch.
+constexpr std::size_t kNoJob = static_cast<std::size_t>(-1);
+
+const char* verb(EndCause cause) {
+  switch (cause) {
+    case EndCause::kHung:
+      return "hung";
+    case EndCause::kKilled:
+      return "was killed";
+    default:
+      return "crashed";
+  }
+}
+
+bool is_answer(const v1::TaskResult& result) {
+  return result.outcome() != v1::OUTCOME_UNSPECIFIED && v1::Outcome_IsValid(result.outcome());
+}
+
+}  // namespace
 
 void JobQueue::start(std::string problem_hash, std::vector<v1::Task> tasks,
                      std::optional<std::uint64_t> shuffle_seed) {
@@ -23,14 +48,10 @@ void JobQueue::start(std::string problem_hash, std::vector<v1::Task> tasks,
   pending_.assign(order.begin(), order.end());
 }
 
-bool JobQueue::suspect(const Job& job) const {
-  return job.crashes + 1 >= limits_.crashes || job.kills + 1 >= limits_.kills;
-}
-
 void JobQueue::wait_in_line(std::size_t index) {
   jobs_[index].waiting = true;
-  if (suspect(jobs_[index])) {
-    suspects_.push_back(index);
+  if (faults_.count(index) != 0) {
+    retries_.push_back(index);
   } else {
     pending_.push_front(index);
   }
@@ -40,89 +61,238 @@ void JobQueue::leave_line(std::size_t index) {
   if (!jobs_[index].waiting) return;
   jobs_[index].waiting = false;
   std::erase(pending_, index);
-  std::erase(suspects_, index);
+  std::erase(retries_, index);
 }
 
-JobQueue::Taken JobQueue::take(WorkerId worker, bool empty_handed, v1::Job* job) {
-  const bool alone = empty_handed && !suspects_.empty();
-  std::deque<std::size_t>& line = alone ? suspects_ : pending_;
-  if (line.empty()) return Taken::kNone;
-  const std::size_t index = line.front();
-  line.pop_front();
+void JobQueue::hand_out(std::size_t index, const WorkerIdentity& worker, double now, v1::Job* job) {
   Job& taken = jobs_[index];
-  taken.waiting = false;
-  ++taken.out;
+  const std::uint64_t attempt = next_attempt();
+  *std::find(taken.out.begin(), taken.out.end(), 0u) = attempt;
   job->set_job_id(first_job_ + index);
-  job->set_attempt_id(first_attempt_ + attempts_.size());
+  job->set_attempt_id(attempt);
   job->set_problem_hash(problem_hash_);
   *job->mutable_task() = taken.task;
-  attempts_.push_back({index, worker, true, alone});
-  return alone ? Taken::kSuspect : Taken::kJob;
+  attempts_.push_back({index, worker.id, now, true});
+}
+
+bool JobQueue::take(const WorkerIdentity& worker, const HostCounts& hosts, double now,
+                    v1::Job* job) {
+  if (!retries_.empty() && take_retry(worker, hosts, now, job)) return true;
+  if (opinions_.has_audits() && opinions_.take_audit(worker, hosts, next_attempt(), job)) {
+    attempts_.push_back({kNoJob, worker.id, now, false});
+    return true;
+  }
+  if (pending_.empty()) return false;
+  const std::size_t index = pending_.front();
+  pending_.pop_front();
+  jobs_[index].waiting = false;
+  hand_out(index, worker, now, job);
+  return true;
+}
+
+bool JobQueue::take_retry(const WorkerIdentity& worker, const HostCounts& hosts, double now,
+                          v1::Job* job) {
+  const auto fits = [&](std::size_t index) {
+    const std::vector<Fault>& faults = faults_.at(index);
+    const auto failed_on = [&](const std::string& host) {
+      return std::any_of(faults.begin(), faults.end(),
+                         [&](const Fault& fault) { return fault.host == host; });
+    };
+    return !failed_on(worker.host) || std::all_of(hosts.begin(), hosts.end(), [&](const auto& h) {
+      return failed_on(h.first);
+    });
+  };
+  const auto at = std::find_if(retries_.begin(), retries_.end(), fits);
+  if (at == retries_.end()) return false;
+  const std::size_t index = *at;
+  retries_.erase(at);
+  jobs_[index].waiting = false;
+  hand_out(index, worker, now, job);
+  return true;
+}
+
+double JobQueue::patience() const {
+  if (mean_wall_ < 0) return copies_.straggler_unknown_s;
+  return std::max(copies_.straggler_min_s, copies_.straggler_factor * mean_wall_);
+}
+
+bool JobQueue::has_straggler(double now) {
+  if (!(copies_.straggler_factor > 0)) return false;
+  while (oldest_ < attempts_.size() && !attempts_[oldest_].live) ++oldest_;
+  return oldest_ < attempts_.size() && now - attempts_[oldest_].since > patience();
+}
+
+bool JobQueue::take_straggler(const WorkerIdentity& worker, double now, v1::Job* job) {
+  if (!has_straggler(now)) return false;
+  for (std::size_t i = oldest_; i < attempts_.size(); ++i) {
+    const Attempt& attempt = attempts_[i];
+    if (now - attempt.since <= patience()) return false;  // the rest is younger
+    if (!attempt.live || attempt.worker == worker.id || jobs_[attempt.job].done) continue;
+    const auto& out = jobs_[attempt.job].out;
+    if (std::find(out.begin(), out.end(), 0u) == out.end()) continue;
+    ++copied_;
+    hand_out(attempt.job, worker, now, job);
+    return true;
+  }
+  return false;
 }
 
 JobQueue::Attempt* JobQueue::find(WorkerId worker, std::uint64_t attempt) {
   if (attempt < first_attempt_ || attempt - first_attempt_ >= attempts_.size()) return nullptr;
   Attempt& found = attempts_[attempt - first_attempt_];
-  return found.worker == worker ? &found : nullptr;
+  return found.worker == worker && found.job != kNoJob ? &found : nullptr;
 }
 
-Commit JobQueue::commit(WorkerId worker, v1::JobResult* result) {
-  Attempt* attempt = find(worker, result->attempt_id());
-  if (attempt == nullptr || first_job_ + attempt->job != result->job_id()) return Commit::kForeign;
-  const v1::Outcome outcome = result->result().outcome();
-  if (outcome == v1::OUTCOME_UNSPECIFIED || !v1::Outcome_IsValid(outcome)) return Commit::kForeign;
+void JobQueue::withdraw(Attempt& attempt, std::uint64_t id) {
+  attempt.live = false;
+  auto& out = jobs_[attempt.job].out;
+  std::replace(out.begin(), out.end(), id, std::uint64_t{0});
+}
+
+Committed JobQueue::commit(const WorkerIdentityPtr& worker, v1::JobResult* result) {
+  Committed committed;
+  if (!is_answer(result->result())) return committed;
+  if (opinions_.compare(worker, *result, &committed.disagreement)) {
+    committed.kind = Commit::kCompared;
+    return committed;
+  }
+  const std::uint64_t id = result->attempt_id();
+  Attempt* attempt = find(worker->id, id);
+  if (attempt == nullptr || first_job_ + attempt->job != result->job_id()) return committed;
+  if (attempt->live) withdraw(*attempt, id);
+  note_wall(result->wall());
   Job& job = jobs_[attempt->job];
-  if (attempt->live) --job.out;
-  attempt->live = false;
-  if (job.done) return Commit::kLate;
-  job.result.Swap(result->mutable_result());
-  complete(job);
-  return Commit::kDone;
+  if (job.done) {
+    committed.kind = Commit::kLate;
+    look_for_late(&committed.disagreement, job, worker, result->result());
+    return committed;
+  }
+  committed.kind = Commit::kDone;
+  accept(job, result->mutable_result(), worker, &committed.losers);
+  return committed;
 }
 
-void JobQueue::complete(Job& job) {
+Committed JobQueue::commit_question(const WorkerIdentityPtr& worker, const std::string& question,
+                                    v1::TaskResult* result) {
+  Committed committed;
+  if (!is_answer(*result)) return committed;
+  if (questions_.empty()) {
+    for (std::size_t i = 0; i < jobs_.size(); ++i) {
+      questions_.emplace(question_hash(problem_hash_, jobs_[i].task), i);
+    }
+  }
+  const auto found = questions_.find(question);
+  if (found == questions_.end()) return committed;
+  Job& job = jobs_[found->second];
+  if (job.done) {
+    committed.kind = Commit::kLate;
+    look_for_late(&committed.disagreement, job, worker, *result);
+    return committed;
+  }
+  committed.kind = Commit::kDone;
+  accept(job, result, worker, &committed.losers);
+  return committed;
+}
+
+void JobQueue::accept(Job& job, v1::TaskResult* result, const WorkerIdentityPtr& worker,
+                      Losers* losers) {
+  job.result.Swap(result);
+  job.answered_by = worker;
+  const std::uint64_t id = first_job_ + index_of(job);
+  if (chosen_for_audit(job.task, id, copies_.audit_share)) {
+    opinions_.audit(taken_answer(job.task, job.result, worker), problem_hash_, job.task, id);
+  }
+  complete(job, losers);
+}
+
+void JobQueue::look_for_late(std::optional<Disagreement>* disagreement, const Job& job,
+                             const WorkerIdentityPtr& worker, const v1::TaskResult& result) {
+  // A message that came twice is no second opinion.
+  if (!job.answered_by || job.answered_by->name == worker->name ||
+      job.answered_by->numeric_class != worker->numeric_class) {
+    return;
+  }
+  ++compared_;
+  if (result.SerializeAsString() == job.result.SerializeAsString()) return;
+  *disagreement = Disagreement{task_label(job.task), job.answered_by, worker};
+}
+
+void JobQueue::note_wall(double wall) {
+  if (!std::isfinite(wall) || wall < 0) return;
+  mean_wall_ = mean_wall_ < 0 ? wall : mean_wall_ + 0.05 * (wall - mean_wall_);
+}
+
+void JobQueue::complete(Job& job, Losers* losers) {
   job.done = true;
   ++committed_;
   // It waits when its attempt was given up too early and answered after all.
-  leave_line(static_cast<std::size_t>(&job - jobs_.data()));
+  leave_line(index_of(job));
+  for (std::uint64_t attempt : job.out) {
+    if (attempt != 0) losers->emplace_back(attempts_[attempt - first_attempt_].worker, attempt);
+  }
 }
 
 bool JobQueue::give_back(WorkerId worker, std::uint64_t attempt_id) {
+  opinions_.give_back(worker, attempt_id);
   Attempt* attempt = find(worker, attempt_id);
   if (attempt == nullptr || !attempt->live) return false;
-  attempt->live = false;
-  Job& job = jobs_[attempt->job];
-  --job.out;
-  if (job.done || job.waiting || job.out > 0) return false;
+  withdraw(*attempt, attempt_id);
+  const Job& job = jobs_[attempt->job];
+  const bool copied = std::any_of(job.out.begin(), job.out.end(), [](auto id) { return id != 0; });
+  if (job.done || job.waiting || copied) return false;
   wait_in_line(attempt->job);
   return true;
 }
 
-bool JobQueue::blame(WorkerId worker, std::uint64_t attempt_id, EndCause cause) {
-  Attempt* attempt = find(worker, attempt_id);
-  if (attempt == nullptr || cause == EndCause::kLeft) return false;
-  Job& job = jobs_[attempt->job];
-  if (job.done) return false;
-  const bool crashed = cause == EndCause::kCrashed;
-  unsigned& count = crashed ? job.crashes : job.kills;
-  const unsigned limit = crashed ? limits_.crashes : limits_.kills;
-  if (count + 1 < limit || attempt->alone) ++count;
-  if (count < limit) {
-    if (job.waiting) {
-      leave_line(attempt->job);
-      wait_in_line(attempt->job);
-    }
-    return false;
+std::string JobQueue::reason(const Job& job, const std::vector<Fault>& faults) const {
+  std::string text = task_label(job.task) + " was given up:";
+  for (const Fault& fault : faults) {
+    text += (&fault == faults.data() ? " " : ", ") + fault.worker + " on " +
+            (fault.host.empty() ? "an unnamed host" : fault.host) + " " + verb(fault.cause);
   }
+  return text;
+}
+
+Blamed JobQueue::blame(const WorkerIdentity& worker, std::uint64_t attempt_id, EndCause cause) {
+  Blamed blamed;
+  Attempt* attempt = find(worker.id, attempt_id);
+  const bool innocent = cause == EndCause::kLeft || cause == EndCause::kStuck;
+  if (attempt == nullptr || attempt->blamed || innocent) return blamed;
+  attempt->blamed = true;
+  const std::size_t index = attempt->job;
+  Job& job = jobs_[index];
+  if (job.done) return blamed;
+  const bool waits = job.waiting;
+  leave_line(index);
+  std::vector<Fault>& faults = faults_[index];
+  faults.push_back({worker.name, worker.host, cause});
+  const auto kills =
+      static_cast<unsigned>(std::count_if(faults.begin(), faults.end(), [](const Fault& fault) {
+        return fault.cause == EndCause::kKilled;
+      }));
+  const auto failures = static_cast<unsigned>(faults.size()) - kills;
+  if (failures < limits_.failures && kills < limits_.kills) {
+    if (waits) wait_in_line(index);
+    return blamed;
+  }
+  blamed.quarantined = true;
+  blamed.reason = reason(job, faults);
   job.result.set_outcome(v1::WORKER_FAILED);
-  job.result.set_message(std::to_string(job.crashes) + " worker processes crashed and " +
-                         std::to_string(job.kills) + " were killed while they worked on this task");
-  complete(job);
-  return true;
+  job.result.set_message(blamed.reason);
+  complete(job, &blamed.losers);
+  return blamed;
 }
 
 std::vector<v1::TaskResult> JobQueue::finish() {
   assert(unfinished() == 0);
+  for (std::size_t i = oldest_; i < attempts_.size(); ++i) {
+    const Attempt& attempt = attempts_[i];
+    if (!attempt.live) continue;
+    const Job& job = jobs_[attempt.job];
+    if (!job.answered_by) continue;
+    opinions_.expect(first_attempt_ + i, first_job_ + attempt.job, attempt.worker,
+                     taken_answer(job.task, job.result, job.answered_by));
+  }
   std::vector<v1::TaskResult> results(jobs_.size());
   for (std::size_t i = 0; i < jobs_.size(); ++i) results[i].Swap(&jobs_[i].result);
   abandon();
@@ -135,7 +305,10 @@ void JobQueue::abandon() {
   jobs_.clear();
   attempts_.clear();
   pending_.clear();
-  suspects_.clear();
+  retries_.clear();
+  faults_.clear();
+  questions_.clear();
+  oldest_ = 0;
   committed_ = 0;
 }
 

@@ -1,102 +1,169 @@
 // The tasks of one batch: which wait, which are out with whom, which are done.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <deque>
 #include <optional>
 #include <string>
+#include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "common/process/process_pool.h"
 #include "gapfarm/v1/farm.pb.h"
+#include "master/farm/second_opinions.h"
+#include "master/farm/worker_identity.h"
 
 namespace gapfarm {
 
-using WorkerId = std::uint64_t;
-
 struct JobLimits {
-  unsigned crashes = 3;  // worker processes that may crash under a job before it is quarantined
+  // Different workers that a job may crash or hang before it is quarantined.
+  unsigned failures = 3;
   // The same for SIGKILL, which says less about the job: the machine may have been out of memory,
   // or somebody cleaned up.
   unsigned kills = 10;
 };
 
+struct CopyOptions {
+  double audit_share = 0.01;  // of the tasks are evaluated a second time, by another worker
+  // A job is a straggler once it is out for this many times the mean evaluation (0: none ever is),
+  // and for at least so long; before any evaluation has come back, for `unknown_s`.
+  double straggler_factor = 3;
+  double straggler_min_s = 0.1;
+  double straggler_unknown_s = 10;
+};
+
 enum class Commit {
-  kDone,     // the job's first answer
-  kLate,     // it had one already
-  kForeign,  // not an answer to anything that this worker was given
+  kDone,      // the job's first answer
+  kLate,      // it had one already
+  kCompared,  // an audit's answer, or one to a job of an earlier batch, that was waited for
+  kForeign,   // not an answer to anything that this worker was given
+};
+
+// Attempts that nobody needs any more, by the worker that has them.
+using Losers = std::vector<std::pair<WorkerId, std::uint64_t>>;
+
+struct Committed {
+  Commit kind = Commit::kForeign;
+  Losers losers;
+  std::optional<Disagreement> disagreement;
+};
+
+struct Blamed {
+  bool quarantined = false;  // the job is done, with WORKER_FAILED
+  std::string reason;        // what was given up, whom it ended, and how
+  Losers losers;
 };
 
 // At-least-once dispatch, exactly-once commit.  Job and attempt ids are never used twice in the
 // queue's life, so an answer from an older batch is foreign to a newer one.
+// Times are seconds of the caller's clock.
 class JobQueue {
  public:
-  explicit JobQueue(JobLimits limits = {}) : limits_(limits) {}
+  explicit JobQueue(JobLimits limits = {}, CopyOptions copies = {})
+      : limits_(limits), copies_(copies) {}
 
   // A new batch; what was left of the one before is forgotten.  With a seed, jobs go out in an
   // order shuffled by it (the results do not depend on the order; that is what shuffling tests).
   void start(std::string problem_hash, std::vector<v1::Task> tasks,
              std::optional<std::uint64_t> shuffle_seed = {});
 
-  bool has_pending() const { return !pending_.empty() || !suspects_.empty(); }
+  bool has_pending() const {
+    return !pending_.empty() || !retries_.empty() || opinions_.has_audits();
+  }
   std::size_t total() const { return jobs_.size(); }
   std::size_t committed() const { return committed_; }
   std::size_t unfinished() const { return jobs_.size() - committed_; }
 
-  enum class Taken { kNone, kJob, kSuspect };
-  // Gives the next job to `worker`: fills `job` but for its epoch.  A job that one more death would
-  // quarantine is a suspect: it goes only to an empty-handed worker, who gets nothing else until it
-  // has answered, because of a worker that dies with several jobs one cannot tell which did it.
-  Taken take(WorkerId worker, bool empty_handed, v1::Job* job);
+  // Gives the next job to `worker`: fills `job` but for its epoch.  A job that has ended workers
+  // goes to a host where it has not, if there is one.  False: nothing for this one.
+  bool take(const WorkerIdentity& worker, const HostCounts& hosts, double now, v1::Job* job);
+  // Whether some job is out for too long, so that an idle worker should get a copy.
+  bool has_straggler(double now);
+  bool take_straggler(const WorkerIdentity& worker, double now, v1::Job* job);
 
   // Takes the answer out of `result` when it is the job's first.  The outcome of an answer without
   // one is UNSPECIFIED and makes it foreign.
-  Commit commit(WorkerId worker, v1::JobResult* result);
+  Committed commit(const WorkerIdentityPtr& worker, v1::JobResult* result);
+  // The same for an answer to the question (question_hash()) instead of to an attempt.
+  Committed commit_question(const WorkerIdentityPtr& worker, const std::string& question,
+                            v1::TaskResult* result);
 
   // `worker` will not answer `attempt`: the job goes to the front of the line unless it is done or
   // another attempt is out.  True: the job was lost with that and waits again.
   bool give_back(WorkerId worker, std::uint64_t attempt);
   // The worker's process ended while it worked on `attempt`; also when that comes out only after
-  // the attempt was given back.  True: that was once too often, and the job is quarantined (done
-  // with WORKER_FAILED).
-  bool blame(WorkerId worker, std::uint64_t attempt, EndCause cause);
+  // the attempt was given back.  An attempt is blamed once.
+  Blamed blame(const WorkerIdentity& worker, std::uint64_t attempt, EndCause cause);
 
   // The results in the order of the tasks.  REQUIRES: unfinished() == 0.  Ends the batch.
   std::vector<v1::TaskResult> finish();
   // Ends the batch without results.
   void abandon();
 
+  // Of evaluations, lately; negative: none has come back yet.
+  double mean_wall() const { return mean_wall_; }
+  std::uint64_t compared() const { return opinions_.compared() + compared_; }
+  std::uint64_t copied() const { return copied_; }
+
  private:
+  static constexpr std::size_t kMostCopies = 2;
   struct Job {
     v1::Task task;
     v1::TaskResult result;
+    WorkerIdentityPtr answered_by;
+    std::array<std::uint64_t, kMostCopies> out{};  // live attempts; 0: none
     bool done = false;
-    bool waiting = true;  // in pending_ or suspects_
-    unsigned out = 0;     // live attempts
-    unsigned crashes = 0;
-    unsigned kills = 0;
+    bool waiting = true;  // in pending_ or retries_
   };
   struct Attempt {
     std::size_t job;
     WorkerId worker;
+    double since;
     bool live;
-    bool alone;  // the worker's only job
+    bool blamed = false;
+  };
+  struct Fault {
+    std::string worker;
+    std::string host;
+    EndCause cause;
   };
   Attempt* find(WorkerId worker, std::uint64_t attempt);
-  bool suspect(const Job& job) const;
+  std::uint64_t next_attempt() const { return first_attempt_ + attempts_.size(); }
+  std::size_t index_of(const Job& job) const {
+    return static_cast<std::size_t>(&job - jobs_.data());
+  }
+  void hand_out(std::size_t index, const WorkerIdentity& worker, double now, v1::Job* job);
+  void withdraw(Attempt& attempt, std::uint64_t id);
+  bool take_retry(const WorkerIdentity& worker, const HostCounts& hosts, double now, v1::Job* job);
+  double patience() const;
   void wait_in_line(std::size_t index);
   void leave_line(std::size_t index);
-  void complete(Job& job);
+  void accept(Job& job, v1::TaskResult* result, const WorkerIdentityPtr& worker, Losers* losers);
+  void complete(Job& job, Losers* losers);
+  void note_wall(double wall);
+  void look_for_late(std::optional<Disagreement>* disagreement, const Job& job,
+                     const WorkerIdentityPtr& worker, const v1::TaskResult& result);
+  std::string reason(const Job& job, const std::vector<Fault>& faults) const;
 
   JobLimits limits_;
+  CopyOptions copies_;
   std::string problem_hash_;
   std::uint64_t first_job_ = 1;
   std::uint64_t first_attempt_ = 1;
   std::vector<Job> jobs_;
   std::vector<Attempt> attempts_;
   std::deque<std::size_t> pending_;
-  std::deque<std::size_t> suspects_;
+  std::deque<std::size_t> retries_;                             // of jobs that ended a worker
+  std::unordered_map<std::size_t, std::vector<Fault>> faults_;  // by job
+  std::unordered_map<std::string, std::size_t> questions_;      // to job; made when first needed
+  std::size_t oldest_ = 0;                                      // no older attempt is live
   std::size_t committed_ = 0;
+  double mean_wall_ = -1;
+  SecondOpinions opinions_;
+  std::uint64_t compared_ = 0;
+  std::uint64_t copied_ = 0;
 };
 
 }  // namespace gapfarm

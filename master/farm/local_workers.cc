@@ -16,10 +16,12 @@ namespace {
 constexpr double kGoodbyeGrace = 0.5;
 constexpr double kTerminateGrace = 0.5;
 
-ProcessPoolOptions pool_options(std::string program, unsigned count, std::string endpoint) {
+ProcessPoolOptions pool_options(std::string program, unsigned count, std::string endpoint,
+                                ProcessLimits limits) {
   ProcessPoolOptions options;
   options.program = std::move(program);
   options.count = count;
+  options.limits = limits;
   options.name_prefix = "local-" + std::to_string(getpid());
   const std::string parent = std::to_string(getpid());
   options.arguments = [endpoint = std::move(endpoint), parent](const std::string& name,
@@ -61,8 +63,9 @@ PrivateFolder::~PrivateFolder() {
   rmdir(path_.c_str());
 }
 
-LocalWorkers::LocalWorkers(std::string program, unsigned count, std::string endpoint)
-    : pool_(pool_options(std::move(program), count, std::move(endpoint))) {}
+LocalWorkers::LocalWorkers(std::string program, unsigned count, std::string endpoint,
+                           ProcessLimits limits)
+    : pool_(pool_options(std::move(program), count, std::move(endpoint), limits)) {}
 
 LocalWorkers::~LocalWorkers() {
   if (pool_.wait_all(kGoodbyeGrace)) return;

@@ -33,7 +33,7 @@ class PrivateFolder {
 // ended three times in a row before it said hello.
 class LocalWorkers {
  public:
-  LocalWorkers(std::string program, unsigned count, std::string endpoint);
+  LocalWorkers(std::string program, unsigned count, std::string endpoint, ProcessLimits limits);
   // Tells them to go (SIGTERM), then makes them (SIGKILL): they keep nothing that could be lost.
   ~LocalWorkers();
   LocalWorkers(const LocalWorkers&) = delete;

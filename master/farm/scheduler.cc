@@ -10,8 +10,9 @@
 namespace gapfarm {
 namespace {
 
-constexpr std::size_t kBatchBytes = std::size_t{1} << 20;
 constexpr std::size_t kDepartedKept = 1000;
+constexpr std::size_t kOffersKept = 10000;
+constexpr std::size_t kReasonsKept = 100;
 constexpr double kForever = std::numeric_limits<double>::infinity();
 
 EndCause cause_of(v1::ProcessEnd end) {
@@ -20,6 +21,8 @@ EndCause cause_of(v1::ProcessEnd end) {
       return EndCause::kKilled;
     case v1::PROCESS_CRASHED:
       return EndCause::kCrashed;
+    case v1::PROCESS_HUNG:
+      return EndCause::kHung;
     default:
       return EndCause::kLeft;
   }
@@ -36,7 +39,9 @@ bool drop_holding(WorkerRecord& worker, std::uint64_t attempt) {
 }  // namespace
 
 Scheduler::Scheduler(SchedulerOptions options)
-    : options_(std::move(options)), registry_(options_.admittance), queue_(options_.limits) {}
+    : options_(std::move(options)),
+      registry_(options_.admittance),
+      queue_(options_.limits, options_.copies) {}
 
 void Scheduler::report(FarmEvent::Kind kind, const std::string& worker,
                        const std::string& text) const {
@@ -53,6 +58,7 @@ void Scheduler::start(const std::string& problem_hash, std::vector<v1::Task> tas
   departed_.clear();
   queue_.start(problem_hash, std::move(tasks), options_.shuffle_seed);
   for (const auto& [id, worker] : registry_.all()) line_up(*worker);
+  take_offers();
 }
 
 std::vector<v1::TaskResult> Scheduler::finish() {
@@ -65,15 +71,20 @@ void Scheduler::abandon() {
   queue_.abandon();
 }
 
-// Between batches nobody holds anything: what is still out has been answered by others or is not
-// wanted any more.
+// What is still out has been answered by others or is not wanted any more.  Who works on it says
+// so until it is done.
 void Scheduler::cancel_all() {
   for (const auto& [id, worker] : registry_.all()) {
     if (worker->holds.empty()) continue;
     v1::Cancel* cancel = post(worker->peer).mutable_cancel();
     for (const Holding& holding : worker->holds) cancel->add_attempt_ids(holding.attempt);
-    worker->holds.clear();
-    worker->doubtful_since = last_tick_;
+  }
+}
+
+void Scheduler::cancel(const Losers& losers) {
+  for (const auto& [id, attempt] : losers) {
+    const WorkerRecord* worker = registry_.find(id);
+    if (worker != nullptr) post(worker->peer).mutable_cancel()->add_attempt_ids(attempt);
   }
 }
 
@@ -115,6 +126,10 @@ void Scheduler::on_message(const std::string& peer, v1::Envelope* envelope, doub
       for (v1::JobResult& result : *envelope->mutable_results()->mutable_results()) {
         on_result(*worker, &result);
       }
+      on_dropped(*worker, envelope->results());
+      break;
+    case v1::Envelope::kOffer:
+      on_offer(*worker, envelope->mutable_offer());
       break;
     case v1::Envelope::kProblemRequest:
       on_problem_request(*worker, envelope->problem_request().hash());
@@ -136,8 +151,9 @@ void Scheduler::on_hello(const std::string& peer, const v1::Hello& hello, double
   }
   WorkerRecord& worker = *admission.worker;
   if (!hello.replaces().empty() && hello.replaces() != worker.name) {
-    on_process_end(hello.replaces(), cause_of(hello.replaced_end()),
-                   "its process ended and was replaced by " + worker.name);
+    on_process_end({hello.replaces(), cause_of(hello.replaced_end()), hello.replaced_epoch(),
+                    hello.replaced_attempt(),
+                    "its process ended and was replaced by " + worker.name});
   }
   if (admission.returning) {
     // Whatever else was under way to it, or its answers on the way here, may be lost.
@@ -173,9 +189,7 @@ void Scheduler::keep_only(WorkerRecord& worker, const List& keeps, double held_s
   for (auto attempt = lost.rbegin(); attempt != lost.rend(); ++attempt) {
     if (queue_.give_back(worker.id, *attempt)) ++counts_.retries;
   }
-  if (lost.empty()) return;
-  worker.doubtful_since = last_tick_;
-  line_up(worker);
+  if (!lost.empty()) line_up(worker);
 }
 
 void Scheduler::on_heartbeat(WorkerRecord& worker, const v1::Heartbeat& heartbeat, double now) {
@@ -184,35 +198,68 @@ void Scheduler::on_heartbeat(WorkerRecord& worker, const v1::Heartbeat& heartbea
     post(worker.peer).mutable_hello_request();
     return;
   }
+  worker.leaving |= heartbeat.leaving();
   post(worker.peer).mutable_heartbeat()->set_sequence(heartbeat.sequence());
   // Messages do get lost when links break.  A job that should have arrived long ago and is not
   // there, while its answer is not here, is out of the world.
   keep_only(worker, heartbeat.attempts(), now - options_.silence_limit_s);
-  // By now nothing that was under way to it then can still arrive.
-  if (heartbeat.attempts().empty() && now - worker.doubtful_since > options_.silence_limit_s) {
-    worker.doubtful_since = kForever;
-    line_up(worker);
-  }
 }
 
 void Scheduler::on_result(WorkerRecord& worker, v1::JobResult* result) {
-  const std::uint64_t attempt = result->attempt_id();
-  const Commit commit =
-      result->epoch() == options_.epoch ? queue_.commit(worker.id, result) : Commit::kForeign;
-  if (commit == Commit::kForeign) {
+  if (result->epoch() != options_.epoch) {
     ++counts_.foreign;
     return;
   }
-  if (drop_holding(worker, attempt)) line_up(worker);
-  if (commit == Commit::kLate) {
-    ++counts_.late;
-    return;
-  }
-  ++worker.finished;
   const double wall = result->wall();
+  const Committed committed = queue_.commit(registry_.identity(worker), result);
+  if (drop_holding(worker, result->attempt_id())) line_up(worker);
+  on_committed(committed);
+  if (committed.kind != Commit::kDone) return;
+  ++worker.finished;
   if (!std::isfinite(wall) || wall < 0) return;
   worker.mean_wall =
       worker.mean_wall < 0 ? wall : worker.mean_wall + 0.1 * (wall - worker.mean_wall);
+}
+
+void Scheduler::on_committed(const Committed& committed) {
+  if (committed.kind == Commit::kForeign) ++counts_.foreign;
+  if (committed.kind == Commit::kLate) ++counts_.late;
+  cancel(committed.losers);
+  if (!committed.disagreement) return;
+  ++counts_.disagreements;
+  const Disagreement& d = *committed.disagreement;
+  report(FarmEvent::kDisagreement, d.second->name,
+         d.question + " has two answers: " + d.first->name + " on " + d.first->host +
+             " said one thing and " + d.second->name + " on " + d.second->host +
+             " another; one of these machines computes wrongly, take it off the farm");
+}
+
+void Scheduler::on_dropped(WorkerRecord& worker, const v1::ResultBatch& batch) {
+  if (batch.epoch() != options_.epoch) return;
+  for (std::uint64_t attempt : batch.dropped()) {
+    if (drop_holding(worker, attempt)) line_up(worker);
+    if (queue_.give_back(worker.id, attempt)) ++counts_.retries;
+  }
+}
+
+void Scheduler::on_offer(WorkerRecord& worker, v1::Offer* offer) {
+  for (v1::Offer::Answer& answer : *offer->mutable_answers()) {
+    if (offers_.size() >= kOffersKept) offers_.pop_front();
+    offers_.push_back({registry_.identity(worker), std::move(answer)});
+  }
+  if (queue_.unfinished() > 0) take_offers();
+}
+
+// A question that nobody asks in this batch will hardly be asked in the next.
+void Scheduler::take_offers() {
+  for (Offered& offered : offers_) {
+    const Committed committed = queue_.commit_question(offered.by, offered.answer.question(),
+                                                       offered.answer.mutable_result());
+    if (committed.kind == Commit::kForeign) continue;
+    if (committed.kind == Commit::kDone) ++counts_.offered;
+    on_committed(committed);
+  }
+  offers_.clear();
 }
 
 void Scheduler::on_problem_request(const WorkerRecord& worker, const std::string& hash) {
@@ -243,23 +290,28 @@ void Scheduler::dismiss(WorkerRecord& worker, FarmEvent::Kind kind, const std::s
   const std::string name = worker.name;
   if (!worker.holds.empty()) {
     if (departed_.size() > kDepartedKept) departed_.clear();
-    departed_[name] = {worker.id, worker.holds.front().attempt};
+    departed_[name] = registry_.identity(worker);
   }
   keep_only(worker, std::vector<std::uint64_t>{}, kForever);
   registry_.remove(worker.id);
   report(kind, name, text);
 }
 
-void Scheduler::on_process_end(const std::string& name, EndCause cause, const std::string& text) {
-  WorkerRecord* worker = registry_.find_name(name);
-  if (worker != nullptr) dismiss(*worker, FarmEvent::kDied, text);
-  const auto departed = departed_.find(name);
+void Scheduler::on_process_end(const WorkerEnd& end) {
+  WorkerRecord* worker = registry_.find_name(end.name);
+  if (worker != nullptr) dismiss(*worker, FarmEvent::kDied, end.text);
+  const auto departed = departed_.find(end.name);
   if (departed == departed_.end()) return;
-  const auto [id, attempt] = departed->second;
+  if (end.epoch != options_.epoch || end.attempt == 0) return;
+  const Blamed blamed = queue_.blame(*departed->second, end.attempt, end.cause);
   departed_.erase(departed);
-  if (!queue_.blame(id, attempt, cause)) return;
+  if (end.cause == EndCause::kHung) ++counts_.hung;
+  if (!blamed.quarantined) return;
   ++counts_.quarantined;
-  report(FarmEvent::kQuarantined, name, "a task was given up: it ended one worker too many");
+  if (quarantine_reasons_.size() >= kReasonsKept) quarantine_reasons_.pop_front();
+  quarantine_reasons_.push_back(blamed.reason);
+  report(FarmEvent::kQuarantined, end.name, blamed.reason);
+  cancel(blamed.losers);
 }
 
 void Scheduler::on_tick(double now) {
@@ -276,60 +328,6 @@ void Scheduler::on_tick(double now) {
 void Scheduler::say_goodbye(const std::string& reason) {
   for (const auto& [id, worker] : registry_.all()) {
     post(worker->peer).mutable_goodbye()->set_reason(reason);
-  }
-}
-
-void Scheduler::line_up(WorkerRecord& worker) {
-  if (worker.in_line) return;
-  worker.in_line = true;
-  line_.push_back(worker.id);
-}
-
-std::size_t Scheduler::credit(const WorkerRecord& worker) const {
-  const std::size_t base = worker.asked_window > 0
-                               ? std::min(worker.asked_window, options_.window_max)
-                               : std::max(options_.window, 1u);
-  if (worker.asked_window > 0 || worker.mean_wall < 0) return base;
-  const double lasting = std::ceil(options_.window_s / std::max(worker.mean_wall, 1e-9)) + 1;
-  const std::size_t wanted =
-      static_cast<std::size_t>(std::min(lasting, static_cast<double>(options_.window_max)));
-  // Towards the end of a batch nobody takes what others will have time for.
-  const std::size_t share = queue_.unfinished() / (2 * registry_.size());
-  return std::max(base, std::min(wanted, share));
-}
-
-// One job a turn, round the line, so that a short batch spreads over all workers.
-void Scheduler::dispatch(double now) {
-  struct Open {
-    std::size_t at;  // in outbox_
-    std::size_t bytes;
-  };
-  std::unordered_map<WorkerId, Open> open;
-  v1::Job job;
-  while (queue_.has_pending() && !line_.empty()) {
-    WorkerRecord* worker = registry_.find(line_.front());
-    line_.pop_front();
-    if (worker == nullptr) continue;
-    const bool empty_handed = worker->holds.empty() && worker->doubtful_since == kForever;
-    const bool full = worker->peer.empty() || worker->holds.size() >= credit(*worker) ||
-                      (worker->alone && !worker->holds.empty());
-    const JobQueue::Taken taken =
-        full ? JobQueue::Taken::kNone : queue_.take(worker->id, empty_handed, &job);
-    if (taken == JobQueue::Taken::kNone) {
-      worker->in_line = false;
-      continue;
-    }
-    line_.push_back(worker->id);
-    worker->alone = taken == JobQueue::Taken::kSuspect;
-    job.set_epoch(options_.epoch);
-    worker->holds.push_back({job.attempt_id(), now});
-    auto [batch, fresh] = open.try_emplace(worker->id, Open{0, 0});
-    if (fresh || batch->second.bytes > kBatchBytes) {
-      post(worker->peer);
-      batch->second = {outbox_.size() - 1, 0};
-    }
-    batch->second.bytes += job.ByteSizeLong();
-    outbox_[batch->second.at].envelope.mutable_batch()->add_jobs()->Swap(&job);
   }
 }
 

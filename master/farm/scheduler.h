@@ -17,7 +17,17 @@ namespace gapfarm {
 
 // What a user may want to know; the farm goes on.
 struct FarmEvent {
-  enum Kind { kJoined, kReturned, kRefused, kLeft, kSilent, kDied, kQuarantined, kBadMessage };
+  enum Kind {
+    kJoined,
+    kReturned,
+    kRefused,
+    kLeft,
+    kSilent,
+    kDied,
+    kQuarantined,
+    kDisagreement,
+    kBadMessage
+  };
   Kind kind;
   std::string worker;  // name; empty: unknown
   std::string text;    // a sentence
@@ -27,6 +37,7 @@ struct SchedulerOptions {
   std::uint64_t epoch = 1;  // of this life of the master; > 0
   Admittance admittance;
   JobLimits limits;
+  CopyOptions copies;
   unsigned window = 2;  // jobs in a worker's hand
   // Tasks shorter than a round trip need more in hand: as many as last so long, at most window_max.
   double window_s = 0.004;
@@ -43,6 +54,18 @@ struct SchedulerCounts {
   std::uint64_t foreign = 0;      // answers to nothing that was asked, or of another epoch
   std::uint64_t malformed = 0;    // messages that are no envelope, or not for a master
   std::uint64_t quarantined = 0;  // jobs
+  std::uint64_t hung = 0;         // workers that were killed because their simulation hung
+  std::uint64_t offered = 0;      // answers that workers kept from an earlier life of the master
+  std::uint64_t disagreements = 0;
+};
+
+// How a worker's process ended, and what it had in work.
+struct WorkerEnd {
+  std::string name;
+  EndCause cause = EndCause::kLeft;
+  std::uint64_t epoch = 0;
+  std::uint64_t attempt = 0;  // 0: nothing
+  std::string text;
 };
 
 struct Outgoing {
@@ -72,7 +95,7 @@ class Scheduler {
   void on_other_protocol(const std::string& peer, std::uint32_t protocol);
   // These messages did not go out: nobody is there, or does not take its messages any more.
   void on_unsent(const std::vector<Outgoing>& messages);
-  void on_process_end(const std::string& name, EndCause cause, const std::string& text);
+  void on_process_end(const WorkerEnd& end);
   // Gives out jobs, without judging anybody.
   void dispatch(double now);
   // Judges silence and gives out jobs.  Call when all messages that have arrived are handled: what
@@ -85,20 +108,35 @@ class Scheduler {
   std::vector<Outgoing>& outbox() { return outbox_; }
 
   const WorkerRegistry& workers() const { return registry_; }
+  std::vector<WorkerStatus> worker_status() const { return registry_.status(last_tick_); }
   const SchedulerCounts& counts() const { return counts_; }
+  // Answers that were compared with another worker's, and jobs given to a second worker because the
+  // first took long.
+  std::uint64_t compared() const { return queue_.compared(); }
+  std::uint64_t copied() const { return queue_.copied(); }
+  // What was given up and why, of this life of the master; the latest.
+  const std::deque<std::string>& quarantine_reasons() const { return quarantine_reasons_; }
 
  private:
   void on_hello(const std::string& peer, const v1::Hello& hello, double now);
   void on_heartbeat(WorkerRecord& worker, const v1::Heartbeat& heartbeat, double now);
   void on_result(WorkerRecord& worker, v1::JobResult* result);
+  void on_dropped(WorkerRecord& worker, const v1::ResultBatch& batch);
+  void on_offer(WorkerRecord& worker, v1::Offer* offer);
+  void on_committed(const Committed& committed);
+  void take_offers();
   void on_problem_request(const WorkerRecord& worker, const std::string& hash);
   // Gives back what the worker holds but `keeps`, if it holds it for longer than `grace`.
   template <class List>
   void keep_only(WorkerRecord& worker, const List& keeps, double held_since_before);
   void dismiss(WorkerRecord& worker, FarmEvent::Kind kind, const std::string& text);
   void cancel_all();
+  void cancel(const Losers& losers);
   void line_up(WorkerRecord& worker);
   std::size_t credit(const WorkerRecord& worker) const;
+  class Batches;
+  void dispatch_line(double now, Batches& batches);
+  void dispatch_stragglers(double now, Batches& batches);
 
   v1::Envelope& post(const std::string& peer);
   void report(FarmEvent::Kind kind, const std::string& worker, const std::string& text) const;
@@ -108,12 +146,14 @@ class Scheduler {
   JobQueue queue_;
   std::map<std::string, std::string> problems_;  // hash -> bytes
   std::deque<WorkerId> line_;                    // may take jobs
-  struct Departed {
-    WorkerId id;
-    std::uint64_t attempt;
+  // Workers that went, by name: how their processes ended may come out later.
+  std::unordered_map<std::string, WorkerIdentityPtr> departed_;
+  struct Offered {
+    WorkerIdentityPtr by;
+    v1::Offer::Answer answer;
   };
-  // What workers that went had in work, by name: how their processes ended may come out later.
-  std::unordered_map<std::string, Departed> departed_;
+  std::deque<Offered> offers_;  // that came between batches
+  std::deque<std::string> quarantine_reasons_;
   std::vector<Outgoing> outbox_;
   SchedulerCounts counts_;
   double last_tick_ = -1;

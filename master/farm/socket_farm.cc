@@ -78,6 +78,8 @@ Status SocketFarm::Impl::open() {
   settings.window = options.window;
   settings.heartbeat_interval_s = options.heartbeat_interval_s;
   settings.silence_limit_s = options.silence_limit_s;
+  settings.limits = options.limits;
+  settings.copies = options.copies;
   settings.shuffle_seed = options.shuffle_seed;
   settings.on_event = [this](const FarmEvent& event) { on_event(event); };
   scheduler = std::make_unique<Scheduler>(std::move(settings));
@@ -105,7 +107,8 @@ Status SocketFarm::Impl::open_local() {
   folder = std::move(made).value();
   auto endpoint = socket->bind("ipc://" + folder->socket_path());
   if (!endpoint) return endpoint.error();
-  locals = std::make_unique<LocalWorkers>(*program, options.local_workers, *endpoint);
+  locals = std::make_unique<LocalWorkers>(*program, options.local_workers, *endpoint,
+                                          options.local_limits);
   return locals->start();
 }
 
@@ -116,7 +119,7 @@ void SocketFarm::Impl::reap(double now) {
   }
   if (!locals) return;
   for (const ProcessEnded& end : locals->pool().reap(now)) {
-    scheduler->on_process_end(end.name, end.cause, end.text);
+    scheduler->on_process_end({end.name, end.cause, end.epoch, end.attempt, end.text});
     if (end.gave_up) {
       if (last_trouble.empty()) last_trouble = end.text;
       on_event({FarmEvent::kDied, end.name, end.text + "; it is not started again"});
@@ -134,7 +137,9 @@ void SocketFarm::Impl::sleep(double now) {
   if (locals) fds = locals->pool().fds();
   if (options.stop != nullptr) fds.push_back(options.stop->fd());
   double until = now + std::min(options.heartbeat_interval_s, kProgressInterval);
-  if (locals) until = std::min(until, locals->pool().next_start());
+  if (locals) {
+    until = std::min({until, locals->pool().next_start(), now + locals->pool().look_interval()});
+  }
   socket->wait(fds, std::max(0.0, until - now));
 }
 
@@ -206,13 +211,19 @@ Result<std::vector<v1::TaskResult>> SocketFarm::run(
   return impl_->scheduler->finish();
 }
 
-std::vector<WorkerStatus> SocketFarm::workers() const {
-  return impl_->scheduler->workers().status();
-}
+std::vector<WorkerStatus> SocketFarm::workers() const { return impl_->scheduler->worker_status(); }
 
 std::uint64_t SocketFarm::retries() const { return impl_->scheduler->counts().retries; }
 
 const std::vector<std::string>& SocketFarm::endpoints() const { return impl_->endpoints; }
+
+std::uint64_t SocketFarm::compared() const { return impl_->scheduler->compared(); }
+
+std::uint64_t SocketFarm::copied() const { return impl_->scheduler->copied(); }
+
+const std::deque<std::string>& SocketFarm::quarantine_reasons() const {
+  return impl_->scheduler->quarantine_reasons();
+}
 
 const SchedulerCounts& SocketFarm::counts() const { return impl_->scheduler->counts(); }
 

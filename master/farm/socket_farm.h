@@ -28,6 +28,9 @@ struct SocketFarmOptions {
   unsigned window = 2;
   double heartbeat_interval_s = 1;
   double silence_limit_s = 10;
+  ProcessLimits local_limits;  // of the local workers; others have their own supervisors
+  JobLimits limits;
+  CopyOptions copies;
   std::optional<std::uint64_t> shuffle_seed;       // jobs go out in shuffled order
   StopSource* stop = nullptr;                      // ends run(); not owned, outlives the farm
   std::function<void(const FarmEvent&)> on_event;  // empty: what went wrong goes to stderr
@@ -56,6 +59,10 @@ class SocketFarm : public Farm {
   const std::vector<std::string>& endpoints() const;
   const SchedulerCounts& counts() const;
   LinkCounts link_counts() const;
+  // See Scheduler.
+  std::uint64_t compared() const;
+  std::uint64_t copied() const;
+  const std::deque<std::string>& quarantine_reasons() const;
   // Of the run; empty before the first worker.
   const std::string& numeric_class() const;
   // Pids of the running local workers.

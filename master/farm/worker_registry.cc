@@ -6,13 +6,15 @@ namespace {
 constexpr std::size_t kGoneKept = 200;
 constexpr std::size_t kNameLimit = 200;  // bytes; names go to logs and status
 
-WorkerStatus status_of(const WorkerRecord& worker, const char* state) {
+WorkerStatus status_of(const WorkerRecord& worker, const char* state, double now) {
   WorkerStatus status;
   status.name = worker.name;
   status.host = worker.host;
   status.state = state;
   status.jobs = static_cast<unsigned>(worker.holds.size());
   status.finished = worker.finished;
+  const double there = now - worker.joined;
+  status.rate_per_s = there > 0 ? static_cast<double>(worker.finished) / there : 0;
   return status;
 }
 
@@ -48,10 +50,13 @@ WorkerRegistry::Admission WorkerRegistry::admit(const std::string& peer, const v
   WorkerRecord* worker = find_name(hello.name());
   admission.returning = worker != nullptr;
   if (worker == nullptr) {
-    auto record = std::make_unique<WorkerRecord>();
+    auto record = std::make_shared<WorkerRecord>();
     record->id = next_id_++;
     record->name = hello.name();
     record->host = hello.host();
+    record->numeric_class = hello.numeric_class();
+    record->joined = now;
+    ++hosts_[record->host];
     worker = record.get();
     by_name_[worker->name] = worker;
     workers_[worker->id] = std::move(record);
@@ -65,6 +70,7 @@ WorkerRegistry::Admission WorkerRegistry::admit(const std::string& peer, const v
   worker->peer = peer;
   by_peer_[peer] = worker;
   worker->asked_window = hello.window();
+  worker->leaving = hello.leaving();
   worker->last_heard = now;
   admission.worker = worker;
   return admission;
@@ -101,9 +107,10 @@ void WorkerRegistry::remove(WorkerId id) {
   const auto found = workers_.find(id);
   if (found == workers_.end()) return;
   const WorkerRecord& worker = *found->second;
-  gone_.push_back(status_of(worker, "gone"));
+  gone_.push_back(status_of(worker, "gone", worker.last_heard));
   if (gone_.size() > kGoneKept) gone_.erase(gone_.begin());
   by_name_.erase(worker.name);
+  if (--hosts_[worker.host] == 0) hosts_.erase(worker.host);
   if (const auto at = by_peer_.find(worker.peer);
       at != by_peer_.end() && at->second == found->second.get()) {
     by_peer_.erase(at);
@@ -111,10 +118,11 @@ void WorkerRegistry::remove(WorkerId id) {
   workers_.erase(found);
 }
 
-std::vector<WorkerStatus> WorkerRegistry::status() const {
+std::vector<WorkerStatus> WorkerRegistry::status(double now) const {
   std::vector<WorkerStatus> all;
   for (const auto& [id, worker] : workers_) {
-    all.push_back(status_of(*worker, worker->holds.empty() ? "idle" : "busy"));
+    const char* state = worker->leaving ? "leaving" : worker->holds.empty() ? "idle" : "busy";
+    all.push_back(status_of(*worker, state, now));
   }
   all.insert(all.end(), gone_.begin(), gone_.end());
   return all;

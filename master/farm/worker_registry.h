@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <limits>
 #include <map>
 #include <memory>
 #include <string>
@@ -12,7 +11,7 @@
 #include "common/process/process_pool.h"
 #include "gapfarm/v1/farm.pb.h"
 #include "master/farm/farm.h"
-#include "master/farm/job_queue.h"
+#include "master/farm/worker_identity.h"
 
 namespace gapfarm {
 
@@ -27,21 +26,16 @@ struct Holding {
   double since = 0;  // s, dispatch
 };
 
-struct WorkerRecord {
-  WorkerId id = 0;
-  std::string peer;  // transport's name of its connection
-  std::string name;  // its own, unique
-  std::string host;
+struct WorkerRecord : WorkerIdentity, std::enable_shared_from_this<WorkerRecord> {
+  std::string peer;            // transport's name of its connection
   unsigned asked_window = 0;   // 0: the master's
   double last_heard = 0;       // s
   std::vector<Holding> holds;  // oldest first: a worker works in this order
   std::uint64_t finished = 0;
   double mean_wall = -1;  // s a task, lately; negative: unknown
-  // Since when it may work on something that was taken back from it (infinity: it does not).  Until
-  // it has said, long enough after, that its hands are empty, its death says nothing about one job.
-  double doubtful_since = std::numeric_limits<double>::infinity();
-  bool alone = false;    // the scheduler's: holds a suspect and gets nothing beside it
-  bool in_line = false;  // the scheduler's: waits in line for jobs
+  bool leaving = false;   // takes no more jobs
+  double joined = 0;      // s
+  bool in_line = false;   // the scheduler's: waits in line for jobs
 };
 
 // Times are seconds of the caller's clock.
@@ -59,6 +53,11 @@ class WorkerRegistry {
   WorkerRecord* find_peer(const std::string& peer);
   WorkerRecord* find_name(const std::string& name);
   WorkerRecord* find(WorkerId id);
+  // As `worker` is now, for as long as somebody needs to know.
+  static WorkerIdentityPtr identity(const WorkerRecord& worker) {
+    return worker.shared_from_this();
+  }
+  const HostCounts& hosts() const { return hosts_; }
 
   // Everybody from whom nothing came for longer than `limit` seconds.
   std::vector<WorkerId> silent_since(double now, double limit) const;
@@ -69,16 +68,17 @@ class WorkerRegistry {
   void remove(WorkerId id);
 
   std::size_t size() const { return workers_.size(); }
-  const std::map<WorkerId, std::unique_ptr<WorkerRecord>>& all() const { return workers_; }
+  const std::map<WorkerId, std::shared_ptr<WorkerRecord>>& all() const { return workers_; }
   const std::string& numeric_class() const { return admittance_.numeric_class; }
-  std::vector<WorkerStatus> status() const;
+  std::vector<WorkerStatus> status(double now) const;
 
  private:
   std::string refusal(const v1::Hello& hello) const;
 
   Admittance admittance_;
   WorkerId next_id_ = 1;
-  std::map<WorkerId, std::unique_ptr<WorkerRecord>> workers_;
+  std::map<WorkerId, std::shared_ptr<WorkerRecord>> workers_;
+  HostCounts hosts_;
   std::unordered_map<std::string, WorkerRecord*> by_peer_;
   std::unordered_map<std::string, WorkerRecord*> by_name_;
   std::vector<WorkerStatus> gone_;  // the latest

@@ -2,7 +2,9 @@
 
 #include <sqlite3.h>
 
+#include <cerrno>
 #include <cmath>
+#include <cstring>
 
 namespace gapfarm {
 namespace {
@@ -38,8 +40,16 @@ const char* remedy(int code) {
   }
 }
 
-Error sql_error(const std::string& file, const std::string& operation, int code, const char* text) {
-  return Error{file + ": cannot " + operation + ": " + text + "; " + remedy(code)};
+// `handle` may be null.
+Error sql_error(const std::string& file, const std::string& operation, int code, const char* text,
+                sqlite3* handle) {
+  // What the operating system said tells more than SQLite's "unable to open" or "disk I/O error".
+  const bool system = (code & 0xff) == SQLITE_CANTOPEN || (code & 0xff) == SQLITE_IOERR;
+  const int number = system && handle != nullptr ? sqlite3_system_errno(handle) : 0;
+  std::string said = text;
+  if (number != 0) said += std::string(" (") + std::strerror(number) + ")";
+  return Error{file + ": cannot " + operation + ": " + said + "; " +
+               remedy(number == ENOSPC || number == EDQUOT ? SQLITE_FULL : code)};
 }
 
 }  // namespace
@@ -90,13 +100,13 @@ SqlStatement& SqlStatement::bind_blob(int index, std::string_view value) {
 Result<bool> SqlStatement::step() {
   sqlite3* handle = sqlite3_db_handle(statement_);
   if (bind_result_ != SQLITE_OK) {
-    return sql_error(file_, operation_, bind_result_, "a value could not be bound");
+    return sql_error(file_, operation_, bind_result_, "a value could not be bound", handle);
   }
   const int code = sqlite3_step(statement_);
   if (code == SQLITE_ROW) return true;
   if (code == SQLITE_DONE) return false;
-  Error error =
-      sql_error(file_, operation_, sqlite3_extended_errcode(handle), sqlite3_errmsg(handle));
+  Error error = sql_error(file_, operation_, sqlite3_extended_errcode(handle),
+                          sqlite3_errmsg(handle), handle);
   sqlite3_reset(statement_);
   return error;
 }
@@ -142,7 +152,7 @@ Result<Database> Database::open(const std::filesystem::path& file, Mode mode) {
   Database database(handle, file);
   if (code != SQLITE_OK) {
     return sql_error(file.string(), "open the run store", code,
-                     handle ? sqlite3_errmsg(handle) : sqlite3_errstr(code));
+                     handle ? sqlite3_errmsg(handle) : sqlite3_errstr(code), handle);
   }
   sqlite3_extended_result_codes(handle, 1);
   sqlite3_busy_timeout(handle, kBusyTimeout_ms);
@@ -174,7 +184,7 @@ Database::~Database() { sqlite3_close_v2(handle_); }
 Status Database::exec(const std::string& sql, const std::string& operation) {
   if (sqlite3_exec(handle_, sql.c_str(), nullptr, nullptr, nullptr) != SQLITE_OK) {
     return sql_error(file_.string(), operation, sqlite3_extended_errcode(handle_),
-                     sqlite3_errmsg(handle_));
+                     sqlite3_errmsg(handle_), handle_);
   }
   return {};
 }
@@ -183,7 +193,7 @@ Result<SqlStatement> Database::prepare(const std::string& sql, const std::string
   sqlite3_stmt* statement = nullptr;
   if (sqlite3_prepare_v2(handle_, sql.c_str(), -1, &statement, nullptr) != SQLITE_OK) {
     return sql_error(file_.string(), operation, sqlite3_extended_errcode(handle_),
-                     sqlite3_errmsg(handle_));
+                     sqlite3_errmsg(handle_), handle_);
   }
   return SqlStatement(statement, file_.string(), operation);
 }

@@ -92,6 +92,18 @@ Status create_tables(Database& database, const RunInfo& info) {
   return transaction->commit();
 }
 
+// Whether nothing is there, or what a creation leaves that was interrupted before its one
+// transaction committed: an empty file, or a database without tables.
+bool is_unborn(const fs::path& file) {
+  std::error_code code;
+  if (!fs::exists(file, code) || fs::file_size(file, code) == 0) return true;
+  const Result<Database> database = Database::open(file, Database::Mode::kQueryOnly);
+  if (!database) return false;
+  const auto tables = database->integer("SELECT count(*) FROM sqlite_master", "look");
+  const auto id = database->integer("PRAGMA application_id", "look");
+  return tables && id && *tables == 0 && *id == 0;
+}
+
 }  // namespace
 
 Result<RunStore> RunStore::create(const fs::path& run, const RunInfo& info) {
@@ -104,8 +116,7 @@ Result<RunStore> RunStore::create(const fs::path& run, const RunInfo& info) {
   Result<RunLock> lock = RunLock::take(run);
   if (!lock) return lock.error();
   const fs::path file = run / "run.sqlite";
-  // An empty file is what a creation leaves that was killed before its one transaction committed.
-  if (fs::exists(file, code) && fs::file_size(file, code) > 0) {
+  if (!is_unborn(file)) {
     return Error{run.string() + ": holds a run already; continue it with `gapfarm resume " +
                  run.string() + "`, or choose another --out"};
   }

@@ -86,8 +86,14 @@ Status check_run_store(const Database& database) {
   if (std::filesystem::file_size(database.file(), ignored) == 0 && !ignored) {
     return Error{file + ": is empty: creating the run was interrupted; delete it and start again"};
   }
+  const Result<std::int64_t> tables =
+      database.integer("SELECT count(*) FROM sqlite_master", "read the run store");
+  if (!tables) return tables.error();
   const Result<std::int64_t> id = database.integer("PRAGMA application_id", "read the run store");
   if (!id) return id.error();
+  if (*id == 0 && *tables == 0) {
+    return Error{file + ": has no tables: creating the run was interrupted; start it again"};
+  }
   if (*id != kRunStoreApplicationId) {
     return Error{file + ": is a SQLite file of another program (application id " +
                  std::to_string(*id) + ", a run store has " +

@@ -1,4 +1,4 @@
-// worker/evaluate.h without Bullet: answers at once, or ends the process when told to.
+// worker/evaluate.h without Bullet: answers at once, or ends the process or hangs when told to.
 #include "worker/evaluate.h"
 
 #include <time.h>
@@ -31,15 +31,16 @@ Result<std::unique_ptr<PreparedProblem>> prepare(const v1::Problem& message) {
   return std::unique_ptr<PreparedProblem>(std::make_unique<FakePrepared>(message));
 }
 
-v1::TaskResult evaluate(const PreparedProblem* prepared, const v1::Task& task) {
+v1::TaskResult evaluate(const PreparedProblem* prepared, const v1::Task& task, StepCounter* steps) {
   v1::TaskResult result;
   result.set_outcome(v1::OK);
   if (task.has_echo()) {
     if (task.echo().payload() == "crash") abort();
+    // An endless loop that computes; a sleep would do as well.
+    for (volatile bool hangs = task.echo().payload() == "hang"; hangs;) cpu_seconds();
     if (task.echo().busy_us() > 0) {
       const double until = cpu_seconds() + 1e-6 * static_cast<double>(task.echo().busy_us());
-      while (cpu_seconds() < until) {
-      }
+      while (cpu_seconds() < until) count_step(steps);
     }
     result.set_echo(task.echo().payload());
   } else if (prepared == nullptr) {

@@ -12,67 +12,11 @@
 #include <vector>
 
 #include "common/net/socket.h"
-#include "common/process/process_pool.h"
-#include "common/process/stop.h"
-#include "master/farm/socket_farm.h"
+#include "tests/integration/farm_fixture.h"
 #include "worker/service.h"
 
 namespace gapfarm {
 namespace {
-
-const char* const kWorkerProgram = GAPFARM_BIN_DIR "/gapfarm-fake-worker";
-
-std::vector<v1::Task> echo_tasks(std::size_t count, std::uint64_t busy_us = 0) {
-  std::vector<v1::Task> tasks(count);
-  for (std::size_t i = 0; i < count; ++i) {
-    tasks[i].mutable_echo()->set_payload("task " + std::to_string(i));
-    tasks[i].mutable_echo()->set_busy_us(busy_us);
-  }
-  return tasks;
-}
-
-void expect_echoes(const Result<std::vector<v1::TaskResult>>& results,
-                   const std::vector<v1::Task>& tasks) {
-  ASSERT_TRUE(results.ok()) << results.error().message;
-  ASSERT_EQ(results->size(), tasks.size());
-  for (std::size_t i = 0; i < tasks.size(); ++i) {
-    EXPECT_EQ((*results)[i].outcome(), v1::OK);
-    EXPECT_EQ((*results)[i].echo(), tasks[i].echo().payload());
-  }
-}
-
-SocketFarmOptions quiet() {
-  SocketFarmOptions options;
-  options.worker_program = kWorkerProgram;
-  options.on_event = [](const FarmEvent&) {};
-  return options;
-}
-
-SocketFarmOptions local(unsigned workers) {
-  SocketFarmOptions options = quiet();
-  options.local_workers = workers;
-  return options;
-}
-
-SocketFarmOptions listening(const std::string& endpoint = "tcp://127.0.0.1:*") {
-  SocketFarmOptions options = quiet();
-  options.listen = {endpoint};
-  options.security.open = OpenLinks::kLoopback;
-  return options;
-}
-
-// A worker as a user starts it.
-std::unique_ptr<ProcessPool> remote_worker(const std::string& endpoint) {
-  ProcessPoolOptions options;
-  options.program = kWorkerProgram;
-  options.name_prefix = "remote";
-  options.arguments = [endpoint](const std::string&, const ProcessEnded*) {
-    return std::vector<std::string>{"--connect", endpoint, "--processes", "1", "--insecure"};
-  };
-  auto pool = std::make_unique<ProcessPool>(std::move(options));
-  EXPECT_TRUE(pool->start(monotonic_seconds()).ok());
-  return pool;
-}
 
 class LocalFarm : public testing::TestWithParam<unsigned> {};
 

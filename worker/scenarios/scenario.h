@@ -10,6 +10,7 @@
 #include "common/base/result.h"
 #include "common/problem/problem.h"
 #include "gapfarm/v1/task.pb.h"
+#include "worker/sim/step_counter.h"
 
 namespace gapfarm {
 
@@ -46,17 +47,20 @@ struct PredictOptions {
   std::span<const std::uint32_t> trials;  // indices into the problem's log; empty: all
   bool means_only = false;                // one alternative a trial, no covariance
   v1::StreamKey stream;                   // only SpreadKind::kSampled draws from it
+  StepCounter* steps = nullptr;           // counts the simulation's steps
 };
 
-// A scenario with a problem's trials prepared for many genomes.  Const methods are pure.
+// A scenario with a problem's trials prepared for many genomes.  Const methods are pure; `steps`
+// (may be null) shows that they advance.
 class ScenarioModel {
  public:
   virtual ~ScenarioModel() = default;
   virtual Prediction predict(const ParameterValues& values,
                              const PredictOptions& options) const = 0;
-  virtual v1::TaskResult simulate(const ParameterValues& values,
-                                  const v1::SimulateTask& task) const = 0;
-  virtual v1::TaskResult trace(const ParameterValues& values, const v1::TraceTask& task) const = 0;
+  virtual v1::TaskResult simulate(const ParameterValues& values, const v1::SimulateTask& task,
+                                  StepCounter* steps) const = 0;
+  virtual v1::TaskResult trace(const ParameterValues& values, const v1::TraceTask& task,
+                               StepCounter* steps) const = 0;
 };
 
 struct Scenario {

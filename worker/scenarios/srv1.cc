@@ -107,13 +107,14 @@ class Srv1Model : public ScenarioModel {
 
   Prediction predict(const ParameterValues& values, const PredictOptions& options) const override;
 
-  v1::TaskResult simulate(const ParameterValues& values,
-                          const v1::SimulateTask& task) const override {
-    return simulate_session(problem_, values, task);
+  v1::TaskResult simulate(const ParameterValues& values, const v1::SimulateTask& task,
+                          StepCounter* steps) const override {
+    return simulate_session(problem_, values, task, steps);
   }
 
-  v1::TaskResult trace(const ParameterValues& values, const v1::TraceTask& task) const override {
-    return trace_command(values, task);
+  v1::TaskResult trace(const ParameterValues& values, const v1::TraceTask& task,
+                       StepCounter* steps) const override {
+    return trace_command(values, task, steps);
   }
 
  private:
@@ -169,7 +170,7 @@ TrialPrediction Srv1Model::observe(const Srv1Robot& robot, const GroupMotion& mo
 Prediction Srv1Model::predict(const ParameterValues& values, const PredictOptions& options) const {
   Prediction prediction;
   prediction.facts.resize(problem_.commands.size());
-  Srv1Robot robot(values);
+  Srv1Robot robot(values, options.steps);
   const unsigned context = robot.effects().motion_context();
   const Grouping& grouping = (context & kLastDirection) ? by_drive_and_last_ : by_drive_;
 

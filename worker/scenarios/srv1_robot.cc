@@ -58,13 +58,13 @@ Gains draw_gains(const NoiseSettings& noise, Stream& stream) {
   return {1 + common + left, 1 + common + right};
 }
 
-Srv1Robot::Srv1Robot(const ParameterValues& values)
+Srv1Robot::Srv1Robot(const ParameterValues& values, StepCounter* steps)
     : effects_(srv1_table(), values),
       noise_{at(values, Srv1::kDriveNoiseCommon),
              at(values, Srv1::kDriveNoiseSide),
              {at(values, Srv1::kPoseNoisePosition), at(values, Srv1::kPoseNoiseHeading)}},
       full_speed_m_s_(at(values, Srv1::kFullSpeed)),
-      simulator_(sim_settings(values, effects_)) {}
+      simulator_(sim_settings(values, effects_), steps) {}
 
 Motion Srv1Robot::run(const DrivenCommand& drive, const Situation& situation, const Gains& gains,
                       std::vector<MotionSample>* path, double interval_s) {

@@ -33,7 +33,7 @@ Gains draw_gains(const NoiseSettings& noise, Stream& stream);
 // One robot at one set of parameter values, with the effects that are active there.
 class Srv1Robot {
  public:
-  explicit Srv1Robot(const ParameterValues& values);
+  explicit Srv1Robot(const ParameterValues& values, StepCounter* steps = nullptr);
 
   const ActiveEffects& effects() const { return effects_; }
   const NoiseSettings& noise() const { return noise_; }

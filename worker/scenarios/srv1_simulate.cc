@@ -19,8 +19,12 @@ double rounded(double value, double quantum) {
 // A robot in the world, seen by a camera.
 class Session {
  public:
-  Session(const Problem& problem, const ParameterValues& values, const v1::SimulateTask& task)
-      : problem_(problem), task_(task), robot_(values), reading_(robot_.effects().reading()) {}
+  Session(const Problem& problem, const ParameterValues& values, const v1::SimulateTask& task,
+          StepCounter* steps)
+      : problem_(problem),
+        task_(task),
+        robot_(values, steps),
+        reading_(robot_.effects().reading()) {}
 
   v1::TaskResult drive() {
     v1::TaskResult result;
@@ -102,13 +106,14 @@ class Session {
 }  // namespace
 
 v1::TaskResult simulate_session(const Problem& problem, const ParameterValues& values,
-                                const v1::SimulateTask& task) {
-  return Session(problem, values, task).drive();
+                                const v1::SimulateTask& task, StepCounter* steps) {
+  return Session(problem, values, task, steps).drive();
 }
 
-v1::TaskResult trace_command(const ParameterValues& values, const v1::TraceTask& task) {
+v1::TaskResult trace_command(const ParameterValues& values, const v1::TraceTask& task,
+                             StepCounter* steps) {
   v1::TaskResult result;
-  Srv1Robot robot(values);
+  Srv1Robot robot(values, steps);
   std::vector<MotionSample> path;
   const v1::Command& c = task.command();
   const Motion motion =

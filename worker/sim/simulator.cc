@@ -65,7 +65,8 @@ MotionSample blend(const MotionSample& a, const MotionSample& b, double t_s) {
 
 class Simulator::Impl {
  public:
-  explicit Impl(const SimSettings& settings) : settings_(settings), world_(settings) {}
+  Impl(const SimSettings& settings, StepCounter* steps)
+      : settings_(settings), world_(settings), watched_(steps) {}
 
   Motion run(const DriveInput& drive, const Floor& floor, std::vector<MotionSample>* path,
              double interval_s);
@@ -80,6 +81,7 @@ class Simulator::Impl {
   SimSettings settings_;
   RobotWorld world_;
   std::uint64_t steps_ = 0;
+  StepCounter* watched_;
 };
 
 Pose Simulator::Impl::pose() {
@@ -131,6 +133,7 @@ Motion Simulator::Impl::run(const DriveInput& drive, const Floor& floor,
     const double dt = plan.length_s();
     world_.step({left.mean_speed(t, dt), right.mean_speed(t, dt)}, dt);
     ++steps_;
+    count_step(watched_);
     const bool stopped = t >= still_s - kTimeSlack_s;
     t = plan.end_s();
     const btTransform& now = body.getWorldTransform();
@@ -171,7 +174,8 @@ Motion Simulator::Impl::run(const DriveInput& drive, const Floor& floor,
   return motion;
 }
 
-Simulator::Simulator(const SimSettings& settings) : impl_(std::make_unique<Impl>(settings)) {}
+Simulator::Simulator(const SimSettings& settings, StepCounter* steps)
+    : impl_(std::make_unique<Impl>(settings, steps)) {}
 Simulator::~Simulator() = default;
 const SimSettings& Simulator::settings() const { return impl_->settings(); }
 std::uint64_t Simulator::steps() const { return impl_->steps(); }

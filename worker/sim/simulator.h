@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "worker/sim/motion.h"
+#include "worker/sim/step_counter.h"
 
 namespace gapfarm {
 
@@ -14,7 +15,8 @@ namespace gapfarm {
 class Simulator {
  public:
   // REQUIRES: settings within the bounds of the parameter table.
-  explicit Simulator(const SimSettings& settings);
+  // `steps` (may be null) outlives the simulator and shows from outside that it advances.
+  explicit Simulator(const SimSettings& settings, StepCounter* steps = nullptr);
   ~Simulator();
   Simulator(const Simulator&) = delete;
   Simulator& operator=(const Simulator&) = delete;

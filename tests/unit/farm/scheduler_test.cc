@@ -158,8 +158,8 @@ TEST(Scheduler, GivesASilentWorkersJobsToOthersWithoutBlame) {
   }
   EXPECT_TRUE(desk.reported(FarmEvent::kSilent));
   EXPECT_EQ(desk.scheduler.counts().retries, 2u);
-  EXPECT_EQ(desk.scheduler.workers().status().at(0).name, "b");
-  EXPECT_EQ(desk.scheduler.workers().status().at(0).jobs, 2u);
+  EXPECT_EQ(desk.scheduler.worker_status().at(0).name, "b");
+  EXPECT_EQ(desk.scheduler.worker_status().at(0).jobs, 2u);
   // It was only cut off: unknown by now, it is asked who it is, and its answers do not count.
   desk.answer("a", lost[0]);
   bool asked = false;
@@ -225,7 +225,11 @@ TEST(Scheduler, QuarantinesOnlyTheJobThatEndsItsWorkers) {
       if (dies) {
         // The link is found broken first; how the process ended comes out later.
         desk.scheduler.on_unsent({Outgoing{name, {}}});
-        desk.scheduler.on_process_end(name, EndCause::kCrashed, "signal 11");
+        std::uint64_t culprit = 0;
+        for (const v1::Job& job : jobs) {
+          if (job.task().echo().payload() == "1") culprit = job.attempt_id();
+        }
+        desk.scheduler.on_process_end({name, EndCause::kCrashed, 7, culprit, "signal 11"});
         break;
       }
       for (const v1::Job& job : jobs) desk.answer(name, job);
@@ -250,7 +254,7 @@ TEST(Scheduler, NeverBlamesAJobForPoliteExits) {
     v1::Envelope goodbye;
     goodbye.mutable_goodbye();
     desk.say(name, goodbye);
-    desk.scheduler.on_process_end(name, EndCause::kLeft, "exited with status 0");
+    desk.scheduler.on_process_end({name, EndCause::kLeft, 7, 0, "exited with status 0"});
   }
   EXPECT_FALSE(desk.scheduler.finished());
   EXPECT_EQ(desk.scheduler.counts().quarantined, 0u);

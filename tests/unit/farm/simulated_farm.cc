@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace gapfarm {
 
@@ -13,8 +14,9 @@ struct SimulatedFarm::Worker {
   bool step_planned = false;
   double hung_until = 0;
   double cut_off_until = 0;
+  double deadline = std::numeric_limits<double>::infinity();
   std::unique_ptr<WorkerSession> session;
-  std::unique_ptr<WorkerEnd> end;
+  std::unique_ptr<WorkerSide> end;
   std::deque<Work> queue;
   bool evaluating = false;
 };
@@ -32,8 +34,8 @@ struct SimulatedFarm::MasterEnd : Transport {
   std::deque<Message> inbox;
 };
 
-struct SimulatedFarm::WorkerEnd : Transport {
-  WorkerEnd(SimulatedFarm& owner, Worker& self) : farm(owner), worker(self) {}
+struct SimulatedFarm::WorkerSide : Transport {
+  WorkerSide(SimulatedFarm& owner, Worker& self) : farm(owner), worker(self) {}
   SendStatus send(const std::string&, const std::string& bytes) override {
     if (farm.now_ < worker.cut_off_until) return SendStatus::kSent;  // and lost
     farm.carry([&to = farm, peer = worker.peer, bytes] {  // may arrive after the sender's end
@@ -69,7 +71,7 @@ SimulatedFarm::SimulatedFarm(std::uint64_t seed, unsigned workers, const FaultPl
     : random_(seed), faults_(faults), places_(workers) {
   start_master();
   for (unsigned place = 0; place < workers; ++place) {
-    at(uniform(0, 0.05), [this, place] { start_worker(place, "", v1::PROCESS_LEFT); });
+    at(uniform(0, 0.05), [this, place] { start_worker(place, {}); });
   }
   plan_faults(faults);
 }
@@ -99,8 +101,15 @@ void SimulatedFarm::plan_faults(const FaultPlan& faults) {
     for (unsigned i = 0; i < count; ++i) at(uniform(0, faults.span_s), event);
   };
   times(faults.deaths, [this] {
-    const auto ends = {v1::PROCESS_LEFT, v1::PROCESS_KILLED};
+    const auto ends = {EndCause::kLeft, EndCause::kKilled};
     if (auto worker = any_worker()) end_worker(worker, *(ends.begin() + random_() % 2));
+  });
+  times(faults.drains, [this] {
+    auto worker = any_worker();
+    if (!worker || now_ < worker->hung_until) return;
+    worker->session->leave(chance(0.5) ? WorkerSession::Leaving::kAfterAll
+                                       : WorkerSession::Leaving::kAfterCurrent);
+    step_worker(worker);
   });
   times(faults.hangs, [this] {
     auto worker = any_worker();
@@ -114,7 +123,8 @@ void SimulatedFarm::plan_faults(const FaultPlan& faults) {
   times(faults.master_pauses, [this] { master_away_until_ = now_ + uniform(0, 3); });
   times(faults.master_restarts, [this] {
     start_master();
-    scheduler_->start("", tasks_);
+    scheduler_->start("", batch_);
+    taken_before_ = 0;
   });
 }
 
@@ -129,24 +139,39 @@ void SimulatedFarm::start_master() {
   options.admittance = {"build", "class", false};
   options.heartbeat_interval_s = 0.1;
   options.silence_limit_s = 1;
+  options.copies.audit_share = faults_.audit_share;
+  options.on_event = [this](const FarmEvent& event) {
+    if (event.kind == FarmEvent::kDisagreement || event.kind == FarmEvent::kQuarantined) {
+      alarms_.push_back(event);
+    }
+  };
   options.shuffle_seed = random_() % 2 ? std::optional<std::uint64_t>(random_()) : std::nullopt;
   scheduler_ = std::make_unique<Scheduler>(std::move(options));
   if (!master_end_) master_end_ = std::make_unique<MasterEnd>(*this);
 }
 
-void SimulatedFarm::start_worker(unsigned place, const std::string& replaces, v1::ProcessEnd end) {
+void SimulatedFarm::start_worker(unsigned place, const WorkerEnd& replaced) {
   auto worker = std::make_shared<Worker>();
   worker->name = "worker-" + std::to_string(++names_);
   worker->peer = "peer-" + std::to_string(names_);
   worker->place = place;
+  if (faults_.lifetime_s > 0) worker->deadline = now_ + faults_.lifetime_s * uniform(0.5, 1.5);
   SessionOptions options;
   options.name = worker->name;
+  options.host = "host-" + std::to_string(place / 2);
   options.fingerprint = "build";
   options.numeric_class = "class";
-  options.replaces = replaces;
-  options.replaced_end = end;
+  options.replaces = replaced.name;
+  options.replaced_end = replaced.cause == EndCause::kCrashed  ? v1::PROCESS_CRASHED
+                         : replaced.cause == EndCause::kKilled ? v1::PROCESS_KILLED
+                         : replaced.cause == EndCause::kHung   ? v1::PROCESS_HUNG
+                                                               : v1::PROCESS_LEFT;
+  options.replaced_epoch = replaced.epoch;
+  options.replaced_attempt = replaced.attempt;
+  options.deadline_s = worker->deadline;
+  options.deadline_margin_s = 0.01;
   worker->session = std::make_unique<WorkerSession>(std::move(options));
-  worker->end = std::make_unique<WorkerEnd>(*this, *worker);
+  worker->end = std::make_unique<WorkerSide>(*this, *worker);
   places_[place] = worker;
   by_peer_[worker->peer] = worker;
   step_worker(worker);
@@ -154,20 +179,20 @@ void SimulatedFarm::start_worker(unsigned place, const std::string& replaces, v1
 
 // Sometimes the master's own child, whose end it sees; sometimes a remote one, of which it may hear
 // from the replacement; sometimes a machine of which nobody ever hears again.
-void SimulatedFarm::end_worker(const std::shared_ptr<Worker>& worker, v1::ProcessEnd end) {
+void SimulatedFarm::end_worker(const std::shared_ptr<Worker>& worker, EndCause cause) {
   worker->alive = false;
   by_peer_.erase(worker->peer);
-  const EndCause cause = end == v1::PROCESS_CRASHED  ? EndCause::kCrashed
-                         : end == v1::PROCESS_KILLED ? EndCause::kKilled
-                                                     : EndCause::kLeft;
-  const bool local = chance(0.5);
-  if (local) {
-    at(now_ + uniform(0, 0.1),
-       [this, worker, cause] { scheduler_->on_process_end(worker->name, cause, "ended"); });
+  WorkerEnd end{worker->name, cause, 0, 0, "ended"};
+  if (worker->evaluating) {
+    end.epoch = worker->queue.front().job.epoch();
+    end.attempt = worker->queue.front().job.attempt_id();
   }
-  const bool told = !local && (end == v1::PROCESS_CRASHED || chance(0.5));
+  const bool local = chance(0.5);
+  if (local) at(now_ + uniform(0, 0.1), [this, end] { scheduler_->on_process_end(end); });
+  const bool own_doing = cause == EndCause::kCrashed || cause == EndCause::kHung;
+  const bool told = !local && (own_doing || chance(0.5));
   at(now_ + uniform(0, 0.5),
-     [this, worker, told, end] { start_worker(worker->place, told ? worker->name : "", end); });
+     [this, worker, told, end] { start_worker(worker->place, told ? end : WorkerEnd{}); });
 }
 
 void SimulatedFarm::step_master() {
@@ -198,8 +223,10 @@ void SimulatedFarm::step_worker(const std::shared_ptr<Worker>& worker) {
     worker->queue.erase(kept, worker->queue.end());
   }
   for (Work& work : session.take_work()) worker->queue.push_back(std::move(work));
-  pump_out(*worker->end, session);
+  if (session.leaving() == WorkerSession::Leaving::kAfterCurrent) drop_work(*worker);
   begin_next(worker);
+  pump_out(*worker->end, session);
+  if (leaves(worker)) return;
   if (worker->step_planned) return;
   worker->step_planned = true;
   at(std::max(session.next_tick(), now_ + 1e-3), [this, worker] {
@@ -208,49 +235,93 @@ void SimulatedFarm::step_worker(const std::shared_ptr<Worker>& worker) {
   });
 }
 
+void SimulatedFarm::drop_work(Worker& worker) {
+  while (worker.queue.size() > (worker.evaluating ? 1u : 0u)) {
+    const v1::Job& job = worker.queue.back().job;
+    worker.session->on_dropped({job.epoch(), job.attempt_id()});
+    worker.queue.pop_back();
+  }
+}
+
+// As worker/service.cc does.
+bool SimulatedFarm::leaves(const std::shared_ptr<Worker>& worker) {
+  const WorkerSession& session = *worker->session;
+  const auto leaving = session.leaving();
+  const bool empty = leaving == WorkerSession::Leaving::kAfterCurrent ||
+                     session.state() != WorkerSession::State::kWorking || session.in_hand() == 0;
+  const bool done = leaving != WorkerSession::Leaving::kNo && !worker->evaluating && empty;
+  if (!done && now_ < worker->deadline) return false;
+  v1::Envelope goodbye = session.goodbye("no time left");
+  send(*worker->end, &goodbye);
+  end_worker(worker, EndCause::kLeft);
+  return true;
+}
+
 void SimulatedFarm::begin_next(const std::shared_ptr<Worker>& worker) {
   if (worker->evaluating || worker->queue.empty()) return;
   worker->evaluating = true;
-  const double wall = 1e-6 * static_cast<double>(worker->queue.front().job.task().echo().busy_us());
+  const v1::EchoTask& task = worker->queue.front().job.task().echo();
+  if (task.payload() == "hang") {
+    at(now_ + faults_.progress_s, [this, worker] {
+      if (worker->alive) end_worker(worker, EndCause::kHung);
+    });
+    return;
+  }
+  const double wall = 1e-6 * static_cast<double>(task.busy_us());
   at(std::max(now_, worker->hung_until) + wall, [this, worker, wall] {
-    if (!worker->alive) return;
-    const v1::Job job = std::move(worker->queue.front().job);
-    worker->queue.pop_front();
-    worker->evaluating = false;
-    if (job.task().echo().payload() == "crash") {
-      end_worker(worker, v1::PROCESS_CRASHED);
-      return;
-    }
-    v1::JobResult result;
-    result.set_job_id(job.job_id());
-    result.set_attempt_id(job.attempt_id());
-    result.set_epoch(job.epoch());
-    result.set_wall(wall);
-    result.mutable_result()->set_outcome(v1::OK);
-    result.mutable_result()->set_echo(job.task().echo().payload());
-    worker->session->on_finished(std::move(result));
-    step_worker(worker);
+    if (worker->alive) finish_task(worker, wall);
   });
 }
 
-std::vector<v1::TaskResult> SimulatedFarm::run(const std::vector<v1::Task>& tasks, double limit_s) {
-  tasks_ = tasks;
-  scheduler_->start("", tasks);
-  at(now_, [this] { master_clock(); });
-  const double limit = now_ + limit_s;
-  while (!scheduler_->finished() || now_ < faults_.span_s) {
-    if (now_ > limit || events_.empty()) return {};
-    Entry entry = events_.top();
-    events_.pop();
-    now_ = entry.time;
-    entry.event();
+void SimulatedFarm::finish_task(const std::shared_ptr<Worker>& worker, double wall) {
+  const std::string& payload = worker->queue.front().job.task().echo().payload();
+  if (payload == "crash") {
+    end_worker(worker, EndCause::kCrashed);
+    return;
   }
-  return scheduler_->finish();
+  const v1::Job job = std::move(worker->queue.front().job);
+  worker->queue.pop_front();
+  worker->evaluating = false;
+  v1::JobResult result;
+  result.set_job_id(job.job_id());
+  result.set_attempt_id(job.attempt_id());
+  result.set_epoch(job.epoch());
+  result.set_wall(wall);
+  result.mutable_result()->set_outcome(v1::OK);
+  result.mutable_result()->set_echo(job.task().echo().payload());
+  if (worker->place == corrupt_) result.mutable_result()->set_echo("wrong");
+  worker->session->on_finished(std::move(result));
+  step_worker(worker);
 }
 
-std::uint64_t SimulatedFarm::answers_taken() const {
-  std::uint64_t taken = 0;
-  for (const WorkerStatus& status : scheduler_->workers().status()) taken += status.finished;
+std::vector<v1::TaskResult> SimulatedFarm::run(const std::vector<v1::Task>& tasks,
+                                               std::size_t batches, double limit_s) {
+  std::vector<v1::TaskResult> all;
+  at(now_, [this] { master_clock(); });
+  const double limit = now_ + limit_s;
+  for (std::size_t b = 0; b < batches; ++b) {
+    const auto from = static_cast<std::ptrdiff_t>(b * tasks.size() / batches);
+    const auto to = static_cast<std::ptrdiff_t>((b + 1) * tasks.size() / batches);
+    batch_.assign(tasks.begin() + from, tasks.begin() + to);
+    taken_before_ = taken();
+    scheduler_->start("", batch_);
+    const bool last = b + 1 == batches;
+    while (!scheduler_->finished() || (last && now_ < faults_.span_s)) {
+      if (now_ > limit || events_.empty()) return {};
+      Entry entry = events_.top();
+      events_.pop();
+      now_ = entry.time;
+      entry.event();
+    }
+    for (v1::TaskResult& result : scheduler_->finish()) all.push_back(std::move(result));
+  }
+  return all;
+}
+
+std::uint64_t SimulatedFarm::taken() const {
+  const SchedulerCounts& counts = scheduler_->counts();
+  std::uint64_t taken = counts.offered + counts.quarantined;
+  for (const WorkerStatus& status : scheduler_->worker_status()) taken += status.finished;
   return taken;
 }
 

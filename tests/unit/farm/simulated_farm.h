@@ -8,6 +8,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <queue>
 #include <random>
 #include <string>
@@ -25,10 +26,14 @@ struct FaultPlan {
   double delay_s = 0.002;   // mean of the exponential time a message takes; reorders
   unsigned deaths = 0;      // worker processes that end, at random times
   unsigned hangs = 0;       // workers that stop for a while and go on
+  unsigned drains = 0;      // workers that are told to finish what they have and go
   unsigned partitions = 0;  // workers cut off for a while
   unsigned master_pauses = 0;
   unsigned master_restarts = 0;
-  double span_s = 5;  // within which all of that happens
+  double lifetime_s = 0;   // mean of what workers are given; 0: they live for ever
+  double span_s = 5;       // within which all of that happens
+  double progress_s = 2;   // after which a supervisor kills a process whose task hangs
+  double audit_share = 0;  // see CopyOptions
 };
 
 class SimulatedFarm {
@@ -36,19 +41,24 @@ class SimulatedFarm {
   SimulatedFarm(std::uint64_t seed, unsigned workers, const FaultPlan& faults);
   ~SimulatedFarm();
 
-  // Runs the tasks to the end in virtual time.  Echo tasks only; busy_us is how long they take, and
-  // the payload "crash" ends the process that works on it.  Empty: not done within `limit_s`.
-  std::vector<v1::TaskResult> run(const std::vector<v1::Task>& tasks, double limit_s = 2000);
+  // Runs the tasks to the end in virtual time, in `batches` of about equal size.  Echo tasks only;
+  // busy_us is how long they take, the payload "crash" ends the process that works on it, and
+  // "hang" never ends.  Empty: not done within `limit_s`.
+  std::vector<v1::TaskResult> run(const std::vector<v1::Task>& tasks, std::size_t batches = 1,
+                                  double limit_s = 2000);
+  // The worker in this place answers every task wrongly.
+  void corrupt(unsigned place) { corrupt_ = place; }
 
   Scheduler& scheduler() { return *scheduler_; }
   double now() const { return now_; }
-  // Answers taken from workers, of the present life of the master.
-  std::uint64_t answers_taken() const;
+  // Answers of the last batch that were taken, of the present life of the master.
+  std::uint64_t answers_taken() const { return taken() - taken_before_; }
+  const std::vector<FarmEvent>& alarms() const { return alarms_; }
 
  private:
   struct Worker;
   struct MasterEnd;
-  struct WorkerEnd;
+  struct WorkerSide;
   using Event = std::function<void()>;
 
   void at(double time, Event event);
@@ -57,8 +67,12 @@ class SimulatedFarm {
   void carry(const std::function<void()>& deliver);
   void plan_faults(const FaultPlan& faults);
   void start_master();
-  void start_worker(unsigned place, const std::string& replaces, v1::ProcessEnd end);
-  void end_worker(const std::shared_ptr<Worker>& worker, v1::ProcessEnd end);
+  void start_worker(unsigned place, const WorkerEnd& replaced);
+  void end_worker(const std::shared_ptr<Worker>& worker, EndCause cause);
+  void drop_work(Worker& worker);
+  bool leaves(const std::shared_ptr<Worker>& worker);
+  void finish_task(const std::shared_ptr<Worker>& worker, double wall);
+  std::uint64_t taken() const;
   void step_master();
   void master_clock();
   void step_worker(const std::shared_ptr<Worker>& worker);
@@ -81,7 +95,10 @@ class SimulatedFarm {
   std::uint64_t epoch_ = 0;
   double master_away_until_ = 0;
   unsigned names_ = 0;
-  std::vector<v1::Task> tasks_;
+  std::vector<v1::Task> batch_;
+  std::uint64_t taken_before_ = 0;
+  std::optional<unsigned> corrupt_;
+  std::vector<FarmEvent> alarms_;
   std::unique_ptr<Scheduler> scheduler_;
   std::unique_ptr<MasterEnd> master_end_;
   std::map<std::string, std::shared_ptr<Worker>> by_peer_;  // connections

@@ -1,0 +1,98 @@
+// Who gets what next.
+#include <algorithm>
+#include <cmath>
+#include <unordered_map>
+
+#include "master/farm/scheduler.h"
+
+namespace gapfarm {
+namespace {
+
+constexpr std::size_t kBatchBytes = std::size_t{1} << 20;
+
+}  // namespace
+
+// Jobs on their way out, a message a worker unless it grows too long.
+class Scheduler::Batches {
+ public:
+  explicit Batches(Scheduler& scheduler) : scheduler_(scheduler) {}
+
+  void add(WorkerRecord& worker, v1::Job* job, double now) {
+    job->set_epoch(scheduler_.options_.epoch);
+    worker.holds.push_back({job->attempt_id(), now});
+    auto [batch, fresh] = open_.try_emplace(worker.id, Open{0, 0});
+    if (fresh || batch->second.bytes > kBatchBytes) {
+      scheduler_.post(worker.peer);
+      batch->second = {scheduler_.outbox_.size() - 1, 0};
+    }
+    batch->second.bytes += job->ByteSizeLong();
+    scheduler_.outbox_[batch->second.at].envelope.mutable_batch()->add_jobs()->Swap(job);
+  }
+
+ private:
+  struct Open {
+    std::size_t at;  // in the outbox
+    std::size_t bytes;
+  };
+  Scheduler& scheduler_;
+  std::unordered_map<WorkerId, Open> open_;
+};
+
+void Scheduler::line_up(WorkerRecord& worker) {
+  if (worker.in_line) return;
+  worker.in_line = true;
+  line_.push_back(worker.id);
+}
+
+std::size_t Scheduler::credit(const WorkerRecord& worker) const {
+  if (worker.leaving || worker.peer.empty()) return 0;
+  const std::size_t base = worker.asked_window > 0
+                               ? std::min(worker.asked_window, options_.window_max)
+                               : std::max(options_.window, 1u);
+  if (worker.asked_window > 0 || worker.mean_wall < 0) return base;
+  const double lasting = std::ceil(options_.window_s / std::max(worker.mean_wall, 1e-9)) + 1;
+  const std::size_t wanted =
+      static_cast<std::size_t>(std::min(lasting, static_cast<double>(options_.window_max)));
+  // Towards the end of a batch nobody takes what others will have time for.
+  const std::size_t share = queue_.unfinished() / (2 * registry_.size());
+  return std::max(base, std::min(wanted, share));
+}
+
+void Scheduler::dispatch(double now) {
+  Batches batches(*this);
+  dispatch_line(now, batches);
+  if (!line_.empty() && queue_.has_straggler(now)) dispatch_stragglers(now, batches);
+}
+
+// One job a turn, round the line, so that a short batch spreads over all workers.
+void Scheduler::dispatch_line(double now, Batches& batches) {
+  std::vector<WorkerId> not_for_them;  // what waits now
+  v1::Job job;
+  while (queue_.has_pending() && !line_.empty()) {
+    WorkerRecord* worker = registry_.find(line_.front());
+    line_.pop_front();
+    if (worker == nullptr) continue;
+    if (worker->holds.size() >= credit(*worker)) {
+      worker->in_line = false;
+    } else if (queue_.take(*worker, registry_.hosts(), now, &job)) {
+      line_.push_back(worker->id);
+      batches.add(*worker, &job, now);
+    } else {
+      not_for_them.push_back(worker->id);
+    }
+  }
+  line_.insert(line_.end(), not_for_them.begin(), not_for_them.end());
+}
+
+// Nothing else is left to do for those in line: whoever has nothing at all helps the slowest.
+void Scheduler::dispatch_stragglers(double now, Batches& batches) {
+  v1::Job job;
+  for (WorkerId id : line_) {
+    WorkerRecord* worker = registry_.find(id);
+    if (worker == nullptr || !worker->holds.empty() || credit(*worker) == 0) continue;
+    if (!queue_.take_straggler(*worker, now, &job)) return;
+    batches.add(*worker, &job, now);
+  }
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,108 @@
+#include "master/farm/second_opinions.h"
+
+#include <utility>
+
+#include "common/base/hash.h"
+#include "common/problem/question.h"
+
+namespace gapfarm {
+namespace {
+
+constexpr std::size_t kAuditsKept = 1000;
+constexpr std::size_t kExpectedKept = 10000;
+// A task that loses its second worker so often is not worth a third.
+constexpr unsigned kAuditTries = 3;
+
+// SplitMix64's finaliser (Steele, Lea and Flood 2014): spreads consecutive numbers evenly.
+std::uint64_t mixed(std::uint64_t x) {
+  x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
+  x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
+  return x ^ (x >> 31);
+}
+
+std::uint64_t number_of(const v1::StreamKey& stream) {
+  return mixed(mixed(stream.run_seed() + 0x9e3779b97f4a7c15u) ^ mixed(stream.birth_id() + 1)) ^
+         mixed(stream.replicate() + 2);
+}
+
+}  // namespace
+
+TakenAnswer taken_answer(const v1::Task& task, const v1::TaskResult& result, WorkerIdentityPtr by) {
+  return {task_label(task), content_hash(result.SerializeAsString()), std::move(by)};
+}
+
+bool chosen_for_audit(const v1::Task& task, std::uint64_t job, double share) {
+  if (!(share > 0)) return false;
+  if (share >= 1) return true;
+  const std::uint64_t number = task.has_evaluate()  ? number_of(task.evaluate().stream())
+                               : task.has_predict() ? number_of(task.predict().stream())
+                                                    : job;
+  return static_cast<double>(mixed(number + 0x9e3779b97f4a7c15u) >> 11) * 0x1p-53 < share;
+}
+
+void SecondOpinions::audit(TakenAnswer first, const std::string& problem_hash, const v1::Task& task,
+                           std::uint64_t job) {
+  if (audits_.size() >= kAuditsKept) audits_.pop_front();
+  audits_.push_back({std::move(first), problem_hash, task, job, 0});
+}
+
+bool SecondOpinions::take_audit(const WorkerIdentity& worker, const HostCounts& hosts,
+                                std::uint64_t attempt, v1::Job* job) {
+  for (auto audit = audits_.begin(); audit != audits_.end(); ++audit) {
+    const WorkerIdentity& first = *audit->first.by;
+    if (first.name == worker.name) continue;
+    const bool elsewhere = hosts.size() > hosts.count(first.host);
+    if (elsewhere && first.host == worker.host) continue;
+    job->set_job_id(audit->job);
+    job->set_attempt_id(attempt);
+    job->set_problem_hash(audit->problem_hash);
+    *job->mutable_task() = audit->task;
+    remember(attempt, {audit->job, worker.id, audit->first, std::move(*audit)});
+    audits_.erase(audit);
+    return true;
+  }
+  return false;
+}
+
+void SecondOpinions::expect(std::uint64_t attempt, std::uint64_t job, WorkerId worker,
+                            TakenAnswer first) {
+  remember(attempt, {job, worker, std::move(first), std::nullopt});
+}
+
+void SecondOpinions::remember(std::uint64_t attempt, Expected expected) {
+  if (order_.size() >= kExpectedKept) {
+    expected_.erase(order_.front());
+    order_.pop_front();
+  }
+  order_.push_back(attempt);
+  expected_.emplace(attempt, std::move(expected));
+}
+
+bool SecondOpinions::compare(const WorkerIdentityPtr& worker, const v1::JobResult& result,
+                             std::optional<Disagreement>* disagreement) {
+  const auto found = expected_.find(result.attempt_id());
+  if (found == expected_.end()) return false;
+  const Expected& expected = found->second;
+  if (expected.worker != worker->id || expected.job != result.job_id()) return false;
+  const TakenAnswer& first = expected.first;
+  if (first.by->numeric_class == worker->numeric_class) {
+    ++compared_;
+    if (content_hash(result.result().SerializeAsString()) != first.hash) {
+      *disagreement = Disagreement{first.question, first.by, worker};
+    }
+  }
+  expected_.erase(found);
+  return true;
+}
+
+void SecondOpinions::give_back(WorkerId worker, std::uint64_t attempt) {
+  const auto found = expected_.find(attempt);
+  if (found == expected_.end() || found->second.worker != worker) return;
+  // What only a straggler's original would have said is not worth waiting for.
+  if (found->second.audit && ++found->second.audit->tries < kAuditTries) {
+    audits_.push_back(std::move(*found->second.audit));
+  }
+  expected_.erase(found);
+}
+
+}  // namespace gapfarm
