@@ -151,7 +151,9 @@ ProcessEnded ProcessPool::ended(Place& place, int status, double now) {
   if (place.pidfd >= 0) close(place.pidfd);
   place.pidfd = -1;
   place.pid = 0;
-  if (now - place.start_at >= options_.healthy_s) place.failures = 0;
+  // Whoever has simulated did useful work before it ended.
+  const bool worked = (*place.page)->steps.load() > 0;
+  if (worked || now - place.start_at >= options_.healthy_s) place.failures = 0;
   ++place.failures;
   const bool hopeless =
       WIFEXITED(status) && (WEXITSTATUS(status) == kExitUsage ||

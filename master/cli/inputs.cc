@@ -131,7 +131,7 @@ Result<std::unique_ptr<SocketFarm>> start_farm(const FarmOptions& options,
   base.heartbeat_interval_s = settings.heartbeat_interval_s;
   base.silence_limit_s = settings.silence_limit_s;
   base.local_limits = {settings.progress_limit_s, settings.answer_limit_s};
-  base.limits = {settings.failure_limit, settings.kill_limit};
+  base.job_limits = {settings.failure_limit, settings.kill_limit};
   base.copies.audit_share = settings.audit_share;
   base.copies.straggler_factor = settings.straggler_factor;
   base.allow_mixed_numeric_classes = settings.allow_mixed_numeric_classes;

@@ -78,7 +78,7 @@ Status SocketFarm::Impl::open() {
   settings.window = options.window;
   settings.heartbeat_interval_s = options.heartbeat_interval_s;
   settings.silence_limit_s = options.silence_limit_s;
-  settings.limits = options.limits;
+  settings.limits = options.job_limits;
   settings.copies = options.copies;
   settings.shuffle_seed = options.shuffle_seed;
   settings.on_event = [this](const FarmEvent& event) { on_event(event); };

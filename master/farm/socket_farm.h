@@ -29,7 +29,7 @@ struct SocketFarmOptions {
   double heartbeat_interval_s = 1;
   double silence_limit_s = 10;
   ProcessLimits local_limits;  // of the local workers; others have their own supervisors
-  JobLimits limits;
+  JobLimits job_limits;
   CopyOptions copies;
   std::optional<std::uint64_t> shuffle_seed;       // jobs go out in shuffled order
   StopSource* stop = nullptr;                      // ends run(); not owned, outlives the farm
