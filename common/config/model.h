@@ -7,17 +7,11 @@
 #include <string_view>
 #include <vector>
 
+#include "common/base/interval.h"
 #include "common/base/result.h"
 #include "common/problem/problem.h"
 
 namespace gapfarm {
-
-// Where a parameter lies with high probability; how high is the writer's to say.
-struct Interval {
-  double lower = 0;
-  double upper = 0;
-  bool operator==(const Interval&) const = default;
-};
 
 // What a model was fitted to.
 struct ModelData {
@@ -36,12 +30,14 @@ struct ModelOrigin {
 
 struct Model {
   std::string scenario = "srv1";
-  std::string kind = "evolved";                    // "evolved", "diagnosed", "documented", ...
-  std::string version;                             // of the program
-  std::string fingerprint;                         // of the build
-  ParameterValues values;                          // one a row of the scenario's table
-  std::vector<std::optional<Interval>> intervals;  // one a row, or none at all
-  std::vector<CommandSpec> commands;               // the scenario's, in its order
+  std::string kind = "evolved";  // "evolved", "diagnosed", "documented", ...
+  std::string version;           // of the program
+  std::string fingerprint;       // of the build
+  ParameterValues values;        // one a row of the scenario's table
+  // Where a parameter lies with high probability, how high is the writer's to say: one a row, or
+  // none at all.
+  std::vector<std::optional<Interval>> intervals;
+  std::vector<CommandSpec> commands;  // the scenario's, in its order
   FitnessSettings fitness;
   SpreadSettings spread;
   std::optional<double> score;  // fitness value on the data

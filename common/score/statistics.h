@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "common/base/interval.h"
 #include "common/random/stream.h"
 
 namespace gapfarm {
@@ -45,11 +46,6 @@ MeanCovariance weighted_mean_covariance(const Eigen::MatrixXd& points,
 // drawn as there are; `blocks[i]` lists the indices of block i (a session, say).
 std::vector<std::size_t> resample_blocks(std::span<const std::vector<std::size_t>> blocks,
                                          Stream& stream);
-
-struct Interval {
-  double lower = 0;
-  double upper = 0;
-};
 
 // Percentile interval of `statistic` over `repeats` block bootstrap samples (Efron 1979; Kuensch
 // 1989).  `coverage` in (0, 1).  REQUIRES: blocks and repeats are not empty / zero.

@@ -7,6 +7,7 @@
 
 #include "master/cli/evolution_farm.h"
 #include "master/cli/leave_behind.h"
+#include "master/evolve/evaluation.h"
 #include "master/evolve/evolve.h"
 #include "master/evolve/optimisers.h"
 
@@ -23,23 +24,9 @@ class SteadyClock : public EvolveClock {
   }
 };
 
-OptimiserSetup optimiser_setup(const EvolutionRun& run) {
-  OptimiserSetup setup;
-  setup.settings = run.config.evolution;
-  setup.table = &run.problem.table();
-  setup.genes = run.problem.genes;
-  setup.run_seed = run.config.seed;
-  setup.noisy = run.problem.spread.kind == SpreadKind::kSampled &&
-                run.problem.fitness.kind != FitnessKind::kRobustMahalanobis;
-  for (const Gene& gene : setup.genes) {
-    setup.nominal.push_back(encode_gene(*setup.table, gene, run.problem.values[gene.row]));
-  }
-  return setup;
-}
-
 Result<std::unique_ptr<Optimiser>> optimiser_at(const std::optional<Checkpoint>& checkpoint,
                                                 const EvolutionRun& run) {
-  const OptimiserSetup setup = optimiser_setup(run);
+  const OptimiserSetup setup = optimiser_setup(run.config.evolution, run.problem, run.config.seed);
   return checkpoint ? restore_optimiser(setup, checkpoint->optimiser_state) : make_optimiser(setup);
 }
 

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "master/evolve/evaluation.h"
+
 namespace gapfarm {
 namespace {
 
@@ -69,26 +71,16 @@ FarmBackend::FarmBackend(SocketFarm& farm, const Problem& problem, std::uint64_t
 Result<std::vector<Score>> FarmBackend::evaluate(std::span<const Candidate> candidates) {
   std::vector<v1::Task> tasks;
   for (const Candidate& candidate : candidates) {
-    v1::Task task;
-    v1::EvaluateTask* evaluate = task.mutable_evaluate();
-    evaluate->mutable_point()->mutable_genome()->Assign(candidate.genome.begin(),
-                                                        candidate.genome.end());
-    evaluate->mutable_stream()->set_run_seed(seed_);
-    evaluate->mutable_stream()->set_birth_id(candidate.birth_id);
-    evaluate->mutable_stream()->set_replicate(candidate.replicate);
-    tasks.push_back(std::move(task));
+    tasks.push_back(evaluation_task(candidate, seed_));
   }
   const auto results =
       farm_.run(problem_hash_, tasks, [&](const FarmProgress& p) { progress_.on_progress(p); });
   if (!results) return results.error();
   std::vector<Score> scores;
   for (const v1::TaskResult& result : *results) {
-    if (result.outcome() == v1::INVALID_REQUEST) {
-      return Error{"a worker refused the evaluation: " + result.message()};
-    }
-    const bool ok = result.outcome() == v1::OK;
-    scores.push_back(
-        {result.outcome(), ok ? cost_of_fitness(fitness_, result.evaluate().fitness()) : 0});
+    const Result<Score> score = score_of(result, fitness_);
+    if (!score) return score.error();
+    scores.push_back(*score);
   }
   return scores;
 }

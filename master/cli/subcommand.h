@@ -40,6 +40,7 @@ std::span<const Subcommand> subcommands();
 
 SubcommandRun setup_blind_check(CLI::App& app);
 SubcommandRun setup_check(CLI::App& app);
+SubcommandRun setup_compare(CLI::App& app);
 SubcommandRun setup_diagnose(CLI::App& app);
 SubcommandRun setup_effects(CLI::App& app);
 SubcommandRun setup_evolve(CLI::App& app);

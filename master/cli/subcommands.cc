@@ -8,6 +8,7 @@ std::span<const Subcommand> subcommands() {
        setup_evolve},
       {"resume", "continue a run, bit for bit", "Runs", setup_resume},
       {"status", "say how a run is doing, live or dead", "Runs", setup_status},
+      {"compare", "run searches side by side over seeds", "Runs", setup_compare},
       {"simulate", "make a trial log from a parameter set", "Models", setup_simulate},
       {"predict", "say where every trial of a log should have ended", "Models", setup_predict},
       {"diagnose", "say where the sim-to-real gap lies and which effect causes it", "Diagnosis",

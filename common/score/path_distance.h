@@ -1,0 +1,28 @@
+// Distances between two sampled paths.  Points in any unit; the distance has it too.  All take time
+// proportional to the product of the paths' lengths, but Lettier's.
+#pragma once
+
+#include <Eigen/Core>
+#include <span>
+
+namespace gapfarm {
+
+using PathPoint = Eigen::Vector3d;
+
+// Greatest distance between points of the same index; the shorter path waits at its last point
+// (Lettier 2013).  What it calls near depends on how both were sampled.
+// REQUIRES of all four: both paths not empty.
+double lettier_distance(std::span<const PathPoint> a, std::span<const PathPoint> b);
+
+// Greatest distance from a point of one path to the nearest of the other; order does not matter.
+double hausdorff_distance(std::span<const PathPoint> a, std::span<const PathPoint> b);
+
+// Discrete Frechet distance: the shortest leash with which both paths can be walked from end to end
+// without a step back, by dynamic programming (Eiter and Mannila 1994).
+double frechet_distance(std::span<const PathPoint> a, std::span<const PathPoint> b);
+
+// The leash of the walk that always takes the step after which it is shortest: an upper bound of
+// frechet_distance(), and what the published "Frechet" figures are.
+double greedy_frechet_bound(std::span<const PathPoint> a, std::span<const PathPoint> b);
+
+}  // namespace gapfarm

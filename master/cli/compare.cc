@@ -1,0 +1,224 @@
+// gapfarm compare FILE...: searches side by side over seeds.
+#include "master/compare/compare.h"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <chrono>
+#include <filesystem>
+#include <memory>
+
+#include "common/base/build_info.h"
+#include "common/config/config.h"
+#include "common/score/constant_velocity.h"
+#include "common/trials/files.h"
+#include "common/trials/read.h"
+#include "master/cli/inputs.h"
+#include "master/compare/summary.h"
+
+namespace gapfarm {
+namespace {
+
+struct CompareCommand {
+  std::vector<std::string> files;
+  std::vector<std::string> trials;
+  std::string out;
+  std::optional<unsigned> seeds;
+  std::optional<std::uint64_t> first_seed, evaluations;
+  std::optional<double> target;
+  FarmOptions farm;
+};
+
+struct Inputs {
+  std::vector<Variant> variants;
+  CompareOptions options;
+  std::optional<double> target;
+};
+
+// Comparison files give variants and settings, configs a variant each; the command line outranks.
+Result<Inputs> read_inputs(const CompareCommand& command) {
+  Inputs inputs;
+  for (const std::string& file : command.files) {
+    const auto text = read_text_file(file);
+    if (!text) return text.error();
+    if (is_comparison(*text)) {
+      auto comparison = read_comparison(file);
+      if (!comparison) return comparison.error();
+      if (comparison->seeds) inputs.options.seeds = *comparison->seeds;
+      if (comparison->evaluations) inputs.options.evaluations = *comparison->evaluations;
+      if (comparison->target_fitness) inputs.target = comparison->target_fitness;
+      for (Variant& v : comparison->variants) inputs.variants.push_back(std::move(v));
+    } else {
+      auto config = read_config(file);
+      if (!config) return config.error();
+      inputs.variants.push_back({std::filesystem::path(file).stem().string(), *std::move(config)});
+    }
+  }
+  inputs.options.seeds = command.seeds.value_or(inputs.options.seeds);
+  inputs.options.first_seed = command.first_seed.value_or(inputs.options.first_seed);
+  inputs.options.evaluations = command.evaluations.value_or(inputs.options.evaluations);
+  if (command.target) inputs.target = command.target;
+  return inputs;
+}
+
+// Reads every variant's trials; equal lists of files only once.
+Status read_trials(const std::vector<std::string>& given, std::vector<Variant>& variants,
+                   Console& console) {
+  const Variant* before = nullptr;
+  for (Variant& variant : variants) {
+    Config& config = variant.config;
+    if (!given.empty()) config.trial_files = given;
+    if (config.trial_files.empty()) {
+      return Error{config.path + ": no trials; name them in the config or with --trials"};
+    }
+    if (before != nullptr && before->config.trial_files == config.trial_files) {
+      config.problem.log = before->config.problem.log;
+    } else {
+      auto log = read_trial_files(config.trial_files, command_names(config.problem.commands));
+      if (!log) return log.error();
+      config.problem.log = *std::move(log);
+      show_notes(config.problem.log, console);
+    }
+    before = &variant;
+  }
+  return {};
+}
+
+// What makes fitness values comparable.
+Status check_alike(const std::vector<Variant>& variants) {
+  const Problem& first = variants.front().config.problem;
+  for (const Variant& variant : variants) {
+    const Problem& problem = variant.config.problem;
+    const auto refuse = [&](const std::string& what) {
+      return Error{"variant \"" + variant.name + "\" has another " + what + " than \"" +
+                   variants.front().name + "\", so their fitness cannot be compared"};
+    };
+    if (problem.scenario != first.scenario) return refuse("scenario");
+    if (problem.fitness.kind != first.fitness.kind) return refuse("fitness");
+    if (variant.config.trial_files != variants.front().config.trial_files) return refuse("log");
+    if (Status s = check_evolvable(variant.config); !s) return s;
+  }
+  return {};
+}
+
+void add_random_search(std::vector<Variant>& variants) {
+  for (const Variant& variant : variants) {
+    if (variant.config.evolution.optimiser.kind == OptimiserKind::kRandom) return;
+  }
+  Variant random{"random search", variants.front().config};
+  random.config.evolution.optimiser = {};
+  random.config.evolution.optimiser.kind = OptimiserKind::kRandom;
+  variants.push_back(std::move(random));
+}
+
+// The config's own values, nothing searched.
+Result<Baseline> untuned(Farm& farm, const Problem& problem) {
+  v1::Task task;
+  task.mutable_evaluate();
+  const auto results = farm.run(farm.add_problem(to_proto(problem)), {task});
+  if (!results) return results.error();
+  Baseline baseline{"the config's own values", std::nullopt};
+  if (results->front().outcome() == v1::OK)
+    baseline.fitness = results->front().evaluate().fitness();
+  return baseline;
+}
+
+std::vector<std::pair<std::string, std::string>> provenance(const CompareCommand& command,
+                                                            const Inputs& inputs) {
+  std::vector<std::pair<std::string, std::string>> rows;
+  for (const std::string& file : command.files) rows.emplace_back("file", file);
+  const Config& first = inputs.variants.front().config;
+  for (const std::string& file : first.trial_files) rows.emplace_back("trials", file);
+  rows.emplace_back("trials read", std::to_string(first.problem.log.trials.size()));
+  rows.emplace_back("seeds", fmt::format("{} to {}", inputs.options.first_seed,
+                                         inputs.options.first_seed + inputs.options.seeds - 1));
+  rows.emplace_back("program", build_summary("gapfarm"));
+  return rows;
+}
+
+Status write_all(const CompareCommand& command, const Inputs& inputs,
+                 const ComparisonSummary& summary, const std::vector<ComparedRun>& runs) {
+  const std::filesystem::path out(command.out);
+  const std::pair<const char*, std::string> files[] = {
+      {"summary.csv", summary_csv(summary)},
+      {"runs.csv", runs_csv(summary, runs)},
+      {"convergence.csv", convergence_csv(summary)},
+      {"compare.html", comparison_page(summary, "Searches compared", provenance(command, inputs))},
+  };
+  for (const auto& [name, text] : files) {
+    if (Status s = write_file_atomically((out / name).string(), text); !s) return s;
+  }
+  return {};
+}
+
+Result<std::vector<ComparedRun>> run_all(const Inputs& inputs, Farm& farm, CliContext& context) {
+  const auto total = static_cast<double>(inputs.options.evaluations * inputs.options.seeds *
+                                         inputs.variants.size());
+  const auto began = std::chrono::steady_clock::now();
+  return compare(
+      inputs.variants, inputs.options, farm_scorer(farm, inputs.variants), [&](std::uint64_t done) {
+        const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - began;
+        const double rate = static_cast<double>(done) / std::max(spent.count(), 1e-6);
+        std::optional<double> left;
+        if (done > 0) left = (total - static_cast<double>(done)) / rate;
+        context.console.progress(
+            progress_text(fmt::format("{} of {:.0f} evaluations", done, total), rate, left));
+      });
+}
+
+int run_compare(const CompareCommand& command, CliContext& context) {
+  Result<Inputs> inputs = read_inputs(command);
+  Status status = inputs ? read_trials(command.trials, inputs->variants, context.console)
+                         : Status(inputs.error());
+  if (status) status = check_alike(inputs->variants);
+  if (!status) {
+    context.console.error(status.error());
+    return kExitBadUsage;
+  }
+  add_random_search(inputs->variants);
+  const Config& first = inputs->variants.front().config;
+  auto farm = start_farm(command.farm, first.farm, context);
+  if (!farm) return failed(farm.error(), context);
+  const auto as_written = untuned(**farm, first.problem);
+  if (!as_written) return failed(as_written.error(), context);
+  const auto runs = run_all(*inputs, **farm, context);
+  context.console.clear_progress();
+  if (!runs) return failed(runs.error(), context);
+  ComparisonSummary summary =
+      summarise_comparison(inputs->variants, *runs, inputs->options, inputs->target);
+  const auto constant = constant_velocity_fitness(first.problem);
+  if (!constant) context.console.note("no constant-velocity baseline: " + constant.error().message);
+  summary.baselines = {{"constant velocity", constant ? std::optional(*constant) : std::nullopt},
+                       *as_written};
+  if (Status s = write_all(command, *inputs, summary, *runs); !s) return failed(s.error(), context);
+  context.console.print(comparison_text(summary));
+  context.console.note(
+      "left behind: " + (std::filesystem::path(command.out) / "compare.html").string() +
+      ", summary.csv, runs.csv, convergence.csv");
+  return (*farm)->counts().quarantined > 0 ? kExitQuarantined : kExitDone;
+}
+
+}  // namespace
+
+SubcommandRun setup_compare(CLI::App& app) {
+  auto command = std::make_shared<CompareCommand>();
+  app.add_option("FILE", command->files,
+                 "Comparison files with [compare] and [variants], or configs, a variant each")
+      ->required();
+  app.add_option("--trials", command->trials, "Trial logs in place of the configs'");
+  app.add_option("--out", command->out, "Folder for the tables and the page")->required();
+  app.add_option("--seeds", command->seeds, "Runs of each variant")->check(CLI::Range(1, 10000));
+  app.add_option("--first-seed", command->first_seed, "Seed of each variant's first run");
+  app.add_option("--evaluations", command->evaluations, "Evaluations of each run")
+      ->check(CLI::PositiveNumber);
+  app.add_option("--target", command->target, "Fitness whose reaching counts as success");
+  command->farm.declare(app, true);
+  app.footer(
+      "Random search, constant-velocity motion and the config's own values are always among the\n"
+      "baselines.\n\n"
+      "Examples:\n"
+      "  gapfarm compare configs/compare_forward.toml --trials log/*.dat --out compared\n"
+      "  gapfarm compare a.toml b.toml --seeds 20 --evaluations 2000 --target 0.5 --out compared");
+  return [command](CliContext& context) { return run_compare(*command, context); };
+}
+
+}  // namespace gapfarm
