@@ -11,8 +11,6 @@
 namespace gapfarm {
 namespace {
 
-const std::vector<std::string> kScenarios = {"srv1"};
-
 std::string beside(const std::string& config, const std::string& file) {
   const std::filesystem::path path(file);
   if (path.is_absolute()) return file;
@@ -20,7 +18,7 @@ std::string beside(const std::string& config, const std::string& file) {
 }
 
 void read_top(TomlSection& top, Config& config) {
-  config.problem.scenario = kScenarios[top.choice("scenario", kScenarios).value_or(0)];
+  config.problem.scenario = scenario_names()[top.choice("scenario", scenario_names()).value_or(0)];
   top.read("seed", config.seed, 0);
   if (const auto files = top.strings("trials")) {
     for (const std::string& file : *files) {

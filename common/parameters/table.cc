@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "common/parameters/racquetball.h"
+
 namespace gapfarm {
 namespace {
 
@@ -136,6 +138,13 @@ std::vector<Parameter> srv1_rows() {
   };
 }
 
+struct ScenarioTable {
+  const char* scenario;
+  const ParameterTable& (*table)();
+};
+constexpr ScenarioTable kScenarioTables[] = {{"srv1", srv1_table},
+                                             {"racquetball", racquetball_table}};
+
 Parameter effect_parameter(const Effect& effect, const EffectParameter& p) {
   return {effect.name + "." + p.key,
           p.unit,
@@ -208,9 +217,22 @@ const ParameterTable& srv1_table() {
   return table;
 }
 
+std::span<const std::string> scenario_names() {
+  static const std::vector<std::string> names = [] {
+    std::vector<std::string> all;
+    for (const ScenarioTable& row : kScenarioTables) all.emplace_back(row.scenario);
+    return all;
+  }();
+  return names;
+}
+
 Result<const ParameterTable*> parameter_table(std::string_view scenario) {
-  if (scenario == "srv1") return &srv1_table();
-  return Error{"unknown scenario '" + std::string(scenario) + "'; known: srv1"};
+  std::string known;
+  for (const ScenarioTable& row : kScenarioTables) {
+    if (scenario == row.scenario) return &row.table();
+    known += (known.empty() ? "" : ", ") + std::string(row.scenario);
+  }
+  return Error{"unknown scenario '" + std::string(scenario) + "'; known: " + known};
 }
 
 }  // namespace gapfarm

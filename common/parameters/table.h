@@ -92,6 +92,8 @@ enum class Srv1 : std::size_t {
 };
 constexpr std::size_t row_of(Srv1 p) { return static_cast<std::size_t>(p); }
 
+// The scenarios that have a table, in a fixed order; the first is the default.
+std::span<const std::string> scenario_names();
 // The table of a scenario; an error names the known scenarios.
 Result<const ParameterTable*> parameter_table(std::string_view scenario);
 const ParameterTable& srv1_table();

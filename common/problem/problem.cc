@@ -4,6 +4,18 @@
 #include <string>
 
 namespace gapfarm {
+namespace {
+
+std::vector<CommandSpec> srv1_commands() {
+  return {{"forward", 1, 1, 1},      {"backward", -1, -1, 1},   {"turn_ccw", -0.3, 0.3, 1},
+          {"turn_cw", 0.3, -0.3, 1}, {"wide_ccw", 0.4, 1.0, 1}, {"wide_cw", 1.0, 0.4, 1}};
+}
+
+std::vector<CommandSpec> racquetball_commands() { return {{"serve", 1, 1, 5}}; }
+
+constexpr ScenarioForm kForms[] = {{"srv1", srv1_commands}, {"racquetball", racquetball_commands}};
+
+}  // namespace
 
 bool higher_is_better(FitnessKind kind) { return kind == FitnessKind::kLogScore; }
 
@@ -35,10 +47,16 @@ const CommandSpec& Problem::command(std::string_view name) const {
   return commands.front();
 }
 
+const ScenarioForm& scenario_form(std::string_view scenario) {
+  for (const ScenarioForm& form : kForms) {
+    if (scenario == form.name) return form;
+  }
+  assert(false && "a row of the parameter tables without a form");
+  return kForms[0];
+}
+
 std::vector<CommandSpec> default_commands(std::string_view scenario) {
-  if (scenario != "srv1") return {};
-  return {{"forward", 1, 1, 1},      {"backward", -1, -1, 1},   {"turn_ccw", -0.3, 0.3, 1},
-          {"turn_cw", 0.3, -0.3, 1}, {"wide_ccw", 0.4, 1.0, 1}, {"wide_cw", 1.0, 0.4, 1}};
+  return scenario_form(scenario).commands();
 }
 
 }  // namespace gapfarm

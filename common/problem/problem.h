@@ -63,8 +63,17 @@ struct Problem {
   const CommandSpec& command(std::string_view name) const;
 };
 
-// The scenario's commands in canonical order with their default duties and durations.
-// srv1: forward, backward, turn_ccw, turn_cw, wide_ccw, wide_cw.
+// What configs and logs of a scenario hold beside its parameters.
+struct ScenarioForm {
+  const char* name;
+  // In canonical order with their default duties and durations.
+  std::vector<CommandSpec> (*commands)();
+};
+// REQUIRES: a scenario that has a parameter table.
+const ScenarioForm& scenario_form(std::string_view scenario);
+
+// The commands of the scenario's form.  srv1: forward, backward, turn_ccw, turn_cw, wide_ccw,
+// wide_cw; racquetball: serve.
 std::vector<CommandSpec> default_commands(std::string_view scenario);
 
 // Extra columns of the log stay behind: no simulation depends on them.

@@ -42,14 +42,17 @@ SubcommandRun setup_blind_check(CLI::App& app);
 SubcommandRun setup_check(CLI::App& app);
 SubcommandRun setup_compare(CLI::App& app);
 SubcommandRun setup_diagnose(CLI::App& app);
+SubcommandRun setup_drive(CLI::App& app);
 SubcommandRun setup_effects(CLI::App& app);
 SubcommandRun setup_evolve(CLI::App& app);
 SubcommandRun setup_import(CLI::App& app);
+SubcommandRun setup_influence(CLI::App& app);
 SubcommandRun setup_keys(CLI::App& app);
 SubcommandRun setup_predict(CLI::App& app);
 SubcommandRun setup_report(CLI::App& app);
 SubcommandRun setup_resume(CLI::App& app);
 SubcommandRun setup_simulate(CLI::App& app);
+SubcommandRun setup_stability(CLI::App& app);
 SubcommandRun setup_status(CLI::App& app);
 
 }  // namespace gapfarm

@@ -116,8 +116,14 @@ v1::TaskResult trace_command(const ParameterValues& values, const v1::TraceTask&
   Srv1Robot robot(values, steps);
   std::vector<MotionSample> path;
   const v1::Command& c = task.command();
+  Gains gains;
+  if (task.noisy()) {
+    Stream stream({task.stream().run_seed(), Purpose::kSimulation, task.stream().generation(),
+                   task.stream().birth_id(), task.stream().replicate()});
+    gains = draw_gains(robot.noise(), stream);
+  }
   const Motion motion =
-      robot.run({c.left(), c.right(), c.duration()}, {}, {}, &path, task.interval());
+      robot.run({c.left(), c.right(), c.duration()}, {}, gains, &path, task.interval());
   result.set_outcome(to_outcome(motion.outcome));
   result.set_simulated(motion.duration_s);
   v1::TraceResult* trace = result.mutable_trace();

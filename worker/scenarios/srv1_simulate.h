@@ -13,7 +13,7 @@ namespace gapfarm {
 v1::TaskResult simulate_session(const Problem& problem, const ParameterValues& values,
                                 const v1::SimulateTask& task, StepCounter* steps = nullptr);
 
-// The nominal motion of one command from (0, 0, 0), without any noise.
+// The motion of one command from (0, 0, 0): nominal, or with one draw of drive noise.
 v1::TaskResult trace_command(const ParameterValues& values, const v1::TraceTask& task,
                              StepCounter* steps = nullptr);
 

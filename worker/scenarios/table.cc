@@ -1,14 +1,16 @@
 #include <array>
 
+#include "worker/scenarios/racquetball.h"
 #include "worker/scenarios/scenario.h"
 #include "worker/scenarios/srv1.h"
 
 namespace gapfarm {
 
 std::span<const Scenario> scenarios() {
-  static constexpr std::array<Scenario, 1> rows = {{
-      {"srv1", "tracked robot, six atomic commands", prepare_srv1},
-  }};
+  static constexpr std::array rows = {
+      Scenario{"srv1", "tracked robot, six atomic commands", prepare_srv1},
+      Scenario{"racquetball", "ball in a closed court, struck by a paddle", prepare_racquetball},
+  };
   return rows;
 }
 

@@ -25,8 +25,8 @@ Points line(int count, double y, double step = 1) {
 
 TEST(PathDistance, ParallelLinesAreTheirGapApart) {
   const Points a = line(11, 0), b = line(11, 3);
-  for (const auto distance : {lettier_distance, hausdorff_distance, frechet_distance,
-                              greedy_frechet_bound}) {
+  for (const auto distance :
+       {lettier_distance, hausdorff_distance, frechet_distance, greedy_frechet_bound}) {
     EXPECT_EQ(distance(a, b), 3);
     EXPECT_EQ(distance(a, a), 0);
   }
@@ -90,7 +90,8 @@ TEST(PathDistance, FrechetIsTheBestOfAllWalks) {
 
 TEST(PathDistance, AreSymmetricAndOrdered) {
   for (std::uint64_t seed = 0; seed < 50; ++seed) {
-    const Points a = random_path(2 * seed), b = random_path(2 * seed + 1), c = random_path(seed + 999);
+    const Points a = random_path(2 * seed), b = random_path(2 * seed + 1),
+                 c = random_path(seed + 999);
     EXPECT_EQ(hausdorff_distance(a, b), hausdorff_distance(b, a));
     EXPECT_EQ(frechet_distance(a, b), frechet_distance(b, a));
     EXPECT_EQ(lettier_distance(a, b), lettier_distance(b, a));
@@ -132,7 +133,8 @@ TEST(PublishedPaths, AreReproduced) {
     const std::size_t second = row.rfind(','), first = row.rfind(',', second - 1);
     const std::string file = row.substr(0, first);
     const Points path = read_ball(*folder / file);
-    EXPECT_NEAR(lettier_distance(standard, path), number(row.substr(first + 1, second)), 1e-9) << file;
+    EXPECT_NEAR(lettier_distance(standard, path), number(row.substr(first + 1, second)), 1e-9)
+        << file;
     EXPECT_NEAR(hausdorff_distance(standard, path), number(row.substr(second + 1)), 1e-9) << file;
     const double frechet = frechet_distance(standard, path);
     const double greedy = greedy_frechet_bound(standard, path);

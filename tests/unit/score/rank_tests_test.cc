@@ -42,8 +42,8 @@ TEST(MannWhitney, AgreesWithAnEnumeration) {
     }
     us.push_back(u);
   }
-  const RankTest test = mann_whitney(std::vector<double>{1, 3, 4, 8},
-                                     std::vector<double>{2, 5, 6, 7, 9});
+  const RankTest test =
+      mann_whitney(std::vector<double>{1, 3, 4, 8}, std::vector<double>{2, 5, 6, 7, 9});
   double low = 0;
   for (const double u : us) low += u <= test.statistic ? 1 : 0;
   EXPECT_EQ(us.size(), 126U);

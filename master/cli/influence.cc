@@ -1,0 +1,101 @@
+// gapfarm influence CONFIG: which parameters move the path further than a repeat does.
+#include "master/influence/influence.h"
+
+#include <filesystem>
+#include <memory>
+
+#include "common/config/config.h"
+#include "common/trials/files.h"
+#include "master/cli/inputs.h"
+#include "master/cli/traced.h"
+
+namespace gapfarm {
+namespace {
+
+struct InfluenceCommand {
+  std::string config;
+  std::string out;
+  std::string distance = "frechet";
+  TracedCommands traced;
+  InfluenceSettings settings;
+  FarmOptions farm;
+};
+
+int run_influence(InfluenceCommand command, CliContext& context) {
+  Result<Config> config = read_config(command.config);
+  Status status = config ? command.traced.choose(config->problem.commands, config->seed,
+                                                 &command.settings.trace)
+                         : Status(config.error());
+  if (!status) {
+    context.console.error(status.error());
+    return kExitBadUsage;
+  }
+  for (std::size_t i = 0; i < path_distances().size(); ++i) {
+    if (command.distance == path_distances()[i].name) command.settings.distance = i;
+  }
+  const ParameterTable& table = config->problem.table();
+  const std::vector<Gene> genes =
+      config->problem.genes.empty() ? all_base_genes(table) : config->problem.genes;
+  auto farm = start_farm(command.farm, config->farm, context);
+  if (!farm) return failed(farm.error(), context);
+  const auto report =
+      find_influence(**farm, config->problem, genes, command.settings,
+                     [&](const std::string& what) { context.console.progress(what); });
+  context.console.clear_progress();
+  if (!report) return failed(report.error(), context);
+  const std::filesystem::path out(command.out);
+  const std::pair<const char*, std::string> files[] = {
+      {"influence.csv", influence_csv(*report, table)},
+      {"influence.html", influence_page(*report, table, command.settings,
+                                        "Influence of parameters: " + config->problem.scenario)},
+      {"genes.toml", influential_genes(*report, table)},
+  };
+  for (const auto& [name, text] : files) {
+    if (Status s = write_file_atomically((out / name).string(), text); !s) {
+      return failed(s.error(), context);
+    }
+  }
+  context.console.print(influence_text(*report, table));
+  context.console.note("left behind: " + (out / "influence.html").string() +
+                       ", influence.csv, genes.toml");
+  return kExitDone;
+}
+
+}  // namespace
+
+SubcommandRun setup_influence(CLI::App& app) {
+  auto command = std::make_shared<InfluenceCommand>();
+  InfluenceSettings& to = command->settings;
+  app.add_option("CONFIG", command->config,
+                 "The standard; its [genes] say what to vary and how far, without them every base "
+                 "parameter varies over its range")
+      ->required();
+  app.add_option("--out", command->out, "Folder for the tables, the page and genes.toml")
+      ->required();
+  app.add_option("--distance", command->distance, "Between paths")
+      ->check(CLI::IsMember({"lettier", "hausdorff", "frechet"}))
+      ->capture_default_str();
+  app.add_option("--horizon", to.horizon_s,
+                 "Seconds of the paths to compare; left out: as long as repeats stay close")
+      ->check(CLI::PositiveNumber);
+  app.add_option("--repeats", to.repeats, "Noisy runs of each level")
+      ->check(CLI::Range(4, 10000))
+      ->capture_default_str();
+  app.add_option("--levels", to.levels, "Levels of a real parameter")
+      ->check(CLI::Range(2, 64))
+      ->capture_default_str();
+  app.add_option("--trajectories", to.trajectories, "Random walks of Morris's method")
+      ->check(CLI::Range(4, 100000))
+      ->capture_default_str();
+  command->traced.declare(app);
+  command->farm.declare(app, true);
+  app.footer(
+      "Examples:\n"
+      "  gapfarm influence configs/racquetball.toml --out influence\n"
+      "  gapfarm influence configs/srv1.toml --command forward --distance hausdorff --out "
+      "influence\n"
+      "then put influence/genes.toml into the config that evolve is to search.");
+  return [command](CliContext& context) { return run_influence(*command, context); };
+}
+
+}  // namespace gapfarm

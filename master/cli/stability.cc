@@ -1,0 +1,125 @@
+// gapfarm stability CONFIG: where tiny changes of the start change the outcome least.
+#include "master/influence/stability.h"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <filesystem>
+#include <memory>
+
+#include "common/base/build_info.h"
+#include "common/config/config.h"
+#include "common/trials/files.h"
+#include "master/cli/inputs.h"
+#include "master/cli/traced.h"
+
+namespace gapfarm {
+namespace {
+
+struct StabilityCommand {
+  std::string config;
+  std::string out;
+  TracedCommands traced;
+  StabilitySettings settings;
+  FarmOptions farm;
+};
+
+std::string spread_text(const std::optional<double>& spread) {
+  return spread ? fmt::format("{:.4g} m", *spread) : std::string("does not end well");
+}
+
+std::string tried_csv(const StabilityReport& report, const Problem& problem) {
+  std::string text = "spread_m";
+  for (const Gene& gene : problem.genes) text += "," + problem.table()[gene.row].key;
+  text += "\n";
+  for (const StablePoint& point : report.tried) {
+    text += fmt::format("{}", point.spread);
+    for (const Gene& gene : problem.genes) text += fmt::format(",{}", point.values[gene.row]);
+    text += "\n";
+  }
+  return text;
+}
+
+Status write_all(const StabilityCommand& command, const Config& config,
+                 const StabilityReport& report) {
+  const std::filesystem::path out(command.out);
+  if (Status s = write_file_atomically((out / "stability.csv").string(),
+                                       tried_csv(report, config.problem));
+      !s) {
+    return s;
+  }
+  Model model;
+  model.scenario = config.problem.scenario;
+  model.kind = "stable";
+  model.version = build_info().version;
+  model.fingerprint = build_info().fingerprint;
+  model.values = report.best.values;
+  model.commands = config.problem.commands;
+  model.fitness = config.problem.fitness;
+  model.spread = config.problem.spread;
+  return write_model(model, (out / "model.toml").string());
+}
+
+int run_stability(StabilityCommand command, CliContext& context) {
+  Result<Config> config = read_config(command.config);
+  Status status = config ? check_evolvable(*config) : Status(config.error());
+  if (status) {
+    status = command.traced.choose(config->problem.commands, config->seed, &command.settings.trace);
+  }
+  if (!status) {
+    context.console.error(status.error());
+    return kExitBadUsage;
+  }
+  command.settings.evolution = config->evolution;
+  auto farm = start_farm(command.farm, config->farm, context);
+  if (!farm) return failed(farm.error(), context);
+  const auto report =
+      find_stability(**farm, config->problem, command.settings,
+                     [&](const std::string& what) { context.console.progress(what); });
+  context.console.clear_progress();
+  if (!report) return failed(report.error(), context);
+  if (Status s = write_all(command, *config, *report); !s) return failed(s.error(), context);
+  const ParameterTable& table = config->problem.table();
+  std::string text = fmt::format(
+      "spread of the ends over {} repeats, {} points tried\n"
+      "  the config's own values  {}, on fresh repeats {}\n"
+      "  the most stable found    {}, on fresh repeats {}\n",
+      command.settings.repeats, report->evaluations, spread_text(report->standard_spread),
+      spread_text(report->standard_fresh), spread_text(report->best.spread),
+      spread_text(report->best_fresh));
+  for (const Gene& gene : config->problem.genes) {
+    text += fmt::format("  {:<22} {}\n", table[gene.row].key,
+                        table.format(gene.row, report->best.values[gene.row]));
+  }
+  context.console.print(text);
+  context.console.note(
+      "left behind: " + (std::filesystem::path(command.out) / "model.toml").string() +
+      ", stability.csv");
+  return kExitDone;
+}
+
+}  // namespace
+
+SubcommandRun setup_stability(CLI::App& app) {
+  auto command = std::make_shared<StabilityCommand>();
+  app.add_option("CONFIG", command->config, "Its [genes] say what to search, its [optimiser] how")
+      ->required();
+  app.add_option("--out", command->out, "Folder for model.toml and stability.csv")->required();
+  app.add_option("--repeats", command->settings.repeats, "Runs with tiny changes at each point")
+      ->check(CLI::Range(2, 10000))
+      ->capture_default_str();
+  app.add_option("--evaluations", command->settings.evaluations, "Points to try")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  command->traced.declare(app);
+  command->farm.declare(app, true);
+  app.footer(
+      "The tiny changes are the scenario's own noise: of the start and launch in racquetball, of "
+      "the\n"
+      "drive in srv1.\n\n"
+      "Examples:\n"
+      "  gapfarm stability configs/racquetball_stability.toml --out stable\n"
+      "  gapfarm predict stable/model.toml --trials log.csv");
+  return [command](CliContext& context) { return run_stability(*command, context); };
+}
+
+}  // namespace gapfarm

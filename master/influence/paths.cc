@@ -1,0 +1,91 @@
+#include "master/influence/paths.h"
+
+#include <algorithm>
+#include <array>
+
+namespace gapfarm {
+namespace {
+
+v1::Task trace_task(const TraceRequest& request, const CommandSpec& command, std::size_t index,
+                    const TraceSettings& settings) {
+  v1::Task task;
+  v1::TraceTask* trace = task.mutable_trace();
+  for (const v1::Override& override : request.overrides) {
+    *trace->mutable_point()->add_overrides() = override;
+  }
+  trace->mutable_stream()->set_run_seed(settings.seed);
+  trace->mutable_stream()->set_birth_id(request.repeat.value_or(0));
+  trace->mutable_stream()->set_replicate(index);
+  trace->mutable_command()->set_name(command.name);
+  trace->mutable_command()->set_left(command.left);
+  trace->mutable_command()->set_right(command.right);
+  trace->mutable_command()->set_duration(command.duration_s);
+  trace->set_interval(settings.interval_s);
+  trace->set_noisy(request.repeat.has_value());
+  return task;
+}
+
+std::span<const PathPoint> first(const std::vector<PathPoint>& path, std::size_t samples) {
+  return std::span(path).first(std::min(samples, path.size()));
+}
+
+}  // namespace
+
+Result<std::vector<PathSet>> trace_paths(Farm& farm, const Problem& problem,
+                                         const TraceSettings& settings,
+                                         std::span<const TraceRequest> requests) {
+  std::vector<v1::Task> tasks;
+  for (const TraceRequest& request : requests) {
+    for (std::size_t c = 0; c < settings.commands.size(); ++c) {
+      tasks.push_back(trace_task(request, settings.commands[c], c, settings));
+    }
+  }
+  const auto results = farm.run(farm.add_problem(to_proto(problem)), tasks);
+  if (!results) return results.error();
+  std::vector<PathSet> sets(requests.size());
+  for (std::size_t i = 0; i < results->size(); ++i) {
+    const v1::TaskResult& result = (*results)[i];
+    if (result.outcome() == v1::INVALID_REQUEST)
+      return Error{"a worker refused: " + result.message()};
+    PathSet& set = sets[i / settings.commands.size()];
+    set.ok = set.ok && result.outcome() == v1::OK && result.trace().samples_size() > 0;
+    std::vector<PathPoint> path;
+    for (const v1::TraceSample& s : result.trace().samples()) {
+      path.emplace_back(s.pose().x(), s.pose().y(), s.height());
+      set.ok = set.ok && path.back().allFinite();
+    }
+    set.paths.push_back(std::move(path));
+  }
+  return sets;
+}
+
+std::span<const PathDistanceRow> path_distances() {
+  static constexpr std::array<PathDistanceRow, 3> rows = {{{"lettier", lettier_distance},
+                                                           {"hausdorff", hausdorff_distance},
+                                                           {"frechet", frechet_distance}}};
+  return rows;
+}
+
+double set_distance(const PathSet& a, const PathSet& b, PathDistance distance,
+                    std::size_t samples) {
+  double sum = 0;
+  for (std::size_t c = 0; c < a.paths.size(); ++c) {
+    sum += distance(first(a.paths[c], samples), first(b.paths[c], samples));
+  }
+  return sum / static_cast<double>(a.paths.size());
+}
+
+double set_extent(const PathSet& set, std::size_t samples) {
+  double extent = 0;
+  for (const std::vector<PathPoint>& path : set.paths) {
+    PathPoint low = path.front(), high = path.front();
+    for (const PathPoint& p : first(path, samples)) {
+      low = low.cwiseMin(p);
+      high = high.cwiseMax(p);
+    }
+    extent = std::max(extent, (high - low).maxCoeff());
+  }
+  return extent;
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,133 @@
+#include "master/influence/influence.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "common/config/config.h"
+#include "common/parameters/racquetball.h"
+#include "master/influence/stability.h"
+#include "tests/unit/blind/worker_farm.h"
+
+namespace gapfarm {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+const FactorInfluence& factor(const InfluenceReport& report, std::size_t row) {
+  for (const FactorInfluence& f : report.factors) {
+    if (f.gene.row == row) return f;
+  }
+  ADD_FAILURE() << "no row " << row;
+  return report.factors.front();
+}
+
+class RacquetballInfluence : public ::testing::Test {
+ protected:
+  Result<InfluenceReport> find(const std::string& genes, InfluenceSettings settings) {
+    config_ = parse_config("scenario = \"racquetball\"\n[genes]\n" + genes, "r.toml").value();
+    settings.trace.commands = config_.problem.commands;
+    return find_influence(farm_, config_.problem, config_.problem.genes, settings);
+  }
+
+  static InfluenceSettings small() {
+    InfluenceSettings settings;
+    settings.repeats = 10;
+    settings.levels = 3;
+    settings.trajectories = 10;
+    return settings;
+  }
+
+  ::gapfarm::testing::WorkerFarm farm_;
+  Config config_;
+};
+
+TEST_F(RacquetballInfluence, TellsWhatMattersFromWhatDoesNot) {
+  // The ball meets nothing in flight that spins it or that sleep could stop.
+  const auto report = find(
+      "gravity = [5, 15]\nlaunch_speed = [10, 30]\nsleep_linear = [0, 1]\n"
+      "rolling_friction = [0, 0.001]\nsolver_iterations = [8, 12]\n",
+      small());
+  ASSERT_TRUE(report.ok()) << report.error().message;
+  for (const auto matters : {Racquetball::kGravity, Racquetball::kLaunchSpeed}) {
+    EXPECT_TRUE(factor(*report, row_of(matters)).alone.influential);
+    EXPECT_TRUE(factor(*report, row_of(matters)).morris.influential);
+    EXPECT_GT(factor(*report, row_of(matters)).alone.distance, 10 * report->repeat_distance);
+  }
+  EXPECT_FALSE(factor(*report, row_of(Racquetball::kSleepLinear)).alone.influential);
+  EXPECT_FALSE(factor(*report, row_of(Racquetball::kSleepLinear)).morris.influential);
+  EXPECT_EQ(factor(*report, row_of(Racquetball::kSleepLinear)).morris.mean, 0);
+  EXPECT_FALSE(factor(*report, row_of(Racquetball::kSolverIterations)).alone.influential);
+
+  const ParameterTable& table = config_.problem.table();
+  const std::string genes = influential_genes(*report, table);
+  EXPECT_THAT(genes, HasSubstr("gravity = [5, 15]"));
+  EXPECT_THAT(genes, Not(HasSubstr("sleep_linear")));
+  EXPECT_TRUE(parse_config("scenario = \"racquetball\"\n" + genes, "again.toml").ok()) << genes;
+  EXPECT_THAT(influence_csv(*report, table), HasSubstr("\ngravity,5,15,"));
+  EXPECT_THAT(influence_page(*report, table, small(), "T"), HasSubstr("launch_speed"));
+}
+
+TEST_F(RacquetballInfluence, TheHorizonEndsWhereRepeatsPart) {
+  InfluenceSettings settings = small();
+  const auto calm = find("gravity = [5, 15]\n", settings);
+  ASSERT_TRUE(calm.ok());
+  settings.chaos_share = 1e-4;
+  const auto strict = find("gravity = [5, 15]\n", settings);
+  ASSERT_TRUE(strict.ok());
+  EXPECT_LT(strict->horizon_s, calm->horizon_s);
+  EXPECT_GT(calm->horizons.back().repeat_distance, calm->horizons.front().repeat_distance)
+      << "differences grow";
+  settings.horizon_s = 0.5;
+  EXPECT_EQ(find("gravity = [5, 15]\n", settings)->horizon_s, 0.5);
+}
+
+TEST(Influence, OfTheTrackedRobotKnowsWhatTreadsDoNotHave) {
+  ::gapfarm::testing::WorkerFarm farm;
+  const Config config =
+      parse_config(
+          "[parameters]\nstep_rate = 120\n[genes]\nfull_speed = [0.1, 0.5]\n"
+          "wheel_shape = \"table\"\nmotor_torque = \"table\"\npose_noise_heading = \"table\"\n",
+          "s.toml")
+          .value();
+  InfluenceSettings settings;
+  settings.repeats = 8;
+  settings.levels = 3;
+  settings.trajectories = 6;
+  settings.trace.commands = {config.problem.command("forward")};
+  const auto report = find_influence(farm, config.problem, config.problem.genes, settings);
+  ASSERT_TRUE(report.ok()) << report.error().message;
+  EXPECT_TRUE(factor(*report, row_of(Srv1::kFullSpeed)).alone.influential);
+  EXPECT_FALSE(factor(*report, row_of(Srv1::kWheelShape)).alone.influential);
+  EXPECT_FALSE(factor(*report, row_of(Srv1::kMotorTorque)).alone.influential);
+  EXPECT_EQ(factor(*report, row_of(Srv1::kMotorTorque)).morris.mean, 0);
+}
+
+TEST(EndSpread, IsTheScatterOfTheLastPoints) {
+  const auto at = [](double x) { return PathSet{true, {{{0, 0, 0}, {x, 0, 0}}}}; };
+  EXPECT_NEAR(*end_spread(std::vector{at(1), at(3)}), 1, 1e-12);
+  EXPECT_EQ(*end_spread(std::vector{at(2), at(2)}), 0);
+  EXPECT_EQ(end_spread(std::vector{at(2), PathSet{false, {}}}), std::nullopt);
+}
+
+TEST(Stability, FindsCalmerSettings) {
+  ::gapfarm::testing::WorkerFarm farm;
+  const Config config = parse_config(
+                            "scenario = \"racquetball\"\n[commands.serve]\nduration = 2.5\n"
+                            "[genes]\nball_restitution = [0.5, 1]\nlinear_damping = [0, 0.9]\n",
+                            "r.toml")
+                            .value();
+  StabilitySettings settings;
+  settings.trace.commands = config.problem.commands;
+  settings.repeats = 6;
+  settings.evaluations = 60;
+  settings.evolution.population = 12;
+  const auto report = find_stability(farm, config.problem, settings);
+  ASSERT_TRUE(report.ok()) << report.error().message;
+  EXPECT_LT(report->best.spread, *report->standard_spread);
+  EXPECT_LT(*report->best_fresh, *report->standard_fresh) << "not only on the repeats it saw";
+  EXPECT_GE(report->evaluations, 60U);
+}
+
+}  // namespace
+}  // namespace gapfarm
