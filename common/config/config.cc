@@ -61,6 +61,9 @@ Result<Config> parse_config(std::string_view text, const std::string& path) {
   read_optimiser(top, config.evolution.optimiser);
   read_farm(top, config.farm);
   read_simulate(top, problem.commands, config.simulate);
+  // Read by those who look at them: read_stages().
+  top.find("stages");
+  top.find("validation");
   top.finish();
   if (!errors.empty()) return errors.error();
   return config;

@@ -9,6 +9,7 @@
 #include "common/trials/context.h"
 #include "master/cli/inputs.h"
 #include "master/cli/subcommand.h"
+#include "master/cli/validation.h"
 
 namespace gapfarm {
 namespace {
@@ -151,8 +152,7 @@ std::string describe(const Config& config, const Summary& summary, unsigned work
 
 int run_check(const CheckOptions& options, CliContext& context) {
   Console& console = context.console;
-  const auto config = open_config(options.config, options.trials, console,
-                                  [](const Config& read) { return check_evolvable(read); });
+  const auto config = open_config(options.config, options.trials, console, check_runnable);
   if (!config) return kExitBadUsage;
   const unsigned workers = local_workers({}, config->farm);
   const Summary summary = summarise(config->problem);

@@ -7,9 +7,11 @@
 
 #include "master/cli/evolution_farm.h"
 #include "master/cli/leave_behind.h"
+#include "master/cli/validation.h"
 #include "master/evolve/evaluation.h"
 #include "master/evolve/evolve.h"
 #include "master/evolve/optimisers.h"
+#include "master/evolve/staged.h"
 
 namespace gapfarm {
 namespace {
@@ -25,9 +27,34 @@ class SteadyClock : public EvolveClock {
 };
 
 Result<std::unique_ptr<Optimiser>> optimiser_at(const std::optional<Checkpoint>& checkpoint,
-                                                const EvolutionRun& run) {
+                                                const EvolutionRun& run, const StagePlan& plan) {
   const OptimiserSetup setup = optimiser_setup(run.config.evolution, run.problem, run.config.seed);
+  if (!plan.stages.empty()) {
+    return checkpoint ? restore_staged(setup, plan.stages, checkpoint->optimiser_state)
+                      : make_staged(setup, plan.stages);
+  }
   return checkpoint ? restore_optimiser(setup, checkpoint->optimiser_state) : make_optimiser(setup);
+}
+
+// Tells how the run's results do on the trials that were kept apart.
+Status show_validation(RunStore& store, const EvolutionRun& run, const TrialLog& log, Farm& farm,
+                       const Genome& best, Console& console) {
+  const auto checkpoint = store.checkpoint();
+  if (!checkpoint) return checkpoint.error();
+  std::vector<Genome> stages;
+  if (*checkpoint) {
+    stages = stage_results((*checkpoint)->optimiser_state, run.problem.genes.size());
+  }
+  const auto rows = validate(farm, run.problem, log, stages, best);
+  if (!rows) return rows.error();
+  console.note(fmt::format("validation on {} trials kept apart, {}:", log.trials.size(),
+                           fitness_name(run.problem.fitness.kind)));
+  for (const Validated& row : *rows) {
+    console.note(
+        fmt::format("  {:<24} {}", row.name,
+                    row.fitness ? fmt::format("{:.6g}", *row.fitness) : "does not end well"));
+  }
+  return {};
 }
 
 // Says how the run ended, in the store and to the user.
@@ -107,7 +134,11 @@ EvolutionOverrides EvolutionOverrides::from_json(const std::string& text) {
 int run_evolution(RunStore& store, const EvolutionRun& run, CliContext& context) {
   const auto checkpoint = store.checkpoint();
   if (!checkpoint) return failed(checkpoint.error(), context);
-  auto optimiser = optimiser_at(*checkpoint, run);
+  const auto plan = read_stages(run.config);
+  if (!plan) return failed(plan.error(), context);
+  const auto kept_apart = read_validation(*plan, run.config);
+  if (!kept_apart) return failed(kept_apart.error(), context);
+  auto optimiser = optimiser_at(*checkpoint, run, *plan);
   if (!optimiser) return failed(optimiser.error(), context);
 
   SocketFarmOptions base;
@@ -146,6 +177,11 @@ int run_evolution(RunStore& store, const EvolutionRun& run, CliContext& context)
   if (summary->best && summary->best->outcome == v1::OK) {
     const Status left = leave_behind(store, run.problem, run.config, *summary, **farm);
     if (!left) return failed(left.error(), context);
+    if (*kept_apart) {
+      const Status shown =
+          show_validation(store, run, **kept_apart, **farm, summary->best->genome, context.console);
+      if (!shown) return failed(shown.error(), context);
+    }
     context.console.note("left behind: " + (store.run() / "model.toml").string() + ", " +
                          (store.run() / "poses.svg").string() + ", " +
                          (store.run() / "fitness.svg").string());

@@ -3,6 +3,7 @@
 
 #include "common/config/config.h"
 #include "master/cli/evolution.h"
+#include "master/cli/validation.h"
 
 namespace gapfarm {
 namespace {
@@ -40,7 +41,7 @@ int run_evolve(const EvolveCommand& command, CliContext& context) {
       open_config(command.config, command.trials, context.console, [&](Config& read) {
         command.overrides.apply(read.evolution);
         if (command.seed) read.seed = *command.seed;
-        if (Status s = check_evolvable(read); !s) return s;
+        if (Status s = check_runnable(read); !s) return s;
         return check_farm(command.farm, read.farm);
       });
   if (!config) return kExitBadUsage;

@@ -11,6 +11,8 @@ std::span<const Subcommand> subcommands() {
       {"compare", "run searches side by side over seeds", "Runs", setup_compare},
       {"simulate", "make a trial log from a parameter set", "Models", setup_simulate},
       {"predict", "say where every trial of a log should have ended", "Models", setup_predict},
+      {"determine", "say which parameters of a tuned model the data determine", "Models",
+       setup_determine},
       {"drive", "drive commands or way-points many times: bands, ellipses, distances", "Models",
        setup_drive},
       {"influence", "say which parameters move a path further than repeats do", "Models",

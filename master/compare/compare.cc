@@ -5,6 +5,7 @@
 
 #include "master/evolve/evaluation.h"
 #include "master/evolve/optimisers.h"
+#include "master/evolve/staged.h"
 
 namespace gapfarm {
 namespace {
@@ -18,7 +19,10 @@ class Lane {
                              std::uint64_t evaluations) {
     const OptimiserSetup setup =
         optimiser_setup(variant.config.evolution, variant.config.problem, seed);
-    auto optimiser = make_optimiser(setup);
+    const auto plan = read_stages(variant.config);
+    if (!plan) return plan.error();
+    auto optimiser =
+        plan->stages.empty() ? make_optimiser(setup) : make_staged(setup, plan->stages);
     if (!optimiser) return Error{"variant \"" + variant.name + "\": " + optimiser.error().message};
     Lane lane;
     lane.optimiser_ = *std::move(optimiser);

@@ -114,6 +114,7 @@ class Court {
     ball_ = std::make_unique<btRigidBody>(info);
     ball_->setLinearVelocity(to_bullet(s_.launch_m_s));
     ball_->setAngularVelocity(btVector3(s_.launch_spin_rad_s, 0, 0));
+    limit_speed();
     if (s_.anisotropic_friction != 1) {
       ball_->setAnisotropicFriction(btVector3(1, s_.anisotropic_friction, 1));
     }

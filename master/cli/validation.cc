@@ -1,0 +1,59 @@
+#include "master/cli/validation.h"
+
+#include <algorithm>
+#include <filesystem>
+
+#include "common/config/config.h"
+#include "common/trials/read.h"
+#include "master/cli/inputs.h"
+#include "master/evolve/evaluation.h"
+
+namespace gapfarm {
+
+Result<std::optional<TrialLog>> read_validation(const StagePlan& plan, const Config& config) {
+  if (plan.validation_files.empty()) return std::optional<TrialLog>();
+  for (const std::string& file : plan.validation_files) {
+    const auto same = [&](const std::string& other) {
+      std::error_code code;
+      return file == other || std::filesystem::equivalent(file, other, code);
+    };
+    if (std::any_of(config.trial_files.begin(), config.trial_files.end(), same)) {
+      return Error{file + " is both evolved on and kept apart; a validation takes other trials"};
+    }
+  }
+  auto log = read_trial_files(plan.validation_files, command_names(config.problem.commands));
+  if (!log) return log.error();
+  return std::optional<TrialLog>(*std::move(log));
+}
+
+Status check_runnable(const Config& config) {
+  if (Status s = check_evolvable(config); !s) return s;
+  const auto plan = read_stages(config);
+  if (!plan) return plan.error();
+  const auto log = read_validation(*plan, config);
+  return log ? Status() : Status(log.error());
+}
+
+Result<std::vector<Validated>> validate(Farm& farm, const Problem& problem, const TrialLog& log,
+                                        const std::vector<Genome>& stages, const Genome& best) {
+  Problem apart = problem;
+  apart.log = log;
+  std::vector<Validated> rows = {{"the config's own values", {}}};
+  std::vector<Genome> genomes = {{}};
+  for (std::size_t i = 0; i < stages.size(); ++i) {
+    rows.push_back({"after stage " + std::to_string(i + 1), {}});
+    genomes.push_back(stages[i]);
+  }
+  rows.push_back({"the best", {}});
+  genomes.push_back(best);
+  std::vector<v1::Task> tasks;
+  for (const Genome& genome : genomes) tasks.push_back(evaluation_task({0, 0, genome}, 0));
+  const auto results = farm.run(farm.add_problem(to_proto(apart)), tasks);
+  if (!results) return results.error();
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    if ((*results)[i].outcome() == v1::OK) rows[i].fitness = (*results)[i].evaluate().fitness();
+  }
+  return rows;
+}
+
+}  // namespace gapfarm

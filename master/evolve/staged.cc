@@ -1,0 +1,247 @@
+#include "master/evolve/staged.h"
+
+#include <cassert>
+#include <cmath>
+
+#include "gapfarm/v1/record.pb.h"
+#include "master/evolve/optimisers.h"
+
+namespace gapfarm {
+namespace {
+
+// What StagedState.kept holds, in its order.
+enum Kept : std::size_t {
+  kGenerations,
+  kEvaluations,
+  kBirths,
+  kLastImprovement,
+  kBestBirth,
+  kBestOutcome,
+  kBestCost,
+  kBestScores,
+  kKeptCount
+};
+
+bool better(const Member& a, const Member& b) {
+  if ((a.outcome == v1::OK) != (b.outcome == v1::OK)) return a.outcome == v1::OK;
+  return a.outcome == v1::OK && a.cost < b.cost;
+}
+
+class StagedOptimiser final : public Optimiser {
+ public:
+  StagedOptimiser(const OptimiserSetup& setup, std::vector<Stage> stages)
+      : setup_(setup), stages_(std::move(stages)) {}
+
+  Status begin() {
+    auto made = make_optimiser(stage_setup());
+    if (!made) return made.error();
+    inner_ = *std::move(made);
+    return {};
+  }
+
+  Status restore(std::string_view state) {
+    v1::StagedState message;
+    const std::size_t genes = setup_.genes.size();
+    if (!message.ParseFromArray(state.data(), static_cast<int>(state.size())) ||
+        message.stage() >= stages_.size() || message.kept_size() != kKeptCount ||
+        static_cast<std::size_t>(message.base_size()) != message.stage() * genes) {
+      return Error{
+          "the saved state of the stages is damaged or belongs to other stages; resume with "
+          "the config of the run"};
+    }
+    stage_ = message.stage();
+    results_ = stage_results(state, genes);
+    const auto kept = [&](Kept k) { return message.kept(static_cast<int>(k)); };
+    generations_ = static_cast<std::uint64_t>(kept(kGenerations));
+    evaluations_ = static_cast<std::uint64_t>(kept(kEvaluations));
+    births_ = static_cast<std::uint64_t>(kept(kBirths));
+    last_improvement_ = static_cast<std::uint64_t>(kept(kLastImprovement));
+    auto restored = restore_optimiser(stage_setup(), message.optimiser());
+    if (!restored) return restored.error();
+    inner_ = *std::move(restored);
+    if (stage_ > 0) {
+      kept_best_.birth_id = static_cast<std::uint64_t>(kept(kBestBirth));
+      kept_best_.outcome = static_cast<v1::Outcome>(static_cast<int>(kept(kBestOutcome)));
+      kept_best_.cost = kept(kBestCost);
+      kept_best_.scores = static_cast<unsigned>(kept(kBestScores));
+      kept_best_.genome = results_.back();
+      kept_best_.operators = "elite";
+    }
+    if (generation() > 0) update_best();
+    return {};
+  }
+
+  std::vector<Candidate> ask() override {
+    std::vector<Candidate> candidates = inner_->ask();
+    for (Candidate& candidate : candidates) {
+      candidate.birth_id += births_;
+      candidate.genome = completed(candidate.genome);
+    }
+    return candidates;
+  }
+
+  void tell(std::span<const Score> scores) override {
+    const bool first = generation() == 0;
+    const Member before = best_;
+    inner_->tell(scores);
+    update_best();
+    if (first || better(best_, before)) last_improvement_ = generation();
+    const bool over = inner_->evaluations() >= stages_[stage_].evaluations;
+    if (stage_ + 1 < stages_.size() && over) advance();
+  }
+
+  std::uint64_t generation() const override { return generations_ + inner_->generation(); }
+  std::uint64_t evaluations() const override { return evaluations_ + inner_->evaluations(); }
+  std::uint64_t last_improvement() const override { return last_improvement_; }
+  const Member& best() const override { return best_; }
+  double diversity() const override { return inner_->diversity(); }
+  std::vector<NamedNumber> operator_probabilities() const override {
+    std::vector<NamedNumber> all = inner_->operator_probabilities();
+    all.push_back({"stage", static_cast<double>(stage_ + 1)});
+    return all;
+  }
+
+  // Of the generation just completed; after a stage's last one, of the stage that ended.
+  std::vector<Member> members() const override {
+    if (inner_->generation() == 0) return last_members_;
+    std::vector<Member> members;
+    for (const Member& member : inner_->members()) members.push_back(completed(member));
+    if (stage_ > 0 && members.front().birth_id != best_.birth_id) {
+      members.insert(members.begin(), best_);
+    }
+    return members;
+  }
+
+  std::string state() const override {
+    v1::StagedState message;
+    message.set_stage(stage_);
+    message.set_optimiser(inner_->state());
+    for (const Genome& genome : results_) message.mutable_base()->Add(genome.begin(), genome.end());
+    const double kept[kKeptCount] = {static_cast<double>(generations_),
+                                     static_cast<double>(evaluations_),
+                                     static_cast<double>(births_),
+                                     static_cast<double>(last_improvement_),
+                                     static_cast<double>(kept_best_.birth_id),
+                                     static_cast<double>(kept_best_.outcome),
+                                     kept_best_.cost,
+                                     static_cast<double>(kept_best_.scores)};
+    message.mutable_kept()->Add(std::begin(kept), std::end(kept));
+    return message.SerializeAsString();
+  }
+
+ private:
+  const Genome& base() const { return results_.empty() ? setup_.nominal : results_.back(); }
+
+  OptimiserSetup stage_setup() const {
+    OptimiserSetup setup = setup_;
+    setup.genes.clear();
+    setup.nominal.clear();
+    for (const std::size_t gene : stages_[stage_].genes) {
+      setup.genes.push_back(setup_.genes[gene]);
+      setup.nominal.push_back(base()[gene]);
+    }
+    // Draws of its own: another stage with as many genes would repeat them.
+    setup.run_seed = setup_.run_seed + 0x9e3779b97f4a7c15u * stage_;
+    return setup;
+  }
+
+  Genome completed(const Genome& part) const {
+    Genome genome = base();
+    for (std::size_t i = 0; i < part.size(); ++i) genome[stages_[stage_].genes[i]] = part[i];
+    return genome;
+  }
+
+  Member completed(Member member) const {
+    member.genome = completed(member.genome);
+    member.birth_id += births_;
+    for (std::uint64_t& parent : member.parents) parent += births_;
+    return member;
+  }
+
+  void update_best() {
+    if (inner_->generation() == 0) {
+      best_ = kept_best_;
+      return;
+    }
+    const Member found = completed(inner_->best());
+    best_ = stage_ > 0 && better(kept_best_, found) ? kept_best_ : found;
+  }
+
+  void advance() {
+    last_members_ = members();
+    generations_ += inner_->generation();
+    evaluations_ += inner_->evaluations();
+    // Births are counted by the greatest that the stage could have given: one a score and
+    // duplicate.
+    for (const Member& member : last_members_) births_ = std::max(births_, member.birth_id + 1);
+    kept_best_ = best_;
+    kept_best_.operators = "elite";
+    results_.push_back(best_.genome);
+    ++stage_;
+    auto made = make_optimiser(stage_setup());
+    assert(made.ok() && "checked when the first stage was made");
+    inner_ = *std::move(made);
+  }
+
+  OptimiserSetup setup_;
+  std::vector<Stage> stages_;
+  std::size_t stage_ = 0;
+  std::vector<Genome> results_;  // of the completed stages
+  std::unique_ptr<Optimiser> inner_;
+  std::uint64_t generations_ = 0, evaluations_ = 0, births_ = 0;  // of the completed stages
+  std::uint64_t last_improvement_ = 0;
+  Member kept_best_;  // of the completed stages
+  Member best_;
+  std::vector<Member> last_members_;
+};
+
+Status check(const OptimiserSetup& setup, const std::vector<Stage>& stages) {
+  if (setup.nominal.size() != setup.genes.size()) {
+    return Error{"stages need the config's own values to begin with"};
+  }
+  // Every stage's own setup must be one that an optimiser takes.
+  for (const Stage& stage : stages) {
+    OptimiserSetup part = setup;
+    part.genes.clear();
+    part.nominal.clear();
+    for (const std::size_t gene : stage.genes) {
+      part.genes.push_back(setup.genes[gene]);
+      part.nominal.push_back(setup.nominal[gene]);
+    }
+    if (const auto made = make_optimiser(part); !made) return made.error();
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<std::unique_ptr<Optimiser>> make_staged(const OptimiserSetup& setup,
+                                               const std::vector<Stage>& stages) {
+  if (Status s = check(setup, stages); !s) return s.error();
+  auto optimiser = std::make_unique<StagedOptimiser>(setup, stages);
+  if (Status s = optimiser->begin(); !s) return s.error();
+  return std::unique_ptr<Optimiser>(std::move(optimiser));
+}
+
+Result<std::unique_ptr<Optimiser>> restore_staged(const OptimiserSetup& setup,
+                                                  const std::vector<Stage>& stages,
+                                                  std::string_view state) {
+  if (Status s = check(setup, stages); !s) return s.error();
+  auto optimiser = std::make_unique<StagedOptimiser>(setup, stages);
+  if (Status s = optimiser->restore(state); !s) return s.error();
+  return std::unique_ptr<Optimiser>(std::move(optimiser));
+}
+
+std::vector<Genome> stage_results(std::string_view state, std::size_t genes) {
+  v1::StagedState message;
+  std::vector<Genome> results;
+  if (genes == 0 || !message.ParseFromArray(state.data(), static_cast<int>(state.size())))
+    return {};
+  for (auto at = message.base().begin(); message.base().end() - at >= static_cast<long>(genes);
+       at += static_cast<long>(genes)) {
+    results.emplace_back(at, at + static_cast<long>(genes));
+  }
+  return results;
+}
+
+}  // namespace gapfarm
