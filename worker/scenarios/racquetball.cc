@@ -64,11 +64,13 @@ class RacquetballModel final : public ScenarioModel {
     return prediction;
   }
 
-  v1::TaskResult simulate(const ParameterValues&, const v1::SimulateTask&) const override {
+  v1::TaskResult simulate(const ParameterValues&, const v1::SimulateTask&,
+                          StepCounter*) const override {
     return no_trials();
   }
 
-  v1::TaskResult trace(const ParameterValues& values, const v1::TraceTask& task) const override {
+  v1::TaskResult trace(const ParameterValues& values, const v1::TraceTask& task,
+                       StepCounter* steps) const override {
     RacquetballSettings settings = settings_of(values);
     settings.launch_m_s *= (task.command().left() + task.command().right()) / 2;
     if (task.noisy()) {
@@ -81,7 +83,7 @@ class RacquetballModel final : public ScenarioModel {
         v += values[row_of(Racquetball::kLaunchNoise)] * stream.normal();
       }
     }
-    const BallFlight flight = fly_ball(settings, task.command().duration(), task.interval());
+    const BallFlight flight = fly_ball(settings, task.command().duration(), task.interval(), steps);
     v1::TaskResult result;
     result.set_outcome(flight.diverged ? v1::DIVERGED : v1::OK);
     result.set_simulated(task.command().duration());

@@ -210,7 +210,8 @@ class Court {
 
 }  // namespace
 
-BallFlight fly_ball(const RacquetballSettings& settings, double duration_s, double interval_s) {
+BallFlight fly_ball(const RacquetballSettings& settings, double duration_s, double interval_s,
+                    StepCounter* steps) {
   Court court(settings);
   BallFlight flight;
   const double dt_s = 1 / (settings.step_rate_hz * settings.sub_steps);
@@ -220,6 +221,7 @@ BallFlight fly_ball(const RacquetballSettings& settings, double duration_s, doub
   for (std::uint64_t step = 0; flight.path.size() <= samples; ++step) {
     const double t_s = static_cast<double>(step) * dt_s;
     court.step(t_s, dt_s);
+    count_step(steps);
     if (!court.sane()) {
       flight.diverged = true;
       break;

@@ -9,6 +9,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "worker/sim/step_counter.h"
+
 namespace gapfarm {
 
 enum class BallShape { kSphere, kBox, kHull };
@@ -60,6 +62,7 @@ struct BallFlight {
 
 // Flies for `duration_s`.  The same settings give the same bits.
 // REQUIRES: settings within the bounds of the parameter table, interval_s > 0.
-BallFlight fly_ball(const RacquetballSettings& settings, double duration_s, double interval_s);
+BallFlight fly_ball(const RacquetballSettings& settings, double duration_s, double interval_s,
+                    StepCounter* steps = nullptr);
 
 }  // namespace gapfarm
