@@ -34,4 +34,17 @@ inline const std::vector<std::string>& path_columns() {
   return names;
 }
 
+// Of a push log; the piece stands where a trial log has its command.
+inline const std::vector<std::string>& push_columns() {
+  static const std::vector<std::string> names = {"session", "trial", "object", "x0",    "y0",
+                                                 "theta0",  "x1",    "y1",     "theta1"};
+  return names;
+}
+
+enum TipColumn : std::size_t { kTipSession, kTipTrial, kTipTime, kTipX, kTipY };
+inline const std::vector<std::string>& tip_columns() {
+  static const std::vector<std::string> names = {"session", "trial", "t", "x", "y"};
+  return names;
+}
+
 }  // namespace gapfarm

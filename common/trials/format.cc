@@ -60,7 +60,7 @@ constexpr FormatWords kWords[] = {
     {TextFormat::kTrialLog, "a trial log", "give it as a trial file, it needs no import"},
     {TextFormat::kPaths, "the paths of a trial log",
      "name the trials.csv beside it; its paths.csv is read with it"},
-    {TextFormat::kPushLog, "a push log", "it belongs to scenario push, not to this one"},
+    {TextFormat::kPushLog, "a push log", "give it as a trial file to a config of scenario push"},
     {TextFormat::kTips, "the finger paths of a push log", "name the pushes.csv beside it"},
     {TextFormat::kBbautotune, "a bbautotune log", "run 'gapfarm import bbautotune $FILE'"},
     {TextFormat::kBlendersim, "a blendersim way-point log",

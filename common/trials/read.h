@@ -17,17 +17,25 @@ namespace gapfarm {
 Result<TrialLog> parse_trials(std::string_view text, const std::string& file,
                               std::span<const std::string> commands);
 
+// The text of a pushes.csv, without its tips.  `commands`: the names of the pieces.
+Result<TrialLog> parse_pushes(std::string_view text, const std::string& file,
+                              std::span<const std::string> commands);
+
 // Adds the text of a paths.csv to the trials it names.  Rows of trials that `log` does not hold are
 // left out, with a note: a log may be split while its paths are not.  On an error `log` is
 // unchanged.
 Status parse_paths(std::string_view text, const std::string& file, TrialLog& log);
 
+// The same of a tips.csv, whose times must increase.
+Status parse_tips(std::string_view text, const std::string& file, TrialLog& log);
+
 // A trials.csv with the paths.csv beside it, when there is one.
 Result<TrialLog> read_trials(const std::string& path, std::span<const std::string> commands);
 
-// Several files as one log, in the order given; each may be a trials.csv or a bbautotune run, told
-// apart by content.  A session split over files is put together in trial order.  Errors beside the
-// formats' own: no files, a (session, trial) in two files, a file of another format.
+// Several files as one log, in the order given; each may be a trials.csv, a pushes.csv (with the
+// tips.csv beside it) or a bbautotune run, told apart by content.  A session split over files is
+// put together in trial order.  Errors beside the formats' own: no files, a (session, trial) in two
+// files, a file of another format.
 Result<TrialLog> read_trial_files(std::span<const std::string> paths,
                                   std::span<const std::string> commands);
 

@@ -1,6 +1,7 @@
 // The words of a trial log (docs/formats.md).
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -15,6 +16,13 @@ struct PathSample {
   Pose pose;       // world frame
 };
 
+// The pushing finger on its recorded way.
+struct TipSample {
+  double t_s = 0;  // since the push began
+  double x = 0;    // m, world frame
+  double y = 0;
+};
+
 // One command driven once by the real robot.  Poses are measured, in the world frame.
 struct Trial {
   std::string session;
@@ -27,6 +35,7 @@ struct Trial {
   Pose X_WE;                          // after the robot came to rest
   std::vector<std::string> extra;     // values of TrialLog::extra_columns
   std::vector<PathSample> path;       // empty: not logged
+  std::vector<TipSample> tip;         // push logs only: what was done; times increase
 };
 
 // Trials in driving order within each session.
@@ -37,10 +46,12 @@ struct TrialLog {
   std::vector<std::string> notes;
 
   bool has_paths() const {
-    for (const Trial& trial : trials) {
-      if (!trial.path.empty()) return true;
-    }
-    return false;
+    return std::any_of(trials.begin(), trials.end(),
+                       [](const Trial& t) { return !t.path.empty(); });
+  }
+  // Whether it is a push log: its commands are pieces, and a finger's way comes with each trial.
+  bool has_tips() const {
+    return std::any_of(trials.begin(), trials.end(), [](const Trial& t) { return !t.tip.empty(); });
   }
 };
 

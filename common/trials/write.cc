@@ -27,6 +27,15 @@ std::string pose_fields(const Pose& pose) {
   return format_double(pose.x) + "," + format_double(pose.y) + "," + format_double(pose.theta);
 }
 
+// With the line's end.
+std::string extra_fields(const Trial& trial, const TrialLog& log) {
+  std::string text;
+  for (std::size_t i = 0; i < log.extra_columns.size(); ++i) {
+    text += "," + (i < trial.extra.size() ? csv_field(trial.extra[i]) : std::string());
+  }
+  return text + "\n";
+}
+
 bool is_finite(const Pose& pose) {
   return std::isfinite(pose.x) && std::isfinite(pose.y) && std::isfinite(pose.theta);
 }
@@ -37,6 +46,9 @@ bool is_finite(const Trial& trial) {
   }
   for (const PathSample& sample : trial.path) {
     if (!std::isfinite(sample.t_s) || !is_finite(sample.pose)) return false;
+  }
+  for (const TipSample& sample : trial.tip) {
+    if (!std::isfinite(sample.t_s + sample.x + sample.y)) return false;
   }
   return is_finite(trial.X_WS) && is_finite(trial.X_WE);
 }
@@ -60,9 +72,37 @@ Status check(const TrialLog& log, const std::string& path) {
   return {};
 }
 
+std::string format_pushes(const TrialLog& log) {
+  std::string text = header(push_columns());
+  for (const std::string& name : log.extra_columns) text += "," + csv_field(name);
+  text += "\n";
+  for (const Trial& trial : log.trials) {
+    text += csv_field(trial.session) + "," + std::to_string(trial.trial) + "," +
+            csv_field(trial.command) + "," + pose_fields(trial.X_WS) + "," +
+            pose_fields(trial.X_WE) + extra_fields(trial, log);
+  }
+  return text;
+}
+
+// Writes the samples of all trials, or makes sure that no other log's are read for them.
+Status write_beside(const TrialLog& log, const std::string& path, const char* name, bool any,
+                    std::string (*format)(const TrialLog&)) {
+  const std::filesystem::path beside = std::filesystem::path(path).parent_path() / name;
+  if (beside == std::filesystem::path(path)) {
+    return Error{path + ": " + name + " lies beside a log and is not one; choose another name"};
+  }
+  if (any) return write_file_atomically(beside.string(), format(log));
+  if (std::filesystem::exists(beside)) {
+    return Error{beside.string() + ": paths of another log would be read with " + path +
+                 "; remove them or write to another folder"};
+  }
+  return {};
+}
+
 }  // namespace
 
 std::string format_trials(const TrialLog& log) {
+  if (log.has_tips()) return format_pushes(log);
   std::string text = header(trial_columns());
   for (const std::string& name : log.extra_columns) text += "," + csv_field(name);
   text += "\n";
@@ -71,11 +111,7 @@ std::string format_trials(const TrialLog& log) {
             optional_double(trial.t_s) + "," + csv_field(trial.command) + "," +
             optional_double(trial.left) + "," + optional_double(trial.right) + "," +
             optional_double(trial.duration_s) + "," + pose_fields(trial.X_WS) + "," +
-            pose_fields(trial.X_WE);
-    for (std::size_t i = 0; i < log.extra_columns.size(); ++i) {
-      text += "," + (i < trial.extra.size() ? csv_field(trial.extra[i]) : std::string());
-    }
-    text += "\n";
+            pose_fields(trial.X_WE) + extra_fields(trial, log);
   }
   return text;
 }
@@ -91,20 +127,27 @@ std::string format_paths(const TrialLog& log) {
   return text;
 }
 
+std::string format_tips(const TrialLog& log) {
+  std::string text = header(tip_columns()) + "\n";
+  for (const Trial& trial : log.trials) {
+    const std::string key = csv_field(trial.session) + "," + std::to_string(trial.trial) + ",";
+    for (const TipSample& sample : trial.tip) {
+      text += key + format_double(sample.t_s) + "," + format_double(sample.x) + "," +
+              format_double(sample.y) + "\n";
+    }
+  }
+  return text;
+}
+
 Status write_trials(const TrialLog& log, const std::string& path) {
   Status good = check(log, path);
   if (!good.ok()) return good;
-  const std::filesystem::path beside = std::filesystem::path(path).parent_path() / "paths.csv";
-  if (beside == std::filesystem::path(path)) {
-    return Error{path + ": paths.csv holds the paths beside a trial log; choose another name"};
-  }
-  if (log.has_paths()) {
-    // Paths first: a reader that finds the new trials then finds their paths too.
-    Status status = write_file_atomically(beside.string(), format_paths(log));
-    if (!status.ok()) return status;
-  } else if (std::filesystem::exists(beside)) {
-    return Error{beside.string() + ": paths of another log would be read with " + path +
-                 "; remove them or write to another folder"};
+  // These first: a reader that finds the new trials then finds what belongs to them too.
+  Status paths = write_beside(log, path, "paths.csv", log.has_paths(), format_paths);
+  if (!paths.ok()) return paths;
+  if (log.has_tips()) {
+    Status tips = write_beside(log, path, "tips.csv", true, format_tips);
+    if (!tips.ok()) return tips;
   }
   return write_file_atomically(path, format_trials(log));
 }

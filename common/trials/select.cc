@@ -1,0 +1,70 @@
+#include "common/trials/select.h"
+
+#include <algorithm>
+
+#include "common/base/suggest.h"
+#include "common/trials/csv.h"
+
+namespace gapfarm {
+namespace {
+
+bool same(const std::string& a, const std::string& b) {
+  const auto x = parse_double(a);
+  const auto y = parse_double(b);
+  return x && y ? *x == *y : a == b;
+}
+
+std::vector<std::string> values_of(const std::string& list) {
+  std::vector<std::string> values;
+  std::size_t begin = 0;
+  while (begin <= list.size()) {
+    const std::size_t end = std::min(list.find(',', begin), list.size());
+    values.push_back(list.substr(begin, end - begin));
+    begin = end + 1;
+  }
+  return values;
+}
+
+}  // namespace
+
+Result<TrialColumnReader> trial_column_reader(const TrialLog& log, const std::string& column) {
+  if (column == "session") return TrialColumnReader([](const Trial& t) { return t.session; });
+  if (column == "trial") {
+    return TrialColumnReader([](const Trial& t) { return std::to_string(t.trial); });
+  }
+  if (column == "command" || column == "object") {
+    return TrialColumnReader([](const Trial& t) { return t.command; });
+  }
+  const auto& extra = log.extra_columns;
+  const auto found = std::find(extra.begin(), extra.end(), column);
+  if (found == extra.end()) {
+    std::vector<std::string> known = {"session", "trial", "command", "object"};
+    known.insert(known.end(), extra.begin(), extra.end());
+    return Error{"the log has no column '" + column + "'" + suggestion(column, known)};
+  }
+  const auto i = static_cast<std::size_t>(found - extra.begin());
+  return TrialColumnReader(
+      [i](const Trial& t) { return i < t.extra.size() ? t.extra[i] : std::string(); });
+}
+
+Result<TrialLog> select_trials(const TrialLog& log, std::span<const std::string> filters) {
+  TrialLog chosen = log;
+  for (const std::string& filter : filters) {
+    const std::size_t equals = filter.find('=');
+    if (equals == std::string::npos || equals == 0) {
+      return Error{filter + ": expected COLUMN=VALUE[,VALUE...]"};
+    }
+    const auto reader = trial_column_reader(log, filter.substr(0, equals));
+    if (!reader) return Error{filter + ": " + reader.error().message};
+    const std::vector<std::string> values = values_of(filter.substr(equals + 1));
+    std::erase_if(chosen.trials, [&](const Trial& trial) {
+      const std::string word = (*reader)(trial);
+      return std::none_of(values.begin(), values.end(),
+                          [&](const std::string& value) { return same(word, value); });
+    });
+    if (chosen.trials.empty()) return Error{filter + ": no trials are left"};
+  }
+  return chosen;
+}
+
+}  // namespace gapfarm
