@@ -54,7 +54,9 @@ Result<Config> parse_config(std::string_view text, const std::string& path) {
   read_parameters(top, table, problem.values);
   read_effects(top, table, problem.values);
   read_genes(top, table, problem.genes);
-  read_commands(top, problem.commands);
+  const ScenarioForm& form = scenario_form(problem.scenario);
+  read_pieces(top, form, problem.pieces, problem.commands);
+  if (!form.pieces) read_commands(top, problem.commands);
   read_fitness(top, problem.fitness);
   read_spread(top, problem.spread);
   read_evolution(top, config.evolution);

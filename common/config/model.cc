@@ -13,8 +13,6 @@
 namespace gapfarm {
 namespace {
 
-const std::vector<std::string> kScenarios = {"srv1"};
-
 // key = { value, unit, lo, hi }, or the bare value.
 void read_entry(TomlSection& section, const std::string& key, std::size_t row, Model& model) {
   const toml::node* node = section.find(key);
@@ -157,6 +155,7 @@ Problem problem_of(const Model& model) {
   problem.scenario = model.scenario;
   problem.values = model.values;
   problem.commands = model.commands;
+  problem.pieces = model.pieces;
   problem.fitness = model.fitness;
   problem.spread = model.spread;
   return problem;
@@ -185,7 +184,8 @@ Result<Model> parse_model(std::string_view text, const std::string& path) {
              "model is of another format version, expected 1; use the program that "
              "wrote it");
   }
-  const std::string scenario = kScenarios[top.choice("scenario", kScenarios).value_or(0)];
+  const std::string scenario =
+      scenario_names()[top.choice("scenario", scenario_names()).value_or(0)];
   Model model = *nominal_model(scenario);
   model.version.clear();
   model.fingerprint.clear();
@@ -193,7 +193,9 @@ Result<Model> parse_model(std::string_view text, const std::string& path) {
   read_base(top, "parameters", model);
   read_base(top, "noise", model);
   read_model_effects(top, model);
-  read_commands(top, model.commands);
+  const ScenarioForm& form = scenario_form(model.scenario);
+  read_pieces(top, form, model.pieces, model.commands);
+  if (!form.pieces) read_commands(top, model.commands);
   read_model_fitness(top, model);
   read_spread(top, model.spread);
   read_origin(top, model);

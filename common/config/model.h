@@ -38,6 +38,7 @@ struct Model {
   // none at all.
   std::vector<std::optional<Interval>> intervals;
   std::vector<CommandSpec> commands;  // the scenario's, in its order
+  std::vector<Piece> pieces;          // where the scenario has them
   FitnessSettings fitness;
   SpreadSettings spread;
   std::optional<double> score;  // fitness value on the data

@@ -59,9 +59,7 @@ std::string entry(const Model& model, std::size_t row, const std::string& key) {
   return text + " }  # " + parameter.summary + "\n";
 }
 
-bool is_noise(const Parameter& row) {
-  return row.key.rfind("drive_noise", 0) == 0 || row.key.rfind("pose_noise", 0) == 0;
-}
+bool is_noise(const Parameter& row) { return row.key.find("_noise_") != std::string::npos; }
 
 std::string base_section(const Model& model, const char* name, bool noise) {
   std::string text = std::string("\n[") + name + "]\n";
@@ -92,7 +90,24 @@ std::string effect_sections(const Model& model) {
   return text;
 }
 
+std::string piece_sections(const Model& model) {
+  std::string text;
+  for (const Piece& piece : model.pieces) {
+    std::string corners;
+    for (const Eigen::Vector2d& c : piece.corners) {
+      corners +=
+          (corners.empty() ? "[" : ", [") + toml_number(c[0]) + ", " + toml_number(c[1]) + "]";
+    }
+    text += "\n[[pieces]]\nname = " + toml_string(piece.name) + "\ncorners = [" + corners +
+            "]\nthickness = " + toml_number(piece.thickness_m) +
+            "\nmass = " + toml_number(piece.mass_kg) +
+            "\nsymmetry = " + std::to_string(piece.symmetry) + "\n";
+  }
+  return text;
+}
+
 std::string command_sections(const Model& model) {
+  if (scenario_form(model.scenario).pieces) return piece_sections(model);
   std::string text;
   for (const CommandSpec& command : model.commands) {
     text += "\n[commands." + command.name + "]\nleft = " + toml_number(command.left) +

@@ -4,9 +4,9 @@
 namespace gapfarm {
 
 const std::vector<std::string>& fitness_words() {
-  static const std::vector<std::string> words = {fitness_name(FitnessKind::kLogScore),
-                                                 fitness_name(FitnessKind::kRobustMahalanobis),
-                                                 fitness_name(FitnessKind::kEnergyScore)};
+  static const std::vector<std::string> words = {
+      fitness_name(FitnessKind::kLogScore), fitness_name(FitnessKind::kRobustMahalanobis),
+      fitness_name(FitnessKind::kEnergyScore), fitness_name(FitnessKind::kCornerDistance)};
   return words;
 }
 

@@ -11,6 +11,9 @@ void read_parameters(TomlSection& top, const ParameterTable& table, ParameterVal
 void read_effects(TomlSection& top, const ParameterTable& table, ParameterValues& values);
 void read_genes(TomlSection& top, const ParameterTable& table, std::vector<Gene>& genes);
 void read_commands(TomlSection& top, std::vector<CommandSpec>& commands);
+// [[pieces]], when the scenario's form has them; they become its commands.
+void read_pieces(TomlSection& top, const ScenarioForm& form, std::vector<Piece>& pieces,
+                 std::vector<CommandSpec>& commands);
 void read_fitness(TomlSection& top, FitnessSettings& fitness);
 void read_spread(TomlSection& top, SpreadSettings& spread);
 void read_evolution(TomlSection& top, EvolutionSettings& evolution);

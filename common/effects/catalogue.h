@@ -10,7 +10,7 @@
 namespace gapfarm {
 
 // Where in the chain from duty to logged pose an effect acts.
-enum class EffectStage { kDrive, kFloor, kCamera };
+enum class EffectStage { kDrive, kFloor, kCamera };  // in `push` the finger drives
 
 // What an effect looks at beside the command itself; conditions are shared over the rest.
 enum EffectContext : unsigned {
@@ -43,7 +43,9 @@ struct Effect {
   std::size_t strengths = 1;
 };
 
-// The catalogue of scenario `srv1`, in a fixed order.
+// The catalogue of each scenario, in a fixed order.  An effect of one name in two catalogues has
+// the same parameters in both and one implementation.
 std::span<const Effect> srv1_effects();
+std::span<const Effect> push_effects();
 
 }  // namespace gapfarm

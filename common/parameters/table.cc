@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "common/parameters/push.h"
 #include "common/parameters/racquetball.h"
 
 namespace gapfarm {
@@ -142,8 +143,8 @@ struct ScenarioTable {
   const char* scenario;
   const ParameterTable& (*table)();
 };
-constexpr ScenarioTable kScenarioTables[] = {{"srv1", srv1_table},
-                                             {"racquetball", racquetball_table}};
+constexpr ScenarioTable kScenarioTables[] = {
+    {"srv1", srv1_table}, {"push", push_table}, {"racquetball", racquetball_table}};
 
 Parameter effect_parameter(const Effect& effect, const EffectParameter& p) {
   return {effect.name + "." + p.key,

@@ -11,13 +11,21 @@ std::vector<CommandSpec> srv1_commands() {
           {"turn_cw", 0.3, -0.3, 1}, {"wide_ccw", 0.4, 1.0, 1}, {"wide_cw", 1.0, 0.4, 1}};
 }
 
+std::vector<CommandSpec> no_commands() { return {}; }
+
 std::vector<CommandSpec> racquetball_commands() { return {{"serve", 1, 1, 5}}; }
 
-constexpr ScenarioForm kForms[] = {{"srv1", srv1_commands}, {"racquetball", racquetball_commands}};
+constexpr ScenarioForm kForms[] = {{"srv1", srv1_commands},
+                                   {"push", no_commands, true},
+                                   {"racquetball", racquetball_commands}};
 
 }  // namespace
 
 bool higher_is_better(FitnessKind kind) { return kind == FitnessKind::kLogScore; }
+
+bool compares_means(FitnessKind kind) {
+  return kind == FitnessKind::kRobustMahalanobis || kind == FitnessKind::kCornerDistance;
+}
 
 const char* fitness_name(FitnessKind kind) {
   switch (kind) {
@@ -27,6 +35,21 @@ const char* fitness_name(FitnessKind kind) {
       return "robust_mahalanobis";
     case FitnessKind::kEnergyScore:
       return "energy_score";
+    case FitnessKind::kCornerDistance:
+      return "corner_distance";
+  }
+  return "?";
+}
+
+const char* fitness_unit(FitnessKind kind) {
+  switch (kind) {
+    case FitnessKind::kLogScore:
+      return "nats/trial";
+    case FitnessKind::kRobustMahalanobis:
+      return "-";
+    case FitnessKind::kEnergyScore:
+    case FitnessKind::kCornerDistance:
+      return "m";
   }
   return "?";
 }
@@ -45,6 +68,14 @@ const CommandSpec& Problem::command(std::string_view name) const {
   }
   assert(false && "commands are checked when trials are read");
   return commands.front();
+}
+
+const Piece& Problem::piece(std::string_view name) const {
+  for (const Piece& piece : pieces) {
+    if (piece.name == name) return piece;
+  }
+  assert(false && "pieces are checked when trials are read");
+  return pieces.front();
 }
 
 const ScenarioForm& scenario_form(std::string_view scenario) {

@@ -8,6 +8,7 @@
 #include "common/base/result.h"
 #include "common/parameters/genome.h"
 #include "common/parameters/table.h"
+#include "common/problem/piece.h"
 #include "common/trials/trial.h"
 #include "gapfarm/v1/problem.pb.h"
 
@@ -21,7 +22,7 @@ struct CommandSpec {
   double duration_s = 1;
 };
 
-enum class FitnessKind { kLogScore, kRobustMahalanobis, kEnergyScore };
+enum class FitnessKind { kLogScore, kRobustMahalanobis, kEnergyScore, kCornerDistance };
 
 struct FitnessSettings {
   FitnessKind kind = FitnessKind::kLogScore;
@@ -35,7 +36,11 @@ struct FitnessSettings {
 
 // Whether a greater fitness is the better one.
 bool higher_is_better(FitnessKind kind);
+// Whether it compares one nominal motion a trial; spread would only cost time.
+bool compares_means(FitnessKind kind);
 const char* fitness_name(FitnessKind kind);
+// Of a fitness value: "m", "nats/trial", "-".
+const char* fitness_unit(FitnessKind kind);
 
 enum class SpreadKind { kCubature, kSampled };
 
@@ -52,6 +57,7 @@ struct Problem {
   ParameterValues values;  // one a row of the table
   std::vector<Gene> genes;
   std::vector<CommandSpec> commands;
+  std::vector<Piece> pieces;  // of a scenario whose form has them: one a command, in its order
   FitnessSettings fitness;
   SpreadSettings spread;
   TrialLog log;
@@ -61,13 +67,17 @@ struct Problem {
   ParameterValues values_of(const Genome& genome) const;
   // REQUIRES: the command exists.
   const CommandSpec& command(std::string_view name) const;
+  // REQUIRES: the scenario's form has pieces and one of this name.
+  const Piece& piece(std::string_view name) const;
 };
 
 // What configs and logs of a scenario hold beside its parameters.
 struct ScenarioForm {
   const char* name;
-  // In canonical order with their default duties and durations.
+  // In canonical order with their default duties and durations; none where pieces are the commands.
   std::vector<CommandSpec> (*commands)();
+  // Trials name pieces of the config and come with the way of a finger.
+  bool pieces = false;
 };
 // REQUIRES: a scenario that has a parameter table.
 const ScenarioForm& scenario_form(std::string_view scenario);
@@ -83,6 +93,8 @@ Result<Problem> from_proto(const v1::Problem& message);
 
 v1::Pose to_proto(const Pose& pose);
 Pose from_proto(const v1::Pose& pose);
+v1::Piece to_proto(const Piece& piece);
+Piece from_proto(const v1::Piece& message);
 v1::Trial to_proto(const Trial& trial);
 Trial from_proto(const v1::Trial& trial);
 

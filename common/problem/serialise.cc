@@ -87,6 +87,46 @@ Status read_values(const v1::Problem& message, Problem* problem) {
   return {};
 }
 
+Status read_pieces(const v1::Problem& message, Problem* problem) {
+  const bool wanted = scenario_form(problem->scenario).pieces;
+  if (wanted != (message.pieces_size() > 0)) {
+    return invalid("scenario '" + problem->scenario + "' " + (wanted ? "needs" : "has no") +
+                   " pieces");
+  }
+  for (const v1::Piece& p : message.pieces()) {
+    Piece piece = from_proto(p);
+    if (p.x_size() != p.y_size()) return invalid("piece '" + p.name() + "' has half a corner");
+    if (Status s = check_piece(piece); !s) return invalid(s.error().message);
+    problem->pieces.push_back(std::move(piece));
+  }
+  if (!wanted) return {};
+  for (std::size_t i = 0; i < problem->commands.size(); ++i) {
+    if (i < problem->pieces.size() && problem->commands[i].name == problem->pieces[i].name)
+      continue;
+    return invalid("command '" + problem->commands[i].name + "' is not the piece in its place");
+  }
+  return {};
+}
+
+// A finger's way, where the scenario has pieces.
+Status check_tip(const Trial& trial, bool wanted, const std::string& where) {
+  if (!wanted) return {};
+  if (trial.tip.size() < 2) {
+    return invalid(where + ": has " + std::to_string(trial.tip.size()) +
+                   " samples of the finger's way, expected at least 2; are they in tips.csv?");
+  }
+  for (std::size_t i = 0; i < trial.tip.size(); ++i) {
+    const TipSample& s = trial.tip[i];
+    if (!std::isfinite(s.t_s + s.x + s.y) || (i > 0 && !(s.t_s > trial.tip[i - 1].t_s))) {
+      return invalid(where + ": the finger's way needs finite samples at increasing times");
+    }
+  }
+  const double lasts_s = trial.tip.back().t_s - trial.tip.front().t_s;
+  if (lasts_s <= 120) return {};
+  return invalid(where + ": the finger's way takes " + std::to_string(lasts_s) +
+                 " s, expected up to 120 s; t is in s");
+}
+
 Status read_commands(const v1::Problem& message, Problem* problem) {
   for (const v1::Command& c : message.commands()) {
     const bool duties = std::abs(c.left()) <= 1 && std::abs(c.right()) <= 1;
@@ -118,6 +158,7 @@ Status read_trials(const v1::Problem& message, Problem* problem) {
     if (!bounded || !std::isfinite(trial.t_s.value_or(0))) {
       return invalid(where + ": needs duties in [-1, 1], a duration in [0, 60] s and a finite t");
     }
+    if (Status s = check_tip(trial, !problem->pieces.empty(), where); !s) return s;
     problem->log.trials.push_back(std::move(trial));
   }
   return {};
@@ -135,6 +176,27 @@ v1::Pose to_proto(const Pose& pose) {
 
 Pose from_proto(const v1::Pose& pose) { return {pose.x(), pose.y(), pose.theta()}; }
 
+v1::Piece to_proto(const Piece& piece) {
+  v1::Piece message;
+  message.set_name(piece.name);
+  for (const Eigen::Vector2d& corner : piece.corners) {
+    message.add_x(corner[0]);
+    message.add_y(corner[1]);
+  }
+  message.set_thickness(piece.thickness_m);
+  message.set_mass(piece.mass_kg);
+  message.set_symmetry(piece.symmetry);
+  return message;
+}
+
+Piece from_proto(const v1::Piece& message) {
+  Piece piece{message.name(), {}, message.thickness(), message.mass(), message.symmetry()};
+  for (int i = 0; i < std::min(message.x_size(), message.y_size()); ++i) {
+    piece.corners.emplace_back(message.x(i), message.y(i));
+  }
+  return piece;
+}
+
 v1::Trial to_proto(const Trial& trial) {
   v1::Trial message;
   message.set_session(trial.session);
@@ -150,6 +212,12 @@ v1::Trial to_proto(const Trial& trial) {
     v1::PathSample* to = message.add_path();
     to->set_t(sample.t_s);
     *to->mutable_pose() = to_proto(sample.pose);
+  }
+  for (const TipSample& sample : trial.tip) {
+    v1::TipSample* to = message.add_tip();
+    to->set_t(sample.t_s);
+    to->set_x(sample.x);
+    to->set_y(sample.y);
   }
   return message;
 }
@@ -167,6 +235,9 @@ Trial from_proto(const v1::Trial& message) {
   trial.X_WE = from_proto(message.end());
   for (const v1::PathSample& sample : message.path()) {
     trial.path.push_back({sample.t(), from_proto(sample.pose())});
+  }
+  for (const v1::TipSample& sample : message.tip()) {
+    trial.tip.push_back({sample.t(), sample.x(), sample.y()});
   }
   return trial;
 }
@@ -192,6 +263,7 @@ v1::Problem to_proto(const Problem& problem) {
   write_fitness(problem.fitness, message.mutable_fitness());
   message.mutable_spread()->set_kind(static_cast<v1::Spread::Kind>(problem.spread.kind));
   message.mutable_spread()->set_replicates(problem.spread.replicates);
+  for (const Piece& piece : problem.pieces) *message.add_pieces() = to_proto(piece);
   for (const Trial& trial : problem.log.trials) *message.add_trials() = to_proto(trial);
   return message;
 }
@@ -202,11 +274,16 @@ Result<Problem> from_proto(const v1::Problem& message) {
   if (auto table = parameter_table(problem.scenario); !table) return table.error();
   if (Status s = read_values(message, &problem); !s) return s.error();
   if (Status s = read_commands(message, &problem); !s) return s.error();
+  if (Status s = read_pieces(message, &problem); !s) return s.error();
   if (!v1::Fitness::Kind_IsValid(message.fitness().kind()) ||
       !v1::Spread::Kind_IsValid(message.spread().kind())) {
     return invalid("unknown kind of fitness or spread; master and worker must be the same build");
   }
   problem.fitness = read_fitness(message.fitness());
+  if (problem.fitness.kind == FitnessKind::kCornerDistance && problem.pieces.empty()) {
+    return invalid("fitness corner_distance needs pieces, which scenario '" + problem.scenario +
+                   "' does not have; choose another");
+  }
   problem.spread = {static_cast<SpreadKind>(message.spread().kind()),
                     message.spread().replicates()};
   if (Status s = check_score(problem.fitness, problem.spread); !s) return s.error();
