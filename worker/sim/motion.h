@@ -62,6 +62,10 @@ struct Floor {
   double rolling_resistance = 0;  // drag opposing motion along the body's x, share of weight
   double patch_x_m = 0, patch_y_m = 0, patch_radius_m = 0;
   double patch_ratio = 1;  // friction inside the disc over friction outside
+  // pieces only
+  double grain_ratio = 1;  // friction across over along the grain; their geometric mean stays
+  double grain_direction_rad = 0;
+  double speed_slope_s_m = 0;  // share of friction gained a m/s of sliding speed
 };
 
 enum class MotionOutcome { kOk, kDiverged, kFellOver, kNeverRested };

@@ -4,62 +4,14 @@
 #include <cmath>
 
 #include "worker/sim/drive.h"
+#include "worker/sim/observe.h"
 #include "worker/sim/step_plan.h"
 #include "worker/sim/world.h"
 
 namespace gapfarm {
 namespace {
 
-// At rest: slower than these, as seen from one step to the next, for kRestTime_s on end.
-constexpr double kRestSpeed_m_s = 1e-3;
-constexpr double kRestTurn_rad_s = 1e-2;
-constexpr double kRestTime_s = 0.05;
 constexpr double kTimeSlack_s = 1e-9;  // rounding of step times
-// A robot that still moves this long after its treads have stopped never rests.
-constexpr double kSettleLimit_s = 3;
-// Faster than any parameter could make the robot: the integration has failed.
-constexpr double kDivergedSpeed_m_s = 20;
-constexpr double kDivergedTurn_rad_s = 500;
-const double kFallenSine = std::sin(M_PI / 4);  // of roll or pitch
-
-// NaN and infinity fail every comparison that holds.
-bool is_sane(const btRigidBody& body) {
-  return body.getLinearVelocity().length2() < kDivergedSpeed_m_s * kDivergedSpeed_m_s &&
-         body.getAngularVelocity().length2() < kDivergedTurn_rad_s * kDivergedTurn_rad_s;
-}
-
-bool has_fallen(const btMatrix3x3& R_SB) {
-  return std::abs(R_SB[2][0]) > kFallenSine || std::abs(R_SB[2][1]) > kFallenSine || R_SB[2][2] < 0;
-}
-
-// Velocities would not do: a loaded soft contact sinks at a millimetre a second while the split
-// impulse lifts it by as much, so the robot stands still with a velocity.
-bool is_still(const btTransform& before, const btTransform& now, double dt_s) {
-  const double shift = kRestSpeed_m_s * dt_s;
-  const double turn = kRestTurn_rad_s * dt_s;
-  const btMatrix3x3& R0 = before.getBasis();
-  const btMatrix3x3& R1 = now.getBasis();
-  return (now.getOrigin() - before.getOrigin()).length2() < shift * shift &&
-         (R1.getColumn(0) - R0.getColumn(0)).length2() < turn * turn &&
-         (R1.getColumn(2) - R0.getColumn(2)).length2() < turn * turn;
-}
-
-double clamped_asin(double sine) { return std::asin(std::clamp(sine, -1.0, 1.0)); }
-
-MotionSample blend(const MotionSample& a, const MotionSample& b, double t_s) {
-  const double f = b.t_s > a.t_s ? (t_s - a.t_s) / (b.t_s - a.t_s) : 1;
-  const auto mix = [f](double from, double to) { return from + f * (to - from); };
-  MotionSample sample;
-  sample.t_s = t_s;
-  sample.X_SB.x = mix(a.X_SB.x, b.X_SB.x);
-  sample.X_SB.y = mix(a.X_SB.y, b.X_SB.y);
-  sample.X_SB.theta = wrap_angle(a.X_SB.theta + f * wrap_angle(b.X_SB.theta - a.X_SB.theta));
-  sample.height_m = mix(a.height_m, b.height_m);
-  sample.roll_rad = mix(a.roll_rad, b.roll_rad);
-  sample.pitch_rad = mix(a.pitch_rad, b.pitch_rad);
-  sample.kinetic_energy_j = mix(a.kinetic_energy_j, b.kinetic_energy_j);
-  return sample;
-}
 
 }  // namespace
 
@@ -137,7 +89,7 @@ Motion Simulator::Impl::run(const DriveInput& drive, const Floor& floor,
     const bool stopped = t >= still_s - kTimeSlack_s;
     t = plan.end_s();
     const btTransform& now = body.getWorldTransform();
-    if (!is_sane(body)) {
+    if (!is_sane(body.getLinearVelocity(), body.getAngularVelocity())) {
       motion.outcome = MotionOutcome::kDiverged;
       break;
     }

@@ -6,7 +6,7 @@
 namespace gapfarm {
 namespace {
 
-// The moving side of a contact row; the floor's side has neither mass nor velocity.
+// The moving side of a contact row; the other side, floor or finger, is moved by no impulse.
 struct MovingSide {
   btSolverBody& body;
   const btVector3& linear;   // direction of the row
@@ -35,11 +35,20 @@ struct MovingSide {
 
 MovingSide moving_side(btAlignedObjectArray<btSolverBody>& bodies, const btSolverConstraint& row) {
   btSolverBody& a = bodies[row.m_solverBodyIdA];
-  if (a.m_originalBody != nullptr) {
+  if (a.internalGetInvMass().x() != 0) {
     return {a, row.m_contactNormal1, row.m_relpos1CrossNormal, row.m_angularComponentA};
   }
   return {bodies[row.m_solverBodyIdB], row.m_contactNormal2, row.m_relpos2CrossNormal,
           row.m_angularComponentB};
+}
+
+// Whether one side moves as it is told, whatever pushes back.
+bool is_driven(btAlignedObjectArray<btSolverBody>& bodies, const btSolverConstraint& row) {
+  for (const int id : {row.m_solverBodyIdA, row.m_solverBodyIdB}) {
+    const btRigidBody* body = bodies[id].m_originalBody;
+    if (body != nullptr && body->isKinematicObject()) return true;
+  }
+  return false;
 }
 
 // The impulses (p1, p2) that minimise a1 (p1 - free1)^2 + a2 (p2 - free2)^2, where a is the inverse
@@ -113,14 +122,21 @@ void EllipseFrictionSolver::convertContacts(btPersistentManifold** manifolds, in
                                             const btContactSolverInfo& info) {
   btSequentialImpulseConstraintSolver::convertContacts(manifolds, count, info);
   for (int c = 0; c < m_tmpSolverContactConstraintPool.size(); ++c) {
-    const btSolverConstraint& normal = m_tmpSolverContactConstraintPool[c];
+    btSolverConstraint& normal = m_tmpSolverContactConstraintPool[c];
     const auto& point = *static_cast<const btManifoldPoint*>(normal.m_originalContactPoint);
+    if ((point.m_contactPointFlags & BT_CONTACT_FLAG_HAS_CONTACT_ERP) != 0) {
+      // A spring pushes with the body's velocity, not beside it as the repair of depth does.
+      normal.m_rhs += normal.m_rhsPenetration;
+      normal.m_rhsPenetration = 0;
+    }
     for (int d = 0; d < 2; ++d) {
       btSolverConstraint& row =
           m_tmpSolverContactFrictionConstraintPool[normal.m_frictionIndex + d];
       row.m_appliedImpulse = info.m_warmstartingFactor * (d == 0 ? point.m_appliedImpulseLateral1
                                                                  : point.m_appliedImpulseLateral2);
       moving_side(m_tmpSolverBodyPool, row).apply(row.m_appliedImpulse);
+      // The first row holds the friction, the second the ratio; only the table has a grain.
+      if (d == 1) row.m_friction = is_driven(m_tmpSolverBodyPool, row) ? 1 : ratio_;
     }
   }
 }
@@ -186,11 +202,12 @@ double EllipseFrictionSolver::solve_friction() {
     double p2 = old_2 + rows[1].m_rhs - side_2.velocity() * rows[1].m_jacDiagABInv;
     const double a1 = 1 / rows[0].m_jacDiagABInv;
     const double a2 = 1 / rows[1].m_jacDiagABInv;
+    const double ratio = rows[1].m_friction;
     const double radius = rows[0].m_friction * normal.m_appliedImpulse;
     if (rows[0].m_cfm > 0) {
-      creep_within_ellipse(a1, a2, ratio_, radius, rows[0].m_cfm, p1, p2);
+      creep_within_ellipse(a1, a2, ratio, radius, rows[0].m_cfm, p1, p2);
     } else {
-      project_onto_ellipse(a1, a2, ratio_, radius, p1, p2);
+      project_onto_ellipse(a1, a2, ratio, radius, p1, p2);
     }
     rows[0].m_appliedImpulse = p1;
     rows[1].m_appliedImpulse = p2;

@@ -16,11 +16,14 @@
 
 namespace gapfarm {
 
-// REQUIRES: one side of every contact is static, two friction directions, warm starting.
+// REQUIRES: one side of every contact is static or kinematic, two friction directions, warm
+// starting.
 class EllipseFrictionSolver final : public btSequentialImpulseConstraintSolver {
  public:
   // `friction_ratio`: friction along m_lateralFrictionDir2 over friction along Dir1, > 0.
+  // Contacts with a kinematic body have none.
   explicit EllipseFrictionSolver(double friction_ratio) : ratio_(friction_ratio) {}
+  void set_friction_ratio(double ratio) { ratio_ = ratio; }
 
   void reset() override;
 

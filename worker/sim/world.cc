@@ -48,13 +48,13 @@ double body_kinetic_energy(const btRigidBody& body) {
   return energy / 2;
 }
 
-WorldParts::WorldParts(const SimSettings& settings)
-    : configuration(small_pools()), dispatcher(&configuration), solver(settings.friction_ratio) {
+WorldParts::WorldParts(double friction_ratio)
+    : configuration(small_pools()), dispatcher(&configuration), solver(friction_ratio) {
   dispatcher.setDispatcherFlags(0);  // breaking distance absolute: it must not depend on shapes
 }
 
 RobotWorld::RobotWorld(const SimSettings& settings)
-    : WorldParts(settings),
+    : WorldParts(settings.friction_ratio),
       btDiscreteDynamicsWorld(&dispatcher, &broadphase, &solver, &configuration),
       settings_(settings),
       damped_(settings.linear_damping > 0 || settings.angular_damping > 0),

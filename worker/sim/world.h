@@ -47,7 +47,7 @@ double body_kinetic_energy(const btRigidBody& body);
 
 // What Bullet's world is built from; a base class so that it outlives the world.
 struct WorldParts {
-  explicit WorldParts(const SimSettings& settings);
+  explicit WorldParts(double friction_ratio);
 
   btDefaultCollisionConfiguration configuration;
   btCollisionDispatcher dispatcher;

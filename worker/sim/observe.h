@@ -1,0 +1,31 @@
+// What is read off a body between two steps: whether it is sound, stands, rests, and where it is.
+#pragma once
+
+#include "worker/sim/bullet.h"
+#include "worker/sim/motion.h"
+
+namespace gapfarm {
+
+// At rest: slower than these, as seen from one step to the next, for kRestTime_s on end.
+inline constexpr double kRestSpeed_m_s = 1e-3;
+inline constexpr double kRestTurn_rad_s = 1e-2;
+inline constexpr double kRestTime_s = 0.05;
+// What still moves this long after its drive has stopped never rests.
+inline constexpr double kSettleLimit_s = 3;
+
+// False when the integration has failed: a velocity (m/s, rad/s) is not finite or faster than any
+// parameter could make it.
+bool is_sane(const btVector3& velocity, const btVector3& spin);
+
+// Whether roll or pitch is beyond 45 degrees.
+bool has_fallen(const btMatrix3x3& R_SB);
+
+// Lengths of the transforms in m.
+bool is_still(const btTransform& before, const btTransform& now, double dt_s);
+
+double clamped_asin(double sine);
+
+// The sample between two others at `t_s`.
+MotionSample blend(const MotionSample& a, const MotionSample& b, double t_s);
+
+}  // namespace gapfarm
