@@ -68,8 +68,7 @@ v1::TaskResult run(const Prepared& p, const ParameterValues& values, const v1::E
   PredictOptions options;
   options.stream = task.stream();
   options.steps = steps;
-  // The thesis's fitness compares one nominal motion; spread would only cost time.
-  options.means_only = p.problem().fitness.kind == FitnessKind::kRobustMahalanobis;
+  options.means_only = compares_means(p.problem().fitness.kind);
   const Prediction prediction = p.model().predict(values, options);
   if (prediction.outcome != v1::OK) return failed(prediction.outcome, prediction.message);
   auto fitness = fitness_of(p.problem(), p.reference(), prediction);

@@ -46,6 +46,16 @@ Result<double> mean_energy_score(const Problem& problem, const Prediction& predi
   return energy_score(trials);
 }
 
+double mean_corner_distance(const Problem& problem, const Prediction& prediction) {
+  double sum = 0;
+  for (std::size_t i = 0; i < prediction.trials.size(); ++i) {
+    const Trial& trial = problem.log.trials[i];
+    sum += corner_distance(problem.piece(trial.command), collapsed(prediction.trials[i]).X_WM,
+                           trial.X_WE);
+  }
+  return sum / static_cast<double>(prediction.trials.size());
+}
+
 Result<RobustFitness> robust_score(const Problem& problem, const FitnessReference& reference,
                                    const Prediction& prediction) {
   std::vector<SimulatedMotion> simulated;
@@ -137,6 +147,9 @@ Result<v1::EvaluateResult> fitness_of(const Problem& problem, const FitnessRefer
       result.set_fitness(*score);
       break;
     }
+    case FitnessKind::kCornerDistance:
+      result.set_fitness(mean_corner_distance(problem, prediction));
+      break;
     case FitnessKind::kRobustMahalanobis: {
       const auto score = robust_score(problem, reference, prediction);
       if (!score) return score.error();

@@ -5,15 +5,25 @@
 
 namespace gapfarm {
 
+namespace {
+
+const EffectBehaviour* behaviour_of(const std::string& effect) {
+  for (const EffectBehaviour* behaviour : effect_behaviours()) {
+    if (behaviour->name == effect) return behaviour;
+  }
+  assert(false && "an effect of a catalogue without an implementation");
+  return nullptr;
+}
+
+}  // namespace
+
 ActiveEffects::ActiveEffects(const ParameterTable& table, const ParameterValues& values) {
-  const auto behaviours = effect_behaviours();
-  assert(behaviours.size() == table.effects().size());
-  for (std::size_t e = 0; e < behaviours.size(); ++e) {
+  for (std::size_t e = 0; e < table.effects().size(); ++e) {
     if (table.is_neutral(e, values)) continue;
     const Effect& effect = table.effects()[e];
     const auto first = values.begin() + static_cast<std::ptrdiff_t>(table.effect_row(e));
-    active_.push_back(
-        {behaviours[e], {first, first + static_cast<std::ptrdiff_t>(effect.parameters.size())}});
+    active_.push_back({behaviour_of(effect.name),
+                       {first, first + static_cast<std::ptrdiff_t>(effect.parameters.size())}});
     if (effect.stage != EffectStage::kCamera) motion_context_ |= effect.context;
   }
 }
@@ -21,6 +31,12 @@ ActiveEffects::ActiveEffects(const ParameterTable& table, const ParameterValues&
 void ActiveEffects::settings(SimSettings& settings) const {
   for (const Active& a : active_) {
     if (a.behaviour->settings) a.behaviour->settings(a.values, settings);
+  }
+}
+
+void ActiveEffects::push(PushSettings& settings) const {
+  for (const Active& a : active_) {
+    if (a.behaviour->push) a.behaviour->push(a.values, settings);
   }
 }
 
@@ -50,6 +66,20 @@ Pose ActiveEffects::recover(Pose X_WM) const {
     if (a.behaviour->recover) X_WM = a.behaviour->recover(a.values, X_WM);
   }
   return X_WM;
+}
+
+Pose ActiveEffects::place(Pose X_WR) const {
+  for (const Active& a : active_) {
+    if (a.behaviour->place) X_WR = a.behaviour->place(a.values, X_WR);
+  }
+  return X_WR;
+}
+
+Pose ActiveEffects::unplace(Pose X_WR) const {
+  for (auto a = active_.rbegin(); a != active_.rend(); ++a) {
+    if (a->behaviour->unplace) X_WR = a->behaviour->unplace(a->values, X_WR);
+  }
+  return X_WR;
 }
 
 std::vector<DriveBranch> ActiveEffects::branches() const {

@@ -17,6 +17,8 @@
 
 namespace gapfarm {
 
+struct PushSettings;  // worker/sim/push.h
+
 using EffectValues = std::span<const double>;
 
 // What an effect may look at beside the command (EffectContext).
@@ -62,18 +64,22 @@ struct Reading {
 struct EffectBehaviour {
   const char* name;
   void (*settings)(EffectValues p, SimSettings& settings) = nullptr;
+  void (*push)(EffectValues p, PushSettings& settings) = nullptr;
   void (*drive)(EffectValues p, const Situation& situation, DriveState& drive) = nullptr;
   void (*floor)(EffectValues p, const Situation& situation, Floor& floor) = nullptr;
   // True pose to logged pose, without noise, and back.
   Pose (*observe)(EffectValues p, const Pose& X_WR) = nullptr;
   Pose (*recover)(EffectValues p, const Pose& X_WM) = nullptr;
+  // A piece's start as the log would have it to where it truly starts, and back.
+  Pose (*place)(EffectValues p, const Pose& X_WR) = nullptr;
+  Pose (*unplace)(EffectValues p, const Pose& X_WR) = nullptr;
   // Random drive effects: all alternatives with their weights, and one drawn.
   std::vector<DriveBranch> (*branches)(EffectValues p) = nullptr;
   DriveBranch (*draw)(EffectValues p, Stream& stream) = nullptr;
   void (*reading)(EffectValues p, Reading& reading) = nullptr;
 };
 
-// One row an effect, in the catalogue's order.
+// One row an effect of any catalogue, by name.
 std::span<const EffectBehaviour* const> effect_behaviours();
 
 // The effects that are not neutral at some parameter values, ready to be applied.
@@ -86,10 +92,13 @@ class ActiveEffects {
   bool any() const { return !active_.empty(); }
 
   void settings(SimSettings& settings) const;
+  void push(PushSettings& settings) const;
   void drive(const Situation& situation, DriveState& drive) const;
   void floor(const Situation& situation, Floor& floor) const;
   Pose observe(Pose X_WR) const;
   Pose recover(Pose X_WM) const;
+  Pose place(Pose X_WR) const;
+  Pose unplace(Pose X_WR) const;
   std::vector<DriveBranch> branches() const;  // at least the one in which nothing happens
   DriveBranch draw(Stream& stream) const;
   Reading reading() const;

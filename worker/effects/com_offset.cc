@@ -1,5 +1,6 @@
 #include "worker/effects/behaviour.h"
 #include "worker/effects/table.h"
+#include "worker/sim/push.h"
 
 namespace gapfarm::effects {
 namespace {
@@ -9,8 +10,13 @@ void settings(EffectValues p, SimSettings& settings) {
   settings.com_y_m += p[1];
 }
 
+void push(EffectValues p, PushSettings& settings) {
+  settings.com_x_m += p[0];
+  settings.com_y_m += p[1];
+}
+
 }  // namespace
 
-const EffectBehaviour com_offset{.name = "com_offset", .settings = settings};
+const EffectBehaviour com_offset{.name = "com_offset", .settings = settings, .push = push};
 
 }  // namespace gapfarm::effects

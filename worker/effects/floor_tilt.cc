@@ -12,5 +12,7 @@ void floor(EffectValues p, const Situation& situation, Floor& floor) {
 }  // namespace
 
 const EffectBehaviour floor_tilt{.name = "floor_tilt", .floor = floor};
+// The same under a piece.
+const EffectBehaviour table_tilt{.name = "table_tilt", .floor = floor};
 
 }  // namespace gapfarm::effects

@@ -83,20 +83,6 @@ Motion Srv1Robot::run(const DrivenCommand& drive, const Situation& situation, co
   return motion;
 }
 
-v1::Outcome to_outcome(MotionOutcome outcome) {
-  switch (outcome) {
-    case MotionOutcome::kOk:
-      return v1::OK;
-    case MotionOutcome::kDiverged:
-      return v1::DIVERGED;
-    case MotionOutcome::kFellOver:
-      return v1::FELL_OVER;
-    case MotionOutcome::kNeverRested:
-      return v1::NEVER_RESTED;
-  }
-  return v1::DIVERGED;
-}
-
 Pose pose_before_end(const std::vector<MotionSample>& path, double age_s) {
   const double when = path.back().t_s - age_s;
   const auto after = std::upper_bound(path.begin(), path.end(), when,

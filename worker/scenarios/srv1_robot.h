@@ -8,6 +8,7 @@
 #include "common/trials/context.h"
 #include "gapfarm/v1/task.pb.h"
 #include "worker/effects/behaviour.h"
+#include "worker/scenarios/outcome.h"
 #include "worker/sim/simulator.h"
 
 namespace gapfarm {
@@ -53,7 +54,6 @@ class Srv1Robot {
 };
 
 SimSettings sim_settings(const ParameterValues& values, const ActiveEffects& effects);
-v1::Outcome to_outcome(MotionOutcome outcome);
 
 // Pose `age_s` before the end of a path sampled from the start to rest, by interpolation; before
 // the first sample the robot stood at the first.

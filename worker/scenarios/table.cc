@@ -1,5 +1,6 @@
 #include <array>
 
+#include "worker/scenarios/push.h"
 #include "worker/scenarios/racquetball.h"
 #include "worker/scenarios/scenario.h"
 #include "worker/scenarios/srv1.h"
@@ -9,6 +10,7 @@ namespace gapfarm {
 std::span<const Scenario> scenarios() {
   static constexpr std::array rows = {
       Scenario{"srv1", "tracked robot, six atomic commands", prepare_srv1},
+      Scenario{"push", "flat pieces pushed across a table by a finger", prepare_push},
       Scenario{"racquetball", "ball in a closed court, struck by a paddle", prepare_racquetball},
   };
   return rows;

@@ -3,7 +3,9 @@
 #include <cctype>
 #include <cmath>
 #include <set>
+#include <span>
 #include <string>
+#include <vector>
 
 #include "common/effects/catalogue.h"
 #include "common/parameters/table.h"
@@ -13,12 +15,44 @@
 namespace gapfarm {
 namespace {
 
-TEST(EffectTable, HasOneImplementationForEveryRowOfTheCatalogueInItsOrder) {
-  const auto behaviours = effect_behaviours();
-  const auto catalogue = srv1_effects();
-  ASSERT_EQ(behaviours.size(), catalogue.size());
-  for (std::size_t i = 0; i < catalogue.size(); ++i)
-    EXPECT_EQ(behaviours[i]->name, catalogue[i].name);
+const std::vector<std::span<const Effect>>& catalogues() {
+  static const std::vector<std::span<const Effect>> all = {srv1_effects(), push_effects()};
+  return all;
+}
+
+const EffectBehaviour* behaviour_of(const std::string& name) {
+  const EffectBehaviour* found = nullptr;
+  for (const EffectBehaviour* b : effect_behaviours()) {
+    if (b->name != name) continue;
+    EXPECT_EQ(found, nullptr) << name << " is implemented twice";
+    found = b;
+  }
+  return found;
+}
+
+TEST(EffectTable, HasOneImplementationForEveryEffectAndNoOther) {
+  std::set<std::string> names;
+  for (const auto& catalogue : catalogues()) {
+    for (const Effect& effect : catalogue) {
+      EXPECT_NE(behaviour_of(effect.name), nullptr) << effect.name;
+      names.insert(effect.name);
+    }
+  }
+  EXPECT_EQ(effect_behaviours().size(), names.size());
+}
+
+TEST(EffectTable, EffectsOfOneNameHaveTheSameParameters) {
+  for (const Effect& a : srv1_effects()) {
+    for (const Effect& b : push_effects()) {
+      if (a.name != b.name) continue;
+      EXPECT_EQ(a.strengths, b.strengths) << a.name;
+      ASSERT_EQ(a.parameters.size(), b.parameters.size()) << a.name;
+      for (std::size_t i = 0; i < a.parameters.size(); ++i) {
+        EXPECT_EQ(a.parameters[i].key, b.parameters[i].key) << a.name;
+        EXPECT_EQ(a.parameters[i].unit, b.parameters[i].unit) << a.name;
+      }
+    }
+  }
 }
 
 // "floor_tilt" is tested by EffectSignature.FloorTilt...
@@ -44,18 +78,22 @@ TEST(EffectTable, EveryRowHasATestOfItsSignature) {
 }
 
 TEST(EffectTable, HooksBelongToTheEffectsStage) {
-  const auto behaviours = effect_behaviours();
-  const auto catalogue = srv1_effects();
-  for (std::size_t i = 0; i < catalogue.size(); ++i) {
-    const EffectBehaviour& b = *behaviours[i];
-    const bool drive = b.drive || b.branches;
-    const bool floor = b.floor || b.settings;
-    const bool camera = b.observe || b.reading;
-    EXPECT_EQ(drive, catalogue[i].stage == EffectStage::kDrive) << b.name;
-    EXPECT_EQ(floor, catalogue[i].stage == EffectStage::kFloor) << b.name;
-    EXPECT_EQ(camera, catalogue[i].stage == EffectStage::kCamera) << b.name;
-    EXPECT_EQ(b.observe != nullptr, b.recover != nullptr) << b.name;
-    EXPECT_EQ(b.branches != nullptr, b.draw != nullptr) << b.name;
+  for (const auto& catalogue : catalogues()) {
+    for (const Effect& effect : catalogue) {
+      const EffectBehaviour& b = *behaviour_of(effect.name);
+      const bool camera = b.observe || b.reading || b.place;
+      EXPECT_EQ(camera, effect.stage == EffectStage::kCamera) << b.name;
+      if (b.drive || b.branches) {
+        EXPECT_EQ(effect.stage, EffectStage::kDrive) << b.name;
+      }
+      if (b.floor || b.settings) {
+        EXPECT_EQ(effect.stage, EffectStage::kFloor) << b.name;
+      }
+      EXPECT_TRUE(camera || b.drive || b.branches || b.floor || b.settings || b.push) << b.name;
+      EXPECT_EQ(b.observe != nullptr, b.recover != nullptr) << b.name;
+      EXPECT_EQ(b.place != nullptr, b.unplace != nullptr) << b.name;
+      EXPECT_EQ(b.branches != nullptr, b.draw != nullptr) << b.name;
+    }
   }
 }
 

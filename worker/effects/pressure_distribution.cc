@@ -1,0 +1,17 @@
+#include "worker/effects/behaviour.h"
+#include "worker/effects/table.h"
+#include "worker/sim/push.h"
+
+namespace gapfarm::effects {
+namespace {
+
+void push(EffectValues p, PushSettings& settings) {
+  settings.stretch = p[0];
+  settings.stretch_direction_rad = p[1];
+}
+
+}  // namespace
+
+const EffectBehaviour pressure_distribution{.name = "pressure_distribution", .push = push};
+
+}  // namespace gapfarm::effects

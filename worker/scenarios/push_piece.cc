@@ -1,0 +1,89 @@
+#include "worker/scenarios/push_piece.h"
+
+#include <cmath>
+
+#include "worker/scenarios/outcome.h"
+
+namespace gapfarm {
+namespace {
+
+double at(const ParameterValues& values, Push row) { return values[row_of(row)]; }
+
+double shape_factor(std::size_t index, const ParameterValues& values) {
+  const double own = index < kOwnShapeFactors ? values[row_of(Push::kShapeFactor1) + index] : 0.0;
+  return own > 0 ? own : at(values, Push::kShapeFactor);
+}
+
+}  // namespace
+
+PushNoise push_noise(const ParameterValues& values) {
+  return {at(values, Push::kPushNoiseSlide),
+          at(values, Push::kPushNoiseTurn),
+          {at(values, Push::kPoseNoisePosition), at(values, Push::kPoseNoiseHeading)}};
+}
+
+PushSettings push_settings(const Piece& piece, std::size_t index, const ParameterValues& values,
+                           const ActiveEffects& effects) {
+  PushSettings s;
+  s.model = static_cast<PushModel>(static_cast<int>(at(values, Push::kModel)));
+  const Eigen::Vector2d middle = centroid(piece);
+  for (const Eigen::Vector2d& corner : piece.corners) s.corners.push_back(corner - middle);
+  s.thickness_m = piece.thickness_m;
+  s.mass_kg = piece.mass_kg * at(values, Push::kMassFactor);
+  const Eigen::Vector3d moments = second_moments(piece);
+  s.gyration_m2 = moments[0] + moments[1];
+  s.shape_factor = shape_factor(index, values);
+  s.ground_friction = at(values, Push::kGroundFriction);
+  s.finger_friction = at(values, Push::kFingerFriction);
+  s.finger_radius_m = at(values, Push::kFingerRadius);
+  s.finger_height = at(values, Push::kFingerHeight);
+  s.contact_margin_m = at(values, Push::kContactMargin);
+  s.gravity_m_s2 = at(values, Push::kGravity);
+  s.length_scale = at(values, Push::kLengthScale);
+  s.step_rate_hz = at(values, Push::kStepRate);
+  s.sub_steps = static_cast<int>(at(values, Push::kSubSteps));
+  s.solver_iterations = static_cast<int>(at(values, Push::kSolverIterations));
+  s.restitution = at(values, Push::kRestitution);
+  s.linear_damping = at(values, Push::kLinearDamping);
+  s.angular_damping = at(values, Push::kAngularDamping);
+  s.error_reduction = at(values, Push::kErrorReduction);
+  s.contact_softness = at(values, Push::kContactSoftness);
+  effects.push(s);
+  return s;
+}
+
+PushedPiece::PushedPiece(const Piece& piece, std::size_t index, const ParameterValues& values)
+    : piece_(piece),
+      effects_(push_table(), values),
+      X_RC_{centroid(piece)[0], centroid(piece)[1], 0},
+      simulator_(push_settings(piece, index, values, effects_)) {}
+
+PushedPiece::Push PushedPiece::push(const Pose& X_WR, std::span<const TipSample> tip,
+                                    std::vector<PathSample>* path, double interval_s) {
+  const Pose X_WS = X_WR * X_RC_;
+  std::vector<FingerSample> finger;
+  for (const TipSample& sample : tip) {
+    const Pose p_SF = between(X_WS, {sample.x, sample.y, 0});
+    finger.push_back({sample.t_s, {p_SF.x, p_SF.y}});
+  }
+  Floor table;
+  Situation situation;
+  situation.X_WR = X_WS;
+  effects_.floor(situation, table);
+  std::vector<MotionSample> samples;
+  Push push;
+  push.motion = simulator_.run(finger, table, path ? &samples : nullptr, interval_s);
+  push.outcome = to_outcome(push.motion.outcome);
+  push.slid_m = std::hypot(push.motion.X_SE.x, push.motion.X_SE.y);
+  const Pose X_CR = inverse(X_RC_);
+  push.X_WE = X_WS * push.motion.X_SE * X_CR;
+  if (path) {
+    path->clear();
+    for (const MotionSample& s : samples) path->push_back({s.t_s, X_WS * s.X_SB * X_CR});
+  }
+  simulated_s_ += push.motion.duration_s;
+  ++runs_;
+  return push;
+}
+
+}  // namespace gapfarm

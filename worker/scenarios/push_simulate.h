@@ -1,0 +1,15 @@
+// `simulate` in scenario push.
+#pragma once
+
+#include "common/problem/problem.h"
+#include "gapfarm/v1/task.pb.h"
+
+namespace gapfarm {
+
+// The pushes of a plan.  Every piece is put down where its trial begins, whatever happened before;
+// it is logged there and at its end with the effects and the noise of both readings.  A trial
+// without a finger's way is an invalid request.
+v1::TaskResult simulate_pushes(const Problem& problem, const ParameterValues& values,
+                               const v1::SimulateTask& task);
+
+}  // namespace gapfarm
