@@ -118,8 +118,9 @@ Json to_json(const Config& config, const Summary& summary, unsigned workers) {
 std::string describe(const Config& config, const Summary& summary, unsigned workers) {
   const Problem& problem = config.problem;
   std::string text = config.path + ": fine\n";
-  text += "scenario     " + problem.scenario + ", robot " +
-          problem.table().format(row_of(Srv1::kRobot), problem.values[row_of(Srv1::kRobot)]) + "\n";
+  // The first row of every table is the model that is simulated.
+  text += "scenario     " + problem.scenario + ", " + problem.table()[0].key + " " +
+          problem.table().format(0, problem.values[0]) + "\n";
   text += "trials       " + std::to_string(summary.trials) + " in " +
           std::to_string(summary.sessions) + " sessions:";
   for (const auto& [command, count] : summary.commands) {

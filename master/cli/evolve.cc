@@ -29,9 +29,7 @@ RunInfo run_info(const Config& config, const EvolutionOverrides& overrides) {
   info.problem_hash = problem_hash(problem);
   info.seed = config.seed;
   info.fitness = fitness_name(kind);
-  info.fitness_unit = kind == FitnessKind::kLogScore      ? "nats/trial"
-                      : kind == FitnessKind::kEnergyScore ? "m"
-                                                          : "-";
+  info.fitness_unit = fitness_unit(kind);
   info.higher_is_better = higher_is_better(kind);
   return info;
 }

@@ -21,6 +21,7 @@ Model model_of(const RunStore& store, const Problem& problem, const Config& conf
   model.fingerprint = build_info().fingerprint;
   model.values = problem.values_of(summary.best->genome);
   model.commands = problem.commands;
+  model.pieces = problem.pieces;
   model.fitness = problem.fitness;
   model.spread = problem.spread;
   model.score = fitness_of_cost(problem.fitness.kind, summary.best->cost);

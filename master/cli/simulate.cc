@@ -7,6 +7,7 @@
 #include "common/trials/read.h"
 #include "common/trials/write.h"
 #include "master/cli/inputs.h"
+#include "master/cli/parameter_options.h"
 #include "master/experiment/plan.h"
 
 namespace gapfarm {
@@ -35,32 +36,6 @@ Result<Config> read_source(const std::string& path) {
   Config config;
   config.problem = problem_of(*model);
   return config;
-}
-
-// "battery_sag.rate=0.01", "robot=wheels" into the problem's values.
-Status apply_setting(const std::string& setting, Problem& problem) {
-  const ParameterTable& table = problem.table();
-  const std::size_t equals = setting.find('=');
-  const std::string key = setting.substr(0, equals);
-  std::vector<std::string> known;
-  for (const Parameter& row : table.rows()) known.push_back(row.key);
-  const auto row = table.find(key);
-  if (!row || equals == std::string::npos) {
-    return Error{"--set " + setting + ": expected PARAMETER=VALUE" +
-                 (row ? "" : ", and there is no parameter '" + key + "'" + suggestion(key, known))};
-  }
-  const std::string text = setting.substr(equals + 1);
-  const std::vector<std::string>& choices = table[*row].choices;
-  const auto choice = std::find(choices.begin(), choices.end(), text);
-  double value = static_cast<double>(choice - choices.begin());
-  if (choice == choices.end() && !CLI::detail::lexical_cast(text, value)) {
-    return Error{"--set " + setting + ": '" + text + "' is not a number" +
-                 (choices.empty() ? "" : suggestion(text, choices))};
-  }
-  if (Status s = table.check(*row, value); !s)
-    return Error{"--set " + setting + ": " + s.error().message};
-  problem.values[*row] = value;
-  return {};
 }
 
 Status apply_options(const SimulateOptions& options, Config& config) {

@@ -41,6 +41,7 @@ std::span<const Subcommand> subcommands();
 SubcommandRun setup_blind_check(CLI::App& app);
 SubcommandRun setup_check(CLI::App& app);
 SubcommandRun setup_compare(CLI::App& app);
+SubcommandRun setup_crossfit(CLI::App& app);
 SubcommandRun setup_determine(CLI::App& app);
 SubcommandRun setup_diagnose(CLI::App& app);
 SubcommandRun setup_drive(CLI::App& app);

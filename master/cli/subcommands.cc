@@ -11,6 +11,7 @@ std::span<const Subcommand> subcommands() {
       {"compare", "run searches side by side over seeds", "Runs", setup_compare},
       {"simulate", "make a trial log from a parameter set", "Models", setup_simulate},
       {"predict", "say where every trial of a log should have ended", "Models", setup_predict},
+      {"crossfit", "tune on some trials, try on others", "Models", setup_crossfit},
       {"determine", "say which parameters of a tuned model the data determine", "Models",
        setup_determine},
       {"drive", "drive commands or way-points many times: bands, ellipses, distances", "Models",

@@ -24,6 +24,29 @@ std::vector<CommandSpec> driven_commands(const Problem& problem, const SimulateS
   return chosen;
 }
 
+constexpr double kFingerSpeed_m_s = 0.1;
+constexpr double kFingerClearance_m = 0.03;  // of its start from the circle round the piece
+
+// The finger of a trial with a piece: from outside, from any side, straight past the centroid at up
+// to half the piece's radius, and on to at most as far behind it.
+void draw_finger(const Piece& piece, Stream& stream, Trial& trial) {
+  const Eigen::Vector2d middle = centroid(piece);
+  double radius = 0;
+  for (const Eigen::Vector2d& corner : piece.corners) {
+    radius = std::max(radius, (corner - middle).norm());
+  }
+  const Pose X_WC = trial.X_WS * Pose{middle[0], middle[1], 0};
+  const double reach = radius + kFingerClearance_m;
+  const Pose X_WF = X_WC * Pose{0, 0, stream.uniform(-std::numbers::pi, std::numbers::pi)};
+  const double aside = radius * stream.uniform(-0.5, 0.5);
+  const double end = radius * stream.uniform(-0.5, 0.5);
+  const Pose from = X_WF * Pose{-reach, aside, 0};
+  const Pose to = X_WF * Pose{end, aside, 0};
+  trial.tip = {{0, from.x, from.y}, {(reach + end) / kFingerSpeed_m_s, to.x, to.y}};
+  trial.left = trial.right = trial.duration_s = std::nullopt;
+  trial.t_s = std::nullopt;
+}
+
 }  // namespace
 
 std::vector<std::vector<v1::PlannedTrial>> draw_plan(const Problem& problem,
@@ -54,7 +77,8 @@ std::vector<std::vector<v1::PlannedTrial>> draw_plan(const Problem& problem,
       trial.X_WS.x = stream.uniform(lower, upper);
       trial.X_WS.y = stream.uniform(lower, upper);
       trial.X_WS.theta = stream.uniform(-std::numbers::pi, std::numbers::pi);
-      t_s += *trial.duration_s + settings.pause_s * stream.uniform(0.75, 1.25);
+      t_s += trial.duration_s.value_or(0) + settings.pause_s * stream.uniform(0.75, 1.25);
+      if (!problem.pieces.empty()) draw_finger(problem.piece(command.name), stream, trial);
       *planned.mutable_trial() = to_proto(trial);
       plan[s].push_back(std::move(planned));
     }

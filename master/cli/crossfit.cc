@@ -1,0 +1,193 @@
+// gapfarm crossfit CONFIG: tune on some trials, try on others, beside what no model would do.
+#include "master/experiment/crossfit.h"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <cmath>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "common/config/config.h"
+#include "common/trials/select.h"
+#include "master/cli/inputs.h"
+#include "master/cli/parameter_options.h"
+#include "master/cli/subcommand.h"
+
+namespace gapfarm {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+struct CrossfitOptions {
+  std::string config;
+  std::vector<std::string> trials, only, train, tests, repeats, sweeps, set, genes;
+  std::string by, per;
+  std::optional<std::uint64_t> evaluations, seed;
+  bool json = false;
+  FarmOptions farm;
+};
+
+std::vector<std::string> words_of(const std::string& text) {
+  std::istringstream in(text);
+  std::vector<std::string> words;
+  for (std::string word; in >> word;) words.push_back(word);
+  return words;
+}
+
+CrossfitPlan plan_of(const CrossfitOptions& options, const Config& config) {
+  CrossfitPlan plan;
+  plan.train = options.train;
+  for (const std::string& test : options.tests) plan.tests.push_back(words_of(test));
+  plan.by = options.by;
+  plan.per = options.per;
+  plan.repeats = options.repeats;
+  plan.sweeps = options.sweeps;
+  plan.tuning.evolution = config.evolution;
+  if (options.evaluations) plan.tuning.evolution.evaluations = *options.evaluations;
+  plan.tuning.seed = options.seed.value_or(config.seed);
+  return plan;
+}
+
+Json to_json(const EndErrors& e) {
+  return {{"trials", e.trials},
+          {"mean_mm", 1e3 * e.mean_m},
+          {"median_mm", 1e3 * e.median_m},
+          {"median_position_mm", 1e3 * e.median_position_m},
+          {"median_heading_deg", e.median_heading_rad * 180 / M_PI}};
+}
+
+Json to_json(const Problem& problem, const CrossfitGroup& group) {
+  Json genes = Json::object();
+  for (const Gene& gene : problem.genes) {
+    genes[problem.table()[gene.row].key] = group.tuned.values[gene.row];
+  }
+  Json sets = Json::array();
+  for (const CrossfitSet& set : group.sets) {
+    Json json = {{"set", set.name},
+                 {"part", set.part},
+                 {"untuned", to_json(set.untuned)},
+                 {"tuned", to_json(set.tuned)},
+                 {"stay", to_json(set.stay)}};
+    if (set.repeat.trials > 0) json["repeat"] = to_json(set.repeat);
+    sets.push_back(std::move(json));
+  }
+  Json sweeps = Json::object();
+  for (const Sweep& sweep : group.sweeps) {
+    for (const SweepPoint& p : sweep.points) {
+      const auto number = [](double m) { return std::isfinite(m) ? Json(1e3 * m) : Json(); };
+      sweeps[sweep.parameter].push_back(
+          {{"value", p.value}, {"train_mm", number(p.train_m)}, {"test_mm", number(p.test_m)}});
+    }
+  }
+  return {{"group", group.name},
+          {"fitness", group.tuned.fitness},
+          {"evaluations", group.tuned.evaluations},
+          {"parameters", genes},
+          {"sets", sets},
+          {"sweeps", sweeps}};
+}
+
+std::string describe(const Problem& problem, const CrossfitGroup& group) {
+  std::string text =
+      (group.name.empty() ? "all" : group.name) +
+      fmt::format(": {} {:.5g} after {} evaluations;", fitness_name(problem.fitness.kind),
+                  group.tuned.fitness, group.tuned.evaluations);
+  for (const Gene& gene : problem.genes) {
+    text += fmt::format(" {} {:.4g}", problem.table()[gene.row].key, group.tuned.values[gene.row]);
+  }
+  text += fmt::format("\n  {:<36} {:>6} {:>8} {:>8} {:>8} {:>8} | {:>8} {:>8}\n", "mean error, mm",
+                      "trials", "still", "untuned", "tuned", "repeats", "median mm", "degrees");
+  for (const CrossfitSet& set : group.sets) {
+    const std::string repeat =
+        set.repeat.trials > 0 ? fmt::format("{:.2f}", 1e3 * set.repeat.mean_m) : "-";
+    text +=
+        fmt::format("  {:<36} {:>6} {:>8.2f} {:>8.2f} {:>8.2f} {:>8} | {:>9.2f} {:>7.2f}\n",
+                    set.name + (set.part.empty() ? "" : " / " + set.part), set.tuned.trials,
+                    1e3 * set.stay.mean_m, 1e3 * set.untuned.mean_m, 1e3 * set.tuned.mean_m, repeat,
+                    1e3 * set.tuned.median_position_m, set.tuned.median_heading_rad * 180 / M_PI);
+  }
+  for (const Sweep& sweep : group.sweeps) {
+    text += "  " + sweep.parameter + " alone (train, test mm):";
+    for (const SweepPoint& p : sweep.points) {
+      text += fmt::format(" {:.3g}: {:.2f}, {:.2f};", p.value, 1e3 * p.train_m, 1e3 * p.test_m);
+    }
+    text += "\n";
+  }
+  return text;
+}
+
+Status apply(const CrossfitOptions& options, Config& config) {
+  for (const std::string& setting : options.set) {
+    if (Status s = apply_setting(setting, config.problem); !s) return s;
+  }
+  if (!options.genes.empty()) {
+    if (Status s = apply_genes(options.genes, config.problem); !s) return s;
+  }
+  Result<TrialLog> log = select_trials(config.problem.log, options.only);
+  if (!log) return log.error();
+  config.problem.log = std::move(*log);
+  return check_evolvable(config);
+}
+
+int run_crossfit(const CrossfitOptions& options, CliContext& context) {
+  Result<Config> config = read_config_and_trials(options.config, options.trials);
+  if (config) {
+    if (Status s = apply(options, *config); !s) config = s.error();
+  }
+  if (!config) {
+    context.console.error(config.error());
+    return kExitBadUsage;
+  }
+  show_notes(config->problem.log, context.console);
+  auto farm = start_farm(options.farm, config->farm, context);
+  if (!farm) return failed(farm.error(), context);
+  const auto groups = crossfit(config->problem, plan_of(options, *config), **farm);
+  if (!groups) return failed(groups.error(), context);
+  Json all = Json::array();
+  for (const CrossfitGroup& group : *groups) {
+    if (options.json) {
+      all.push_back(to_json(config->problem, group));
+    } else {
+      context.console.print(describe(config->problem, group));
+    }
+  }
+  if (options.json) context.console.print(all.dump(2) + "\n");
+  return kExitDone;
+}
+
+}  // namespace
+
+SubcommandRun setup_crossfit(CLI::App& app) {
+  auto options = std::make_shared<CrossfitOptions>();
+  app.add_option("CONFIG", options->config, "Config file (TOML)")->required();
+  app.add_option("--trials", options->trials, "Trial logs in place of the config's");
+  app.add_option("--only", options->only,
+                 "COLUMN=VALUE[,VALUE...]: leave all other trials out; may repeat, all must hold");
+  app.add_option("--set", options->set, "PARAMETER=VALUE, effects included; may repeat");
+  app.add_option("--genes", options->genes,
+                 "KEY or KEY=LOWER,UPPER in place of the config's genes; may repeat");
+  app.add_option("--train", options->train,
+                 "COLUMN=VALUE[,VALUE...] of the trials to tune on; may repeat, all must hold");
+  app.add_option("--test", options->tests,
+                 "A set of trials to try it on: such filters between blanks; may repeat");
+  app.add_option("--by", options->by, "Tune for each value of this column on its own");
+  app.add_option("--per", options->per, "Show errors by the values of this column");
+  app.add_option("--repeats", options->repeats,
+                 "Columns that make a condition: trials alike in them repeat one another");
+  app.add_option("--sweep", options->sweeps, "Vary these parameters alone around what was tuned");
+  app.add_option("--evaluations", options->evaluations,
+                 "Stop each fit after so many, in place of the config's");
+  app.add_option("--seed", options->seed, "In place of the config's");
+  app.add_flag("--json", options->json, "Everything, for machines");
+  options->farm.declare(app, false);
+  app.footer(
+      "Examples:\n"
+      "  gapfarm crossfit configs/push.toml --trials pushes.csv --by object \\\n"
+      "      --train start=0.11,0.15,0.21 --test start=0.13,0.18 --repeats object start\n"
+      "  gapfarm crossfit configs/srv1.toml --trials a.csv b.csv --train session=a \\\n"
+      "      --test session=b --per command");
+  return [options](CliContext& context) { return run_crossfit(*options, context); };
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,20 @@
+// Parameters on the command line.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "common/base/result.h"
+#include "common/problem/problem.h"
+
+namespace gapfarm {
+
+// "battery_sag.rate=0.01", "robot=wheels" into the problem's values.  Errors: no such parameter, a
+// value that it does not accept.
+Status apply_setting(const std::string& setting, Problem& problem);
+
+// "KEY", with the table's range, or "KEY=LOWER,UPPER", as the problem's genes.  Errors as above, an
+// empty range, a key twice.
+Status apply_genes(const std::vector<std::string>& genes, Problem& problem);
+
+}  // namespace gapfarm

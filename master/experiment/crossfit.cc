@@ -1,0 +1,225 @@
+#include "master/experiment/crossfit.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+
+#include "common/score/motion_model.h"
+#include "common/trials/select.h"
+
+namespace gapfarm {
+namespace {
+
+double median(std::vector<double> values) {
+  if (values.empty()) return 0;
+  std::sort(values.begin(), values.end());
+  const std::size_t n = values.size();
+  return n % 2 == 1 ? values[n / 2] : (values[n / 2 - 1] + values[n / 2]) / 2;
+}
+
+EndErrors errors_of(const Problem& problem, const std::vector<Trial>& trials,
+                    const std::vector<Pose>& ends) {
+  EndErrors errors;
+  std::vector<double> whole, position, heading;
+  for (std::size_t i = 0; i < trials.size(); ++i) {
+    whole.push_back(end_error(problem, trials[i], ends[i]));
+    const Pose& X = trials[i].X_WE;
+    position.push_back(std::hypot(ends[i].x - X.x, ends[i].y - X.y));
+    heading.push_back(std::abs(wrap_angle(ends[i].theta - X.theta)));
+    errors.mean_m += whole.back();
+  }
+  errors.trials = trials.size();
+  if (!trials.empty()) errors.mean_m /= static_cast<double>(trials.size());
+  errors.median_m = median(whole);
+  errors.median_position_m = median(position);
+  errors.median_heading_rad = median(heading);
+  return errors;
+}
+
+std::vector<std::string> values_in(const TrialLog& log, const TrialColumnReader& column) {
+  std::vector<std::string> values;
+  for (const Trial& trial : log.trials) {
+    const std::string word = column(trial);
+    if (std::find(values.begin(), values.end(), word) == values.end()) values.push_back(word);
+  }
+  return values;
+}
+
+// The mean end of each trial's condition, over its repeats as seen from their own starts.
+std::vector<Pose> mean_of_repeats(const TrialLog& log,
+                                  const std::vector<TrialColumnReader>& columns) {
+  std::map<std::vector<std::string>, Eigen::Vector4d> sums;  // x, y, cos, sin
+  std::vector<std::vector<std::string>> keys;
+  for (const Trial& trial : log.trials) {
+    std::vector<std::string> key;
+    for (const TrialColumnReader& column : columns) key.push_back(column(trial));
+    const Pose& X = trial.X_WE;
+    const auto [entry, fresh] = sums.try_emplace(key, Eigen::Vector4d::Zero());
+    entry->second += Eigen::Vector4d(X.x, X.y, std::cos(X.theta), std::sin(X.theta));
+    keys.push_back(std::move(key));
+  }
+  std::vector<Pose> ends;
+  for (const auto& key : keys) {
+    const auto n = static_cast<double>(std::count(keys.begin(), keys.end(), key));
+    const Eigen::Vector4d mean = sums.at(key) / n;
+    ends.push_back({mean[0], mean[1], std::atan2(mean[3], mean[2])});
+  }
+  return ends;
+}
+
+std::string joined(const std::vector<std::string>& words) {
+  std::string text;
+  for (const std::string& word : words) text += (text.empty() ? "" : " ") + word;
+  return text;
+}
+
+class Crossfit {
+ public:
+  Crossfit(const Problem& problem, const CrossfitPlan& plan, Farm& farm)
+      : problem_(problem), plan_(plan), farm_(farm) {}
+
+  Result<CrossfitGroup> group(const std::string& name, const TrialLog& log) {
+    CrossfitGroup group;
+    group.name = name;
+    const Result<TrialLog> train = select_trials(log, plan_.train);
+    if (!train) return train.error();
+    const auto tuned = tune(with(*train), farm_, plan_.tuning);
+    if (!tuned) return tuned.error();
+    group.tuned = *tuned;
+    if (Status s = add_set("train", *train, group); !s) return s.error();
+    TrialLog tests;
+    for (const std::vector<std::string>& filters : plan_.tests) {
+      const Result<TrialLog> test = select_trials(log, filters);
+      if (!test) return test.error();
+      if (Status s = add_set(joined(filters), *test, group); !s) return s.error();
+      tests.trials.insert(tests.trials.end(), test->trials.begin(), test->trials.end());
+    }
+    for (const std::string& key : plan_.sweeps) {
+      auto swept = sweep(key, *train, tests, group.tuned.values);
+      if (!swept) return swept.error();
+      group.sweeps.push_back(std::move(*swept));
+    }
+    return group;
+  }
+
+ private:
+  Problem with(const TrialLog& log) const {
+    Problem problem = problem_;
+    problem.log = log;
+    return problem;
+  }
+
+  Status add_set(const std::string& name, const TrialLog& log, CrossfitGroup& group) {
+    const auto ends = predict_means(with(log), {problem_.values, group.tuned.values}, farm_);
+    if (!ends) return ends.error();
+    if (!(*ends)[0] || !(*ends)[1]) {
+      return Error{"the simulation of " + name + " failed at the " +
+                   ((*ends)[0] ? "tuned" : "config's own") + " parameters"};
+    }
+    std::vector<Pose> starts, repeats;
+    for (const Trial& trial : log.trials) starts.push_back(trial.X_WS);
+    std::vector<TrialColumnReader> condition;
+    for (const std::string& column : plan_.repeats) {
+      const auto reader = trial_column_reader(log, column);
+      if (!reader) return reader.error();
+      condition.push_back(*reader);
+    }
+    if (!condition.empty()) repeats = mean_of_repeats(log, condition);
+    std::vector<std::string> parts = {""};
+    TrialColumnReader per;
+    if (!plan_.per.empty()) {
+      const auto reader = trial_column_reader(log, plan_.per);
+      if (!reader) return reader.error();
+      per = *reader;
+      const auto values = values_in(log, per);
+      if (values.size() > 1) parts.insert(parts.end(), values.begin(), values.end());
+    }
+    for (const std::string& part : parts) {
+      std::vector<std::size_t> members;
+      for (std::size_t i = 0; i < log.trials.size(); ++i) {
+        if (part.empty() || per(log.trials[i]) == part) members.push_back(i);
+      }
+      const auto errors = [&](const std::vector<Pose>& all) {
+        std::vector<Trial> trials;
+        std::vector<Pose> chosen;
+        for (const std::size_t i : members) {
+          if (i >= all.size()) return EndErrors{};
+          trials.push_back(log.trials[i]);
+          chosen.push_back(all[i]);
+        }
+        return errors_of(problem_, trials, chosen);
+      };
+      group.sets.push_back(
+          {name, part, errors(*(*ends)[0]), errors(*(*ends)[1]), errors(starts), errors(repeats)});
+    }
+    return {};
+  }
+
+  Result<Sweep> sweep(const std::string& key, const TrialLog& train, const TrialLog& test,
+                      const ParameterValues& around) {
+    const ParameterTable& table = problem_.table();
+    const auto row = table.find(key);
+    if (!row) return Error{"--sweep " + key + ": there is no such parameter"};
+    // Over the gene's range where it is one, else over the row's.
+    Gene gene{*row, table[*row].lower, table[*row].upper, table[*row].scale};
+    for (const Gene& searched : problem_.genes) {
+      if (searched.row == *row) gene = searched;
+    }
+    Sweep sweep{key, {}};
+    std::vector<ParameterValues> points;
+    for (unsigned i = 0; i < plan_.sweep_points; ++i) {
+      const double g = plan_.sweep_points < 2 ? 0.5 : double(i) / (plan_.sweep_points - 1);
+      points.push_back(around);
+      points.back()[*row] = decode_gene(table, gene, g);
+      sweep.points.push_back({points.back()[*row], 0, 0});
+    }
+    for (const auto& [log, member] :
+         {std::pair{&train, &SweepPoint::train_m}, std::pair{&test, &SweepPoint::test_m}}) {
+      if (log->trials.empty()) continue;
+      const auto ends = predict_means(with(*log), points, farm_);
+      if (!ends) return ends.error();
+      for (std::size_t i = 0; i < points.size(); ++i) {
+        sweep.points[i].*member = (*ends)[i] ? errors_of(problem_, log->trials, *(*ends)[i]).mean_m
+                                             : std::numeric_limits<double>::quiet_NaN();
+      }
+    }
+    return sweep;
+  }
+
+  const Problem& problem_;
+  const CrossfitPlan& plan_;
+  Farm& farm_;
+};
+
+}  // namespace
+
+double end_error(const Problem& problem, const Trial& trial, const Pose& X_WE) {
+  if (problem.pieces.empty()) return std::hypot(X_WE.x - trial.X_WE.x, X_WE.y - trial.X_WE.y);
+  return corner_distance(problem.piece(trial.command), X_WE, trial.X_WE);
+}
+
+Result<std::vector<CrossfitGroup>> crossfit(const Problem& problem, const CrossfitPlan& plan,
+                                            Farm& farm) {
+  Crossfit fit(problem, plan, farm);
+  std::vector<CrossfitGroup> groups;
+  if (plan.by.empty()) {
+    auto group = fit.group("", problem.log);
+    if (!group) return group.error();
+    groups.push_back(std::move(*group));
+    return groups;
+  }
+  const auto by = trial_column_reader(problem.log, plan.by);
+  if (!by) return by.error();
+  for (const std::string& value : values_in(problem.log, *by)) {
+    const std::string filter = plan.by + "=" + value;
+    const auto log = select_trials(problem.log, {&filter, 1});
+    if (!log) return log.error();
+    auto group = fit.group(value, *log);
+    if (!group) return Error{filter + ": " + group.error().message};
+    groups.push_back(std::move(*group));
+  }
+  return groups;
+}
+
+}  // namespace gapfarm

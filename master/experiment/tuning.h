@@ -1,0 +1,33 @@
+// Fits a problem's genes where no run has to be kept: many small fits, as experiments need them.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "common/base/result.h"
+#include "common/config/settings.h"
+#include "master/farm/farm.h"
+
+namespace gapfarm {
+
+struct TuningSettings {
+  EvolutionSettings evolution;  // optimiser and stop conditions, those of time apart
+  std::uint64_t seed = 1;
+};
+
+struct Tuned {
+  ParameterValues values;
+  double fitness = 0;  // in the fitness's own sense and unit
+  std::uint64_t evaluations = 0;
+};
+
+// Errors: of the farm, and a problem whose every genome fails.
+Result<Tuned> tune(const Problem& problem, Farm& farm, const TuningSettings& settings);
+
+// Where every trial of the problem's log ends at some parameter values, by the means alone; none
+// when the simulation failed there.
+Result<std::vector<std::optional<std::vector<Pose>>>> predict_means(
+    const Problem& problem, const std::vector<ParameterValues>& points, Farm& farm);
+
+}  // namespace gapfarm
