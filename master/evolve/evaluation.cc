@@ -9,8 +9,8 @@ OptimiserSetup optimiser_setup(const EvolutionSettings& settings, const Problem&
   setup.table = &problem.table();
   setup.genes = problem.genes;
   setup.run_seed = seed;
-  setup.noisy = problem.spread.kind == SpreadKind::kSampled &&
-                !compares_means(problem.fitness.kind);
+  setup.noisy =
+      problem.spread.kind == SpreadKind::kSampled && !compares_means(problem.fitness.kind);
   for (const Gene& gene : setup.genes) {
     setup.nominal.push_back(encode_gene(*setup.table, gene, problem.values[gene.row]));
   }

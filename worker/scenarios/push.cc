@@ -33,13 +33,13 @@ class PushModelOfLog : public ScenarioModel {
 
   Prediction predict(const ParameterValues& values, const PredictOptions& options) const override;
 
-  v1::TaskResult simulate(const ParameterValues& values,
-                          const v1::SimulateTask& task) const override {
-    return simulate_pushes(problem_, values, task);
+  v1::TaskResult simulate(const ParameterValues& values, const v1::SimulateTask& task,
+                          StepCounter* steps) const override {
+    return simulate_pushes(problem_, values, task, steps);
   }
 
-  v1::TaskResult trace(const ParameterValues& /*values*/,
-                       const v1::TraceTask& /*task*/) const override {
+  v1::TaskResult trace(const ParameterValues& /*values*/, const v1::TraceTask& /*task*/,
+                       StepCounter* /*steps*/) const override {
     v1::TaskResult result;
     result.set_outcome(v1::INVALID_REQUEST);
     result.set_message("scenario push has no commands to trace; simulate pushes with paths");
@@ -105,6 +105,7 @@ Prediction PushModelOfLog::predict(const ParameterValues& values,
     double slid_m = 0;
     for (const Eigen::Vector3d& o : offsets(noise, options, i)) {
       const PushedPiece::Push push = pushed.push(X_WR * Pose{o[0], o[1], o[2]}, trial.tip);
+      count_step(options.steps);  // a push takes milliseconds: fine enough to see one that hangs
       if (push.outcome != v1::OK) {
         prediction.outcome = push.outcome;
         prediction.message = "piece " + piece.name + ", trial " + std::to_string(trial.trial) +

@@ -10,8 +10,13 @@ namespace {
 
 class PushSession {
  public:
-  PushSession(const Problem& problem, const ParameterValues& values, const v1::SimulateTask& task)
-      : problem_(problem), values_(values), task_(task), noise_(push_noise(values)) {}
+  PushSession(const Problem& problem, const ParameterValues& values, const v1::SimulateTask& task,
+              StepCounter* steps)
+      : problem_(problem),
+        values_(values),
+        task_(task),
+        steps_(steps),
+        noise_(push_noise(values)) {}
 
   v1::TaskResult run() {
     v1::TaskResult result;
@@ -52,6 +57,7 @@ class PushSession {
     const Pose X_WR = trial.X_WS;
     PushedPiece::Push push =
         piece.push(X_WR, trial.tip, sampled ? &path : nullptr, task_.path_interval());
+    count_step(steps_);
     if (push.outcome != v1::OK) return push.outcome;
     const double aside = noise_.slide * push.slid_m;
     const double turned = noise_.turn_rad_m * push.slid_m;
@@ -77,6 +83,7 @@ class PushSession {
   const Problem& problem_;
   const ParameterValues& values_;
   const v1::SimulateTask& task_;
+  StepCounter* steps_;
   PushNoise noise_;
   std::map<std::string, PushedPiece> pieces_;
 };
@@ -84,8 +91,8 @@ class PushSession {
 }  // namespace
 
 v1::TaskResult simulate_pushes(const Problem& problem, const ParameterValues& values,
-                               const v1::SimulateTask& task) {
-  return PushSession(problem, values, task).run();
+                               const v1::SimulateTask& task, StepCounter* steps) {
+  return PushSession(problem, values, task, steps).run();
 }
 
 }  // namespace gapfarm

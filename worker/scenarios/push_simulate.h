@@ -3,6 +3,7 @@
 
 #include "common/problem/problem.h"
 #include "gapfarm/v1/task.pb.h"
+#include "worker/sim/step_counter.h"
 
 namespace gapfarm {
 
@@ -10,6 +11,6 @@ namespace gapfarm {
 // it is logged there and at its end with the effects and the noise of both readings.  A trial
 // without a finger's way is an invalid request.
 v1::TaskResult simulate_pushes(const Problem& problem, const ParameterValues& values,
-                               const v1::SimulateTask& task);
+                               const v1::SimulateTask& task, StepCounter* steps);
 
 }  // namespace gapfarm

@@ -22,6 +22,7 @@ using gapfarm::testing::noiseless;
 
 constexpr double kPi = std::numbers::pi;
 
+double mass_height_m() { return srv1_table()[row_of(Srv1::kMassHeight)].nominal; }
 double friction() { return srv1_table()[row_of(Srv1::kFriction)].nominal; }
 double gravity() { return srv1_table()[row_of(Srv1::kGravity)].nominal; }
 
@@ -55,7 +56,7 @@ TEST(EffectSignature, FloorTiltLetsATurningRobotDriftDownhill) {
   const double u2 = turn.sliding_2();
   const double ux = turn.along_m_s, uy = turn.across_m_s;
   const double slide = std::sqrt(u2) * u2 * std::tan(kTilt) / friction();
-  const double load = kMassHeight_m * u2 * std::tan(kTilt);
+  const double load = mass_height_m() * u2 * std::tan(kTilt);
   for (const double direction : {0.0, 0.8, 2.5}) {
     double x = 0, y = 0;
     constexpr int kSteps = 1000;
