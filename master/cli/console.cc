@@ -46,14 +46,18 @@ void Console::print(std::string_view text) {
 }
 
 void Console::note(std::string_view text) {
+  if (log_ != nullptr) return log_->write(LogLevel::kInfo, text);
   clear_progress();
   write_all(err_, std::string(text) + "\n");
 }
 
-void Console::error(const Error& error) { note("gapfarm: " + error.message); }
+void Console::error(const Error& error) {
+  if (log_ != nullptr) return log_->write(LogLevel::kError, error.message);
+  note("gapfarm: " + error.message);
+}
 
 void Console::progress(std::string_view text) {
-  if (!err_is_terminal_) return;
+  if (!err_is_terminal_ || log_ != nullptr) return;
   const double now =
       std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
   if (progress_shown_ && now - last_progress_s_ < 0.1) return;

@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "common/base/result.h"
+#include "common/log/log.h"
 
 namespace gapfarm {
 
@@ -19,6 +20,10 @@ class Console {
 
   // Results, to stdout, as they are and at once.
   void print(std::string_view text);
+  // From now on notes and errors are lines of this log, and no progress is shown.  It outlives
+  // this.
+  void use(Log* log) { log_ = log; }
+
   // A line to stderr.
   void note(std::string_view text);
   // "gapfarm: MESSAGE" to stderr.
@@ -45,6 +50,7 @@ class Console {
   bool err_is_terminal_;
   bool colour_;
   bool progress_shown_ = false;
+  Log* log_ = nullptr;
   double last_progress_s_ = -1;
 };
 

@@ -132,6 +132,7 @@ EvolutionOverrides EvolutionOverrides::from_json(const std::string& text) {
 }
 
 int run_evolution(RunStore& store, const EvolutionRun& run, CliContext& context) {
+  run.log.set({"run", store.run().string()});
   const auto checkpoint = store.checkpoint();
   if (!checkpoint) return failed(checkpoint.error(), context);
   const auto plan = read_stages(run.config);
@@ -145,6 +146,15 @@ int run_evolution(RunStore& store, const EvolutionRun& run, CliContext& context)
   base.epoch = store.epoch();
   base.numeric_class = store.info().numeric_class;
   base.shuffle_seed = run.shuffle_seed;
+  report_to(run.log, base);
+  std::unique_ptr<MetricsServer> metrics;
+  if (run.farm.metrics_port) {
+    auto server = MetricsServer::listen(*run.farm.metrics_port);
+    if (!server) return failed(server.error(), context);
+    metrics = std::move(*server);
+    context.console.note("metrics: http://127.0.0.1:" + std::to_string(metrics->port()) +
+                         "/metrics");
+  }
   auto farm = start_farm(run.farm, run.config.farm, context, base);
   if (!farm) return failed(farm.error(), context);
   for (const std::string& endpoint : (*farm)->endpoints()) {
@@ -155,6 +165,7 @@ int run_evolution(RunStore& store, const EvolutionRun& run, CliContext& context)
 
   const SteadyClock clock;
   FarmProgressWriter progress(store, **farm, run.config.evolution, clock, context.console);
+  progress.watch(&run.log, metrics.get());
   FarmBackend backend(**farm, run.problem, run.config.seed, progress);
   StoreSink sink(store, run.problem, **farm, progress);
   EvolveOptions options;

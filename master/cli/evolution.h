@@ -29,6 +29,7 @@ struct EvolutionRun {
   const Config& config;  // overrides applied; its log may be empty
   const Problem& problem;
   const FarmOptions& farm;
+  Log& log;
   std::optional<std::uint64_t> shuffle_seed;
 };
 

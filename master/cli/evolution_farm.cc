@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "master/cli/farm_metrics.h"
 #include "master/evolve/evaluation.h"
 
 namespace gapfarm {
@@ -27,12 +28,31 @@ void FarmProgressWriter::on_progress(const FarmProgress& progress) {
   refresh(clock_.now_s());
 }
 
-void FarmProgressWriter::on_generation(const GenerationRecord& record, const std::string& best) {
+void FarmProgressWriter::watch(Log* log, MetricsServer* metrics) {
+  log_ = log;
+  metrics_ = metrics;
+  publish();
+}
+
+void FarmProgressWriter::publish() {
+  if (metrics_ == nullptr) return;
+  metrics_->publish(
+      metrics_page(farm_, last_, {generation_, evaluations_before_ + last_.done, best_fitness_}));
+}
+
+void FarmProgressWriter::on_generation(const GenerationRecord& record, std::optional<double> best) {
   evaluations_before_ += last_.done;
   last_.done = last_.total = 0;
   ++generations_;
   generation_ = record.generation;
-  best_ = best;
+  best_fitness_ = best;
+  best_ = format_number(best);
+  if (log_ != nullptr) {
+    log_->set({"generation", record.generation});
+    std::vector<LogField> fields = {{"evaluations", record.evaluations}};
+    if (best) fields.push_back({"best", *best});
+    log_->write(LogLevel::kInfo, "generation committed", fields);
+  }
   refresh(clock_.now_s());
 }
 
@@ -53,6 +73,7 @@ void FarmProgressWriter::refresh(double now_s) {
                                   last_.rate_per_s, last_.time_left_s));
   if (now_s - written_s_ < kWriteInterval_s) return;
   written_s_ = now_s;
+  publish();
   last_.workers.clear();
   for (const WorkerStatus& w : farm_.workers()) {
     last_.workers.push_back({w.name, w.host, w.state, w.jobs, w.finished});
@@ -114,7 +135,7 @@ Status StoreSink::commit(const GenerationRecord& record) {
   summarise_fitness(stored, higher_is_better(kind));
   const Result<std::string> digest = store_.commit(stored);
   if (!digest) return digest.error();
-  progress_.on_generation(record, format_number(stored.best));
+  progress_.on_generation(record, stored.best);
   return {};
 }
 

@@ -1,12 +1,15 @@
 // Where the evolution loop meets the farm and the run store.
 #pragma once
 
+#include <optional>
 #include <string>
 
+#include "common/log/log.h"
 #include "common/problem/problem.h"
 #include "master/cli/console.h"
 #include "master/evolve/evolve.h"
 #include "master/farm/socket_farm.h"
+#include "master/metrics/metrics_server.h"
 #include "master/store/run_store.h"
 
 namespace gapfarm {
@@ -18,11 +21,14 @@ class FarmProgressWriter {
                      const EvolveClock& clock, Console& console);
 
   void on_progress(const FarmProgress& progress);
-  void on_generation(const GenerationRecord& record, const std::string& best);
+  void on_generation(const GenerationRecord& record, std::optional<double> best);
   const Progress& last() const { return last_; }
+  // Where generations and figures also go; neither is owned, both may be null.
+  void watch(Log* log, MetricsServer* metrics);
 
  private:
   void refresh(double now_s);
+  void publish();
 
   RunStore& store_;
   const SocketFarm& farm_;
@@ -35,7 +41,10 @@ class FarmProgressWriter {
   std::uint64_t generations_ = 0;         // of this life of the master
   std::uint64_t generation_ = 0;          // of the run
   std::string best_;
+  std::optional<double> best_fitness_;
   Progress last_;
+  Log* log_ = nullptr;
+  MetricsServer* metrics_ = nullptr;
 };
 
 // Candidates to EvaluateTasks and back.

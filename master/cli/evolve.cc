@@ -35,6 +35,8 @@ RunInfo run_info(const Config& config, const EvolutionOverrides& overrides) {
 }
 
 int run_evolve(const EvolveCommand& command, CliContext& context) {
+  const std::unique_ptr<Log> log = command.farm.log.open();
+  const NotesGoTo notes(*log, context.console);
   const auto config =
       open_config(command.config, command.trials, context.console, [&](Config& read) {
         command.overrides.apply(read.evolution);
@@ -48,7 +50,8 @@ int run_evolve(const EvolveCommand& command, CliContext& context) {
   context.console.note(command.out + ": evolving " + std::to_string(config->problem.genes.size()) +
                        " parameters on " + std::to_string(config->problem.log.trials.size()) +
                        " trials, seed " + std::to_string(config->seed));
-  return run_evolution(*store, {*config, config->problem, command.farm, command.shuffle}, context);
+  return run_evolution(*store, {*config, config->problem, command.farm, *log, command.shuffle},
+                       context);
 }
 
 }  // namespace

@@ -11,6 +11,7 @@
 #include "common/config/model.h"
 #include "common/config/settings.h"
 #include "common/net/keys.h"
+#include "master/cli/farm_log.h"
 #include "master/cli/subcommand.h"
 #include "master/farm/socket_farm.h"
 
@@ -43,6 +44,8 @@ struct FarmOptions {
   std::string keys = KeyFolder::default_path();
   bool insecure = false;
   bool insecure_anywhere = false;
+  std::optional<unsigned> metrics_port;
+  LogFlags log;
 
   void declare(CLI::App& app, bool remote);
 };

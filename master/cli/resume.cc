@@ -34,6 +34,8 @@ Result<Config> stored_config(const RunInfo& info, const EvolutionOverrides& over
 }
 
 int run_resume(const ResumeCommand& command, CliContext& context) {
+  const std::unique_ptr<Log> log = command.farm.log.open();
+  const NotesGoTo notes(*log, context.console);
   Result<RunStore> store = RunStore::open(command.run);
   if (!store) return failed(store.error(), context);
   const Result<Config> config = stored_config(store->info(), command.overrides);
@@ -43,7 +45,8 @@ int run_resume(const ResumeCommand& command, CliContext& context) {
     if (!kept) return failed(kept.error(), context);
     if (!kept->empty()) context.console.note("later generations are kept in " + kept->string());
   }
-  return run_evolution(*store, {*config, config->problem, command.farm, command.shuffle}, context);
+  return run_evolution(*store, {*config, config->problem, command.farm, *log, command.shuffle},
+                       context);
 }
 
 }  // namespace

@@ -51,6 +51,7 @@ SubcommandRun setup_import(CLI::App& app);
 SubcommandRun setup_influence(CLI::App& app);
 SubcommandRun setup_keys(CLI::App& app);
 SubcommandRun setup_predict(CLI::App& app);
+SubcommandRun setup_replay(CLI::App& app);
 SubcommandRun setup_report(CLI::App& app);
 SubcommandRun setup_resume(CLI::App& app);
 SubcommandRun setup_simulate(CLI::App& app);

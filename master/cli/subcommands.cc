@@ -9,6 +9,7 @@ std::span<const Subcommand> subcommands() {
       {"resume", "continue a run, bit for bit", "Runs", setup_resume},
       {"status", "say how a run is doing, live or dead", "Runs", setup_status},
       {"compare", "run searches side by side over seeds", "Runs", setup_compare},
+      {"replay", "evaluate one individual of a run again, to the bit", "Runs", setup_replay},
       {"simulate", "make a trial log from a parameter set", "Models", setup_simulate},
       {"predict", "say where every trial of a log should have ended", "Models", setup_predict},
       {"crossfit", "tune on some trials, try on others", "Models", setup_crossfit},

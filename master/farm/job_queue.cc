@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "common/problem/question.h"
+#include "master/farm/answer.h"
 
 namespace gapfarm {
 namespace {
@@ -159,6 +160,10 @@ Committed JobQueue::commit(const WorkerIdentityPtr& worker, v1::JobResult* resul
   const std::uint64_t id = result->attempt_id();
   Attempt* attempt = find(worker->id, id);
   if (attempt == nullptr || first_job_ + attempt->job != result->job_id()) return committed;
+  if (!answers(jobs_[attempt->job].task, result->result())) {
+    committed.kind = Commit::kNoAnswer;
+    return committed;
+  }
   if (attempt->live) withdraw(*attempt, id);
   note_wall(result->wall());
   Job& job = jobs_[attempt->job];

@@ -45,7 +45,9 @@ Scheduler::Scheduler(SchedulerOptions options)
 
 void Scheduler::report(FarmEvent::Kind kind, const std::string& worker,
                        const std::string& text) const {
-  if (options_.on_event) options_.on_event({kind, worker, text});
+  if (!options_.on_event) return;
+  const WorkerRecord* known = registry_.find_name(worker);
+  options_.on_event({kind, worker, text, known != nullptr ? known->host : ""});
 }
 
 v1::Envelope& Scheduler::post(const std::string& peer) {
@@ -124,7 +126,7 @@ void Scheduler::on_message(const std::string& peer, v1::Envelope* envelope, doub
       break;
     case v1::Envelope::kResults:
       for (v1::JobResult& result : *envelope->mutable_results()->mutable_results()) {
-        on_result(*worker, &result);
+        if (!on_result(*worker, &result)) return;
       }
       on_dropped(*worker, envelope->results());
       break;
@@ -205,20 +207,33 @@ void Scheduler::on_heartbeat(WorkerRecord& worker, const v1::Heartbeat& heartbea
   keep_only(worker, heartbeat.attempts(), now - options_.silence_limit_s);
 }
 
-void Scheduler::on_result(WorkerRecord& worker, v1::JobResult* result) {
+bool Scheduler::on_result(WorkerRecord& worker, v1::JobResult* result) {
   if (result->epoch() != options_.epoch) {
     ++counts_.foreign;
-    return;
+    return true;
   }
+  const std::uint64_t attempt = result->attempt_id();
   const double wall = result->wall();
   const Committed committed = queue_.commit(registry_.identity(worker), result);
-  if (drop_holding(worker, result->attempt_id())) line_up(worker);
+  if (committed.kind == Commit::kNoAnswer) {
+    // Broken or lying: nothing else that it says is worth waiting for.
+    ++counts_.malformed;
+    const std::string reason = "it answered a task with something that is no result of it";
+    post(worker.peer).mutable_refusal()->set_reason(reason);
+    dismiss(worker, FarmEvent::kBadMessage, "is refused: " + reason);
+    return false;
+  }
+  if (drop_holding(worker, attempt)) line_up(worker);
   on_committed(committed);
-  if (committed.kind != Commit::kDone) return;
+  if (committed.kind != Commit::kDone) return true;
   ++worker.finished;
-  if (!std::isfinite(wall) || wall < 0) return;
+  if (options_.on_job) {
+    options_.on_job({true, result->job_id(), attempt, worker.name, worker.host});
+  }
+  if (!std::isfinite(wall) || wall < 0) return true;
   worker.mean_wall =
       worker.mean_wall < 0 ? wall : worker.mean_wall + 0.1 * (wall - worker.mean_wall);
+  return true;
 }
 
 void Scheduler::on_committed(const Committed& committed) {

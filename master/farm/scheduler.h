@@ -31,6 +31,16 @@ struct FarmEvent {
   Kind kind;
   std::string worker;  // name; empty: unknown
   std::string text;    // a sentence
+  std::string host;    // the worker's; empty: unknown
+};
+
+// One job on its way; for logs.
+struct JobEvent {
+  bool answered = false;  // else given out
+  std::uint64_t job = 0;
+  std::uint64_t attempt = 0;
+  const std::string& worker;
+  const std::string& host;
 };
 
 struct SchedulerOptions {
@@ -46,6 +56,7 @@ struct SchedulerOptions {
   double silence_limit_s = 10;
   std::optional<std::uint64_t> shuffle_seed;
   std::function<void(const FarmEvent&)> on_event;
+  std::function<void(const JobEvent&)> on_job;  // may be empty
 };
 
 struct SchedulerCounts {
@@ -120,7 +131,8 @@ class Scheduler {
  private:
   void on_hello(const std::string& peer, const v1::Hello& hello, double now);
   void on_heartbeat(WorkerRecord& worker, const v1::Heartbeat& heartbeat, double now);
-  void on_result(WorkerRecord& worker, v1::JobResult* result);
+  // False: the worker is gone with it.
+  bool on_result(WorkerRecord& worker, v1::JobResult* result);
   void on_dropped(WorkerRecord& worker, const v1::ResultBatch& batch);
   void on_offer(WorkerRecord& worker, v1::Offer* offer);
   void on_committed(const Committed& committed);

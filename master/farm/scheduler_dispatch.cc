@@ -20,6 +20,10 @@ class Scheduler::Batches {
   void add(WorkerRecord& worker, v1::Job* job, double now) {
     job->set_epoch(scheduler_.options_.epoch);
     worker.holds.push_back({job->attempt_id(), now});
+    if (scheduler_.options_.on_job) {
+      scheduler_.options_.on_job(
+          {false, job->job_id(), job->attempt_id(), worker.name, worker.host});
+    }
     auto [batch, fresh] = open_.try_emplace(worker.id, Open{0, 0});
     if (fresh || batch->second.bytes > kBatchBytes) {
       scheduler_.post(worker.peer);

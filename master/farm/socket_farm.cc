@@ -81,6 +81,7 @@ Status SocketFarm::Impl::open() {
   settings.limits = options.job_limits;
   settings.copies = options.copies;
   settings.shuffle_seed = options.shuffle_seed;
+  settings.on_job = options.on_job;
   settings.on_event = [this](const FarmEvent& event) { on_event(event); };
   scheduler = std::make_unique<Scheduler>(std::move(settings));
 
@@ -115,14 +116,14 @@ Status SocketFarm::Impl::open_local() {
 void SocketFarm::Impl::reap(double now) {
   next_reap = now + kReapInterval;
   for (std::string& text : socket->take_complaints()) {
-    on_event({FarmEvent::kRefused, "", std::move(text)});
+    on_event({FarmEvent::kRefused, "", std::move(text), ""});
   }
   if (!locals) return;
   for (const ProcessEnded& end : locals->pool().reap(now)) {
     scheduler->on_process_end({end.name, end.cause, end.epoch, end.attempt, end.text});
     if (end.gave_up) {
       if (last_trouble.empty()) last_trouble = end.text;
-      on_event({FarmEvent::kDied, end.name, end.text + "; it is not started again"});
+      on_event({FarmEvent::kDied, end.name, end.text + "; it is not started again", ""});
     }
   }
 }

@@ -34,6 +34,7 @@ struct SocketFarmOptions {
   std::optional<std::uint64_t> shuffle_seed;       // jobs go out in shuffled order
   StopSource* stop = nullptr;                      // ends run(); not owned, outlives the farm
   std::function<void(const FarmEvent&)> on_event;  // empty: what went wrong goes to stderr
+  std::function<void(const JobEvent&)> on_job;     // may be empty
 };
 
 // Belongs to the thread that made it, which must live as long: the local workers die with it.

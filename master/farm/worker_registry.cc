@@ -81,7 +81,7 @@ WorkerRecord* WorkerRegistry::find_peer(const std::string& peer) {
   return found == by_peer_.end() ? nullptr : found->second;
 }
 
-WorkerRecord* WorkerRegistry::find_name(const std::string& name) {
+WorkerRecord* WorkerRegistry::find_name(const std::string& name) const {
   const auto found = by_name_.find(name);
   return found == by_name_.end() ? nullptr : found->second;
 }

@@ -51,7 +51,7 @@ class WorkerRegistry {
   Admission admit(const std::string& peer, const v1::Hello& hello, double now);
 
   WorkerRecord* find_peer(const std::string& peer);
-  WorkerRecord* find_name(const std::string& name);
+  WorkerRecord* find_name(const std::string& name) const;
   WorkerRecord* find(WorkerId id);
   // As `worker` is now, for as long as somebody needs to know.
   static WorkerIdentityPtr identity(const WorkerRecord& worker) {

@@ -3,6 +3,7 @@
 #include <fcntl.h>
 #include <signal.h>
 #include <stdlib.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -57,11 +58,15 @@ void RunningProgram::send(int signal) const { ::kill(pid_, signal); }
 
 std::string RunningProgram::out() const { return content(folder_ / "out"); }
 
+std::string RunningProgram::err() const { return content(folder_ / "err"); }
+
 Finished RunningProgram::wait() {
   int status = 0;
-  ::waitpid(pid_, &status, 0);
+  rusage usage = {};
+  ::wait4(pid_, &status, 0, &usage);
   pid_ = -1;
   Finished finished;
+  finished.peak_memory_kB = usage.ru_maxrss;
   finished.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
   finished.out = content(folder_ / "out");
   finished.err = content(folder_ / "err");

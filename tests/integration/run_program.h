@@ -13,6 +13,7 @@ struct Finished {
   int exit_code = -1;  // 128 + signal when a signal ended it
   std::string out;
   std::string err;
+  long peak_memory_kB = 0;  // of it and of its children that it waited for, whichever had most
 };
 
 // A program that is running; destroying it kills it.
@@ -29,6 +30,7 @@ class RunningProgram {
   void send(int signal) const;
   // Everything written to stdout so far.
   std::string out() const;
+  std::string err() const;
   Finished wait();
 
  private:

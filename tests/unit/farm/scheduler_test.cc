@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <limits>
 #include <set>
 #include <string>
 #include <vector>
@@ -306,6 +307,33 @@ TEST(Envelope, RejectsWhatIsNone) {
   EXPECT_EQ(decode(goodbye.SerializeAsString(), &envelope), DecodeStatus::kOtherProtocol);
   v1::Envelope empty;
   EXPECT_EQ(decode(encode(&empty), &envelope), DecodeStatus::kMalformed);
+}
+
+// A worker that sends nonsense is refused, and what it held is done by others.
+TEST(Scheduler, RefusesAWorkerWhoseAnswerIsNone) {
+  std::vector<v1::Task> tasks(2);
+  for (v1::Task& task : tasks) task.mutable_evaluate();
+  Desk desk;
+  desk.scheduler.start("p", tasks);
+  desk.join("liar");
+  const auto jobs = desk.jobs_for("liar");
+  ASSERT_EQ(jobs.size(), 2u);
+  v1::Envelope envelope;
+  for (const v1::Job& job : jobs) {
+    v1::JobResult* result = envelope.mutable_results()->add_results();
+    result->set_job_id(job.job_id());
+    result->set_attempt_id(job.attempt_id());
+    result->set_epoch(job.epoch());
+    result->mutable_result()->set_outcome(v1::OK);
+    result->mutable_result()->mutable_evaluate()->set_fitness(
+        std::numeric_limits<double>::quiet_NaN());
+  }
+  desk.say("liar", envelope);
+  EXPECT_EQ(desk.scheduler.workers().size(), 0u);
+  desk.tick();
+  desk.join("honest");
+  const auto again = desk.jobs_for("honest");
+  ASSERT_EQ(again.size(), 2u);
 }
 
 }  // namespace

@@ -1,0 +1,111 @@
+#include "common/log/log.h"
+
+#include <spdlog/logger.h>
+#include <spdlog/pattern_formatter.h>
+#include <spdlog/sinks/stdout_sinks.h>
+
+#include <algorithm>
+#include <mutex>
+#include <nlohmann/json.hpp>
+
+namespace gapfarm {
+namespace {
+
+spdlog::level::level_enum spdlog_level(LogLevel level) {
+  switch (level) {
+    case LogLevel::kDebug:
+      return spdlog::level::debug;
+    case LogLevel::kInfo:
+      return spdlog::level::info;
+    case LogLevel::kWarn:
+      return spdlog::level::warn;
+    case LogLevel::kError:
+      return spdlog::level::err;
+    default:
+      return spdlog::level::off;
+  }
+}
+
+std::string json_of(const nlohmann::json& value) {
+  return value.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
+std::string json_of(const LogField& field) {
+  return std::visit([](const auto& value) { return json_of(nlohmann::json(value)); }, field.value);
+}
+
+// As it is when that reads as one word.
+std::string word_of(const LogField& field) {
+  const auto* text = std::get_if<std::string>(&field.value);
+  const bool plain = text != nullptr && !text->empty() &&
+                     std::all_of(text->begin(), text->end(), [](unsigned char c) {
+                       return c > ' ' && c != '"' && c != '\\' && c != '=' && c < 0x7f;
+                     });
+  return plain ? *text : json_of(field);
+}
+
+// What came from elsewhere cannot begin a line or steer a terminal.
+std::string one_line(std::string_view text) {
+  std::string result(text);
+  std::replace_if(
+      result.begin(), result.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }, '?');
+  return result;
+}
+
+std::unique_ptr<spdlog::formatter> formatter_of(const LogOptions& options) {
+  const std::string time = "%Y-%m-%dT%H:%M:%S.%eZ";
+  const std::string pattern = options.format == LogFormat::kJson
+                                  ? "{\"time\":\"" + time + "\",\"level\":\"%l\",%v}"
+                                  : time + " %l " + options.program + ": %v";
+  return std::make_unique<spdlog::pattern_formatter>(pattern, spdlog::pattern_time_type::utc);
+}
+
+}  // namespace
+
+struct Log::Impl {
+  explicit Impl(const std::string& program)
+      : logger(program, std::make_shared<spdlog::sinks::stderr_sink_mt>()) {}
+  spdlog::logger logger;
+  std::mutex mutex;
+  std::vector<LogField> context;
+};
+
+Log::Log(const LogOptions& options)
+    : impl_(std::make_unique<Impl>(options.program)), format_(options.format) {
+  impl_->logger.set_formatter(formatter_of(options));
+  impl_->logger.set_level(spdlog_level(options.level));
+  impl_->logger.flush_on(spdlog::level::trace);
+}
+
+Log::~Log() = default;
+
+bool Log::wants(LogLevel level) const { return impl_->logger.should_log(spdlog_level(level)); }
+
+void Log::set(LogField field) {
+  const std::lock_guard lock(impl_->mutex);
+  const auto same = std::find_if(impl_->context.begin(), impl_->context.end(),
+                                 [&](const LogField& f) { return f.key == field.key; });
+  if (same == impl_->context.end()) {
+    impl_->context.push_back(std::move(field));
+  } else {
+    same->value = std::move(field.value);
+  }
+}
+
+void Log::write(LogLevel level, std::string_view text, const std::vector<LogField>& fields) {
+  if (!wants(level)) return;
+  const bool json = format_ == LogFormat::kJson;
+  std::string line = json ? "\"text\":" + json_of(nlohmann::json(text)) : one_line(text);
+  const auto add = [&](const LogField& field) {
+    line += json ? "," + json_of(nlohmann::json(field.key)) + ":" + json_of(field)
+                 : " " + field.key + "=" + word_of(field);
+  };
+  {
+    const std::lock_guard lock(impl_->mutex);
+    for (const LogField& field : impl_->context) add(field);
+  }
+  for (const LogField& field : fields) add(field);
+  impl_->logger.log(spdlog_level(level), spdlog::string_view_t(line.data(), line.size()));
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,56 @@
+// Structured logs on stderr: a sentence for people with fields for machines.
+#pragma once
+
+#include <cstdint>
+#include <initializer_list>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+namespace gapfarm {
+
+enum class LogLevel { kDebug, kInfo, kWarn, kError, kOff };
+enum class LogFormat {
+  kText,  // 2026-01-31T12:00:00.000Z warn gapfarm: it is late worker=rack3-1
+  kJson,  // {"time":"2026-01-31T12:00:00.000Z","level":"warn","text":"it is
+          // late","worker":"rack3-1"}
+};
+
+// run, generation, job, attempt, worker, host: the same key for the same thing everywhere.
+struct LogField {
+  std::string key;
+  std::variant<std::string, std::uint64_t, double> value;
+};
+
+struct LogOptions {
+  std::string program;  // for people
+  LogFormat format = LogFormat::kText;
+  LogLevel level = LogLevel::kWarn;
+};
+
+// Nothing is ever lost without a word: writing is synchronous.  Thread-safe.
+class Log {
+ public:
+  explicit Log(const LogOptions& options);
+  ~Log();
+  Log(const Log&) = delete;
+  Log& operator=(const Log&) = delete;
+
+  bool wants(LogLevel level) const;
+  // One line.  Text and values may hold anything.
+  void write(LogLevel level, std::string_view text, const std::vector<LogField>& fields = {});
+
+  // Every later line carries this field; a second call with its key replaces it.
+  void set(LogField field);
+
+  LogFormat format() const { return format_; }
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+  LogFormat format_;
+};
+
+}  // namespace gapfarm

@@ -1,0 +1,147 @@
+// Logs, figures and replays of real runs.
+#include <arpa/inet.h>
+#include <gmock/gmock.h>
+#include <netinet/in.h>
+#include <signal.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <array>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <thread>
+
+#include "master/store/run_reader.h"
+#include "tests/integration/run_program.h"
+
+namespace gapfarm {
+namespace {
+
+using nlohmann::json;
+using testing::HasSubstr;
+
+class Observability : public testing::Test {
+ protected:
+  std::vector<std::string> evolve(const std::string& run, std::vector<std::string> more) const {
+    std::vector<std::string> arguments = {"evolve",      config_,         "--out",
+                                          folder_ / run, "--generations", "3"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return arguments;
+  }
+
+  TemporaryFolder folder_;
+  // Sampled spread: scores draw random numbers, and elites are scored again.
+  const std::string config_ = folder_.write("run.toml", "trials = [\"" GAPFARM_SOURCE_DIR
+                                                        "/configs/demo/trials.csv\"]\n"
+                                                        "[genes]\n"
+                                                        "friction = [0.1, 1.5]\n"
+                                                        "full_speed = [0.1, 0.6]\n"
+                                                        "[parameters]\n"
+                                                        "step_rate = 60\n"
+                                                        "[spread]\n"
+                                                        "kind = \"sampled\"\n"
+                                                        "replicates = 4\n"
+                                                        "[evolution]\n"
+                                                        "population = 8\n");
+};
+
+std::vector<json> log_lines(const std::string& text) {
+  std::vector<json> lines;
+  std::istringstream in(text);
+  for (std::string line; std::getline(in, line);) {
+    lines.push_back(json::parse(line, nullptr, false));
+    EXPECT_TRUE(lines.back().is_object()) << line;
+  }
+  return lines;
+}
+
+std::string fetch(int port, const std::string& request) {
+  const int fd = ::socket(AF_INET, SOCK_STREAM, 0);
+  sockaddr_in address = {};
+  address.sin_family = AF_INET;
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  address.sin_port = htons(static_cast<std::uint16_t>(port));
+  EXPECT_EQ(::connect(fd, reinterpret_cast<sockaddr*>(&address), sizeof address), 0);
+  EXPECT_GT(::send(fd, request.data(), request.size(), MSG_NOSIGNAL), 0);
+  std::string answer;
+  std::array<char, 4096> bytes;
+  for (ssize_t n = 0; (n = ::recv(fd, bytes.data(), bytes.size(), 0)) > 0;) {
+    answer.append(bytes.data(), static_cast<std::size_t>(n));
+  }
+  ::close(fd);
+  return answer;
+}
+
+TEST_F(Observability, EveryLineOfAJsonLogIsAnObjectWithItsPlace) {
+  const Finished run = gapfarm_command(
+      evolve("run", {"--workers", "1", "--log-format", "json", "--log-level", "debug"}));
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  std::size_t jobs = 0, generations = 0, joined = 0;
+  for (const json& line : log_lines(run.err)) {
+    EXPECT_TRUE(line.contains("time") && line.contains("level") && line.contains("text")) << line;
+    const std::string text = line.value("text", "");
+    if (text == "job answered") {
+      EXPECT_EQ(line.value("run", ""), folder_ / "run") << line;
+      ++jobs;
+      EXPECT_GT(line.value("job", 0u), 0u);
+      EXPECT_GT(line.value("attempt", 0u), 0u);
+      EXPECT_NE(line.value("host", ""), "");
+    }
+    generations += text == "generation committed" && line.value("generation", 0u) > 0;
+    joined += text.rfind("joined", 0) == 0 && line.value("worker", "") != "";
+  }
+  EXPECT_GE(jobs, 24u);
+  EXPECT_EQ(generations, 3u);
+  EXPECT_EQ(joined, 1u);
+}
+
+TEST_F(Observability, FiguresAreServedOnThisMachine) {
+  RunningProgram master("gapfarm", evolve("run", {"--workers", "0", "--listen",
+                                                  "ipc://" + folder_ / "farm", "--metrics", "0"}));
+  const std::string marker = "http://127.0.0.1:";
+  std::size_t at = std::string::npos;
+  while (at == std::string::npos || master.err().find('\n', at) == std::string::npos) {
+    at = master.err().find(marker);
+    std::this_thread::yield();
+  }
+  const int port = std::stoi(master.err().substr(at + marker.size()));
+  std::string page;
+  while (page.find("gapfarm_generation") == std::string::npos) {
+    page = fetch(port, "GET /metrics HTTP/1.1\r\nHost: x\r\n\r\n");
+  }
+  EXPECT_THAT(page, HasSubstr("200 OK"));
+  EXPECT_THAT(page, HasSubstr("\n# TYPE gapfarm_retries_total counter\ngapfarm_retries_total 0\n"));
+  EXPECT_THAT(page, HasSubstr("gapfarm_workers{state=\"busy\"} 0\n"));
+  EXPECT_THAT(fetch(port, "GET /etc/passwd HTTP/1.1\r\n\r\n"), HasSubstr("404"));
+  EXPECT_THAT(fetch(port, "nonsense\r\n\r\n"), HasSubstr("404"));
+  master.send(SIGTERM);
+  master.wait();
+}
+
+TEST_F(Observability, AnIndividualIsReplayedToTheBit) {
+  ASSERT_EQ(gapfarm_command(evolve("run", {"--workers", "2"})).exit_code, 0);
+  const auto reader = RunReader::open(folder_ / "run");
+  ASSERT_TRUE(reader.ok()) << reader.error().message;
+  const auto last = reader->individuals(3);
+  ASSERT_TRUE(last.ok());
+  ASSERT_FALSE(last->empty());
+  for (const StoredIndividual& individual : {last->front(), last->back()}) {
+    const Finished replay =
+        gapfarm_command({"replay", folder_ / "run", "--genome", std::to_string(individual.birth_id),
+                         "--paths", folder_ / "paths.csv"});
+    EXPECT_EQ(replay.exit_code, 0) << replay.out << replay.err;
+    EXPECT_THAT(replay.out, HasSubstr("the same to the bit"));
+  }
+  std::ifstream paths(folder_ / "paths.csv");
+  std::string header, row;
+  std::getline(paths, header);
+  EXPECT_EQ(header, "session,trial,t,x,y,theta");
+  EXPECT_TRUE(std::getline(paths, row));
+  const Finished unknown = gapfarm_command({"replay", folder_ / "run", "--genome", "999999"});
+  EXPECT_EQ(unknown.exit_code, 1);
+  EXPECT_THAT(unknown.err, HasSubstr("999999"));
+}
+
+}  // namespace
+}  // namespace gapfarm
