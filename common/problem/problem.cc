@@ -15,9 +15,8 @@ std::vector<CommandSpec> no_commands() { return {}; }
 
 std::vector<CommandSpec> racquetball_commands() { return {{"serve", 1, 1, 5}}; }
 
-constexpr ScenarioForm kForms[] = {{"srv1", srv1_commands},
-                                   {"push", no_commands, true},
-                                   {"racquetball", racquetball_commands}};
+constexpr ScenarioForm kForms[] = {
+    {"srv1", srv1_commands}, {"push", no_commands, true}, {"racquetball", racquetball_commands}};
 
 }  // namespace
 

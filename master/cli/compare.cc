@@ -216,7 +216,7 @@ SubcommandRun setup_compare(CLI::App& app) {
       "Random search, constant-velocity motion and the config's own values are always among the\n"
       "baselines.\n\n"
       "Examples:\n"
-      "  gapfarm compare configs/compare_forward.toml --trials log/*.dat --out compared\n"
+      "  gapfarm compare configs/compare/forward.toml --trials log/*.dat --out compared\n"
       "  gapfarm compare a.toml b.toml --seeds 20 --evaluations 2000 --target 0.5 --out compared");
   return [command](CliContext& context) { return run_compare(*command, context); };
 }

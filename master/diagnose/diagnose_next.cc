@@ -19,7 +19,7 @@ Status DiagnosisRun::plan_next() {
     auto candidates = selector_->candidates(explained, {});
     if (!candidates) return candidates.error();
     Rivals rivals;
-    for (const Candidate& c : *candidates) {
+    for (const EffectCandidate& c : *candidates) {
       const std::string& name = c.signature.effect;
       const bool alias = std::any_of(chosen_[k].aliases.begin(), chosen_[k].aliases.end(),
                                      [&](const Alias& a) { return a.effect == name; });

@@ -52,7 +52,7 @@ RootMeanSquare root_mean_square(const std::vector<Eigen::Vector3d>& residuals) {
 
 }  // namespace
 
-Overrides DiagnosisRun::start_of(const std::vector<Candidate>& effects) const {
+Overrides DiagnosisRun::start_of(const std::vector<EffectCandidate>& effects) const {
   Overrides at = study_.base;
   for (std::size_t k = 0; k < effects.size(); ++k) {
     std::vector<const Signature*> others;
@@ -73,7 +73,7 @@ Overrides DiagnosisRun::start_of(const std::vector<Candidate>& effects) const {
 Status DiagnosisRun::refit_nested() {
   const Eigen::MatrixXd none(static_cast<Eigen::Index>(3 * study_.size()), 0);
   std::set<std::string> names;
-  std::vector<Candidate> effects;
+  std::vector<EffectCandidate> effects;
   for (std::size_t count = 0; count <= chosen_.size(); ++count) {
     if (count > 0) {
       effects.push_back(chosen_[count - 1].candidate);
@@ -95,7 +95,7 @@ Status DiagnosisRun::refit_nested() {
 
 Status DiagnosisRun::refit() {
   if (!chosen_.empty()) {
-    std::vector<Candidate> effects;
+    std::vector<EffectCandidate> effects;
     for (const ChosenEffect& c : chosen_) effects.push_back(c.candidate);
     auto fit = estimate(effects, estimates_ ? 1 : 2);
     if (!fit) return fit.error();

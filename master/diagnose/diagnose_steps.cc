@@ -111,16 +111,16 @@ Status DiagnosisRun::select() {
   estimates_.reset();
   auto chosen = selector_->select(
       first_, first_.empty() ? 0 : latency_.gain,
-      [&](const std::vector<Candidate>& effects) { return relinearise(effects); });
+      [&](const std::vector<EffectCandidate>& effects) { return relinearise(effects); });
   if (!chosen) return chosen.error();
   chosen_ = std::move(*chosen);
   return {};
 }
 
 // The effects fitted together, base and nuisances beside them to first order.
-Result<JointFit> DiagnosisRun::estimate(const std::vector<Candidate>& effects, int rounds) {
+Result<JointFit> DiagnosisRun::estimate(const std::vector<EffectCandidate>& effects, int rounds) {
   Overrides start = start_of(effects);
-  for (const Candidate& effect : effects) {
+  for (const EffectCandidate& effect : effects) {
     for (const auto& [row, value] : estimates_ ? estimates_->at : Overrides{}) {
       if (problem_.table()[row].effect == effect.signature.effect) start[row] = value;
     }
@@ -128,12 +128,12 @@ Result<JointFit> DiagnosisRun::estimate(const std::vector<Candidate>& effects, i
   return fit_jointly(predictor_, study_, effects, start, BaseParameters::kHeld, nuisances_, rounds);
 }
 
-Result<Relinearised> DiagnosisRun::relinearise(const std::vector<Candidate>& effects) {
+Result<Relinearised> DiagnosisRun::relinearise(const std::vector<EffectCandidate>& effects) {
   auto fit = estimate(effects, 2);
   if (!fit) return fit.error();
   estimates_ = std::move(*fit);
   std::vector<PredictionRequest> without;
-  for (const Candidate& effect : effects) {
+  for (const EffectCandidate& effect : effects) {
     without.push_back({estimates_->at, {}});
     std::erase_if(without.back().at, [&](const auto& entry) {
       return problem_.table()[entry.first].effect == effect.signature.effect;
@@ -193,9 +193,9 @@ double DiagnosisRun::explained_nats(const Regression& explained) const {
   return (selector_->nothing_explained().left_squares() - explained.left_squares()) / 2;
 }
 
-void DiagnosisRun::fill_screening(const std::vector<Candidate>& candidates) {
+void DiagnosisRun::fill_screening(const std::vector<EffectCandidate>& candidates) {
   std::vector<Eigen::VectorXd> explained;
-  for (const Candidate& c : candidates) {
+  for (const EffectCandidate& c : candidates) {
     explained.push_back(base_->explained(c.signature.columns));
   }
   for (std::size_t i = 0; i < candidates.size(); ++i) {

@@ -39,17 +39,17 @@ class DiagnosisRun {
   bool too_thin();
   Status rebuild_nuisances();
   Status look_for_latency();
-  void fill_screening(const std::vector<Candidate>& candidates);
+  void fill_screening(const std::vector<EffectCandidate>& candidates);
   Regression explained() const;  // what is left once all that was chosen is explained
   double explained_nats(const Regression& explained) const;
   void look_for_slip(const Regression& explained);
   std::vector<bool> tells_of_slips() const;
   Status select();
-  Result<JointFit> estimate(const std::vector<Candidate>& effects, int rounds);
-  Result<Relinearised> relinearise(const std::vector<Candidate>& effects);
+  Result<JointFit> estimate(const std::vector<EffectCandidate>& effects, int rounds);
+  Result<Relinearised> relinearise(const std::vector<EffectCandidate>& effects);
   Status select_without_slips(const Regression& explained);
   // Base and these effects at their best linear fit.
-  Overrides start_of(const std::vector<Candidate>& effects) const;
+  Overrides start_of(const std::vector<EffectCandidate>& effects) const;
   void spread_effects(Overrides* at) const;
   Status refit_nested();
   void name_effects();

@@ -18,7 +18,7 @@ double step_of(const Parameter& row, double value) {
 }
 
 std::vector<FittedParameter> parameters_of(const ParameterTable& table, const Overrides& start,
-                                           const std::vector<Candidate>& effects,
+                                           const std::vector<EffectCandidate>& effects,
                                            BaseParameters base, std::size_t* base_count) {
   std::vector<FittedParameter> parameters;
   if (base == BaseParameters::kFitted) {
@@ -27,7 +27,7 @@ std::vector<FittedParameter> parameters_of(const ParameterTable& table, const Ov
     }
   }
   *base_count = parameters.size();
-  for (const Candidate& effect : effects) {
+  for (const EffectCandidate& effect : effects) {
     for (const auto& [row, value] : start) {
       const Parameter& p = table[row];
       // Where a seam runs is searched, not sloped: residuals jump as a trial changes sides.
@@ -176,7 +176,7 @@ std::map<std::string, double> start_values(const Study& study, const Regression&
 }
 
 Result<JointFit> fit_jointly(Predictor& predictor, const Study& study,
-                             const std::vector<Candidate>& effects, const Overrides& start,
+                             const std::vector<EffectCandidate>& effects, const Overrides& start,
                              BaseParameters base, const Eigen::MatrixXd& nuisances, int rounds) {
   JointFit fit;
   fit.at = start;

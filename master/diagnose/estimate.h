@@ -32,7 +32,7 @@ enum class BaseParameters { kHeld, kFitted };
 // Gauss-Newton on the predictions, `rounds` re-linearisations; fitted base parameters have their
 // prior; `nuisances` (may have no columns) take part and are thrown away.
 Result<JointFit> fit_jointly(Predictor& predictor, const Study& study,
-                             const std::vector<Candidate>& effects, const Overrides& start,
+                             const std::vector<EffectCandidate>& effects, const Overrides& start,
                              BaseParameters base, const Eigen::MatrixXd& nuisances, int rounds);
 
 // Parameter values at which a refinement of the effect begins.

@@ -57,13 +57,13 @@ double cosine(const Eigen::VectorXd& a, const Eigen::VectorXd& b) {
   return lengths > 0 ? a.dot(b) / lengths : 0;
 }
 
-double total_gain(const std::vector<Candidate>& chosen) {
+double total_gain(const std::vector<EffectCandidate>& chosen) {
   double sum = 0;
-  for (const Candidate& c : chosen) sum += c.gain;
+  for (const EffectCandidate& c : chosen) sum += c.gain;
   return sum;
 }
 
-std::set<std::string> names_of(const std::vector<Candidate>& chosen,
+std::set<std::string> names_of(const std::vector<EffectCandidate>& chosen,
                                std::size_t but = ~std::size_t{0}) {
   std::set<std::string> names;
   for (std::size_t i = 0; i < chosen.size(); ++i) {
@@ -95,7 +95,7 @@ Status Selector::add_patches() {
   return {};
 }
 
-Candidate Selector::refine_seam(const Regression& explained, Candidate best) const {
+EffectCandidate Selector::refine_seam(const Regression& explained, EffectCandidate best) const {
   const int axis = static_cast<int>(best.signature.fixed.at("camera_seam.axis"));
   for (double step : {0.02, 0.01, 0.005}) {
     const double position = best.signature.fixed.at("camera_seam.position");
@@ -110,8 +110,9 @@ Candidate Selector::refine_seam(const Regression& explained, Candidate best) con
 }
 
 // All discs looked at join the catalogue, so that a later search starts from the best of them.
-Result<Candidate> Selector::refine_patch(const Regression& explained, const Candidate& coarse) {
-  Candidate best = coarse;
+Result<EffectCandidate> Selector::refine_patch(const Regression& explained,
+                                               const EffectCandidate& coarse) {
+  EffectCandidate best = coarse;
   const auto look = [&](const std::vector<std::array<double, 4>>& places) -> Status {
     auto found = patch_signatures(predictor_, study_, places);
     if (!found) return found.error();
@@ -146,27 +147,30 @@ Result<Candidate> Selector::refine_patch(const Regression& explained, const Cand
 }
 
 // The best two discs, unless a search has been there.
-std::vector<Candidate> Selector::unrefined_patches(const Regression& explained) const {
-  std::vector<Candidate> all;
+std::vector<EffectCandidate> Selector::unrefined_patches(const Regression& explained) const {
+  std::vector<EffectCandidate> all;
   for (const Signature& s : catalogue_) {
     if (s.effect == "friction_patch") all.push_back({net_gain(explained, s), s});
   }
-  std::stable_sort(all.begin(), all.end(),
-                   [](const Candidate& a, const Candidate& b) { return a.gain > b.gain; });
+  std::stable_sort(all.begin(), all.end(), [](const EffectCandidate& a, const EffectCandidate& b) {
+    return a.gain > b.gain;
+  });
   if (!all.empty() && refined_patches_.count(patch_of(all.front().signature))) return {};
-  const auto coarse = [](const Candidate& c) { return patch_of(c.signature)[3] == kScreenedRatio; };
-  std::erase_if(all, [&](const Candidate& c) { return !coarse(c); });
+  const auto coarse = [](const EffectCandidate& c) {
+    return patch_of(c.signature)[3] == kScreenedRatio;
+  };
+  std::erase_if(all, [&](const EffectCandidate& c) { return !coarse(c); });
   if (all.size() > 2) all.resize(2);
   return all;
 }
 
-Result<std::vector<Candidate>> Selector::candidates(const Regression& explained,
-                                                    const std::set<std::string>& without) {
-  std::map<std::string, Candidate> best;
+Result<std::vector<EffectCandidate>> Selector::candidates(const Regression& explained,
+                                                          const std::set<std::string>& without) {
+  std::map<std::string, EffectCandidate> best;
   for (const Signature& s : catalogue_) {
     if (without.count(s.effect)) continue;
     const double gain = net_gain(explained, s);
-    const auto [entry, fresh] = best.try_emplace(s.effect, Candidate{gain, s});
+    const auto [entry, fresh] = best.try_emplace(s.effect, EffectCandidate{gain, s});
     if (!fresh && gain > entry->second.gain) entry->second = {gain, s};
   }
   double most = 0;
@@ -176,7 +180,7 @@ Result<std::vector<Candidate>> Selector::candidates(const Regression& explained,
     if (candidate.gain < kWorthRefiningShare * most) continue;
     if (effect == "camera_seam") candidate = refine_seam(explained, candidate);
     if (effect != "friction_patch") continue;
-    for (const Candidate& start : unrefined_patches(explained)) {
+    for (const EffectCandidate& start : unrefined_patches(explained)) {
       if (start.gain + start.signature.penalty < kWorthRefining) break;
       if (start.gain < kWorthRefiningShare * candidate.gain) break;
       if (patch_searches_++ >= kMostPatchSearches) break;
@@ -185,10 +189,11 @@ Result<std::vector<Candidate>> Selector::candidates(const Regression& explained,
       if (refined->gain > candidate.gain) candidate = *refined;
     }
   }
-  std::vector<Candidate> sorted;
+  std::vector<EffectCandidate> sorted;
   for (auto& [effect, candidate] : best) sorted.push_back(std::move(candidate));
-  std::stable_sort(sorted.begin(), sorted.end(),
-                   [](const Candidate& a, const Candidate& b) { return a.gain > b.gain; });
+  std::stable_sort(
+      sorted.begin(), sorted.end(),
+      [](const EffectCandidate& a, const EffectCandidate& b) { return a.gain > b.gain; });
   return sorted;
 }
 
@@ -199,7 +204,8 @@ Regression Selector::with(const std::vector<const Signature*>& signatures) const
 }
 
 Regression Selector::without(const std::vector<Signature>& first,
-                             const std::vector<Candidate>& chosen, std::size_t leave_out) const {
+                             const std::vector<EffectCandidate>& chosen,
+                             std::size_t leave_out) const {
   std::vector<const Signature*> all;
   for (const Signature& s : first) all.push_back(&s);
   for (std::size_t i = 0; i < chosen.size(); ++i) {
@@ -209,18 +215,19 @@ Regression Selector::without(const std::vector<Signature>& first,
 }
 
 double Selector::alias_cosine(const std::vector<Signature>& first,
-                              const std::vector<Candidate>& chosen, std::size_t i,
-                              const Candidate& other) const {
+                              const std::vector<EffectCandidate>& chosen, std::size_t i,
+                              const EffectCandidate& other) const {
   const Regression r = without(first, chosen, i);
   return cosine(r.explained(chosen[i].signature.columns), r.explained(other.signature.columns));
 }
 
-bool Selector::is_new(const std::vector<Signature>& first, const std::vector<Candidate>& chosen,
-                      const Candidate& candidate) const {
+bool Selector::is_new(const std::vector<Signature>& first,
+                      const std::vector<EffectCandidate>& chosen,
+                      const EffectCandidate& candidate) const {
   for (const Family& family : kFamilies) {
     if (!family.effects.count(candidate.signature.effect)) continue;
     double gained = 0;
-    for (const Candidate& c : chosen) {
+    for (const EffectCandidate& c : chosen) {
       if (family.effects.count(c.signature.effect)) gained += c.gain;
     }
     if (candidate.gain < family.share * gained) return false;
@@ -232,19 +239,20 @@ bool Selector::is_new(const std::vector<Signature>& first, const std::vector<Can
   return true;
 }
 
-void Selector::drop_weak(std::vector<Candidate>* chosen) const {
+void Selector::drop_weak(std::vector<EffectCandidate>* chosen) const {
   const double least = std::max(kLeastGain, kLeastShare * (first_gain_ + total_gain(*chosen)));
-  std::erase_if(*chosen, [&](const Candidate& c) { return c.gain <= least; });
+  std::erase_if(*chosen, [&](const EffectCandidate& c) { return c.gain <= least; });
 }
 
 // Lets every earlier choice be replaced in the light of the later ones, and drops what has become
 // too weak.
-Status Selector::replace_each(const std::vector<Signature>& first, std::vector<Candidate>* chosen) {
+Status Selector::replace_each(const std::vector<Signature>& first,
+                              std::vector<EffectCandidate>* chosen) {
   for (std::size_t i = 0; i < chosen->size(); ++i) {
     const Regression others = without(first, *chosen, i);
     auto better = candidates(others, names_of(*chosen, i));
     if (!better) return better.error();
-    Candidate& own = (*chosen)[i];
+    EffectCandidate& own = (*chosen)[i];
     own.gain = net_gain(others, own.signature);
     if (!better->empty() && better->front().gain > own.gain) own = better->front();
   }
@@ -254,7 +262,7 @@ Status Selector::replace_each(const std::vector<Signature>& first, std::vector<C
 
 // Small errors of a strong effect's linear signature look like other effects.
 Status Selector::use_estimates(const std::vector<Signature>& first, const Relinearise& relinearise,
-                               std::vector<Candidate>* chosen) {
+                               std::vector<EffectCandidate>* chosen) {
   if (total_gain(*chosen) < kWorthRelinearising || relinearised_ == kMostRelinearised) return {};
   ++relinearised_;
   auto at_estimate = relinearise(*chosen);
@@ -271,14 +279,14 @@ Status Selector::use_estimates(const std::vector<Signature>& first, const Reline
 }
 
 Result<std::vector<Alias>> Selector::aliases_of(const std::vector<Signature>& first,
-                                                const std::vector<Candidate>& chosen,
+                                                const std::vector<EffectCandidate>& chosen,
                                                 std::size_t i) {
   const Regression r = without(first, chosen, i);
   const Eigen::VectorXd own = r.explained(chosen[i].signature.columns);
   auto others = candidates(r, names_of(chosen));
   if (!others) return others.error();
   std::vector<Alias> aliases;
-  for (const Candidate& other : *others) {
+  for (const EffectCandidate& other : *others) {
     const double parallel = cosine(own, r.explained(other.signature.columns));
     const bool as_good = chosen[i].gain - other.gain < 4 && other.gain > kLeastGain / 2;
     const bool always = always_aliases(chosen[i].signature.effect, other.signature.effect);
@@ -300,7 +308,7 @@ Result<std::vector<ChosenEffect>> Selector::select(const std::vector<Signature>&
   first_gain_ = first_gain;
   relinearised_ = 0;
   steps_.clear();
-  std::vector<Candidate> chosen;
+  std::vector<EffectCandidate> chosen;
   std::set<std::string> taken;
   for (const Signature& s : first) taken.insert(s.effect);
   std::set<std::set<std::string>> seen;
@@ -316,7 +324,7 @@ Result<std::vector<ChosenEffect>> Selector::select(const std::vector<Signature>&
       step.offered.emplace_back((*next)[i].signature.effect, (*next)[i].gain);
     }
     steps_.push_back(std::move(step));
-    std::erase_if(*next, [&](const Candidate& c) {
+    std::erase_if(*next, [&](const EffectCandidate& c) {
       return c.gain < kLeastGain || !is_new(first, chosen, c);
     });
     const double least = kLeastShare * (first_gain + total_gain(chosen));
@@ -327,8 +335,9 @@ Result<std::vector<ChosenEffect>> Selector::select(const std::vector<Signature>&
     }
     if (Status s = use_estimates(first, relinearise, &chosen); !s) return s.error();
   }
-  std::stable_sort(chosen.begin(), chosen.end(),
-                   [](const Candidate& a, const Candidate& b) { return a.gain > b.gain; });
+  std::stable_sort(
+      chosen.begin(), chosen.end(),
+      [](const EffectCandidate& a, const EffectCandidate& b) { return a.gain > b.gain; });
   std::vector<ChosenEffect> effects;
   for (std::size_t i = 0; i < chosen.size(); ++i) {
     auto aliases = aliases_of(first, chosen, i);

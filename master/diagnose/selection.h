@@ -23,7 +23,7 @@ inline constexpr double kLeastShare = 0.02;
 inline constexpr double kAliasCosine = 0.9;
 inline constexpr std::size_t kMostEffects = 4;
 
-struct Candidate {
+struct EffectCandidate {
   double gain = 0;  // net of the signature's penalty, nats
   Signature signature;
 };
@@ -40,7 +40,7 @@ struct Relinearised {
   Eigen::VectorXd data;                  // whitened
   std::vector<Eigen::MatrixXd> columns;  // one matrix an effect
 };
-using Relinearise = std::function<Result<Relinearised>(const std::vector<Candidate>&)>;
+using Relinearise = std::function<Result<Relinearised>(const std::vector<EffectCandidate>&)>;
 
 struct Alias {
   std::string effect;
@@ -48,7 +48,7 @@ struct Alias {
 };
 
 struct ChosenEffect {
-  Candidate candidate;
+  EffectCandidate candidate;
   std::vector<Alias> aliases;  // at most three, likeliest first
 };
 
@@ -62,8 +62,8 @@ class Selector {
   Status add_patches();
 
   // The best signature of every effect, best first, beyond what `explained` holds.
-  Result<std::vector<Candidate>> candidates(const Regression& explained,
-                                            const std::set<std::string>& without);
+  Result<std::vector<EffectCandidate>> candidates(const Regression& explained,
+                                                  const std::set<std::string>& without);
 
   // `first` are explained before anything else (a late camera, say) and gained `first_gain` nats.
   // `relinearise` fits what was chosen so far.
@@ -82,21 +82,22 @@ class Selector {
   Regression with(const std::vector<const Signature*>& signatures) const;
 
  private:
-  Result<Candidate> refine_patch(const Regression& explained, const Candidate& coarse);
-  std::vector<Candidate> unrefined_patches(const Regression& explained) const;
-  Candidate refine_seam(const Regression& explained, Candidate best) const;
-  Regression without(const std::vector<Signature>& first, const std::vector<Candidate>& chosen,
-                     std::size_t leave_out) const;
-  double alias_cosine(const std::vector<Signature>& first, const std::vector<Candidate>& chosen,
-                      std::size_t i, const Candidate& other) const;
-  bool is_new(const std::vector<Signature>& first, const std::vector<Candidate>& chosen,
-              const Candidate& candidate) const;
-  Status replace_each(const std::vector<Signature>& first, std::vector<Candidate>* chosen);
+  Result<EffectCandidate> refine_patch(const Regression& explained, const EffectCandidate& coarse);
+  std::vector<EffectCandidate> unrefined_patches(const Regression& explained) const;
+  EffectCandidate refine_seam(const Regression& explained, EffectCandidate best) const;
+  Regression without(const std::vector<Signature>& first,
+                     const std::vector<EffectCandidate>& chosen, std::size_t leave_out) const;
+  double alias_cosine(const std::vector<Signature>& first,
+                      const std::vector<EffectCandidate>& chosen, std::size_t i,
+                      const EffectCandidate& other) const;
+  bool is_new(const std::vector<Signature>& first, const std::vector<EffectCandidate>& chosen,
+              const EffectCandidate& candidate) const;
+  Status replace_each(const std::vector<Signature>& first, std::vector<EffectCandidate>* chosen);
   Status use_estimates(const std::vector<Signature>& first, const Relinearise& relinearise,
-                       std::vector<Candidate>* chosen);
-  void drop_weak(std::vector<Candidate>* chosen) const;
+                       std::vector<EffectCandidate>* chosen);
+  void drop_weak(std::vector<EffectCandidate>* chosen) const;
   Result<std::vector<Alias>> aliases_of(const std::vector<Signature>& first,
-                                        const std::vector<Candidate>& chosen, std::size_t i);
+                                        const std::vector<EffectCandidate>& chosen, std::size_t i);
 
   Predictor& predictor_;
   const Study& study_;

@@ -92,7 +92,7 @@ TEST(EndEllipse, HoldsItsShareOfANormalCloud) {
 TEST(FloorPath, KeepsPointsApartAndTheEnd) {
   std::vector<PathSample> path;
   for (int i = 0; i <= 100; ++i) path.push_back({0.01 * i, {0.001 * i, 0, 0}});
-  const auto points = floor_path(path, 0.02);
+  const auto points = floor_path(path, 0.0195);
   EXPECT_EQ(points.size(), 7U);
   EXPECT_NEAR(points.back().x(), 0.1, 1e-12);
 }
