@@ -247,6 +247,8 @@ TEST(Config, ShippedConfigsAreRead) {
     ++files;
     const auto config = read_config(entry.path().string());
     ASSERT_TRUE(config.ok()) << config.error().message;
+    // Some are for commands that search nothing.
+    if (config->problem.genes.empty()) continue;
     EXPECT_TRUE(check_evolvable(*config).ok()) << entry.path();
   }
   EXPECT_GE(files, 4);
