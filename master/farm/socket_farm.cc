@@ -33,9 +33,12 @@ void complain(const FarmEvent& event) {
   }
 }
 
-std::uint64_t draw_epoch() {
+// The count tells the lives of one run apart, the random bits those of different runs that one
+// worker serves one after the other: their counts, and so their attempt ids, may be the same.
+std::uint64_t unique_epoch(std::uint64_t count) {
   std::random_device device;
-  return (std::uint64_t{device()} << 32 | device()) | 1;
+  const std::uint64_t drawn = (std::uint64_t{device()} << 32 | device()) >> 24;
+  return count << 40 | drawn | 1;
 }
 
 }  // namespace
@@ -72,7 +75,7 @@ Status SocketFarm::Impl::open() {
     return Error{"the farm has no local workers and listens nowhere; give it one or the other"};
   }
   SchedulerOptions settings;
-  settings.epoch = options.epoch != 0 ? options.epoch : draw_epoch();
+  settings.epoch = unique_epoch(options.epoch);
   settings.admittance = {build_info().fingerprint, options.numeric_class,
                          options.allow_mixed_numeric_classes};
   settings.window = options.window;

@@ -22,7 +22,7 @@ struct SocketFarmOptions {
   LinkSecurity security;            // of tcp:// endpoints; without it they cannot be listened on
   LinkLimits limits;
   std::string worker_program;  // empty: find_worker_program()
-  std::uint64_t epoch = 0;     // of this life of the master; 0: drawn
+  std::uint64_t epoch = 0;     // lives of the master so far, below 2^24
   std::string numeric_class;   // of the run; empty: the first worker's
   bool allow_mixed_numeric_classes = false;
   unsigned window = 2;
