@@ -113,9 +113,10 @@ class Crossfit {
   Status add_set(const std::string& name, const TrialLog& log, CrossfitGroup& group) {
     const auto ends = predict_means(with(log), {problem_.values, group.tuned.values}, farm_);
     if (!ends) return ends.error();
-    if (!(*ends)[0] || !(*ends)[1]) {
-      return Error{"the simulation of " + name + " failed at the " +
-                   ((*ends)[0] ? "tuned" : "config's own") + " parameters"};
+    for (std::size_t k = 0; k < 2; ++k) {
+      if ((*ends)[k].failure.empty()) continue;
+      return Error{"the simulation of " + name + " at the " + (k == 1 ? "tuned" : "config's own") +
+                   " parameters ended with " + (*ends)[k].failure};
     }
     std::vector<Pose> starts, repeats;
     for (const Trial& trial : log.trials) starts.push_back(trial.X_WS);
@@ -150,8 +151,8 @@ class Crossfit {
         }
         return errors_of(problem_, trials, chosen);
       };
-      group.sets.push_back(
-          {name, part, errors(*(*ends)[0]), errors(*(*ends)[1]), errors(starts), errors(repeats)});
+      group.sets.push_back({name, part, errors((*ends)[0].ends), errors((*ends)[1].ends),
+                            errors(starts), errors(repeats)});
     }
     return {};
   }
@@ -180,8 +181,10 @@ class Crossfit {
       const auto ends = predict_means(with(*log), points, farm_);
       if (!ends) return ends.error();
       for (std::size_t i = 0; i < points.size(); ++i) {
-        sweep.points[i].*member = (*ends)[i] ? errors_of(problem_, log->trials, *(*ends)[i]).mean_m
-                                             : std::numeric_limits<double>::quiet_NaN();
+        const PredictedEnds& predicted = (*ends)[i];
+        sweep.points[i].*member = predicted.failure.empty()
+                                      ? errors_of(problem_, log->trials, predicted.ends).mean_m
+                                      : std::numeric_limits<double>::quiet_NaN();
       }
     }
     return sweep;

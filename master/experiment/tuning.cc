@@ -85,8 +85,9 @@ Result<Tuned> tune(const Problem& problem, Farm& farm, const TuningSettings& set
                fitness_of_cost(problem.fitness.kind, summary->best->cost), summary->evaluations};
 }
 
-Result<std::vector<std::optional<std::vector<Pose>>>> predict_means(
-    const Problem& problem, const std::vector<ParameterValues>& points, Farm& farm) {
+Result<std::vector<PredictedEnds>> predict_means(const Problem& problem,
+                                                 const std::vector<ParameterValues>& points,
+                                                 Farm& farm) {
   Problem plain = problem;
   plain.genes.clear();
   // Any fitness will do; this one asks nothing of the log.
@@ -105,13 +106,15 @@ Result<std::vector<std::optional<std::vector<Pose>>>> predict_means(
   }
   const auto results = farm.run(farm.add_problem(to_proto(plain)), tasks);
   if (!results) return results.error();
-  std::vector<std::optional<std::vector<Pose>>> all;
+  std::vector<PredictedEnds> all;
   for (const v1::TaskResult& result : *results) {
-    all.emplace_back();
-    if (result.outcome() != v1::OK) continue;
-    all.back().emplace();
+    PredictedEnds& predicted = all.emplace_back();
+    if (result.outcome() != v1::OK) {
+      predicted.failure = v1::Outcome_Name(result.outcome()) + " (" + result.message() + ")";
+      continue;
+    }
     for (const v1::Predicted& p : result.predict().predictions()) {
-      all.back()->push_back(from_proto(p.end()));
+      predicted.ends.push_back(from_proto(p.end()));
     }
   }
   return all;

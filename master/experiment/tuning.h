@@ -2,7 +2,7 @@
 #pragma once
 
 #include <cstdint>
-#include <optional>
+#include <string>
 #include <vector>
 
 #include "common/base/result.h"
@@ -25,9 +25,13 @@ struct Tuned {
 // Errors: of the farm, and a problem whose every genome fails.
 Result<Tuned> tune(const Problem& problem, Farm& farm, const TuningSettings& settings);
 
-// Where every trial of the problem's log ends at some parameter values, by the means alone; none
-// when the simulation failed there.
-Result<std::vector<std::optional<std::vector<Pose>>>> predict_means(
-    const Problem& problem, const std::vector<ParameterValues>& points, Farm& farm);
+// Where every trial of a log ends at some parameter values, by the means alone.
+struct PredictedEnds {
+  std::vector<Pose> ends;
+  std::string failure;  // how and where the simulation failed; empty: it did not
+};
+Result<std::vector<PredictedEnds>> predict_means(const Problem& problem,
+                                                 const std::vector<ParameterValues>& points,
+                                                 Farm& farm);
 
 }  // namespace gapfarm
