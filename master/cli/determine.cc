@@ -85,7 +85,11 @@ int run_determine(const DetermineCommand& command, CliContext& context) {
   for (const GeneDetermined& g : report->genes) {
     if (!g.determined) loose += (loose.empty() ? "" : ", ") + problem->table()[g.gene.row].key;
   }
-  if (!loose.empty()) {
+  if (!report->reliable) {
+    context.console.note(
+        "warning: the likelihood about this model is no hill whose width could be "
+        "measured; is it the best of its run?");
+  } else if (!loose.empty()) {
     context.console.note("warning: these data do not determine " + loose +
                          "; other values explain the log as well, so do not read them as measured");
   }
@@ -103,7 +107,8 @@ SubcommandRun setup_determine(CLI::App& app) {
       ->required();
   app.add_option("--trials", command->trials, "Trial logs in place of the config's");
   app.add_option("--out", command->out, "CSV to write");
-  app.add_option("--width", to.half_width, "Half width of the box looked at, share of each range")
+  app.add_option("--width", to.half_width,
+                 "Greatest half width of the box looked at, share of each range")
       ->check(CLI::Range(0.001, 0.5))
       ->capture_default_str();
   app.add_option("--share", to.share,

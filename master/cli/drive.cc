@@ -141,12 +141,7 @@ class Driving {
   Result<DriveReport> run() {
     const auto nominal = nominal_velocities(farm_, problem_);
     if (!nominal) return nominal.error();
-    if (!task_.targets.empty()) {
-      const auto pilot = make_pilot(*nominal);
-      if (!pilot) return pilot.error();
-      pilot_ = *pilot;
-    }
-    if (Status s = simulate(); !s) return s.error();
+    if (Status s = simulate(*nominal); !s) return s.error();
     auto constant = *nominal;
     if (!command_.mined.empty()) {
       const auto log = read_trial_files(command_.mined, command_names(problem_.commands));
@@ -157,17 +152,18 @@ class Driving {
       const auto mined = MotionModel::mine(*log, problem_.commands);
       if (!mined) return mined.error();
       const auto mover = mined_mover(*mined, command_.settings);
-      if (Status s = add("mined motion model", drive(*mover, command_.runs), true); !s)
+      if (Status s = add("mined motion model", drive(*mover, constant, command_.runs), true); !s)
         return s.error();
     }
     const auto mover = constant_velocity_mover(constant, command_.settings);
-    if (Status s = add("constant velocity", drive(*mover, 2), false); !s) return s.error();
+    if (Status s = add("constant velocity", drive(*mover, constant, 2), false); !s)
+      return s.error();
     compare_targets();
     return report_;
   }
 
  private:
-  Status simulate() {
+  Status simulate(const std::vector<ConstantVelocity>& nominal) {
     if (task_.targets.empty()) {
       return add("simulation",
                  drive_commands(farm_, problem_, task_.start, task_.commands, command_.runs,
@@ -175,12 +171,17 @@ class Driving {
                  true);
     }
     const auto mover = simulated_mover(farm_, problem_, command_.settings);
-    return add("simulation", drive(*mover, command_.runs), true);
+    return add("simulation", drive(*mover, nominal, command_.runs), true);
   }
 
-  Result<std::vector<DrivenRun>> drive(const Mover& mover, unsigned runs) const {
-    return task_.targets.empty() ? drive_commands(mover, task_.start, task_.commands, runs)
-                                 : drive_waypoints(mover, pilot_, task_.start, task_.targets, runs);
+  // `rates`: what a pilot would have measured of the robot that the mover moves.
+  Result<std::vector<DrivenRun>> drive(const Mover& mover,
+                                       const std::vector<ConstantVelocity>& rates,
+                                       unsigned runs) const {
+    if (task_.targets.empty()) return drive_commands(mover, task_.start, task_.commands, runs);
+    const auto pilot = make_pilot(rates);
+    if (!pilot) return pilot.error();
+    return drive_waypoints(mover, *pilot, task_.start, task_.targets, runs);
   }
 
   Status add(const std::string& name, Result<std::vector<DrivenRun>> runs, bool spread) {
@@ -219,7 +220,6 @@ class Driving {
   const Task& task_;
   const Problem& problem_;
   Farm& farm_;
-  WaypointPilot pilot_;
   DriveReport report_;
 };
 

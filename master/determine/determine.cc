@@ -20,11 +20,16 @@ constexpr double kAtBound_share = 0.01;
 // s.d. would be far beyond the range anyway.
 constexpr double kFlat_nats = 0.02;
 
+// Half widths that are tried, shares of the range.
+constexpr double kProbes[] = {0.3, 0.1, 0.03, 0.01, 0.003, 0.001, 0.0003};
+constexpr double kWanted_nats = 2;  // that a gene alone changes the likelihood by at its half width
+constexpr double kExplained = 0.9;  // of the variance: the quadratic fits
+constexpr double kCalm_nats = 0.5;  // or the scatter about it is as small as this
+constexpr int kRounds = 5;
+
 struct Design {
-  std::vector<std::size_t> moving;  // genes
   std::vector<Genome> points;
-  Eigen::MatrixXd offsets;  // one row a point, shares of the range, from the centre
-  Eigen::VectorXd centre;   // of the moving genes
+  Eigen::MatrixXd offsets;  // one row a point, in half widths, from the centre
 };
 
 std::size_t terms(std::size_t n) { return (n + 1) * (n + 2) / 2; }
@@ -38,33 +43,6 @@ bool takes_part(const ParameterTable& table, const Gene& gene) {
     default:
       return false;
   }
-}
-
-// A box about the point, moved inward where the range ends.
-Design draw_design(const Problem& problem, const Genome& point, const DetermineSettings& settings) {
-  Design design;
-  for (std::size_t i = 0; i < problem.genes.size(); ++i) {
-    if (takes_part(problem.table(), problem.genes[i])) design.moving.push_back(i);
-  }
-  const auto n = static_cast<Eigen::Index>(design.moving.size());
-  design.centre.resize(n);
-  for (Eigen::Index k = 0; k < n; ++k) {
-    design.centre[k] = std::clamp(point[design.moving[static_cast<std::size_t>(k)]],
-                                  settings.half_width, 1 - settings.half_width);
-  }
-  const auto count = static_cast<Eigen::Index>(
-      std::ceil(settings.points_a_term * static_cast<double>(terms(design.moving.size()))));
-  design.offsets.resize(count, n);
-  Stream stream({.run_seed = settings.seed, .purpose = Purpose::kStatistics});
-  for (Eigen::Index i = 0; i < count; ++i) {
-    Genome genome = point;
-    for (Eigen::Index k = 0; k < n; ++k) {
-      design.offsets(i, k) = stream.uniform(-settings.half_width, settings.half_width);
-      genome[design.moving[static_cast<std::size_t>(k)]] = design.centre[k] + design.offsets(i, k);
-    }
-    design.points.push_back(std::move(genome));
-  }
-  return design;
 }
 
 // 1, x_i, x_i x_j (i <= j).
@@ -83,37 +61,43 @@ struct Quadratic {
   Eigen::VectorXd gradient;
   Eigen::MatrixXd hessian;  // of the function itself
   double roughness = 0;
+  double explained = 0;
 };
 
-Quadratic fit(const Eigen::MatrixXd& offsets, const Eigen::VectorXd& values, double half_width) {
+// `offsets` in half widths; the result in shares of the range.
+Quadratic fit(const Eigen::MatrixXd& offsets, const Eigen::VectorXd& values,
+              const Eigen::VectorXd& widths) {
   const Eigen::Index n = offsets.cols();
   Eigen::MatrixXd design(offsets.rows(),
                          static_cast<Eigen::Index>(terms(static_cast<std::size_t>(n))));
   for (Eigen::Index i = 0; i < offsets.rows(); ++i) {
-    design.row(i) = features(offsets.row(i).transpose() / half_width);
+    design.row(i) = features(offsets.row(i).transpose());
   }
   const Eigen::VectorXd b = design.colPivHouseholderQr().solve(values);
   Quadratic q;
-  q.gradient = b.segment(1, n) / half_width;
+  q.gradient = b.segment(1, n).cwiseQuotient(widths);
   q.hessian.resize(n, n);
   Eigen::Index at = 1 + n;
   for (Eigen::Index i = 0; i < n; ++i) {
     for (Eigen::Index j = i; j < n; ++j) {
-      const double second = b[at++] / (half_width * half_width);
+      const double second = b[at++] / (widths[i] * widths[j]);
       q.hessian(i, j) = q.hessian(j, i) = i == j ? 2 * second : second;
     }
   }
+  const Eigen::VectorXd residuals = values - design * b;
   const auto freedom = std::max<Eigen::Index>(1, offsets.rows() - design.cols());
-  q.roughness = std::sqrt((values - design * b).squaredNorm() / static_cast<double>(freedom));
+  q.roughness = std::sqrt(residuals.squaredNorm() / static_cast<double>(freedom));
+  const Eigen::VectorXd centred = values.array() - values.mean();
+  q.explained = centred.squaredNorm() > 0 ? 1 - residuals.squaredNorm() / centred.squaredNorm() : 1;
   return q;
 }
 
-void add_genes(const Problem& problem, const Genome& point, const Design& design,
+void add_genes(const Problem& problem, const Genome& point, const std::vector<std::size_t>& moving,
                const Eigen::MatrixXd& covariance, const DetermineSettings& settings,
                DetermineReport& report) {
-  for (std::size_t k = 0; k < design.moving.size(); ++k) {
-    const Gene& gene = problem.genes[design.moving[k]];
-    const double g = point[design.moving[k]];
+  for (std::size_t k = 0; k < moving.size(); ++k) {
+    const Gene& gene = problem.genes[moving[k]];
+    const double g = point[moving[k]];
     GeneDetermined of;
     of.gene = gene;
     of.value = decode_gene(problem.table(), gene, g);
@@ -123,69 +107,181 @@ void add_genes(const Problem& problem, const Genome& point, const Design& design
     const double high = std::clamp(g + kNormal_95 * of.deviation, 0.0, 1.0);
     of.interval_95 = {decode_gene(problem.table(), gene, low),
                       decode_gene(problem.table(), gene, high)};
-    of.determined = 2 * kNormal_95 * of.deviation < settings.share;
+    of.determined = report.reliable && 2 * kNormal_95 * of.deviation < settings.share;
     of.at_bound = g < kAtBound_share || g > 1 - kAtBound_share;
     report.genes.push_back(of);
   }
 }
+
+class Study {
+ public:
+  Study(const Problem& problem, const Genome& point, const LikelihoodOf& likelihood,
+        const DetermineSettings& settings)
+      : problem_(problem), point_(point), likelihood_(likelihood), settings_(settings) {
+    for (std::size_t i = 0; i < problem.genes.size(); ++i) {
+      if (takes_part(problem.table(), problem.genes[i])) moving_.push_back(i);
+    }
+    widths_ = Eigen::VectorXd::Constant(size(), settings.half_width);
+  }
+
+  Result<DetermineReport> run() {
+    if (moving_.empty()) {
+      return Error{
+          "none of the genes is a number with room to move; there is nothing to determine"};
+    }
+    if (Status s = find_widths(); !s) return s.error();
+    Quadratic quadratic;
+    for (std::uint64_t round = 0; round < kRounds && !report_.reliable; ++round) {
+      if (round > 0) widths_ /= 2;
+      auto fitted = fit_box(round);
+      if (!fitted) return fitted.error();
+      quadratic = *std::move(fitted);
+      report_.reliable = quadratic.explained > kExplained || quadratic.roughness < kCalm_nats;
+    }
+    report_.roughness = quadratic.roughness;
+    report_.explained = quadratic.explained;
+    read_off(quadratic);
+    return report_;
+  }
+
+ private:
+  Eigen::Index size() const { return static_cast<Eigen::Index>(moving_.size()); }
+  std::size_t gene(Eigen::Index k) const { return moving_[static_cast<std::size_t>(k)]; }
+
+  Result<std::vector<double>> nats(const std::vector<Genome>& genomes) {
+    auto scores = likelihood_(genomes);
+    if (!scores) return scores;
+    report_.evaluations += scores->size();
+    for (double& score : *scores) {
+      score *= static_cast<double>(problem_.log.trials.size());
+      report_.failures += std::isfinite(score) ? 0 : 1;
+    }
+    return scores;
+  }
+
+  // As wide as changes the likelihood by kWanted_nats, each gene alone.
+  Status find_widths() {
+    std::vector<Genome> genomes = {point_};
+    for (const std::size_t moving : moving_) {
+      for (const double width : kProbes) {
+        for (const double side : {-width, width}) {
+          genomes.push_back(point_);
+          genomes.back()[moving] = std::clamp(point_[moving] + side, 0.0, 1.0);
+        }
+      }
+    }
+    const auto values = nats(genomes);
+    if (!values) return values.error();
+    if (!std::isfinite(values->front()))
+      return Error{"the model itself does not end well on this log"};
+    std::size_t at = 1;
+    for (Eigen::Index k = 0; k < size(); ++k) {
+      for (const double width : kProbes) {
+        double change = 0;
+        for (int side = 0; side < 2; ++side) {
+          const double value = (*values)[at++];
+          // What does not end well is beyond any quadratic.
+          change = std::max(change, std::isfinite(value) ? std::abs(value - values->front()) : 1e6);
+        }
+        // Narrower ones follow: the last that changes enough decides.
+        if (change >= kWanted_nats / 2) {
+          widths_[k] = std::min(settings_.half_width, width * std::sqrt(kWanted_nats / change));
+        }
+      }
+    }
+    return {};
+  }
+
+  // A box about the point, moved inward where the range ends.
+  Design draw(std::uint64_t round) {
+    centre_.resize(size());
+    for (Eigen::Index k = 0; k < size(); ++k) {
+      centre_[k] = std::clamp(point_[gene(k)], widths_[k], 1 - widths_[k]);
+    }
+    Design design;
+    design.offsets.resize(
+        static_cast<Eigen::Index>(
+            std::ceil(settings_.points_a_term * static_cast<double>(terms(moving_.size())))),
+        size());
+    Stream stream(
+        {.run_seed = settings_.seed, .purpose = Purpose::kStatistics, .generation = round});
+    for (Eigen::Index i = 0; i < design.offsets.rows(); ++i) {
+      Genome genome = point_;
+      for (Eigen::Index k = 0; k < size(); ++k) {
+        design.offsets(i, k) = stream.uniform(-1, 1);
+        genome[gene(k)] = std::clamp(centre_[k] + widths_[k] * design.offsets(i, k), 0.0, 1.0);
+      }
+      design.points.push_back(std::move(genome));
+    }
+    return design;
+  }
+
+  Result<Quadratic> fit_box(std::uint64_t round) {
+    const Design design = draw(round);
+    const auto values = nats(design.points);
+    if (!values) return values.error();
+    std::vector<Eigen::Index> usable;
+    for (std::size_t i = 0; i < values->size(); ++i) {
+      if (std::isfinite((*values)[i])) usable.push_back(static_cast<Eigen::Index>(i));
+    }
+    if (usable.size() < terms(moving_.size())) {
+      return Error{"only " + std::to_string(usable.size()) + " of " +
+                   std::to_string(values->size()) +
+                   " points about the model end well; the quadratic needs " +
+                   std::to_string(terms(moving_.size()))};
+    }
+    Eigen::MatrixXd offsets(static_cast<Eigen::Index>(usable.size()), size());
+    Eigen::VectorXd told(offsets.rows());
+    for (Eigen::Index i = 0; i < offsets.rows(); ++i) {
+      const Eigen::Index from = usable[static_cast<std::size_t>(i)];
+      offsets.row(i) = design.offsets.row(from);
+      told[i] = (*values)[static_cast<std::size_t>(from)];
+    }
+    return fit(offsets, told, widths_);
+  }
+
+  void read_off(const Quadratic& quadratic) {
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(-quadratic.hessian);
+    report_.curvatures = axes.eigenvalues();
+    report_.directions = axes.eigenvectors();
+    const Eigen::VectorXd stiff = report_.curvatures.cwiseMax(kFlat_nats);
+    const Eigen::MatrixXd covariance =
+        axes.eigenvectors() * stiff.cwiseInverse().asDiagonal() * axes.eigenvectors().transpose();
+    // Where the quadratic has its top, seen from the centre.
+    const Eigen::VectorXd top = covariance * quadratic.gradient;
+    const Eigen::VectorXd reach = 3 * covariance.diagonal().cwiseSqrt() + widths_;
+    report_.outside = (top.array().abs() > reach.array()).any();
+    add_genes(problem_, point_, moving_, covariance, settings_, report_);
+    if (!report_.reliable) return;
+    for (Eigen::Index a = 0; a < covariance.rows(); ++a) {
+      for (Eigen::Index b = a + 1; b < covariance.rows(); ++b) {
+        const double r = covariance(a, b) / std::sqrt(covariance(a, a) * covariance(b, b));
+        if (std::abs(r) < kCorrelated) continue;
+        report_.compensations.push_back(
+            {static_cast<std::size_t>(a), static_cast<std::size_t>(b), r});
+      }
+    }
+    std::sort(report_.compensations.begin(), report_.compensations.end(),
+              [](const Compensation& x, const Compensation& y) {
+                return std::abs(x.correlation) > std::abs(y.correlation);
+              });
+  }
+
+  const Problem& problem_;
+  const Genome& point_;
+  const LikelihoodOf& likelihood_;
+  const DetermineSettings& settings_;
+  std::vector<std::size_t> moving_;  // genes that take part
+  Eigen::VectorXd widths_, centre_;
+  DetermineReport report_;
+};
 
 }  // namespace
 
 Result<DetermineReport> determine(const Problem& problem, const Genome& point,
                                   const LikelihoodOf& likelihood,
                                   const DetermineSettings& settings) {
-  const Design design = draw_design(problem, point, settings);
-  if (design.moving.empty()) {
-    return Error{"none of the genes is a number with room to move; there is nothing to determine"};
-  }
-  const auto scores = likelihood(design.points);
-  if (!scores) return scores.error();
-  const double trials = static_cast<double>(problem.log.trials.size());
-  std::vector<Eigen::Index> usable;
-  for (std::size_t i = 0; i < scores->size(); ++i) {
-    if (std::isfinite((*scores)[i])) usable.push_back(static_cast<Eigen::Index>(i));
-  }
-  DetermineReport report;
-  report.evaluations = scores->size();
-  report.failures = scores->size() - usable.size();
-  if (usable.size() < terms(design.moving.size())) {
-    return Error{"only " + std::to_string(usable.size()) + " of " + std::to_string(scores->size()) +
-                 " points about the model end well; the quadratic "
-                 "needs " +
-                 std::to_string(terms(design.moving.size()))};
-  }
-  Eigen::MatrixXd offsets(static_cast<Eigen::Index>(usable.size()), design.offsets.cols());
-  Eigen::VectorXd values(offsets.rows());
-  for (Eigen::Index i = 0; i < offsets.rows(); ++i) {
-    const Eigen::Index from = usable[static_cast<std::size_t>(i)];
-    offsets.row(i) = design.offsets.row(from);
-    values[i] = trials * (*scores)[static_cast<std::size_t>(from)];
-  }
-  const Quadratic quadratic = fit(offsets, values, settings.half_width);
-  report.roughness = quadratic.roughness;
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(-quadratic.hessian);
-  report.curvatures = axes.eigenvalues();
-  report.directions = axes.eigenvectors();
-  const Eigen::VectorXd stiff = report.curvatures.cwiseMax(kFlat_nats);
-  const Eigen::MatrixXd covariance =
-      axes.eigenvectors() * stiff.cwiseInverse().asDiagonal() * axes.eigenvectors().transpose();
-  // Where the quadratic has its top, seen from the centre.
-  const Eigen::VectorXd top = covariance * quadratic.gradient;
-  report.outside =
-      (top.array().abs() > 3 * covariance.diagonal().array().sqrt() + settings.half_width).any();
-  add_genes(problem, point, design, covariance, settings, report);
-  for (Eigen::Index a = 0; a < covariance.rows(); ++a) {
-    for (Eigen::Index b = a + 1; b < covariance.rows(); ++b) {
-      const double r = covariance(a, b) / std::sqrt(covariance(a, a) * covariance(b, b));
-      if (std::abs(r) < kCorrelated) continue;
-      report.compensations.push_back({static_cast<std::size_t>(a), static_cast<std::size_t>(b), r});
-    }
-  }
-  std::sort(report.compensations.begin(), report.compensations.end(),
-            [](const Compensation& x, const Compensation& y) {
-              return std::abs(x.correlation) > std::abs(y.correlation);
-            });
-  return report;
+  return Study(problem, point, likelihood, settings).run();
 }
 
 std::string determine_text(const DetermineReport& report, const ParameterTable& table) {
@@ -196,13 +292,19 @@ std::string determine_text(const DetermineReport& report, const ParameterTable& 
                         fmt::format("{:.4g}", g.value),
                         fmt::format("{:.4g} to {:.4g}", g.interval_95.lower, g.interval_95.upper),
                         100 * std::min(1.0, 2 * kNormal_95 * g.deviation),
-                        g.determined ? "determined" : "NOT DETERMINED",
+                        !report.reliable ? "unclear"
+                        : g.determined   ? "determined"
+                                         : "NOT DETERMINED",
                         g.at_bound ? ", at the end of its range" : "");
   }
   for (const Compensation& c : report.compensations) {
     text += fmt::format("{} and {} make up for one another (correlation {:.2f})\n",
                         table[report.genes[c.a].gene.row].key,
                         table[report.genes[c.b].gene.row].key, c.correlation);
+  }
+  if (!report.reliable) {
+    text +=
+        "the likelihood about the model is too rough or too bent for any of this to be read off\n";
   }
   if (report.outside) {
     text +=

@@ -2,8 +2,9 @@
 // one says nothing about that.
 //
 // Around a tuned point the log likelihood (mean log score times trials) is fitted by a quadratic
-// over points drawn in a small box.  Its curvature gives every gene's covariance, given that all
-// genes may move, and the directions along which the likelihood hardly changes.
+// over points drawn in a box.  The box is as wide in each gene as changes the likelihood by some
+// nats, and shrinks while the quadratic fits badly.  Its curvature gives every gene's covariance,
+// given that all genes may move, and the directions along which the likelihood hardly changes.
 #pragma once
 
 #include <Eigen/Core>
@@ -18,7 +19,7 @@
 namespace gapfarm {
 
 struct DetermineSettings {
-  double half_width = 0.05;  // of the box, share of each gene's range
+  double half_width = 0.3;   // greatest, of the box, share of each gene's range
   double points_a_term = 4;  // evaluations a coefficient of the quadratic
   double share = 0.5;        // of its range that a determined gene's 95 % interval may cover
   std::uint64_t seed = 1;
@@ -44,6 +45,8 @@ struct DetermineReport {
   Eigen::VectorXd curvatures;               // of -log likelihood, ascending, a unit of range
   Eigen::MatrixXd directions;               // columns, one a curvature
   double roughness = 0;                     // s.d. of the likelihood about the quadratic, nats
+  double explained = 0;                     // share of its variance that the quadratic explains
+  bool reliable = false;                    // false: too rough or too bent to read anything off
   bool outside = false;  // the quadratic rises beyond the box: the point is no maximum
   std::size_t evaluations = 0, failures = 0;
 };

@@ -137,7 +137,9 @@ std::vector<PathPoint> floor_path(std::span<const PathSample> path, double spaci
     const PathPoint point(sample.pose.x, sample.pose.y, 0);
     if (points.empty() || (point - points.back()).norm() >= spacing_m) points.push_back(point);
   }
-  if (!path.empty()) points.emplace_back(path.back().pose.x, path.back().pose.y, 0);
+  if (path.empty()) return points;
+  const PathPoint end(path.back().pose.x, path.back().pose.y, 0);
+  if (points.back() != end) points.push_back(end);
   return points;
 }
 

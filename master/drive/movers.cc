@@ -35,7 +35,9 @@ class ConstantVelocityMover final : public Mover {
     std::vector<Leg> legs;
     for (const Start& start : starts) {
       const auto model = std::find_if(models_.begin(), models_.end(), [&](const auto& m) {
-        return m.command.name == start.command.name;
+        const CommandSpec& c = m.command;
+        return c.name == start.command.name && c.left == start.command.left &&
+               c.right == start.command.right;
       });
       if (model == models_.end()) return unknown(start.command, "the constant-velocity model");
       const double t = start.command.duration_s;

@@ -96,6 +96,45 @@ TEST(Determine, AveragesOverARoughSimulation) {
   }
 }
 
+// The box finds its own width, over three orders of magnitude.
+TEST(Determine, LooksAsCloseAsTheLikelihoodIsSharp) {
+  const Problem problem = three_genes(50);
+  const Eigen::Vector3d deviations(0.0005, 0.01, 0.1);
+  const Eigen::Vector3d top(0.4, 0.5, 0.6);
+  // Quadratic near the top only: beyond some deviations it flattens out.
+  const auto bent = [&](const std::vector<Genome>& genomes) -> Result<std::vector<double>> {
+    std::vector<double> scores;
+    for (const Genome& genome : genomes) {
+      const Eigen::Vector3d d =
+          (Eigen::Vector3d(genome[0], genome[1], genome[2]) - top).cwiseQuotient(deviations);
+      scores.push_back(-50 * std::log1p(d.squaredNorm() / 100) / 50);
+    }
+    return scores;
+  };
+  const auto report = determine(problem, {0.4, 0.5, 0.6, 0.5}, bent, {});
+  ASSERT_TRUE(report.ok()) << report.error().message;
+  EXPECT_TRUE(report->reliable);
+  for (std::size_t i = 0; i < 3; ++i) {
+    const double wanted = deviations[static_cast<Eigen::Index>(i)];
+    EXPECT_NEAR(of(*report, i).deviation / wanted, 1, 0.15);
+    EXPECT_TRUE(of(*report, i).determined);
+  }
+}
+
+TEST(Determine, SaysWhenNothingCanBeReadOff) {
+  const Problem problem = three_genes(50);
+  const auto noise = [](const std::vector<Genome>& genomes) -> Result<std::vector<double>> {
+    Stream stream({.run_seed = 3});
+    std::vector<double> scores;
+    for (std::size_t i = 0; i < genomes.size(); ++i) scores.push_back(stream.normal());
+    return scores;
+  };
+  const auto report = determine(problem, {0.5, 0.5, 0.5, 0.5}, noise, {});
+  ASSERT_TRUE(report.ok());
+  EXPECT_FALSE(report->reliable);
+  EXPECT_THAT(determine_text(*report, problem.table()), HasSubstr("unclear"));
+}
+
 TEST(Determine, SaysWhenThePointIsNoMaximumOrAtABound) {
   const Problem problem = three_genes(50);
   const Eigen::Matrix3d information = 1e4 * Eigen::Matrix3d::Identity();
