@@ -62,7 +62,10 @@ while [[ $# -gt 0 ]]; do
   esac
   shift
 done
-bin=$(cd "$bin" 2>/dev/null && pwd) || fail "there is no folder '$bin'; give --bin FOLDER"
+if [[ $verb == workers || $verb == run ]]; then
+  [[ -d $bin ]] || fail "there is no folder '$bin'; give --bin FOLDER"
+  bin=$(cd "$bin" && pwd)
+fi
 
 # Prints the command, or runs it.
 run() {
