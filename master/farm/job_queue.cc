@@ -138,10 +138,19 @@ bool JobQueue::take_straggler(const WorkerIdentity& worker, double now, v1::Job*
   return false;
 }
 
-JobQueue::Attempt* JobQueue::find(WorkerId worker, std::uint64_t attempt) {
+const JobQueue::Attempt* JobQueue::find(WorkerId worker, std::uint64_t attempt) const {
   if (attempt < first_attempt_ || attempt - first_attempt_ >= attempts_.size()) return nullptr;
-  Attempt& found = attempts_[attempt - first_attempt_];
+  const Attempt& found = attempts_[attempt - first_attempt_];
   return found.worker == worker && found.job != kNoJob ? &found : nullptr;
+}
+
+JobQueue::Attempt* JobQueue::find(WorkerId worker, std::uint64_t attempt) {
+  return const_cast<Attempt*>(std::as_const(*this).find(worker, attempt));
+}
+
+bool JobQueue::is_out(WorkerId worker, std::uint64_t attempt) const {
+  const Attempt* found = find(worker, attempt);
+  return found != nullptr && found->live;
 }
 
 void JobQueue::withdraw(Attempt& attempt, std::uint64_t id) {

@@ -94,6 +94,8 @@ class JobQueue {
   // `worker` will not answer `attempt`: the job goes to the front of the line unless it is done or
   // another attempt is out.  True: the job was lost with that and waits again.
   bool give_back(WorkerId worker, std::uint64_t attempt);
+  // Whether an answer of `worker` to `attempt` is waited for.
+  bool is_out(WorkerId worker, std::uint64_t attempt) const;
   // The worker's process ended while it worked on `attempt`; also when that comes out only after
   // the attempt was given back.  An attempt is blamed once.
   Blamed blame(const WorkerIdentity& worker, std::uint64_t attempt, EndCause cause);
@@ -130,6 +132,7 @@ class JobQueue {
     std::string host;
     EndCause cause;
   };
+  const Attempt* find(WorkerId worker, std::uint64_t attempt) const;
   Attempt* find(WorkerId worker, std::uint64_t attempt);
   std::uint64_t next_attempt() const { return first_attempt_ + attempts_.size(); }
   std::size_t index_of(const Job& job) const {

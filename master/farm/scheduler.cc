@@ -223,7 +223,9 @@ bool Scheduler::on_result(WorkerRecord& worker, v1::JobResult* result) {
     dismiss(worker, FarmEvent::kBadMessage, "is refused: " + reason);
     return false;
   }
-  if (drop_holding(worker, attempt)) line_up(worker);
+  // Nonsense about a job leaves it in the worker's hands, to be given back with the rest of them.
+  const bool held = committed.kind == Commit::kForeign && queue_.is_out(worker.id, attempt);
+  if (!held && drop_holding(worker, attempt)) line_up(worker);
   on_committed(committed);
   if (committed.kind != Commit::kDone) return true;
   ++worker.finished;

@@ -102,22 +102,29 @@ class Liar {
     if (decode(bytes, &envelope) != DecodeStatus::kOk) return;
     for (const v1::Job& job : envelope.batch().jobs()) {
       v1::Envelope lie;
-      for (int shift = kind_ == kWrongIds ? -3 : 0; shift <= (kind_ == kWrongIds ? 3 : 0);
-           ++shift) {
-        if (kind_ == kWrongIds && shift == 0) continue;
-        v1::JobResult* result = lie.mutable_results()->add_results();
-        const auto offset = static_cast<std::uint64_t>(shift);
-        result->set_job_id(job.job_id() + offset);
-        result->set_attempt_id(job.attempt_id() + (shift % 2 == 0 ? offset : 0));
-        result->set_epoch(job.epoch() + (shift == 2 ? 1 : 0));
-        result->mutable_result()->set_outcome(v1::OK);
-        result->mutable_result()->mutable_evaluate()->set_fitness(
-            kind_ == kNotANumber ? std::numeric_limits<double>::quiet_NaN() : 1e9);
+      if (kind_ == kWrongIds) {
+        add_lie(job, lie).set_job_id(job.job_id() + 1);
+        add_lie(job, lie).set_job_id(job.job_id() - 1);
+        add_lie(job, lie).set_attempt_id(job.attempt_id() + (1ULL << 40));
+        add_lie(job, lie).set_epoch(job.epoch() + 1);
+      } else {
+        add_lie(job, lie).mutable_result()->mutable_evaluate()->set_fitness(
+            std::numeric_limits<double>::quiet_NaN());
       }
       ++lies_;
       socket.send("", encode(&lie));
       socket.send("", std::string(1000, static_cast<char>(lies_.load())));  // no envelope at all
     }
+  }
+
+  static v1::JobResult& add_lie(const v1::Job& job, v1::Envelope& lie) {
+    v1::JobResult* result = lie.mutable_results()->add_results();
+    result->set_job_id(job.job_id());
+    result->set_attempt_id(job.attempt_id());
+    result->set_epoch(job.epoch());
+    result->mutable_result()->set_outcome(v1::OK);
+    result->mutable_result()->mutable_evaluate()->set_fitness(1e9);
+    return *result;
   }
 
   std::string endpoint_;

@@ -46,6 +46,7 @@ FaultPlan faults_for(std::uint64_t seed) {
   faults.master_restarts = random() % 3 == 0 ? 1 + random() % 2 : 0;
   faults.lifetime_s = random() % 4 == 0 ? 4 : 0;
   faults.audit_share = random() % 2 == 0 ? 0.2 : 0.0;
+  faults.mistaken = random() % 4 == 0 ? 0.1 : 0.0;
   return faults;
 }
 

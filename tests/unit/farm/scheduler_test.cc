@@ -212,6 +212,24 @@ TEST(Scheduler, TakesNoAnswerTwiceNorFromAnotherEpochOrWorker) {
   EXPECT_FALSE(desk.scheduler.finished()) << "an answer of the batch before";
 }
 
+TEST(Scheduler, GivesToOthersWhatAWorkerAnsweredWithNonsense) {
+  Desk desk;
+  desk.join("liar");
+  desk.scheduler.start("", echo_tasks(2));
+  const auto lost = desk.jobs_for("liar");
+  ASSERT_EQ(lost.size(), 2u);
+  v1::Job wrong = lost[0];
+  wrong.set_job_id(lost[1].job_id());
+  desk.answer("liar", wrong);
+  desk.answer("liar", lost[1], 7, v1::OUTCOME_UNSPECIFIED);
+  v1::Envelope goodbye;
+  goodbye.mutable_goodbye();
+  desk.say("liar", goodbye);
+  desk.join("honest");
+  for (const v1::Job& job : desk.jobs_for("honest")) desk.answer("honest", job);
+  EXPECT_TRUE(desk.scheduler.finished());
+}
+
 TEST(Scheduler, QuarantinesOnlyTheJobThatEndsItsWorkers) {
   Desk desk;
   desk.scheduler.start("", echo_tasks(3));

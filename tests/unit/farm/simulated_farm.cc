@@ -290,6 +290,7 @@ void SimulatedFarm::finish_task(const std::shared_ptr<Worker>& worker, double wa
   result.mutable_result()->set_outcome(v1::OK);
   result.mutable_result()->set_echo(job.task().echo().payload());
   if (worker->place == corrupt_) result.mutable_result()->set_echo("wrong");
+  if (chance(faults_.mistaken)) result.set_job_id(job.job_id() + 1);
   worker->session->on_finished(std::move(result));
   step_worker(worker);
 }

@@ -34,6 +34,7 @@ struct FaultPlan {
   double span_s = 5;       // within which all of that happens
   double progress_s = 2;   // after which a supervisor kills a process whose task hangs
   double audit_share = 0;  // see CopyOptions
+  double mistaken = 0;     // probability of an answer to name another job than its own
 };
 
 class SimulatedFarm {
