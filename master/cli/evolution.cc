@@ -59,7 +59,7 @@ Status show_validation(RunStore& store, const EvolutionRun& run, const TrialLog&
 
 // Says how the run ended, in the store and to the user.
 Status conclude(RunStore& store, const EvolveSummary& summary, const FarmProgressWriter& writer) {
-  Progress progress = writer.last();
+  Progress progress = writer.now();
   const bool requested = summary.reason == StopReason::kRequested;
   progress.state = requested ? RunState::kStopped : RunState::kFinished;
   progress.stop_reason = summary.text;
@@ -147,6 +147,7 @@ int run_evolution(RunStore& store, const EvolutionRun& run, CliContext& context)
   base.numeric_class = store.info().numeric_class;
   base.shuffle_seed = run.shuffle_seed;
   report_to(run.log, base);
+  keep_incidents(store, context.console, base);
   std::unique_ptr<MetricsServer> metrics;
   if (run.farm.metrics_port) {
     auto server = MetricsServer::listen(*run.farm.metrics_port);
@@ -164,7 +165,8 @@ int run_evolution(RunStore& store, const EvolutionRun& run, CliContext& context)
   }
 
   const SteadyClock clock;
-  FarmProgressWriter progress(store, **farm, run.config.evolution, clock, context.console);
+  FarmProgressWriter progress(store, **farm, run.config.evolution, *checkpoint, clock,
+                              context.console);
   progress.watch(&run.log, metrics.get());
   FarmBackend backend(**farm, run.problem, run.config.seed, progress);
   StoreSink sink(store, run.problem, **farm, progress);
@@ -197,7 +199,11 @@ int run_evolution(RunStore& store, const EvolutionRun& run, CliContext& context)
                          (store.run() / "poses.svg").string() + ", " +
                          (store.run() / "fitness.svg").string());
   }
-  return (*farm)->counts().quarantined > 0 ? kExitQuarantined : kExitDone;
+  // Of earlier masters' generations too, and of what was done after the last one.
+  const auto given_up = store.quarantined();
+  if (!given_up) return failed(given_up.error(), context);
+  const bool lost = *given_up > 0 || (*farm)->counts().quarantined > 0;
+  return lost ? kExitQuarantined : kExitDone;
 }
 
 }  // namespace gapfarm

@@ -4,23 +4,67 @@
 
 #include "master/cli/farm_metrics.h"
 #include "master/evolve/evaluation.h"
+#include "master/evolve/time_left.h"
 
 namespace gapfarm {
 namespace {
 
 constexpr double kWriteInterval_s = 1;  // each costs a disk write
 
+FarmTally tally_of(const SocketFarm& farm) {
+  const SchedulerCounts& counts = farm.counts();
+  FarmTally tally;
+  tally.retries = counts.retries;
+  tally.hung = counts.hung;
+  tally.copies = farm.copied();
+  tally.compared = farm.compared();
+  tally.alarms = counts.disagreements;
+  tally.handed_over = counts.offered;
+  tally.late = counts.late;
+  tally.foreign = counts.foreign;
+  tally.malformed = counts.malformed;
+  return tally;
+}
+
+std::optional<IncidentKind> incident_of(FarmEvent::Kind kind) {
+  if (kind == FarmEvent::kQuarantined) return IncidentKind::kQuarantine;
+  if (kind == FarmEvent::kDisagreement) return IncidentKind::kAlarm;
+  return std::nullopt;
+}
+
 }  // namespace
 
+void keep_incidents(RunStore& store, Console& console, SocketFarmOptions& options) {
+  options.on_event = [&store, &console, next = options.on_event](const FarmEvent& event) {
+    if (const std::optional<IncidentKind> kind = incident_of(event.kind)) {
+      // The run goes on when it cannot be written, as with the live row.
+      if (Status s = store.add_incident(*kind, event.text); !s) console.error(s.error());
+    }
+    if (next) next(event);
+  };
+}
+
 FarmProgressWriter::FarmProgressWriter(RunStore& store, const SocketFarm& farm,
-                                       const EvolutionSettings& settings, const EvolveClock& clock,
-                                       Console& console)
+                                       const EvolutionSettings& settings,
+                                       const std::optional<Checkpoint>& resumed,
+                                       const EvolveClock& clock, Console& console)
     : store_(store),
       farm_(farm),
       settings_(settings),
       clock_(clock),
       console_(console),
-      began_s_(clock.now_s()) {}
+      began_s_(clock.now_s()) {
+  if (!resumed) return;
+  generation_ = resumed->generation;
+  evaluations_of_others_ = resumed->evaluations;
+  wall_of_others_s_ = resumed->wall_s;
+}
+
+Progress FarmProgressWriter::now() const {
+  Progress progress = last_;
+  progress.farm = tally_of(farm_);
+  return progress;
+}
 
 void FarmProgressWriter::on_progress(const FarmProgress& progress) {
   last_.done = progress.done;
@@ -60,13 +104,17 @@ void FarmProgressWriter::refresh(double now_s) {
   const double spent_s = now_s - began_s_;
   const std::uint64_t done = evaluations_before_ + last_.done;
   last_.rate_per_s = spent_s > 0 ? static_cast<double>(done) / spent_s : 0;
-  last_.time_left_s.reset();
-  if (generations_ > 0 && settings_.generations > generation_) {
-    const auto left = static_cast<double>(settings_.generations - generation_);
-    last_.time_left_s = left * spent_s / static_cast<double>(generations_);
-    if (settings_.time_s)
-      last_.time_left_s = std::min(*last_.time_left_s, *settings_.time_s - spent_s);
+  Pace pace;
+  pace.generation = generation_;
+  pace.evaluations = evaluations_of_others_ + done;
+  pace.wall_s = wall_of_others_s_ + spent_s;
+  if (last_.total > 0) {
+    pace.share = static_cast<double>(last_.done) / static_cast<double>(last_.total);
   }
+  pace.generations_here = generations_;
+  pace.evaluations_here = done;
+  pace.wall_here_s = spent_s;
+  last_.time_left_s = time_left_s(settings_, pace);
   console_.progress(progress_text("generation " + std::to_string(generation_ + 1) + " of " +
                                       std::to_string(settings_.generations) +
                                       (best_.empty() ? "" : ", best " + best_),
@@ -76,8 +124,9 @@ void FarmProgressWriter::refresh(double now_s) {
   publish();
   last_.workers.clear();
   for (const WorkerStatus& w : farm_.workers()) {
-    last_.workers.push_back({w.name, w.host, w.state, w.jobs, w.finished});
+    last_.workers.push_back({w.name, w.host, w.state, w.jobs, w.finished, w.rate_per_s});
   }
+  last_.farm = tally_of(farm_);
   // The live row is a courtesy: a run goes on when it cannot be written, and a commit that cannot
   // be written stops it with the reason.
   if (Status s = store_.set_progress(last_); !s) console_.error(s.error());

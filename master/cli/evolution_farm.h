@@ -14,15 +14,22 @@
 
 namespace gapfarm {
 
+// Keeps what a farm reports as lost or contradictory in the store, besides what `options` does with
+// it.  `store` and `console` outlive the farm.
+void keep_incidents(RunStore& store, Console& console, SocketFarmOptions& options);
+
 // Keeps the store's live row and the terminal's progress line fresh, about once a second.
 class FarmProgressWriter {
  public:
+  // `resumed`: where the run goes on; none at its start.
   FarmProgressWriter(RunStore& store, const SocketFarm& farm, const EvolutionSettings& settings,
-                     const EvolveClock& clock, Console& console);
+                     const std::optional<Checkpoint>& resumed, const EvolveClock& clock,
+                     Console& console);
 
   void on_progress(const FarmProgress& progress);
   void on_generation(const GenerationRecord& record, std::optional<double> best);
-  const Progress& last() const { return last_; }
+  // As last shown, with the farm's counts as they are now.
+  Progress now() const;
   // Where generations and figures also go; neither is owned, both may be null.
   void watch(Log* log, MetricsServer* metrics);
 
@@ -37,9 +44,11 @@ class FarmProgressWriter {
   Console& console_;
   double began_s_;
   double written_s_ = -1e9;
-  std::uint64_t evaluations_before_ = 0;  // of this life of the master, generations done
-  std::uint64_t generations_ = 0;         // of this life of the master
-  std::uint64_t generation_ = 0;          // of the run
+  std::uint64_t evaluations_before_ = 0;     // of this life of the master, generations done
+  std::uint64_t generations_ = 0;            // of this life of the master
+  std::uint64_t generation_ = 0;             // of the run
+  std::uint64_t evaluations_of_others_ = 0;  // of earlier masters
+  double wall_of_others_s_ = 0;
   std::string best_;
   std::optional<double> best_fitness_;
   Progress last_;

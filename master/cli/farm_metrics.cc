@@ -41,6 +41,13 @@ std::string metrics_page(const SocketFarm& farm, const Progress& progress,
   add_workers(farm, &page);
   const SchedulerCounts& counts = farm.counts();
   page.add("retries_total", kCounter, "Jobs given out again.", real(counts.retries));
+  page.add("copies_total", kCounter, "Jobs given to a second worker because the first took long.",
+           real(farm.copied()));
+  page.add("compared_results_total", kCounter, "Answers held against another worker's.",
+           real(farm.compared()));
+  page.add("alarms_total", kCounter, "Those of them that differed.", real(counts.disagreements));
+  page.add("hung_total", kCounter, "Workers killed because their simulation hung.",
+           real(counts.hung));
   page.add("late_results_total", kCounter, "Answers to jobs that had one.", real(counts.late));
   page.add("foreign_results_total", kCounter, "Answers to nothing that was asked.",
            real(counts.foreign));

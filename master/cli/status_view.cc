@@ -9,6 +9,7 @@ namespace {
 
 constexpr std::size_t kMostWorkers = 8;
 constexpr std::size_t kMostParameters = 12;
+constexpr std::size_t kMostIncidents = 4;  // of a kind
 
 const char* state_style(const RunStatus& status) {
   switch (status.state) {
@@ -61,7 +62,56 @@ std::string worker_lines(const RunStatus& status, const Console& console) {
     text += label(console, i == 0 ? "workers" : "") + printable(worker.name) + " on " +
             printable(worker.host) + ": " + printable(worker.state) + ", " +
             std::to_string(worker.jobs) + " in hand, " + std::to_string(worker.finished) +
-            " done\n";
+            " done, " + format_number(worker.rate_per_s, 3) + "/s\n";
+  }
+  return text;
+}
+
+// What the farm coped with; nothing where there was nothing.
+std::string farm_line(const FarmTally& farm, const Console& console) {
+  const std::pair<std::uint64_t, const char*> parts[] = {
+      {farm.retries, " retries"},
+      {farm.hung, " hung and killed"},
+      {farm.copies, " copies of stragglers"},
+      {farm.handed_over, " answers kept over a restart"},
+      {farm.compared, " answers compared"}};
+  std::string text;
+  for (const auto& [count, what] : parts) {
+    if (count > 0) text += (text.empty() ? "" : ", ") + std::to_string(count) + what;
+  }
+  return text.empty() ? text : label(console, "farm") + text + "\n";
+}
+
+// The latest of a kind.
+std::string incident_lines(const RunStatus& status, IncidentKind kind, const Console& console) {
+  std::vector<const Incident*> all;
+  for (const Incident& incident : status.incidents) {
+    if (incident.kind == kind) all.push_back(&incident);
+  }
+  std::string text;
+  const std::size_t first = all.size() - std::min(all.size(), kMostIncidents);
+  for (std::size_t i = first; i < all.size(); ++i) {
+    text += label(console, "") + "generation " + std::to_string(all[i]->generation) + ": " +
+            printable(all[i]->text) + "\n";
+  }
+  if (first > 0) {
+    text += label(console, "") + "... " + std::to_string(first) + " earlier with --json\n";
+  }
+  return text;
+}
+
+std::string trouble(const RunStatus& status, const Console& console) {
+  std::string text = farm_line(status.progress.farm, console);
+  if (status.quarantined > 0) {
+    text += label(console, "given up") + std::to_string(status.quarantined) +
+            (status.quarantined == 1 ? " task\n" : " tasks\n") +
+            incident_lines(status, IncidentKind::kQuarantine, console);
+  }
+  const std::string alarms = incident_lines(status, IncidentKind::kAlarm, console);
+  if (!alarms.empty()) {
+    text += label(console, "alarms") +
+            console.styled("two answers to one task: a machine computes wrongly", "1;31") + "\n" +
+            alarms;
   }
   return text;
 }
@@ -128,9 +178,7 @@ std::string status_screen(const RunStatus& status, const std::string& run, const
   if (status.state == RunState::kRunning && status.heartbeat_age_s > 5) {
     text += label(console, "heartbeat") + format_duration(status.heartbeat_age_s) + " ago\n";
   }
-  if (status.quarantined > 0) {
-    text += label(console, "given up") + std::to_string(status.quarantined) + " tasks\n";
-  }
+  text += trouble(status, console);
   text += label(console, "seed") + std::to_string(status.info.seed) + "\n";
   if (!status.digest.empty()) text += label(console, "digest") + status.digest + "\n";
   if (status.state == RunState::kStopped) {

@@ -20,6 +20,46 @@ const char* run_state_name(RunState state) {
   return "stopped";
 }
 
+const std::array<FarmTally::Row, 9> FarmTally::kRows = {{
+    {"retries", &FarmTally::retries},
+    {"hung", &FarmTally::hung},
+    {"copies", &FarmTally::copies},
+    {"compared", &FarmTally::compared},
+    {"alarms", &FarmTally::alarms},
+    {"handed_over", &FarmTally::handed_over},
+    {"late", &FarmTally::late},
+    {"foreign", &FarmTally::foreign},
+    {"malformed", &FarmTally::malformed},
+}};
+
+FarmTally& FarmTally::operator+=(const FarmTally& other) {
+  for (const Row& row : kRows) this->*row.count += other.*row.count;
+  return *this;
+}
+
+std::string FarmTally::to_json() const {
+  nlohmann::ordered_json json = nlohmann::ordered_json::object();
+  for (const Row& row : kRows) json[row.key] = this->*row.count;
+  return json.dump();
+}
+
+FarmTally FarmTally::from_json(const std::string& text) {
+  FarmTally tally;
+  const auto json = nlohmann::ordered_json::parse(text, nullptr, false);
+  if (!json.is_object()) return tally;
+  for (const Row& row : kRows) {
+    const auto found = json.find(row.key);
+    if (found != json.end() && found->is_number_unsigned()) {
+      tally.*row.count = found->get<std::uint64_t>();
+    }
+  }
+  return tally;
+}
+
+const char* incident_name(IncidentKind kind) {
+  return kind == IncidentKind::kAlarm ? "alarm" : "quarantine";
+}
+
 std::string readable_values(const Problem& problem, const Genome& genome) {
   const ParameterTable& table = problem.table();
   const ParameterValues values = problem.values_of(genome);

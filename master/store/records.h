@@ -1,6 +1,7 @@
 // What the run store keeps, as plain data (docs/run_store.md gives the tables behind it).
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -62,7 +63,46 @@ struct StoredWorker {
   std::string state;  // "idle", "busy", "gone"
   unsigned jobs = 0;  // in its hands
   std::uint64_t finished = 0;
+  double rate_per_s = 0;  // jobs, since it joined
 };
+
+// What the farm went through, counted over all masters that have written to the run.
+struct FarmTally {
+  std::uint64_t retries = 0;      // jobs that went back into the line
+  std::uint64_t hung = 0;         // workers that were killed because their simulation hung
+  std::uint64_t copies = 0;       // of stragglers' jobs, given to idle workers
+  std::uint64_t compared = 0;     // answers held against another worker's: audits and copies
+  std::uint64_t alarms = 0;       // of those, answers that differed
+  std::uint64_t handed_over = 0;  // answers that workers kept from one master to the next
+  std::uint64_t late = 0;         // answers to jobs that had one
+  std::uint64_t foreign = 0;      // answers to nothing that was asked
+  std::uint64_t malformed = 0;    // messages that made no sense
+
+  struct Row {
+    const char* key;
+    std::uint64_t FarmTally::*count;
+  };
+  static const std::array<Row, 9> kRows;  // every count, by its name in the store and in status
+
+  FarmTally& operator+=(const FarmTally& other);
+  // A JSON object, and back; what is no such object counts nothing.
+  std::string to_json() const;
+  static FarmTally from_json(const std::string& text);
+};
+
+enum class IncidentKind {
+  kQuarantine,  // a task was given up: it ended too many workers
+  kAlarm,       // two workers answered one task differently
+};
+
+// One thing that somebody should look at.
+struct Incident {
+  IncidentKind kind = IncidentKind::kQuarantine;
+  std::uint64_t generation = 0;  // in work when it happened
+  double unix_s = 0;
+  std::string text;  // a sentence that names tasks, workers and hosts
+};
+const char* incident_name(IncidentKind kind);  // "quarantine", "alarm"
 
 // The live part: what a running master last said about itself.
 struct Progress {
@@ -72,6 +112,7 @@ struct Progress {
   std::optional<double> time_left_s;
   std::uint64_t done = 0, total = 0;  // tasks of the generation in work
   std::vector<StoredWorker> workers;
+  FarmTally farm;
   // Set by the store:
   std::int64_t pid = 0;
   std::string host;

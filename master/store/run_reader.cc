@@ -10,6 +10,8 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
+constexpr std::int64_t kSchemaWithIncidents = 2;
+
 // What was written by hand or damaged reads as empty: status is no place to die over it.
 Json parse(const std::string& text) { return Json::parse(text, nullptr, false); }
 
@@ -38,6 +40,7 @@ std::vector<StoredWorker> workers_of(const std::string& text) {
     worker.state = entry.value("state", "");
     worker.jobs = entry.value("jobs", 0u);
     worker.finished = entry.value("finished", std::uint64_t{0});
+    worker.rate_per_s = entry.value("rate_per_s", 0.0);
     workers.push_back(std::move(worker));
   }
   return workers;
@@ -58,7 +61,10 @@ Result<RunReader> RunReader::open(const std::filesystem::path& run) {
   if (Status s = check_run_store(*database); !s) return s.error();
   Result<RunInfo> info = load_run_info(*database);
   if (!info) return info.error();
+  const Result<std::int64_t> schema = run_store_schema(*database);
+  if (!schema) return schema.error();
   RunReader reader(run, std::move(*database));
+  reader.schema_ = *schema;
   reader.info_ = std::move(*info);
   return reader;
 }
@@ -130,10 +136,28 @@ Result<std::optional<StoredIndividual>> RunReader::best() const {
   return std::optional<StoredIndividual>(std::move(all->front()));
 }
 
+Result<std::vector<Incident>> RunReader::incidents() const {
+  std::vector<Incident> incidents;
+  if (schema_ < kSchemaWithIncidents) return incidents;
+  Result<SqlStatement> select = database_.prepare(
+      "SELECT generation, kind, time, text FROM incidents ORDER BY rowid", "read the incidents");
+  if (!select) return select.error();
+  for (;;) {
+    const Result<bool> row = select->step();
+    if (!row) return row.error();
+    if (!*row) return incidents;
+    const bool alarm = select->text(1) == incident_name(IncidentKind::kAlarm);
+    incidents.push_back({alarm ? IncidentKind::kAlarm : IncidentKind::kQuarantine,
+                         static_cast<std::uint64_t>(select->integer(0)), select->real(2),
+                         select->text(3)});
+  }
+}
+
 Result<Progress> RunReader::progress() const {
   Result<SqlStatement> select = database_.prepare(
       "SELECT state, stop_reason, pid, host, heartbeat, rate_per_s, time_left_s, done, total, "
-      "workers, epoch FROM progress",
+      "workers, epoch, " +
+          std::string(schema_ < kSchemaWithIncidents ? "'{}'" : "farm") + " FROM progress",
       "read the progress");
   if (!select) return select.error();
   const Result<bool> row = select->step();
@@ -151,6 +175,7 @@ Result<Progress> RunReader::progress() const {
   progress.total = static_cast<std::uint64_t>(select->integer(8));
   progress.workers = workers_of(select->text(9));
   progress.epoch = static_cast<std::uint64_t>(select->integer(10));
+  progress.farm = FarmTally::from_json(select->text(11));
   return progress;
 }
 

@@ -28,6 +28,8 @@ class RunReader {
   Result<std::vector<StoredIndividual>> individuals(std::uint64_t generation) const;
   // The best of the last generation; none when nothing was committed yet.
   Result<std::optional<StoredIndividual>> best() const;
+  // In the order in which they happened.
+  Result<std::vector<Incident>> incidents() const;
   // As the master last wrote it.  What it says of a master that crashed is stale: run_status().
   Result<Progress> progress() const;
 
@@ -37,6 +39,7 @@ class RunReader {
 
   std::filesystem::path run_;
   Database database_;
+  std::int64_t schema_ = 0;
   RunInfo info_;
 };
 

@@ -26,6 +26,13 @@ Json number_or_null(const std::optional<double>& value) {
   return value ? Json(*value) : Json(nullptr);
 }
 
+Json to_json(const Incident& incident) {
+  return {{"kind", incident_name(incident.kind)},
+          {"generation", incident.generation},
+          {"time", incident.unix_s},
+          {"text", incident.text}};
+}
+
 }  // namespace
 
 Result<RunStatus> run_status(const RunReader& reader, double now_unix_s) {
@@ -43,6 +50,9 @@ Result<RunStatus> run_status(const RunReader& reader, double now_unix_s) {
     status.wall_s += generation.wall_s;
     status.quarantined += generation.quarantined;
   }
+  Result<std::vector<Incident>> incidents = reader.incidents();
+  if (!incidents) return incidents.error();
+  status.incidents = std::move(*incidents);
   if (!generations->empty()) {
     const StoredGeneration& last = generations->back();
     status.generation = last.generation;
@@ -51,6 +61,10 @@ Result<RunStatus> run_status(const RunReader& reader, double now_unix_s) {
     status.mean = last.mean;
     status.worst = last.worst;
     status.digest = last.digest;
+  }
+  for (const Incident& incident : status.incidents) {
+    const bool counted = incident.generation <= status.generation;  // with its generation
+    status.quarantined += incident.kind == IncidentKind::kQuarantine && !counted ? 1 : 0;
   }
   // By number, not "the last": another generation may have been committed meanwhile.
   const Result<std::vector<StoredIndividual>> members = reader.individuals(status.generation);
@@ -85,7 +99,8 @@ Json to_json(const RunStatus& status) {
                        {"state", worker.state},
                        {"jobs", worker.jobs},
                        {"host", worker.host},
-                       {"finished", worker.finished}});
+                       {"finished", worker.finished},
+                       {"rate_per_s", worker.rate_per_s}});
   }
   Json json;
   json["state"] = run_state_name(status.state);
@@ -100,6 +115,12 @@ Json to_json(const RunStatus& status) {
   json["digest"] = status.digest;
   json["workers"] = std::move(workers);
   json["quarantined"] = status.quarantined;
+  Json& incidents = json["incidents"] = Json::array();
+  for (const Incident& incident : status.incidents) incidents.push_back(to_json(incident));
+  Json& farm = json["farm"] = Json::object();
+  for (const FarmTally::Row& row : FarmTally::kRows) {
+    farm[row.key] = status.progress.farm.*row.count;
+  }
   json["fitness"] = status.info.fitness;
   json["fitness_unit"] = status.info.fitness_unit;
   json["higher_is_better"] = status.info.higher_is_better;

@@ -22,8 +22,9 @@ struct RunStatus {
   std::optional<double> best, mean, worst;  // fitness of the last committed generation
   double rate_per_s = 0;
   std::optional<double> time_left_s;
-  std::string digest;  // empty: nothing committed
-  unsigned quarantined = 0;
+  std::string digest;               // empty: nothing committed
+  std::uint64_t quarantined = 0;    // tasks given up, with those of the generation in work
+  std::vector<Incident> incidents;  // in the order in which they happened
   Progress progress;
   double heartbeat_age_s = 0;
   std::vector<std::optional<double>> best_by_generation;

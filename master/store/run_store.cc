@@ -63,9 +63,16 @@ std::string workers_json(const std::vector<StoredWorker>& workers) {
                     {"host", worker.host},
                     {"state", worker.state},
                     {"jobs", worker.jobs},
-                    {"finished", worker.finished}});
+                    {"finished", worker.finished},
+                    {"rate_per_s", worker.rate_per_s}});
   }
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+// Alarms stay: they are about machines, not about generations.
+std::string forget_quarantines(std::uint64_t from) {
+  return std::string("DELETE FROM incidents WHERE kind = '") +
+         incident_name(IncidentKind::kQuarantine) + "' AND generation >= " + std::to_string(from);
 }
 
 // A path in `run` that is not taken: run.generation-41.sqlite, run.generation-41.2.sqlite, ...
@@ -84,7 +91,7 @@ Status create_tables(Database& database, const RunInfo& info) {
   if (Status s = create_run_tables(database); !s) return s;
   if (Status s = insert_run_info(database, info); !s) return s;
   if (Status s = database.exec("INSERT INTO progress VALUES (1, 'stopped', '', 0, '', 0, 0, NULL, "
-                               "0, 0, '[]', 0)",
+                               "0, 0, '[]', 0, '{}')",
                                "create the run store");
       !s) {
     return s;
@@ -162,6 +169,7 @@ Result<RunStore> RunStore::open(const fs::path& run) {
     return Error{file.string() + ": the file is damaged (" + damage->text(0) +
                  "); restore a copy, or save what is left with `sqlite3 run.sqlite .recover`"};
   }
+  if (Status s = upgrade_run_store(*database); !s) return s.error();
   Result<RunInfo> info = load_run_info(*database);
   if (!info) return info.error();
 
@@ -177,12 +185,43 @@ Result<RunStore> RunStore::open(const fs::path& run) {
   return store;
 }
 
+Status RunStore::load_before() {
+  Result<SqlStatement> before =
+      database_.prepare("SELECT epoch, farm FROM progress", "read the run store");
+  if (!before) return before.error();
+  const Result<bool> row = before->step();
+  if (!row) return row.error();
+  if (!*row) {
+    return Error{database_.file().string() +
+                 ": table progress is empty: the file was changed by hand; restore a copy"};
+  }
+  epoch_ = static_cast<std::uint64_t>(before->integer(0)) + 1;
+  farm_before_ = FarmTally::from_json(before->text(1));
+  return {};
+}
+
 Status RunStore::begin_epoch() {
-  const Result<std::int64_t> epoch =
-      database_.integer("SELECT epoch FROM progress", "read the run store");
-  if (!epoch) return epoch.error();
-  epoch_ = static_cast<std::uint64_t>(*epoch) + 1;
+  if (Status s = load_before(); !s) return s;
+  if (Status s = database_.exec(forget_quarantines(next_generation()), "write the run store"); !s) {
+    return s;
+  }
   return set_progress({});
+}
+
+Status RunStore::add_incident(IncidentKind kind, const std::string& text) {
+  Result<SqlStatement> insert =
+      database_.prepare("INSERT INTO incidents VALUES (?, ?, ?, ?)", "write down what happened");
+  if (!insert) return insert.error();
+  insert->bind(1, static_cast<std::int64_t>(next_generation()));
+  insert->bind_text(2, incident_name(kind)).bind(3, unix_now_s()).bind_text(4, text);
+  return insert->run();
+}
+
+Result<std::uint64_t> RunStore::quarantined() const {
+  const Result<std::int64_t> sum = database_.integer(
+      "SELECT coalesce(sum(quarantined), 0) FROM generations", "read the generations");
+  if (!sum) return sum.error();
+  return static_cast<std::uint64_t>(*sum);
 }
 
 Result<std::string> RunStore::commit(const StoredGeneration& generation) {
@@ -243,7 +282,7 @@ Status RunStore::set_numeric_class(const std::string& numeric_class) {
 Status RunStore::set_progress(const Progress& progress) {
   Result<SqlStatement> update = database_.prepare(
       "UPDATE progress SET state = ?, stop_reason = ?, pid = ?, host = ?, heartbeat = ?, "
-      "rate_per_s = ?, time_left_s = ?, done = ?, total = ?, workers = ?, epoch = ?",
+      "rate_per_s = ?, time_left_s = ?, done = ?, total = ?, workers = ?, epoch = ?, farm = ?",
       "write the progress");
   if (!update) return update.error();
   update->bind_text(1, run_state_name(progress.state)).bind_text(2, progress.stop_reason);
@@ -253,6 +292,9 @@ Status RunStore::set_progress(const Progress& progress) {
   update->bind(9, static_cast<std::int64_t>(progress.total));
   update->bind_text(10, workers_json(progress.workers));
   update->bind(11, static_cast<std::int64_t>(epoch_));
+  FarmTally farm = farm_before_;
+  farm += progress.farm;
+  update->bind_text(12, farm.to_json());
   return update->run();
 }
 
@@ -298,13 +340,17 @@ Result<fs::path> RunStore::truncate_after(std::uint64_t generation) {
   if (Status s = sync_to_disk(backup); !s) return s.error();
   if (Status s = sync_to_disk(run_); !s) return s.error();
 
-  // One transaction: the individuals go with their generations.
+  // The individuals go with their generations.
+  Result<SqlTransaction> transaction = SqlTransaction::begin(database_);
+  if (!transaction) return transaction.error();
   if (Status s =
-          database_.exec("DELETE FROM generations WHERE generation > " + std::to_string(generation),
+          database_.exec("DELETE FROM generations WHERE generation > " +
+                             std::to_string(generation) + "; " + forget_quarantines(generation + 1),
                          "forget the generations after " + std::to_string(generation));
       !s) {
     return s.error();
   }
+  if (Status s = transaction->commit(); !s) return s.error();
   last_generation_ = generation;
   digest_ = (*kept)->digest;
   return backup;

@@ -43,8 +43,16 @@ class RunStore {
   // disk when it returns.  Generations follow one another without gaps.  Returns the run's digest.
   Result<std::string> commit(const StoredGeneration& generation);
 
-  // Overwrites the live row and its heartbeat.  Costs a disk write: about once a second is enough.
+  // Overwrites the live row and its heartbeat.  `progress.farm` counts this master's part; what
+  // those before it counted is added.  Costs a disk write: about once a second is enough.
   Status set_progress(const Progress& progress);
+
+  // Keeps what happened in the generation in work.  Quarantines of a generation that is not
+  // committed are forgotten when the run is opened again: it is evaluated again.
+  Status add_incident(IncidentKind kind, const std::string& text);
+
+  // Tasks given up in all committed generations, by this master or those before it.
+  Result<std::uint64_t> quarantined() const;
 
   // The state after `generation`, or after the last one; none when nothing was committed yet.
   // Errors: there is no such generation.
@@ -59,13 +67,16 @@ class RunStore {
       : run_(std::move(run)), lock_(std::move(lock)), database_(std::move(database)) {}
 
   Status insert_individuals(const StoredGeneration& generation);
+  Status load_before();
   Status begin_epoch();
+  std::uint64_t next_generation() const { return last_generation_.value_or(0) + 1; }
 
   std::filesystem::path run_;
   RunLock lock_;
   Database database_;
   RunInfo info_;
   std::uint64_t epoch_ = 0;
+  FarmTally farm_before_;  // of earlier masters
   std::optional<std::uint64_t> last_generation_;
   std::string digest_;
 };

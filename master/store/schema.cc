@@ -1,12 +1,13 @@
 #include "master/store/schema.h"
 
 #include <charconv>
+#include <iterator>
 #include <system_error>
 
 namespace gapfarm {
 namespace {
 
-// Comments inside the statements stay in the file and show in `.schema`.
+// Schema 1.  Comments inside the statements stay in the file and show in `.schema`.
 constexpr const char* kTables = R"sql(
 CREATE TABLE run (             -- one row: what was fixed when the run was created
   id INTEGER PRIMARY KEY CHECK (id = 1),
@@ -65,6 +66,28 @@ CREATE TABLE progress (        -- one row: what the master last said about itsel
 ) STRICT;
 )sql";
 
+// From schema i + 1 to i + 2.  New files go the same way, so there is one way to each schema.
+constexpr const char* kUpgrades[] = {
+    R"sql(
+ALTER TABLE progress ADD COLUMN
+  farm TEXT NOT NULL DEFAULT '{}' /* JSON object: counts over all masters of this run */;
+CREATE TABLE incidents (       -- what somebody should look at, as it happened
+  generation INTEGER NOT NULL, -- in work then
+  kind TEXT NOT NULL,          -- quarantine: a task was given up; alarm: two answers to one task
+  time REAL NOT NULL,          -- Unix time
+  text TEXT NOT NULL
+) STRICT;
+)sql",
+};
+static_assert(std::size(kUpgrades) + 1 == kRunStoreSchema);
+
+Status upgrade_from(Database& database, std::int64_t schema, const std::string& operation) {
+  for (std::int64_t from = schema; from < kRunStoreSchema; ++from) {
+    if (Status s = database.exec(kUpgrades[from - 1], operation); !s) return s;
+  }
+  return database.exec("PRAGMA user_version = " + std::to_string(kRunStoreSchema), operation);
+}
+
 }  // namespace
 
 std::filesystem::path run_store_file(const std::filesystem::path& run) {
@@ -75,9 +98,26 @@ std::filesystem::path run_store_file(const std::filesystem::path& run) {
 Status create_run_tables(Database& database) {
   const std::string operation = "create the run store";
   if (Status s = database.exec(kTables, operation); !s) return s;
-  return database.exec("PRAGMA application_id = " + std::to_string(kRunStoreApplicationId) +
-                           "; PRAGMA user_version = " + std::to_string(kRunStoreSchema),
-                       operation);
+  if (Status s = database.exec("PRAGMA application_id = " + std::to_string(kRunStoreApplicationId),
+                               operation);
+      !s) {
+    return s;
+  }
+  return upgrade_from(database, 1, operation);
+}
+
+Result<std::int64_t> run_store_schema(const Database& database) {
+  return database.integer("PRAGMA user_version", "read the run store");
+}
+
+Status upgrade_run_store(Database& database) {
+  const Result<std::int64_t> schema = run_store_schema(database);
+  if (!schema) return schema.error();
+  if (*schema >= kRunStoreSchema) return {};
+  Result<SqlTransaction> transaction = SqlTransaction::begin(database);
+  if (!transaction) return transaction.error();
+  if (Status s = upgrade_from(database, *schema, "upgrade the run store"); !s) return s;
+  return transaction->commit();
 }
 
 Status check_run_store(const Database& database) {
@@ -99,8 +139,11 @@ Status check_run_store(const Database& database) {
                  std::to_string(*id) + ", a run store has " +
                  std::to_string(kRunStoreApplicationId) + "); give the folder of a gapfarm run"};
   }
-  const Result<std::int64_t> schema = database.integer("PRAGMA user_version", "read the run store");
+  const Result<std::int64_t> schema = run_store_schema(database);
   if (!schema) return schema.error();
+  if (*schema < 1) {
+    return Error{file + ": names no schema: the file was changed by hand; restore a copy"};
+  }
   if (*schema > kRunStoreSchema) {
     return Error{file + ": was written by a newer gapfarm (schema " + std::to_string(*schema) +
                  "; this program knows up to " + std::to_string(kRunStoreSchema) +

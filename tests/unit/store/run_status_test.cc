@@ -34,7 +34,7 @@ TEST_F(RunStatusTest, IsRunningWhileTheMasterHoldsTheLock) {
   Progress progress;
   progress.rate_per_s = 210;
   progress.time_left_s = 12;
-  progress.workers = {{"w1", "here", "busy", 2, 40}};
+  progress.workers = {{"w1", "here", "busy", 2, 40, 10}};
   ASSERT_TRUE(store->set_progress(progress).ok());
   // However long its last word is ago: it may sit in one long evaluation.
   const RunStatus now = status(3600);
@@ -84,8 +84,10 @@ TEST_F(RunStatusTest, JsonHasTheFieldsOfTheContract) {
   EXPECT_EQ(json["digest"], "");
   const std::string digest = *store->commit(example_generation(1));
   Progress progress;
-  progress.workers = {{"w1", "here", "busy", 3, 40}};
+  progress.workers = {{"w1", "here", "busy", 3, 40, 12.5}};
+  progress.farm.retries = 4;
   ASSERT_TRUE(store->set_progress(progress).ok());
+  ASSERT_TRUE(store->add_incident(IncidentKind::kQuarantine, "evaluation of birth 7").ok());
 
   json = to_json(status());
   EXPECT_EQ(json["state"], "running");
@@ -96,7 +98,13 @@ TEST_F(RunStatusTest, JsonHasTheFieldsOfTheContract) {
   EXPECT_EQ(json["mean_fitness"], 0.5);
   EXPECT_EQ(json["worst_fitness"], 0.0);
   EXPECT_EQ(json["digest"], digest);
-  EXPECT_EQ(json["quarantined"], 0);
+  EXPECT_EQ(json["quarantined"], 1) << "of the generation in work";
+  EXPECT_EQ(json["incidents"][0]["kind"], "quarantine");
+  EXPECT_EQ(json["incidents"][0]["generation"], 2);
+  EXPECT_EQ(json["incidents"][0]["text"], "evaluation of birth 7");
+  EXPECT_EQ(json["farm"]["retries"], 4);
+  EXPECT_EQ(json["farm"]["alarms"], 0);
+  EXPECT_EQ(json["workers"][0]["rate_per_s"], 12.5);
   EXPECT_TRUE(json.contains("rate_per_s"));
   EXPECT_TRUE(json.contains("time_left_s"));
   EXPECT_EQ(json["workers"][0]["name"], "w1");

@@ -247,6 +247,94 @@ TEST_F(RunStoreTest, SurvivesAKillInTheMiddleOfACommit) {
   EXPECT_EQ((*RunStore::open(run())->checkpoint())->digest, digest);
 }
 
+FarmTally example_tally() {
+  FarmTally tally;
+  std::uint64_t value = 1;
+  for (const FarmTally::Row& row : FarmTally::kRows) tally.*row.count = value++;
+  return tally;
+}
+
+TEST_F(RunStoreTest, CountsTheFarmsTroublesOverAllMasters) {
+  Progress progress;
+  progress.farm = example_tally();
+  {
+    RunStore store = store_with(1);
+    ASSERT_TRUE(store.set_progress(progress).ok());
+    ASSERT_TRUE(store.set_progress(progress).ok());  // the same once more, not twice as much
+  }
+  for (std::uint64_t lives = 2; lives <= 3; ++lives) {
+    Result<RunStore> store = RunStore::open(run());
+    ASSERT_TRUE(store.ok()) << store.error().message;
+    EXPECT_EQ(RunReader::open(run())->progress()->farm.retries, lives - 1) << "before it says more";
+    ASSERT_TRUE(store->set_progress(progress).ok());
+    const FarmTally all = RunReader::open(run())->progress()->farm;
+    for (const FarmTally::Row& row : FarmTally::kRows) {
+      EXPECT_EQ(all.*row.count, lives * (progress.farm.*row.count)) << row.key;
+    }
+  }
+}
+
+TEST_F(RunStoreTest, KeepsWhatWasGivenUpWithItsGeneration) {
+  const auto texts = [this] {
+    std::string all;
+    const auto incidents = RunReader::open(run())->incidents();
+    for (const Incident& incident : *incidents) {
+      all += incident_name(incident.kind) + std::to_string(incident.generation) + incident.text;
+    }
+    return all;
+  };
+  {
+    RunStore store = store_with(1);
+    ASSERT_TRUE(store.add_incident(IncidentKind::kQuarantine, "a").ok());
+    ASSERT_TRUE(store.add_incident(IncidentKind::kAlarm, "b").ok());
+    StoredGeneration second = example_generation(2);
+    second.quarantined = 1;
+    ASSERT_TRUE(store.commit(second).ok());
+    ASSERT_TRUE(store.add_incident(IncidentKind::kQuarantine, "c").ok());
+    ASSERT_TRUE(store.add_incident(IncidentKind::kAlarm, "d").ok());
+    EXPECT_EQ(*store.quarantined(), 1u);
+    EXPECT_EQ(texts(), "quarantine2aalarm2bquarantine3calarm3d");
+  }
+  // Generation 3 is evaluated again; what is wrong with a machine stays wrong.
+  Result<RunStore> store = RunStore::open(run());
+  ASSERT_TRUE(store.ok()) << store.error().message;
+  EXPECT_EQ(*store->quarantined(), 1u);
+  EXPECT_EQ(texts(), "quarantine2aalarm2balarm3d");
+  ASSERT_TRUE(store->truncate_after(1).ok());
+  EXPECT_EQ(*store->quarantined(), 0u);
+  EXPECT_EQ(texts(), "alarm2balarm3d");
+}
+
+TEST_F(RunStoreTest, ReadsAndUpgradesAnOlderSchema) {
+  { RunStore store = store_with(3); }
+  const auto schema_text = [this] {
+    const auto database = Database::open(file(), Database::Mode::kQueryOnly);
+    auto select = database->prepare("SELECT sql FROM sqlite_master ORDER BY name", "test");
+    std::string text;
+    while (*select->step()) text += select->text(0) + "\n";
+    return text;
+  };
+  const std::string newest = schema_text();
+  downgrade_to_schema_1();
+  ASSERT_NE(schema_text(), newest);
+  {
+    const Result<RunReader> reader = RunReader::open(run());
+    ASSERT_TRUE(reader.ok()) << reader.error().message;
+    EXPECT_EQ(reader->generations()->size(), 3u);
+    EXPECT_EQ(reader->progress()->epoch, 1u);
+    EXPECT_EQ(reader->progress()->farm.retries, 0u);
+    EXPECT_TRUE(reader->incidents()->empty());
+    EXPECT_NE(schema_text(), newest) << "reading changes nothing";
+  }
+  Result<RunStore> store = RunStore::open(run());
+  ASSERT_TRUE(store.ok()) << store.error().message;
+  EXPECT_EQ(schema_text(), newest);
+  EXPECT_EQ(store->epoch(), 2u);
+  EXPECT_EQ((*store->checkpoint())->generation, 3u);
+  EXPECT_TRUE(store->add_incident(IncidentKind::kAlarm, "x").ok());
+  EXPECT_TRUE(store->commit(example_generation(4)).ok());
+}
+
 TEST_F(RunStoreTest, ReadsBesideAWriter) {
   RunStore store = store_with(1);
   const Result<RunReader> reader = RunReader::open(run());

@@ -8,6 +8,7 @@
 
 #include "master/store/run_reader.h"
 #include "master/store/run_store.h"
+#include "master/store/schema.h"
 #include "tests/unit/store/io_faults.h"
 #include "tests/unit/store/store_fixture.h"
 
@@ -18,7 +19,7 @@ namespace fs = std::filesystem;
 using ::testing::AnyOf;
 using ::testing::HasSubstr;
 
-// The digests of what is committed; "none": there is no run.
+// The file's schema and the digests of what is committed; "none": there is no run.
 using State = std::vector<std::string>;
 
 class StoreFaults : public StoreTest {
@@ -30,10 +31,16 @@ class StoreFaults : public StoreTest {
       EXPECT_TRUE(RunStore::create(run(), example_info()).ok()) << "may be started again";
       return {"none"};
     }
+    State state;
+    {
+      const auto database = Database::open(file(), Database::Mode::kQueryOnly);
+      const auto schema = run_store_schema(*database);
+      EXPECT_TRUE(schema.ok()) << schema.error().message;
+      if (schema.ok()) state.push_back("schema " + std::to_string(*schema));
+    }
     const auto store = RunStore::open(run());
     EXPECT_TRUE(store.ok()) << store.error().message;
     if (!store.ok()) return {"unusable"};
-    State state;
     const auto reader = RunReader::open(run());
     const auto generations = reader->generations();
     for (const StoredGeneration& generation : *generations) {
@@ -132,6 +139,17 @@ TEST_F(StoreFaults, GoingBackIsAllOrNothing) {
         if (!store) return store.error();
         const auto backup = store->truncate_after(2);
         return backup ? Status{} : backup.error();
+      },
+      EIO);
+}
+
+TEST_F(StoreFaults, AnOlderStoreIsUpgradedOrNot) {
+  make_run(2);
+  downgrade_to_schema_1();
+  fail_everywhere(
+      [this] {
+        const auto store = RunStore::open(run());
+        return store ? Status{} : store.error();
       },
       EIO);
 }

@@ -63,6 +63,17 @@ class StoreTest : public ::testing::Test {
     return generation;
   }
 
+  // Makes the file what schema 1 had, with the rows that fit.
+  void downgrade_to_schema_1() const {
+    Result<Database> database = Database::open(file(), Database::Mode::kWrite);
+    ASSERT_TRUE(database.ok());
+    ASSERT_TRUE(database
+                    ->exec("DROP TABLE incidents; ALTER TABLE progress DROP COLUMN farm; "
+                           "PRAGMA user_version = 1",
+                           "test")
+                    .ok());
+  }
+
   std::filesystem::path folder_;
 };
 

@@ -1,0 +1,122 @@
+// A genome that ends three workers is given up, named with the reason, and not forgotten by the
+// masters that come after.
+#include <gmock/gmock.h>
+#include <poll.h>
+#include <signal.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <sstream>
+
+#include "tests/integration/run_program.h"
+
+namespace gapfarm {
+namespace {
+
+using nlohmann::json;
+using ::testing::HasSubstr;
+
+constexpr int kQuarantined = 3;
+constexpr int kStopped = 85;
+
+std::vector<pid_t> children(pid_t pid) {
+  std::vector<pid_t> found;
+  std::ifstream in("/proc/" + std::to_string(pid) + "/task/" + std::to_string(pid) + "/children");
+  for (pid_t child = 0; in >> child;) found.push_back(child);
+  return found;
+}
+
+// 'Z' once it has ended.
+char state_of(pid_t pid) {
+  std::ifstream in("/proc/" + std::to_string(pid) + "/stat");
+  std::string number, name;
+  char state = '?';
+  in >> number >> name >> state;
+  return state;
+}
+
+// The workers that have been given a job, from a log of level debug.
+std::set<std::string> employed(const std::string& log) {
+  std::set<std::string> names;
+  std::istringstream in(log);
+  for (std::string line; std::getline(in, line);) {
+    const json entry = json::parse(line, nullptr, false);
+    if (entry.is_object() && entry.value("text", "") == "job given out") {
+      names.insert(entry.value("worker", ""));
+    }
+  }
+  return names;
+}
+
+class Quarantine : public ::testing::Test {
+ protected:
+  json status() const {
+    const Finished finished = gapfarm_command({"status", run_, "--json"});
+    const json found = json::parse(finished.out, nullptr, false);
+    return found.is_object() ? found : json::object();
+  }
+
+  Finished resume() const {
+    return gapfarm_command({"resume", run_, "--generations", "2", "--workers", "1"});
+  }
+
+  const TemporaryFolder folder_;
+  const std::string run_ = folder_ / "run";
+  // Evaluations long enough to be met at work.
+  const std::string config_ = folder_.write("run.toml", "trials = [\"" GAPFARM_SOURCE_DIR
+                                                        "/configs/demo/trials.csv\"]\n"
+                                                        "[genes]\n"
+                                                        "friction = [0.1, 1.5]\n"
+                                                        "full_speed = [0.1, 0.6]\n"
+                                                        "[spread]\n"
+                                                        "kind = \"sampled\"\n"
+                                                        "replicates = 20\n"
+                                                        "[evolution]\n"
+                                                        "population = 4\n");
+};
+
+TEST_F(Quarantine, IsReportedAndOutlivesTheMaster) {
+  RunningProgram master(
+      "gapfarm", {"evolve", config_, "--out", run_, "--generations", "1000000", "--workers", "1",
+                  "--log-format", "json", "--log-level", "debug"});
+  // Whoever has taken up work crashes.  The task goes to the next one, first of all.
+  std::size_t ended = 0;
+  while (status().value("quarantined", 0) == 0) {
+    ASSERT_NE(state_of(master.pid()), 'Z') << master.err();
+    ::poll(nullptr, 0, 20);
+    const std::size_t seen = employed(master.err()).size();
+    if (seen == ended) continue;
+    ended = seen;
+    for (const pid_t worker : children(master.pid())) ::kill(worker, SIGSEGV);
+  }
+  while (status().value("generation", 0) == 0) {
+    ASSERT_NE(state_of(master.pid()), 'Z') << master.err();
+    ::poll(nullptr, 0, 20);
+  }
+  master.send(SIGINT);
+  EXPECT_EQ(master.wait().exit_code, kStopped);
+
+  const json stopped = status();
+  EXPECT_EQ(stopped["quarantined"], 1);
+  ASSERT_EQ(stopped["incidents"].size(), 1u);
+  EXPECT_EQ(stopped["incidents"][0]["kind"], "quarantine");
+  EXPECT_EQ(stopped["incidents"][0]["generation"], 1);
+  EXPECT_THAT(stopped["incidents"][0]["text"].get<std::string>(), HasSubstr("evaluation of birth"));
+  EXPECT_THAT(stopped["incidents"][0]["text"].get<std::string>(), HasSubstr("crashed"));
+  EXPECT_GE(stopped["farm"]["retries"], 2);
+
+  EXPECT_EQ(resume().exit_code, kQuarantined) << "that run ended with something given up";
+  EXPECT_EQ(resume().exit_code, kQuarantined) << "also when there was nothing left to do";
+  const json finished = status();
+  EXPECT_EQ(finished["state"], "finished");
+  EXPECT_EQ(finished["quarantined"], 1);
+  EXPECT_EQ(finished["incidents"], stopped["incidents"]);
+  EXPECT_GE(finished["farm"]["retries"], stopped["farm"]["retries"]);
+  const std::string screen = gapfarm_command({"status", run_}).out;
+  EXPECT_THAT(screen, HasSubstr("given up    1 task\n"));
+  EXPECT_THAT(screen, HasSubstr("generation 1: evaluation of birth"));
+}
+
+}  // namespace
+}  // namespace gapfarm
