@@ -27,6 +27,28 @@ const std::map<std::string, double> kModelError = {
     {"heading_offset", 0.03},    {"motor_deadband", 0.1},     {"motor_lag", 0.4},
     {"rolling_resistance", 0.3}, {"timing_offset", 0.06},     {"marker_offset", 0.03}};
 
+// What was searched rather than fitted may be a neighbour of the best.  A patch's mark changes
+// within a few cm and has several hills when it is weak: standard deviation of its place and
+// radius, and of its ratio's distance from 1 as a share, for a gain of half a nat.
+constexpr double kPatchPlace_m = 0.25;
+constexpr double kPatchRatio = 1;
+constexpr double kSeamStep_m = 0.005;  // to which a seam's position is searched
+
+// Standard deviation of a parameter beyond what the fit says, in its unit.
+double search_error(const Parameter& p, double value, double gain) {
+  const double weakness = 1 / std::sqrt(2 * std::max(gain, 1.0));
+  if (p.key == "friction_patch.ratio") return kPatchRatio * weakness * (value - p.nominal);
+  if (p.effect == "friction_patch") return kPatchPlace_m * weakness;
+  return p.key == "camera_seam.position" ? kSeamStep_m : 0;
+}
+
+// Relative to the effect's size.
+double model_error(const Parameter& p, double value) {
+  const bool angle = p.unit == "rad" && p.key != "floor_tilt.angle";
+  if (angle || !kModelError.count(p.effect)) return 0;
+  return kModelError.at(p.effect) * (value - p.nominal);
+}
+
 double mean_of(const std::vector<double>& values) {
   double sum = 0;
   for (double v : values) sum += v;
@@ -176,16 +198,16 @@ NamedEffect DiagnosisRun::named(std::size_t k, const JointFit& estimates) const 
     const Parameter& p = problem_.table()[row];
     if (p.effect != effect.name || p.kind != ParameterKind::kReal) continue;
     Estimate e{p.key.substr(p.key.find('.') + 1), value, value, value, p.unit};
+    double fit_error = 0, model = 0;
     for (const FittedParameter& fitted : estimates.parameters) {
       if (fitted.row != row) continue;
-      const double model = kModelError.count(effect.name) ? kModelError.at(effect.name) : 0;
-      const double half = kNormal90 * std::hypot(fitted.standard_error * std::sqrt(scale_),
-                                                 p.unit == "rad" && p.key != "floor_tilt.angle"
-                                                     ? 0.0
-                                                     : model * (value - p.nominal));
-      e.lo = value - half;
-      e.hi = value + half;
+      fit_error = fitted.standard_error * std::sqrt(scale_);
+      model = model_error(p, value);
     }
+    const double search = search_error(p, value, chosen.candidate.gain);
+    const double half = kNormal90 * std::hypot(fit_error, model, search);
+    e.lo = value - half;
+    e.hi = value + half;
     effect.parameters.push_back(e);
   }
   effect.gap_before = floor_ - mean_of(nested_scores_[k]);

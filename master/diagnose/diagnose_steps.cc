@@ -93,9 +93,7 @@ Status DiagnosisRun::screen() {
   auto catalogue = signatures(predictor_, study_, options_.left_out);
   if (!catalogue) return catalogue.error();
   selector_ = std::make_unique<Selector>(predictor_, study_, std::move(*catalogue), *base_);
-  if (!left_out("friction_patch")) {
-    if (Status s = selector_->add_patches(); !s) return s;
-  }
+  if (!left_out("friction_patch")) selector_->look_for_patches();
   std::vector<const Signature*> first;
   for (const Signature& s : first_) first.push_back(&s);
   auto all = selector_->candidates(selector_->with(first), {});

@@ -10,6 +10,8 @@ namespace gapfarm {
 namespace {
 
 constexpr int kMostHalvings = 4;
+constexpr double kSettled = 0.02;   // of the objective (twice nats): less is no progress
+constexpr double kFarSquared = 16;  // squared distance beyond which a trial counts linearly
 
 // Step of a finite difference in a parameter: a hundredth of its value, but no less than what the
 // catalogue's bounds make a small change.
@@ -38,13 +40,24 @@ std::vector<FittedParameter> parameters_of(const ParameterTable& table, const Ov
   return parameters;
 }
 
-// Predictions at `fit.at` and their derivatives.
-Status linearise(Predictor& predictor, const Study& study, JointFit* fit) {
-  const ParameterTable& table = predictor.problem().table();
-  std::vector<PredictionRequest> requests = {{fit->at, {}}};
+// Predictions at `fit.at`.
+Status predict(Predictor& predictor, const Study& study, JointFit* fit) {
+  auto ends = predictor.ends({{fit->at, {}}});
+  if (!ends) return ends.error();
+  fit->ends = std::move(ends->front());
+  fit->residuals.clear();
+  for (std::size_t i = 0; i < study.size(); ++i) {
+    fit->residuals.push_back(local_difference(fit->ends[i], study.trials[i].X_WE));
+  }
+  return {};
+}
+
+// Derivatives of the predictions there.
+Status differentiate(Predictor& predictor, const Study& study, JointFit* fit) {
+  std::vector<PredictionRequest> requests;
   std::vector<double> steps;
   for (const FittedParameter& p : fit->parameters) {
-    const Parameter& row = table[p.row];
+    const Parameter& row = predictor.problem().table()[p.row];
     double step = step_of(row, p.value);
     if (p.value + step > row.upper) step = -step;
     Overrides moved = fit->at;
@@ -52,19 +65,15 @@ Status linearise(Predictor& predictor, const Study& study, JointFit* fit) {
     requests.push_back({moved, {}});
     steps.push_back(step);
   }
-  const auto ends = predictor.ends(requests);
-  if (!ends) return ends.error();
-  fit->ends = ends->front();
-  fit->residuals.clear();
-  for (std::size_t i = 0; i < study.size(); ++i) {
-    fit->residuals.push_back(local_difference(fit->ends[i], study.trials[i].X_WE));
-  }
   fit->jacobian.resize(static_cast<Eigen::Index>(3 * study.size()),
                        static_cast<Eigen::Index>(fit->parameters.size()));
+  if (requests.empty()) return {};
+  const auto ends = predictor.ends(requests);
+  if (!ends) return ends.error();
   for (std::size_t k = 0; k < steps.size(); ++k) {
     std::vector<Eigen::Vector3d> d;
     for (std::size_t i = 0; i < study.size(); ++i) {
-      d.push_back(local_difference(fit->ends[i], (*ends)[k + 1][i]) / steps[k]);
+      d.push_back(local_difference(fit->ends[i], (*ends)[k][i]) / steps[k]);
     }
     fit->jacobian.col(static_cast<Eigen::Index>(k)) = study.whiten(d);
   }
@@ -94,7 +103,40 @@ void add_prior(const Study& study, const JointFit& fit, Normal* normal) {
 double weight_of(const Study& study, Eigen::Index trial, const Eigen::VectorXd& z) {
   if (study.ignores(static_cast<std::size_t>(trial))) return 0;
   const double d2 = z.segment<3>(3 * trial).squaredNorm();
-  return d2 > 16 ? std::sqrt(16 / d2) : 1;
+  return d2 > kFarSquared ? std::sqrt(kFarSquared / d2) : 1;
+}
+
+Eigen::VectorXd weights_of(const Study& study, const Eigen::VectorXd& z) {
+  Eigen::VectorXd weight(z.size());
+  for (Eigen::Index i = 0; i < z.size(); i += 3) {
+    weight.segment<3>(i).setConstant(weight_of(study, i / 3, z));
+  }
+  return weight;
+}
+
+// What a step is to make smaller: Huber's function of every trial's distance once the nuisances
+// have taken their part, and what that and the parameters cost under their priors.
+double objective(const Study& study, const JointFit& fit, const Eigen::MatrixXd& nuisances) {
+  const Eigen::VectorXd z = study.whiten(fit.residuals);
+  const Eigen::VectorXd weight = weights_of(study, z);
+  Eigen::MatrixXd normal = nuisances.transpose() * weight.asDiagonal() * nuisances;
+  normal.diagonal().array() += 1;
+  const Eigen::VectorXd taken =
+      normal.ldlt().solve(nuisances.transpose() * weight.asDiagonal() * z);
+  const Eigen::VectorXd left = z - nuisances * taken;
+  double sum = taken.squaredNorm();
+  for (Eigen::Index i = 0; i < left.size() / 3; ++i) {
+    if (study.ignores(static_cast<std::size_t>(i))) continue;
+    const double d2 = left.segment<3>(3 * i).squaredNorm();
+    sum += d2 > kFarSquared ? 2 * std::sqrt(kFarSquared * d2) - kFarSquared : d2;
+  }
+  const std::vector<BaseParameter> base = tuned_base_parameters();
+  for (std::size_t k = 0; k < fit.base_parameters; ++k) {
+    const double tuned = study.base.at(base[k].row);
+    const double away = (fit.parameters[k].value / tuned - 1) / base[k].prior_log_sd;
+    sum += away * away;
+  }
+  return sum;
 }
 
 // One step, with bounded weights for trials far out; fills in the standard errors.
@@ -103,11 +145,8 @@ void step(const Problem& problem, const Study& study, const Eigen::MatrixXd& nui
   const Eigen::Index p = fit->jacobian.cols(), q = nuisances.cols();
   Eigen::MatrixXd all(fit->jacobian.rows(), p + q);
   all << fit->jacobian, nuisances;
-  Eigen::VectorXd z = study.whiten(fit->residuals);
-  Eigen::VectorXd weight(z.size());
-  for (Eigen::Index i = 0; i < z.size(); i += 3) {
-    weight.segment<3>(i).setConstant(weight_of(study, i / 3, z));
-  }
+  const Eigen::VectorXd z = study.whiten(fit->residuals);
+  const Eigen::VectorXd weight = weights_of(study, z);
   Normal normal{all.transpose() * weight.asDiagonal() * all,
                 all.transpose() * weight.asDiagonal() * z};
   normal.matrix.diagonal().tail(q).array() += 1;
@@ -182,22 +221,38 @@ Result<JointFit> fit_jointly(Predictor& predictor, const Study& study,
   fit.at = start;
   fit.parameters =
       parameters_of(predictor.problem().table(), start, effects, base, &fit.base_parameters);
-  if (Status s = linearise(predictor, study, &fit); !s) return s.error();
+  if (Status s = predict(predictor, study, &fit); !s) return s.error();
+  if (Status s = differentiate(predictor, study, &fit); !s) return s.error();
+  double best = objective(study, fit, nuisances);
   for (int round = 0; round < rounds; ++round) {
     JointFit next = fit;
     step(predictor.problem(), study, nuisances, &next);
-    // A step may lead to where the robot falls over: half of it, then.
-    Status linearised = linearise(predictor, study, &next);
-    for (int half = 0; !linearised && predictor.simulation_failed() && half < kMostHalvings;
-         ++half) {
+    const std::vector<FittedParameter> whole = next.parameters;
+    double now = 0;
+    // A step may lead to where the robot falls over, or past the optimum: half of it, then.
+    for (int half = 0;; ++half) {
+      const Status moved = predict(predictor, study, &next);
+      if (!moved && !predictor.simulation_failed()) return moved.error();
+      if (moved) now = objective(study, next, nuisances);
+      if (moved && now <= best) break;
+      if (half == kMostHalvings) {
+        if (!moved) return moved.error();
+        // No way down: the present values stay, with the standard errors found here.
+        for (std::size_t k = 0; k < whole.size(); ++k) {
+          fit.parameters[k].standard_error = whole[k].standard_error;
+        }
+        return fit;
+      }
       for (std::size_t k = 0; k < next.parameters.size(); ++k) {
         FittedParameter& p = next.parameters[k];
         next.at[p.row] = p.value = (p.value + fit.parameters[k].value) / 2;
       }
-      linearised = linearise(predictor, study, &next);
     }
-    if (!linearised) return linearised.error();
+    const bool settled = now > best - kSettled;
+    best = now;
+    if (Status s = differentiate(predictor, study, &next); !s) return s.error();
     fit = std::move(next);
+    if (settled) break;
   }
   return fit;
 }

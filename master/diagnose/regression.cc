@@ -54,6 +54,23 @@ Gain Regression::gain(const Eigen::MatrixXd& columns) const {
   return gain;
 }
 
+Eigen::VectorXd Regression::each_gain(const Eigen::MatrixXd& columns) const {
+  // The data have nothing of the basis left in them, so neither has their product with a column.
+  const Eigen::VectorXd product = columns.transpose() * left_.head(rows_);
+  const Eigen::MatrixXd held = basis_.topRows(rows_).transpose() * columns;
+  Eigen::VectorXd squares = Eigen::VectorXd::Zero(columns.cols());
+  for (Eigen::Index j = 0; j < columns.cols(); ++j) {
+    const double whole = columns.col(j).squaredNorm();
+    const double own = whole - held.col(j).squaredNorm();
+    if (own > kAbsorbed * whole) squares[j] = product[j] * product[j] / own;
+  }
+  return squares;
+}
+
+double Regression::own_squares(const Eigen::VectorXd& column) const {
+  return column.squaredNorm() - (basis_.topRows(rows_).transpose() * column).squaredNorm();
+}
+
 Eigen::MatrixXd Regression::directions(const Eigen::MatrixXd& columns) const {
   const Eigen::MatrixXd c = cut(columns);
   if (c.cols() == 0) return c;

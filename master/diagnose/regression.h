@@ -23,6 +23,10 @@ class Regression {
   // What `columns` would explain beyond the basis.  Directions that the basis absorbs but for a
   // share of 1e-4 of their squares do not count.
   Gain gain(const Eigen::MatrixXd& columns) const;
+  // Squares that each column would explain beyond the basis were it alone.
+  Eigen::VectorXd each_gain(const Eigen::MatrixXd& columns) const;
+  // What a column's squares have beyond the basis.
+  double own_squares(const Eigen::VectorXd& column) const;
   // The part of the data that `columns` explain beyond the basis.
   Eigen::VectorXd explained(const Eigen::MatrixXd& columns) const;
   // Other data for the same basis.

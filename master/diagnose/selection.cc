@@ -10,6 +10,7 @@ namespace gapfarm {
 namespace {
 
 constexpr double kWorthRefining = 8;         // nats before the penalty
+constexpr double kWorthSketched = 12.5;      // of patches; where there are none it reaches 11
 constexpr double kWorthRefiningShare = 0.3;  // of the best: no search of places makes up for less
 constexpr double kSecondAlias = 0.8;   // cosine beyond which a further effect is the first again,
 constexpr double kSecondShare = 0.25;  // unless it gains this share of all that is explained
@@ -40,10 +41,7 @@ bool always_aliases(const std::string& a, const std::string& b) {
   });
 }
 
-constexpr double kScreenedRatio = 0.5;  // of the coarse grid of patches
-
-// {x, y, radius, ratio}
-std::array<double, 4> patch_of(const Signature& s) {
+Patch patch_of(const Signature& s) {
   return {s.fixed.at("friction_patch.x"), s.fixed.at("friction_patch.y"),
           s.fixed.at("friction_patch.radius"), s.fixed.at("friction_patch.ratio")};
 }
@@ -74,26 +72,7 @@ std::set<std::string> names_of(const std::vector<EffectCandidate>& chosen,
 
 }  // namespace
 
-Status Selector::add_patches() {
-  double low[2] = {1e9, 1e9}, high[2] = {-1e9, -1e9};
-  for (const ResidualTrial& t : study_.trials) {
-    low[0] = std::min(low[0], t.X_WS.x), high[0] = std::max(high[0], t.X_WS.x);
-    low[1] = std::min(low[1], t.X_WS.y), high[1] = std::max(high[1], t.X_WS.y);
-  }
-  constexpr int kGrid = 5;
-  std::vector<std::array<double, 4>> places;
-  for (int i = 0; i < kGrid; ++i) {
-    for (int j = 0; j < kGrid; ++j) {
-      places.push_back({low[0] + (high[0] - low[0]) * (2 * i + 1) / (2 * kGrid),
-                        low[1] + (high[1] - low[1]) * (2 * j + 1) / (2 * kGrid),
-                        0.25 * std::max(high[0] - low[0], high[1] - low[1]), kScreenedRatio});
-    }
-  }
-  auto patches = patch_signatures(predictor_, study_, places);
-  if (!patches) return patches.error();
-  catalogue_.insert(catalogue_.end(), patches->begin(), patches->end());
-  return {};
-}
+void Selector::look_for_patches() { sketch_.emplace(predictor_.problem(), study_); }
 
 EffectCandidate Selector::refine_seam(const Regression& explained, EffectCandidate best) const {
   const int axis = static_cast<int>(best.signature.fixed.at("camera_seam.axis"));
@@ -109,85 +88,95 @@ EffectCandidate Selector::refine_seam(const Regression& explained, EffectCandida
   return best;
 }
 
-// All discs looked at join the catalogue, so that a later search starts from the best of them.
-Result<EffectCandidate> Selector::refine_patch(const Regression& explained,
-                                               const EffectCandidate& coarse) {
-  EffectCandidate best = coarse;
-  const auto look = [&](const std::vector<std::array<double, 4>>& places) -> Status {
-    auto found = patch_signatures(predictor_, study_, places);
-    if (!found) return found.error();
-    for (Signature& s : *found) {
-      study_.drop_ignored(s.columns);
-      const double gain = net_gain(explained, s);
-      if (gain > best.gain) best = {gain, s};
-      catalogue_.push_back(std::move(s));
-    }
-    return {};
-  };
-  const std::array<double, 4> first = patch_of(best.signature);
-  if (first[3] == kScreenedRatio) {
-    std::vector<std::array<double, 4>> ratios;
-    for (double ratio : {0.2, 1.8}) ratios.push_back({first[0], first[1], first[2], ratio});
-    if (Status s = look(ratios); !s) return s.error();
+// Simulates discs; they join the catalogue.
+Status Selector::simulate_patches(const Regression& explained, const std::vector<Patch>& patches,
+                                  EffectCandidate* best) {
+  auto found = patch_signatures(predictor_, study_, patches);
+  if (!found) return found.error();
+  for (Signature& s : *found) {
+    study_.drop_ignored(s.columns);
+    const double gain = net_gain(explained, s);
+    if (gain > best->gain) *best = {gain, s};
+    catalogue_.push_back(std::move(s));
   }
-  for (double step : {0.14, 0.1, 0.07, 0.045, 0.03}) {
-    const auto [x, y, r, q] = patch_of(best.signature);
-    const Status s = look({{x + step, y, r, q},
-                           {x - step, y, r, q},
-                           {x, y + step, r, q},
-                           {x, y - step, r, q},
-                           {x, y, r + step, q},
-                           {x, y, std::max(0.1, r - step), q},
-                           {x, y, r, std::min(2.9, q * (1 + 4 * step))},
-                           {x, y, r, std::max(0.06, q / (1 + 4 * step))}});
-    if (!s) return s.error();
-  }
-  refined_patches_.insert(patch_of(best.signature));
-  return best;
+  return {};
 }
 
-// The best two discs, unless a search has been there.
-std::vector<EffectCandidate> Selector::unrefined_patches(const Regression& explained) const {
-  std::vector<EffectCandidate> all;
-  for (const Signature& s : catalogue_) {
-    if (s.effect == "friction_patch") all.push_back({net_gain(explained, s), s});
+// A disc that the sketch proposes, moved to where the simulation explains most: every step tries
+// both ways along x, y, radius and ratio, then all that helped at once.
+Status Selector::refine_patch(const Regression& explained, EffectCandidate* best) {
+  for (double step : {0.04, 0.02, 0.01}) {
+    const EffectCandidate before = *best;
+    const Patch from = patch_of(before.signature);
+    Patch together = from;
+    for (std::size_t k = 0; k < 4; ++k) {
+      const auto moved = [&](double sign) {
+        Patch to = from;
+        to[k] = k < 3 ? from[k] + sign * step : from[k] * std::pow(1 + 6 * step, sign);
+        to[2] = std::max(to[2], 0.05);
+        to[3] = std::clamp(to[3], 0.06, 2.9);
+        return to;
+      };
+      EffectCandidate own = before;
+      if (Status s = simulate_patches(explained, {moved(1), moved(-1)}, &own); !s) return s;
+      together[k] = patch_of(own.signature)[k];
+      if (own.gain > best->gain) *best = own;
+    }
+    if (Status s = simulate_patches(explained, {together}, best); !s) return s;
   }
-  std::stable_sort(all.begin(), all.end(), [](const EffectCandidate& a, const EffectCandidate& b) {
-    return a.gain > b.gain;
-  });
-  if (!all.empty() && refined_patches_.count(patch_of(all.front().signature))) return {};
-  const auto coarse = [](const EffectCandidate& c) {
-    return patch_of(c.signature)[3] == kScreenedRatio;
-  };
-  std::erase_if(all, [&](const EffectCandidate& c) { return !coarse(c); });
-  if (all.size() > 2) all.resize(2);
-  return all;
+  refined_patches_.push_back(patch_of(best->signature));
+  return {};
+}
+
+// Adds to the catalogue what the sketch finds in the data that are left, where a search has not
+// been yet.
+Status Selector::search_patches(const Regression& explained, double most_gain) {
+  if (!sketch_ || patch_searches_ >= kMostPatchSearches) return {};
+  const double worth = std::max(kWorthSketched, kWorthRefiningShare * most_gain);
+  std::vector<Patch> starts;
+  for (const PatchSketch::Place& place : sketch_->search(explained, 3, 2 * worth)) {
+    const bool known =
+        std::any_of(refined_patches_.begin(), refined_patches_.end(), [&](const Patch& p) {
+          return std::hypot(p[0] - place.patch[0], p[1] - place.patch[1], p[2] - place.patch[2]) <
+                 0.15;
+        });
+    if (known) continue;
+    starts.push_back(place.patch);
+    starts.push_back(place.patch);
+    starts.back()[3] = std::sqrt(place.patch[3]);
+  }
+  if (starts.empty()) return {};
+  ++patch_searches_;
+  EffectCandidate best{-1e9, {}};
+  if (Status s = simulate_patches(explained, starts, &best); !s) return s;
+  if (best.gain + best.signature.penalty < kWorthRefining) return {};
+  return refine_patch(explained, &best);
 }
 
 Result<std::vector<EffectCandidate>> Selector::candidates(const Regression& explained,
                                                           const std::set<std::string>& without) {
   std::map<std::string, EffectCandidate> best;
-  for (const Signature& s : catalogue_) {
-    if (without.count(s.effect)) continue;
-    const double gain = net_gain(explained, s);
-    const auto [entry, fresh] = best.try_emplace(s.effect, EffectCandidate{gain, s});
-    if (!fresh && gain > entry->second.gain) entry->second = {gain, s};
-  }
   double most = 0;
-  for (const auto& [effect, candidate] : best) most = std::max(most, candidate.gain);
+  std::size_t seen = 0;
+  const auto see_all = [&] {
+    for (; seen < catalogue_.size(); ++seen) {
+      const Signature& s = catalogue_[seen];
+      if (without.count(s.effect)) continue;
+      const double gain = net_gain(explained, s);
+      most = std::max(most, gain);
+      const auto [entry, fresh] = best.try_emplace(s.effect, EffectCandidate{gain, s});
+      if (!fresh && gain > entry->second.gain) entry->second = {gain, s};
+    }
+  };
+  see_all();
+  if (!without.count("friction_patch")) {
+    if (Status s = search_patches(explained, most); !s) return s.error();
+    see_all();
+  }
   for (auto& [effect, candidate] : best) {
     if (candidate.gain + candidate.signature.penalty < kWorthRefining) continue;
     if (candidate.gain < kWorthRefiningShare * most) continue;
     if (effect == "camera_seam") candidate = refine_seam(explained, candidate);
-    if (effect != "friction_patch") continue;
-    for (const EffectCandidate& start : unrefined_patches(explained)) {
-      if (start.gain + start.signature.penalty < kWorthRefining) break;
-      if (start.gain < kWorthRefiningShare * candidate.gain) break;
-      if (patch_searches_++ >= kMostPatchSearches) break;
-      auto refined = refine_patch(explained, start);
-      if (!refined) return refined.error();
-      if (refined->gain > candidate.gain) candidate = *refined;
-    }
   }
   std::vector<EffectCandidate> sorted;
   for (auto& [effect, candidate] : best) sorted.push_back(std::move(candidate));
@@ -299,6 +288,7 @@ Result<std::vector<Alias>> Selector::aliases_of(const std::vector<Signature>& fi
 
 void Selector::recount(const Regression& nuisances) {
   base_ = nuisances;
+  if (sketch_) look_for_patches();
   for (Signature& s : catalogue_) study_.drop_ignored(s.columns);
 }
 

@@ -1,14 +1,15 @@
 // Which effects the residuals call for: forward selection over the catalogue's signatures.
 #pragma once
 
-#include <array>
 #include <functional>
+#include <optional>
 #include <set>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "common/base/result.h"
+#include "master/diagnose/patch_sketch.h"
 #include "master/diagnose/regression.h"
 #include "master/diagnose/signatures.h"
 
@@ -58,8 +59,8 @@ class Selector {
            const Regression& nuisances)
       : predictor_(predictor), study_(study), catalogue_(std::move(catalogue)), base_(nuisances) {}
 
-  // Adds the coarse grid of friction patches.  Error: the farm's.
-  Status add_patches();
+  // From now on candidates() looks for friction patches, too.
+  void look_for_patches();
 
   // The best signature of every effect, best first, beyond what `explained` holds.
   Result<std::vector<EffectCandidate>> candidates(const Regression& explained,
@@ -82,8 +83,10 @@ class Selector {
   Regression with(const std::vector<const Signature*>& signatures) const;
 
  private:
-  Result<EffectCandidate> refine_patch(const Regression& explained, const EffectCandidate& coarse);
-  std::vector<EffectCandidate> unrefined_patches(const Regression& explained) const;
+  Status search_patches(const Regression& explained, double most_gain);
+  Status simulate_patches(const Regression& explained, const std::vector<Patch>& patches,
+                          EffectCandidate* best);
+  Status refine_patch(const Regression& explained, EffectCandidate* best);
   EffectCandidate refine_seam(const Regression& explained, EffectCandidate best) const;
   Regression without(const std::vector<Signature>& first,
                      const std::vector<EffectCandidate>& chosen, std::size_t leave_out) const;
@@ -103,11 +106,12 @@ class Selector {
   const Study& study_;
   std::vector<Signature> catalogue_;
   Regression base_;
+  std::optional<PatchSketch> sketch_;
   std::vector<SelectionStep> steps_;
   double first_gain_ = 0;
   int patch_searches_ = 0;
   int relinearised_ = 0;
-  std::set<std::array<double, 4>> refined_patches_;
+  std::vector<Patch> refined_patches_;
 };
 
 }  // namespace gapfarm

@@ -1,0 +1,64 @@
+// Where on the floor a patch of other friction could lie: a sketch that is quick enough to try
+// thousands of discs.  The simulation has the last word on those that it proposes.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <vector>
+
+#include "master/diagnose/regression.h"
+#include "master/diagnose/study.h"
+
+namespace gapfarm {
+
+// x, y, radius (m), ratio of the friction inside to that outside.
+using Patch = std::array<double, 4>;
+
+// Quasi-static: four contacts whose friction outweighs all else.  On a floor of one friction the
+// motion does not depend on it; while some contacts are inside the disc, the body moves with the
+// twist that makes the least of sum mu_i sqrt(s_i^2 + creep^2) over the contacts' sliding speeds
+// s_i.  How that differs from the twist on an even floor, along the way that the base predicts, is
+// the disc's mark on the end pose.
+class PatchSketch {
+ public:
+  PatchSketch(const Problem& problem, const Study& study);
+
+  // Whitened shifts of the predicted ends, three rows a trial.
+  Eigen::VectorXd column(const Patch& patch) const;
+
+  // Twist (m/s, m/s, rad/s in body axes) of the robot with these tread speeds (m/s) while the
+  // contacts have these relative frictions: left front, left rear, right front, right rear.
+  Eigen::Vector3d twist(double left, double right, const Eigen::Vector4d& friction) const;
+
+  struct Place {
+    Patch patch;
+    double squares = 0;  // that its mark explains beyond the regression's
+  };
+  // Up to `most` discs that explain `least` squares or more, the best first, none near another,
+  // with the ratio that fits best.  Start places bound the search.
+  std::vector<Place> search(const Regression& explained, std::size_t most, double least) const;
+
+ private:
+  struct Moment {                             // of a trial
+    std::array<Eigen::Vector2d, 4> contacts;  // world, m
+    Eigen::Matrix3d to_end;                   // twist in body axes -> whitened shift of the end
+  };
+  using Shifts = std::array<Eigen::Vector3d, 16>;  // of the twist, by the set of contacts inside
+  std::vector<Shifts> shifts(double ratio) const;  // by cell
+  Eigen::VectorXd column(const Patch& patch, const std::vector<Shifts>& shifts) const;
+  void lay_grid();
+  void climb(const Regression& explained, Place* place) const;
+  double fitted_ratio(const Regression& explained, const Patch& patch) const;
+
+  const Study& study_;
+  std::array<Eigen::Vector2d, 4> contacts_;  // body axes, m
+  double lateral_ = 1;                       // over longitudinal friction
+  double creep_ = 0;
+  double speed_m_s_ = 0;
+  std::vector<std::vector<Moment>> moments_;  // by trial
+  std::vector<std::vector<Shifts>> shifts_;   // of kRatios
+  std::vector<Patch> grid_;
+  Eigen::MatrixXd marks_;  // of the grid's discs
+};
+
+}  // namespace gapfarm

@@ -1,0 +1,103 @@
+#include "master/diagnose/patch_sketch.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "common/random/stream.h"
+#include "tests/unit/worker/problems.h"
+
+namespace gapfarm {
+namespace {
+
+constexpr double kSpeed_m_s = 0.28;
+
+// 600 drives over a floor of 1.4 m: ahead and turning on the spot.
+Study drives(const Problem& problem) {
+  Study study;
+  study.speed_m_s = kSpeed_m_s;
+  study.cells = {{problem.command("forward"), DriveKind::kStraight, 1, 1, 1, 300},
+                 {problem.command("turn_ccw"), DriveKind::kTurn, 1, 1, 1, 300}};
+  Stream stream({.run_seed = 5});
+  for (std::size_t i = 0; i < 600; ++i) {
+    ResidualTrial t;
+    t.cell = i % 2;
+    t.X_WS = {stream.uniform(0.3, 1.7), stream.uniform(0.3, 1.7),
+              stream.uniform(-std::numbers::pi, std::numbers::pi)};
+    t.X_WP = t.X_WS * (t.cell == 0 ? Pose{kSpeed_m_s, 0, 0} : Pose{0, 0, 0.9});
+    study.trials.push_back(t);
+    study.whitener.push_back(Eigen::Vector3d(1 / 0.004, 1 / 0.004, 1 / 0.02).asDiagonal());
+  }
+  return study;
+}
+
+class PatchSketchTest : public ::testing::Test {
+ protected:
+  const Problem problem_ = testing::empty_problem();
+  const Study study_ = drives(problem_);
+  const PatchSketch sketch_{problem_, study_};
+};
+
+TEST_F(PatchSketchTest, AnEvenFloorsFrictionDoesNotMatter) {
+  const Eigen::Vector3d some = sketch_.twist(0.28, 0.112, Eigen::Vector4d::Ones());
+  const Eigen::Vector3d less = sketch_.twist(0.28, 0.112, Eigen::Vector4d::Constant(0.3));
+  EXPECT_LT((some - less).norm(), 1e-6);
+  EXPECT_LT(some[2], 0) << "the left side is faster";
+}
+
+TEST_F(PatchSketchTest, StraightDrivesDoNotSlideAndDoNotTurn) {
+  EXPECT_LT((sketch_.twist(0.28, 0.28, {0.3, 0.3, 1, 1}) - Eigen::Vector3d(0.28, 0, 0)).norm(),
+            1e-6);
+}
+
+TEST_F(PatchSketchTest, ATurnMovesTowardTheSideThatHolds) {
+  const Eigen::Vector3d even = sketch_.twist(-0.084, 0.084, Eigen::Vector4d::Ones());
+  EXPECT_NEAR(even[0], 0, 1e-9);
+  EXPECT_NEAR(even[1], 0, 1e-9);
+  EXPECT_GT(even[2], 0);
+  // The right side holds: there the treads slide less, so the body goes with them, ahead.
+  const Eigen::Vector3d right = sketch_.twist(-0.084, 0.084, {0.3, 0.3, 1, 1});
+  EXPECT_GT(right[0], 0.001);
+  // Mirrored left to right.
+  const Eigen::Vector3d mirrored = sketch_.twist(0.084, -0.084, {1, 1, 0.3, 0.3});
+  EXPECT_NEAR(mirrored[0], right[0], 1e-9);
+  EXPECT_NEAR(mirrored[1], -right[1], 1e-9);
+  EXPECT_NEAR(mirrored[2], -right[2], 1e-9);
+}
+
+TEST_F(PatchSketchTest, OnlyDrivesOverTheRimAreMarked) {
+  const Patch patch = {1, 1, 0.3, 0.4};
+  const Eigen::VectorXd mark = sketch_.column(patch);
+  for (std::size_t i = 0; i < study_.size(); ++i) {
+    const Pose& X = study_.trials[i].X_WS;
+    const double away = std::abs(std::hypot(X.x - 1, X.y - 1) - 0.3);
+    const double reach = study_.trials[i].cell == 0 ? 0.4 : 0.08;
+    if (away > reach) {
+      EXPECT_EQ(mark.segment<3>(static_cast<Eigen::Index>(3 * i)).norm(), 0);
+    }
+  }
+  EXPECT_GT(mark.norm(), 5);
+  EXPECT_EQ(sketch_.column({1, 1, 0.3, 1}).norm(), 0) << "no other friction";
+}
+
+TEST_F(PatchSketchTest, FindsADiscAndNoneInNoise) {
+  Stream stream({.run_seed = 6});
+  Eigen::VectorXd noise(static_cast<Eigen::Index>(3 * study_.size()));
+  for (double& z : noise) z = stream.normal();
+  const Eigen::MatrixXd none(noise.size(), 0);
+  const Patch truth = {0.83, 1.12, 0.33, 0.4};
+  const Regression marked(none, noise + sketch_.column(truth));
+  const auto found = sketch_.search(marked, 3, 16);
+  ASSERT_FALSE(found.empty());
+  EXPECT_NEAR(found[0].patch[0], truth[0], 0.03);
+  EXPECT_NEAR(found[0].patch[1], truth[1], 0.03);
+  EXPECT_NEAR(found[0].patch[2], truth[2], 0.03);
+  EXPECT_NEAR(std::log(found[0].patch[3]), std::log(truth[3]), 0.2);
+  for (const auto& place : sketch_.search(Regression(none, noise), 3, 0)) {
+    EXPECT_LT(place.squares, 30) << "what a disc must gain to be named";
+  }
+}
+
+}  // namespace
+}  // namespace gapfarm
