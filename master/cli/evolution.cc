@@ -57,15 +57,20 @@ Status show_validation(RunStore& store, const EvolutionRun& run, const TrialLog&
   return {};
 }
 
-// Says how the run ended, in the store and to the user.
-Status conclude(RunStore& store, const EvolveSummary& summary, const FarmProgressWriter& writer) {
+Status write_end(RunStore& store, const FarmProgressWriter& writer, RunState state,
+                 const std::string& reason) {
   Progress progress = writer.now();
-  const bool requested = summary.reason == StopReason::kRequested;
-  progress.state = requested ? RunState::kStopped : RunState::kFinished;
-  progress.stop_reason = summary.text;
+  progress.state = state;
+  progress.stop_reason = reason;
   progress.rate_per_s = 0;
   progress.time_left_s.reset();
   return store.set_progress(progress);
+}
+
+Status conclude(RunStore& store, const EvolveSummary& summary, const FarmProgressWriter& writer) {
+  const bool requested = summary.reason == StopReason::kRequested;
+  return write_end(store, writer, requested ? RunState::kStopped : RunState::kFinished,
+                   summary.text);
 }
 
 std::string outcome_line(const EvolutionRun& run, const EvolveSummary& summary) {
@@ -180,7 +185,11 @@ int run_evolution(RunStore& store, const EvolutionRun& run, CliContext& context)
   const auto summary =
       evolve(**optimiser, backend, sink, clock, options, [&] { return context.stop.requested(); });
   context.console.clear_progress();
-  if (!summary) return failed(summary.error(), context);
+  if (!summary) {
+    // Where even that cannot be written, status finds the master gone, and the error is on stderr.
+    static_cast<void>(write_end(store, progress, RunState::kStopped, summary.error().message));
+    return failed(summary.error(), context);
+  }
   if (Status s = conclude(store, *summary, progress); !s) return failed(s.error(), context);
   context.console.note(outcome_line(run, *summary));
   if (summary->reason == StopReason::kRequested) {

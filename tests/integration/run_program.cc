@@ -3,6 +3,7 @@
 #include <fcntl.h>
 #include <signal.h>
 #include <stdlib.h>
+#include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -31,13 +32,18 @@ RunningProgram::RunningProgram(const std::string& program,
                                const std::vector<std::string>& arguments,
                                const std::vector<std::string>& environment)
     : folder_(fresh_folder()) {
-  const std::string path = std::string(GAPFARM_BIN_DIR) + "/" + program;
+  const std::string path =
+      program.front() == '/' ? program : std::string(GAPFARM_BIN_DIR) + "/" + program;
   const std::string out = folder_ / "out", err = folder_ / "err";
   std::vector<char*> argv = {const_cast<char*>(path.c_str())};
   for (const std::string& argument : arguments) argv.push_back(const_cast<char*>(argument.c_str()));
   argv.push_back(nullptr);
+  const pid_t parent = ::getpid();
   pid_ = ::fork();
   if (pid_ != 0) return;
+  // A test that is killed leaves nothing running.
+  ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+  if (::getppid() != parent) ::_exit(127);
   for (const std::string& entry : environment) ::putenv(const_cast<char*>(entry.c_str()));
   ::dup2(::open("/dev/null", O_RDONLY), 0);
   ::dup2(::open(out.c_str(), O_WRONLY | O_CREAT, 0600), 1);

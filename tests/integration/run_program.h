@@ -19,7 +19,8 @@ struct Finished {
 // A program that is running; destroying it kills it.
 class RunningProgram {
  public:
-  // `program` is looked for beside the tests' own programs.  `environment`: "NAME=value" to add.
+  // `program` is looked for beside the tests' own programs unless it is a whole path.
+  // `environment`: "NAME=value" to add.  Belongs to the thread that makes it: ends with it.
   RunningProgram(const std::string& program, const std::vector<std::string>& arguments,
                  const std::vector<std::string>& environment = {});
   ~RunningProgram();

@@ -1,0 +1,174 @@
+// Run folders that cannot be used: full, read-only, damaged, another program's, or in use.  Each is
+// said with the file and a remedy, and what was committed is still there afterwards.
+#include <gmock/gmock.h>
+#include <poll.h>
+#include <signal.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "master/store/database.h"
+#include "tests/integration/run_program.h"
+
+namespace gapfarm {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+constexpr int kFailed = 1;
+constexpr int kNoMounts = 99;
+
+class RunFolder : public ::testing::Test {
+ protected:
+  Finished evolve(const std::string& run, const std::string& generations) const {
+    return gapfarm_command(
+        {"evolve", config_, "--out", run, "--generations", generations, "--workers", "1"});
+  }
+
+  static Finished resume(const std::string& run, const std::string& generations) {
+    return gapfarm_command({"resume", run, "--generations", generations, "--workers", "1"});
+  }
+
+  static nlohmann::json status(const std::string& run) {
+    const Finished finished = gapfarm_command({"status", run, "--json"});
+    const auto json = nlohmann::json::parse(finished.out, nullptr, false);
+    return json.is_object() ? json : nlohmann::json::object();
+  }
+
+  static std::string bytes(const std::string& file) {
+    std::ifstream in(file, std::ios::binary);
+    std::ostringstream text;
+    text << in.rdbuf();
+    return text.str();
+  }
+
+  // Runs a shell script with mounts of its own; $G is gapfarm, $C the config, $R a folder.
+  Finished with_mounts(const std::string& script, const std::string& folder) const {
+    return run_program("/usr/bin/unshare", {"-m", "sh", "-c", script},
+                       {"G=" GAPFARM_BIN_DIR "/gapfarm", "C=" + config_, "R=" + folder});
+  }
+
+  static bool lacks_mounts(const Finished& finished) {
+    return finished.exit_code == kNoMounts ||
+           finished.err.find("unshare failed") != std::string::npos || finished.exit_code == 127;
+  }
+
+  const TemporaryFolder folder_;
+  const std::string run_ = folder_ / "run";
+  const std::string file_ = run_ + "/run.sqlite";
+  const std::string config_ = folder_.write("run.toml", "trials = [\"" GAPFARM_SOURCE_DIR
+                                                        "/configs/demo/trials.csv\"]\n"
+                                                        "[genes]\n"
+                                                        "friction = [0.1, 1.5]\n"
+                                                        "full_speed = [0.1, 0.6]\n"
+                                                        "[parameters]\n"
+                                                        "step_rate = 60\n"
+                                                        "[evolution]\n"
+                                                        "population = 6\n");
+};
+
+TEST_F(RunFolder, ReadOnlyIsSaidAndCanStillBeLookedAt) {
+  ASSERT_EQ(evolve(run_, "2").exit_code, 0);
+  const std::string digest = status(run_)["digest"];
+  const Finished tried = with_mounts(
+      "mount --bind \"$R\" \"$R\" && mount -o remount,ro,bind \"$R\" || exit 99\n"
+      "\"$G\" resume \"$R\" --generations 3 --workers 1; echo \"resume $?\"\n"
+      "\"$G\" evolve \"$C\" --out \"$R/new\" --workers 1; echo \"evolve $?\"\n"
+      "\"$G\" status \"$R\" --json",
+      run_);
+  if (lacks_mounts(tried)) GTEST_SKIP() << "this machine lends no mounts: " << tried.err;
+  EXPECT_THAT(tried.out,
+              AllOf(HasSubstr("resume 1\n"), HasSubstr("evolve 1\n"), HasSubstr(digest)));
+  EXPECT_THAT(tried.err, AllOf(HasSubstr(run_ + "/run.lock"), HasSubstr("Read-only"),
+                               HasSubstr("make the run folder writable")));
+  EXPECT_THAT(tried.err, AllOf(HasSubstr(run_ + "/new"), HasSubstr("choose another --out")));
+  EXPECT_EQ(status(run_)["digest"], digest);
+  EXPECT_EQ(resume(run_, "3").exit_code, 0);
+}
+
+TEST_F(RunFolder, BelowAFileIsNoPlaceForARun) {
+  const Finished tried = evolve(config_ + "/run", "2");
+  EXPECT_EQ(tried.exit_code, kFailed);
+  EXPECT_THAT(tried.err, AllOf(HasSubstr(config_ + "/run"), HasSubstr("choose another --out")));
+}
+
+// On a disk of its own that fills up and is then enlarged.
+TEST_F(RunFolder, AFullDiskStopsARunThatGoesOnWhenThereIsRoom) {
+  ASSERT_EQ(evolve(folder_ / "whole", "20").exit_code, 0);
+  const std::string whole = status(folder_ / "whole")["digest"];
+  std::filesystem::create_directory(run_);
+  const Finished tried = with_mounts(
+      "mount -t tmpfs -o size=120k none \"$R\" || exit 99\n"
+      "\"$G\" evolve \"$C\" --out \"$R\" --generations 1000000 --workers 1; echo \"evolve $?\"\n"
+      "\"$G\" status \"$R\"\n"
+      "mount -o remount,size=20M \"$R\"\n"
+      "\"$G\" resume \"$R\" --generations 20 --workers 1; echo \"resume $?\"\n"
+      "\"$G\" status \"$R\" --json",
+      run_);
+  if (lacks_mounts(tried)) GTEST_SKIP() << "this machine lends no mounts: " << tried.err;
+  EXPECT_THAT(tried.out, AllOf(HasSubstr("evolve 1\n"), HasSubstr("stopped: "),
+                               HasSubstr("resume 0\n"), HasSubstr(whole)));
+  EXPECT_THAT(tried.err, AllOf(HasSubstr(file_), HasSubstr("free some disk space")));
+}
+
+TEST_F(RunFolder, DamageIsNoticedBeforeAnythingIsWritten) {
+  ASSERT_EQ(evolve(run_, "20").exit_code, 0);
+  {
+    const auto size = std::filesystem::file_size(file_);
+    std::fstream damaged(file_, std::ios::in | std::ios::out | std::ios::binary);
+    damaged.seekp(static_cast<std::streamoff>(size / 2));
+    damaged << std::string(size / 4, '\xff');
+  }
+  const std::string before = bytes(file_);
+  const Finished tried = resume(run_, "21");
+  EXPECT_EQ(tried.exit_code, kFailed);
+  EXPECT_THAT(tried.err, AllOf(HasSubstr(file_), HasSubstr("damaged"), HasSubstr(".recover")));
+  EXPECT_EQ(bytes(file_), before);
+}
+
+TEST_F(RunFolder, AnotherProgramsFileIsLeftAlone) {
+  std::filesystem::create_directory(run_);
+  {
+    auto database = Database::open(file_, Database::Mode::kCreate);
+    ASSERT_TRUE(database
+                    ->exec("CREATE TABLE bookmarks (url TEXT); PRAGMA user_version = 1",
+                           "make another program's file")
+                    .ok());
+  }
+  const std::string before = bytes(file_);
+  for (const Finished& tried : {resume(run_, "2"), gapfarm_command({"status", run_})}) {
+    EXPECT_EQ(tried.exit_code, kFailed);
+    EXPECT_THAT(tried.err, AllOf(HasSubstr(file_), HasSubstr("another program"),
+                                 HasSubstr("give the folder of a gapfarm run")));
+  }
+  const Finished over = evolve(run_, "2");
+  EXPECT_EQ(over.exit_code, kFailed);
+  EXPECT_THAT(over.err, AllOf(HasSubstr(run_), HasSubstr("choose another --out")));
+  EXPECT_EQ(bytes(file_), before);
+}
+
+TEST_F(RunFolder, ASecondMasterIsRefusedAndTheFirstGoesOn) {
+  ASSERT_EQ(evolve(folder_ / "whole", "2").exit_code, 0);
+  RunningProgram first(
+      "gapfarm", {"evolve", config_, "--out", run_, "--generations", "1000000", "--workers", "1"});
+  while (status(run_).value("generation", 0) < 1) ::poll(nullptr, 0, 10);
+  for (const Finished& second : {resume(run_, "2"), evolve(run_, "2")}) {
+    EXPECT_EQ(second.exit_code, kFailed);
+    EXPECT_THAT(second.err, AllOf(HasSubstr(run_),
+                                  HasSubstr("in use by process " + std::to_string(first.pid()))));
+  }
+  const auto seen = status(run_);
+  EXPECT_EQ(seen["state"], "running");
+  EXPECT_EQ(seen["epoch"], 1);
+  while (status(run_).value("generation", 0) <= seen["generation"]) ::poll(nullptr, 0, 10);
+  first.send(SIGINT);
+  EXPECT_EQ(first.wait().exit_code, 85);
+  EXPECT_EQ(gapfarm_command({"resume", run_, "--generation", "2", "--generations", "2"}).exit_code,
+            0);
+  EXPECT_EQ(status(run_)["digest"], status(folder_ / "whole")["digest"]);
+}
+
+}  // namespace
+}  // namespace gapfarm
