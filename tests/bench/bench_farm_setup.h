@@ -68,9 +68,10 @@ struct Bench {
 
   void start_remote(Link link, unsigned workers) {
     ProcessPoolOptions options;
-    options.program = kWorkerProgram;
-    std::vector<std::string> arguments = {"--connect", farm->endpoints().at(0), "--processes",
-                                          std::to_string(workers)};
+    options.program = "/usr/bin/setpriv";  // the workers go when the benchmark is killed
+    std::vector<std::string> arguments = {
+        "--pdeathsig",           "KILL",        kWorkerProgram,         "--connect",
+        farm->endpoints().at(0), "--processes", std::to_string(workers)};
     if (link == kTcp) arguments.push_back("--insecure");
     if (link == kCurve) arguments.insert(arguments.end(), {"--keys", keys.path()});
     options.arguments = [arguments](const std::string&, const ProcessEnded*) { return arguments; };

@@ -54,16 +54,18 @@ inline SocketFarmOptions listening(const std::string& endpoint = "tcp://127.0.0.
   return options;
 }
 
-// Workers as a user starts them, with these `words` on the command line.
+// Workers as a user starts them, with these `words` on the command line; but a test that is killed
+// takes them with it.
 inline std::unique_ptr<ProcessPool> remote_worker(const std::string& endpoint,
                                                   const std::vector<std::string>& words = {
                                                       "--processes", "1"}) {
   ProcessPoolOptions options;
-  options.program = kWorkerProgram;
+  options.program = "/usr/bin/setpriv";  // of util-linux
   options.name_prefix = "remote";
   options.limits = {0, 0};  // a supervisor has no page of its own
   options.arguments = [endpoint, words](const std::string&, const ProcessEnded*) {
-    std::vector<std::string> all = {"--connect", endpoint, "--insecure"};
+    std::vector<std::string> all = {"--pdeathsig", "KILL",   kWorkerProgram,
+                                    "--connect",   endpoint, "--insecure"};
     all.insert(all.end(), words.begin(), words.end());
     return all;
   };
