@@ -11,10 +11,13 @@
 #include "common/trials/files.h"
 #include "master/cli/inputs.h"
 #include "master/diagnose/diagnosis_json.h"
+#include "master/experiment/recorded_farm.h"
 #include "master/report/report_html.h"
 
 namespace gapfarm {
 namespace {
+
+constexpr const char* kAnswers = "simulations.sqlite";
 
 struct DiagnoseCommand {
   std::string config;
@@ -62,9 +65,6 @@ void add_provenance(const Config& config, const DiagnoseCommand& command, Diagno
 Status write_all(const Config& config, const DiagnoseCommand& command,
                  const DiagnosisResult& result) {
   const std::filesystem::path out(command.out);
-  std::error_code code;
-  std::filesystem::create_directories(out, code);
-  if (code) return Error{command.out + ": cannot make the folder: " + code.message()};
   Model model = model_of(config, result.final_, "diagnosed");
   model.intervals.resize(model.values.size());
   for (std::size_t i = 0; i < result.intervals.size(); ++i) {
@@ -81,6 +81,15 @@ Status write_all(const Config& config, const DiagnoseCommand& command,
   }
   // Last: whoever sees it sees the rest.
   return write_file_atomically((out / "diagnosis.json").string(), to_json(result.diagnosis));
+}
+
+// Every simulation goes into the folder: a stopped diagnosis goes on where it was, and what a
+// figure rests on can be looked up.
+Result<AnswerStore> open_answers(const std::string& out) {
+  std::error_code code;
+  std::filesystem::create_directories(out, code);
+  if (code) return Error{out + ": cannot make the folder: " + code.message()};
+  return AnswerStore::open(std::filesystem::path(out) / kAnswers, build_info().fingerprint);
 }
 
 std::string summary(const Diagnosis& d) {
@@ -128,11 +137,35 @@ int run_diagnose(const DiagnoseCommand& command, CliContext& context) {
   options.keep_base = !command.model.empty();
   options.left_out = command.leave_out;
   options.seed = config->seed;
-  options.on_stage = [&](const std::string& stage) { context.console.progress(stage); };
-  auto result = diagnose(**farm, config->problem, options);
+  auto answers = open_answers(command.out);
+  if (!answers) return failed(answers.error(), context);
+  const Result<std::int64_t> at_hand = answers->count();
+  if (!at_hand) return failed(at_hand.error(), context);
+  RecordedFarm recorded(**farm, *answers);
+  options.on_stage = [&](const std::string& stage) {
+    context.console.progress(stage);
+    recorded.set_stage(stage);
+  };
+  auto result = diagnose(recorded, config->problem, options);
   context.console.clear_progress();
-  if (!result) return failed(result.error(), context);
+  if (*at_hand > 0) {
+    context.console.note(
+        fmt::format("{} of {} simulations were in {}/{} already", recorded.remembered(),
+                    recorded.remembered() + recorded.simulated(), command.out, kAnswers));
+  }
+  if (!result) {
+    if (result.error().message == kStopRequested) {
+      context.console.note("what was simulated is kept; the same command goes on from there");
+    }
+    return failed(result.error(), context);
+  }
   add_provenance(*config, command, &result->diagnosis);
+  for (const auto& [fit, at] : result->fits) {
+    result->diagnosis.provenance.emplace_back(
+        "predictions of " + fit,
+        std::string(kAnswers) + ", question " +
+            answers->key(problem_hash(to_proto(config->problem)), predict_task(at, true)));
+  }
   if (Status s = write_all(*config, command, *result); !s) return failed(s.error(), context);
   context.console.print(summary(result->diagnosis));
   context.console.note("left behind: " + command.out + "/report.html, diagnosis.json, model.toml");
@@ -153,7 +186,8 @@ SubcommandRun setup_diagnose(CLI::App& app) {
   app.footer(
       "Examples:\n"
       "  gapfarm diagnose configs/srv1.toml --trials log.csv --out diagnosis\n"
-      "  gapfarm diagnose configs/srv1.toml --trials log.csv --out d2 --model run/srv1");
+      "  gapfarm diagnose configs/srv1.toml --trials log.csv --out d2 --model run/srv1\n"
+      "Stopped?  The same command goes on: simulations are kept in OUT/simulations.sqlite.");
   return [command](CliContext& context) { return run_diagnose(*command, context); };
 }
 

@@ -110,6 +110,11 @@ Status DiagnosisRun::refit_nested() {
     auto fit =
         fit_jointly(predictor_, study_, effects, start, BaseParameters::kFitted, none, rounds);
     if (!fit) return fit.error();
+    std::string name = "the tuned base";
+    for (std::size_t k = 0; k < effects.size(); ++k) {
+      name += (k == 0 ? ", " : " and ") + effects[k].signature.effect;
+    }
+    result_.fits.emplace_back(name, fit->at);
     nested_.push_back(std::move(*fit));
   }
   return {};

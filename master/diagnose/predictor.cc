@@ -3,17 +3,6 @@
 namespace gapfarm {
 namespace {
 
-v1::Task task_of(const Overrides& at, bool means_only) {
-  v1::Task task;
-  task.mutable_predict()->set_means_only(means_only);
-  for (const auto& [row, value] : at) {
-    v1::Override* to = task.mutable_predict()->mutable_point()->add_overrides();
-    to->set_parameter(static_cast<std::uint32_t>(row));
-    to->set_value(value);
-  }
-  return task;
-}
-
 Error bad_point(const Problem& problem, const Overrides& at, const v1::TaskResult& result) {
   std::string text = "the simulation ended with " + v1::Outcome_Name(result.outcome()) + " (" +
                      result.message() + ") at";
@@ -25,11 +14,22 @@ Error bad_point(const Problem& problem, const Overrides& at, const v1::TaskResul
 
 }  // namespace
 
+v1::Task predict_task(const Overrides& at, bool means_only) {
+  v1::Task task;
+  task.mutable_predict()->set_means_only(means_only);
+  for (const auto& [row, value] : at) {
+    v1::Override* to = task.mutable_predict()->mutable_point()->add_overrides();
+    to->set_parameter(static_cast<std::uint32_t>(row));
+    to->set_value(value);
+  }
+  return task;
+}
+
 Result<std::vector<std::vector<Pose>>> Predictor::ends(
     const std::vector<PredictionRequest>& requests) {
   std::vector<v1::Task> tasks;
   for (const PredictionRequest& request : requests) {
-    tasks.push_back(task_of(request.at, true));
+    tasks.push_back(predict_task(request.at, true));
     tasks.back().mutable_predict()->mutable_trials()->Add(request.trials.begin(),
                                                           request.trials.end());
   }
@@ -51,7 +51,7 @@ Result<std::vector<std::vector<Pose>>> Predictor::ends(
 }
 
 Result<std::vector<double>> Predictor::log_scores(const Overrides& at) {
-  const auto results = farm_.run(hash_, {task_of(at, false)});
+  const auto results = farm_.run(hash_, {predict_task(at, false)});
   if (!results) return results.error();
   ++predictions_;
   const v1::TaskResult& result = results->front();

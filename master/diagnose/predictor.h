@@ -21,6 +21,9 @@ struct PredictionRequest {
   std::vector<std::uint32_t> trials;  // empty: all
 };
 
+// The farm's task behind a request for all trials.
+v1::Task predict_task(const Overrides& at, bool means_only);
+
 class Predictor {
  public:
   Predictor(Farm& farm, const Problem& problem)

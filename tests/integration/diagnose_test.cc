@@ -3,6 +3,7 @@
 
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <regex>
 #include <set>
 #include <sstream>
 
@@ -75,6 +76,21 @@ TEST_F(Diagnose, NamesAnEffectWithAnIntervalAndClosesTheGap) {
   const Finished predicted = gapfarm_command(
       {"predict", folder_ / "d/model.toml", "--trials", folder_ / "trials.csv", "--out", "-"});
   EXPECT_EQ(predicted.exit_code, 0) << predicted.err;
+}
+
+TEST_F(Diagnose, GoesOnWithWhatWasSimulatedAlready) {
+  simulate(60, {"motor_asymmetry.ratio=0.05"});
+  Json first = diagnose();
+  const std::vector<std::string> arguments = {
+      "diagnose", config_, "--trials", folder_ / "trials.csv", "--out", folder_ / "d"};
+  const Finished again = gapfarm_command(arguments);
+  EXPECT_EQ(again.exit_code, 0) << again.err;
+  EXPECT_TRUE(std::regex_search(again.err, std::regex(R"(([1-9][0-9]*) of \1 simulations)")))
+      << again.err;
+  Json second = Json::parse(text_of(folder_ / "d/diagnosis.json"), nullptr, false);
+  first.erase("timing");
+  second.erase("timing");
+  EXPECT_EQ(first, second);
 }
 
 TEST_F(Diagnose, SaysNoneWhenNothingIsMissing) {

@@ -1,0 +1,98 @@
+#include "master/store/answer_store.h"
+
+#include "common/base/hash.h"
+#include "common/problem/question.h"
+
+namespace gapfarm {
+namespace {
+
+constexpr const char* kTables = R"sql(
+CREATE TABLE IF NOT EXISTS problems (
+  hash TEXT PRIMARY KEY,
+  problem BLOB NOT NULL        -- gapfarm.v1.Problem
+) STRICT;
+CREATE TABLE IF NOT EXISTS answers (
+  question TEXT PRIMARY KEY,   -- hash of build, problem and task
+  number INTEGER NOT NULL,     -- in the order in which they were first asked
+  problem_hash TEXT NOT NULL REFERENCES problems,
+  fingerprint TEXT NOT NULL,   -- of the build
+  stage TEXT NOT NULL,         -- of the experiment that asked first
+  task BLOB NOT NULL,          -- gapfarm.v1.Task
+  result BLOB NOT NULL         -- gapfarm.v1.TaskResult
+) STRICT;
+)sql";
+
+Status check_identity(const Database& database) {
+  const auto id = database.integer("PRAGMA application_id", "read the answers");
+  if (!id) return id.error();
+  const auto tables = database.integer("SELECT count(*) FROM sqlite_master", "read the answers");
+  if (!tables) return tables.error();
+  if (*id == kAnswerStoreApplicationId || (*id == 0 && *tables == 0)) return {};
+  return Error{database.file().string() + ": is a SQLite file of another kind (application id " +
+               std::to_string(*id) + "); take another folder, or move the file away"};
+}
+
+}  // namespace
+
+Result<AnswerStore> AnswerStore::open(const std::filesystem::path& file,
+                                      const std::string& fingerprint) {
+  std::error_code code;
+  const bool there = std::filesystem::exists(file, code);
+  auto database = Database::open(file, there ? Database::Mode::kWrite : Database::Mode::kCreate);
+  if (!database) return database.error();
+  if (Status s = check_identity(*database); !s) return s.error();
+  const std::string tables =
+      kTables + ("PRAGMA application_id = " + std::to_string(kAnswerStoreApplicationId));
+  auto transaction = SqlTransaction::begin(*database);
+  if (!transaction) return transaction.error();
+  if (Status s = database->exec(tables, "keep answers"); !s) return s.error();
+  if (Status s = transaction->commit(); !s) return s.error();
+  return AnswerStore(std::move(*database), fingerprint);
+}
+
+Status AnswerStore::add_problem(const std::string& hash, const std::string& bytes) {
+  auto insert = database_.prepare("INSERT OR IGNORE INTO problems VALUES (?, ?)", "keep a problem");
+  if (!insert) return insert.error();
+  return insert->bind_text(1, hash).bind_blob(2, bytes).run();
+}
+
+std::string AnswerStore::key(const std::string& problem_hash, const v1::Task& task) const {
+  return content_hash(fingerprint_ + '\n' + question_hash(problem_hash, task));
+}
+
+Result<std::optional<v1::TaskResult>> AnswerStore::find(const std::string& key) const {
+  auto select = database_.prepare("SELECT result FROM answers WHERE question = ?", "read answers");
+  if (!select) return select.error();
+  const auto row = select->bind_text(1, key).step();
+  if (!row) return row.error();
+  std::optional<v1::TaskResult> result;
+  if (*row && !result.emplace().ParseFromString(select->blob(0))) {
+    return Error{database_.file().string() + ": the answer " + key +
+                 " is damaged; delete the file and run the command again"};
+  }
+  return result;
+}
+
+Status AnswerStore::add(const std::string& problem_hash, const std::string& stage,
+                        const std::vector<Answer>& answers) {
+  auto transaction = SqlTransaction::begin(database_);
+  if (!transaction) return transaction.error();
+  auto insert = database_.prepare(
+      "INSERT OR IGNORE INTO answers VALUES "
+      "(?, (SELECT coalesce(max(number), 0) + 1 FROM answers), ?, ?, ?, ?, ?)",
+      "keep answers");
+  if (!insert) return insert.error();
+  for (const Answer& answer : answers) {
+    insert->bind_text(1, answer.key).bind_text(2, problem_hash).bind_text(3, fingerprint_);
+    insert->bind_text(4, stage).bind_blob(5, answer.task->SerializeAsString());
+    insert->bind_blob(6, answer.result->SerializeAsString());
+    if (Status s = insert->run(); !s) return s;
+  }
+  return transaction->commit();
+}
+
+Result<std::int64_t> AnswerStore::count() const {
+  return database_.integer("SELECT count(*) FROM answers", "count answers");
+}
+
+}  // namespace gapfarm

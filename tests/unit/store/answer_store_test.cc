@@ -1,0 +1,116 @@
+#include "master/store/answer_store.h"
+
+#include <gmock/gmock.h>
+
+#include <fstream>
+
+#include "master/experiment/recorded_farm.h"
+#include "tests/unit/store/store_fixture.h"
+
+namespace gapfarm {
+namespace {
+
+using testing::HasSubstr;
+
+v1::Task echo(const std::string& payload) {
+  v1::Task task;
+  task.mutable_echo()->set_payload(payload);
+  return task;
+}
+
+// Answers with the payload, counts what it is asked, and stops when told to.
+class EchoFarm : public Farm {
+ public:
+  std::string add_problem(const v1::Problem&) override { return "hash"; }
+  Result<std::vector<v1::TaskResult>> run(
+      const std::string&, const std::vector<v1::Task>& tasks,
+      const std::function<void(const FarmProgress&)>&) override {
+    if (stopped) return Error{kStopRequested};
+    std::vector<v1::TaskResult> results;
+    for (const v1::Task& task : tasks) {
+      asked.push_back(task.echo().payload());
+      v1::TaskResult& result = results.emplace_back();
+      result.set_outcome(task.echo().payload() == "bad worker" ? v1::WORKER_FAILED : v1::OK);
+      result.set_echo(task.echo().payload());
+    }
+    return results;
+  }
+  std::vector<WorkerStatus> workers() const override { return {}; }
+  std::uint64_t retries() const override { return 0; }
+
+  std::vector<std::string> asked;
+  bool stopped = false;
+};
+
+class AnswerStoreTest : public StoreTest {
+ protected:
+  std::filesystem::path answers() const { return folder_ / "simulations.sqlite"; }
+};
+
+TEST_F(AnswerStoreTest, AFarmIsAskedOnlyOnceAndAnswersKeepTheirOrder) {
+  EchoFarm farm;
+  for (const bool again : {false, true}) {
+    auto store = AnswerStore::open(answers(), "build");
+    ASSERT_TRUE(store.ok()) << store.error().message;
+    RecordedFarm recorded(farm, *store);
+    const std::string hash = recorded.add_problem({});
+    const auto first = recorded.run(hash, {echo("a"), echo("b")});
+    ASSERT_TRUE(first.ok());
+    const auto second = recorded.run(hash, {echo("c"), echo("b"), echo("a")});
+    ASSERT_TRUE(second.ok());
+    EXPECT_EQ((*second)[0].echo(), "c");
+    EXPECT_EQ((*second)[1].echo(), "b");
+    EXPECT_EQ((*second)[2].echo(), "a");
+    EXPECT_EQ(recorded.simulated(), again ? 0u : 3u);
+    EXPECT_EQ(recorded.remembered(), again ? 5u : 2u);
+  }
+  EXPECT_THAT(farm.asked, testing::ElementsAre("a", "b", "c"));
+}
+
+TEST_F(AnswerStoreTest, AStopLosesNothingThatWasAnswered) {
+  EchoFarm farm;
+  auto store = AnswerStore::open(answers(), "build");
+  ASSERT_TRUE(store.ok());
+  RecordedFarm recorded(farm, *store);
+  const std::string hash = recorded.add_problem({});
+  ASSERT_TRUE(recorded.run(hash, {echo("a")}).ok());
+  farm.stopped = true;
+  const auto stopped = recorded.run(hash, {echo("a"), echo("b")});
+  ASSERT_FALSE(stopped.ok());
+  EXPECT_EQ(stopped.error().message, kStopRequested);
+  EXPECT_TRUE(recorded.run(hash, {echo("a")}).ok()) << "no farm is needed for what is known";
+}
+
+TEST_F(AnswerStoreTest, OtherBuildsAndFailedWorkersAreNoAnswers) {
+  EchoFarm farm;
+  for (const char* build : {"one", "two"}) {
+    auto store = AnswerStore::open(answers(), build);
+    ASSERT_TRUE(store.ok());
+    RecordedFarm recorded(farm, *store);
+    const std::string hash = recorded.add_problem({});
+    ASSERT_TRUE(recorded.run(hash, {echo("a"), echo("bad worker")}).ok());
+    ASSERT_TRUE(recorded.run(hash, {echo("a"), echo("bad worker")}).ok());
+  }
+  EXPECT_THAT(farm.asked, testing::ElementsAre("a", "bad worker", "bad worker", "a", "bad worker",
+                                               "bad worker"));
+}
+
+TEST_F(AnswerStoreTest, FilesOfAnotherKindAreLeftAlone) {
+  std::ofstream(answers()) << "no database at all, but long enough to be taken for a header....."
+                              "................................................................";
+  const auto text = AnswerStore::open(answers(), "build");
+  ASSERT_FALSE(text.ok());
+  EXPECT_THAT(text.error().message, HasSubstr(answers().string()));
+  std::filesystem::remove(answers());
+  {
+    auto other = Database::open(answers(), Database::Mode::kCreate);
+    ASSERT_TRUE(other.ok());
+    ASSERT_TRUE(other->exec("CREATE TABLE mine (x); PRAGMA application_id = 7", "try").ok());
+  }
+  const auto foreign = AnswerStore::open(answers(), "build");
+  ASSERT_FALSE(foreign.ok());
+  EXPECT_THAT(foreign.error().message, HasSubstr("another kind (application id 7"));
+}
+
+}  // namespace
+}  // namespace gapfarm
