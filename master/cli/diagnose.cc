@@ -116,6 +116,11 @@ std::string summary(const Diagnosis& d) {
 
 // What the command line says of the problem, on top of the config.
 Status apply_options(const DiagnoseCommand& command, Config& config) {
+  if (!config.problem.pieces.empty()) {
+    return Error{command.config + ": scenario " + config.problem.scenario +
+                 " pushes pieces, and diagnose reads what motors were told; `gapfarm crossfit " +
+                 command.config + " --effects all` asks the same of pushes"};
+  }
   if (command.seed) config.seed = *command.seed;
   if (!command.model.empty()) {
     const Result<Model> model = read_model_of(command.model);

@@ -40,7 +40,8 @@ Status apply_setting(const std::string& setting, Problem& problem) {
   return {};
 }
 
-Status apply_genes(const std::vector<std::string>& genes, Problem& problem) {
+Status apply_genes(const std::vector<std::string>& genes, Problem& problem,
+                   const std::string& option) {
   const ParameterTable& table = problem.table();
   problem.genes.clear();
   for (const std::string& text : genes) {
@@ -48,7 +49,7 @@ Status apply_genes(const std::vector<std::string>& genes, Problem& problem) {
     const std::string key = text.substr(0, equals);
     const auto row = table.find(key);
     if (!row) {
-      return Error{"--genes " + text + ": there is no parameter '" + key + "'" +
+      return Error{option + " " + text + ": there is no parameter '" + key + "'" +
                    suggestion(key, keys_of(table))};
     }
     Gene gene{*row, table[*row].lower, table[*row].upper, table[*row].scale};
@@ -58,17 +59,17 @@ Status apply_genes(const std::vector<std::string>& genes, Problem& problem) {
           comma != std::string::npos &&
           CLI::detail::lexical_cast(text.substr(equals + 1, comma - equals - 1), gene.lower) &&
           CLI::detail::lexical_cast(text.substr(comma + 1), gene.upper);
-      if (!read) return Error{"--genes " + text + ": expected KEY or KEY=LOWER,UPPER"};
+      if (!read) return Error{option + " " + text + ": expected KEY or KEY=LOWER,UPPER"};
     }
     for (const double end : {gene.lower, gene.upper}) {
       if (Status s = table.check(*row, end); !s) {
-        return Error{"--genes " + text + ": " + s.error().message};
+        return Error{option + " " + text + ": " + s.error().message};
       }
     }
     const bool twice = std::any_of(problem.genes.begin(), problem.genes.end(),
                                    [&](const Gene& other) { return other.row == *row; });
     if (twice || gene.lower >= gene.upper) {
-      return Error{"--genes " + text + ": " + (twice ? "is there twice" : "has an empty range")};
+      return Error{option + " " + text + ": " + (twice ? "is there twice" : "has an empty range")};
     }
     if (gene.lower <= 0) gene.scale = ParameterScale::kLinear;
     problem.genes.push_back(gene);

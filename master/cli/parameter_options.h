@@ -14,7 +14,8 @@ namespace gapfarm {
 Status apply_setting(const std::string& setting, Problem& problem);
 
 // "KEY", with the table's range, or "KEY=LOWER,UPPER", as the problem's genes.  Errors as above, an
-// empty range, a key twice.
-Status apply_genes(const std::vector<std::string>& genes, Problem& problem);
+// empty range, a key twice; they name the option.
+Status apply_genes(const std::vector<std::string>& genes, Problem& problem,
+                   const std::string& option = "--genes");
 
 }  // namespace gapfarm

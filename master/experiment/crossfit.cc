@@ -5,37 +5,11 @@
 #include <limits>
 #include <map>
 
-#include "common/score/motion_model.h"
+#include "common/score/statistics.h"
 #include "common/trials/select.h"
 
 namespace gapfarm {
 namespace {
-
-double median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  std::sort(values.begin(), values.end());
-  const std::size_t n = values.size();
-  return n % 2 == 1 ? values[n / 2] : (values[n / 2 - 1] + values[n / 2]) / 2;
-}
-
-EndErrors errors_of(const Problem& problem, const std::vector<Trial>& trials,
-                    const std::vector<Pose>& ends) {
-  EndErrors errors;
-  std::vector<double> whole, position, heading;
-  for (std::size_t i = 0; i < trials.size(); ++i) {
-    whole.push_back(end_error(problem, trials[i], ends[i]));
-    const Pose& X = trials[i].X_WE;
-    position.push_back(std::hypot(ends[i].x - X.x, ends[i].y - X.y));
-    heading.push_back(std::abs(wrap_angle(ends[i].theta - X.theta)));
-    errors.mean_m += whole.back();
-  }
-  errors.trials = trials.size();
-  if (!trials.empty()) errors.mean_m /= static_cast<double>(trials.size());
-  errors.median_m = median(whole);
-  errors.median_position_m = median(position);
-  errors.median_heading_rad = median(heading);
-  return errors;
-}
 
 std::vector<std::string> values_in(const TrialLog& log, const TrialColumnReader& column) {
   std::vector<std::string> values;
@@ -111,7 +85,7 @@ class Crossfit {
   }
 
   Status add_set(const std::string& name, const TrialLog& log, CrossfitGroup& group) {
-    const auto ends = predict_means(with(log), {problem_.values, group.tuned.values}, farm_);
+    const auto ends = predict_ends(with(log), {problem_.values, group.tuned.values}, farm_);
     if (!ends) return ends.error();
     for (std::size_t k = 0; k < 2; ++k) {
       if ((*ends)[k].failure.empty()) continue;
@@ -149,7 +123,7 @@ class Crossfit {
           trials.push_back(log.trials[i]);
           chosen.push_back(all[i]);
         }
-        return errors_of(problem_, trials, chosen);
+        return end_errors(problem_, trials, chosen);
       };
       group.sets.push_back({name, part, errors((*ends)[0].ends), errors((*ends)[1].ends),
                             errors(starts), errors(repeats)});
@@ -178,12 +152,12 @@ class Crossfit {
     for (const auto& [log, member] :
          {std::pair{&train, &SweepPoint::train_m}, std::pair{&test, &SweepPoint::test_m}}) {
       if (log->trials.empty()) continue;
-      const auto ends = predict_means(with(*log), points, farm_);
+      const auto ends = predict_ends(with(*log), points, farm_);
       if (!ends) return ends.error();
       for (std::size_t i = 0; i < points.size(); ++i) {
         const PredictedEnds& predicted = (*ends)[i];
         sweep.points[i].*member = predicted.failure.empty()
-                                      ? errors_of(problem_, log->trials, predicted.ends).mean_m
+                                      ? end_errors(problem_, log->trials, predicted.ends).mean_m
                                       : std::numeric_limits<double>::quiet_NaN();
       }
     }
@@ -200,6 +174,26 @@ class Crossfit {
 double end_error(const Problem& problem, const Trial& trial, const Pose& X_WE) {
   if (problem.pieces.empty()) return std::hypot(X_WE.x - trial.X_WE.x, X_WE.y - trial.X_WE.y);
   return corner_distance(problem.piece(trial.command), X_WE, trial.X_WE);
+}
+
+EndErrors end_errors(const Problem& problem, std::span<const Trial> trials,
+                     std::span<const Pose> ends) {
+  EndErrors errors;
+  if (trials.empty()) return errors;
+  std::vector<double> whole, position, heading;
+  for (std::size_t i = 0; i < trials.size(); ++i) {
+    whole.push_back(end_error(problem, trials[i], ends[i]));
+    const Pose& X = trials[i].X_WE;
+    position.push_back(std::hypot(ends[i].x - X.x, ends[i].y - X.y));
+    heading.push_back(std::abs(wrap_angle(ends[i].theta - X.theta)));
+    errors.mean_m += whole.back();
+  }
+  errors.trials = trials.size();
+  errors.mean_m /= static_cast<double>(trials.size());
+  errors.median_m = median(whole);
+  errors.median_position_m = median(position);
+  errors.median_heading_rad = median(heading);
+  return errors;
 }
 
 Result<std::vector<CrossfitGroup>> crossfit(const Problem& problem, const CrossfitPlan& plan,

@@ -1,6 +1,7 @@
 // Tuned on some trials, tried on others: what a model is worth.
 #pragma once
 
+#include <span>
 #include <string>
 #include <vector>
 
@@ -19,6 +20,10 @@ struct EndErrors {
 
 // Mean corner distance where the trial's command is a piece, else the distance of the positions, m.
 double end_error(const Problem& problem, const Trial& trial, const Pose& X_WE);
+
+// One end a trial.
+EndErrors end_errors(const Problem& problem, std::span<const Trial> trials,
+                     std::span<const Pose> ends);
 
 struct CrossfitPlan {
   std::vector<std::string> train;               // filters of select_trials(), all of which hold

@@ -85,9 +85,9 @@ Result<Tuned> tune(const Problem& problem, Farm& farm, const TuningSettings& set
                fitness_of_cost(problem.fitness.kind, summary->best->cost), summary->evaluations};
 }
 
-Result<std::vector<PredictedEnds>> predict_means(const Problem& problem,
-                                                 const std::vector<ParameterValues>& points,
-                                                 Farm& farm) {
+Result<std::vector<PredictedEnds>> predict_ends(const Problem& problem,
+                                                const std::vector<ParameterValues>& points,
+                                                Farm& farm, bool log_scores) {
   Problem plain = problem;
   plain.genes.clear();
   // Any fitness will do; this one asks nothing of the log.
@@ -95,7 +95,7 @@ Result<std::vector<PredictedEnds>> predict_means(const Problem& problem,
   std::vector<v1::Task> tasks;
   for (const ParameterValues& values : points) {
     v1::Task task;
-    task.mutable_predict()->set_means_only(true);
+    task.mutable_predict()->set_means_only(!log_scores);
     for (std::size_t row = 0; row < values.size(); ++row) {
       if (values[row] == plain.values[row]) continue;
       v1::Override* to = task.mutable_predict()->mutable_point()->add_overrides();
@@ -115,6 +115,7 @@ Result<std::vector<PredictedEnds>> predict_means(const Problem& problem,
     }
     for (const v1::Predicted& p : result.predict().predictions()) {
       predicted.ends.push_back(from_proto(p.end()));
+      if (log_scores) predicted.log_scores.push_back(p.log_score());
     }
   }
   return all;

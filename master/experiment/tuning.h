@@ -25,13 +25,16 @@ struct Tuned {
 // Errors: of the farm, and a problem whose every genome fails.
 Result<Tuned> tune(const Problem& problem, Farm& farm, const TuningSettings& settings);
 
-// Where every trial of a log ends at some parameter values, by the means alone.
+// Where every trial of a log ends at some parameter values.
 struct PredictedEnds {
   std::vector<Pose> ends;
-  std::string failure;  // how and where the simulation failed; empty: it did not
+  std::vector<double> log_scores;  // of the real ends, nats; empty unless asked for
+  std::string failure;             // how and where the simulation failed; empty: it did not
 };
-Result<std::vector<PredictedEnds>> predict_means(const Problem& problem,
-                                                 const std::vector<ParameterValues>& points,
-                                                 Farm& farm);
+// One a point.  Without `log_scores` by the means alone, which takes a fraction of the time.
+// Error: of the farm.
+Result<std::vector<PredictedEnds>> predict_ends(const Problem& problem,
+                                                const std::vector<ParameterValues>& points,
+                                                Farm& farm, bool log_scores = false);
 
 }  // namespace gapfarm
