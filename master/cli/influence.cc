@@ -22,12 +22,9 @@ struct InfluenceCommand {
 };
 
 int run_influence(InfluenceCommand command, CliContext& context) {
-  Result<Config> config = read_config(command.config);
-  Status status = config ? command.traced.choose(config->problem.commands, config->seed,
-                                                 &command.settings.trace)
-                         : Status(config.error());
-  if (!status) {
-    context.console.error(status.error());
+  const Result<Config> config = command.traced.open(command.config, &command.settings.trace);
+  if (!config) {
+    context.console.error(config.error());
     return kExitBadUsage;
   }
   for (std::size_t i = 0; i < path_distances().size(); ++i) {

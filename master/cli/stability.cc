@@ -60,13 +60,12 @@ Status write_all(const StabilityCommand& command, const Config& config,
 }
 
 int run_stability(StabilityCommand command, CliContext& context) {
-  Result<Config> config = read_config(command.config);
-  Status status = config ? check_evolvable(*config) : Status(config.error());
-  if (status) {
-    status = command.traced.choose(config->problem.commands, config->seed, &command.settings.trace);
+  Result<Config> config = command.traced.open(command.config, &command.settings.trace);
+  if (config) {
+    if (Status s = check_evolvable(*config); !s) config = s.error();
   }
-  if (!status) {
-    context.console.error(status.error());
+  if (!config) {
+    context.console.error(config.error());
     return kExitBadUsage;
   }
   command.settings.evolution = config->evolution;
@@ -115,7 +114,8 @@ SubcommandRun setup_stability(CLI::App& app) {
   app.footer(
       "The tiny changes are the scenario's own noise: of the start and launch in racquetball, of "
       "the\n"
-      "drive in srv1.\n\n"
+      "drive in srv1, of a reading of the start in push (pose_noise_position and _heading; spread\n"
+      "over the piece's corners and the log's pushes).\n\n"
       "Examples:\n"
       "  gapfarm stability configs/racquetball_stability.toml --out stable\n"
       "  gapfarm predict stable/model.toml --trials log.csv");

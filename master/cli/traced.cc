@@ -3,21 +3,49 @@
 #include <algorithm>
 
 #include "common/base/suggest.h"
+#include "common/config/config.h"
+#include "common/trials/select.h"
 #include "master/cli/inputs.h"
 
 namespace gapfarm {
 
 void TracedCommands::declare(CLI::App& app) {
   app.add_option("--command", names, "Commands whose paths to look at; left out: all");
+  app.add_option("--trials", trials,
+                 "Where commands are pieces: the pushes to trace, in place of the config's");
+  app.add_option("--only", only,
+                 "COLUMN=VALUE[,VALUE...]: leave all other pushes out; may repeat, all must hold");
   app.add_option("--interval", interval_s, "Seconds between samples of a path")
       ->check(CLI::Range(0.001, 10.0))
       ->capture_default_str();
 }
 
-Status TracedCommands::choose(const std::vector<CommandSpec>& known, std::uint64_t seed,
-                              TraceSettings* to) const {
-  to->seed = seed;
+Result<Config> TracedCommands::open(const std::string& path, TraceSettings* to) const {
+  Result<Config> config = read_config(path);
+  if (!config) return config.error();
+  to->seed = config->seed;
   to->interval_s = interval_s;
+  if (Status s = choose(config->problem.commands, to); !s) return s.error();
+  if (config->problem.pieces.empty()) {
+    if (trials.empty() && only.empty()) return config;
+    return Error{path + ": scenario " + config->problem.scenario +
+                 " traces commands and no trials; leave out --trials and --only"};
+  }
+  config = read_config_and_trials(path, trials);
+  if (!config) return config.error();
+  Result<TrialLog> log = select_trials(config->problem.log, only);
+  if (!log) return log.error();
+  config->problem.log = std::move(*log);
+  const std::vector<Trial>& pushes = config->problem.log.trials;
+  for (std::uint32_t i = 0; i < pushes.size(); ++i) {
+    const auto wanted = [&](const CommandSpec& c) { return c.name == pushes[i].command; };
+    if (std::any_of(to->commands.begin(), to->commands.end(), wanted)) to->trials.push_back(i);
+  }
+  if (to->trials.empty()) return Error{path + ": the log has no push of the pieces asked for"};
+  return config;
+}
+
+Status TracedCommands::choose(const std::vector<CommandSpec>& known, TraceSettings* to) const {
   to->commands = known;
   if (!names.empty()) to->commands.clear();
   for (const std::string& name : names) {

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "common/config/settings.h"
 #include "master/influence/paths.h"
 
 namespace gapfarm {
@@ -12,10 +13,15 @@ namespace gapfarm {
 struct TracedCommands {
   std::vector<std::string> names;  // empty: all
   double interval_s = 0.02;
+  std::vector<std::string> trials, only;  // where commands are pieces: the log, and which of it
 
   void declare(CLI::App& app);
-  // Error: a name that is none of `known`; no commands at all.
-  Status choose(const std::vector<CommandSpec>& known, std::uint64_t seed, TraceSettings* to) const;
+  // The config, and in `to` what of it is traced: its commands, or the pushes of a log where the
+  // commands are pieces.  Errors: of reading either, a name that is no command, nothing to trace.
+  Result<Config> open(const std::string& path, TraceSettings* to) const;
+
+ private:
+  Status choose(const std::vector<CommandSpec>& known, TraceSettings* to) const;
 };
 
 }  // namespace gapfarm

@@ -6,8 +6,29 @@
 namespace gapfarm {
 namespace {
 
-v1::Task trace_task(const TraceRequest& request, const CommandSpec& command, std::size_t index,
+// What a set holds one trace of.
+struct Traced {
+  CommandSpec command;
+  std::uint32_t trial = 0;
+  // Points of the body that are followed, in its frame.
+  std::vector<Eigen::Vector2d> points = {Eigen::Vector2d::Zero()};
+};
+
+std::vector<Traced> traced_of(const Problem& problem, const TraceSettings& settings) {
+  std::vector<Traced> all;
+  if (problem.pieces.empty()) {
+    for (const CommandSpec& command : settings.commands) all.push_back({command});
+  }
+  for (const std::uint32_t trial : settings.trials) {
+    const std::string& name = problem.log.trials[trial].command;
+    all.push_back({problem.command(name), trial, problem.piece(name).corners});
+  }
+  return all;
+}
+
+v1::Task trace_task(const TraceRequest& request, const Traced& traced, std::size_t index,
                     const TraceSettings& settings) {
+  const CommandSpec& command = traced.command;
   v1::Task task;
   v1::TraceTask* trace = task.mutable_trace();
   for (const v1::Override& override : request.overrides) {
@@ -22,6 +43,7 @@ v1::Task trace_task(const TraceRequest& request, const CommandSpec& command, std
   trace->mutable_command()->set_duration(command.duration_s);
   trace->set_interval(settings.interval_s);
   trace->set_noisy(request.repeat.has_value());
+  trace->set_trial(traced.trial);
   return task;
 }
 
@@ -34,10 +56,11 @@ std::span<const PathPoint> first(const std::vector<PathPoint>& path, std::size_t
 Result<std::vector<PathSet>> trace_paths(Farm& farm, const Problem& problem,
                                          const TraceSettings& settings,
                                          std::span<const TraceRequest> requests) {
+  const std::vector<Traced> traced = traced_of(problem, settings);
   std::vector<v1::Task> tasks;
   for (const TraceRequest& request : requests) {
-    for (std::size_t c = 0; c < settings.commands.size(); ++c) {
-      tasks.push_back(trace_task(request, settings.commands[c], c, settings));
+    for (std::size_t i = 0; i < traced.size(); ++i) {
+      tasks.push_back(trace_task(request, traced[i], i, settings));
     }
   }
   const auto results = farm.run(farm.add_problem(to_proto(problem)), tasks);
@@ -47,14 +70,17 @@ Result<std::vector<PathSet>> trace_paths(Farm& farm, const Problem& problem,
     const v1::TaskResult& result = (*results)[i];
     if (result.outcome() == v1::INVALID_REQUEST)
       return Error{"a worker refused: " + result.message()};
-    PathSet& set = sets[i / settings.commands.size()];
+    PathSet& set = sets[i / traced.size()];
     set.ok = set.ok && result.outcome() == v1::OK && result.trace().samples_size() > 0;
-    std::vector<PathPoint> path;
-    for (const v1::TraceSample& s : result.trace().samples()) {
-      path.emplace_back(s.pose().x(), s.pose().y(), s.height());
-      set.ok = set.ok && path.back().allFinite();
+    for (const Eigen::Vector2d& point : traced[i % traced.size()].points) {
+      std::vector<PathPoint> path;
+      for (const v1::TraceSample& s : result.trace().samples()) {
+        const Eigen::Vector2d p = transform(from_proto(s.pose()), point);
+        path.emplace_back(p.x(), p.y(), s.height());
+        set.ok = set.ok && path.back().allFinite();
+      }
+      set.paths.push_back(std::move(path));
     }
-    set.paths.push_back(std::move(path));
   }
   return sets;
 }

@@ -15,7 +15,8 @@
 
 namespace gapfarm {
 
-// One path a command, sampled from t = 0 at equal intervals; z is the height.
+// One path a command, or one a corner of the piece in each trial, sampled from t = 0 at equal
+// intervals; z is the height.
 struct PathSet {
   bool ok = true;  // false: a simulation did not end well, the paths are not to be used
   std::vector<std::vector<PathPoint>> paths;
@@ -23,6 +24,8 @@ struct PathSet {
 
 struct TraceSettings {
   std::vector<CommandSpec> commands;
+  // Where commands are pieces, the pushes to trace, by index into the problem's trials.
+  std::vector<std::uint32_t> trials;
   double interval_s = 0.02;
   std::uint64_t seed = 1;
 };

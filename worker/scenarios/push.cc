@@ -38,12 +38,9 @@ class PushModelOfLog : public ScenarioModel {
     return simulate_pushes(problem_, values, task, steps);
   }
 
-  v1::TaskResult trace(const ParameterValues& /*values*/, const v1::TraceTask& /*task*/,
-                       StepCounter* /*steps*/) const override {
-    v1::TaskResult result;
-    result.set_outcome(v1::INVALID_REQUEST);
-    result.set_message("scenario push has no commands to trace; simulate pushes with paths");
-    return result;
+  v1::TaskResult trace(const ParameterValues& values, const v1::TraceTask& task,
+                       StepCounter* steps) const override {
+    return trace_push(problem_, values, task, steps);
   }
 
  private:

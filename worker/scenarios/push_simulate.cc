@@ -95,4 +95,39 @@ v1::TaskResult simulate_pushes(const Problem& problem, const ParameterValues& va
   return PushSession(problem, values, task, steps).run();
 }
 
+v1::TaskResult trace_push(const Problem& problem, const ParameterValues& values,
+                          const v1::TraceTask& task, StepCounter* steps) {
+  v1::TaskResult result;
+  if (task.trial() >= problem.log.trials.size()) {
+    result.set_outcome(v1::INVALID_REQUEST);
+    result.set_message("trial " + std::to_string(task.trial()) +
+                       " is to be traced, and the log has " +
+                       std::to_string(problem.log.trials.size()) + " pushes");
+    return result;
+  }
+  const Trial& trial = problem.log.trials[task.trial()];
+  const Piece& piece = problem.piece(trial.command);
+  PushedPiece pushed(piece, static_cast<std::size_t>(&piece - problem.pieces.data()), values);
+  Pose X_WR = pushed.effects().place(pushed.effects().recover(trial.X_WS));
+  if (task.noisy()) {
+    const PushNoise noise = push_noise(values);
+    Stream stream({task.stream().run_seed(), Purpose::kSimulation, task.stream().generation(),
+                   task.stream().birth_id(), task.stream().replicate()});
+    const double x = noise.pose.position_m * stream.normal();
+    const double y = noise.pose.position_m * stream.normal();
+    X_WR = X_WR * Pose{x, y, noise.pose.heading_rad * stream.normal()};
+  }
+  std::vector<PathSample> path;
+  const PushedPiece::Push push = pushed.push(X_WR, trial.tip, &path, task.interval());
+  count_step(steps);
+  result.set_outcome(push.outcome);
+  result.set_simulated(pushed.simulated_s());
+  for (const PathSample& s : path) {
+    v1::TraceSample* sample = result.mutable_trace()->add_samples();
+    sample->set_t(s.t_s);
+    *sample->mutable_pose() = to_proto(s.pose);
+  }
+  return result;
+}
+
 }  // namespace gapfarm

@@ -13,4 +13,9 @@ namespace gapfarm {
 v1::TaskResult simulate_pushes(const Problem& problem, const ParameterValues& values,
                                const v1::SimulateTask& task, StepCounter* steps);
 
+// The true way of the piece in the push of `task.trial`, from where the log has its start; noisy:
+// from beside it by a reading's noise.
+v1::TaskResult trace_push(const Problem& problem, const ParameterValues& values,
+                          const v1::TraceTask& task, StepCounter* steps);
+
 }  // namespace gapfarm

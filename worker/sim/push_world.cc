@@ -167,7 +167,8 @@ void PushWorld::place_touch(const Eigen::Vector2d& finger_m, double advance_m, d
   point.m_combinedFriction = settings_.finger_friction;
   point.m_combinedRestitution = settings_.restitution;
   point.m_lateralFrictionDir1 = btVector3(-outward.y(), outward.x(), 0);
-  point.m_lateralFrictionDir2 = btVector3(0, 0, 1);
+  // None upright: nothing slides that way, and it would hold up what a step has tilted.
+  point.m_lateralFrictionDir2 = btVector3(0, 0, 0);
   point.m_contactPointFlags = BT_CONTACT_FLAG_LATERAL_FRICTION_INITIALIZED;
   if (settings_.finger_compliance_m_n > 0) {
     // An implicit spring: the force after the step is the depth then over the compliance.

@@ -86,6 +86,23 @@ TEST(Push, APieceIsNotFlungByItsFinger) {
   for (const MotionSample& sample : path) EXPECT_LT(sample.kinetic_energy_j, limit);
 }
 
+// Friction upright at the finger would hold up what a step has tilted, little by little.
+TEST(Push, APieceStaysFlatAgainstASlowRoughPin) {
+  PushSettings settings = triangle_piece();
+  settings.shape_factor = 0.46;
+  settings.thickness_m = 0.015;
+  settings.mass_kg = 0.5;
+  settings.finger_radius_m = 1e-3;
+  settings.finger_friction = 0.9;
+  settings.step_rate_hz = 60;
+  for (const double x : {-0.03, 0.0, 0.04}) {
+    const Motion motion = pushed(settings, {{0, {x, -0.06}}, {7, {x + 0.005, -0.035}}});
+    EXPECT_EQ(motion.outcome, MotionOutcome::kOk) << x;
+    EXPECT_GT(std::hypot(motion.X_SE.x, motion.X_SE.y), 0.003);
+    EXPECT_LT(std::max(motion.max_roll_rad, motion.max_pitch_rad), 0.01) << x;
+  }
+}
+
 TEST(Push, ThroughTheCentreOfFrictionDoesNotTurn) {
   const Motion motion = pushed(square_piece(), straight(0, -0.1, 0.05, 0.05));
   ASSERT_EQ(motion.outcome, MotionOutcome::kOk);
