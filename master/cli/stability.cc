@@ -54,6 +54,7 @@ Status write_all(const StabilityCommand& command, const Config& config,
   model.fingerprint = build_info().fingerprint;
   model.values = report.best.values;
   model.commands = config.problem.commands;
+  model.pieces = config.problem.pieces;
   model.fitness = config.problem.fitness;
   model.spread = config.problem.spread;
   return write_model(model, (out / "model.toml").string());
@@ -118,6 +119,8 @@ SubcommandRun setup_stability(CLI::App& app) {
       "over the piece's corners and the log's pushes).\n\n"
       "Examples:\n"
       "  gapfarm stability configs/racquetball_stability.toml --out stable\n"
+      "  gapfarm stability configs/push_stability.toml --trials pushes.csv --only start=0.15 \\\n"
+      "      --out stable\n"
       "  gapfarm predict stable/model.toml --trials log.csv");
   return [command](CliContext& context) { return run_stability(*command, context); };
 }

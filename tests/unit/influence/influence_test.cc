@@ -7,6 +7,7 @@
 #include "common/parameters/racquetball.h"
 #include "master/influence/stability.h"
 #include "tests/unit/blind/worker_farm.h"
+#include "tests/unit/worker/push_problem.h"
 
 namespace gapfarm {
 namespace {
@@ -127,6 +128,32 @@ TEST(Stability, FindsCalmerSettings) {
   EXPECT_LT(report->best.spread, *report->standard_spread);
   EXPECT_LT(*report->best_fresh, *report->standard_fresh) << "not only on the repeats it saw";
   EXPECT_GE(report->evaluations, 60U);
+}
+
+// Corners keep their distances on every path; ends scatter as the starts do.
+TEST(PushPaths, FollowEveryCornerOfEveryPush) {
+  Problem problem = ::gapfarm::testing::push_problem();
+  ::gapfarm::testing::WorkerFarm farm;
+  TraceSettings settings;
+  settings.trials = {2, 5};  // a square and a triangle
+  const std::vector<TraceRequest> requests = {{{}, 0}, {{}, 1}, {{}, 2}, {{}, 3}};
+  const auto sets = trace_paths(farm, problem, settings, requests);
+  ASSERT_TRUE(sets.ok()) << sets.error().message;
+  const std::vector<std::vector<PathPoint>>& paths = sets->front().paths;
+  ASSERT_EQ(paths.size(), 7u);
+  for (const std::size_t at : {std::size_t{0}, paths[0].size() - 1}) {
+    EXPECT_NEAR((paths[0][at] - paths[2][at]).norm(), 0.12 * std::sqrt(2.0), 1e-9);
+  }
+  EXPECT_NEAR((paths[4].back() - paths[5].back()).norm(), 0.15, 1e-9);
+  const auto spread = end_spread(*sets);
+  ASSERT_TRUE(spread);
+  EXPECT_GT(*spread, 1e-4);
+  for (const char* noise : {"pose_noise_position", "pose_noise_heading"}) {
+    ::gapfarm::testing::push_value(problem, noise) /= 10;
+  }
+  const auto calmer = trace_paths(farm, problem, settings, requests);
+  ASSERT_TRUE(calmer.ok()) << calmer.error().message;
+  EXPECT_LT(*end_spread(*calmer), *spread / 3);
 }
 
 }  // namespace

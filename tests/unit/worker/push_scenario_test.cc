@@ -104,6 +104,40 @@ TEST(PushEffects, CameraEffectsActOnBothReadings) {
   }
 }
 
+// What influence and stability look at: without noise a trace ends where a prediction does, with
+// it beside, and equal streams give equal traces.
+TEST(PushScenario, TracesThePushOfATrial) {
+  const Problem problem = push_problem();
+  const auto prepared = prepare(to_proto(problem));
+  const v1::TaskResult plain = predicted(problem);
+  v1::Task task;
+  v1::TraceTask* trace = task.mutable_trace();
+  trace->set_interval(0.05);
+  for (std::uint32_t i = 0; i < problem.log.trials.size(); ++i) {
+    trace->set_trial(i);
+    trace->mutable_command()->set_name(problem.log.trials[i].command);
+    trace->set_noisy(false);
+    const v1::TaskResult result = evaluate(prepared->get(), task);
+    ASSERT_EQ(result.outcome(), v1::OK) << result.message();
+    const auto& samples = result.trace().samples();
+    ASSERT_GT(samples.size(), 10);
+    const Pose from = between(problem.log.trials[i].X_WS, from_proto(samples.begin()->pose()));
+    const Pose to =
+        between(end_of(plain, static_cast<int>(i)), from_proto(samples.rbegin()->pose()));
+    EXPECT_LT(std::hypot(from.x, from.y, from.theta), 1e-9);
+    EXPECT_LT(std::hypot(to.x, to.y, to.theta), 1e-9);
+    trace->set_noisy(true);
+    const v1::TaskResult noisy = evaluate(prepared->get(), task);
+    EXPECT_EQ(noisy.SerializeAsString(), evaluate(prepared->get(), task).SerializeAsString());
+    const Pose beside =
+        between(problem.log.trials[i].X_WS, from_proto(noisy.trace().samples().begin()->pose()));
+    EXPECT_GT(std::hypot(beside.x, beside.y), 0);
+    EXPECT_LT(std::hypot(beside.x, beside.y), 0.006);  // six standard deviations
+  }
+  trace->set_trial(8);
+  EXPECT_EQ(evaluate(prepared->get(), task).outcome(), v1::INVALID_REQUEST);
+}
+
 // Pushes and tables turned together end turned.
 TEST(PushScenario, TurningTheWorldTurnsTheEnds) {
   Problem problem = push_problem();
