@@ -191,8 +191,11 @@ class Fleet {
       }
       const double until = std::min(next_ticks, due_.empty() ? HUGE_VAL : due_.top().first);
       now = monotonic_seconds();
-      const int wait_ms = until > now ? static_cast<int>(std::ceil((until - now) * 1e3)) : 0;
-      const int ready = epoll_wait(epoll_, events.data(), static_cast<int>(events.size()), wait_ms);
+      const double wait_s = std::max(0.0, until - now);  // at most a tick: below a second
+      const timespec wait = {0, static_cast<long>(wait_s * 1e9)};
+      // Milliseconds would be too coarse for jobs of one.
+      const int ready =
+          epoll_pwait2(epoll_, events.data(), static_cast<int>(events.size()), &wait, nullptr);
       now = monotonic_seconds();
       for (int i = 0; i < ready; ++i) step(events[static_cast<std::size_t>(i)].data.u32, now);
     }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 
 namespace gapfarm {
@@ -11,24 +12,28 @@ FarmForecast forecast(const FarmModel& model) {
   constexpr double kClose = 1e-12;
   const double window = model.window;
   const double jobs = window * model.workers;
-  const std::array<double, 2> demands = {model.main_s, model.link_s};
-  std::array<double, 2> queues = {jobs / 3, jobs / 3};  // at the master, of all workers
-  double in_hand = window / 3;                          // of one worker
-  double rate = 0;                                      // of one worker
+  const double main_free = 1 - model.workers * model.main_idle;
+  const double link_free = 1 - model.workers * model.link_idle;
+  if (main_free <= 0 || link_free <= 0) return {};
+  const std::array<double, 3> demands = {model.main_s / main_free, model.link_s / link_free,
+                                         model.shared_s};
+  std::array<double, 3> queues = {jobs / 3, jobs / 3, jobs / 3};  // of all workers' jobs
+  double in_hand = window / 3;                                    // of one worker
+  double rate = 0;                                                // of one worker
   double at_master = 0;
   for (int round = 0; round < kMostRounds; ++round) {
     // A job that arrives finds what the others would have queued without it.
     const double at_worker = model.service_s * (1 + in_hand * (window - 1) / window);
-    std::array<double, 2> stays = {};
+    std::array<double, 3> stays = {};
     at_master = model.delay_s;
-    for (std::size_t i = 0; i < 2; ++i) {
+    for (std::size_t i = 0; i < demands.size(); ++i) {
       stays[i] = demands[i] * (1 + queues[i] * (jobs - 1) / jobs);
       at_master += stays[i];
     }
     const double before = rate;
     rate = window / (at_worker + at_master);
     in_hand = rate * at_worker;
-    for (std::size_t i = 0; i < 2; ++i) queues[i] = model.workers * rate * stays[i];
+    for (std::size_t i = 0; i < demands.size(); ++i) queues[i] = model.workers * rate * stays[i];
     if (std::abs(rate - before) <= kClose * rate) break;
   }
   FarmForecast result;
@@ -36,6 +41,16 @@ FarmForecast forecast(const FarmModel& model) {
   result.efficiency = std::min(1.0, rate * model.service_s);
   result.round_trip_s = at_master;
   return result;
+}
+
+unsigned workers_carried(FarmModel model, double efficiency, unsigned limit) {
+  // More workers never make one busier.
+  unsigned carried = 0;
+  for (unsigned step = std::bit_floor(std::max(limit, 1u)); step > 0; step /= 2) {
+    model.workers = carried + step;
+    if (model.workers <= limit && forecast(model).efficiency >= efficiency) carried += step;
+  }
+  return carried;
 }
 
 }  // namespace gapfarm

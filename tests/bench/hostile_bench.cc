@@ -1,36 +1,59 @@
-// What hostile peers cost a farm: the same batches with CURVE, left in peace and attacked.  The
-// attackers need cores too: compare the master's CPU time, not only the wall's.
+// What hostile peers cost a farm: the same batches with CURVE, left in peace and attacked as fast
+// as one process can.  In `attacked` workers, master and attacker share this machine's cores, so
+// that most of what is lost the attacker's own CPU time takes: compare the master's.  In
+// `attacked_master` workers need no cores, as if they were elsewhere.
 #include <benchmark/benchmark.h>
 #include <signal.h>
+#include <sys/mman.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <atomic>
+#include <cstdlib>
 #include <functional>
 #include <memory>
+#include <new>
 #include <string>
 #include <vector>
 
-#include "tests/bench/bench_farm_setup.h"
+#include "tests/bench/fleet_bench.h"
 #include "tests/integration/hostile_peers.h"
 
 namespace gapfarm {
 namespace {
 
-// Repeats `round` in a process of its own until end_child().
-pid_t in_child(const std::function<void()>& round) {
-  const pid_t pid = fork();
-  if (pid != 0) return pid;
-  prctl(PR_SET_PDEATHSIG, SIGKILL);
-  for (;;) round();
-}
+// Repeats `round` (may be empty) in a process of its own, so that its CPU time is not the master's.
+class Attacker {
+ public:
+  explicit Attacker(const std::function<void()>& round) {
+    void* page =
+        mmap(nullptr, sizeof *rounds_, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+    if (page == MAP_FAILED) std::abort();
+    rounds_ = new (page) std::atomic<std::uint64_t>(0);
+    if (!round) return;
+    pid_ = fork();
+    if (pid_ != 0) return;
+    prctl(PR_SET_PDEATHSIG, SIGKILL);
+    for (;; ++*rounds_) round();
+  }
+  ~Attacker() {
+    if (pid_ > 0) {
+      kill(pid_, SIGKILL);
+      waitpid(pid_, nullptr, 0);
+    }
+    munmap(rounds_, sizeof *rounds_);
+  }
+  Attacker(const Attacker&) = delete;
+  Attacker& operator=(const Attacker&) = delete;
 
-void end_child(pid_t pid) {
-  if (pid < 0) return;
-  kill(pid, SIGKILL);
-  waitpid(pid, nullptr, 0);
-}
+  double rounds() const { return static_cast<double>(*rounds_); }
+
+ private:
+  std::atomic<std::uint64_t>* rounds_ = nullptr;
+  pid_t pid_ = -1;
+};
 
 double process_cpu_s() {
   rusage usage = {};
@@ -61,27 +84,48 @@ const std::vector<Attacked>& kinds() {
   return all;
 }
 
-// Arguments: kind of attack, microseconds a task, tasks.  The attacker runs in a child process, so
-// that its CPU time is not the master's.
-void attacked(benchmark::State& state) {
-  Bench bench(kCurve, 2);
+// `run` runs a batch of `count` tasks on `farm`.
+void attack(benchmark::State& state, const SocketFarm& farm, std::size_t count,
+            const std::function<void()>& run) {
   const Attacked& kind = kinds().at(static_cast<std::size_t>(state.range(0)));
   state.SetLabel(kind.name);
-  const std::string endpoint = bench.farm->endpoints().at(0);
+  const std::string endpoint = farm.endpoints().at(0);
   const int port = std::stoi(endpoint.substr(endpoint.rfind(':') + 1));
-  const auto tasks = echo_tasks(static_cast<std::size_t>(state.range(2)),
-                                static_cast<std::uint64_t>(state.range(1)), 100);
-  const pid_t attacker = kind.round == nullptr ? -1 : in_child(kind.round(port));
-  bench.run(tasks);
+  const Attacker attacker(kind.round ? kind.round(port) : nullptr);
+  run();
+  const double rounds = attacker.rounds();
+  const double begun = monotonic_seconds();
   const double cpu = process_cpu_s();
-  for (auto _ : state) bench.run(tasks);
-  state.counters["master_cpu_us_a_task"] =
-      1e6 * (process_cpu_s() - cpu) /
-      static_cast<double>(static_cast<std::size_t>(state.iterations()) * tasks.size());
-  state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(tasks.size()));
-  end_child(attacker);
+  for (auto _ : state) run();
+  const double wall = monotonic_seconds() - begun;
+  const auto tasks = static_cast<double>(count) * static_cast<double>(state.iterations());
+  state.counters["master_cpu_us_a_task"] = 1e6 * (process_cpu_s() - cpu) / tasks;
+  state.counters["master_cores"] = (process_cpu_s() - cpu) / wall;
+  state.counters["rounds_per_s"] = (attacker.rounds() - rounds) / wall;
+  state.SetItemsProcessed(static_cast<std::int64_t>(tasks));
 }
 
+// Arguments: kind of attack, microseconds a task, tasks.  Two worker processes.
+void attacked(benchmark::State& state) {
+  Bench bench(kCurve, 2);
+  const auto tasks = echo_tasks(static_cast<std::size_t>(state.range(2)),
+                                static_cast<std::uint64_t>(state.range(1)), 100);
+  attack(state, *bench.farm, tasks.size(), [&] { bench.run(tasks); });
+}
+
+// Argument: kind of attack.  100 workers with evaluations of 10 ms by the clock.
+void attacked_master(benchmark::State& state) {
+  constexpr std::size_t kTasks = 20000;
+  FleetBench bench(kCurve, 100, 0.01);
+  attack(state, *bench.farm, kTasks, [&] { bench.run(kTasks); });
+}
+
+BENCHMARK(attacked_master)
+    ->ArgNames({"attack"})
+    ->DenseRange(0, 5)
+    ->Iterations(1)
+    ->UseRealTime()
+    ->Unit(benchmark::kMillisecond);
 BENCHMARK(attacked)
     ->ArgNames({"attack", "us", "tasks"})
     ->ArgsProduct({{0, 1, 2, 3, 4, 5}, {10000}, {200}})

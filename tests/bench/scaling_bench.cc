@@ -6,18 +6,17 @@
 // and of its other threads (`link_us`) and of the fleet (`fleet_us`) a task; memory of the whole
 // master (`rss_MB`); from a result to the next jobs as a worker sees it (`next_job_*_ms`); seconds
 // until all workers had answered (`join_s`).  `forecast_per_s` is what farm_model.h says of
-// `main_us` and `link_us`.
+// these costs, on as many cores as this machine has.
 #include <benchmark/benchmark.h>
 #include <time.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <fstream>
-#include <memory>
+#include <thread>
 
-#include "tests/bench/bench_farm_setup.h"
-#include "tests/bench/echo_fleet.h"
 #include "tests/bench/farm_model.h"
+#include "tests/bench/fleet_bench.h"
 
 namespace gapfarm {
 namespace {
@@ -34,37 +33,6 @@ double resident_MB() {
   in >> size >> resident;
   return resident * static_cast<double>(sysconf(_SC_PAGESIZE)) / 1e6;
 }
-
-// A farm whose fleet has joined.
-struct FleetBench {
-  FleetBench(Link link, unsigned workers, double service_s) {
-    SocketFarmOptions options;
-    options.on_event = [](const FarmEvent&) {};
-    options.listen = {"tcp://127.0.0.1:*"};
-    options.security.open = OpenLinks::kLoopback;
-    if (link == kCurve) options.security = master_security(keys.path()).value();
-    farm = std::move(SocketFarm::create(options)).value();
-    FleetOptions many;
-    many.endpoint = farm->endpoints().at(0);
-    many.security.open = OpenLinks::kLoopback;
-    if (link == kCurve) many.security = worker_security(keys.path()).value();
-    many.workers = workers;
-    many.service_s = service_s;
-    const double begun = monotonic_seconds();
-    fleet = std::make_unique<EchoFleet>(many);
-    while (farm->workers().size() < workers) run(100);
-    join_s = monotonic_seconds() - begun;
-  }
-
-  void run(std::size_t count) {
-    if (!farm->run("", echo_tasks(count, 0, 100))) std::fprintf(stderr, "a run failed\n");
-  }
-
-  BenchKeys keys;
-  std::unique_ptr<SocketFarm> farm;
-  std::unique_ptr<EchoFleet> fleet;
-  double join_s = 0;
-};
 
 void measure(benchmark::State& state, Link link, unsigned workers, double service_s,
              std::size_t count) {
@@ -94,6 +62,8 @@ void measure(benchmark::State& state, Link link, unsigned workers, double servic
   model.service_s = service_s;
   model.main_s = main_s / tasks;
   model.link_s = link_s / tasks;
+  const double cores = std::max(1u, std::thread::hardware_concurrency());
+  model.shared_s = (main_s + link_s + bench.fleet->cpu_s() - fleet) / tasks / cores;
   state.counters["efficiency"] = tasks * service_s / (workers * wall_s);
   state.counters["forecast_per_s"] = forecast(model).tasks_per_s;
 }

@@ -50,6 +50,43 @@ TEST(FarmModel, TheSlowerThreadBoundsAnOverloadedMaster) {
   EXPECT_NEAR(forecast(model).efficiency, 0.01, 1e-4);
 }
 
+TEST(FarmModel, SharedCoresBoundEverybodyTogether) {
+  FarmModel model;
+  model.workers = 500;
+  model.service_s = 1e-3;
+  model.main_s = 5e-6;
+  model.link_s = 10e-6;
+  model.shared_s = 40e-6 / 2;
+  EXPECT_NEAR(forecast(model).tasks_per_s, 50000, 50);
+}
+
+TEST(FarmModel, ConnectionsTakeTheirShare) {
+  FarmModel model;
+  model.workers = 5000;
+  model.service_s = 1;
+  model.link_s = 20e-6;
+  model.link_idle = 1e-4;
+  EXPECT_NEAR(forecast(model).efficiency, 1, 0.01);
+  model.service_s = 0.01;
+  EXPECT_NEAR(forecast(model).tasks_per_s, 0.5 / 20e-6, 30);
+  model.workers = 10001;
+  EXPECT_EQ(forecast(model).tasks_per_s, 0);
+}
+
+TEST(FarmModel, CarriesAsManyWorkersAsStayBusy) {
+  FarmModel model;
+  model.service_s = 0.01;
+  model.main_s = 10e-6;
+  const unsigned carried = workers_carried(model, 0.95, 100000);
+  EXPECT_GT(carried, 900u);
+  EXPECT_LE(carried, 1050u);
+  model.workers = carried;
+  EXPECT_GE(forecast(model).efficiency, 0.95);
+  model.workers = carried + 1;
+  EXPECT_LT(forecast(model).efficiency, 0.95);
+  EXPECT_EQ(workers_carried(model, 0.95, 300), 300u);
+}
+
 TEST(FarmModel, AWindowHidesTheWayToTheMaster) {
   FarmModel model;
   model.workers = 4;
