@@ -211,8 +211,12 @@ int run_evolution(RunStore& store, const EvolutionRun& run, CliContext& context)
   // Of earlier masters' generations too, and of what was done after the last one.
   const auto given_up = store.quarantined();
   if (!given_up) return failed(given_up.error(), context);
-  const bool lost = *given_up > 0 || (*farm)->counts().quarantined > 0;
-  return lost ? kExitQuarantined : kExitDone;
+  const std::uint64_t lost = *given_up + (*farm)->counts().quarantined - sink.quarantined();
+  if (lost == 0) return kExitDone;
+  context.console.note(fmt::format("{} given up; which and why: gapfarm status {}",
+                                   lost == 1 ? "1 task was" : std::to_string(lost) + " tasks were",
+                                   store.run().string()));
+  return kExitQuarantined;
 }
 
 }  // namespace gapfarm

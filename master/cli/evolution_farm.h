@@ -77,6 +77,8 @@ class StoreSink : public GenerationSink {
             FarmProgressWriter& progress)
       : store_(store), problem_(problem), farm_(farm), progress_(progress) {}
   Status commit(const GenerationRecord& record) override;
+  // Tasks that this master's farm gave up, of the generations committed here.
+  std::uint64_t quarantined() const { return quarantined_; }
 
  private:
   RunStore& store_;

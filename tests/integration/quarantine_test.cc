@@ -106,7 +106,9 @@ TEST_F(Quarantine, IsReportedAndOutlivesTheMaster) {
   EXPECT_THAT(stopped["incidents"][0]["text"].get<std::string>(), HasSubstr("crashed"));
   EXPECT_GE(stopped["farm"]["retries"], 2);
 
-  EXPECT_EQ(resume().exit_code, kQuarantined) << "that run ended with something given up";
+  const Finished resumed = resume();
+  EXPECT_EQ(resumed.exit_code, kQuarantined) << "that run ended with something given up";
+  EXPECT_THAT(resumed.err, HasSubstr("1 task was given up"));
   EXPECT_EQ(resume().exit_code, kQuarantined) << "also when there was nothing left to do";
   const json finished = status();
   EXPECT_EQ(finished["state"], "finished");
