@@ -9,6 +9,7 @@
 namespace gapfarm {
 namespace {
 
+constexpr unsigned kMostAlarms = 100;
 constexpr double kWriteInterval_s = 1;  // each costs a disk write
 
 FarmTally tally_of(const SocketFarm& farm) {
@@ -35,8 +36,10 @@ std::optional<IncidentKind> incident_of(FarmEvent::Kind kind) {
 }  // namespace
 
 void keep_incidents(RunStore& store, Console& console, SocketFarmOptions& options) {
-  options.on_event = [&store, &console, next = options.on_event](const FarmEvent& event) {
-    if (const std::optional<IncidentKind> kind = incident_of(event.kind)) {
+  options.on_event = [&store, &console, next = options.on_event,
+                      alarms = 0u](const FarmEvent& event) mutable {
+    const std::optional<IncidentKind> kind = incident_of(event.kind);
+    if (kind && (*kind != IncidentKind::kAlarm || alarms++ < kMostAlarms)) {
       // The run goes on when it cannot be written, as with the live row.
       if (Status s = store.add_incident(*kind, event.text); !s) console.error(s.error());
     }

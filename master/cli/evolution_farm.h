@@ -15,7 +15,8 @@
 namespace gapfarm {
 
 // Keeps what a farm reports as lost or contradictory in the store, besides what `options` does with
-// it.  `store` and `console` outlive the farm.
+// it.  Of the alarms only the first hundred: each costs a disk write, and a machine that computes
+// wrongly raises one after the other.  `store` and `console` outlive the farm.
 void keep_incidents(RunStore& store, Console& console, SocketFarmOptions& options);
 
 // Keeps the store's live row and the terminal's progress line fresh, about once a second.

@@ -1,4 +1,6 @@
 // worker/evaluate.h without Bullet: answers at once, or ends the process or hangs when told to.
+// A machine that computes wrongly has GAPFARM_FAKE_ERROR in its environment: what it adds to a
+// fitness.
 #include "worker/evaluate.h"
 
 #include <time.h>
@@ -16,6 +18,11 @@ class FakePrepared : public PreparedProblem {
  private:
   Problem problem_;
 };
+
+double error() {
+  static const char* const text = getenv("GAPFARM_FAKE_ERROR");
+  return text != nullptr ? strtod(text, nullptr) : 0;
+}
 
 // Of this thread: time for which others had the core is no work.
 double cpu_seconds() {
@@ -47,7 +54,7 @@ v1::TaskResult evaluate(const PreparedProblem* prepared, const v1::Task& task, S
     result.set_outcome(v1::INVALID_REQUEST);
   } else {
     result.set_message(prepared->problem().scenario);
-    result.mutable_evaluate()->set_fitness(2 * task.evaluate().point().genome(0));
+    result.mutable_evaluate()->set_fitness(2 * task.evaluate().point().genome(0) + error());
   }
   return result;
 }

@@ -1,5 +1,5 @@
-// A genome that ends three workers is given up, named with the reason, and not forgotten by the
-// masters that come after.
+// What a run keeps of its troubles: genomes that were given up, answers that differ.  None of it is
+// forgotten by the masters that come after.
 #include <gmock/gmock.h>
 #include <poll.h>
 #include <signal.h>
@@ -118,6 +118,36 @@ TEST_F(Quarantine, IsReportedAndOutlivesTheMaster) {
   const std::string screen = gapfarm_command({"status", run_}).out;
   EXPECT_THAT(screen, HasSubstr("given up    1 task\n"));
   EXPECT_THAT(screen, HasSubstr("generation 1: evaluation of birth"));
+}
+
+// One of two machines computes wrongly, and everything is done twice.
+TEST_F(Quarantine, AnAlarmNamesBothSides) {
+  const std::string workers =
+      folder_.write("workers.sh",
+                    "#!/bin/sh\n"
+                    "case \"$*\" in *-1.*) export GAPFARM_FAKE_ERROR=1e-9 ;; esac\n"
+                    "exec " GAPFARM_BIN_DIR "/gapfarm-fake-worker \"$@\"\n");
+  std::filesystem::permissions(workers, std::filesystem::perms::owner_all);
+  std::ofstream(config_, std::ios::app) << "[farm]\naudit_share = 1.0\n";
+  RunningProgram master(
+      "gapfarm", {"evolve", config_, "--out", run_, "--generations", "1000000", "--workers", "2"},
+      {"GAPFARM_WORKER=" + workers});
+  while (status().value("incidents", json::array()).empty()) {
+    ASSERT_NE(state_of(master.pid()), 'Z') << master.err();
+    ::poll(nullptr, 0, 20);
+  }
+  master.send(SIGINT);
+  EXPECT_EQ(master.wait().exit_code, kStopped);
+  const json stopped = status();
+  EXPECT_EQ(stopped["incidents"][0]["kind"], "alarm");
+  const std::string text = stopped["incidents"][0]["text"];
+  EXPECT_THAT(text, HasSubstr("two answers"));
+  EXPECT_THAT(text, HasSubstr("-1.1 on "));
+  EXPECT_THAT(text, HasSubstr("-2.1 on "));
+  EXPECT_GE(stopped["farm"]["alarms"], 1);
+  EXPECT_GE(stopped["farm"]["compared"], stopped["farm"]["alarms"]);
+  EXPECT_EQ(stopped["quarantined"], 0);
+  EXPECT_THAT(gapfarm_command({"status", run_}).out, HasSubstr("alarms      two answers"));
 }
 
 }  // namespace
