@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "common/trials/files.h"
+#include "master/diagnose/aliases.h"
 
 namespace gapfarm {
 namespace {
@@ -20,7 +21,11 @@ std::vector<std::string> diagnose_command(const OpenCase& open, std::size_t numb
   if (!settings.model_path.empty()) {
     words.insert(words.end(), {"--model", settings.model_path});
   }
-  if (!open.left_out.empty()) words.insert(words.end(), {"--leave-out", open.left_out});
+  if (!open.left_out.empty()) {
+    // An effect that passes for another one is no stranger while the other one is there.
+    words.insert(words.end(), {"--leave-out", open.left_out});
+    for (const std::string& alias : constant_aliases(open.left_out)) words.push_back(alias);
+  }
   return words;
 }
 

@@ -196,7 +196,7 @@ void declare_cases(CLI::App& app, BlindCheckOptions& options) {
   app.add_option("--nulls", options.nulls, "Cases without any effect");
   app.add_option("--pairs", options.pairs, "Cases with two effects");
   app.add_option("--left-out", options.left_out,
-                 "Cases whose effect the diagnosis has to do without");
+                 "Cases whose effect, and what passes for it, the diagnosis has to do without");
   app.add_option("--trials", options.trials, "Trials a case (default: as [simulate] says)")
       ->check(CLI::Range(1, 1000000));
   app.add_option("--like", options.like, "Repeat the plan of this trial log");

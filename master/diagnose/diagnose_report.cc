@@ -10,44 +10,13 @@
 #include "common/score/statistics.h"
 #include "master/diagnose/diagnose_steps.h"
 #include "master/diagnose/findings.h"
+#include "master/diagnose/intervals.h"
 #include "master/diagnose/where.h"
 
 namespace gapfarm {
 namespace {
 
-constexpr double kNormal90 = 1.645;
 constexpr int kBootstraps = 400;
-
-// Relative standard deviation of an effect's size between simulations that share the effect but not
-// the contact of treads and floor (docs/diagnosis.md); of others it is below the data's own.
-const std::map<std::string, double> kModelError = {
-    {"motor_asymmetry", 0.03},   {"battery_sag", 0.03},       {"backlash", 0.1},
-    {"camera_aspect", 0.02},     {"camera_distortion", 0.03}, {"camera_seam", 0.05},
-    {"com_offset", 0.15},        {"floor_nap", 0.2},          {"floor_tilt", 0.3},
-    {"heading_offset", 0.03},    {"motor_deadband", 0.1},     {"motor_lag", 0.4},
-    {"rolling_resistance", 0.3}, {"timing_offset", 0.06},     {"marker_offset", 0.03}};
-
-// What was searched rather than fitted may be a neighbour of the best.  A patch's mark changes
-// within a few cm and has several hills when it is weak: standard deviation of its place and
-// radius, and of its ratio's distance from 1 as a share, for a gain of half a nat.
-constexpr double kPatchPlace_m = 0.25;
-constexpr double kPatchRatio = 1;
-constexpr double kSeamStep_m = 0.005;  // to which a seam's position is searched
-
-// Standard deviation of a parameter beyond what the fit says, in its unit.
-double search_error(const Parameter& p, double value, double gain) {
-  const double weakness = 1 / std::sqrt(2 * std::max(gain, 1.0));
-  if (p.key == "friction_patch.ratio") return kPatchRatio * weakness * (value - p.nominal);
-  if (p.effect == "friction_patch") return kPatchPlace_m * weakness;
-  return p.key == "camera_seam.position" ? kSeamStep_m : 0;
-}
-
-// Relative to the effect's size.
-double model_error(const Parameter& p, double value) {
-  const bool angle = p.unit == "rad" && p.key != "floor_tilt.angle";
-  if (angle || !kModelError.count(p.effect)) return 0;
-  return kModelError.at(p.effect) * (value - p.nominal);
-}
 
 double mean_of(const std::vector<double>& values) {
   double sum = 0;
@@ -134,7 +103,8 @@ Status DiagnosisRun::refit() {
   for (const JointFit& fit : nested_) {
     nested_scores_.push_back(held_out_scores(study_, fit, folds, share));
   }
-  floor_ = floor_score(study_, share);
+  // A perfect prediction also knows that a side slips now and then.
+  floor_ = floor_score(study_, share) + slip_.gain / static_cast<double>(study_.size());
   return {};
 }
 
@@ -203,14 +173,13 @@ NamedEffect DiagnosisRun::named(std::size_t k, const JointFit& estimates) const 
     const Parameter& p = problem_.table()[row];
     if (p.effect != effect.name || p.kind != ParameterKind::kReal) continue;
     Estimate e{p.key.substr(p.key.find('.') + 1), value, value, value, p.unit};
-    double fit_error = 0, model = 0;
+    double fit_error = 0;
     for (const FittedParameter& fitted : estimates.parameters) {
-      if (fitted.row != row) continue;
-      fit_error = fitted.standard_error * std::sqrt(scale_);
-      model = model_error(p, value);
+      if (fitted.row == row) fit_error = fitted.standard_error * std::sqrt(scale_);
     }
-    const double search = search_error(p, value, chosen.candidate.gain);
-    const double half = kNormal90 * std::hypot(fit_error, model, search);
+    const double half =
+        kNormal90 * std::hypot(fit_error, error_beyond_fit(study_, problem_.table(), row,
+                                                           estimates.at, chosen.candidate.gain));
     e.lo = value - half;
     e.hi = value + half;
     effect.parameters.push_back(e);

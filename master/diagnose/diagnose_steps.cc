@@ -74,7 +74,9 @@ Status DiagnosisRun::look_for_latency() {
   for (const Eigen::Vector3d& d : differences(study_, ends->front(), kStep_s)) {
     velocity.push_back(-d);
   }
-  latency_ = fit_latency(study_.gaps, velocity, study_.noise.pose, study_.size());
+  const std::vector<ReadingGap> gaps =
+      late_reading_gaps(study_.trials, velocity, study_.noise.pose);
+  latency_ = fit_latency(gaps, velocity, study_.noise.pose, study_.size());
   if (latency_.gain < kLeastLatencyGain) return {};
   std::vector<Eigen::Vector3d> late;
   for (std::size_t i = 0; i < study_.size(); ++i) {

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "common/score/density.h"
+#include "master/diagnose/seam.h"
 
 namespace gapfarm {
 namespace {
@@ -203,6 +204,7 @@ std::map<std::string, double> start_values(const Study& study, const Regression&
     // Slopes were about the middle; the catalogue's are about zero.
     const Eigen::Vector2d middle = middle_of(study);
     const double along = signature.fixed.at("camera_seam.axis") == 0 ? middle.y() : middle.x();
+    values["camera_seam.position"] = seam_position(study, others, signature, c.head<4>());
     values["camera_seam.offset_x"] -= along * values["camera_seam.slope_x"];
     values["camera_seam.offset_y"] -= along * values["camera_seam.slope_y"];
   }

@@ -6,6 +6,9 @@
 #include <map>
 #include <utility>
 
+#include "master/diagnose/aliases.h"
+#include "master/diagnose/seam.h"
+
 namespace gapfarm {
 namespace {
 
@@ -25,22 +28,12 @@ const Family kFamilies[] = {
     {{"motor_deadband", "rolling_resistance", "timing_offset", "motor_lag"}, 0.75},
     {{"floor_tilt", "floor_nap"}, 0.15},
 };
+constexpr double kSeamStep_m = 0.005;
+constexpr int kSeamSteps = 10;
 constexpr int kMostPatchSearches = 4;
 constexpr double kWorthRelinearising = 40;  // nats: curvature of weaker effects is below the noise
 constexpr int kMostRelinearised = 4;
 constexpr std::size_t kOffered = 6;  // candidates kept of a step
-// Turn alike in any data of rest poses.
-constexpr std::pair<const char*, const char*> kAlwaysAliases[] = {
-    {"motor_deadband", "rolling_resistance"},
-    {"com_offset", "marker_offset"},
-    {"timing_offset", "motor_lag"}};  // how hard the motors brake decides what lag leaves behind
-
-bool always_aliases(const std::string& a, const std::string& b) {
-  return std::any_of(std::begin(kAlwaysAliases), std::end(kAlwaysAliases), [&](const auto& pair) {
-    return (a == pair.first && b == pair.second) || (a == pair.second && b == pair.first);
-  });
-}
-
 Patch patch_of(const Signature& s) {
   return {s.fixed.at("friction_patch.x"), s.fixed.at("friction_patch.y"),
           s.fixed.at("friction_patch.radius"), s.fixed.at("friction_patch.ratio")};
@@ -75,15 +68,14 @@ std::set<std::string> names_of(const std::vector<EffectCandidate>& chosen,
 void Selector::look_for_patches() { sketch_.emplace(predictor_.problem(), study_); }
 
 EffectCandidate Selector::refine_seam(const Regression& explained, EffectCandidate best) const {
+  // The gain jumps as readings change sides, so everything near is tried.
   const int axis = static_cast<int>(best.signature.fixed.at("camera_seam.axis"));
-  for (double step : {0.02, 0.01, 0.005}) {
-    const double position = best.signature.fixed.at("camera_seam.position");
-    for (double sign : {-1.0, 1.0}) {
-      Signature s = seam_signature(study_, axis, position + sign * step);
-      study_.drop_ignored(s.columns);
-      const double gain = net_gain(explained, s);
-      if (gain > best.gain) best = {gain, std::move(s)};
-    }
+  const double coarse = best.signature.fixed.at("camera_seam.position");
+  for (int k = -kSeamSteps; k <= kSeamSteps; ++k) {
+    Signature s = seam_signature(study_, axis, coarse + k * kSeamStep_m);
+    study_.drop_ignored(s.columns);
+    const double gain = net_gain(explained, s);
+    if (gain > best.gain) best = {gain, std::move(s)};
   }
   return best;
 }
@@ -278,7 +270,9 @@ Result<std::vector<Alias>> Selector::aliases_of(const std::vector<Signature>& fi
   for (const EffectCandidate& other : *others) {
     const double parallel = cosine(own, r.explained(other.signature.columns));
     const bool as_good = chosen[i].gain - other.gain < 4 && other.gain > kLeastGain / 2;
-    const bool always = always_aliases(chosen[i].signature.effect, other.signature.effect);
+    const auto& constant = constant_aliases(chosen[i].signature.effect);
+    const bool always =
+        std::find(constant.begin(), constant.end(), other.signature.effect) != constant.end();
     if (parallel > kAliasCosine || as_good || always)
       aliases.push_back({other.signature.effect, parallel});
     if (aliases.size() == 3) break;

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "master/diagnose/seam.h"
+
 namespace gapfarm {
 namespace {
 
@@ -293,36 +295,6 @@ Result<std::vector<Signature>> signatures(Predictor& predictor, const Study& stu
            std::find(left_out.begin(), left_out.end(), s.effect) != left_out.end();
   });
   return found;
-}
-
-Signature seam_signature(const Study& study, int axis, double position_m) {
-  const Eigen::Vector2d middle = middle_of(study);
-  std::vector<Eigen::VectorXd> columns;
-  for (bool sloped : {false, true}) {
-    for (int component = 0; component < 2; ++component) {
-      std::vector<Eigen::Vector3d> d(study.size(), Eigen::Vector3d::Zero());
-      const auto shift = [&](const Pose& X) {
-        if ((axis == 0 ? X.x : X.y) <= position_m) return 0.0;
-        return sloped ? (axis == 0 ? X.y - middle.y() : X.x - middle.x()) : 1.0;
-      };
-      for (std::size_t i = 0; i < d.size(); ++i) {
-        const ResidualTrial& t = study.trials[i];
-        const double jump = shift(t.X_WP) - shift(t.X_WS);
-        const double c = std::cos(t.X_WP.theta), s = std::sin(t.X_WP.theta);
-        d[i] = component == 0 ? Eigen::Vector3d(c * jump, -s * jump, 0)
-                              : Eigen::Vector3d(s * jump, c * jump, 0);
-      }
-      columns.push_back(study.whiten(d));
-    }
-  }
-  Signature s;
-  s.effect = "camera_seam";
-  s.columns = stack(columns);
-  s.parameters = {"camera_seam.offset_x", "camera_seam.offset_y", "camera_seam.slope_x",
-                  "camera_seam.slope_y"};
-  s.fixed = {{"camera_seam.axis", axis}, {"camera_seam.position", position_m}};
-  s.penalty = 6.5;
-  return s;
 }
 
 Result<std::vector<Signature>> patch_signatures(Predictor& predictor, const Study& study,

@@ -34,9 +34,6 @@ bool depends_on_contact(const std::string& effect);
 // Each column in three, one a kind of drive; those of nothing but zeros left out.
 Eigen::MatrixXd split_by_kind(const Study& study, const Eigen::MatrixXd& columns);
 
-// Shift of the readings beyond a line: two offsets, then two slopes along it about `middle`.
-Signature seam_signature(const Study& study, int axis, double position_m);
-
 // Discs of floor {x, y, radius, ratio}; simulated trial by trial where they can matter.
 Result<std::vector<Signature>> patch_signatures(Predictor& predictor, const Study& study,
                                                 const std::vector<std::array<double, 4>>& places);

@@ -1,0 +1,75 @@
+#include "master/diagnose/seam.h"
+
+#include <cmath>
+#include <vector>
+
+namespace gapfarm {
+
+Signature seam_signature(const Study& study, int axis, double position_m) {
+  const Eigen::Vector2d middle = middle_of(study);
+  Signature seam;
+  seam.columns.resize(static_cast<Eigen::Index>(3 * study.size()), 4);
+  Eigen::Index column = 0;
+  for (bool sloped : {false, true}) {
+    for (int component = 0; component < 2; ++component) {
+      std::vector<Eigen::Vector3d> d(study.size(), Eigen::Vector3d::Zero());
+      const auto shift = [&](const Pose& X) {
+        if ((axis == 0 ? X.x : X.y) <= position_m) return 0.0;
+        return sloped ? (axis == 0 ? X.y - middle.y() : X.x - middle.x()) : 1.0;
+      };
+      for (std::size_t i = 0; i < d.size(); ++i) {
+        const ResidualTrial& t = study.trials[i];
+        const double jump = shift(t.X_WP) - shift(t.X_WS);
+        const double c = std::cos(t.X_WP.theta), s = std::sin(t.X_WP.theta);
+        d[i] = component == 0 ? Eigen::Vector3d(c * jump, -s * jump, 0)
+                              : Eigen::Vector3d(s * jump, c * jump, 0);
+      }
+      seam.columns.col(column++) = study.whiten(d);
+    }
+  }
+  seam.effect = "camera_seam";
+  seam.parameters = {"camera_seam.offset_x", "camera_seam.offset_y", "camera_seam.slope_x",
+                     "camera_seam.slope_y"};
+  seam.fixed = {{"camera_seam.axis", axis}, {"camera_seam.position", position_m}};
+  seam.penalty = 6.5;
+  return seam;
+}
+
+double seam_position(const Study& study, const Regression& others, const Signature& seam,
+                     const Eigen::Vector4d& coefficients) {
+  constexpr double kStep_m = 0.0025;
+  const bool across_x = seam.fixed.at("camera_seam.axis") == 0;
+  const Eigen::Vector2d middle = middle_of(study);
+  const auto shift = [&](const Pose& X, double line) {
+    if ((across_x ? X.x : X.y) <= line) return Pose{};
+    const double along = across_x ? X.y - middle.y() : X.x - middle.x();
+    return Pose{coefficients[0] + coefficients[2] * along,
+                coefficients[1] + coefficients[3] * along, 0};
+  };
+  const double about = seam.fixed.at("camera_seam.position");
+  const double reach = std::abs(coefficients[across_x ? 0 : 1]) + 4 * kStep_m;
+  double best = about, least = INFINITY;
+  for (double line = about - reach; line <= about + reach; line += kStep_m) {
+    std::vector<Eigen::Vector3d> d;
+    for (const ResidualTrial& t : study.trials) {
+      Pose start = t.X_WS;
+      for (int round = 0; round < 3; ++round) {  // as the simulated camera's readings are undone
+        const Pose s = shift(start, line);
+        start = {t.X_WS.x - s.x, t.X_WS.y - s.y, t.X_WS.theta};
+      }
+      const Pose end = start * between(t.X_WS, t.X_WP);
+      const Pose s = shift(end, line);
+      d.push_back(local_difference(t.X_WP, {end.x + s.x, end.y + s.y, end.theta}));
+    }
+    Eigen::VectorXd mark = study.whiten(d);
+    study.drop_ignored(mark);
+    // What would be left with this mark taken out, less what is left without.
+    const double change = others.own_squares(mark) - 2 * mark.dot(others.left());
+    if (change >= least) continue;
+    least = change;
+    best = line;
+  }
+  return best;
+}
+
+}  // namespace gapfarm
