@@ -165,11 +165,11 @@ int run_diagnose(const DiagnoseCommand& command, CliContext& context) {
     return failed(result.error(), context);
   }
   add_provenance(*config, command, &result->diagnosis);
-  for (const auto& [fit, at] : result->fits) {
+  const std::string hash = problem_hash(to_proto(config->problem));
+  for (const auto& [fit, tasks] : result->fits) {
     result->diagnosis.provenance.emplace_back(
-        "predictions of " + fit,
-        std::string(kAnswers) + ", question " +
-            answers->key(problem_hash(to_proto(config->problem)), predict_task(at, true)));
+        "predictions of " + fit, fmt::format("{}, question {} and the {} after it", kAnswers,
+                                             answers->key(hash, tasks.front()), tasks.size() - 1));
   }
   if (Status s = write_all(*config, command, *result); !s) return failed(s.error(), context);
   context.console.print(summary(result->diagnosis));

@@ -27,8 +27,9 @@ struct DiagnosisResult {
   ParameterValues final_;  // with the named effects
   // 90 % intervals of `final_`; lo > hi where there is none.
   std::vector<std::pair<double, double>> intervals;
-  // The fits behind the gaps: "the tuned base", "base and floor_tilt", ...
-  std::vector<std::pair<std::string, Overrides>> fits;
+  // The fits behind the gaps ("the tuned base", "the tuned base, floor_tilt", ...) and the farm's
+  // tasks that predicted them.
+  std::vector<std::pair<std::string, std::vector<v1::Task>>> fits;
 };
 
 // Errors: an empty log, an effect to leave out that the catalogue does not have, the farm's.

@@ -83,7 +83,7 @@ Status DiagnosisRun::refit_nested() {
     for (std::size_t k = 0; k < effects.size(); ++k) {
       name += (k == 0 ? ", " : " and ") + effects[k].signature.effect;
     }
-    result_.fits.emplace_back(name, fit->at);
+    result_.fits.emplace_back(name, predictor_.tasks(fit->at));
     nested_.push_back(std::move(*fit));
   }
   return {};

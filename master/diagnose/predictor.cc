@@ -1,7 +1,27 @@
 #include "master/diagnose/predictor.h"
 
+#include <algorithm>
+#include <numeric>
+#include <set>
+#include <tuple>
+
 namespace gapfarm {
 namespace {
+
+constexpr std::size_t kTasks = 16;  // of a batch: enough for eight workers to end together
+constexpr std::size_t kMostParts = 8;
+
+v1::Task task_of(const Overrides& at, const std::vector<std::uint32_t>& trials, bool means_only) {
+  v1::Task task;
+  task.mutable_predict()->set_means_only(means_only);
+  task.mutable_predict()->mutable_trials()->Add(trials.begin(), trials.end());
+  for (const auto& [row, value] : at) {
+    v1::Override* to = task.mutable_predict()->mutable_point()->add_overrides();
+    to->set_parameter(static_cast<std::uint32_t>(row));
+    to->set_value(value);
+  }
+  return task;
+}
 
 Error bad_point(const Problem& problem, const Overrides& at, const v1::TaskResult& result) {
   std::string text = "the simulation ended with " + v1::Outcome_Name(result.outcome()) + " (" +
@@ -14,44 +34,89 @@ Error bad_point(const Problem& problem, const Overrides& at, const v1::TaskResul
 
 }  // namespace
 
-v1::Task predict_task(const Overrides& at, bool means_only) {
-  v1::Task task;
-  task.mutable_predict()->set_means_only(means_only);
-  for (const auto& [row, value] : at) {
-    v1::Override* to = task.mutable_predict()->mutable_point()->add_overrides();
-    to->set_parameter(static_cast<std::uint32_t>(row));
-    to->set_value(value);
+Predictor::Predictor(Farm& farm, const Problem& problem)
+    : farm_(farm), problem_(problem), hash_(farm.add_problem(to_proto(problem))) {
+  const std::vector<Trial>& trials = problem.log.trials;
+  by_condition_.resize(trials.size());
+  std::iota(by_condition_.begin(), by_condition_.end(), 0);
+  const auto condition = [&](std::uint32_t i) {
+    return std::tie(trials[i].command, trials[i].left, trials[i].right, trials[i].duration_s);
+  };
+  std::stable_sort(by_condition_.begin(), by_condition_.end(),
+                   [&](auto a, auto b) { return condition(a) < condition(b); });
+}
+
+std::vector<std::vector<std::uint32_t>> Predictor::parts_of(const PredictionRequest& request,
+                                                            std::size_t parts) const {
+  if (parts == 1) return {request.trials};
+  std::vector<std::uint32_t> trials = by_condition_;
+  if (!request.trials.empty()) {
+    const std::set<std::uint32_t> wanted(request.trials.begin(), request.trials.end());
+    std::erase_if(trials, [&](std::uint32_t i) { return !wanted.count(i); });
   }
-  return task;
+  std::vector<std::vector<std::uint32_t>> cut;
+  parts = std::min(parts, std::max<std::size_t>(trials.size(), 1));
+  for (std::size_t p = 0; p < parts; ++p) {
+    const auto at = [&](std::size_t part) {
+      return trials.begin() + static_cast<std::ptrdiff_t>(part * trials.size() / parts);
+    };
+    cut.emplace_back(at(p), at(p + 1));
+  }
+  return cut;
+}
+
+std::vector<v1::Task> Predictor::tasks(const Overrides& at) const {
+  std::vector<v1::Task> tasks;
+  for (const auto& part : parts_of({at, {}}, kMostParts)) tasks.push_back(task_of(at, part, true));
+  return tasks;
 }
 
 Result<std::vector<std::vector<Pose>>> Predictor::ends(
     const std::vector<PredictionRequest>& requests) {
   std::vector<v1::Task> tasks;
-  for (const PredictionRequest& request : requests) {
-    tasks.push_back(predict_task(request.at, true));
-    tasks.back().mutable_predict()->mutable_trials()->Add(request.trials.begin(),
-                                                          request.trials.end());
+  std::vector<std::pair<std::size_t, std::vector<std::uint32_t>>> asked;  // request, trials
+  for (std::size_t k = 0; k < requests.size(); ++k) {
+    // As many whoever works, so that the answers do not depend on it.
+    const std::size_t parts = std::clamp<std::size_t>(kTasks / requests.size(), 1, kMostParts);
+    for (std::vector<std::uint32_t>& part : parts_of(requests[k], parts)) {
+      tasks.push_back(task_of(requests[k].at, part, true));
+      asked.emplace_back(k, std::move(part));
+    }
   }
   simulation_failed_ = false;
   const auto results = farm_.run(hash_, tasks);
   if (!results) return results.error();
   predictions_ += requests.size();
-  std::vector<std::vector<Pose>> ends;
+  std::vector<std::vector<Pose>> ends(requests.size());
   for (std::size_t k = 0; k < requests.size(); ++k) {
-    const v1::TaskResult& result = (*results)[k];
+    if (!requests[k].trials.empty())
+      ends[k].resize(requests[k].trials.size());
+    else
+      ends[k].resize(problem_.log.trials.size());
+  }
+  for (std::size_t t = 0; t < tasks.size(); ++t) {
+    const auto& [k, part] = asked[t];
+    const v1::TaskResult& result = (*results)[t];
     if (result.outcome() != v1::OK) {
       simulation_failed_ = true;
       return bad_point(problem_, requests[k].at, result);
     }
-    std::vector<Pose>& to = ends.emplace_back();
-    for (const v1::Predicted& p : result.predict().predictions()) to.push_back(from_proto(p.end()));
+    const std::vector<std::uint32_t>& wanted = requests[k].trials;
+    for (int i = 0; i < result.predict().predictions_size(); ++i) {
+      const auto at = static_cast<std::size_t>(i);
+      std::size_t place = part.empty() ? at : part[at];  // no list: all of the log
+      if (!wanted.empty()) {
+        place = static_cast<std::size_t>(std::lower_bound(wanted.begin(), wanted.end(), part[at]) -
+                                         wanted.begin());
+      }
+      ends[k][place] = from_proto(result.predict().predictions(i).end());
+    }
   }
   return ends;
 }
 
 Result<std::vector<double>> Predictor::log_scores(const Overrides& at) {
-  const auto results = farm_.run(hash_, {predict_task(at, false)});
+  const auto results = farm_.run(hash_, {task_of(at, {}, false)});
   if (!results) return results.error();
   ++predictions_;
   const v1::TaskResult& result = results->front();

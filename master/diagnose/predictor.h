@@ -18,23 +18,22 @@ using Overrides = std::map<std::size_t, double>;
 
 struct PredictionRequest {
   Overrides at;
-  std::vector<std::uint32_t> trials;  // empty: all
+  std::vector<std::uint32_t> trials;  // ascending; empty: all
 };
-
-// The farm's task behind a request for all trials.
-v1::Task predict_task(const Overrides& at, bool means_only);
 
 class Predictor {
  public:
-  Predictor(Farm& farm, const Problem& problem)
-      : farm_(farm), problem_(problem), hash_(farm.add_problem(to_proto(problem))) {}
+  Predictor(Farm& farm, const Problem& problem);
 
   const Problem& problem() const { return problem_; }
   std::uint64_t predictions() const { return predictions_; }
 
-  // Predicted measured end poses, one a trial asked for, of each request.  Errors: the farm's, and
-  // a simulation that did not end well (its point is named).
+  // Predicted measured end poses, one a trial asked for, of each request.  Few requests are cut
+  // into tasks of some conditions each, so that many workers have something to do.  Errors: the
+  // farm's, and a simulation that did not end well (its point is named).
   Result<std::vector<std::vector<Pose>>> ends(const std::vector<PredictionRequest>& requests);
+  // The farm's tasks behind a lone request for all trials.
+  std::vector<v1::Task> tasks(const Overrides& at) const;
   // Whether the last error of ends() was a simulation's rather than the farm's.
   bool simulation_failed() const { return simulation_failed_; }
 
@@ -42,9 +41,13 @@ class Predictor {
   Result<std::vector<double>> log_scores(const Overrides& at);
 
  private:
+  std::vector<std::vector<std::uint32_t>> parts_of(const PredictionRequest& request,
+                                                   std::size_t parts) const;
+
   Farm& farm_;
   const Problem& problem_;
   std::string hash_;
+  std::vector<std::uint32_t> by_condition_;  // trials, those that share a simulation in a row
   std::uint64_t predictions_ = 0;
   bool simulation_failed_ = false;
 };

@@ -80,43 +80,49 @@ EffectCandidate Selector::refine_seam(const Regression& explained, EffectCandida
   return best;
 }
 
-// Simulates discs; they join the catalogue.
-Status Selector::simulate_patches(const Regression& explained, const std::vector<Patch>& patches,
-                                  EffectCandidate* best) {
+// Simulates discs, in their order; they join the catalogue.
+Result<std::vector<EffectCandidate>> Selector::simulate_patches(const Regression& explained,
+                                                                const std::vector<Patch>& patches) {
   auto found = patch_signatures(predictor_, study_, patches);
   if (!found) return found.error();
+  std::vector<EffectCandidate> simulated;
   for (Signature& s : *found) {
     study_.drop_ignored(s.columns);
-    const double gain = net_gain(explained, s);
-    if (gain > best->gain) *best = {gain, s};
+    simulated.push_back({net_gain(explained, s), s});
     catalogue_.push_back(std::move(s));
   }
-  return {};
+  return simulated;
 }
 
 // A disc that the sketch proposes, moved to where the simulation explains most: every step tries
 // both ways along x, y, radius and ratio, then all that helped at once.
-Status Selector::refine_patch(const Regression& explained, EffectCandidate* best) {
+Status Selector::refine_patch(const Regression& explained, EffectCandidate best) {
   for (double step : {0.04, 0.02, 0.01}) {
-    const EffectCandidate before = *best;
-    const Patch from = patch_of(before.signature);
-    Patch together = from;
-    for (std::size_t k = 0; k < 4; ++k) {
-      const auto moved = [&](double sign) {
-        Patch to = from;
-        to[k] = k < 3 ? from[k] + sign * step : from[k] * std::pow(1 + 6 * step, sign);
-        to[2] = std::max(to[2], 0.05);
-        to[3] = std::clamp(to[3], 0.06, 2.9);
-        return to;
-      };
-      EffectCandidate own = before;
-      if (Status s = simulate_patches(explained, {moved(1), moved(-1)}, &own); !s) return s;
-      together[k] = patch_of(own.signature)[k];
-      if (own.gain > best->gain) *best = own;
+    const Patch from = patch_of(best.signature);
+    std::vector<Patch> moves;
+    for (std::size_t k = 0; k < 8; ++k) {
+      const double sign = k % 2 == 0 ? 1 : -1;
+      Patch& to = moves.emplace_back(from);
+      double& moved = to[k / 2];
+      moved = k < 6 ? moved + sign * step : moved * std::pow(1 + 6 * step, sign);
+      to[2] = std::max(to[2], 0.05);
+      to[3] = std::clamp(to[3], 0.06, 2.9);
     }
-    if (Status s = simulate_patches(explained, {together}, best); !s) return s;
+    auto tried = simulate_patches(explained, moves);
+    if (!tried) return tried.error();
+    const double before = best.gain;
+    Patch together = from;
+    for (std::size_t k = 0; k < 8; k += 2) {
+      const EffectCandidate& better =
+          (*tried)[k].gain > (*tried)[k + 1].gain ? (*tried)[k] : (*tried)[k + 1];
+      if (better.gain > before) together[k / 2] = patch_of(better.signature)[k / 2];
+      if (better.gain > best.gain) best = better;
+    }
+    auto all = simulate_patches(explained, {together});
+    if (!all) return all.error();
+    if (all->front().gain > best.gain) best = all->front();
   }
-  refined_patches_.push_back(patch_of(best->signature));
+  refined_patches_.push_back(patch_of(best.signature));
   return {};
 }
 
@@ -139,10 +145,13 @@ Status Selector::search_patches(const Regression& explained, double most_gain) {
   }
   if (starts.empty()) return {};
   ++patch_searches_;
-  EffectCandidate best{-1e9, {}};
-  if (Status s = simulate_patches(explained, starts, &best); !s) return s;
+  auto simulated = simulate_patches(explained, starts);
+  if (!simulated) return simulated.error();
+  const EffectCandidate& best = *std::max_element(
+      simulated->begin(), simulated->end(),
+      [](const EffectCandidate& a, const EffectCandidate& b) { return a.gain < b.gain; });
   if (best.gain + best.signature.penalty < kWorthRefining) return {};
-  return refine_patch(explained, &best);
+  return refine_patch(explained, best);
 }
 
 Result<std::vector<EffectCandidate>> Selector::candidates(const Regression& explained,

@@ -84,9 +84,9 @@ class Selector {
 
  private:
   Status search_patches(const Regression& explained, double most_gain);
-  Status simulate_patches(const Regression& explained, const std::vector<Patch>& patches,
-                          EffectCandidate* best);
-  Status refine_patch(const Regression& explained, EffectCandidate* best);
+  Result<std::vector<EffectCandidate>> simulate_patches(const Regression& explained,
+                                                        const std::vector<Patch>& patches);
+  Status refine_patch(const Regression& explained, EffectCandidate best);
   EffectCandidate refine_seam(const Regression& explained, EffectCandidate best) const;
   Regression without(const std::vector<Signature>& first,
                      const std::vector<EffectCandidate>& chosen, std::size_t leave_out) const;
