@@ -18,6 +18,8 @@ namespace {
 
 constexpr int kBootstraps = 400;
 
+constexpr double kLagError = 0.05;  // of a lag seen in paths, between simulations
+
 double mean_of(const std::vector<double>& values) {
   double sum = 0;
   for (double v : values) sum += v;
@@ -117,6 +119,7 @@ void DiagnosisRun::spread_effects(Overrides* at) const {
   for (const Signature& s : first_) {
     for (const auto& [key, value] : s.fixed) set(key.c_str(), value);
   }
+  if (lag_.gain > 0) set("motor_lag.tau", lag_.tau_s);
   if (slip_.gain > 0) {
     set("slip_events.probability", std::clamp(slip_.probability, 0.0, 0.5));
     set("slip_events.loss", std::clamp(slip_.loss, 0.0, 1.0));
@@ -205,6 +208,11 @@ std::vector<DiagnosisRun::SpreadEffect> DiagnosisRun::spread_effects_found() con
                      latency_.gain,
                      {{"latency", age, 0.8 * age, 1.25 * age, "s"},
                       {"share", share, 0.7 * share, std::min(1.0, 1.4 * share), "-"}}});
+  }
+  if (lag_.gain > 0) {
+    const double half = kNormal90 * std::hypot(lag_.standard_error_s, kLagError * lag_.tau_s);
+    found.push_back(
+        {"motor_lag", lag_.gain, {{"tau", lag_.tau_s, lag_.tau_s - half, lag_.tau_s + half, "s"}}});
   }
   if (slip_.gain > 0) {
     const double p = slip_.probability, loss = slip_.loss;

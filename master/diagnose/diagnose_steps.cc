@@ -15,6 +15,7 @@ namespace gapfarm {
 namespace {
 
 constexpr double kLeastLatencyGain = 14;  // nats; the share and the age are searched on a grid
+constexpr double kLeastLagGain = 14;      // it stands for all samples of a path, which go together
 constexpr double kLeastSlipGain = 11;
 constexpr double kLeastSlipShare = 0.03;  // of what the effects on the means explain
 constexpr double kSlippedSquared = 11.5;  // squared distance with 3 degrees of freedom: one in 110
@@ -90,9 +91,22 @@ Status DiagnosisRun::look_for_latency() {
   return {};
 }
 
+// Where paths were logged they say more of a lag than rest poses do, and have the last word.
+Status DiagnosisRun::look_for_lag() {
+  if (left_out("motor_lag")) return {};
+  auto lag = fit_path_lag(predictor_, study_);
+  if (!lag) return lag.error();
+  lag_ = *lag;
+  if (lag_.gain < kLeastLagGain) lag_.gain = 0;
+  return {};
+}
+
 Status DiagnosisRun::screen() {
   if (Status s = look_for_latency(); !s) return s;
-  auto catalogue = signatures(predictor_, study_, options_.left_out);
+  if (Status s = look_for_lag(); !s) return s;
+  std::vector<std::string> without = options_.left_out;
+  if (lag_.trials > 0) without.emplace_back("motor_lag");
+  auto catalogue = signatures(predictor_, study_, without);
   if (!catalogue) return catalogue.error();
   selector_ = std::make_unique<Selector>(predictor_, study_, std::move(*catalogue), *base_);
   if (!left_out("friction_patch")) selector_->look_for_patches();
@@ -280,6 +294,7 @@ bool DiagnosisRun::too_thin() {
   if (study_.size() >= kFewestTrials) return false;
   first_.clear();
   chosen_.clear();
+  lag_ = {};
   study_.quantum_m = 0;
   result_.diagnosis.verdict = Verdict::kNone;
   result_.diagnosis.cautions.push_back(
@@ -301,12 +316,14 @@ void DiagnosisRun::judge() {
     result_.diagnosis.checks.push_back({l.covariate, l.log10_p, l.excess});
   }
   const bool rounded = study_.quantum_m > kLeastQuantum_m && !left_out("pose_quantisation");
-  const bool named = !first_.empty() || !chosen_.empty() || slip_.gain > 0 || rounded;
+  const bool named =
+      !first_.empty() || !chosen_.empty() || slip_.gain > 0 || lag_.gain > 0 || rounded;
   result_.diagnosis.verdict = judge_verdict(named, nats, leftovers_);
   if (result_.diagnosis.verdict == Verdict::kUnknown) {
     first_.clear();
     chosen_.clear();
     slip_ = {};
+    lag_ = {};
   }
   if (!rounded || result_.diagnosis.verdict == Verdict::kUnknown) study_.quantum_m = 0;
 }

@@ -11,6 +11,7 @@
 #include "master/diagnose/diagnose.h"
 #include "master/diagnose/distribution.h"
 #include "master/diagnose/estimate.h"
+#include "master/diagnose/path_lag.h"
 #include "master/diagnose/selection.h"
 #include "master/diagnose/slip.h"
 #include "master/diagnose/study.h"
@@ -39,6 +40,7 @@ class DiagnosisRun {
   bool too_thin();
   Status rebuild_nuisances();
   Status look_for_latency();
+  Status look_for_lag();
   void fill_screening(const std::vector<EffectCandidate>& candidates);
   Regression explained() const;  // what is left once all that was chosen is explained
   double explained_nats(const Regression& explained) const;
@@ -79,6 +81,7 @@ class DiagnosisRun {
   std::unique_ptr<Regression> base_;  // nuisances only
   std::unique_ptr<Selector> selector_;
   LatencyFit latency_;
+  PathLag lag_;  // by paths
   SlipFit slip_;
   std::vector<Signature> first_;  // explained before anything else
   std::vector<ChosenEffect> chosen_;

@@ -11,15 +11,19 @@ namespace {
 constexpr std::size_t kTasks = 16;  // of a batch: enough for eight workers to end together
 constexpr std::size_t kMostParts = 8;
 
+void fill(const Overrides& at, v1::Point* point) {
+  for (const auto& [row, value] : at) {
+    v1::Override* to = point->add_overrides();
+    to->set_parameter(static_cast<std::uint32_t>(row));
+    to->set_value(value);
+  }
+}
+
 v1::Task task_of(const Overrides& at, const std::vector<std::uint32_t>& trials, bool means_only) {
   v1::Task task;
   task.mutable_predict()->set_means_only(means_only);
   task.mutable_predict()->mutable_trials()->Add(trials.begin(), trials.end());
-  for (const auto& [row, value] : at) {
-    v1::Override* to = task.mutable_predict()->mutable_point()->add_overrides();
-    to->set_parameter(static_cast<std::uint32_t>(row));
-    to->set_value(value);
-  }
+  fill(at, task.mutable_predict()->mutable_point());
   return task;
 }
 
@@ -124,6 +128,32 @@ Result<std::vector<double>> Predictor::log_scores(const Overrides& at) {
   std::vector<double> scores;
   for (const v1::Predicted& p : result.predict().predictions()) scores.push_back(p.log_score());
   return scores;
+}
+
+Result<std::vector<std::vector<PathSample>>> Predictor::paths(
+    const Overrides& at, const std::vector<CommandSpec>& commands, double interval_s) {
+  std::vector<v1::Task> tasks;
+  for (const CommandSpec& command : commands) {
+    v1::TraceTask* trace = tasks.emplace_back().mutable_trace();
+    fill(at, trace->mutable_point());
+    trace->mutable_command()->set_name(command.name);
+    trace->mutable_command()->set_left(command.left);
+    trace->mutable_command()->set_right(command.right);
+    trace->mutable_command()->set_duration(command.duration_s);
+    trace->set_interval(interval_s);
+  }
+  const auto results = farm_.run(hash_, tasks);
+  if (!results) return results.error();
+  predictions_ += tasks.size();
+  std::vector<std::vector<PathSample>> paths;
+  for (const v1::TaskResult& result : *results) {
+    if (result.outcome() != v1::OK) return bad_point(problem_, at, result);
+    std::vector<PathSample>& path = paths.emplace_back();
+    for (const v1::TraceSample& s : result.trace().samples()) {
+      path.push_back({s.t(), from_proto(s.pose())});
+    }
+  }
+  return paths;
 }
 
 }  // namespace gapfarm

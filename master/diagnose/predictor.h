@@ -34,6 +34,10 @@ class Predictor {
   Result<std::vector<std::vector<Pose>>> ends(const std::vector<PredictionRequest>& requests);
   // The farm's tasks behind a lone request for all trials.
   std::vector<v1::Task> tasks(const Overrides& at) const;
+  // Nominal path of each command in its start frame.
+  Result<std::vector<std::vector<PathSample>>> paths(const Overrides& at,
+                                                     const std::vector<CommandSpec>& commands,
+                                                     double interval_s);
   // Whether the last error of ends() was a simulation's rather than the farm's.
   bool simulation_failed() const { return simulation_failed_; }
 

@@ -38,7 +38,7 @@ std::string text_of(const std::string& path) {
 class Diagnose : public ::testing::Test {
  protected:
   void simulate(int trials, const std::vector<std::string>& set, const std::string& seed = "3") {
-    config_ = folder_.write("c.toml", kConfig);
+    config_ = folder_.write("c.toml", kConfig + more_config_);
     std::vector<std::string> arguments = {
         "simulate", config_, "--out", folder_ / "trials.csv", "--trials", std::to_string(trials),
         "--seed",   seed};
@@ -59,6 +59,7 @@ class Diagnose : public ::testing::Test {
 
   TemporaryFolder folder_;
   std::string config_;
+  std::string more_config_;  // goes on with [simulate]
 };
 
 TEST_F(Diagnose, NamesAnEffectWithAnIntervalAndClosesTheGap) {
@@ -76,6 +77,22 @@ TEST_F(Diagnose, NamesAnEffectWithAnIntervalAndClosesTheGap) {
   const Finished predicted = gapfarm_command(
       {"predict", folder_ / "d/model.toml", "--trials", folder_ / "trials.csv", "--out", "-"});
   EXPECT_EQ(predicted.exit_code, 0) << predicted.err;
+}
+
+// Where the robot comes to rest does not depend on the lag; how it gets there does.
+TEST_F(Diagnose, FindsALagInPathsAndNoneWithoutOne) {
+  more_config_ = "path_interval = 0.05\n";
+  simulate(60, {"motor_lag.tau=0.06"});
+  const Json lagging = diagnose();
+  EXPECT_EQ(lagging["verdict"], "effect") << lagging["headline"];
+  ASSERT_EQ(lagging["effects"].size(), 1u);
+  EXPECT_EQ(lagging["effects"][0]["name"], "motor_lag");
+  const Json& tau = lagging["effects"][0]["parameters"]["tau"];
+  EXPECT_LT(tau["lo"], 0.06);
+  EXPECT_GT(tau["hi"], 0.06);
+  EXPECT_LT(tau["hi"].get<double>() - tau["lo"].get<double>(), 0.02);
+  simulate(60, {});
+  EXPECT_EQ(diagnose()["verdict"], "none");
 }
 
 TEST_F(Diagnose, GoesOnWithWhatWasSimulatedAlready) {
