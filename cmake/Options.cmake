@@ -7,7 +7,10 @@ set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
 set(CMAKE_RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bin)
 
 # Asserts stay alive: they are cheap beside a physics step, and they guard our own mistakes.
-set(CMAKE_CXX_FLAGS_RELEASE "-O2 -g1")
+# The sanitizers' presets bring flags of their own.
+if(NOT GAPFARM_SANITIZE)
+  set(CMAKE_CXX_FLAGS_RELEASE "-O2 -g1")
+endif()
 # Results are part of the interface (docs/determinism.md): no contraction, no reassociation.
 add_compile_options(-ffp-contract=off)
 add_compile_options(-Wall -Wextra -Wshadow -Wnon-virtual-dtor -Wcast-align)
