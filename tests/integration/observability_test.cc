@@ -13,6 +13,7 @@
 #include <thread>
 
 #include "master/store/run_reader.h"
+#include "tests/integration/demo_config.h"
 #include "tests/integration/run_program.h"
 
 namespace gapfarm {
@@ -31,19 +32,7 @@ class Observability : public testing::Test {
   }
 
   TemporaryFolder folder_;
-  // Sampled spread: scores draw random numbers, and elites are scored again.
-  const std::string config_ = folder_.write("run.toml", "trials = [\"" GAPFARM_SOURCE_DIR
-                                                        "/configs/demo/trials.csv\"]\n"
-                                                        "[genes]\n"
-                                                        "friction = [0.1, 1.5]\n"
-                                                        "full_speed = [0.1, 0.6]\n"
-                                                        "[parameters]\n"
-                                                        "step_rate = 60\n"
-                                                        "[spread]\n"
-                                                        "kind = \"sampled\"\n"
-                                                        "replicates = 4\n"
-                                                        "[evolution]\n"
-                                                        "population = 8\n");
+  const std::string config_ = folder_.write("run.toml", demo_config(8, 4));
 };
 
 std::vector<json> log_lines(const std::string& text) {

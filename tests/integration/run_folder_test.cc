@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "master/store/database.h"
+#include "tests/integration/demo_config.h"
 #include "tests/integration/run_program.h"
 
 namespace gapfarm {
@@ -58,15 +59,7 @@ class RunFolder : public ::testing::Test {
   const TemporaryFolder folder_;
   const std::string run_ = folder_ / "run";
   const std::string file_ = run_ + "/run.sqlite";
-  const std::string config_ = folder_.write("run.toml", "trials = [\"" GAPFARM_SOURCE_DIR
-                                                        "/configs/demo/trials.csv\"]\n"
-                                                        "[genes]\n"
-                                                        "friction = [0.1, 1.5]\n"
-                                                        "full_speed = [0.1, 0.6]\n"
-                                                        "[parameters]\n"
-                                                        "step_rate = 60\n"
-                                                        "[evolution]\n"
-                                                        "population = 6\n");
+  const std::string config_ = folder_.write("run.toml", demo_config(6));
 };
 
 TEST_F(RunFolder, ReadOnlyIsSaidAndCanStillBeLookedAt) {

@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "master/store/run_reader.h"
+#include "tests/integration/demo_config.h"
 #include "tests/integration/run_program.h"
 
 namespace gapfarm {
@@ -97,23 +98,11 @@ class RunPurity : public ::testing::Test {
   }
 
   const TemporaryFolder folder_;
-  const std::string config_ = folder_.write("run.toml", "trials = [\"" GAPFARM_SOURCE_DIR
-                                                        "/configs/demo/trials.csv\"]\n"
-                                                        "[genes]\n"
-                                                        "friction = [0.1, 1.5]\n"
-                                                        "contact_length = [0.03, 0.12]\n"
-                                                        "full_speed = [0.1, 0.6]\n"
-                                                        "pose_noise_position = [0.0005, 0.03]\n"
-                                                        "[parameters]\n"
-                                                        "step_rate = 60\n"
-                                                        "[spread]\n"
-                                                        "kind = \"sampled\"\n"
-                                                        "replicates = 3\n"
-                                                        "[evolution]\n"
-                                                        "population = 10\n"
-                                                        "[evolution.stop]\n"
-                                                        "generations = " +
-                                                            std::to_string(kGenerations) + "\n");
+  const std::string config_ =
+      folder_.write("run.toml", demo_config(10, 3, kMoreGenes,
+                                            "[evolution.stop]\n"
+                                            "generations = " +
+                                                std::to_string(kGenerations) + "\n"));
 };
 
 TEST_F(RunPurity, HoldsForAnyNumberOfWorkersAndAnyOrder) {

@@ -13,6 +13,7 @@
 #include <random>
 
 #include "master/store/database.h"
+#include "tests/integration/demo_config.h"
 #include "tests/integration/run_program.h"
 
 namespace gapfarm {
@@ -135,24 +136,11 @@ class Soak : public ::testing::Test {
   std::mt19937_64 random_{seed_};
   std::uint64_t killed_workers_ = 0;
   std::vector<std::unique_ptr<RunningProgram>> supervisors_;
-  const std::string config_ = folder_.write("run.toml", "trials = [\"" GAPFARM_SOURCE_DIR
-                                                        "/configs/demo/trials.csv\"]\n"
-                                                        "[genes]\n"
-                                                        "friction = [0.1, 1.5]\n"
-                                                        "contact_length = [0.03, 0.12]\n"
-                                                        "full_speed = [0.1, 0.6]\n"
-                                                        "pose_noise_position = [0.0005, 0.03]\n"
-                                                        "[parameters]\n"
-                                                        "step_rate = 60\n"
-                                                        "[spread]\n"
-                                                        "kind = \"sampled\"\n"
-                                                        "replicates = 3\n"
-                                                        "[evolution]\n"
-                                                        "population = 12\n"
-                                                        "[farm]\n"
-                                                        "heartbeat_interval = 0.1\n"
-                                                        "silence_limit = 1.0\n"
-                                                        "audit_share = 0.05\n");
+  const std::string config_ = folder_.write("run.toml", demo_config(12, 3, kMoreGenes,
+                                                                    "[farm]\n"
+                                                                    "heartbeat_interval = 0.1\n"
+                                                                    "silence_limit = 1.0\n"
+                                                                    "audit_share = 0.05\n"));
 };
 
 TEST_F(Soak, LeavesTheBytesOfAnUndisturbedRun) {
