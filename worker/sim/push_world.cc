@@ -13,7 +13,6 @@ namespace {
 constexpr double kSupportRadius_m = 5e-4;
 // The finger is looked at when it is this near, and may come so much nearer in a step.
 constexpr double kTouchRange_m = 2e-3;
-constexpr double kConverged = 1e-20;     // squared change of velocity, below which sweeps stop
 constexpr double kLeastFriction = 0.05;  // share that a falling friction keeps
 
 btRigidBody::btRigidBodyConstructionInfo still(btCollisionShape* shape) {
@@ -25,24 +24,15 @@ btVector3 flat(const Eigen::Vector2d& p, double z) { return {p[0], p[1], z}; }
 }  // namespace
 
 PushWorld::PushWorld(const PushSettings& settings)
-    : WorldParts(1),
-      btDiscreteDynamicsWorld(&dispatcher, &broadphase, &solver, &configuration),
+    : LeanWorld(1, settings.linear_damping > 0 || settings.angular_damping > 0,
+                settings.solver_iterations),
       settings_(settings),
-      damped_(settings.linear_damping > 0 || settings.angular_damping > 0),
       plane_(btVector3(0, 0, 1), 0),
       support_(kSupportRadius_m * settings.length_scale),
       finger_shape_(settings.finger_radius_m * settings.length_scale),
       plate_(false, static_cast<int>(settings.corners.size())),
       floor_body_(still(&plane_)) {
-  getDispatchInfo().m_useContinuous = false;
   btContactSolverInfo& info = getSolverInfo();
-  info.m_solverMode = SOLVER_USE_WARMSTARTING | SOLVER_USE_2_FRICTION_DIRECTIONS |
-                      SOLVER_ENABLE_FRICTION_DIRECTION_CACHING;
-  info.m_numIterations = settings.solver_iterations;
-  info.m_leastSquaresResidualThreshold = kConverged;
-  info.m_globalCfm = 0;
-  info.m_splitImpulse = 1;
-  info.m_splitImpulsePenetrationThreshold = 0;
   info.m_erp = info.m_erp2 = settings.error_reduction;
   info.m_warmstartingFactor = 1;
   floor_body_.setRestitution(1);  // restitutions multiply
@@ -184,10 +174,6 @@ void PushWorld::place_touch(const Eigen::Vector2d& finger_m, double advance_m, d
     touch_.clearManifold();
   }
   touch_.addManifoldPoint(point);
-}
-
-void PushWorld::predictUnconstraintMotion(btScalar dt_s) {
-  if (damped_) body_->applyDamping(dt_s);
 }
 
 // Friction of the table under a support, along the grain.

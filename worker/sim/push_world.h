@@ -14,7 +14,7 @@ namespace gapfarm {
 // table at the corners of its support plate, where Bullet would put the contacts of a flat plate
 // too, each a small sphere.  Outline and finger meet at their nearest point, found exactly in the
 // plane: Bullet's own search answers with a margin and up to four points of arbitrary height.
-class PushWorld final : private WorldParts, public btDiscreteDynamicsWorld {
+class PushWorld final : public LeanWorld {
  public:
   explicit PushWorld(const PushSettings& settings);
   ~PushWorld() override;
@@ -34,13 +34,6 @@ class PushWorld final : private WorldParts, public btDiscreteDynamicsWorld {
 
  private:
   void solveConstraints(btContactSolverInfo& info) override;
-  void predictUnconstraintMotion(btScalar dt_s) override;
-  void createPredictiveContacts(btScalar /*dt_s*/) override {}
-  void calculateSimulationIslands() override {}
-  void updateActivationState(btScalar /*dt_s*/) override {}
-  void synchronizeMotionStates() override {}
-  void updateAabbs() override {}
-  void computeOverlappingPairs() override {}
 
   void clear();
   void prepare_table_contacts();
@@ -48,7 +41,6 @@ class PushWorld final : private WorldParts, public btDiscreteDynamicsWorld {
   double table_friction(const btVector3& on_table, const btVector3& on_piece) const;
 
   PushSettings settings_;
-  bool damped_;
   Floor table_;
   btStaticPlaneShape plane_;
   btSphereShape support_;

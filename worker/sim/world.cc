@@ -7,8 +7,8 @@
 namespace gapfarm {
 namespace {
 
-// Contacts give a little: load sharing among four supports has one answer instead of many.
 constexpr double kCreepAtRest_m_s = 1.5e-3;  // a standing tread holds, but not like rock
+// Contacts give a little: load sharing among four supports has one answer instead of many.
 constexpr double kContactSoftness = 1e-3;
 // Share of a joint's or contact's position error that a step of full length repairs; a shorter one
 // repairs less, or it would have to move fast.
@@ -27,15 +27,9 @@ btDefaultCollisionConstructionInfo small_pools() {
   return info;
 }
 
-void configure(btContactSolverInfo& info, const SimSettings& settings) {
-  info.m_solverMode = SOLVER_USE_WARMSTARTING | SOLVER_USE_2_FRICTION_DIRECTIONS |
-                      SOLVER_ENABLE_FRICTION_DIRECTION_CACHING;
+int sweeps(const SimSettings& settings) {
   const bool joints = settings.robot == RobotModel::kWheels;
-  info.m_numIterations = settings.solver_iterations * (joints ? kJointIterations : 1);
-  info.m_leastSquaresResidualThreshold = kConverged;
-  info.m_globalCfm = 0;  // joints are stiff, contacts carry their own softness
-  info.m_splitImpulse = 1;
-  info.m_splitImpulsePenetrationThreshold = 0;
+  return settings.solver_iterations * (joints ? kJointIterations : 1);
 }
 
 }  // namespace
@@ -53,17 +47,35 @@ WorldParts::WorldParts(double friction_ratio)
   dispatcher.setDispatcherFlags(0);  // breaking distance absolute: it must not depend on shapes
 }
 
-RobotWorld::RobotWorld(const SimSettings& settings)
-    : WorldParts(settings.friction_ratio),
+LeanWorld::LeanWorld(double friction_ratio, bool damped, int solver_iterations)
+    : WorldParts(friction_ratio),
       btDiscreteDynamicsWorld(&dispatcher, &broadphase, &solver, &configuration),
+      damped_(damped) {
+  getDispatchInfo().m_useContinuous = false;
+  btContactSolverInfo& info = getSolverInfo();
+  info.m_solverMode = SOLVER_USE_WARMSTARTING | SOLVER_USE_2_FRICTION_DIRECTIONS |
+                      SOLVER_ENABLE_FRICTION_DIRECTION_CACHING;
+  info.m_numIterations = solver_iterations;
+  info.m_leastSquaresResidualThreshold = kConverged;
+  info.m_globalCfm = 0;  // joints are stiff, contacts carry their own softness
+  info.m_splitImpulse = 1;
+  info.m_splitImpulsePenetrationThreshold = 0;
+}
+
+void LeanWorld::predictUnconstraintMotion(btScalar dt_s) {
+  if (!damped_) return;
+  for (int i = 0; i < m_nonStaticRigidBodies.size(); ++i) {
+    m_nonStaticRigidBodies[i]->applyDamping(dt_s);
+  }
+}
+
+RobotWorld::RobotWorld(const SimSettings& settings)
+    : LeanWorld(settings.friction_ratio,
+                settings.linear_damping > 0 || settings.angular_damping > 0, sweeps(settings)),
       settings_(settings),
-      damped_(settings.linear_damping > 0 || settings.angular_damping > 0),
       plane_(btVector3(0, 0, 1), 0),
       robot_(settings.robot == RobotModel::kTreads ? make_treads(settings)
-                                                   : make_wheels(settings)) {
-  getDispatchInfo().m_useContinuous = false;
-  configure(getSolverInfo(), settings);
-}
+                                                   : make_wheels(settings)) {}
 
 RobotWorld::~RobotWorld() { clear(); }
 
@@ -113,13 +125,6 @@ void RobotWorld::apply_drag(double dt_s) {
   // impulse, since Bullet's friction rows know nothing of a torque that waits for the step.
   const btVector3 floor_point(0, 0, -body.getCenterOfMassPosition().z());
   body.applyImpulse(settings_.mass_kg * dt_s * btVector3(drag.x(), drag.y(), 0), floor_point);
-}
-
-void RobotWorld::predictUnconstraintMotion(btScalar dt_s) {
-  if (!damped_) return;
-  for (int i = 0; i < m_nonStaticRigidBodies.size(); ++i) {
-    m_nonStaticRigidBodies[i]->applyDamping(dt_s);
-  }
 }
 
 // Writes friction and the surface's own speed into every contact with the floor.

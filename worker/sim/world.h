@@ -55,10 +55,28 @@ struct WorldParts {
   EllipseFrictionSolver solver;
 };
 
-// Bullet's step without what one robot on an unbounded plane never needs: no islands, no sleeping,
-// no motion states, and no search for new pairs (every pair has the plane, whose bounding box is
-// unbounded, so pairs last from insertion to removal).
-class RobotWorld final : private WorldParts, public btDiscreteDynamicsWorld {
+// Bullet's step without what a few bodies on an unbounded plane never need: no islands, no
+// sleeping, no motion states, and no search for new pairs (every pair has the plane, whose bounding
+// box is unbounded, so pairs last from insertion to removal).
+class LeanWorld : protected WorldParts, public btDiscreteDynamicsWorld {
+ protected:
+  // `damped`: some body has linear or angular damping.
+  LeanWorld(double friction_ratio, bool damped, int solver_iterations);
+
+ private:
+  void predictUnconstraintMotion(btScalar dt_s) override;
+  void createPredictiveContacts(btScalar /*dt_s*/) override {}
+  void calculateSimulationIslands() override {}
+  void updateActivationState(btScalar /*dt_s*/) override {}
+  void synchronizeMotionStates() override {}
+  void updateAabbs() override {}
+  void computeOverlappingPairs() override {}
+
+  bool damped_;
+};
+
+// One robot on the floor.
+class RobotWorld final : public LeanWorld {
  public:
   explicit RobotWorld(const SimSettings& settings);
   ~RobotWorld() override;
@@ -72,13 +90,6 @@ class RobotWorld final : private WorldParts, public btDiscreteDynamicsWorld {
 
  private:
   void solveConstraints(btContactSolverInfo& info) override;
-  void predictUnconstraintMotion(btScalar dt_s) override;
-  void createPredictiveContacts(btScalar /*dt_s*/) override {}
-  void calculateSimulationIslands() override {}
-  void updateActivationState(btScalar /*dt_s*/) override {}
-  void synchronizeMotionStates() override {}
-  void updateAabbs() override {}
-  void computeOverlappingPairs() override {}
 
   void clear();
   void apply_drag(double dt_s);
@@ -86,7 +97,6 @@ class RobotWorld final : private WorldParts, public btDiscreteDynamicsWorld {
 
   SimSettings settings_;
   double last_step_s_ = 0;  // 0: none since the reset
-  bool damped_;
   Floor floor_;
   btStaticPlaneShape plane_;
   std::unique_ptr<btRigidBody> floor_body_;
