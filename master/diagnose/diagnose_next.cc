@@ -1,6 +1,7 @@
-// What to drive next.
+// What to look at and to drive next.
 
 #include <algorithm>
+#include <cmath>
 
 #include "master/diagnose/diagnose_steps.h"
 #include "master/diagnose/next_experiment.h"
@@ -46,6 +47,37 @@ Status DiagnosisRun::plan_next() {
     if (!next) return next.error();
     auto& to = result_.diagnosis.next;
     to.insert(to.end(), next->begin(), next->end());
+  }
+  return {};
+}
+
+// An arena may have two seams, a floor two patches; a model holds one of each.
+Status DiagnosisRun::look_for_second_places() {
+  const std::pair<const char*, std::vector<const char*>> kPlaces[] = {
+      {"camera_seam", {"axis", "position"}}, {"friction_patch", {"x", "y", "radius"}}};
+  const Regression explained = this->explained();
+  for (const ChosenEffect& effect : chosen_) {
+    for (const auto& [name, keys] : kPlaces) {
+      if (effect.candidate.signature.effect != name) continue;
+      const auto second = selector_->again(explained, name);
+      if (!second) return second.error();
+      if (second->gain < kLeastGain) continue;
+      std::string place;
+      for (const char* key : keys) {
+        const std::size_t row = problem_.table().row(std::string(name) + "." + key);
+        const double value = second->signature.fixed.at(problem_.table()[row].key);
+        place += std::string(place.empty() ? "" : ", ") + key + " " +
+                 problem_.table().format(row, std::round(value * 1e3) / 1e3);
+      }
+      Regression with_it = explained;
+      with_it.add(second->signature.columns);
+      const std::vector<Leftover> left = leftovers(with_it, blocks_);
+      const bool all = left.empty() || left.front().log10_p >= kUnknownLog10P;
+      result_.diagnosis.cautions.push_back(
+          "A second " + std::string(name) + " (" + place + ") would explain " +
+          std::to_string(std::lround(second->gain)) + " nats more of what is left" +
+          (all ? ", and nothing would remain" : "") + "; a model holds one.");
+    }
   }
   return {};
 }

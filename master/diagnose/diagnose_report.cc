@@ -357,6 +357,9 @@ Status DiagnosisRun::report() {
       d.cautions.push_back("What is left still depends on " + l.covariate + ".");
     }
   }
+  if (d.verdict == Verdict::kEffectAndUnknown) {
+    if (Status s = look_for_second_places(); !s) return s;
+  }
   d.headline = headline(d);
   return plan_next();
 }

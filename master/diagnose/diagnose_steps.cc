@@ -63,7 +63,7 @@ Status DiagnosisRun::measure_noise() {
   return rebuild_nuisances();
 }
 
-// A late camera reads a pose before the motion has ended; the gap to the next reading shows it.
+// A late camera reads a pose before the motion has ended; the next reading shows it.
 Status DiagnosisRun::look_for_latency() {
   if (left_out("pose_latency") || study_.gaps.size() < 20) return {};
   constexpr double kStep_s = 0.02;
@@ -75,17 +75,14 @@ Status DiagnosisRun::look_for_latency() {
   for (const Eigen::Vector3d& d : differences(study_, ends->front(), kStep_s)) {
     velocity.push_back(-d);
   }
-  const std::vector<ReadingGap> gaps =
-      late_reading_gaps(study_.trials, velocity, study_.noise.pose);
-  latency_ = fit_latency(gaps, velocity, study_.noise.pose, study_.size());
+  latency_ = study_.reading_noise_known
+                 ? fit_latency(late_reading_gaps(study_.trials, velocity, study_.noise.pose),
+                               velocity, study_.noise.pose, study_.size())
+                 : fit_shared_latency(study_, velocity);
   if (latency_.gain < kLeastLatencyGain) return {};
-  std::vector<Eigen::Vector3d> late;
-  for (std::size_t i = 0; i < study_.size(); ++i) {
-    late.push_back(-latency_.weights[i] * latency_.latency_s * velocity[i]);
-  }
   Signature s;
   s.effect = "pose_latency";
-  s.columns = study_.whiten(late);
+  s.columns = study_.whiten(late_marks(study_, latency_, velocity));
   s.fixed = {{"pose_latency.share", latency_.share}, {"pose_latency.latency", latency_.latency_s}};
   first_.push_back(std::move(s));
   return {};

@@ -11,6 +11,7 @@
 #include "master/diagnose/diagnose.h"
 #include "master/diagnose/distribution.h"
 #include "master/diagnose/estimate.h"
+#include "master/diagnose/latency.h"
 #include "master/diagnose/path_lag.h"
 #include "master/diagnose/selection.h"
 #include "master/diagnose/slip.h"
@@ -66,6 +67,7 @@ class DiagnosisRun {
   NamedEffect named(std::size_t k, const JointFit& estimates) const;
   NamedEffect named(const SpreadEffect& found) const;
   void set_closed(NamedEffect* effect, const std::vector<double>& gained) const;
+  Status look_for_second_places();
   Status plan_next();
   void fill_gap();
   void fill_trials();

@@ -28,8 +28,6 @@ constexpr double kFarGap_m = 0.05;  // farther is no rounding
 // for the headings, and these are four of them.
 constexpr double kHeavyPosition = 3.6;
 constexpr double kHeavyHeading = 3.9;
-// A squared standardised gap beyond this is an outlier of neither hypothesis.
-constexpr double kCap = 25;
 
 double squared(double v) { return v * v; }
 
@@ -171,47 +169,6 @@ PoseNoise reading_noise(std::span<const ReadingGap> gaps, double quantum_m) {
   noise.position_m = std::max(noise.position_m, 1e-4);
   noise.heading_rad = std::max(noise.heading_rad, 1e-3);
   return noise;
-}
-
-LatencyFit fit_latency(std::span<const ReadingGap> gaps,
-                       std::span<const Eigen::Vector3d> end_velocity, const PoseNoise& noise,
-                       std::size_t trials) {
-  LatencyFit best;
-  best.weights.assign(trials, 0);
-  if (gaps.empty() || noise.position_m <= 0 || noise.heading_rad <= 0) return best;
-  const Eigen::Vector3d sd =
-      std::sqrt(2.0) * Eigen::Vector3d(noise.position_m, noise.position_m, noise.heading_rad);
-  // The reading at rest follows the late one by `age`: the gap is age times the end velocity.
-  const auto log_density = [&](const ReadingGap& g, double age_s, double cap) {
-    const Eigen::Vector3d z = (g.gap - age_s * end_velocity[g.previous]).cwiseQuotient(sd);
-    double sum = 0;
-    for (int k = 0; k < 3; ++k) sum -= 0.5 * std::min(z[k] * z[k], cap);
-    return sum;
-  };
-  std::vector<double> ages;
-  for (double a = 0.004; a < 0.04; a += 0.003) ages.push_back(a);
-  for (double a = 0.04; a <= 0.5; a += 0.015) ages.push_back(a);
-  std::vector<double> on_time;
-  for (const ReadingGap& g : gaps) on_time.push_back(log_density(g, 0, kCap));
-  for (double age : ages) {
-    std::vector<double> late;
-    for (const ReadingGap& g : gaps) late.push_back(log_density(g, age, kCap));
-    for (double share : {0.03, 0.06, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.999}) {
-      double gain = 0;
-      for (std::size_t i = 0; i < gaps.size(); ++i) {
-        gain += std::log(1 - share + share * std::exp(std::min(late[i] - on_time[i], 600.0)));
-      }
-      if (gain > best.gain) best = {gain, age, share, {}};
-    }
-  }
-  best.weights.assign(trials, best.share);
-  for (const ReadingGap& g : gaps) {
-    if (best.gain <= 0) break;
-    const double ratio = std::exp(std::clamp(
-        log_density(g, best.latency_s, INFINITY) - log_density(g, 0, INFINITY), -40.0, 40.0));
-    best.weights[g.previous] = best.share * ratio / (1 - best.share + best.share * ratio);
-  }
-  return best;
 }
 
 }  // namespace gapfarm

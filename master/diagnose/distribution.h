@@ -1,4 +1,4 @@
-// What the readings alone tell: their grid, their noise, and whether some came late.
+// What the readings alone tell: their grid and their noise.
 #pragma once
 
 #include <Eigen/Core>
@@ -22,21 +22,5 @@ double quantisation_step(std::span<const Trial> trials);
 // do not tell: fewer than 20 of them, or most exactly zero because the log shares readings between
 // trials. The noise is then to be had from residuals (refit_drive_noise() with fit_pose).
 PoseNoise reading_noise(std::span<const ReadingGap> gaps, double quantum_m);
-
-// A share of the end poses read some time before the motion's end, against none.
-struct LatencyFit {
-  double gain = 0;  // nats over all gaps; null data stay below 8, and two parameters are fitted
-  double latency_s = 0;
-  double share = 0;
-  std::vector<double> weights;  // of each trial: probability that its end pose was late
-};
-
-// The later reading is of the robot at rest, so that a late one shows a gap of age times velocity.
-// Ages to 0.5 s and shares are searched on a grid.  Trials that no gap follows get the share
-// itself. Without gaps or noise the gain and all weights are 0.  `end_velocity`: of every trial,
-// just before the motors stop, in the end's axes (m/s, m/s, rad/s).
-LatencyFit fit_latency(std::span<const ReadingGap> gaps,
-                       std::span<const Eigen::Vector3d> end_velocity, const PoseNoise& noise,
-                       std::size_t trials);
 
 }  // namespace gapfarm

@@ -187,6 +187,16 @@ Result<std::vector<EffectCandidate>> Selector::candidates(const Regression& expl
   return sorted;
 }
 
+Result<EffectCandidate> Selector::again(const Regression& explained, const std::string& effect) {
+  std::set<std::string> others;
+  for (const Signature& s : catalogue_) others.insert(s.effect);
+  others.insert("friction_patch");  // joins the catalogue when it is looked for
+  others.erase(effect);
+  auto best = candidates(explained, others);
+  if (!best) return best.error();
+  return best->empty() ? EffectCandidate{} : std::move(best->front());
+}
+
 Regression Selector::with(const std::vector<const Signature*>& signatures) const {
   Regression r = base_;
   for (const Signature* s : signatures) r.add(s->columns);

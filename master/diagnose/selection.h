@@ -66,6 +66,9 @@ class Selector {
   Result<std::vector<EffectCandidate>> candidates(const Regression& explained,
                                                   const std::set<std::string>& without);
 
+  // The best signature of one effect, which may have been chosen once already: a second seam.
+  Result<EffectCandidate> again(const Regression& explained, const std::string& effect);
+
   // `first` are explained before anything else (a late camera, say) and gained `first_gain` nats.
   // `relinearise` fits what was chosen so far.
   Result<std::vector<ChosenEffect>> select(const std::vector<Signature>& first, double first_gain,

@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "tests/integration/run_program.h"
+#include "tests/unit/trials/shared_data.h"
 
 namespace gapfarm {
 namespace {
@@ -132,6 +133,28 @@ TEST_F(Diagnose, ThinDataGiveCautionsNotClaims) {
   const Json d = diagnose();
   EXPECT_EQ(d["verdict"], "none") << d["headline"];
   EXPECT_GT(d["cautions"].size(), 1u);
+}
+
+// 26 runs of a real robot under several overhead cameras, where the log is at hand.
+TEST_F(Diagnose, TheRealForwardLogHasSeamsAndLateReadings) {
+  const auto data = shared_data("srv1_forward");
+  if (!data) return;
+  std::vector<std::string> arguments = {"diagnose", GAPFARM_SOURCE_DIR "/configs/srv1_forward.toml",
+                                        "--out", folder_ / "d", "--trials"};
+  for (const std::string& file : files_in(*data, ".dat")) arguments.push_back(file);
+  const Finished finished = gapfarm_command(arguments);
+  ASSERT_EQ(finished.exit_code, 0) << finished.err;
+  const Json d = Json::parse(text_of(folder_ / "d/diagnosis.json"), nullptr, false);
+  std::set<std::string> names;
+  for (const Json& effect : d["effects"]) names.insert(effect["name"]);
+  EXPECT_TRUE(names.count("camera_seam")) << d["headline"];
+  EXPECT_TRUE(names.count("pose_latency")) << d["headline"];
+  EXPECT_TRUE(names.count("pose_quantisation")) << d["headline"];
+  EXPECT_EQ(d["effects"][0]["name"], "camera_seam");
+  // Found by a regression of its own, too: between cameras at x = 1.04 m.
+  EXPECT_NE(d["cautions"].dump().find("A second camera_seam (axis x, position 1.0"),
+            std::string::npos)
+      << d["cautions"];
 }
 
 TEST_F(Diagnose, UnknownEffectToLeaveOutIsRefused) {

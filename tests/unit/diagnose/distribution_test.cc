@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "common/random/stream.h"
+#include "master/diagnose/latency.h"
 
 namespace gapfarm {
 namespace {
