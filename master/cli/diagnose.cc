@@ -115,30 +115,27 @@ std::string summary(const Diagnosis& d) {
 }
 
 // What the command line says of the problem, on top of the config.
-Status apply_options(const DiagnoseCommand& command, Config& config) {
-  if (!config.problem.pieces.empty()) {
-    return Error{command.config + ": scenario " + config.problem.scenario +
-                 " pushes pieces, and diagnose reads what motors were told; `gapfarm crossfit " +
-                 command.config + " --effects all` asks the same of pushes"};
-  }
+Status apply_options(const DiagnoseCommand& command, Config& config, std::vector<Gene>& searched) {
   if (command.seed) config.seed = *command.seed;
   if (!command.model.empty()) {
     const Result<Model> model = read_model_of(command.model);
     if (!model) return model.error();
     config.problem.values = model->values;
   }
+  searched = std::move(config.problem.genes);
   config.problem.genes.clear();
   config.problem.fitness.kind = FitnessKind::kLogScore;
   return {};
 }
 
 int run_diagnose(const DiagnoseCommand& command, CliContext& context) {
-  const auto config = open_config(command.config, command.trials, context.console,
-                                  [&](Config& read) { return apply_options(command, read); });
+  DiagnoseOptions options;
+  const auto config =
+      open_config(command.config, command.trials, context.console,
+                  [&](Config& read) { return apply_options(command, read, options.genes); });
   if (!config) return kExitBadUsage;
   auto farm = start_farm(command.farm, config->farm, context);
   if (!farm) return failed(farm.error(), context);
-  DiagnoseOptions options;
   options.keep_base = !command.model.empty();
   options.left_out = command.leave_out;
   options.seed = config->seed;

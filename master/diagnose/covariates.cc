@@ -4,6 +4,8 @@
 #include <cmath>
 #include <functional>
 
+#include "master/diagnose/probes.h"
+
 namespace gapfarm {
 namespace {
 
@@ -89,13 +91,6 @@ class BlockBuilder {
       }
     }
     return d;
-  }
-
-  static Eigen::MatrixXd stack(const std::vector<Eigen::VectorXd>& columns) {
-    Eigen::MatrixXd all(columns.front().size(), static_cast<Eigen::Index>(columns.size()));
-    for (std::size_t k = 0; k < columns.size(); ++k)
-      all.col(static_cast<Eigen::Index>(k)) = columns[k];
-    return all;
   }
 
   const Study& study_;

@@ -9,9 +9,9 @@
 namespace gapfarm {
 namespace {
 
-Status check_left_out(const std::vector<std::string>& left_out) {
+Status check_left_out(const Problem& problem, const std::vector<std::string>& left_out) {
   std::vector<std::string> known;
-  for (const Effect& effect : srv1_effects()) known.push_back(effect.name);
+  for (const Effect& effect : problem.table().effects()) known.push_back(effect.name);
   for (const std::string& name : left_out) {
     if (std::find(known.begin(), known.end(), name) == known.end()) {
       return Error{"there is no effect '" + name + "' to leave out" + suggestion(name, known)};
@@ -25,7 +25,12 @@ Status check_left_out(const std::vector<std::string>& left_out) {
 // The steps in the order of docs/diagnosis.md.
 Result<DiagnosisResult> diagnose(Farm& farm, const Problem& problem,
                                  const DiagnoseOptions& options) {
-  if (Status s = check_left_out(options.left_out); !s) return s.error();
+  if (diagnosis_subject(problem.scenario) == nullptr) {
+    return Error{"scenario " + problem.scenario +
+                 " cannot be diagnosed: it has no catalogue of effects; `gapfarm influence` says "
+                 "what its parameters do"};
+  }
+  if (Status s = check_left_out(problem, options.left_out); !s) return s.error();
   DiagnosisRun run(farm, problem, options);
   run.stage("tune the base model");
   if (Status s = run.tune(); !s) return s.error();

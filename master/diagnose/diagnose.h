@@ -18,6 +18,7 @@ struct DiagnoseOptions {
   bool keep_base = false;             // the problem's values are a tuned model
   std::vector<std::string> left_out;  // effects that the catalogue is to be without
   std::uint64_t seed = 1;             // of the bootstrap
+  std::vector<Gene> genes;            // what the config has searched: what may be tuned of the base
   std::function<void(const std::string& stage)> on_stage;
 };
 
@@ -32,7 +33,8 @@ struct DiagnosisResult {
   std::vector<std::pair<std::string, std::vector<v1::Task>>> fits;
 };
 
-// Errors: an empty log, an effect to leave out that the catalogue does not have, the farm's.
+// Errors: a scenario that cannot be diagnosed, an empty log, an effect to leave out that the
+// catalogue does not have, the farm's.
 Result<DiagnosisResult> diagnose(Farm& farm, const Problem& problem,
                                  const DiagnoseOptions& options);
 

@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "master/diagnose/diagnose_steps.h"
-#include "master/diagnose/next_experiment.h"
 
 namespace gapfarm {
 
@@ -43,7 +42,7 @@ Status DiagnosisRun::plan_next() {
       }
       rivals.push_back(std::move(rival));
     }
-    auto next = next_experiments(farm_, problem_, rivals);
+    auto next = subject_.next(farm_, problem_, rivals);
     if (!next) return next.error();
     auto& to = result_.diagnosis.next;
     to.insert(to.end(), next->begin(), next->end());

@@ -6,12 +6,10 @@
 #include <set>
 
 #include "common/random/stream.h"
-#include "common/score/density.h"
 #include "common/score/statistics.h"
 #include "master/diagnose/diagnose_steps.h"
 #include "master/diagnose/findings.h"
 #include "master/diagnose/intervals.h"
-#include "master/diagnose/where.h"
 
 namespace gapfarm {
 namespace {
@@ -27,7 +25,9 @@ double mean_of(const std::vector<double>& values) {
 }
 
 // Evidence to confidence: the least gain that names an effect is an even bet.
-double confidence_of(double gain) { return 1 / (1 + std::exp(-(gain - kLeastGain + 1.5))); }
+double confidence_of(double gain, double least_gain) {
+  return 1 / (1 + std::exp(-(gain - least_gain + 1.5)));
+}
 
 struct RootMeanSquare {
   double position_mm = 0;
@@ -41,6 +41,21 @@ RootMeanSquare root_mean_square(const std::vector<Eigen::Vector3d>& residuals) {
     heading += r[2] * r[2] / static_cast<double>(residuals.size());
   }
   return {1e3 * std::sqrt(position), 1e3 * std::sqrt(heading)};
+}
+
+// Residuals, ends and their covariances, seen from axes turned by `angle_rad`.
+void turn(double angle_rad, DiagnosedTrial* trial) {
+  const auto turned = [&](const Eigen::Vector3d& v) {
+    const Pose seen = Pose{0, 0, -angle_rad} * Pose{v[0], v[1], 0};
+    return Eigen::Vector3d(seen.x, seen.y, v[2]);
+  };
+  trial->tuned_residual = turned(trial->tuned_residual);
+  trial->final_residual = turned(trial->final_residual);
+  trial->tuned_cov = rotate_covariance(trial->tuned_cov, -angle_rad);
+  trial->final_cov = rotate_covariance(trial->final_cov, -angle_rad);
+  for (Pose* end : {&trial->measured, &trial->tuned, &trial->final_}) {
+    end->theta = wrap_angle(end->theta + angle_rad);
+  }
 }
 
 }  // namespace
@@ -101,7 +116,7 @@ Status DiagnosisRun::refit() {
   }
   if (Status s = refit_nested(); !s) return s;
   const double share = problem_.fitness.outlier_share;
-  const std::vector<std::size_t> folds = folds_of(study_);
+  const std::vector<std::size_t> folds = subject_.folds(study_);
   for (const JointFit& fit : nested_) {
     nested_scores_.push_back(held_out_scores(study_, fit, folds, share));
   }
@@ -110,12 +125,19 @@ Status DiagnosisRun::refit() {
   return {};
 }
 
+void DiagnosisRun::set_noise(const NoiseEstimate& noise, Overrides* at) const {
+  const auto set = [&](const NoiseRow& to, double value) { (*at)[to.row] = value * to.unit; };
+  set(subject_.drive_common, noise.drive_common);
+  set(subject_.drive_side, noise.drive_side);
+  set(subject_.pose_position, noise.pose.position_m);
+  set(subject_.pose_heading, noise.pose.heading_rad);
+}
+
 void DiagnosisRun::spread_effects(Overrides* at) const {
   const auto set = [&](const char* key, double value) { (*at)[problem_.table().row(key)] = value; };
-  (*at)[row_of(Srv1::kDriveNoiseCommon)] = study_.noise.drive_common;
-  (*at)[row_of(Srv1::kDriveNoiseSide)] = study_.noise.drive_side;
-  (*at)[row_of(Srv1::kPoseNoisePosition)] = std::max(1e-5, study_.noise.pose.position_m);
-  (*at)[row_of(Srv1::kPoseNoiseHeading)] = std::max(1e-5, study_.noise.pose.heading_rad);
+  NoiseEstimate noise = study_.noise;
+  noise.pose.position_m = std::max(1e-5, noise.pose.position_m);
+  noise.pose.heading_rad = std::max(1e-5, noise.pose.heading_rad);
   for (const Signature& s : first_) {
     for (const auto& [key, value] : s.fixed) set(key.c_str(), value);
   }
@@ -123,9 +145,10 @@ void DiagnosisRun::spread_effects(Overrides* at) const {
   if (slip_.gain > 0) {
     set("slip_events.probability", std::clamp(slip_.probability, 0.0, 0.5));
     set("slip_events.loss", std::clamp(slip_.loss, 0.0, 1.0));
-    (*at)[row_of(Srv1::kDriveNoiseCommon)] = slip_.noise.drive_common;
-    (*at)[row_of(Srv1::kDriveNoiseSide)] = slip_.noise.drive_side;
+    noise.drive_common = slip_.noise.drive_common;
+    noise.drive_side = slip_.noise.drive_side;
   }
+  set_noise(noise, at);
 }
 
 // Share of the explainable gap, with an interval from a bootstrap over the chains between
@@ -169,9 +192,8 @@ NamedEffect DiagnosisRun::named(std::size_t k, const JointFit& estimates) const 
     effect.aliases.push_back(alias.effect);
     reasons.push_back({alias.effect, std::abs(alias.cosine)});
   }
-  effect.alias_reason =
-      alias_sentence(effect.name, reasons, log_variety(study_.trials, study_.cells, problem_.log));
-  effect.confidence = confidence_of(chosen.candidate.gain);
+  effect.alias_reason = alias_sentence(effect.name, reasons, subject_.lacks(study_, problem_.log));
+  effect.confidence = confidence_of(chosen.candidate.gain, subject_.least_gain);
   for (const auto& [row, value] : estimates.at) {
     const Parameter& p = problem_.table()[row];
     if (p.effect != effect.name || p.kind != ParameterKind::kReal) continue;
@@ -193,7 +215,7 @@ NamedEffect DiagnosisRun::named(std::size_t k, const JointFit& estimates) const 
   for (std::size_t i = 0; i < gained.size(); ++i) gained[i] -= nested_scores_[k][i];
   set_closed(&effect, gained);
   const RootMeanSquare after =
-      root_mean_square(held_out_residuals(study_, nested_[k + 1], folds_of(study_)));
+      root_mean_square(held_out_residuals(study_, nested_[k + 1], subject_.folds(study_)));
   effect.position_mm_after = after.position_mm;
   effect.heading_mrad_after = after.heading_mrad;
   return effect;
@@ -233,7 +255,7 @@ std::vector<DiagnosisRun::SpreadEffect> DiagnosisRun::spread_effects_found() con
 NamedEffect DiagnosisRun::named(const SpreadEffect& found) const {
   NamedEffect effect;
   effect.name = found.name;
-  effect.confidence = confidence_of(found.gain);
+  effect.confidence = confidence_of(found.gain, subject_.least_gain);
   effect.parameters = found.estimates;
   // The gain is over all that the readings tell; of the gap it can close what the means left.
   const double per_trial = std::min(found.gain / static_cast<double>(study_.size()),
@@ -266,7 +288,7 @@ void DiagnosisRun::name_effects() {
 
 void DiagnosisRun::fill_gap() {
   Diagnosis& d = result_.diagnosis;
-  const std::vector<std::size_t> folds = folds_of(study_);
+  const std::vector<std::size_t> folds = subject_.folds(study_);
   d.gap.tuned = floor_ - mean_of(nested_scores_.front());
   d.gap.final_ = d.effects.empty() ? d.gap.tuned : d.effects.back().gap_after;
   d.gap.floor = 0;
@@ -282,6 +304,8 @@ void DiagnosisRun::fill_gap() {
 }
 
 void DiagnosisRun::fill_trials() {
+  result_.diagnosis.shown = subject_.shown;
+  result_.diagnosis.words = subject_.words;
   const JointFit& tuned = nested_.front();
   const JointFit& last = nested_.back();
   const std::vector<Eigen::Matrix3d> covariances = study_.covariances();
@@ -298,12 +322,15 @@ void DiagnosisRun::fill_trials() {
     to.place_in_run = t.context.place_in_run;
     to.held_out = true;  // every trial's scores come from the other folds
     to.X_WS = t.X_WS;
-    to.measured = between(t.X_WS, t.X_WE);
-    to.tuned = between(t.X_WS, tuned.ends[i]);
-    to.final_ = between(t.X_WS, last.ends[i]);
+    TrialView view = subject_.view(study_, i);
+    to.measured = between(view.X_WV, t.X_WE);
+    to.tuned = between(view.X_WV, tuned.ends[i]);
+    to.final_ = between(view.X_WV, last.ends[i]);
     to.tuned_cov = to.final_cov = covariances[i];
     to.tuned_residual = tuned.residuals[i];
     to.final_residual = last.residuals[i];
+    if (view.turn_rad != 0) turn(view.turn_rad, &to);
+    to.covariates = std::move(view.covariates);
     to.tuned_score = nested_scores_.front()[i];
     to.final_score = nested_scores_.back()[i];
     result_.diagnosis.trials.push_back(std::move(to));
@@ -315,10 +342,7 @@ void DiagnosisRun::fill_values() {
     if (with_effects) {
       spread_effects(&at);
     } else {
-      at[row_of(Srv1::kDriveNoiseCommon)] = study_.noise.drive_common;
-      at[row_of(Srv1::kDriveNoiseSide)] = study_.noise.drive_side;
-      at[row_of(Srv1::kPoseNoisePosition)] = study_.noise.pose.position_m;
-      at[row_of(Srv1::kPoseNoiseHeading)] = study_.noise.pose.heading_rad;
+      set_noise(study_.noise, &at);
     }
     ParameterValues values = problem_.values;
     for (const auto& [row, value] : at) values[row] = value;
@@ -342,18 +366,17 @@ Status DiagnosisRun::report() {
   fill_trials();
   fill_values();
   Diagnosis& d = result_.diagnosis;
-  const std::vector<Eigen::Matrix3d> covariances = study_.covariances();
   const auto look = [&](const std::vector<Eigen::Vector3d>& residuals) {
-    return where(study_.trials, residuals, covariances, study_.cells, problem_, {});
+    return subject_.where(study_, residuals, problem_);
   };
   d.where = look(nested_.front().residuals);
   const bool unexplained =
       d.verdict == Verdict::kUnknown || d.verdict == Verdict::kEffectAndUnknown;
   if (unexplained) d.unexplained = look(nested_.back().residuals);
-  const std::vector<std::string> thin = cautions(study_.trials, study_.cells, problem_.log);
+  const std::vector<std::string> thin = subject_.cautions(study_, problem_.log);
   d.cautions.insert(d.cautions.end(), thin.begin(), thin.end());
   for (const Leftover& l : leftovers_) {
-    if (l.log10_p < kUnknownLog10P) {
+    if (l.log10_p < subject_.unknown_log10_p) {
       d.cautions.push_back("What is left still depends on " + l.covariate + ".");
     }
   }

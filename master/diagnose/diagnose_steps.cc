@@ -9,7 +9,6 @@
 #include "common/score/statistics.h"
 #include "master/diagnose/drive_noise.h"
 #include "master/diagnose/noise.h"
-#include "master/diagnose/nuisance.h"
 
 namespace gapfarm {
 namespace {
@@ -41,18 +40,22 @@ bool DiagnosisRun::left_out(const std::string& effect) const {
          options_.left_out.end();
 }
 
+bool DiagnosisRun::looks_for(const std::string& effect, Looks look) const {
+  return (subject_.looks & look) != 0 && !left_out(effect);
+}
+
 Status DiagnosisRun::tune() {
-  Result<Study> study = make_study(problem_);
+  Result<Study> study = subject_.make_study(problem_, options_.genes);
   if (!study) return study.error();
   study_ = std::move(*study);
-  return tune_base(predictor_, options_.keep_base, &study_);
+  return subject_.tune(predictor_, options_.keep_base, &study_);
 }
 
 Status DiagnosisRun::rebuild_nuisances() {
-  auto nuisances = nuisance_columns(predictor_, study_);
+  auto nuisances = subject_.nuisances(predictor_, study_);
   if (!nuisances) return nuisances.error();
   nuisances_ = std::move(*nuisances);
-  blocks_ = covariate_blocks(study_);
+  blocks_ = subject_.blocks(study_);
   base_ = std::make_unique<Regression>(nuisances_, study_.whitened_residuals());
   return {};
 }
@@ -60,12 +63,16 @@ Status DiagnosisRun::rebuild_nuisances() {
 Status DiagnosisRun::measure_noise() {
   if (Status s = rebuild_nuisances(); !s) return s;
   estimate_noise(*base_, blocks_, &study_);
+  if (study_.trust.empty()) return rebuild_nuisances();
+  // Again, without what far trials drew to themselves.
+  if (Status s = rebuild_nuisances(); !s) return s;
+  estimate_noise(*base_, blocks_, &study_);
   return rebuild_nuisances();
 }
 
 // A late camera reads a pose before the motion has ended; the next reading shows it.
 Status DiagnosisRun::look_for_latency() {
-  if (left_out("pose_latency") || study_.gaps.size() < 20) return {};
+  if (!looks_for("pose_latency", kLooksForLateReadings) || study_.gaps.size() < 20) return {};
   constexpr double kStep_s = 0.02;
   Overrides shorter = study_.base;
   shorter[problem_.table().row("timing_offset.offset")] = -kStep_s;
@@ -90,7 +97,7 @@ Status DiagnosisRun::look_for_latency() {
 
 // Where paths were logged they say more of a lag than rest poses do, and have the last word.
 Status DiagnosisRun::look_for_lag() {
-  if (left_out("motor_lag")) return {};
+  if (!looks_for("motor_lag", kLooksForLag)) return {};
   auto lag = fit_path_lag(predictor_, study_);
   if (!lag) return lag.error();
   lag_ = *lag;
@@ -103,10 +110,12 @@ Status DiagnosisRun::screen() {
   if (Status s = look_for_lag(); !s) return s;
   std::vector<std::string> without = options_.left_out;
   if (lag_.trials > 0) without.emplace_back("motor_lag");
-  auto catalogue = signatures(predictor_, study_, without);
+  auto catalogue = subject_.signatures(predictor_, study_, without);
   if (!catalogue) return catalogue.error();
   selector_ = std::make_unique<Selector>(predictor_, study_, std::move(*catalogue), *base_);
-  if (!left_out("friction_patch")) selector_->look_for_patches();
+  if (!left_out("friction_patch")) {
+    selector_->look_for_patches([this] { return subject_.patches(predictor_, study_); });
+  }
   std::vector<const Signature*> first;
   for (const Signature& s : first_) first.push_back(&s);
   auto all = selector_->candidates(selector_->with(first), {});
@@ -240,7 +249,7 @@ void DiagnosisRun::fill_screening(const std::vector<EffectCandidate>& candidates
 
 // Events that slow one side in some trials show as a heavy tail along that side's derivative.
 void DiagnosisRun::look_for_slip(const Regression& explained) {
-  if (left_out("slip_events")) return;
+  if (!looks_for("slip_events", kLooksForSlips)) return;
   const Eigen::VectorXd z = studentised(explained, 0.2);
   std::size_t far = 0;
   for (Eigen::Index i = 0; i < z.size(); i += 3) far += z.segment<3>(i).squaredNorm() > 13 ? 1 : 0;
@@ -312,10 +321,11 @@ void DiagnosisRun::judge() {
   for (const Leftover& l : leftovers_) {
     result_.diagnosis.checks.push_back({l.covariate, l.log10_p, l.excess});
   }
-  const bool rounded = study_.quantum_m > kLeastQuantum_m && !left_out("pose_quantisation");
+  const bool rounded =
+      study_.quantum_m > kLeastQuantum_m && looks_for("pose_quantisation", kLooksForRounding);
   const bool named =
       !first_.empty() || !chosen_.empty() || slip_.gain > 0 || lag_.gain > 0 || rounded;
-  result_.diagnosis.verdict = judge_verdict(named, nats, leftovers_);
+  result_.diagnosis.verdict = judge_verdict(named, nats, leftovers_, subject_.unknown_log10_p);
   if (result_.diagnosis.verdict == Verdict::kUnknown) {
     first_.clear();
     chosen_.clear();

@@ -16,14 +16,20 @@
 #include "master/diagnose/selection.h"
 #include "master/diagnose/slip.h"
 #include "master/diagnose/study.h"
+#include "master/diagnose/subject.h"
 #include "master/diagnose/verdict.h"
 
 namespace gapfarm {
 
 class DiagnosisRun {
  public:
+  // REQUIRES: a scenario that has a diagnosis_subject().
   DiagnosisRun(Farm& farm, const Problem& problem, const DiagnoseOptions& options)
-      : problem_(problem), options_(options), farm_(farm), predictor_(farm, problem) {}
+      : problem_(problem),
+        subject_(*diagnosis_subject(problem.scenario)),
+        options_(options),
+        farm_(farm),
+        predictor_(farm, problem) {}
 
   // Ends the stage before, if any, and begins one; "" only ends.
   void stage(const std::string& name);
@@ -38,6 +44,7 @@ class DiagnosisRun {
 
  private:
   bool left_out(const std::string& effect) const;
+  bool looks_for(const std::string& effect, Looks look) const;
   bool too_thin();
   Status rebuild_nuisances();
   Status look_for_latency();
@@ -53,6 +60,7 @@ class DiagnosisRun {
   Status select_without_slips(const Regression& explained);
   // Base and these effects at their best linear fit.
   Overrides start_of(const std::vector<EffectCandidate>& effects) const;
+  void set_noise(const NoiseEstimate& noise, Overrides* at) const;
   void spread_effects(Overrides* at) const;
   Status refit_nested();
   void name_effects();
@@ -74,6 +82,7 @@ class DiagnosisRun {
   void fill_values();
 
   const Problem& problem_;
+  const DiagnosisSubject& subject_;
   const DiagnoseOptions& options_;
   Farm& farm_;
   Predictor predictor_;

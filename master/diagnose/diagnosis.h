@@ -90,6 +90,20 @@ struct NextExperiment {
   std::uint64_t trials = 0;  // needed to tell them apart with 95 % power
 };
 
+// How the pictures tell of trials; empty: of commands that were driven.
+struct PictureWords {
+  std::string ends;       // a paragraph on the pictures of end poses
+  std::string residuals;  // same of residuals
+  std::string x, y;       // "along the push": components of a residual
+};
+
+// What the pictures may show residuals against, beside what every log has.
+struct ShownCovariate {
+  std::string key;      // of its column
+  std::string label;    // "distance pushed, mm"
+  std::string matches;  // what Where::covariate holds when a finding is of it
+};
+
 // One trial for the plots.  Ends are seen from the measured start.
 struct DiagnosedTrial {
   std::string session;
@@ -105,6 +119,7 @@ struct DiagnosedTrial {
   Eigen::Matrix3d tuned_cov, final_cov;            // in the predicted end's own axes
   Eigen::Vector3d tuned_residual, final_residual;  // m, m, rad, in the predicted end's own axes
   double tuned_score = 0, final_score = 0;         // nats
+  std::vector<double> covariates;                  // one a Diagnosis::shown
 };
 
 struct Diagnosis {
@@ -122,6 +137,8 @@ struct Diagnosis {
   std::vector<NextExperiment> next;
   std::vector<std::string> cautions;  // thin data and the like, one sentence each
   std::vector<DiagnosedTrial> trials;
+  std::vector<ShownCovariate> shown;
+  PictureWords words;
   // Label and value: files, hashes, counts, program, seeds, the run stores behind the numbers.
   std::vector<std::pair<std::string, std::string>> provenance;
   std::vector<std::pair<std::string, double>> timing_s;  // stage and wall seconds

@@ -18,6 +18,7 @@ struct Likelihood {
   std::span<const Eigen::Vector3d> residuals;
   NoiseEstimate start;
   bool fit_pose;
+  CovarianceOf covariance;
 
   NoiseEstimate at(const std::vector<double>& log_values) const {
     NoiseEstimate noise = start;
@@ -30,7 +31,7 @@ struct Likelihood {
   double negative(const NoiseEstimate& noise) const {
     double sum = 0;
     for (std::size_t i = 0; i < trials.size(); ++i) {
-      const Eigen::Matrix3d cov = trial_covariance(trials[i], noise);
+      const Eigen::Matrix3d cov = covariance(trials[i], noise);
       const double d2 = residuals[i].dot(cov.inverse() * residuals[i]);
       const double bounded = d2 > kFarSquared ? kFarSquared + std::log1p(d2 - kFarSquared) : d2;
       sum += 0.5 * (std::log(cov.determinant()) + bounded);
@@ -43,8 +44,9 @@ struct Likelihood {
 
 NoiseEstimate refit_drive_noise(std::span<const ResidualTrial> trials,
                                 std::span<const Eigen::Vector3d> residuals,
-                                const NoiseEstimate& start, bool fit_pose) {
-  const Likelihood likelihood{trials, residuals, start, fit_pose};
+                                const NoiseEstimate& start, bool fit_pose,
+                                CovarianceOf covariance) {
+  const Likelihood likelihood{trials, residuals, start, fit_pose, covariance};
   // An unknown value (0) begins at that of a small tracked robot under a good camera.
   const auto first = [](double value, double unknown) {
     return std::log(std::clamp(value > 0 ? value : unknown, kLeast, kMost));

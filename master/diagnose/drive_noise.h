@@ -15,6 +15,7 @@ namespace gapfarm {
 // `fit_pose`, a positive `start.pose`.  `residuals`: one a trial, m, m, rad.
 NoiseEstimate refit_drive_noise(std::span<const ResidualTrial> trials,
                                 std::span<const Eigen::Vector3d> residuals,
-                                const NoiseEstimate& start, bool fit_pose);
+                                const NoiseEstimate& start, bool fit_pose,
+                                CovarianceOf covariance = trial_covariance);
 
 }  // namespace gapfarm

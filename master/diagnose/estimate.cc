@@ -6,6 +6,7 @@
 
 #include "common/score/density.h"
 #include "master/diagnose/seam.h"
+#include "master/diagnose/subject.h"
 
 namespace gapfarm {
 namespace {
@@ -14,25 +15,47 @@ constexpr int kMostHalvings = 4;
 constexpr double kSettled = 0.02;   // of the objective (twice nats): less is no progress
 constexpr double kFarSquared = 16;  // squared distance beyond which a trial counts linearly
 
+// Effects with a strength and a direction, whose first two columns belong to its cosine and sine.
+struct Polar {
+  const char* effect;
+  const char* strength;
+  const char* direction;
+  double symmetry;  // looks the same after this share of a turn
+  bool ratio;       // the strength is the logarithm of a ratio
+};
+constexpr Polar kPolar[] = {
+    {"floor_tilt", "floor_tilt.angle", "floor_tilt.direction", 1, false},
+    {"table_tilt", "table_tilt.angle", "table_tilt.direction", 1, false},
+    {"friction_anisotropy", "friction_anisotropy.ratio", "friction_anisotropy.direction", 2, true},
+    {"pressure_distribution", "pressure_distribution.stretch", "pressure_distribution.direction", 2,
+     false},
+};
+
+const Polar* polar_of(const std::string& effect) {
+  const auto* found = std::find_if(std::begin(kPolar), std::end(kPolar),
+                                   [&](const Polar& p) { return effect == p.effect; });
+  return found == std::end(kPolar) ? nullptr : found;
+}
+
 // Step of a finite difference in a parameter: a hundredth of its value, but no less than what the
 // catalogue's bounds make a small change.
 double step_of(const Parameter& row, double value) {
   return std::max(0.01 * std::abs(value), 0.002 * (row.upper - row.lower) / 2);
 }
 
-std::vector<FittedParameter> parameters_of(const ParameterTable& table, const Overrides& start,
+std::vector<FittedParameter> parameters_of(const Study& study, const Overrides& start,
                                            const std::vector<EffectCandidate>& effects,
                                            BaseParameters base, std::size_t* base_count) {
   std::vector<FittedParameter> parameters;
   if (base == BaseParameters::kFitted) {
-    for (const BaseParameter& p : tuned_base_parameters()) {
+    for (const BaseParameter& p : study.base_parameters) {
       parameters.push_back({p.row, start.at(p.row), 0});
     }
   }
   *base_count = parameters.size();
   for (const EffectCandidate& effect : effects) {
     for (const auto& [row, value] : start) {
-      const Parameter& p = table[row];
+      const Parameter& p = (*study.table)[row];
       // Where a seam runs is searched, not sloped: residuals jump as a trial changes sides.
       const bool jumps = p.kind != ParameterKind::kReal || p.key == "camera_seam.position";
       if (p.effect == effect.signature.effect && !jumps) parameters.push_back({row, value, 0});
@@ -88,7 +111,7 @@ struct Normal {
 
 // Prior of the base parameters about the tuned base, in their own units.
 void add_prior(const Study& study, const JointFit& fit, Normal* normal) {
-  const std::vector<BaseParameter> base = tuned_base_parameters();
+  const std::vector<BaseParameter>& base = study.base_parameters;
   for (std::size_t k = 0; k < fit.base_parameters; ++k) {
     const double sd = base[k].prior_log_sd * study.base.at(base[k].row);
     const auto i = static_cast<Eigen::Index>(k);
@@ -131,7 +154,7 @@ double objective(const Study& study, const JointFit& fit, const Eigen::MatrixXd&
     const double d2 = left.segment<3>(3 * i).squaredNorm();
     sum += d2 > kFarSquared ? 2 * std::sqrt(kFarSquared * d2) - kFarSquared : d2;
   }
-  const std::vector<BaseParameter> base = tuned_base_parameters();
+  const std::vector<BaseParameter>& base = study.base_parameters;
   for (std::size_t k = 0; k < fit.base_parameters; ++k) {
     const double tuned = study.base.at(base[k].row);
     const double away = (fit.parameters[k].value / tuned - 1) / base[k].prior_log_sd;
@@ -168,7 +191,7 @@ void step(const Problem& problem, const Study& study, const Eigen::MatrixXd& nui
 
 double trial_score(const Study& study, std::size_t i, const Eigen::Vector3d& residual,
                    double outlier_share) {
-  const auto cov = Covariance3::factorise(trial_covariance(study.trials[i], study.noise));
+  const auto cov = Covariance3::factorise(study.subject->covariance(study.trials[i], study.noise));
   return cov ? log_predictive_density(residual, *cov, outlier_share) : -1e3;
 }
 
@@ -185,9 +208,11 @@ std::map<std::string, double> start_values(const Study& study, const Regression&
   const Eigen::VectorXd c = ridged.ldlt().solve(columns.transpose() * data);
   std::map<std::string, double> values = signature.fixed;
   const std::string& e = signature.effect;
-  if (e == "floor_tilt") {
-    values["floor_tilt.angle"] = std::hypot(c[0], c[1]);
-    values["floor_tilt.direction"] = std::atan2(c[1], c[0]);
+  const Polar* polar = polar_of(e);
+  if (polar != nullptr) {
+    const double strength = std::hypot(c[0], c[1]);
+    values[polar->strength] = polar->ratio ? std::exp(strength) : strength;
+    values[polar->direction] = std::atan2(c[1], c[0]) / polar->symmetry;
   } else if (e == "camera_distortion") {
     const Eigen::Vector2d middle = middle_of(study);
     const double k1 = std::abs(c[0]) > 1e-6 ? c[0] : 1e-6;
@@ -208,7 +233,7 @@ std::map<std::string, double> start_values(const Study& study, const Regression&
     values["camera_seam.offset_x"] -= along * values["camera_seam.slope_x"];
     values["camera_seam.offset_y"] -= along * values["camera_seam.slope_y"];
   }
-  const ParameterTable& table = srv1_table();
+  const ParameterTable& table = *study.table;
   for (auto& [key, value] : values) {
     const Parameter& row = table[table.row(key)];
     value = std::clamp(value, row.lower, row.upper);
@@ -221,8 +246,7 @@ Result<JointFit> fit_jointly(Predictor& predictor, const Study& study,
                              BaseParameters base, const Eigen::MatrixXd& nuisances, int rounds) {
   JointFit fit;
   fit.at = start;
-  fit.parameters =
-      parameters_of(predictor.problem().table(), start, effects, base, &fit.base_parameters);
+  fit.parameters = parameters_of(study, start, effects, base, &fit.base_parameters);
   if (Status s = predict(predictor, study, &fit); !s) return s.error();
   if (Status s = differentiate(predictor, study, &fit); !s) return s.error();
   double best = objective(study, fit, nuisances);

@@ -272,7 +272,7 @@ std::vector<std::string> lacking(const LogVariety& v) {
 }
 
 std::string alias_sentence(std::string_view effect, std::span<const AliasReason> aliases,
-                           const LogVariety& variety) {
+                           std::span<const std::string> lacks) {
   if (aliases.empty()) return "";
   std::vector<std::string> names;
   double least = 1;
@@ -285,7 +285,6 @@ std::string alias_sentence(std::string_view effect, std::span<const AliasReason>
   std::string text = "In these data " + std::string(effect) + " and " + listed(names, "or") +
                      " change the end poses alike (|cos| " +
                      (aliases.size() > 1 ? "at least " : "") + cosine + " after retuning the base)";
-  const std::vector<std::string> lacks = lacking(variety);
   if (!lacks.empty()) text += "; the log lacks " + listed(lacks);
   return text + ".";
 }

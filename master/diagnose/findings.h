@@ -61,9 +61,9 @@ struct AliasReason {
   std::string name;
   double cosine = 0;  // absolute, of what retuning the base leaves of both
 };
-// One sentence; empty without aliases.
+// One sentence; empty without aliases.  `lacks`: what the log would need to part them.
 std::string alias_sentence(std::string_view effect, std::span<const AliasReason> aliases,
-                           const LogVariety& variety);
+                           std::span<const std::string> lacks);
 
 // What cannot be seen, or not be trusted, in data as thin as these; one sentence each.
 std::vector<std::string> cautions(std::span<const ResidualTrial> trials,

@@ -1,10 +1,12 @@
 #include "master/diagnose/noise.h"
 
+#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 
 #include "common/score/statistics.h"
 #include "master/diagnose/drive_noise.h"
+#include "master/diagnose/subject.h"
 
 namespace gapfarm {
 namespace {
@@ -19,6 +21,15 @@ Eigen::VectorXd studentised(const Regression& explained, double least_freedom) {
   const Eigen::VectorXd freedom =
       (1 - explained.leverage().array()).max(least_freedom).sqrt().matrix();
   return explained.left().cwiseQuotient(freedom);
+}
+
+void bound_far_trials(const std::vector<Eigen::Vector3d>& residuals, double most, Study* study) {
+  study->trust.clear();
+  for (std::size_t i = 0; i < residuals.size(); ++i) {
+    const Eigen::Matrix3d cov = study->subject->covariance(study->trials[i], study->noise);
+    const double distance = std::sqrt(residuals[i].dot(cov.inverse() * residuals[i]));
+    study->trust.push_back(std::min(1.0, most / std::max(distance, most)));
+  }
 }
 
 void estimate_noise(const Regression& nuisances, const std::vector<CovariateBlock>& blocks,
@@ -47,10 +58,12 @@ void estimate_noise(const Regression& nuisances, const std::vector<CovariateBloc
     rich.add(blocks[best].columns);
   }
   const std::vector<Eigen::Vector3d> residuals = study->unwhiten(studentised(rich, 0.1));
-  NoiseEstimate noise =
-      refit_drive_noise(study->trials, residuals, study->noise, !study->reading_noise_known);
+  NoiseEstimate noise = refit_drive_noise(study->trials, residuals, study->noise,
+                                          !study->reading_noise_known, study->subject->covariance);
   noise.drive_common = std::max(noise.drive_common, kLeastDriveNoise);
   noise.drive_side = std::max(noise.drive_side, kLeastDriveNoise);
+  study->noise = noise;
+  if (study->subject->farthest > 0) bound_far_trials(residuals, study->subject->farthest, study);
   study->use_noise(noise);
 }
 

@@ -6,13 +6,11 @@
 #include <array>
 #include <vector>
 
+#include "master/diagnose/patch.h"
 #include "master/diagnose/regression.h"
 #include "master/diagnose/study.h"
 
 namespace gapfarm {
-
-// x, y, radius (m), ratio of the friction inside to that outside.
-using Patch = std::array<double, 4>;
 
 // Quasi-static: four contacts whose friction outweighs all else.  On a floor of one friction the
 // motion does not depend on it; while some contacts are inside the disc, the body moves with the

@@ -10,6 +10,7 @@
 #include "common/problem/problem.h"
 #include "common/score/fitness.h"
 #include "common/trials/context.h"
+#include "master/diagnose/push/push_geometry.h"
 
 namespace gapfarm {
 
@@ -39,19 +40,23 @@ struct ResidualTrial {
   // Change of the predicted end for a unit change of each side's gain.
   Eigen::Vector3d left = Eigen::Vector3d::Zero();
   Eigen::Vector3d right = Eigen::Vector3d::Zero();
+  PushGeometry push;  // of push logs only, as are these
+  PushSpread spread;
 };
 
 // Standard deviations of everything random, per trial.
 struct NoiseEstimate {
   PoseNoise pose;           // of one reading
-  double drive_common = 0;  // of both sides' gain
-  double drive_side = 0;    // of each side's gain
+  double drive_common = 0;  // of both sides' gain; of a push: of its end, over the distance slid
+  double drive_side = 0;    // of each side's gain; of a push: of its turn, kTurnUnit_rad_m a metre
 };
 
 // Covariance of the two readings in the predicted end's axes, without the drive's part.
 Eigen::Matrix3d reading_covariance(const ResidualTrial& trial, const PoseNoise& noise);
 // With it: common^2 (l + r)(l + r)' + side^2 (l l' + r r').
 Eigen::Matrix3d trial_covariance(const ResidualTrial& trial, const NoiseEstimate& noise);
+// What a scenario's trials vary by: that, or one of its own.
+using CovarianceOf = Eigen::Matrix3d (*)(const ResidualTrial& trial, const NoiseEstimate& noise);
 
 // Between the end reading of the trial before and the start reading of trial `i`, in the frame of
 // the first; only where the robot was not moved in between.

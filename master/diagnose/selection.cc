@@ -8,6 +8,7 @@
 
 #include "master/diagnose/aliases.h"
 #include "master/diagnose/seam.h"
+#include "master/diagnose/subject.h"
 
 namespace gapfarm {
 namespace {
@@ -65,7 +66,10 @@ std::set<std::string> names_of(const std::vector<EffectCandidate>& chosen,
 
 }  // namespace
 
-void Selector::look_for_patches() { sketch_.emplace(predictor_.problem(), study_); }
+void Selector::look_for_patches(std::function<PatchSearch()> make) {
+  make_patch_search_ = std::move(make);
+  patch_search_ = make_patch_search_();
+}
 
 EffectCandidate Selector::refine_seam(const Regression& explained, EffectCandidate best) const {
   // The gain jumps as readings change sides, so everything near is tried.
@@ -129,19 +133,20 @@ Status Selector::refine_patch(const Regression& explained, EffectCandidate best)
 // Adds to the catalogue what the sketch finds in the data that are left, where a search has not
 // been yet.
 Status Selector::search_patches(const Regression& explained, double most_gain) {
-  if (!sketch_ || patch_searches_ >= kMostPatchSearches) return {};
+  if (!patch_search_ || patch_searches_ >= kMostPatchSearches) return {};
   const double worth = std::max(kWorthSketched, kWorthRefiningShare * most_gain);
   std::vector<Patch> starts;
-  for (const PatchSketch::Place& place : sketch_->search(explained, 3, 2 * worth)) {
+  const auto places = patch_search_(explained, 3, 2 * worth);
+  if (!places) return places.error();
+  for (const Patch& place : *places) {
     const bool known =
         std::any_of(refined_patches_.begin(), refined_patches_.end(), [&](const Patch& p) {
-          return std::hypot(p[0] - place.patch[0], p[1] - place.patch[1], p[2] - place.patch[2]) <
-                 0.15;
+          return std::hypot(p[0] - place[0], p[1] - place[1], p[2] - place[2]) < 0.15;
         });
     if (known) continue;
-    starts.push_back(place.patch);
-    starts.push_back(place.patch);
-    starts.back()[3] = std::sqrt(place.patch[3]);
+    starts.push_back(place);
+    starts.push_back(place);
+    starts.back()[3] = std::sqrt(place[3]);
   }
   if (starts.empty()) return {};
   ++patch_searches_;
@@ -240,7 +245,8 @@ bool Selector::is_new(const std::vector<Signature>& first,
 }
 
 void Selector::drop_weak(std::vector<EffectCandidate>* chosen) const {
-  const double least = std::max(kLeastGain, kLeastShare * (first_gain_ + total_gain(*chosen)));
+  const double least =
+      std::max(study_.subject->least_gain, kLeastShare * (first_gain_ + total_gain(*chosen)));
   std::erase_if(*chosen, [&](const EffectCandidate& c) { return c.gain <= least; });
 }
 
@@ -288,7 +294,8 @@ Result<std::vector<Alias>> Selector::aliases_of(const std::vector<Signature>& fi
   std::vector<Alias> aliases;
   for (const EffectCandidate& other : *others) {
     const double parallel = cosine(own, r.explained(other.signature.columns));
-    const bool as_good = chosen[i].gain - other.gain < 4 && other.gain > kLeastGain / 2;
+    const bool as_good =
+        chosen[i].gain - other.gain < 4 && other.gain > study_.subject->least_gain / 2;
     const auto& constant = constant_aliases(chosen[i].signature.effect);
     const bool always =
         std::find(constant.begin(), constant.end(), other.signature.effect) != constant.end();
@@ -301,7 +308,7 @@ Result<std::vector<Alias>> Selector::aliases_of(const std::vector<Signature>& fi
 
 void Selector::recount(const Regression& nuisances) {
   base_ = nuisances;
-  if (sketch_) look_for_patches();
+  if (make_patch_search_) patch_search_ = make_patch_search_();
   for (Signature& s : catalogue_) study_.drop_ignored(s.columns);
 }
 
@@ -328,7 +335,7 @@ Result<std::vector<ChosenEffect>> Selector::select(const std::vector<Signature>&
     }
     steps_.push_back(std::move(step));
     std::erase_if(*next, [&](const EffectCandidate& c) {
-      return c.gain < kLeastGain || !is_new(first, chosen, c);
+      return c.gain < study_.subject->least_gain || !is_new(first, chosen, c);
     });
     const double least = kLeastShare * (first_gain + total_gain(chosen));
     if (next->empty() || next->front().gain < least) break;

@@ -2,22 +2,18 @@
 #pragma once
 
 #include <functional>
-#include <optional>
 #include <set>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "common/base/result.h"
-#include "master/diagnose/patch_sketch.h"
+#include "master/diagnose/patch.h"
 #include "master/diagnose/regression.h"
 #include "master/diagnose/signatures.h"
 
 namespace gapfarm {
 
-// Net log-likelihood (nats over all trials) that an effect must gain to be named.  The best of the
-// catalogue gained 4.4 at most in 90 of 100 null logs, 6.7 in 99 (400 logs; docs/diagnosis.md).
-inline constexpr double kLeastGain = 9;
 // A further effect must also gain this share of what the others did: small systematic errors of
 // a strong effect's model look like weaker effects.
 inline constexpr double kLeastShare = 0.02;
@@ -59,8 +55,8 @@ class Selector {
            const Regression& nuisances)
       : predictor_(predictor), study_(study), catalogue_(std::move(catalogue)), base_(nuisances) {}
 
-  // From now on candidates() looks for friction patches, too.
-  void look_for_patches();
+  // From now on candidates() looks for friction patches, too; recount() calls `make` again.
+  void look_for_patches(std::function<PatchSearch()> make);
 
   // The best signature of every effect, best first, beyond what `explained` holds.
   Result<std::vector<EffectCandidate>> candidates(const Regression& explained,
@@ -109,7 +105,8 @@ class Selector {
   const Study& study_;
   std::vector<Signature> catalogue_;
   Regression base_;
-  std::optional<PatchSketch> sketch_;
+  std::function<PatchSearch()> make_patch_search_;
+  PatchSearch patch_search_;
   std::vector<SelectionStep> steps_;
   double first_gain_ = 0;
   int patch_searches_ = 0;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "master/diagnose/probes.h"
 #include "master/diagnose/seam.h"
 
 namespace gapfarm {
@@ -12,20 +13,6 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 constexpr double kLowMass_m = 0.002;  // hardly over the floor
-
-Eigen::MatrixXd stack(const std::vector<Eigen::VectorXd>& columns) {
-  Eigen::MatrixXd all(columns.front().size(), static_cast<Eigen::Index>(columns.size()));
-  for (std::size_t k = 0; k < columns.size(); ++k)
-    all.col(static_cast<Eigen::Index>(k)) = columns[k];
-  return all;
-}
-
-// One finite difference: an effect's parameters at `plus`, less those at `minus` (empty: neutral).
-struct Probe {
-  std::string effect;
-  std::map<std::string, double> plus, minus;
-  double scale = 1;
-};
 
 std::vector<Probe> probes(const Eigen::Vector2d& middle, double own_height_m) {
   std::vector<Probe> all;
@@ -78,13 +65,6 @@ std::vector<Probe> probes(const Eigen::Vector2d& middle, double own_height_m) {
   all.push_back({"camera_distortion", lens(away, 0), lens(-away, 0), 2 * away * k1});
   all.push_back({"camera_distortion", lens(0, away), lens(0, -away), 2 * away * k1});
   return all;
-}
-
-Overrides at(const Predictor& predictor, const Study& study,
-             const std::map<std::string, double>& values) {
-  Overrides overrides = study.base;
-  for (const auto& [key, value] : values) overrides[predictor.problem().table().row(key)] = value;
-  return overrides;
 }
 
 // Whether a drive sticks: Coulomb treads then give way to no small force, real ones creep in
@@ -228,25 +208,14 @@ Result<std::vector<Signature>> signatures(Predictor& predictor, const Study& stu
                                           const std::vector<std::string>& left_out) {
   const Eigen::Vector2d middle = middle_of(study);
   const std::vector<Probe> all = probes(middle, study.base.at(row_of(Srv1::kMassHeight)));
-  std::vector<PredictionRequest> requests;
-  for (const Probe& probe : all) {
-    requests.push_back({at(predictor, study, probe.plus), {}});
-    if (!probe.minus.empty()) requests.push_back({at(predictor, study, probe.minus), {}});
-  }
-  const auto ends = predictor.ends(requests);
-  if (!ends) return ends.error();
+  auto probed = probe_all(predictor, study, all);
+  if (!probed) return probed.error();
 
   std::map<std::string, std::vector<std::vector<Eigen::Vector3d>>> slopes;
   std::vector<std::string> order;
-  std::size_t next = 0;
-  for (const Probe& probe : all) {
-    std::vector<Eigen::Vector3d> d = differences(study, (*ends)[next++], probe.scale);
-    if (!probe.minus.empty()) {
-      const std::vector<Eigen::Vector3d> minus = differences(study, (*ends)[next++], probe.scale);
-      for (std::size_t i = 0; i < d.size(); ++i) d[i] -= minus[i];
-    }
-    if (slopes[probe.effect].empty()) order.push_back(probe.effect);
-    slopes[probe.effect].push_back(std::move(d));
+  for (std::size_t k = 0; k < all.size(); ++k) {
+    if (slopes[all[k].effect].empty()) order.push_back(all[k].effect);
+    slopes[all[k].effect].push_back(std::move((*probed)[k]));
   }
 
   std::vector<Signature> found;
@@ -312,7 +281,7 @@ Result<std::vector<Signature>> patch_signatures(Predictor& predictor, const Stud
                       {"friction_patch.x", x},
                       {"friction_patch.y", y},
                       {"friction_patch.radius", radius}});
-    request.at = at(predictor, study, values.back());
+    request.at = base_with(predictor, study, values.back());
     if (request.trials.empty()) request.trials.push_back(0);
     requests.push_back(std::move(request));
   }

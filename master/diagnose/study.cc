@@ -10,6 +10,7 @@
 #include "common/score/statistics.h"
 #include "master/diagnose/distribution.h"
 #include "master/diagnose/nuisance.h"
+#include "master/diagnose/subject.h"
 
 namespace gapfarm {
 namespace {
@@ -163,7 +164,7 @@ std::vector<Eigen::Vector3d> Study::unwhiten(const Eigen::VectorXd& rows) const 
 
 std::vector<Eigen::Matrix3d> Study::covariances() const {
   std::vector<Eigen::Matrix3d> all;
-  for (const ResidualTrial& t : trials) all.push_back(trial_covariance(t, noise));
+  for (const ResidualTrial& t : trials) all.push_back(subject->covariance(t, noise));
   return all;
 }
 
@@ -171,8 +172,9 @@ void Study::use_noise(const NoiseEstimate& estimate) {
   noise = estimate;
   whitener.clear();
   for (const ResidualTrial& t : trials) {
-    const Eigen::Matrix3d lower = trial_covariance(t, noise).llt().matrixL();
+    const Eigen::Matrix3d lower = subject->covariance(t, noise).llt().matrixL();
     whitener.push_back(lower.triangularView<Eigen::Lower>().solve(Eigen::Matrix3d::Identity()));
+    if (!trust.empty()) whitener.back() *= trust[whitener.size() - 1];
   }
 }
 
@@ -180,6 +182,9 @@ Result<Study> make_study(const Problem& problem) {
   if (problem.log.trials.empty())
     return Error{"the trial log is empty; there is nothing to explain"};
   Study study;
+  study.subject = diagnosis_subject(problem.scenario);
+  study.table = &problem.table();
+  study.base_parameters = tuned_base_parameters();
   std::vector<DrivenCommand> driven;
   for (const Trial& trial : problem.log.trials) {
     const CommandSpec c = resolved_command(trial, problem.commands);

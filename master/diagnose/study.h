@@ -20,18 +20,33 @@ struct BaseParameter {
 };
 std::vector<BaseParameter> tuned_base_parameters();
 
+// A parameter that retuning may move, with a prior on the logarithm of its value, and the change of
+// every trial's end for a change of that logarithm, in the axes of the base's ends.
+struct RetunedPush {
+  BaseParameter parameter;
+  std::vector<Eigen::Vector3d> slopes;
+};
+
+struct DiagnosisSubject;  // master/diagnose/subject.h
+
 struct Study {
+  const DiagnosisSubject* subject = nullptr;
+  const ParameterTable* table = nullptr;
+  std::vector<BaseParameter> base_parameters;  // that tuning moves
   std::vector<Cell> cells;
   std::vector<ResidualTrial> trials;
   std::vector<ReadingGap> gaps;
   std::size_t sessions = 0;
   double quantum_m = 0;  // grid of the logged positions
   NoiseEstimate noise;
-  bool reading_noise_known = true;        // from gaps between readings, rather than the config's
-  Overrides base;                         // tuned values
-  double speed_m_s = 0;                   // tuned full speed
+  bool reading_noise_known = true;  // from gaps between readings, rather than the config's
+  Overrides base;                   // tuned values
+  double speed_m_s = 0;             // tuned full speed
+  // Of push logs: what a relative change of each of these parameters moves the base's ends by.
+  std::vector<RetunedPush> retuned;
   std::vector<Eigen::Matrix3d> whitener;  // L^-1 of each trial's covariance L L'
   std::vector<bool> ignored;              // trials that no fit may learn from; empty: none
+  std::vector<double> trust;              // factor of each trial's whitener, (0, 1]; empty: 1
 
   std::size_t size() const { return trials.size(); }
   // Three rows a trial.

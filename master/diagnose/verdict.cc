@@ -33,8 +33,9 @@ std::vector<Leftover> leftovers(const Regression& explained,
   return all;
 }
 
-Verdict judge_verdict(bool named, double explained_nats, const std::vector<Leftover>& left) {
-  const bool unknown = !left.empty() && left.front().log10_p < kUnknownLog10P;
+Verdict judge_verdict(bool named, double explained_nats, const std::vector<Leftover>& left,
+                      double unknown_log10_p) {
+  const bool unknown = !left.empty() && left.front().log10_p < unknown_log10_p;
   if (!unknown) return named ? Verdict::kEffect : Verdict::kNone;
   if (!named || left.front().excess > kWrongShare * std::max(explained_nats, 1.0)) {
     return Verdict::kUnknown;

@@ -24,15 +24,14 @@ double leftover_scale(const Regression& explained);
 std::vector<Leftover> leftovers(const Regression& explained,
                                 const std::vector<CovariateBlock>& blocks);
 
-// A leftover dependence below this is not chance: the least p of twelve blocks was 10^-3.8 in 400
-// null logs (docs/diagnosis.md).
-inline constexpr double kUnknownLog10P = -4.2;
 // Leftovers beyond this share of what the named effects explain mean that they are not the cause.
 // Right effects left 1 to 4 %, effects outside the catalogue under a wrong name 18 % and more.
 inline constexpr double kWrongShare = 0.15;
 
 // `explained_nats`: by the named effects.  Whether they are to be believed at all is the caller's
-// to drop when the verdict is kUnknown.
-Verdict judge_verdict(bool named, double explained_nats, const std::vector<Leftover>& left);
+// to drop when the verdict is kUnknown.  A leftover dependence below `unknown_log10_p` is not
+// chance.
+Verdict judge_verdict(bool named, double explained_nats, const std::vector<Leftover>& left,
+                      double unknown_log10_p);
 
 }  // namespace gapfarm

@@ -12,9 +12,7 @@
 #include <string>
 
 #include "common/score/statistics.h"
-#include "master/diagnose/findings.h"
 #include "master/diagnose/trend_test.h"
-#include "master/diagnose/where_covariates.h"
 
 namespace gapfarm {
 namespace {
@@ -39,15 +37,13 @@ struct Selection {
   std::vector<double> sign;
 };
 
-std::string deviation(const Selection& s, double size, bool trend) {
-  return deviation_words(s.component, size, s.along_motion, trend);
-}
-
 class Looker {
  public:
   Looker(std::span<const ResidualTrial> trials, std::span<const Eigen::Vector3d> residuals,
-         std::span<const Eigen::Matrix3d> covariances, std::span<const Cell> cells)
-      : trials_(trials),
+         std::span<const Eigen::Matrix3d> covariances, std::span<const Cell> cells,
+         const WhereOptions& options)
+      : words_(options.words),
+        trials_(trials),
         residuals_(residuals),
         covariances_(covariances),
         cells_(cells),
@@ -59,7 +55,7 @@ class Looker {
     }
     const auto n = static_cast<double>(trials.size());
     excess_ = std::max(squares - 3 * n, std::sqrt(6 * n));
-    covariates_ = where_covariates(trials, residuals, cells);
+    covariates_ = options.covariates(trials, residuals, cells);
   }
 
   // All rows whose corrected p is at most `level`.
@@ -77,6 +73,9 @@ class Looker {
   }
 
  private:
+  std::string deviation(const Selection& s, double size, bool trend) const {
+    return words_.deviation(s.component, size, s.along_motion, trend);
+  }
   double sd(std::size_t trial, int k) const { return std::sqrt(covariances_[trial](k, k)); }
   double path(std::size_t trial) const { return cells_[trials_[trial].cell].path; }
 
@@ -215,7 +214,7 @@ class Looker {
     }
     const double mean = 1000 * found.test.coefficients[0] * (s.along_motion ? mean_motion(s) : 1.0);
     push(s, "bias", "", std::abs(mean), found.test.squares - 1, found.test.p,
-         motions_of(s.command) + " " + deviation(s, mean, false) + " on average.");
+         words_.motions(s.command) + " " + deviation(s, mean, false) + " on average.");
   }
 
   void tell_trend(const Selection& s, const WhereCovariate& covariate, const TrendTest& test,
@@ -224,12 +223,12 @@ class Looker {
     const double size = 1000 * std::sqrt(fitted.squaredNorm() / double(fitted.size()));
     double slope = 1000 * test.coefficients[0] * covariate.unit;
     if (covariate.with_motion) slope *= mean_motion(s);
-    std::string text = motions_of(s.command) + " ";
+    std::string text = words_.motions(s.command) + " ";
     if (!covariate.each.empty()) {
       text += deviation(s, slope, true) + " " + covariate.each + ".";
     } else {
       text +=
-          "differ in " + component_words(s.component) + " by " + amount_words(size, s.component) +
+          "differ in " + words_.component(s.component) + " by " + amount_words(size, s.component) +
           " (s.d.) with the " +
           (covariate.name == "previous residual" ? "error of the trial before" : covariate.name) +
           ".";
@@ -325,11 +324,11 @@ class Looker {
 
   void tell_scatter(const Scatter& scatter, bool spread) {
     const Selection& s = scatter.selection;
-    const std::string what = component_words(s.component);
+    const std::string what = words_.component(s.component);
     if (!spread) {
       const std::string of = std::to_string(std::lround(scatter.count));
       push(s, "outliers", "", median(scatter.beyond), scatter.wild, scatter.p_outliers,
-           motions_of(s.command) + ": " + std::to_string(scatter.beyond.size()) + " of " + of +
+           words_.motions(s.command) + ": " + std::to_string(scatter.beyond.size()) + " of " + of +
                " are far off in " + what + ", where " +
                plain_number(kOutlierShare * scatter.count) + " would be by chance.");
       return;
@@ -338,11 +337,12 @@ class Looker {
     const double size =
         std::sqrt(scatter.variance / scatter.count) * std::sqrt(std::abs(ratio - 1));
     push(s, "spread", "", size, scatter.squares - scatter.freedom, scatter.p_spread,
-         motions_of(s.command) + " scatter " + plain_number(std::sqrt(ratio)) +
+         words_.motions(s.command) + " scatter " + plain_number(std::sqrt(ratio)) +
              " times as much in " + what + " as the noise allows (" +
              amount_words(size, s.component) + (ratio > 1 ? " beyond it)." : " below it)."));
   }
 
+  WhereWords words_;
   std::span<const ResidualTrial> trials_;
   std::span<const Eigen::Vector3d> residuals_;
   std::span<const Eigen::Matrix3d> covariances_;
@@ -364,7 +364,7 @@ std::vector<Where> where(std::span<const ResidualTrial> trials,
   assert(trials.size() == residuals.size() && trials.size() == covariances.size());
   if (trials.empty()) return {};
   std::vector<Where> rows =
-      Looker(trials, residuals, covariances, cells).look(problem, options.level);
+      Looker(trials, residuals, covariances, cells, options).look(problem, options.level);
   std::stable_sort(rows.begin(), rows.end(),
                    [](const Where& a, const Where& b) { return a.share > b.share; });
   if (rows.size() > options.most) rows.resize(options.most);

@@ -8,13 +8,26 @@
 
 #include "common/problem/problem.h"
 #include "master/diagnose/diagnosis.h"
+#include "master/diagnose/findings.h"
 #include "master/diagnose/residuals.h"
+#include "master/diagnose/where_covariates.h"
 
 namespace gapfarm {
+
+struct WhereWords {
+  std::string (*motions)(const std::string& command) = motions_of;
+  std::string (*component)(int component) = component_words;
+  std::string (*deviation)(int component, double size, bool along_motion,
+                           bool trend) = deviation_words;
+};
 
 struct WhereOptions {
   double level = 0.01;    // greatest corrected p of a row
   std::size_t most = 12;  // rows
+  WhereWords words = {};
+  std::vector<WhereCovariate> (*covariates)(std::span<const ResidualTrial> trials,
+                                            std::span<const Eigen::Vector3d> residuals,
+                                            std::span<const Cell> cells) = where_covariates;
 };
 
 // The dependences of `residuals` (measured minus predicted end, m, m, rad, in the predicted end's

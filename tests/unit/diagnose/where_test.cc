@@ -283,12 +283,12 @@ TEST(Findings, SayWhatThinDataCannotShow) {
 
   const LogVariety variety = log_variety(poor, rich.cells, TrialLog{});
   const std::vector<AliasReason> aliases = {{"marker_offset", 0.968}};
-  const std::string text = alias_sentence("com_offset", aliases, variety);
+  const std::string text = alias_sentence("com_offset", aliases, lacking(variety));
   EXPECT_NE(text.find("com_offset and marker_offset"), std::string::npos) << text;
   EXPECT_NE(text.find("0.96"), std::string::npos) << text;
   EXPECT_NE(text.find("the log lacks several commands, several durations"), std::string::npos)
       << text;
-  EXPECT_EQ(alias_sentence("com_offset", {}, variety), "");
+  EXPECT_EQ(alias_sentence("com_offset", {}, lacking(variety)), "");
 }
 
 }  // namespace

@@ -1,0 +1,35 @@
+// Finite differences of predictions about the tuned base.
+#pragma once
+
+#include <Eigen/Core>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "common/base/result.h"
+#include "master/diagnose/predictor.h"
+#include "master/diagnose/study.h"
+
+namespace gapfarm {
+
+// One finite difference: parameters at `plus`, less those at `minus` (empty: neutral).
+struct Probe {
+  std::string effect;
+  std::map<std::string, double> plus, minus;
+  double scale = 1;
+};
+
+// The tuned base with some table keys' values put in.
+Overrides base_with(const Predictor& predictor, const Study& study,
+                    const std::map<std::string, double>& values);
+
+// Differences of the ends over each probe's scale, in the axes of the base's ends: one batch of
+// farm work.
+Result<std::vector<std::vector<Eigen::Vector3d>>> probe_all(Predictor& predictor,
+                                                            const Study& study,
+                                                            const std::vector<Probe>& probes);
+
+// Columns side by side.  REQUIRES: at least one, all of one length.
+Eigen::MatrixXd stack(const std::vector<Eigen::VectorXd>& columns);
+
+}  // namespace gapfarm

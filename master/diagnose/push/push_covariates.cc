@@ -1,0 +1,204 @@
+#include <algorithm>
+#include <cmath>
+#include <functional>
+
+#include "master/diagnose/probes.h"
+#include "master/diagnose/push/push_subject.h"
+
+namespace gapfarm {
+namespace {
+
+using Feature = std::function<double(const ResidualTrial&)>;
+
+// Of a piece whose outline and finger are known to this, m.
+constexpr double kOutline_m = 3e-4;
+// What a simulation of other physics gets wrong of a push, over the distance slid (or, of a turn,
+// over that and the gyration radius): measured on pushes by a simulator with friction all over the
+// face (docs/pushing.md).
+constexpr double kMisfit = 0.01;
+constexpr double kConditionMisfit = 0.015;  // of one push, alike in its repeats
+constexpr std::size_t kRepeats = 3;         // that a condition needs to be told from noise
+constexpr double kFarArm = 2;               // gyration radii: beyond, the finger slips off
+
+double arm(const ResidualTrial& t) {
+  return std::clamp(t.push.arm_m / t.push.gyration_m, -kFarArm, kFarArm);
+}
+
+// By component: along, across, turn.
+Eigen::Vector3d grown(const ResidualTrial& t) {
+  return {t.spread.slid_m, t.spread.slid_m, t.spread.slid_m / t.push.gyration_m};
+}
+
+Eigen::VectorXd column(const Study& study, int component, const Feature& feature) {
+  std::vector<Eigen::Vector3d> d;
+  for (const ResidualTrial& t : study.trials) {
+    Eigen::Vector3d shift = Eigen::Vector3d::Zero();
+    shift[component] = t.push.touched ? feature(t) : 0;
+    d.push_back(from_push_axes(t, shift));
+  }
+  return study.whiten(d);
+}
+
+CovariateBlock block(const Study& study, const std::string& name,
+                     const std::vector<Feature>& features) {
+  std::vector<Eigen::VectorXd> columns;
+  for (const Feature& feature : features) {
+    for (int k = 0; k < 3; ++k) {
+      columns.push_back(
+          column(study, k, [&](const ResidualTrial& t) { return feature(t) * grown(t)[k]; }));
+    }
+  }
+  return {name, stack(columns)};
+}
+
+// World-frame shifts of the readings that depend on the pose: the end's, less what the start's
+// does to the end.
+CovariateBlock readings(const Study& study) {
+  const Eigen::Vector2d middle = middle_of(study);
+  std::vector<Eigen::VectorXd> columns;
+  for (int i = 0; i <= 3; ++i) {
+    for (int j = 0; i + j <= 3; ++j) {
+      if (i + j == 0) continue;
+      const auto field = [&](const Pose& X) {
+        return std::pow(X.x - middle.x(), i) * std::pow(X.y - middle.y(), j);
+      };
+      for (int k = 0; k < 2; ++k) {
+        std::vector<Eigen::Vector3d> d;
+        for (const ResidualTrial& t : study.trials) {
+          const Pose end =
+              Pose{0, 0, -t.X_WP.theta} * Pose{k == 0 ? 1.0 : 0.0, k == 1 ? 1.0 : 0.0, 0};
+          d.push_back(field(t.X_WP) * Eigen::Vector3d(end.x, end.y, 0) -
+                      field(t.X_WS) * t.spread.start.col(k));
+        }
+        columns.push_back(study.whiten(d));
+      }
+    }
+  }
+  return {"place of the readings", stack(columns)};
+}
+
+std::vector<Feature> harmonics(const Feature& angle, int most) {
+  std::vector<Feature> features;
+  for (int h = 1; h <= most; ++h) {
+    features.push_back([=](const ResidualTrial& t) { return std::cos(h * angle(t)); });
+    features.push_back([=](const ResidualTrial& t) { return std::sin(h * angle(t)); });
+  }
+  return features;
+}
+
+std::vector<Feature> powers(const Feature& value, int most) {
+  std::vector<Feature> features;
+  for (int p = 1; p <= most; ++p) {
+    features.push_back([=](const ResidualTrial& t) { return std::pow(value(t), p); });
+  }
+  return features;
+}
+
+// `value` less its mean, over its standard deviation; 0 where it hardly varies.
+Feature standardised(const Study& study, const Feature& value, double least_sd) {
+  const auto n = static_cast<double>(study.size());
+  double mean = 0, square = 0;
+  for (const ResidualTrial& t : study.trials) mean += value(t) / n;
+  for (const ResidualTrial& t : study.trials) square += std::pow(value(t) - mean, 2) / n;
+  const double sd = std::sqrt(square);
+  if (sd < least_sd) return [](const ResidualTrial&) { return 0.0; };
+  return [=](const ResidualTrial& t) { return std::clamp((value(t) - mean) / sd, -3.0, 3.0); };
+}
+
+std::vector<Feature> in_each_piece(const Study& study, const std::vector<Feature>& features) {
+  std::size_t most = 0;
+  for (const ResidualTrial& t : study.trials) most = std::max(most, t.command);
+  std::vector<Feature> all;
+  for (std::size_t c = 0; c <= most; ++c) {
+    for (const Feature& f : features) {
+      all.push_back([=](const ResidualTrial& t) { return t.command == c ? f(t) : 0.0; });
+    }
+  }
+  return all;
+}
+
+// Retuning in one session and not in another, and offsets of its own.
+CovariateBlock sessions_block(const Study& study) {
+  std::vector<Eigen::VectorXd> columns;
+  for (std::size_t s = 1; s < study.sessions; ++s) {
+    const Feature here = [s](const ResidualTrial& t) { return t.session == s ? 1.0 : 0.0; };
+    const Eigen::MatrixXd offsets = block(study, "", {here}).columns;
+    for (Eigen::Index k = 0; k < offsets.cols(); ++k) columns.push_back(offsets.col(k));
+    for (const RetunedPush& retuned : study.retuned) {
+      std::vector<Eigen::Vector3d> d = retuned.slopes;
+      for (std::size_t i = 0; i < d.size(); ++i) d[i] *= here(study.trials[i]);
+      columns.push_back(study.whiten(d));
+    }
+  }
+  return {"session", stack(columns)};
+}
+
+}  // namespace
+
+Result<Eigen::MatrixXd> push_nuisances(Predictor& predictor, const Study& study) {
+  std::vector<Eigen::VectorXd> columns;
+  for (const RetunedPush& retuned : study.retuned) {
+    columns.push_back(retuned.parameter.prior_log_sd * study.whiten(retuned.slopes));
+  }
+  constexpr double kMargin_m = 5e-4;
+  const auto margin =
+      probe_all(predictor, study, {{"", {{"contact_margin", kMargin_m}}, {}, kMargin_m}});
+  if (!margin) return margin.error();
+  columns.push_back(kOutline_m * study.whiten(margin->front()));
+  // Alike for a push and its mirror image: along it even in the arm, across it and in turn odd.
+  for (int component = 0; component < 3; ++component) {
+    for (int power = component == 0 ? 0 : 1; power <= 3; power += 2) {
+      columns.push_back(kMisfit * column(study, component, [&](const ResidualTrial& t) {
+                          return grown(t)[component] * std::pow(arm(t), power);
+                        }));
+    }
+  }
+  for (std::size_t c = 0; c < study.cells.size(); ++c) {
+    if (study.cells[c].trials < kRepeats) continue;
+    for (int component = 0; component < 3; ++component) {
+      columns.push_back(kConditionMisfit * column(study, component, [&](const ResidualTrial& t) {
+                          return t.cell == c ? grown(t)[component] : 0.0;
+                        }));
+    }
+  }
+  return stack(columns);
+}
+
+std::vector<CovariateBlock> push_blocks(const Study& study) {
+  const Feature one = [](const ResidualTrial&) { return 1.0; };
+  const auto direction = [](const ResidualTrial& t) { return t.push.direction_rad; };
+  const auto in_piece = [](const ResidualTrial& t) { return t.push.in_piece_rad; };
+  const Eigen::Vector2d middle = middle_of(study);
+  const auto x = [=](const ResidualTrial& t) { return t.X_WS.x - middle.x(); };
+  const auto y = [=](const ResidualTrial& t) { return t.X_WS.y - middle.y(); };
+  const auto slid = standardised(
+      study, [](const ResidualTrial& t) { return t.spread.slid_m; }, 1e-3);
+  const auto speed = standardised(
+      study, [](const ResidualTrial& t) { return t.push.speed_m_s; }, 1e-3);
+  const auto order = standardised(
+      study, [](const ResidualTrial& t) { return t.context.session_time_s; }, 1);
+
+  std::vector<CovariateBlock> blocks;
+  blocks.push_back(block(study, "piece", in_each_piece(study, {one})));
+  blocks.push_back(block(study, "contact offset", powers(arm, 3)));
+  blocks.push_back(block(study, "place of the touch on its edge",
+                         powers([](const ResidualTrial& t) { return t.push.along_edge; }, 3)));
+  blocks.push_back(block(study, "side of the piece", in_each_piece(study, harmonics(in_piece, 2))));
+  blocks.push_back(block(study, "push direction", harmonics(direction, 1)));
+  blocks.push_back(block(study, "push direction, twice a turn",
+                         harmonics([=](const ResidualTrial& t) { return 2 * direction(t); }, 1)));
+  blocks.push_back(block(study, "start heading",
+                         harmonics([](const ResidualTrial& t) { return t.X_WS.theta; }, 2)));
+  blocks.push_back(block(study, "start place",
+                         {x, y, [=](const ResidualTrial& t) { return x(t) * x(t); },
+                          [=](const ResidualTrial& t) { return x(t) * y(t); },
+                          [=](const ResidualTrial& t) { return y(t) * y(t); }}));
+  blocks.push_back(readings(study));
+  blocks.push_back(block(study, "distance slid", powers(slid, 2)));
+  blocks.push_back(block(study, "finger speed", powers(speed, 2)));
+  blocks.push_back(block(study, "order of the pushes", powers(order, 2)));
+  if (study.sessions > 1 && study.sessions <= 8) blocks.push_back(sessions_block(study));
+  return blocks;
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,319 @@
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+
+#include "common/parameters/push.h"
+#include "common/score/motion_model.h"
+#include "master/diagnose/estimate.h"
+#include "master/diagnose/push/push_subject.h"
+
+namespace gapfarm {
+namespace {
+
+constexpr double kRetuningStep = 0.05;  // of the logarithm
+constexpr int kTuningRounds = 4;
+constexpr std::size_t kMostGridTrials = 120;
+constexpr double kGridFactors[] = {0.25, 0.4, 0.55, 0.7, 0.85, 1.0};
+constexpr double kGridFrictions[] = {0.1, 0.25, 0.45, 0.7};
+// What a coarse grid's points may miss ends by before they count less: of the distance slid, and
+// turned by on the way.
+constexpr double kCoarse_m = 3e-3, kCoarseShare = 0.05;
+constexpr double kCoarse_rad = 0.02, kCoarseTurn_rad_m = 1;
+
+bool is_factor(std::size_t row) {
+  return row >= row_of(Push::kShapeFactor) && row < row_of(Push::kShapeFactor1) + kOwnShapeFactors;
+}
+
+double own_factor(const Problem& problem, std::size_t piece) {
+  const double own = problem.values[row_of(Push::kShapeFactor1) + piece];
+  return own > 0 ? own : problem.values[row_of(Push::kShapeFactor)];
+}
+
+// The rows that tuning moves.
+Result<std::vector<BaseParameter>> base_of(const Problem& problem, std::span<const Gene> genes,
+                                           const std::set<std::size_t>& pieces) {
+  constexpr double kFactorPrior = 1, kFingerPrior = 1;
+  // Hardly seen in slow pushes: held close.
+  constexpr double kGroundPrior = 0.3;
+  bool factor = genes.empty(), finger = genes.empty(), ground = false;
+  for (const Gene& gene : genes) {
+    factor = factor || is_factor(gene.row);
+    finger = finger || gene.row == row_of(Push::kFingerFriction);
+    ground = ground || gene.row == row_of(Push::kGroundFriction);
+  }
+  std::vector<BaseParameter> base;
+  for (const std::size_t piece : pieces) {
+    if (!factor) break;
+    const bool own = pieces.size() > 1 || problem.values[row_of(Push::kShapeFactor1) + piece] > 0;
+    if (own && piece >= kOwnShapeFactors) {
+      return Error{"piece " + problem.pieces[piece].name + " is number " +
+                   std::to_string(piece + 1) + " of the config, and only the first " +
+                   std::to_string(kOwnShapeFactors) +
+                   " can have a shape factor of their own; list it earlier"};
+    }
+    base.push_back(
+        {own ? row_of(Push::kShapeFactor1) + piece : row_of(Push::kShapeFactor), kFactorPrior});
+  }
+  if (finger) base.push_back({row_of(Push::kFingerFriction), kFingerPrior});
+  if (ground) base.push_back({row_of(Push::kGroundFriction), kGroundPrior});
+  return base;
+}
+
+void set_ends(const std::vector<Pose>& ends, Study* study) {
+  for (std::size_t i = 0; i < study->size(); ++i) {
+    ResidualTrial& t = study->trials[i];
+    t.X_WP = ends[i];
+    t.residual = local_difference(t.X_WP, t.X_WE);
+    const Eigen::Vector2d slid = transform(t.X_WP, t.push.p_RC) - transform(t.X_WS, t.push.p_RC);
+    t.spread.slid_m = slid.norm();
+    // Half of the whole motion each, along and across the push.
+    const double c = std::cos(t.push.direction_rad), s = std::sin(t.push.direction_rad);
+    const Eigen::Vector3d motion(c * slid.x() + s * slid.y(), -s * slid.x() + c * slid.y(),
+                                 wrap_angle(t.X_WP.theta - t.X_WS.theta));
+    t.left = t.right = motion / 2;
+  }
+}
+
+// Start noise through the simulation: cubature points at sqrt(3) standard deviations, as the
+// worker's own prediction has them, so that a bend within them counts as spread.
+Status measure_spread(Predictor& predictor, Study* study) {
+  const ParameterTable& table = *study->table;
+  std::vector<PredictionRequest> requests;
+  const double steps[] = {std::sqrt(3.0) * study->noise.pose.position_m,
+                          std::sqrt(3.0) * study->noise.pose.position_m,
+                          std::sqrt(3.0) * study->noise.pose.heading_rad};
+  const char* const keys[] = {"placement_bias.x", "placement_bias.y", "placement_bias.angle"};
+  for (int k = 0; k < 3; ++k) {
+    for (double sign : {1.0, -1.0}) {
+      requests.push_back({study->base, {}});
+      requests.back().at[table.row(keys[k])] = sign * steps[k];
+    }
+  }
+  const auto ends = predictor.ends(requests);
+  if (!ends) return ends.error();
+  for (std::size_t i = 0; i < study->size(); ++i) {
+    ResidualTrial& t = study->trials[i];
+    t.spread.position.setZero();
+    t.spread.heading.setZero();
+    for (int k = 0; k < 3; ++k) {
+      const auto at = static_cast<std::size_t>(2 * k);
+      const Eigen::Vector3d up = local_difference(t.X_WP, (*ends)[at][i]);
+      const Eigen::Vector3d down = local_difference(t.X_WP, (*ends)[at + 1][i]);
+      Eigen::Matrix3d& moments = k < 2 ? t.spread.position : t.spread.heading;
+      moments += (up * up.transpose() + down * down.transpose()) / (2 * steps[k] * steps[k]);
+      t.spread.start.col(k) = (up - down) / (2 * steps[k]);
+    }
+  }
+  return {};
+}
+
+// Slopes of everything that retuning may move, tuned here or not.
+Status measure_retuning(Predictor& predictor, Study* study) {
+  std::vector<BaseParameter> parameters = study->base_parameters;
+  for (BaseParameter& p : parameters) p.prior_log_sd = std::max(p.prior_log_sd, 0.5);
+  for (const auto& [row, prior] :
+       {std::pair{Push::kFingerFriction, 0.3}, std::pair{Push::kGroundFriction, 0.5}}) {
+    const bool known = std::any_of(parameters.begin(), parameters.end(),
+                                   [&](const BaseParameter& p) { return p.row == row_of(row); });
+    if (!known) parameters.push_back({row_of(row), prior});
+  }
+  std::vector<PredictionRequest> requests;
+  std::vector<double> steps;
+  for (const BaseParameter& p : parameters) {
+    const double value =
+        study->base.count(p.row) ? study->base.at(p.row) : predictor.problem().values[p.row];
+    const auto at = [&](double log_step) {
+      return std::clamp(value * std::exp(log_step), (*study->table)[p.row].lower,
+                        (*study->table)[p.row].upper);
+    };
+    const double up = at(kRetuningStep), down = at(-kRetuningStep);
+    for (double moved : {up, down}) {
+      requests.push_back({study->base, {}});
+      requests.back().at[p.row] = moved;
+    }
+    steps.push_back(std::log(up / down));
+  }
+  const auto ends = predictor.ends(requests);
+  if (!ends) return ends.error();
+  study->retuned.clear();
+  for (std::size_t k = 0; k < parameters.size(); ++k) {
+    RetunedPush& retuned = study->retuned.emplace_back();
+    retuned.parameter = parameters[k];
+    for (std::size_t i = 0; i < study->size(); ++i) {
+      const Pose& X_WP = study->trials[i].X_WP;
+      retuned.slopes.push_back((local_difference(X_WP, (*ends)[2 * k][i]) -
+                                local_difference(X_WP, (*ends)[2 * k + 1][i])) /
+                               steps[k]);
+    }
+  }
+  return {};
+}
+
+double coarse_cost(const ResidualTrial& t, const Pose& end) {
+  const double slid = std::hypot(t.X_WE.x - t.X_WS.x, t.X_WE.y - t.X_WS.y);
+  const Eigen::Vector3d d = local_difference(end, t.X_WE);
+  const double aside = d.head<2>().norm() / std::hypot(kCoarse_m, kCoarseShare * slid);
+  const double turned = d[2] / std::hypot(kCoarse_rad, kCoarseTurn_rad_m * slid);
+  return std::sqrt(1 + aside * aside + turned * turned);
+}
+
+// The best point of a grid: a friction for all pieces, a factor for each.
+Status start_from_grid(Predictor& predictor, Study* study) {
+  PredictionRequest some;
+  const std::size_t count = std::min(kMostGridTrials, study->size());
+  for (std::size_t i = 0; i < count; ++i) {
+    some.trials.push_back(static_cast<std::uint32_t>(i * study->size() / count));
+  }
+  const auto tuned = [&](std::size_t row) { return study->base.count(row) > 0; };
+  std::vector<double> frictions = {predictor.problem().values[row_of(Push::kFingerFriction)]};
+  if (tuned(row_of(Push::kFingerFriction))) {
+    frictions.insert(frictions.end(), std::begin(kGridFrictions), std::end(kGridFrictions));
+  }
+  const bool factors_tuned = std::any_of(study->base.begin(), study->base.end(),
+                                         [](const auto& entry) { return is_factor(entry.first); });
+  std::vector<double> factors = {0};  // the config's
+  if (factors_tuned)
+    factors.insert(factors.end(), std::begin(kGridFactors), std::end(kGridFactors));
+  if (frictions.size() * factors.size() == 1) return {};
+  std::vector<PredictionRequest> requests;
+  for (double friction : frictions) {
+    for (double factor : factors) {
+      some.at = study->base;
+      for (auto& [row, value] : some.at) {
+        if (is_factor(row) && factor > 0) value = factor;
+      }
+      if (tuned(row_of(Push::kFingerFriction))) some.at[row_of(Push::kFingerFriction)] = friction;
+      requests.push_back(some);
+    }
+  }
+  const auto ends = predictor.ends(requests);
+  if (!ends) return ends.error();
+  double least = INFINITY;
+  for (std::size_t f = 0; f < frictions.size(); ++f) {
+    std::map<std::size_t, std::vector<double>> costs;  // by piece: of each factor
+    for (std::size_t s = 0; s < factors.size(); ++s) {
+      for (std::size_t j = 0; j < some.trials.size(); ++j) {
+        const ResidualTrial& t = study->trials[some.trials[j]];
+        std::vector<double>& own = costs[t.command];
+        own.resize(factors.size());
+        own[s] += coarse_cost(t, (*ends)[f * factors.size() + s][j]);
+      }
+    }
+    double sum = 0;
+    Overrides at = requests[f * factors.size()].at;
+    for (const auto& [piece, own] : costs) {
+      const auto best =
+          static_cast<std::size_t>(std::min_element(own.begin(), own.end()) - own.begin());
+      sum += own[best];
+      const std::size_t row = row_of(Push::kShapeFactor1) + piece;
+      const std::size_t to = at.count(row) ? row : row_of(Push::kShapeFactor);
+      if (factors[best] > 0 && at.count(to)) at[to] = factors[best];
+    }
+    if (sum < least) {
+      least = sum;
+      study->base = at;
+    }
+  }
+  return {};
+}
+
+}  // namespace
+
+Eigen::Vector3d from_push_axes(const ResidualTrial& trial, const Eigen::Vector3d& shift) {
+  const Pose end =
+      Pose{0, 0, trial.push.direction_rad - trial.X_WP.theta} * Pose{shift[0], shift[1], 0};
+  return {end.x, end.y, shift[2]};
+}
+
+Eigen::Matrix3d push_covariance(const ResidualTrial& trial, const NoiseEstimate& noise) {
+  const double position2 = noise.pose.position_m * noise.pose.position_m;
+  const double heading2 = noise.pose.heading_rad * noise.pose.heading_rad;
+  const double slid = noise.drive_common * trial.spread.slid_m;
+  const double turned = noise.drive_side * kTurnUnit_rad_m * trial.spread.slid_m;
+  Eigen::Matrix3d cov = position2 * trial.spread.position + heading2 * trial.spread.heading;
+  cov.diagonal() +=
+      Eigen::Vector3d(position2 + slid * slid, position2 + slid * slid, heading2 + turned * turned);
+  return cov;
+}
+
+Result<Study> make_push_study(const Problem& problem, std::span<const Gene> genes) {
+  const std::vector<Trial>& log = problem.log.trials;
+  if (log.empty()) return Error{"the push log is empty; there is nothing to explain"};
+  Study study;
+  study.subject = diagnosis_subject(problem.scenario);
+  study.table = &problem.table();
+  std::vector<DrivenCommand> driven;
+  for (const Trial& trial : log) {
+    driven.push_back({0, 0, trial.tip.back().t_s - trial.tip.front().t_s});
+  }
+  const std::vector<TrialContext> contexts = trial_contexts(problem.log, driven);
+  const std::vector<std::size_t> cells = push_cells(problem.log);
+  std::map<std::string, std::size_t> sessions;
+  std::set<std::size_t> pieces;
+  study.cells.resize(1 + *std::max_element(cells.begin(), cells.end()));
+  for (std::size_t i = 0; i < log.size(); ++i) {
+    ResidualTrial t;
+    const Piece& piece = problem.piece(log[i].command);
+    t.command = static_cast<std::size_t>(&piece - problem.pieces.data());
+    t.cell = cells[i];
+    t.session = sessions.try_emplace(log[i].session, sessions.size()).first->second;
+    t.context = contexts[i];
+    t.context.moved = true;  // a push that begins where another ended is a start like any
+    t.X_WS = log[i].X_WS;
+    t.X_WE = log[i].X_WE;
+    t.push = push_geometry(piece, log[i], problem.values[row_of(Push::kFingerRadius)]);
+    Cell& cell = study.cells[cells[i]];
+    cell.command = {piece.name, 0, 0, driven[i].duration_s};
+    ++cell.trials;
+    pieces.insert(t.command);
+    study.trials.push_back(t);
+  }
+  study.sessions = sessions.size();
+  const auto base = base_of(problem, genes, pieces);
+  if (!base) return base.error();
+  study.base_parameters = *base;
+  for (const BaseParameter& p : *base) {
+    const bool own = p.row >= row_of(Push::kShapeFactor1) && is_factor(p.row);
+    study.base[p.row] =
+        own ? own_factor(problem, p.row - row_of(Push::kShapeFactor1)) : problem.values[p.row];
+  }
+  // To begin with; logs of pushes hold no two readings of one pose.
+  study.reading_noise_known = false;
+  study.noise.pose = {problem.values[row_of(Push::kPoseNoisePosition)],
+                      problem.values[row_of(Push::kPoseNoiseHeading)]};
+  study.noise.drive_common = problem.values[row_of(Push::kPushNoiseSlide)];
+  study.noise.drive_side = problem.values[row_of(Push::kPushNoiseTurn)] / kTurnUnit_rad_m;
+  return study;
+}
+
+Status tune_push_base(Predictor& predictor, bool keep, Study* study) {
+  if (!keep) {
+    if (Status s = start_from_grid(predictor, study); !s) return s;
+  }
+  // Twice: how a start's noise spreads depends on the base, which is fitted to what it leaves.
+  for (int round = 0; round < 2; ++round) {
+    auto ends = predictor.ends({{study->base, {}}});
+    if (!ends) return ends.error();
+    set_ends(ends->front(), study);
+    if (Status s = measure_spread(predictor, study); !s) return s;
+    study->use_noise(study->noise);
+    if (keep || round == 1) break;
+    const Eigen::MatrixXd none(static_cast<Eigen::Index>(3 * study->size()), 0);
+    auto fit = fit_jointly(predictor, *study, {}, study->base, BaseParameters::kFitted, none,
+                           kTuningRounds);
+    if (!fit) return fit.error();
+    study->base = fit->at;
+  }
+  return measure_retuning(predictor, study);
+}
+
+std::vector<std::size_t> push_folds(const Study& study) {
+  constexpr std::size_t kFolds = 5;
+  std::vector<std::size_t> folds;
+  for (const ResidualTrial& t : study.trials) folds.push_back(t.cell % kFolds);
+  return folds;
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,86 @@
+// What a diagnosis has to know of a scenario, as a row of a table.
+//
+// The rest of the diagnosis is linear algebra over three whitened rows a trial, whatever moves.
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "common/base/result.h"
+#include "master/diagnose/covariates.h"
+#include "master/diagnose/diagnosis.h"
+#include "master/diagnose/next_experiment.h"
+#include "master/diagnose/patch.h"
+#include "master/diagnose/signatures.h"
+#include "master/diagnose/study.h"
+
+namespace gapfarm {
+
+// Effects on the spread or the readings that are looked for beside the catalogue's means.
+enum Looks : unsigned {
+  kLooksAtNothingElse = 0,
+  kLooksForLateReadings = 1u << 0,
+  kLooksForLag = 1u << 1,  // in logged paths
+  kLooksForSlips = 1u << 2,
+  kLooksForRounding = 1u << 3,
+};
+
+// Where a value of NoiseEstimate stands in the parameter table, and its unit there.
+struct NoiseRow {
+  std::size_t row = 0;
+  double unit = 1;
+};
+
+// How the pictures show a trial.
+struct TrialView {
+  Pose X_WV;                       // ends are seen from here
+  double turn_rad = 0;             // residuals are told in the predicted end's axes turned by this
+  std::vector<double> covariates;  // one a DiagnosisSubject::shown
+};
+
+struct DiagnosisSubject {
+  const char* scenario;
+  unsigned looks;
+  // Net log-likelihood (nats over all trials) that an effect must gain to be named, and log10 of
+  // the p below which a leftover dependence is no chance: measured on logs without any effect
+  // (docs/diagnosis.md).
+  double least_gain;
+  double unknown_log10_p;
+  // Standard deviations beyond which a trial that nothing smooth explains counts no more; 0: none.
+  double farthest;
+  NoiseRow drive_common, drive_side, pose_position, pose_heading;
+  CovarianceOf covariance;
+
+  // Errors: an empty log.  `genes`: what the config has searched.
+  Result<Study> (*make_study)(const Problem& problem, std::span<const Gene> genes);
+  // Tunes the base, or keeps that of the problem, and fills in what depends on it.
+  Status (*tune)(Predictor& predictor, bool keep, Study* study);
+  // Whitened columns, scaled to a prior standard deviation of 1, of what no effect may claim.
+  Result<Eigen::MatrixXd> (*nuisances)(Predictor& predictor, const Study& study);
+  std::vector<CovariateBlock> (*blocks)(const Study& study);
+  Result<std::vector<Signature>> (*signatures)(Predictor& predictor, const Study& study,
+                                               const std::vector<std::string>& left_out);
+  PatchSearch (*patches)(Predictor& predictor, const Study& study);
+  // The parts of the log that are predicted from the others, one number a trial.
+  std::vector<std::size_t> (*folds)(const Study& study);
+
+  std::vector<Where> (*where)(const Study& study, std::span<const Eigen::Vector3d> residuals,
+                              const Problem& problem);
+  std::vector<std::string> (*cautions)(const Study& study, const TrialLog& log);
+  // What the log would need to part effects that look alike in it.
+  std::vector<std::string> (*lacks)(const Study& study, const TrialLog& log);
+  Result<std::vector<NextExperiment>> (*next)(Farm& farm, const Problem& problem,
+                                              const Rivals& rivals);
+  TrialView (*view)(const Study& study, std::size_t trial);
+  std::vector<ShownCovariate> shown;  // in the pictures, beside what every log has
+  PictureWords words;
+};
+
+// Null where the scenario cannot be diagnosed.
+const DiagnosisSubject* diagnosis_subject(std::string_view scenario);
+
+}  // namespace gapfarm
