@@ -60,7 +60,7 @@ Status DiagnosisRun::look_for_second_places() {
       if (effect.candidate.signature.effect != name) continue;
       const auto second = selector_->again(explained, name);
       if (!second) return second.error();
-      if (second->gain < kLeastGain) continue;
+      if (second->gain < subject_.least_gain) continue;
       std::string place;
       for (const char* key : keys) {
         const std::size_t row = problem_.table().row(std::string(name) + "." + key);
@@ -71,7 +71,7 @@ Status DiagnosisRun::look_for_second_places() {
       Regression with_it = explained;
       with_it.add(second->signature.columns);
       const std::vector<Leftover> left = leftovers(with_it, blocks_);
-      const bool all = left.empty() || left.front().log10_p >= kUnknownLog10P;
+      const bool all = left.empty() || left.front().log10_p >= subject_.unknown_log10_p;
       result_.diagnosis.cautions.push_back(
           "A second " + std::string(name) + " (" + place + ") would explain " +
           std::to_string(std::lround(second->gain)) + " nats more of what is left" +

@@ -8,8 +8,8 @@
 namespace gapfarm {
 namespace {
 
-constexpr std::size_t kTasks = 16;  // of a batch: enough for eight workers to end together
-constexpr std::size_t kMostParts = 8;
+constexpr std::size_t kTasks = 80;  // of a batch: enough for eight workers to end together
+constexpr std::size_t kMostParts = 16;
 
 void fill(const Overrides& at, v1::Point* point) {
   for (const auto& [row, value] : at) {
@@ -40,14 +40,15 @@ Error bad_point(const Problem& problem, const Overrides& at, const v1::TaskResul
 
 Predictor::Predictor(Farm& farm, const Problem& problem)
     : farm_(farm), problem_(problem), hash_(farm.add_problem(to_proto(problem))) {
-  const std::vector<Trial>& trials = problem.log.trials;
-  by_condition_.resize(trials.size());
+  by_condition_.resize(problem.log.trials.size());
   std::iota(by_condition_.begin(), by_condition_.end(), 0);
-  const auto condition = [&](std::uint32_t i) {
-    return std::tie(trials[i].command, trials[i].left, trials[i].right, trials[i].duration_s);
-  };
   std::stable_sort(by_condition_.begin(), by_condition_.end(),
                    [&](auto a, auto b) { return condition(a) < condition(b); });
+}
+
+Predictor::Condition Predictor::condition(std::uint32_t trial) const {
+  const Trial& t = problem_.log.trials[trial];
+  return {t.command, t.left, t.right, t.duration_s};
 }
 
 std::vector<std::vector<std::uint32_t>> Predictor::parts_of(const PredictionRequest& request,
@@ -58,13 +59,23 @@ std::vector<std::vector<std::uint32_t>> Predictor::parts_of(const PredictionRequ
     const std::set<std::uint32_t> wanted(request.trials.begin(), request.trials.end());
     std::erase_if(trials, [&](std::uint32_t i) { return !wanted.count(i); });
   }
-  std::vector<std::vector<std::uint32_t>> cut;
   parts = std::min(parts, std::max<std::size_t>(trials.size(), 1));
-  for (std::size_t p = 0; p < parts; ++p) {
-    const auto at = [&](std::size_t part) {
-      return trials.begin() + static_cast<std::ptrdiff_t>(part * trials.size() / parts);
-    };
-    cut.emplace_back(at(p), at(p + 1));
+  std::vector<std::size_t> begins;  // of conditions
+  for (std::size_t i = 0; i < trials.size(); ++i) {
+    if (i == 0 || condition(trials[i - 1]) != condition(trials[i])) begins.push_back(i);
+  }
+  std::vector<std::vector<std::uint32_t>> cut;
+  std::size_t from = 0;
+  for (std::size_t p = 1; p <= parts; ++p) {
+    std::size_t to = p * trials.size() / parts;
+    // A condition in two tasks may have to be simulated twice.
+    if (p < parts && begins.size() >= 2 * parts) {
+      to = *std::lower_bound(begins.begin(), begins.end() - 1, to);
+    }
+    if (to <= from) continue;
+    cut.emplace_back(trials.begin() + static_cast<std::ptrdiff_t>(from),
+                     trials.begin() + static_cast<std::ptrdiff_t>(to));
+    from = to;
   }
   return cut;
 }
@@ -81,7 +92,8 @@ Result<std::vector<std::vector<Pose>>> Predictor::ends(
   std::vector<std::pair<std::size_t, std::vector<std::uint32_t>>> asked;  // request, trials
   for (std::size_t k = 0; k < requests.size(); ++k) {
     // As many whoever works, so that the answers do not depend on it.
-    const std::size_t parts = std::clamp<std::size_t>(kTasks / requests.size(), 1, kMostParts);
+    const std::size_t parts =
+        std::clamp<std::size_t>(1 + (kTasks - 1) / requests.size(), 1, kMostParts);
     for (std::vector<std::uint32_t>& part : parts_of(requests[k], parts)) {
       tasks.push_back(task_of(requests[k].at, part, true));
       asked.emplace_back(k, std::move(part));
@@ -117,17 +129,6 @@ Result<std::vector<std::vector<Pose>>> Predictor::ends(
     }
   }
   return ends;
-}
-
-Result<std::vector<double>> Predictor::log_scores(const Overrides& at) {
-  const auto results = farm_.run(hash_, {task_of(at, {}, false)});
-  if (!results) return results.error();
-  ++predictions_;
-  const v1::TaskResult& result = results->front();
-  if (result.outcome() != v1::OK) return bad_point(problem_, at, result);
-  std::vector<double> scores;
-  for (const v1::Predicted& p : result.predict().predictions()) scores.push_back(p.log_score());
-  return scores;
 }
 
 Result<std::vector<std::vector<PathSample>>> Predictor::paths(

@@ -3,7 +3,9 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "common/base/result.h"
@@ -41,10 +43,11 @@ class Predictor {
   // Whether the last error of ends() was a simulation's rather than the farm's.
   bool simulation_failed() const { return simulation_failed_; }
 
-  // Log scores of every trial under the worker's own predictive distribution.
-  Result<std::vector<double>> log_scores(const Overrides& at);
-
  private:
+  // Trials of one share a simulation, unless their places matter.
+  using Condition =
+      std::tuple<std::string, std::optional<double>, std::optional<double>, std::optional<double>>;
+  Condition condition(std::uint32_t trial) const;
   std::vector<std::vector<std::uint32_t>> parts_of(const PredictionRequest& request,
                                                    std::size_t parts) const;
 
