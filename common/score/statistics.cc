@@ -32,6 +32,12 @@ double quantile(std::span<const double> values, double share) {
   return sorted[below] + fraction * (sorted[above] - sorted[below]);
 }
 
+double mean(std::span<const double> values) {
+  double sum = 0;
+  for (double v : values) sum += v;
+  return values.empty() ? 0 : sum / static_cast<double>(values.size());
+}
+
 double median(std::span<const double> values) { return quantile(values, 0.5); }
 
 double mad(std::span<const double> values) {

@@ -12,6 +12,9 @@
 
 namespace gapfarm {
 
+// 0 of no values.
+double mean(std::span<const double> values);
+
 // The median; the mean of the middle two for an even count.  REQUIRES: not empty, all finite.
 double median(std::span<const double> values);
 

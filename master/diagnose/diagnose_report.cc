@@ -16,13 +16,10 @@ namespace {
 
 constexpr int kBootstraps = 400;
 
+// For so long another robot may roll on by itself: what a late reading's age is counted from is its
+// recorder's secret.
+constexpr double kCoasting_s = 0.04;
 constexpr double kLagError = 0.05;  // of a lag seen in paths, between simulations
-
-double mean_of(const std::vector<double>& values) {
-  double sum = 0;
-  for (double v : values) sum += v;
-  return values.empty() ? 0 : sum / static_cast<double>(values.size());
-}
 
 // Evidence to confidence: the least gain that names an effect is an even bet.
 double confidence_of(double gain, double least_gain) {
@@ -59,71 +56,6 @@ void turn(double angle_rad, DiagnosedTrial* trial) {
 }
 
 }  // namespace
-
-Overrides DiagnosisRun::start_of(const std::vector<EffectCandidate>& effects) const {
-  Overrides at = study_.base;
-  for (std::size_t k = 0; k < effects.size(); ++k) {
-    std::vector<const Signature*> others;
-    for (const Signature& s : first_) others.push_back(&s);
-    for (std::size_t j = 0; j < effects.size(); ++j) {
-      if (j != k) others.push_back(&effects[j].signature);
-    }
-    const Regression explained = selector_->with(others);
-    for (const auto& [key, value] : start_values(study_, explained, effects[k].signature)) {
-      at[problem_.table().row(key)] = value;
-    }
-  }
-  return at;
-}
-
-// Base alone, with the first effect, with the first two, ...: each fitted without nuisances, since
-// these are what a user's predictions will come from.
-Status DiagnosisRun::refit_nested() {
-  const Eigen::MatrixXd none(static_cast<Eigen::Index>(3 * study_.size()), 0);
-  std::set<std::string> names;
-  std::vector<EffectCandidate> effects;
-  for (std::size_t count = 0; count <= chosen_.size(); ++count) {
-    if (count > 0) {
-      effects.push_back(chosen_[count - 1].candidate);
-      names.insert(effects.back().signature.effect);
-    }
-    Overrides start = study_.base;
-    for (const auto& [row, value] : estimates_ ? estimates_->at : Overrides{}) {
-      const std::string& effect = problem_.table()[row].effect;
-      if (count > 0 && (effect.empty() || names.count(effect))) start[row] = value;
-    }
-    const int rounds = options_.keep_base && count == 0 ? 0 : 2;
-    auto fit =
-        fit_jointly(predictor_, study_, effects, start, BaseParameters::kFitted, none, rounds);
-    if (!fit) return fit.error();
-    std::string name = "the tuned base";
-    for (std::size_t k = 0; k < effects.size(); ++k) {
-      name += (k == 0 ? ", " : " and ") + effects[k].signature.effect;
-    }
-    result_.fits.emplace_back(name, predictor_.tasks(fit->at));
-    nested_.push_back(std::move(*fit));
-  }
-  return {};
-}
-
-Status DiagnosisRun::refit() {
-  if (!chosen_.empty()) {
-    std::vector<EffectCandidate> effects;
-    for (const ChosenEffect& c : chosen_) effects.push_back(c.candidate);
-    auto fit = estimate(effects, estimates_ ? 1 : 2);
-    if (!fit) return fit.error();
-    estimates_ = std::move(*fit);
-  }
-  if (Status s = refit_nested(); !s) return s;
-  const double share = problem_.fitness.outlier_share;
-  const std::vector<std::size_t> folds = subject_.folds(study_);
-  for (const JointFit& fit : nested_) {
-    nested_scores_.push_back(held_out_scores(study_, fit, folds, share));
-  }
-  // A perfect prediction also knows that a side slips now and then.
-  floor_ = floor_score(study_, share) + slip_.gain / static_cast<double>(study_.size());
-  return {};
-}
 
 void DiagnosisRun::set_noise(const NoiseEstimate& noise, Overrides* at) const {
   const auto set = [&](const NoiseRow& to, double value) { (*at)[to.row] = value * to.unit; };
@@ -183,6 +115,13 @@ void DiagnosisRun::set_closed(NamedEffect* effect, const std::vector<double>& ga
   effect->closed_hi = quantile(shares, 0.95);
 }
 
+// Of every trial, by a nested fit over the one before.
+std::vector<double> DiagnosisRun::gained_by(std::size_t nested) const {
+  std::vector<double> gained = nested_scores_[nested];
+  for (std::size_t i = 0; i < gained.size(); ++i) gained[i] -= nested_scores_[nested - 1][i];
+  return gained;
+}
+
 NamedEffect DiagnosisRun::named(std::size_t k, const JointFit& estimates) const {
   const ChosenEffect& chosen = chosen_[k];
   NamedEffect effect;
@@ -209,13 +148,12 @@ NamedEffect DiagnosisRun::named(std::size_t k, const JointFit& estimates) const 
     e.hi = value + half;
     effect.parameters.push_back(e);
   }
-  effect.gap_before = floor_ - mean_of(nested_scores_[k]);
-  effect.gap_after = floor_ - mean_of(nested_scores_[k + 1]);
-  std::vector<double> gained = nested_scores_[k + 1];
-  for (std::size_t i = 0; i < gained.size(); ++i) gained[i] -= nested_scores_[k][i];
-  set_closed(&effect, gained);
+  const std::size_t before = k + (as_logged_ ? 1 : 0);
+  effect.gap_before = floor_ - mean(nested_scores_[before]);
+  effect.gap_after = floor_ - mean(nested_scores_[before + 1]);
+  set_closed(&effect, gained_by(before + 1));
   const RootMeanSquare after =
-      root_mean_square(held_out_residuals(study_, nested_[k + 1], subject_.folds(study_)));
+      root_mean_square(held_out_residuals(study_, nested_[before + 1], subject_.folds(study_)));
   effect.position_mm_after = after.position_mm;
   effect.heading_mrad_after = after.heading_mrad;
   return effect;
@@ -225,29 +163,35 @@ NamedEffect DiagnosisRun::named(std::size_t k, const JointFit& estimates) const 
 std::vector<DiagnosisRun::SpreadEffect> DiagnosisRun::spread_effects_found() const {
   std::vector<SpreadEffect> found;
   if (!first_.empty()) {
-    const double age = latency_.latency_s, share = latency_.share;
-    found.push_back({"pose_latency",
-                     latency_.gain,
-                     {{"latency", age, 0.8 * age, 1.25 * age, "s"},
-                      {"share", share, 0.7 * share, std::min(1.0, 1.4 * share), "-"}}});
+    const double age = latency_from_rest_s_, share = latency_.share;
+    found.push_back(
+        {"pose_latency",
+         latency_.gain,
+         {{"latency", age, std::max(0.0, 0.8 * latency_.latency_s - kCoasting_s), 1.2 * age, "s"},
+          {"share", share, 0.7 * share, std::min(1.0, 1.4 * share), "-"}},
+         gained_by(1)});
   }
   if (lag_.gain > 0) {
     const double half = kNormal90 * std::hypot(lag_.standard_error_s, kLagError * lag_.tau_s);
-    found.push_back(
-        {"motor_lag", lag_.gain, {{"tau", lag_.tau_s, lag_.tau_s - half, lag_.tau_s + half, "s"}}});
+    found.push_back({"motor_lag",
+                     lag_.gain,
+                     {{"tau", lag_.tau_s, lag_.tau_s - half, lag_.tau_s + half, "s"}},
+                     {}});
   }
   if (slip_.gain > 0) {
     const double p = slip_.probability, loss = slip_.loss;
     found.push_back(
         {"slip_events",
          slip_.gain,
-         {{"probability", p, 0.6 * p, 1.6 * p, "-"}, {"loss", loss, 0.7 * loss, 1.4 * loss, "-"}}});
+         {{"probability", p, 0.6 * p, 1.6 * p, "-"}, {"loss", loss, 0.7 * loss, 1.4 * loss, "-"}},
+         {}});
   }
   if (study_.quantum_m > 0) {
     const double q = study_.quantum_m;
     found.push_back({"pose_quantisation",
                      0.02 * static_cast<double>(study_.size()) + 20,
-                     {{"step", q, 0.99 * q, 1.01 * q, "m"}}});
+                     {{"step", q, 0.99 * q, 1.01 * q, "m"}},
+                     {}});
   }
   return found;
 }
@@ -257,9 +201,14 @@ NamedEffect DiagnosisRun::named(const SpreadEffect& found) const {
   effect.name = found.name;
   effect.confidence = confidence_of(found.gain, subject_.least_gain);
   effect.parameters = found.estimates;
+  if (!found.gained.empty()) {
+    effect.gap_after = -mean(found.gained);
+    set_closed(&effect, found.gained);
+    return effect;
+  }
   // The gain is over all that the readings tell; of the gap it can close what the means left.
   const double per_trial = std::min(found.gain / static_cast<double>(study_.size()),
-                                    std::max(0.0, floor_ - mean_of(nested_scores_.back())));
+                                    std::max(0.0, floor_ - mean(nested_scores_.back())));
   effect.gap_after = -per_trial;
   set_closed(&effect, std::vector<double>(study_.size(), per_trial));
   return effect;
@@ -276,7 +225,7 @@ void DiagnosisRun::name_effects() {
   }
   std::stable_sort(all.begin(), all.end(),
                    [](const auto& a, const auto& b) { return a.first > b.first; });
-  double gap = floor_ - mean_of(nested_scores_.front());
+  double gap = floor_ - mean(nested_scores_.front());
   for (auto& [gain, effect] : all) {
     const double change = effect.gap_after - effect.gap_before;
     effect.gap_before = gap;
@@ -289,10 +238,11 @@ void DiagnosisRun::name_effects() {
 void DiagnosisRun::fill_gap() {
   Diagnosis& d = result_.diagnosis;
   const std::vector<std::size_t> folds = subject_.folds(study_);
-  d.gap.tuned = floor_ - mean_of(nested_scores_.front());
+  d.gap.tuned = floor_ - mean(nested_scores_.front());
   d.gap.final_ = d.effects.empty() ? d.gap.tuned : d.effects.back().gap_after;
   d.gap.floor = 0;
-  const RootMeanSquare tuned = root_mean_square(held_out_residuals(study_, nested_.front(), folds));
+  const RootMeanSquare tuned =
+      root_mean_square(held_out_residuals(study_of(0), nested_.front(), folds));
   const RootMeanSquare last = root_mean_square(held_out_residuals(study_, nested_.back(), folds));
   double position = 0, heading = 0;
   for (const Eigen::Matrix3d& cov : study_.covariances()) {
@@ -342,7 +292,7 @@ void DiagnosisRun::fill_values() {
     if (with_effects) {
       spread_effects(&at);
     } else {
-      set_noise(study_.noise, &at);
+      set_noise(study_of(0).noise, &at);
     }
     ParameterValues values = problem_.values;
     for (const auto& [row, value] : at) values[row] = value;

@@ -13,8 +13,6 @@
 namespace gapfarm {
 namespace {
 
-constexpr double kLeastLatencyGain = 14;  // nats; the share and the age are searched on a grid
-constexpr double kLeastLagGain = 14;      // it stands for all samples of a path, which go together
 constexpr double kLeastSlipGain = 11;
 constexpr double kLeastSlipShare = 0.03;  // of what the effects on the means explain
 constexpr double kSlippedSquared = 11.5;  // squared distance with 3 degrees of freedom: one in 110
@@ -68,41 +66,6 @@ Status DiagnosisRun::measure_noise() {
   if (Status s = rebuild_nuisances(); !s) return s;
   estimate_noise(*base_, blocks_, &study_);
   return rebuild_nuisances();
-}
-
-// A late camera reads a pose before the motion has ended; the next reading shows it.
-Status DiagnosisRun::look_for_latency() {
-  if (!looks_for("pose_latency", kLooksForLateReadings) || study_.gaps.size() < 20) return {};
-  constexpr double kStep_s = 0.02;
-  Overrides shorter = study_.base;
-  shorter[problem_.table().row("timing_offset.offset")] = -kStep_s;
-  const auto ends = predictor_.ends({{shorter, {}}});
-  if (!ends) return ends.error();
-  std::vector<Eigen::Vector3d> velocity;
-  for (const Eigen::Vector3d& d : differences(study_, ends->front(), kStep_s)) {
-    velocity.push_back(-d);
-  }
-  latency_ = study_.reading_noise_known
-                 ? fit_latency(late_reading_gaps(study_.trials, velocity, study_.noise.pose),
-                               velocity, study_.noise.pose, study_.size())
-                 : fit_shared_latency(study_, velocity);
-  if (latency_.gain < kLeastLatencyGain) return {};
-  Signature s;
-  s.effect = "pose_latency";
-  s.columns = study_.whiten(late_marks(study_, latency_, velocity));
-  s.fixed = {{"pose_latency.share", latency_.share}, {"pose_latency.latency", latency_.latency_s}};
-  first_.push_back(std::move(s));
-  return {};
-}
-
-// Where paths were logged they say more of a lag than rest poses do, and have the last word.
-Status DiagnosisRun::look_for_lag() {
-  if (!looks_for("motor_lag", kLooksForLag)) return {};
-  auto lag = fit_path_lag(predictor_, study_);
-  if (!lag) return lag.error();
-  lag_ = *lag;
-  if (lag_.gain < kLeastLagGain) lag_.gain = 0;
-  return {};
 }
 
 Status DiagnosisRun::screen() {
@@ -295,13 +258,20 @@ std::vector<bool> DiagnosisRun::tells_of_slips() const {
   return tells;
 }
 
+void DiagnosisRun::name_nothing() {
+  first_.clear();
+  chosen_.clear();
+  slip_ = {};
+  lag_ = {};
+  if (as_logged_) study_ = std::move(*as_logged_);
+  as_logged_.reset();
+  study_.quantum_m = 0;
+}
+
 // Names nothing where the data are too few for a claim, and says so.
 bool DiagnosisRun::too_thin() {
   if (study_.size() >= kFewestTrials) return false;
-  first_.clear();
-  chosen_.clear();
-  lag_ = {};
-  study_.quantum_m = 0;
+  name_nothing();
   result_.diagnosis.verdict = Verdict::kNone;
   result_.diagnosis.cautions.push_back(
       "Fewer than " + std::to_string(kFewestTrials) +
@@ -317,22 +287,28 @@ void DiagnosisRun::judge() {
   const Regression explained = this->explained();
   leftovers_ = leftovers(explained, blocks_);
   scale_ = leftover_scale(explained);
-  const double nats = explained_nats(explained) + slip_.gain;
+  const double nats = explained_nats(explained) + slip_.gain + (as_logged_ ? latency_.gain : 0);
   for (const Leftover& l : leftovers_) {
     result_.diagnosis.checks.push_back({l.covariate, l.log10_p, l.excess});
   }
-  const bool rounded =
-      study_.quantum_m > kLeastQuantum_m && looks_for("pose_quantisation", kLooksForRounding);
+  const bool on_grid =
+      (subject_.looks & kLooksForRounding) != 0 && study_.quantum_m > kLeastQuantum_m;
+  const bool rounded = on_grid && !left_out("pose_quantisation");
   const bool named =
       !first_.empty() || !chosen_.empty() || slip_.gain > 0 || lag_.gain > 0 || rounded;
-  result_.diagnosis.verdict = judge_verdict(named, nats, leftovers_, subject_.unknown_log10_p);
-  if (result_.diagnosis.verdict == Verdict::kUnknown) {
-    first_.clear();
-    chosen_.clear();
-    slip_ = {};
-    lag_ = {};
+  Verdict& verdict = result_.diagnosis.verdict;
+  verdict = judge_verdict(named, nats, leftovers_, subject_.unknown_log10_p);
+  if (on_grid && !rounded) {
+    odd_readings_ =
+        "The logged positions lie on a grid, which nothing that was looked for explains.";
+    if (verdict == Verdict::kEffect) verdict = Verdict::kEffectAndUnknown;
   }
-  if (!rounded || result_.diagnosis.verdict == Verdict::kUnknown) study_.quantum_m = 0;
+  if (!odd_readings_.empty()) {
+    if (verdict != Verdict::kEffectAndUnknown) verdict = Verdict::kUnknown;
+    result_.diagnosis.cautions.push_back(odd_readings_);
+  }
+  if (verdict == Verdict::kUnknown) name_nothing();
+  if (!rounded) study_.quantum_m = 0;
 }
 
 }  // namespace gapfarm

@@ -48,6 +48,10 @@ class DiagnosisRun {
   bool too_thin();
   Status rebuild_nuisances();
   Status look_for_latency();
+  Result<std::vector<Eigen::Vector3d>> end_velocities();
+  Status put_late_readings_right(std::vector<Eigen::Vector3d> velocity);
+  Status date_latency(const std::vector<Eigen::Vector3d>& velocity);
+  void name_nothing();
   Status look_for_lag();
   void fill_screening(const std::vector<EffectCandidate>& candidates);
   Regression explained() const;  // what is left once all that was chosen is explained
@@ -63,14 +67,18 @@ class DiagnosisRun {
   void set_noise(const NoiseEstimate& noise, Overrides* at) const;
   void spread_effects(Overrides* at) const;
   Status refit_nested();
+  Status estimate_beside_base();
   void name_effects();
   // An effect on the spread: gain in nats over all trials.
   struct SpreadEffect {
     std::string name;
     double gain = 0;
     std::vector<Estimate> estimates;
+    std::vector<double> gained;  // of each trial, where that is known
   };
   std::vector<SpreadEffect> spread_effects_found() const;
+  const Study& study_of(std::size_t nested) const;
+  std::vector<double> gained_by(std::size_t nested) const;
   // Without words, and with a gap that only its change counts of.
   NamedEffect named(std::size_t k, const JointFit& estimates) const;
   NamedEffect named(const SpreadEffect& found) const;
@@ -87,17 +95,20 @@ class DiagnosisRun {
   Farm& farm_;
   Predictor predictor_;
   Study study_;
+  std::optional<Study> as_logged_;  // where late readings were put right: before that
   Eigen::MatrixXd nuisances_;
   std::vector<CovariateBlock> blocks_;
   std::unique_ptr<Regression> base_;  // nuisances only
   std::unique_ptr<Selector> selector_;
   LatencyFit latency_;
-  PathLag lag_;  // by paths
+  double latency_from_rest_s_ = 0;  // as the parameter has it
+  PathLag lag_;                     // by paths
   SlipFit slip_;
+  std::string odd_readings_;      // what readings show that no effect looked for explains
   std::vector<Signature> first_;  // explained before anything else
   std::vector<ChosenEffect> chosen_;
   std::vector<Leftover> leftovers_;
-  std::vector<JointFit> nested_;                    // base, base + first effect, ...
+  std::vector<JointFit> nested_;                    // see refit_nested()
   std::optional<JointFit> estimates_;               // base held, beside nuisances
   std::vector<std::vector<double>> nested_scores_;  // held out, one a trial
   double scale_ = 1;                                // leftover variance over the noise's

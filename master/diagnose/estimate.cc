@@ -12,7 +12,7 @@ namespace gapfarm {
 namespace {
 
 constexpr int kMostHalvings = 4;
-constexpr double kSettled = 0.02;   // of the objective (twice nats): less is no progress
+constexpr double kSettled = 0.2;    // of the objective (twice nats): less is no progress
 constexpr double kFarSquared = 16;  // squared distance beyond which a trial counts linearly
 
 // Effects with a strength and a direction, whose first two columns belong to its cosine and sine.
@@ -71,7 +71,7 @@ Status predict(Predictor& predictor, const Study& study, JointFit* fit) {
   fit->ends = std::move(ends->front());
   fit->residuals.clear();
   for (std::size_t i = 0; i < study.size(); ++i) {
-    fit->residuals.push_back(local_difference(fit->ends[i], study.trials[i].X_WE));
+    fit->residuals.push_back(residual_of(study.trials[i], fit->ends[i]));
   }
   return {};
 }

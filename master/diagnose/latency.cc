@@ -96,10 +96,33 @@ LatencyFit fit_latency(std::span<const ReadingGap> gaps,
   return best;
 }
 
+LatencyFit fit_latency(const Study& study, std::span<const Eigen::Vector3d> end_velocity) {
+  if (!study.reading_noise_known) return fit_shared_latency(study, end_velocity);
+  const std::vector<ReadingGap> gaps =
+      late_reading_gaps(study.trials, {end_velocity.begin(), end_velocity.end()}, study.noise.pose);
+  LatencyFit fit = fit_latency(gaps, end_velocity, study.noise.pose, study.size());
+  if (fit.gain <= 0) return fit;
+  // Where no reading follows, only the trial's own end tells.
+  std::vector<bool> followed(study.size(), false);
+  for (const ReadingGap& g : gaps) followed[g.previous] = true;
+  for (std::size_t i = 0; i < study.size(); ++i) {
+    if (followed[i]) continue;
+    const ResidualTrial& t = study.trials[i];
+    const auto squares = [&](const Eigen::Vector3d& expected) {
+      return (study.whitener[i] * (t.residual + t.late - expected)).squaredNorm();
+    };
+    const Eigen::Vector3d late = -fit.latency_s * end_velocity[i];
+    fit.weights[i] =
+        probability_of(fit.share, (squares(Eigen::Vector3d::Zero()) - squares(late)) / 2);
+  }
+  return fit;
+}
+
 LatencyFit fit_shared_latency(const Study& study, std::span<const Eigen::Vector3d> end_velocity) {
   const std::vector<SharedReading> readings = shared_readings(study);
   const auto squares = [&](std::size_t trial, const Eigen::Vector3d& expected) {
-    const Eigen::Vector3d z = study.whitener[trial] * (study.trials[trial].residual - expected);
+    const ResidualTrial& t = study.trials[trial];
+    const Eigen::Vector3d z = study.whitener[trial] * (t.residual + t.late - expected);
     return std::min(z.squaredNorm(), kCap);
   };
   const auto evidence = [&](double age_s) {

@@ -18,6 +18,9 @@ struct LatencyFit {
   std::vector<double> weights;  // of each trial: probability that its end pose was late
 };
 
+// Whichever of the two that follow the log's readings allow.
+LatencyFit fit_latency(const Study& study, std::span<const Eigen::Vector3d> end_velocity);
+
 // The later reading is of the robot at rest, so that a late one shows a gap of age times velocity.
 // Ages to 0.5 s and shares are searched on a grid.  Trials that no gap follows get the share
 // itself. Without gaps or noise the gain and all weights are 0.  `end_velocity`: of every trial,

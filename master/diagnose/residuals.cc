@@ -5,6 +5,10 @@
 
 namespace gapfarm {
 
+Eigen::Vector3d residual_of(const ResidualTrial& trial, const Pose& X_WP) {
+  return local_difference(X_WP, trial.X_WE) - trial.late;
+}
+
 Eigen::Matrix3d reading_covariance(const ResidualTrial& trial, const PoseNoise& noise) {
   return predictive_covariance(between(trial.X_WS, trial.X_WP), Eigen::Matrix3d::Zero(), noise);
 }

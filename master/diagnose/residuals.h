@@ -37,12 +37,17 @@ struct ResidualTrial {
   Pose X_WS, X_WE;  // measured
   Pose X_WP;        // predicted measured end
   Eigen::Vector3d residual = Eigen::Vector3d::Zero();
+  // What readings that came late did to it: left out of the residual.
+  Eigen::Vector3d late = Eigen::Vector3d::Zero();
   // Change of the predicted end for a unit change of each side's gain.
   Eigen::Vector3d left = Eigen::Vector3d::Zero();
   Eigen::Vector3d right = Eigen::Vector3d::Zero();
   PushGeometry push;  // of push logs only, as are these
   PushSpread spread;
 };
+
+// Of the measured end, were it predicted there.
+Eigen::Vector3d residual_of(const ResidualTrial& trial, const Pose& X_WP);
 
 // Standard deviations of everything random, per trial.
 struct NoiseEstimate {

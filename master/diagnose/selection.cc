@@ -253,10 +253,13 @@ void Selector::drop_weak(std::vector<EffectCandidate>* chosen) const {
 // Lets every earlier choice be replaced in the light of the later ones, and drops what has become
 // too weak.
 Status Selector::replace_each(const std::vector<Signature>& first,
+                              const std::set<std::string>& rejected,
                               std::vector<EffectCandidate>* chosen) {
   for (std::size_t i = 0; i < chosen->size(); ++i) {
     const Regression others = without(first, *chosen, i);
-    auto better = candidates(others, names_of(*chosen, i));
+    std::set<std::string> not_these = names_of(*chosen, i);
+    not_these.insert(rejected.begin(), rejected.end());
+    auto better = candidates(others, not_these);
     if (!better) return better.error();
     EffectCandidate& own = (*chosen)[i];
     own.gain = net_gain(others, own.signature);
@@ -321,9 +324,12 @@ Result<std::vector<ChosenEffect>> Selector::select(const std::vector<Signature>&
   std::vector<EffectCandidate> chosen;
   std::set<std::string> taken;
   for (const Signature& s : first) taken.insert(s.effect);
+  // Adding and dropping could go round for ever: whatever led to names that were there before is
+  // not tried again.
   std::set<std::set<std::string>> seen;
-  // Adding and dropping could go round for ever: a set of names that was there before ends it.
-  while (chosen.size() < kMostEffects && seen.insert(names_of(chosen)).second) {
+  std::set<std::string> rejected;
+  while (chosen.size() < kMostEffects) {
+    seen.insert(names_of(chosen));
     std::set<std::string> used = names_of(chosen);
     used.insert(taken.begin(), taken.end());
     auto next = candidates(without(first, chosen, ~std::size_t{0}), used);
@@ -335,15 +341,18 @@ Result<std::vector<ChosenEffect>> Selector::select(const std::vector<Signature>&
     }
     steps_.push_back(std::move(step));
     std::erase_if(*next, [&](const EffectCandidate& c) {
-      return c.gain < study_.subject->least_gain || !is_new(first, chosen, c);
+      return c.gain < study_.subject->least_gain || rejected.count(c.signature.effect) ||
+             !is_new(first, chosen, c);
     });
     const double least = kLeastShare * (first_gain + total_gain(chosen));
     if (next->empty() || next->front().gain < least) break;
+    const std::string added = next->front().signature.effect;
     chosen.push_back(next->front());
     if (chosen.size() > 1) {
-      if (Status s = replace_each(first, &chosen); !s) return s.error();
+      if (Status s = replace_each(first, rejected, &chosen); !s) return s.error();
     }
     if (Status s = use_estimates(first, relinearise, &chosen); !s) return s.error();
+    if (seen.count(names_of(chosen))) rejected.insert(added);
   }
   std::stable_sort(
       chosen.begin(), chosen.end(),

@@ -94,7 +94,8 @@ class Selector {
                       const EffectCandidate& other) const;
   bool is_new(const std::vector<Signature>& first, const std::vector<EffectCandidate>& chosen,
               const EffectCandidate& candidate) const;
-  Status replace_each(const std::vector<Signature>& first, std::vector<EffectCandidate>* chosen);
+  Status replace_each(const std::vector<Signature>& first, const std::set<std::string>& rejected,
+                      std::vector<EffectCandidate>* chosen);
   Status use_estimates(const std::vector<Signature>& first, const Relinearise& relinearise,
                        std::vector<EffectCandidate>* chosen);
   void drop_weak(std::vector<EffectCandidate>* chosen) const;

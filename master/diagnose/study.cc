@@ -67,7 +67,7 @@ void set_predictions(const std::vector<Pose>& ends, Study* study) {
   for (std::size_t i = 0; i < study->size(); ++i) {
     ResidualTrial& t = study->trials[i];
     t.X_WP = ends[i];
-    t.residual = local_difference(t.X_WP, t.X_WE);
+    t.residual = residual_of(t, t.X_WP);
   }
 }
 
