@@ -81,6 +81,35 @@ TEST_F(Diagnose, NamesAnEffectWithAnIntervalAndClosesTheGap) {
 }
 
 // Where the robot comes to rest does not depend on the lag; how it gets there does.
+// Part of a sag or of late readings passes for a slower motor when the base is tuned alone.
+TEST_F(Diagnose, SizesASagBesideTheSpeedThatItHides) {
+  simulate(180, {"battery_sag.rate=0.03"});
+  const Json d = diagnose();
+  ASSERT_EQ(d["effects"].size(), 1u) << d["headline"];
+  const Json& rate = d["effects"][0]["parameters"]["rate"];
+  EXPECT_LT(rate["lo"], 0.03);
+  EXPECT_GT(rate["hi"], 0.03);
+  EXPECT_LT(rate["hi"].get<double>() - rate["lo"].get<double>(), 0.015);
+}
+
+TEST_F(Diagnose, LateReadingsDoNotSlowTheMotors) {
+  simulate(240, {"pose_latency.share=0.25", "pose_latency.latency=0.25"});
+  const Json d = diagnose();
+  ASSERT_EQ(d["effects"].size(), 1u) << d["headline"];
+  EXPECT_EQ(d["effects"][0]["name"], "pose_latency");
+  const Json& latency = d["effects"][0]["parameters"]["latency"];
+  EXPECT_NEAR(latency["value"].get<double>(), 0.25, 0.03);
+  const std::string tuned = text_of(folder_ / "d/tuned.toml");
+  const std::string model = text_of(folder_ / "d/model.toml");
+  const std::regex speed(R"(full_speed = \{ value = ([0-9.]+))");
+  std::smatch before, after;
+  ASSERT_TRUE(std::regex_search(tuned, before, speed));
+  ASSERT_TRUE(std::regex_search(model, after, speed));
+  const double truth = 0.28;  // the parameter table's
+  EXPECT_NEAR(std::stod(after[1]), truth, 0.01 * truth);
+  EXPECT_LT(std::stod(before[1]), 0.98 * truth);
+}
+
 TEST_F(Diagnose, FindsALagInPathsAndNoneWithoutOne) {
   more_config_ = "path_interval = 0.05\n";
   simulate(60, {"motor_lag.tau=0.06"});
