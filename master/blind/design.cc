@@ -32,6 +32,11 @@ constexpr Spread kSpreads[] = {
     {"drive_noise_side", 1.2, true},
     {"pose_noise_position", 1.2, true},
     {"pose_noise_heading", 1.2, true},
+    {"shape_factor", 1.15, false},
+    {"ground_friction", 1.5, false},
+    {"finger_friction", 1.3, false},
+    {"push_noise_slide", 1.2, true},
+    {"push_noise_turn", 1.2, true},
 };
 
 // The search for one effect's strength in one case.
@@ -265,9 +270,9 @@ std::map<std::string, double> draw_robot(const Problem& problem, Stream& stream)
   const ParameterTable& table = problem.table();
   std::map<std::string, double> robot;
   for (const Spread& spread : kSpreads) {
-    const double factor = std::pow(spread.factor, stream.uniform(-1, 1));
     const auto row = table.find(spread.key);
     if (!row) continue;
+    const double factor = std::pow(spread.factor, stream.uniform(-1, 1));
     double lower = table[*row].lower;
     double upper = table[*row].upper;
     bool free = problem.genes.empty() || spread.noise;

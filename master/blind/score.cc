@@ -6,8 +6,6 @@
 #include <numbers>
 #include <set>
 
-#include "common/effects/catalogue.h"
-
 namespace gapfarm {
 namespace {
 
@@ -56,13 +54,6 @@ Judgement judge_effects(const Truth& truth, const Said& said) {
   return {true, what + "; said " + names_of(said)};
 }
 
-const Effect* catalogue_entry(const std::string& name) {
-  for (const Effect& effect : srv1_effects()) {
-    if (effect.name == name) return &effect;
-  }
-  return nullptr;
-}
-
 // Strengths all neutral: places and directions mean nothing.
 bool does_nothing(const Effect& entry, const TrueEffect& effect) {
   for (std::size_t i = 0; i < entry.strengths; ++i) {
@@ -74,11 +65,30 @@ bool does_nothing(const Effect& entry, const TrueEffect& effect) {
   return true;
 }
 
-bool holds(double lo, double hi, double value, bool angle) {
-  if (!angle) return value >= lo && value <= hi;
-  constexpr double kTurn = 2 * std::numbers::pi;
+// `turn`: after which the value means the same; 0: never.
+bool holds(double lo, double hi, double value, double turn) {
+  if (turn == 0) return value >= lo && value <= hi;
   // The turn of `value` that is the first at or above lo.
-  return value + kTurn * std::ceil((lo - value) / kTurn) <= hi;
+  return value + turn * std::ceil((lo - value) / turn) <= hi;
+}
+
+// Effects without an arrow: half a turn changes nothing, and a quarter of one undoes them.
+bool has_no_arrow(const std::string& effect) {
+  return effect == "friction_anisotropy" || effect == "pressure_distribution";
+}
+
+// The same effect with its strength above neutral, as a diagnosis tells it.
+std::map<std::string, double> as_told(const TrueEffect& effect) {
+  std::map<std::string, double> told = effect.parameters;
+  if (!has_no_arrow(effect.name) || !told.count("direction")) return told;
+  const auto ratio = told.find("ratio"), stretch = told.find("stretch");
+  const bool across =
+      (ratio != told.end() && ratio->second < 1) || (stretch != told.end() && stretch->second < 0);
+  if (!across) return told;
+  if (ratio != told.end()) ratio->second = 1 / ratio->second;
+  if (stretch != told.end()) stretch->second = -stretch->second;
+  told["direction"] += std::numbers::pi / 2;
+  return told;
 }
 
 }  // namespace
@@ -116,17 +126,19 @@ std::vector<Coverage> coverage_of(const Truth& truth, const Said& said) {
     const Effect* entry = catalogue_entry(effect.name);
     if (named == said.effects.end() || !entry) continue;
     const bool neutral = does_nothing(*entry, effect);
+    const std::map<std::string, double> told = as_told(effect);
+    const double turn = (has_no_arrow(effect.name) ? 1 : 2) * std::numbers::pi;
     for (std::size_t i = 0; i < entry->parameters.size(); ++i) {
       const EffectParameter& p = entry->parameters[i];
-      const auto value = effect.parameters.find(p.key);
-      if (value == effect.parameters.end() || !p.choices.empty()) continue;
+      const auto value = told.find(p.key);
+      if (value == told.end() || !p.choices.empty()) continue;
       if (neutral && i >= entry->strengths) continue;
       Coverage coverage{effect.name, p.key, value->second, kNone, kNone, false};
       for (const SaidParameter& s : named->parameters) {
         if (s.key != p.key) continue;
         coverage.lo = s.lo;
         coverage.hi = s.hi;
-        coverage.covered = holds(s.lo, s.hi, value->second, p.unit == "rad");
+        coverage.covered = holds(s.lo, s.hi, value->second, p.unit == "rad" ? turn : 0);
       }
       all.push_back(coverage);
     }

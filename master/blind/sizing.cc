@@ -21,7 +21,7 @@ double middle(double lower, double upper, Stream& stream) {
 
 double draw_rest(const Parameter& p, const std::string& key, const Arena& arena, Stream& stream) {
   if (p.kind == ParameterKind::kChoice) return static_cast<double>(stream.below(p.choices.size()));
-  if (p.unit == "rad") return stream.uniform(-std::numbers::pi, std::numbers::pi);
+  if (p.unit == "rad") return stream.uniform(p.lower, p.upper);
   const double width = std::max(arena.x_upper - arena.x_lower, arena.y_upper - arena.y_lower);
   double value = p.nominal;
   if (p.unit == "m" && p.lower >= 0) {

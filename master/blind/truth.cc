@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "common/effects/catalogue.h"
-
 namespace gapfarm {
 namespace {
 
@@ -21,13 +19,12 @@ std::optional<double> parameter_value(const std::string& effect, const std::stri
                                       const Json& value) {
   if (value.is_number()) return value.get<double>();
   if (!value.is_string()) return std::nullopt;
-  for (const Effect& e : srv1_effects()) {
-    if (e.name != effect) continue;
-    for (const EffectParameter& p : e.parameters) {
-      const auto word = std::find(p.choices.begin(), p.choices.end(), value.get<std::string>());
-      if (p.key == key && word != p.choices.end()) {
-        return static_cast<double>(word - p.choices.begin());
-      }
+  const Effect* entry = catalogue_entry(effect);
+  if (entry == nullptr) return std::nullopt;
+  for (const EffectParameter& p : entry->parameters) {
+    const auto word = std::find(p.choices.begin(), p.choices.end(), value.get<std::string>());
+    if (p.key == key && word != p.choices.end()) {
+      return static_cast<double>(word - p.choices.begin());
     }
   }
   return std::nullopt;
@@ -46,6 +43,15 @@ Error wrong(const std::string& file, const std::string& what) {
 }
 
 }  // namespace
+
+const Effect* catalogue_entry(const std::string& name) {
+  for (const std::span<const Effect> catalogue : {srv1_effects(), push_effects()}) {
+    for (const Effect& effect : catalogue) {
+      if (effect.name == name) return &effect;
+    }
+  }
+  return nullptr;
+}
 
 const char* case_kind_name(CaseKind kind) {
   return kind_words()[static_cast<std::size_t>(kind)].c_str();

@@ -7,8 +7,12 @@
 #include <vector>
 
 #include "common/base/result.h"
+#include "common/effects/catalogue.h"
 
 namespace gapfarm {
+
+// Of any scenario's catalogue: what bears one name is one effect.  Null: none has it.
+const Effect* catalogue_entry(const std::string& name);
 
 struct TrueEffect {
   std::string name;

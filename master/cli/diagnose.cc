@@ -37,6 +37,7 @@ Model model_of(const Config& config, const ParameterValues& values, const std::s
   model.fingerprint = build_info().fingerprint;
   model.values = values;
   model.commands = config.problem.commands;
+  model.pieces = config.problem.pieces;
   model.fitness = config.problem.fitness;
   model.spread = config.problem.spread;
   model.data = {problem_hash(to_proto(config.problem)), config.problem.log.trials.size(),
@@ -189,6 +190,7 @@ SubcommandRun setup_diagnose(CLI::App& app) {
       "Examples:\n"
       "  gapfarm diagnose configs/srv1.toml --trials log.csv --out diagnosis\n"
       "  gapfarm diagnose configs/srv1.toml --trials log.csv --out d2 --model run/srv1\n"
+      "  gapfarm diagnose configs/push.toml --trials pushes.csv --out d3\n"
       "Stopped?  The same command goes on: simulations are kept in OUT/simulations.sqlite.");
   return [command](CliContext& context) { return run_diagnose(*command, context); };
 }

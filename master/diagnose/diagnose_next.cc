@@ -9,6 +9,7 @@ namespace gapfarm {
 
 // Every named effect against its aliases, each at its best linear fit.
 Status DiagnosisRun::plan_next() {
+  if (subject_.next == nullptr) return {};
   for (std::size_t k = 0; k < chosen_.size(); ++k) {
     if (chosen_[k].aliases.empty()) continue;
     std::vector<const Signature*> others;

@@ -52,7 +52,7 @@ Status DiagnosisRun::refit_nested() {
       effects.push_back(chosen_[count - 1].candidate);
       names.insert(effects.back().signature.effect);
     }
-    Overrides start = study_.base;
+    Overrides start = count == 0 && !tuned_alone_.empty() ? tuned_alone_ : study_.base;
     for (const auto& [row, value] : estimates_ ? estimates_->at : Overrides{}) {
       const std::string& effect = problem_.table()[row].effect;
       if (count > 0 && (effect.empty() || names.count(effect))) start[row] = value;

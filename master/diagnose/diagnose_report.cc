@@ -230,7 +230,7 @@ void DiagnosisRun::name_effects() {
     const double change = effect.gap_after - effect.gap_before;
     effect.gap_before = gap;
     effect.gap_after = gap += change;
-    effect.text = effect_sentence(effect);
+    effect.text = effect_sentence(effect, subject_.effect_words);
     result_.diagnosis.effects.push_back(std::move(effect));
   }
 }

@@ -68,9 +68,7 @@ Status DiagnosisRun::measure_noise() {
   return rebuild_nuisances();
 }
 
-Status DiagnosisRun::screen() {
-  if (Status s = look_for_latency(); !s) return s;
-  if (Status s = look_for_lag(); !s) return s;
+Status DiagnosisRun::search_catalogue() {
   std::vector<std::string> without = options_.left_out;
   if (lag_.trials > 0) without.emplace_back("motor_lag");
   auto catalogue = subject_.signatures(predictor_, study_, without);
@@ -83,8 +81,18 @@ Status DiagnosisRun::screen() {
   for (const Signature& s : first_) first.push_back(&s);
   auto all = selector_->candidates(selector_->with(first), {});
   if (!all) return all.error();
+  result_.diagnosis.screening.clear();
   fill_screening(*all);
-  if (Status s = select(); !s) return s;
+  return select();
+}
+
+Status DiagnosisRun::screen() {
+  if (Status s = look_for_latency(); !s) return s;
+  if (Status s = look_for_lag(); !s) return s;
+  if (Status s = search_catalogue(); !s) return s;
+  if (subject_.base_moves && estimates_) {
+    if (Status s = search_again(); !s) return s;
+  }
   const Regression explained = this->explained();
   look_for_slip(explained);
   return slip_.gain > 0 ? select_without_slips(explained) : Status{};
@@ -105,10 +113,12 @@ Result<JointFit> DiagnosisRun::estimate(const std::vector<EffectCandidate>& effe
   Overrides start = start_of(effects);
   for (const EffectCandidate& effect : effects) {
     for (const auto& [row, value] : estimates_ ? estimates_->at : Overrides{}) {
-      if (problem_.table()[row].effect == effect.signature.effect) start[row] = value;
+      const std::string& of = problem_.table()[row].effect;
+      if (of == effect.signature.effect || (of.empty() && subject_.base_moves)) start[row] = value;
     }
   }
-  return fit_jointly(predictor_, study_, effects, start, BaseParameters::kHeld, nuisances_, rounds);
+  const BaseParameters base = subject_.base_moves ? BaseParameters::kFitted : BaseParameters::kHeld;
+  return fit_jointly(predictor_, study_, effects, start, base, nuisances_, rounds);
 }
 
 Result<Relinearised> DiagnosisRun::relinearise(const std::vector<EffectCandidate>& effects) {
@@ -286,6 +296,7 @@ void DiagnosisRun::judge() {
   if (too_thin()) return;
   const Regression explained = this->explained();
   leftovers_ = leftovers(explained, blocks_);
+  if (study_.misfit_columns > 0) compare_with_repeats();
   scale_ = leftover_scale(explained);
   const double nats = explained_nats(explained) + slip_.gain + (as_logged_ ? latency_.gain : 0);
   for (const Leftover& l : leftovers_) {

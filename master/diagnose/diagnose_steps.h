@@ -46,6 +46,9 @@ class DiagnosisRun {
   bool left_out(const std::string& effect) const;
   bool looks_for(const std::string& effect, Looks look) const;
   bool too_thin();
+  void compare_with_repeats();
+  Status search_catalogue();
+  Status search_again();
   Status rebuild_nuisances();
   Status look_for_latency();
   Result<std::vector<Eigen::Vector3d>> end_velocities();
@@ -96,6 +99,7 @@ class DiagnosisRun {
   Predictor predictor_;
   Study study_;
   std::optional<Study> as_logged_;  // where late readings were put right: before that
+  Overrides tuned_alone_;           // the base without any effect, where study_.base is not it
   Eigen::MatrixXd nuisances_;
   std::vector<CovariateBlock> blocks_;
   std::unique_ptr<Regression> base_;  // nuisances only

@@ -318,26 +318,28 @@ Json summary_json(const Diagnosis& diagnosis) {
   for (const auto& [stage, seconds] : diagnosis.timing_s) {
     timing.push_back({{"stage", stage}, {"seconds", seconds}});
   }
-  return {{"version", kVersion},
-          {"verdict", verdict_name(diagnosis.verdict)},
-          {"headline", diagnosis.headline},
-          {"effects", std::move(effects)},
-          {"gap", std::move(gap)},
-          {"where", where_json(diagnosis.where)},
-          {"unexplained", where_json(diagnosis.unexplained)},
-          {"screening", screening_json(diagnosis.screening)},
-          {"steps", steps_json(diagnosis.steps)},
-          {"checks", checks_json(diagnosis.checks)},
-          {"next_experiment", std::move(next)},
-          {"cautions", diagnosis.cautions},
-          {"provenance", std::move(provenance)},
-          {"timing", std::move(timing)}};
+  Json summary = {{"version", kVersion},
+                  {"verdict", verdict_name(diagnosis.verdict)},
+                  {"headline", diagnosis.headline},
+                  {"effects", std::move(effects)},
+                  {"gap", std::move(gap)},
+                  {"where", where_json(diagnosis.where)},
+                  {"unexplained", where_json(diagnosis.unexplained)},
+                  {"screening", screening_json(diagnosis.screening)},
+                  {"steps", steps_json(diagnosis.steps)},
+                  {"checks", checks_json(diagnosis.checks)},
+                  {"next_experiment", std::move(next)},
+                  {"cautions", diagnosis.cautions},
+                  {"provenance", std::move(provenance)},
+                  {"timing", std::move(timing)}};
+  if (!diagnosis.shown.empty()) summary["pictures"] = pictures_json(diagnosis);
+  return summary;
 }
 
 std::string to_json(const Diagnosis& diagnosis) {
   std::string text = dump(summary_json(diagnosis), 2);
   text.resize(text.size() - 2);  // the closing "\n}", so that the trials follow, a line each
-  const Json table = trials_json(diagnosis.trials);
+  const Json table = trials_json(diagnosis);
   text +=
       ",\n  \"trials\": {\n    \"columns\": " + dump(table["columns"], -1) + ",\n    \"rows\": [";
   const char* separator = "\n";
@@ -380,8 +382,11 @@ Result<Diagnosis> parse_diagnosis(std::string_view text) {
   read_screening(root, diagnosis);
   read_remainder(root, diagnosis);
   if (!error.empty()) return Error{error};
+  if (json.contains("pictures")) {
+    if (Status s = read_pictures(json["pictures"], &diagnosis); !s) return s.error();
+  }
   if (json.contains("trials")) {
-    auto trials = parse_trials(json["trials"]);
+    auto trials = parse_trials(json["trials"], diagnosis.shown);
     if (!trials) return trials.error();
     diagnosis.trials = std::move(*trials);
   }

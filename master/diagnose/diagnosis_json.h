@@ -24,9 +24,14 @@ nlohmann::ordered_json summary_json(const Diagnosis& diagnosis);
 
 // {"columns": ["session", ...], "rows": [[...], ...]}: a table, since there are many trials.
 // `digits` significant digits a number; 0: as many as it takes to read back the same bits.
-nlohmann::ordered_json trials_json(const std::vector<DiagnosedTrial>& trials, int digits = 0);
+nlohmann::ordered_json trials_json(const Diagnosis& diagnosis, int digits = 0);
 
 // The inverse of trials_json().
-Result<std::vector<DiagnosedTrial>> parse_trials(const nlohmann::ordered_json& table);
+Result<std::vector<DiagnosedTrial>> parse_trials(const nlohmann::ordered_json& table,
+                                                 const std::vector<ShownCovariate>& shown);
+
+// How the pictures tell of the trials, where not of driven commands; and back.
+nlohmann::ordered_json pictures_json(const Diagnosis& diagnosis);
+Status read_pictures(const nlohmann::ordered_json& pictures, Diagnosis* diagnosis);
 
 }  // namespace gapfarm

@@ -19,6 +19,7 @@ struct Likelihood {
   NoiseEstimate start;
   bool fit_pose;
   CovarianceOf covariance;
+  double tail;
 
   NoiseEstimate at(const std::vector<double>& log_values) const {
     NoiseEstimate noise = start;
@@ -33,7 +34,8 @@ struct Likelihood {
     for (std::size_t i = 0; i < trials.size(); ++i) {
       const Eigen::Matrix3d cov = covariance(trials[i], noise);
       const double d2 = residuals[i].dot(cov.inverse() * residuals[i]);
-      const double bounded = d2 > kFarSquared ? kFarSquared + std::log1p(d2 - kFarSquared) : d2;
+      const double bounded =
+          d2 > kFarSquared ? kFarSquared + tail * std::log1p((d2 - kFarSquared) / tail) : d2;
       sum += 0.5 * (std::log(cov.determinant()) + bounded);
     }
     return sum;
@@ -44,9 +46,9 @@ struct Likelihood {
 
 NoiseEstimate refit_drive_noise(std::span<const ResidualTrial> trials,
                                 std::span<const Eigen::Vector3d> residuals,
-                                const NoiseEstimate& start, bool fit_pose,
-                                CovarianceOf covariance) {
-  const Likelihood likelihood{trials, residuals, start, fit_pose, covariance};
+                                const NoiseEstimate& start, bool fit_pose, CovarianceOf covariance,
+                                double tail) {
+  const Likelihood likelihood{trials, residuals, start, fit_pose, covariance, tail};
   // An unknown value (0) begins at that of a small tracked robot under a good camera.
   const auto first = [](double value, double unknown) {
     return std::log(std::clamp(value > 0 ? value : unknown, kLeast, kMost));

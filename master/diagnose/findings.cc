@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <map>
 #include <numbers>
 #include <set>
 
@@ -16,21 +15,9 @@ constexpr int kSectors = 12;
 constexpr std::size_t kFewTrials = 60;
 constexpr double kFewInCell = 4;
 
-// How a parameter is told: the words around its value in a unit that people use.
-struct Telling {
-  const char* key;
-  double factor;
-  const char* unit;
-};
-
-struct EffectWords {
-  const char* sentence;  // %1, %2, ...: the tellings' values with their intervals
-  std::vector<Telling> parameters;
-};
-
-const std::map<std::string, EffectWords, std::less<>>& effect_words() {
+const EffectWordsByName& robot_effect_words() {
   constexpr double kDegrees = 180 / std::numbers::pi;
-  static const std::map<std::string, EffectWords, std::less<>> words = {
+  static const EffectWordsByName words = {
       {"motor_asymmetry",
        {"The right side runs faster than the left by %1", {{"ratio", 100, " %"}}}},
       {"motor_deadband", {"Duty below %1 moves nothing and is lost above it", {{"duty", 1, ""}}}},
@@ -95,9 +82,10 @@ std::string plain_claim(const NamedEffect& effect) {
   return "The data show " + effect.name + (values.empty() ? "" : " with " + listed(values));
 }
 
-std::string claim(const NamedEffect& effect) {
-  const auto found = effect_words().find(effect.name);
-  if (found == effect_words().end()) return plain_claim(effect);
+std::string claim(const NamedEffect& effect, const EffectWordsByName* own) {
+  const EffectWordsByName& all = own != nullptr ? *own : robot_effect_words();
+  const auto found = all.find(effect.name);
+  if (found == all.end()) return plain_claim(effect);
   const EffectWords& words = found->second;
   std::string text;
   for (const char* c = words.sentence; *c != 0; ++c) {
@@ -188,8 +176,8 @@ std::string deviation_words(int component, double size, bool along_motion, bool 
   return "end turned " + much + " " + far + " to the " + side;
 }
 
-std::string effect_sentence(const NamedEffect& effect) {
-  std::string text = claim(effect);
+std::string effect_sentence(const NamedEffect& effect, const EffectWordsByName* words) {
+  std::string text = claim(effect, words);
   if (std::isfinite(effect.closed) && effect.closed > 0) {
     text += "; adding that closes " + percent(effect.closed) + " of the gap";
   }
@@ -211,7 +199,10 @@ std::string headline(const Diagnosis& diagnosis) {
       return "Something is missing from the simulation that no effect of the catalogue explains." +
              (where.empty() ? "" : " " + where);
     case Verdict::kEffect:
-      if (diagnosis.effects.size() == 1) return effect_sentence(diagnosis.effects.front());
+      if (diagnosis.effects.size() == 1) {
+        const NamedEffect& only = diagnosis.effects.front();
+        return only.text.empty() ? effect_sentence(only) : only.text;
+      }
       return "The gap comes from " + listed(names) + "; adding them closes " + percent(closed) +
              " of it.";
     case Verdict::kEffectAndUnknown:

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
+#include <map>
 #include <span>
 #include <string>
 #include <string_view>
@@ -28,9 +30,22 @@ std::string component_words(int component);
 // along the motion "turn 0.9 mrad too little" or "turn 0.9 mrad less".
 std::string deviation_words(int component, double size, bool along_motion, bool trend);
 
+// How a parameter is told: the words around its value in a unit that people use.
+struct Telling {
+  const char* key;
+  double factor;
+  const char* unit;
+};
+struct EffectWords {
+  const char* sentence;  // %1, %2, ...: the tellings' values with their intervals
+  std::vector<Telling> parameters;
+};
+using EffectWordsByName = std::map<std::string, EffectWords, std::less<>>;
+
 // "The battery loses 0.35 % of its speed a minute (0.31 to 0.4); adding that closes 88 % of the
-// gap."  Effects outside the catalogue, or without their parameters, are named with what is there.
-std::string effect_sentence(const NamedEffect& effect);
+// gap."  Effects outside `words` (null: those of a tracked robot), or without their parameters, are
+// named with what is there.
+std::string effect_sentence(const NamedEffect& effect, const EffectWordsByName* words = nullptr);
 
 // The verdict and its first reason.
 std::string headline(const Diagnosis& diagnosis);

@@ -58,8 +58,9 @@ void estimate_noise(const Regression& nuisances, const std::vector<CovariateBloc
     rich.add(blocks[best].columns);
   }
   const std::vector<Eigen::Vector3d> residuals = study->unwhiten(studentised(rich, 0.1));
-  NoiseEstimate noise = refit_drive_noise(study->trials, residuals, study->noise,
-                                          !study->reading_noise_known, study->subject->covariance);
+  NoiseEstimate noise =
+      refit_drive_noise(study->trials, residuals, study->noise, !study->reading_noise_known,
+                        study->subject->covariance, study->subject->noise_tail);
   noise.drive_common = std::max(noise.drive_common, kLeastDriveNoise);
   noise.drive_side = std::max(noise.drive_side, kLeastDriveNoise);
   study->noise = noise;

@@ -7,6 +7,7 @@
 
 #include "master/diagnose/probes.h"
 #include "master/diagnose/seam.h"
+#include "master/diagnose/subject.h"
 
 namespace gapfarm {
 namespace {
@@ -273,8 +274,7 @@ Result<std::vector<Signature>> patch_signatures(Predictor& predictor, const Stud
   for (const auto& [x, y, radius, ratio] : places) {
     PredictionRequest request;
     for (std::size_t i = 0; i < study.size(); ++i) {
-      const Pose& X = study.trials[i].X_WS;
-      if (std::hypot(X.x - x, X.y - y) < radius + 0.5)
+      if (study.subject->in_reach(study.trials[i], {x, y, radius, ratio}))
         request.trials.push_back(static_cast<std::uint32_t>(i));
     }
     values.push_back({{"friction_patch.ratio", ratio},

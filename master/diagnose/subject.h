@@ -13,6 +13,7 @@
 #include "common/base/result.h"
 #include "master/diagnose/covariates.h"
 #include "master/diagnose/diagnosis.h"
+#include "master/diagnose/findings.h"
 #include "master/diagnose/next_experiment.h"
 #include "master/diagnose/patch.h"
 #include "master/diagnose/signatures.h"
@@ -52,6 +53,10 @@ struct DiagnosisSubject {
   double unknown_log10_p;
   // Standard deviations beyond which a trial that nothing smooth explains counts no more; 0: none.
   double farthest;
+  double noise_tail;  // of refit_drive_noise()
+  // Whether strong effects are fitted with the base beside them, and looked for again from the base
+  // and the noise that they leave: where the base was tuned without them, both may be far off.
+  bool base_moves;
   NoiseRow drive_common, drive_side, pose_position, pose_heading;
   CovarianceOf covariance;
 
@@ -60,10 +65,12 @@ struct DiagnosisSubject {
   // Tunes the base, or keeps that of the problem, and fills in what depends on it.
   Status (*tune)(Predictor& predictor, bool keep, Study* study);
   // Whitened columns, scaled to a prior standard deviation of 1, of what no effect may claim.
-  Result<Eigen::MatrixXd> (*nuisances)(Predictor& predictor, const Study& study);
+  Result<Eigen::MatrixXd> (*nuisances)(Predictor& predictor, Study& study);
   std::vector<CovariateBlock> (*blocks)(const Study& study);
   Result<std::vector<Signature>> (*signatures)(Predictor& predictor, const Study& study,
                                                const std::vector<std::string>& left_out);
+  // Whether a disc can matter to a trial's end.
+  bool (*in_reach)(const ResidualTrial& trial, const Patch& patch);
   PatchSearch (*patches)(Predictor& predictor, const Study& study);
   // The parts of the log that are predicted from the others, one number a trial.
   std::vector<std::size_t> (*folds)(const Study& study);
@@ -73,8 +80,10 @@ struct DiagnosisSubject {
   std::vector<std::string> (*cautions)(const Study& study, const TrialLog& log);
   // What the log would need to part effects that look alike in it.
   std::vector<std::string> (*lacks)(const Study& study, const TrialLog& log);
+  // What would part rival explanations; null: nothing is proposed.
   Result<std::vector<NextExperiment>> (*next)(Farm& farm, const Problem& problem,
                                               const Rivals& rivals);
+  const EffectWordsByName* effect_words;  // of effect_sentence(); null: a tracked robot's
   TrialView (*view)(const Study& study, std::size_t trial);
   std::vector<ShownCovariate> shown;  // in the pictures, beside what every log has
   PictureWords words;

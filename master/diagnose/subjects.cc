@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <memory>
 
 #include "common/parameters/push.h"
@@ -36,6 +37,8 @@ DiagnosisSubject srv1_subject() {
   s.least_gain = 9;
   s.unknown_log10_p = -4.2;
   s.farthest = 0;  // slips are looked for
+  s.noise_tail = 1;
+  s.base_moves = false;
   s.drive_common = {row_of(Srv1::kDriveNoiseCommon)};
   s.drive_side = {row_of(Srv1::kDriveNoiseSide)};
   s.pose_position = {row_of(Srv1::kPoseNoisePosition)};
@@ -43,9 +46,14 @@ DiagnosisSubject srv1_subject() {
   s.covariance = trial_covariance;
   s.make_study = [](const Problem& problem, std::span<const Gene>) { return make_study(problem); };
   s.tune = tune_base;
-  s.nuisances = nuisance_columns;
+  s.nuisances = [](Predictor& predictor, Study& study) {
+    return nuisance_columns(predictor, study);
+  };
   s.blocks = covariate_blocks;
   s.signatures = signatures;
+  s.in_reach = [](const ResidualTrial& trial, const Patch& patch) {
+    return std::hypot(trial.X_WS.x - patch[0], trial.X_WS.y - patch[1]) < patch[2] + 0.5;
+  };
   s.patches = sketched_patches;
   s.folds = folds_of;
   s.where = [](const Study& study, std::span<const Eigen::Vector3d> residuals,
@@ -61,6 +69,7 @@ DiagnosisSubject srv1_subject() {
   s.next = [](Farm& farm, const Problem& problem, const Rivals& rivals) {
     return next_experiments(farm, problem, rivals);
   };
+  s.effect_words = nullptr;
   s.view = [](const Study& study, std::size_t trial) {
     return TrialView{study.trials[trial].X_WS, 0, {}};
   };

@@ -89,12 +89,13 @@ bool read_cell(const Json& json, Field& field) {
 
 }  // namespace
 
-Json trials_json(const std::vector<DiagnosedTrial>& trials, int digits) {
+Json trials_json(const Diagnosis& diagnosis, int digits) {
   Json columns = Json::array();
   const DiagnosedTrial blank = blank_trial();
   visit_columns(blank, [&](const std::string& name, const auto&) { columns.push_back(name); });
+  for (const ShownCovariate& shown : diagnosis.shown) columns.push_back(shown.key);
   Json rows = Json::array();
-  for (const DiagnosedTrial& trial : trials) {
+  for (const DiagnosedTrial& trial : diagnosis.trials) {
     Json row = Json::array();
     visit_columns(trial, [&](const std::string&, const auto& field) {
       if constexpr (std::is_same_v<std::decay_t<decltype(field)>, double>) {
@@ -103,13 +104,17 @@ Json trials_json(const std::vector<DiagnosedTrial>& trials, int digits) {
         row.push_back(field);
       }
     });
+    for (double value : trial.covariates) row.push_back(rounded(value, digits));
     rows.push_back(std::move(row));
   }
   return {{"columns", std::move(columns)}, {"rows", std::move(rows)}};
 }
 
-Result<std::vector<DiagnosedTrial>> parse_trials(const Json& table) {
-  const Json expected = trials_json({})["columns"];
+Result<std::vector<DiagnosedTrial>> parse_trials(const Json& table,
+                                                 const std::vector<ShownCovariate>& shown) {
+  Diagnosis none;
+  none.shown = shown;
+  const Json expected = trials_json(none)["columns"];
   if (!table.is_object() || !table.contains("columns") || !table.contains("rows") ||
       !table["rows"].is_array()) {
     return Error{"diagnosis.json: \"trials\" must be an object with \"columns\" and \"rows\""};
@@ -126,16 +131,19 @@ Result<std::vector<DiagnosedTrial>> parse_trials(const Json& table) {
       return Error{where + " must be a list of " + std::to_string(expected.size()) + " cells"};
     }
     DiagnosedTrial trial = blank_trial();
+    trial.covariates.resize(shown.size());
     std::size_t column = 0;
     std::string error;
-    visit_columns(trial, [&](const std::string& name, auto& field) {
+    const auto read = [&](const std::string& name, auto& field) {
       const Json& cell = row[column++];
       if (error.empty() && !read_cell(cell, field)) {
         error = where + ": " + name + " is " +
                 cell.dump(-1, ' ', false, Json::error_handler_t::replace) +
                 ", which is not of its column's type";
       }
-    });
+    };
+    visit_columns(trial, read);
+    for (std::size_t k = 0; k < shown.size(); ++k) read(shown[k].key, trial.covariates[k]);
     if (!error.empty()) return Error{error};
     for (Eigen::Matrix3d* cov : {&trial.tuned_cov, &trial.final_cov}) {
       cov->triangularView<Eigen::StrictlyLower>() = cov->transpose();
@@ -143,6 +151,49 @@ Result<std::vector<DiagnosedTrial>> parse_trials(const Json& table) {
     trials.push_back(std::move(trial));
   }
   return trials;
+}
+
+Json pictures_json(const Diagnosis& diagnosis) {
+  Json shown = Json::array();
+  for (const ShownCovariate& s : diagnosis.shown) {
+    shown.push_back({{"key", s.key}, {"label", s.label}, {"matches", s.matches}});
+  }
+  const PictureWords& words = diagnosis.words;
+  return {{"ends", words.ends},
+          {"residuals", words.residuals},
+          {"x", words.x},
+          {"y", words.y},
+          {"shown", std::move(shown)}};
+}
+
+Status read_pictures(const Json& pictures, Diagnosis* diagnosis) {
+  const auto text = [](const Json& from, const char* key, std::string* to) -> Status {
+    if (from.is_object() && from.contains(key) && from[key].is_string()) {
+      *to = from[key].get<std::string>();
+      return {};
+    }
+    return Error{std::string("diagnosis.json: pictures: expected a text under \"") + key +
+                 "\"; was this written by gapfarm diagnose?"};
+  };
+  PictureWords& words = diagnosis->words;
+  for (const auto& [key, to] : {std::pair{"ends", &words.ends},
+                                {"residuals", &words.residuals},
+                                {"x", &words.x},
+                                {"y", &words.y}}) {
+    if (Status s = text(pictures, key, to); !s) return s;
+  }
+  if (!pictures.contains("shown") || !pictures["shown"].is_array()) {
+    return Error{"diagnosis.json: pictures: expected a list under \"shown\""};
+  }
+  for (const Json& entry : pictures["shown"]) {
+    ShownCovariate shown;
+    for (const auto& [key, to] :
+         {std::pair{"key", &shown.key}, {"label", &shown.label}, {"matches", &shown.matches}}) {
+      if (Status s = text(entry, key, to); !s) return s;
+    }
+    diagnosis->shown.push_back(std::move(shown));
+  }
+  return {};
 }
 
 }  // namespace gapfarm

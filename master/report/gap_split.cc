@@ -215,7 +215,7 @@ std::string gap_split_html(const Diagnosis& diagnosis) {
   return R"(<figure class="gap-split"><div class="splits">)" + html + "</div><figcaption>" +
          "Before: the tuned base model. After: with the named effects. An effect's part is how "
          "much the gap fell when it was added, in the order found, on trials that the fit did not "
-         "see. The floor is what repeating a trial on the real robot varies by; the log score is "
+         "see. The floor is what repeating a trial in reality varies by; the log score is "
          "counted from it.</figcaption></figure>" +
          parts_table(splits);
 }

@@ -81,10 +81,19 @@ std::string key(std::string_view items) {
 constexpr const char* kNoScript =
     R"(<noscript><p class="quiet">The plots need scripts; the tables do not.</p></noscript>)";
 
-std::string poses_section() {
-  return std::string(R"(<section id="poses"><h2>Measured against predicted end poses</h2>
-<p>One picture a command, seen from where each trial began: x ahead, y to the left. An ellipse should hold nine trials in ten. As driven, there is one ellipse a condition, so a model that looks at more than the command spreads its predictions; an error takes each trial's own prediction away.</p>)") +
-         key(std::string(kMeasuredKey) + kModelKeys) +
+constexpr const char* kDrivenEnds =
+    R"(One picture a command, seen from where each trial began: x ahead, y to the left. An ellipse should hold nine trials in ten. As driven, there is one ellipse a condition, so a model that looks at more than the command spreads its predictions; an error takes each trial's own prediction away.)";
+constexpr const char* kDrivenResiduals =
+    R"(Measured minus predicted, along the axes of the predicted end pose.)";
+
+std::string or_else(const std::string& words, const char* driven) {
+  return words.empty() ? driven : html_escaped(words);
+}
+
+std::string poses_section(const Diagnosis& diagnosis) {
+  return R"(<section id="poses"><h2>Measured against predicted end poses</h2>
+<p>)" + or_else(diagnosis.words.ends, kDrivenEnds) +
+         "</p>" + key(std::string(kMeasuredKey) + kModelKeys) +
          R"(<div class="controls" id="pose-controls"></div>
 <div class="grid" id="pose-plots"></div>)" +
          kNoScript + "</section>\n";
@@ -98,7 +107,8 @@ std::string residuals_section(const Diagnosis& diagnosis) {
     html += where_table(diagnosis.where, "Where the tuned model goes wrong");
   }
   return html + R"(<h3 id="residual-title">Residuals against what may drive them</h3>
-<p>Measured minus predicted, along the axes of the predicted end pose. Lines join the means of neighbouring trials, with 90 % intervals.</p>)" +
+<p>)" + or_else(diagnosis.words.residuals, kDrivenResiduals) +
+         R"( Lines join the means of neighbouring trials, with 90 % intervals.</p>)" +
          key(kModelKeys) + R"(<div class="controls" id="residual-controls"></div>
 <div class="grid" id="residual-plots"></div>)" +
          kNoScript + "</section>\n";
@@ -129,7 +139,7 @@ std::string report_html(const Diagnosis& diagnosis) {
   html += "<main>\n" + summary_section(diagnosis);
   html += R"(<section id="gap"><h2>The gap, split by cause</h2>)" + gap_split_html(diagnosis) +
           "</section>\n";
-  html += poses_section();
+  html += poses_section(diagnosis);
   html += residuals_section(diagnosis);
   html += screening_section(diagnosis);
   html += shrinkage_section(diagnosis);
@@ -141,7 +151,7 @@ std::string report_html(const Diagnosis& diagnosis) {
       "</main>\n<footer>Made by gapfarm; plots by {}. This page needs no network.</footer>\n",
       plot_library());
   html += data_block("diagnosis", summary_json(diagnosis));
-  html += data_block("trials", trials_json(diagnosis.trials, kPlotDigits));
+  html += data_block("trials", trials_json(diagnosis, kPlotDigits));
   for (const std::string_view script : page_scripts()) {
     html += fmt::format("<script>{}</script>\n", script);
   }

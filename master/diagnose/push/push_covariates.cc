@@ -12,13 +12,14 @@ using Feature = std::function<double(const ResidualTrial&)>;
 
 // Of a piece whose outline and finger are known to this, m.
 constexpr double kOutline_m = 3e-4;
-// What a simulation of other physics gets wrong of a push, over the distance slid (or, of a turn,
-// over that and the gyration radius): measured on pushes by a simulator with friction all over the
-// face (docs/pushing.md).
+// What a simulation of other physics gets wrong of a push, along it, across it and in turn, over
+// the finger's way after the touch (a turn: over that in gyration radii): of a smooth function of
+// the push, and of one push by itself.  The latter are root mean squares of the means of repeats by
+// a simulator with friction all over the face (docs/pushing.md).
 constexpr double kMisfit = 0.01;
-constexpr double kConditionMisfit = 0.015;  // of one push, alike in its repeats
-constexpr std::size_t kRepeats = 3;         // that a condition needs to be told from noise
-constexpr double kFarArm = 2;               // gyration radii: beyond, the finger slips off
+constexpr double kConditionMisfit[] = {0.02, 0.01, 0.01};
+constexpr std::size_t kRepeats = 3;  // that a condition needs to be told from noise
+constexpr double kFarArm = 2;        // gyration radii: beyond, the finger slips off
 
 double arm(const ResidualTrial& t) {
   return std::clamp(t.push.arm_m / t.push.gyration_m, -kFarArm, kFarArm);
@@ -37,6 +38,11 @@ Eigen::VectorXd column(const Study& study, int component, const Feature& feature
     d.push_back(from_push_axes(t, shift));
   }
   return study.whiten(d);
+}
+
+// The same of what another physics gets wrong.
+Eigen::Vector3d misfit(const ResidualTrial& t) {
+  return {t.push.pushed_m, t.push.pushed_m, t.push.pushed_m / t.push.gyration_m};
 }
 
 CovariateBlock block(const Study& study, const std::string& name,
@@ -135,7 +141,8 @@ CovariateBlock sessions_block(const Study& study) {
 
 }  // namespace
 
-Result<Eigen::MatrixXd> push_nuisances(Predictor& predictor, const Study& study) {
+Result<Eigen::MatrixXd> push_nuisances(Predictor& predictor, Study& study) {
+  study.misfit_columns = 0;
   std::vector<Eigen::VectorXd> columns;
   for (const RetunedPush& retuned : study.retuned) {
     columns.push_back(retuned.parameter.prior_log_sd * study.whiten(retuned.slopes));
@@ -149,16 +156,18 @@ Result<Eigen::MatrixXd> push_nuisances(Predictor& predictor, const Study& study)
   for (int component = 0; component < 3; ++component) {
     for (int power = component == 0 ? 0 : 1; power <= 3; power += 2) {
       columns.push_back(kMisfit * column(study, component, [&](const ResidualTrial& t) {
-                          return grown(t)[component] * std::pow(arm(t), power);
+                          return misfit(t)[component] * std::pow(arm(t), power);
                         }));
     }
   }
   for (std::size_t c = 0; c < study.cells.size(); ++c) {
     if (study.cells[c].trials < kRepeats) continue;
     for (int component = 0; component < 3; ++component) {
-      columns.push_back(kConditionMisfit * column(study, component, [&](const ResidualTrial& t) {
-                          return t.cell == c ? grown(t)[component] : 0.0;
-                        }));
+      const auto here = [&](const ResidualTrial& t) {
+        return t.cell == c ? misfit(t)[component] : 0.0;
+      };
+      columns.push_back(kConditionMisfit[component] * column(study, component, here));
+      ++study.misfit_columns;
     }
   }
   return stack(columns);

@@ -11,6 +11,8 @@ DiagnosisSubject push_subject() {
   s.least_gain = 9;
   s.unknown_log10_p = -4.2;
   s.farthest = 4;
+  s.noise_tail = 7;
+  s.base_moves = true;
   s.drive_common = {row_of(Push::kPushNoiseSlide)};
   s.drive_side = {row_of(Push::kPushNoiseTurn), kTurnUnit_rad_m};
   s.pose_position = {row_of(Push::kPoseNoisePosition)};
@@ -21,12 +23,14 @@ DiagnosisSubject push_subject() {
   s.nuisances = push_nuisances;
   s.blocks = push_blocks;
   s.signatures = push_signatures;
+  s.in_reach = piece_crosses;
   s.patches = push_patches;
   s.folds = push_folds;
   s.where = push_where;
   s.cautions = push_cautions;
   s.lacks = push_lacks;
-  s.next = next_pushes;
+  s.next = nullptr;
+  s.effect_words = &push_effect_words();
   s.view = push_view;
   s.shown = {{"arm_mm", "centroid left of the finger's line, mm", "contact offset"},
              {"direction", "push direction in the world, degrees", "push direction"},

@@ -26,10 +26,12 @@ Status tune_push_base(Predictor& predictor, bool keep, Study* study);
 Eigen::Matrix3d push_covariance(const ResidualTrial& trial, const NoiseEstimate& noise);
 // Retuning, the outline's tolerance, misfits that are alike for a push and its mirror image, and
 // what repeats of one push have in common.
-Result<Eigen::MatrixXd> push_nuisances(Predictor& predictor, const Study& study);
+Result<Eigen::MatrixXd> push_nuisances(Predictor& predictor, Study& study);
 std::vector<CovariateBlock> push_blocks(const Study& study);
 Result<std::vector<Signature>> push_signatures(Predictor& predictor, const Study& study,
                                                const std::vector<std::string>& left_out);
+// Whether the piece, on its way as the base predicts it, comes upon the disc.
+bool piece_crosses(const ResidualTrial& trial, const Patch& patch);
 // Discs simulated over a grid of the table that pieces cross.
 PatchSearch push_patches(Predictor& predictor, const Study& study);
 // Whole cells, dealt in turn.
@@ -38,8 +40,7 @@ std::vector<Where> push_where(const Study& study, std::span<const Eigen::Vector3
                               const Problem& problem);
 std::vector<std::string> push_cautions(const Study& study, const TrialLog& log);
 std::vector<std::string> push_lacks(const Study& study, const TrialLog& log);
-Result<std::vector<NextExperiment>> next_pushes(Farm& farm, const Problem& problem,
-                                                const Rivals& rivals);
+const EffectWordsByName& push_effect_words();
 TrialView push_view(const Study& study, std::size_t trial);
 
 // A shift along and across the push (across: to its left), in the axes of the predicted end.

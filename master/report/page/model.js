@@ -33,6 +33,16 @@ const COVARIATES = [
   { key: "session", label: "session", matches: /session/, of: (t) => t.session_index },
 ];
 
+// What a diagnosis of something else than driven commands brings of its own.
+const PICTURES = readJson("diagnosis").pictures;
+if (PICTURES) {
+  COMPONENT.x = PICTURES.x;
+  COMPONENT.y = PICTURES.y;
+  const plain = COVARIATES.filter((c) => c.key === "session");
+  COVARIATES.splice(0, COVARIATES.length, ...PICTURES.shown.map(({ key, label, matches }) => (
+    { key, label, matches: new RegExp(matches), of: (t) => t[key] })), ...plain);
+}
+
 const covariateOf = (words) => {
   const lower = words.toLowerCase();
   return lower ? COVARIATES.find((c) => c.matches.test(lower)) : undefined;

@@ -18,8 +18,8 @@ function describeTrial(trial) {
   const r = (model, a) => words(1000 * trial[`${model}_residual_${a}`], 2);
   const error = (model) => `${r(model, "x")}, ${r(model, "y")} mm, ${r(model, "theta")} mrad`;
   return (
-    `${trial.session}, trial ${trial.trial}, ${commandName(trial.command)} ${words(trial.duration_s)} s at ` +
-    `${words(trial.level)}${trial.held_out ? ", held out" : ""}: off by ${error("tuned")} (tuned), ` +
+    `${trial.session}, trial ${trial.trial}, ${commandName(trial.command)}` +
+    `${PICTURES ? "" : ` ${words(trial.duration_s)} s at ${words(trial.level)}`}${trial.held_out ? ", held out" : ""}: off by ${error("tuned")} (tuned), ` +
     `${error("final")} (final)`
   );
 }
@@ -33,7 +33,8 @@ function limits(points, k) {
   return values.length ? { min: min - margin, max: max + margin } : { min: -1, max: 1 };
 }
 
-const conditionOf = (t) => `${words(t.duration_s)} s at duty ${words(t.level)}`;
+// A push is a condition of its own: there is no choosing among them.
+const conditionOf = (t) => (PICTURES ? "all" : `${words(t.duration_s)} s at duty ${words(t.level)}`);
 
 function drivenSpec(trials, shown) {
   const layers = [];
@@ -90,7 +91,8 @@ function startPoses(trials) {
   const conditions = [...new Set(trials.map(conditionOf))].sort();
   const view = radios(controls, "View", POSE_VIEWS, draw);
   const shown = checks(controls, "Show", ["measured", "tuned", "final"], draw);
-  const condition = choice(controls, "Condition", ["all", ...conditions].map((c) => [c, c]), draw);
+  const condition = PICTURES ? () => "all"
+    : choice(controls, "Condition", ["all", ...conditions].map((c) => [c, c]), draw);
 
   function draw() {
     const { axes } = POSE_VIEWS.find((v) => v.key === view());

@@ -1,0 +1,110 @@
+// gapfarm diagnose on pushes as a user runs it, on logs whose truth is known.
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "tests/integration/run_program.h"
+
+namespace gapfarm {
+namespace {
+
+constexpr const char* kConfig = R"(scenario = "push"
+[parameters]
+step_rate = 60
+shape_factor = 0.6
+[genes]
+shape_factor = [0.2, 1.0]
+finger_friction = [0.02, 1.0]
+[simulate]
+sessions = 1
+[[pieces]]
+name = "square"
+corners = [[0, 0], [0.12, 0], [0.12, 0.12], [0, 0.12]]
+origin = "centroid"
+thickness = 0.01
+mass = 0.15
+[[pieces]]
+name = "triangle"
+corners = [[0, 0], [0.17, 0], [0.085, 0.085]]
+thickness = 0.01
+mass = 0.08
+)";
+
+using Json = nlohmann::json;
+
+std::string text_of(const std::string& path) {
+  std::ifstream file(path);
+  std::stringstream text;
+  text << file.rdbuf();
+  return text.str();
+}
+
+class DiagnosePushes : public ::testing::Test {
+ protected:
+  Json diagnose(int pushes, const std::vector<std::string>& set,
+                const std::vector<std::string>& more = {}) {
+    const std::string config = folder_.write("c.toml", kConfig);
+    std::vector<std::string> arguments = {
+        "simulate", config, "--out", folder_ / "pushes.csv", "--trials", std::to_string(pushes),
+        "--seed",   "3"};
+    for (const std::string& s : set) arguments.insert(arguments.end(), {"--set", s});
+    const Finished made = gapfarm_command(arguments);
+    EXPECT_EQ(made.exit_code, 0) << made.err;
+    arguments = {"diagnose", config, "--trials", folder_ / "pushes.csv", "--out", folder_ / "d"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const Finished finished = gapfarm_command(arguments);
+    EXPECT_EQ(finished.exit_code, 0) << finished.err;
+    report_ = text_of(folder_ / "d/report.html");
+    EXPECT_NE(report_.find("</html>"), std::string::npos);
+    return Json::parse(text_of(folder_ / "d/diagnosis.json"), nullptr, false);
+  }
+
+  TemporaryFolder folder_;
+  std::string report_;
+};
+
+TEST_F(DiagnosePushes, NamesAnEffectWithAnIntervalAndClosesTheGap) {
+  const Json d = diagnose(80, {"com_offset.y=0.008"});
+  EXPECT_EQ(d["verdict"], "effect") << d["headline"];
+  ASSERT_EQ(d["effects"].size(), 1u);
+  EXPECT_EQ(d["effects"][0]["name"], "com_offset");
+  const Json& y = d["effects"][0]["parameters"]["y"];
+  EXPECT_LT(y["lo"], 0.008);
+  EXPECT_GT(y["hi"], 0.008);
+  EXPECT_GT(y["lo"], 0.004);
+  EXPECT_LT(d["gap"]["final"], d["gap"]["tuned"]);
+  // The pictures show what pushes depend on, and no word of what a robot is told.
+  EXPECT_EQ(d["pictures"]["x"], "along the push");
+  EXPECT_NE(report_.find("along and across the push"), std::string::npos);
+  const std::size_t body = report_.find("<body>");
+  for (const char* word : {" tread", "motor", " robot"}) {
+    EXPECT_EQ(report_.substr(body, report_.find("<script>") - body).find(word), std::string::npos)
+        << word;
+  }
+  // The model left behind predicts the log that it was made for.
+  const Finished predicted = gapfarm_command(
+      {"predict", folder_ / "d/model.toml", "--trials", folder_ / "pushes.csv", "--out", "-"});
+  EXPECT_EQ(predicted.exit_code, 0) << predicted.err;
+  // The report can be made again from the diagnosis alone.
+  const Finished again =
+      gapfarm_command({"report", folder_ / "d/diagnosis.json", "--out", folder_ / "again.html"});
+  EXPECT_EQ(again.exit_code, 0) << again.err;
+}
+
+TEST_F(DiagnosePushes, SayNoneWhenNothingIsMissing) {
+  const Json d = diagnose(80, {});
+  EXPECT_EQ(d["verdict"], "none") << d["headline"];
+  EXPECT_TRUE(d["effects"].empty());
+}
+
+TEST_F(DiagnosePushes, ThinDataGiveCautionsNotClaims) {
+  const Json d = diagnose(12, {"com_offset.y=0.008"});
+  EXPECT_EQ(d["verdict"], "none") << d["headline"];
+  EXPECT_TRUE(d["effects"].empty());
+  EXPECT_GT(d["cautions"].size(), 1u);
+}
+
+}  // namespace
+}  // namespace gapfarm
