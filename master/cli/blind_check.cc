@@ -230,6 +230,7 @@ SubcommandRun setup_blind_check(CLI::App& app) {
       "Examples:\n"
       "  gapfarm blind-check configs/srv1.toml --dry-run\n"
       "  gapfarm blind-check configs/srv1.toml --out run/blind --seed 7\n"
+      "  gapfarm blind-check configs/push.toml --out run/pushes --sizes clear --trials 90\n"
       "  gapfarm blind-check configs/srv1.toml --out run/foreign --foreign logs/cases \\\n"
       "      --truth logs/cases/truth");
   return [options](CliContext& context) { return run_blind(*options, context); };
