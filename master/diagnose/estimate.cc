@@ -12,7 +12,7 @@ namespace gapfarm {
 namespace {
 
 constexpr int kMostHalvings = 4;
-constexpr double kSettled = 0.2;    // of the objective (twice nats): less is no progress
+constexpr double kSettled = 1;      // of the objective (twice nats): less is no progress
 constexpr double kFarSquared = 16;  // squared distance beyond which a trial counts linearly
 
 // Effects with a strength and a direction, whose first two columns belong to its cosine and sine.
@@ -255,15 +255,18 @@ Result<JointFit> fit_jointly(Predictor& predictor, const Study& study,
     step(predictor.problem(), study, nuisances, &next);
     const std::vector<FittedParameter> whole = next.parameters;
     double now = 0;
-    // A step may lead to where the robot falls over, or past the optimum: half of it, then.
+    // A step may lead to where the robot falls over, or would with a little more of a parameter, or
+    // past the optimum: half of it, then.
     for (int half = 0;; ++half) {
-      const Status moved = predict(predictor, study, &next);
-      if (!moved && !predictor.simulation_failed()) return moved.error();
+      Status moved = predict(predictor, study, &next);
       if (moved) now = objective(study, next, nuisances);
-      if (moved && now <= best) break;
+      if (moved && now <= best) {
+        moved = differentiate(predictor, study, &next);
+        if (moved) break;
+      }
+      if (!moved && !predictor.simulation_failed()) return moved.error();
       if (half == kMostHalvings) {
-        if (!moved) return moved.error();
-        // No way down: the present values stay, with the standard errors found here.
+        // No way on: the present values stay, with the standard errors found here.
         for (std::size_t k = 0; k < whole.size(); ++k) {
           fit.parameters[k].standard_error = whole[k].standard_error;
         }
@@ -276,7 +279,6 @@ Result<JointFit> fit_jointly(Predictor& predictor, const Study& study,
     }
     const bool settled = now > best - kSettled;
     best = now;
-    if (Status s = differentiate(predictor, study, &next); !s) return s.error();
     fit = std::move(next);
     if (settled) break;
   }
@@ -310,14 +312,18 @@ std::vector<Eigen::Vector3d> held_out_residuals(const Study& study, const JointF
   return study.unwhiten(left);
 }
 
-std::vector<double> held_out_scores(const Study& study, const JointFit& fit,
-                                    const std::vector<std::size_t>& fold_of, double outlier_share) {
-  const std::vector<Eigen::Vector3d> residuals = held_out_residuals(study, fit, fold_of);
+std::vector<double> scores_of(const Study& study, const std::vector<Eigen::Vector3d>& residuals,
+                              double outlier_share) {
   std::vector<double> scores;
   for (std::size_t i = 0; i < study.size(); ++i) {
     scores.push_back(trial_score(study, i, residuals[i], outlier_share));
   }
   return scores;
+}
+
+std::vector<double> held_out_scores(const Study& study, const JointFit& fit,
+                                    const std::vector<std::size_t>& fold_of, double outlier_share) {
+  return scores_of(study, held_out_residuals(study, fit, fold_of), outlier_share);
 }
 
 std::vector<std::size_t> folds_of(const Study& study) {

@@ -39,6 +39,10 @@ Result<JointFit> fit_jointly(Predictor& predictor, const Study& study,
 std::map<std::string, double> start_values(const Study& study, const Regression& others,
                                            const Signature& signature);
 
+// Log scores (nats) of every trial that misses its prediction so far.
+std::vector<double> scores_of(const Study& study, const std::vector<Eigen::Vector3d>& residuals,
+                              double outlier_share);
+
 // Log scores (nats) of every trial, predicted from a fit to the other folds' trials alone: the
 // joint fit's linearisation is solved again without the fold.
 std::vector<double> held_out_scores(const Study& study, const JointFit& fit,

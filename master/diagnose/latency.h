@@ -18,7 +18,8 @@ struct LatencyFit {
   std::vector<double> weights;  // of each trial: probability that its end pose was late
 };
 
-// Whichever of the two that follow the log's readings allow.
+// Whichever of the two that follow the log's readings allow.  Of a trial that no reading follows
+// its own residual tells whether it was late.
 LatencyFit fit_latency(const Study& study, std::span<const Eigen::Vector3d> end_velocity);
 
 // The later reading is of the robot at rest, so that a late one shows a gap of age times velocity.
