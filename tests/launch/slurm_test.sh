@@ -10,6 +10,7 @@ for program in munged slurmctld slurmd sbatch scontrol; do
   command -v $program >/dev/null || not_run "$program is not installed (scripts/setup.sh --tests)"
 done
 [[ $(id -u) -eq 0 ]] || not_run 'slurmd wants to be root'
+mountpoint -q /sys/fs/cgroup || not_run 'slurmd wants /sys/fs/cgroup mounted'
 
 T=$(mktemp -d /tmp/gapfarm-slurm-XXXXXX)
 chmod 755 "$T"
