@@ -1,11 +1,9 @@
 // gapfarm diagnose on pushes as a user runs it, on logs whose truth is known.
 #include <gtest/gtest.h>
 
-#include <fstream>
 #include <nlohmann/json.hpp>
-#include <sstream>
 
-#include "tests/integration/run_program.h"
+#include "tests/integration/diagnose_program.h"
 
 namespace gapfarm {
 namespace {
@@ -34,31 +32,15 @@ mass = 0.08
 
 using Json = nlohmann::json;
 
-std::string text_of(const std::string& path) {
-  std::ifstream file(path);
-  std::stringstream text;
-  text << file.rdbuf();
-  return text.str();
-}
-
 class DiagnosePushes : public ::testing::Test {
  protected:
   Json diagnose(int pushes, const std::vector<std::string>& set,
                 const std::vector<std::string>& more = {}) {
     const std::string config = folder_.write("c.toml", kConfig);
-    std::vector<std::string> arguments = {
-        "simulate", config, "--out", folder_ / "pushes.csv", "--trials", std::to_string(pushes),
-        "--seed",   "3"};
-    for (const std::string& s : set) arguments.insert(arguments.end(), {"--set", s});
-    const Finished made = gapfarm_command(arguments);
-    EXPECT_EQ(made.exit_code, 0) << made.err;
-    arguments = {"diagnose", config, "--trials", folder_ / "pushes.csv", "--out", folder_ / "d"};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    const Finished finished = gapfarm_command(arguments);
-    EXPECT_EQ(finished.exit_code, 0) << finished.err;
+    simulate_log(config, folder_ / "pushes.csv", pushes, set);
+    const Json diagnosis = diagnose_log(config, folder_ / "pushes.csv", folder_ / "d", more);
     report_ = text_of(folder_ / "d/report.html");
-    EXPECT_NE(report_.find("</html>"), std::string::npos);
-    return Json::parse(text_of(folder_ / "d/diagnosis.json"), nullptr, false);
+    return diagnosis;
   }
 
   TemporaryFolder folder_;

@@ -7,7 +7,7 @@
 #include <set>
 #include <sstream>
 
-#include "tests/integration/run_program.h"
+#include "tests/integration/diagnose_program.h"
 #include "tests/unit/trials/shared_data.h"
 
 namespace gapfarm {
@@ -29,33 +29,15 @@ durations = [0.5, 1.0]
 
 using Json = nlohmann::json;
 
-std::string text_of(const std::string& path) {
-  std::ifstream file(path);
-  std::stringstream text;
-  text << file.rdbuf();
-  return text.str();
-}
-
 class Diagnose : public ::testing::Test {
  protected:
   void simulate(int trials, const std::vector<std::string>& set, const std::string& seed = "3") {
     config_ = folder_.write("c.toml", kConfig + more_config_);
-    std::vector<std::string> arguments = {
-        "simulate", config_, "--out", folder_ / "trials.csv", "--trials", std::to_string(trials),
-        "--seed",   seed};
-    for (const std::string& s : set) arguments.insert(arguments.end(), {"--set", s});
-    const Finished made = gapfarm_command(arguments);
-    ASSERT_EQ(made.exit_code, 0) << made.err;
+    simulate_log(config_, folder_ / "trials.csv", trials, set, seed);
   }
 
   Json diagnose(const std::vector<std::string>& more = {}) {
-    std::vector<std::string> arguments = {
-        "diagnose", config_, "--trials", folder_ / "trials.csv", "--out", folder_ / "d"};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    const Finished finished = gapfarm_command(arguments);
-    EXPECT_EQ(finished.exit_code, 0) << finished.err;
-    EXPECT_NE(text_of(folder_ / "d/report.html").find("</html>"), std::string::npos);
-    return Json::parse(text_of(folder_ / "d/diagnosis.json"), nullptr, false);
+    return diagnose_log(config_, folder_ / "trials.csv", folder_ / "d", more);
   }
 
   TemporaryFolder folder_;

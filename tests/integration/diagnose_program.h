@@ -1,0 +1,45 @@
+// gapfarm simulate and gapfarm diagnose, one after the other, as tests of diagnoses run them.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "tests/integration/run_program.h"
+
+namespace gapfarm {
+
+inline std::string text_of(const std::string& path) {
+  std::ifstream file(path);
+  std::stringstream text;
+  text << file.rdbuf();
+  return text.str();
+}
+
+// A log of so many trials with these effects ("effect.key=value").
+inline void simulate_log(const std::string& config, const std::string& log, int trials,
+                         const std::vector<std::string>& set, const std::string& seed = "3") {
+  std::vector<std::string> arguments = {
+      "simulate", config, "--out", log, "--trials", std::to_string(trials), "--seed", seed};
+  for (const std::string& s : set) arguments.insert(arguments.end(), {"--set", s});
+  const Finished made = gapfarm_command(arguments);
+  EXPECT_EQ(made.exit_code, 0) << made.err;
+}
+
+// What diagnosis.json says; the report is whole.
+inline nlohmann::json diagnose_log(const std::string& config, const std::string& log,
+                                   const std::string& out,
+                                   const std::vector<std::string>& more = {}) {
+  std::vector<std::string> arguments = {"diagnose", config, "--trials", log, "--out", out};
+  arguments.insert(arguments.end(), more.begin(), more.end());
+  const Finished finished = gapfarm_command(arguments);
+  EXPECT_EQ(finished.exit_code, 0) << finished.err;
+  EXPECT_NE(text_of(out + "/report.html").find("</html>"), std::string::npos);
+  return nlohmann::json::parse(text_of(out + "/diagnosis.json"), nullptr, false);
+}
+
+}  // namespace gapfarm
