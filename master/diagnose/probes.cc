@@ -2,6 +2,18 @@
 
 namespace gapfarm {
 
+std::vector<Probe> lens_probes(const Eigen::Vector2d& middle) {
+  constexpr double k1 = 0.02, away = 0.1;
+  const auto lens = [&](double dx, double dy) {
+    return std::map<std::string, double>{{"camera_distortion.k1", k1},
+                                         {"camera_distortion.x", middle.x() + dx},
+                                         {"camera_distortion.y", middle.y() + dy}};
+  };
+  return {{"camera_distortion", lens(0, 0), {}, k1},
+          {"camera_distortion", lens(away, 0), lens(-away, 0), 2 * away * k1},
+          {"camera_distortion", lens(0, away), lens(0, -away), 2 * away * k1}};
+}
+
 Overrides base_with(const Predictor& predictor, const Study& study,
                     const std::map<std::string, double>& values) {
   Overrides overrides = study.base;

@@ -19,6 +19,10 @@ struct Probe {
   double scale = 1;
 };
 
+// Of camera_distortion: its strength about the middle of the trials, and where its centre lies, to
+// first order along x and y.
+std::vector<Probe> lens_probes(const Eigen::Vector2d& middle);
+
 // The tuned base with some table keys' values put in.
 Overrides base_with(const Predictor& predictor, const Study& study,
                     const std::map<std::string, double>& values);

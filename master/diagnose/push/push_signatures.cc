@@ -60,16 +60,7 @@ std::vector<Probe> push_probes(const Study& study) {
     };
     all.push_back({"table_tilt", tilt(direction), tilt(wrap_angle(direction + kPi)), 2 * kTilt});
   }
-  constexpr double k1 = 0.02, away = 0.1;
-  const Eigen::Vector2d middle = middle_of(study);
-  const auto lens = [&](double dx, double dy) {
-    return std::map<std::string, double>{{"camera_distortion.k1", k1},
-                                         {"camera_distortion.x", middle.x() + dx},
-                                         {"camera_distortion.y", middle.y() + dy}};
-  };
-  all.push_back({"camera_distortion", lens(0, 0), {}, k1});
-  all.push_back({"camera_distortion", lens(away, 0), lens(-away, 0), 2 * away * k1});
-  all.push_back({"camera_distortion", lens(0, away), lens(0, -away), 2 * away * k1});
+  for (Probe& probe : lens_probes(middle_of(study))) all.push_back(std::move(probe));
   return all;
 }
 
