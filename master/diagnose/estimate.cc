@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "common/score/density.h"
+#include "master/diagnose/bounded_minimum.h"
 #include "master/diagnose/seam.h"
 #include "master/diagnose/subject.h"
 
@@ -13,6 +14,7 @@ namespace {
 
 constexpr int kMostHalvings = 4;
 constexpr double kSettled = 1;      // of the objective (twice nats): less is no progress
+constexpr double kMostOfRange = 0.3;  // of a parameter's range, that one step may go
 constexpr double kFarSquared = 16;  // squared distance beyond which a trial counts linearly
 
 // Effects with a strength and a direction, whose first two columns belong to its cosine and sine.
@@ -104,6 +106,21 @@ Status differentiate(Predictor& predictor, const Study& study, JointFit* fit) {
   return {};
 }
 
+// Directions go round: beyond the one bound they come in at the other.
+bool goes_round(const Parameter& row) { return row.key.ends_with(".direction"); }
+
+double within(const Parameter& row, double value) {
+  if (!goes_round(row)) return std::clamp(value, row.lower, row.upper);
+  const double turn = row.upper - row.lower;
+  return value - turn * std::floor((value - row.lower) / turn);
+}
+
+double way_between(const Parameter& row, double from, double to) {
+  if (!goes_round(row)) return to - from;
+  const double turn = row.upper - row.lower;
+  return to - from - turn * std::round((to - from) / turn);
+}
+
 struct Normal {
   Eigen::MatrixXd matrix;
   Eigen::VectorXd right;
@@ -176,14 +193,22 @@ void step(const Problem& problem, const Study& study, const Eigen::MatrixXd& nui
   normal.matrix.diagonal().tail(q).array() += 1;
   add_prior(study, *fit, &normal);
   const Eigen::LDLT<Eigen::MatrixXd> factor(normal.matrix);
-  const Eigen::VectorXd delta = factor.solve(normal.right);
   const Eigen::MatrixXd inverse = factor.solve(Eigen::MatrixXd::Identity(p + q, p + q));
+  Eigen::VectorXd lower = Eigen::VectorXd::Constant(p + q, -INFINITY), upper = -lower;
+  for (Eigen::Index k = 0; k < p; ++k) {
+    const FittedParameter& parameter = fit->parameters[static_cast<std::size_t>(k)];
+    const Parameter& row = problem.table()[parameter.row];
+    upper[k] = kMostOfRange * (row.upper - row.lower);
+    lower[k] = -upper[k];
+    if (goes_round(row)) continue;
+    upper[k] = std::min(upper[k], row.upper - parameter.value);
+    lower[k] = std::max(lower[k], row.lower - parameter.value);
+  }
+  const Eigen::VectorXd delta = bounded_minimum(normal.matrix, normal.right, lower, upper);
   for (Eigen::Index k = 0; k < p; ++k) {
     FittedParameter& parameter = fit->parameters[static_cast<std::size_t>(k)];
     const Parameter& row = problem.table()[parameter.row];
-    const double most = 0.3 * (row.upper - row.lower);
-    parameter.value =
-        std::clamp(parameter.value + std::clamp(delta[k], -most, most), row.lower, row.upper);
+    parameter.value = within(row, parameter.value + delta[k]);
     parameter.standard_error = std::sqrt(std::max(0.0, inverse(k, k)));
     fit->at[parameter.row] = parameter.value;
   }
@@ -265,7 +290,8 @@ Result<JointFit> fit_jointly(Predictor& predictor, const Study& study,
         if (moved) break;
       }
       if (!moved && !predictor.simulation_failed()) return moved.error();
-      if (half == kMostHalvings) {
+      const bool level = moved && now < best + kSettled;
+      if (level || half == kMostHalvings) {
         // No way on: the present values stay, with the standard errors found here.
         for (std::size_t k = 0; k < whole.size(); ++k) {
           fit.parameters[k].standard_error = whole[k].standard_error;
@@ -274,7 +300,9 @@ Result<JointFit> fit_jointly(Predictor& predictor, const Study& study,
       }
       for (std::size_t k = 0; k < next.parameters.size(); ++k) {
         FittedParameter& p = next.parameters[k];
-        next.at[p.row] = p.value = (p.value + fit.parameters[k].value) / 2;
+        const double last = fit.parameters[k].value;
+        const Parameter& row = predictor.problem().table()[p.row];
+        next.at[p.row] = p.value = within(row, last + way_between(row, last, p.value) / 2);
       }
     }
     const bool settled = now > best - kSettled;
