@@ -40,6 +40,11 @@ RootMeanSquare root_mean_square(const std::vector<Eigen::Vector3d>& residuals) {
   return {1e3 * std::sqrt(position), 1e3 * std::sqrt(heading)};
 }
 
+std::vector<double> difference(std::vector<double> values, const std::vector<double>& less) {
+  for (std::size_t i = 0; i < values.size(); ++i) values[i] -= less[i];
+  return values;
+}
+
 // Residuals, ends and their covariances, seen from axes turned by `angle_rad`.
 void turn(double angle_rad, DiagnosedTrial* trial) {
   const auto turned = [&](const Eigen::Vector3d& v) {
@@ -78,7 +83,14 @@ double DiagnosisRun::mean_loss_of_slips() const {
 
 void DiagnosisRun::spread_effects(Overrides* at) const {
   const auto set = [&](const char* key, double value) { (*at)[problem_.table().row(key)] = value; };
-  NoiseEstimate noise = study_.noise;
+  NoiseEstimate noise = nested_studies_.back().noise;
+  if (study_.quantum_m > 0) {
+    // The readings' noise was measured with the rounding in it.
+    const double rounding2 = study_.quantum_m * study_.quantum_m / 12;
+    set("pose_quantisation.step", study_.quantum_m);
+    noise.pose.position_m =
+        std::sqrt(std::max(0.0, noise.pose.position_m * noise.pose.position_m - rounding2));
+  }
   noise.pose.position_m = std::max(1e-5, noise.pose.position_m);
   noise.pose.heading_rad = std::max(1e-5, noise.pose.heading_rad);
   for (const Signature& s : first_) {
@@ -130,9 +142,7 @@ void DiagnosisRun::set_closed(NamedEffect* effect, const std::vector<double>& ga
 
 // Of every trial, by a nested fit over the one before.
 std::vector<double> DiagnosisRun::gained_by(std::size_t nested) const {
-  std::vector<double> gained = nested_scores_[nested];
-  for (std::size_t i = 0; i < gained.size(); ++i) gained[i] -= nested_scores_[nested - 1][i];
-  return gained;
+  return difference(nested_scores_[nested], nested_scores_[nested - 1]);
 }
 
 NamedEffect DiagnosisRun::named(std::size_t k, const JointFit& estimates) const {
@@ -165,8 +175,8 @@ NamedEffect DiagnosisRun::named(std::size_t k, const JointFit& estimates) const 
   effect.gap_before = floor_ - mean(nested_scores_[before]);
   effect.gap_after = floor_ - mean(nested_scores_[before + 1]);
   set_closed(&effect, gained_by(before + 1));
-  const RootMeanSquare after =
-      root_mean_square(held_out_residuals(study_, nested_[before + 1], subject_.folds(study_)));
+  const RootMeanSquare after = root_mean_square(
+      held_out_residuals(nested_studies_[before + 1], nested_[before + 1], subject_.folds(study_)));
   effect.position_mm_after = after.position_mm;
   effect.heading_mrad_after = after.heading_mrad;
   return effect;
@@ -197,7 +207,7 @@ std::vector<DiagnosisRun::SpreadEffect> DiagnosisRun::spread_effects_found() con
         {"slip_events",
          slip_.gain,
          {{"probability", p, 0.6 * p, 1.6 * p, "-"}, {"loss", loss, 0.7 * loss, 1.4 * loss, "-"}},
-         {}});
+         difference(slip_scores_, nested_scores_.back())});
   }
   if (study_.quantum_m > 0) {
     const double q = study_.quantum_m;
@@ -255,10 +265,11 @@ void DiagnosisRun::fill_gap() {
   d.gap.final_ = d.effects.empty() ? d.gap.tuned : d.effects.back().gap_after;
   d.gap.floor = 0;
   const RootMeanSquare tuned =
-      root_mean_square(held_out_residuals(study_of(0), nested_.front(), folds));
-  const RootMeanSquare last = root_mean_square(held_out_residuals(study_, nested_.back(), folds));
+      root_mean_square(held_out_residuals(nested_studies_.front(), nested_.front(), folds));
+  const RootMeanSquare last =
+      root_mean_square(held_out_residuals(nested_studies_.back(), nested_.back(), folds));
   double position = 0, heading = 0;
-  for (const Eigen::Matrix3d& cov : study_.covariances()) {
+  for (const Eigen::Matrix3d& cov : nested_studies_.back().covariances()) {
     position += (cov(0, 0) + cov(1, 1)) / static_cast<double>(study_.size());
     heading += cov(2, 2) / static_cast<double>(study_.size());
   }
@@ -271,7 +282,8 @@ void DiagnosisRun::fill_trials() {
   result_.diagnosis.words = subject_.words;
   const JointFit& tuned = nested_.front();
   const JointFit& last = nested_.back();
-  const std::vector<Eigen::Matrix3d> covariances = study_.covariances();
+  const std::vector<Eigen::Matrix3d> tuned_cov = nested_studies_.front().covariances();
+  const std::vector<Eigen::Matrix3d> last_cov = nested_studies_.back().covariances();
   for (std::size_t i = 0; i < study_.size(); ++i) {
     const ResidualTrial& t = study_.trials[i];
     const Cell& cell = study_.cells[t.cell];
@@ -289,7 +301,8 @@ void DiagnosisRun::fill_trials() {
     to.measured = between(view.X_WV, t.X_WE);
     to.tuned = between(view.X_WV, tuned.ends[i]);
     to.final_ = between(view.X_WV, last.ends[i]);
-    to.tuned_cov = to.final_cov = covariances[i];
+    to.tuned_cov = tuned_cov[i];
+    to.final_cov = last_cov[i];
     to.tuned_residual = tuned.residuals[i];
     to.final_residual = last.residuals[i];
     if (view.turn_rad != 0) turn(view.turn_rad, &to);
@@ -305,7 +318,7 @@ void DiagnosisRun::fill_values() {
     if (with_effects) {
       spread_effects(&at);
     } else {
-      set_noise(study_of(0).noise, &at);
+      set_noise(nested_studies_.front().noise, &at);
     }
     ParameterValues values = problem_.values;
     for (const auto& [row, value] : at) values[row] = value;

@@ -9,6 +9,7 @@
 #include "common/score/statistics.h"
 #include "master/diagnose/drive_noise.h"
 #include "master/diagnose/noise.h"
+#include "master/diagnose/slip_places.h"
 
 namespace gapfarm {
 namespace {
@@ -227,9 +228,23 @@ void DiagnosisRun::look_for_slip(const Regression& explained) {
   std::size_t far = 0;
   for (Eigen::Index i = 0; i < z.size(); i += 3) far += z.segment<3>(i).squaredNorm() > 13 ? 1 : 0;
   if (far <= 4 && residual_kurtosis(z) <= 3.2) return;
-  slip_ = fit_slip(study_.trials, study_.unwhiten(z), tells_of_slips(), study_.noise);
-  if (slip_.gain < std::max(kLeastSlipGain, kLeastSlipShare * explained_nats(explained)))
+  const std::vector<Eigen::Vector3d> left = study_.unwhiten(z);
+  const std::vector<bool> tells = tells_of_slips();
+  slip_ = fit_slip(study_.trials, left, tells, study_.noise);
+  if (slip_.gain < std::max(kLeastSlipGain, kLeastSlipShare * explained_nats(explained))) {
     slip_ = {};
+    return;
+  }
+  std::vector<double> slipped;
+  for (const SlipTrial& t :
+       trials_with_slips(study_.trials, left, slip_, slip_.probability * slip_.loss / 2, 0)) {
+    slipped.push_back(t.slipped);
+  }
+  const Gathering gathering = gathering_of_slips(study_, slipped, tells);
+  if (gathering.gain < kLeastGathering) return;
+  slip_ = {};
+  odd_drives_ = "Single drives stray, most of them " + gathering.where +
+                ": something lies there that nothing explains which was looked for.";
 }
 
 // False where something else that was chosen makes single trials stray.
@@ -317,6 +332,12 @@ void DiagnosisRun::judge() {
   if (!odd_readings_.empty()) {
     if (verdict != Verdict::kEffectAndUnknown) verdict = Verdict::kUnknown;
     result_.diagnosis.cautions.push_back(odd_readings_);
+  }
+  if (!odd_drives_.empty()) {
+    verdict = verdict == Verdict::kEffect || verdict == Verdict::kEffectAndUnknown
+                  ? Verdict::kEffectAndUnknown
+                  : Verdict::kUnknown;
+    result_.diagnosis.cautions.push_back(odd_drives_);
   }
   if (verdict == Verdict::kUnknown) name_nothing();
   if (!rounded) study_.quantum_m = 0;

@@ -71,6 +71,10 @@ class DiagnosisRun {
   double mean_loss_of_slips() const;
   void spread_effects(Overrides* at) const;
   Status refit_nested();
+  void foresee_slips(const std::vector<std::size_t>& folds);
+  void drop_slips();
+  Study study_beside(const JointFit& fit) const;
+  void keep_nested(JointFit fit, const Study& fitted_in, Study scored_in);
   Status estimate_beside_base();
   void name_effects();
   // An effect on the spread: gain in nats over all trials.
@@ -81,7 +85,6 @@ class DiagnosisRun {
     std::vector<double> gained;  // of each trial, where that is known
   };
   std::vector<SpreadEffect> spread_effects_found() const;
-  const Study& study_of(std::size_t nested) const;
   std::vector<double> gained_by(std::size_t nested) const;
   // Without words, and with a gap that only its change counts of.
   NamedEffect named(std::size_t k, const JointFit& estimates) const;
@@ -110,12 +113,15 @@ class DiagnosisRun {
   PathLag lag_;                     // by paths
   SlipFit slip_;
   std::string odd_readings_;      // what readings show that no effect looked for explains
+  std::string odd_drives_;        // the same of drives that stray in one place
   std::vector<Signature> first_;  // explained before anything else
   std::vector<ChosenEffect> chosen_;
   std::vector<Leftover> leftovers_;
   std::vector<JointFit> nested_;                    // see refit_nested()
+  std::vector<Study> nested_studies_;               // each with the noise that the fit leaves
   std::optional<JointFit> estimates_;               // base held, beside nuisances
   std::vector<std::vector<double>> nested_scores_;  // held out, one a trial
+  std::vector<double> slip_scores_;                 // the same, of the last fit and slips
   double scale_ = 1;                                // leftover variance over the noise's
   double floor_ = 0;
   DiagnosisResult result_;

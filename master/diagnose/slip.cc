@@ -6,6 +6,8 @@
 #include <functional>
 #include <nlopt.hpp>
 
+#include "common/score/density.h"
+
 namespace gapfarm {
 namespace {
 
@@ -144,6 +146,34 @@ SlipFit fit_slip(std::span<const ResidualTrial> trials, std::span<const Eigen::V
   fit.noise.drive_common = std::exp(x[0]);
   fit.noise.drive_side = std::exp(x[1]);
   return fit;
+}
+
+std::vector<SlipTrial> trials_with_slips(std::span<const ResidualTrial> trials,
+                                         std::span<const Eigen::Vector3d> residuals,
+                                         const SlipFit& fit, double mean_loss,
+                                         double outlier_share) {
+  const std::vector<Event> events = events_of(fit.probability, fit.loss);
+  std::vector<SlipTrial> judged;
+  for (std::size_t i = 0; i < trials.size(); ++i) {
+    const ResidualTrial& t = trials[i];
+    const auto cov = Covariance3::factorise(trial_covariance(t, fit.noise));
+    if (!cov) {
+      judged.push_back({-1e3, 0});
+      continue;
+    }
+    const Eigen::Vector3d centred = residuals[i] - mean_loss * (t.left + t.right);
+    std::vector<double> logs;
+    for (const Event& e : events) {
+      const Eigen::Vector3d r = centred - e.left * t.left - e.right * t.right;
+      logs.push_back(std::log(e.weight) + log_predictive_density(r, *cov, outlier_share));
+    }
+    const double greatest = *std::max_element(logs.begin(), logs.end());
+    double sum = 0;
+    for (double l : logs) sum += std::exp(l - greatest);
+    const double score = greatest + std::log(sum);
+    judged.push_back({score, 1 - std::exp(logs.front() - score)});
+  }
+  return judged;
 }
 
 double residual_kurtosis(const Eigen::VectorXd& whitened) {

@@ -22,6 +22,18 @@ struct SlipFit {
 SlipFit fit_slip(std::span<const ResidualTrial> trials, std::span<const Eigen::Vector3d> residuals,
                  const std::vector<bool>& mask, const NoiseEstimate& start);
 
+// One trial once slips are foreseen.
+struct SlipTrial {
+  double score = 0;    // log predictive density, nats
+  double slipped = 0;  // probability that a side did
+};
+// `mean_loss`: share of the sides' speed that the predictions of `residuals` lost to slips already.
+// As a worker scores a prediction with slips: every event of the mixture has the outliers' tail.
+std::vector<SlipTrial> trials_with_slips(std::span<const ResidualTrial> trials,
+                                         std::span<const Eigen::Vector3d> residuals,
+                                         const SlipFit& fit, double mean_loss,
+                                         double outlier_share);
+
 // Mean fourth power over squared mean square: 3 for a Gaussian, and where there is nothing.
 double residual_kurtosis(const Eigen::VectorXd& whitened);
 

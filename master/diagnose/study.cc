@@ -178,6 +178,16 @@ void Study::use_noise(const NoiseEstimate& estimate) {
   }
 }
 
+Eigen::MatrixXd Study::rewhitened(const Study& other, const Eigen::MatrixXd& rows) const {
+  Eigen::MatrixXd changed(rows.rows(), rows.cols());
+  for (std::size_t i = 0; i < size(); ++i) {
+    const auto at = static_cast<Eigen::Index>(3 * i);
+    const auto lower = other.whitener[i].triangularView<Eigen::Lower>();
+    changed.middleRows(at, 3) = whitener[i] * lower.solve(Eigen::MatrixXd(rows.middleRows(at, 3)));
+  }
+  return changed;
+}
+
 Result<Study> make_study(const Problem& problem) {
   if (problem.log.trials.empty())
     return Error{"the trial log is empty; there is nothing to explain"};

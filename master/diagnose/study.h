@@ -61,6 +61,8 @@ struct Study {
   std::vector<Eigen::Matrix3d> covariances() const;
   // Whitener and covariances from the present noise.
   void use_noise(const NoiseEstimate& estimate);
+  // The same values as these rows, which `other`, a study of the same trials, whitened.
+  Eigen::MatrixXd rewhitened(const Study& other, const Eigen::MatrixXd& rows) const;
 };
 
 // Cells, contexts and reading noise of the problem's log.  Errors: an empty log.

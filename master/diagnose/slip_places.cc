@@ -1,0 +1,127 @@
+#include "master/diagnose/slip_places.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <functional>
+#include <map>
+#include <utility>
+
+namespace gapfarm {
+namespace {
+
+constexpr double kGrid_m = 0.1;
+constexpr std::array<double, 6> kRadii_m = {0.1, 0.15, 0.2, 0.3, 0.4, 0.55};
+constexpr double kLineStep_m = 0.05;
+constexpr double kAbout_m = 0.03;   // of a line: readings near it count as across
+constexpr double kMostPlaces = 40;  // along an axis
+constexpr double kPriorTrials = 5;  // with the log's own rate, in every group of drives
+constexpr double kFewestSlips = 3;  // in a place
+
+struct Way {
+  Eigen::Vector2d from, to;
+};
+
+double distance(const Eigen::Vector2d& point, const Way& way) {
+  const Eigen::Vector2d along = way.to - way.from;
+  const double share =
+      std::clamp((point - way.from).dot(along) / std::max(along.squaredNorm(), 1e-12), 0.0, 1.0);
+  return (way.from + share * along - point).norm();
+}
+
+// Expected slips of every trial if they fell anywhere.
+std::vector<double> expected(const Study& study, std::span<const double> slipped,
+                             const std::vector<bool>& tells) {
+  std::map<std::pair<DriveKind, double>, std::pair<double, double>> groups;  // slips, trials
+  const auto group_of = [&](std::size_t i) {
+    const Cell& cell = study.cells[study.trials[i].cell];
+    return std::pair(cell.kind, cell.path);
+  };
+  double slips = 0, trials = 0;
+  for (std::size_t i = 0; i < study.size(); ++i) {
+    if (!tells[i]) continue;
+    auto& [own_slips, own_trials] = groups[group_of(i)];
+    own_slips += slipped[i];
+    own_trials += 1;
+    slips += slipped[i];
+    trials += 1;
+  }
+  const double rate = slips / std::max(trials, 1.0);
+  std::vector<double> all;
+  double sum = 0;
+  for (std::size_t i = 0; i < study.size(); ++i) {
+    const auto [own_slips, own_trials] = groups[group_of(i)];
+    all.push_back(tells[i] ? (own_slips + kPriorTrials * rate) / (own_trials + kPriorTrials) : 0);
+    sum += all.back();
+  }
+  for (double& e : all) e *= slips / std::max(sum, 1e-12);
+  return all;
+}
+
+}  // namespace
+
+Gathering gathering_of_slips(const Study& study, std::span<const double> slipped,
+                             const std::vector<bool>& tells) {
+  const std::vector<double> chance = expected(study, slipped, tells);
+  std::vector<Way> ways;
+  Eigen::Vector2d low(INFINITY, INFINITY), high = -low;
+  double slips = 0;
+  for (std::size_t i = 0; i < study.size(); ++i) {
+    const ResidualTrial& t = study.trials[i];
+    ways.push_back({{t.X_WS.x, t.X_WS.y}, {t.X_WP.x, t.X_WP.y}});
+    low = low.cwiseMin(ways.back().from);
+    high = high.cwiseMax(ways.back().from);
+    if (tells[i]) slips += slipped[i];
+  }
+  Gathering best;
+  const auto try_place = [&](const std::function<bool(const Way&)>& passes, auto words) {
+    double here = 0, expected_here = 0;
+    for (std::size_t i = 0; i < study.size(); ++i) {
+      if (!tells[i] || !passes(ways[i])) continue;
+      here += slipped[i];
+      expected_here += chance[i];
+    }
+    const double rest = slips - here, expected_rest = slips - expected_here;
+    if (here < kFewestSlips || here <= expected_here || expected_here <= 0) return;
+    const double gain = here * std::log(here / expected_here) +
+                        (rest > 0 ? rest * std::log(rest / expected_rest) : 0);
+    if (gain > best.gain) best = {gain, words()};
+  };
+  const auto metres = [](double value) {
+    char text[32];
+    std::snprintf(text, sizeof text, "%.2f", value);
+    return std::string(text);
+  };
+  const Eigen::Vector2d extent = (high - low).cwiseMax(kGrid_m);
+  const double grid = std::max(kGrid_m, extent.maxCoeff() / kMostPlaces);
+  for (double x = low.x(); x <= high.x(); x += grid) {
+    for (double y = low.y(); y <= high.y(); y += grid) {
+      for (double radius : kRadii_m) {
+        try_place(
+            [&](const Way& way) {
+              return distance({x, y}, way) < radius;
+            },
+            [&] {
+              return "within " + metres(radius) + " m of (" + metres(x) + ", " + metres(y) + ")";
+            });
+      }
+    }
+  }
+  for (int axis : {0, 1}) {
+    const double step = std::max(kLineStep_m, extent[axis] / kMostPlaces);
+    for (double at = low[axis]; at <= high[axis]; at += step) {
+      try_place(
+          [&](const Way& way) {
+            return std::min(way.from[axis], way.to[axis]) < at + kAbout_m &&
+                   std::max(way.from[axis], way.to[axis]) > at - kAbout_m;
+          },
+          [&] {
+            return std::string("across ") + (axis == 0 ? "x" : "y") + " = " + metres(at) + " m";
+          });
+    }
+  }
+  return best;
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,201 @@
+#include "master/diagnose/slip.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <vector>
+
+#include "common/score/density.h"
+#include "common/score/statistics.h"
+#include "master/diagnose/drive_noise.h"
+#include "master/diagnose/slip_places.h"
+#include "tests/unit/diagnose/drawn_drives.h"
+
+namespace gapfarm {
+namespace {
+
+TEST(FitSlip, FindsEvents) {
+  const std::vector<bool> all(600, true);
+  for (std::uint64_t seed = 0; seed < 5; ++seed) {
+    const Drawn d = draw(seed, 0.1, 0.3);
+    const SlipFit fit = fit_slip(d.trials, d.residuals, all, kStart);
+    EXPECT_GT(fit.gain, 50) << seed;
+    EXPECT_NEAR(fit.probability, 0.1, 0.05) << seed;
+    EXPECT_NEAR(fit.loss, 0.3, 0.06) << seed;
+    EXPECT_NEAR(fit.noise.drive_side / kTruth.drive_side, 1, 0.2) << seed;
+  }
+}
+
+TEST(FitSlip, FindsNoneInGaussianResiduals) {
+  const std::vector<bool> all(600, true);
+  for (std::uint64_t seed = 0; seed < 20; ++seed) {
+    const Drawn d = draw(seed);
+    EXPECT_LT(fit_slip(d.trials, d.residuals, all, kTruth).gain, 8) << seed;
+  }
+}
+
+TEST(FitSlip, StartingFarFromTheNoiseFindsNoneEither) {
+  const Drawn d = draw(1);
+  const SlipFit fit =
+      fit_slip(d.trials, d.residuals, std::vector<bool>(600, true), {kTruth.pose, 0.002, 0.05});
+  EXPECT_LT(fit.gain, 8);
+}
+
+TEST(FitSlip, StartsFromNothing) {
+  const Drawn d = draw(1, 0.1, 0.3);
+  const std::vector<bool> all(600, true);
+  EXPECT_TRUE(std::isfinite(fit_slip(d.trials, d.residuals, all, {kTruth.pose, 0, 0}).gain));
+}
+
+TEST(FitSlip, LeavesMaskedTrialsOut) {
+  Drawn d = draw(1);
+  std::vector<bool> mask(600, true);
+  for (std::size_t i = 0; i < 600; i += 10) {
+    d.residuals[i] -= 0.4 * d.trials[i].left;
+    mask[i] = false;
+  }
+  EXPECT_GT(fit_slip(d.trials, d.residuals, std::vector<bool>(600, true), kStart).gain, 50);
+  EXPECT_LT(fit_slip(d.trials, d.residuals, mask, kStart).gain, 8);
+}
+
+// What a drive's log density is under the events themselves, by adding up many draws of them.
+TEST(TrialsWithSlips, ScoreIsTheMixturesDensity) {
+  const Drawn d = draw(1, 0.2, 0.4);
+  const SlipFit fit{.gain = 1, .probability = 0.2, .loss = 0.4, .noise = kTruth};
+  const std::vector<SlipTrial> judged =
+      trials_with_slips(d.trials, d.residuals, fit, 0.04, /*outlier_share=*/0);
+  Stream stream({.run_seed = 2});
+  double difference = 0;
+  for (std::size_t i = 0; i < 60; ++i) {
+    const ResidualTrial& t = d.trials[i];
+    const auto cov = Covariance3::factorise(trial_covariance(t, kTruth));
+    double density = 0;
+    constexpr int kDraws = 4000;
+    for (int k = 0; k < kDraws; ++k) {
+      Eigen::Vector3d r = d.residuals[i] - 0.04 * (t.left + t.right);
+      if (stream.bernoulli(0.2)) r += 0.4 * stream.uniform() * t.left;
+      if (stream.bernoulli(0.2)) r += 0.4 * stream.uniform() * t.right;
+      density += std::exp(log_normal_density(r, *cov)) / kDraws;
+    }
+    difference += std::abs(std::log(density) - judged[i].score) / 60;
+  }
+  EXPECT_LT(difference, 0.25);  // six steps of a loss stand for all
+}
+
+TEST(TrialsWithSlips, WithoutEventsItIsTheDensityOfOutliers) {
+  const Drawn d = draw(1);
+  const SlipFit none{.gain = 0, .probability = 0, .loss = 0.3, .noise = kTruth};
+  const std::vector<SlipTrial> judged = trials_with_slips(d.trials, d.residuals, none, 0, 0.02);
+  for (std::size_t i = 0; i < d.trials.size(); ++i) {
+    const auto cov = Covariance3::factorise(trial_covariance(d.trials[i], kTruth));
+    EXPECT_NEAR(judged[i].score, log_predictive_density(d.residuals[i], *cov, 0.02), 1e-9);
+    EXPECT_NEAR(judged[i].slipped, 0, 1e-12);
+  }
+}
+
+TEST(TrialsWithSlips, ForeseenSlipsScoreHigher) {
+  const Drawn d = draw(3, 0.1, 0.3);
+  const SlipFit fit = fit_slip(d.trials, d.residuals, std::vector<bool>(600, true), kStart);
+  const NoiseEstimate wide = refit_drive_noise(d.trials, d.residuals, kStart, false);
+  const SlipFit none{.noise = wide};
+  std::vector<double> with, without, slipped;
+  for (const SlipTrial& t : trials_with_slips(d.trials, d.residuals, fit, 0.015, 0.02)) {
+    with.push_back(t.score);
+    slipped.push_back(t.slipped);
+  }
+  for (const SlipTrial& t : trials_with_slips(d.trials, d.residuals, none, 0, 0.02)) {
+    without.push_back(t.score);
+  }
+  EXPECT_GT(mean(with) - mean(without), 0.1);
+  EXPECT_NEAR(mean(slipped), 0.19, 0.1);  // 1 - 0.9^2
+}
+
+// Drives that a side slipped in, as likely as they are told.
+struct Scene {
+  Study study;
+  std::vector<double> slipped;
+  std::vector<bool> tells;
+};
+
+Scene scene(std::uint64_t seed) {
+  Scene s;
+  s.study.trials = draw(seed).trials;
+  s.study.cells.resize(6);
+  for (std::size_t c = 0; c < 6; ++c) {
+    s.study.cells[c].kind = c % 2 == 1 ? DriveKind::kTurn : DriveKind::kStraight;
+    s.study.cells[c].path = 0.5 * static_cast<double>(1 + c % 3);
+  }
+  for (std::size_t i = 0; i < s.study.size(); ++i) s.study.trials[i].cell = i % 6;
+  s.slipped.assign(s.study.size(), 0);
+  s.tells.assign(s.study.size(), true);
+  return s;
+}
+
+TEST(GatheringOfSlips, NoneWhereSlipsFallAnywhere) {
+  double most = 0;
+  for (std::uint64_t seed = 0; seed < 40; ++seed) {
+    Scene s = scene(seed);
+    Stream stream({.run_seed = 100 + seed});
+    // Longer drives show more of them.
+    for (std::size_t i = 0; i < s.slipped.size(); ++i) {
+      s.slipped[i] = stream.bernoulli(0.1 * s.study.cells[i % 6].path) ? 1 : 0;
+    }
+    most = std::max(most, gathering_of_slips(s.study, s.slipped, s.tells).gain);
+  }
+  EXPECT_LT(most, kLeastGathering);
+  EXPECT_GT(most, 2);
+}
+
+TEST(GatheringOfSlips, FindsADisc) {
+  Scene s = scene(1);
+  for (std::size_t i = 0; i < s.slipped.size(); ++i) {
+    const Pose& at = s.study.trials[i].X_WS;
+    s.slipped[i] = std::hypot(at.x - 1.2, at.y - 0.8) < 0.2 && i % 4 != 0 ? 1 : i % 50 == 0;
+  }
+  const Gathering found = gathering_of_slips(s.study, s.slipped, s.tells);
+  EXPECT_GT(found.gain, kLeastGathering);
+  double radius = 0, x = 0, y = 0;
+  ASSERT_EQ(std::sscanf(found.where.c_str(), "within %lf m of (%lf, %lf)", &radius, &x, &y), 3)
+      << found.where;
+  EXPECT_LT(std::hypot(x - 1.2, y - 0.8), 0.2);
+  // Not among trials that something else made stray.
+  for (std::size_t i = 0; i < s.slipped.size(); ++i) {
+    const Pose& at = s.study.trials[i].X_WS;
+    if (std::hypot(at.x - 1.2, at.y - 0.8) < 0.2) s.tells[i] = false;
+  }
+  EXPECT_LT(gathering_of_slips(s.study, s.slipped, s.tells).gain, kLeastGathering);
+}
+
+TEST(GatheringOfSlips, FindsALine) {
+  Scene s = scene(1);
+  for (std::size_t i = 0; i < s.slipped.size(); ++i) {
+    const ResidualTrial& t = s.study.trials[i];
+    if ((t.X_WS.y > 1) != (t.X_WP.y > 1)) s.slipped[i] = 0.9;
+  }
+  const Gathering found = gathering_of_slips(s.study, s.slipped, s.tells);
+  EXPECT_GT(found.gain, kLeastGathering);
+  double y = 0;
+  ASSERT_EQ(std::sscanf(found.where.c_str(), "across y = %lf", &y), 1) << found.where;
+  EXPECT_NEAR(y, 1, 0.06);
+}
+
+TEST(GatheringOfSlips, NoSlipsGatherNowhere) {
+  const Scene s = scene(1);
+  EXPECT_EQ(gathering_of_slips(s.study, s.slipped, s.tells).gain, 0);
+}
+
+TEST(ResidualKurtosis, TellsTailsFromNone) {
+  Stream stream({.run_seed = 1});
+  Eigen::VectorXd z(1800);
+  for (double& v : z) v = stream.normal();
+  EXPECT_NEAR(residual_kurtosis(z), 3, 0.3);
+  for (Eigen::Index i = 0; i < z.size(); i += 30) z[i] *= 5;
+  EXPECT_GT(residual_kurtosis(z), 6);
+  EXPECT_EQ(residual_kurtosis(Eigen::VectorXd::Zero(9)), 3);
+}
+
+}  // namespace
+}  // namespace gapfarm
