@@ -9,7 +9,6 @@ namespace gapfarm {
 
 // Every named effect against its aliases, each at its best linear fit.
 Status DiagnosisRun::plan_next() {
-  if (subject_.next == nullptr) return {};
   for (std::size_t k = 0; k < chosen_.size(); ++k) {
     if (chosen_[k].aliases.empty()) continue;
     std::vector<const Signature*> others;
@@ -43,7 +42,7 @@ Status DiagnosisRun::plan_next() {
       }
       rivals.push_back(std::move(rival));
     }
-    auto next = subject_.next(farm_, problem_, rivals);
+    auto next = next_experiments(farm_, subject_.experiments(problem_), rivals);
     if (!next) return next.error();
     auto& to = result_.diagnosis.next;
     to.insert(to.end(), next->begin(), next->end());

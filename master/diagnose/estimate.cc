@@ -13,9 +13,9 @@ namespace gapfarm {
 namespace {
 
 constexpr int kMostHalvings = 4;
-constexpr double kSettled = 1;      // of the objective (twice nats): less is no progress
+constexpr double kSettled = 1;        // of the objective (twice nats): less is no progress
 constexpr double kMostOfRange = 0.3;  // of a parameter's range, that one step may go
-constexpr double kFarSquared = 16;  // squared distance beyond which a trial counts linearly
+constexpr double kFarSquared = 16;    // squared distance beyond which a trial counts linearly
 
 // Effects with a strength and a direction, whose first two columns belong to its cosine and sine.
 struct Polar {

@@ -3,6 +3,8 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -22,10 +24,26 @@ struct Rival {
 };
 using Rivals = std::vector<Rival>;
 
+// Trials that might be made, all alike but for where they start.
+struct Design {
+  std::string group;                  // a further sentence offers a design of another group
+  std::vector<std::uint32_t> trials;  // of the plan's log, to be predicted
+  // What is special about it must be why it tells: the trial without that, from the same start.
+  std::optional<std::uint32_t> ordinary;
+  double cost = 0;  // of two that tell as much the cheaper is offered
+  // What to do, without a full stop; `many_starts`: one start alone would tell less.
+  std::function<std::string(bool many_starts)> action;
+};
+
+struct ExperimentPlan {
+  Problem problem;  // without genes, and with the synthetic log of all designs
+  std::vector<Design> designs;
+  std::string designs_are;  // "No ... tells them apart"
+  std::string instead;      // what to do when no design tells rivals apart
+};
+
 struct NextExperimentOptions {
-  std::vector<double> durations_s = {0.5, 1, 2};
-  std::vector<double> levels = {0.5, 1};  // of each command's own duties
-  std::uint64_t most_trials = 500;        // a design that needs more separates nothing
+  std::uint64_t most_trials = 500;  // a design that needs more separates nothing
   std::size_t sentences = 2;
 };
 
@@ -50,14 +68,13 @@ double divergence(const PredictedEnd& a, const PredictedEnd& b);
 // in D at a fixed level: ln 20 / D = 3.0 / D for one error alone.)  At least 3.
 std::uint64_t trials_needed(double divergence);
 
-// Predicts every rival on the same fixed designs (each command at the durations and levels above:
-// from several headings and places, straight after driving the opposite way, and late in a session)
-// and says which designs tell the rivals apart with the fewest trials; at most `sentences`.  A
-// further sentence parts rivals that the ones before left together, or offers another command.
-// Rivals that no design parts get a sentence saying so, with 0 trials.  Fewer than two rivals need
-// no experiment.  Rivals are taken at their fits: the base is not retuned to the new trials.
+// Predicts every rival on the plan's designs and says which of them tell the rivals apart with the
+// fewest trials; at most `sentences`.  A further sentence parts rivals that the ones before left
+// together, or offers a design of another group.  Rivals that no design parts get a sentence saying
+// so, with 0 trials.  Fewer than two rivals need no experiment.  Rivals are taken at their fits:
+// the base is not retuned to the new trials.
 // Errors: the farm's, and a rival that cannot be simulated anywhere.
-Result<std::vector<NextExperiment>> next_experiments(Farm& farm, const Problem& problem,
+Result<std::vector<NextExperiment>> next_experiments(Farm& farm, const ExperimentPlan& plan,
                                                      const Rivals& rivals,
                                                      const NextExperimentOptions& options = {});
 

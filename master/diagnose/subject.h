@@ -58,6 +58,7 @@ struct DiagnosisSubject {
   // and the noise that they leave: where the base was tuned without them, both may be far off.
   bool base_moves;
   NoiseRow drive_common, drive_side, pose_position, pose_heading;
+  std::size_t speed = 0;  // row of what slips take a share of; of kLooksForSlips only
   CovarianceOf covariance;
 
   // Errors: an empty log.  `genes`: what the config has searched.
@@ -80,9 +81,8 @@ struct DiagnosisSubject {
   std::vector<std::string> (*cautions)(const Study& study, const TrialLog& log);
   // What the log would need to part effects that look alike in it.
   std::vector<std::string> (*lacks)(const Study& study, const TrialLog& log);
-  // What would part rival explanations; null: nothing is proposed.
-  Result<std::vector<NextExperiment>> (*next)(Farm& farm, const Problem& problem,
-                                              const Rivals& rivals);
+  // Trials that might part rival explanations.
+  ExperimentPlan (*experiments)(const Problem& problem);
   const EffectWordsByName* effect_words;  // of effect_sentence(); null: a tracked robot's
   TrialView (*view)(const Study& study, std::size_t trial);
   std::vector<ShownCovariate> shown;  // in the pictures, beside what every log has

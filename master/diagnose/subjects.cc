@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "common/parameters/push.h"
+#include "master/diagnose/drive_designs.h"
 #include "master/diagnose/estimate.h"
 #include "master/diagnose/findings.h"
 #include "master/diagnose/nuisance.h"
@@ -43,6 +44,7 @@ DiagnosisSubject srv1_subject() {
   s.drive_side = {row_of(Srv1::kDriveNoiseSide)};
   s.pose_position = {row_of(Srv1::kPoseNoisePosition)};
   s.pose_heading = {row_of(Srv1::kPoseNoiseHeading)};
+  s.speed = row_of(Srv1::kFullSpeed);
   s.covariance = trial_covariance;
   s.make_study = [](const Problem& problem, std::span<const Gene>) { return make_study(problem); };
   s.tune = tune_base;
@@ -66,9 +68,7 @@ DiagnosisSubject srv1_subject() {
   s.lacks = [](const Study& study, const TrialLog& log) {
     return lacking(log_variety(study.trials, study.cells, log));
   };
-  s.next = [](Farm& farm, const Problem& problem, const Rivals& rivals) {
-    return next_experiments(farm, problem, rivals);
-  };
+  s.experiments = plan_drives;
   s.effect_words = nullptr;
   s.view = [](const Study& study, std::size_t trial) {
     return TrialView{study.trials[trial].X_WS, 0, {}};

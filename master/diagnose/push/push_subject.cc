@@ -1,6 +1,7 @@
 #include "master/diagnose/push/push_subject.h"
 
 #include "common/parameters/push.h"
+#include "master/diagnose/push/push_designs.h"
 
 namespace gapfarm {
 
@@ -29,7 +30,7 @@ DiagnosisSubject push_subject() {
   s.where = push_where;
   s.cautions = push_cautions;
   s.lacks = push_lacks;
-  s.next = nullptr;
+  s.experiments = plan_pushes;
   s.effect_words = &push_effect_words();
   s.view = push_view;
   s.shown = {{"arm_mm", "centroid left of the finger's line, mm", "contact offset"},

@@ -1,5 +1,3 @@
-#include "master/diagnose/next_experiment.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -7,6 +5,7 @@
 #include <numbers>
 
 #include "common/random/stream.h"
+#include "master/diagnose/drive_designs.h"
 
 namespace gapfarm {
 namespace {
@@ -131,8 +130,8 @@ TEST(NextExperiments, ChooseTheCommandAndDurationThatPart) {
                ? 0.005 * s.strength * s.trial.duration() * s.trial.right() / 0.3
                : 0;
   });
-  const auto next =
-      next_experiments(farm, make_problem(), {rival("com_offset", 0), rival("marker_offset", 1)});
+  const auto next = next_experiments(farm, plan_drives(make_problem()),
+                                     {rival("com_offset", 0), rival("marker_offset", 1)});
   ASSERT_TRUE(next.ok()) << next.error().message;
   ASSERT_EQ(next->size(), 1u);  // no other command parts them
   const NextExperiment& best = next->front();
@@ -146,7 +145,8 @@ TEST(NextExperiments, ChooseTheCommandAndDurationThatPart) {
 TEST(NextExperiments, OfferAnotherCommandWhenOnePartsThemAll) {
   FakeFarm farm(
       [](const Seen& s) { return s.strength * (s.trial.command() == "forward" ? 0.02 : 0.01); });
-  const auto next = next_experiments(farm, make_problem(), {rival("a", 0), rival("b", 1)});
+  const auto next =
+      next_experiments(farm, plan_drives(make_problem()), {rival("a", 0), rival("b", 1)});
   ASSERT_TRUE(next.ok());
   ASSERT_EQ(next->size(), 2u);
   EXPECT_LT((*next)[0].trials, (*next)[1].trials);
@@ -159,7 +159,7 @@ TEST(NextExperiments, AskForHeadingsDirectionsAndLateDrivesWhereTheseTell) {
   const Rivals rivals = {rival("a", 0), rival("b", 1)};
   FakeFarm tilt(
       [](const Seen& s) { return 0.008 * s.strength * std::cos(s.trial.start().theta() - 2.2); });
-  const auto headings = next_experiments(tilt, make_problem(), rivals);
+  const auto headings = next_experiments(tilt, plan_drives(make_problem()), rivals);
   ASSERT_TRUE(headings.ok());
   EXPECT_NE(headings->front().text.find("from several headings and places"), std::string::npos);
   EXPECT_GE(headings->front().trials, 5u);
@@ -168,20 +168,20 @@ TEST(NextExperiments, AskForHeadingsDirectionsAndLateDrivesWhereTheseTell) {
     const bool reversed = s.before != nullptr && s.before->left() * s.trial.left() < 0;
     return reversed ? 0.02 * s.strength : 0;
   });
-  const auto reversing = next_experiments(backlash, make_problem(), rivals);
+  const auto reversing = next_experiments(backlash, plan_drives(make_problem()), rivals);
   ASSERT_TRUE(reversing.ok());
   EXPECT_NE(reversing->front().text.find("straight after driving the opposite way"),
             std::string::npos);
 
   FakeFarm sag([](const Seen& s) { return s.strength * s.trial.t() / 60 * 0.0005; });
-  const auto late = next_experiments(sag, make_problem(), rivals);
+  const auto late = next_experiments(sag, plan_drives(make_problem()), rivals);
   ASSERT_TRUE(late.ok());
   EXPECT_NE(late->front().text.find("20 minutes into a session"), std::string::npos);
 }
 
 TEST(NextExperiments, SayWhenNothingParts) {
   FakeFarm farm([](const Seen& s) { return s.strength >= 2 ? 0.02 : 0; });
-  const auto next = next_experiments(farm, make_problem(),
+  const auto next = next_experiments(farm, plan_drives(make_problem()),
                                      {rival("lag", 0), rival("timing", 1), rival("tilt", 2)});
   ASSERT_TRUE(next.ok());
   ASSERT_EQ(next->size(), 2u);
@@ -193,13 +193,15 @@ TEST(NextExperiments, SayWhenNothingParts) {
 
 TEST(NextExperiments, PassOnFaults) {
   FakeFarm farm([](const Seen&) { return 0.0; });
-  EXPECT_TRUE(next_experiments(farm, make_problem(), {rival("alone", 0)})->empty());
+  EXPECT_TRUE(next_experiments(farm, plan_drives(make_problem()), {rival("alone", 0)})->empty());
   farm.diverges_above = 0.5;
-  const auto dead = next_experiments(farm, make_problem(), {rival("a", 0), rival("b", 1)});
+  const auto dead =
+      next_experiments(farm, plan_drives(make_problem()), {rival("a", 0), rival("b", 1)});
   ASSERT_FALSE(dead.ok());
   EXPECT_NE(dead.error().message.find("'b'"), std::string::npos);
   farm.broken = true;
-  const auto stopped = next_experiments(farm, make_problem(), {rival("a", 0), rival("b", 1)});
+  const auto stopped =
+      next_experiments(farm, plan_drives(make_problem()), {rival("a", 0), rival("b", 1)});
   ASSERT_FALSE(stopped.ok());
   EXPECT_EQ(stopped.error().message, kStopRequested);
 }

@@ -1,0 +1,13 @@
+// Pushes that might part rival explanations.
+#pragma once
+
+#include "master/diagnose/next_experiment.h"
+
+namespace gapfarm {
+
+// Pushes of the problem's log, as different as it has them: as they were, turned with the table
+// under them, elsewhere on it, with the finger further to a side, faster and slower.
+// REQUIRES: a push log.
+ExperimentPlan plan_pushes(const Problem& problem);
+
+}  // namespace gapfarm
