@@ -1,16 +1,31 @@
 // The fits behind the figures.
 
 #include <algorithm>
+#include <cmath>
 #include <set>
 
 #include "common/score/statistics.h"
 #include "master/diagnose/diagnose_steps.h"
+#include "master/diagnose/intervals.h"
 #include "master/diagnose/noise.h"
 
 namespace gapfarm {
 namespace {
 
 constexpr int kMostRounds = 6;  // of a fit that does not settle; most need two
+
+// By paired scores: not by chance, but for one case in twenty.
+bool clearly_better(const std::vector<double>& scores, const std::vector<double>& others) {
+  const auto n = static_cast<double>(scores.size());
+  double sum = 0, squares = 0;
+  for (std::size_t i = 0; i < scores.size(); ++i) {
+    const double gain = scores[i] - others[i];
+    sum += gain;
+    squares += gain * gain;
+  }
+  const double variance = std::max(0.0, squares / n - (sum / n) * (sum / n));
+  return sum / n > kNormal90 * std::sqrt(variance / n);
+}
 
 }  // namespace
 
@@ -107,7 +122,7 @@ Status DiagnosisRun::refit() {
     nested_scores_.push_back(mean(own) < mean(scores) ? std::move(own) : std::move(scores));
   }
   if (slip_.gain > 0) foresee_slips(folds);
-  if (slip_.gain > 0 && mean(slip_scores_) <= mean(nested_scores_.back())) drop_slips();
+  if (slip_.gain > 0 && !clearly_better(slip_scores_, nested_scores_.back())) drop_slips();
   // What slips scatter is no Gaussian: the best prediction is the mixture fitted to it.
   floor_ = slip_.gain > 0 ? mean(slip_scores_) : floor_score(nested_studies_.back(), share);
   // Nor is it worse than what was reached on trials that the fit did not see.
@@ -143,10 +158,9 @@ Status DiagnosisRun::estimate_beside_base() {
   if (chosen_.empty()) return {};
   std::vector<EffectCandidate> effects;
   for (const ChosenEffect& c : chosen_) effects.push_back(c.candidate);
-  for (const BaseParameter& p : study_.base_parameters) {
-    estimates_->at[p.row] = nested_.back().at.at(p.row);
-  }
-  auto fit = fit_jointly(predictor_, study_, effects, estimates_->at, BaseParameters::kHeld,
+  // From where that fit ended, which can be simulated: with this base and another fit's effects the
+  // robot may fall over.
+  auto fit = fit_jointly(predictor_, study_, effects, nested_.back().at, BaseParameters::kHeld,
                          nuisances_, kMostRounds);
   if (!fit) return fit.error();
   estimates_ = std::move(*fit);
