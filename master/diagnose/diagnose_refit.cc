@@ -125,10 +125,16 @@ Status DiagnosisRun::refit() {
   if (slip_.gain > 0 && !clearly_better(slip_scores_, nested_scores_.back())) drop_slips();
   // What slips scatter is no Gaussian: the best prediction is the mixture fitted to it.
   floor_ = slip_.gain > 0 ? mean(slip_scores_) : floor_score(nested_studies_.back(), share);
-  // Nor is it worse than what was reached on trials that the fit did not see.
+  // Nor is it worse than what was reached on trials that the fit did not see, and there is more to
+  // be had where that still depends on something.
+  double reached = -INFINITY, more = 0;
   for (const std::vector<double>& scores : nested_scores_) {
-    floor_ = std::max(floor_, mean(scores));
+    reached = std::max(reached, mean(scores));
   }
+  for (const Leftover& l : leftovers_) {
+    if (l.log10_p < subject_.unknown_log10_p) more = std::max(more, l.excess);
+  }
+  floor_ = std::max(floor_, reached + more / static_cast<double>(study_.size()));
   return {};
 }
 
