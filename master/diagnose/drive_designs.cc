@@ -15,16 +15,9 @@ constexpr int kStarts = 5;  // no harmonic of the heading up to the fourth repea
 constexpr double kFirstHeading = 0.3;  // rad
 constexpr double kEarly_s = 30;
 constexpr double kLate_s = 1200;
-
 constexpr double kTrouble_s = 10;  // what a special way costs beyond the command
 constexpr std::array<double, 3> kDurations_s = {0.5, 1, 2};
 constexpr std::array<double, 2> kLevels = {0.5, 1};  // of each command's own duties
-
-std::string level_words(double level) {
-  if (level == 1) return "full level";
-  if (level == 0.5) return "half level";
-  return plain_number(100 * level) + " % of the level";
-}
 
 // Places over the box around the log's own starts; the origin alone without a log.
 std::vector<Pose> starts_like(const TrialLog& log) {
@@ -87,7 +80,7 @@ std::string drive_words(const CommandSpec& command, double level, Way way, bool 
   if (way == Way::kAfterOpposite) how = " straight after driving the opposite way";
   if (way == Way::kLate) how = " " + plain_number(kLate_s / 60) + " minutes into a session";
   return "Drive " + command.name + " for " + plain_number(command.duration_s) + " s at " +
-         level_words(level) + how;
+         (level == 1 ? "full" : "half") + " level" + how;
 }
 
 }  // namespace
