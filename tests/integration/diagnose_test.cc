@@ -139,6 +139,19 @@ TEST_F(Diagnose, WithoutTheEffectInTheCatalogueItIsNotGivenAnotherName) {
   EXPECT_TRUE(without["effects"].empty());
 }
 
+// Both make single drives stray: slips anywhere, a patch where it lies.
+TEST_F(Diagnose, SlipsAreNamedButNotForWhatLiesInOnePlace) {
+  simulate(200, {"slip_events.probability=0.15", "slip_events.loss=0.35"});
+  const Json slips = diagnose();
+  ASSERT_EQ(slips["effects"].size(), 1u) << slips["headline"];
+  EXPECT_EQ(slips["effects"][0]["name"], "slip_events");
+  EXPECT_GT(slips["effects"][0]["closed"].get<double>(), 0.8);
+  simulate(200, {"friction_patch.ratio=0.15", "friction_patch.x=1", "friction_patch.y=1",
+                 "friction_patch.radius=0.25"});
+  const Json patch = diagnose({"--leave-out", "friction_patch"});
+  EXPECT_EQ(patch["verdict"], "unknown") << patch["headline"];
+}
+
 TEST_F(Diagnose, ThinDataGiveCautionsNotClaims) {
   simulate(5, {"motor_asymmetry.ratio=0.02"});
   const Json d = diagnose();
