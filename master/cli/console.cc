@@ -58,8 +58,7 @@ void Console::error(const Error& error) {
 
 void Console::progress(std::string_view text) {
   if (!err_is_terminal_ || log_ != nullptr) return;
-  const double now =
-      std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+  const double now = steady_now_s();
   if (progress_shown_ && now - last_progress_s_ < 0.1) return;
   last_progress_s_ = now;
   progress_shown_ = true;
@@ -96,6 +95,11 @@ std::string format_duration(double seconds) {
 
 std::string format_number(const std::optional<double>& value, int digits) {
   return value ? formatted("%.*g", digits, *value) : "-";
+}
+
+double steady_now_s() {
+  const auto now = std::chrono::steady_clock::now().time_since_epoch();
+  return std::chrono::duration<double>(now).count();
 }
 
 std::string progress_text(std::string_view what, double rate_per_s,

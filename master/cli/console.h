@@ -54,6 +54,8 @@ class Console {
   double last_progress_s_ = -1;
 };
 
+// Of a clock that only goes forward, from any beginning.
+double steady_now_s();
 // "1 h 02 min", "3 min 20 s", "12 s", "0.4 s".
 std::string format_duration(double seconds);
 // Six significant digits, "-" for none.

@@ -11,6 +11,7 @@
 #include "common/trials/files.h"
 #include "master/cli/inputs.h"
 #include "master/diagnose/diagnosis_json.h"
+#include "master/diagnose/stage_pace.h"
 #include "master/experiment/recorded_farm.h"
 #include "master/report/report_html.h"
 
@@ -129,6 +130,35 @@ Status apply_options(const DiagnoseCommand& command, Config& config, std::vector
   return {};
 }
 
+// What is simulated now, and how long the rest may take.
+class StageProgress {
+ public:
+  StageProgress(Console& console, RecordedFarm& farm) : console_(console), farm_(farm) {
+    farm_.watch([this](std::uint64_t simulated) { show(simulated); });
+  }
+
+  void begin(const std::string& stage) {
+    stage_ = stage;
+    farm_.set_stage(stage);
+    pace_.begin(stage, steady_now_s());
+    console_.progress(stage);
+  }
+
+ private:
+  void show(std::uint64_t simulated) {
+    std::string text = fmt::format("{}, {} simulations", stage_, simulated);
+    if (const auto left = pace_.time_left_s(steady_now_s())) {
+      text += ", about " + format_duration(*left) + " left";
+    }
+    console_.progress(text);
+  }
+
+  Console& console_;
+  RecordedFarm& farm_;
+  StagePace pace_;
+  std::string stage_;
+};
+
 int run_diagnose(const DiagnoseCommand& command, CliContext& context) {
   DiagnoseOptions options;
   const auto config =
@@ -145,10 +175,8 @@ int run_diagnose(const DiagnoseCommand& command, CliContext& context) {
   const Result<std::int64_t> at_hand = answers->count();
   if (!at_hand) return failed(at_hand.error(), context);
   RecordedFarm recorded(**farm, *answers);
-  options.on_stage = [&](const std::string& stage) {
-    context.console.progress(stage);
-    recorded.set_stage(stage);
-  };
+  StageProgress progress(context.console, recorded);
+  options.on_stage = [&](const std::string& stage) { progress.begin(stage); };
   auto result = diagnose(recorded, config->problem, options);
   context.console.clear_progress();
   if (*at_hand > 0) {

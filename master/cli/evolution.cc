@@ -20,10 +20,7 @@ using Json = nlohmann::ordered_json;
 
 class SteadyClock : public EvolveClock {
  public:
-  double now_s() const override {
-    const auto now = std::chrono::steady_clock::now().time_since_epoch();
-    return std::chrono::duration<double>(now).count();
-  }
+  double now_s() const override { return steady_now_s(); }
 };
 
 Result<std::unique_ptr<Optimiser>> optimiser_at(const std::optional<Checkpoint>& checkpoint,

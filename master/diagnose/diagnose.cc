@@ -32,18 +32,14 @@ Result<DiagnosisResult> diagnose(Farm& farm, const Problem& problem,
   }
   if (Status s = check_left_out(problem, options.left_out); !s) return s.error();
   DiagnosisRun run(farm, problem, options);
-  run.stage("tune the base model");
-  if (Status s = run.tune(); !s) return s.error();
-  run.stage("measure the noise");
-  if (Status s = run.measure_noise(); !s) return s.error();
-  run.stage("screen the catalogue");
-  if (Status s = run.screen(); !s) return s.error();
-  run.stage("judge what is left");
-  run.judge();
-  run.stage("refit base and effects together");
-  if (Status s = run.refit(); !s) return s.error();
-  run.stage("say where, how far and what next");
-  if (Status s = run.report(); !s) return s.error();
+  const std::array<std::function<Status()>, kDiagnosisStages.size()> steps = {
+      [&] { return run.tune(); },   [&] { return run.measure_noise(); },
+      [&] { return run.screen(); }, [&] { return run.judge(); },
+      [&] { return run.refit(); },  [&] { return run.report(); }};
+  for (std::size_t k = 0; k < steps.size(); ++k) {
+    run.stage(kDiagnosisStages[k].name);
+    if (Status s = steps[k](); !s) return s.error();
+  }
   run.stage("");
   return run.take();
 }

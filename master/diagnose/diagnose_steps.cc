@@ -304,11 +304,11 @@ bool DiagnosisRun::too_thin() {
   return true;
 }
 
-void DiagnosisRun::judge() {
+Status DiagnosisRun::judge() {
   for (const SelectionStep& step : selector_->steps()) {
     result_.diagnosis.steps.push_back({step.explained, step.offered});
   }
-  if (too_thin()) return;
+  if (too_thin()) return {};
   const Regression explained = this->explained();
   leftovers_ = leftovers(explained, blocks_);
   if (study_.misfit_columns > 0) compare_with_repeats();
@@ -341,6 +341,7 @@ void DiagnosisRun::judge() {
   }
   if (verdict == Verdict::kUnknown) name_nothing();
   if (!rounded) study_.quantum_m = 0;
+  return {};
 }
 
 }  // namespace gapfarm

@@ -37,7 +37,7 @@ class DiagnosisRun {
   Status tune();
   Status measure_noise();
   Status screen();
-  void judge();
+  Status judge();
   Status refit();
   Status report();
   DiagnosisResult take() { return std::move(result_); }

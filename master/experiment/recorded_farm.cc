@@ -37,7 +37,10 @@ Result<std::vector<v1::TaskResult>> RecordedFarm::run(
   }
   remembered_ += tasks.size() - open.size();
   if (open.empty()) return results;
-  auto fresh = farm_.run(problem_hash, open, on_progress);
+  auto fresh = farm_.run(problem_hash, open, [&](const FarmProgress& progress) {
+    if (watcher_) watcher_(simulated_ + progress.done);
+    if (on_progress) on_progress(progress);
+  });
   if (!fresh) return fresh.error();
   simulated_ += open.size();
   std::vector<AnswerStore::Answer> answers;

@@ -19,6 +19,8 @@ class RecordedFarm : public Farm {
 
   // Written beside the answers from now on.
   void set_stage(std::string stage) { stage_ = std::move(stage); }
+  // Called as simulations are answered, with their number so far, those at hand not counted.
+  void watch(std::function<void(std::uint64_t)> watcher) { watcher_ = std::move(watcher); }
 
   std::string add_problem(const v1::Problem& problem) override;
   // Errors: the farm's and the store's.  A batch is kept as a whole or not at all; answers that
@@ -36,6 +38,7 @@ class RecordedFarm : public Farm {
   Farm& farm_;
   AnswerStore& store_;
   std::string stage_;
+  std::function<void(std::uint64_t)> watcher_;
   std::map<std::string, std::string> unkept_;  // problems by hash: bytes, until first asked about
   std::uint64_t remembered_ = 0;
   std::uint64_t simulated_ = 0;
