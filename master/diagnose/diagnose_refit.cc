@@ -8,6 +8,7 @@
 #include "master/diagnose/diagnose_steps.h"
 #include "master/diagnose/intervals.h"
 #include "master/diagnose/noise.h"
+#include "master/diagnose/verdict.h"
 
 namespace gapfarm {
 namespace {
@@ -111,9 +112,21 @@ Status DiagnosisRun::refit() {
     estimates_ = std::move(*fit);
   }
   if (Status s = refit_nested(); !s) return s;
-  if (Status s = estimate_beside_base(); !s) return s;
-  const double share = problem_.fitness.outlier_share;
   const std::vector<std::size_t> folds = subject_.folds(study_);
+  score_nested(folds);
+  const std::size_t found = chosen_.size();
+  while (chosen_.size() > 1 && mean(nested_scores_.back()) <= mean(*(nested_scores_.end() - 2))) {
+    drop_last_effect();
+  }
+  if (Status s = estimate_beside_base(); !s) return s;
+  if (chosen_.size() < found) judge_again();
+  set_floor(folds);
+  return {};
+}
+
+// Of every trial, by the nested fits to the other folds.
+void DiagnosisRun::score_nested(const std::vector<std::size_t>& folds) {
+  const double share = problem_.fitness.outlier_share;
   for (std::size_t k = 0; k < nested_.size(); ++k) {
     const Study& study = nested_studies_[k];
     std::vector<double> scores = held_out_scores(study, nested_[k], folds, share);
@@ -121,10 +134,44 @@ Status DiagnosisRun::refit() {
     std::vector<double> own = scores_of(study, nested_[k].residuals, share);
     nested_scores_.push_back(mean(own) < mean(scores) ? std::move(own) : std::move(scores));
   }
+}
+
+// What the others do beyond first order can look like a further effect, which then foretells
+// nothing once all are fitted together.
+void DiagnosisRun::drop_last_effect() {
+  result_.diagnosis.cautions.push_back(
+      chosen_.back().candidate.signature.effect +
+      " seemed to explain some of it, too, but trials that the fit did not see are predicted no "
+      "better with it.");
+  chosen_.pop_back();
+  nested_.pop_back();
+  nested_studies_.pop_back();
+  nested_scores_.pop_back();
+  result_.fits.pop_back();
+}
+
+// What the remaining effects leave at their estimates.
+void DiagnosisRun::judge_again() {
+  Eigen::VectorXd residuals = study_.whiten(estimates_->residuals);
+  Eigen::MatrixXd slopes = estimates_->jacobian;
+  study_.drop_ignored(residuals);
+  study_.drop_ignored(slopes);
+  Regression left(nuisances_, residuals);
+  left.add(slopes);
+  judge_leftovers(left);
+  Verdict& verdict = result_.diagnosis.verdict;
+  const bool odd = !odd_readings_.empty() || !odd_drives_.empty();
+  verdict = judge_verdict(true, explained_nats(left), leftovers_, subject_.unknown_log10_p);
+  if (odd || verdict == Verdict::kUnknown) verdict = Verdict::kEffectAndUnknown;
+}
+
+// What a perfect prediction would score.
+void DiagnosisRun::set_floor(const std::vector<std::size_t>& folds) {
   if (slip_.gain > 0) foresee_slips(folds);
   if (slip_.gain > 0 && !clearly_better(slip_scores_, nested_scores_.back())) drop_slips();
   // What slips scatter is no Gaussian: the best prediction is the mixture fitted to it.
-  floor_ = slip_.gain > 0 ? mean(slip_scores_) : floor_score(nested_studies_.back(), share);
+  floor_ = slip_.gain > 0 ? mean(slip_scores_)
+                          : floor_score(nested_studies_.back(), problem_.fitness.outlier_share);
   // Nor is it worse than what was reached on trials that the fit did not see, and there is more to
   // be had where that still depends on something.
   double reached = -INFINITY, more = 0;
@@ -135,7 +182,6 @@ Status DiagnosisRun::refit() {
     if (l.log10_p < subject_.unknown_log10_p) more = std::max(more, l.excess);
   }
   floor_ = std::max(floor_, reached + more / static_cast<double>(study_.size()));
-  return {};
 }
 
 // The last of the nested fits, and slips foreseen.

@@ -304,19 +304,24 @@ bool DiagnosisRun::too_thin() {
   return true;
 }
 
+void DiagnosisRun::judge_leftovers(const Regression& explained) {
+  leftovers_ = leftovers(explained, blocks_);
+  if (study_.misfit_columns > 0) compare_with_repeats();
+  scale_ = leftover_scale(explained);
+  result_.diagnosis.checks.clear();
+  for (const Leftover& l : leftovers_) {
+    result_.diagnosis.checks.push_back({l.covariate, l.log10_p, l.excess});
+  }
+}
+
 Status DiagnosisRun::judge() {
   for (const SelectionStep& step : selector_->steps()) {
     result_.diagnosis.steps.push_back({step.explained, step.offered});
   }
   if (too_thin()) return {};
   const Regression explained = this->explained();
-  leftovers_ = leftovers(explained, blocks_);
-  if (study_.misfit_columns > 0) compare_with_repeats();
-  scale_ = leftover_scale(explained);
+  judge_leftovers(explained);
   const double nats = explained_nats(explained) + slip_.gain + (as_logged_ ? latency_.gain : 0);
-  for (const Leftover& l : leftovers_) {
-    result_.diagnosis.checks.push_back({l.covariate, l.log10_p, l.excess});
-  }
   const bool on_grid =
       (subject_.looks & kLooksForRounding) != 0 && study_.quantum_m > kLeastQuantum_m;
   const bool rounded = on_grid && !left_out("pose_quantisation");

@@ -75,6 +75,11 @@ class DiagnosisRun {
   void drop_slips();
   Study study_beside(const JointFit& fit) const;
   void keep_nested(JointFit fit, const Study& fitted_in, Study scored_in);
+  void score_nested(const std::vector<std::size_t>& folds);
+  void drop_last_effect();
+  void judge_leftovers(const Regression& explained);
+  void judge_again();
+  void set_floor(const std::vector<std::size_t>& folds);
   Status estimate_beside_base();
   void name_effects();
   // An effect on the spread: gain in nats over all trials.
