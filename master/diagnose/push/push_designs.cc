@@ -24,11 +24,6 @@ struct Base {
   PushGeometry push;
 };
 
-const Piece& piece_of(const Problem& problem, const Trial& trial) {
-  return *std::find_if(problem.pieces.begin(), problem.pieces.end(),
-                       [&](const Piece& p) { return p.name == trial.command; });
-}
-
 double unlikeness(const Problem& problem, const Base& a, const Base& b) {
   if (problem.log.trials[a.trial].command != problem.log.trials[b.trial].command) return INFINITY;
   const double side = 2 * std::sin((a.push.in_piece_rad - b.push.in_piece_rad) / 2);
@@ -44,7 +39,7 @@ std::vector<Base> bases_of(const Problem& problem) {
   for (std::size_t i = 0; i < cell_of.size(); ++i) {
     if (!cells.insert(cell_of[i]).second) continue;
     const Trial& trial = problem.log.trials[i];
-    const PushGeometry push = push_geometry(piece_of(problem, trial), trial, finger_m);
+    const PushGeometry push = push_geometry(problem.piece(trial.command), trial, finger_m);
     if (push.touched) open.push_back({i, push});
   }
   while (!open.empty() && taken.size() < kBases) {
@@ -105,7 +100,7 @@ class Planner {
     plan_.problem.genes.clear();
     plan_.problem.log = {};
     for (const Trial& t : problem.log.trials) {
-      const Eigen::Vector2d c = transform(t.X_WS, centroid(piece_of(problem, t)));
+      const Eigen::Vector2d c = transform(t.X_WS, centroid(problem.piece(t.command)));
       low_ = low_.cwiseMin(c);
       high_ = high_.cwiseMax(c);
     }
