@@ -6,6 +6,7 @@
 #include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
 
+#include "common/pose/segment.h"
 #include "common/score/statistics.h"
 #include "master/diagnose/drive_noise.h"
 #include "master/diagnose/noise.h"
@@ -20,6 +21,25 @@ constexpr double kSlippedSquared = 11.5;  // squared distance with 3 degrees of 
 constexpr double kLeastQuantum_m = 4e-4;
 // Of fewer trials, a place or a direction that is searched for explains any of them.
 constexpr std::size_t kFewestTrials = 40;
+
+// Which camera saw a pose on the line of a seam is not known, and at the edge of a patch a small
+// error of its place is a large one of the motion.
+bool strays_by(const Signature& chosen, const ResidualTrial& trial) {
+  const Eigen::Vector2d from(trial.X_WS.x, trial.X_WS.y), to(trial.X_WP.x, trial.X_WP.y);
+  if (chosen.effect == "camera_seam") {
+    const int axis = chosen.fixed.at("camera_seam.axis") == 0 ? 0 : 1;
+    const double line = chosen.fixed.at("camera_seam.position");
+    return std::abs(to[axis] - line) < 0.03 || std::abs(from[axis] - line) < 0.01;
+  }
+  if (chosen.effect == "friction_patch") {
+    constexpr double kEdge_m = 0.1;
+    const Eigen::Vector2d centre(chosen.fixed.at("friction_patch.x"),
+                                 chosen.fixed.at("friction_patch.y"));
+    return nearest_on_segment(centre, from, to).distance <
+           chosen.fixed.at("friction_patch.radius") + kEdge_m;
+  }
+  return false;
+}
 
 }  // namespace
 
@@ -250,35 +270,12 @@ void DiagnosisRun::look_for_slip(const Regression& explained) {
 // False where something else that was chosen makes single trials stray.
 std::vector<bool> DiagnosisRun::tells_of_slips() const {
   std::vector<bool> tells(study_.size(), true);
-  for (const ChosenEffect& effect : chosen_) {
-    const auto& at = effect.candidate.signature.fixed;
-    for (std::size_t i = 0; i < study_.size(); ++i) {
-      const ResidualTrial& t = study_.trials[i];
-      if (effect.candidate.signature.effect == "camera_seam") {
-        const bool x = at.at("camera_seam.axis") == 0;
-        const double position = at.at("camera_seam.position");
-        // Which camera saw a pose on the line is not known.
-        if (std::abs((x ? t.X_WP.x : t.X_WP.y) - position) < 0.03 ||
-            std::abs((x ? t.X_WS.x : t.X_WS.y) - position) < 0.01) {
-          tells[i] = false;
-        }
-      }
-      if (effect.candidate.signature.effect == "friction_patch") {
-        // At the edge of a patch a small error of its place is a large one of the motion.
-        constexpr double kEdge_m = 0.1;
-        const Eigen::Vector2d start(t.X_WS.x, t.X_WS.y);
-        const Eigen::Vector2d way = Eigen::Vector2d(t.X_WP.x, t.X_WP.y) - start;
-        const Eigen::Vector2d centre(at.at("friction_patch.x"), at.at("friction_patch.y"));
-        const double length2 = std::max(way.squaredNorm(), 1e-12);
-        const double share = std::clamp((centre - start).dot(way) / length2, 0.0, 1.0);
-        if ((start + share * way - centre).norm() < at.at("friction_patch.radius") + kEdge_m) {
-          tells[i] = false;
-        }
-      }
+  for (std::size_t i = 0; i < study_.size(); ++i) {
+    const ResidualTrial& trial = study_.trials[i];
+    if (!first_.empty() && trial.context.moved) tells[i] = false;
+    for (const ChosenEffect& effect : chosen_) {
+      if (strays_by(effect.candidate.signature, trial)) tells[i] = false;
     }
-  }
-  for (std::size_t i = 0; !first_.empty() && i < study_.size(); ++i) {
-    if (study_.trials[i].context.moved) tells[i] = false;
   }
   return tells;
 }

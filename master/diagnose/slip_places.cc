@@ -8,6 +8,8 @@
 #include <map>
 #include <utility>
 
+#include "common/pose/segment.h"
+
 namespace gapfarm {
 namespace {
 
@@ -23,12 +25,11 @@ struct Way {
   Eigen::Vector2d from, to;
 };
 
-double distance(const Eigen::Vector2d& point, const Way& way) {
-  const Eigen::Vector2d along = way.to - way.from;
-  const double share =
-      std::clamp((point - way.from).dot(along) / std::max(along.squaredNorm(), 1e-12), 0.0, 1.0);
-  return (way.from + share * along - point).norm();
-}
+// Where drives may pass through.
+struct Place {
+  std::function<bool(const Way&)> passed;
+  std::string words;
+};
 
 // Expected slips of every trial if they fell anywhere.
 std::vector<double> expected(const Study& study, std::span<const double> slipped,
@@ -59,67 +60,75 @@ std::vector<double> expected(const Study& study, std::span<const double> slipped
   return all;
 }
 
+std::string metres(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.2f", value);
+  return text;
+}
+
+Place disc(const Eigen::Vector2d& centre, double radius_m) {
+  return {[=](const Way& way) {
+            return nearest_on_segment(centre, way.from, way.to).distance < radius_m;
+          },
+          "within " + metres(radius_m) + " m of (" + metres(centre.x()) + ", " +
+              metres(centre.y()) + ")"};
+}
+
+Place line(int axis, double at_m) {
+  return {[=](const Way& way) {
+            return std::min(way.from[axis], way.to[axis]) < at_m + kAbout_m &&
+                   std::max(way.from[axis], way.to[axis]) > at_m - kAbout_m;
+          },
+          std::string("across ") + (axis == 0 ? "x" : "y") + " = " + metres(at_m) + " m"};
+}
+
+// Discs and lines all over the box of the ways' starts.
+std::vector<Place> places(const std::vector<Way>& ways) {
+  Eigen::Vector2d low(INFINITY, INFINITY), high = -low;
+  for (const Way& way : ways) {
+    low = low.cwiseMin(way.from);
+    high = high.cwiseMax(way.from);
+  }
+  const Eigen::Vector2d extent = high - low;
+  std::vector<Place> all;
+  const double grid = std::max(kGrid_m, extent.maxCoeff() / kMostPlaces);
+  for (double x = low.x(); x <= high.x(); x += grid) {
+    for (double y = low.y(); y <= high.y(); y += grid) {
+      for (double radius : kRadii_m) all.push_back(disc({x, y}, radius));
+    }
+  }
+  for (int axis : {0, 1}) {
+    const double step = std::max(kLineStep_m, extent[axis] / kMostPlaces);
+    for (double at = low[axis]; at <= high[axis]; at += step) all.push_back(line(axis, at));
+  }
+  return all;
+}
+
 }  // namespace
 
 Gathering gathering_of_slips(const Study& study, std::span<const double> slipped,
                              const std::vector<bool>& tells) {
   const std::vector<double> chance = expected(study, slipped, tells);
   std::vector<Way> ways;
-  Eigen::Vector2d low(INFINITY, INFINITY), high = -low;
   double slips = 0;
   for (std::size_t i = 0; i < study.size(); ++i) {
     const ResidualTrial& t = study.trials[i];
     ways.push_back({{t.X_WS.x, t.X_WS.y}, {t.X_WP.x, t.X_WP.y}});
-    low = low.cwiseMin(ways.back().from);
-    high = high.cwiseMax(ways.back().from);
     if (tells[i]) slips += slipped[i];
   }
   Gathering best;
-  const auto try_place = [&](const std::function<bool(const Way&)>& passes, auto words) {
+  for (const Place& place : places(ways)) {
     double here = 0, expected_here = 0;
     for (std::size_t i = 0; i < study.size(); ++i) {
-      if (!tells[i] || !passes(ways[i])) continue;
+      if (!tells[i] || !place.passed(ways[i])) continue;
       here += slipped[i];
       expected_here += chance[i];
     }
     const double rest = slips - here, expected_rest = slips - expected_here;
-    if (here < kFewestSlips || here <= expected_here || expected_here <= 0) return;
+    if (here < kFewestSlips || here <= expected_here || expected_here <= 0) continue;
     const double gain = here * std::log(here / expected_here) +
                         (rest > 0 ? rest * std::log(rest / expected_rest) : 0);
-    if (gain > best.gain) best = {gain, words()};
-  };
-  const auto metres = [](double value) {
-    char text[32];
-    std::snprintf(text, sizeof text, "%.2f", value);
-    return std::string(text);
-  };
-  const Eigen::Vector2d extent = (high - low).cwiseMax(kGrid_m);
-  const double grid = std::max(kGrid_m, extent.maxCoeff() / kMostPlaces);
-  for (double x = low.x(); x <= high.x(); x += grid) {
-    for (double y = low.y(); y <= high.y(); y += grid) {
-      for (double radius : kRadii_m) {
-        try_place(
-            [&](const Way& way) {
-              return distance({x, y}, way) < radius;
-            },
-            [&] {
-              return "within " + metres(radius) + " m of (" + metres(x) + ", " + metres(y) + ")";
-            });
-      }
-    }
-  }
-  for (int axis : {0, 1}) {
-    const double step = std::max(kLineStep_m, extent[axis] / kMostPlaces);
-    for (double at = low[axis]; at <= high[axis]; at += step) {
-      try_place(
-          [&](const Way& way) {
-            return std::min(way.from[axis], way.to[axis]) < at + kAbout_m &&
-                   std::max(way.from[axis], way.to[axis]) > at - kAbout_m;
-          },
-          [&] {
-            return std::string("across ") + (axis == 0 ? "x" : "y") + " = " + metres(at) + " m";
-          });
-    }
+    if (gain > best.gain) best = {gain, place.words};
   }
   return best;
 }

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "common/pose/segment.h"
+
 namespace gapfarm {
 namespace {
 
@@ -24,12 +26,11 @@ Nearest nearest(const std::vector<Eigen::Vector2d>& corners, const Eigen::Vector
   bool inside = true;
   for (std::size_t i = 0; i < corners.size(); ++i) {
     const Eigen::Vector2d& a = corners[i];
-    const Eigen::Vector2d edge = corners[(i + 1) % corners.size()] - a;
-    const Eigen::Vector2d from = p - a;
+    const Eigen::Vector2d& b = corners[(i + 1) % corners.size()];
+    const Eigen::Vector2d edge = b - a, from = p - a;
     if (edge.x() * from.y() - edge.y() * from.x() < 0) inside = false;
-    const double share = std::clamp(from.dot(edge) / edge.squaredNorm(), 0.0, 1.0);
-    const double distance = (from - share * edge).norm();
-    if (distance < best.distance_m) best = {distance, 2 * share - 1};
+    const OnSegment at = nearest_on_segment(p, a, b);
+    if (at.distance < best.distance_m) best = {at.distance, 2 * at.share - 1};
   }
   if (inside) best.distance_m = 0;
   return best;

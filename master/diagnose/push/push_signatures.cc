@@ -3,6 +3,7 @@
 #include <memory>
 #include <numbers>
 
+#include "common/pose/segment.h"
 #include "common/score/statistics.h"
 #include "master/diagnose/probes.h"
 #include "master/diagnose/push/push_subject.h"
@@ -144,12 +145,10 @@ Result<std::vector<Signature>> push_signatures(Predictor& predictor, const Study
 
 bool piece_crosses(const ResidualTrial& trial, const Patch& patch) {
   constexpr double kExtent = 2.4;  // gyration radii: the farthest corner of a slender triangle
-  const Eigen::Vector2d from = transform(trial.X_WS, trial.push.p_RC);
-  const Eigen::Vector2d way = transform(trial.X_WP, trial.push.p_RC) - from;
-  const Eigen::Vector2d centre(patch[0], patch[1]);
-  const double share =
-      std::clamp((centre - from).dot(way) / std::max(way.squaredNorm(), 1e-12), 0.0, 1.0);
-  return (from + share * way - centre).norm() < patch[2] + kExtent * trial.push.gyration_m;
+  const OnSegment nearest =
+      nearest_on_segment({patch[0], patch[1]}, transform(trial.X_WS, trial.push.p_RC),
+                         transform(trial.X_WP, trial.push.p_RC));
+  return nearest.distance < patch[2] + kExtent * trial.push.gyration_m;
 }
 
 PatchSearch push_patches(Predictor& predictor, const Study& study) {

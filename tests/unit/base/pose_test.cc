@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "common/pose/segment.h"
 #include "common/random/stream.h"
 
 namespace gapfarm {
@@ -54,6 +55,16 @@ TEST(Pose, ExpOfAConstantTwistIsAnArc) {
   const Pose end = exp({v, 0, w});
   EXPECT_NEAR(end.x, v / w * std::sin(w), 1e-15);
   EXPECT_NEAR(end.y, v / w * (1 - std::cos(w)), 1e-15);
+}
+
+TEST(NearestOnSegment, IsTheFootOfThePerpendicularOrAnEnd) {
+  const Eigen::Vector2d from(1, 1), to(3, 1);
+  EXPECT_DOUBLE_EQ(nearest_on_segment({1.5, 3}, from, to).share, 0.25);
+  EXPECT_DOUBLE_EQ(nearest_on_segment({1.5, 3}, from, to).distance, 2);
+  EXPECT_DOUBLE_EQ(nearest_on_segment({-2, 5}, from, to).share, 0);
+  EXPECT_DOUBLE_EQ(nearest_on_segment({-2, 5}, from, to).distance, 5);
+  EXPECT_DOUBLE_EQ(nearest_on_segment({4, 1}, from, to).share, 1);
+  EXPECT_DOUBLE_EQ(nearest_on_segment({4, 1}, from, from).distance, 3);
 }
 
 }  // namespace
