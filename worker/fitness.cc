@@ -114,7 +114,6 @@ Alternative collapsed(const TrialPrediction& prediction) {
 
 Result<double> log_score_of(const TrialPrediction& prediction, const Pose& X_WM,
                             double outlier_share) {
-  double greatest = -INFINITY;
   std::vector<double> terms;
   for (const Alternative& a : prediction.alternatives) {
     if (a.weight <= 0) continue;
@@ -122,11 +121,8 @@ Result<double> log_score_of(const TrialPrediction& prediction, const Pose& X_WM,
     if (!cov) return cov.error();
     terms.push_back(std::log(a.weight) +
                     log_predictive_density(local_difference(a.X_WM, X_WM), *cov, outlier_share));
-    greatest = std::max(greatest, terms.back());
   }
-  double sum = 0;
-  for (double term : terms) sum += std::exp(term - greatest);
-  return greatest + std::log(sum);
+  return log_sum_exp(terms);
 }
 
 Result<v1::EvaluateResult> fitness_of(const Problem& problem, const FitnessReference& reference,

@@ -54,6 +54,15 @@ double log_tail_density(const Eigen::Vector3d& residual, const Covariance3& cova
          0.5 * (kTailFreedom + 3) * std::log1p(q);
 }
 
+double log_sum_exp(std::span<const double> logarithms) {
+  double greatest = -INFINITY;
+  for (double l : logarithms) greatest = std::max(greatest, l);
+  if (greatest == -INFINITY) return greatest;
+  double sum = 0;
+  for (double l : logarithms) sum += std::exp(l - greatest);
+  return greatest + std::log(sum);
+}
+
 double log_predictive_density(const Eigen::Vector3d& residual, const Covariance3& covariance,
                               double outlier_share) {
   assert(outlier_share >= 0 && outlier_share < 1);

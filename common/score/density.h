@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <span>
 #include <vector>
 
 #include "common/base/result.h"
@@ -37,6 +38,9 @@ double log_tail_density(const Eigen::Vector3d& residual, const Covariance3& cova
 // `outlier_share` in [0, 1).
 double log_predictive_density(const Eigen::Vector3d& residual, const Covariance3& covariance,
                               double outlier_share);
+
+// log sum exp of the logarithms, without overflow; -infinity of none.
+double log_sum_exp(std::span<const double> logarithms);
 
 // The energy score needs one norm for positions and headings: a heading of 1 rad counts as this
 // many metres, about the distance from the turning centre to a corner of the robot.

@@ -167,10 +167,7 @@ std::vector<SlipTrial> trials_with_slips(std::span<const ResidualTrial> trials,
       const Eigen::Vector3d r = centred - e.left * t.left - e.right * t.right;
       logs.push_back(std::log(e.weight) + log_predictive_density(r, *cov, outlier_share));
     }
-    const double greatest = *std::max_element(logs.begin(), logs.end());
-    double sum = 0;
-    for (double l : logs) sum += std::exp(l - greatest);
-    const double score = greatest + std::log(sum);
+    const double score = log_sum_exp(logs);
     judged.push_back({score, 1 - std::exp(logs.front() - score)});
   }
   return judged;

@@ -62,6 +62,13 @@ TEST(Density, IntegratesToOne) {
   }
 }
 
+TEST(LogSumExp, NeitherOverflowsNorUnderflows) {
+  EXPECT_NEAR(log_sum_exp(std::vector<double>{std::log(0.2), std::log(0.3)}), std::log(0.5), 1e-15);
+  EXPECT_NEAR(log_sum_exp(std::vector<double>{-5000, -5000}), -5000 + std::log(2), 1e-12);
+  EXPECT_NEAR(log_sum_exp(std::vector<double>{5000, -INFINITY}), 5000, 1e-12);
+  EXPECT_EQ(log_sum_exp({}), -INFINITY);
+}
+
 TEST(Density, IsFiniteFarOut) {
   const Covariance3 S = factorised(1e-8 * Eigen::Matrix3d::Identity());
   const double far = log_predictive_density(Eigen::Vector3d(1e6, 1e6, 3), S, 0.02);
