@@ -127,7 +127,6 @@ std::vector<Coverage> coverage_of(const Truth& truth, const Said& said) {
     if (named == said.effects.end() || !entry) continue;
     const bool neutral = does_nothing(*entry, effect);
     const std::map<std::string, double> told = as_told(effect);
-    const double turn = (has_no_arrow(effect.name) ? 1 : 2) * std::numbers::pi;
     for (std::size_t i = 0; i < entry->parameters.size(); ++i) {
       const EffectParameter& p = entry->parameters[i];
       const auto value = told.find(p.key);
@@ -138,7 +137,9 @@ std::vector<Coverage> coverage_of(const Truth& truth, const Said& said) {
         if (s.key != p.key) continue;
         coverage.lo = s.lo;
         coverage.hi = s.hi;
-        coverage.covered = holds(s.lo, s.hi, value->second, p.unit == "rad" ? turn : 0);
+        // A direction's bounds are a whole turn of it apart.
+        const double turn = p.key == "direction" ? p.upper - p.lower : 0;
+        coverage.covered = holds(s.lo, s.hi, value->second, turn);
       }
       all.push_back(coverage);
     }

@@ -82,11 +82,16 @@ std::string plain_claim(const NamedEffect& effect) {
   return "The data show " + effect.name + (values.empty() ? "" : " with " + listed(values));
 }
 
+const EffectWords* words_in(const EffectWordsByName& table, const std::string& effect) {
+  const auto found = table.find(effect);
+  return found == table.end() ? nullptr : &found->second;
+}
+
 std::string claim(const NamedEffect& effect, const EffectWordsByName* own) {
-  const EffectWordsByName& all = own != nullptr ? *own : robot_effect_words();
-  const auto found = all.find(effect.name);
-  if (found == all.end()) return plain_claim(effect);
-  const EffectWords& words = found->second;
+  const EffectWords* found = own != nullptr ? words_in(*own, effect.name) : nullptr;
+  if (found == nullptr) found = words_in(robot_effect_words(), effect.name);
+  if (found == nullptr) return plain_claim(effect);
+  const EffectWords& words = *found;
   std::string text;
   for (const char* c = words.sentence; *c != 0; ++c) {
     if (*c != '%') {

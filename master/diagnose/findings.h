@@ -43,8 +43,8 @@ struct EffectWords {
 using EffectWordsByName = std::map<std::string, EffectWords, std::less<>>;
 
 // "The battery loses 0.35 % of its speed a minute (0.31 to 0.4); adding that closes 88 % of the
-// gap."  Effects outside `words` (null: those of a tracked robot), or without their parameters, are
-// named with what is there.
+// gap."  `words`: of a scenario that has its own for some effects; the others are told as of a
+// tracked robot.  Effects without words, or without their parameters, are named with what is there.
 std::string effect_sentence(const NamedEffect& effect, const EffectWordsByName* words = nullptr);
 
 // The verdict and its first reason.

@@ -83,7 +83,7 @@ struct DiagnosisSubject {
   std::vector<std::string> (*lacks)(const Study& study, const TrialLog& log);
   // Trials that might part rival explanations.
   ExperimentPlan (*experiments)(const Problem& problem);
-  const EffectWordsByName* effect_words;  // of effect_sentence(); null: a tracked robot's
+  const EffectWordsByName* effect_words;  // its own, of effect_sentence(); null: none
   TrialView (*view)(const Study& study, std::size_t trial);
   std::vector<ShownCovariate> shown;  // in the pictures, beside what every log has
   PictureWords words;

@@ -30,10 +30,6 @@ const EffectWordsByName& push_effect_words() {
       {"placement_bias",
        {"Pieces truly start %1 along x and %2 along y from where the log says, turned by %3",
         {{"x", 1000, " mm"}, {"y", 1000, " mm"}, {"angle", 1000, " mrad"}}}},
-      {"camera_aspect", {"The camera's y scale is %1 times its x scale", {{"ratio", 1, ""}}}},
-      {"camera_distortion",
-       {"The lens distorts radially with k1 = %1 about x = %2, y = %3",
-        {{"k1", 1, " 1/m^2"}, {"x", 1, " m"}, {"y", 1, " m"}}}},
       {"marker_offset",
        {"The marker sits %1 along x and %2 along y from where the outline says",
         {{"x", 1000, " mm"}, {"y", 1000, " mm"}}}}};

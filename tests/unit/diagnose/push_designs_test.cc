@@ -4,29 +4,17 @@
 
 #include <cmath>
 #include <map>
-#include <numbers>
-#include <set>
 
 #include "master/diagnose/push/push_geometry.h"
+#include "tests/unit/diagnose/drawn_pushes.h"
 
 namespace gapfarm {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
-
-Piece square() {
-  return {"square", {{-0.06, -0.06}, {0.06, -0.06}, {0.06, 0.06}, {-0.06, 0.06}}, 0.01, 0.15, 1};
-}
-
-// The finger comes from below, `aside` to the right of the centroid; the scene moves by `X_WS`.
 Trial push(double aside, const Pose& X_WS) {
-  Trial trial;
+  Trial trial = push_from_below(aside, X_WS, 0.05);
   trial.session = "s1";
   trial.trial = 7;
-  trial.command = "square";
-  trial.X_WS = X_WS;
-  const Pose from = X_WS * Pose{aside, -0.2, 0}, to = X_WS * Pose{aside, 0.05, 0};
-  trial.tip = {{0, from.x, from.y}, {2.5, to.x, to.y}};
   return trial;
 }
 
@@ -51,9 +39,8 @@ TEST(PlanPushes, EachWayChangesWhatItSaysAndNothingElse) {
   const Problem problem = pushes();
   const ExperimentPlan plan = plan_pushes(problem);
   EXPECT_TRUE(plan.problem.genes.empty());
-  const double finger_m = 0.008;
   const auto geometry = [&](std::uint32_t i) {
-    return push_geometry(square(), plan.problem.log.trials[i], finger_m);
+    return push_geometry(square(), plan.problem.log.trials[i], kFinger_m);
   };
   const auto groups = by_group(plan);
   // The second push repeats the first.

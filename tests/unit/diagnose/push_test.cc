@@ -8,28 +8,12 @@
 #include "common/random/stream.h"
 #include "master/diagnose/noise.h"
 #include "master/diagnose/push/push_subject.h"
+#include "tests/unit/diagnose/drawn_pushes.h"
 
 namespace gapfarm {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
-constexpr double kFinger_m = 0.008;
-
-Piece square() {
-  return {"square", {{-0.06, -0.06}, {0.06, -0.06}, {0.06, 0.06}, {-0.06, 0.06}}, 0.01, 0.15, 1};
-}
-
-// The finger comes from below, `aside` to the right of the centroid, seen from the world; the whole
-// scene then moves by `X_WS`.
-Trial push_from_below(double aside, const Pose& X_WS = {}) {
-  Trial trial;
-  trial.command = "square";
-  trial.X_WS = X_WS;
-  const Pose from = X_WS * Pose{aside, -0.2, 0}, to = X_WS * Pose{aside, -0.02, 0};
-  trial.tip = {{0, from.x, from.y}, {1.8, to.x, to.y}};
-  return trial;
-}
-
 TEST(PushGeometry, TellsTheTouchFromTheOutline) {
   const PushGeometry push = push_geometry(square(), push_from_below(0.03), kFinger_m);
   ASSERT_TRUE(push.touched);
