@@ -9,7 +9,7 @@ set(CMAKE_RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bin)
 # Asserts stay alive: they are cheap beside a physics step, and they guard our own mistakes.
 # The sanitizers' presets bring flags of their own.
 if(NOT GAPFARM_SANITIZE)
-  set(CMAKE_CXX_FLAGS_RELEASE "-O2 -g1")
+  set(CMAKE_CXX_FLAGS_RELEASE "-O2")
 endif()
 # Results are part of the interface (docs/determinism.md): no contraction, no reassociation.
 add_compile_options(-ffp-contract=off)
@@ -27,13 +27,26 @@ if(CCACHE)
   set(CMAKE_CXX_COMPILER_LAUNCHER ${CCACHE})
 endif()
 
-# gapfarm_library(NAME SOURCES a.cc b.cc DEPS x y): one library a folder, sources listed by hand.
+# gapfarm_precompile(TARGET [HEADER...]): parses the standard library's headers and these once a
+# target, where GAPFARM_PRECOMPILE asks for it.
+function(gapfarm_precompile name)
+  if(GAPFARM_PRECOMPILE)
+    target_precompile_headers(${name} PRIVATE
+      <algorithm> <array> <chrono> <cmath> <cstdint> <filesystem> <fstream> <functional> <map>
+      <memory> <optional> <span> <sstream> <string> <string_view> <utility> <vector> ${ARGN})
+    target_compile_options(${name} PRIVATE -fpch-preprocess)  # for ccache
+  endif()
+endfunction()
+
+# gapfarm_library(NAME SOURCES a.cc b.cc DEPS x y [PRECOMPILE <header>...]): one library a folder,
+# sources listed by hand.
 function(gapfarm_library name)
-  cmake_parse_arguments(ARG "" "" "SOURCES;DEPS" ${ARGN})
+  cmake_parse_arguments(ARG "" "" "SOURCES;DEPS;PRECOMPILE" ${ARGN})
   if(ARG_SOURCES)
     add_library(${name} STATIC ${ARG_SOURCES})
     target_include_directories(${name} PUBLIC ${PROJECT_SOURCE_DIR} ${PROJECT_BINARY_DIR})
     target_link_libraries(${name} PUBLIC ${ARG_DEPS})
+    gapfarm_precompile(${name} ${ARG_PRECOMPILE})
   else()
     add_library(${name} INTERFACE)
     target_include_directories(${name} INTERFACE ${PROJECT_SOURCE_DIR} ${PROJECT_BINARY_DIR})
