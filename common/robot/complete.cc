@@ -1,0 +1,360 @@
+// What follows from a robot's drive and the sizes that its file states.
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <numbers>
+
+#include "common/robot/robot.h"
+
+namespace gapfarm {
+namespace {
+
+using std::numbers::pi;
+
+// A skid-steer of which nothing but the gauge is known is taken for as long as it is wide.
+constexpr double kSquare = 1;
+constexpr double kWheelPerGauge = 0.3;   // radius over separation, where nobody states a radius
+constexpr double kHeightPerGauge = 0.2;  // centre of mass over the floor
+constexpr double kMass_kg = 10;          // hardly matters to Coulomb friction
+constexpr double kTrackPerBase = 0.6;    // of a car
+
+std::string number(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.4g", value);
+  return text;
+}
+
+class Completion {
+ public:
+  explicit Completion(GroundRobot* robot) : r_(*robot) {}
+
+  Status run() {
+    if (Status s = wheels(); !s) return s;
+    if (Status s = sizes(); !s) return s;
+    return check_robot(r_);
+  }
+
+ private:
+  void assume(const std::string& sentence) { r_.notes.push_back("assumed: " + sentence); }
+
+  Error missing(const std::string& what) const {
+    return Error{"a robot of drive \"" + drive_words()[static_cast<std::size_t>(r_.drive)] +
+                 "\" needs " + what};
+  }
+
+  RobotWheel* find(std::string_view name) { return const_cast<RobotWheel*>(r_.wheel(name)); }
+
+  // The wheel of this name, made when the file has none.
+  RobotWheel& ensure(const std::string& name) {
+    if (RobotWheel* w = find(name)) return *w;
+    r_.wheels.push_back({});
+    r_.wheels.back().name = name;
+    return r_.wheels.back();
+  }
+
+  static void place(RobotWheel& wheel, double x_m, double y_m) {
+    if (!wheel.x_m) wheel.x_m = x_m;
+    if (!wheel.y_m) wheel.y_m = y_m;
+  }
+
+  // Two wheels of which the file says no place stand for the sides of a robot.
+  bool states_sides() const {
+    const RobotWheel* left = r_.wheel("left");
+    const RobotWheel* right = r_.wheel("right");
+    return r_.wheels.empty() || (left != nullptr && right != nullptr && !left->x_m && !right->x_m);
+  }
+
+  std::optional<double> separation() {
+    if (r_.controller.wheel_separation_m) return r_.controller.wheel_separation_m;
+    double left = 0, right = 0;
+    for (const RobotWheel& w : r_.wheels) {
+      if (!w.y_m || !w.driven) continue;
+      left = std::max(left, *w.y_m);
+      right = std::min(right, *w.y_m);
+    }
+    if (left - right <= 0) return {};
+    r_.controller.wheel_separation_m = left - right;
+    return left - right;
+  }
+
+  Status wheels() {
+    for (RobotWheel& w : r_.wheels) {
+      if (w.kind == WheelKind::kCaster) w.driven = false;
+    }
+    switch (r_.drive) {
+      case DriveKind::kDifferential:
+        return differential();
+      case DriveKind::kSkid:
+        return skid();
+      case DriveKind::kTracked:
+        return tracked();
+      case DriveKind::kOmni:
+        return omni();
+      case DriveKind::kMecanum:
+        return mecanum();
+      case DriveKind::kAckermann:
+        return ackermann();
+      case DriveKind::kTricycle:
+        return tricycle();
+    }
+    return {};
+  }
+
+  Status need_separation() {
+    const auto gauge = separation();
+    if (!gauge) return missing("wheel_separation in m, or the wheels' y");
+    if (*gauge > 0) return {};
+    return Error{"wheel_separation is " + number(*gauge) + " m, expected more than 0"};
+  }
+
+  void sides() {
+    for (RobotWheel& w : r_.wheels) {
+      if (w.side != WheelSide::kNone || !w.driven || !w.y_m || *w.y_m == 0) continue;
+      w.side = *w.y_m > 0 ? WheelSide::kLeft : WheelSide::kRight;
+    }
+  }
+
+  // Wheels that stand on no more than a line would let the robot fall over.
+  void prop(double reach_m) {
+    double front = -1e9, rear = 1e9;
+    for (const RobotWheel& w : r_.wheels) {
+      front = std::max(front, w.x_m.value_or(0));
+      rear = std::min(rear, w.x_m.value_or(0));
+    }
+    const bool ahead = front < r_.com_x_m + 0.05 * reach_m;
+    const bool behind = rear > r_.com_x_m - 0.05 * reach_m;
+    if (!ahead && !behind) return;
+    for (const double side : {1.0, -1.0}) {
+      if (!(side > 0 ? ahead : behind)) continue;
+      RobotWheel caster;
+      caster.name = side > 0 ? "caster_front" : "caster_rear";
+      caster.kind = WheelKind::kCaster;
+      caster.driven = false;
+      caster.x_m = r_.com_x_m + side * reach_m;
+      caster.y_m = 0;
+      caster.radius_m = 0.1 * reach_m;
+      r_.wheels.push_back(caster);
+      assume("a caster without drag at x = " + number(*caster.x_m) + " m (" + caster.name + ")");
+    }
+  }
+
+  Status differential() {
+    if (Status s = need_separation(); !s) return s;
+    const double half = *separation() / 2;
+    if (states_sides()) {
+      place(ensure("left"), 0, half);
+      place(ensure("right"), 0, -half);
+    }
+    sides();
+    prop(half);
+    return {};
+  }
+
+  // Contacts of four-point Coulomb theory at +-b along and +-c across turn in place as if they
+  // stood (b^2 + c^2) / c^2 times as wide apart (worker/sim: the tests derive it).
+  double half_base(double half_gauge) {
+    if (r_.controller.wheelbase_m) return *r_.controller.wheelbase_m / 2;
+    const double multiplier = r_.controller.wheel_separation_multiplier;
+    double ratio = kSquare;
+    if (multiplier > 1.01) {
+      ratio = std::sqrt((multiplier - 1) / r_.friction_ratio);
+      assume("the axles " + number(2 * half_gauge * ratio) +
+             " m apart, which makes a skid turn as wide as wheel_separation_multiplier " +
+             number(multiplier) + " says");
+    } else {
+      assume("the axles as far apart as the wheels: " + number(2 * half_gauge) + " m");
+    }
+    r_.controller.wheelbase_m = 2 * half_gauge * ratio;
+    return half_gauge * ratio;
+  }
+
+  Status skid() {
+    if (Status s = need_separation(); !s) return s;
+    if (states_sides()) {
+      const double c = *separation() / 2;
+      const double b = half_base(c);
+      const RobotWheel left = ensure("left");
+      const RobotWheel right = ensure("right");
+      r_.wheels.clear();
+      for (const double x : {b, -b}) {
+        for (const RobotWheel* side : {&left, &right}) {
+          RobotWheel wheel = *side;
+          wheel.name = (x > 0 ? "front_" : "rear_") + side->name;
+          wheel.group = side->name;
+          wheel.side = side == &left ? WheelSide::kLeft : WheelSide::kRight;
+          wheel.x_m = x;
+          wheel.y_m = side == &left ? c : -c;
+          r_.wheels.push_back(wheel);
+        }
+      }
+    }
+    sides();
+    return {};
+  }
+
+  Status tracked() {
+    if (Status s = need_separation(); !s) return s;
+    const double c = *separation() / 2;
+    for (const char* name : {"left", "right"}) {
+      RobotWheel& tread = ensure(name);
+      tread.kind = WheelKind::kTread;
+      place(tread, 0, name[0] == 'l' ? c : -c);
+      if (!tread.contact_length_m) {
+        tread.contact_length_m = 2 * half_base(c);
+      }
+    }
+    sides();
+    return {};
+  }
+
+  Status omni() {
+    const bool placed = std::any_of(r_.wheels.begin(), r_.wheels.end(),
+                                    [](const RobotWheel& w) { return w.x_m && w.driven; });
+    if (!placed) {
+      const auto radius = r_.controller.robot_radius_m;
+      if (!radius) return missing("robot_radius in m, or the wheels' x, y and heading");
+      std::vector<std::string> names;
+      for (const RobotWheel& w : r_.wheels) names.push_back(w.name);
+      if (names.empty()) names = r_.channels;
+      if (names.size() < 3) return missing("three or more wheels, or as many channels");
+      const double n = static_cast<double>(names.size());
+      for (std::size_t i = 0; i < names.size(); ++i) {
+        const double at = r_.controller.wheel_offset_rad + 2 * pi * static_cast<double>(i) / n;
+        RobotWheel& w = ensure(names[i]);
+        place(w, *radius * std::cos(at), *radius * std::sin(at));
+        w.heading_rad = wrap_angle(at + pi / 2);
+      }
+    }
+    for (RobotWheel& w : r_.wheels) {
+      if (w.driven) w.kind = WheelKind::kOmni;
+    }
+    return {};
+  }
+
+  Status mecanum() {
+    const bool placed = std::any_of(r_.wheels.begin(), r_.wheels.end(),
+                                    [](const RobotWheel& w) { return w.x_m && w.driven; });
+    const auto& k = r_.controller;
+    double lx = 0, ly = 0;
+    if (!placed) {
+      if (k.wheelbase_m && k.wheel_separation_m) {
+        lx = *k.wheelbase_m / 2;
+        ly = *k.wheel_separation_m / 2;
+      } else if (k.sum_of_robot_center_projection_m) {
+        lx = ly = *k.sum_of_robot_center_projection_m / 2;
+        assume("wheels as far apart along as across: only lx + ly is stated");
+      } else {
+        return missing("wheelbase and wheel_separation, or sum_of_robot_center_projection, in m");
+      }
+    }
+    for (const char* name : {"front_left", "front_right", "rear_left", "rear_right"}) {
+      if (placed && find(name) == nullptr) continue;
+      RobotWheel& w = ensure(name);
+      place(w, name[0] == 'f' ? lx : -lx, std::string(name).ends_with("left") ? ly : -ly);
+    }
+    for (RobotWheel& w : r_.wheels) {
+      if (!w.driven) continue;
+      w.kind = WheelKind::kMecanum;
+      if (w.roller_angle_rad == 0) w.roller_angle_rad = *w.x_m * *w.y_m > 0 ? -pi / 4 : pi / 4;
+    }
+    return {};
+  }
+
+  Status ackermann() {
+    auto& k = r_.controller;
+    if (!k.wheelbase_m) return missing("wheelbase in m");
+    const double track = k.traction_track_width_m ? *k.traction_track_width_m
+                         : k.wheel_separation_m   ? *k.wheel_separation_m
+                                                  : kTrackPerBase * *k.wheelbase_m;
+    if (!k.traction_track_width_m && !k.wheel_separation_m) {
+      assume("a track of " + number(track) + " m");
+    }
+    k.traction_track_width_m = track;
+    const double front = k.steering_track_width_m.value_or(track);
+    for (const char* name : {"front_left", "front_right", "rear_left", "rear_right"}) {
+      const bool made = find(name) == nullptr;
+      RobotWheel& w = ensure(name);
+      const bool ahead = name[0] == 'f';
+      const double sign = std::string(name).ends_with("left") ? 1 : -1;
+      place(w, ahead ? *k.wheelbase_m : 0, sign * (ahead ? front : track) / 2);
+      if (!made) continue;
+      w.steered = ahead;
+      w.driven = !ahead;
+    }
+    return {};
+  }
+
+  Status tricycle() {
+    auto& k = r_.controller;
+    if (!k.wheelbase_m) return missing("wheelbase in m");
+    const double track = k.traction_track_width_m ? *k.traction_track_width_m
+                         : k.wheel_separation_m   ? *k.wheel_separation_m
+                                                  : kTrackPerBase * *k.wheelbase_m;
+    if (!k.traction_track_width_m && !k.wheel_separation_m) {
+      assume("a track of " + number(track) + " m");
+    }
+    k.traction_track_width_m = track;
+    const bool made = find("front") == nullptr;
+    RobotWheel& front = ensure("front");
+    place(front, *k.wheelbase_m, 0);
+    if (made) front.steered = true;
+    for (const char* name : {"rear_left", "rear_right"}) {
+      const bool fresh = find(name) == nullptr;
+      RobotWheel& w = ensure(name);
+      place(w, 0, name[5] == 'l' ? track / 2 : -track / 2);
+      if (fresh) w.driven = false;
+    }
+    return {};
+  }
+
+  // The farthest that a wheel stands out; sizes that nobody states are shares of it.
+  double reach() const {
+    double farthest = 0;
+    for (const RobotWheel& w : r_.wheels) {
+      farthest = std::max(farthest, std::hypot(w.x_m.value_or(0), w.y_m.value_or(0)));
+    }
+    return farthest;
+  }
+
+  Status sizes() {
+    const double across = 2 * reach();
+    if (!(across > 0)) return Error{"every wheel stands at the origin; state x and y in m"};
+    bool assumed = false;
+    for (RobotWheel& w : r_.wheels) {
+      if (w.group.empty()) w.group = w.name;
+      if (!w.x_m || !w.y_m) return Error{"wheel \"" + w.name + "\" needs x and y in m"};
+      if (w.radius_m) continue;
+      if (r_.controller.wheel_radius_m) {
+        w.radius_m = r_.controller.wheel_radius_m;
+      } else if (w.driven && r_.command == CommandKind::kWheelSpeeds) {
+        return Error{"wheel \"" + w.name + "\" needs a radius in m: its commands are in rad/s"};
+      } else {
+        w.radius_m = kWheelPerGauge * across / 2;
+        assumed = assumed || w.driven;
+      }
+    }
+    if (assumed) assume("wheel radii of " + number(kWheelPerGauge * across / 2) + " m");
+    if (!r_.mass_kg) {
+      r_.mass_kg = kMass_kg;
+      assume("a mass of " + number(kMass_kg) + " kg");
+    }
+    if (!r_.com_z_m) {
+      r_.com_z_m = kHeightPerGauge * across;
+      assume("the centre of mass " + number(*r_.com_z_m) + " m over the floor");
+    }
+    if (!r_.yaw_inertia_kg_m2) {
+      // A plate of the wheels' circle, of even mass.
+      r_.yaw_inertia_kg_m2 = *r_.mass_kg * reach() * reach() / 2;
+      assume("a yaw inertia of " + number(*r_.yaw_inertia_kg_m2) + " kg m^2");
+    }
+    return {};
+  }
+
+  GroundRobot& r_;
+};
+
+}  // namespace
+
+Status complete_robot(GroundRobot* robot) { return Completion(robot).run(); }
+
+}  // namespace gapfarm

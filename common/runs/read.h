@@ -1,0 +1,19 @@
+// Run logs: commands.csv with poses.csv beside it (docs/formats.md).
+#pragma once
+
+#include <span>
+#include <string>
+
+#include "common/base/result.h"
+#include "common/runs/run.h"
+
+namespace gapfarm {
+
+// `channels`: the columns of the commands that the robot takes, in its order; the others are left
+// out and noted.  Errors name file, line and column, what was found and what was expected: a column
+// that is missing, a number that is not one, times that do not ascend within a run, a run with
+// poses and no commands or the other way round.
+Result<RunLog> read_runs(const std::string& commands_path, const std::string& poses_path,
+                         std::span<const std::string> channels);
+
+}  // namespace gapfarm

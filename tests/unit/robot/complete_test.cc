@@ -1,0 +1,72 @@
+// What follows from a robot's drive and the sizes that its file states.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "common/robot/robot.h"
+
+namespace gapfarm {
+namespace {
+
+GroundRobot sides(DriveKind drive) {
+  GroundRobot robot;
+  robot.drive = drive;
+  robot.controller.wheel_separation_m = 0.3;
+  for (const char* name : {"left", "right"}) {
+    RobotWheel wheel;
+    wheel.name = name;
+    wheel.radius_m = 0.05;
+    robot.wheels.push_back(wheel);
+  }
+  return robot;
+}
+
+TEST(CompleteRobot, PlacesADifferentialDrivesWheelsAndPropsIt) {
+  GroundRobot robot = sides(DriveKind::kDifferential);
+  ASSERT_TRUE(complete_robot(&robot).ok());
+  EXPECT_EQ(*robot.wheel("left")->y_m, 0.15);
+  EXPECT_EQ(*robot.wheel("right")->y_m, -0.15);
+  EXPECT_EQ(robot.wheel("right")->side, WheelSide::kRight);
+  EXPECT_EQ(robot.wheels.size(), 4u);  // and two casters
+  EXPECT_FALSE(robot.notes.empty());
+}
+
+TEST(CompleteRobot, PlacesASkidSteersAxlesWhereItsMultiplierSays) {
+  GroundRobot robot = sides(DriveKind::kSkid);
+  robot.controller.wheel_separation_multiplier = 1.81;
+  ASSERT_TRUE(complete_robot(&robot).ok());
+  ASSERT_EQ(robot.wheels.size(), 4u);
+  EXPECT_NEAR(*robot.wheel("front_left")->x_m, 0.15 * 0.9, 1e-12);
+  EXPECT_EQ(robot.wheel("rear_right")->group, "right");
+}
+
+TEST(CompleteRobot, CrossesTheRollersOfAMecanumDrive) {
+  GroundRobot robot;
+  robot.drive = DriveKind::kMecanum;
+  robot.controller.sum_of_robot_center_projection_m = 0.4;
+  robot.controller.wheel_radius_m = 0.05;
+  robot.channels = {"front_left", "front_right", "rear_left", "rear_right"};
+  ASSERT_TRUE(complete_robot(&robot).ok());
+  EXPECT_EQ(robot.wheel("front_left")->roller_angle_rad, -std::numbers::pi / 4);
+  EXPECT_EQ(robot.wheel("rear_left")->roller_angle_rad, std::numbers::pi / 4);
+}
+
+TEST(CompleteRobot, NamesTheSizeThatIsMissing) {
+  GroundRobot robot = sides(DriveKind::kDifferential);
+  robot.controller.wheel_separation_m.reset();
+  const Status status = complete_robot(&robot);
+  ASSERT_FALSE(status.ok());
+  EXPECT_NE(status.error().message.find("wheel_separation"), std::string::npos);
+}
+
+TEST(CompleteRobot, RefusesAChannelThatTheRobotDoesNotHave) {
+  GroundRobot robot = sides(DriveKind::kDifferential);
+  robot.channels = {"left", "middle"};
+  const Status status = complete_robot(&robot);
+  ASSERT_FALSE(status.ok());
+  EXPECT_NE(status.error().message.find("middle"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace gapfarm
