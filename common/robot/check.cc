@@ -52,6 +52,7 @@ Status check_robot(const GroundRobot& robot) {
     if (Status s = positive("the radius of wheel \"" + w.name + "\"", w.radius_m.value_or(0)); !s)
       return s;
   }
+  if (!robot.com_x_m || !robot.com_y_m) return Error{"the centre of mass needs x and y in m"};
   if (Status s = positive("mass", robot.mass_kg.value_or(0)); !s) return s;
   if (Status s = positive("yaw_inertia", robot.yaw_inertia_kg_m2.value_or(0)); !s) return s;
   if (Status s = positive("friction", robot.friction); !s) return s;

@@ -121,8 +121,9 @@ class Completion {
       front = std::max(front, w.x_m.value_or(0));
       rear = std::min(rear, w.x_m.value_or(0));
     }
-    const bool ahead = front < r_.com_x_m + 0.05 * reach_m;
-    const bool behind = rear > r_.com_x_m - 0.05 * reach_m;
+    const double middle = r_.com_x_m.value_or(0);
+    const bool ahead = front < middle + 0.05 * reach_m;
+    const bool behind = rear > middle - 0.05 * reach_m;
     if (!ahead && !behind) return;
     for (const double side : {1.0, -1.0}) {
       if (!(side > 0 ? ahead : behind)) continue;
@@ -130,7 +131,7 @@ class Completion {
       caster.name = side > 0 ? "caster_front" : "caster_rear";
       caster.kind = WheelKind::kCaster;
       caster.driven = false;
-      caster.x_m = r_.com_x_m + side * reach_m;
+      caster.x_m = middle + side * reach_m;
       caster.y_m = 0;
       caster.radius_m = 0.1 * reach_m;
       r_.wheels.push_back(caster);
@@ -150,14 +151,14 @@ class Completion {
     return {};
   }
 
-  // Contacts of four-point Coulomb theory at +-b along and +-c across turn in place as if they
-  // stood (b^2 + c^2) / c^2 times as wide apart (worker/sim: the tests derive it).
+  // Contacts of four-point Coulomb theory at +-b along and +-c across, with friction across the
+  // wheels r times that along, turn as if they stood 1 + (r b / c)^2 times as wide apart.
   double half_base(double half_gauge) {
     if (r_.controller.wheelbase_m) return *r_.controller.wheelbase_m / 2;
     const double multiplier = r_.controller.wheel_separation_multiplier;
     double ratio = kSquare;
     if (multiplier > 1.01) {
-      ratio = std::sqrt((multiplier - 1) / r_.friction_ratio);
+      ratio = std::sqrt(multiplier - 1) / r_.friction_ratio;
       assume("the axles " + number(2 * half_gauge * ratio) +
              " m apart, which makes a skid turn as wide as wheel_separation_multiplier " +
              number(multiplier) + " says");
@@ -316,6 +317,19 @@ class Completion {
     return farthest;
   }
 
+  // Where the wheels share the load alike.  A car's or a tricycle's frame begins at its rear axle,
+  // over which its mass would not stand.
+  double middle(std::optional<double> RobotWheel::*at) const {
+    if (r_.drive == DriveKind::kDifferential) return 0;
+    double sum = 0, count = 0;
+    for (const RobotWheel& w : r_.wheels) {
+      if (w.kind == WheelKind::kCaster) continue;
+      sum += (w.*at).value_or(0);
+      count += 1;
+    }
+    return sum / std::max(count, 1.0);
+  }
+
   Status sizes() {
     const double across = 2 * reach();
     if (!(across > 0)) return Error{"every wheel stands at the origin; state x and y in m"};
@@ -338,6 +352,8 @@ class Completion {
       r_.mass_kg = kMass_kg;
       assume("a mass of " + number(kMass_kg) + " kg");
     }
+    if (!r_.com_x_m) r_.com_x_m = middle(&RobotWheel::x_m);
+    if (!r_.com_y_m) r_.com_y_m = middle(&RobotWheel::y_m);
     if (!r_.com_z_m) {
       r_.com_z_m = kHeightPerGauge * across;
       assume("the centre of mass " + number(*r_.com_z_m) + " m over the floor");

@@ -115,8 +115,7 @@ struct GroundRobot {
   DriveKind drive = DriveKind::kDifferential;
   std::vector<RobotWheel> wheels;
   std::optional<double> mass_kg;
-  double com_x_m = 0, com_y_m = 0;
-  std::optional<double> com_z_m;
+  std::optional<double> com_x_m, com_y_m, com_z_m;  // centre of mass, z over the floor
   std::optional<double> yaw_inertia_kg_m2;  // about the centre of mass
   double friction = 0.7;                    // of the floor along the wheels
   double friction_ratio = 1;                // across over along

@@ -141,7 +141,13 @@ void EllipseFrictionSolver::convertContacts(btPersistentManifold** manifolds, in
                                                                  : point.m_appliedImpulseLateral2);
       moving_side(m_tmpSolverBodyPool, row).apply(row.m_appliedImpulse);
       // The first row holds the friction, the second the ratio; only the table has a grain.
-      if (d == 1) row.m_friction = is_driven(m_tmpSolverBodyPool, row) ? 1 : ratio_;
+      if (d == 0) continue;
+      if (point.m_userPersistentData != nullptr) {
+        const auto& grip = *static_cast<const ContactGrip*>(point.m_userPersistentData);
+        row.m_friction = grip.separate ? -grip.ratio : grip.ratio;  // the sign: which of the two
+      } else {
+        row.m_friction = is_driven(m_tmpSolverBodyPool, row) ? 1 : ratio_;
+      }
     }
   }
 }
@@ -209,7 +215,10 @@ double EllipseFrictionSolver::solve_friction() {
     const double a2 = 1 / rows[1].m_jacDiagABInv;
     const double ratio = rows[1].m_friction;
     const double radius = rows[0].m_friction * normal.m_appliedImpulse;
-    if (rows[0].m_cfm > 0) {
+    if (ratio < 0) {
+      p1 = std::clamp(p1, -radius, radius);
+      p2 = std::clamp(p2, ratio * radius, -ratio * radius);
+    } else if (rows[0].m_cfm > 0) {
       creep_within_ellipse(a1, a2, ratio, radius, rows[0].m_cfm, p1, p2);
     } else {
       project_onto_ellipse(a1, a2, ratio, radius, p1, p2);

@@ -16,12 +16,19 @@
 
 namespace gapfarm {
 
+// Friction of one contact across its first direction, where m_userPersistentData points to one.
+struct ContactGrip {
+  double ratio = 1;  // over the friction along it, > 0
+  // Both directions have limits of their own, as with rollers that roll freely across.
+  bool separate = false;
+};
+
 // REQUIRES: one side of every contact is static or kinematic, two friction directions, warm
 // starting.
 class EllipseFrictionSolver final : public btSequentialImpulseConstraintSolver {
  public:
-  // `friction_ratio`: friction along m_lateralFrictionDir2 over friction along Dir1, > 0.
-  // Contacts with a kinematic body have none.
+  // `friction_ratio`: friction along m_lateralFrictionDir2 over friction along Dir1, > 0,
+  // of contacts without a grip of their own.  Contacts with a kinematic body have none.
   explicit EllipseFrictionSolver(double friction_ratio) : ratio_(friction_ratio) {}
   void set_friction_ratio(double ratio) { ratio_ = ratio; }
 

@@ -1,0 +1,256 @@
+#include "common/robot/robot_drive.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace gapfarm {
+namespace {
+
+constexpr double kStandingSpeed_m_s = 1e-4;
+
+int index_of(const std::vector<std::string>& names, std::string_view name) {
+  const auto found = std::find(names.begin(), names.end(), name);
+  return found == names.end() ? -1 : static_cast<int>(found - names.begin());
+}
+
+double at(const std::vector<double>& told, int channel) {
+  return channel < 0 ? 0 : told[static_cast<std::size_t>(channel)];
+}
+
+}  // namespace
+
+CommandTrack::CommandTrack(std::span<const CommandRow> rows, std::size_t channels,
+                           std::optional<double> timeout_s)
+    : rows_(rows), timeout_s_(timeout_s), mean_(channels, 0.0) {}
+
+const std::vector<double>& CommandTrack::mean(double t_s, double dt_s) {
+  std::fill(mean_.begin(), mean_.end(), 0.0);
+  if (rows_.empty()) return mean_;
+  while (row_ + 1 < rows_.size() && rows_[row_ + 1].t_s <= t_s) ++row_;
+  double from = t_s;
+  const double until = t_s + dt_s;
+  for (std::size_t r = row_; r < rows_.size() && from < until; ++r) {
+    const double next =
+        r + 1 < rows_.size() ? rows_[r + 1].t_s : std::numeric_limits<double>::infinity();
+    double to = std::min(until, next);
+    const double end = timeout_s_ ? rows_[r].t_s + *timeout_s_ : to;
+    const double share = std::max(0.0, std::min(to, end) - from) / dt_s;
+    for (std::size_t c = 0; c < mean_.size(); ++c) mean_[c] += share * rows_[r].values[c];
+    from = std::max(from, to);
+  }
+  return mean_;
+}
+
+double CommandTrack::next_motion(double t_s) const {
+  for (std::size_t r = row_; r < rows_.size(); ++r) {
+    const bool over = r + 1 < rows_.size() && rows_[r + 1].t_s <= t_s;
+    const bool moves = std::any_of(rows_[r].values.begin(), rows_[r].values.end(),
+                                   [](double value) { return value != 0; });
+    if (!over && moves) return std::max(t_s, rows_[r].t_s);
+  }
+  return std::numeric_limits<double>::infinity();
+}
+
+RobotDrive::RobotDrive(const GroundRobot& robot, std::span<const CommandRow> commands, double t_s,
+                       double speed_m_s)
+    : robot_(robot),
+      track_(commands, robot.channels.size(), robot.motors.command_timeout_s),
+      steered_(robot.drive == DriveKind::kAckermann || robot.drive == DriveKind::kTricycle),
+      lag_in_wheels_(!steered_),
+      targets_(robot.wheels.size(), 0.0),
+      limited_(robot.wheels.size(), 0.0),
+      speeds_(robot.wheels.size(), 0.0),
+      motions_(robot.wheels.size()),
+      throttle_m_s_(speed_m_s) {
+  (void)t_s;
+  const auto& names = robot.channels;
+  for (const RobotWheel& wheel : robot.wheels) {
+    int channel = index_of(names, wheel.name);
+    if (channel < 0 && wheel.side == WheelSide::kLeft) channel = index_of(names, "left");
+    if (channel < 0 && wheel.side == WheelSide::kRight) channel = index_of(names, "right");
+    channel_.push_back(wheel.driven ? channel : -1);
+  }
+  v_ = index_of(names, "v");
+  omega_ = index_of(names, "omega");
+  vy_ = index_of(names, "vy");
+  throttle_ = index_of(names, "throttle");
+  speed_ = index_of(names, "speed");
+  steering_ = index_of(names, "steering");
+}
+
+double RobotDrive::dead(double value) const {
+  const double band = robot_.motors.dead_band;
+  if (band <= 0) return value;
+  return std::copysign(std::max(0.0, std::abs(value) - band), value);
+}
+
+void RobotDrive::wheel_targets(const std::vector<double>& told) {
+  const bool duties = robot_.command == CommandKind::kDuties;
+  const double scale = duties ? robot_.motors.full_speed_rad_s.value_or(1) : 1;
+  for (std::size_t i = 0; i < targets_.size(); ++i) {
+    targets_[i] = dead(at(told, channel_[i])) * scale * *robot_.wheels[i].radius_m;
+  }
+}
+
+// What the controller makes of a twist, by its own sizes; rolling is by the wheels' own.
+void RobotDrive::twist_targets(double v, double omega, double vy) {
+  const ControllerKinematics& k = robot_.controller;
+  const double half = k.wheel_separation_m.value_or(0) * k.wheel_separation_multiplier / 2;
+  for (std::size_t i = 0; i < targets_.size(); ++i) {
+    const RobotWheel& w = robot_.wheels[i];
+    targets_[i] = 0;
+    if (!w.driven) continue;
+    const double side =
+        w.side == WheelSide::kLeft || (w.side == WheelSide::kNone && *w.y_m > 0) ? 1.0 : -1.0;
+    double surface = v - side * omega * half;
+    double radius = k.wheel_radius_m.value_or(*w.radius_m);
+    radius *= side > 0 ? k.left_wheel_radius_multiplier : k.right_wheel_radius_multiplier;
+    if (robot_.drive == DriveKind::kMecanum) {
+      const double arm = k.sum_of_robot_center_projection_m.value_or(std::abs(*w.x_m) + half);
+      surface = v + std::tan(w.roller_angle_rad) * vy - side * omega * arm;
+    } else if (robot_.drive == DriveKind::kOmni) {
+      const double turn = *w.x_m * std::sin(w.heading_rad) - *w.y_m * std::cos(w.heading_rad);
+      const double arm = k.robot_radius_m.value_or(std::abs(turn));
+      surface = v * std::cos(w.heading_rad) + vy * std::sin(w.heading_rad) +
+                omega * std::copysign(arm, turn);
+    }
+    targets_[i] = surface / radius * *w.radius_m;
+  }
+}
+
+double RobotDrive::angle_of(double command) const {
+  const RobotSteering& s = robot_.steering;
+  double angle = command;
+  if (!s.table.empty()) {
+    const auto after = std::upper_bound(
+        s.table.begin(), s.table.end(), command,
+        [](double c, const RobotSteering::Point& point) { return c < point.command; });
+    if (after == s.table.begin()) {
+      angle = s.table.front().angle_rad;
+    } else if (after == s.table.end()) {
+      angle = s.table.back().angle_rad;
+    } else {
+      const RobotSteering::Point& a = *(after - 1);
+      angle = a.angle_rad + (after->angle_rad - a.angle_rad) * (command - a.command) /
+                                (after->command - a.command);
+    }
+  }
+  angle = s.gain * angle + s.offset_rad;
+  if (s.limit_rad) angle = std::clamp(angle, -*s.limit_rad, *s.limit_rad);
+  return angle;
+}
+
+void RobotDrive::steer(double wanted_rad, double dt_s) {
+  const double before = steering_rad_;
+  const double lag = robot_.motors.lag_s;
+  if (fresh_ || lag <= 0) {
+    steering_rad_ = wanted_rad;
+  } else {
+    steering_rad_ = wanted_rad + (before - wanted_rad) * std::exp(-dt_s / lag);
+  }
+  if (robot_.steering.rate_limit_rad_s && !fresh_) {
+    const double most = *robot_.steering.rate_limit_rad_s * dt_s;
+    steering_rad_ = std::clamp(steering_rad_, before - most, before + most);
+  }
+}
+
+double RobotDrive::throttle(double told, double dt_s, double yaw_rate_rad_s) {
+  const RobotThrottle& t = robot_.throttle;
+  const double v = throttle_m_s_;
+  const double push = std::max(0.0, std::abs(told) - t.zero);
+  const double decay = push * t.back_emf + t.drag + t.cornering * std::abs(yaw_rate_rad_s);
+  double next = (v + dt_s * std::copysign(push * t.gain, told)) / (1 + dt_s * decay);
+  const double held = t.coulomb * dt_s;  // dry friction stops, and does not turn round
+  next = std::abs(next) <= held ? 0 : next - std::copysign(held, next);
+  throttle_m_s_ = next;
+  return (v + next) / 2;
+}
+
+// Every wheel of a steered robot on circles about one centre on the unsteered axle.
+void RobotDrive::place_on_curve(double speed_m_s) {
+  const double base = *robot_.controller.wheelbase_m;
+  const double slow = 1 + robot_.steering.understeer_s2_m2 * speed_m_s * speed_m_s;
+  curvature_ = std::tan(steering_rad_) / base / slow;
+  traction_m_s_ = speed_m_s;
+  for (std::size_t i = 0; i < motions_.size(); ++i) {
+    const RobotWheel& w = robot_.wheels[i];
+    const double ahead = 1 - curvature_ * *w.y_m;
+    const double aside = curvature_ * *w.x_m;
+    const double heading = w.steered ? std::atan2(aside, ahead) : 0.0;
+    motions_[i].heading_rad = w.heading_rad + heading;
+    motions_[i].speed_m_s =
+        w.driven ? speed_m_s * (w.steered ? std::hypot(ahead, aside) : ahead) : 0;
+  }
+}
+
+double RobotDrive::follow(std::size_t i, double target, double dt_s) {
+  if (fresh_) {
+    limited_[i] = speeds_[i] = target;
+    return target;
+  }
+  double wanted = target;
+  if (robot_.motors.acceleration_limit_m_s2) {
+    const double most = *robot_.motors.acceleration_limit_m_s2 * dt_s;
+    wanted = std::clamp(target, limited_[i] - most, limited_[i] + most);
+  }
+  // A ramp's mean over the step, where it is one.
+  const double input = (wanted == target) ? target : (limited_[i] + wanted) / 2;
+  limited_[i] = wanted;
+  const double lag = robot_.motors.lag_s;
+  if (!lag_in_wheels_ || lag <= 0) {
+    speeds_[i] = wanted;
+    return input;
+  }
+  const double decay = std::exp(-dt_s / lag);
+  const double gap = speeds_[i] - input;
+  speeds_[i] = input + gap * decay;
+  return input + gap * (1 - decay) * lag / dt_s;
+}
+
+std::span<const WheelMotion> RobotDrive::advance(double t_s, double dt_s, double yaw_rate_rad_s) {
+  const std::vector<double>& told = track_.mean(t_s - robot_.motors.delay_s, dt_s);
+  if (steered_) {
+    double speed = 0;
+    double wanted = angle_of(at(told, steering_));
+    if (robot_.command == CommandKind::kThrottleSteering) {
+      speed = throttle(dead(at(told, throttle_)), dt_s, yaw_rate_rad_s);
+    } else if (robot_.command == CommandKind::kTwist) {
+      const double v = at(told, v_);
+      if (v != 0)
+        wanted = angle_of(std::atan(at(told, omega_) * *robot_.controller.wheelbase_m / v));
+      speed = follow(0, dead(v), dt_s);
+    } else {
+      const auto driven = std::find_if(robot_.wheels.begin(), robot_.wheels.end(),
+                                       [](const RobotWheel& w) { return w.driven; });
+      const double radius = driven == robot_.wheels.end() ? 1 : *driven->radius_m;
+      speed = follow(0, dead(at(told, speed_)) * radius, dt_s);
+      // The middle of the unsteered axle is slower than a steered traction wheel.
+      if (driven != robot_.wheels.end() && driven->steered) speed *= std::cos(steering_rad_);
+    }
+    steer(wanted, dt_s);
+    place_on_curve(speed);
+    fresh_ = false;
+    stands_ = std::abs(speed) < kStandingSpeed_m_s;
+    return motions_;
+  }
+  if (robot_.command == CommandKind::kTwist) {
+    twist_targets(dead(at(told, v_)), at(told, omega_), at(told, vy_));
+  } else {
+    wheel_targets(told);
+  }
+  stands_ = true;
+  for (std::size_t i = 0; i < motions_.size(); ++i) {
+    motions_[i].speed_m_s = follow(i, targets_[i], dt_s);
+    motions_[i].heading_rad = robot_.wheels[i].heading_rad;
+    stands_ = stands_ && targets_[i] == 0 && std::abs(speeds_[i]) < kStandingSpeed_m_s;
+  }
+  fresh_ = false;
+  return motions_;
+}
+
+double RobotDrive::next_motion(double t_s) const {
+  return track_.next_motion(t_s - robot_.motors.delay_s) + robot_.motors.delay_s;
+}
+
+}  // namespace gapfarm

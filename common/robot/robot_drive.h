@@ -1,0 +1,88 @@
+// From logged commands to what each wheel does: the controller's kinematics and the motor side.
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "common/robot/robot.h"
+#include "common/runs/run.h"
+
+namespace gapfarm {
+
+// What a wheel does over one step.
+struct WheelMotion {
+  double speed_m_s = 0;    // mean speed of its surface, positive when it rolls along its heading
+  double heading_rad = 0;  // of rolling, in the robot's frame, the steering included
+};
+
+// The mean of piecewise constant commands over a step, so that what is told between two steps
+// counts by how long it was told.
+class CommandTrack {
+ public:
+  // `rows` outlive the track.  Before the first row its values count; after `timeout_s` without a
+  // new row zeros do.
+  CommandTrack(std::span<const CommandRow> rows, std::size_t channels,
+               std::optional<double> timeout_s);
+
+  // REQUIRES: times that do not go back, dt_s > 0.
+  const std::vector<double>& mean(double t_s, double dt_s);
+  // First time from `t_s` on at which a value is not zero; infinity when none is.
+  double next_motion(double t_s) const;
+
+ private:
+  std::span<const CommandRow> rows_;
+  std::optional<double> timeout_s_;
+  std::size_t row_ = 0;
+  std::vector<double> mean_;
+};
+
+class RobotDrive {
+ public:
+  // `robot` is complete and outlives this, as do the commands.  Throttle begins at `speed_m_s`;
+  // motors begin at the commands' speed when they begin at `t_s`.
+  RobotDrive(const GroundRobot& robot, std::span<const CommandRow> commands, double t_s,
+             double speed_m_s = 0);
+
+  // Over [t_s, t_s + dt_s], one a wheel of the robot.  `yaw_rate_rad_s` is the robot's own.
+  // REQUIRES: steps that follow one another.
+  std::span<const WheelMotion> advance(double t_s, double dt_s, double yaw_rate_rad_s);
+
+  // Whether the wheels stand and are told to; and when they are told otherwise.
+  bool stands() const { return stands_; }
+  double next_motion(double t_s) const;
+
+  // Curvature (1/m) that the steering asks for over the last step, and the speed of the traction
+  // axle's middle (m/s).  Steered robots only.
+  double curvature() const { return curvature_; }
+  double traction_m_s() const { return traction_m_s_; }
+
+ private:
+  void wheel_targets(const std::vector<double>& told);
+  void twist_targets(double v, double omega, double vy);
+  void steer(double wanted_rad, double dt_s);
+  double throttle(double told, double dt_s, double yaw_rate_rad_s);
+  void place_on_curve(double speed_m_s);
+  double follow(std::size_t wheel, double target_m_s, double dt_s);
+  double angle_of(double command) const;
+  double dead(double value) const;
+
+  const GroundRobot& robot_;
+  CommandTrack track_;
+  bool steered_;
+  bool lag_in_wheels_;
+  std::vector<int> channel_;  // of each wheel; -1: none
+  int v_ = -1, omega_ = -1, vy_ = -1, throttle_ = -1, speed_ = -1, steering_ = -1;
+  std::vector<double> targets_;  // m/s of each wheel
+  std::vector<double> limited_;  // behind the acceleration limit
+  std::vector<double> speeds_;   // behind the lag
+  std::vector<WheelMotion> motions_;
+  bool fresh_ = true;
+  bool stands_ = false;
+  double steering_rad_ = 0;
+  double curvature_ = 0;
+  double traction_m_s_ = 0;
+  double throttle_m_s_ = 0;
+};
+
+}  // namespace gapfarm

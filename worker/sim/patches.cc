@@ -1,0 +1,213 @@
+#include "worker/sim/patches.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "worker/sim/observe.h"
+#include "worker/sim/world.h"
+
+namespace gapfarm {
+namespace {
+
+constexpr double kCreepAtRest_m_s = 1.5e-3;  // as for treads (world.cc)
+constexpr double kErrorReduction = 0.2;
+// Compliance of a contact in units of 1 / mass and step; supports beyond three then share the load
+// as equal springs would.
+constexpr double kSoftness = 3.5e-4;
+// Support spheres over the farthest patch's distance: small, so that pitch does not move contacts.
+constexpr double kSphereShare = 0.05;
+
+double reach(const PatchSettings& settings) {
+  double farthest = 1e-3;
+  for (const Patch& p : settings.patches) farthest = std::max(farthest, std::hypot(p.x_m, p.y_m));
+  return farthest;
+}
+
+}  // namespace
+
+class PatchRobot::Impl final : public LeanWorld {
+ public:
+  Impl(const PatchSettings& settings, StepCounter* steps)
+      : LeanWorld(1, false, settings.solver_iterations),
+        settings_(settings),
+        radius_(kSphereShare * reach(settings)),
+        plane_(btVector3(0, 0, 1), 0),
+        sphere_(radius_),
+        compound_(false, static_cast<int>(settings.patches.size())),
+        motions_(settings.patches.size()),
+        steps_(steps) {
+    setGravity(btVector3(0, 0, -settings.gravity_m_s2));
+    for (const Patch& p : settings.patches) {
+      const btVector3 at(p.x_m - settings.com_x_m, p.y_m - settings.com_y_m,
+                         radius_ - settings.com_z_m);
+      compound_.addChildShape(btTransform(btMatrix3x3::getIdentity(), at), &sphere_);
+      grips_.push_back({p.ratio, p.rolls_across});
+    }
+  }
+  ~Impl() override { clear(); }
+
+  void reset(const BodyTwist& twist);
+  void step(std::span<const PatchMotion> motions, double dt_s);
+  const btRigidBody& body() const { return *body_; }
+  btVector3 origin() const { return {-settings_.com_x_m, -settings_.com_y_m, -settings_.com_z_m}; }
+  std::vector<double> loads() const;
+
+ private:
+  void solveConstraints(btContactSolverInfo& info) override;
+  void prepare_contacts();
+  void clear();
+  // Child of the body's shape that a contact belongs to.
+  int patch_of(const btManifoldPoint& point, bool floor_is_second) const {
+    return floor_is_second ? point.m_index0 : point.m_index1;
+  }
+
+  PatchSettings settings_;
+  double radius_;
+  btStaticPlaneShape plane_;
+  btSphereShape sphere_;
+  btCompoundShape compound_;
+  std::vector<ContactGrip> grips_;
+  std::vector<PatchMotion> motions_;
+  std::optional<btRigidBody> floor_, body_;
+  double last_step_s_ = 0;
+  StepCounter* steps_;
+};
+
+void PatchRobot::Impl::clear() {
+  if (!body_) return;
+  removeRigidBody(&*body_);
+  removeRigidBody(&*floor_);
+  body_.reset();
+  floor_.reset();
+}
+
+void PatchRobot::Impl::reset(const BodyTwist& twist) {
+  clear();
+  broadphase.resetPool(&dispatcher);
+  solver.reset();
+  last_step_s_ = 0;
+  floor_.emplace(btRigidBody::btRigidBodyConstructionInfo(0, nullptr, &plane_));
+  addRigidBody(&*floor_, kFloorGroup, kContactGroup);
+  // A flat body has half its yaw inertia about each of the other axes.
+  const double izz = settings_.yaw_inertia_kg_m2;
+  btRigidBody::btRigidBodyConstructionInfo info(settings_.mass_kg, nullptr, &compound_,
+                                                btVector3(izz / 2, izz / 2, izz));
+  info.m_startWorldTransform.setOrigin(-origin());
+  info.m_linearDamping = info.m_angularDamping = 0;
+  body_.emplace(info);
+  body_->setFlags(0);
+  body_->forceActivationState(DISABLE_DEACTIVATION);
+  addRigidBody(&*body_, kContactGroup, kFloorGroup);
+  const double w = twist.omega_rad_s;
+  body_->setLinearVelocity(
+      btVector3(twist.vx_m_s - w * settings_.com_y_m, twist.vy_m_s + w * settings_.com_x_m, 0));
+  body_->setAngularVelocity(btVector3(0, 0, w));
+}
+
+void PatchRobot::Impl::step(std::span<const PatchMotion> motions, double dt_s) {
+  std::copy(motions.begin(), motions.end(), motions_.begin());
+  getSolverInfo().m_warmstartingFactor = last_step_s_ > 0 ? dt_s / last_step_s_ : 1;
+  last_step_s_ = dt_s;
+  const double erp = kErrorReduction * dt_s * settings_.step_rate_hz;
+  getSolverInfo().m_erp = erp;
+  getSolverInfo().m_erp2 = erp;
+  stepSimulation(dt_s, 0);
+  count_step(steps_);
+}
+
+void PatchRobot::Impl::prepare_contacts() {
+  btVector3 ahead = body_->getWorldTransform().getBasis().getColumn(0);
+  ahead.setZ(0);
+  ahead = ahead.length2() > 1e-12 ? ahead.normalized() : btVector3(1, 0, 0);
+  const btVector3 left(-ahead.y(), ahead.x(), 0);
+  const double softness = kSoftness / settings_.mass_kg;
+  for (int m = 0; m < dispatcher.getNumManifolds(); ++m) {
+    btPersistentManifold* manifold = dispatcher.getInternalManifoldPointer()[m];
+    const bool floor_is_second = manifold->getBody1() == &*floor_;
+    for (int i = 0; i < manifold->getNumContacts(); ++i) {
+      btManifoldPoint& point = manifold->getContactPoint(i);
+      const auto index = static_cast<std::size_t>(patch_of(point, floor_is_second));
+      const PatchMotion& motion = motions_[index];
+      const double c = std::cos(motion.e1_rad);
+      const double s = std::sin(motion.e1_rad);
+      point.m_lateralFrictionDir1 = c * ahead + s * left;
+      point.m_lateralFrictionDir2 = c * left - s * ahead;
+      point.m_contactMotion1 = floor_is_second ? motion.speed_m_s : -motion.speed_m_s;
+      point.m_contactCFM = softness;
+      point.m_contactERP = getSolverInfo().m_erp2;
+      point.m_contactPointFlags |=
+          BT_CONTACT_FLAG_LATERAL_FRICTION_INITIALIZED | BT_CONTACT_FLAG_HAS_CONTACT_CFM;
+      point.m_combinedFriction = settings_.patches[index].friction;
+      point.m_frictionCFM = settings_.creep * (std::abs(motion.speed_m_s) + kCreepAtRest_m_s);
+      point.m_userPersistentData = &grips_[index];
+    }
+  }
+}
+
+void PatchRobot::Impl::solveConstraints(btContactSolverInfo& info) {
+  prepare_contacts();
+  solver.solveGroup(&m_collisionObjects[0], m_collisionObjects.size(),
+                    dispatcher.getInternalManifoldPointer(), dispatcher.getNumManifolds(), nullptr,
+                    0, info, nullptr, &dispatcher);
+}
+
+std::vector<double> PatchRobot::Impl::loads() const {
+  std::vector<double> loads(settings_.patches.size(), 0.0);
+  double sum = 0;
+  for (int m = 0; m < dispatcher.getNumManifolds(); ++m) {
+    const btPersistentManifold* manifold = dispatcher.getManifoldByIndexInternal(m);
+    const bool floor_is_second = manifold->getBody1() == &*floor_;
+    for (int i = 0; i < manifold->getNumContacts(); ++i) {
+      const btManifoldPoint& point = manifold->getContactPoint(i);
+      loads[static_cast<std::size_t>(patch_of(point, floor_is_second))] += point.m_appliedImpulse;
+      sum += point.m_appliedImpulse;
+    }
+  }
+  if (sum > 0) {
+    for (double& load : loads) load /= sum;
+  }
+  return loads;
+}
+
+PatchRobot::PatchRobot(const PatchSettings& settings, StepCounter* steps)
+    : impl_(std::make_unique<Impl>(settings, steps)) {
+  impl_->reset({});
+}
+PatchRobot::~PatchRobot() = default;
+
+void PatchRobot::reset(const BodyTwist& twist) { impl_->reset(twist); }
+void PatchRobot::step(std::span<const PatchMotion> motions, double dt_s) {
+  impl_->step(motions, dt_s);
+}
+
+Pose PatchRobot::pose() const {
+  const btTransform& X_SB = impl_->body().getWorldTransform();
+  const btVector3 at = X_SB * impl_->origin();
+  const btVector3 ahead = X_SB.getBasis().getColumn(0);
+  return {at.x(), at.y(), std::atan2(ahead.y(), ahead.x())};
+}
+
+BodyTwist PatchRobot::twist() const {
+  const btRigidBody& body = impl_->body();
+  const btMatrix3x3& R_SB = body.getWorldTransform().getBasis();
+  const btVector3 v = body.getVelocityInLocalPoint(R_SB * impl_->origin()) * R_SB;
+  return {v.x(), v.y(), body.getAngularVelocity().z()};
+}
+
+bool PatchRobot::sane() const {
+  return is_sane(impl_->body().getLinearVelocity(), impl_->body().getAngularVelocity());
+}
+bool PatchRobot::fallen() const { return has_fallen(impl_->body().getWorldTransform().getBasis()); }
+double PatchRobot::roll_rad() const {
+  return clamped_asin(impl_->body().getWorldTransform().getBasis()[2][1]);
+}
+double PatchRobot::pitch_rad() const {
+  return -clamped_asin(impl_->body().getWorldTransform().getBasis()[2][0]);
+}
+double PatchRobot::height_m() const {
+  return (impl_->body().getWorldTransform() * impl_->origin()).z();
+}
+std::vector<double> PatchRobot::loads() const { return impl_->loads(); }
+
+}  // namespace gapfarm

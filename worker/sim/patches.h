@@ -1,0 +1,77 @@
+// A rigid body on contact patches: what every drive of a ground robot comes down to.
+//
+// A patch has a place, a friction frame in the floor's plane whose first direction e1 may be turned
+// from step to step (steering), friction along e1 and across it, and a surface speed along e1.
+#pragma once
+
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "common/pose/pose.h"
+#include "worker/sim/step_counter.h"
+
+namespace gapfarm {
+
+struct Patch {
+  double x_m = 0, y_m = 0;  // on the floor, robot frame R
+  double friction = 0.7;    // along e1
+  double ratio = 1;         // friction across e1 over along it
+  // Something rolls freely across e1 (a roller, an idle wheel): its drag there takes nothing from
+  // the grip along e1.  Otherwise both share one ellipse, as a sliding tyre's do.
+  bool rolls_across = false;
+};
+
+struct PatchSettings {
+  std::vector<Patch> patches;  // at least three, not in a row
+  double mass_kg = 10;
+  double com_x_m = 0, com_y_m = 0, com_z_m = 0.1;  // centre of mass, R
+  double yaw_inertia_kg_m2 = 1;                    // about it
+  double creep = 0;  // slip over surface speed at 0.7 of full traction
+  double gravity_m_s2 = 9.81;
+  double step_rate_hz = 240;
+  int solver_iterations = 10;
+};
+
+// Of one patch over one step.
+struct PatchMotion {
+  double e1_rad = 0;     // in R
+  double speed_m_s = 0;  // of the surface along e1, positive when it drives the robot that way
+};
+
+// Velocity of R's origin in R's axes.
+struct BodyTwist {
+  double vx_m_s = 0, vy_m_s = 0, omega_rad_s = 0;
+};
+
+// Deterministic to the bit, whatever was simulated before reset().  One thread at a time.
+class PatchRobot {
+ public:
+  // `steps` (may be null) outlives the robot.
+  explicit PatchRobot(const PatchSettings& settings, StepCounter* steps = nullptr);
+  ~PatchRobot();
+  PatchRobot(const PatchRobot&) = delete;
+  PatchRobot& operator=(const PatchRobot&) = delete;
+
+  // At the origin of the start frame, heading along x, moving like this.
+  void reset(const BodyTwist& twist = {});
+  // One step; one motion a patch.
+  void step(std::span<const PatchMotion> motions, double dt_s);
+
+  Pose pose() const;  // of R in the start frame
+  BodyTwist twist() const;
+  // False when the integration has failed.
+  bool sane() const;
+  bool fallen() const;
+  double roll_rad() const;
+  double pitch_rad() const;
+  double height_m() const;  // of R's origin over the floor
+  // Share of the weight on each patch in the last step.
+  std::vector<double> loads() const;
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace gapfarm
