@@ -9,10 +9,10 @@
 
 namespace gapfarm {
 
-// `channels`: the columns of the commands that the robot takes, in its order; the others are left
-// out and noted.  Errors name file, line and column, what was found and what was expected: a column
-// that is missing, a number that is not one, times that do not ascend within a run, a run with
-// poses and no commands or the other way round.
+// `channels`: the columns of the commands that the robot takes, in its order; others are left out.
+// Errors name file, line and column, what was found and what was expected: a column that is
+// missing, a number that is not one, times that go back within a run, a run with poses and no
+// commands.  Noted: a run with commands and no poses, poses at the time of the one before.
 Result<RunLog> read_runs(const std::string& commands_path, const std::string& poses_path,
                          std::span<const std::string> channels);
 

@@ -36,6 +36,7 @@ struct Trial {
   std::vector<std::string> extra;     // values of TrialLog::extra_columns
   std::vector<PathSample> path;       // empty: not logged
   std::vector<TipSample> tip;         // push logs only: what was done; times increase
+  std::optional<std::uint32_t> run;   // windows only: of the problem's runs; t_s is on its clock
 };
 
 // Trials in driving order within each session.

@@ -1,0 +1,186 @@
+// Reading robot.toml.
+#include "common/robot/robot_file.h"
+
+#include <algorithm>
+
+#include "common/config/toml_section.h"
+#include "common/trials/files.h"
+
+namespace gapfarm {
+namespace {
+
+void read_wheel(TomlSection& own, RobotWheel& wheel) {
+  if (const auto kind = own.choice("kind", wheel_words())) {
+    wheel.kind = static_cast<WheelKind>(*kind);
+  }
+  if (const auto side = own.choice("side", side_words())) {
+    wheel.side = static_cast<WheelSide>(*side);
+  }
+  own.read("x", wheel.x_m, -50, 50, "m");
+  own.read("y", wheel.y_m, -50, 50, "m");
+  own.read("radius", wheel.radius_m, 1e-4, 10, "m");
+  own.read("width", wheel.width_m, 0, 10, "m");
+  own.read("contact_length", wheel.contact_length_m, 0, 50, "m");
+  own.read("heading", wheel.heading_rad, -7, 7, "rad");
+  own.read("driven", wheel.driven);
+  own.read("steered", wheel.steered);
+  own.read("roller_angle", wheel.roller_angle_rad, -7, 7, "rad");
+  own.read("group", wheel.group);
+  own.finish();
+}
+
+void read_wheels(TomlSection& top, std::vector<RobotWheel>& wheels) {
+  auto section = top.section("wheels");
+  if (!section) return;
+  std::vector<std::pair<toml::source_position, std::string>> names;  // in the file's order
+  for (const auto& [key, node] : section->table()) {
+    names.emplace_back(key.source().begin, std::string(key.str()));
+  }
+  std::stable_sort(names.begin(), names.end(),
+                   [](const auto& a, const auto& b) { return a.first < b.first; });
+  for (const auto& [place, name] : names) {
+    auto own = section->section(name);
+    if (!own) continue;
+    RobotWheel wheel;
+    wheel.name = name;
+    read_wheel(*own, wheel);
+    wheels.push_back(std::move(wheel));
+  }
+  section->finish();
+}
+
+void read_controller(TomlSection& top, ControllerKinematics& k) {
+  top.read("wheel_separation", k.wheel_separation_m, 1e-3, 50, "m");
+  top.read("wheel_radius", k.wheel_radius_m, 1e-4, 10, "m");
+  top.read("wheel_separation_multiplier", k.wheel_separation_multiplier, 0.01, 100);
+  top.read("left_wheel_radius_multiplier", k.left_wheel_radius_multiplier, 0.01, 100);
+  top.read("right_wheel_radius_multiplier", k.right_wheel_radius_multiplier, 0.01, 100);
+  top.read("wheelbase", k.wheelbase_m, 1e-3, 50, "m");
+  top.read("traction_track_width", k.traction_track_width_m, 1e-3, 50, "m");
+  top.read("steering_track_width", k.steering_track_width_m, 1e-3, 50, "m");
+  top.read("sum_of_robot_center_projection", k.sum_of_robot_center_projection_m, 1e-3, 50, "m");
+  top.read("robot_radius", k.robot_radius_m, 1e-3, 50, "m");
+  top.read("wheel_offset", k.wheel_offset_rad, -7, 7, "rad");
+}
+
+void read_motors(TomlSection& top, RobotMotors& m) {
+  top.read("closed_loop", m.closed_loop);
+  top.read("delay", m.delay_s, -60, 60, "s");
+  top.read("lag", m.lag_s, 0, 60, "s");
+  top.read("acceleration_limit", m.acceleration_limit_m_s2, 1e-3, 1e4, "m/s^2");
+  top.read("dead_band", m.dead_band, 0, 1e4);
+  top.read("cmd_vel_timeout", m.command_timeout_s, 1e-3, 1e4, "s");
+  top.read("full_speed", m.full_speed_rad_s, 1e-3, 1e5, "rad/s");
+}
+
+void read_body(TomlSection& top, GroundRobot& robot) {
+  top.read("mass", robot.mass_kg, 1e-3, 1e6, "kg");
+  top.read("yaw_inertia", robot.yaw_inertia_kg_m2, 1e-8, 1e8, "kg m^2");
+  if (auto own = top.section("centre_of_mass")) {
+    own->read("x", robot.com_x_m, -50, 50, "m");
+    own->read("y", robot.com_y_m, -50, 50, "m");
+    own->read("z", robot.com_z_m, 1e-4, 50, "m");
+    own->finish();
+  }
+  top.read("friction", robot.friction, 1e-3, 10);
+  top.read("friction_ratio", robot.friction_ratio, 1e-3, 100);
+  top.read("rolling_resistance", robot.rolling_resistance, 0, 1);
+  top.read("roller_drag", robot.roller_drag, 0, 1);
+  top.read("caster_drag", robot.caster_drag, 0, 10);
+  if (auto own = top.section("marker")) {
+    own->read("x", robot.X_RM.x, -50, 50, "m");
+    own->read("y", robot.X_RM.y, -50, 50, "m");
+    own->read("yaw", robot.X_RM.theta, -7, 7, "rad");
+    own->finish();
+  }
+}
+
+void read_steering_table(TomlSection& top, RobotSteering& steering) {
+  const toml::node* node = top.find("steering_table");
+  if (node == nullptr) return;
+  bool fine = node->is_array();
+  for (std::size_t i = 0; fine && i < node->as_array()->size(); ++i) {
+    const toml::array* pair = (*node->as_array())[i].as_array();
+    const auto command =
+        pair != nullptr && pair->size() == 2 ? (*pair)[0].value<double>() : std::nullopt;
+    const auto angle = command ? (*pair)[1].value<double>() : std::nullopt;
+    fine = angle && (steering.table.empty() || *command > steering.table.back().command);
+    if (fine) steering.table.push_back({*command, *angle});
+  }
+  if (fine && steering.table.size() != 1) return;
+  top.fail("steering_table",
+           "steering_table is [[command, angle in rad], ...] with two or more ascending commands");
+}
+
+void read_steering(TomlSection& top, GroundRobot& robot) {
+  read_steering_table(top, robot.steering);
+  top.read("understeer", robot.steering.understeer_s2_m2, 0, 100, "s^2/m^2");
+  if (auto own = top.section("steering")) {
+    own->read("gain", robot.steering.gain, -100, 100);
+    own->read("offset", robot.steering.offset_rad, -2, 2, "rad");
+    own->read("limit", robot.steering.limit_rad, 0, 2, "rad");
+    own->read("rate_limit", robot.steering.rate_limit_rad_s, 1e-3, 1e3, "rad/s");
+    own->finish();
+  }
+  if (auto own = top.section("throttle")) {
+    RobotThrottle& t = robot.throttle;
+    own->read("gain", t.gain, 0, 1e4, "m/s^2");
+    own->read("zero", t.zero, 0, 1);
+    own->read("back_emf", t.back_emf, 0, 1e4, "1/s");
+    own->read("drag", t.drag, 0, 1e3, "1/s");
+    own->read("coulomb", t.coulomb, 0, 1e3, "m/s^2");
+    own->read("cornering", t.cornering, 0, 1e3);
+    own->finish();
+  }
+}
+
+void read_commands(TomlSection& top, GroundRobot& robot) {
+  if (auto channels = top.strings("commands")) robot.channels = std::move(*channels);
+  const auto has = [&](const char* name) {
+    return std::find(robot.channels.begin(), robot.channels.end(), name) != robot.channels.end();
+  };
+  robot.command = has("v")          ? CommandKind::kTwist
+                  : has("throttle") ? CommandKind::kThrottleSteering
+                  : has("steering") ? CommandKind::kSpeedSteering
+                                    : CommandKind::kWheelSpeeds;
+  if (const auto kind = top.choice("command_kind", command_words())) {
+    robot.command = static_cast<CommandKind>(*kind);
+  }
+  top.read("measured", robot.measured);
+}
+
+}  // namespace
+
+Result<GroundRobot> parse_robot(std::string_view text, const std::string& path) {
+  auto parsed = parse_toml(text, path);
+  if (!parsed.ok()) return parsed.error();
+  TomlErrors errors(path);
+  TomlSection top(*parsed, "", errors);
+  GroundRobot robot;
+  top.read("name", robot.name);
+  if (const auto drive = top.choice("drive", drive_words())) {
+    robot.drive = static_cast<DriveKind>(*drive);
+  } else if (!parsed->contains("drive")) {
+    std::string known;
+    for (const std::string& word : drive_words()) known += (known.empty() ? "" : ", ") + word;
+    return Error{path + ": no key 'drive', expected one of " + known};
+  }
+  read_commands(top, robot);
+  read_controller(top, robot.controller);
+  read_motors(top, robot.motors);
+  read_body(top, robot);
+  read_steering(top, robot);
+  read_wheels(top, robot.wheels);
+  top.finish();
+  if (!errors.empty()) return errors.error();
+  if (Status s = complete_robot(&robot); !s) return Error{path + ": " + s.error().message};
+  return robot;
+}
+
+Result<GroundRobot> read_robot(const std::string& path) {
+  auto text = read_text_file(path);
+  if (!text.ok()) return text.error();
+  return parse_robot(*text, path);
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,106 @@
+// robot.toml: read, written, and refused with the place of what is wrong.
+#include "common/robot/robot_file.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "common/runs/read.h"
+#include "common/trials/files.h"
+
+namespace gapfarm {
+namespace {
+
+constexpr const char* kSkid = R"(
+drive = "skid"
+commands = ["left", "right"]
+lag = 0.0143
+delay = 0.4386
+wheel_separation = 1.08
+wheel_separation_multiplier = 1.8341
+mass = 470.0
+[wheels.left]
+radius = 0.291753
+[wheels.right]
+radius = 0.297176
+[marker]
+x = 0.05271
+y = 0.01
+yaw = -0.02
+)";
+
+TEST(RobotFile, ReadsWhatItSays) {
+  const auto robot = parse_robot(kSkid, "robot.toml");
+  ASSERT_TRUE(robot.ok()) << robot.error().message;
+  EXPECT_EQ(robot->drive, DriveKind::kSkid);
+  EXPECT_EQ(robot->command, CommandKind::kWheelSpeeds);
+  EXPECT_EQ(robot->motors.delay_s, 0.4386);
+  EXPECT_EQ(*robot->wheel("rear_right")->radius_m, 0.297176);
+  EXPECT_EQ(robot->X_RM.theta, -0.02);
+}
+
+TEST(RobotFile, WhatIsWrittenReadsBackAsTheSameRobot) {
+  const auto robot = parse_robot(kSkid, "robot.toml");
+  ASSERT_TRUE(robot.ok());
+  const std::string text = format_robot(*robot);
+  const auto again = parse_robot(text, "again.toml");
+  ASSERT_TRUE(again.ok()) << again.error().message;
+  EXPECT_EQ(format_robot(*again), text);
+  EXPECT_TRUE(again->notes.empty());  // nothing is assumed any more
+  EXPECT_EQ(*again->wheel("front_left")->x_m, *robot->wheel("front_left")->x_m);
+}
+
+TEST(RobotFile, GuessesWhatCommandsAreFromTheirNames) {
+  const auto twist = parse_robot(
+      "drive = \"differential\"\ncommands = [\"v\", \"omega\"]\nwheel_separation = 0.3\n", "r");
+  ASSERT_TRUE(twist.ok()) << twist.error().message;
+  EXPECT_EQ(twist->command, CommandKind::kTwist);
+}
+
+TEST(RobotFile, NamesThePlaceOfWhatIsWrong) {
+  const auto robot = parse_robot("drive = \"skidd\"\nwheel_seperation = 1\n", "robot.toml");
+  ASSERT_FALSE(robot.ok());
+  EXPECT_NE(robot.error().message.find("robot.toml:1:"), std::string::npos);
+  EXPECT_NE(robot.error().message.find("robot.toml:2:"), std::string::npos);
+  EXPECT_NE(robot.error().message.find("wheel_separation"), std::string::npos);
+}
+
+class Runs : public ::testing::Test {
+ protected:
+  std::string write(const std::string& name, const std::string& text) {
+    const auto path =
+        std::filesystem::temp_directory_path() /
+        (std::string(::testing::UnitTest::GetInstance()->current_test_info()->name()) + "_" + name);
+    EXPECT_TRUE(write_file_atomically(path.string(), text).ok());
+    return path.string();
+  }
+  const std::vector<std::string> channels_ = {"left", "right"};
+};
+
+TEST_F(Runs, AreReadByRun) {
+  const auto log =
+      read_runs(write("c.csv", "run,t,right,left,extra\n1,0,2,1,9\n1,0.5,0,0,9\n2,7,3,3,9\n"),
+                write("p.csv", "run,t,x,y,theta\n1,0,0,0,0\n1,0.1,1,2,7\n2,7,0,0,0\n"), channels_);
+  ASSERT_TRUE(log.ok()) << log.error().message;
+  ASSERT_EQ(log->runs.size(), 2u);
+  EXPECT_EQ(log->runs[0].commands[0].values, (std::vector<double>{1, 2}));
+  EXPECT_NEAR(log->runs[0].poses[1].X_WM.theta, 7 - 2 * 3.14159265358979, 1e-9);
+  EXPECT_EQ(log->runs[1].run, "2");
+}
+
+TEST_F(Runs, TimesThatGoBackAreNamedByPlace) {
+  const auto log = read_runs(write("c.csv", "run,t,left,right\n1,1,2,1\n1,0.5,0,0\n"),
+                             write("p.csv", "run,t,x,y,theta\n1,0,0,0,0\n"), channels_);
+  ASSERT_FALSE(log.ok());
+  EXPECT_NE(log.error().message.find("c.csv:3:3"), std::string::npos) << log.error().message;
+}
+
+TEST_F(Runs, ARunWithoutCommandsIsRefused) {
+  const auto log = read_runs(write("c.csv", "run,t,left,right\n1,1,2,1\n"),
+                             write("p.csv", "run,t,x,y,theta\n3,0,0,0,0\n"), channels_);
+  ASSERT_FALSE(log.ok());
+  EXPECT_NE(log.error().message.find("'3'"), std::string::npos) << log.error().message;
+}
+
+}  // namespace
+}  // namespace gapfarm
