@@ -34,6 +34,7 @@ class Cutter {
   Result<std::vector<CsvRow>> cut() {
     if (text_.substr(0, kByteOrderMark.size()) == kByteOrderMark) at_ = kByteOrderMark.size();
     line_start_ = at_;
+    skip_comments();
     std::vector<CsvRow> rows;
     while (at_ < text_.size()) {
       CsvRow row;
@@ -56,6 +57,14 @@ class Cutter {
     if (at_ < text_.size()) ++at_;
     ++line_;
     line_start_ = at_;
+  }
+  void skip_comments() {
+    while (at_ < text_.size()) {
+      const std::string_view line = text_.substr(at_, text_.find('\n', at_) - at_);
+      if (!is_comment(line)) return;
+      at_ += line.size();
+      next_line();
+    }
   }
   void skip_blanks() {
     while (at_ < text_.size() && is_blank(text_[at_])) ++at_;
@@ -192,6 +201,11 @@ std::string quoted_word(std::string_view word) {
   return text + (word.size() > kLongest ? "...'" : "'");
 }
 
+bool is_comment(std::string_view line) {
+  if (line.empty() || line[0] != '#') return false;
+  return line.substr(0, 6) == "# log:" || line.find(',') == line.npos;
+}
+
 Result<std::vector<CsvRow>> parse_csv(std::string_view text, std::string_view file) {
   Status encoding = check_utf8(text, file);
   if (!encoding.ok()) return encoding.error();
@@ -238,6 +252,42 @@ std::string format_double(double value) {
   return code == std::errc{} ? std::string(buffer, end) : std::string("nan");
 }
 
+namespace {
+
+std::string in_words(const std::vector<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + quoted_word(name);
+  return text;
+}
+
+// `names`: of the row's columns.
+Error missing_columns(const CsvRow& row, const std::vector<std::string>& names,
+                      const std::vector<std::string>& missing,
+                      std::span<const std::string> required, std::string_view file,
+                      std::string_view format) {
+  std::vector<std::string> others;
+  for (const std::string& name : names) {
+    const bool known = std::find(required.begin(), required.end(), name) != required.end();
+    if (!known) others.push_back(name);
+  }
+  // A column with nearly that name is most likely a slip of the pen: point at it.
+  const std::string near = nearest_word(missing.front(), others);
+  if (missing.size() == 1 && !near.empty()) {
+    const auto i = std::find(names.begin(), names.end(), near) - names.begin();
+    return text_error(file, row.fields[static_cast<std::size_t>(i)].place,
+                      "column " + quoted_word(near) + " but no column '" + missing.front() + "'",
+                      "column '" + missing.front() + "'", "rename it");
+  }
+  const std::string columns = (missing.size() == 1 ? "column " : "columns ") + in_words(missing);
+  const std::string remedy =
+      others.empty() ? (missing.size() == 1 ? "add it to every row" : "add them to every row")
+                     : "columns here beyond those of the format: " + in_words(others) +
+                           "; rename what is one of them, or add it to every row";
+  return text_error(file, row.end, "no " + columns, columns + " of " + std::string(format), remedy);
+}
+
+}  // namespace
+
 Result<CsvHeader> CsvHeader::match(const CsvRow& row, std::span<const std::string> required,
                                    std::string_view file, std::string_view format) {
   CsvHeader header;
@@ -254,24 +304,13 @@ Result<CsvHeader> CsvHeader::match(const CsvRow& row, std::span<const std::strin
     }
     names.push_back(field.text);
   }
+  std::vector<std::string> missing;
   for (const std::string& name : required) {
     const auto found = std::find(names.begin(), names.end(), name);
-    if (found != names.end()) {
-      header.positions_.push_back(static_cast<std::size_t>(found - names.begin()));
-      continue;
-    }
-    // A column with nearly that name is most likely a slip of the pen: point at it.
-    const std::string near = nearest_word(name, names);
-    const bool near_is_known = std::find(required.begin(), required.end(), near) != required.end();
-    if (!near.empty() && !near_is_known) {
-      const auto i = std::find(names.begin(), names.end(), near) - names.begin();
-      return text_error(file, row.fields[static_cast<std::size_t>(i)].place,
-                        "column " + quoted_word(near) + " but no column '" + name + "'",
-                        "column '" + name + "'", "rename it");
-    }
-    return text_error(file, row.end, "no column '" + name + "'",
-                      "column '" + name + "' of " + std::string(format), "add it to every row");
+    if (found == names.end()) missing.push_back(name);
+    header.positions_.push_back(static_cast<std::size_t>(found - names.begin()));
   }
+  if (!missing.empty()) return missing_columns(row, names, missing, required, file, format);
   for (std::size_t i = 0; i < names.size(); ++i) {
     if (std::find(required.begin(), required.end(), names[i]) == required.end()) {
       header.extra_.push_back(i);
@@ -292,9 +331,10 @@ Status check_width(const CsvRow& row, const CsvHeader& header, std::string_view 
 
 void CsvRowReader::fail(std::size_t column, std::string_view found, std::string_view expected,
                         std::string_view remedy) {
-  if (error_) return;
-  error_ = text_error(file_, field(column).place, names_[column] + " " + std::string(found),
-                      expected, remedy);
+  if (std::find(failed_.begin(), failed_.end(), column) != failed_.end()) return;
+  failed_.push_back(column);
+  errors_.push_back(text_error(file_, field(column).place,
+                               names_[column] + " " + std::string(found), expected, remedy));
 }
 
 std::string CsvRowReader::word(std::size_t column) {

@@ -31,14 +31,18 @@ struct CsvField {
   TextPlace place;   // of its first byte
 };
 
+// A line that begins with '#' before the header.  A header whose first name begins so is none: it
+// has commas, which only a mark ("# log: ...", mark.h) may have too.
+bool is_comment(std::string_view line);
+
 struct CsvRow {
   std::vector<CsvField> fields;
   TextPlace end;  // just past its last byte
 };
 
 // All rows; a byte-order mark, CRLF and empty lines are accepted, a quoted field may hold commas,
-// line breaks and doubled quotes.  Errors: unclosed quote, text after a closing quote,
-// bytes that are not UTF-8.
+// line breaks and doubled quotes.  Lines at the very beginning that are comments are left out.
+// Errors: unclosed quote, text after a closing quote, bytes that are not UTF-8.
 Result<std::vector<CsvRow>> parse_csv(std::string_view text, std::string_view file);
 
 // `text` as a field, quoted when it must be.
@@ -55,7 +59,8 @@ std::string format_double(double value);
 // The columns of a header row.  Columns beyond the `required` ones are the `extra`.
 class CsvHeader {
  public:
-  // Errors: a missing, empty or repeated column.  `format` names the file's format for the error.
+  // Errors: missing (all of them are named), empty or repeated columns.  `format` names the file's
+  // format for the error.
   static Result<CsvHeader> match(const CsvRow& row, std::span<const std::string> required,
                                  std::string_view file, std::string_view format);
 
@@ -70,8 +75,8 @@ class CsvHeader {
   std::vector<std::size_t> extra_;
 };
 
-// Typed fields of one row.  The first error sticks, and later reads return zeros, so that a caller
-// reads everything and then asks once.
+// Typed fields of one row.  What is wrong is kept, the first mistake of each column, and reading it
+// gives zero, so that a caller reads everything and then asks once.
 class CsvRowReader {
  public:
   // REQUIRES: the row has as many fields as the header is wide (check_width).
@@ -91,14 +96,17 @@ class CsvRowReader {
 
   void fail(std::size_t column, std::string_view found, std::string_view expected,
             std::string_view remedy = {});
-  const std::optional<Error>& error() const { return error_; }
+  const std::vector<Error>& errors() const { return errors_; }
+  // The first of them; null when there is none.
+  const Error* error() const { return errors_.empty() ? nullptr : &errors_.front(); }
 
  private:
   const CsvRow& row_;
   const CsvHeader& header_;
   std::span<const std::string> names_;
   std::string_view file_;
-  std::optional<Error> error_;
+  std::vector<Error> errors_;
+  std::vector<std::size_t> failed_;  // their columns
 };
 
 // OK when the row has as many fields as the header.

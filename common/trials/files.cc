@@ -58,7 +58,33 @@ Status write_in_place(const std::string& path, std::string_view bytes) {
 
 }  // namespace
 
-Status write_file_atomically(const std::string& given, std::string_view bytes) {
+namespace {
+
+// Gives the finished file its name.
+Status put_in_place(const std::string& temporary, const std::string& path, IfThere if_there) {
+  if (if_there == IfThere::kKeep) {
+    // A second name, then away with the first: unlike a rename, that never replaces.
+    if (::link(temporary.c_str(), path.c_str()) == 0) {
+      ::unlink(temporary.c_str());
+      return {};
+    }
+    // Not so on a file system without second names, where a rename has to do.
+    std::error_code code;
+    if (errno == EEXIST || std::filesystem::exists(path, code)) {
+      return Error{path +
+                   ": has appeared meanwhile and stays; what was to be written there is in " +
+                   temporary};
+    }
+  }
+  if (::rename(temporary.c_str(), path.c_str()) == 0) return {};
+  const Error error{path + ": cannot be replaced: " + std::strerror(errno)};
+  ::unlink(temporary.c_str());
+  return error;
+}
+
+}  // namespace
+
+Status write_file_atomically(const std::string& given, std::string_view bytes, IfThere if_there) {
   std::error_code code;
   // Through a link, so that the link stays one.
   std::filesystem::path target(given);
@@ -93,11 +119,11 @@ Status write_file_atomically(const std::string& given, std::string_view bytes) {
   ::umask(mask);
   ::fchmod(fd, 0666 & ~mask);
   ::close(fd);
-  if (written.ok() && ::rename(temporary.c_str(), path.c_str()) != 0) {
-    written = Error{path + ": cannot be replaced: " + std::strerror(errno)};
+  if (!written.ok()) {
+    ::unlink(temporary.c_str());
+    return written;
   }
-  if (!written.ok()) ::unlink(temporary.c_str());
-  return written;
+  return put_in_place(temporary, path, if_there);
 }
 
 }  // namespace gapfarm

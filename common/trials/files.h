@@ -11,8 +11,14 @@ namespace gapfarm {
 // The bytes of a file.  Errors name the path and say whether it is missing, a folder or unreadable.
 Result<std::string> read_text_file(const std::string& path);
 
+// What becomes of a file in the way: replaced, or kept.  Kept, the new one stays beside it, under a
+// name that the error tells.
+enum class IfThere { kReplace, kKeep };
+
 // Writes beside `path` and renames, so a reader sees the old file or the new one, never a part.
-// Missing folders of `path` are made.
-Status write_file_atomically(const std::string& path, std::string_view bytes);
+// Missing folders of `path` are made.  Links are followed; devices and pipes are written to.  What
+// a command is asked to write goes through its Outputs (master/cli), which come here.
+Status write_file_atomically(const std::string& path, std::string_view bytes,
+                             IfThere if_there = IfThere::kReplace);
 
 }  // namespace gapfarm

@@ -8,13 +8,20 @@
 namespace gapfarm {
 namespace {
 
-// The first line that is not blank, without its byte-order mark.
+// The first line that is not blank, without its byte-order mark; the line after a log's comments.
+// Of text that may be TOML a comment is a line like others.
 std::string_view first_line(std::string_view text) {
   if (text.substr(0, 3) == "\xEF\xBB\xBF") text.remove_prefix(3);
-  const std::size_t begin = text.find_first_not_of(" \t\r\n");
-  if (begin == text.npos) return {};
-  text.remove_prefix(begin);
-  return text.substr(0, text.find_first_of("\r\n"));
+  const bool assigns = text.find(" = ") != text.npos;
+  while (true) {
+    const std::size_t begin = text.find_first_not_of(" \t\r\n");
+    if (begin == text.npos) return {};
+    text.remove_prefix(begin);
+    const std::string_view line = text.substr(0, text.find_first_of("\r\n"));
+    const bool mark = line.substr(0, 6) == "# log:";
+    if (!is_comment(line) || (assigns && !mark)) return line;
+    text.remove_prefix(line.size());
+  }
 }
 
 bool has(std::string_view text, std::string_view part) { return text.find(part) != text.npos; }

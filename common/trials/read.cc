@@ -3,22 +3,22 @@
 #include <algorithm>
 #include <filesystem>
 #include <map>
-#include <set>
 #include <utility>
 
 #include "common/trials/bbautotune.h"
-#include "common/trials/columns.h"
-#include "common/trials/csv.h"
 #include "common/trials/files.h"
 #include "common/trials/format.h"
+#include "common/trials/mark.h"
+#include "common/trials/mistakes.h"
+#include "common/trials/samples.h"
 #include "common/trials/trial_parser.h"
 
 namespace gapfarm {
 namespace {
 
-std::string session_of(const std::string& path) {
-  return std::filesystem::path(path).stem().string();
-}
+namespace fs = std::filesystem;
+
+std::string session_of(const std::string& path) { return fs::path(path).stem().string(); }
 
 // Puts `part` behind `log`.  Columns that only one of them has stay empty in the other's trials.
 void append(TrialLog part, TrialLog& log) {
@@ -49,226 +49,228 @@ void join_sessions(TrialLog& log) {
   });
 }
 
-// What lies beside a log and comes to its trials by (session, trial).
-struct Companion {
-  const char* file;
-  bool required;
-  Status (*parse)(std::string_view text, const std::string& file, TrialLog& log);
-};
-constexpr Companion kPathsBeside{"paths.csv", false, parse_paths};
-constexpr Companion kTipsBeside{"tips.csv", true, parse_tips};
-
 // The formats that are read as trials.
 struct ReadableLog {
   TextFormat format;
-  Result<TrialLog> (*parse)(std::string_view text, const std::string& file,
-                            std::span<const std::string> commands);
-  std::vector<Companion> beside;
+  TrialLog (*parse)(std::string_view text, const std::string& file,
+                    std::span<const std::string> commands, Mistakes& mistakes);
+  bool tips;   // whether a tips.csv must lie beside it
+  bool paths;  // whether a paths.csv may
 };
 
-Result<TrialLog> parse_run(std::string_view text, const std::string& file,
-                           std::span<const std::string> commands) {
-  return parse_bbautotune(text, file, session_of(file), commands);
+TrialLog parse_trial_rows(std::string_view text, const std::string& file,
+                          std::span<const std::string> commands, Mistakes& mistakes) {
+  return parse_log(kTrialLogForm, text, file, commands, mistakes);
+}
+
+TrialLog parse_push_rows(std::string_view text, const std::string& file,
+                         std::span<const std::string> commands, Mistakes& mistakes) {
+  return parse_log(kPushLogForm, text, file, commands, mistakes);
+}
+
+TrialLog parse_run(std::string_view text, const std::string& file,
+                   std::span<const std::string> commands, Mistakes& mistakes) {
+  auto log = parse_bbautotune(text, file, session_of(file), commands);
+  if (log.ok()) return *std::move(log);
+  mistakes.add_file(log.error());
+  return {};
 }
 
 const ReadableLog& readable_log(TextFormat format) {
   // The first is what another format is told to be.
-  static const std::vector<ReadableLog> kLogs = {
-      {TextFormat::kTrialLog, parse_trials, {kPathsBeside}},
-      {TextFormat::kPushLog, parse_pushes, {kTipsBeside, kPathsBeside}},
-      {TextFormat::kBbautotune, parse_run, {}},
+  static const ReadableLog kLogs[] = {
+      {TextFormat::kTrialLog, parse_trial_rows, false, true},
+      {TextFormat::kPushLog, parse_push_rows, true, true},
+      {TextFormat::kBbautotune, parse_run, false, false},
   };
   for (const ReadableLog& log : kLogs) {
     if (log.format == format) return log;
   }
-  return kLogs.front();
+  return kLogs[0];
 }
 
-// Reads what lies beside each file, once a folder.
-Status read_beside(const std::vector<std::pair<std::string, const ReadableLog*>>& files,
-                   TrialLog& log) {
-  std::set<std::filesystem::path> seen;
-  for (const auto& [file, form] : files) {
-    for (const Companion& companion : form->beside) {
-      const std::filesystem::path beside =
-          std::filesystem::path(file).parent_path() / companion.file;
-      std::error_code code;
-      if (!seen.insert(beside).second) continue;
-      if (!std::filesystem::exists(beside, code)) {
-        if (!companion.required) continue;
-        return Error{file + ": found no " + companion.file + " beside it, expected one, since " +
-                     format_name(form->format) + " is of no use without; put them together"};
-      }
-      auto text = read_text_file(beside.string());
-      if (!text.ok()) return text.error();
-      Status status = companion.parse(*text, beside.string(), log);
-      if (!status.ok()) return status;
-    }
-  }
-  return {};
-}
-
-// Rows (session, trial, t, ...) of a file beside a log, to the trials that they name.
-template <class Sample>
-struct SampleForm {
-  TextFormat format;
-  const char* expected;
-  const char* rows_are;  // "path", for the note on rows without a trial
-  const std::vector<std::string>& (*columns)();
-  Sample (*read)(CsvRowReader& reader);
-  std::vector<Sample> Trial::*member;
-  bool times_repeat;  // whether two samples may have one time
+// One file of several that are to be one log.
+struct Part {
+  std::string file;
+  std::string text;
+  const ReadableLog* form = nullptr;
+  TrialLog log;
 };
 
-template <class Sample>
-Status parse_samples(const SampleForm<Sample>& form, std::string_view text, const std::string& file,
-                     TrialLog& log) {
-  const TextFormat format = sniff_format(text);
-  if (format != form.format) return wrong_format(file, format, form.expected);
-  auto rows = parse_csv(text, file);
-  if (!rows.ok()) return rows.error();
-  auto header = CsvHeader::match(rows->front(), form.columns(), file, form.expected);
-  if (!header.ok()) return header.error();
+// The companion `name` of each folder with parts that may have one, with those parts.
+std::map<fs::path, std::vector<Part*>> companions(std::vector<Part>& parts, const char* name,
+                                                  bool ReadableLog::*wanted) {
+  std::map<fs::path, std::vector<Part*>> all;
+  for (Part& part : parts) {
+    if (part.form->*wanted) all[fs::path(part.file).parent_path() / name].push_back(&part);
+  }
+  return all;
+}
 
-  std::map<TrialKey, std::size_t> index;
-  for (std::size_t i = 0; i < log.trials.size(); ++i) {
-    index.emplace(TrialKey{log.trials[i].session, log.trials[i].trial}, i);
-  }
-  std::map<TrialKey, std::vector<Sample>> samples;
-  std::size_t strangers = 0, first_stranger = 0;
-  for (std::size_t i = 1; i < rows->size(); ++i) {
-    const CsvRow& row = (*rows)[i];
-    Status width = check_width(row, *header, file);
-    if (!width.ok()) return width;
-    CsvRowReader reader(row, *header, form.columns(), file);
-    const TrialKey key{reader.word(kPathSession), reader.integer(kPathTrial)};
-    Sample sample = form.read(reader);
-    std::vector<Sample>& path = samples[key];
-    const bool late = path.empty() || sample.t_s > path.back().t_s ||
-                      (form.times_repeat && sample.t_s == path.back().t_s);
-    if (!late) {
-      reader.fail(kPathTime,
-                  format_double(sample.t_s) + " after " + format_double(path.back().t_s) + " in " +
-                      key_text(key),
-                  form.times_repeat ? "times that do not decrease within a trial"
-                                    : "times that increase within a trial",
-                  "sort the rows by time");
+using AddSamples = void (*)(std::string_view text, const std::string& file,
+                            const std::vector<TrialLog*>& logs, Mistakes& mistakes);
+
+void add_file(const std::string& file, const std::vector<Part*>& parts, AddSamples add,
+              std::vector<std::string>& read, Mistakes& mistakes) {
+  const auto text = read_text_file(file);
+  if (!text.ok()) return mistakes.add_file(text.error());
+  std::vector<TrialLog*> logs;
+  for (Part* part : parts) logs.push_back(&part->log);
+  read.push_back(file);
+  add(*text, file, logs, mistakes);
+}
+
+void read_tips(std::vector<Part>& parts, std::vector<std::string>& read, Mistakes& mistakes) {
+  for (const auto& [file, of] : companions(parts, "tips.csv", &ReadableLog::tips)) {
+    std::error_code code;
+    if (fs::exists(file, code)) {
+      add_file(file.string(), of, add_tips, read, mistakes);
+      continue;
     }
-    if (reader.error()) return *reader.error();
-    path.push_back(sample);
-    if (index.count(key) == 0 && strangers++ == 0) first_stranger = row.fields[0].place.line;
+    const Part& first = *of.front();
+    mistakes.add_file(Error{first.file + ": found no tips.csv beside it, expected one, since " +
+                            format_name(first.form->format) +
+                            " is of no use without; put them together"});
   }
-  for (const auto& [key, at] : index) {
-    if (samples.count(key) != 0 && !(log.trials[at].*form.member).empty()) {
-      return Error{file + ": found a " + form.rows_are + " of " + key_text(key) +
-                   ", which has one from another file; remove one of them"};
+}
+
+// A paths.csv that does not say that it belongs to a log may be anybody's: a simulation's, say.
+void read_paths_beside(std::vector<Part>& parts, TrialLog& log, Mistakes& mistakes) {
+  for (const auto& [file, of] : companions(parts, "paths.csv", &ReadableLog::paths)) {
+    std::error_code code;
+    if (!fs::exists(file, code)) continue;
+    const auto text = read_text_file(file.string());
+    if (!text.ok()) {
+      mistakes.add_file(text.error());
+      continue;
     }
+    const std::vector<LogMark> marks = log_marks(*text);
+    std::vector<Part*> owners;
+    bool stale = false;
+    for (Part* part : of) {
+      const Belonging belongs = belonging(marks, part->file, part->text);
+      if (belongs == Belonging::kYes) owners.push_back(part);
+      stale = stale || belongs == Belonging::kStale;
+    }
+    if (!owners.empty()) {
+      add_file(file.string(), owners, add_paths, log.files, mistakes);
+      continue;
+    }
+    const std::string name = fs::path(of.front()->file).filename().string();
+    log.notes.push_back(file.string() + ": not read, since " +
+                        (stale           ? name + " has changed since it was written"
+                         : marks.empty() ? "it does not say which log it belongs to"
+                                         : "it says that it belongs to " + marks.front().file) +
+                        "; --paths " + file.string() + " reads it all the same" +
+                        (marks.empty() ? ", or begin it with the line '# log: " + name + "'" : ""));
   }
-  for (auto& [key, path] : samples) {
-    const auto at = index.find(key);
-    if (at != index.end()) log.trials[at->second].*form.member = std::move(path);
+}
+
+void name_sessions(Part& part) {
+  for (Trial& trial : part.log.trials) {
+    trial.session = session_of(part.file) + "/" + trial.session;
   }
-  if (strangers > 0) {
-    log.notes.push_back(file + ":" + std::to_string(first_stranger) + ":1: left out " +
-                        std::to_string(strangers) + " " + form.rows_are +
-                        " rows of trials that are not in the log");
+}
+
+// Puts the parts together.
+Status join(std::vector<Part> parts, TrialLog& log) {
+  std::map<TrialKey, std::string> file_of;
+  std::map<std::string, std::string> session_file;
+  bool split = false;
+  for (Part& part : parts) {
+    for (const Trial& trial : part.log.trials) {
+      const TrialKey key{trial.session, trial.trial};
+      const auto [at, is_new] = file_of.emplace(key, part.file);
+      if (!is_new) {
+        return Error{part.file + ": found " + key_text(key) + " again, first in " + at->second +
+                     ", expected each (session, trial) once; name a file once, and give different "
+                     "runs different session names, or let --session-prefix put the files' names "
+                     "before them"};
+      }
+      const auto [owner, first] = session_file.emplace(trial.session, part.file);
+      split = split || (!first && owner->second != part.file);
+    }
+    append(std::move(part.log), log);
   }
+  if (split) join_sessions(log);
   return {};
 }
 
-double sample_time(CsvRowReader& reader) {
-  return reader.number(kPathTime, -kLongestCommand_s, kLongestSession_s, "s");
+// What one text holds, for the readers of texts.
+Result<TrialLog> finished(TrialLog log, const Mistakes& mistakes) {
+  if (Status status = mistakes.status(); !status.ok()) return status.error();
+  for (std::string& note : mistakes.notes()) log.notes.push_back(std::move(note));
+  return log;
 }
 
-PathSample read_path_sample(CsvRowReader& reader) {
-  return {sample_time(reader),
-          {reader.coordinate(kPathX), reader.coordinate(kPathY), reader.angle(kPathTheta)}};
-}
-
-TipSample read_tip_sample(CsvRowReader& reader) {
-  const double t_s = sample_time(reader);
-  return {t_s, reader.coordinate(kTipX), reader.coordinate(kTipY)};
+Status add_text(std::string_view text, const std::string& file, TrialLog& log, AddSamples add) {
+  Mistakes mistakes(false);
+  add(text, file, {&log}, mistakes);
+  return mistakes.status();
 }
 
 }  // namespace
 
 Result<TrialLog> parse_trials(std::string_view text, const std::string& file,
-                              std::span<const std::string> commands) {
-  return parse_log(kTrialLogForm, text, file, commands);
+                              std::span<const std::string> commands, const ReadOptions& options) {
+  Mistakes mistakes(options.skip_invalid);
+  return finished(parse_trial_rows(text, file, commands, mistakes), mistakes);
 }
 
 Result<TrialLog> parse_pushes(std::string_view text, const std::string& file,
                               std::span<const std::string> commands) {
-  return parse_log(kPushLogForm, text, file, commands);
+  Mistakes mistakes(false);
+  return finished(parse_push_rows(text, file, commands, mistakes), mistakes);
 }
 
 Status parse_paths(std::string_view text, const std::string& file, TrialLog& log) {
-  const SampleForm<PathSample> form{TextFormat::kPaths,
-                                    "the paths of a trial log (columns session,trial,t,x,y,theta)",
-                                    "path",
-                                    path_columns,
-                                    read_path_sample,
-                                    &Trial::path,
-                                    true};
-  return parse_samples(form, text, file, log);
+  return add_text(text, file, log, add_paths);
 }
 
 Status parse_tips(std::string_view text, const std::string& file, TrialLog& log) {
-  const SampleForm<TipSample> form{TextFormat::kTips,
-                                   "the finger paths of a push log (columns session,trial,t,x,y)",
-                                   "tip",
-                                   tip_columns,
-                                   read_tip_sample,
-                                   &Trial::tip,
-                                   false};
-  return parse_samples(form, text, file, log);
+  return add_text(text, file, log, add_tips);
 }
 
 Result<TrialLog> read_trials(const std::string& path, std::span<const std::string> commands) {
-  auto text = read_text_file(path);
-  if (!text.ok()) return text.error();
-  const ReadableLog& form = readable_log(TextFormat::kTrialLog);
-  auto log = form.parse(*text, path, commands);
-  if (!log.ok()) return log;
-  Status status = read_beside({{path, &form}}, *log);
-  if (!status.ok()) return status.error();
-  return log;
+  if (auto text = read_text_file(path); text.ok()) {
+    const TextFormat format = sniff_format(*text);
+    if (format != TextFormat::kTrialLog) return wrong_format(path, format, "a trial log");
+  }
+  return read_trial_files(std::vector<std::string>{path}, commands);
 }
 
 Result<TrialLog> read_trial_files(std::span<const std::string> paths,
-                                  std::span<const std::string> commands) {
+                                  std::span<const std::string> commands,
+                                  const ReadOptions& options) {
   if (paths.empty()) {
     return Error{"no trial files; name some with --trials or as 'trials' in the config"};
   }
   TrialLog log;
-  std::map<TrialKey, std::string> file_of;
-  std::map<std::string, std::string> session_file;
-  std::vector<std::pair<std::string, const ReadableLog*>> files;
-  bool split = false;
+  Mistakes mistakes(options.skip_invalid);
+  std::vector<Part> parts;
   for (const std::string& path : paths) {
     auto text = read_text_file(path);
-    if (!text.ok()) return text.error();
-    const ReadableLog& form = readable_log(sniff_format(*text));
-    auto part = form.parse(*text, path, commands);
-    if (!part.ok()) return part;
-    files.emplace_back(path, &form);
-    for (const Trial& trial : part->trials) {
-      const TrialKey key{trial.session, trial.trial};
-      const auto [at, is_new] = file_of.emplace(key, path);
-      if (!is_new) {
-        return Error{path + ": found " + key_text(key) + " again, first in " + at->second +
-                     ", expected each (session, trial) once; name a file once, and give "
-                     "different runs different session names"};
-      }
-      const auto [owner, first] = session_file.emplace(trial.session, path);
-      split = split || (!first && owner->second != path);
+    if (!text.ok()) {
+      mistakes.add_file(text.error());
+      continue;
     }
-    append(std::move(*part), log);
+    Part part{path, *std::move(text), nullptr, {}};
+    part.form = &readable_log(sniff_format(part.text));
+    part.log = part.form->parse(part.text, path, commands, mistakes);
+    log.files.push_back(path);
+    parts.push_back(std::move(part));
   }
-  if (split) join_sessions(log);
-  Status status = read_beside(files, log);
-  if (!status.ok()) return status.error();
-  return log;
+  read_tips(parts, log.files, mistakes);
+  if (options.paths.empty()) read_paths_beside(parts, log, mistakes);
+  std::vector<Part*> all;
+  for (Part& part : parts) all.push_back(&part);
+  for (const std::string& file : options.paths) {
+    add_file(file, all, add_paths, log.files, mistakes);
+  }
+  if (Status status = mistakes.status(); !status.ok()) return status.error();
+  if (options.name_sessions) std::for_each(parts.begin(), parts.end(), name_sessions);
+  if (Status status = join(std::move(parts), log); !status.ok()) return status.error();
+  return finished(std::move(log), mistakes);
 }
 
 }  // namespace gapfarm

@@ -1,21 +1,33 @@
-// Reads trial logs (docs/formats.md).  Nothing is half-read: a log comes back whole or not at all.
+// Reads trial logs (docs/formats.md).  A log comes back whole or not at all, unless the user wants
+// rows with mistakes left out.
 #pragma once
 
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "common/base/result.h"
 #include "common/trials/trial.h"
 
 namespace gapfarm {
 
-// `commands`: the scenario's command names; another command in a log is an error.  Every error
-// reads "file:line:column: found X, expected Y; remedy".
+struct ReadOptions {
+  bool skip_invalid = false;   // leave rows with mistakes out, with a note for each
+  bool name_sessions = false;  // put a file's name before its sessions': "monday/s1"
+  // Files of paths that are read whatever they say; a paths.csv beside a log is read when its mark
+  // names the log (mark.h), else a note says that it was not.
+  std::vector<std::string> paths;
+};
+
+// `commands`: the scenario's command names; another command in a log is an error.  Every mistake
+// reads "file:line:column: found X, expected Y; remedy"; an Error holds all of them, a line each,
+// of many the first twenty and their number.
 
 // The text of a trials.csv.  `file` stands in the errors.
 Result<TrialLog> parse_trials(std::string_view text, const std::string& file,
-                              std::span<const std::string> commands);
+                              std::span<const std::string> commands,
+                              const ReadOptions& options = {});
 
 // The text of a pushes.csv, without its tips.  `commands`: the names of the pieces.
 Result<TrialLog> parse_pushes(std::string_view text, const std::string& file,
@@ -29,7 +41,7 @@ Status parse_paths(std::string_view text, const std::string& file, TrialLog& log
 // The same of a tips.csv, whose times must increase.
 Status parse_tips(std::string_view text, const std::string& file, TrialLog& log);
 
-// A trials.csv with the paths.csv beside it, when there is one.
+// A trials.csv with the paths.csv beside it that belongs to it, when there is one.
 Result<TrialLog> read_trials(const std::string& path, std::span<const std::string> commands);
 
 // Several files as one log, in the order given; each may be a trials.csv, a pushes.csv (with the
@@ -37,6 +49,7 @@ Result<TrialLog> read_trials(const std::string& path, std::span<const std::strin
 // put together in trial order.  Errors beside the formats' own: no files, a (session, trial) in two
 // files, a file of another format.
 Result<TrialLog> read_trial_files(std::span<const std::string> paths,
-                                  std::span<const std::string> commands);
+                                  std::span<const std::string> commands,
+                                  const ReadOptions& options = {});
 
 }  // namespace gapfarm

@@ -45,6 +45,8 @@ struct TrialLog {
   std::vector<std::string> extra_columns;
   // What reading left out and why, one sentence each with file:line:column; show them to the user.
   std::vector<std::string> notes;
+  // What was read for it, what lay beside the logs included.
+  std::vector<std::string> files;
 
   bool has_paths() const {
     return std::any_of(trials.begin(), trials.end(),

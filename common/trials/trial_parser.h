@@ -12,6 +12,7 @@
 #include "common/base/result.h"
 #include "common/trials/csv.h"
 #include "common/trials/format.h"
+#include "common/trials/mistakes.h"
 #include "common/trials/trial.h"
 
 namespace gapfarm {
@@ -40,8 +41,9 @@ struct LogForm {
 extern const LogForm kTrialLogForm;
 extern const LogForm kPushLogForm;
 
-// The text of such a log.  Errors as parse_trials().
-Result<TrialLog> parse_log(const LogForm& form, std::string_view text, const std::string& file,
-                           std::span<const std::string> commands);
+// The text of such a log.  What is wrong goes into `mistakes`; the trials are those of the rows in
+// which nothing is.
+TrialLog parse_log(const LogForm& form, std::string_view text, const std::string& file,
+                   std::span<const std::string> commands, Mistakes& mistakes);
 
 }  // namespace gapfarm

@@ -9,6 +9,7 @@
 #include "common/trials/columns.h"
 #include "common/trials/csv.h"
 #include "common/trials/files.h"
+#include "common/trials/mark.h"
 
 namespace gapfarm {
 namespace {
@@ -84,19 +85,8 @@ std::string format_pushes(const TrialLog& log) {
   return text;
 }
 
-// Writes the samples of all trials, or makes sure that no other log's are read for them.
-Status write_beside(const TrialLog& log, const std::string& path, const char* name, bool any,
-                    std::string (*format)(const TrialLog&)) {
-  const std::filesystem::path beside = std::filesystem::path(path).parent_path() / name;
-  if (beside == std::filesystem::path(path)) {
-    return Error{path + ": " + name + " lies beside a log and is not one; choose another name"};
-  }
-  if (any) return write_file_atomically(beside.string(), format(log));
-  if (std::filesystem::exists(beside)) {
-    return Error{beside.string() + ": paths of another log would be read with " + path +
-                 "; remove them or write to another folder"};
-  }
-  return {};
+std::string beside(const std::string& path, const char* name) {
+  return (std::filesystem::path(path).parent_path() / name).string();
 }
 
 }  // namespace
@@ -139,17 +129,37 @@ std::string format_tips(const TrialLog& log) {
   return text;
 }
 
-Status write_trials(const TrialLog& log, const std::string& path) {
-  Status good = check(log, path);
-  if (!good.ok()) return good;
-  // These first: a reader that finds the new trials then finds what belongs to them too.
-  Status paths = write_beside(log, path, "paths.csv", log.has_paths(), format_paths);
-  if (!paths.ok()) return paths;
-  if (log.has_tips()) {
-    Status tips = write_beside(log, path, "tips.csv", true, format_tips);
-    if (!tips.ok()) return tips;
+std::vector<std::string> trial_file_names(const std::string& path, bool paths, bool tips) {
+  std::vector<std::string> names = {path};
+  if (paths) names.push_back(beside(path, "paths.csv"));
+  if (tips) names.push_back(beside(path, "tips.csv"));
+  return names;
+}
+
+Result<std::vector<TrialFile>> trial_files(const TrialLog& log, const std::string& path) {
+  if (Status good = check(log, path); !good.ok()) return good.error();
+  const std::string name = std::filesystem::path(path).filename().string();
+  if (name == "paths.csv" || name == "tips.csv") {
+    return Error{path + ": " + name + " lies beside a log and is not one; choose another name"};
   }
-  return write_file_atomically(path, format_trials(log));
+  // The log last: a reader that finds it then finds what belongs to it too.
+  std::vector<TrialFile> files;
+  std::string text = format_trials(log);
+  if (log.has_paths()) {
+    files.push_back({beside(path, "paths.csv"), format_mark(path, text) + format_paths(log)});
+  }
+  if (log.has_tips()) files.push_back({beside(path, "tips.csv"), format_tips(log)});
+  files.push_back({path, std::move(text)});
+  return files;
+}
+
+Status write_trials(const TrialLog& log, const std::string& path) {
+  const auto files = trial_files(log, path);
+  if (!files.ok()) return files.error();
+  for (const TrialFile& file : *files) {
+    if (Status written = write_file_atomically(file.path, file.text); !written.ok()) return written;
+  }
+  return {};
 }
 
 }  // namespace gapfarm

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "common/base/result.h"
 #include "common/trials/trial.h"
@@ -17,10 +18,21 @@ std::string format_paths(const TrialLog& log);
 // The text of a tips.csv.
 std::string format_tips(const TrialLog& log);
 
-// Writes `path`, and paths.csv and tips.csv beside it when the log has them.  Each file appears
-// whole or not at all.  Errors: what would not read back (an empty session, extra values without a
-// column, a repeated trial, a number that is not finite), a paths.csv of another log in the way,
-// the file system's own.
+struct TrialFile {
+  std::string path;
+  std::string text;
+};
+
+// The files that a log at `path` is made of, in the order to write them: paths.csv, marked as this
+// log's (mark.h), and tips.csv beside it when it has them, then `path` itself.  Errors: what would
+// not read back (an empty session, extra values without a column, a repeated trial, a number that
+// is not finite), a path named like what lies beside a log.
+Result<std::vector<TrialFile>> trial_files(const TrialLog& log, const std::string& path);
+
+// Where trial_files() will put a log that is not there yet.
+std::vector<std::string> trial_file_names(const std::string& path, bool paths, bool tips);
+
+// Writes them.  Each file appears whole or not at all, in place of what is there.
 Status write_trials(const TrialLog& log, const std::string& path);
 
 }  // namespace gapfarm

@@ -107,7 +107,8 @@ TEST(ReadTrials, NamesAMissingColumn) {
 TEST(ReadTrials, NamesWhatIsNotANumber) {
   EXPECT_EQ(error_of_row("s1,0,0,forward,1,1,1,0,0.2m,0,0.25,0,0"),
             "log.csv:2:24: found y0 '0.2m', expected a number in [-10000, 10000] m; write decimals "
-            "with a point, without units");
+            "with a point, without units\n"
+            "1 mistake in 1 row: mend it, or leave such rows out with --skip-invalid");
   EXPECT_THAT(error_of_row("s1,0,0,forward,1,1,1,0,,0,0.25,0,0"),
               HasSubstr("2:24: found y0 empty, expected a number"));
   EXPECT_THAT(error_of_row("s1,0,0,forward,1,1,1,0,0x10,0,0.25,0,0"), HasSubstr("y0 '0x10'"));
@@ -147,7 +148,8 @@ TEST(ReadTrials, SuggestsACommand) {
 TEST(ReadTrials, RefusesRepeatedAndUnorderedTrials) {
   EXPECT_EQ(error_of(kHeader + "\n" + kRow + "\n" + kRow + "\n"),
             "log.csv:3:4: found trial 0 of session 's1' again, first in line 2, expected each "
-            "(session, trial) once; number the trials of a session 0, 1, 2, ...");
+            "(session, trial) once; number the trials of a session 0, 1, 2, ...\n"
+            "1 mistake in 1 row: mend it, or leave such rows out with --skip-invalid");
   EXPECT_THAT(error_of(kHeader + "\ns1,2,,forward,,,,0,0,0,0,0,0\n"
                                  "s2,0,,forward,,,,0,0,0,0,0,0\ns1,1,,forward,,,,0,0,0,0,0,0\n"),
               StartsWith("log.csv:4:4: found trial 1 after 2"));
@@ -229,7 +231,7 @@ TEST(ReadFiles, MakesOneLogOfSeveralFiles) {
       folder.write("a/early.csv", kHeader + "\n" + kRow + "\n"),
       folder.write("run7.dat", "1;2;0.5;move(25.0, 0.0, 0.0);26;2;0.5\n"),
   };
-  folder.write("a/paths.csv", "session,trial,t,x,y,theta\ns1,1,0,0,0,0\n");
+  folder.write("a/paths.csv", "# log: late.csv\nsession,trial,t,x,y,theta\ns1,1,0,0,0,0\n");
   const auto log = read_trial_files(files, kCommands);
   ASSERT_TRUE(log.ok()) << log.error().message;
   ASSERT_EQ(log->trials.size(), 3u);
@@ -239,6 +241,121 @@ TEST(ReadFiles, MakesOneLogOfSeveralFiles) {
   EXPECT_EQ(log->trials[1].path.size(), 1u);
   EXPECT_EQ(log->trials[2].session, "run7");
   EXPECT_EQ(log->trials[2].X_WS, (Pose{0.01, 0.02, 0.5}));
+}
+
+TEST(ReadTrials, NamesAllMistakesAtOnce) {
+  std::string text = kHeader + "\n";
+  for (int i = 0; i < 300; ++i) {
+    text +=
+        "s1," + std::to_string(i) + ",,forward,,,,0,0,0," + (i % 2 == 0 ? "nan" : "1") + ",0,9\n";
+  }
+  const std::string message = error_of(text);
+  EXPECT_THAT(message, StartsWith("log.csv:2:24: found x1 'nan', expected a finite number"));
+  EXPECT_THAT(message,
+              HasSubstr("; also in lines 4, 6, 8, 10, 12, 14, 16, 18, 20, 22 and 139 more\n"
+                        "log.csv:2:30: found theta1 9, expected an angle"));
+  EXPECT_THAT(message, HasSubstr("\n450 mistakes in 300 rows: mend them, or leave such rows out"));
+  EXPECT_EQ(std::count(message.begin(), message.end(), '\n'), 2);
+}
+
+// Each of another kind: a screen of them is enough.
+TEST(ReadTrials, NamesTheFirstOfManyMistakes) {
+  std::string text = kHeader + "\n";
+  for (int i = 0; i < 300; ++i) {
+    text +=
+        "s1," + std::to_string(i) + ",,forward,,,,0,0,0," + std::to_string(i + 99999) + ",0,0\n";
+  }
+  const std::string message = error_of(text);
+  EXPECT_THAT(message, HasSubstr("\nand 280 more mistakes\n300 mistakes in 300 rows: "));
+  EXPECT_EQ(std::count(message.begin(), message.end(), '\n'), 21);
+}
+
+TEST(ReadTrials, NamesAllMissingColumnsAndThoseThatMayBeMeant) {
+  const std::string message =
+      error_of("session,trial,t,command,left,right,duration,x0,y0,theta0,x1,Y,heading\n");
+  EXPECT_THAT(message, HasSubstr("found no columns 'y1', 'theta1', expected columns"));
+  EXPECT_THAT(message, HasSubstr("'Y', 'heading'; rename what is one of them"));
+}
+
+// The order of what is left counts, not that of rows which are left out.
+TEST(ReadTrials, LeavesRowsWithMistakesOut) {
+  const std::string text = kHeader +
+                           "\ns1,0,,forward,,,,0,0,0,1,0,0\n"
+                           "s1,900,,forward,,,,0,0,0,nan,0,0\n"
+                           "s1,1,,forward,,,,0,0,0,2,0,0\n"
+                           "s1,1,,forward,,,,0,0,0,3,0,0\n"
+                           "s1,2,,forward,,,,0,0\n"
+                           "s1,3,,forward,,,,0,0,0,4,0,0\n";
+  ReadOptions options;
+  options.skip_invalid = true;
+  const auto log = parse_trials(text, "log.csv", kCommands, options);
+  ASSERT_TRUE(log.ok()) << log.error().message;
+  ASSERT_EQ(log->trials.size(), 3u);
+  EXPECT_EQ(log->trials[1].X_WE.x, 2);
+  EXPECT_EQ(log->trials[2].trial, 3);
+  EXPECT_THAT(
+      log->notes,
+      ElementsAre(StartsWith("left out: log.csv:3:"), StartsWith("left out: log.csv:5:"),
+                  StartsWith("left out: log.csv:6:"), "left out 3 rows with mistakes in all"));
+  const auto none =
+      parse_trials(kHeader + "\ns1,0,,forward,,,,0,0,0,nan,0,0\n", "l", kCommands, options);
+  ASSERT_FALSE(none.ok());
+  EXPECT_THAT(none.error().message, HasSubstr("no row without a mistake"));
+}
+
+TEST(ReadFiles, NamesTheMistakesOfAllFiles) {
+  TemporaryFolder folder;
+  const std::vector<std::string> files = {
+      folder.write("a.csv", kHeader + "\ns1,0,,forward,,,,0,0,0,nan,0,0\n" + kRow + "\n"),
+      folder.path("none.csv"),
+      folder.write("b.csv", kHeader + "\ns2,0,,forward,,,,0,0,0,0,inf,0\n" + kRow + "\n")};
+  const auto log = read_trial_files(files, kCommands);
+  ASSERT_FALSE(log.ok());
+  EXPECT_THAT(log.error().message, AllOf(HasSubstr("a.csv:2:"), HasSubstr("b.csv:2:"),
+                                         HasSubstr("none.csv: no such file")));
+}
+
+TEST(ReadFiles, ReadsPathsThatSayWhoseTheyAreOrAreNamed) {
+  TemporaryFolder folder;
+  const std::vector<std::string> files = {folder.write("log.csv", kHeader + "\n" + kRow + "\n")};
+  const std::string rows = "session,trial,t,x,y,theta\ns1,0,0,0,0,0\n";
+  const auto read = [&](const std::string& mark, const ReadOptions& options = {}) {
+    folder.write("paths.csv", mark + rows);
+    auto log = read_trial_files(files, kCommands, options);
+    EXPECT_TRUE(log.ok()) << log.error().message;
+    return *std::move(log);
+  };
+  const TrialLog unmarked = read("");
+  EXPECT_FALSE(unmarked.has_paths());
+  EXPECT_THAT(unmarked.notes, ElementsAre(HasSubstr("paths.csv: not read, since it does not say")));
+  EXPECT_THAT(unmarked.files, ElementsAre(files[0]));
+  EXPECT_THAT(read("# log: other.csv\n").notes,
+              ElementsAre(HasSubstr("it says that it belongs to other.csv")));
+  EXPECT_FALSE(read("# log: log.csv 0123456789abcdef0123456789abcdef\n").has_paths());
+  const TrialLog marked = read("# recorded by hand\n# log: log.csv\n");
+  EXPECT_TRUE(marked.has_paths());
+  EXPECT_THAT(marked.files, ElementsAre(files[0], folder.path("paths.csv")));
+  ReadOptions options;
+  options.paths = {folder.write("elsewhere/way.csv", rows)};
+  const TrialLog named = read("", options);
+  EXPECT_TRUE(named.has_paths());
+  EXPECT_TRUE(named.notes.empty());
+}
+
+TEST(ReadFiles, PutsTheFilesNamesBeforeTheirSessions) {
+  TemporaryFolder folder;
+  const std::vector<std::string> files = {
+      folder.write("monday.csv", kHeader + "\n" + kRow + "\n"),
+      folder.write("tuesday.csv", kHeader + "\n" + kRow + "\n")};
+  folder.write("paths.csv", "# log: tuesday.csv\nsession,trial,t,x,y,theta\ns1,0,0,0,0,0\n");
+  ReadOptions options;
+  options.name_sessions = true;
+  const auto log = read_trial_files(files, kCommands, options);
+  ASSERT_TRUE(log.ok()) << log.error().message;
+  EXPECT_EQ(log->trials[0].session, "monday/s1");
+  EXPECT_TRUE(log->trials[0].path.empty());
+  EXPECT_EQ(log->trials[1].session, "tuesday/s1");
+  EXPECT_EQ(log->trials[1].path.size(), 1u);
 }
 
 TEST(ReadFiles, RefusesWhatCannotBeOneLog) {

@@ -115,14 +115,23 @@ TEST(WriteTrials, RefusesWhatWouldNotReadBack) {
   EXPECT_THAT(error({}), HasSubstr("no trials to write"));
 }
 
-TEST(WriteTrials, DoesNotLeaveAnotherLogsPathsBeside) {
+// Simulated paths beside a measured log once passed for measured ones.
+TEST(WriteTrials, PathsBelongToTheLogThatTheyWereWrittenWith) {
   TemporaryFolder folder;
   TrialLog log = awkward_log();
   ASSERT_TRUE(write_trials(log, folder.path("trials.csv")).ok());
+  std::filesystem::rename(folder.path("trials.csv"), folder.path("renamed.csv"));
+  const auto renamed = read_trials(folder.path("renamed.csv"), kCommands);
+  ASSERT_TRUE(renamed.ok()) << renamed.error().message;
+  EXPECT_TRUE(renamed->has_paths());
+
   log.trials[0].path.clear();
-  const Status status = write_trials(log, folder.path("trials.csv"));
-  ASSERT_FALSE(status.ok());
-  EXPECT_THAT(status.error().message, HasSubstr("paths of another log"));
+  log.trials[0].X_WE.x += 1;
+  ASSERT_TRUE(write_trials(log, folder.path("trials.csv")).ok());
+  const auto again = read_trials(folder.path("trials.csv"), kCommands);
+  ASSERT_TRUE(again.ok()) << again.error().message;
+  EXPECT_FALSE(again->has_paths());
+  EXPECT_THAT(again->notes, testing::ElementsAre(HasSubstr("trials.csv has changed since")));
 }
 
 TEST(WriteFile, NamesTheFileThatCannotBeWritten) {
