@@ -19,7 +19,8 @@ void read_kinds(TomlSection& section, const char* key, const std::vector<std::st
                 std::vector<Kind>& to) {
   const auto found = section.choices(key, words);
   if (!found) return;
-  if (found->empty()) section.fail(key, std::string(key) + " is empty, expected at least one");
+  const std::string name = key;
+  if (found->empty()) section.fail(key, name + " is empty, expected at least one");
   to.clear();
   for (const std::size_t index : *found) to.push_back(static_cast<Kind>(index));
 }
@@ -69,6 +70,37 @@ void check_commands(TomlSection& section, const std::vector<CommandSpec>& comman
   if (!found) return;
   simulate.commands.clear();
   for (const std::size_t index : *found) simulate.commands.push_back(names[index]);
+}
+
+// Two ascending numbers.
+void read_range(TomlSection& section, const char* key, double lower, double upper, const char* unit,
+                Range& to) {
+  const auto ends = section.numbers(key, lower, upper, unit);
+  if (!ends) return;
+  if (ends->size() != 2 || (*ends)[0] > (*ends)[1]) {
+    section.fail(key, std::string(key) + ": expected two numbers, the least and the greatest");
+    return;
+  }
+  to = {(*ends)[0], (*ends)[1]};
+}
+
+// What a free plan draws from; a grid knows nothing of it.
+void read_free_plan(TomlSection& section, SimulateSettings& to) {
+  read_range(section, "duty_range", -1, 1, "", to.duty_range);
+  read_range(section, "duration_range", 0, 60, "s", to.duration_range_s);
+  section.read("duty_step", to.duty_step, 0, 1);
+  for (const char* key : {"duty_range", "duration_range", "duty_step"}) {
+    if (to.plan == PlanKind::kGrid && section.table().contains(key)) {
+      section.fail(key, std::string(key) + " is of plan = \"free\" only");
+    }
+  }
+  for (const char* key : {"levels", "durations", "commands"}) {
+    if (to.plan == PlanKind::kFree && section.table().contains(key)) {
+      section.fail(key, std::string(key) +
+                            " is of plan = \"grid\" only; a free plan has "
+                            "duty_range, duration_range and duty_step");
+    }
+  }
 }
 
 bool is_endpoint(const std::string& text) {
@@ -145,6 +177,8 @@ void read_simulate(TomlSection& top, const std::vector<CommandSpec>& commands,
                    SimulateSettings& to) {
   auto section = top.section("simulate");
   if (!section) return;
+  static const std::string plans[] = {"grid", "free"};
+  if (const auto plan = section->choice("plan", plans)) to.plan = static_cast<PlanKind>(*plan);
   section->read("sessions", to.sessions, 1, kMany);
   section->read("trials_per_session", to.trials_per_session, 1, kMany);
   section->read("chain", to.chain, 1, kMany);
@@ -158,6 +192,7 @@ void read_simulate(TomlSection& top, const std::vector<CommandSpec>& commands,
     to.durations_s = std::move(*durations);
   }
   check_commands(*section, commands, to);
+  read_free_plan(*section, to);
   section->read("path_interval", to.path_interval_s, 0, 60, "s");
   if (to.path_interval_s != 0 && to.path_interval_s < kLeastPathInterval_s) {
     section->fail("path_interval",

@@ -91,8 +91,18 @@ struct FarmSettings {
   bool allow_mixed_numeric_classes = false;
 };
 
+// Commands of the config at some levels and durations, or any duties for any time, as a joystick
+// gives them.
+enum class PlanKind { kGrid, kFree };
+
+struct Range {
+  double lower = 0;
+  double upper = 0;
+};
+
 // `gapfarm simulate`: what to drive and how often.
 struct SimulateSettings {
+  PlanKind plan = PlanKind::kGrid;
   unsigned sessions = 3;
   unsigned trials_per_session = 100;
   unsigned chain = 4;  // trials between unrecorded moves
@@ -102,6 +112,10 @@ struct SimulateSettings {
   std::vector<double> durations_s;     // empty: each command's own
   std::vector<std::string> commands;   // empty: all
   double path_interval_s = 0;          // 0: no paths
+  // Of a free plan, drawn evenly for each side and trial.
+  Range duty_range = {-1, 1};
+  Range duration_range_s = {0.5, 2};
+  double duty_step = 0;  // duties are multiples of it; 0: any
 };
 
 struct Config {

@@ -1,6 +1,7 @@
 #include "master/experiment/plan.h"
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <numbers>
 #include <string>
@@ -47,6 +48,47 @@ void draw_finger(const Piece& piece, Stream& stream, Trial& trial) {
   trial.t_s = std::nullopt;
 }
 
+// A free trial bears the name of the config's command that it is most like: duties at the least
+// angle.
+const CommandSpec& nearest_command(const std::vector<CommandSpec>& commands, double left,
+                                   double right) {
+  const auto likeness = [&](const CommandSpec& c) {
+    const double lengths = std::hypot(c.left, c.right) * std::hypot(left, right);
+    return lengths > 0 ? (c.left * left + c.right * right) / lengths : 0;
+  };
+  return *std::max_element(
+      commands.begin(), commands.end(),
+      [&](const CommandSpec& a, const CommandSpec& b) { return likeness(a) < likeness(b); });
+}
+
+double draw_duty(const SimulateSettings& settings, Stream& stream) {
+  const Range& range = settings.duty_range;
+  const double duty = stream.uniform(range.lower, range.upper);
+  if (settings.duty_step <= 0) return duty;
+  return std::clamp(settings.duty_step * std::round(duty / settings.duty_step), -1.0, 1.0);
+}
+
+// Command, duties and duration.
+void draw_drive(const std::vector<CommandSpec>& commands, const SimulateSettings& settings,
+                Stream& stream, Trial& trial) {
+  if (settings.plan == PlanKind::kFree) {
+    const Range& duration = settings.duration_range_s;
+    const double left = draw_duty(settings, stream), right = draw_duty(settings, stream);
+    trial.command = nearest_command(commands, left, right).name;
+    trial.left = left;
+    trial.right = right;
+    trial.duration_s = stream.uniform(duration.lower, duration.upper);
+    return;
+  }
+  const CommandSpec& command = pick(commands, stream);
+  const double level = pick(settings.levels, stream);
+  trial.command = command.name;
+  trial.left = level * command.left;
+  trial.right = level * command.right;
+  trial.duration_s =
+      settings.durations_s.empty() ? command.duration_s : pick(settings.durations_s, stream);
+}
+
 }  // namespace
 
 std::vector<std::vector<v1::PlannedTrial>> draw_plan(const Problem& problem,
@@ -61,24 +103,18 @@ std::vector<std::vector<v1::PlannedTrial>> draw_plan(const Problem& problem,
     for (unsigned i = 0; i < settings.trials_per_session; ++i) {
       v1::PlannedTrial planned;
       planned.set_moved(i % std::max(1u, settings.chain) == 0);
-      const CommandSpec& command = pick(commands, stream);
-      const double level = pick(settings.levels, stream);
       Trial trial;
       trial.session = "s" + std::to_string(s + 1);
       trial.trial = i;
       trial.t_s = t_s;
-      trial.command = command.name;
-      trial.left = level * command.left;
-      trial.right = level * command.right;
-      trial.duration_s =
-          settings.durations_s.empty() ? command.duration_s : pick(settings.durations_s, stream);
+      draw_drive(commands, settings, stream, trial);
       const double lower = 0.15 * settings.arena_m;
       const double upper = 0.85 * settings.arena_m;
       trial.X_WS.x = stream.uniform(lower, upper);
       trial.X_WS.y = stream.uniform(lower, upper);
       trial.X_WS.theta = stream.uniform(-std::numbers::pi, std::numbers::pi);
       t_s += trial.duration_s.value_or(0) + settings.pause_s * stream.uniform(0.75, 1.25);
-      if (!problem.pieces.empty()) draw_finger(problem.piece(command.name), stream, trial);
+      if (!problem.pieces.empty()) draw_finger(problem.piece(trial.command), stream, trial);
       *planned.mutable_trial() = to_proto(trial);
       plan[s].push_back(std::move(planned));
     }

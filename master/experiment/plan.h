@@ -12,9 +12,10 @@ namespace gapfarm {
 
 // One session's trials in driving order.  Every `chain` trials the robot is put down somewhere else
 // in the arena, in any heading; between, each trial starts where the one before ended.  Commands,
-// levels and durations are drawn evenly.  A scenario with pieces gets a straight push of a finger
-// for each trial, from any side, in place of duties.  Sessions are named s1, s2, ...; all draws
-// come from (seed, session).
+// levels and durations are drawn evenly; in a free plan each trial has duties and a duration of its
+// own, and the name of the command that it is most like.  A scenario with pieces gets a straight
+// push of a finger for each trial, from any side, in place of duties.  Sessions are named s1, s2,
+// ...; all draws come from (seed, session).
 std::vector<std::vector<v1::PlannedTrial>> draw_plan(const Problem& problem,
                                                      const SimulateSettings& settings,
                                                      std::uint64_t seed);

@@ -40,6 +40,26 @@ TEST(Config, LeftOutKeysKeepTheirDefaults) {
   EXPECT_FALSE(check_evolvable(config).ok());
 }
 
+TEST(Config, AFreePlanHasRangesAndAGridHasLevels) {
+  const SimulateSettings plan = config_of(R"([simulate]
+plan = "free"
+duty_range = [-0.5, 1]
+duration_range = [0.3, 0.9]
+duty_step = 0.1
+)")
+                                    .simulate;
+  EXPECT_EQ(plan.plan, PlanKind::kFree);
+  EXPECT_EQ(plan.duty_range.lower, -0.5);
+  EXPECT_EQ(plan.duration_range_s.upper, 0.9);
+  EXPECT_EQ(plan.duty_step, 0.1);
+  EXPECT_EQ(config_of("").simulate.plan, PlanKind::kGrid);
+  EXPECT_THAT(error_of("[simulate]\nplan = \"free\"\nlevels = [0.5]\n"),
+              HasSubstr("c.toml:3:10: levels is of plan = \"grid\" only"));
+  EXPECT_THAT(error_of("[simulate]\nduty_step = 0.1\n"), HasSubstr("is of plan = \"free\" only"));
+  EXPECT_THAT(error_of("[simulate]\nplan = \"free\"\nduty_range = [1, -1]\n"),
+              HasSubstr("expected two numbers, the least and the greatest"));
+}
+
 TEST(Config, ReadsEverySection) {
   const Config config = config_of(
       R"(scenario = "srv1"
