@@ -41,8 +41,10 @@ Grouping group_trials(const std::vector<PreparedTrial>& trials, bool by_last_dir
                           grouping.groups.size());
     if (fresh) {
       grouping.groups.push_back({trial.drive, last_left, last_right, time, time, trial.command});
+      grouping.groups.back().first_trial = grouping.of_trial.size();
     }
     ConditionGroup& group = grouping.groups[entry->second];
+    ++group.trials;
     group.first_time_s = std::min(group.first_time_s, time);
     group.last_time_s = std::max(group.last_time_s, time);
     grouping.of_trial.push_back(entry->second);
@@ -78,9 +80,12 @@ bool patch_in_reach(const Floor& floor, const GroupMotion& motion, const Pose& X
 }
 
 // Whether what trials share says too little of one of them.
-bool simulate_alone(const Srv1Robot& robot, const GroupMotion& motion, const Situation& situation,
-                    const Pose& X_SE) {
+bool simulate_alone(const Srv1Robot& robot, const ConditionGroup& group, const GroupMotion& motion,
+                    const Situation& situation, const Pose& X_SE) {
   if (motion.jumps_over_heading()) return true;
+  // A lone trial's reference starts at its own heading.
+  const bool by_heading = robot.effects().motion_context() & kStartHeading;
+  if (by_heading && group.few() && group.trials > 1) return true;
   if (!(robot.effects().motion_context() & kStartPlace)) return false;
   Floor floor;
   robot.effects().floor(situation, floor);
@@ -191,8 +196,11 @@ Prediction Srv1Model::predict(const ParameterValues& values, const PredictOption
 
   std::map<std::size_t, GroupMotion> motions;
   for (std::size_t g : needed) {
-    GroupResult result =
-        simulate_group(robot, grouping.groups[g], options.means_only, draws(robot, options, g));
+    ConditionGroup group = grouping.groups[g];
+    if (group.trials == 1 && (context & kStartHeading)) {
+      group.heading_rad = robot.effects().recover(trials_[group.first_trial].X_WS).theta;
+    }
+    GroupResult result = simulate_group(robot, group, options.means_only, draws(robot, options, g));
     if (result.outcome != v1::OK) return give_up(result.outcome, grouping.groups[g]);
     const MotionFacts& f = result.motion.facts();
     MotionFacts& worst = prediction.facts[grouping.groups[g].command];
@@ -210,7 +218,7 @@ Prediction Srv1Model::predict(const ParameterValues& values, const PredictOption
     Situation situation = reference_situation(group);
     situation.X_WR = X_WR;
     situation.session_time_s = trial.context.session_time_s;
-    if (simulate_alone(robot, motion, situation, X_SE)) {
+    if (simulate_alone(robot, group, motion, situation, X_SE)) {
       const Motion direct = robot.run(group.drive, situation, {});
       if (direct.outcome != MotionOutcome::kOk) return give_up(to_outcome(direct.outcome), group);
       X_SE = motion.spread_end(direct.X_SE);

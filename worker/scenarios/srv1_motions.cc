@@ -24,9 +24,11 @@ constexpr double kPathInterval_s = 0.02;
 
 }  // namespace
 
+bool ConditionGroup::few() const { return trials < kFewestHeadings; }
+
 Situation reference_situation(const ConditionGroup& group) {
   Situation s;
-  s.X_WR = {kFarAway, kFarAway, 0};
+  s.X_WR = {kFarAway, kFarAway, group.heading_rad};
   s.session_time_s = (group.first_time_s + group.last_time_s) / 2;
   s.last_left = group.last_left;
   s.last_right = group.last_right;
@@ -190,7 +192,7 @@ GroupResult simulate_group(Srv1Robot& robot, const ConditionGroup& group, bool m
   const bool by_place = effects.motion_context() & kStartPlace;
   bool ok = simulation.reference(by_place || reading.stale_share != 0);
   if (ok && by_place) simulation.keep_way();
-  if (ok && (effects.motion_context() & kStartHeading)) ok = simulation.headings();
+  if (ok && (effects.motion_context() & kStartHeading) && !group.few()) ok = simulation.headings();
   if (ok && (effects.motion_context() & kSessionTime)) ok = simulation.times();
   if (ok && !means_only) {
     const std::vector<Gains> gains = draws.empty() ? cubature_points(robot.noise()) : draws;

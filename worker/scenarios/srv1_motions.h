@@ -3,7 +3,8 @@
 // On a flat floor the motion does not depend on where it starts, so trials with the same duties and
 // duration share theirs.  An effect that looks at the heading or at the time makes the motion a
 // smooth function of it: that is simulated at nodes and interpolated.  One that looks at the place
-// is simulated trial by trial, where the place can matter, and so is a motion that is not smooth.
+// is simulated trial by trial, where the place can matter, and so is a motion that is not smooth,
+// and a motion that fewer trials share than there would be nodes.
 #pragma once
 
 #include <Eigen/Core>
@@ -21,7 +22,12 @@ struct ConditionGroup {
   int last_right = 0;
   double first_time_s = 0;  // of the session, over the group's trials
   double last_time_s = 0;
-  std::size_t command = 0;  // of the problem
+  std::size_t command = 0;      // of the problem
+  std::size_t trials = 0;       // of the log, that share it
+  std::size_t first_trial = 0;  // of the log
+  double heading_rad = 0;       // of the reference situation
+  // Whether trials differ in their headings by too few to interpolate between.
+  bool few() const;
 };
 
 // The main motion's end, what it depends on, and what may happen instead.

@@ -51,7 +51,8 @@ double worst_sharing_error(const Problem& problem) {
 // a tenth of a camera's noise for one, and to a quarter where two strong effects meet, since
 // headings and times are taken to add.
 TEST(Prediction, SharedConditionsMatchSimulatingEachTrial) {
-  Problem plain = small_problem(24);
+  Problem plain = small_problem(60);
+  for (Trial& trial : plain.log.trials) trial.t_s = 0.4 * *trial.t_s;  // two minutes
   value(plain, "drive_noise_common") = 0;
   value(plain, "drive_noise_side") = 0;
   EXPECT_LT(worst_sharing_error(plain), 1e-12);
@@ -69,6 +70,22 @@ TEST(Prediction, SharedConditionsMatchSimulatingEachTrial) {
 
   value(floor, "battery_sag.rate") = 0.02;
   EXPECT_LT(worst_sharing_error(floor), 4e-3);
+}
+
+// Fewer trials of a condition than interpolation has nodes are simulated at their own headings, and
+// one alone costs no more than on a floor that is even.
+TEST(Prediction, FewTrialsOfAConditionAreSimulatedAtTheirHeadings) {
+  for (const std::size_t count : {6u, 24u}) {
+    Problem problem = small_problem(count);
+    value(problem, "drive_noise_common") = 0;
+    value(problem, "drive_noise_side") = 0;
+    const auto simulated_s = [&] { return predict(problem, true).simulated(); };
+    const double even_s = simulated_s();
+    value(problem, "floor_tilt.angle") = 0.05;
+    value(problem, "floor_nap.strength") = 0.2;
+    EXPECT_LT(worst_sharing_error(problem), 1e-12);
+    EXPECT_LT(simulated_s(), (count == 6 ? 1.5 : 6) * even_s);
+  }
 }
 
 // A patch changes the trials that cross it and no others.
@@ -100,7 +117,7 @@ TEST(Prediction, AFrictionPatchActsWhereItIs) {
 
 // A motion that jumps at some heading is simulated trial by trial.
 TEST(Prediction, ANapThatTakesTheGripIsSimulatedTrialByTrial) {
-  Problem problem = small_problem(24);
+  Problem problem = small_problem(60);
   value(problem, "drive_noise_common") = 0;
   value(problem, "drive_noise_side") = 0;
   value(problem, "floor_nap.strength") = 0.5;
