@@ -4,6 +4,7 @@
 #include <cmath>
 #include <functional>
 
+#include "master/diagnose/free_commands.h"
 #include "master/diagnose/probes.h"
 
 namespace gapfarm {
@@ -38,6 +39,13 @@ class BlockBuilder {
       }
     }
     return {name, stack(columns)};
+  }
+
+  // Whatever is alike for trials with the same command, duties and duration.
+  CovariateBlock cells() const {
+    std::vector<Values> groups(study_.cells.size(), Values(study_.size(), 0));
+    for (std::size_t i = 0; i < study_.size(); ++i) groups[study_.trials[i].cell][i] = 1;
+    return block("command, level and duration", {Values(study_.size(), 1)}, groups);
   }
 
   // World-frame shifts of the readings that depend on the pose: end's less start's, seen from the
@@ -96,6 +104,14 @@ class BlockBuilder {
   const Study& study_;
 };
 
+std::vector<Values> by_command(const Study& study) {
+  std::size_t most = 0;
+  for (const ResidualTrial& t : study.trials) most = std::max(most, t.command);
+  std::vector<Values> commands(most + 1, Values(study.size(), 0));
+  for (std::size_t i = 0; i < study.size(); ++i) commands[study.trials[i].command][i] = 1;
+  return commands;
+}
+
 }  // namespace
 
 std::vector<CovariateBlock> covariate_blocks(const Study& study) {
@@ -109,16 +125,9 @@ std::vector<CovariateBlock> covariate_blocks(const Study& study) {
         scaled([=](const ResidualTrial& t) { return std::cos(h * t.X_WS.theta); }),
         scaled([=](const ResidualTrial& t) { return std::sin(h * t.X_WS.theta); })};
   };
-  std::vector<Values> commands, cells;
-  std::size_t most = 0;
-  for (const ResidualTrial& t : study.trials) most = std::max(most, t.command);
-  for (std::size_t c = 0; c <= most; ++c) {
-    commands.push_back(
-        b.values([=](const ResidualTrial& t) { return t.command == c ? 1.0 : 0.0; }));
-  }
-  for (std::size_t c = 0; c < study.cells.size(); ++c) {
-    cells.push_back(b.values([=](const ResidualTrial& t) { return t.cell == c ? 1.0 : 0.0; }));
-  }
+  // Trials that may be pushed about alike.
+  const std::vector<Values> commands =
+      study.free_commands ? drive_classes(study) : by_command(study);
   double longest_s = 1, mx = 0, my = 0;
   for (const ResidualTrial& t : study.trials) {
     longest_s = std::max(longest_s, t.context.session_time_s);
@@ -139,11 +148,20 @@ std::vector<CovariateBlock> covariate_blocks(const Study& study) {
   };
 
   std::vector<CovariateBlock> blocks;
-  blocks.push_back(b.block("command, level and duration",
-                           {b.values([](const ResidualTrial&) { return 1.0; })}, cells));
+  blocks.push_back(study.free_commands ? free_command_block(study) : b.cells());
   blocks.push_back(b.block("start heading", heading(1), commands));
   blocks.push_back(b.block("start heading, twice a turn", heading(2), commands));
   blocks.push_back(b.block("start heading, four times a turn", heading(4), commands));
+  if (study.free_commands) {
+    // Arcs end in headings that the commands' names do not tell.
+    const auto end_heading = [&](int h) {
+      return std::vector<Values>{
+          scaled([=](const ResidualTrial& t) { return std::cos(h * t.X_WP.theta); }),
+          scaled([=](const ResidualTrial& t) { return std::sin(h * t.X_WP.theta); })};
+    };
+    blocks.push_back(b.block("end heading", end_heading(1), commands));
+    blocks.push_back(b.block("end heading, twice a turn", end_heading(2), commands));
+  }
   blocks.push_back(
       b.block("start place",
               {scaled(x), scaled(y), scaled([=](const ResidualTrial& t) { return x(t) * x(t); }),
@@ -173,10 +191,13 @@ std::vector<CovariateBlock> covariate_blocks(const Study& study) {
         return b.cell(t).command.left * b.cell(t).command.right < 0 ? 1.0 : 0.0;
       })};
   std::vector<Values> previous;
-  for (std::size_t c = 1; c <= most; ++c) {
-    previous.push_back(scaled([=, &study](const ResidualTrial& t) {
-      return t.context.previous && study.trials[*t.context.previous].command == c ? 1.0 : 0.0;
-    }));
+  for (std::size_t c = 1; c < commands.size(); ++c) {
+    Values after = scaled([](const ResidualTrial&) { return 1.0; });
+    for (std::size_t i = 0; i < study.size(); ++i) {
+      const auto& before = study.trials[i].context.previous;
+      if (!before || commands[c][*before] == 0) after[i] = 0;
+    }
+    previous.push_back(std::move(after));
   }
   if (!previous.empty()) blocks.push_back(b.block("command before", previous, same_or_against));
   const auto work = [&study](const ResidualTrial& t) {

@@ -7,6 +7,7 @@
 #include <set>
 
 #include "common/score/statistics.h"
+#include "master/diagnose/free_commands.h"
 
 namespace gapfarm {
 namespace {
@@ -295,7 +296,11 @@ std::vector<std::string> cautions(std::span<const ResidualTrial> trials,
                    " only large effects show, and no claim is sure.");
   }
   if (v.trials == 0) return text;
-  if (v.typical_cell < kFewInCell) {
+  if (commands_are_free(cells)) {
+    text.emplace_back(
+        "Hardly a command repeats: the noise is what trials vary by beyond a smooth dependence on "
+        "duties and duration, so a small dependence that is not smooth may pass for noise.");
+  } else if (v.typical_cell < kFewInCell) {
     text.push_back("Most conditions were driven " +
                    (v.typical_cell <= 1 ? std::string("once")
                                         : "about " + plain_number(v.typical_cell) + " times") +

@@ -4,6 +4,8 @@
 #include <set>
 #include <tuple>
 
+#include "master/diagnose/free_commands.h"
+
 namespace gapfarm {
 namespace {
 
@@ -103,7 +105,11 @@ Result<Eigen::MatrixXd> nuisance_columns(Predictor& predictor, const Study& stud
   }
   // Motors of some hundredths of a second are part of any robot.
   add_column(study, differences(study, ends->back(), kLagStep), 0.02, &columns);
-  add_misfits(study, &columns);
+  if (study.free_commands) {
+    for (Eigen::VectorXd& column : smooth_misfits(study)) columns.push_back(std::move(column));
+  } else {
+    add_misfits(study, &columns);
+  }
 
   Eigen::MatrixXd all(static_cast<Eigen::Index>(3 * study.size()),
                       static_cast<Eigen::Index>(columns.size()));

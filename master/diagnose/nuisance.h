@@ -16,7 +16,8 @@ Eigen::Vector3d misfit_sd(const Cell& cell, double speed_m_s);
 // Whitened columns scaled to a prior standard deviation of 1: retuning of the base (free within its
 // bounds), and, for each kind of drive, level and duration, an offset that is alike for a command
 // and its mirror image (saturation of slip, starting and stopping), a fraction of a per cent of the
-// motion.  The sizes were measured between two simulations of different physics
+// motion.  Where hardly a command repeats, smooth functions of the duties take the offsets' place
+// (free_commands.h).  The sizes were measured between two simulations of different physics
 // (docs/diagnosis.md).
 Result<Eigen::MatrixXd> nuisance_columns(Predictor& predictor, const Study& study);
 

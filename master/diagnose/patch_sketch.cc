@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "common/pose/pose.h"
+#include "master/diagnose/free_commands.h"
 
 namespace gapfarm {
 namespace {
@@ -29,7 +30,7 @@ double value_of(const Problem& problem, const Study& study, const char* key) {
 }
 
 // Shift of the end, in its axes, for a twist in the body axes of a moment from which X leads there.
-Eigen::Matrix3d carried_to_end(const Pose& X) {
+Eigen::Matrix3d moved_to_end(const Pose& X) {
   const double c = std::cos(X.theta), s = std::sin(X.theta);
   Eigen::Matrix3d m;
   // A turn about the moment's origin moves the end by (-y, x) of the way there.
@@ -55,7 +56,7 @@ PatchSketch::PatchSketch(const Problem& problem, const Study& study) : study_(st
   for (std::size_t i = 0; i < study.size(); ++i) {
     const ResidualTrial& trial = study.trials[i];
     const double duration = study.cells[trial.cell].command.duration_s;
-    Twist way = log(between(trial.X_WS, trial.X_WP));
+    const Twist way = way_of(study, i);
     std::vector<Moment>& moments = moments_.emplace_back(kMoments);
     for (int k = 0; k < kMoments; ++k) {
       const double share = (k + 0.5) / kMoments;
@@ -66,7 +67,7 @@ PatchSketch::PatchSketch(const Problem& problem, const Study& study) : study_(st
         moments[k].contacts[c] = {at.x, at.y};
       }
       moments[k].to_end = study.whitener[i] *
-                          carried_to_end(between(X_SB, between(trial.X_WS, trial.X_WP))) *
+                          moved_to_end(between(X_SB, between(trial.X_WS, trial.X_WP))) *
                           (duration / kMoments);
     }
   }

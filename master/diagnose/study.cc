@@ -9,6 +9,7 @@
 #include "common/score/motion_model.h"
 #include "common/score/statistics.h"
 #include "master/diagnose/distribution.h"
+#include "master/diagnose/free_commands.h"
 #include "master/diagnose/nuisance.h"
 #include "master/diagnose/subject.h"
 
@@ -71,39 +72,128 @@ void set_predictions(const std::vector<Pose>& ends, Study* study) {
   }
 }
 
+// From both sides faster, and the right side faster than the left: each side's derivative.
+void set_gains(const Eigen::Vector3d& both, const Eigen::Vector3d& apart, std::size_t trial,
+               Study* study) {
+  study->trials[trial].right = both / 2 + apart;
+  study->trials[trial].left = both / 2 - apart;
+}
+
 Overrides scaled(const Overrides& at, std::size_t row, double factor) {
   Overrides moved = at;
   moved[row] *= factor;
   return moved;
 }
 
-// One Gauss-Newton step on the logarithms of the base parameters; returns its length.
-double tuning_step(const Problem& problem, const std::vector<BaseParameter>& parameters,
-                   const std::vector<std::vector<Pose>>& ends, Study* study) {
-  const auto p = static_cast<Eigen::Index>(parameters.size());
-  Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(p, p);
-  Eigen::VectorXd right = Eigen::VectorXd::Zero(p);
-  for (const CellResidual& cell : cell_residuals(*study)) {
+// The turn beyond which a trial says nothing yet: a heading off by half a turn looks as if it were
+// off the other way.  In the first rounds the speed of turning may be off by these shares.
+double most_turn(std::vector<double> turns, int round) {
+  constexpr double kSureTurn = 2;  // rad
+  constexpr double kShares[] = {0.35, 0.15, 0.05};
+  constexpr std::size_t kFewest = 12;
+  if (round >= static_cast<int>(std::size(kShares))) return INFINITY;
+  for (double& turn : turns) turn = std::abs(turn);
+  std::sort(turns.begin(), turns.end());
+  return std::max(kSureTurn / kShares[round], turns[std::min(kFewest, turns.size()) - 1]);
+}
+
+struct TuningStep {
+  double length = 0;   // greatest change of a logarithm
+  bool of_all = true;  // no trial was left out
+};
+
+struct Normal {
+  Eigen::MatrixXd matrix;
+  Eigen::VectorXd right;
+};
+
+// Soft L1 beyond three standard errors: what the base cannot fit must not rule.
+double soft_weight(const Eigen::Vector3d& z) { return 1 / std::sqrt(1 + z.squaredNorm() / 27); }
+
+// Change of a trial's end for each logarithm.
+Eigen::MatrixXd log_slopes(const Study& study, const std::vector<std::vector<Pose>>& ends,
+                           std::size_t trial, Eigen::Index parameters) {
+  Eigen::MatrixXd j(3, parameters);
+  for (Eigen::Index k = 0; k < parameters; ++k) {
+    j.col(k) =
+        local_difference(study.trials[trial].X_WP, ends[static_cast<std::size_t>(k) + 1][trial]) /
+        std::log1p(kRelativeStep);
+  }
+  return j;
+}
+
+// By the cells' medians.
+Normal normal_of_cells(const Study& study, const std::vector<std::vector<Pose>>& ends,
+                       Eigen::Index p, int round, bool* of_all) {
+  Normal normal{Eigen::MatrixXd::Zero(p, p), Eigen::VectorXd::Zero(p)};
+  const std::vector<CellResidual> cells = cell_residuals(study);
+  std::vector<double> turns;
+  for (const CellResidual& cell : cells) {
+    turns.push_back(log_slopes(study, ends, cell.trial, 1)(2, 0));
+  }
+  const double most = most_turn(turns, round);
+  for (std::size_t c = 0; c < cells.size(); ++c) {
+    const CellResidual& cell = cells[c];
     if (cell.count == 0) continue;
-    Eigen::MatrixXd j(3, p);
-    for (Eigen::Index k = 0; k < p; ++k) {
-      j.col(k) = local_difference(study->trials[cell.trial].X_WP,
-                                  ends[static_cast<std::size_t>(k) + 1][cell.trial]) /
-                 std::log1p(kRelativeStep);
+    if (std::abs(turns[c]) > most) {
+      *of_all = false;
+      continue;
     }
     // A cell's mean is known to its standard error, but no simulation gets it right to that.
-    const ResidualTrial& trial = study->trials[cell.trial];
-    const Eigen::Vector3d misfit = misfit_sd(study->cells[trial.cell], study->speed_m_s);
-    Eigen::Matrix3d cov = trial_covariance(trial, study->noise) / cell.count;
+    const ResidualTrial& trial = study.trials[cell.trial];
+    const Eigen::Vector3d misfit = misfit_sd(study.cells[trial.cell], study.speed_m_s);
+    Eigen::Matrix3d cov = trial_covariance(trial, study.noise) / cell.count;
     cov.diagonal() += misfit.cwiseAbs2();
     const Eigen::LLT<Eigen::Matrix3d> factor(cov);
-    const Eigen::MatrixXd wj = factor.matrixL().solve(j);
+    const Eigen::MatrixXd wj = factor.matrixL().solve(log_slopes(study, ends, cell.trial, p));
     const Eigen::Vector3d z = factor.matrixL().solve(cell.median);
-    // Soft L1 beyond three standard errors: a cell that the base cannot fit must not rule.
-    const double weight = 1 / std::sqrt(1 + z.squaredNorm() / 27);
-    normal += weight * wj.transpose() * wj;
-    right += weight * wj.transpose() * z;
+    const double weight = soft_weight(z);
+    normal.matrix += weight * wj.transpose() * wj;
+    normal.right += weight * wj.transpose() * z;
   }
+  return normal;
+}
+
+// By every trial, beside the misfits that neighbouring commands have in common; their coefficients
+// come after the parameters.
+Normal normal_of_trials(const Study& study, const std::vector<std::vector<Pose>>& ends,
+                        Eigen::Index p, int round, bool* of_all) {
+  const std::vector<Eigen::VectorXd> misfits = smooth_misfits(study);
+  const auto q = static_cast<Eigen::Index>(misfits.size());
+  Normal normal{Eigen::MatrixXd::Zero(p + q, p + q), Eigen::VectorXd::Zero(p + q)};
+  normal.matrix.diagonal().tail(q).setOnes();
+  std::vector<double> turns;
+  for (std::size_t i = 0; i < study.size(); ++i) {
+    turns.push_back((study.trials[i].left + study.trials[i].right)[2]);
+  }
+  const double most = most_turn(turns, round);
+  for (std::size_t i = 0; i < study.size(); ++i) {
+    if (std::abs(turns[i]) > most) {
+      *of_all = false;
+      continue;
+    }
+    Eigen::MatrixXd rows(3, p + q);
+    rows.leftCols(p) = study.whitener[i] * log_slopes(study, ends, i, p);
+    for (Eigen::Index k = 0; k < q; ++k) {
+      rows.col(p + k) =
+          misfits[static_cast<std::size_t>(k)].segment<3>(static_cast<Eigen::Index>(3 * i));
+    }
+    const Eigen::Vector3d z = study.whitener[i] * study.trials[i].residual;
+    const double weight = soft_weight(z);
+    normal.matrix += weight * rows.transpose() * rows;
+    normal.right += weight * rows.transpose() * z;
+  }
+  return normal;
+}
+
+// One Gauss-Newton step on the logarithms of the base parameters, of which the speed is the first.
+TuningStep tuning_step(const Problem& problem, const std::vector<BaseParameter>& parameters,
+                       const std::vector<std::vector<Pose>>& ends, int round, Study* study) {
+  const auto p = static_cast<Eigen::Index>(parameters.size());
+  TuningStep taken;
+  auto [normal, right] = study->free_commands
+                             ? normal_of_trials(*study, ends, p, round, &taken.of_all)
+                             : normal_of_cells(*study, ends, p, round, &taken.of_all);
   for (Eigen::Index k = 0; k < p; ++k) {
     const BaseParameter& parameter = parameters[static_cast<std::size_t>(k)];
     const double precision = 1 / (parameter.prior_log_sd * parameter.prior_log_sd);
@@ -111,7 +201,7 @@ double tuning_step(const Problem& problem, const std::vector<BaseParameter>& par
     normal(k, k) += precision;
     right[k] -= precision * away;
   }
-  const Eigen::VectorXd step = normal.ldlt().solve(right);
+  const Eigen::VectorXd step = normal.ldlt().solve(right).head(p);
   for (Eigen::Index k = 0; k < p; ++k) {
     const std::size_t row = parameters[static_cast<std::size_t>(k)].row;
     const Parameter& bounds = problem.table()[row];
@@ -119,7 +209,8 @@ double tuning_step(const Problem& problem, const std::vector<BaseParameter>& par
     value *= std::exp(std::clamp(step[k], -kLargestLogStep, kLargestLogStep));
     value = std::clamp(value, bounds.lower * 1.1, bounds.upper * 0.9);
   }
-  return step.cwiseAbs().maxCoeff();
+  taken.length = step.cwiseAbs().maxCoeff();
+  return taken;
 }
 
 }  // namespace
@@ -219,6 +310,13 @@ Result<Study> make_study(const Problem& problem) {
     t.X_WE = trial.X_WE;
     study.trials.push_back(t);
   }
+  study.free_commands = commands_are_free(study.cells);
+  for (Cell& cell : study.cells) {
+    if (!study.free_commands) break;
+    // No command of the config is what such a trial is a level of.
+    cell.level = std::max(std::abs(cell.command.left), std::abs(cell.command.right));
+    cell.path = cell.level * cell.command.duration_s;
+  }
   study.sessions = sessions.size();
   study.gaps = reading_gaps(problem.log, contexts);
   study.quantum_m = quantisation_step(problem.log.trials);
@@ -253,42 +351,47 @@ Status tune_base(Predictor& predictor, bool keep, Study* study) {
   for (Srv1 kept : {Srv1::kFriction, Srv1::kTrackGauge, Srv1::kTreadCreep, Srv1::kMassHeight}) {
     study->base[row_of(kept)] = problem.values[row_of(kept)];
   }
+  constexpr double kGainStep = 0.02;
+  const std::size_t asymmetry = problem.table().row("motor_asymmetry.ratio");
+  const auto with_asymmetry = [&](double ratio) {
+    Overrides at = study->base;
+    at[asymmetry] = ratio;
+    return at;
+  };
   for (int round = 0; !keep && round < kTuningRounds; ++round) {
     std::vector<PredictionRequest> requests = {{study->base, {}}};
     for (const BaseParameter& p : parameters) {
       requests.push_back({scaled(study->base, p.row, 1 + kRelativeStep), {}});
     }
+    if (study->free_commands) requests.push_back({with_asymmetry(kGainStep), {}});
     const auto ends = predictor.ends(requests);
     if (!ends) return ends.error();
     set_predictions(ends->front(), study);
     study->speed_m_s = study->base[row_of(Srv1::kFullSpeed)];
+    if (study->free_commands) {
+      const std::vector<Eigen::Vector3d> both =
+          differences(*study, (*ends)[1], std::log1p(kRelativeStep));
+      const std::vector<Eigen::Vector3d> apart = differences(*study, ends->back(), kGainStep);
+      for (std::size_t i = 0; i < study->size(); ++i) set_gains(both[i], apart[i], i, study);
+    }
     study->use_noise(study->noise);
-    if (tuning_step(problem, parameters, *ends, study) < 1e-3) break;
+    const TuningStep taken = tuning_step(problem, parameters, *ends, round, study);
+    if (taken.of_all && taken.length < 1e-3) break;
   }
   study->speed_m_s = study->base[row_of(Srv1::kFullSpeed)];
 
-  // Both sides faster, and the right side faster than the left: from these, each side's derivative.
-  constexpr double kGainStep = 0.02;
-  const std::size_t asymmetry = problem.table().row("motor_asymmetry.ratio");
-  const auto with = [&](double ratio) {
-    Overrides at = study->base;
-    at[asymmetry] = ratio;
-    return at;
-  };
   const std::size_t speed = row_of(Srv1::kFullSpeed);
   const auto ends = predictor.ends({{study->base, {}},
                                     {scaled(study->base, speed, 1 + kGainStep), {}},
                                     {scaled(study->base, speed, 1 - kGainStep), {}},
-                                    {with(kGainStep), {}},
-                                    {with(-kGainStep), {}}});
+                                    {with_asymmetry(kGainStep), {}},
+                                    {with_asymmetry(-kGainStep), {}}});
   if (!ends) return ends.error();
   set_predictions(ends->front(), study);
   for (std::size_t i = 0; i < study->size(); ++i) {
-    ResidualTrial& t = study->trials[i];
     const Eigen::Vector3d both = local_difference((*ends)[2][i], (*ends)[1][i]) / (2 * kGainStep);
     const Eigen::Vector3d apart = local_difference((*ends)[4][i], (*ends)[3][i]) / (2 * kGainStep);
-    t.right = both / 2 + apart;
-    t.left = both / 2 - apart;
+    set_gains(both, apart, i, study);
   }
   study->use_noise(study->noise);
   return {};

@@ -37,7 +37,8 @@ struct Study {
   std::vector<ResidualTrial> trials;
   std::vector<ReadingGap> gaps;
   std::size_t sessions = 0;
-  double quantum_m = 0;  // grid of the logged positions
+  bool free_commands = false;  // hardly a command repeats: see free_commands.h
+  double quantum_m = 0;        // grid of the logged positions
   NoiseEstimate noise;
   bool reading_noise_known = true;  // from gaps between readings, rather than the config's
   Overrides base;                   // tuned values

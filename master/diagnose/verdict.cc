@@ -5,12 +5,13 @@
 #include <cmath>
 
 #include "common/score/statistics.h"
+#include "master/diagnose/noise.h"
 
 namespace gapfarm {
 
 double leftover_scale(const Regression& explained) {
   std::vector<double> squares;
-  for (double z : explained.left()) {
+  for (double z : studentised(explained, 0.2)) {
     if (z != 0) squares.push_back(z * z);  // rows of ignored trials are
   }
   return squares.empty() ? 1 : std::clamp(median(squares) / 0.455, 0.9, 1.4);

@@ -17,7 +17,8 @@ struct Leftover {
   double excess = 0;  // nats over all trials beyond what chance explains
 };
 
-// Variance of what is left over the noise's: robust, and bounded since the noise was measured.
+// Variance of what is left over the noise's, the degrees of freedom that were spent given back:
+// robust, and bounded since the noise was measured.
 double leftover_scale(const Regression& explained);
 
 // Most significant first.
