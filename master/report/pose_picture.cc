@@ -12,11 +12,15 @@ namespace {
 
 constexpr double kPlot = 264;   // side of a panel's plot
 constexpr double kLeft = 58;    // for the y axis
-constexpr double kTop = 30;     // for the panel's title
+constexpr double kTop = 46;     // for the panel's title and its note
 constexpr double kBottom = 50;  // for the x axis
 constexpr double kGap = 14;
 constexpr double kHeader = 88;  // titles and legend
 constexpr double kMargin = 18;
+constexpr double kLegendWidth = 664;
+// A letter of the fonts that browsers take for the title's 19 px in bold, and the subtitle's.
+constexpr double kTitleWidth = 10.4;
+constexpr double kSubtitleWidth = 6.6;
 constexpr double kSmallestSpan_mm = 20;
 constexpr double kEllipse90 = 2.145966;  // sqrt of the chi-square quantile: 2 degrees of freedom
 
@@ -118,7 +122,7 @@ void draw_axes(Svg& svg, const PosePanel& panel, const Window& window) {
     svg.text({c.x - 6, py + 4}, tick_label(y, step), left);
   }
   svg.rectangle(c, kPlot, kPlot, {.stroke = "#b5b5b5"});
-  svg.text({c.x, c.y - 10}, panel.title, {.size = 14, .colour = kInk, .bold = true});
+  svg.text({c.x, c.y - 26}, panel.title, {.size = 14, .colour = kInk, .bold = true});
   svg.text({c.x + kPlot / 2, c.y + kPlot + 33}, "ahead of the start (mm)", label);
   SvgText upright = label;
   upright.rotation_deg = -90;
@@ -192,8 +196,7 @@ void draw_panel(Svg& svg, const PosePanel& panel, SvgPoint corner) {
   svg.end_clip();
   std::string note = std::to_string(panel.measured.size()) + " trials";
   if (beyond > 0) note += ", " + std::to_string(beyond) + " beyond the frame";
-  svg.text({corner.x + kPlot, corner.y - 10}, note,
-           {.size = 11, .colour = kFaint, .anchor = SvgAnchor::kEnd});
+  svg.text({corner.x, corner.y - 9}, note, {.size = 11, .colour = kFaint});
 }
 
 void draw_legend(Svg& svg, const std::vector<PosePanel>& panels, SvgPoint place) {
@@ -223,8 +226,11 @@ std::string pose_picture(const std::vector<PosePanel>& panels, const std::string
   const std::size_t columns = std::clamp<std::size_t>(panels.size(), 1, 3);
   const std::size_t rows = std::max<std::size_t>(1, (panels.size() + columns - 1) / columns);
   const double cell_width = kLeft + kPlot + kGap, cell_height = kTop + kPlot + kBottom;
-  // Wide enough for the legend even with one panel.
-  const double width = std::max(2 * kMargin + static_cast<double>(columns) * cell_width, 700.0);
+  // Wide enough for the legend and the titles even with one panel.
+  const double words = std::max(kTitleWidth * static_cast<double>(title.size()),
+                                kSubtitleWidth * static_cast<double>(subtitle.size()));
+  const double width =
+      2 * kMargin + std::max({static_cast<double>(columns) * cell_width, kLegendWidth, words});
   Svg svg(width, kHeader + static_cast<double>(rows) * cell_height + kMargin);
   svg.text({kMargin, 30}, title, {.size = 19, .colour = kInk, .bold = true});
   svg.text({kMargin, 50}, subtitle, {.size = 12.5, .colour = kFaint});

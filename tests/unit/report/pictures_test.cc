@@ -7,6 +7,7 @@
 #include <fstream>
 #include <limits>
 #include <numbers>
+#include <regex>
 #include <sstream>
 
 #include "common/random/stream.h"
@@ -87,6 +88,19 @@ TEST(PosePicture, CountsWhatLiesFarAway) {
   EXPECT_EQ(count(svg, "<circle"), dots);
   EXPECT_THAT(svg, HasSubstr("61 trials, "));
   EXPECT_THAT(svg, HasSubstr("beyond the frame"));
+}
+
+// With one panel the title once ran out of the picture, and the note over the panel's title.
+TEST(PosePicture, HasRoomForItsWords) {
+  const std::string title(98, 'm');
+  PosePanel panel = example_panel("forward, 1 s", {0.25, 0, 0}, 1);
+  const std::string svg = pose_picture({panel}, title);
+  std::smatch width, name, note;
+  ASSERT_TRUE(std::regex_search(svg, width, std::regex("width=\"([0-9.]+)\"")));
+  EXPECT_GT(std::stod(width[1]), 98 * 10.0);
+  ASSERT_TRUE(std::regex_search(svg, name, std::regex("y=\"([0-9.]+)\"[^>]*>forward, 1 s<")));
+  ASSERT_TRUE(std::regex_search(svg, note, std::regex("y=\"([0-9.]+)\"[^>]*>60 trials")));
+  EXPECT_GE(std::stod(note[1]) - std::stod(name[1]), 14);
 }
 
 TEST(PosePicture, BearsEmptyAndDegenerateInput) {
