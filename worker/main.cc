@@ -10,6 +10,7 @@
 #include "common/base/build_info.h"
 #include "common/net/keys.h"
 #include "common/process/process_pool.h"
+#include "common/usage/usage.h"
 #include "worker/evaluate.h"
 #include "worker/service.h"
 #include "worker/supervisor.h"
@@ -51,7 +52,7 @@ struct Arguments {
 
 void describe(CLI::App& app, Arguments* arguments) {
   app.footer(kExamples);
-  app.set_version_flag("--version", build_summary("gapfarm-worker"));
+  app.set_version_flag("-V,--version", build_summary("gapfarm-worker"));
   app.add_option("--connect", arguments->endpoint, "The master: tcp://HOST:PORT or ipc://PATH")
       ->required()
       ->type_name("ENDPOINT");
@@ -189,7 +190,10 @@ int main(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : gapfarm::kExitUsage;
+    if (error.get_exit_code() == 0) return app.exit(error);  // --help, --version
+    std::fprintf(stderr, "gapfarm-worker: %s\nSee `gapfarm-worker --help`.\n",
+                 gapfarm::usage_sentence(app, error).c_str());
+    return gapfarm::kExitUsage;
   }
   return arguments.parent > 0 ? gapfarm::work(arguments) : gapfarm::start_workers(arguments);
 }
