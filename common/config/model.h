@@ -62,7 +62,9 @@ bool is_model(std::string_view text);
 // effects that differ from neutral, provenance.  Every double reads back as the same bits.
 // REQUIRES: values that the table accepts.
 std::string format_model(const Model& model);
-// Errors beside the file system's: values that the table does not accept.
+// Error: values that the table does not accept.
+Status check_model(const Model& model);
+// Errors beside the file system's: of check_model().
 Status write_model(const Model& model, const std::string& path);
 
 // Rows that the file leaves out are nominal.  Errors as parse_config(), a unit that is not the

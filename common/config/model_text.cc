@@ -161,17 +161,22 @@ std::string format_model(const Model& model) {
          origin_sections(model);
 }
 
-Status write_model(const Model& model, const std::string& path) {
+Status check_model(const Model& model) {
   if (auto known = parameter_table(model.scenario); !known.ok()) return known.error();
   const ParameterTable& table = model.table();
   if (model.values.size() != table.size()) {
-    return Error{path + ": the model has " + std::to_string(model.values.size()) +
-                 " values, expected " + std::to_string(table.size())};
+    return Error{"the model has " + std::to_string(model.values.size()) + " values, expected " +
+                 std::to_string(table.size())};
   }
   for (std::size_t row = 0; row < table.size(); ++row) {
     const Status accepted = table.check(row, model.values[row]);
-    if (!accepted.ok()) return Error{path + ": " + accepted.error().message};
+    if (!accepted.ok()) return accepted;
   }
+  return {};
+}
+
+Status write_model(const Model& model, const std::string& path) {
+  if (Status s = check_model(model); !s.ok()) return Error{path + ": " + s.error().message};
   return write_file_atomically(path, format_model(model));
 }
 

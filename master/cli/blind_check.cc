@@ -26,7 +26,7 @@ struct BlindCheckOptions {
   std::optional<unsigned> trials, workers, jobs;
   std::optional<std::uint64_t> seed;
   double time_limit_s = 1800;
-  bool resume = false, dry_run = false, json = false;
+  bool resume = false, dry_run = false;
 };
 
 std::string command_line() {
@@ -56,7 +56,7 @@ Result<DesignSettings> design_of(const BlindCheckOptions& options, const Config&
   return design;
 }
 
-Result<Config> config_of(const BlindCheckOptions& options, SessionPlans& plan) {
+Result<Config> config_of(const BlindCheckOptions& options, SessionPlans& plan, Console& console) {
   Result<Config> config = read_config(options.config);
   if (!config) return config;
   if (options.seed) config->seed = *options.seed;
@@ -68,6 +68,7 @@ Result<Config> config_of(const BlindCheckOptions& options, SessionPlans& plan) {
     const std::vector<std::string> files = {options.like};
     const auto log = read_trial_files(files, command_names(config->problem.commands));
     if (!log) return log.error();
+    show_notes(*log, console);
     plan = plan_of(config->problem, *log);
   }
   return config;
@@ -150,14 +151,15 @@ int finish(const Result<BlindReport>& report, const BlindCheckOptions& options,
     }
     return failed(report.error(), context);
   }
-  context.console.print(options.json ? format_blind_json(*report) : format_blind_summary(*report));
+  context.console.print(context.console.json() ? format_blind_json(*report)
+                                               : format_blind_summary(*report));
   context.console.note("tables: " + options.out + "/blind_check.md");
   return kExitDone;
 }
 
 int run_blind(const BlindCheckOptions& options, CliContext& context) {
   BlindCheckSettings settings;
-  const Result<Config> config = config_of(options, settings.plan);
+  const Result<Config> config = config_of(options, settings.plan, context.console);
   const auto design = config ? design_of(options, *config) : Result<DesignSettings>(config.error());
   if (!design) {
     context.console.error(design.error());
@@ -225,7 +227,6 @@ SubcommandRun setup_blind_check(CLI::App& app) {
   app.add_flag("--resume", options->resume, "Go on with the check in the folder");
   app.add_flag("--dry-run", options->dry_run,
                "Only say which strengths would be needed for every effect to be that large");
-  app.add_flag("--json", options->json, "Print JSON");
   app.footer(
       "Examples:\n"
       "  gapfarm blind-check configs/srv1.toml --dry-run\n"

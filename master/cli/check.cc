@@ -10,6 +10,7 @@
 #include "master/cli/inputs.h"
 #include "master/cli/subcommand.h"
 #include "master/cli/validation.h"
+#include "master/evolve/evaluation.h"
 
 namespace gapfarm {
 namespace {
@@ -18,8 +19,7 @@ using Json = nlohmann::ordered_json;
 
 struct CheckOptions {
   std::string config;
-  std::vector<std::string> trials;
-  bool json = false;
+  TrialOptions trials;
 };
 
 struct Summary {
@@ -28,7 +28,32 @@ struct Summary {
   std::map<std::string, std::size_t> commands;
   std::size_t conditions = 0;
   std::vector<std::string> effects;  // enabled: not neutral, or searched
+  double evaluation_s = 0;           // on one worker here, as measured
 };
+
+// What a run may take at most, as far as its settings say.
+std::uint64_t most_evaluations(const Config& config) {
+  const std::uint64_t all = config.evolution.generations * config.evolution.population;
+  return config.evolution.evaluations ? std::min(all, *config.evolution.evaluations) : all;
+}
+
+// Seconds that one worker takes for the config's own values, once it knows the problem.
+Result<double> measure_evaluation(const Config& config, CliContext& context) {
+  FarmOptions options;
+  options.workers = 1;
+  auto farm = start_farm(options, {}, context);
+  if (!farm) return farm.error();
+  const std::string hash = (*farm)->add_problem(to_proto(config.problem));
+  double last_s = 0;
+  // The first one brings the problem to the worker.
+  for (unsigned replicate = 0; replicate < 2; ++replicate) {
+    const double began_s = steady_now_s();
+    const auto results = (*farm)->run(hash, {evaluation_task({0, replicate, {}}, config.seed)});
+    if (!results) return results.error();
+    last_s = steady_now_s() - began_s;
+  }
+  return last_s;
+}
 
 // Effects that are on in the config's own values or that a gene may turn on.
 std::vector<std::size_t> enabled_effects(const Problem& problem) {
@@ -45,6 +70,14 @@ std::vector<std::size_t> enabled_effects(const Problem& problem) {
   return enabled;
 }
 
+std::size_t piece_of(const Problem& problem, const Trial& trial) {
+  const auto& pieces = problem.pieces;
+  return static_cast<std::size_t>(
+      std::find_if(pieces.begin(), pieces.end(),
+                   [&](const auto& piece) { return piece.name == trial.command; }) -
+      pieces.begin());
+}
+
 // Trials that differ in nothing that the enabled effects look at share one condition.
 std::size_t count_conditions(const Problem& problem, unsigned context) {
   std::vector<DrivenCommand> driven;
@@ -58,6 +91,12 @@ std::size_t count_conditions(const Problem& problem, unsigned context) {
   for (std::size_t i = 0; i < driven.size(); ++i) {
     const Trial& trial = problem.log.trials[i];
     std::vector<double> key = {driven[i].left, driven[i].right, driven[i].duration_s};
+    // A push is nothing but where the piece lay and how the finger went.
+    if (!trial.tip.empty()) {
+      key.insert(key.end(),
+                 {double(piece_of(problem, trial)), trial.X_WS.x, trial.X_WS.y, trial.X_WS.theta});
+      for (const TipSample& tip : trial.tip) key.insert(key.end(), {tip.t_s, tip.x, tip.y});
+    }
     if (context & kStartHeading) key.push_back(trial.X_WS.theta);
     if (context & kStartPlace) key.insert(key.end(), {trial.X_WS.x, trial.X_WS.y});
     if (context & kSessionTime) key.push_back(around[i].session_time_s);
@@ -107,6 +146,8 @@ Json to_json(const Config& config, const Summary& summary, unsigned workers) {
           {"sessions", summary.sessions},
           {"commands", summary.commands},
           {"conditions", summary.conditions},
+          {"evaluation_s", summary.evaluation_s},
+          {"most_evaluations", most_evaluations(config)},
           {"effects", summary.effects},
           {"genes", genes},
           {"population", config.evolution.population},
@@ -145,6 +186,12 @@ std::string describe(const Config& config, const Summary& summary, unsigned work
   text += "evolution    " + std::to_string(config.evolution.population) + " individuals, at most " +
           std::to_string(config.evolution.generations) + " generations, seed " +
           std::to_string(config.seed) + "\n";
+  const auto most = most_evaluations(config);
+  const double all_s = summary.evaluation_s * static_cast<double>(most);
+  text += "cost         " + format_duration(summary.evaluation_s) +
+          " an evaluation (one, measured here); " + std::to_string(most) + " of them about " +
+          format_duration(all_s / std::max(1u, workers)) + " on " + std::to_string(workers) +
+          " workers like it\n";
   text += "farm         " + std::to_string(workers) + " local workers";
   if (config.farm.listen) text += ", and remote ones at " + *config.farm.listen;
   text += "\nproblem      " + problem_hash(to_proto(problem)) + "\n";
@@ -156,9 +203,11 @@ int run_check(const CheckOptions& options, CliContext& context) {
   const auto config = open_config(options.config, options.trials, console, check_runnable);
   if (!config) return kExitBadUsage;
   const unsigned workers = local_workers({}, config->farm);
-  const Summary summary = summarise(config->problem);
-  console.print(options.json ? to_json(*config, summary, workers).dump(2) + "\n"
-                             : describe(*config, summary, workers));
+  Summary summary = summarise(config->problem);
+  const auto measured = measure_evaluation(*config, context);
+  if (!measured) return failed(measured.error(), context);
+  summary.evaluation_s = *measured;
+  console.result(describe(*config, summary, workers), to_json(*config, summary, workers));
   return kExitDone;
 }
 
@@ -167,8 +216,7 @@ int run_check(const CheckOptions& options, CliContext& context) {
 SubcommandRun setup_check(CLI::App& app) {
   auto options = std::make_shared<CheckOptions>();
   app.add_option("CONFIG", options->config, "Config file (TOML)")->required();
-  app.add_option("--trials", options->trials, "Trial logs in place of the config's");
-  app.add_flag("--json", options->json, "Print JSON");
+  options->trials.declare(app);
   app.footer(
       "Examples:\n"
       "  gapfarm check configs/demo.toml\n"

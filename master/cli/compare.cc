@@ -4,8 +4,10 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <chrono>
+#include <cmath>
 #include <filesystem>
 #include <memory>
+#include <nlohmann/json.hpp>
 
 #include "common/base/build_info.h"
 #include "common/config/config.h"
@@ -13,6 +15,7 @@
 #include "common/trials/files.h"
 #include "common/trials/read.h"
 #include "master/cli/inputs.h"
+#include "master/cli/outputs.h"
 #include "master/compare/summary.h"
 
 namespace gapfarm {
@@ -20,13 +23,16 @@ namespace {
 
 struct CompareCommand {
   std::vector<std::string> files;
-  std::vector<std::string> trials;
+  TrialOptions trials;
   std::string out;
   std::optional<unsigned> seeds;
   std::optional<std::uint64_t> first_seed, evaluations;
   std::optional<double> target;
+  Outputs outputs;
   FarmOptions farm;
 };
+
+constexpr const char* kFiles[] = {"summary.csv", "runs.csv", "convergence.csv", "compare.html"};
 
 struct Inputs {
   std::vector<Variant> variants;
@@ -61,19 +67,19 @@ Result<Inputs> read_inputs(const CompareCommand& command) {
 }
 
 // Reads every variant's trials; equal lists of files only once.
-Status read_trials(const std::vector<std::string>& given, std::vector<Variant>& variants,
-                   Console& console) {
+Status read_trials(const TrialOptions& given, std::vector<Variant>& variants, Console& console) {
   const Variant* before = nullptr;
   for (Variant& variant : variants) {
     Config& config = variant.config;
-    if (!given.empty()) config.trial_files = given;
+    if (!given.files.empty()) config.trial_files = given.files;
     if (config.trial_files.empty()) {
       return Error{config.path + ": no trials; name them in the config or with --trials"};
     }
     if (before != nullptr && before->config.trial_files == config.trial_files) {
       config.problem.log = before->config.problem.log;
     } else {
-      auto log = read_trial_files(config.trial_files, command_names(config.problem.commands));
+      auto log =
+          read_trial_files(config.trial_files, command_names(config.problem.commands), given.read);
       if (!log) return log.error();
       config.problem.log = *std::move(log);
       show_notes(config.problem.log, console);
@@ -139,13 +145,13 @@ Status write_all(const CompareCommand& command, const Inputs& inputs,
                  const ComparisonSummary& summary, const std::vector<ComparedRun>& runs) {
   const std::filesystem::path out(command.out);
   const std::pair<const char*, std::string> files[] = {
-      {"summary.csv", summary_csv(summary)},
-      {"runs.csv", runs_csv(summary, runs)},
-      {"convergence.csv", convergence_csv(summary)},
-      {"compare.html", comparison_page(summary, "Searches compared", provenance(command, inputs))},
+      {kFiles[0], summary_csv(summary)},
+      {kFiles[1], runs_csv(summary, runs)},
+      {kFiles[2], convergence_csv(summary)},
+      {kFiles[3], comparison_page(summary, "Searches compared", provenance(command, inputs))},
   };
   for (const auto& [name, text] : files) {
-    if (Status s = write_file_atomically((out / name).string(), text); !s) return s;
+    if (Status s = command.outputs.write((out / name).string(), text); !s) return s;
   }
   return {};
 }
@@ -165,11 +171,47 @@ Result<std::vector<ComparedRun>> run_all(const Inputs& inputs, Farm& farm, CliCo
       });
 }
 
-int run_compare(const CompareCommand& command, CliContext& context) {
+nlohmann::ordered_json to_json(const ComparisonSummary& summary) {
+  using Json = nlohmann::ordered_json;
+  const auto number = [](const std::optional<double>& v) {
+    return v && std::isfinite(*v) ? Json(*v) : Json();
+  };
+  Json baselines = Json::array(), variants = Json::array();
+  for (const Baseline& b : summary.baselines) {
+    baselines.push_back({{"name", b.name}, {"fitness", number(b.fitness)}});
+  }
+  for (const VariantSummary& v : summary.variants) {
+    variants.push_back({{"name", v.name},
+                        {"median", number(v.median)},
+                        {"median_lo", number(v.median_95.lower)},
+                        {"median_hi", number(v.median_95.upper)},
+                        {"mean_rank", number(v.mean_rank)},
+                        {"successes", v.successes},
+                        {"median_to_target", number(v.median_to_target)},
+                        {"expected_to_target", number(v.expected_to_target)},
+                        {"final", v.final_fitness}});
+  }
+  return {{"fitness", summary.fitness},
+          {"higher_is_better", summary.higher_is_better},
+          {"target", number(summary.target)},
+          {"evaluations", summary.evaluations},
+          {"seeds", summary.seeds},
+          {"baselines", baselines},
+          {"variants", variants}};
+}
+
+Status plan_outputs(CompareCommand& command, const Inputs& inputs) {
+  for (const std::string& file : command.files) command.outputs.reads(file);
+  for (const Variant& variant : inputs.variants) command.outputs.reads(variant.config.problem.log);
+  return command.outputs.plan_in(command.out, {std::begin(kFiles), std::end(kFiles)});
+}
+
+int run_compare(CompareCommand& command, CliContext& context) {
   Result<Inputs> inputs = read_inputs(command);
   Status status = inputs ? read_trials(command.trials, inputs->variants, context.console)
                          : Status(inputs.error());
   if (status) status = check_alike(inputs->variants);
+  if (status) status = plan_outputs(command, *inputs);
   if (!status) {
     context.console.error(status.error());
     return kExitBadUsage;
@@ -190,7 +232,7 @@ int run_compare(const CompareCommand& command, CliContext& context) {
   summary.baselines = {{"constant velocity", constant ? std::optional(*constant) : std::nullopt},
                        *as_written};
   if (Status s = write_all(command, *inputs, summary, *runs); !s) return failed(s.error(), context);
-  context.console.print(comparison_text(summary));
+  context.console.result(comparison_text(summary), to_json(summary));
   context.console.note(
       "left behind: " + (std::filesystem::path(command.out) / "compare.html").string() +
       ", summary.csv, runs.csv, convergence.csv");
@@ -204,13 +246,14 @@ SubcommandRun setup_compare(CLI::App& app) {
   app.add_option("FILE", command->files,
                  "Comparison files with [compare] and [variants], or configs, a variant each")
       ->required();
-  app.add_option("--trials", command->trials, "Trial logs in place of the configs'");
+  command->trials.declare(app, "Trial logs in place of the configs'");
   app.add_option("--out", command->out, "Folder for the tables and the page")->required();
   app.add_option("--seeds", command->seeds, "Runs of each variant")->check(CLI::Range(1, 10000));
   app.add_option("--first-seed", command->first_seed, "Seed of each variant's first run");
   app.add_option("--evaluations", command->evaluations, "Evaluations of each run")
       ->check(CLI::PositiveNumber);
   app.add_option("--target", command->target, "Fitness whose reaching counts as success");
+  command->outputs.declare(app);
   command->farm.declare(app, true);
   app.footer(
       "Random search, constant-velocity motion and the config's own values are always among the\n"

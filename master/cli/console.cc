@@ -7,6 +7,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstdlib>
+#include <nlohmann/json.hpp>
 
 namespace gapfarm {
 namespace {
@@ -40,8 +41,24 @@ Console::Console(std::FILE* out, std::FILE* err)
 
 Console::~Console() { clear_progress(); }
 
+void Console::result(std::string_view text, const nlohmann::ordered_json& value) {
+  if (!json_) return print(text);
+  // What comes from a log's text may be anything.
+  print(value.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n");
+}
+
+int Console::end(int exit_code) {
+  if (!json_ || printed_ || exit_code == 0) return exit_code;
+  const std::string message = !errors_.empty()  ? errors_
+                              : exit_code > 128 ? "stopped by a signal"
+                                                : "stopped";
+  result("", {{"error", {{"message", message}, {"exit_code", exit_code}}}});
+  return exit_code;
+}
+
 void Console::print(std::string_view text) {
   clear_progress();
+  printed_ = true;
   write_all(out_, text);
 }
 
@@ -52,6 +69,7 @@ void Console::note(std::string_view text) {
 }
 
 void Console::error(const Error& error) {
+  errors_ += (errors_.empty() ? "" : "\n") + error.message;
   if (log_ != nullptr) return log_->write(LogLevel::kError, error.message);
   note("gapfarm: " + error.message);
 }

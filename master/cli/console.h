@@ -1,7 +1,9 @@
-// Words for people: results on stdout, everything else on stderr.
+// Words for people: results on stdout, everything else on stderr.  With --json the results, or the
+// error when there are none, are one JSON value on stdout.
 #pragma once
 
 #include <cstdio>
+#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -18,7 +20,17 @@ class Console {
   Console(const Console&) = delete;
   Console& operator=(const Console&) = delete;
 
-  // Results, to stdout, as they are and at once.
+  // From now on results are JSON.
+  void use_json() { json_ = true; }
+  bool json() const { return json_; }
+
+  // What came of a command, once: the text, or with --json the value.
+  void result(std::string_view text, const nlohmann::ordered_json& value);
+  // To be called last: with --json, where no result was shown, {"error": {"message", "exit_code"}}
+  // with all that error() was told.  Returns `exit_code`.
+  int end(int exit_code);
+
+  // To stdout, as it is and at once.
   void print(std::string_view text);
   // From now on notes and errors are lines of this log, and no progress is shown.  It outlives
   // this.
@@ -50,6 +62,9 @@ class Console {
   bool err_is_terminal_;
   bool colour_;
   bool progress_shown_ = false;
+  bool json_ = false;
+  bool printed_ = false;
+  std::string errors_;
   Log* log_ = nullptr;
   double last_progress_s_ = -1;
 };

@@ -3,6 +3,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include <algorithm>
 #include <cmath>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -22,12 +23,12 @@ using Json = nlohmann::ordered_json;
 
 struct CrossfitOptions {
   std::string config;
-  std::vector<std::string> trials, only, train, tests, repeats, sweeps, set, genes;
+  TrialOptions trials;
+  std::vector<std::string> only, train, tests, repeats, sweeps, set, genes;
   std::vector<std::string> effects, ranges;
   std::string by, per;
   unsigned folds = 5;
   std::optional<std::uint64_t> evaluations, seed;
-  bool json = false;
   FarmOptions farm;
 };
 
@@ -113,6 +114,12 @@ std::string describe(const Problem& problem, const CrossfitGroup& group) {
   for (const Gene& gene : problem.genes) {
     text += fmt::format(" {} {:.4g}", problem.table()[gene.row].key, group.tuned.values[gene.row]);
   }
+  const auto kept = [&](const Gene& gene) {
+    return group.tuned.values[gene.row] == problem.values[gene.row];
+  };
+  if (std::all_of(problem.genes.begin(), problem.genes.end(), kept)) {
+    text += "\n  nothing was gained by tuning: these are the config's own values";
+  }
   text += fmt::format("\n  {:<36} {:>6} {:>8} {:>8} {:>8} {:>8} | {:>8} {:>8}\n", "mean error, mm",
                       "trials", "still", "untuned", "tuned", "repeats", "median mm", "degrees");
   for (const CrossfitSet& set : group.sets) {
@@ -157,35 +164,27 @@ int run_ranking(const CrossfitOptions& options, const Config& config, CliContext
   if (!farm) return failed(farm.error(), context);
   const auto ranking = rank_effects(config.problem, *plan, **farm);
   if (!ranking) return failed(ranking.error(), context);
-  context.console.print(options.json ? ranking_json(config.problem, *ranking).dump(2) + "\n"
-                                     : ranking_text(config.problem, *ranking, *plan));
+  context.console.result(ranking_text(config.problem, *ranking, *plan),
+                         ranking_json(config.problem, *ranking));
   return kExitDone;
 }
 
 int run_crossfit(const CrossfitOptions& options, CliContext& context) {
-  Result<Config> config = read_config_and_trials(options.config, options.trials);
-  if (config) {
-    if (Status s = apply(options, *config); !s) config = s.error();
-  }
-  if (!config) {
-    context.console.error(config.error());
-    return kExitBadUsage;
-  }
-  show_notes(config->problem.log, context.console);
+  const auto config = open_config(options.config, options.trials, context.console,
+                                  [&](Config& read) { return apply(options, read); });
+  if (!config) return kExitBadUsage;
   if (!options.effects.empty()) return run_ranking(options, *config, context);
   auto farm = start_farm(options.farm, config->farm, context);
   if (!farm) return failed(farm.error(), context);
   const auto groups = crossfit(config->problem, plan_of(options, *config), **farm);
   if (!groups) return failed(groups.error(), context);
   Json all = Json::array();
+  std::string text;
   for (const CrossfitGroup& group : *groups) {
-    if (options.json) {
-      all.push_back(to_json(config->problem, group));
-    } else {
-      context.console.print(describe(config->problem, group));
-    }
+    all.push_back(to_json(config->problem, group));
+    text += describe(config->problem, group);
   }
-  if (options.json) context.console.print(all.dump(2) + "\n");
+  context.console.result(text, all);
   return kExitDone;
 }
 
@@ -194,7 +193,7 @@ int run_crossfit(const CrossfitOptions& options, CliContext& context) {
 SubcommandRun setup_crossfit(CLI::App& app) {
   auto options = std::make_shared<CrossfitOptions>();
   app.add_option("CONFIG", options->config, "Config file (TOML)")->required();
-  app.add_option("--trials", options->trials, "Trial logs in place of the config's");
+  options->trials.declare(app);
   app.add_option("--only", options->only,
                  "COLUMN=VALUE[,VALUE...]: leave all other trials out; may repeat, all must hold");
   app.add_option("--set", options->set, "PARAMETER=VALUE, effects included; may repeat");
@@ -229,9 +228,9 @@ SubcommandRun setup_crossfit(CLI::App& app) {
          "--effects; may repeat")
       ->needs(effects);
   app.add_option("--evaluations", options->evaluations,
-                 "Stop each fit after so many, in place of the config's");
+                 "Stop each fit after the generation in which so many are reached, in place of the "
+                 "config's");
   app.add_option("--seed", options->seed, "In place of the config's");
-  app.add_flag("--json", options->json, "Everything, for machines");
   options->farm.declare(app, false);
   app.footer(
       "Examples:\n"

@@ -2,11 +2,13 @@
 #include "master/determine/determine.h"
 
 #include <cmath>
+#include <filesystem>
 #include <memory>
+#include <nlohmann/json.hpp>
 
 #include "common/config/config.h"
-#include "common/trials/files.h"
 #include "master/cli/inputs.h"
+#include "master/cli/outputs.h"
 #include "master/evolve/evaluation.h"
 
 namespace gapfarm {
@@ -14,8 +16,9 @@ namespace {
 
 struct DetermineCommand {
   std::string config, model, out;
-  std::vector<std::string> trials;
+  TrialOptions trials;
   DetermineSettings settings;
+  Outputs outputs;
   FarmOptions farm;
 };
 
@@ -51,15 +54,53 @@ LikelihoodOf farm_likelihood(Farm& farm, const Problem& problem, std::uint64_t s
   };
 }
 
-int run_determine(const DetermineCommand& command, CliContext& context) {
-  Result<Config> config = read_config_and_trials(command.config, command.trials);
-  if (config) {
-    if (Status s = check_evolvable(*config); !s) config = s.error();
+nlohmann::ordered_json to_json(const DetermineReport& report, const ParameterTable& table) {
+  // JSON knows no infinity.
+  const auto number = [](double v) {
+    return std::isfinite(v) ? nlohmann::ordered_json(v) : nlohmann::ordered_json();
+  };
+  nlohmann::ordered_json genes = nlohmann::ordered_json::array(), pairs = genes;
+  for (const GeneDetermined& g : report.genes) {
+    genes.push_back({{"parameter", table[g.gene.row].key},
+                     {"value", g.value},
+                     {"unit", table[g.gene.row].unit},
+                     {"lo", number(g.interval_95.lower)},
+                     {"hi", number(g.interval_95.upper)},
+                     {"deviation_share", number(g.deviation)},
+                     {"determined", g.determined},
+                     {"at_bound", g.at_bound}});
   }
+  for (const Compensation& c : report.compensations) {
+    pairs.push_back({{"a", table[report.genes[c.a].gene.row].key},
+                     {"b", table[report.genes[c.b].gene.row].key},
+                     {"correlation", number(c.correlation)}});
+  }
+  return {{"reliable", report.reliable},
+          {"at_maximum", !report.outside},
+          {"parameters", genes},
+          {"compensations", pairs},
+          {"roughness", number(report.roughness)},
+          {"explained", number(report.explained)},
+          {"evaluations", report.evaluations},
+          {"failures", report.failures}};
+}
+
+// The problem, and that its table can be written.
+Result<Problem> open_problem(DetermineCommand& command, const std::optional<Config>& config) {
   const Result<Model> model = read_model_of(command.model);
-  Result<Problem> problem = !config  ? Result<Problem>(config.error())
-                            : !model ? Result<Problem>(model.error())
-                                     : problem_at(*config, *model);
+  if (!model) return model.error();
+  command.outputs.reads(config->problem.log);
+  command.outputs.reads(command.config);
+  command.outputs.reads(command.model);
+  command.outputs.reads((std::filesystem::path(command.model) / "model.toml").string());
+  if (Status s = command.outputs.plan(command.out); !s) return s.error();
+  return problem_at(*config, *model);
+}
+
+int run_determine(DetermineCommand& command, CliContext& context) {
+  const auto config = open_config(command.config, command.trials, context.console, check_evolvable);
+  if (!config) return kExitBadUsage;
+  const Result<Problem> problem = open_problem(command, config);
   if (!problem) {
     context.console.error(problem.error());
     return kExitBadUsage;
@@ -77,10 +118,11 @@ int run_determine(const DetermineCommand& command, CliContext& context) {
   if (!report) return failed(report.error(), context);
   if (!command.out.empty()) {
     const Status written =
-        write_file_atomically(command.out, determine_csv(*report, problem->table()));
+        command.outputs.write(command.out, determine_csv(*report, problem->table()));
     if (!written) return failed(written.error(), context);
   }
-  context.console.print(determine_text(*report, problem->table()));
+  context.console.result(determine_text(*report, problem->table()),
+                         to_json(*report, problem->table()));
   std::string loose;
   for (const GeneDetermined& g : report->genes) {
     if (!g.determined) loose += (loose.empty() ? "" : ", ") + problem->table()[g.gene.row].key;
@@ -105,7 +147,7 @@ SubcommandRun setup_determine(CLI::App& app) {
       ->required();
   app.add_option("--model", command->model, "The tuned model: a file, or a run's folder")
       ->required();
-  app.add_option("--trials", command->trials, "Trial logs in place of the config's");
+  command->trials.declare(app);
   app.add_option("--out", command->out, "CSV to write");
   app.add_option("--width", to.half_width,
                  "Greatest half width of the box looked at, share of each range")
@@ -115,6 +157,7 @@ SubcommandRun setup_determine(CLI::App& app) {
                  "Share of its range that a determined parameter's 95 % interval may cover")
       ->check(CLI::Range(0.01, 1.0))
       ->capture_default_str();
+  command->outputs.declare(app);
   command->farm.declare(app, true);
   app.footer(
       "The curvature of the log likelihood about the model says how far each parameter could be\n"

@@ -5,11 +5,13 @@
 
 #include <filesystem>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <set>
 
 #include "common/base/build_info.h"
-#include "common/trials/files.h"
 #include "master/cli/inputs.h"
+#include "master/cli/outputs.h"
+#include "master/cli/question_stamp.h"
 #include "master/diagnose/diagnosis_json.h"
 #include "master/diagnose/stage_pace.h"
 #include "master/experiment/recorded_farm.h"
@@ -19,14 +21,16 @@ namespace gapfarm {
 namespace {
 
 constexpr const char* kAnswers = "simulations.sqlite";
+constexpr const char* kResult = "diagnosis.json";
 
 struct DiagnoseCommand {
   std::string config;
-  std::vector<std::string> trials;
+  TrialOptions trials;
   std::string out;
   std::string model;
   std::vector<std::string> leave_out;
   std::optional<std::uint64_t> seed;
+  Outputs outputs;
   FarmOptions farm;
 };
 
@@ -64,6 +68,11 @@ void add_provenance(const Config& config, const DiagnoseCommand& command, Diagno
   to.emplace_back("seed", std::to_string(config.seed));
 }
 
+Status write_model(const Model& model, const std::filesystem::path& path, const Outputs& outputs) {
+  if (Status s = check_model(model); !s) return Error{path.string() + ": " + s.error().message};
+  return outputs.write(path.string(), format_model(model));
+}
+
 Status write_all(const Config& config, const DiagnoseCommand& command,
                  const DiagnosisResult& result) {
   const std::filesystem::path out(command.out);
@@ -73,16 +82,49 @@ Status write_all(const Config& config, const DiagnoseCommand& command,
     const auto& [lo, hi] = result.intervals[i];
     if (lo < hi) model.intervals[i] = Interval{lo, hi};
   }
-  if (Status s = write_model(model, (out / "model.toml").string()); !s) return s;
+  if (Status s = write_model(model, out / "model.toml", command.outputs); !s) return s;
   const Model tuned = model_of(config, result.tuned, "tuned");
-  if (Status s = write_model(tuned, (out / "tuned.toml").string()); !s) return s;
-  if (Status s =
-          write_file_atomically((out / "report.html").string(), report_html(result.diagnosis));
-      !s) {
-    return s;
-  }
+  if (Status s = write_model(tuned, out / "tuned.toml", command.outputs); !s) return s;
+  const Status report =
+      command.outputs.write((out / "report.html").string(), report_html(result.diagnosis));
+  if (!report) return report;
   // Last: whoever sees it sees the rest.
-  return write_file_atomically((out / "diagnosis.json").string(), to_json(result.diagnosis));
+  return command.outputs.write((out / kResult).string(), to_json(result.diagnosis));
+}
+
+QuestionStamp stamp_of(const Config& config, const DiagnoseCommand& command,
+                       const std::vector<Gene>& searched) {
+  QuestionStamp stamp;
+  stamp.command = "diagnose";
+  stamp.problem = problem_hash(to_proto(config.problem));
+  nlohmann::ordered_json genes = nlohmann::ordered_json::object();
+  for (const Gene& gene : searched) {
+    genes[config.problem.table()[gene.row].key] = {gene.lower, gene.upper};
+  }
+  stamp.options = {{"genes", genes},
+                   {"model", !command.model.empty()},
+                   {"leave-out", command.leave_out},
+                   {"seed", config.seed}};
+  stamp.about = {{"config", config.path}, {"trials", config.trial_files}};
+  stamp.build = build_info().fingerprint;
+  return stamp;
+}
+
+// Makes sure that the folder takes this diagnosis, a new one or the same again.
+Status plan_outputs(DiagnoseCommand& command, const Config& config, const QuestionStamp& stamp) {
+  Outputs& outputs = command.outputs;
+  if (Status s = check_folder(command.out, FolderKind::kDiagnosis); !s) return s;
+  outputs.reads(config.problem.log);
+  outputs.reads(command.config);
+  outputs.reads(command.model);
+  const auto state = compare_stamp(command.out, kResult, stamp, outputs.force());
+  if (!state) return state.error();
+  for (const char* name : {kStampFile, "model.toml", "tuned.toml", "report.html", kResult}) {
+    const std::string path = (std::filesystem::path(command.out) / name).string();
+    const Status s = *state == FolderState::kNew ? outputs.plan(path) : outputs.plan_again(path);
+    if (!s) return s;
+  }
+  return {};
 }
 
 // Every simulation goes into the folder: a stopped diagnosis goes on where it was, and what a
@@ -90,7 +132,9 @@ Status write_all(const Config& config, const DiagnoseCommand& command,
 Result<AnswerStore> open_answers(const std::string& out) {
   std::error_code code;
   std::filesystem::create_directories(out, code);
-  if (code) return Error{out + ": cannot make the folder: " + code.message()};
+  if (code) {
+    return Error{out + ": cannot make the folder: " + code.message() + "; choose another --out"};
+  }
   return AnswerStore::open(std::filesystem::path(out) / kAnswers, build_info().fingerprint);
 }
 
@@ -114,6 +158,14 @@ std::string summary(const Diagnosis& d) {
       d.heading_mrad.final_, d.position_mm.floor, d.heading_mrad.floor);
   for (const std::string& caution : d.cautions) text += "  note: " + caution + "\n";
   return text;
+}
+
+// diagnosis.json without its trials.
+nlohmann::ordered_json summary_json(const Diagnosis& diagnosis, const DiagnoseCommand& command) {
+  auto json = nlohmann::ordered_json::parse(to_json(diagnosis), nullptr, false);
+  json.erase("trials");
+  json["out"] = command.out;
+  return json;
 }
 
 // What the command line says of the problem, on top of the config.
@@ -159,12 +211,17 @@ class StageProgress {
   std::string stage_;
 };
 
-int run_diagnose(const DiagnoseCommand& command, CliContext& context) {
+int run_diagnose(DiagnoseCommand& command, CliContext& context) {
   DiagnoseOptions options;
   const auto config =
       open_config(command.config, command.trials, context.console,
                   [&](Config& read) { return apply_options(command, read, options.genes); });
   if (!config) return kExitBadUsage;
+  const QuestionStamp stamp = stamp_of(*config, command, options.genes);
+  if (Status s = plan_outputs(command, *config, stamp); !s) {
+    context.console.error(s.error());
+    return kExitBadUsage;
+  }
   auto farm = start_farm(command.farm, config->farm, context);
   if (!farm) return failed(farm.error(), context);
   options.keep_base = !command.model.empty();
@@ -172,6 +229,10 @@ int run_diagnose(const DiagnoseCommand& command, CliContext& context) {
   options.seed = config->seed;
   auto answers = open_answers(command.out);
   if (!answers) return failed(answers.error(), context);
+  const std::string stamp_file = (std::filesystem::path(command.out) / kStampFile).string();
+  if (Status s = command.outputs.write(stamp_file, format_stamp(stamp)); !s) {
+    return failed(s.error(), context);
+  }
   const Result<std::int64_t> at_hand = answers->count();
   if (!at_hand) return failed(at_hand.error(), context);
   RecordedFarm recorded(**farm, *answers);
@@ -187,6 +248,7 @@ int run_diagnose(const DiagnoseCommand& command, CliContext& context) {
   if (!result) {
     if (result.error().message == kStopRequested) {
       context.console.note("what was simulated is kept; the same command goes on from there");
+      return kExitResumable;
     }
     return failed(result.error(), context);
   }
@@ -198,7 +260,7 @@ int run_diagnose(const DiagnoseCommand& command, CliContext& context) {
                                              answers->key(hash, tasks.front()), tasks.size() - 1));
   }
   if (Status s = write_all(*config, command, *result); !s) return failed(s.error(), context);
-  context.console.print(summary(result->diagnosis));
+  context.console.result(summary(result->diagnosis), summary_json(result->diagnosis, command));
   context.console.note("left behind: " + command.out + "/report.html, diagnosis.json, model.toml");
   return (*farm)->counts().quarantined > 0 ? kExitQuarantined : kExitDone;
 }
@@ -208,11 +270,12 @@ int run_diagnose(const DiagnoseCommand& command, CliContext& context) {
 SubcommandRun setup_diagnose(CLI::App& app) {
   auto command = std::make_shared<DiagnoseCommand>();
   app.add_option("CONFIG", command->config, "Config file (TOML)")->required();
-  app.add_option("--trials", command->trials, "Trial logs in place of the config's");
+  command->trials.declare(app);
   app.add_option("--out", command->out, "Folder for report, diagnosis and models")->required();
   app.add_option("--model", command->model, "Base model (run or model.toml); default: tuned here");
   app.add_option("--leave-out", command->leave_out, "Effects that the catalogue is to be without");
   app.add_option("--seed", command->seed, "Of the bootstrap");
+  command->outputs.declare(app);
   command->farm.declare(app, true);
   app.footer(
       "Examples:\n"

@@ -6,22 +6,26 @@
 #include <charconv>
 #include <filesystem>
 #include <memory>
+#include <nlohmann/json.hpp>
 
 #include "common/base/suggest.h"
-#include "common/trials/files.h"
 #include "common/trials/read.h"
 #include "common/trials/waypoint_log.h"
 #include "master/cli/inputs.h"
+#include "master/cli/outputs.h"
 #include "master/drive/drive_report.h"
 
 namespace gapfarm {
 namespace {
+
+using Json = nlohmann::ordered_json;
 
 constexpr double kSpacing_m = 0.02;  // between points of paths that are compared
 
 struct DriveCommand {
   std::string model;
   std::vector<std::string> commands, waypoints, mined;
+  TrialOptions reading;
   std::string start = "0,0,0";
   std::string log;  // blendersim's
   std::string out;
@@ -29,6 +33,7 @@ struct DriveCommand {
   unsigned targets = 0;  // of the log; 0: all
   double coverage = 0.9;
   DriveSettings settings;
+  Outputs outputs;
   FarmOptions farm;
 };
 
@@ -131,8 +136,9 @@ Result<Task> read_task(const DriveCommand& command, const Model& model) {
 
 class Driving {
  public:
-  Driving(const DriveCommand& command, const Task& task, const Problem& problem, Farm& farm)
-      : command_(command), task_(task), problem_(problem), farm_(farm) {
+  Driving(const DriveCommand& command, const Task& task, const Problem& problem, Farm& farm,
+          Console& console)
+      : command_(command), task_(task), problem_(problem), farm_(farm), console_(console) {
     report_.coverage = command.coverage;
     report_.real = task.real;
     report_.targets = task.targets;
@@ -144,8 +150,10 @@ class Driving {
     if (Status s = simulate(*nominal); !s) return s.error();
     auto constant = *nominal;
     if (!command_.mined.empty()) {
-      const auto log = read_trial_files(command_.mined, command_names(problem_.commands));
+      const auto log =
+          read_trial_files(command_.mined, command_names(problem_.commands), command_.reading.read);
       if (!log) return log.error();
+      show_notes(*log, console_);
       const auto fitted = constant_velocities(*log, problem_.commands);
       if (!fitted) return fitted.error();
       constant = *fitted;
@@ -220,16 +228,53 @@ class Driving {
   const Task& task_;
   const Problem& problem_;
   Farm& farm_;
+  Console& console_;
   DriveReport report_;
 };
 
-int run_drive(const DriveCommand& command, CliContext& context) {
+Json to_json(const DriveReport& report) {
+  Json drivers = Json::array();
+  for (const DriverReport& d : report.drivers) {
+    Json driver = {{"name", d.name}, {"runs", d.runs.size()}};
+    if (d.real) {
+      driver["to_real_m"] = {{"lettier", d.real->lettier},
+                             {"hausdorff", d.real->hausdorff},
+                             {"frechet", d.real->frechet}};
+    }
+    Json ends = Json::array();
+    for (const DrivenRun& run : d.runs) {
+      if (run.empty() || run.back().path.empty()) continue;
+      const Pose end = run.back().path.back().pose;
+      ends.push_back({end.x, end.y, end.theta});
+    }
+    driver["ends"] = std::move(ends);
+    drivers.push_back(std::move(driver));
+  }
+  return {{"coverage", report.coverage}, {"drivers", std::move(drivers)}};
+}
+
+constexpr const char* kBand = "band.csv";
+constexpr const char* kEnds = "ends.csv";
+constexpr const char* kPage = "drive.html";
+
+Status plan_outputs(DriveCommand& command) {
+  command.outputs.reads(command.model);
+  command.outputs.reads(command.log);
+  for (const std::string& file : command.mined) command.outputs.reads(file);
+  for (const std::string& file : command.reading.read.paths) command.outputs.reads(file);
+  return command.outputs.plan_in(command.out, {kBand, kEnds, kPage});
+}
+
+int run_drive(DriveCommand& command, CliContext& context) {
   const auto model = read_model_of(command.model);
   if (!model) {
     context.console.error(model.error());
     return kExitBadUsage;
   }
-  const auto task = read_task(command, *model);
+  auto task = read_task(command, *model);
+  if (task) {
+    if (Status s = plan_outputs(command); !s) task = s.error();
+  }
   if (!task) {
     context.console.error(task.error());
     return kExitBadUsage;
@@ -237,21 +282,23 @@ int run_drive(const DriveCommand& command, CliContext& context) {
   auto farm = start_farm(command.farm, {}, context);
   if (!farm) return failed(farm.error(), context);
   const Problem problem = problem_of(*model);
-  const auto report = Driving(command, *task, problem, **farm).run();
+  const auto report = Driving(command, *task, problem, **farm, context.console).run();
   if (!report) return failed(report.error(), context);
   const std::filesystem::path out(command.out);
   const std::pair<const char*, std::string> files[] = {
-      {"band.csv", band_csv(*report)},
-      {"ends.csv", ends_csv(*report)},
-      {"drive.html", drive_page(*report, "Driven " + std::to_string(command.runs) + " times")},
+      {kBand, band_csv(*report)},
+      {kEnds, ends_csv(*report)},
+      {kPage, drive_page(*report, "Driven " + std::to_string(command.runs) + " times")},
   };
   for (const auto& [name, text] : files) {
-    if (Status s = write_file_atomically((out / name).string(), text); !s) {
+    if (Status s = command.outputs.write((out / name).string(), text); !s) {
       return failed(s.error(), context);
     }
   }
-  context.console.print(drive_text(*report));
-  context.console.note("left behind: " + (out / "drive.html").string() + ", band.csv, ends.csv");
+  Json json = to_json(*report);
+  json["out"] = command.out;
+  context.console.result(drive_text(*report), json);
+  context.console.note("left behind: " + (out / kPage).string() + ", band.csv, ends.csv");
   return kExitDone;
 }
 
@@ -269,6 +316,7 @@ SubcommandRun setup_drive(CLI::App& app) {
   app.add_option("--start", command->start, "X,Y,THETA in m and rad")->capture_default_str();
   app.add_option("--mined", command->mined,
                  "Trial logs that the mined motion model and constant velocities are fitted to");
+  command->reading.declare_reading(app);
   app.add_option("--runs", command->runs)->check(CLI::Range(8, 1000000))->capture_default_str();
   app.add_option("--coverage", command->coverage, "Share of paths that the band is to hold")
       ->check(CLI::Range(0.05, 0.99))
@@ -278,6 +326,7 @@ SubcommandRun setup_drive(CLI::App& app) {
       ->check(CLI::Range(0.005, 1.0))
       ->capture_default_str();
   app.add_option("--out", command->out, "Folder for the tables and the page")->required();
+  command->outputs.declare(app);
   command->farm.declare(app, true);
   app.footer(
       "Constant velocity, and with --mined the motion model mined from a log, drive the same "

@@ -3,12 +3,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
 
 #include "common/config/config.h"
-#include "common/trials/files.h"
 #include "master/cli/inputs.h"
+#include "master/cli/outputs.h"
 #include "master/report/effect_figure.h"
 
 namespace gapfarm {
@@ -19,7 +20,7 @@ using Json = nlohmann::ordered_json;
 struct EffectsOptions {
   std::string config;
   std::string figures;
-  bool json = false;
+  Outputs outputs;
   FarmOptions farm;
 };
 
@@ -221,8 +222,16 @@ std::vector<v1::Task> figure_tasks(const Problem& problem) {
   return tasks;
 }
 
-int draw_figures(const EffectsOptions& options, CliContext& context) {
-  const Result<Config> config = figure_config(options);
+int draw_figures(EffectsOptions& options, CliContext& context) {
+  Result<Config> config = figure_config(options);
+  std::vector<std::string> names;
+  if (config) {
+    for (const Effect& effect : config->problem.table().effects()) {
+      names.push_back(effect.name + ".svg");
+    }
+    if (!options.config.empty()) options.outputs.reads(options.config);
+    if (Status s = options.outputs.plan_in(options.figures, names); !s) config = s.error();
+  }
   if (!config) {
     context.console.error(config.error());
     return kExitBadUsage;
@@ -245,17 +254,17 @@ int draw_figures(const EffectsOptions& options, CliContext& context) {
         drives_of(problem, (*results)[2 * e].simulate(), (*results)[2 * e + 1].simulate());
     const std::string picture =
         effect_figure(effects[e], figure_values(effects[e]), kFigureStart, drives);
-    const std::string path = options.figures + "/" + effects[e].name + ".svg";
-    if (Status s = write_file_atomically(path, picture); !s) return failed(s.error(), context);
+    const std::string path = (std::filesystem::path(options.figures) / names[e]).string();
+    if (Status s = options.outputs.write(path, picture); !s) return failed(s.error(), context);
   }
-  context.console.note(options.figures + ": " + std::to_string(effects.size()) + " pictures");
+  context.console.result(options.figures + ": " + std::to_string(effects.size()) + " pictures\n",
+                         {{"out", options.figures}, {"files", names}});
   return kExitDone;
 }
 
-int run_effects(const EffectsOptions& options, CliContext& context) {
+int run_effects(EffectsOptions& options, CliContext& context) {
   if (!options.figures.empty()) return draw_figures(options, context);
-  context.console.print(options.json ? to_json(srv1_effects()).dump(2) + "\n"
-                                     : listing(srv1_effects()));
+  context.console.result(listing(srv1_effects()), to_json(srv1_effects()));
   return kExitDone;
 }
 
@@ -266,7 +275,7 @@ SubcommandRun setup_effects(CLI::App& app) {
   app.add_option("CONFIG", options->config, "Robot of the pictures; default: the nominal one");
   app.add_option("--figures", options->figures,
                  "Draw what each effect does to the commands, as SVG, into this folder");
-  app.add_flag("--json", options->json, "Print JSON");
+  options->outputs.declare(app);
   options->farm.declare(app, false);
   app.footer(
       "Examples:\n"

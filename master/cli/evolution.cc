@@ -3,6 +3,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <chrono>
+#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "master/cli/evolution_farm.h"
@@ -33,9 +34,9 @@ Result<std::unique_ptr<Optimiser>> optimiser_at(const std::optional<Checkpoint>&
   return checkpoint ? restore_optimiser(setup, checkpoint->optimiser_state) : make_optimiser(setup);
 }
 
-// Tells how the run's results do on the trials that were kept apart.
-Status show_validation(RunStore& store, const EvolutionRun& run, const TrialLog& log, Farm& farm,
-                       const Genome& best, Console& console) {
+// Adds how the run's results do on the trials that were kept apart.
+Status add_validation(RunStore& store, const EvolutionRun& run, const TrialLog& log, Farm& farm,
+                      const Genome& best, std::string& text, Json& json) {
   const auto checkpoint = store.checkpoint();
   if (!checkpoint) return checkpoint.error();
   std::vector<Genome> stages;
@@ -44,12 +45,13 @@ Status show_validation(RunStore& store, const EvolutionRun& run, const TrialLog&
   }
   const auto rows = validate(farm, run.problem, log, stages, best);
   if (!rows) return rows.error();
-  console.note(fmt::format("validation on {} trials kept apart, {}:", log.trials.size(),
-                           fitness_name(run.problem.fitness.kind)));
+  text += fmt::format("validation on {} trials kept apart, {}:\n", log.trials.size(),
+                      fitness_name(run.problem.fitness.kind));
   for (const Validated& row : *rows) {
-    console.note(
-        fmt::format("  {:<24} {}", row.name,
-                    row.fitness ? fmt::format("{:.6g}", *row.fitness) : "does not end well"));
+    text += fmt::format("  {:<24} {}\n", row.name,
+                        row.fitness ? fmt::format("{:.6g}", *row.fitness) : "does not end well");
+    json["validation"].push_back(
+        {{"name", row.name}, {"fitness", row.fitness ? Json(*row.fitness) : Json()}});
   }
   return {};
 }
@@ -80,11 +82,31 @@ std::string outcome_line(const EvolutionRun& run, const EvolveSummary& summary) 
                             summary.evaluations, format_duration(summary.wall_s));
 }
 
+Json outcome_json(const RunStore& store, const EvolutionRun& run, const EvolveSummary& summary) {
+  const FitnessKind kind = run.problem.fitness.kind;
+  Json json = {{"run", store.run().string()},
+               {"state", summary.reason == StopReason::kRequested ? "stopped" : "finished"},
+               {"stop_reason", summary.text},
+               {"generations", summary.generations},
+               {"evaluations", summary.evaluations},
+               {"wall_s", summary.wall_s},
+               {"fitness", fitness_name(kind)},
+               {"best_fitness", nullptr}};
+  if (summary.best && summary.best->outcome == v1::OK) {
+    json["best_fitness"] = fitness_of_cost(kind, summary.best->cost);
+  }
+  return json;
+}
+
 }  // namespace
 
 void EvolutionOverrides::declare(CLI::App& app) {
-  app.add_option("--generations", generations, "Stop after so many generations");
-  app.add_option("--evaluations", evaluations, "Stop after so many evaluations");
+  constexpr std::uint64_t kMost = std::numeric_limits<std::int64_t>::max();
+  app.add_option("--generations", generations, "Stop after so many generations")
+      ->check(CLI::Range(std::uint64_t{1}, kMost));
+  app.add_option("--evaluations", evaluations,
+                 "Stop after the generation in which so many evaluations are reached")
+      ->check(CLI::Range(std::uint64_t{1}, kMost));
   app.add_option("--time", time_s, "Stop after so many seconds")->check(CLI::PositiveNumber);
   app.add_option("--target", target_fitness, "Stop at this fitness");
   app.add_option("--population", population, "Individuals")->check(CLI::Range(2, 1000000));
@@ -188,8 +210,10 @@ int run_evolution(RunStore& store, const EvolutionRun& run, CliContext& context)
     return failed(summary.error(), context);
   }
   if (Status s = conclude(store, *summary, progress); !s) return failed(s.error(), context);
-  context.console.note(outcome_line(run, *summary));
+  std::string text = outcome_line(run, *summary) + "\n";
+  Json json = outcome_json(store, run, *summary);
   if (summary->reason == StopReason::kRequested) {
+    context.console.result(text, json);
     context.console.note("continue with: gapfarm resume " + store.run().string());
     return kExitResumable;
   }
@@ -197,18 +221,25 @@ int run_evolution(RunStore& store, const EvolutionRun& run, CliContext& context)
     const Status left = leave_behind(store, run.problem, run.config, *summary, **farm);
     if (!left) return failed(left.error(), context);
     if (*kept_apart) {
-      const Status shown =
-          show_validation(store, run, **kept_apart, **farm, summary->best->genome, context.console);
-      if (!shown) return failed(shown.error(), context);
+      show_notes(**kept_apart, context.console);
+      const Status added =
+          add_validation(store, run, **kept_apart, **farm, summary->best->genome, text, json);
+      if (!added) return failed(added.error(), context);
     }
-    context.console.note("left behind: " + (store.run() / "model.toml").string() + ", " +
-                         (store.run() / "poses.svg").string() + ", " +
-                         (store.run() / "fitness.svg").string());
+    const char* separator = "left behind: ";
+    for (const char* name : {"model.toml", "poses.svg", "fitness.svg"}) {
+      text += separator + (store.run() / name).string();
+      json["files"].push_back((store.run() / name).string());
+      separator = ", ";
+    }
+    text += "\n";
   }
   // Of earlier masters' generations too, and of what was done after the last one.
   const auto given_up = store.quarantined();
   if (!given_up) return failed(given_up.error(), context);
   const std::uint64_t lost = *given_up + (*farm)->counts().quarantined - sink.quarantined();
+  json["given_up"] = lost;
+  context.console.result(text, json);
   if (lost == 0) return kExitDone;
   context.console.note(fmt::format("{} given up; which and why: gapfarm status {}",
                                    lost == 1 ? "1 task was" : std::to_string(lost) + " tasks were",

@@ -1,8 +1,10 @@
 // gapfarm evolve CONFIG: evolve parameters against a trial log.
+#include <filesystem>
 #include <memory>
 
 #include "common/config/config.h"
 #include "master/cli/evolution.h"
+#include "master/cli/outputs.h"
 #include "master/cli/validation.h"
 
 namespace gapfarm {
@@ -10,7 +12,7 @@ namespace {
 
 struct EvolveCommand {
   std::string config;
-  std::vector<std::string> trials;
+  TrialOptions trials;
   std::string out;
   std::optional<std::uint64_t> seed;
   std::optional<std::uint64_t> shuffle;
@@ -42,16 +44,30 @@ int run_evolve(const EvolveCommand& command, CliContext& context) {
         command.overrides.apply(read.evolution);
         if (command.seed) read.seed = *command.seed;
         if (Status s = check_runnable(read); !s) return s;
-        return check_farm(command.farm, read.farm);
+        if (Status s = check_farm(command.farm, read.farm); !s) return s;
+        return check_folder(command.out, FolderKind::kRun);
       });
   if (!config) return kExitBadUsage;
+  std::error_code ignored;
+  const bool folder_was_there = std::filesystem::exists(command.out, ignored);
   Result<RunStore> store = RunStore::create(command.out, run_info(*config, command.overrides));
-  if (!store) return failed(store.error(), context);
+  if (!store) {
+    context.console.error(store.error());
+    return kExitBadUsage;
+  }
   context.console.note(command.out + ": evolving " + std::to_string(config->problem.genes.size()) +
                        " parameters on " + std::to_string(config->problem.log.trials.size()) +
                        " trials, seed " + std::to_string(config->seed));
-  return run_evolution(*store, {*config, config->problem, command.farm, *log, command.shuffle},
-                       context);
+  const int code = run_evolution(
+      *store, {*config, config->problem, command.farm, *log, command.shuffle}, context);
+  // What failed before its first generation is not to be in the way of the next attempt.
+  const auto checkpoint = store->checkpoint();
+  if (code == kExitFailed && checkpoint && !*checkpoint) {
+    if (Status s = RunStore::discard(*std::move(store), !folder_was_there); !s) {
+      context.console.error(s.error());
+    }
+  }
+  return code;
 }
 
 }  // namespace
@@ -59,7 +75,7 @@ int run_evolve(const EvolveCommand& command, CliContext& context) {
 SubcommandRun setup_evolve(CLI::App& app) {
   auto command = std::make_shared<EvolveCommand>();
   app.add_option("CONFIG", command->config, "Config file (TOML)")->required();
-  app.add_option("--trials", command->trials, "Trial logs in place of the config's");
+  command->trials.declare(app);
   app.add_option("--out", command->out, "Run folder to make")->required();
   app.add_option("--seed", command->seed, "In place of the config's");
   command->overrides.declare(app);

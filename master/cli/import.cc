@@ -1,6 +1,6 @@
 // gapfarm import FORMAT FILES: other programs' logs to the trial format.
-#include <filesystem>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <set>
 
 #include "common/base/suggest.h"
@@ -10,6 +10,7 @@
 #include "common/trials/read.h"
 #include "common/trials/write.h"
 #include "master/cli/inputs.h"
+#include "master/cli/outputs.h"
 #include "master/cli/subcommand.h"
 
 namespace gapfarm {
@@ -27,7 +28,8 @@ struct ImportOptions {
   std::string format;
   std::vector<std::string> files;
   std::string out;
-  bool force = false;
+  Outputs outputs;
+  TrialOptions reading;
 };
 
 const ImportFormat* find_format(const std::string& name) {
@@ -48,48 +50,61 @@ Status check_formats(const ImportOptions& options, const ImportFormat& wanted) {
   return {};
 }
 
-int run_import(const ImportOptions& options, CliContext& context) {
-  Console& console = context.console;
+Result<TrialLog> read_logs(const ImportOptions& options) {
   const ImportFormat* format = find_format(options.format);
   if (!format) {
     std::vector<std::string> known;
     for (const ImportFormat& row : kFormats) known.emplace_back(row.name);
-    console.error(
-        Error{"unknown format '" + options.format + "'" + suggestion(options.format, known)});
-    return kExitBadUsage;
+    return Error{"unknown format '" + options.format + "'" + suggestion(options.format, known)};
   }
-  const bool to_stdout = options.out == "-";
-  std::error_code ignored;
-  if (!to_stdout && !options.force && std::filesystem::exists(options.out, ignored)) {
-    console.error(Error{options.out + ": exists already; give another --out, or --force to "
-                                      "replace it"});
-    return kExitBadUsage;
-  }
-  if (Status s = check_formats(options, *format); !s) {
-    console.error(s.error());
-    return kExitFailed;
-  }
+  if (Status s = check_formats(options, *format); !s) return s.error();
   std::vector<std::string> commands;
   for (const CommandSpec& command : default_commands(format->scenario)) {
     commands.push_back(command.name);
   }
-  const Result<TrialLog> log = read_trial_files(options.files, commands);
+  return read_trial_files(options.files, commands, options.reading.read);
+}
+
+int run_import(ImportOptions& options, CliContext& context) {
+  Console& console = context.console;
+  const bool to_stdout = options.out == "-";
+  const Result<TrialLog> log = read_logs(options);
   if (!log) {
     console.error(log.error());
-    return kExitFailed;
+    return kExitBadUsage;
   }
   show_notes(*log, console);
+  if (to_stdout && console.json()) {
+    console.error(Error{"--json and --out - both want standard output; name a file"});
+    return kExitBadUsage;
+  }
   if (to_stdout) {
     console.print(format_trials(*log));
-  } else if (Status s = write_trials(*log, options.out); !s) {
-    console.error(s.error());
-    return kExitFailed;
+    return kExitDone;
+  }
+  options.outputs.reads(*log);
+  const auto files = trial_files(*log, options.out);
+  if (!files) return failed(files.error(), context);
+  for (const TrialFile& file : *files) {
+    if (Status s = options.outputs.plan(file.path); !s) {
+      console.error(s.error());
+      return kExitBadUsage;
+    }
+  }
+  for (const TrialFile& file : *files) {
+    if (Status s = options.outputs.write(file.path, file.text); !s) {
+      return failed(s.error(), context);
+    }
   }
   std::set<std::string> sessions;
   for (const Trial& trial : log->trials) sessions.insert(trial.session);
-  console.note(std::to_string(log->trials.size()) + " trials in " +
-               std::to_string(sessions.size()) + " sessions" +
-               (to_stdout ? "" : " written to " + options.out));
+  console.result(std::to_string(log->trials.size()) + " trials in " +
+                     std::to_string(sessions.size()) + " sessions written to " + options.out + "\n",
+                 {{"out", options.out},
+                  {"trials", log->trials.size()},
+                  {"sessions", sessions.size()},
+                  {"read", log->files},
+                  {"notes", log->notes}});
   return kExitDone;
 }
 
@@ -100,7 +115,8 @@ SubcommandRun setup_import(CLI::App& app) {
   app.add_option("FORMAT", options->format, "Format of the files: bbautotune")->required();
   app.add_option("FILES", options->files, "Logs; each becomes a session")->required();
   app.add_option("-o,--out", options->out, "Trial log to write; - for standard output")->required();
-  app.add_flag("--force", options->force, "Replace an existing trial log");
+  options->outputs.declare(app);
+  options->reading.declare_reading(app);
   app.footer(
       "Examples:\n"
       "  gapfarm import bbautotune logs/*.dat --out trials.csv\n"

@@ -1,12 +1,14 @@
 // gapfarm influence CONFIG: which parameters move the path further than a repeat does.
 #include "master/influence/influence.h"
 
+#include <cmath>
 #include <filesystem>
 #include <memory>
+#include <nlohmann/json.hpp>
 
 #include "common/config/config.h"
-#include "common/trials/files.h"
 #include "master/cli/inputs.h"
+#include "master/cli/outputs.h"
 #include "master/cli/traced.h"
 
 namespace gapfarm {
@@ -18,15 +20,45 @@ struct InfluenceCommand {
   std::string distance = "frechet";
   TracedCommands traced;
   InfluenceSettings settings;
+  Outputs outputs;
   FarmOptions farm;
 };
 
+nlohmann::ordered_json to_json(const InfluenceReport& report, const ParameterTable& table) {
+  // JSON knows no infinity.
+  const auto number = [](double v) {
+    return std::isfinite(v) ? nlohmann::ordered_json(v) : nlohmann::ordered_json();
+  };
+  nlohmann::ordered_json factors = nlohmann::ordered_json::array();
+  for (const FactorInfluence& f : report.factors) {
+    factors.push_back({{"parameter", table[f.gene.row].key},
+                       {"alone_m", number(f.alone.distance)},
+                       {"alone_at", number(f.alone.value)},
+                       {"alone_p", number(f.alone.p)},
+                       {"alone_influential", f.alone.influential},
+                       {"morris_m", number(f.morris.mean)},
+                       {"morris_p", number(f.morris.p)},
+                       {"morris_influential", f.morris.influential}});
+  }
+  return {{"horizon_s", number(report.horizon_s)},
+          {"repeat_distance_m", number(report.repeat_distance)},
+          {"factors", factors}};
+}
+
 int run_influence(InfluenceCommand command, CliContext& context) {
-  const Result<Config> config = command.traced.open(command.config, &command.settings.trace);
+  Result<Config> config = command.traced.open(command.config, &command.settings.trace);
+  if (config) {
+    command.outputs.reads(command.config);
+    command.outputs.reads(config->problem.log);
+    const Status planned =
+        command.outputs.plan_in(command.out, {"influence.csv", "influence.html", "genes.toml"});
+    if (!planned) config = planned.error();
+  }
   if (!config) {
     context.console.error(config.error());
     return kExitBadUsage;
   }
+  show_notes(config->problem.log, context.console);
   for (std::size_t i = 0; i < path_distances().size(); ++i) {
     if (command.distance == path_distances()[i].name) command.settings.distance = i;
   }
@@ -48,11 +80,11 @@ int run_influence(InfluenceCommand command, CliContext& context) {
       {"genes.toml", influential_genes(*report, table)},
   };
   for (const auto& [name, text] : files) {
-    if (Status s = write_file_atomically((out / name).string(), text); !s) {
+    if (Status s = command.outputs.write((out / name).string(), text); !s) {
       return failed(s.error(), context);
     }
   }
-  context.console.print(influence_text(*report, table));
+  context.console.result(influence_text(*report, table), to_json(*report, table));
   context.console.note("left behind: " + (out / "influence.html").string() +
                        ", influence.csv, genes.toml");
   return kExitDone;
@@ -85,6 +117,7 @@ SubcommandRun setup_influence(CLI::App& app) {
       ->check(CLI::Range(4, 100000))
       ->capture_default_str();
   command->traced.declare(app);
+  command->outputs.declare(app);
   command->farm.declare(app, true);
   app.footer(
       "Examples:\n"

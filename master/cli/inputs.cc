@@ -15,28 +15,28 @@ std::vector<std::string> command_names(const std::vector<CommandSpec>& commands)
   return names;
 }
 
-Result<Config> read_config_and_trials(const std::string& config_path,
-                                      const std::vector<std::string>& trial_files) {
+Result<Config> read_config_and_trials(const std::string& config_path, const TrialOptions& trials) {
   Result<Config> config = read_config(config_path);
   if (!config) return config.error();
-  if (!trial_files.empty()) config->trial_files = trial_files;
+  if (!trials.files.empty()) config->trial_files = trials.files;
   if (config->trial_files.empty()) {
     return Error{config_path +
                  ": names no trial files; add them to the config or give --trials FILE"};
   }
   Result<TrialLog> log =
-      read_trial_files(config->trial_files, command_names(config->problem.commands));
+      read_trial_files(config->trial_files, command_names(config->problem.commands), trials.read);
   if (!log) return log.error();
   config->problem.log = std::move(*log);
-  const Result<Problem> sound = from_proto(to_proto(config->problem));
+  const v1::Problem message = to_proto(config->problem);
+  const Result<Problem> sound = from_proto(message);
   if (!sound) return sound.error();
+  if (Status s = check_sendable(message); !s) return s.error();
   return config;
 }
 
-std::optional<Config> open_config(const std::string& config_path,
-                                  const std::vector<std::string>& trial_files, Console& console,
-                                  const std::function<Status(Config&)>& finish) {
-  Result<Config> config = read_config_and_trials(config_path, trial_files);
+std::optional<Config> open_config(const std::string& config_path, const TrialOptions& trials,
+                                  Console& console, const std::function<Status(Config&)>& finish) {
+  Result<Config> config = read_config_and_trials(config_path, trials);
   if (config) {
     if (Status s = finish(*config); !s) config = s.error();
   }
@@ -46,10 +46,6 @@ std::optional<Config> open_config(const std::string& config_path,
   }
   show_notes(config->problem.log, console);
   return std::move(*config);
-}
-
-void show_notes(const TrialLog& log, Console& console) {
-  for (const std::string& note : log.notes) console.note(note);
 }
 
 Result<Model> read_model_of(const std::string& run_or_model) {
@@ -106,6 +102,10 @@ std::vector<std::string> endpoints_of(const FarmOptions& options, const FarmSett
 
 Status check_farm(const FarmOptions& options, const FarmSettings& settings) {
   const std::vector<std::string> endpoints = endpoints_of(options, settings);
+  if (endpoints.empty() && local_workers(options, settings) == 0) {
+    return Error{
+        "--workers 0 leaves nobody to work; name an endpoint for remote ones with --listen"};
+  }
   const Result<LinkSecurity> security = link_security(options, endpoints);
   if (!security) return security.error();
   for (const std::string& endpoint : endpoints) {

@@ -13,6 +13,7 @@
 #include "common/net/keys.h"
 #include "master/cli/farm_log.h"
 #include "master/cli/subcommand.h"
+#include "master/cli/trial_options.h"
 #include "master/farm/socket_farm.h"
 
 namespace gapfarm {
@@ -21,18 +22,13 @@ std::vector<std::string> command_names(const std::vector<CommandSpec>& commands)
 
 // A config with its trials read: those given, else the config's own.  Errors: neither names any
 // file, and whatever reading either finds.
-Result<Config> read_config_and_trials(const std::string& config_path,
-                                      const std::vector<std::string>& trial_files);
+Result<Config> read_config_and_trials(const std::string& config_path, const TrialOptions& trials);
 
 // The config that a command works on, with its trials and the log's notes shown.  `finish` puts in
 // what the command line changes and checks what the command needs.  Nothing when any of it went
 // wrong: that was shown, and the command is to end with kExitBadUsage.
-std::optional<Config> open_config(const std::string& config_path,
-                                  const std::vector<std::string>& trial_files, Console& console,
-                                  const std::function<Status(Config&)>& finish);
-
-// Tells the user what the readers left out of a log.
-void show_notes(const TrialLog& log, Console& console);
+std::optional<Config> open_config(const std::string& config_path, const TrialOptions& trials,
+                                  Console& console, const std::function<Status(Config&)>& finish);
 
 // A model file, or the model.toml of a run folder.
 Result<Model> read_model_of(const std::string& run_or_model);

@@ -19,13 +19,17 @@ struct KeysOptions {
   std::string key;
   std::string out;
   bool worker_only = false;
-  bool json = false;
 };
 
 std::string host_name() {
   char name[65] = {};
   if (gethostname(name, sizeof name - 1) != 0 || !is_key_name(name)) return "worker";
   return name;
+}
+
+nlohmann::ordered_json key_json(const std::string& folder, const std::string& worker,
+                                const std::string& public_key) {
+  return {{"folder", folder}, {"worker", worker}, {"public", public_key}};
 }
 
 int failed_with(const Error& error, CliContext& context) {
@@ -61,20 +65,21 @@ int run_make(const KeysOptions& options, CliContext& context) {
       worker_pair(*folder, options.name.empty() ? host_name() : options.name);
   if (!worker) return failed_with(worker.error(), context);
   if (options.worker_only) {
-    console.print("made the key of worker '" + worker->name + "' in " + folder->path() +
-                  "\nput master.pub of the master's key folder there, and list the worker on the "
-                  "master with\n"
-                  "  gapfarm keys allow " +
-                  worker->name + " --key '" + worker->public_key + "'\n");
+    console.result("made the key of worker '" + worker->name + "' in " + folder->path() +
+                       "\nput master.pub of the master's key folder there, and list the worker on "
+                       "the master with\n  gapfarm keys allow " +
+                       worker->name + " --key '" + worker->public_key + "'\n",
+                   key_json(folder->path(), worker->name, worker->public_key));
     return kExitDone;
   }
   if (Status s = make_master(*folder, console); !s) return failed_with(s.error(), context);
   if (Status s = folder->list({worker->name, worker->public_key}); !s) {
     return failed_with(s.error(), context);
   }
-  console.print("keys of a master, and of the workers of this user on '" + worker->name +
-                "' (and wherever this folder is shared), are in " + folder->path() +
-                "\nfor another machine: gapfarm keys worker NAME --out FOLDER\n");
+  console.result("keys of a master, and of the workers of this user on '" + worker->name +
+                     "' (and wherever this folder is shared), are in " + folder->path() +
+                     "\nfor another machine: gapfarm keys worker NAME --out FOLDER\n",
+                 key_json(folder->path(), worker->name, worker->public_key));
   return kExitDone;
 }
 
@@ -92,10 +97,10 @@ int run_worker(const KeysOptions& options, CliContext& context) {
   if (Status s = folder->list({options.name, worker->public_key}); !s) {
     return failed_with(s.error(), context);
   }
-  context.console.print("listed worker '" + options.name +
-                        "'; copy its folder over and remove it "
-                        "here:\n  scp -rp " +
-                        options.out + " HOST:.config/gapfarm/keys && rm -r " + options.out + "\n");
+  context.console.result(
+      "listed worker '" + options.name + "'; copy its folder over and remove it here:\n  scp -rp " +
+          options.out + " HOST:.config/gapfarm/keys && rm -r " + options.out + "\n",
+      key_json(options.out, options.name, worker->public_key));
   return kExitDone;
 }
 
@@ -113,7 +118,8 @@ int run_allow(const KeysOptions& options, CliContext& context) {
     key.key = read->key;
   }
   if (Status s = folder->list(key); !s) return failed_with(s.error(), context);
-  context.console.print("listed worker '" + options.name + "'\n");
+  context.console.result("listed worker '" + options.name + "'\n",
+                         key_json(folder->path(), options.name, key.key));
   return kExitDone;
 }
 
@@ -121,9 +127,10 @@ int run_revoke(const KeysOptions& options, CliContext& context) {
   const Result<KeyFolder> folder = KeyFolder::open(options.folder);
   if (!folder) return failed_with(folder.error(), context);
   if (Status s = folder->unlist(options.name); !s) return failed_with(s.error(), context);
-  context.console.print("worker '" + options.name +
-                        "' is not listed any more; links that stand go on until they break or the "
-                        "master restarts\n");
+  context.console.result("worker '" + options.name +
+                             "' is not listed any more; links that stand go on until they break or "
+                             "the master restarts\n",
+                         {{"folder", folder->path()}, {"revoked", options.name}});
   return kExitDone;
 }
 
@@ -147,16 +154,13 @@ int run_list(const KeysOptions& options, CliContext& context) {
   const auto listed = folder->listed(&trouble);
   if (!listed) return failed_with(listed.error(), context);
   for (const PublicKey& key : *listed) row("listed", key.name, key.key);
-  if (options.json) {
-    context.console.print(rows.dump(2) + "\n");
-  } else {
-    for (const auto& entry : rows) {
-      const std::string role = entry["role"], name = entry["name"], key = entry["public"];
-      context.console.print(role + std::string(8 - role.size(), ' ') + key + "  " +
-                            printable(name) + "\n");
-    }
-    if (rows.empty()) context.console.note("no keys in " + folder->path());
+  std::string lines;
+  for (const auto& entry : rows) {
+    const std::string role = entry["role"], name = entry["name"], public_key = entry["public"];
+    lines += role + std::string(8 - role.size(), ' ') + public_key + "  " + printable(name) + "\n";
   }
+  context.console.result(lines, rows);
+  if (rows.empty()) context.console.note("no keys in " + folder->path());
   for (const std::string& text : trouble) context.console.error(Error{text});
   return trouble.empty() ? kExitDone : kExitFailed;
 }
@@ -193,7 +197,25 @@ SubcommandRun setup_keys(CLI::App& app) {
   CLI::App* revoke = add("revoke", "let a worker in no more", run_revoke);
   revoke->add_option("NAME", options->name, "Of the worker")->required()->check(name);
   CLI::App* list = add("list", "show public keys and who is let in", run_list);
-  list->add_flag("--json", options->json, "Print JSON");
+  // A parent's examples are not its children's.
+  make->footer(
+      "Examples:\n"
+      "  gapfarm keys make                       # once, for master and local workers\n"
+      "  gapfarm keys make --worker --name rack4 # on rack4, to be let in by `gapfarm keys allow`");
+  worker->footer(
+      "Examples:\n"
+      "  gapfarm keys worker rack3 --out /tmp/rack3   # then copy the folder to rack3");
+  allow->footer(
+      "Examples:\n"
+      "  gapfarm keys allow rack4 rack4.pub\n"
+      "  gapfarm keys allow rack4 --key KEY");
+  revoke->footer(
+      "Examples:\n"
+      "  gapfarm keys revoke rack4");
+  list->footer(
+      "Examples:\n"
+      "  gapfarm keys list\n"
+      "  gapfarm keys list --json | jq .[].name");
   app.require_subcommand(1);
   app.footer(
       "Examples:\n"

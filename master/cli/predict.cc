@@ -1,13 +1,15 @@
 // gapfarm predict RUN|MODEL: the predictive distribution of every trial of a log.
 #include <Eigen/Core>
 #include <cmath>
+#include <filesystem>
 #include <memory>
+#include <nlohmann/json.hpp>
 
 #include "common/score/fitness.h"
 #include "common/score/motion_model.h"
-#include "common/trials/files.h"
 #include "common/trials/read.h"
 #include "master/cli/inputs.h"
+#include "master/cli/outputs.h"
 #include "master/report/prediction_table.h"
 
 namespace gapfarm {
@@ -16,8 +18,9 @@ namespace {
 struct PredictOptions {
   std::string model;
   std::vector<std::string> mined;
-  std::vector<std::string> trials;
+  TrialOptions trials;
   std::string out = "-";
+  Outputs outputs;
   FarmOptions farm;
 };
 
@@ -42,11 +45,21 @@ Result<std::vector<PredictedTrial>> predict_by_model(const Model& model, const T
   return world_predictions(result.predict());
 }
 
+// Paths are those of the trials to predict.
+ReadOptions reading_of_mined(const PredictOptions& options) {
+  ReadOptions read = options.trials.read;
+  read.paths.clear();
+  return read;
+}
+
 Result<std::vector<PredictedTrial>> predict_by_log(const TrialLog& log,
-                                                   const PredictOptions& options) {
+                                                   const PredictOptions& options,
+                                                   Console& console) {
   const std::vector<CommandSpec> commands = default_commands("srv1");
-  const Result<TrialLog> mined = read_trial_files(options.mined, command_names(commands));
+  const Result<TrialLog> mined =
+      read_trial_files(options.mined, command_names(commands), reading_of_mined(options));
   if (!mined) return mined.error();
+  show_notes(*mined, console);
   const Result<MotionModel> model = MotionModel::mine(*mined, commands);
   if (!model) return model.error();
   std::vector<PredictedTrial> predictions;
@@ -61,7 +74,34 @@ Result<std::vector<PredictedTrial>> predict_by_log(const TrialLog& log,
   return predictions;
 }
 
-int run_predict(const PredictOptions& options, CliContext& context) {
+// Beside the table on standard output there is no room for a summary.
+void show_summary(const TrialLog& log, const std::vector<PredictedTrial>& predictions,
+                  const PredictOptions& options, Console& console) {
+  const std::string text = summarise_predictions(log, predictions);
+  if (options.out == "-" && !console.json()) return console.note(text);
+  nlohmann::ordered_json json = {{"trials", predictions.size()}, {"summary", text}};
+  double score = 0;
+  for (const PredictedTrial& p : predictions) {
+    score += p.log_score / static_cast<double>(predictions.size());
+  }
+  json["log_score"] = score;
+  if (options.out != "-") {
+    json["out"] = options.out;
+  } else {
+    for (std::size_t i = 0; i < predictions.size(); ++i) {
+      const PredictedTrial& p = predictions[i];
+      json["predictions"].push_back({{"session", log.trials[i].session},
+                                     {"trial", log.trials[i].trial},
+                                     {"x", p.X_WE.x},
+                                     {"y", p.X_WE.y},
+                                     {"theta", p.X_WE.theta},
+                                     {"log_score", p.log_score}});
+    }
+  }
+  console.result(text + "\n", json);
+}
+
+int run_predict(PredictOptions& options, CliContext& context) {
   Console& console = context.console;
   if (options.model.empty() == options.mined.empty()) {
     console.error(Error{"give either a run or model file, or --mined LOG"});
@@ -73,22 +113,31 @@ int run_predict(const PredictOptions& options, CliContext& context) {
     console.error(model.error());
     return kExitBadUsage;
   }
-  const Result<TrialLog> log = read_trial_files(options.trials, command_names(model->commands));
+  const Result<TrialLog> log =
+      read_trial_files(options.trials.files, command_names(model->commands), options.trials.read);
   if (!log) {
     console.error(log.error());
     return kExitBadUsage;
   }
   show_notes(*log, console);
+  options.outputs.reads(*log);
+  options.outputs.reads(options.model);
+  options.outputs.reads((std::filesystem::path(options.model) / "model.toml").string());
+  for (const std::string& file : options.mined) options.outputs.reads(file);
+  if (Status s = options.outputs.plan(options.out); !s) {
+    console.error(s.error());
+    return kExitBadUsage;
+  }
   const auto predictions = options.mined.empty() ? predict_by_model(*model, *log, options, context)
-                                                 : predict_by_log(*log, options);
+                                                 : predict_by_log(*log, options, console);
   if (!predictions) return failed(predictions.error(), context);
   const std::string table = format_predictions(*log, *predictions);
   if (options.out == "-") {
-    console.print(table);
-  } else if (Status s = write_file_atomically(options.out, table); !s) {
+    if (!console.json()) console.print(table);
+  } else if (Status s = options.outputs.write(options.out, table); !s) {
     return failed(s.error(), context);
   }
-  console.note(summarise_predictions(*log, *predictions));
+  show_summary(*log, *predictions, options, console);
   return kExitDone;
 }
 
@@ -97,11 +146,12 @@ int run_predict(const PredictOptions& options, CliContext& context) {
 SubcommandRun setup_predict(CLI::App& app) {
   auto options = std::make_shared<PredictOptions>();
   app.add_option("RUN|MODEL", options->model, "Run folder or model.toml");
-  app.add_option("--trials", options->trials, "Trial logs to predict")->required();
+  options->trials.declare(app, "Trial logs to predict")->required();
   app.add_option("--out", options->out, "CSV to write; - for stdout");
   app.add_option("--mined", options->mined,
                  "Predict by the motion model mined from these logs, P(M' | M, u), in place of a "
                  "simulation");
+  options->outputs.declare(app);
   options->farm.declare(app, false);
   app.footer(
       "Examples:\n"

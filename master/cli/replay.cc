@@ -1,11 +1,14 @@
 // gapfarm replay RUN --genome ID: one individual of a run again, from what the run store keeps.
 #include <bit>
+#include <filesystem>
 #include <memory>
+#include <nlohmann/json.hpp>
 
-#include "common/trials/files.h"
+#include "common/trials/csv.h"
 #include "common/trials/write.h"
 #include "master/cli/evolution_farm.h"
 #include "master/cli/inputs.h"
+#include "master/cli/outputs.h"
 #include "master/evolve/evaluation.h"
 #include "master/evolve/individual.h"
 #include "master/experiment/plan.h"
@@ -16,10 +19,11 @@ namespace {
 
 struct ReplayOptions {
   std::string run;
-  std::uint64_t genome = 0;
+  std::string genome;  // a birth id, or "best"
   std::optional<std::uint64_t> generation;
   std::string paths;
   double interval_s = 0.05;
+  Outputs outputs;
 };
 
 struct Found {
@@ -42,8 +46,40 @@ Result<Found> find_individual(const RunReader& reader, std::uint64_t birth_id,
   }
   return Error{reader.run().string() + ": no generation" +
                (until ? " up to " + std::to_string(*until) : "") + " holds genome " +
-               std::to_string(birth_id) +
-               "; `sqlite3 RUN/run.sqlite` lists them (docs/run_store.md)"};
+               std::to_string(birth_id) + "; --genome best is its best, and `sqlite3 " +
+               reader.run().string() +
+               "/run.sqlite 'SELECT DISTINCT birth_id FROM individuals'` lists them"};
+}
+
+// The best of the latest generation up to `until`.
+Result<Found> find_best(const RunReader& reader, std::optional<std::uint64_t> until) {
+  const auto generations = reader.generations();
+  if (!generations) return generations.error();
+  for (auto g = generations->rbegin(); g != generations->rend(); ++g) {
+    if (until && g->generation > *until) continue;
+    const auto individuals = reader.individuals(g->generation);
+    if (!individuals) return individuals.error();
+    const StoredIndividual* best = nullptr;
+    const bool higher = reader.info().higher_is_better;
+    for (const StoredIndividual& other : *individuals) {
+      if (!other.fitness) continue;
+      const bool better = best == nullptr || (higher ? *other.fitness > *best->fitness
+                                                     : *other.fitness < *best->fitness);
+      if (better) best = &other;
+    }
+    if (best != nullptr) return Found{*best, g->generation};
+  }
+  return Error{reader.run().string() +
+               ": no generation holds an individual that ended well; evolve it further"};
+}
+
+Result<Found> find(const RunReader& reader, const ReplayOptions& options) {
+  if (options.genome == "best") return find_best(reader, options.generation);
+  const auto id = parse_integer(options.genome);
+  if (!id || *id < 0) {
+    return Error{"--genome is '" + options.genome + "', expected a birth id or 'best'"};
+  }
+  return find_individual(reader, static_cast<std::uint64_t>(*id), options.generation);
 }
 
 // A duplicate took its score from the first individual of that genome: who that is.
@@ -119,30 +155,44 @@ std::string in_full(const std::string& outcome, const std::optional<double>& fit
   return fitness ? format_number(fitness, 17) : outcome;
 }
 
-// Says whether it is the same; true: to the bit.
-bool compare(const Found& found, const Standing& again, const Problem& problem, Console& console) {
+// Whether it is the same to the bit, in words and as JSON.
+struct Comparison {
+  bool same = false;
+  std::string text;
+  nlohmann::ordered_json json;
+};
+
+Comparison compare(const Found& found, const Standing& again, const Problem& problem) {
   const FitnessKind kind = problem.fitness.kind;
   const std::string outcome = v1::Outcome_Name(again.outcome);
   std::optional<double> fitness;
   if (again.outcome == v1::OK) fitness = fitness_of_cost(kind, again.cost);
   const StoredIndividual& stored = found.individual;
-  const bool same = outcome == stored.outcome &&
-                    fitness.has_value() == stored.fitness.has_value() &&
-                    (!fitness || std::bit_cast<std::uint64_t>(*fitness) ==
-                                     std::bit_cast<std::uint64_t>(*stored.fitness));
+  Comparison result;
+  result.same = outcome == stored.outcome && fitness.has_value() == stored.fitness.has_value() &&
+                (!fitness || std::bit_cast<std::uint64_t>(*fitness) ==
+                                 std::bit_cast<std::uint64_t>(*stored.fitness));
   const std::string who = "genome " + std::to_string(stored.birth_id) + " of generation " +
                           std::to_string(found.generation) + ": " + fitness_name(kind) + " ";
-  if (same) {
-    console.print(who + in_full(outcome, fitness) + " from " + std::to_string(again.scores) +
-                  " scores, the same to the bit\n");
-  } else {
-    console.print(who + "differs: stored " + in_full(stored.outcome, stored.fitness) +
-                  ", replayed " + in_full(outcome, fitness) + "\n");
-  }
-  return same;
+  result.text = result.same ? who + in_full(outcome, fitness) + " from " +
+                                  std::to_string(again.scores) + " scores, the same to the bit\n"
+                            : who + "differs: stored " + in_full(stored.outcome, stored.fitness) +
+                                  ", replayed " + in_full(outcome, fitness) + "\n";
+  const auto value = [](const std::optional<double>& v) {
+    return v ? nlohmann::ordered_json(*v) : nlohmann::ordered_json();
+  };
+  result.json = {{"genome", stored.birth_id},
+                 {"generation", found.generation},
+                 {"fitness", fitness_name(kind)},
+                 {"same", result.same},
+                 {"stored", {{"outcome", stored.outcome}, {"fitness", value(stored.fitness)}}},
+                 {"replayed", {{"outcome", outcome}, {"fitness", value(fitness)}}},
+                 {"scores", again.scores}};
+  return result;
 }
 
-Result<bool> replay(const ReplayOptions& options, CliContext& context) {
+// `begun`: whether the work has, so that what is wrong is not the input.
+Result<bool> replay(ReplayOptions& options, CliContext& context, bool& begun) {
   const Result<RunReader> reader = RunReader::open(options.run);
   if (!reader) return reader.error();
   const RunInfo& info = reader->info();
@@ -152,9 +202,13 @@ Result<bool> replay(const ReplayOptions& options, CliContext& context) {
   }
   const Result<Problem> problem = from_proto(message);
   if (!problem) return problem.error();
-  const Result<Found> found = find_individual(*reader, options.genome, options.generation);
+  const Result<Found> found = find(*reader, options);
   if (!found) return found.error();
 
+  options.outputs.reads((std::filesystem::path(options.run) / "run.sqlite").string());
+  if (Status s = options.outputs.plan(options.paths); !s) return s.error();
+
+  begun = true;
   FarmOptions local;
   local.workers = 1;
   auto farm = start_farm(local, {}, context);
@@ -167,23 +221,31 @@ Result<bool> replay(const ReplayOptions& options, CliContext& context) {
     again = replay.standing(found->individual, **twin);
     if (!again) return again.error();
   }
-  const bool same = compare(*found, *again, *problem, context.console);
-  if (!same && (*farm)->numeric_class() != info.numeric_class) {
+  Comparison comparison = compare(*found, *again, *problem);
+  if (!comparison.same && (*farm)->numeric_class() != info.numeric_class) {
     context.console.note("this machine computes other last bits: numeric class " +
                          (*farm)->numeric_class() + ", the run's " + info.numeric_class);
   }
   if (!options.paths.empty()) {
     const Result<TrialLog> log = replay.drive(found->individual, options.interval_s);
     if (!log) return log.error();
-    if (Status s = write_file_atomically(options.paths, format_paths(*log)); !s) return s.error();
-    context.console.note(options.paths + ": " + std::to_string(log->trials.size()) +
-                         " trials driven by it");
+    // Without a mark: they were not measured, so no log may read them by itself.
+    if (Status s = options.outputs.write(options.paths, format_paths(*log)); !s) return s.error();
+    comparison.text +=
+        options.paths + ": " + std::to_string(log->trials.size()) + " trials driven by it\n";
+    comparison.json["paths"] = options.paths;
   }
-  return same;
+  context.console.result(comparison.text, comparison.json);
+  return comparison.same;
 }
 
-int run_replay(const ReplayOptions& options, CliContext& context) {
-  const Result<bool> same = replay(options, context);
+int run_replay(ReplayOptions& options, CliContext& context) {
+  bool begun = false;
+  const Result<bool> same = replay(options, context, begun);
+  if (!same && !begun) {
+    context.console.error(same.error());
+    return kExitBadUsage;
+  }
   if (!same) return failed(same.error(), context);
   return *same ? kExitDone : kExitFailed;
 }
@@ -193,18 +255,19 @@ int run_replay(const ReplayOptions& options, CliContext& context) {
 SubcommandRun setup_replay(CLI::App& app) {
   auto options = std::make_shared<ReplayOptions>();
   app.add_option("RUN", options->run, "Folder of the run")->required();
-  app.add_option("--genome", options->genome, "Birth id of the individual")->required();
+  app.add_option("--genome", options->genome, "Birth id of the individual, or best")->required();
   app.add_option("--generation", options->generation,
                  "As it was then (default: the last that holds it)");
   app.add_option("--paths", options->paths,
-                 "Drive the run's log with it and write the poses on the way (paths.csv)");
+                 "Drive the run's log with it and write the poses on the way to this file");
   app.add_option("--interval", options->interval_s, "Between two poses, s")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
+  options->outputs.declare(app);
   app.footer(
       "Examples:\n"
-      "  gapfarm replay run/demo --genome 1284\n"
-      "  gapfarm replay run/demo --genome 1284 --paths paths.csv --interval 0.02\n"
+      "  gapfarm replay run/demo --genome best\n"
+      "  gapfarm replay run/demo --genome 1284 --paths driven_by_1284.csv --interval 0.02\n"
       "Exit status: 0 the same to the bit, 1 it differs (both values are shown).");
   return [options](CliContext& context) { return run_replay(*options, context); };
 }

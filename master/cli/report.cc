@@ -1,8 +1,10 @@
 // gapfarm report DIAGNOSIS: draw the report of a diagnosis again.
 #include <filesystem>
 #include <memory>
+#include <nlohmann/json.hpp>
 
 #include "common/trials/files.h"
+#include "master/cli/outputs.h"
 #include "master/cli/subcommand.h"
 #include "master/diagnose/diagnosis_json.h"
 #include "master/report/report_html.h"
@@ -13,9 +15,10 @@ namespace {
 struct ReportCommand {
   std::string diagnosis;
   std::string out;
+  Outputs outputs;
 };
 
-int run_report(const ReportCommand& command, CliContext& context) {
+int run_report(ReportCommand& command, CliContext& context) {
   std::filesystem::path from(command.diagnosis);
   std::error_code ignored;
   if (std::filesystem::is_directory(from, ignored)) from /= "diagnosis.json";
@@ -31,11 +34,19 @@ int run_report(const ReportCommand& command, CliContext& context) {
     context.console.error(Error{from.string() + ": " + diagnosis.error().message});
     return kExitBadUsage;
   }
-  if (Status s = write_file_atomically(out, report_html(*diagnosis)); !s) {
+  command.outputs.reads(from.string());
+  // Its own page is what it is there to draw again.
+  Status planned =
+      command.out.empty() ? command.outputs.plan_again(out) : command.outputs.plan(out);
+  if (!planned) {
+    context.console.error(planned.error());
+    return kExitBadUsage;
+  }
+  if (Status s = command.outputs.write(out, report_html(*diagnosis)); !s) {
     context.console.error(s.error());
     return kExitFailed;
   }
-  context.console.note(out);
+  context.console.result(out + "\n", {{"report", out}});
   return kExitDone;
 }
 
@@ -46,6 +57,7 @@ SubcommandRun setup_report(CLI::App& app) {
   app.add_option("DIAGNOSIS", command->diagnosis, "Folder of a diagnosis, or its diagnosis.json")
       ->required();
   app.add_option("--out", command->out, "HTML file; default: report.html beside it");
+  command->outputs.declare(app);
   app.footer(
       "Examples:\n"
       "  gapfarm report diagnosis\n"

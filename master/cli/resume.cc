@@ -37,7 +37,10 @@ int run_resume(const ResumeCommand& command, CliContext& context) {
   const std::unique_ptr<Log> log = command.farm.log.open();
   const NotesGoTo notes(*log, context.console);
   Result<RunStore> store = RunStore::open(command.run);
-  if (!store) return failed(store.error(), context);
+  if (!store) {
+    context.console.error(store.error());
+    return kExitBadUsage;
+  }
   const Result<Config> config = stored_config(store->info(), command.overrides);
   if (!config) return failed(Error{command.run + ": " + config.error().message}, context);
   if (command.generation) {

@@ -1,5 +1,6 @@
 // gapfarm simulate CONFIG|MODEL: make a trial log from a parameter set.
 #include <memory>
+#include <nlohmann/json.hpp>
 
 #include "common/base/suggest.h"
 #include "common/config/config.h"
@@ -7,6 +8,7 @@
 #include "common/trials/read.h"
 #include "common/trials/write.h"
 #include "master/cli/inputs.h"
+#include "master/cli/outputs.h"
 #include "master/cli/parameter_options.h"
 #include "master/experiment/plan.h"
 
@@ -23,6 +25,7 @@ struct SimulateOptions {
   std::vector<double> levels, durations;
   std::vector<std::string> commands;
   std::optional<double> path_interval_s;
+  Outputs outputs;
   FarmOptions farm;
 };
 
@@ -63,17 +66,39 @@ Status apply_options(const SimulateOptions& options, Config& config) {
   return {};
 }
 
-Result<TrialLog> simulate(const SimulateOptions& options, const Config& config,
-                          CliContext& context) {
-  std::vector<std::vector<v1::PlannedTrial>> plan;
+using Plan = std::vector<std::vector<v1::PlannedTrial>>;
+
+// What is to be driven, and that its log can be written.
+Result<Plan> plan_and_outputs(SimulateOptions& options, const Config& config, CliContext& context) {
+  Outputs& outputs = options.outputs;
+  Plan plan;
+  bool tips = false;
   if (options.like.empty()) {
     plan = draw_plan(config.problem, config.simulate, config.seed);
   } else {
     const std::vector<std::string> files = {options.like};
     const Result<TrialLog> log = read_trial_files(files, command_names(config.problem.commands));
     if (!log) return log.error();
+    show_notes(*log, context.console);
+    outputs.reads(*log);
+    tips = log->has_tips();
     plan = plan_of(config.problem, *log);
   }
+  outputs.reads(options.source);
+  if (options.out == "-") {
+    if (context.console.json()) {
+      return Error{"--json and --out - both want standard output; name a file"};
+    }
+    return plan;
+  }
+  const bool paths = config.simulate.path_interval_s > 0;
+  tips = tips || !config.problem.pieces.empty();
+  if (Status s = outputs.plan(trial_file_names(options.out, paths, tips)); !s) return s.error();
+  return plan;
+}
+
+Result<TrialLog> simulate(const SimulateOptions& options, const Config& config, const Plan& plan,
+                          CliContext& context) {
   auto farm = start_farm(options.farm, config.farm, context);
   if (!farm) return farm.error();
   Problem problem = config.problem;
@@ -96,24 +121,36 @@ Result<TrialLog> simulate(const SimulateOptions& options, const Config& config,
   return log;
 }
 
-int run_simulate(const SimulateOptions& options, CliContext& context) {
+int run_simulate(SimulateOptions& options, CliContext& context) {
   Result<Config> config = read_source(options.source);
   if (config) {
     if (Status s = apply_options(options, *config); !s) config = s.error();
   }
-  if (!config) {
-    context.console.error(config.error());
+  const Result<Plan> plan =
+      config ? plan_and_outputs(options, *config, context) : Result<Plan>(config.error());
+  if (!plan) {
+    context.console.error(plan.error());
     return kExitBadUsage;
   }
-  const Result<TrialLog> log = simulate(options, *config, context);
+  const Result<TrialLog> log = simulate(options, *config, *plan, context);
   if (!log) return failed(log.error(), context);
   if (options.out == "-") {
     context.console.print(format_trials(*log));
     return kExitDone;
   }
-  if (Status s = write_trials(*log, options.out); !s) return failed(s.error(), context);
-  context.console.note(options.out + ": " + std::to_string(log->trials.size()) +
-                       " simulated trials, seed " + std::to_string(config->seed));
+  const auto files = trial_files(*log, options.out);
+  if (!files) return failed(files.error(), context);
+  for (const TrialFile& file : *files) {
+    if (Status s = options.outputs.write(file.path, file.text); !s) {
+      return failed(s.error(), context);
+    }
+  }
+  context.console.result(options.out + ": " + std::to_string(log->trials.size()) +
+                             " simulated trials, seed " + std::to_string(config->seed) + "\n",
+                         {{"out", options.out},
+                          {"trials", log->trials.size()},
+                          {"paths", log->has_paths()},
+                          {"seed", config->seed}});
   return kExitDone;
 }
 
@@ -136,6 +173,7 @@ SubcommandRun setup_simulate(CLI::App& app) {
   app.add_option("--commands", options->commands, "Only these commands");
   app.add_option("--paths", options->path_interval_s, "s between samples of paths.csv; 0: none")
       ->check(CLI::Range(0.0, 10.0));
+  options->outputs.declare(app);
   options->farm.declare(app, false);
   app.footer(
       "Examples:\n"

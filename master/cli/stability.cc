@@ -5,11 +5,12 @@
 
 #include <filesystem>
 #include <memory>
+#include <nlohmann/json.hpp>
 
 #include "common/base/build_info.h"
 #include "common/config/config.h"
-#include "common/trials/files.h"
 #include "master/cli/inputs.h"
+#include "master/cli/outputs.h"
 #include "master/cli/traced.h"
 
 namespace gapfarm {
@@ -20,6 +21,7 @@ struct StabilityCommand {
   std::string out;
   TracedCommands traced;
   StabilitySettings settings;
+  Outputs outputs;
   FarmOptions farm;
 };
 
@@ -42,11 +44,9 @@ std::string tried_csv(const StabilityReport& report, const Problem& problem) {
 Status write_all(const StabilityCommand& command, const Config& config,
                  const StabilityReport& report) {
   const std::filesystem::path out(command.out);
-  if (Status s = write_file_atomically((out / "stability.csv").string(),
-                                       tried_csv(report, config.problem));
-      !s) {
-    return s;
-  }
+  const Status tried =
+      command.outputs.write((out / "stability.csv").string(), tried_csv(report, config.problem));
+  if (!tried) return tried;
   Model model;
   model.scenario = config.problem.scenario;
   model.kind = "stable";
@@ -57,7 +57,9 @@ Status write_all(const StabilityCommand& command, const Config& config,
   model.pieces = config.problem.pieces;
   model.fitness = config.problem.fitness;
   model.spread = config.problem.spread;
-  return write_model(model, (out / "model.toml").string());
+  const std::string path = (out / "model.toml").string();
+  if (Status s = check_model(model); !s) return Error{path + ": " + s.error().message};
+  return command.outputs.write(path, format_model(model));
 }
 
 int run_stability(StabilityCommand command, CliContext& context) {
@@ -65,10 +67,17 @@ int run_stability(StabilityCommand command, CliContext& context) {
   if (config) {
     if (Status s = check_evolvable(*config); !s) config = s.error();
   }
+  if (config) {
+    command.outputs.reads(command.config);
+    command.outputs.reads(config->problem.log);
+    const Status planned = command.outputs.plan_in(command.out, {"model.toml", "stability.csv"});
+    if (!planned) config = planned.error();
+  }
   if (!config) {
     context.console.error(config.error());
     return kExitBadUsage;
   }
+  show_notes(config->problem.log, context.console);
   command.settings.evolution = config->evolution;
   auto farm = start_farm(command.farm, config->farm, context);
   if (!farm) return failed(farm.error(), context);
@@ -86,11 +95,22 @@ int run_stability(StabilityCommand command, CliContext& context) {
       command.settings.repeats, report->evaluations, spread_text(report->standard_spread),
       spread_text(report->standard_fresh), spread_text(report->best.spread),
       spread_text(report->best_fresh));
+  nlohmann::ordered_json values = nlohmann::ordered_json::object();
   for (const Gene& gene : config->problem.genes) {
+    values[table[gene.row].key] = report->best.values[gene.row];
     text += fmt::format("  {:<22} {}\n", table[gene.row].key,
                         table.format(gene.row, report->best.values[gene.row]));
   }
-  context.console.print(text);
+  const auto metres = [](const std::optional<double>& v) {
+    return v ? nlohmann::ordered_json(*v) : nlohmann::ordered_json();
+  };
+  context.console.result(text, {{"repeats", command.settings.repeats},
+                                {"evaluations", report->evaluations},
+                                {"config_spread_m", metres(report->standard_spread)},
+                                {"config_fresh_m", metres(report->standard_fresh)},
+                                {"best_spread_m", report->best.spread},
+                                {"best_fresh_m", metres(report->best_fresh)},
+                                {"best", values}});
   context.console.note(
       "left behind: " + (std::filesystem::path(command.out) / "model.toml").string() +
       ", stability.csv");
@@ -111,6 +131,7 @@ SubcommandRun setup_stability(CLI::App& app) {
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   command->traced.declare(app);
+  command->outputs.declare(app);
   command->farm.declare(app, true);
   app.footer(
       "The tiny changes are the scenario's own noise: of the start and launch in racquetball, of "

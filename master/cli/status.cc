@@ -16,7 +16,6 @@ constexpr int kWatchInterval_ms = 1000;
 
 struct StatusOptions {
   std::string run;
-  bool json = false;
   bool watch = false;
 };
 
@@ -28,7 +27,7 @@ Result<RunStatus> look(const std::string& run) {
 }
 
 void show(const RunStatus& status, const StatusOptions& options, Console& console) {
-  if (options.json) {
+  if (console.json()) {
     // Watched: one line a look, for `jq` and the like.
     const int indent = options.watch ? -1 : 2;
     console.print(
@@ -46,7 +45,7 @@ int run_status_command(const StatusOptions& options, CliContext& context) {
     const Result<RunStatus> status = look(options.run);
     if (!status) {
       context.console.error(status.error());
-      return kExitFailed;
+      return kExitBadUsage;
     }
     show(*status, options, context.console);
     if (!options.watch || status->state != RunState::kRunning) return kExitDone;
@@ -61,7 +60,6 @@ int run_status_command(const StatusOptions& options, CliContext& context) {
 SubcommandRun setup_status(CLI::App& app) {
   auto options = std::make_shared<StatusOptions>();
   app.add_option("RUN", options->run, "Folder of the run")->required();
-  app.add_flag("--json", options->json, "Print JSON (docs/formats.md)");
   app.add_flag("--watch", options->watch, "Look again every second until the run ends");
   app.footer(
       "Examples:\n"

@@ -13,11 +13,11 @@ namespace gapfarm {
 
 enum ExitCode : int {
   kExitDone = 0,
-  kExitFailed = 1,
-  kExitBadUsage = 2,      // wrong usage or config
+  kExitFailed = 1,        // the work had begun
+  kExitBadUsage = 2,      // wrong usage, config or input: found before the work began
   kExitQuarantined = 3,   // done, but some tasks were given up
-  kExitResumable = 85,    // stopped at a checkpoint
-  kExitSignalBase = 128,  // + the signal: 130, 143
+  kExitResumable = 85,    // stopped; the same command, or `resume`, goes on from there
+  kExitSignalBase = 128,  // + the signal, 130 or 143: stopped, and nothing is kept
 };
 
 struct CliContext {

@@ -11,8 +11,7 @@ namespace gapfarm {
 
 void TracedCommands::declare(CLI::App& app) {
   app.add_option("--command", names, "Commands whose paths to look at; left out: all");
-  app.add_option("--trials", trials,
-                 "Where commands are pieces: the pushes to trace, in place of the config's");
+  trials.declare(app, "Where commands are pieces: the pushes to trace, in place of the config's");
   app.add_option("--only", only,
                  "COLUMN=VALUE[,VALUE...]: leave all other pushes out; may repeat, all must hold");
   app.add_option("--interval", interval_s, "Seconds between samples of a path")
@@ -27,7 +26,7 @@ Result<Config> TracedCommands::open(const std::string& path, TraceSettings* to) 
   to->interval_s = interval_s;
   if (Status s = choose(config->problem.commands, to); !s) return s.error();
   if (config->problem.pieces.empty()) {
-    if (trials.empty() && only.empty()) return config;
+    if (trials.files.empty() && only.empty()) return config;
     return Error{path + ": scenario " + config->problem.scenario +
                  " traces commands and no trials; leave out --trials and --only"};
   }

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "common/config/settings.h"
+#include "master/cli/trial_options.h"
 #include "master/influence/paths.h"
 
 namespace gapfarm {
@@ -13,7 +14,8 @@ namespace gapfarm {
 struct TracedCommands {
   std::vector<std::string> names;  // empty: all
   double interval_s = 0.02;
-  std::vector<std::string> trials, only;  // where commands are pieces: the log, and which of it
+  TrialOptions trials;  // where commands are pieces
+  std::vector<std::string> only;
 
   void declare(CLI::App& app);
   // The config, and in `to` what of it is traced: its commands, or the pushes of a log where the

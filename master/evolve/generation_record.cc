@@ -93,8 +93,9 @@ std::optional<std::pair<StopReason, std::string>> reason_to_stop(const Optimiser
                    " generations");
   }
   if (s.evaluations && optimiser.evaluations() >= *s.evaluations) {
-    return because(StopReason::kEvaluations, "used ", optimiser.evaluations(), " of ",
-                   *s.evaluations, " evaluations");
+    // A generation is always finished.
+    return because(StopReason::kEvaluations, "used ", optimiser.evaluations(),
+                   " evaluations, the limit was ", *s.evaluations);
   }
   if (s.time_s && wall_s >= *s.time_s) {
     return because(StopReason::kTime, "used the ", *s.time_s, " s allowed");

@@ -181,14 +181,17 @@ SocketFarm::~SocketFarm() {
   pump(*impl_->socket, *impl_->scheduler, monotonic_seconds());
 }
 
+Status check_sendable(const v1::Problem& problem) {
+  const std::size_t size = problem.ByteSizeLong();
+  if (size <= kMaxMessageBytes / 2) return {};
+  return Error{"the problem has " + std::to_string(size) + " bytes and a message at most " +
+               std::to_string(kMaxMessageBytes / 2) + "; split the trial log or thin its paths"};
+}
+
 std::string SocketFarm::add_problem(const v1::Problem& problem) {
   std::string bytes = serialise(problem);
   std::string hash = problem_hash(problem);
-  if (bytes.size() > kMaxMessageBytes / 2) {
-    impl_->unsendable[hash] =
-        "the problem has " + std::to_string(bytes.size()) + " bytes and a message at most " +
-        std::to_string(kMaxMessageBytes / 2) + "; split the trial log or thin its paths";
-  }
+  if (Status s = check_sendable(problem); !s) impl_->unsendable[hash] = s.error().message;
   impl_->scheduler->add_problem(hash, std::move(bytes));
   return hash;
 }

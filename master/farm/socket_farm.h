@@ -38,6 +38,9 @@ struct SocketFarmOptions {
 };
 
 // Belongs to the thread that made it, which must live as long: the local workers die with it.
+// Error: a problem too large for a message to a worker.
+Status check_sendable(const v1::Problem& problem);
+
 class SocketFarm : public Farm {
  public:
   // Listens and starts the local workers.  Errors: an endpoint that cannot be bound, no worker

@@ -142,6 +142,24 @@ Result<RunStore> RunStore::create(const fs::path& run, const RunInfo& info) {
   return store;
 }
 
+Status RunStore::discard(RunStore store, bool with_folder) {
+  const fs::path run = store.run();
+  {
+    // Closed before its files go; the lock goes last.
+    const Database closing = std::move(store.database_);
+  }
+  std::error_code code;
+  for (const char* name : {"run.sqlite", "run.sqlite-wal", "run.sqlite-shm", "run.lock"}) {
+    fs::remove(run / name, code);
+    if (code) {
+      return Error{(run / name).string() + ": cannot be taken away: " + code.message() +
+                   "; delete it by hand"};
+    }
+  }
+  if (with_folder && fs::is_empty(run, code)) fs::remove(run, code);
+  return {};
+}
+
 Result<RunStore> RunStore::open(const fs::path& run) {
   const fs::path file = run / "run.sqlite";
   std::error_code missing;

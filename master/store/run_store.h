@@ -29,6 +29,9 @@ class RunStore {
   // holds a run already, is in use, or cannot be written.
   static Result<RunStore> create(const std::filesystem::path& run, const RunInfo& info);
 
+  // Takes away a run that never had a generation, and its folder too when asked and empty.
+  static Status discard(RunStore store, bool with_folder);
+
   // Opens and locks an existing run, checks the file for damage, and says that it runs again.
   static Result<RunStore> open(const std::filesystem::path& run);
 

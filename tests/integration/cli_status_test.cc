@@ -133,7 +133,7 @@ TEST_F(CliStatus, LeavesOnCtrlC) {
 
 TEST_F(CliStatus, SaysWhatIsNotARun) {
   const Finished nothing = gapfarm_command({"status", run_});
-  EXPECT_EQ(nothing.exit_code, 1);
+  EXPECT_EQ(nothing.exit_code, 2);
   EXPECT_THAT(nothing.err, HasSubstr("holds no run"));
   EXPECT_EQ(nothing.out, "");
   std::filesystem::create_directory(run_);

@@ -16,6 +16,21 @@ TEST(CliUsage, SaysWhatItIs) {
   EXPECT_EQ(version.out, build_summary("gapfarm") + "\n");
 }
 
+TEST(CliUsage, AnswersWhatPeopleTry) {
+  EXPECT_EQ(gapfarm_command({"-V"}).out, gapfarm_command({"--version"}).out);
+  const Finished help = gapfarm_command({"help", "evolve"});
+  EXPECT_EQ(help.exit_code, 0);
+  EXPECT_EQ(help.out, gapfarm_command({"evolve", "--help"}).out);
+  EXPECT_THAT(gapfarm_command({"chekc"}).err, HasSubstr("did you mean 'check'?"));
+  const Finished key = gapfarm_command({"keys", "revoke", "--help"});
+  EXPECT_THAT(key.out, HasSubstr("Examples:\n  gapfarm keys revoke"));
+  const Finished worker =
+      run_program("gapfarm-worker", {"--connect", "ipc:///nowhere", "--processes", "abc"});
+  EXPECT_EQ(worker.exit_code, 2);
+  EXPECT_THAT(worker.err,
+              HasSubstr("--processes is 'abc', expected a whole number from 1 to 4096"));
+}
+
 TEST(CliUsage, HelpFitsAScreenAndHasExamplesEverywhere) {
   const Finished help = gapfarm_command({"--help"});
   EXPECT_EQ(help.exit_code, 0);
@@ -56,7 +71,8 @@ TEST(CliImport, TurnsRunsIntoATrialLog) {
   const std::string out = folder / "trials.csv";
   const Finished done = gapfarm_command({"import", "bbautotune", first, second, "--out", out});
   EXPECT_EQ(done.exit_code, 0) << done.err;
-  EXPECT_THAT(done.err, HasSubstr("2 trials in 2 sessions"));
+  EXPECT_THAT(done.out, HasSubstr("2 trials in 2 sessions"));
+  EXPECT_THAT(done.err, HasSubstr("read " + first + ", " + second));
 
   const Finished shown = gapfarm_command({"import", "bbautotune", first, second, "--out", "-"});
   EXPECT_THAT(shown.out, StartsWith("session,trial,t,command,left,right,duration,x0,y0,theta0"));
@@ -69,7 +85,7 @@ TEST(CliImport, TurnsRunsIntoATrialLog) {
 
   // Its own output is not a bbautotune log.
   const Finished wrong = gapfarm_command({"import", "bbautotune", out, "--out", folder / "x.csv"});
-  EXPECT_EQ(wrong.exit_code, 1);
+  EXPECT_EQ(wrong.exit_code, 2);
   EXPECT_THAT(wrong.err, HasSubstr("trials.csv:1:1: found a trial log"));
   EXPECT_FALSE(std::filesystem::exists(folder / "x.csv"));
 
@@ -102,6 +118,32 @@ TEST_F(CliCheck, CountsWhatARunWouldNeed) {
   EXPECT_THAT(json.out, HasSubstr("\"conditions\": 2"));
   EXPECT_THAT(json.out, HasSubstr("\"parameter\": \"friction\""));
   EXPECT_THAT(json.out, HasSubstr("\"seed\": 7"));
+  // What it would cost: measured, and counted.
+  EXPECT_THAT(json.out, HasSubstr("\"evaluation_s\": 0."));
+  EXPECT_THAT(text.out, HasSubstr("an evaluation (one, measured here)"));
+}
+
+// Each push was its own, whatever the config says of commands.
+TEST_F(CliCheck, EveryPushIsAConditionOfItsOwn) {
+  const std::string config =
+      folder_.write("push.toml",
+                    "scenario = \"push\"\n[[pieces]]\nname = \"square\"\nmass = 0.1\nthickness = 0.01\n"
+                    "corners = [[-0.02, -0.02], [0.02, -0.02], [0.02, 0.02], [-0.02, 0.02]]\n"
+                    "[genes]\nground_friction = [0.1, 1.0]\n");
+  std::string pushes = "session,trial,object,x0,y0,theta0,x1,y1,theta1\n";
+  std::string tips = "session,trial,t,x,y\n";
+  for (int i = 0; i < 3; ++i) {
+    const std::string key = "a," + std::to_string(i) + ",";
+    // The last two are the same push again.
+    const std::string y = i == 0 ? "0.001" : "0.002";
+    pushes += key + "square,0,0,0,0.01,0,0\n";
+    tips += key + "0,-0.03," + y + "\n" + key + "1,-0.01," + y + "\n";
+  }
+  folder_.write("tips.csv", tips);
+  const Finished json = gapfarm_command(
+      {"check", config, "--trials", folder_.write("p.csv", pushes), "--json"});
+  EXPECT_EQ(json.exit_code, 0) << json.err;
+  EXPECT_THAT(json.out, HasSubstr("\"conditions\": 2"));
 }
 
 // An effect that looks at the time makes every time of a session a condition of its own.

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <sstream>
@@ -23,17 +24,19 @@ inline std::string text_of(const std::string& path) {
 // A log of so many trials with these effects ("effect.key=value").
 inline void simulate_log(const std::string& config, const std::string& log, int trials,
                          const std::vector<std::string>& set, const std::string& seed = "3") {
-  std::vector<std::string> arguments = {
-      "simulate", config, "--out", log, "--trials", std::to_string(trials), "--seed", seed};
+  std::vector<std::string> arguments = {"simulate", config,     "--out",
+                                        log,        "--trials", std::to_string(trials),
+                                        "--seed",   seed,       "--force"};
   for (const std::string& s : set) arguments.insert(arguments.end(), {"--set", s});
   const Finished made = gapfarm_command(arguments);
   EXPECT_EQ(made.exit_code, 0) << made.err;
 }
 
-// What diagnosis.json says; the report is whole.
+// What diagnosis.json says; the report is whole.  `out` holds nothing else afterwards.
 inline nlohmann::json diagnose_log(const std::string& config, const std::string& log,
                                    const std::string& out,
                                    const std::vector<std::string>& more = {}) {
+  std::filesystem::remove_all(out);
   std::vector<std::string> arguments = {"diagnose", config, "--trials", log, "--out", out};
   arguments.insert(arguments.end(), more.begin(), more.end());
   const Finished finished = gapfarm_command(arguments);

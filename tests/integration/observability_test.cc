@@ -115,20 +115,30 @@ TEST_F(Observability, AnIndividualIsReplayedToTheBit) {
   const auto last = reader->individuals(3);
   ASSERT_TRUE(last.ok());
   ASSERT_FALSE(last->empty());
+  const std::string file = folder_ / "paths.csv";
   for (const StoredIndividual& individual : {last->front(), last->back()}) {
-    const Finished replay =
-        gapfarm_command({"replay", folder_ / "run", "--genome", std::to_string(individual.birth_id),
-                         "--paths", folder_ / "paths.csv"});
+    const std::vector<std::string> words = {
+        "replay", folder_ / "run", "--genome", std::to_string(individual.birth_id), "--paths",
+        file,     "--force"};
+    const Finished replay = gapfarm_command(words);
     EXPECT_EQ(replay.exit_code, 0) << replay.out << replay.err;
     EXPECT_THAT(replay.out, HasSubstr("the same to the bit"));
   }
+  // Without --force a file in the way is kept, whatever it is.
+  const Finished taken =
+      gapfarm_command({"replay", folder_ / "run", "--genome", "best", "--paths", file});
+  EXPECT_EQ(taken.exit_code, 2);
+  EXPECT_THAT(taken.err, HasSubstr("exists already"));
+  const Finished best = gapfarm_command({"replay", folder_ / "run", "--genome", "best", "--json"});
+  EXPECT_EQ(best.exit_code, 0) << best.err;
+  EXPECT_THAT(best.out, HasSubstr("\"same\": true"));
   std::ifstream paths(folder_ / "paths.csv");
   std::string header, row;
   std::getline(paths, header);
   EXPECT_EQ(header, "session,trial,t,x,y,theta");
   EXPECT_TRUE(std::getline(paths, row));
   const Finished unknown = gapfarm_command({"replay", folder_ / "run", "--genome", "999999"});
-  EXPECT_EQ(unknown.exit_code, 1);
+  EXPECT_EQ(unknown.exit_code, 2);
   EXPECT_THAT(unknown.err, HasSubstr("999999"));
 }
 

@@ -113,7 +113,7 @@ TEST_F(Recovery, ReachesTheRealForwardLog) {
   arguments = {"import", "bbautotune", "--out", folder_ / "trials.csv"};
   for (const std::string& file : files_in(*data, ".dat")) arguments.push_back(file);
   expect_done(arguments);
-  EXPECT_THAT(finished_.err, HasSubstr("518 trials in 26 sessions"));
+  EXPECT_THAT(finished_.out, HasSubstr("518 trials in 26 sessions"));
   EXPECT_THAT(finished_.err, HasSubstr("run40.dat:172:15"));
 }
 

@@ -18,7 +18,7 @@ namespace {
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 
-constexpr int kFailed = 1;
+constexpr int kRefused = 2;
 constexpr int kNoMounts = 99;
 
 class RunFolder : public ::testing::Test {
@@ -74,7 +74,7 @@ TEST_F(RunFolder, ReadOnlyIsSaidAndCanStillBeLookedAt) {
       run_);
   if (lacks_mounts(tried)) GTEST_SKIP() << "this machine lends no mounts: " << tried.err;
   EXPECT_THAT(tried.out,
-              AllOf(HasSubstr("resume 1\n"), HasSubstr("evolve 1\n"), HasSubstr(digest)));
+              AllOf(HasSubstr("resume 2\n"), HasSubstr("evolve 2\n"), HasSubstr(digest)));
   EXPECT_THAT(tried.err, AllOf(HasSubstr(run_ + "/run.lock"), HasSubstr("Read-only"),
                                HasSubstr("make the run folder writable")));
   EXPECT_THAT(tried.err, AllOf(HasSubstr(run_ + "/new"), HasSubstr("choose another --out")));
@@ -84,7 +84,7 @@ TEST_F(RunFolder, ReadOnlyIsSaidAndCanStillBeLookedAt) {
 
 TEST_F(RunFolder, BelowAFileIsNoPlaceForARun) {
   const Finished tried = evolve(config_ + "/run", "2");
-  EXPECT_EQ(tried.exit_code, kFailed);
+  EXPECT_EQ(tried.exit_code, kRefused);
   EXPECT_THAT(tried.err, AllOf(HasSubstr(config_ + "/run"), HasSubstr("choose another --out")));
 }
 
@@ -117,7 +117,7 @@ TEST_F(RunFolder, DamageIsNoticedBeforeAnythingIsWritten) {
   }
   const std::string before = bytes(file_);
   const Finished tried = resume(run_, "21");
-  EXPECT_EQ(tried.exit_code, kFailed);
+  EXPECT_EQ(tried.exit_code, kRefused);
   EXPECT_THAT(tried.err, AllOf(HasSubstr(file_), HasSubstr("damaged"), HasSubstr(".recover")));
   EXPECT_EQ(bytes(file_), before);
 }
@@ -133,12 +133,12 @@ TEST_F(RunFolder, AnotherProgramsFileIsLeftAlone) {
   }
   const std::string before = bytes(file_);
   for (const Finished& tried : {resume(run_, "2"), gapfarm_command({"status", run_})}) {
-    EXPECT_EQ(tried.exit_code, kFailed);
+    EXPECT_EQ(tried.exit_code, kRefused);
     EXPECT_THAT(tried.err, AllOf(HasSubstr(file_), HasSubstr("another program"),
                                  HasSubstr("give the folder of a gapfarm run")));
   }
   const Finished over = evolve(run_, "2");
-  EXPECT_EQ(over.exit_code, kFailed);
+  EXPECT_EQ(over.exit_code, kRefused);
   EXPECT_THAT(over.err, AllOf(HasSubstr(run_), HasSubstr("choose another --out")));
   EXPECT_EQ(bytes(file_), before);
 }
@@ -149,7 +149,7 @@ TEST_F(RunFolder, ASecondMasterIsRefusedAndTheFirstGoesOn) {
       "gapfarm", {"evolve", config_, "--out", run_, "--generations", "1000000", "--workers", "1"});
   while (status(run_).value("generation", 0) < 1) ::poll(nullptr, 0, 10);
   for (const Finished& second : {resume(run_, "2"), evolve(run_, "2")}) {
-    EXPECT_EQ(second.exit_code, kFailed);
+    EXPECT_EQ(second.exit_code, kRefused);
     EXPECT_THAT(second.err, AllOf(HasSubstr(run_),
                                   HasSubstr("in use by process " + std::to_string(first.pid()))));
   }

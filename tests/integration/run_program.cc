@@ -89,6 +89,7 @@ TemporaryFolder::TemporaryFolder() : path_(fresh_folder()) {}
 TemporaryFolder::~TemporaryFolder() { std::filesystem::remove_all(path_); }
 
 std::string TemporaryFolder::write(const std::string& name, const std::string& text) const {
+  std::filesystem::create_directories((path_ / name).parent_path());
   std::ofstream(path_ / name, std::ios::binary) << text;
   return (path_ / name).string();
 }

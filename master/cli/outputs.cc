@@ -1,0 +1,150 @@
+#include "master/cli/outputs.h"
+
+#include <stdlib.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+
+#include "common/trials/files.h"
+
+namespace gapfarm {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Marker {
+  FolderKind kind;
+  const char* file;
+  const char* words;
+};
+
+constexpr Marker kMarkers[] = {
+    {FolderKind::kRun, "run.sqlite", "a run"},
+    {FolderKind::kDiagnosis, "simulations.sqlite", "a diagnosis"},
+    {FolderKind::kDiagnosis, "diagnosis.json", "a diagnosis"},
+    {FolderKind::kBlindCheck, "seals.txt", "a blind check"},
+};
+
+bool same_file(const std::string& a, const std::string& b) {
+  std::error_code code;
+  if (fs::equivalent(a, b, code)) return true;
+  const fs::path left = fs::weakly_canonical(a, code);
+  return !code && left == fs::weakly_canonical(b, code) && !code;
+}
+
+// The folder that a file would be made in, or the nearest one above that is there.
+fs::path standing_folder(const fs::path& path) {
+  fs::path folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
+  std::error_code code;
+  while (!fs::exists(folder, code) && folder.has_parent_path() && folder != folder.parent_path()) {
+    folder = folder.parent_path();
+  }
+  return fs::exists(folder, code) ? folder : fs::path(".");
+}
+
+// Permissions alone do not tell (root, read-only mounts): tries it.
+Status check_writable(const std::string& path) {
+  const fs::path folder = standing_folder(path);
+  std::error_code code;
+  if (!fs::is_directory(folder, code)) {
+    return Error{path + ": " + folder.string() + " is no folder; give another name"};
+  }
+  std::string trial = (folder / ".gapfarm-XXXXXX").string();
+  const int fd = ::mkstemp(trial.data());
+  if (fd < 0) {
+    return Error{path + ": cannot be written: " + std::strerror(errno) + " in " + folder.string() +
+                 "; give another name, or make that folder writable"};
+  }
+  ::close(fd);
+  ::unlink(trial.c_str());
+  return {};
+}
+
+bool is_in_place(const std::string& path) {
+  std::error_code code;
+  const auto status = fs::status(path, code);
+  return fs::exists(status) && !fs::is_regular_file(status) && !fs::is_directory(status);
+}
+
+}  // namespace
+
+Status check_folder(const std::string& folder, FolderKind kind) {
+  std::error_code code;
+  if (fs::exists(folder, code) && !fs::is_directory(folder, code)) {
+    return Error{folder + ": is a file, expected a folder; choose another --out"};
+  }
+  for (const Marker& marker : kMarkers) {
+    if (marker.kind == kind || !fs::exists(fs::path(folder) / marker.file, code)) continue;
+    return Error{folder + ": holds " + marker.words +
+                 ", and nothing else belongs there; choose another --out"};
+  }
+  return {};
+}
+
+void Outputs::declare(CLI::App& app) {
+  app.add_flag("--force", force_, "Replace files that are there already");
+}
+
+void Outputs::reads(const std::string& path) {
+  if (!path.empty()) inputs_.push_back(path);
+}
+
+void Outputs::reads(const TrialLog& log) {
+  for (const std::string& file : log.files) reads(file);
+}
+
+Status Outputs::check(const std::string& path, bool replace) const {
+  if (is_in_place(path)) return {};
+  const auto input = std::find_if(inputs_.begin(), inputs_.end(),
+                                  [&](const std::string& other) { return same_file(path, other); });
+  if (input != inputs_.end()) {
+    return Error{path + ": is read by this command, so it cannot be written; give another name"};
+  }
+  std::error_code code;
+  if (fs::is_directory(path, code)) {
+    return Error{path + ": is a folder, expected a file; give another name"};
+  }
+  if (!replace && fs::exists(fs::symlink_status(path, code))) {
+    return Error{path + ": exists already; give another name, or --force to replace it"};
+  }
+  return check_writable(path);
+}
+
+Status Outputs::plan(const std::string& path) {
+  if (path.empty() || path == "-") return {};
+  planned_.push_back({path, force_});
+  return check(path, force_);
+}
+
+Status Outputs::plan(const std::vector<std::string>& paths) {
+  for (const std::string& path : paths) {
+    if (Status s = plan(path); !s) return s;
+  }
+  return {};
+}
+
+Status Outputs::plan_in(const std::string& folder, const std::vector<std::string>& names,
+                        FolderKind kind) {
+  if (Status s = check_folder(folder, kind); !s) return s;
+  for (const std::string& name : names) {
+    if (Status s = plan((fs::path(folder) / name).string()); !s) return s;
+  }
+  return {};
+}
+
+Status Outputs::plan_again(const std::string& path) {
+  planned_.push_back({path, true});
+  return check(path, true);
+}
+
+Status Outputs::write(const std::string& path, std::string_view bytes) const {
+  const auto planned = std::find_if(planned_.begin(), planned_.end(),
+                                    [&](const Planned& other) { return other.path == path; });
+  const bool replace = planned != planned_.end() ? planned->replace : force_;
+  return write_file_atomically(path, bytes, replace ? IfThere::kReplace : IfThere::kKeep);
+}
+
+}  // namespace gapfarm

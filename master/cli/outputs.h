@@ -1,0 +1,60 @@
+// The one way in which commands write files: nothing measured or made is overwritten unasked.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <string>
+#include <vector>
+
+#include "common/base/result.h"
+#include "common/trials/trial.h"
+
+namespace gapfarm {
+
+// What a folder may hold that nothing else may be mixed with.
+enum class FolderKind { kRun, kDiagnosis, kBlindCheck, kOther };
+
+// OK unless the folder holds what another kind of command made: not even --force mixes them.
+Status check_folder(const std::string& folder, FolderKind kind);
+
+// What a command has read and what it is to write.  Everything to be written is planned before the
+// work begins, when a mistake costs nothing, and written afterwards.
+class Outputs {
+ public:
+  // --force.
+  void declare(CLI::App& app);
+
+  // An output is never one of these, however it is spelt and even with --force.
+  void reads(const std::string& path);
+  void reads(const TrialLog& log);
+
+  // Errors: the file is read by this command, is there already and --force was not given, is a
+  // folder, or lies where nothing can be written.  Empty and "-" (stdout) are fine.  Devices and
+  // pipes are written to as they are.
+  Status plan(const std::string& path);
+  Status plan(const std::vector<std::string>& paths);
+  // Files of these names in a folder that is made for them.  Error also: a folder of another kind.
+  Status plan_in(const std::string& folder, const std::vector<std::string>& names,
+                 FolderKind kind = FolderKind::kOther);
+  // A file of the command's own that it makes again, whoever made it before.
+  Status plan_again(const std::string& path);
+
+  // Writes beside `path` and renames.  A file that has appeared since it was planned is kept, and
+  // the new one lies beside it under another name, which the error tells.
+  Status write(const std::string& path, std::string_view bytes) const;
+
+  bool force() const { return force_; }
+
+ private:
+  struct Planned {
+    std::string path;
+    bool replace;
+  };
+
+  Status check(const std::string& path, bool replace) const;
+
+  bool force_ = false;
+  std::vector<std::string> inputs_;
+  std::vector<Planned> planned_;
+};
+
+}  // namespace gapfarm

@@ -1,0 +1,173 @@
+// Nothing measured or made is overwritten unasked, whichever command it is.
+#include <gmock/gmock.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "tests/integration/demo_config.h"
+#include "tests/integration/run_program.h"
+
+namespace gapfarm {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+using Json = nlohmann::json;
+
+std::string bytes_of(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::stringstream text;
+  text << file.rdbuf();
+  return text.str();
+}
+
+class Overwrite : public testing::Test {
+ protected:
+  // Ends with 2 before it does anything, names the file, and leaves it as it was.
+  void refused(const std::vector<std::string>& words, const std::string& file,
+               const std::string& sentence) const {
+    const std::string before = bytes_of(file);
+    const Finished tried = gapfarm_command(words);
+    EXPECT_EQ(tried.exit_code, 2) << words[0] << ": " << tried.out << tried.err;
+    EXPECT_THAT(tried.err, HasSubstr(sentence)) << words[0];
+    EXPECT_EQ(bytes_of(file), before) << words[0];
+  }
+  std::string row(const char* session, int trial) const {
+    return std::string(session) + "," + std::to_string(trial) + ",,forward,,,,0,0,0,0.25,0.01,0\n";
+  }
+
+  const TemporaryFolder folder_;
+  const std::string log_ = folder_.write(
+      "log.csv", "session,trial,t,command,left,right,duration,x0,y0,theta0,x1,y1,theta1\n" +
+                     row("a", 0) + row("a", 1));
+  const std::string config_ =
+      folder_.write("c.toml",
+                    "[genes]\nfull_speed = [0.1, 0.6]\n[parameters]\nstep_rate = 60\n"
+                    "[evolution]\npopulation = 4\n");
+  const std::vector<std::string> one_ = {"--workers", "1"};
+};
+
+TEST_F(Overwrite, NoCommandTakesAMeasuredFile) {
+  const std::string model = folder_ / "run/model.toml";
+  ASSERT_EQ(gapfarm_command({"evolve", config_, "--trials", log_, "--out", folder_ / "run",
+                             "--generations", "1", "--workers", "1"})
+                .exit_code,
+            0);
+  const std::string read = "is read by this command";
+  refused({"predict", folder_ / "run", "--trials", log_, "--out", log_, "--force"}, log_, read);
+  refused({"predict", folder_ / "run", "--trials", log_, "--out", model, "--force"}, model, read);
+  refused({"determine", config_, "--trials", log_, "--model", model, "--out", config_, "--force"},
+          config_, read);
+  refused({"simulate", config_, "--like", log_, "--out", log_, "--force"}, log_, read);
+  const std::string there = "exists already; give another name, or --force";
+  refused({"simulate", config_, "--out", log_}, log_, there);
+  const std::string other = folder_.write("paths.csv", "measured");
+  refused({"replay", folder_ / "run", "--genome", "best", "--paths", other}, other, there);
+  // The paths that would come with a new log.
+  refused({"simulate", config_, "--out", folder_ / "new.csv", "--paths", "0.1"}, other, there);
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "new.csv"));
+  // In a folder of tables one is enough.
+  const std::string band = folder_.write("driven/band.csv", "mine");
+  refused({"drive", model, "--commands", "forward", "--out", folder_ / "driven"}, band, there);
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "driven/ends.csv"));
+  const Finished forced =
+      gapfarm_command({"simulate", config_, "--out", folder_ / "new.csv", "--paths", "0.1",
+                       "--trials", "2", "--force", "--workers", "1"});
+  EXPECT_EQ(forced.exit_code, 0) << forced.err;
+  EXPECT_THAT(bytes_of(other), HasSubstr("# log: new.csv "));
+}
+
+TEST_F(Overwrite, ARunAndADiagnosisDoNotShareAFolder) {
+  ASSERT_EQ(gapfarm_command({"evolve", config_, "--trials", log_, "--out", folder_ / "run",
+                             "--generations", "1", "--workers", "1"})
+                .exit_code,
+            0);
+  refused({"diagnose", config_, "--trials", log_, "--out", folder_ / "run"},
+          folder_ / "run/model.toml", "holds a run, and nothing else belongs there");
+  refused({"evolve", config_, "--trials", log_, "--out", folder_ / "run"},
+          folder_ / "run/model.toml", "holds a run already");
+  const std::string answers = folder_.write("d/simulations.sqlite", "");
+  refused({"evolve", config_, "--trials", log_, "--out", folder_ / "d"}, answers,
+          "holds a diagnosis");
+  const Finished nowhere =
+      gapfarm_command({"diagnose", config_, "--trials", log_, "--out", "/proc/nowhere/d"});
+  EXPECT_EQ(nowhere.exit_code, 2);
+  EXPECT_THAT(nowhere.err, HasSubstr("cannot be written"));
+}
+
+// What cannot begin leaves nothing in the way of the next attempt.
+TEST_F(Overwrite, WhatDoesNotBeginLeavesNoRun) {
+  const std::string run = folder_ / "run";
+  const std::vector<std::string> words = {"evolve", config_, "--trials", log_, "--out", run};
+  std::vector<std::string> nobody = words;
+  nobody.insert(nobody.end(), {"--workers", "0"});
+  const Finished alone = gapfarm_command(nobody);
+  EXPECT_EQ(alone.exit_code, 2);
+  EXPECT_THAT(alone.err, HasSubstr("--listen"));
+  EXPECT_FALSE(std::filesystem::exists(run));
+  // Found out only as the farm starts.
+  std::vector<std::string> bad = words;
+  bad.insert(bad.end(), {"--workers", "1", "--listen", "ipc:///proc/nowhere/socket"});
+  const Finished failed = gapfarm_command(bad);
+  EXPECT_NE(failed.exit_code, 0);
+  EXPECT_FALSE(std::filesystem::exists(run));
+}
+
+TEST_F(Overwrite, LogsSayWhatWasRead) {
+  const std::string paths = folder_.write("paths.csv", "session,trial,t,x,y,theta\na,0,0,0,0,0\n");
+  const Finished unmarked = gapfarm_command({"check", config_, "--trials", log_});
+  EXPECT_EQ(unmarked.exit_code, 0) << unmarked.err;
+  EXPECT_THAT(unmarked.err, HasSubstr(paths + ": not read, since it does not say"));
+  EXPECT_THAT(unmarked.err, HasSubstr("\nread " + log_ + "\n"));
+  const Finished named = gapfarm_command({"check", config_, "--trials", log_, "--paths", paths});
+  EXPECT_THAT(named.err, HasSubstr("read " + log_ + ", " + paths + "\n"));
+  EXPECT_THAT(named.err, Not(HasSubstr("not read")));
+}
+
+TEST_F(Overwrite, RowsWithMistakesAreListedAndLeftOutWhenAsked) {
+  const std::string bad = folder_.write(
+      "bad.csv", bytes_of(log_) + "a,2,,forward,,,,0,0,0,nan,0,0\na,3,,foward,,,,0,0,0,0,0,0\n");
+  const Finished strict = gapfarm_command({"check", config_, "--trials", bad, "--json"});
+  EXPECT_EQ(strict.exit_code, 2);
+  EXPECT_THAT(strict.err, HasSubstr("bad.csv:4:"));
+  EXPECT_THAT(strict.err, HasSubstr("bad.csv:5:"));
+  EXPECT_THAT(strict.err, HasSubstr("2 mistakes in 2 rows: mend them, or leave such rows out"));
+  EXPECT_THAT(Json::parse(strict.out)["error"]["message"].get<std::string>(),
+              HasSubstr("bad.csv:5:"));
+  const Finished lax = gapfarm_command({"check", config_, "--trials", bad, "--skip-invalid"});
+  EXPECT_EQ(lax.exit_code, 0) << lax.err;
+  EXPECT_THAT(lax.err, HasSubstr("left out: " + bad + ":4:"));
+  EXPECT_THAT(lax.out, HasSubstr("trials       2 in 1 sessions"));
+}
+
+TEST_F(Overwrite, ResultsAreOnStandardOutputInWordsOrAsJson) {
+  const std::vector<std::string> evolve = {
+      "evolve", config_, "--trials", log_, "--generations", "1", "--workers", "1", "--out"};
+  const auto with = [](std::vector<std::string> words, const std::vector<std::string>& more) {
+    words.insert(words.end(), more.begin(), more.end());
+    return gapfarm_command(words);
+  };
+  const Finished words = with(evolve, {folder_ / "words"});
+  EXPECT_THAT(words.out, HasSubstr("completed 1 of 1 generations"));
+  const Finished run = with(evolve, {folder_ / "run", "--json"});
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_EQ(Json::parse(run.out)["generations"], 1);
+  EXPECT_EQ(Json::parse(run.out)["files"].size(), 3u);
+  const Finished predicted = with({"predict", folder_ / "run", "--trials", log_}, {"--json"});
+  EXPECT_EQ(Json::parse(predicted.out)["predictions"].size(), 2u) << predicted.err;
+  const Finished made = with({"simulate", config_, "--out", folder_ / "s.csv", "--trials", "2"},
+                             {"--workers", "1", "--json"});
+  EXPECT_EQ(Json::parse(made.out)["trials"], 2) << made.err;
+  // Failures too, in the command line's own words.
+  const Finished typo = with({"check", folder_.write("t.toml", "sed = 1\n")}, {"--json"});
+  EXPECT_EQ(typo.exit_code, 2);
+  EXPECT_EQ(Json::parse(typo.out)["error"]["exit_code"], 2);
+  const Finished usage = with({"evolve", "--json"}, {"--wrokers", "1"});
+  EXPECT_EQ(usage.exit_code, 2);
+  EXPECT_THAT(Json::parse(usage.out)["error"]["message"].get<std::string>(),
+              HasSubstr("--wrokers"));
+}
+
+}  // namespace
+}  // namespace gapfarm

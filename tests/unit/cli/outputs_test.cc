@@ -1,0 +1,96 @@
+#include "master/cli/outputs.h"
+
+#include <gmock/gmock.h>
+#include <sys/stat.h>
+
+#include <filesystem>
+
+#include "common/trials/files.h"
+#include "tests/unit/trials/trial_text.h"
+
+namespace gapfarm {
+namespace {
+
+using testing::HasSubstr;
+
+Outputs forced() {
+  Outputs outputs;
+  CLI::App app;
+  outputs.declare(app);
+  app.parse(std::vector<std::string>{"--force"});
+  return outputs;
+}
+
+std::string said(const Status& status) { return status ? "" : status.error().message; }
+
+TEST(Outputs, KeepsWhatIsThereWithoutForce) {
+  TemporaryFolder folder;
+  const std::string file = folder.write("predictions.csv", "measured");
+  Outputs outputs;
+  EXPECT_THAT(said(outputs.plan(file)), HasSubstr("exists already; give another name, or --force"));
+  EXPECT_THAT(said(outputs.plan_in(folder.path(""), {"new.csv", "predictions.csv"})),
+              HasSubstr("exists already"));
+  Outputs replacing = forced();
+  ASSERT_EQ(said(replacing.plan(file)), "");
+  ASSERT_EQ(said(replacing.write(file, "new")), "");
+  EXPECT_EQ(*read_text_file(file), "new");
+}
+
+TEST(Outputs, NeverWritesWhatTheCommandReads) {
+  TemporaryFolder folder;
+  const std::string log = folder.write("log.csv", "measured");
+  std::filesystem::create_symlink(log, folder.path("link.csv"));
+  std::filesystem::create_hard_link(log, folder.path("hard.csv"));
+  std::filesystem::create_directories(folder.path("sub"));
+  TrialLog trials;
+  trials.files = {log};
+  Outputs outputs = forced();
+  outputs.reads(trials);
+  for (const char* name : {"log.csv", "link.csv", "hard.csv", "sub/../log.csv"}) {
+    EXPECT_THAT(said(outputs.plan(folder.path(name))), HasSubstr("is read by this command"))
+        << name;
+  }
+}
+
+TEST(Outputs, FindsWhatCannotBeWrittenBeforeTheWork) {
+  TemporaryFolder folder;
+  folder.write("file", "");
+  Outputs outputs;
+  EXPECT_THAT(said(outputs.plan("/proc/nowhere/out.csv")), HasSubstr("cannot be written"));
+  EXPECT_THAT(said(outputs.plan(folder.path("file/out.csv"))), HasSubstr("is no folder"));
+  EXPECT_THAT(said(outputs.plan(folder.path(""))), HasSubstr("is a folder, expected a file"));
+  EXPECT_EQ(said(outputs.plan(folder.path("new/folder/out.csv"))), "");
+  EXPECT_EQ(said(outputs.plan("-")), "");
+  EXPECT_EQ(said(outputs.plan("/dev/null")), "");
+  // Looking leaves nothing.
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path("")), {}), 1);
+}
+
+// What appears between looking and writing stays too, and no work is lost.
+TEST(Outputs, KeepsWhatAppearsMeanwhile) {
+  TemporaryFolder folder;
+  const std::string file = folder.path("out.csv");
+  Outputs outputs;
+  ASSERT_EQ(said(outputs.plan(file)), "");
+  folder.write("out.csv", "another's");
+  const std::string message = said(outputs.write(file, "ours"));
+  EXPECT_THAT(message, HasSubstr("has appeared meanwhile and stays"));
+  EXPECT_EQ(*read_text_file(file), "another's");
+  EXPECT_EQ(*read_text_file(message.substr(message.rfind(' ') + 1)), "ours");
+}
+
+TEST(Outputs, DoesNotMixWhatFoldersAreFor) {
+  TemporaryFolder folder;
+  folder.write("run/run.sqlite", "");
+  folder.write("diagnosis/simulations.sqlite", "");
+  const std::string run = folder.path("run"), diagnosis = folder.path("diagnosis");
+  EXPECT_THAT(said(check_folder(run, FolderKind::kDiagnosis)), HasSubstr("holds a run"));
+  EXPECT_THAT(said(check_folder(diagnosis, FolderKind::kRun)), HasSubstr("holds a diagnosis"));
+  EXPECT_EQ(said(check_folder(run, FolderKind::kRun)), "");
+  EXPECT_EQ(said(check_folder(diagnosis, FolderKind::kDiagnosis)), "");
+  EXPECT_EQ(said(check_folder(folder.path("none"), FolderKind::kRun)), "");
+  EXPECT_THAT(said(forced().plan_in(run, {"model.toml"})), HasSubstr("holds a run"));
+}
+
+}  // namespace
+}  // namespace gapfarm

@@ -1,0 +1,63 @@
+#include "common/usage/usage.h"
+
+#include <gmock/gmock.h>
+
+#include "common/base/suggest.h"
+#include "master/cli/app.h"
+
+namespace gapfarm {
+namespace {
+
+using testing::HasSubstr;
+
+std::string sentence_of(const std::vector<std::string>& words) {
+  const std::unique_ptr<Program> program = make_program();
+  try {
+    parse_words(*program, words);
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() == 0) return "help";
+    return usage_sentence(*program->app->get_subcommands().front(), error);
+  }
+  return "no error";
+}
+
+TEST(Usage, SaysWhatWasFoundAndWhatWasExpected) {
+  const std::vector<std::string> evolve = {"evolve", "c.toml", "--out", "x"};
+  const auto with = [&](const std::string& option, const std::string& value) {
+    std::vector<std::string> words = evolve;
+    words.insert(words.end(), {option, value});
+    return sentence_of(words);
+  };
+  EXPECT_EQ(with("--workers", "abc"), "--workers is 'abc', expected a whole number from 0 to 4096");
+  EXPECT_EQ(with("--workers", "5000"),
+            "--workers is '5000', expected a whole number from 0 to 4096");
+  EXPECT_EQ(with("--seed", "first"), "--seed is 'first', expected a whole number of at least 0");
+  EXPECT_EQ(with("--target", "high"), "--target is 'high', expected a number");
+  EXPECT_EQ(with("--time", "-3"), "--time is '-3', expected a number greater than 0");
+  // Nothing would be done.
+  EXPECT_EQ(with("--generations", "0"),
+            "--generations is '0', expected a whole number of at least 1");
+  EXPECT_THAT(with("--evaluations", "0"), HasSubstr("expected a whole number"));
+  EXPECT_EQ(with("--generations", "1"), "no error");
+}
+
+TEST(Usage, NamesTheOptionThatTookTheConfig) {
+  EXPECT_EQ(sentence_of({"evolve", "--trials", "log.csv", "c.toml", "--out", "x"}),
+            "CONFIG is missing: --trials took 'c.toml' too; put CONFIG before --trials");
+  EXPECT_EQ(sentence_of({"evolve", "--trials", "log.csv", "--out", "x"}), "CONFIG is required");
+}
+
+TEST(Usage, HelpIsACommandToo) {
+  EXPECT_EQ(sentence_of({"help", "evolve"}), "help");
+  EXPECT_EQ(sentence_of({"help", "keys", "make"}), "help");
+}
+
+TEST(Suggest, CountsSwappedLettersAsOneSlip) {
+  const std::vector<std::string> known = {"check", "keys", "status"};
+  EXPECT_EQ(nearest_word("chekc", known), "check");
+  EXPECT_EQ(nearest_word("kesy", known), "keys");
+  EXPECT_EQ(nearest_word("cheese", known), "");
+}
+
+}  // namespace
+}  // namespace gapfarm
