@@ -36,6 +36,7 @@ outside common/net 'zmq' 'only common/net includes ZeroMQ'
 outside worker/sim '(bullet|Bullet|LinearMath|btBullet)' 'only worker/sim includes Bullet'
 outside master/store 'sqlite3' 'only master/store includes SQLite'
 outside common/config 'toml' 'only common/config includes toml++'
+outside master/robot '(tinyxml2|yaml-cpp)' 'only master/robot includes tinyxml2 and yaml-cpp'
 
 globs=$(grep -rnE --include=CMakeLists.txt 'file\((GLOB|GLOB_RECURSE)' common worker master tests \
   proto || true)
