@@ -29,6 +29,7 @@ std::span<const Subcommand> subcommands() {
        setup_effects},
       {"keys", "make and list the keys of masters and workers", "Farm", setup_keys},
       {"check", "validate everything that a run would need; run nothing", "Data", setup_check},
+      {"robot", "say what a robot is, from its URDF and controller file", "Data", setup_robot},
       {"import", "turn other programs' logs into a trial log", "Data", setup_import},
   };
   return kTable;

@@ -1,5 +1,6 @@
 #include "master/robot/drive_guess.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -29,7 +30,16 @@ bool mentions_mecanum(const UrdfModel& model) {
 class Guess {
  public:
   Guess(const UrdfModel& model, const Chassis& chassis, const std::vector<DriveFacts>& facts)
-      : model_(model), chassis_(chassis), facts_(facts) {}
+      : model_(model), chassis_(chassis), facts_(facts) {
+    // Sides are those of the wheels' middle: the root may lie anywhere.
+    double count = 0;
+    for (const ChassisWheel& wheel : chassis.wheels) {
+      if (!free(wheel) || !wheel.named) continue;
+      middle_B_ += wheel.centre_B_m;
+      ++count;
+    }
+    middle_B_ /= std::max(count, 1.0);
+  }
 
   Result<DriveGuess> run() {
     if (Status s = turn_forward(); !s) return s.error();
@@ -50,7 +60,8 @@ class Guess {
     return std::cos(guess_.forward_rad) * p_B.x() + std::sin(guess_.forward_rad) * p_B.y();
   }
   double across(const Eigen::Vector3d& p_B) const {
-    return -std::sin(guess_.forward_rad) * p_B.x() + std::cos(guess_.forward_rad) * p_B.y();
+    const Eigen::Vector3d from = p_B - middle_B_;
+    return -std::sin(guess_.forward_rad) * from.x() + std::cos(guess_.forward_rad) * from.y();
   }
 
   // Forward is across the axles; nearly always the root's x.
@@ -180,6 +191,7 @@ class Guess {
   const UrdfModel& model_;
   const Chassis& chassis_;
   const std::vector<DriveFacts>& facts_;
+  Eigen::Vector3d middle_B_ = Eigen::Vector3d::Zero();
   DriveGuess guess_;
 };
 

@@ -11,7 +11,8 @@ std::vector<double> standing_loads(const GroundRobot& robot) {
   for (const RobotWheel& wheel : robot.wheels) {
     points.emplace_back(wheel.x_m.value_or(0), wheel.y_m.value_or(0));
   }
-  return wheel_loads(points, {robot.com_x_m, robot.com_y_m}, kGravity * *robot.mass_kg);
+  const Eigen::Vector2d com(robot.com_x_m.value_or(0), robot.com_y_m.value_or(0));
+  return wheel_loads(points, com, kGravity * *robot.mass_kg);
 }
 
 std::vector<double> wheel_loads(const std::vector<Eigen::Vector2d>& points,

@@ -24,7 +24,7 @@ class Picture {
  public:
   Picture(const RobotReading& reading, const GroundRobot& robot) : reading_(reading), r_(robot) {
     if (reading.robot.mass_kg) loads_ = standing_loads(robot);
-    cover({r_.com_x_m, r_.com_y_m});
+    cover({r_.com_x_m.value_or(0), r_.com_y_m.value_or(0)});
     for (const RobotWheel& wheel : r_.wheels) {
       const double reach = radius(wheel) + 0.5 * width(wheel);
       cover({*wheel.x_m + reach, *wheel.y_m + reach});
@@ -167,7 +167,7 @@ class Picture {
 
   void mass(Svg& svg) const {
     if (!reading_.robot.mass_kg) return;
-    const SvgPoint c = at({r_.com_x_m, r_.com_y_m});
+    const SvgPoint c = at({r_.com_x_m.value_or(0), r_.com_y_m.value_or(0)});
     svg.circle(c, 7, {"#ffffff", kMass, 2});
     svg.line({c.x - 7, c.y}, {c.x + 7, c.y}, {"none", kMass, 2});
     svg.line({c.x, c.y - 7}, {c.x, c.y + 7}, {"none", kMass, 2});

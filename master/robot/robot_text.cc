@@ -186,22 +186,23 @@ std::string describe_robot_json(const RobotReading& reading, const GroundRobot& 
                       {"mu1", optional(source.mu1)},
                       {"mu2", optional(source.mu2)}});
   }
-  const json out = {
-      {"name", completed.name},
-      {"drive", drive_words()[static_cast<std::size_t>(completed.drive)]},
-      {"evidence", reading.evidence},
-      {"base_link", reading.base_link},
-      {"origin_in_base_link",
-       {{"x", reading.X_BR.x}, {"y", reading.X_BR.y}, {"theta", reading.X_BR.theta}}},
-      {"mass", optional(reading.robot.mass_kg)},
-      {"centre_of_mass",
-       {{"x", completed.com_x_m}, {"y", completed.com_y_m}, {"z", optional(completed.com_z_m)}}},
-      {"yaw_inertia", optional(reading.robot.yaw_inertia_kg_m2)},
-      {"wheels", wheels},
-      {"disagreements", reading.disagreements},
-      {"remarks", reading.remarks},
-      {"assumed", completed.notes},
-      {"toml", toml}};
+  const json out = {{"name", completed.name},
+                    {"drive", drive_words()[static_cast<std::size_t>(completed.drive)]},
+                    {"evidence", reading.evidence},
+                    {"base_link", reading.base_link},
+                    {"origin_in_base_link",
+                     {{"x", reading.X_BR.x}, {"y", reading.X_BR.y}, {"theta", reading.X_BR.theta}}},
+                    {"mass", optional(reading.robot.mass_kg)},
+                    {"centre_of_mass",
+                     {{"x", optional(completed.com_x_m)},
+                      {"y", optional(completed.com_y_m)},
+                      {"z", optional(completed.com_z_m)}}},
+                    {"yaw_inertia", optional(reading.robot.yaw_inertia_kg_m2)},
+                    {"wheels", wheels},
+                    {"disagreements", reading.disagreements},
+                    {"remarks", reading.remarks},
+                    {"assumed", completed.notes},
+                    {"toml", toml}};
   // Names come from files: bytes that are not UTF-8 become marks, not exceptions.
   return out.dump(2, ' ', false, json::error_handler_t::replace) + "\n";
 }

@@ -238,7 +238,7 @@ class Understanding {
                                  " from the middle, and the wheels reach " + millimetres(reach) +
                                  ": probably a placeholder");
     }
-    const Eigen::Vector2d com(robot().com_x_m, robot().com_y_m);
+    const Eigen::Vector2d com(*robot().com_x_m, *robot().com_y_m);
     if (!wheel_loads(points, com, 1).empty()) return;
     reading_.remarks.push_back(
         "the centre of mass is not above the wheels: the robot would fall over; a caster or its "

@@ -1,0 +1,169 @@
+// gapfarm robot FILE...: what a robot is, from the files that its user has.
+#include <filesystem>
+#include <memory>
+
+#include "common/robot/robot_file.h"
+#include "common/trials/files.h"
+#include "master/cli/subcommand.h"
+#include "master/robot/compare_facts.h"
+#include "master/robot/controllers.h"
+#include "master/robot/robot_text.h"
+
+namespace gapfarm {
+namespace {
+
+struct RobotOptions {
+  std::vector<std::string> files;
+  std::vector<std::string> controllers;
+  std::string out;
+  std::string picture;
+  bool json = false;
+  bool force = false;
+};
+
+bool ends_with(const std::string& file, std::initializer_list<const char*> endings) {
+  const std::string extension = std::filesystem::path(file).extension().string();
+  for (const char* ending : endings) {
+    if (extension == ending) return true;
+  }
+  return false;
+}
+
+// A robot.toml says everything itself.
+Result<RobotReading> read_toml(const std::string& file) {
+  Result<GroundRobot> robot = read_robot(file);
+  if (!robot) return robot.error();
+  RobotReading reading;
+  reading.robot = *std::move(robot);
+  reading.robot.notes.clear();
+  reading.sources.resize(reading.robot.wheels.size());
+  reading.evidence.push_back(file + " says so");
+  return reading;
+}
+
+Result<RobotReading> read_urdf(const std::string& file, const std::vector<DriveFacts>& facts) {
+  const Result<std::string> text = read_text_file(file);
+  if (!text) return text.error();
+  const Result<UrdfModel> model = parse_urdf(*text, file);
+  if (!model) return model.error();
+  return understand_robot(*model, facts);
+}
+
+Result<std::vector<DriveFacts>> read_controllers(const std::vector<std::string>& files) {
+  std::vector<DriveFacts> facts;
+  for (const std::string& file : files) {
+    const Result<std::string> text = read_text_file(file);
+    if (!text) return text.error();
+    const Result<ControllerFile> read = parse_controllers(*text, file);
+    if (!read) return read.error();
+    facts.insert(facts.end(), read->drives.begin(), read->drives.end());
+  }
+  return facts;
+}
+
+// The first robot; what others say differently is added to its disagreements.
+Result<RobotReading> read_all(RobotOptions options) {
+  std::vector<std::string> robots;
+  for (const std::string& file : options.files) {
+    (ends_with(file, {".yaml", ".yml"}) ? options.controllers : robots).push_back(file);
+  }
+  const Result<std::vector<DriveFacts>> facts = read_controllers(options.controllers);
+  if (!facts) return facts.error();
+  if (robots.empty()) return understand_controllers(*facts);
+  std::optional<RobotReading> first;
+  for (const std::string& file : robots) {
+    Result<RobotReading> next =
+        ends_with(file, {".toml"}) ? read_toml(file) : read_urdf(file, *facts);
+    if (!next) return next.error();
+    if (!first) {
+      first = *std::move(next);
+      continue;
+    }
+    for (std::string& said : compare_readings(*first, robots[0], *next, file)) {
+      first->disagreements.push_back(std::move(said));
+    }
+  }
+  return *std::move(first);
+}
+
+Status write_new(const std::string& path, std::string_view text, bool force) {
+  std::error_code ignored;
+  if (!force && std::filesystem::exists(path, ignored)) {
+    return Error{path + ": exists already; give another name, or --force to replace it"};
+  }
+  return write_file_atomically(path, text);
+}
+
+// Names come from files: they may not steer the terminal.
+std::string plain_lines(const std::string& text) {
+  std::string out;
+  for (std::size_t at = 0; at < text.size();) {
+    const std::size_t end = std::min(text.find('\n', at), text.size());
+    out += printable(std::string_view(text).substr(at, end - at)) + "\n";
+    at = end + 1;
+  }
+  return out;
+}
+
+int run_robot(const RobotOptions& options, CliContext& context) {
+  Console& console = context.console;
+  const Result<RobotReading> reading = read_all(options);
+  if (!reading) {
+    console.error(reading.error());
+    return kExitFailed;
+  }
+  GroundRobot completed = reading->robot;
+  if (const Status status = complete_robot(&completed); !status) {
+    console.error(Error{options.files[0] + ": " + status.error().message +
+                        "; state it in a robot.toml (docs/formats.md)"});
+    return kExitFailed;
+  }
+  const std::string toml = format_robot(completed);
+  const std::pair<const std::string*, std::string> outputs[] = {
+      {&options.out, toml},
+      {&options.picture, options.picture.empty() ? "" : draw_robot(*reading, completed)}};
+  for (const auto& [path, text] : outputs) {
+    if (path->empty()) continue;
+    if (const Status status = write_new(*path, text, options.force); !status) {
+      console.error(status.error());
+      return kExitFailed;
+    }
+  }
+  if (options.json) {
+    console.print(describe_robot_json(*reading, completed, toml));
+    return kExitDone;
+  }
+  console.print(plain_lines(describe_robot(*reading, completed)));
+  if (options.out.empty()) {
+    console.print("\nrobot.toml, to paste and correct (--out robot.toml writes it):\n\n" +
+                  plain_lines(toml));
+  } else {
+    console.note("robot written to " + options.out + "; next: gapfarm import LOG --robot " +
+                 options.out + " --out runs");
+  }
+  return kExitDone;
+}
+
+}  // namespace
+
+SubcommandRun setup_robot(CLI::App& app) {
+  auto options = std::make_shared<RobotOptions>();
+  app.add_option("FILE", options->files,
+                 "URDF, controller YAML or robot.toml; further ones are held against the first")
+      ->required();
+  app.add_option("--controllers", options->controllers,
+                 "Controller files (ros_control, ros2_control)");
+  app.add_option("-o,--out", options->out, "Write the robot as TOML");
+  app.add_option("--picture", options->picture, "Draw the robot from above (SVG)");
+  app.add_flag("--json", options->json, "Print JSON");
+  app.add_flag("--force", options->force, "Replace existing files");
+  app.footer(
+      "Examples:\n"
+      "  gapfarm robot husky.urdf --controllers control.yaml --out robot.toml\n"
+      "  gapfarm robot burger.urdf --picture burger.svg\n"
+      "  gapfarm robot old.urdf new.urdf\n"
+      "Next: gapfarm import LOG --out runs");
+  return [options](CliContext& context) { return run_robot(*options, context); };
+}
+
+}  // namespace gapfarm
