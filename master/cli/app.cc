@@ -18,7 +18,7 @@ constexpr const char* kExamples =
     "config\n"
     "or input, 3 done but tasks were given up, 85 stopped and can be resumed, 130/143 on signals.";
 
-// Commands that only hold others do not take it themselves.
+// Commands that only hold others do not take it themselves.  None declares it on its own.
 void declare_json(CLI::App& app, bool* json) {
   const std::vector<CLI::App*> inner = app.get_subcommands({});
   for (CLI::App* sub : inner) declare_json(*sub, json);

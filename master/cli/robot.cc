@@ -4,6 +4,7 @@
 
 #include "common/robot/robot_file.h"
 #include "common/trials/files.h"
+#include "master/cli/outputs.h"
 #include "master/cli/subcommand.h"
 #include "master/robot/compare_facts.h"
 #include "master/robot/controllers.h"
@@ -17,8 +18,7 @@ struct RobotOptions {
   std::vector<std::string> controllers;
   std::string out;
   std::string picture;
-  bool json = false;
-  bool force = false;
+  Outputs outputs;
 };
 
 bool ends_with(const std::string& file, std::initializer_list<const char*> endings) {
@@ -86,14 +86,6 @@ Result<RobotReading> read_all(RobotOptions options) {
   return *std::move(first);
 }
 
-Status write_new(const std::string& path, std::string_view text, bool force) {
-  std::error_code ignored;
-  if (!force && std::filesystem::exists(path, ignored)) {
-    return Error{path + ": exists already; give another name, or --force to replace it"};
-  }
-  return write_file_atomically(path, text);
-}
-
 // Names come from files: they may not steer the terminal.
 std::string plain_lines(const std::string& text) {
   std::string out;
@@ -105,18 +97,28 @@ std::string plain_lines(const std::string& text) {
   return out;
 }
 
-int run_robot(const RobotOptions& options, CliContext& context) {
+Status plan_outputs(RobotOptions& options) {
+  for (const auto* files : {&options.files, &options.controllers}) {
+    for (const std::string& file : *files) options.outputs.reads(file);
+  }
+  return options.outputs.plan(std::vector<std::string>{options.out, options.picture});
+}
+
+int run_robot(RobotOptions& options, CliContext& context) {
   Console& console = context.console;
-  const Result<RobotReading> reading = read_all(options);
+  Result<RobotReading> reading = read_all(options);
+  if (reading) {
+    if (Status s = plan_outputs(options); !s) reading = s.error();
+  }
   if (!reading) {
     console.error(reading.error());
-    return kExitFailed;
+    return kExitBadUsage;
   }
   GroundRobot completed = reading->robot;
   if (const Status status = complete_robot(&completed); !status) {
     console.error(Error{options.files[0] + ": " + status.error().message +
                         "; state it in a robot.toml (docs/formats.md)"});
-    return kExitFailed;
+    return kExitBadUsage;
   }
   const std::string toml = format_robot(completed);
   const std::pair<const std::string*, std::string> outputs[] = {
@@ -124,12 +126,12 @@ int run_robot(const RobotOptions& options, CliContext& context) {
       {&options.picture, options.picture.empty() ? "" : draw_robot(*reading, completed)}};
   for (const auto& [path, text] : outputs) {
     if (path->empty()) continue;
-    if (const Status status = write_new(*path, text, options.force); !status) {
+    if (const Status status = options.outputs.write(*path, text); !status) {
       console.error(status.error());
       return kExitFailed;
     }
   }
-  if (options.json) {
+  if (console.json()) {
     console.print(describe_robot_json(*reading, completed, toml));
     return kExitDone;
   }
@@ -155,8 +157,7 @@ SubcommandRun setup_robot(CLI::App& app) {
                  "Controller files (ros_control, ros2_control)");
   app.add_option("-o,--out", options->out, "Write the robot as TOML");
   app.add_option("--picture", options->picture, "Draw the robot from above (SVG)");
-  app.add_flag("--json", options->json, "Print JSON");
-  app.add_flag("--force", options->force, "Replace existing files");
+  options->outputs.declare(app);
   app.footer(
       "Examples:\n"
       "  gapfarm robot husky.urdf --controllers control.yaml --out robot.toml\n"
