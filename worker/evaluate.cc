@@ -102,6 +102,7 @@ v1::TaskResult run(const Prepared& p, const ParameterValues& values, const v1::P
   v1::TaskResult result;
   result.set_outcome(v1::OK);
   result.set_simulated(prediction.simulated_s);
+  const TailedDensity density(prediction.tails);
   for (std::size_t k = 0; k < prediction.trials.size(); ++k) {
     const std::uint32_t i =
         options.trials.empty() ? static_cast<std::uint32_t>(k) : options.trials[k];
@@ -111,8 +112,8 @@ v1::TaskResult run(const Prepared& p, const ParameterValues& values, const v1::P
     *to->mutable_end() = to_proto(whole.X_WM);
     if (options.means_only) continue;
     write_covariance(whole.cov, to);
-    const auto score =
-        log_score_of(prediction.trials[k], trials[i].X_WE, p.problem().fitness.outlier_share);
+    const auto score = log_score_of(prediction.trials[k], density, trials[i].X_WE,
+                                    p.problem().fitness.outlier_share);
     if (!score) return failed(v1::DIVERGED, score.error().message);
     to->set_log_score(*score);
   }

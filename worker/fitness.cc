@@ -27,9 +27,10 @@ Pose mean_displacement(const Problem& problem, const Prediction& prediction,
 }
 
 Result<double> mean_log_score(const Problem& problem, const Prediction& prediction) {
+  const TailedDensity density(prediction.tails);
   double sum = 0;
   for (std::size_t i = 0; i < prediction.trials.size(); ++i) {
-    const auto score = log_score_of(prediction.trials[i], problem.log.trials[i].X_WE,
+    const auto score = log_score_of(prediction.trials[i], density, problem.log.trials[i].X_WE,
                                     problem.fitness.outlier_share);
     if (!score) return score.error();
     sum += *score;
@@ -112,15 +113,15 @@ Alternative collapsed(const TrialPrediction& prediction) {
   return whole;
 }
 
-Result<double> log_score_of(const TrialPrediction& prediction, const Pose& X_WM,
-                            double outlier_share) {
+Result<double> log_score_of(const TrialPrediction& prediction, const TailedDensity& density,
+                            const Pose& X_WM, double outlier_share) {
   std::vector<double> terms;
   for (const Alternative& a : prediction.alternatives) {
     if (a.weight <= 0) continue;
-    const auto cov = Covariance3::factorise(a.cov);
-    if (!cov) return cov.error();
-    terms.push_back(std::log(a.weight) +
-                    log_predictive_density(local_difference(a.X_WM, X_WM), *cov, outlier_share));
+    const auto term =
+        density.log_density(local_difference(a.X_WM, X_WM), a.cov, a.reading_cov, outlier_share);
+    if (!term) return term.error();
+    terms.push_back(std::log(a.weight) + *term);
   }
   return log_sum_exp(terms);
 }

@@ -78,6 +78,8 @@ enum class Srv1 : std::size_t {
   kDriveNoiseSide,     // -, per-trial s.d. of each side's speed
   kPoseNoisePosition,  // m, s.d. of a measured x and y
   kPoseNoiseHeading,   // rad, s.d. of a measured heading
+  kDriveNoiseTail,     // -, 1 / degrees of freedom of the drive's noise; 0: Gaussian
+  kPoseNoiseTail,      // -, the same of the readings' noise
   kGravity,            // m/s^2
   kStepRate,           // Hz
   kSubSteps,           // -

@@ -9,6 +9,7 @@
 
 #include "common/base/result.h"
 #include "common/problem/problem.h"
+#include "common/score/scale_mixture.h"
 #include "gapfarm/v1/task.pb.h"
 #include "worker/sim/step_counter.h"
 
@@ -19,6 +20,8 @@ struct Alternative {
   double weight = 1;
   Pose X_WM;                                      // mean of the measured end pose, world frame
   Eigen::Matrix3d cov = Eigen::Matrix3d::Zero();  // in X_WM's own axes: m, m, rad
+  // The readings' part of it; only with tails (see Prediction).
+  Eigen::Matrix3d reading_cov = Eigen::Matrix3d::Zero();
 };
 
 // The predictive distribution of a trial's measured end pose: a mixture whose weights sum to 1.
@@ -38,6 +41,7 @@ struct Prediction {
   v1::Outcome outcome = v1::OK;  // the first simulation that did not end well decides
   std::string message;
   std::vector<TrialPrediction> trials;  // as asked for
+  NoiseTails tails;                     // of every trial's alternatives; covariances are the cores'
   std::vector<MotionFacts> facts;       // one a command of the problem
   unsigned conditions = 0;              // distinct motions that had to be simulated
   double simulated_s = 0;

@@ -147,9 +147,11 @@ std::vector<Gains> Srv1Model::draws(const Srv1Robot& robot, const PredictOptions
   Stream stream({options.stream.run_seed(), Purpose::kEvaluation, options.stream.generation(),
                  options.stream.birth_id(),
                  options.stream.replicate() | static_cast<std::uint64_t>(group + 1) << 32});
+  NoiseSettings core = robot.noise();
+  core.tails = {};
   std::vector<Gains> gains;
   for (unsigned i = 0; i < problem_.spread.replicates; ++i) {
-    gains.push_back(draw_gains(robot.noise(), stream));
+    gains.push_back(draw_gains(core, stream));
   }
   return gains;
 }
@@ -159,7 +161,7 @@ TrialPrediction Srv1Model::observe(const Srv1Robot& robot, const GroupMotion& mo
                                    const Pose& X_SE, const Pose& X_WR, bool means_only) const {
   TrialPrediction prediction;
   const Pose X_WE = X_WR * X_SE;
-  if (means_only) return {{{1, robot.effects().observe(X_WE), Eigen::Matrix3d::Zero()}}};
+  if (means_only) return {{{1, robot.effects().observe(X_WE)}}};
   PoseNoise noise = robot.noise().pose;
   // Rounding to a grid adds the variance of a uniform error.
   noise.position_m =
@@ -168,6 +170,9 @@ TrialPrediction Srv1Model::observe(const Srv1Robot& robot, const GroupMotion& mo
     const Pose X_SA = X_SE * branch.X_EA;
     prediction.alternatives.push_back({branch.weight, robot.effects().observe(X_WE * branch.X_EA),
                                        predictive_covariance(X_SA, motion.drive_cov(), noise)});
+    if (robot.noise().tails.gaussian()) continue;
+    prediction.alternatives.back().reading_cov =
+        predictive_covariance(X_SA, Eigen::Matrix3d::Zero(), noise);
   }
   return prediction;
 }
@@ -176,6 +181,7 @@ Prediction Srv1Model::predict(const ParameterValues& values, const PredictOption
   Prediction prediction;
   prediction.facts.resize(problem_.commands.size());
   Srv1Robot robot(values, options.steps);
+  prediction.tails = robot.noise().tails;
   const unsigned context = robot.effects().motion_context();
   const Grouping& grouping = (context & kLastDirection) ? by_drive_and_last_ : by_drive_;
 

@@ -55,14 +55,18 @@ Gains draw_gains(const NoiseSettings& noise, Stream& stream) {
   const double common = noise.drive_common * stream.normal();
   const double left = noise.drive_side * stream.normal();
   const double right = noise.drive_side * stream.normal();
-  return {1 + common + left, 1 + common + right};
+  if (noise.tails.drive == 0) return {1 + common + left, 1 + common + right};
+  const double core = std::sqrt(draw_tail_scale(noise.tails.drive, stream));
+  return {std::clamp(1 + core * (common + left), 0.0, 2.0),
+          std::clamp(1 + core * (common + right), 0.0, 2.0)};
 }
 
 Srv1Robot::Srv1Robot(const ParameterValues& values, StepCounter* steps)
     : effects_(srv1_table(), values),
       noise_{at(values, Srv1::kDriveNoiseCommon),
              at(values, Srv1::kDriveNoiseSide),
-             {at(values, Srv1::kPoseNoisePosition), at(values, Srv1::kPoseNoiseHeading)}},
+             {at(values, Srv1::kPoseNoisePosition), at(values, Srv1::kPoseNoiseHeading)},
+             {at(values, Srv1::kDriveNoiseTail), at(values, Srv1::kPoseNoiseTail)}},
       full_speed_m_s_(at(values, Srv1::kFullSpeed)),
       simulator_(sim_settings(values, effects_), steps) {}
 

@@ -5,6 +5,7 @@
 
 #include "common/parameters/table.h"
 #include "common/score/fitness.h"
+#include "common/score/scale_mixture.h"
 #include "common/trials/context.h"
 #include "gapfarm/v1/task.pb.h"
 #include "worker/effects/behaviour.h"
@@ -17,6 +18,7 @@ struct NoiseSettings {
   double drive_common = 0;  // s.d. of both sides' gain, per trial
   double drive_side = 0;    // s.d. of each side's gain, per trial
   PoseNoise pose;
+  NoiseTails tails;  // with tails the above are those of Student's t's core
 };
 
 // Gains of the two sides' speed in one trial.
@@ -29,6 +31,7 @@ struct Gains {
 // weighted points at +-sqrt(2) standard deviations along the two principal axes.  Empty without
 // noise.
 std::vector<Gains> cubature_points(const NoiseSettings& noise);
+// Within [0, 2] where the noise has a tail.
 Gains draw_gains(const NoiseSettings& noise, Stream& stream);
 
 // One robot at one set of parameter values, with the effects that are active there.

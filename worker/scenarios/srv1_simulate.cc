@@ -87,7 +87,10 @@ class Session {
   }
 
   Pose measured(const Pose& X_WR) {
-    const PoseNoise& noise = robot_.noise().pose;
+    PoseNoise noise = robot_.noise().pose;
+    const double core = std::sqrt(draw_tail_scale(robot_.noise().tails.reading, stream_));
+    noise.position_m *= core;
+    noise.heading_rad *= core;
     const Pose X_WM = robot_.effects().observe(X_WR);
     const double x = X_WM.x + noise.position_m * stream_.normal();
     const double y = X_WM.y + noise.position_m * stream_.normal();

@@ -1,0 +1,311 @@
+#include "common/score/baselines.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <boost/math/special_functions/gamma.hpp>
+#include <boost/math/tools/minima.hpp>
+#include <cmath>
+#include <cstdio>
+#include <map>
+#include <numbers>
+#include <tuple>
+
+#include "common/score/density.h"
+#include "common/score/motion_model.h"
+
+namespace gapfarm {
+namespace {
+
+constexpr double kLeastFreedom = 1;
+constexpr double kMostFreedom = 200;
+constexpr int kRounds = 60;           // of expectation and maximisation; 20 settle
+constexpr unsigned kMcdStarts = 100;  // a log of many sessions is fitted many times
+constexpr int kDigits = 12;           // bits of the freedom's logarithm
+constexpr double kLeastScale = 1e-5;  // m and rad: identical trials would have no density
+constexpr double kLeastVariance = 1e-10;
+
+using Key = std::tuple<std::string, double, double, double>;
+using Ends = std::map<Key, std::vector<Eigen::Vector3d>>;
+
+Key key_of(const CommandSpec& c) { return {c.name, c.left, c.right, c.duration_s}; }
+
+// Of Student's t about a place, without its scale: n dimensions at the squared distance.
+double log_t(double squared, double freedom, int n) {
+  return boost::math::lgamma((freedom + n) / 2) - boost::math::lgamma(freedom / 2) -
+         n / 2.0 * std::log(freedom * std::numbers::pi) -
+         (freedom + n) / 2 * std::log1p(squared / freedom);
+}
+
+// The freedom of the greatest likelihood.
+template <class Nats>
+double best_freedom(const Nats& nats) {
+  const auto worse = [&](double log_freedom) { return -nats(std::exp(log_freedom)); };
+  return std::exp(boost::math::tools::brent_find_minima(worse, std::log(kLeastFreedom),
+                                                        std::log(kMostFreedom), kDigits)
+                      .first);
+}
+
+// One component of one command's ends: Student's t at a place.
+struct Student {
+  double place = 0;
+  double scale = 1;
+
+  static Student fit(const std::vector<double>& values, double freedom) {
+    Student t;
+    std::vector<double> sorted = values;
+    const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
+    std::nth_element(sorted.begin(), middle, sorted.end());
+    t.place = *middle;
+    double squares = 0;
+    for (double v : values) squares += (v - t.place) * (v - t.place);
+    t.scale = std::max(kLeastScale, std::sqrt(squares / static_cast<double>(values.size())));
+    for (int round = 0; round < kRounds; ++round) {
+      double weights = 0, sum = 0, spread = 0;
+      for (double v : values) {
+        const double z = (v - t.place) / t.scale;
+        const double w = (freedom + 1) / (freedom + z * z);
+        weights += w;
+        sum += w * v;
+      }
+      t.place = sum / weights;
+      for (double v : values) {
+        const double z = (v - t.place) / t.scale;
+        spread += (freedom + 1) / (freedom + z * z) * (v - t.place) * (v - t.place);
+      }
+      t.scale = std::max(kLeastScale, std::sqrt(spread / static_cast<double>(values.size())));
+    }
+    return t;
+  }
+
+  double log_density(double value, double freedom) const {
+    const double z = (value - place) / scale;
+    return log_t(z * z, freedom, 1) - std::log(scale);
+  }
+};
+
+// Headings are near their command's robust mean, so that they do not wrap.
+class ConstantMotion {
+ public:
+  explicit ConstantMotion(const Ends& ends) {
+    for (int k = 0; k < 3; ++k) {
+      std::map<Key, std::vector<double>> values;
+      for (const auto& [key, all] : ends) {
+        for (const Eigen::Vector3d& end : all) values[key].push_back(end[k]);
+      }
+      freedom_[k] = best_freedom([&](double freedom) {
+        double sum = 0;
+        for (const auto& [key, own] : values) {
+          const Student t = Student::fit(own, freedom);
+          for (double v : own) sum += t.log_density(v, freedom);
+        }
+        return sum;
+      });
+      for (const auto& [key, own] : values) {
+        places_[key][static_cast<std::size_t>(k)] = Student::fit(own, freedom_[k]);
+      }
+    }
+  }
+
+  double log_density(const Key& key, const Eigen::Vector3d& end) const {
+    const std::array<Student, 3>& own = places_.at(key);
+    double sum = 0;
+    for (int k = 0; k < 3; ++k) {
+      sum += own[static_cast<std::size_t>(k)].log_density(end[k], freedom_[k]);
+    }
+    return sum;
+  }
+
+ private:
+  Eigen::Vector3d freedom_;
+  std::map<Key, std::array<Student, 3>> places_;
+};
+
+// About each command's robust mean and covariance.
+class MinedMotion {
+ public:
+  MinedMotion(const MotionModel& model, const Ends& ends) {
+    std::vector<double> squares;
+    for (const CommandMotion& motion : model.commands()) {
+      const auto own = ends.find(key_of(motion.command));
+      if (own == ends.end()) continue;
+      Eigen::Matrix3d covariance = motion.motion.covariance;
+      covariance.diagonal().array() += kLeastVariance;
+      const auto factor = Covariance3::factorise(covariance);
+      if (!factor) continue;
+      factors_.emplace(own->first, *factor);
+      for (const Eigen::Vector3d& end : own->second) {
+        squares.push_back(factor->squared_distance(end));
+      }
+    }
+    if (squares.empty()) return;
+    freedom_ = best_freedom([&](double freedom) {
+      const double scale = scale_of(squares, freedom);
+      double sum = 0;
+      for (double q : squares) sum += log_t(q / scale, freedom, 3) - 1.5 * std::log(scale);
+      return sum;
+    });
+    scale_ = scale_of(squares, freedom_);
+  }
+
+  std::optional<double> log_density(const Key& key, const Eigen::Vector3d& end) const {
+    const auto factor = factors_.find(key);
+    if (factor == factors_.end()) return std::nullopt;
+    return log_t(factor->second.squared_distance(end) / scale_, freedom_, 3) -
+           1.5 * std::log(scale_) - 0.5 * factor->second.log_determinant();
+  }
+
+ private:
+  // Factor of the covariances, of the greatest likelihood at that freedom.
+  static double scale_of(const std::vector<double>& squares, double freedom) {
+    double scale = 1;
+    for (int round = 0; round < kRounds; ++round) {
+      double sum = 0;
+      for (double q : squares) sum += (freedom + 3) / (freedom + q / scale) * q;
+      scale = std::max(kLeastVariance, sum / (3 * static_cast<double>(squares.size())));
+    }
+    return scale;
+  }
+
+  std::map<Key, Covariance3> factors_;
+  double freedom_ = 1;
+  double scale_ = 1;
+};
+
+std::string number(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.3f", value);
+  return text;
+}
+
+}  // namespace
+
+Result<std::vector<BaselineScores>> baseline_scores(const TrialLog& train, const TrialLog& test,
+                                                    std::span<const CommandSpec> commands) {
+  MotionModelSettings settings;
+  settings.least_trials = kLeastBaselineTrials;
+  settings.mcd.starts = kMcdStarts;
+  const auto mined = MotionModel::mine(train, commands, settings);
+  if (!mined) return mined.error();
+  MotionModelSettings names;  // no command has trials enough to be fitted
+  names.least_trials = test.trials.size() + 1;
+  const auto check = MotionModel::mine(test, commands, names);
+  if (!check) return check.error();
+  // Ends about each command's robust mean, in the start's axes.
+  std::map<Key, Pose> about;
+  for (const CommandMotion& motion : mined->commands()) {
+    if (motion.trials >= kLeastBaselineTrials) about[key_of(motion.command)] = motion.motion.mean;
+  }
+  const auto seen = [&](const Trial& trial) {
+    const Key key = key_of(resolved_command(trial, commands));
+    const Pose end = between(trial.X_WS, trial.X_WE);
+    const auto mean = about.find(key);
+    std::optional<Eigen::Vector3d> offset;
+    if (mean != about.end()) {
+      offset = Eigen::Vector3d(end.x - mean->second.x, end.y - mean->second.y,
+                               wrap_angle(end.theta - mean->second.theta));
+    }
+    return std::pair{key, offset};
+  };
+  Ends ends;
+  for (const Trial& trial : train.trials) {
+    const auto [key, offset] = seen(trial);
+    if (offset) ends[key].push_back(*offset);
+  }
+  std::vector<BaselineScores> all = {{"constant motion", {}}, {"mined motion", {}}};
+  std::optional<ConstantMotion> constant;
+  std::optional<MinedMotion> motion;
+  if (!ends.empty()) {
+    constant.emplace(ends);
+    motion.emplace(*mined, ends);
+  }
+  for (const Trial& trial : test.trials) {
+    const auto [key, offset] = seen(trial);
+    all[0].scores.push_back(offset ? std::optional(constant->log_density(key, *offset))
+                                   : std::nullopt);
+    all[1].scores.push_back(offset ? motion->log_density(key, *offset) : std::nullopt);
+  }
+  return all;
+}
+
+Result<std::vector<BaselineScores>> crossfitted_baselines(const TrialLog& log,
+                                                          std::span<const CommandSpec> commands,
+                                                          std::span<const std::size_t> fold_of) {
+  const std::size_t folds = 1 + *std::max_element(fold_of.begin(), fold_of.end());
+  if (folds == 1) return baseline_scores(log, log, commands);
+  std::vector<BaselineScores> all;
+  for (std::size_t f = 0; f < folds; ++f) {
+    TrialLog train, test;
+    std::vector<std::size_t> places;
+    for (std::size_t i = 0; i < log.trials.size(); ++i) {
+      (fold_of[i] == f ? test : train).trials.push_back(log.trials[i]);
+      if (fold_of[i] == f) places.push_back(i);
+    }
+    if (test.trials.empty() || train.trials.empty()) continue;
+    const auto scores = baseline_scores(train, test, commands);
+    if (!scores) return scores.error();
+    all.resize(scores->size());
+    for (std::size_t b = 0; b < all.size(); ++b) {
+      all[b].name = (*scores)[b].name;
+      all[b].scores.resize(log.trials.size());
+      for (std::size_t i = 0; i < places.size(); ++i) {
+        all[b].scores[places[i]] = (*scores)[b].scores[i];
+      }
+    }
+  }
+  return all;
+}
+
+std::vector<std::size_t> session_folds(const TrialLog& log) {
+  std::map<std::string, std::size_t> sessions;
+  std::vector<std::size_t> folds;
+  for (const Trial& trial : log.trials) {
+    folds.push_back(sessions.try_emplace(trial.session, sessions.size()).first->second);
+  }
+  if (sessions.size() > 1) return folds;
+  for (std::size_t i = 0; i < folds.size(); ++i) folds[i] = i * 5 / folds.size();
+  return folds;
+}
+
+std::vector<BaselineComparison> compare_with_baselines(std::span<const BaselineScores> baselines,
+                                                       std::span<const double> model_scores) {
+  std::vector<BaselineComparison> all;
+  for (const BaselineScores& baseline : baselines) {
+    BaselineComparison c{baseline.name};
+    double squares = 0;
+    for (std::size_t i = 0; i < model_scores.size(); ++i) {
+      if (!baseline.scores[i]) continue;
+      const double gain = model_scores[i] - *baseline.scores[i];
+      ++c.trials;
+      c.baseline += *baseline.scores[i];
+      c.model += model_scores[i];
+      squares += gain * gain;
+    }
+    if (c.trials == 0) continue;
+    const auto n = static_cast<double>(c.trials);
+    c.baseline /= n;
+    c.model /= n;
+    const double mean = c.model - c.baseline;
+    c.error = std::sqrt(std::max(0.0, squares / n - mean * mean) / n);
+    all.push_back(c);
+  }
+  return all;
+}
+
+std::string baseline_sentence(std::span<const BaselineComparison> comparisons,
+                              const std::string& model) {
+  std::string text, beat_by;
+  for (const BaselineComparison& c : comparisons) {
+    text += (text.empty() ? "" : ", ") + c.name + " " + number(c.baseline) + " (" + model + " " +
+            number(c.model) + ")";
+    if (!c.beaten()) beat_by += (beat_by.empty() ? "" : " and ") + c.name;
+  }
+  if (text.empty()) return text;
+  text += " nats a trial on " + std::to_string(comparisons.front().trials) + " trials";
+  if (!beat_by.empty()) {
+    text +=
+        ". " + model + " does not beat " + beat_by + ": as it is, predictions need no simulation";
+  }
+  return text;
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,125 @@
+#include "common/score/scale_mixture.h"
+
+#include <Eigen/Dense>
+#include <array>
+#include <cassert>
+#include <cmath>
+
+#include "common/score/density.h"
+
+namespace gapfarm {
+namespace {
+
+constexpr std::size_t kScales = 9;
+// How far from its mode the scale's density is followed, in nats, below and above, and the greatest
+// scale: an s.d. 32 times the core's.  What lies beyond is the outliers' affair.
+constexpr double kNatsBelow = 4;
+constexpr double kNatsAbove = 7;
+constexpr double kMostScale = 1000;
+constexpr double kLogTwoPi = 1.8378770664093454836;
+
+// Nats that the density of log a has lost at `log_a`; its mode is 0.
+double lost(double freedom, double log_a) { return freedom / 2 * (std::exp(-log_a) + log_a - 1); }
+
+// Where that many nats are lost on one side of the mode, by bisection.
+double where_lost(double freedom, double nats, double sign) {
+  double near = 0, far = 1;
+  while (lost(freedom, sign * far) < nats) far *= 2;
+  for (int i = 0; i < 60; ++i) {
+    const double middle = (near + far) / 2;
+    (lost(freedom, sign * middle) < nats ? near : far) = middle;
+  }
+  return sign * near;
+}
+
+}  // namespace
+
+std::vector<TailScale> tail_scales(double tail) {
+  assert(tail >= 0 && tail <= 1);
+  if (tail == 0) return {{1, 1}};
+  const double freedom = 1 / tail;
+  const double first = where_lost(freedom, kNatsBelow, -1);
+  const double last = std::min(where_lost(freedom, kNatsAbove, 1), std::log(kMostScale));
+  std::vector<TailScale> scales;
+  double sum = 0;
+  for (std::size_t k = 0; k < kScales; ++k) {
+    const double share = static_cast<double>(k) / static_cast<double>(kScales - 1);
+    const double log_a = first + share * (last - first);
+    scales.push_back({std::exp(log_a), std::exp(-lost(freedom, log_a))});
+    sum += scales.back().weight;
+  }
+  for (TailScale& s : scales) s.weight /= sum;
+  return scales;
+}
+
+double draw_tail_scale(double tail, Stream& stream) {
+  if (tail == 0) return 1;
+  double left = stream.uniform();
+  const std::vector<TailScale> scales = tail_scales(tail);
+  for (const TailScale& s : scales) {
+    left -= s.weight;
+    if (left < 0) return s.scale;
+  }
+  return scales.back().scale;
+}
+
+TailedDensity::TailedDensity(const NoiseTails& tails)
+    : tails_(tails), drive_(tail_scales(tails.drive)), reading_(tail_scales(tails.reading)) {}
+
+Result<double> TailedDensity::log_density(const Eigen::Vector3d& residual,
+                                          const Eigen::Matrix3d& covariance,
+                                          const Eigen::Matrix3d& reading,
+                                          double outlier_share) const {
+  const Result<Covariance3> whole = Covariance3::factorise(covariance);
+  if (!whole) return whole.error();
+  if (tails_.gaussian()) return log_predictive_density(residual, *whole, outlier_share);
+  const Result<Covariance3> readings = Covariance3::factorise(reading);
+  if (!readings) return Error{"of the readings: " + readings.error().message};
+  // In axes in which the readings' covariance is 1 and the drive's diagonal, every pair of scales
+  // is.
+  const auto lower = readings->lower().triangularView<Eigen::Lower>();
+  const Eigen::Matrix3d half = lower.solve(Eigen::Matrix3d(covariance - reading));
+  const Eigen::Matrix3d drive = lower.solve(Eigen::Matrix3d(half.transpose()));
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(drive);
+  const Eigen::Array3d spread = axes.eigenvalues().array().max(0.0);
+  const Eigen::Array3d squares =
+      (axes.eigenvectors().transpose() * lower.solve(residual)).array().square();
+  std::array<double, kScales * kScales> logs;
+  std::size_t count = 0;
+  for (const TailScale& a : drive_) {
+    for (const TailScale& b : reading_) {
+      const Eigen::Array3d variances = a.scale * spread + b.scale;
+      logs[count++] = std::log(a.weight * b.weight) -
+                      0.5 * (std::log(variances.prod()) + (squares / variances).sum());
+    }
+  }
+  const double mixture = log_sum_exp(std::span(logs.data(), count)) -
+                         0.5 * (3 * kLogTwoPi + readings->log_determinant());
+  if (outlier_share == 0) return mixture;
+  const std::array<double, 2> both = {std::log1p(-outlier_share) + mixture,
+                                      std::log(outlier_share) + log_tail_density(residual, *whole)};
+  return log_sum_exp(both);
+}
+
+Result<double> expected_log_density(const TailedDensity& density, const NoiseTails& tails,
+                                    const Eigen::Matrix3d& covariance,
+                                    const Eigen::Matrix3d& reading, double outlier_share,
+                                    unsigned draws, Stream& stream) {
+  const Eigen::Matrix3d drive = covariance - reading;
+  double sum = 0;
+  for (unsigned i = 0; i < draws; ++i) {
+    const double a = draw_tail_scale(tails.drive, stream);
+    const double b = draw_tail_scale(tails.reading, stream);
+    const Eigen::Matrix3d drawn = a * drive + b * reading;
+    const Result<Covariance3> factor = Covariance3::factorise(drawn);
+    if (!factor) return factor.error();
+    Eigen::Vector3d z;
+    for (double& value : z) value = stream.normal();
+    const auto score = density.log_density(factor->lower() * z, covariance, reading, outlier_share);
+    if (!score) return score.error();
+    sum += *score;
+  }
+  return sum / draws;
+}
+
+}  // namespace gapfarm
