@@ -6,6 +6,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "master/cli/baseline_notes.h"
 #include "master/cli/evolution_farm.h"
 #include "master/cli/leave_behind.h"
 #include "master/cli/validation.h"
@@ -220,6 +221,9 @@ int run_evolution(RunStore& store, const EvolutionRun& run, CliContext& context)
   if (summary->best && summary->best->outcome == v1::OK) {
     const Status left = leave_behind(store, run.problem, run.config, *summary, **farm);
     if (!left) return failed(left.error(), context);
+    const auto beside = baseline_note_of_run(run.problem, summary->best->genome, **farm);
+    if (!beside) return failed(beside.error(), context);
+    if (!beside->empty()) context.console.note(*beside);
     if (*kept_apart) {
       show_notes(**kept_apart, context.console);
       const Status added =

@@ -8,6 +8,7 @@
 #include "common/score/fitness.h"
 #include "common/score/motion_model.h"
 #include "common/trials/read.h"
+#include "master/cli/baseline_notes.h"
 #include "master/cli/inputs.h"
 #include "master/cli/outputs.h"
 #include "master/report/prediction_table.h"
@@ -74,17 +75,20 @@ Result<std::vector<PredictedTrial>> predict_by_log(const TrialLog& log,
   return predictions;
 }
 
-// Beside the table on standard output there is no room for a summary.
+// Beside the table on standard output there is no room for a summary.  `beside`: what predictions
+// without a simulation score, or empty.
 void show_summary(const TrialLog& log, const std::vector<PredictedTrial>& predictions,
-                  const PredictOptions& options, Console& console) {
-  const std::string text = summarise_predictions(log, predictions);
+                  const std::string& beside, const PredictOptions& options, Console& console) {
+  const std::string summary = summarise_predictions(log, predictions);
+  const std::string text = beside.empty() ? summary : summary + "\n" + beside;
   if (options.out == "-" && !console.json()) return console.note(text);
-  nlohmann::ordered_json json = {{"trials", predictions.size()}, {"summary", text}};
+  nlohmann::ordered_json json = {{"trials", predictions.size()}, {"summary", summary}};
   double score = 0;
   for (const PredictedTrial& p : predictions) {
     score += p.log_score / static_cast<double>(predictions.size());
   }
   json["log_score"] = score;
+  if (!beside.empty()) json["without_a_simulation"] = beside;
   if (options.out != "-") {
     json["out"] = options.out;
   } else {
@@ -137,7 +141,15 @@ int run_predict(PredictOptions& options, CliContext& context) {
   } else if (Status s = options.outputs.write(options.out, table); !s) {
     return failed(s.error(), context);
   }
-  show_summary(*log, *predictions, options, console);
+  std::string beside;
+  if (options.mined.empty()) {
+    std::vector<double> scores;
+    for (const PredictedTrial& p : *predictions) scores.push_back(p.log_score);
+    const auto note = baseline_note(*model, *log, scores);
+    if (!note) return failed(note.error(), context);
+    beside = *note;
+  }
+  show_summary(*log, *predictions, beside, options, console);
   return kExitDone;
 }
 
