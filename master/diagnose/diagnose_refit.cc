@@ -15,7 +15,8 @@ namespace {
 
 constexpr int kMostRounds = 6;  // of a fit that does not settle; most need two
 
-// By paired scores: not by chance, but for one case in twenty.
+}  // namespace
+
 bool clearly_better(const std::vector<double>& scores, const std::vector<double>& others) {
   const auto n = static_cast<double>(scores.size());
   double sum = 0, squares = 0;
@@ -27,8 +28,6 @@ bool clearly_better(const std::vector<double>& scores, const std::vector<double>
   const double variance = std::max(0.0, squares / n - (sum / n) * (sum / n));
   return sum / n > kNormal90 * std::sqrt(variance / n);
 }
-
-}  // namespace
 
 // An effect that shifts single trials, such as a patch, passed for noise where it is not smooth:
 // what the fit leaves is measured as the tuned base's noise was.  Slips' noise came with them.
@@ -120,6 +119,7 @@ Status DiagnosisRun::refit() {
   }
   if (Status s = estimate_beside_base(); !s) return s;
   if (chosen_.size() < found) judge_again();
+  if (Status s = fit_correction(); !s) return s;
   set_floor(folds);
   return {};
 }
@@ -127,6 +127,7 @@ Status DiagnosisRun::refit() {
 // Of every trial, by the nested fits to the other folds.
 void DiagnosisRun::score_nested(const std::vector<std::size_t>& folds) {
   const double share = problem_.fitness.outlier_share;
+  nested_scores_.clear();
   for (std::size_t k = 0; k < nested_.size(); ++k) {
     const Study& study = nested_studies_[k];
     std::vector<double> scores = held_out_scores(study, nested_[k], folds, share);
@@ -169,9 +170,13 @@ void DiagnosisRun::judge_again() {
 void DiagnosisRun::set_floor(const std::vector<std::size_t>& folds) {
   if (slip_.gain > 0) foresee_slips(folds);
   if (slip_.gain > 0 && !clearly_better(slip_scores_, nested_scores_.back())) drop_slips();
+  const std::optional<double> tailed = slip_.gain == 0 ? fit_tails() : std::nullopt;
+  if (tailed) score_nested(folds);
   // What slips scatter is no Gaussian: the best prediction is the mixture fitted to it.
-  floor_ = slip_.gain > 0 ? mean(slip_scores_)
-                          : floor_score(nested_studies_.back(), problem_.fitness.outlier_share);
+  floor_ =
+      slip_.gain > 0
+          ? mean(slip_scores_)
+          : tailed.value_or(floor_score(nested_studies_.back(), problem_.fitness.outlier_share));
   // Nor is it worse than what was reached on trials that the fit did not see, and there is more to
   // be had where that still depends on something.
   double reached = -INFINITY, more = 0;

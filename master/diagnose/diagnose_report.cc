@@ -68,6 +68,8 @@ void DiagnosisRun::set_noise(const NoiseEstimate& noise, Overrides* at) const {
   set(subject_.drive_side, noise.drive_side);
   set(subject_.pose_position, noise.pose.position_m);
   set(subject_.pose_heading, noise.pose.heading_rad);
+  if (subject_.drive_tail) set(*subject_.drive_tail, noise.tails.drive);
+  if (subject_.pose_tail) set(*subject_.pose_tail, noise.tails.reading);
 }
 
 // Of a side's speed, over the trials that the fits learned from.  An event's loss is uniform below
@@ -83,7 +85,7 @@ double DiagnosisRun::mean_loss_of_slips() const {
 
 void DiagnosisRun::spread_effects(Overrides* at) const {
   const auto set = [&](const char* key, double value) { (*at)[problem_.table().row(key)] = value; };
-  NoiseEstimate noise = nested_studies_.back().noise;
+  NoiseEstimate noise = nested_studies_.back().predictive_noise();
   if (study_.quantum_m > 0) {
     // The readings' noise was measured with the rounding in it.
     const double rounding2 = study_.quantum_m * study_.quantum_m / 12;
@@ -262,7 +264,8 @@ void DiagnosisRun::fill_gap() {
   Diagnosis& d = result_.diagnosis;
   const std::vector<std::size_t> folds = subject_.folds(study_);
   d.gap.tuned = floor_ - mean(nested_scores_.front());
-  d.gap.final_ = d.effects.empty() ? d.gap.tuned : d.effects.back().gap_after;
+  d.gap.final_ =
+      d.effects.empty() ? floor_ - mean(nested_scores_.back()) : d.effects.back().gap_after;
   d.gap.floor = 0;
   const RootMeanSquare tuned =
       root_mean_square(held_out_residuals(nested_studies_.front(), nested_.front(), folds));
@@ -318,7 +321,7 @@ void DiagnosisRun::fill_values() {
     if (with_effects) {
       spread_effects(&at);
     } else {
-      set_noise(nested_studies_.front().noise, &at);
+      set_noise(nested_studies_.front().predictive_noise(), &at);
     }
     ParameterValues values = problem_.values;
     for (const auto& [row, value] : at) values[row] = value;
@@ -359,6 +362,7 @@ Status DiagnosisRun::report() {
   if (d.verdict == Verdict::kEffectAndUnknown) {
     if (Status s = look_for_second_places(); !s) return s;
   }
+  if (Status s = compare_with_baselines(); !s) return s;
   d.headline = headline(d);
   return plan_next();
 }

@@ -341,7 +341,10 @@ Status DiagnosisRun::judge() {
                   : Verdict::kUnknown;
     result_.diagnosis.cautions.push_back(odd_drives_);
   }
-  if (verdict == Verdict::kUnknown) name_nothing();
+  if (verdict == Verdict::kUnknown) {
+    unnamed_ = chosen_;
+    name_nothing();
+  }
   if (!rounded) study_.quantum_m = 0;
   return {};
 }

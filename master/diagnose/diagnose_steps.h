@@ -21,6 +21,9 @@
 
 namespace gapfarm {
 
+// By paired scores: not by chance, but for one case in twenty.
+bool clearly_better(const std::vector<double>& scores, const std::vector<double>& others);
+
 class DiagnosisRun {
  public:
   // REQUIRES: a scenario that has a diagnosis_subject().
@@ -73,6 +76,9 @@ class DiagnosisRun {
   Status refit_nested();
   void foresee_slips(const std::vector<std::size_t>& folds);
   void drop_slips();
+  std::optional<double> fit_tails();
+  Status fit_correction();
+  Status compare_with_baselines();
   Study study_beside(const JointFit& fit) const;
   void keep_nested(JointFit fit, const Study& fitted_in, Study scored_in);
   void score_nested(const std::vector<std::size_t>& folds);
@@ -127,7 +133,10 @@ class DiagnosisRun {
   std::optional<JointFit> estimates_;               // base held, beside nuisances
   std::vector<std::vector<double>> nested_scores_;  // held out, one a trial
   std::vector<double> slip_scores_;                 // the same, of the last fit and slips
-  double scale_ = 1;                                // leftover variance over the noise's
+  // What explains something, but too little of what is there to be named: as a correction it may
+  // still help.
+  std::vector<ChosenEffect> unnamed_;
+  double scale_ = 1;  // leftover variance over the noise's
   double floor_ = 0;
   DiagnosisResult result_;
   std::string stage_;

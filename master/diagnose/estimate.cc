@@ -8,6 +8,7 @@
 #include "master/diagnose/bounded_minimum.h"
 #include "master/diagnose/seam.h"
 #include "master/diagnose/subject.h"
+#include "master/diagnose/tail_noise.h"
 
 namespace gapfarm {
 namespace {
@@ -214,12 +215,6 @@ void step(const Problem& problem, const Study& study, const Eigen::MatrixXd& nui
   }
 }
 
-double trial_score(const Study& study, std::size_t i, const Eigen::Vector3d& residual,
-                   double outlier_share) {
-  const auto cov = Covariance3::factorise(study.subject->covariance(study.trials[i], study.noise));
-  return cov ? log_predictive_density(residual, *cov, outlier_share) : -1e3;
-}
-
 }  // namespace
 
 std::map<std::string, double> start_values(const Study& study, const Regression& others,
@@ -342,11 +337,8 @@ std::vector<Eigen::Vector3d> held_out_residuals(const Study& study, const JointF
 
 std::vector<double> scores_of(const Study& study, const std::vector<Eigen::Vector3d>& residuals,
                               double outlier_share) {
-  std::vector<double> scores;
-  for (std::size_t i = 0; i < study.size(); ++i) {
-    scores.push_back(trial_score(study, i, residuals[i], outlier_share));
-  }
-  return scores;
+  return predictive_scores(study.trials, residuals, study.predictive_noise(), *study.subject,
+                           outlier_share);
 }
 
 std::vector<double> held_out_scores(const Study& study, const JointFit& fit,

@@ -32,8 +32,9 @@ void bound_far_trials(const std::vector<Eigen::Vector3d>& residuals, double most
   }
 }
 
-void estimate_noise(const Regression& nuisances, const std::vector<CovariateBlock>& blocks,
-                    Study* study) {
+std::vector<Eigen::Vector3d> estimate_noise(const Regression& nuisances,
+                                            const std::vector<CovariateBlock>& blocks,
+                                            Study* study) {
   Regression rich = nuisances;
   std::vector<bool> used(blocks.size(), false);
   for (;;) {
@@ -66,6 +67,7 @@ void estimate_noise(const Regression& nuisances, const std::vector<CovariateBloc
   study->noise = noise;
   if (study->subject->farthest > 0) bound_far_trials(residuals, study->subject->farthest, study);
   study->use_noise(noise);
+  return residuals;
 }
 
 }  // namespace gapfarm

@@ -17,8 +17,10 @@ Eigen::VectorXd studentised(const Regression& explained, double least_freedom);
 void bound_far_trials(const std::vector<Eigen::Vector3d>& residuals, double most, Study* study);
 
 // Sets the study's drive noise (and the readings' too, when the log shares one reading between
-// trials), so that an effect that is not yet named does not pass for noise.
-void estimate_noise(const Regression& nuisances, const std::vector<CovariateBlock>& blocks,
-                    Study* study);
+// trials), so that an effect that is not yet named does not pass for noise.  Returns what nothing
+// smooth explains of every trial (m, m, rad).
+std::vector<Eigen::Vector3d> estimate_noise(const Regression& nuisances,
+                                            const std::vector<CovariateBlock>& blocks,
+                                            Study* study);
 
 }  // namespace gapfarm

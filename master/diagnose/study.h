@@ -39,7 +39,10 @@ struct Study {
   std::size_t sessions = 0;
   bool free_commands = false;  // hardly a command repeats: see free_commands.h
   double quantum_m = 0;        // grid of the logged positions
-  NoiseEstimate noise;
+  NoiseEstimate noise;         // by which rows are whitened and dependences judged
+  // By which trials are scored and the models left behind predict, where that is another one:
+  // drives or readings with heavy tails.
+  std::optional<NoiseEstimate> predictive;
   bool reading_noise_known = true;  // from gaps between readings, rather than the config's
   Overrides base;                   // tuned values
   double speed_m_s = 0;             // tuned full speed
@@ -51,6 +54,7 @@ struct Study {
   std::vector<double> trust;              // factor of each trial's whitener, (0, 1]; empty: 1
 
   std::size_t size() const { return trials.size(); }
+  const NoiseEstimate& predictive_noise() const { return predictive ? *predictive : noise; }
   // Three rows a trial.
   Eigen::VectorXd whiten(const std::vector<Eigen::Vector3d>& values) const;
   Eigen::VectorXd whitened_residuals() const;

@@ -5,6 +5,7 @@
 
 #include <Eigen/Core>
 #include <functional>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -58,6 +59,8 @@ struct DiagnosisSubject {
   // and the noise that they leave: where the base was tuned without them, both may be far off.
   bool base_moves;
   NoiseRow drive_common, drive_side, pose_position, pose_heading;
+  std::optional<NoiseRow> drive_tail, pose_tail;  // both or none; the readings then vary a trial by
+                                                  // reading_covariance()
   std::size_t speed = 0;  // row of what slips take a share of; of kLooksForSlips only
   CovarianceOf covariance;
 

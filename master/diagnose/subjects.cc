@@ -44,6 +44,8 @@ DiagnosisSubject srv1_subject() {
   s.drive_side = {row_of(Srv1::kDriveNoiseSide)};
   s.pose_position = {row_of(Srv1::kPoseNoisePosition)};
   s.pose_heading = {row_of(Srv1::kPoseNoiseHeading)};
+  s.drive_tail = {row_of(Srv1::kDriveNoiseTail)};
+  s.pose_tail = {row_of(Srv1::kPoseNoiseTail)};
   s.speed = row_of(Srv1::kFullSpeed);
   s.covariance = trial_covariance;
   s.make_study = [](const Problem& problem, std::span<const Gene>) { return make_study(problem); };
