@@ -26,8 +26,8 @@ Result<FitnessReference> fitness_reference(const Problem& problem);
 // Mean and covariance (in the mean's own axes) of a trial's mixture.
 Alternative collapsed(const TrialPrediction& prediction);
 
-// Log density (nats) of `X_WM` under the mixture; each part has the prediction's tails and its share
-// of outliers.
+// Log density (nats) of `X_WM` under the mixture; each part has the prediction's tails and its
+// share of outliers.
 Result<double> log_score_of(const TrialPrediction& prediction, const TailedDensity& density,
                             const Pose& X_WM, double outlier_share);
 
