@@ -55,7 +55,7 @@ struct NoiseEstimate {
   PoseNoise pose;           // of one reading
   double drive_common = 0;  // of both sides' gain; of a push: of its end, over the distance slid
   double drive_side = 0;    // of each side's gain; of a push: of its turn, kTurnUnit_rad_m a metre
-  NoiseTails tails;         // with any, the above are those of Student's t's core
+  NoiseTails tails = {};    // with any, the above are those of Student's t's core
 };
 
 // Covariance of the two readings in the predicted end's axes, without the drive's part.

@@ -18,7 +18,7 @@ struct NoiseSettings {
   double drive_common = 0;  // s.d. of both sides' gain, per trial
   double drive_side = 0;    // s.d. of each side's gain, per trial
   PoseNoise pose;
-  NoiseTails tails;  // with tails the above are those of Student's t's core
+  NoiseTails tails = {};  // with tails the above are those of Student's t's core
 };
 
 // Gains of the two sides' speed in one trial.
