@@ -116,12 +116,12 @@ struct GroundRobot {
   std::vector<RobotWheel> wheels;
   std::optional<double> mass_kg;
   std::optional<double> com_x_m, com_y_m, com_z_m;  // centre of mass, z over the floor
-  std::optional<double> yaw_inertia_kg_m2;  // about the centre of mass
-  double friction = 0.7;                    // of the floor along the wheels
-  double friction_ratio = 1;                // across over along
-  double rolling_resistance = 0;            // share of weight
-  double roller_drag = 0.02;                // omni, mecanum: friction across over along
-  double caster_drag = 0;                   // friction of a caster over that of a wheel
+  std::optional<double> yaw_inertia_kg_m2;          // about the centre of mass
+  double friction = 0.7;                            // of the floor along the wheels
+  double friction_ratio = 1;                        // across over along
+  double rolling_resistance = 0;                    // share of weight
+  double roller_drag = 0.02;                        // omni, mecanum: friction across over along
+  double caster_drag = 0;                           // friction of a caster over that of a wheel
   ControllerKinematics controller;
   RobotMotors motors;
   RobotThrottle throttle;
