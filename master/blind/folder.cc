@@ -18,6 +18,13 @@ std::vector<std::string> diagnose_command(const OpenCase& open, std::size_t numb
   words.insert(words.end(),
                {settings.config_path, "--trials", open.trials, "--out", paths.diagnosis(open.id),
                 "--workers", std::to_string(settings.workers), "--seed", std::to_string(number)});
+  // In a case's folder nothing lies but the case: its paths need no mark.
+  const std::filesystem::path recorded =
+      std::filesystem::path(open.trials).parent_path() / "paths.csv";
+  std::error_code code;
+  if (std::filesystem::exists(recorded, code)) {
+    words.insert(words.end(), {"--paths", recorded.string()});
+  }
   if (!settings.model_path.empty()) {
     words.insert(words.end(), {"--model", settings.model_path});
   }

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <thread>
 
 #include "common/base/build_info.h"
@@ -11,6 +12,7 @@
 #include "common/trials/files.h"
 #include "common/trials/read.h"
 #include "master/cli/inputs.h"
+#include "master/cli/outputs.h"
 #include "master/experiment/plan.h"
 
 namespace gapfarm {
@@ -132,13 +134,20 @@ int dry_run(const BlindCheckOptions& options, const Config& config, const Sessio
                                    hooks.progress(what, done, total, monotonic_seconds() - begin);
                                  });
   if (!drawn) return failed(drawn.error(), context);
-  context.console.print(std::to_string(planned->log.trials.size()) +
-                        " trials a case.  A case of every effect and "
-                        "size, with the strength that this experiment takes:\n\n" +
-                        format_design(*drawn, planned->table()) + "\nBeside these " +
-                        std::to_string(options.nulls) + " nulls, " + std::to_string(options.pairs) +
-                        " pairs and " + std::to_string(options.left_out) +
-                        " effects left out of the catalogue.\n");
+  const std::size_t trials = planned->log.trials.size();
+  const std::string table = format_design(*drawn, planned->table());
+  context.console.result(std::to_string(trials) +
+                             " trials a case.  A case of every effect and size, with the strength "
+                             "that this experiment takes:\n\n" +
+                             table + "\nBeside these " + std::to_string(options.nulls) +
+                             " nulls, " + std::to_string(options.pairs) + " pairs and " +
+                             std::to_string(options.left_out) +
+                             " effects left out of the catalogue.\n",
+                         {{"trials", trials},
+                          {"design", table},
+                          {"nulls", options.nulls},
+                          {"pairs", options.pairs},
+                          {"left_out", options.left_out}});
   return kExitDone;
 }
 
@@ -170,6 +179,10 @@ int run_blind(const BlindCheckOptions& options, CliContext& context) {
   }
   if (options.out.empty()) {
     context.console.error(Error{"--out DIR is missing: the folder for cases, seals and result"});
+    return kExitBadUsage;
+  }
+  if (Status s = check_folder(options.out, FolderKind::kBlindCheck); !s) {
+    context.console.error(s.error());
     return kExitBadUsage;
   }
   settings.design = *design;

@@ -77,7 +77,8 @@ Result<FolderState> compare_stamp(const std::string& folder, const std::string& 
                  "); choose another --out"};
   }
   if (there->options != stamp.options) {
-    if (force) return FolderState::kReplaced;
+    // A mistake in the options found late leaves simulations, which are of use to any.
+    if (force || !finished) return FolderState::kReplaced;
     return Error{of + " with other " + differing(there->options, stamp.options) +
                  "; choose another --out, or --force to replace it"};
   }

@@ -21,12 +21,12 @@ struct QuestionStamp {
 enum class FolderState {
   kNew,       // nothing of such a command is there
   kSame,      // the same question: go on
-  kReplaced,  // another one about the same problem, to be replaced with --force
+  kReplaced,  // another one about the same problem, unfinished or to be replaced with --force
 };
 
 // Compares with the stamp, question.json, in `folder`.  `result`: the file that a finished command
 // leaves there.  Errors: a folder of another command, another problem, and without `force` other
-// options or a finished result of another build.
+// options than those of a finished result, or such a result of another build.
 Result<FolderState> compare_stamp(const std::string& folder, const std::string& result,
                                   const QuestionStamp& stamp, bool force);
 

@@ -141,8 +141,7 @@ SubcommandRun setup_stability(CLI::App& app) {
       "Examples:\n"
       "  gapfarm stability configs/racquetball_stability.toml --out stable\n"
       "  gapfarm stability configs/push_stability.toml --trials pushes.csv --only start=0.15 \\\n"
-      "      --out stable\n"
-      "  gapfarm predict stable/model.toml --trials log.csv");
+      "      --out stable");
   return [command](CliContext& context) { return run_stability(*command, context); };
 }
 

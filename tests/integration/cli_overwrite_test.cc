@@ -153,7 +153,7 @@ TEST_F(Overwrite, ResultsAreOnStandardOutputInWordsOrAsJson) {
   const Finished run = with(evolve, {folder_ / "run", "--json"});
   EXPECT_EQ(run.exit_code, 0) << run.err;
   EXPECT_EQ(Json::parse(run.out)["generations"], 1);
-  EXPECT_EQ(Json::parse(run.out)["files"].size(), 3u);
+  EXPECT_GE(Json::parse(run.out)["files"].size(), 3u);
   const Finished predicted = with({"predict", folder_ / "run", "--trials", log_}, {"--json"});
   EXPECT_EQ(Json::parse(predicted.out)["predictions"].size(), 2u) << predicted.err;
   const Finished made = with({"simulate", config_, "--out", folder_ / "s.csv", "--trials", "2"},

@@ -125,11 +125,11 @@ TEST_F(CliCheck, CountsWhatARunWouldNeed) {
 
 // Each push was its own, whatever the config says of commands.
 TEST_F(CliCheck, EveryPushIsAConditionOfItsOwn) {
-  const std::string config =
-      folder_.write("push.toml",
-                    "scenario = \"push\"\n[[pieces]]\nname = \"square\"\nmass = 0.1\nthickness = 0.01\n"
-                    "corners = [[-0.02, -0.02], [0.02, -0.02], [0.02, 0.02], [-0.02, 0.02]]\n"
-                    "[genes]\nground_friction = [0.1, 1.0]\n");
+  const std::string config = folder_.write(
+      "push.toml",
+      "scenario = \"push\"\n[[pieces]]\nname = \"square\"\nmass = 0.1\nthickness = 0.01\n"
+      "corners = [[-0.02, -0.02], [0.02, -0.02], [0.02, 0.02], [-0.02, 0.02]]\n"
+      "[genes]\nground_friction = [0.1, 1.0]\n");
   std::string pushes = "session,trial,object,x0,y0,theta0,x1,y1,theta1\n";
   std::string tips = "session,trial,t,x,y\n";
   for (int i = 0; i < 3; ++i) {
@@ -140,8 +140,8 @@ TEST_F(CliCheck, EveryPushIsAConditionOfItsOwn) {
     tips += key + "0,-0.03," + y + "\n" + key + "1,-0.01," + y + "\n";
   }
   folder_.write("tips.csv", tips);
-  const Finished json = gapfarm_command(
-      {"check", config, "--trials", folder_.write("p.csv", pushes), "--json"});
+  const Finished json =
+      gapfarm_command({"check", config, "--trials", folder_.write("p.csv", pushes), "--json"});
   EXPECT_EQ(json.exit_code, 0) << json.err;
   EXPECT_THAT(json.out, HasSubstr("\"conditions\": 2"));
 }

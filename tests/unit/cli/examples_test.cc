@@ -58,7 +58,9 @@ void check(const CLI::App& app, const std::string& command, bool leaf) {
   const std::vector<std::string> examples = examples_in(app.get_footer());
   EXPECT_FALSE(examples.empty()) << command;
   for (const std::string& example : examples) {
-    if (leaf) EXPECT_THAT(example, StartsWith("  " + command)) << "not its own";
+    if (leaf) {
+      EXPECT_THAT(example, StartsWith("  " + command)) << "not its own";
+    }
     std::vector<std::string> words = words_of(example);
     words.erase(words.begin());
     for (const std::string& word : words) {
