@@ -9,6 +9,7 @@
 #include "common/trials/format.h"
 #include "common/trials/read.h"
 #include "common/trials/write.h"
+#include "master/cli/import_runs.h"
 #include "master/cli/inputs.h"
 #include "master/cli/outputs.h"
 #include "master/cli/subcommand.h"
@@ -22,12 +23,17 @@ struct ImportFormat {
   const char* scenario;  // whose commands the log is in
 };
 
+// Drives of ground robots, in any of the formats of master/input.
+constexpr const char* kRuns = "runs";
+
 constexpr ImportFormat kFormats[] = {{"bbautotune", TextFormat::kBbautotune, "srv1"}};
 
 struct ImportOptions {
   std::string format;
   std::vector<std::string> files;
   std::string out;
+  std::string map;
+  bool print_map = false;
   Outputs outputs;
   TrialOptions reading;
 };
@@ -55,6 +61,7 @@ Result<TrialLog> read_logs(const ImportOptions& options) {
   if (!format) {
     std::vector<std::string> known;
     for (const ImportFormat& row : kFormats) known.emplace_back(row.name);
+    known.emplace_back(kRuns);
     return Error{"unknown format '" + options.format + "'" + suggestion(options.format, known)};
   }
   if (Status s = check_formats(options, *format); !s) return s.error();
@@ -67,6 +74,14 @@ Result<TrialLog> read_logs(const ImportOptions& options) {
 
 int run_import(ImportOptions& options, CliContext& context) {
   Console& console = context.console;
+  if (options.out.empty() && !options.print_map) {
+    console.error(Error{"--out is missing, expected where to write; --out trials.csv"});
+    return kExitBadUsage;
+  }
+  if (options.format == kRuns) {
+    return import_runs({options.files, options.out, options.map, options.print_map},
+                       options.outputs, context);
+  }
   const bool to_stdout = options.out == "-";
   const Result<TrialLog> log = read_logs(options);
   if (!log) {
@@ -112,15 +127,23 @@ int run_import(ImportOptions& options, CliContext& context) {
 
 SubcommandRun setup_import(CLI::App& app) {
   auto options = std::make_shared<ImportOptions>();
-  app.add_option("FORMAT", options->format, "Format of the files: bbautotune")->required();
-  app.add_option("FILES", options->files, "Logs; each becomes a session")->required();
-  app.add_option("-o,--out", options->out, "Trial log to write; - for standard output")->required();
+  app.add_option("FORMAT", options->format,
+                 "bbautotune: its trials; runs: drives of a ground robot as CSV, TUM, Motive, "
+                 "rostopic or ros2 topic echo, PlotJuggler, .bag, .db3 or .mcap")
+      ->required();
+  app.add_option("FILES", options->files, "Logs; each becomes a session or a run")->required();
+  app.add_option("-o,--out", options->out,
+                 "Trial log to write, - for standard output; of runs: a folder");
+  app.add_option("--map", options->map, "Of runs: TOML that says which column is what");
+  app.add_flag("--print-map", options->print_map, "Of runs: print columns and map; write nothing");
   options->outputs.declare(app);
   options->reading.declare_reading(app);
   app.footer(
       "Examples:\n"
       "  gapfarm import bbautotune logs/*.dat --out trials.csv\n"
-      "  gapfarm import bbautotune logs/run1.dat --out - | head");
+      "  gapfarm import runs drive.bag --out drive\n"
+      "  gapfarm import runs drive.csv --print-map > map.toml\n"
+      "  gapfarm import runs drive.csv --map map.toml --out drive");
   return [options](CliContext& context) { return run_import(*options, context); };
 }
 

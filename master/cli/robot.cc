@@ -140,8 +140,7 @@ int run_robot(RobotOptions& options, CliContext& context) {
     console.print("\nrobot.toml, to paste and correct (--out robot.toml writes it):\n\n" +
                   plain_lines(toml));
   } else {
-    console.note("robot written to " + options.out + "; next: gapfarm import LOG --robot " +
-                 options.out + " --out runs");
+    console.note("robot written to " + options.out + "; next: gapfarm import runs LOG --out drive");
   }
   return kExitDone;
 }
@@ -163,7 +162,7 @@ SubcommandRun setup_robot(CLI::App& app) {
       "  gapfarm robot husky.urdf --controllers control.yaml --out robot.toml\n"
       "  gapfarm robot burger.urdf --picture burger.svg\n"
       "  gapfarm robot old.urdf new.urdf\n"
-      "Next: gapfarm import LOG --out runs");
+      "Next: gapfarm import runs LOG --out drive");
   return [options](CliContext& context) { return run_robot(*options, context); };
 }
 

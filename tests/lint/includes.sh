@@ -25,7 +25,7 @@ forbid master -- '(worker|tests)/' 'master does not include worker: ask for a jo
 outside() {
   local found
   found=$(grep -rnE --include='*.h' --include='*.cc' "^#include [<\"]$2" common worker master \
-    | grep -v "^$1/" || true)
+    | grep -vE "^$1/" || true)
   if [[ -n "$found" ]]; then
     printf '%s\n    %s\n' "$found" "$3"
     failures=$((failures + 1))
@@ -34,7 +34,8 @@ outside() {
 
 outside common/net 'zmq' 'only common/net includes ZeroMQ'
 outside worker/sim '(bullet|Bullet|LinearMath|btBullet)' 'only worker/sim includes Bullet'
-outside master/store 'sqlite3' 'only master/store includes SQLite'
+outside 'master/(store|input)' 'sqlite3' 'only the run store and the reader of bags include SQLite'
+outside master/input '(bzlib|lz4|zstd)' 'only master/input unpacks'
 outside common/config 'toml' 'only common/config includes toml++'
 outside master/robot '(tinyxml2|yaml-cpp)' 'only master/robot includes tinyxml2 and yaml-cpp'
 

@@ -1,0 +1,142 @@
+#include "master/cli/import_runs.h"
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "common/trials/files.h"
+#include "master/input/bags.h"
+#include "master/input/to_runs.h"
+
+namespace gapfarm {
+namespace {
+
+namespace fs = std::filesystem;
+
+Result<std::vector<Recording>> read_all(const std::vector<std::string>& files) {
+  std::vector<Recording> recordings;
+  for (const std::string& file : files) {
+    Result<Recording> recording = read_recording(file);
+    if (!recording) return recording.error();
+    recordings.push_back(*std::move(recording));
+  }
+  return recordings;
+}
+
+Result<LogMap> read_map(const std::string& path, const std::vector<Recording>& recordings) {
+  if (path.empty()) return guess_map(recordings);
+  const Result<std::string> text = read_text_file(path);
+  if (!text) return text.error();
+  return parse_map(*text, path);
+}
+
+// What there is, for somebody who has to write a map.
+std::string columns_text(const std::vector<Recording>& recordings) {
+  std::string text;
+  for (const Recording& recording : recordings) {
+    for (const LogTable& table : recording.tables) {
+      text += "# " + printable(table.source) + " (" + printable(table.type) + ", " +
+              std::to_string(table.rows()) + " rows):";
+      for (std::size_t i = 0; i < table.columns.size(); ++i) {
+        text += (i == 0 ? " " : ", ") + printable(table.columns[i]);
+      }
+      text += "\n";
+    }
+  }
+  return text;
+}
+
+// Commands that were not logged, but what the wheels did: that drives the simulation as well.
+void drive_by_wheels(LogMap& map) {
+  if (!map.commands.columns.empty() || map.wheels.columns.empty()) return;
+  map.commands = std::move(map.wheels);
+  map.wheels = {};
+  map.notes.push_back(
+      "the log holds measured wheel speeds and no commands: they stand as commands; say "
+      "measured = true in the robot's table");
+}
+
+Status check_map(const LogMap& map, const std::vector<Recording>& recordings) {
+  const bool poses = !map.poses.columns.empty(), commands = !map.commands.columns.empty();
+  if (poses && commands) return {};
+  return Error{recordings.front().file + ":1: found no columns that are clearly " +
+               (poses      ? "commands"
+                : commands ? "poses"
+                           : "poses or commands") +
+               ", expected poses (t, x, y, heading) and commands (left and right, v and omega, "
+               "throttle and steering, ...); write them into a map: gapfarm import runs FILES "
+               "--print-map > map.toml lists the columns, --map map.toml uses it"};
+}
+
+struct NamedText {
+  const char* name;
+  const std::string* text;
+};
+
+Status write_files(const std::string& out, const RunFiles& files, const std::string& map,
+                   Outputs& outputs) {
+  const NamedText all[] = {{"commands.csv", &files.commands},
+                           {"poses.csv", &files.poses},
+                           {"wheels.csv", &files.wheels},
+                           {"map.toml", &map}};
+  for (const NamedText& file : all) {
+    if (file.text->empty()) continue;
+    if (Status s = outputs.plan_in(out, {file.name}); !s) return s;
+  }
+  for (const NamedText& file : all) {
+    if (file.text->empty()) continue;
+    if (Status s = outputs.write((fs::path(out) / file.name).string(), *file.text); !s) return s;
+  }
+  return {};
+}
+
+int bad_input(const Error& error, CliContext& context) {
+  context.console.error(error);
+  return kExitBadUsage;
+}
+
+}  // namespace
+
+int import_runs(const ImportRunsOptions& options, Outputs& outputs, CliContext& context) {
+  Console& console = context.console;
+  for (const std::string& file : options.files) outputs.reads(file);
+  if (!options.map.empty()) outputs.reads(options.map);
+  const Result<std::vector<Recording>> recordings = read_all(options.files);
+  if (!recordings) return bad_input(recordings.error(), context);
+  Result<LogMap> map = read_map(options.map, *recordings);
+  if (!map) return bad_input(map.error(), context);
+  if (options.map.empty()) drive_by_wheels(*map);
+  for (const std::string& note : map->notes) console.note(printable(note));
+  const std::string map_text =
+      (options.map.empty() ? "# Guessed from names and numbers; correct it and give it by --map.\n"
+                           : "") +
+      format_map(*map);
+  if (options.print_map) {
+    console.result(columns_text(*recordings) + map_text, {{"map", map_text}});
+    return kExitDone;
+  }
+  if (Status s = check_map(*map, *recordings); !s) return bad_input(s.error(), context);
+  const Result<ImportedRuns> runs = to_runs(*recordings, *map);
+  if (!runs) return bad_input(runs.error(), context);
+  for (const std::string& line : runs->report) console.note(printable(line));
+  if (runs->log.runs.empty()) {
+    return bad_input(Error{options.files.front() +
+                           ":1: found no run with both poses and commands, expected one; give the "
+                           "files of both, in the same order"},
+                     context);
+  }
+  if (Status s = write_files(options.out, format_runs(runs->log), map_text, outputs); !s) {
+    return bad_input(s.error(), context);
+  }
+  const std::string done = std::to_string(runs->log.runs.size()) + " runs written to " +
+                           options.out + " (commands.csv, poses.csv, map.toml)\n";
+  console.result((options.map.empty() ? map_text + "\n" : "") + done,
+                 {{"out", options.out},
+                  {"runs", runs->log.runs.size()},
+                  {"channels", runs->log.channels},
+                  {"clock_start_s", runs->clock_start_s},
+                  {"report", runs->report},
+                  {"map", map_text}});
+  return kExitDone;
+}
+
+}  // namespace gapfarm

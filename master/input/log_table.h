@@ -1,0 +1,48 @@
+// A recording as it is written: named columns of numbers, whatever file they came from.
+#pragma once
+
+#include <cmath>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "common/base/result.h"
+
+namespace gapfarm {
+
+// One topic of a bag, or one text file.  Row-major; NaN where the file has a blank or no number.
+struct LogTable {
+  std::string source;                // file, and topic where it has several
+  std::string topic;                 // empty for text files
+  std::string type;                  // geometry_msgs/Twist, tum, csv, ...
+  std::vector<std::string> columns;  // "t" of a bag is the time of recording, s
+  std::vector<double> values;
+
+  std::size_t rows() const { return columns.empty() ? 0 : values.size() / columns.size(); }
+  double at(std::size_t row, std::size_t column) const {
+    return values[row * columns.size() + column];
+  }
+  std::optional<std::size_t> find(std::string_view name) const {
+    for (std::size_t i = 0; i < columns.size(); ++i) {
+      if (columns[i] == name) return i;
+    }
+    return {};
+  }
+};
+
+// What one file held.
+struct Recording {
+  std::string file;
+  std::string format;  // "a CSV file with a header", for sentences
+  std::vector<LogTable> tables;
+  std::string robot_description;   // a URDF that was recorded with it; often empty
+  std::vector<std::string> notes;  // what was left out, and why
+};
+
+// Reads text logs: CSV with a header (rostopic echo -p and PlotJuggler included), ros2 topic echo
+// --csv of the usual types, TUM, OptiTrack Motive.  Told by its content.  Errors name file, line,
+// what was found and expected; nothing is half-read.
+Result<Recording> parse_text_log(std::string_view text, const std::string& file);
+
+}  // namespace gapfarm

@@ -1,0 +1,114 @@
+// The same small drive in every kind of bag (data/, written by make_logs.py) reads as one run.
+#include "master/input/bags.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+
+#include "common/trials/files.h"
+#include "master/input/decompress.h"
+#include "master/input/to_runs.h"
+
+namespace gapfarm {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::Contains;
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+const char* const kFiles[] = {"ros1_none.bag", "ros1_bz2.bag",  "ros1_lz4.bag", "cdr_plain.mcap",
+                              "cdr_zstd.mcap", "ros1_lz4.mcap", "cdr.db3"};
+
+std::string data(const std::string& name) {
+  return std::string(GAPFARM_SOURCE_DIR) + "/tests/unit/input/data/" + name;
+}
+
+class Bags : public testing::TestWithParam<const char*> {};
+
+TEST_P(Bags, GiveTheDriveThatWasWritten) {
+  const Result<Recording> recording = read_recording(data(GetParam()));
+  ASSERT_TRUE(recording) << recording.error().message;
+  EXPECT_THAT(recording->notes, Contains(HasSubstr("/camera (")));
+  const LogMap map = guess_map({*recording});
+  EXPECT_EQ(map.poses.source, "/pose");
+  EXPECT_EQ(map.poses.find("t")->column, "header.stamp");
+  EXPECT_EQ(map.commands.source, "/cmd_vel");
+  EXPECT_EQ(map.commands.find("t")->column, "t");
+  const Result<ImportedRuns> imported = to_runs({*recording}, map);
+  ASSERT_TRUE(imported) << imported.error().message;
+  ASSERT_EQ(imported->log.runs.size(), 1u);
+  const LoggedRun& run = imported->log.runs[0];
+  EXPECT_THAT(imported->log.channels, ElementsAre("v", "omega"));
+  EXPECT_EQ(imported->clock_start_s, 1'700'000'000);
+  ASSERT_EQ(run.poses.size(), 12u);
+  for (std::size_t i = 0; i < 12; ++i) {
+    const double k = static_cast<double>(i);
+    EXPECT_NEAR(run.poses[i].t_s, 0.5 + 0.1 * k, 1e-6);
+    EXPECT_NEAR(run.poses[i].X_WM.x, 0.1 * k, 1e-12);
+    EXPECT_NEAR(run.poses[i].X_WM.y, -0.05 * k, 1e-12);
+    EXPECT_NEAR(run.poses[i].X_WM.theta, 0.3 * k - 1.5, 1e-12);
+  }
+  ASSERT_EQ(run.commands.size(), 24u);
+  EXPECT_NEAR(run.commands[7].t_s, 0.501 + 0.05 * 7, 1e-6);
+  EXPECT_NEAR(run.commands[7].values[0], 0.57, 1e-12);
+  EXPECT_NEAR(run.commands[7].values[1], -0.04, 1e-12);
+  EXPECT_THAT(imported->log.wheel_channels, ElementsAre("left", "right"));
+  ASSERT_EQ(run.wheel_speeds.size(), 12u);
+  EXPECT_NEAR(run.wheel_speeds[5].values[1], -15, 1e-12);
+}
+
+INSTANTIATE_TEST_SUITE_P(Formats, Bags, testing::ValuesIn(kFiles), [](const auto& param) {
+  std::string name = param.param;
+  for (char& c : name) c = c == '.' ? '_' : c;
+  return name;
+});
+
+// A file that broke off anywhere is an error with its place; nothing is half-read.
+TEST(BrokenBags, AreErrorsWithTheirPlace) {
+  for (const char* name : {"ros1_none.bag", "ros1_bz2.bag", "cdr_zstd.mcap", "cdr_plain.mcap"}) {
+    const Result<std::string> whole = read_text_file(data(name));
+    ASSERT_TRUE(whole);
+    const bool bag = std::string(name).ends_with(".bag");
+    std::size_t fine = 0;
+    for (std::size_t length = 1; length < whole->size(); length += 7) {
+      MemorySource source(std::string_view(*whole).substr(0, length));
+      const auto read = bag ? read_ros1_bag(source, "f") : read_mcap(source, "f");
+      if (read) {
+        ++fine;
+        continue;
+      }
+      EXPECT_THAT(read.error().message, testing::MatchesRegex("f:[0-9]+: found .*expected .*"));
+    }
+    // Cut between two records of its own a bag is a shorter bag; an MCAP file lacks its footer.
+    EXPECT_LE(fine, bag ? 3u : 2u) << name;
+  }
+}
+
+TEST(BrokenBags, ClaimsAreNotBelieved) {
+  EXPECT_FALSE(decompress("abc", "lz4", 1ull << 40));
+  EXPECT_FALSE(decompress("abc", "lz4", 1u << 20));
+  EXPECT_FALSE(decompress("abc", "bz2", 16));
+  EXPECT_FALSE(decompress("abc", "xz", 3));
+  EXPECT_TRUE(decompress("abc", "none", 3));
+}
+
+TEST(RealBag, HoldsWhatAnotherReaderCounted) {
+  const fs::path bag = fs::path(GAPFARM_SOURCE_DIR) / "../shared/data/ground/bags/bag1.bag";
+  if (!fs::exists(bag)) GTEST_SKIP() << "no " << bag;
+  const Result<Recording> recording = read_recording(bag.string());
+  ASSERT_TRUE(recording) << recording.error().message;
+  ASSERT_EQ(recording->tables.size(), 2u);
+  EXPECT_EQ(recording->tables[0].topic, "/robot/pose");
+  EXPECT_EQ(recording->tables[0].rows(), 9924u);
+  EXPECT_EQ(recording->tables[1].topic, "/wheel_states");
+  EXPECT_EQ(recording->tables[1].rows(), 2871u);
+  const LogTable& poses = recording->tables[0];
+  EXPECT_NEAR(poses.at(0, 0), 1649348542.221, 0.1);
+  EXPECT_NEAR(poses.at(poses.rows() - 1, 0), 1649348600.988, 0.1);
+}
+
+}  // namespace
+}  // namespace gapfarm

@@ -1,0 +1,203 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <numbers>
+
+#include "common/runs/read.h"
+#include "common/trials/files.h"
+#include "master/input/bags.h"
+#include "master/input/to_runs.h"
+
+namespace gapfarm {
+namespace {
+
+using testing::Contains;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::StartsWith;
+
+struct Read {
+  LogMap map;
+  Result<ImportedRuns> runs;
+};
+
+Read read(const std::vector<std::string>& texts) {
+  std::vector<Recording> recordings;
+  for (const std::string& text : texts) {
+    Result<Recording> recording =
+        parse_text_log(text, "f" + std::to_string(recordings.size()) + ".csv");
+    EXPECT_TRUE(recording) << recording.error().message;
+    if (!recording) return {{}, recording.error()};
+    recordings.push_back(*std::move(recording));
+  }
+  LogMap map = guess_map(recordings);
+  return {map, to_runs(recordings, map)};
+}
+
+std::string error_of(const std::string& text) {
+  const auto recording = parse_text_log(text, "f.csv");
+  return recording ? "" : recording.error().message;
+}
+
+// What a drive says in any dress: poses (1, 2, 0.5) and (1.1, 2, 0.6) at 10 and 10.1 s, v and
+// omega.
+void expect_the_drive(const Read& r) {
+  ASSERT_TRUE(r.runs) << r.runs.error().message;
+  ASSERT_EQ(r.runs->log.runs.size(), 1u);
+  const LoggedRun& run = r.runs->log.runs[0];
+  ASSERT_EQ(run.poses.size(), 2u);
+  EXPECT_NEAR(run.poses[1].t_s - run.poses[0].t_s, 0.1, 1e-6);
+  EXPECT_NEAR(run.poses[0].X_WM.x, 1, 1e-9);
+  EXPECT_NEAR(run.poses[1].X_WM.x, 1.1, 1e-9);
+  EXPECT_NEAR(run.poses[1].X_WM.y, 2, 1e-9);
+  EXPECT_NEAR(run.poses[0].X_WM.theta, 0.5, 1e-6);
+  EXPECT_NEAR(run.poses[1].X_WM.theta, 0.6, 1e-6);
+  ASSERT_GE(run.commands.size(), 2u);
+  EXPECT_THAT(r.runs->log.channels, ElementsAre("v", "omega"));
+  EXPECT_NEAR(run.commands[1].values[0], 0.3, 1e-9);
+  EXPECT_NEAR(run.commands[1].values[1], -0.2, 1e-9);
+}
+
+const std::string kTwists = "t,v,w\n10,0.1,0\n10.1,0.3,-0.2\n";
+
+std::string quaternion(double yaw) {
+  return std::to_string(std::sin(yaw / 2)) + "," + std::to_string(std::cos(yaw / 2));
+}
+
+TEST(TextLogs, HeadedCsv) {
+  expect_the_drive(read({"t,x,y,theta,v,omega\n10,1,2,0.5,0.1,0\n10.1,1.1,2,0.6,0.3,-0.2\n"}));
+  // Degrees and millimetres, named; a byte-order mark, CRLF, an unnamed column of row numbers.
+  expect_the_drive(
+      read({"\xEF\xBB\xBF,time [ms],x [mm],y [mm],yaw_deg,cmd_v,cmd_w\r\n"
+            "0,10000,1000,2000,28.64788976,0.1,0\r\n1,10100,1100,2000,34.37746771,0.3,-0.2\r\n"}));
+}
+
+TEST(TextLogs, PosesAndCommandsInTwoFiles) {
+  expect_the_drive(read({kTwists, "t,x,y,theta\n10,1,2,0.5\n10.1,1.1,2,0.6\n"}));
+}
+
+TEST(TextLogs, Tum) {
+  expect_the_drive(
+      read({"# timestamp tx ty tz qx qy qz qw\n"
+            "10 1 2 0.3 0 0 0.247403959 0.968912422\n"
+            "10.1 1.1 2 0.3 0 0 0.295520207 0.955336489\n"
+            "10.2 1.1 2 0.3 0 0 0 0\n",
+            kTwists}));
+  EXPECT_THAT(error_of("1 2 3 4 0 0 0 1\n1 2 3\n"), StartsWith("f.csv:2:1: found 3 numbers"));
+}
+
+TEST(TextLogs, RostopicEcho) {
+  expect_the_drive(
+      read({"%time,field.header.seq,field.header.stamp,field.header.frame_id,"
+            "field.pose.position.x,field.pose.position.y,field.pose.position.z,"
+            "field.pose.orientation.x,field.pose.orientation.y,field.pose.orientation.z,"
+            "field.pose.orientation.w\n"
+            "1600000010000000000,1,1600000010000000000,map,1,2,0,0,0,0.247403959,0.968912422\n"
+            "1600000010100000000,2,1600000010100000000,map,1.1,2,0,0,0,0.295520207,0.955336489\n",
+            "%time,field.linear.x,field.linear.y,field.linear.z,field.angular.x,field.angular.y,"
+            "field.angular.z\n1600000010000000000,0.1,0,0,0,0,0\n"
+            "1600000010100000000,0.3,0,0,0,0,-0.2\n"}));
+}
+
+TEST(TextLogs, Ros2TopicEchoWithoutAHeader) {
+  expect_the_drive(read({"1600000010,0,map,1,2,0,0,0," + quaternion(0.5) +
+                             "\n1600000010,100000000,map,1.1,2,0,0,0," + quaternion(0.6) + "\n",
+                         "1600000010,0,base,0.1,0,0,0,0,0\n1600000010,100000000,base,0.3,0,0,0,0,"
+                         "-0.2\n"}));
+}
+
+TEST(TextLogs, PlotJugglerLeavesBlanks) {
+  expect_the_drive(read(
+      {"__time,/pose/pose/position/x,/pose/pose/position/y,/pose/pose/orientation/x,"
+       "/pose/pose/orientation/y,/pose/pose/orientation/z,/pose/pose/orientation/w,"
+       "/cmd_vel/linear/x,/cmd_vel/angular/z\n10,1,2,0,0,0.247403959,0.968912422,,\n"
+       "10.01,,,,,,,0.1,0\n10.1,1.1,2,0,0,0.295520207,0.955336489,,\n10.11,,,,,,,0.3,-0.2\n"}));
+}
+
+// y is up: the floor's y is -z, and a turn about y is a heading.
+TEST(TextLogs, MotiveIsYUp) {
+  expect_the_drive(
+      read({"Format Version,1.23,Take Name,t\n,,Rigid Body,Rigid Body,Rigid Body,Rigid Body,Rigid "
+            "Body,Rigid Body,Rigid Body\n,Name,bot,bot,bot,bot,bot,bot,bot\n,ID,1,1,1,1,1,1,1\n\n"
+            ",,Rotation,Rotation,Rotation,Rotation,Position,Position,Position\n"
+            "Frame,Time (Seconds),X,Y,Z,W,X,Y,Z\n"
+            "0,10,0,0.247403959,0,0.968912422,1,0.1,-2\n"
+            "1,10.1,0,0.295520207,0,0.955336489,1.1,0.1,-2\n2,10.2,,,,,,,\n",
+            kTwists}));
+}
+
+TEST(TextLogs, KeepsNewPosesAndRunsApart) {
+  const Read r =
+      read({"step,t,cmd_left,cmd_right,x,y,yaw,pose_new\n0,0,1,1,0,0,0,1\n0,0.05,1,1,0,0,0,0\n"
+            "0,0.1,1,1,0.1,0,0,1\n1,0,2,2,0,0,0,1\n1,0.05,2,2,0.1,0,0,1\n"});
+  ASSERT_TRUE(r.runs) << r.runs.error().message;
+  ASSERT_EQ(r.runs->log.runs.size(), 2u);
+  EXPECT_EQ(r.runs->log.runs[0].poses.size(), 2u);
+  EXPECT_EQ(r.runs->log.runs[0].commands.size(), 3u);
+  EXPECT_EQ(r.runs->log.runs[1].run, "1");
+  EXPECT_THAT(r.runs->report, Contains(HasSubstr("1 rows of poses where pose_new is 0")));
+}
+
+TEST(TextLogs, RimSpeedsNeedARadius) {
+  const std::string text = "t,x,y,theta,vl,vr\n0,0,0,0,0.1,0.2\n0.1,0,0,0,0.1,0.2\n";
+  const Read r = read({text});
+  ASSERT_FALSE(r.runs);
+  EXPECT_THAT(r.runs.error().message, HasSubstr("wheel_radius"));
+  LogMap map = r.map;
+  map.commands.wheel_radius_m = 0.05;
+  const auto runs = to_runs({*parse_text_log(text, "f.csv")}, map);
+  ASSERT_TRUE(runs) << runs.error().message;
+  EXPECT_NEAR(runs->log.runs[0].commands[0].values[1], 4, 1e-12);
+}
+
+TEST(TextLogs, ErrorsSayWhatAndWhere) {
+  EXPECT_THAT(error_of(""), HasSubstr("empty"));
+  EXPECT_THAT(error_of("t,x\n1,2,3\n"), StartsWith("f.csv:2:"));
+  EXPECT_THAT(error_of("t,x,x\n1,2,3\n"), StartsWith("f.csv:1:5: found column 'x' again"));
+  std::string slip = "t,x\n";
+  for (int i = 0; i < 40; ++i) slip += std::to_string(i) + ",1\n";
+  EXPECT_THAT(error_of(slip + "41,1.0.0\n"), StartsWith("f.csv:42:4: found column 'x' '1.0.0'"));
+  EXPECT_THAT(error_of("t;x\n1;2\n"), HasSubstr("separate columns by commas"));
+  const Read none = read({"a,b\n1,2\n"});
+  EXPECT_TRUE(none.map.poses.columns.empty());
+}
+
+TEST(LogMaps, ReadBackAndNameMistakes) {
+  const std::string text =
+      "[poses]\nsource = \"/odom\"\nup = \"y\"\nt = { column = \"a \\\"b\\\"\", unit = \"ns\" }\n"
+      "x = { column = \"px\", unit = \"mm\" }\nz = { column = \"pz\", unit = \"mm\" }\n"
+      "theta = { column = \"th\", unit = \"deg\" }\n\n[commands]\n"
+      "t = { column = \"t\", unit = \"s\" }\nright = { column = \"r\" }\nleft = { column = \"l\" "
+      "}\n";
+  const auto map = parse_map(text, "m.toml");
+  ASSERT_TRUE(map) << map.error().message;
+  EXPECT_EQ(format_map(*map), text);
+  const auto bad = parse_map(
+      "[poses]\nt = \"t\"\nx = { column = \"x\", unit = \"mn\" }\ny = {}\n[comands]\n", "m.toml");
+  ASSERT_FALSE(bad);
+  EXPECT_THAT(bad.error().message, HasSubstr("unknown unit 'mn'"));
+  EXPECT_THAT(bad.error().message, HasSubstr("m.toml:4:"));
+  EXPECT_THAT(bad.error().message, HasSubstr("did you mean 'commands'"));
+  EXPECT_THAT(bad.error().message, HasSubstr("needs x, y and theta"));
+}
+
+TEST(RunFilesOfImports, AreReadAsTheyWereWritten) {
+  const Read r = read({kTwists, "t,x,y,theta\n10,1,2,0.5\n10.1,1.1,2,0.6\n"});
+  ASSERT_TRUE(r.runs);
+  const RunFiles files = format_runs(r.runs->log);
+  EXPECT_TRUE(files.wheels.empty());
+  const std::string folder = testing::TempDir() + "/import_runs";
+  ASSERT_TRUE(write_file_atomically(folder + "/commands.csv", files.commands));
+  ASSERT_TRUE(write_file_atomically(folder + "/poses.csv", files.poses));
+  const std::vector<std::string> channels = {"v", "omega"};
+  const auto log = read_runs(folder + "/commands.csv", folder + "/poses.csv", channels);
+  ASSERT_TRUE(log) << log.error().message;
+  ASSERT_EQ(log->runs.size(), 1u);
+  EXPECT_NEAR(log->runs[0].poses[1].X_WM.theta, 0.6, 1e-6);
+  EXPECT_NEAR(log->runs[0].commands[1].values[1], -0.2, 1e-9);
+}
+
+}  // namespace
+}  // namespace gapfarm
