@@ -78,10 +78,11 @@ Status write_files(const std::string& out, const RunFiles& files, const std::str
                            {"poses.csv", &files.poses},
                            {"wheels.csv", &files.wheels},
                            {"map.toml", &map}};
+  std::vector<std::string> names;
   for (const NamedText& file : all) {
-    if (file.text->empty()) continue;
-    if (Status s = outputs.plan_in(out, {file.name}); !s) return s;
+    if (!file.text->empty()) names.emplace_back(file.name);
   }
+  if (Status s = outputs.plan_in(out, names); !s) return s;
   for (const NamedText& file : all) {
     if (file.text->empty()) continue;
     if (Status s = outputs.write((fs::path(out) / file.name).string(), *file.text); !s) return s;

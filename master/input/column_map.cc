@@ -38,16 +38,23 @@ constexpr Unit kUnits[] = {{"s", 1},
                            {"%", 1e-2},
                            {"1", 1}};
 
+// As TOML's basic string.  Bags may hold any bytes: what TOML cannot hold becomes '_'.
+std::string quoted(const std::string& text) {
+  std::string word = "\"", plain = "\"";
+  for (const char c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    const std::string escape = c == '"' || c == '\\' ? "\\" : "";
+    const bool control = byte < 0x20 || byte == 0x7f;
+    word += escape + (control ? '_' : c);
+    plain += escape + (control || byte >= 0x80 ? '_' : c);
+  }
+  word += '"';
+  plain += '"';
+  return parse_toml("k = " + word, "").ok() ? word : plain;
+}
+
 void write_table(const char* name, const TableMap& table, std::string& out) {
   if (table.columns.empty()) return;
-  const auto quoted = [](const std::string& text) {
-    std::string word = "\"";
-    for (const char c : text) {
-      if (c == '"' || c == '\\') word += '\\';
-      word += static_cast<unsigned char>(c) < 0x20 ? '_' : c;
-    }
-    return word + '"';
-  };
   out += std::string(out.empty() ? "" : "\n") + "[" + name + "]\n";
   if (!table.source.empty()) out += "source = " + quoted(table.source) + "\n";
   if (!table.run.empty()) out += "run = " + quoted(table.run) + "\n";

@@ -232,6 +232,19 @@ class Guess {
     }
   }
 
+  // A joint's name as a key of the map: plain letters, each once, none of the map's own.
+  static std::string role_of(const std::string& joint, const TableMap& taken) {
+    std::string role;
+    for (const char c : joint) {
+      role += std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '-' ? c : '_';
+    }
+    for (const char* own : {"", "source", "run", "keep", "up", "wheel_radius"}) {
+      if (role == own) role += "_joint";
+    }
+    while (taken.find(role) != nullptr) role += "_2";
+    return role;
+  }
+
   void guess_wheels(const LogTable& table, const std::string& time) {
     TableMap found;
     start(table, time, found);
@@ -243,7 +256,7 @@ class Guess {
     if (found.columns.size() == 1 && table.type.find("JointState") != std::string::npos) {
       for (const std::string& column : table.columns) {
         if (column.rfind("velocity.", 0) == 0) {
-          found.columns.push_back({column.substr(9), column, "rad/s"});
+          found.columns.push_back({role_of(column.substr(9), found), column, "rad/s"});
         }
       }
     }

@@ -16,6 +16,9 @@ namespace {
 // A quaternion this far from unit length was not measured (Motive and TUM write zeros).
 constexpr double kUnitLength = 0.1;
 
+// Seconds since 1970 are 2e9; what is greater than this was never measured.
+constexpr double kGreatest = 1e12;
+
 struct Kind {
   const char* name;
   const TableMap* map;
@@ -141,8 +144,8 @@ class Importer {
       }
       std::vector<double> values;
       for (std::size_t c = 0; c < at.size(); ++c) values.push_back(table.at(r, at[c]) * factors[c]);
-      const bool whole =
-          std::all_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); });
+      const bool whole = std::all_of(values.begin(), values.end(),
+                                     [](double v) { return std::abs(v) < kGreatest; });
       if (!whole || (poses && !to_pose(map, values))) {
         ++tally.blank;
         continue;
