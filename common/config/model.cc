@@ -113,6 +113,16 @@ void read_seed(TomlSection& run, std::uint64_t& seed) {
   }
 }
 
+constexpr double kFarthestFrame_m = 10'000;  // as poses of a log
+
+void read_frame(TomlSection& top, Model& model) {
+  auto frame = top.section("frame");
+  if (!frame) return;
+  frame->read("x", model.frame_x_m, -kFarthestFrame_m, kFarthestFrame_m, "m");
+  frame->read("y", model.frame_y_m, -kFarthestFrame_m, kFarthestFrame_m, "m");
+  frame->finish();
+}
+
 void read_origin(TomlSection& top, Model& model) {
   if (auto data = top.section("data")) {
     data->read("hash", model.data.hash);
@@ -198,6 +208,7 @@ Result<Model> parse_model(std::string_view text, const std::string& path) {
   if (!form.pieces) read_commands(top, model.commands);
   read_model_fitness(top, model);
   read_spread(top, model.spread);
+  read_frame(top, model);
   read_origin(top, model);
   top.finish();
   if (!errors.empty()) return errors.error();

@@ -42,6 +42,8 @@ struct Model {
   FitnessSettings fitness;
   SpreadSettings spread;
   std::optional<double> score;  // fitness value on the data
+  // World position that the effects' places count from, m: simulate a log less this.
+  double frame_x_m = 0, frame_y_m = 0;
   ModelData data;
   ModelOrigin origin;
 

@@ -135,6 +135,13 @@ std::string score_sections(const Model& model) {
   return text;
 }
 
+// Only where it is not the world's own origin.
+std::string frame_section(const Model& model) {
+  if (model.frame_x_m == 0 && model.frame_y_m == 0) return "";
+  return "\n# The effects' places count from this point of the world, in metres.\n[frame]\nx = " +
+         toml_number(model.frame_x_m) + "\ny = " + toml_number(model.frame_y_m) + "\n";
+}
+
 std::string origin_sections(const Model& model) {
   std::string files;
   for (const std::string& file : model.data.files) {
@@ -157,8 +164,8 @@ std::string format_model(const Model& model) {
          "scenario = " +
          toml_string(model.scenario) + "\nkind = " + toml_string(model.kind) + "\n" +
          base_section(model, "parameters", false) + base_section(model, "noise", true) +
-         effect_sections(model) + command_sections(model) + score_sections(model) +
-         origin_sections(model);
+         effect_sections(model) + frame_section(model) + command_sections(model) +
+         score_sections(model) + origin_sections(model);
 }
 
 Status check_model(const Model& model) {

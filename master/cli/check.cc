@@ -11,6 +11,8 @@
 #include "master/cli/subcommand.h"
 #include "master/cli/validation.h"
 #include "master/evolve/evaluation.h"
+#include "master/sanity/sanity.h"
+#include "master/sanity/words.h"
 
 namespace gapfarm {
 namespace {
@@ -29,6 +31,7 @@ struct Summary {
   std::size_t conditions = 0;
   std::vector<std::string> effects;  // enabled: not neutral, or searched
   double evaluation_s = 0;           // on one worker here, as measured
+  std::vector<SanityFinding> sanity;
 };
 
 // What a run may take at most, as far as its settings say.
@@ -125,7 +128,19 @@ Summary summarise(const Problem& problem) {
     summary.effects.push_back(effect.name);
   }
   summary.conditions = count_conditions(problem, context);
+  summary.sanity = check_sanity(problem);
   return summary;
+}
+
+Json sanity_json(const std::vector<SanityFinding>& findings) {
+  Json list = Json::array();
+  for (const SanityFinding& f : findings) {
+    list.push_back({{"name", f.name},
+                    {"severity", severity_name(f.severity)},
+                    {"text", f.text},
+                    {"remedy", f.remedy}});
+  }
+  return list;
 }
 
 Json to_json(const Config& config, const Summary& summary, unsigned workers) {
@@ -153,12 +168,24 @@ Json to_json(const Config& config, const Summary& summary, unsigned workers) {
           {"population", config.evolution.population},
           {"generations", config.evolution.generations},
           {"workers", workers},
-          {"seed", config.seed}};
+          {"seed", config.seed},
+          {"sanity", sanity_json(summary.sanity)}};
+}
+
+std::string standing(const std::vector<SanityFinding>& findings) {
+  for (const SanityFinding& f : findings) {
+    if (f.severity == Severity::kUnusable) return "readable, but " + finding_phrase(f);
+  }
+  return "fine";
 }
 
 std::string describe(const Config& config, const Summary& summary, unsigned workers) {
   const Problem& problem = config.problem;
-  std::string text = config.path + ": fine\n";
+  std::string text = config.path + ": " + standing(summary.sanity) + "\n";
+  for (const SanityFinding& f : summary.sanity) {
+    text += std::string(f.severity == Severity::kUnusable ? "doubt" : "note ") + "        " +
+            f.name + ": " + f.text + " " + f.remedy + "\n";
+  }
   // The first row of every table is the model that is simulated.
   text += "scenario     " + problem.scenario + ", " + problem.table()[0].key + " " +
           problem.table().format(0, problem.values[0]) + "\n";

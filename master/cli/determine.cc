@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "common/config/config.h"
+#include "common/trials/shifted.h"
 #include "master/cli/inputs.h"
 #include "master/cli/outputs.h"
 #include "master/evolve/evaluation.h"
@@ -30,6 +31,7 @@ Result<Problem> problem_at(const Config& config, const Model& model) {
   }
   Problem problem = config.problem;
   problem.values = model.values;
+  problem.log = shifted(std::move(problem.log), -model.frame_x_m, -model.frame_y_m);
   problem.fitness.kind = FitnessKind::kLogScore;
   problem.spread = {};
   return problem;

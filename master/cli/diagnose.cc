@@ -34,7 +34,8 @@ struct DiagnoseCommand {
   FarmOptions farm;
 };
 
-Model model_of(const Config& config, const ParameterValues& values, const std::string& kind) {
+Model model_of(const Config& config, const DiagnosisResult& result, const ParameterValues& values,
+               const std::string& kind) {
   Model model;
   model.scenario = config.problem.scenario;
   model.kind = kind;
@@ -45,6 +46,8 @@ Model model_of(const Config& config, const ParameterValues& values, const std::s
   model.pieces = config.problem.pieces;
   model.fitness = config.problem.fitness;
   model.spread = config.problem.spread;
+  model.frame_x_m = result.frame_x_m;
+  model.frame_y_m = result.frame_y_m;
   model.data = {problem_hash(to_proto(config.problem)), config.problem.log.trials.size(),
                 config.trial_files};
   return model;
@@ -76,14 +79,14 @@ Status write_model(const Model& model, const std::filesystem::path& path, const 
 Status write_all(const Config& config, const DiagnoseCommand& command,
                  const DiagnosisResult& result) {
   const std::filesystem::path out(command.out);
-  Model model = model_of(config, result.final_, "diagnosed");
+  Model model = model_of(config, result, result.final_, "diagnosed");
   model.intervals.resize(model.values.size());
   for (std::size_t i = 0; i < result.intervals.size(); ++i) {
     const auto& [lo, hi] = result.intervals[i];
     if (lo < hi) model.intervals[i] = Interval{lo, hi};
   }
   if (Status s = write_model(model, out / "model.toml", command.outputs); !s) return s;
-  const Model tuned = model_of(config, result.tuned, "tuned");
+  const Model tuned = model_of(config, result, result.tuned, "tuned");
   if (Status s = write_model(tuned, out / "tuned.toml", command.outputs); !s) return s;
   const Status report =
       command.outputs.write((out / "report.html").string(), report_html(result.diagnosis));
@@ -140,11 +143,18 @@ Result<AnswerStore> open_answers(const std::string& out) {
 
 std::string summary(const Diagnosis& d) {
   std::string text = d.headline + "\n";
+  for (const SanityFinding& f : d.sanity) {
+    text += "  " + f.name + ": " + f.text + " " + f.remedy + "\n";
+  }
+  if (d.verdict == Verdict::kUnusable) return text;
   for (const NamedEffect& e : d.effects) {
     text += fmt::format("  {}: confidence {:.2f}, closes {:.0f} % [{:.0f}, {:.0f}] of the gap",
                         e.name, e.confidence, 100 * e.closed, 100 * e.closed_lo, 100 * e.closed_hi);
     for (const Estimate& p : e.parameters) {
-      text += fmt::format(", {} {:.4g} [{:.4g}, {:.4g}] {}", p.key, p.value, p.lo, p.hi, p.unit);
+      // A seam's place is one along an axis.
+      const std::string key =
+          p.key == "position" && !e.axis.empty() ? p.key + " along " + e.axis : p.key;
+      text += fmt::format(", {} {:.4g} [{:.4g}, {:.4g}] {}", key, p.value, p.lo, p.hi, p.unit);
     }
     for (std::size_t i = 0; i < e.aliases.size(); ++i) {
       text += (i == 0 ? "; not told from " : ", ") + e.aliases[i];
@@ -169,12 +179,14 @@ nlohmann::ordered_json summary_json(const Diagnosis& diagnosis, const DiagnoseCo
 }
 
 // What the command line says of the problem, on top of the config.
-Status apply_options(const DiagnoseCommand& command, Config& config, std::vector<Gene>& searched) {
+Status apply_options(const DiagnoseCommand& command, Config& config, std::vector<Gene>& searched,
+                     std::optional<Eigen::Vector2d>& frame) {
   if (command.seed) config.seed = *command.seed;
   if (!command.model.empty()) {
     const Result<Model> model = read_model_of(command.model);
     if (!model) return model.error();
     config.problem.values = model->values;
+    frame = {model->frame_x_m, model->frame_y_m};
   }
   searched = std::move(config.problem.genes);
   config.problem.genes.clear();
@@ -213,9 +225,9 @@ class StageProgress {
 
 int run_diagnose(DiagnoseCommand& command, CliContext& context) {
   DiagnoseOptions options;
-  const auto config =
-      open_config(command.config, command.trials, context.console,
-                  [&](Config& read) { return apply_options(command, read, options.genes); });
+  const auto config = open_config(
+      command.config, command.trials, context.console,
+      [&](Config& read) { return apply_options(command, read, options.genes, options.frame_m); });
   if (!config) return kExitBadUsage;
   const QuestionStamp stamp = stamp_of(*config, command, options.genes);
   if (Status s = plan_outputs(command, *config, stamp); !s) {
@@ -253,11 +265,11 @@ int run_diagnose(DiagnoseCommand& command, CliContext& context) {
     return failed(result.error(), context);
   }
   add_provenance(*config, command, &result->diagnosis);
-  const std::string hash = problem_hash(to_proto(config->problem));
   for (const auto& [fit, tasks] : result->fits) {
     result->diagnosis.provenance.emplace_back(
-        "predictions of " + fit, fmt::format("{}, question {} and the {} after it", kAnswers,
-                                             answers->key(hash, tasks.front()), tasks.size() - 1));
+        "predictions of " + fit,
+        fmt::format("{}, question {} and the {} after it", kAnswers,
+                    answers->key(result->problem, tasks.front()), tasks.size() - 1));
   }
   if (Status s = write_all(*config, command, *result); !s) return failed(s.error(), context);
   context.console.result(summary(result->diagnosis), summary_json(result->diagnosis, command));

@@ -8,6 +8,7 @@
 #include "common/score/fitness.h"
 #include "common/score/motion_model.h"
 #include "common/trials/read.h"
+#include "common/trials/shifted.h"
 #include "master/cli/baseline_notes.h"
 #include "master/cli/inputs.h"
 #include "master/cli/outputs.h"
@@ -29,7 +30,7 @@ Result<std::vector<PredictedTrial>> predict_by_model(const Model& model, const T
                                                      const PredictOptions& options,
                                                      CliContext& context) {
   Problem problem = problem_of(model);
-  problem.log = log;
+  problem.log = shifted(log, -model.frame_x_m, -model.frame_y_m);
   // Any fitness will do; this one asks nothing of the log.
   problem.fitness.kind = FitnessKind::kLogScore;
   auto farm = start_farm(options.farm, {}, context);
@@ -43,7 +44,12 @@ Result<std::vector<PredictedTrial>> predict_by_model(const Model& model, const T
     return Error{options.model + ": the simulation ended with " +
                  v1::Outcome_Name(result.outcome()) + " (" + result.message() + ")"};
   }
-  return world_predictions(result.predict());
+  std::vector<PredictedTrial> predictions = world_predictions(result.predict());
+  for (PredictedTrial& p : predictions) {
+    p.X_WE.x += model.frame_x_m;
+    p.X_WE.y += model.frame_y_m;
+  }
+  return predictions;
 }
 
 // Paths are those of the trials to predict.

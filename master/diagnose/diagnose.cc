@@ -5,6 +5,7 @@
 
 #include "common/base/suggest.h"
 #include "master/diagnose/diagnose_steps.h"
+#include "master/diagnose/prepare.h"
 
 namespace gapfarm {
 namespace {
@@ -31,14 +32,20 @@ Result<DiagnosisResult> diagnose(Farm& farm, const Problem& problem,
                  "what its parameters do"};
   }
   if (Status s = check_left_out(problem, options.left_out); !s) return s.error();
-  DiagnosisRun run(farm, problem, options);
+  const PreparedLog log = prepare_log(problem, options.frame_m);
+  if (any_unusable(log.sanity)) return unusable_result(log);
+  DiagnosisRun run(farm, log, options);
   const std::array<std::function<Status()>, kDiagnosisStages.size()> steps = {
       [&] { return run.tune(); },   [&] { return run.measure_noise(); },
       [&] { return run.screen(); }, [&] { return run.judge(); },
       [&] { return run.refit(); },  [&] { return run.report(); }};
   for (std::size_t k = 0; k < steps.size(); ++k) {
     run.stage(kDiagnosisStages[k].name);
-    if (Status s = steps[k](); !s) return s.error();
+    const Status s = steps[k]();
+    if (s) continue;
+    if (!run.simulation_failed()) return s.error();
+    run.stage("");
+    return run.give_up(kDiagnosisStages[k].name, s.error());
   }
   run.stage("");
   return run.take();

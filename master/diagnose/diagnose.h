@@ -2,8 +2,10 @@
 // (docs/diagnosis.md).
 #pragma once
 
+#include <Eigen/Core>
 #include <array>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -33,12 +35,18 @@ struct DiagnoseOptions {
   bool keep_base = false;             // the problem's values are a tuned model
   std::vector<std::string> left_out;  // effects that the catalogue is to be without
   std::uint64_t seed = 1;             // of the bootstrap
-  std::vector<Gene> genes;            // what the config has searched: what may be tuned of the base
+  // World position that the values' places count from, where the problem's values have such places;
+  // else it is chosen by the log.
+  std::optional<Eigen::Vector2d> frame_m;
+  std::vector<Gene> genes;  // what the config has searched: what may be tuned of the base
   std::function<void(const std::string& stage)> on_stage;
 };
 
 struct DiagnosisResult {
   Diagnosis diagnosis;
+  std::string problem;  // hash of what was simulated: the log in its own frame
+  // World position that the values' places count from, m.
+  double frame_x_m = 0, frame_y_m = 0;
   ParameterValues tuned;   // the base model, as tuned
   ParameterValues final_;  // with the named effects
   // 90 % intervals of `final_`; lo > hi where there is none.
@@ -48,8 +56,9 @@ struct DiagnosisResult {
   std::vector<std::pair<std::string, std::vector<v1::Task>>> fits;
 };
 
-// Errors: a scenario that cannot be diagnosed, an empty log, an effect to leave out that the
-// catalogue does not have, the farm's.
+// A log that cannot be used is told without any simulation (verdict "unusable"), and what cannot be
+// simulated is left out and said.  Errors: a scenario that cannot be diagnosed, an empty log, an
+// effect to leave out that the catalogue does not have, the farm's.
 Result<DiagnosisResult> diagnose(Farm& farm, const Problem& problem,
                                  const DiagnoseOptions& options);
 

@@ -43,7 +43,12 @@ Status DiagnosisRun::plan_next() {
       rivals.push_back(std::move(rival));
     }
     auto next = next_experiments(farm_, subject_.experiments(problem_), rivals);
-    if (!next) return next.error();
+    if (!next && next.error().message == kStopRequested) return next.error();
+    if (!next) {
+      result_.diagnosis.cautions.push_back(
+          "What to drive next could not be planned: " + next.error().message + ".");
+      continue;
+    }
     auto& to = result_.diagnosis.next;
     to.insert(to.end(), next->begin(), next->end());
   }
@@ -64,7 +69,10 @@ Status DiagnosisRun::look_for_second_places() {
       std::string place;
       for (const char* key : keys) {
         const std::size_t row = problem_.table().row(std::string(name) + "." + key);
-        const double value = second->signature.fixed.at(problem_.table()[row].key);
+        const std::string& full = problem_.table()[row].key;
+        Overrides at;
+        for (const auto& [k, v] : second->signature.fixed) at[problem_.table().row(k)] = v;
+        const double value = second->signature.fixed.at(full) + frame_of(full, at);
         place += std::string(place.empty() ? "" : ", ") + key + " " +
                  problem_.table().format(row, std::round(value * 1e3) / 1e3);
       }

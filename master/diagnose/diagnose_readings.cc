@@ -15,15 +15,20 @@ constexpr double kLeastLagGain = 14;      // it stands for all samples of a path
 
 }  // namespace
 
-// Of every trial just before its motors stop, in the axes of its predicted end.
+// Of every trial just before its motors stop, in the axes of its predicted end; none where that
+// cannot be simulated.
 Result<std::vector<Eigen::Vector3d>> DiagnosisRun::end_velocities() {
   constexpr double kStep_s = 0.02;
   Overrides shorter = study_.base;
   shorter[problem_.table().row("timing_offset.offset")] = -kStep_s;
-  const auto ends = predictor_.ends({{shorter, {}}});
+  const auto ends = predictor_.attempt({{shorter, {}}});
   if (!ends) return ends.error();
   std::vector<Eigen::Vector3d> velocity;
-  for (const Eigen::Vector3d& d : differences(study_, ends->front(), kStep_s)) {
+  if (!ends->front()) {
+    predictor_.leave_out("pose_latency");
+    return velocity;
+  }
+  for (const Eigen::Vector3d& d : differences(study_, *ends->front(), kStep_s)) {
     velocity.push_back(-d);
   }
   return velocity;
@@ -40,6 +45,7 @@ Status DiagnosisRun::put_late_readings_right(std::vector<Eigen::Vector3d> veloci
     if (Status s = measure_noise(); !s) return s;
     auto faster = end_velocities();
     if (!faster) return faster.error();
+    if (faster->empty()) break;
     velocity = std::move(*faster);
     latency_ = fit_latency(study_, velocity);
   }
@@ -52,6 +58,10 @@ Status DiagnosisRun::date_latency(const std::vector<Eigen::Vector3d>& velocity) 
   std::vector<CommandSpec> commands;
   for (const Cell& cell : study_.cells) commands.push_back(cell.command);
   const auto paths = predictor_.paths(study_.base, commands, kPathInterval_s);
+  if (!paths && predictor_.simulation_failed()) {
+    latency_from_rest_s_ = latency_.latency_s;
+    return {};
+  }
   if (!paths) return paths.error();
   std::vector<const Eigen::Vector3d*> of_cell(study_.cells.size());
   for (std::size_t i = 0; i < study_.size(); ++i) of_cell[study_.trials[i].cell] = &velocity[i];
@@ -75,6 +85,7 @@ Status DiagnosisRun::look_for_latency() {
   if ((subject_.looks & kLooksForLateReadings) == 0 || study_.gaps.size() < 20) return {};
   const auto velocity = end_velocities();
   if (!velocity) return velocity.error();
+  if (velocity->empty()) return {};
   latency_ = fit_latency(study_, *velocity);
   if (latency_.gain < kLeastLatencyGain) return {};
   if (left_out("pose_latency")) {
@@ -99,6 +110,10 @@ Status DiagnosisRun::look_for_latency() {
 Status DiagnosisRun::look_for_lag() {
   if (!looks_for("motor_lag", kLooksForLag)) return {};
   auto lag = fit_path_lag(predictor_, study_);
+  if (!lag && predictor_.simulation_failed()) {
+    predictor_.leave_out("motor_lag");
+    return {};
+  }
   if (!lag) return lag.error();
   lag_ = *lag;
   if (lag_.gain < kLeastLagGain) lag_.gain = 0;

@@ -110,17 +110,51 @@ Status DiagnosisRun::refit() {
     if (!fit) return fit.error();
     estimates_ = std::move(*fit);
   }
-  if (Status s = refit_nested(); !s) return s;
   const std::vector<std::size_t> folds = subject_.folds(study_);
-  score_nested(folds);
   const std::size_t found = chosen_.size();
-  while (chosen_.size() > 1 && mean(nested_scores_.back()) <= mean(*(nested_scores_.end() - 2))) {
-    drop_last_effect();
+  for (;;) {
+    if (Status s = refit_nested(); !s) return s;
+    score_nested(folds);
+    auto worthless = effect_to_drop();
+    if (!worthless) {
+      if (Status s = estimate_beside_base(); !s) return s;
+      worthless = effect_at_bound();
+    }
+    if (!worthless) break;
+    drop_effect(worthless->first, worthless->second);
   }
-  if (Status s = estimate_beside_base(); !s) return s;
   if (chosen_.size() < found) judge_again();
   if (Status s = fit_correction(); !s) return s;
   set_floor(folds);
+  doubt_misses();
+  if (misses_) return name_none_for_misses(folds);
+  return fit_final();
+}
+
+// The base alone is what is left to tell of.
+Status DiagnosisRun::name_none_for_misses(const std::vector<std::size_t>& folds) {
+  chosen_.clear();
+  estimates_.reset();
+  nested_.clear();
+  nested_studies_.clear();
+  nested_scores_.clear();
+  slip_scores_.clear();
+  result_.fits.clear();
+  doubt(*misses_);
+  if (Status s = refit_nested(); !s) return s;
+  score_nested(folds);
+  set_floor(folds);
+  return {};
+}
+
+// The values that are told, with the base that fits beside them: report and model say the same.
+Status DiagnosisRun::fit_final() {
+  if (chosen_.empty()) return {};
+  const Eigen::MatrixXd none(static_cast<Eigen::Index>(3 * study_.size()), 0);
+  auto fit = fit_jointly(predictor_, nested_studies_.back(), {}, estimates_->at,
+                         BaseParameters::kFitted, none, options_.keep_base ? 0 : 2);
+  if (!fit && !predictor_.simulation_failed()) return fit.error();
+  final_at_ = fit ? fit->at : estimates_->at;
   return {};
 }
 
@@ -137,22 +171,20 @@ void DiagnosisRun::score_nested(const std::vector<std::size_t>& folds) {
   }
 }
 
-// What the others do beyond first order can look like a further effect, which then foretells
-// nothing once all are fitted together.
-void DiagnosisRun::drop_last_effect() {
-  result_.diagnosis.cautions.push_back(
-      chosen_.back().candidate.signature.effect +
-      " seemed to explain some of it, too, but trials that the fit did not see are predicted no "
-      "better with it.");
-  chosen_.pop_back();
-  nested_.pop_back();
-  nested_studies_.pop_back();
-  nested_scores_.pop_back();
-  result_.fits.pop_back();
-}
-
 // What the remaining effects leave at their estimates.
 void DiagnosisRun::judge_again() {
+  const bool odd = !odd_readings_.empty() || !odd_drives_.empty();
+  const bool others = !first_.empty() || slip_.gain > 0 || lag_.gain > 0 || study_.quantum_m > 0;
+  Verdict& verdict = result_.diagnosis.verdict;
+  if (chosen_.empty()) {
+    estimates_.reset();
+    judge_leftovers(explained());
+    verdict =
+        judge_verdict(others, explained_nats(explained()), leftovers_, subject_.unknown_log10_p);
+    if (odd && verdict == Verdict::kNone) verdict = Verdict::kUnknown;
+    if (others && (odd || verdict == Verdict::kUnknown)) verdict = Verdict::kEffectAndUnknown;
+    return;
+  }
   Eigen::VectorXd residuals = study_.whiten(estimates_->residuals);
   Eigen::MatrixXd slopes = estimates_->jacobian;
   study_.drop_ignored(residuals);
@@ -160,8 +192,6 @@ void DiagnosisRun::judge_again() {
   Regression left(nuisances_, residuals);
   left.add(slopes);
   judge_leftovers(left);
-  Verdict& verdict = result_.diagnosis.verdict;
-  const bool odd = !odd_readings_.empty() || !odd_drives_.empty();
   verdict = judge_verdict(true, explained_nats(left), leftovers_, subject_.unknown_log10_p);
   if (odd || verdict == Verdict::kUnknown) verdict = Verdict::kEffectAndUnknown;
 }
@@ -204,7 +234,7 @@ void DiagnosisRun::drop_slips() {
   slip_ = {};
   const bool named = !first_.empty() || !chosen_.empty() || lag_.gain > 0 || study_.quantum_m > 0;
   result_.diagnosis.verdict = named ? Verdict::kEffectAndUnknown : Verdict::kUnknown;
-  result_.diagnosis.cautions.push_back(
+  result_.diagnosis.cautions.emplace_back(
       "Single drives stray, but not as slips would make them: nothing that was looked for explains "
       "them.");
 }

@@ -7,6 +7,7 @@
 
 #include "common/random/stream.h"
 #include "common/score/statistics.h"
+#include "master/diagnose/confidence.h"
 #include "master/diagnose/diagnose_steps.h"
 #include "master/diagnose/findings.h"
 #include "master/diagnose/intervals.h"
@@ -20,11 +21,6 @@ constexpr int kBootstraps = 400;
 // recorder's secret.
 constexpr double kCoasting_s = 0.04;
 constexpr double kLagError = 0.05;  // of a lag seen in paths, between simulations
-
-// Evidence to confidence: the least gain that names an effect is an even bet.
-double confidence_of(double gain, double least_gain) {
-  return 1 / (1 + std::exp(-(gain - least_gain + 1.5)));
-}
 
 struct RootMeanSquare {
   double position_mm = 0;
@@ -61,54 +57,6 @@ void turn(double angle_rad, DiagnosedTrial* trial) {
 }
 
 }  // namespace
-
-void DiagnosisRun::set_noise(const NoiseEstimate& noise, Overrides* at) const {
-  const auto set = [&](const NoiseRow& to, double value) { (*at)[to.row] = value * to.unit; };
-  set(subject_.drive_common, noise.drive_common);
-  set(subject_.drive_side, noise.drive_side);
-  set(subject_.pose_position, noise.pose.position_m);
-  set(subject_.pose_heading, noise.pose.heading_rad);
-  if (subject_.drive_tail) set(*subject_.drive_tail, noise.tails.drive);
-  if (subject_.pose_tail) set(*subject_.pose_tail, noise.tails.reading);
-}
-
-// Of a side's speed, over the trials that the fits learned from.  An event's loss is uniform below
-// the greatest; the trials left out are taken for the worst of those with an event on either side.
-double DiagnosisRun::mean_loss_of_slips() const {
-  const double either = slip_.probability * (2 - slip_.probability);
-  const double left_out =
-      static_cast<double>(std::count(study_.ignored.begin(), study_.ignored.end(), true));
-  const double most =
-      1 - std::min(1.0, left_out / std::max(1.0, either * static_cast<double>(study_.size())));
-  return std::clamp(slip_.probability * most * slip_.loss * most / 2, 0.0, 0.5);
-}
-
-void DiagnosisRun::spread_effects(Overrides* at) const {
-  const auto set = [&](const char* key, double value) { (*at)[problem_.table().row(key)] = value; };
-  NoiseEstimate noise = nested_studies_.back().predictive_noise();
-  if (study_.quantum_m > 0) {
-    // The readings' noise was measured with the rounding in it.
-    const double rounding2 = study_.quantum_m * study_.quantum_m / 12;
-    set("pose_quantisation.step", study_.quantum_m);
-    noise.pose.position_m =
-        std::sqrt(std::max(0.0, noise.pose.position_m * noise.pose.position_m - rounding2));
-  }
-  noise.pose.position_m = std::max(1e-5, noise.pose.position_m);
-  noise.pose.heading_rad = std::max(1e-5, noise.pose.heading_rad);
-  for (const Signature& s : first_) {
-    for (const auto& [key, value] : s.fixed) set(key.c_str(), value);
-  }
-  if (lag_.gain > 0) set("motor_lag.tau", lag_.tau_s);
-  if (slip_.gain > 0) {
-    set("slip_events.probability", std::clamp(slip_.probability, 0.0, 0.5));
-    set("slip_events.loss", std::clamp(slip_.loss, 0.0, 1.0));
-    noise.drive_common = slip_.noise.drive_common;
-    noise.drive_side = slip_.noise.drive_side;
-    // Without events in it the fitted speed has made up for those that were not left out.
-    (*at)[subject_.speed] /= 1 - mean_loss_of_slips();
-  }
-  set_noise(noise, at);
-}
 
 // Share of the explainable gap, with an interval from a bootstrap over the chains between
 // unrecorded moves, whose trials share a start.
@@ -171,17 +119,44 @@ NamedEffect DiagnosisRun::named(std::size_t k, const JointFit& estimates) const 
                                                            estimates.at, chosen.candidate.gain));
     e.lo = value - half;
     e.hi = value + half;
+    if (!e.key.ends_with("direction")) {
+      e.lo = std::max(e.lo, p.lower);
+      e.hi = std::min(e.hi, p.upper);
+    }
+    const double frame = frame_of(p.key, estimates.at);
+    for (double* told : {&e.value, &e.lo, &e.hi}) *told += frame;
     effect.parameters.push_back(e);
+  }
+  if (effect.name == "camera_seam") {
+    effect.axis = estimates.at.at(problem_.table().row("camera_seam.axis")) == 0 ? "x" : "y";
   }
   const std::size_t before = k + (as_logged_ ? 1 : 0);
   effect.gap_before = floor_ - mean(nested_scores_[before]);
   effect.gap_after = floor_ - mean(nested_scores_[before + 1]);
   set_closed(&effect, gained_by(before + 1));
-  const RootMeanSquare after = root_mean_square(
-      held_out_residuals(nested_studies_[before + 1], nested_[before + 1], subject_.folds(study_)));
-  effect.position_mm_after = after.position_mm;
-  effect.heading_mrad_after = after.heading_mrad;
+  const auto held_out = [&](std::size_t n) {
+    return root_mean_square(
+        held_out_residuals(nested_studies_[n], nested_[n], subject_.folds(study_)));
+  };
+  const RootMeanSquare without = held_out(before), with = held_out(before + 1);
+  effect.position_mm_before = without.position_mm;
+  effect.heading_mrad_before = without.heading_mrad;
+  effect.position_mm_after = with.position_mm;
+  effect.heading_mrad_after = with.heading_mrad;
   return effect;
+}
+
+double DiagnosisRun::frame_of(const std::string& key, const Overrides& at) const {
+  if (key == "camera_distortion.x" || key == "friction_patch.x") return frame_m_.x();
+  if (key == "camera_distortion.y" || key == "friction_patch.y") return frame_m_.y();
+  if (key != "camera_seam.position") return 0;
+  const auto axis = at.find(problem_.table().row("camera_seam.axis"));
+  return axis != at.end() && axis->second != 0 ? frame_m_.y() : frame_m_.x();
+}
+
+// That positions lie on a grid is certain; by this it is put among the others.
+double DiagnosisRun::pose_grid_gain() const {
+  return 0.02 * static_cast<double>(study_.size()) + 20;
 }
 
 // Effects that widen the distribution rather than move it: their gain is that of the mixture.
@@ -213,10 +188,8 @@ std::vector<DiagnosisRun::SpreadEffect> DiagnosisRun::spread_effects_found() con
   }
   if (study_.quantum_m > 0) {
     const double q = study_.quantum_m;
-    found.push_back({"pose_quantisation",
-                     0.02 * static_cast<double>(study_.size()) + 20,
-                     {{"step", q, 0.99 * q, 1.01 * q, "m"}},
-                     {}});
+    found.push_back(
+        {"pose_quantisation", pose_grid_gain(), {{"step", q, 0.99 * q, 1.01 * q, "m"}}, {}});
   }
   return found;
 }
@@ -300,6 +273,8 @@ void DiagnosisRun::fill_trials() {
     to.place_in_run = t.context.place_in_run;
     to.held_out = true;  // every trial's scores come from the other folds
     to.X_WS = t.X_WS;
+    to.X_WS.x += frame_m_.x();
+    to.X_WS.y += frame_m_.y();
     TrialView view = subject_.view(study_, i);
     to.measured = between(view.X_WV, t.X_WE);
     to.tuned = between(view.X_WV, tuned.ends[i]);
@@ -313,29 +288,6 @@ void DiagnosisRun::fill_trials() {
     to.tuned_score = nested_scores_.front()[i];
     to.final_score = nested_scores_.back()[i];
     result_.diagnosis.trials.push_back(std::move(to));
-  }
-}
-
-void DiagnosisRun::fill_values() {
-  const auto values_at = [&](Overrides at, bool with_effects) {
-    if (with_effects) {
-      spread_effects(&at);
-    } else {
-      set_noise(nested_studies_.front().predictive_noise(), &at);
-    }
-    ParameterValues values = problem_.values;
-    for (const auto& [row, value] : at) values[row] = value;
-    return values;
-  };
-  result_.tuned = values_at(nested_.front().at, false);
-  result_.final_ = values_at(nested_.back().at, true);
-  result_.intervals.assign(problem_.values.size(), {1, 0});
-  for (const NamedEffect& effect : result_.diagnosis.effects) {
-    for (const Estimate& e : effect.parameters) {
-      const std::size_t row = problem_.table().row(effect.name + "." + e.key);
-      const Parameter& p = problem_.table()[row];
-      if (e.lo < e.hi) result_.intervals[row] = {std::max(e.lo, p.lower), std::min(e.hi, p.upper)};
-    }
   }
 }
 
@@ -363,6 +315,15 @@ Status DiagnosisRun::report() {
     if (Status s = look_for_second_places(); !s) return s;
   }
   if (Status s = compare_with_baselines(); !s) return s;
+  complete_screening();
+  say_what_was_left_out();
+  if (frame_m_.x() != 0 || frame_m_.y() != 0) {
+    d.cautions.push_back(
+        "The log lies far from the world's origin: model.toml counts places from x "
+        "= " +
+        plain_number(frame_m_.x()) + " m, y = " + plain_number(frame_m_.y()) +
+        " m (its [frame]), and a seam's shift is the one there.");
+  }
   d.headline = headline(d);
   return plan_next();
 }

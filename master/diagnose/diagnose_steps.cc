@@ -8,6 +8,7 @@
 
 #include "common/pose/segment.h"
 #include "common/score/statistics.h"
+#include "master/diagnose/digits.h"
 #include "master/diagnose/drive_noise.h"
 #include "master/diagnose/noise.h"
 #include "master/diagnose/slip_places.h"
@@ -19,8 +20,6 @@ constexpr double kLeastSlipGain = 11;
 constexpr double kLeastSlipShare = 0.03;  // of what the effects on the means explain
 constexpr double kSlippedSquared = 11.5;  // squared distance with 3 degrees of freedom: one in 110
 constexpr double kLeastQuantum_m = 4e-4;
-// Of fewer trials, a place or a direction that is searched for explains any of them.
-constexpr std::size_t kFewestTrials = 40;
 
 // Which camera saw a pose on the line of a seam is not known, and at the edge of a patch a small
 // error of its place is a large one of the motion.
@@ -108,6 +107,7 @@ Status DiagnosisRun::search_catalogue() {
 }
 
 Status DiagnosisRun::screen() {
+  if (doubts_base()) return {};
   if (Status s = look_for_latency(); !s) return s;
   if (Status s = look_for_lag(); !s) return s;
   if (Status s = search_catalogue(); !s) return s;
@@ -144,22 +144,26 @@ Result<JointFit> DiagnosisRun::estimate(const std::vector<EffectCandidate>& effe
 
 Result<Relinearised> DiagnosisRun::relinearise(const std::vector<EffectCandidate>& effects) {
   auto fit = estimate(effects, 2);
+  if (!fit && predictor_.simulation_failed()) return Relinearised{};
   if (!fit) return fit.error();
-  estimates_ = std::move(*fit);
   std::vector<PredictionRequest> without;
   for (const EffectCandidate& effect : effects) {
-    without.push_back({estimates_->at, {}});
+    without.push_back({fit->at, {}});
     std::erase_if(without.back().at, [&](const auto& entry) {
       return problem_.table()[entry.first].effect == effect.signature.effect;
     });
   }
-  const auto ends = predictor_.ends(without);
+  const auto ends = predictor_.attempt(without);
   if (!ends) return ends.error();
+  for (const auto& simulated : *ends) {
+    if (!simulated) return Relinearised{};
+  }
+  estimates_ = std::move(*fit);
   Relinearised at_estimate{study_.whiten(estimates_->residuals), {}};
   for (std::size_t k = 0; k < effects.size(); ++k) {
     std::vector<Eigen::Vector3d> contribution;
     for (std::size_t i = 0; i < study_.size(); ++i) {
-      contribution.push_back(local_difference((*ends)[k][i], estimates_->ends[i]));
+      contribution.push_back(local_difference((*(*ends)[k])[i], estimates_->ends[i]));
     }
     std::vector<Eigen::Index> own;
     for (std::size_t p = 0; p < estimates_->parameters.size(); ++p) {
@@ -224,11 +228,15 @@ void DiagnosisRun::fill_screening(const std::vector<EffectCandidate>& candidates
       row.p = boost::math::cdf(
           boost::math::complement(boost::math::chi_squared(gain.dimensions), gain.squares));
     }
-    for (const auto& [key, value] : start_values(study_, *base_, s)) {
+    Overrides start;
+    const auto values = start_values(study_, *base_, s);
+    for (const auto& [key, value] : values) start[problem_.table().row(key)] = value;
+    for (const auto& [key, value] : values) {
       if (key.rfind(s.effect + ".", 0) != 0) continue;
       const std::size_t at = problem_.table().row(key);
-      row.estimate += (row.estimate.empty() ? "" : ", ") + key.substr(key.find('.') + 1) + " " +
-                      problem_.table().format(at, std::round(value * 1e5) / 1e5);
+      row.estimate +=
+          (row.estimate.empty() ? "" : ", ") + key.substr(key.find('.') + 1) + " " +
+          problem_.table().format(at, rounded_to_digits(value + frame_of(key, start), 4));
     }
     for (std::size_t j = 0; j < candidates.size(); ++j) {
       const double lengths = explained[i].norm() * explained[j].norm();
@@ -290,17 +298,6 @@ void DiagnosisRun::name_nothing() {
   study_.quantum_m = 0;
 }
 
-// Names nothing where the data are too few for a claim, and says so.
-bool DiagnosisRun::too_thin() {
-  if (study_.size() >= kFewestTrials) return false;
-  name_nothing();
-  result_.diagnosis.verdict = Verdict::kNone;
-  result_.diagnosis.cautions.push_back(
-      "Fewer than " + std::to_string(kFewestTrials) +
-      " trials: the catalogue was screened, but no effect is named on so few.");
-  return true;
-}
-
 void DiagnosisRun::judge_leftovers(const Regression& explained) {
   leftovers_ = leftovers(explained, blocks_);
   if (study_.misfit_columns > 0) compare_with_repeats();
@@ -312,10 +309,10 @@ void DiagnosisRun::judge_leftovers(const Regression& explained) {
 }
 
 Status DiagnosisRun::judge() {
+  if (doubted_) return {};
   for (const SelectionStep& step : selector_->steps()) {
     result_.diagnosis.steps.push_back({step.explained, step.offered});
   }
-  if (too_thin()) return {};
   const Regression explained = this->explained();
   judge_leftovers(explained);
   const double nats = explained_nats(explained) + slip_.gain + (as_logged_ ? latency_.gain : 0);

@@ -13,6 +13,7 @@
 #include "master/diagnose/estimate.h"
 #include "master/diagnose/latency.h"
 #include "master/diagnose/path_lag.h"
+#include "master/diagnose/prepare.h"
 #include "master/diagnose/selection.h"
 #include "master/diagnose/slip.h"
 #include "master/diagnose/study.h"
@@ -27,12 +28,19 @@ bool clearly_better(const std::vector<double>& scores, const std::vector<double>
 class DiagnosisRun {
  public:
   // REQUIRES: a scenario that has a diagnosis_subject().
-  DiagnosisRun(Farm& farm, const Problem& problem, const DiagnoseOptions& options)
-      : problem_(problem),
-        subject_(*diagnosis_subject(problem.scenario)),
+  // All three outlive it.
+  DiagnosisRun(Farm& farm, const PreparedLog& log, const DiagnoseOptions& options)
+      : problem_(log.problem),
+        subject_(*diagnosis_subject(log.problem.scenario)),
         options_(options),
         farm_(farm),
-        predictor_(farm, problem) {}
+        frame_m_(log.frame_x_m, log.frame_y_m),
+        predictor_(farm, log.problem) {
+    result_.diagnosis.sanity = log.sanity;
+    result_.problem = predictor_.problem_hash();
+    result_.frame_x_m = log.frame_x_m;
+    result_.frame_y_m = log.frame_y_m;
+  }
 
   // Ends the stage before, if any, and begins one; "" only ends.
   void stage(const std::string& name);
@@ -44,11 +52,28 @@ class DiagnosisRun {
   Status refit();
   Status report();
   DiagnosisResult take() { return std::move(result_); }
+  // Whether a stage's error is a simulation's, which is no reason to be without a report.
+  bool simulation_failed() const { return predictor_.simulation_failed(); }
+  DiagnosisResult give_up(const std::string& stage, const Error& error);
 
  private:
+  bool doubts_base();
+  void doubt(SanityFinding finding);
+  void doubt_misses();
+  std::optional<std::pair<std::size_t, std::string>> effect_to_drop() const;
+  std::optional<std::pair<std::size_t, std::string>> effect_at_bound() const;
+  void drop_effect(std::size_t k, const std::string& why);
+  void say_what_was_left_out();
+  // Of a table key that is a place along a world axis: how far the log's frame lies along it.
+  double frame_of(const std::string& key, const Overrides& at) const;
+  Status fit_final();
+  double within_table(std::size_t row, double value);
+  Status name_none_for_misses(const std::vector<std::size_t>& folds);
+  void complete_screening();
+  std::string why_not_screened(const std::string& name, Screened* row) const;
+  double pose_grid_gain() const;
   bool left_out(const std::string& effect) const;
   bool looks_for(const std::string& effect, Looks look) const;
-  bool too_thin();
   void compare_with_repeats();
   Status search_catalogue();
   Status search_again();
@@ -82,7 +107,6 @@ class DiagnosisRun {
   Study study_beside(const JointFit& fit) const;
   void keep_nested(JointFit fit, const Study& fitted_in, Study scored_in);
   void score_nested(const std::vector<std::size_t>& folds);
-  void drop_last_effect();
   void judge_leftovers(const Regression& explained);
   void judge_again();
   void set_floor(const std::vector<std::size_t>& folds);
@@ -111,6 +135,7 @@ class DiagnosisRun {
   const DiagnosisSubject& subject_;
   const DiagnoseOptions& options_;
   Farm& farm_;
+  Eigen::Vector2d frame_m_;  // the log's frame in the world
   Predictor predictor_;
   Study study_;
   std::optional<Study> as_logged_;  // where late readings were put right: before that
@@ -138,6 +163,9 @@ class DiagnosisRun {
   std::vector<ChosenEffect> unnamed_;
   double scale_ = 1;  // leftover variance over the noise's
   double floor_ = 0;
+  bool doubted_ = false;                 // nothing is to be named
+  std::optional<SanityFinding> misses_;  // why, where that shows after the refit
+  std::optional<Overrides> final_at_;    // base and effects as they are told
   DiagnosisResult result_;
   std::string stage_;
   std::chrono::steady_clock::time_point began_;

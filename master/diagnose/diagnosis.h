@@ -9,11 +9,13 @@
 #include <vector>
 
 #include "common/pose/pose.h"
+#include "master/sanity/finding.h"
 
 namespace gapfarm {
 
-enum class Verdict { kEffect, kNone, kUnknown, kEffectAndUnknown };
-const char* verdict_name(Verdict verdict);  // "effect", "none", "unknown", "effect+unknown"
+enum class Verdict { kEffect, kNone, kUnknown, kEffectAndUnknown, kUnusable };
+// "effect", "none", "unknown", "effect+unknown", "unusable"
+const char* verdict_name(Verdict verdict);
 
 struct Estimate {
   std::string key;  // within the effect: "rate"
@@ -33,12 +35,15 @@ struct NamedEffect {
   // Mean log score lost against the floor, nats a trial, on trials that the fit did not see.
   double gap_before = 0;
   double gap_after = 0;
-  // The same trials' root mean squares once the effect was added; empty when not measured.
+  // The same trials' root mean squares before and once the effect was added; empty when not
+  // measured.
+  std::optional<double> position_mm_before, heading_mrad_before;
   std::optional<double> position_mm_after, heading_mrad_after;
   double closed = 0;  // share of the explainable gap (tuned minus floor) that adding it removed
   double closed_lo = 0;
   double closed_hi = 0;
   std::string text;  // one sentence for a person
+  std::string axis;  // "x" or "y": of camera_seam, which coordinate crosses the line
 };
 
 struct GapFigures {
@@ -129,6 +134,8 @@ struct Diagnosis {
   GapFigures gap;          // nats/trial
   GapFigures position_mm;  // root mean square
   GapFigures heading_mrad;
+  // Of an unusable log: why; what names an effect also stands in `effects`.  Notes of any log.
+  std::vector<SanityFinding> sanity;
   std::vector<Where> where;        // of the tuned base model
   std::vector<Where> unexplained;  // of the final model
   std::vector<Screened> screening;

@@ -5,21 +5,21 @@
 #include <nlohmann/json.hpp>
 #include <type_traits>
 
+#include "master/diagnose/json_fields.h"
+#include "master/sanity/words.h"
+
 namespace gapfarm {
 namespace {
 
 using Json = nlohmann::ordered_json;
 
 constexpr int kVersion = 1;
-constexpr std::array<std::pair<Verdict, const char*>, 4> kVerdicts = {
+constexpr std::array<std::pair<Verdict, const char*>, 5> kVerdicts = {
     {{Verdict::kEffect, "effect"},
      {Verdict::kNone, "none"},
      {Verdict::kUnknown, "unknown"},
-     {Verdict::kEffectAndUnknown, "effect+unknown"}}};
-
-std::string dump(const Json& json, int indent) {
-  return json.dump(indent, ' ', false, Json::error_handler_t::replace);
-}
+     {Verdict::kEffectAndUnknown, "effect+unknown"},
+     {Verdict::kUnusable, "unusable"}}};
 
 Json effect_json(const NamedEffect& effect) {
   Json parameters = Json::object();
@@ -33,6 +33,9 @@ Json effect_json(const NamedEffect& effect) {
                {"parameters", std::move(parameters)},
                {"gap_before", effect.gap_before},
                {"gap_after", effect.gap_after}};
+  if (!effect.axis.empty()) json["axis"] = effect.axis;
+  if (effect.position_mm_before) json["position_mm_before"] = *effect.position_mm_before;
+  if (effect.heading_mrad_before) json["heading_mrad_before"] = *effect.heading_mrad_before;
   if (effect.position_mm_after) json["position_mm_after"] = *effect.position_mm_after;
   if (effect.heading_mrad_after) json["heading_mrad_after"] = *effect.heading_mrad_after;
   json["closed"] = effect.closed;
@@ -40,6 +43,17 @@ Json effect_json(const NamedEffect& effect) {
   json["closed_hi"] = effect.closed_hi;
   json["text"] = effect.text;
   return json;
+}
+
+Json sanity_json(const std::vector<SanityFinding>& findings) {
+  Json list = Json::array();
+  for (const SanityFinding& f : findings) {
+    list.push_back({{"name", f.name},
+                    {"severity", severity_name(f.severity)},
+                    {"text", f.text},
+                    {"remedy", f.remedy}});
+  }
+  return list;
 }
 
 Json figures_json(const GapFigures& figures) {
@@ -95,83 +109,6 @@ Json checks_json(const std::vector<ResidualCheck>& checks) {
   return list;
 }
 
-// Reads fields of one object; the first thing that does not fit is kept as a sentence.
-class Fields {
- public:
-  Fields(const Json& json, std::string path, std::string& error)
-      : json_(json), path_(std::move(path)), error_(error) {
-    if (!json.is_object()) complain("", json, "an object");
-  }
-
-  template <class T>
-  void read(const char* key, T& field) {
-    if (!json_.is_object() || !json_.contains(key)) {
-      return fail(name(key) + " is missing; was this written by gapfarm diagnose?");
-    }
-    convert(key, json_[key], field);
-  }
-
-  // A field that an earlier version, or another program, may leave out.
-  template <class T>
-  void read_if_there(const char* key, T& field) {
-    if (json_.is_object() && json_.contains(key)) convert(key, json_[key], field);
-  }
-
-  // Calls each(item, path) for the list under `key`, when there is one.
-  template <class Each>
-  void for_each(const char* key, const Each& each) {
-    if (!json_.is_object() || !json_.contains(key)) return;
-    const Json& list = json_[key];
-    if (!list.is_array() && !list.is_object()) return complain(key, list, "a list");
-    std::size_t index = 0;
-    for (const auto& [item_key, item] : list.items()) {
-      const std::string place =
-          list.is_array() ? "[" + std::to_string(index++) + "]" : "." + item_key;
-      each(item, name(key) + place, item_key);
-    }
-  }
-
-  std::string name(const std::string& key) const { return path_.empty() ? key : path_ + "." + key; }
-  void complain(const std::string& key, const Json& found, const char* expected) {
-    fail(name(key) + " is " + dump(found, -1).substr(0, 60) + ", expected " + expected);
-  }
-  std::string& error() { return error_; }
-
- private:
-  void convert(const char* key, const Json& json, double& field) {
-    if (json.is_null()) {
-      field = std::numeric_limits<double>::quiet_NaN();
-    } else if (json.is_number()) {
-      field = json.get<double>();
-    } else {
-      complain(key, json, "a number");
-    }
-  }
-  void convert(const char* key, const Json& json, std::optional<double>& field) {
-    convert(key, json, field.emplace());
-  }
-  void convert(const char* key, const Json& json, std::uint64_t& field) {
-    if (!json.is_number_unsigned()) return complain(key, json, "a count");
-    field = json.get<std::uint64_t>();
-  }
-  void convert(const char* key, const Json& json, std::string& field) {
-    if (!json.is_string()) return complain(key, json, "a text");
-    field = json.get<std::string>();
-  }
-  void convert(const char* key, const Json& json, std::vector<std::string>& field) {
-    if (!json.is_array()) return complain(key, json, "a list of texts");
-    field.clear();
-    for (const Json& item : json) convert(key, item, field.emplace_back());
-  }
-  void fail(const std::string& sentence) {
-    if (error_.empty()) error_ = "diagnosis.json: " + sentence;
-  }
-
-  const Json& json_;
-  std::string path_;
-  std::string& error_;
-};
-
 NamedEffect read_effect(const Json& json, const std::string& path, std::string& error) {
   NamedEffect effect;
   Fields fields(json, path, error);
@@ -190,6 +127,9 @@ NamedEffect read_effect(const Json& json, const std::string& path, std::string& 
   });
   fields.read("gap_before", effect.gap_before);
   fields.read("gap_after", effect.gap_after);
+  fields.read_if_there("axis", effect.axis);
+  fields.read_if_there("position_mm_before", effect.position_mm_before);
+  fields.read_if_there("heading_mrad_before", effect.heading_mrad_before);
   fields.read_if_there("position_mm_after", effect.position_mm_after);
   fields.read_if_there("heading_mrad_after", effect.heading_mrad_after);
   fields.read("closed", effect.closed);
@@ -248,6 +188,21 @@ void read_gap(const Json& json, Fields& root, Diagnosis& diagnosis) {
   };
   figures("position_mm", diagnosis.position_mm);
   figures("heading_mrad", diagnosis.heading_mrad);
+}
+
+void read_sanity(Fields& root, Diagnosis& diagnosis) {
+  root.for_each("sanity", [&](const Json& item, const std::string& path, const auto&) {
+    SanityFinding& f = diagnosis.sanity.emplace_back();
+    std::string severity = "unusable";
+    Fields fields(item, path, root.error());
+    fields.read("name", f.name);
+    fields.read("text", f.text);
+    fields.read("remedy", f.remedy);
+    fields.read_if_there("severity", severity);
+    for (Severity s : {Severity::kNote, Severity::kDoubt, Severity::kUnusable}) {
+      if (severity == severity_name(s)) f.severity = s;
+    }
+  });
 }
 
 // The lists that FORMATS leaves to us.
@@ -321,6 +276,7 @@ Json summary_json(const Diagnosis& diagnosis) {
   Json summary = {{"version", kVersion},
                   {"verdict", verdict_name(diagnosis.verdict)},
                   {"headline", diagnosis.headline},
+                  {"sanity", sanity_json(diagnosis.sanity)},
                   {"effects", std::move(effects)},
                   {"gap", std::move(gap)},
                   {"where", where_json(diagnosis.where)},
@@ -337,14 +293,14 @@ Json summary_json(const Diagnosis& diagnosis) {
 }
 
 std::string to_json(const Diagnosis& diagnosis) {
-  std::string text = dump(summary_json(diagnosis), 2);
+  std::string text = dump_json(summary_json(diagnosis), 2);
   text.resize(text.size() - 2);  // the closing "\n}", so that the trials follow, a line each
   const Json table = trials_json(diagnosis);
-  text +=
-      ",\n  \"trials\": {\n    \"columns\": " + dump(table["columns"], -1) + ",\n    \"rows\": [";
+  text += ",\n  \"trials\": {\n    \"columns\": " + dump_json(table["columns"], -1) +
+          ",\n    \"rows\": [";
   const char* separator = "\n";
   for (const Json& row : table["rows"]) {
-    text += separator + ("      " + dump(row, -1));
+    text += separator + ("      " + dump_json(row, -1));
     separator = ",\n";
   }
   return text + "\n    ]\n  }\n}\n";
@@ -358,7 +314,7 @@ Result<Diagnosis> parse_diagnosis(std::string_view text) {
   double version = 0;
   root.read("version", version);
   if (error.empty() && version != kVersion) {
-    return Error{"diagnosis.json: version is " + dump(json["version"], -1) +
+    return Error{"diagnosis.json: version is " + dump_json(json["version"], -1) +
                  ", this program reads version " + std::to_string(kVersion)};
   }
   Diagnosis diagnosis;
@@ -369,7 +325,7 @@ Result<Diagnosis> parse_diagnosis(std::string_view text) {
     if (verdict == name) diagnosis.verdict = value, known = true;
   }
   if (error.empty() && !known) {
-    root.complain("verdict", json["verdict"], "effect, none, unknown or effect+unknown");
+    root.complain("verdict", json["verdict"], "effect, none, unknown, effect+unknown or unusable");
   }
   if (!error.empty()) return Error{error};
   root.read_if_there("headline", diagnosis.headline);
@@ -377,6 +333,7 @@ Result<Diagnosis> parse_diagnosis(std::string_view text) {
     diagnosis.effects.push_back(read_effect(item, path, error));
   });
   read_gap(json, root, diagnosis);
+  read_sanity(root, diagnosis);
   read_findings(root, "where", diagnosis.where);
   read_findings(root, "unexplained", diagnosis.unexplained);
   read_screening(root, diagnosis);

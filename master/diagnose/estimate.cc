@@ -7,6 +7,7 @@
 #include "common/score/density.h"
 #include "master/diagnose/bounded_minimum.h"
 #include "master/diagnose/seam.h"
+#include "master/diagnose/slopes.h"
 #include "master/diagnose/subject.h"
 #include "master/diagnose/tail_noise.h"
 
@@ -16,7 +17,9 @@ namespace {
 constexpr int kMostHalvings = 4;
 constexpr double kSettled = 1;        // of the objective (twice nats): less is no progress
 constexpr double kMostOfRange = 0.3;  // of a parameter's range, that one step may go
-constexpr double kFarSquared = 16;    // squared distance beyond which a trial counts linearly
+// Of a finite difference, root mean square in standard deviations a row.
+constexpr double kLeastMove = 1e-4, kMostMove = 5, kGoodMove = 0.3;
+constexpr double kFarSquared = 16;  // squared distance beyond which a trial counts linearly
 
 // Effects with a strength and a direction, whose first two columns belong to its cosine and sine.
 struct Polar {
@@ -79,30 +82,47 @@ Status predict(Predictor& predictor, const Study& study, JointFit* fit) {
   return {};
 }
 
-// Derivatives of the predictions there.
-Status differentiate(Predictor& predictor, const Study& study, JointFit* fit) {
-  std::vector<PredictionRequest> requests;
-  std::vector<double> steps;
-  for (const FittedParameter& p : fit->parameters) {
-    const Parameter& row = predictor.problem().table()[p.row];
-    double step = step_of(row, p.value);
-    if (p.value + step > row.upper) step = -step;
-    Overrides moved = fit->at;
-    moved[p.row] = p.value + step;
-    requests.push_back({moved, {}});
-    steps.push_back(step);
+// Steps that moved the ends by many standard deviations, or by next to nothing, are taken again so
+// that they move them by a part of one: what a small change is, the motion says, not the bounds.
+Status rescale(Predictor& predictor, const Study& study, const JointFit& fit,
+               const std::vector<SlopeRequest>& requests,
+               std::vector<std::optional<Slope>>* slopes) {
+  std::vector<SlopeRequest> again;
+  std::vector<std::size_t> of;
+  for (std::size_t k = 0; k < requests.size(); ++k) {
+    if (!(*slopes)[k]) continue;
+    const double rows = static_cast<double>(3 * study.size());
+    const double a_unit = std::sqrt(study.whiten(*(*slopes)[k]).squaredNorm() / rows);
+    const double moved = a_unit * requests[k].step;
+    if (!(a_unit > 0) || (moved > kLeastMove && moved < kMostMove)) continue;
+    const Parameter& row = predictor.problem().table()[requests[k].row];
+    const double step = std::min(kGoodMove / a_unit, kMostOfRange * (row.upper - row.lower));
+    again.push_back({requests[k].row, step});
+    of.push_back(k);
   }
-  fit->jacobian.resize(static_cast<Eigen::Index>(3 * study.size()),
-                       static_cast<Eigen::Index>(fit->parameters.size()));
-  if (requests.empty()) return {};
-  const auto ends = predictor.ends(requests);
-  if (!ends) return ends.error();
-  for (std::size_t k = 0; k < steps.size(); ++k) {
-    std::vector<Eigen::Vector3d> d;
-    for (std::size_t i = 0; i < study.size(); ++i) {
-      d.push_back(local_difference(fit->ends[i], (*ends)[k][i]) / steps[k]);
-    }
-    fit->jacobian.col(static_cast<Eigen::Index>(k)) = study.whiten(d);
+  if (again.empty()) return {};
+  auto better = slopes_at(predictor, fit.at, fit.ends, again);
+  if (!better) return better.error();
+  for (std::size_t j = 0; j < of.size(); ++j) {
+    if ((*better)[j]) (*slopes)[of[j]] = std::move((*better)[j]);
+  }
+  return {};
+}
+
+// Derivatives of the predictions there.  What cannot be moved at all has none, and stays.
+Status differentiate(Predictor& predictor, const Study& study, JointFit* fit) {
+  std::vector<SlopeRequest> requests;
+  for (const FittedParameter& p : fit->parameters) {
+    requests.push_back({p.row, step_of(predictor.problem().table()[p.row], p.value)});
+  }
+  fit->jacobian.setZero(static_cast<Eigen::Index>(3 * study.size()),
+                        static_cast<Eigen::Index>(fit->parameters.size()));
+  auto slopes = slopes_at(predictor, fit->at, fit->ends, requests);
+  if (!slopes) return slopes.error();
+  if (Status s = rescale(predictor, study, *fit, requests, &*slopes); !s) return s;
+  for (std::size_t k = 0; k < slopes->size(); ++k) {
+    if (!(*slopes)[k]) continue;
+    fit->jacobian.col(static_cast<Eigen::Index>(k)) = study.whiten(*(*slopes)[k]);
   }
   return {};
 }

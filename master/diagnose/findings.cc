@@ -8,6 +8,8 @@
 
 #include "common/score/statistics.h"
 #include "master/diagnose/free_commands.h"
+#include "master/diagnose/selection.h"
+#include "master/sanity/words.h"
 
 namespace gapfarm {
 namespace {
@@ -48,7 +50,7 @@ const EffectWordsByName& robot_effect_words() {
        {"The lens distorts radially with k1 = %1 about x = %2, y = %3",
         {{"k1", 1, " 1/m^2"}, {"x", 1, " m"}, {"y", 1, " m"}}}},
       {"camera_seam",
-       {"Beyond a seam at %1 the poses are shifted by %2 in x and %3 in y",
+       {"Beyond a seam at %a = %1 the poses are shifted by %2 in x and %3 in y",
         {{"position", 1, " m"}, {"offset_x", 1000, " mm"}, {"offset_y", 1000, " mm"}}}},
       {"heading_offset",
        {"The marker's heading is %1 to the left of the robot's", {{"angle", 1000, " mrad"}}}},
@@ -99,7 +101,11 @@ std::string claim(const NamedEffect& effect, const EffectWordsByName* own) {
       text += *c;
       continue;
     }
-    const Telling& telling = words.parameters[static_cast<std::size_t>(*++c - '1')];
+    if (*++c == 'a') {
+      text += effect.axis.empty() ? "its axis" : effect.axis;
+      continue;
+    }
+    const Telling& telling = words.parameters[static_cast<std::size_t>(*c - '1')];
     const Estimate* e = find(effect, telling.key);
     if (e == nullptr) return plain_claim(effect);
     text += told(*e, telling.factor, telling.unit);
@@ -182,10 +188,22 @@ std::string deviation_words(int component, double size, bool along_motion, bool 
   return "end turned " + much + " " + far + " to the " + side;
 }
 
+// " (errors from 66 to 58.6 mm and from 103 to 98.7 mrad)".
+std::string change_words(const GapFigures& position_mm, const GapFigures& heading_mrad) {
+  return " (errors from " + plain_number(position_mm.tuned) + " to " +
+         plain_number(position_mm.final_) + " mm and from " + plain_number(heading_mrad.tuned) +
+         " to " + plain_number(heading_mrad.final_) + " mrad)";
+}
+
 std::string effect_sentence(const NamedEffect& effect, const EffectWordsByName* words) {
   std::string text = claim(effect, words);
   if (std::isfinite(effect.closed) && effect.closed > 0) {
-    text += "; adding that closes " + percent(effect.closed) + " of the gap";
+    text += "; adding that closes " + percent(effect.closed) + " of the gap in log score";
+    if (effect.position_mm_before && effect.position_mm_after && effect.heading_mrad_before &&
+        effect.heading_mrad_after) {
+      text += change_words({*effect.position_mm_before, *effect.position_mm_after, 0},
+                           {*effect.heading_mrad_before, *effect.heading_mrad_after, 0});
+    }
   }
   return text + ".";
 }
@@ -201,7 +219,16 @@ std::string headline(const Diagnosis& diagnosis) {
     case Verdict::kNone:
       return "Nothing is missing that these data could show: the tuned model predicts them as well "
              "as their own noise allows.";
+    case Verdict::kUnusable:
+      return "Not usable as it is: " + (diagnosis.sanity.empty()
+                                            ? std::string("something is wrong with it.")
+                                            : finding_phrase(diagnosis.sanity.front()) + ". " +
+                                                  diagnosis.sanity.front().remedy);
     case Verdict::kUnknown:
+      if (!diagnosis.sanity.empty() && diagnosis.sanity.front().severity == Severity::kDoubt) {
+        return "No cause can be named: " + finding_phrase(diagnosis.sanity.front()) + ". " +
+               diagnosis.sanity.front().remedy;
+      }
       return "Something is missing from the simulation that no effect of the catalogue explains." +
              (where.empty() ? "" : " " + where);
     case Verdict::kEffect:
@@ -210,10 +237,11 @@ std::string headline(const Diagnosis& diagnosis) {
         return only.text.empty() ? effect_sentence(only) : only.text;
       }
       return "The gap comes from " + listed(names) + "; adding them closes " + percent(closed) +
-             " of it.";
+             " of it" + change_words(diagnosis.position_mm, diagnosis.heading_mrad) + ".";
     case Verdict::kEffectAndUnknown:
-      return "Adding " + listed(names) + " closes " + percent(closed) +
-             " of the gap, but something remains that no effect of the catalogue explains." +
+      return "Adding " + listed(names) + " closes " + percent(closed) + " of the gap" +
+             change_words(diagnosis.position_mm, diagnosis.heading_mrad) +
+             ", but something remains that no effect of the catalogue explains." +
              (where.empty() ? "" : " " + where);
   }
   return "";
@@ -271,17 +299,25 @@ std::vector<std::string> lacking(const LogVariety& v) {
 std::string alias_sentence(std::string_view effect, std::span<const AliasReason> aliases,
                            std::span<const std::string> lacks) {
   if (aliases.empty()) return "";
-  std::vector<std::string> names;
+  std::vector<std::string> parallel, others;
   double least = 1;
   for (const AliasReason& alias : aliases) {
-    names.push_back(alias.name);
-    least = std::min(least, std::abs(alias.cosine));
+    const bool alike = std::abs(alias.cosine) > kAliasCosine;
+    (alike ? parallel : others).push_back(alias.name);
+    if (alike) least = std::min(least, std::abs(alias.cosine));
   }
-  char cosine[16];
-  std::snprintf(cosine, sizeof cosine, "%.2f", std::floor(100 * least) / 100);
-  std::string text = "In these data " + std::string(effect) + " and " + listed(names, "or") +
-                     " change the end poses alike (|cos| " +
-                     (aliases.size() > 1 ? "at least " : "") + cosine + " after retuning the base)";
+  std::string text;
+  if (!parallel.empty()) {
+    char cosine[16];
+    std::snprintf(cosine, sizeof cosine, "%.2f", std::floor(100 * least) / 100);
+    text = "In these data " + std::string(effect) + " and " + listed(parallel, "or") +
+           " change the end poses alike (|cos| " + (parallel.size() > 1 ? "at least " : "") +
+           cosine + " after retuning the base)";
+  }
+  if (!others.empty()) {
+    text += (text.empty() ? "In these data " : "; ") + listed(others, "or") +
+            " would explain about as much as " + std::string(effect) + " in another way";
+  }
   if (!lacks.empty()) text += "; the log lacks " + listed(lacks);
   return text + ".";
 }

@@ -5,6 +5,7 @@
 #include <tuple>
 
 #include "master/diagnose/free_commands.h"
+#include "master/diagnose/slopes.h"
 
 namespace gapfarm {
 namespace {
@@ -80,31 +81,33 @@ Result<Eigen::MatrixXd> nuisance_columns(Predictor& predictor, const Study& stud
       {row_of(Srv1::kTreadCreep), 1},      {row_of(Srv1::kMassHeight), 1}};
   std::vector<PredictionRequest> requests;
   for (const Retuned& r : retuned) {
-    Overrides up = study.base, down = study.base;
-    up[r.row] *= 1 + kStep;
-    down[r.row] *= 1 - kStep;
-    requests.push_back({up, {}});
-    requests.push_back({down, {}});
+    for (double factor : {1 + kStep, 1 - kStep}) {
+      requests.push_back({study.base, {}});
+      requests.back().at[r.row] *= factor;
+    }
   }
   Overrides lagging = study.base;
   lagging[predictor.problem().table().row("motor_lag.tau")] = kLagStep;
   requests.push_back({lagging, {}});
-  const auto ends = predictor.ends(requests);
+  const auto ends = predictor.attempt(requests);
   if (!ends) return ends.error();
 
+  std::vector<Pose> middle;
+  for (const ResidualTrial& t : study.trials) middle.push_back(t.X_WP);
   std::vector<Eigen::VectorXd> columns;
   std::vector<Eigen::Vector3d> faster;
   for (const ResidualTrial& t : study.trials) faster.push_back(t.left + t.right);
   add_column(study, faster, 0.3, &columns);
   for (std::size_t r = 0; r < std::size(retuned); ++r) {
-    std::vector<Eigen::Vector3d> d;
-    for (std::size_t i = 0; i < study.size(); ++i) {
-      d.push_back(local_difference((*ends)[2 * r + 1][i], (*ends)[2 * r][i]) / (2 * kStep));
+    const auto slope = central_slope(middle, (*ends)[2 * r], (*ends)[2 * r + 1], kStep);
+    if (slope) {
+      add_column(study, *slope, retuned[r].prior, &columns);
+    } else {
+      predictor.leave_out("retuning " + predictor.problem().table()[retuned[r].row].key);
     }
-    add_column(study, d, retuned[r].prior, &columns);
   }
   // Motors of some hundredths of a second are part of any robot.
-  add_column(study, differences(study, ends->back(), kLagStep), 0.02, &columns);
+  if (ends->back()) add_column(study, differences(study, *ends->back(), kLagStep), 0.02, &columns);
   if (study.free_commands) {
     for (Eigen::VectorXd& column : smooth_misfits(study)) columns.push_back(std::move(column));
   } else {

@@ -5,6 +5,8 @@
 #include <set>
 #include <tuple>
 
+#include "master/diagnose/digits.h"
+
 namespace gapfarm {
 namespace {
 
@@ -27,13 +29,34 @@ v1::Task task_of(const Overrides& at, const std::vector<std::uint32_t>& trials, 
   return task;
 }
 
-Error bad_point(const Problem& problem, const Overrides& at, const v1::TaskResult& result) {
-  std::string text = "the simulation ended with " + v1::Outcome_Name(result.outcome()) + " (" +
-                     result.message() + ") at";
+// The point by what differs from the problem's own values, no more than can be read.
+std::string point_words(const Problem& problem, const Overrides& at) {
+  constexpr std::size_t kMostNamed = 6;
+  std::string text;
+  std::size_t named = 0, others = 0;
   for (const auto& [row, value] : at) {
-    text += " " + problem.table()[row].key + " = " + problem.table().format(row, value);
+    if (value == problem.values[row]) continue;
+    if (named == kMostNamed) {
+      ++others;
+      continue;
+    }
+    text += (named++ == 0 ? " at " : ", ") + problem.table()[row].key + " = " +
+            problem.table().format(row, rounded_to_digits(value, 4));
   }
-  return Error{text};
+  return text + (others > 0 ? " and " + std::to_string(others) + " more" : "");
+}
+
+Error bad_point(const Problem& problem, const Overrides& at, const v1::TaskResult& result) {
+  const std::string why = result.message().empty() ? "" : " (" + result.message() + ")";
+  return Error{"the simulation ended with " + v1::Outcome_Name(result.outcome()) + why +
+               point_words(problem, at)};
+}
+
+Status within_bounds(const Problem& problem, const Overrides& at) {
+  for (const auto& [row, value] : at) {
+    if (Status s = problem.table().check(row, value); !s) return s;
+  }
+  return {};
 }
 
 }  // namespace
@@ -88,9 +111,47 @@ std::vector<v1::Task> Predictor::tasks(const Overrides& at) const {
 
 Result<std::vector<std::vector<Pose>>> Predictor::ends(
     const std::vector<PredictionRequest>& requests) {
+  std::vector<std::optional<Error>> errors;
+  auto all = simulate(requests, &errors);
+  if (!all) return all.error();
+  std::vector<std::vector<Pose>> ends;
+  for (std::size_t k = 0; k < requests.size(); ++k) {
+    if (!(*all)[k]) {
+      simulation_failed_ = true;
+      last_failure_ = errors[k]->message;
+      return *errors[k];
+    }
+    ends.push_back(std::move(*(*all)[k]));
+  }
+  return ends;
+}
+
+Error Predictor::failed(const std::string& what) {
+  simulation_failed_ = true;
+  return Error{what + ": " + last_failure_};
+}
+
+Result<std::vector<std::optional<std::vector<Pose>>>> Predictor::attempt(
+    const std::vector<PredictionRequest>& requests) {
+  std::vector<std::optional<Error>> errors;
+  auto all = simulate(requests, &errors);
+  if (!all) return all.error();
+  for (const std::optional<Error>& error : errors) {
+    if (error) last_failure_ = error->message;
+  }
+  return all;
+}
+
+Result<std::vector<std::optional<std::vector<Pose>>>> Predictor::simulate(
+    const std::vector<PredictionRequest>& requests, std::vector<std::optional<Error>>* errors) {
+  errors->assign(requests.size(), std::nullopt);
   std::vector<v1::Task> tasks;
   std::vector<std::pair<std::size_t, std::vector<std::uint32_t>>> asked;  // request, trials
   for (std::size_t k = 0; k < requests.size(); ++k) {
+    if (const Status s = within_bounds(problem_, requests[k].at); !s) {
+      (*errors)[k] = s.error();
+      continue;
+    }
     // As many whoever works, so that the answers do not depend on it.
     const std::size_t parts =
         std::clamp<std::size_t>(1 + (kTasks - 1) / requests.size(), 1, kMostParts);
@@ -103,20 +164,20 @@ Result<std::vector<std::vector<Pose>>> Predictor::ends(
   const auto results = farm_.run(hash_, tasks);
   if (!results) return results.error();
   predictions_ += requests.size();
-  std::vector<std::vector<Pose>> ends(requests.size());
+  std::vector<std::optional<std::vector<Pose>>> ends(requests.size());
   for (std::size_t k = 0; k < requests.size(); ++k) {
-    if (!requests[k].trials.empty())
-      ends[k].resize(requests[k].trials.size());
-    else
-      ends[k].resize(problem_.log.trials.size());
+    if ((*errors)[k]) continue;
+    ends[k].emplace(requests[k].trials.empty() ? problem_.log.trials.size()
+                                               : requests[k].trials.size());
   }
   for (std::size_t t = 0; t < tasks.size(); ++t) {
     const auto& [k, part] = asked[t];
     const v1::TaskResult& result = (*results)[t];
     if (result.outcome() != v1::OK) {
-      simulation_failed_ = true;
-      return bad_point(problem_, requests[k].at, result);
+      if (!(*errors)[k]) (*errors)[k] = bad_point(problem_, requests[k].at, result);
+      ends[k].reset();
     }
+    if (!ends[k]) continue;
     const std::vector<std::uint32_t>& wanted = requests[k].trials;
     for (int i = 0; i < result.predict().predictions_size(); ++i) {
       const auto at = static_cast<std::size_t>(i);
@@ -125,7 +186,7 @@ Result<std::vector<std::vector<Pose>>> Predictor::ends(
         place = static_cast<std::size_t>(std::lower_bound(wanted.begin(), wanted.end(), part[at]) -
                                          wanted.begin());
       }
-      ends[k][place] = from_proto(result.predict().predictions(i).end());
+      (*ends[k])[place] = from_proto(result.predict().predictions(i).end());
     }
   }
   return ends;
@@ -143,12 +204,16 @@ Result<std::vector<std::vector<PathSample>>> Predictor::paths(
     trace->mutable_command()->set_duration(command.duration_s);
     trace->set_interval(interval_s);
   }
+  simulation_failed_ = false;
   const auto results = farm_.run(hash_, tasks);
   if (!results) return results.error();
   predictions_ += tasks.size();
   std::vector<std::vector<PathSample>> paths;
   for (const v1::TaskResult& result : *results) {
-    if (result.outcome() != v1::OK) return bad_point(problem_, at, result);
+    if (result.outcome() != v1::OK) {
+      last_failure_ = bad_point(problem_, at, result).message;
+      return failed("a path");
+    }
     std::vector<PathSample>& path = paths.emplace_back();
     for (const v1::TraceSample& s : result.trace().samples()) {
       path.push_back({s.t(), from_proto(s.pose())});

@@ -28,19 +28,31 @@ class Predictor {
   Predictor(Farm& farm, const Problem& problem);
 
   const Problem& problem() const { return problem_; }
+  const std::string& problem_hash() const { return hash_; }
   std::uint64_t predictions() const { return predictions_; }
 
   // Predicted measured end poses, one a trial asked for, of each request.  Few requests are cut
   // into tasks of some conditions each, so that many workers have something to do.  Errors: the
   // farm's, and a simulation that did not end well (its point is named).
   Result<std::vector<std::vector<Pose>>> ends(const std::vector<PredictionRequest>& requests);
+  // The same, but a point outside the parameters' bounds, or one whose simulation does not end
+  // well, has no ends; last_failure() says why.  Errors: the farm's alone.
+  Result<std::vector<std::optional<std::vector<Pose>>>> attempt(
+      const std::vector<PredictionRequest>& requests);
+  const std::string& last_failure() const { return last_failure_; }
+  // Keeps the last failure as the reason why `what` ("floor_tilt") had to be left out.
+  void leave_out(const std::string& what) { left_out_.try_emplace(what, last_failure_); }
+  const std::map<std::string, std::string>& left_out() const { return left_out_; }
   // The farm's tasks behind a lone request for all trials.
   std::vector<v1::Task> tasks(const Overrides& at) const;
   // Nominal path of each command in its start frame.
   Result<std::vector<std::vector<PathSample>>> paths(const Overrides& at,
                                                      const std::vector<CommandSpec>& commands,
                                                      double interval_s);
-  // Whether the last error of ends() was a simulation's rather than the farm's.
+  // The last failure as an error of the simulation's.
+  Error failed(const std::string& what);
+  // Whether the last error of ends(), paths() or failed() was a simulation's rather than the
+  // farm's.
   bool simulation_failed() const { return simulation_failed_; }
 
  private:
@@ -50,6 +62,8 @@ class Predictor {
   Condition condition(std::uint32_t trial) const;
   std::vector<std::vector<std::uint32_t>> parts_of(const PredictionRequest& request,
                                                    std::size_t parts) const;
+  Result<std::vector<std::optional<std::vector<Pose>>>> simulate(
+      const std::vector<PredictionRequest>& requests, std::vector<std::optional<Error>>* errors);
 
   Farm& farm_;
   const Problem& problem_;
@@ -57,6 +71,8 @@ class Predictor {
   std::vector<std::uint32_t> by_condition_;  // trials, those that share a simulation in a row
   std::uint64_t predictions_ = 0;
   bool simulation_failed_ = false;
+  std::string last_failure_;
+  std::map<std::string, std::string> left_out_;
 };
 
 }  // namespace gapfarm

@@ -14,6 +14,13 @@ std::vector<Probe> lens_probes(const Eigen::Vector2d& middle) {
           {"camera_distortion", lens(0, away), lens(0, -away), 2 * away * k1}};
 }
 
+namespace {
+
+// Whether the two sides lie about the base alike: one parameter, moved up and down.
+bool mirrors(const Probe& probe) { return probe.plus.size() == 1 && probe.minus.size() == 1; }
+
+}  // namespace
+
 Overrides base_with(const Predictor& predictor, const Study& study,
                     const std::map<std::string, double>& values) {
   Overrides overrides = study.base;
@@ -29,17 +36,28 @@ Result<std::vector<std::vector<Eigen::Vector3d>>> probe_all(Predictor& predictor
     requests.push_back({base_with(predictor, study, probe.plus), {}});
     if (!probe.minus.empty()) requests.push_back({base_with(predictor, study, probe.minus), {}});
   }
-  const auto ends = predictor.ends(requests);
+  const auto ends = predictor.attempt(requests);
   if (!ends) return ends.error();
   std::vector<std::vector<Eigen::Vector3d>> all;
   std::size_t next = 0;
   for (const Probe& probe : probes) {
-    std::vector<Eigen::Vector3d> d = differences(study, (*ends)[next++], probe.scale);
-    if (!probe.minus.empty()) {
-      const std::vector<Eigen::Vector3d> minus = differences(study, (*ends)[next++], probe.scale);
-      for (std::size_t i = 0; i < d.size(); ++i) d[i] -= minus[i];
+    const auto& plus = (*ends)[next++];
+    std::vector<Eigen::Vector3d>& d = all.emplace_back();
+    if (probe.minus.empty()) {
+      if (plus) d = differences(study, *plus, probe.scale);
+      continue;
     }
-    all.push_back(std::move(d));
+    const auto& minus = (*ends)[next++];
+    const bool both = plus && minus, mirrored = mirrors(probe);
+    if (plus && (both || mirrored)) d = differences(study, *plus, probe.scale / (both ? 1 : 2));
+    if (!minus || (!both && !mirrored)) continue;
+    const std::vector<Eigen::Vector3d> below =
+        differences(study, *minus, probe.scale / (both ? 1 : 2));
+    if (d.empty()) d.assign(study.size(), Eigen::Vector3d::Zero());
+    for (std::size_t i = 0; i < d.size(); ++i) d[i] -= below[i];
+  }
+  for (std::size_t k = 0; k < all.size(); ++k) {
+    if (all[k].empty()) predictor.leave_out(probes[k].effect);
   }
   return all;
 }

@@ -28,7 +28,8 @@ Overrides base_with(const Predictor& predictor, const Study& study,
                     const std::map<std::string, double>& values);
 
 // Differences of the ends over each probe's scale, in the axes of the base's ends: one batch of
-// farm work.
+// farm work.  Where one of two sides cannot be simulated, the other one counts twice; a probe
+// without any is empty.
 Result<std::vector<std::vector<Eigen::Vector3d>>> probe_all(Predictor& predictor,
                                                             const Study& study,
                                                             const std::vector<Probe>& probes);

@@ -276,6 +276,7 @@ Status Selector::use_estimates(const std::vector<Signature>& first, const Reline
   ++relinearised_;
   auto at_estimate = relinearise(*chosen);
   if (!at_estimate) return at_estimate.error();
+  if (at_estimate->columns.empty()) return {};  // cannot be simulated there
   base_.restart(at_estimate->data);
   for (std::size_t i = 0; i < chosen->size(); ++i) {
     (*chosen)[i].signature.columns = std::move(at_estimate->columns[i]);

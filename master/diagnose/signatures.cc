@@ -214,6 +214,7 @@ Result<std::vector<Signature>> signatures(Predictor& predictor, const Study& stu
   std::vector<Signature> found;
   for (const std::string& effect : order) {
     const auto& own = slopes[effect];
+    if (std::any_of(own.begin(), own.end(), [](const auto& d) { return d.empty(); })) continue;
     if (effect == "floor_nap") {
       const std::vector<Signature> naps = nap_signatures(study, {own[0], own[1], own[2]});
       found.insert(found.end(), naps.begin(), naps.end());
@@ -277,14 +278,15 @@ Result<std::vector<Signature>> patch_signatures(Predictor& predictor, const Stud
     if (request.trials.empty()) request.trials.push_back(0);
     requests.push_back(std::move(request));
   }
-  const auto ends = predictor.ends(requests);
+  const auto ends = predictor.attempt(requests);
   if (!ends) return ends.error();
   std::vector<Signature> all;
   for (std::size_t k = 0; k < requests.size(); ++k) {
+    if (!(*ends)[k]) predictor.leave_out("some places of friction_patch");
     std::vector<Eigen::Vector3d> d(study.size(), Eigen::Vector3d::Zero());
-    for (std::size_t j = 0; j < requests[k].trials.size(); ++j) {
+    for (std::size_t j = 0; (*ends)[k] && j < requests[k].trials.size(); ++j) {
       const std::size_t i = requests[k].trials[j];
-      d[i] = local_difference(study.trials[i].X_WP, (*ends)[k][j]);
+      d[i] = local_difference(study.trials[i].X_WP, (*(*ends)[k])[j]);
     }
     Signature s;
     s.effect = "friction_patch";

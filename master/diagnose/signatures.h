@@ -23,8 +23,8 @@ struct Signature {
   double penalty = 0.5;                 // nats that its best fit gains by luck
 };
 
-// All of the catalogue but `left_out`: by finite differences of predictions, one batch of farm
-// work.
+// All of the catalogue but `left_out` and what cannot be simulated: by finite differences of
+// predictions, one batch of farm work.
 Result<std::vector<Signature>> signatures(Predictor& predictor, const Study& study,
                                           const std::vector<std::string>& left_out);
 
@@ -34,7 +34,8 @@ bool depends_on_contact(const std::string& effect);
 // Each column in three, one a kind of drive; those of nothing but zeros left out.
 Eigen::MatrixXd split_by_kind(const Study& study, const Eigen::MatrixXd& columns);
 
-// Discs of floor {x, y, radius, ratio}; simulated trial by trial where they can matter.
+// Discs of floor {x, y, radius, ratio}; simulated trial by trial where they can matter.  One that
+// cannot be simulated explains nothing.
 Result<std::vector<Signature>> patch_signatures(Predictor& predictor, const Study& study,
                                                 const std::vector<std::array<double, 4>>& places);
 

@@ -43,10 +43,11 @@ struct Study {
   // By which trials are scored and the models left behind predict, where that is another one:
   // drives or readings with heavy tails.
   std::optional<NoiseEstimate> predictive;
-  bool reading_noise_known = true;  // from gaps between readings, rather than the config's
-  Overrides base;                   // tuned values
-  double speed_m_s = 0;             // tuned full speed
-  Eigen::Index misfit_columns = 0;  // last nuisances: what repeats of a trial have in common
+  bool reading_noise_known = true;     // from gaps between readings, rather than the config's
+  Overrides base;                      // tuned values
+  double speed_m_s = 0;                // tuned full speed
+  std::vector<std::size_t> on_bounds;  // rows of the base that tuning left on their bounds
+  Eigen::Index misfit_columns = 0;     // last nuisances: what repeats of a trial have in common
   // Of push logs: what a relative change of each of these parameters moves the base's ends by.
   std::vector<RetunedPush> retuned;
   std::vector<Eigen::Matrix3d> whitener;  // L^-1 of each trial's covariance L L'

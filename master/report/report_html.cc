@@ -129,6 +129,13 @@ std::string data_block(const char* id, const nlohmann::ordered_json& json) {
       script_safe(json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace)));
 }
 
+// Nothing was simulated: there is nothing to plot.
+std::string unusable_rest(const Diagnosis& diagnosis) {
+  return cautions_section(diagnosis) + provenance_section(diagnosis) +
+         "</main>\n<footer>Made by gapfarm. This page needs no network.</footer>\n" +
+         data_block("diagnosis", summary_json(diagnosis)) + "</body>\n</html>\n";
+}
+
 }  // namespace
 
 std::string report_html(const Diagnosis& diagnosis) {
@@ -136,7 +143,8 @@ std::string report_html(const Diagnosis& diagnosis) {
   html += "<body>\n";
   html += kHatches;
   html += kTop;
-  html += "<main>\n" + summary_section(diagnosis);
+  html += "<main>\n" + summary_section(diagnosis) + sanity_section(diagnosis);
+  if (diagnosis.verdict == Verdict::kUnusable) return html + unusable_rest(diagnosis);
   html += R"(<section id="gap"><h2>The gap, split by cause</h2>)" + gap_split_html(diagnosis) +
           "</section>\n";
   html += poses_section(diagnosis);

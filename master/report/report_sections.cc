@@ -30,6 +30,9 @@ VerdictWords verdict_words(Verdict verdict) {
     case Verdict::kEffectAndUnknown:
       return {"verdict-both", "◆▲", "Effect found, more remains",
               "A known effect explains a part of the gap; something else is there too."};
+    case Verdict::kUnusable:
+      return {"verdict-unusable", "✕", "Not usable as it is",
+              "Something is wrong with the log or with its config; nothing was simulated."};
   }
   return {"", "", "", ""};
 }
@@ -165,6 +168,7 @@ std::string summary_section(const Diagnosis& diagnosis) {
       words.css_class, words.sign, words.title,
       html_escaped(diagnosis.headline.empty() ? words.meaning : diagnosis.headline));
   const bool changed = !diagnosis.effects.empty();
+  if (diagnosis.verdict == Verdict::kUnusable) return html + "</section>";
   html += R"(<dl class="tiles">)" + tile("Gap, held out", diagnosis.gap, changed, "nats/trial") +
           tile("Position, rms", diagnosis.position_mm, changed, "mm") +
           tile("Heading, rms", diagnosis.heading_mrad, changed, "mrad") + "</dl>";
@@ -174,6 +178,16 @@ std::string summary_section(const Diagnosis& diagnosis) {
         diagnosis.cautions.size(), diagnosis.cautions.size() == 1 ? "" : "s");
   }
   return html + "</section>";
+}
+
+std::string sanity_section(const Diagnosis& diagnosis) {
+  if (diagnosis.sanity.empty()) return "";
+  std::string html = R"(<section id="sanity"><h2>What is doubtful</h2><ul class="cautions">)";
+  for (const SanityFinding& f : diagnosis.sanity) {
+    html += "<li><p><code>" + html_escaped(f.name) + "</code>: " + html_escaped(f.text) +
+            "</p><p><strong>What to do:</strong> " + html_escaped(f.remedy) + "</p></li>";
+  }
+  return html + "</ul></section>\n";
 }
 
 std::string where_table(const std::vector<Where>& findings, const char* caption) {

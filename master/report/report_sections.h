@@ -11,6 +11,9 @@ namespace gapfarm {
 // Verdict, headline, what was found in words, and the three figures that matter.
 std::string summary_section(const Diagnosis& diagnosis);
 
+// What the sanity stage found; empty where nothing.
+std::string sanity_section(const Diagnosis& diagnosis);
+
 // Dependences of residuals, with buttons that show them in the plots.
 std::string where_table(const std::vector<Where>& findings, const char* caption);
 

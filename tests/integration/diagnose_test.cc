@@ -40,6 +40,30 @@ class Diagnose : public ::testing::Test {
     return diagnose_log(config_, folder_ / "trials.csv", folder_ / "d", more);
   }
 
+  // Writes the log moved along x and y, with y mirrored where asked for; returns its path.
+  static std::string move_log(const std::string& log, const std::string& to, double dx, double dy,
+                              bool mirrored = false) {
+    std::istringstream lines(text_of(log));
+    std::ofstream out(to);
+    std::string line;
+    for (std::size_t row = 0; std::getline(lines, line); ++row) {
+      std::vector<std::string> cells;
+      std::istringstream cut(line);
+      for (std::string cell; std::getline(cut, cell, ',');) cells.push_back(cell);
+      for (std::size_t c : {7u, 8u, 10u, 11u}) {
+        if (row == 0) continue;
+        const bool y = c == 8 || c == 11;
+        const double value = std::stod(cells[c]) * (y && mirrored ? -1 : 1);
+        char text[32];
+        std::snprintf(text, sizeof text, "%.9f", value + (y ? dy : dx));
+        cells[c] = text;
+      }
+      for (std::size_t c = 0; c < cells.size(); ++c) out << (c > 0 ? "," : "") << cells[c];
+      out << "\n";
+    }
+    return to;
+  }
+
   TemporaryFolder folder_;
   std::string config_;
   std::string more_config_;  // goes on with [simulate]
@@ -152,11 +176,85 @@ TEST_F(Diagnose, SlipsAreNamedButNotForWhatLiesInOnePlace) {
   EXPECT_EQ(patch["verdict"], "unknown") << patch["headline"];
 }
 
-TEST_F(Diagnose, ThinDataGiveCautionsNotClaims) {
+TEST_F(Diagnose, OfAFewTrialsNothingIsSaid) {
   simulate(5, {"motor_asymmetry.ratio=0.02"});
   const Json d = diagnose();
-  EXPECT_EQ(d["verdict"], "none") << d["headline"];
-  EXPECT_GT(d["cautions"].size(), 1u);
+  EXPECT_EQ(d["verdict"], "unusable") << d["headline"];
+  EXPECT_TRUE(d["effects"].empty());
+  EXPECT_EQ(d["sanity"][0]["name"], "too_few_trials");
+}
+
+// In a map whose origin is kilometres away places are found as near to it.
+TEST_F(Diagnose, SaysTheSameWhereverTheLogLies) {
+  simulate(200, {"friction_patch.ratio=0.2", "friction_patch.x=1", "friction_patch.y=1",
+                 "friction_patch.radius=0.3"});
+  const Json near = diagnose();
+  const std::string log = move_log(folder_ / "trials.csv", folder_ / "far.csv", 5000, -3000);
+  const Json far = diagnose_log(config_, log, folder_ / "far");
+  EXPECT_EQ(far["verdict"], near["verdict"]);
+  ASSERT_EQ(far["effects"].size(), near["effects"].size()) << far["headline"];
+  for (std::size_t k = 0; k < near["effects"].size(); ++k) {
+    EXPECT_EQ(far["effects"][k]["name"], near["effects"][k]["name"]);
+  }
+  ASSERT_EQ(far["effects"][0]["name"], "friction_patch");
+  const Json& here = near["effects"][0]["parameters"];
+  const Json& there = far["effects"][0]["parameters"];
+  EXPECT_NEAR(there["x"]["value"].get<double>(), here["x"]["value"].get<double>() + 5000, 0.02);
+  EXPECT_NEAR(there["y"]["value"].get<double>(), here["y"]["value"].get<double>() - 3000, 0.02);
+  const Finished predicted = gapfarm_command(
+      {"predict", folder_ / "far/model.toml", "--trials", log, "--out", folder_ / "p.csv"});
+  EXPECT_EQ(predicted.exit_code, 0) << predicted.err;
+  const std::string first = text_of(folder_ / "p.csv");
+  EXPECT_TRUE(first.find("500") != std::string::npos || first.find("499") != std::string::npos);
+}
+
+TEST_F(Diagnose, ABaseAtTheEdgeOfItsBoundsIsNoReasonToStop) {
+  simulate(60, {});
+  std::string edge = kConfig;
+  edge.replace(edge.find("step_rate = 60"), 14, "step_rate = 60\ntrack_gauge = 0.16");
+  config_ = folder_.write("edge.toml", edge);
+  EXPECT_TRUE(diagnose().contains("verdict"));
+}
+
+// Another robot, with two wheels and a caster, where its log is at hand.
+TEST_F(Diagnose, ARobotThatIsNoTrackedOneIsNotExplained) {
+  const auto data = shared_data("ground/neato");
+  if (!data) return;
+  const std::string log = (*data / "trials.csv").string();
+  const Json shipped =
+      diagnose_log(GAPFARM_SOURCE_DIR "/configs/srv1.toml", log, folder_ / "shipped");
+  EXPECT_EQ(shipped["verdict"], "unusable") << shipped["headline"];
+  const std::string own = folder_.write("n.toml", R"(scenario = "srv1"
+[parameters]
+mass = 1.5
+track_gauge = 0.16
+contact_length = 0.02
+tread_creep = 0.05
+step_rate = 120
+[commands.forward]
+left = 1
+right = 1
+duration = 1
+[commands.turn_ccw]
+left = -0.6
+right = 0.6
+duration = 1
+)");
+  const Json adapted = diagnose_log(own, log, folder_ / "adapted");
+  EXPECT_TRUE(adapted["verdict"] == "unknown" || adapted["verdict"] == "unusable")
+      << adapted["headline"];
+  EXPECT_TRUE(adapted["effects"].empty()) << adapted["headline"];
+  EXPECT_FALSE(adapted["sanity"].empty());
+}
+
+TEST_F(Diagnose, MirroredPositionsAreNamedByCheckAndDiagnosis) {
+  simulate(60, {});
+  const std::string log = move_log(folder_ / "trials.csv", folder_ / "m.csv", 0, 0, true);
+  const Json d = diagnose_log(config_, log, folder_ / "m");
+  EXPECT_EQ(d["verdict"], "unusable") << d["headline"];
+  EXPECT_EQ(d["effects"][0]["name"], "axis_mirrored");
+  const Finished checked = gapfarm_command({"check", config_, "--trials", log});
+  EXPECT_NE(checked.out.find("an axis is mirrored"), std::string::npos) << checked.out;
 }
 
 // 26 runs of a real robot under several overhead cameras, where the log is at hand.

@@ -123,10 +123,12 @@ Result<std::vector<Signature>> push_signatures(Predictor& predictor, const Study
     std::vector<Eigen::VectorXd> columns;
     for (std::size_t j = k; j < all.size(); ++j) {
       if (all[j].effect != s.effect) continue;
+      if ((*probed)[j].empty()) columns.clear();
+      if ((*probed)[j].empty()) break;
       columns.push_back(study.whiten((*probed)[j]));
       if (all[j].plus.size() == 1) s.parameters.push_back(all[j].plus.begin()->first);
     }
-    s.columns = stack(columns);
+    if (!columns.empty()) s.columns = stack(columns);  // else left out below
     s.penalty = 0.5 * static_cast<double>(columns.size());
     found.push_back(std::move(s));
     // To the next effect that is not there yet.
@@ -138,7 +140,8 @@ Result<std::vector<Signature>> push_signatures(Predictor& predictor, const Study
   }
   found.push_back(placement_signature(study));
   std::erase_if(found, [&](const Signature& s) {
-    return std::find(left_out.begin(), left_out.end(), s.effect) != left_out.end();
+    return s.columns.cols() == 0 ||
+           std::find(left_out.begin(), left_out.end(), s.effect) != left_out.end();
   });
   return found;
 }

@@ -91,16 +91,20 @@ Status measure_spread(Predictor& predictor, Study* study) {
       requests.back().at[table.row(keys[k])] = sign * steps[k];
     }
   }
-  const auto ends = predictor.ends(requests);
+  const auto ends = predictor.attempt(requests);
   if (!ends) return ends.error();
   for (std::size_t i = 0; i < study->size(); ++i) {
     ResidualTrial& t = study->trials[i];
     t.spread.position.setZero();
     t.spread.heading.setZero();
     for (int k = 0; k < 3; ++k) {
-      const auto at = static_cast<std::size_t>(2 * k);
-      const Eigen::Vector3d up = local_difference(t.X_WP, (*ends)[at][i]);
-      const Eigen::Vector3d down = local_difference(t.X_WP, (*ends)[at + 1][i]);
+      const auto& above = (*ends)[static_cast<std::size_t>(2 * k)];
+      const auto& below = (*ends)[static_cast<std::size_t>(2 * k + 1)];
+      Eigen::Vector3d up = Eigen::Vector3d::Zero(), down = up;
+      if (above) up = local_difference(t.X_WP, (*above)[i]);
+      if (below) down = local_difference(t.X_WP, (*below)[i]);
+      if (!above) up = -down;  // one side alone is mirrored
+      if (!below) down = -up;
       Eigen::Matrix3d& moments = k < 2 ? t.spread.position : t.spread.heading;
       moments += (up * up.transpose() + down * down.transpose()) / (2 * steps[k] * steps[k]);
       t.spread.start.col(k) = (up - down) / (2 * steps[k]);
@@ -135,21 +139,25 @@ Status measure_retuning(Predictor& predictor, Study* study) {
     }
     steps.push_back(std::log(up / down));
   }
-  const auto ends = predictor.ends(requests);
+  const auto ends = predictor.attempt(requests);
   if (!ends) return ends.error();
   study->retuned.clear();
   for (std::size_t k = 0; k < parameters.size(); ++k) {
+    const auto& above = (*ends)[2 * k];
+    const auto& below = (*ends)[2 * k + 1];
+    if (!above || !below) continue;
     RetunedPush& retuned = study->retuned.emplace_back();
     retuned.parameter = parameters[k];
     for (std::size_t i = 0; i < study->size(); ++i) {
       const Pose& X_WP = study->trials[i].X_WP;
-      retuned.slopes.push_back((local_difference(X_WP, (*ends)[2 * k][i]) -
-                                local_difference(X_WP, (*ends)[2 * k + 1][i])) /
-                               steps[k]);
+      retuned.slopes.push_back(
+          (local_difference(X_WP, (*above)[i]) - local_difference(X_WP, (*below)[i])) / steps[k]);
     }
   }
   return {};
 }
+
+constexpr double kNotSimulated = 1e6;  // a trial, beside coarse_cost()
 
 double coarse_cost(const ResidualTrial& t, const Pose& end) {
   const double slid = std::hypot(t.X_WE.x - t.X_WS.x, t.X_WE.y - t.X_WS.y);
@@ -188,7 +196,7 @@ Status start_from_grid(Predictor& predictor, Study* study) {
       requests.push_back(some);
     }
   }
-  const auto ends = predictor.ends(requests);
+  const auto ends = predictor.attempt(requests);
   if (!ends) return ends.error();
   double least = INFINITY;
   for (std::size_t f = 0; f < frictions.size(); ++f) {
@@ -198,7 +206,8 @@ Status start_from_grid(Predictor& predictor, Study* study) {
         const ResidualTrial& t = study->trials[some.trials[j]];
         std::vector<double>& own = costs[t.command];
         own.resize(factors.size());
-        own[s] += coarse_cost(t, (*ends)[f * factors.size() + s][j]);
+        const auto& simulated = (*ends)[f * factors.size() + s];
+        own[s] += simulated ? coarse_cost(t, (*simulated)[j]) : kNotSimulated;
       }
     }
     double sum = 0;

@@ -234,7 +234,7 @@ NamedEffect sag() {
 TEST(Findings, TellEffectsInPlainUnits) {
   EXPECT_EQ(effect_sentence(sag()),
             "The battery loses 0.35 % (0.31 to 0.4) of its speed a minute; adding that closes 88 % "
-            "of the gap.");
+            "of the gap in log score.");
   NamedEffect strange;
   strange.name = "moon_phase";
   strange.parameters = {{"pull", 2, 1, 3, "N"}};

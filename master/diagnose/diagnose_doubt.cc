@@ -1,0 +1,197 @@
+// When no effect is to be named, and how a diagnosis ends that cannot go on.
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/score/statistics.h"
+#include "master/diagnose/diagnose_steps.h"
+#include "master/diagnose/digits.h"
+#include "master/diagnose/findings.h"
+#include "master/sanity/words.h"
+
+namespace gapfarm {
+namespace {
+
+// A parameter within this share of its range from an end sits there.
+constexpr double kAtBound = 1e-3;
+// Nats a trial: the worst of 11 practice logs and of the real forward log keep 0.2 with their
+// effects.
+constexpr double kMostMissed = 3;
+
+bool is_place(const std::string& key) {
+  return key == "camera_distortion.x" || key == "camera_distortion.y" ||
+         key == "friction_patch.x" || key == "friction_patch.y" || key == "camera_seam.position";
+}
+
+bool at_bound(const Parameter& row, double value) {
+  if (row.kind != ParameterKind::kReal || is_place(row.key)) return false;
+  if (row.key.ends_with(".direction")) return false;
+  const double near = kAtBound * (row.upper - row.lower);
+  return value <= row.lower + near || value >= row.upper - near;
+}
+
+}  // namespace
+
+// Tuning that ends on a bound would have gone on: another robot, or another log than the config's.
+bool DiagnosisRun::doubts_base() {
+  if (study_.on_bounds.empty()) return false;
+  std::vector<std::string> where;
+  for (std::size_t row : study_.on_bounds) {
+    const Parameter& p = problem_.table()[row];
+    where.push_back(p.key + " " +
+                    problem_.table().format(row, rounded_to_digits(study_.base.at(row), 3)) +
+                    " (from " + problem_.table().format(row, p.lower) + " to " +
+                    problem_.table().format(row, p.upper) + ")");
+  }
+  doubt({"base_on_bounds",
+         "Tuning the base ended on the edge of what scenario " + problem_.scenario +
+             " can be: " + listed(where) +
+             ". A robot that needs such values is probably not one of this kind, so whatever the "
+             "catalogue explained would be its being another one.",
+         "Check what the config says of the robot and of duties and durations that the log leaves "
+         "empty, or use a scenario that can be this robot.",
+         Severity::kDoubt});
+  return true;
+}
+
+void DiagnosisRun::doubt(SanityFinding finding) {
+  doubted_ = true;
+  name_nothing();
+  result_.diagnosis.verdict = Verdict::kUnknown;
+  result_.diagnosis.sanity.insert(result_.diagnosis.sanity.begin(), std::move(finding));
+}
+
+// With its effects the model should predict about as well as its noise allows.
+void DiagnosisRun::doubt_misses() {
+  const double gap = floor_ - mean(nested_scores_.back());
+  if (doubted_ || !(gap > kMostMissed)) return;
+  const bool named = !chosen_.empty() || !first_.empty() || slip_.gain > 0 || lag_.gain > 0;
+  if (!named && result_.diagnosis.verdict != Verdict::kNone) return;
+  misses_ = SanityFinding{
+      "base_misses",
+      "Even with everything that the catalogue offers the model loses " +
+          plain_number(rounded_to_digits(gap, 3)) +
+          " nats a trial against its own noise: it is not this robot's, and what fits such a gap "
+          "best need not be a cause.",
+      "Check robot, units and commands of the config against the log.", Severity::kDoubt};
+}
+
+// The chosen effect that is to be dropped and why: trials that no fit saw are predicted no better
+// with it, or its best size is none or more than there can be.
+std::optional<std::pair<std::size_t, std::string>> DiagnosisRun::effect_to_drop() const {
+  const std::size_t before = as_logged_ ? 1 : 0;
+  for (std::size_t k = chosen_.size(); k-- > 0;) {
+    const std::size_t with = before + k + 1;
+    if (mean(nested_scores_[with]) > mean(nested_scores_[with - 1])) continue;
+    return std::pair{k, std::string(" seemed to explain some of it, too, but trials that the fit "
+                                    "did not see are predicted no better with it.")};
+  }
+  return std::nullopt;
+}
+
+std::optional<std::pair<std::size_t, std::string>> DiagnosisRun::effect_at_bound() const {
+  for (std::size_t k = chosen_.size(); k-- > 0;) {
+    for (const FittedParameter& fitted : estimates_->parameters) {
+      const Parameter& row = problem_.table()[fitted.row];
+      if (row.effect != chosen_[k].candidate.signature.effect) continue;
+      if (!at_bound(row, fitted.value)) continue;
+      return std::pair{
+          k, " explains some of it only at the edge of what it can be (" + row.key + " = " +
+                 problem_.table().format(fitted.row, rounded_to_digits(fitted.value, 4)) +
+                 "), so it is not the cause."};
+    }
+  }
+  return std::nullopt;
+}
+
+void DiagnosisRun::drop_effect(std::size_t k, const std::string& why) {
+  result_.diagnosis.cautions.push_back(chosen_[k].candidate.signature.effect + why);
+  chosen_.erase(chosen_.begin() + static_cast<std::ptrdiff_t>(k));
+  nested_.clear();
+  nested_studies_.clear();
+  nested_scores_.clear();
+  result_.fits.clear();
+}
+
+// Every effect of the catalogue has a row, also those that no mean shows.
+void DiagnosisRun::complete_screening() {
+  std::vector<Screened>& rows = result_.diagnosis.screening;
+  for (const Effect& effect : problem_.table().effects()) {
+    const std::string& name = effect.name;
+    const bool there =
+        std::any_of(rows.begin(), rows.end(), [&](const Screened& s) { return s.effect == name; });
+    if (there) continue;
+    Screened& row = rows.emplace_back();
+    row.effect = name;
+    row.note = doubted_ ? "not looked for: no effect is to be named" : why_not_screened(name, &row);
+  }
+}
+
+std::string DiagnosisRun::why_not_screened(const std::string& name, Screened* row) const {
+  if (left_out(name)) return "left out of the catalogue as asked";
+  if (predictor_.left_out().count(name)) return predictor_.left_out().at(name);
+  const auto told = [&](double gain, const char* key, double value, const std::string& note) {
+    row->gain = std::max(0.0, gain);
+    if (gain > 0) {
+      const std::size_t at = problem_.table().row(name + "." + key);
+      row->estimate =
+          std::string(key) + " " + problem_.table().format(at, rounded_to_digits(value, 4));
+    }
+    return note;
+  };
+  if (name == "friction_patch") return "no disc of floor promises enough to be simulated";
+  if (name == "slip_events") {
+    return told(slip_.gain, "probability", slip_.probability,
+                slip_.gain > 0 ? "by the tails of what is left"
+                               : "single drives do not stray as slips would make them");
+  }
+  if (name == "pose_latency") {
+    if (study_.gaps.size() < 20) return "too few resting poses were read twice";
+    return told(latency_.gain, "latency",
+                latency_from_rest_s_ > 0 ? latency_from_rest_s_ : latency_.latency_s,
+                latency_.gain > 0 ? "by readings that fall behind the next ones"
+                                  : "readings of one resting pose agree");
+  }
+  if (name == "pose_quantisation") {
+    return told(
+        study_.quantum_m > 0 ? pose_grid_gain() : 0, "step", study_.quantum_m,
+        study_.quantum_m > 0 ? "the positions lie on this grid" : "the positions lie on no grid");
+  }
+  if (name == "motor_lag" && lag_.trials > 0) {
+    return told(lag_.gain, "tau", lag_.tau_s, "by the logged paths");
+  }
+  return "cannot be seen in this log: one level and one duration make it another full speed";
+}
+
+// What is known so far, as a report.
+DiagnosisResult DiagnosisRun::give_up(const std::string& stage, const Error& error) {
+  Diagnosis& d = result_.diagnosis;
+  const bool base = study_.whitener.empty();
+  d.verdict = base ? Verdict::kUnusable : Verdict::kUnknown;
+  d.effects.clear();
+  d.sanity.insert(d.sanity.begin(),
+                  {base ? "base_not_simulated" : "unfinished",
+                   "While it was to " + stage + ": " + error.message + ".",
+                   base ? "Give the config values at which the robot moves and comes to rest."
+                        : "Bring [parameters] nearer to the robot; --leave-out NAME goes on "
+                          "without an effect.",
+                   base ? Severity::kUnusable : Severity::kDoubt});
+  d.trials.clear();
+  say_what_was_left_out();
+  d.headline = headline(d);
+  result_.tuned = problem_.values;
+  for (const auto& [row, value] : study_.base) result_.tuned[row] = value;
+  result_.final_ = result_.tuned;
+  result_.intervals.assign(problem_.values.size(), {1, 0});
+  result_.fits.clear();
+  return std::move(result_);
+}
+
+void DiagnosisRun::say_what_was_left_out() {
+  for (const auto& [what, why] : predictor_.left_out()) {
+    result_.diagnosis.cautions.push_back("Left out, since it cannot be simulated: " + what + " (" +
+                                         why + ").");
+  }
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,95 @@
+// Reading JSON field by field, with an error that names the place.
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace gapfarm {
+
+inline std::string dump_json(const nlohmann::ordered_json& json, int indent) {
+  return json.dump(indent, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+}
+
+// Reads fields of one object; the first thing that does not fit is kept as a sentence.
+class Fields {
+ public:
+  Fields(const nlohmann::ordered_json& json, std::string path, std::string& error)
+      : json_(json), path_(std::move(path)), error_(error) {
+    if (!json.is_object()) complain("", json, "an object");
+  }
+
+  template <class T>
+  void read(const char* key, T& field) {
+    if (!json_.is_object() || !json_.contains(key)) {
+      return fail(name(key) + " is missing; was this written by gapfarm diagnose?");
+    }
+    convert(key, json_[key], field);
+  }
+
+  // A field that an earlier version, or another program, may leave out.
+  template <class T>
+  void read_if_there(const char* key, T& field) {
+    if (json_.is_object() && json_.contains(key)) convert(key, json_[key], field);
+  }
+
+  // Calls each(item, path) for the list under `key`, when there is one.
+  template <class Each>
+  void for_each(const char* key, const Each& each) {
+    if (!json_.is_object() || !json_.contains(key)) return;
+    const nlohmann::ordered_json& list = json_[key];
+    if (!list.is_array() && !list.is_object()) return complain(key, list, "a list");
+    std::size_t index = 0;
+    for (const auto& [item_key, item] : list.items()) {
+      const std::string place =
+          list.is_array() ? "[" + std::to_string(index++) + "]" : "." + item_key;
+      each(item, name(key) + place, item_key);
+    }
+  }
+
+  std::string name(const std::string& key) const { return path_.empty() ? key : path_ + "." + key; }
+  void complain(const std::string& key, const nlohmann::ordered_json& found, const char* expected) {
+    fail(name(key) + " is " + dump_json(found, -1).substr(0, 60) + ", expected " + expected);
+  }
+  std::string& error() { return error_; }
+
+ private:
+  void convert(const char* key, const nlohmann::ordered_json& json, double& field) {
+    if (json.is_null()) {
+      field = std::numeric_limits<double>::quiet_NaN();
+    } else if (json.is_number()) {
+      field = json.get<double>();
+    } else {
+      complain(key, json, "a number");
+    }
+  }
+  void convert(const char* key, const nlohmann::ordered_json& json, std::optional<double>& field) {
+    convert(key, json, field.emplace());
+  }
+  void convert(const char* key, const nlohmann::ordered_json& json, std::uint64_t& field) {
+    if (!json.is_number_unsigned()) return complain(key, json, "a count");
+    field = json.get<std::uint64_t>();
+  }
+  void convert(const char* key, const nlohmann::ordered_json& json, std::string& field) {
+    if (!json.is_string()) return complain(key, json, "a text");
+    field = json.get<std::string>();
+  }
+  void convert(const char* key, const nlohmann::ordered_json& json,
+               std::vector<std::string>& field) {
+    if (!json.is_array()) return complain(key, json, "a list of texts");
+    field.clear();
+    for (const nlohmann::ordered_json& item : json) convert(key, item, field.emplace_back());
+  }
+  void fail(const std::string& sentence) {
+    if (error_.empty()) error_ = "diagnosis.json: " + sentence;
+  }
+
+  const nlohmann::ordered_json& json_;
+  std::string path_;
+  std::string& error_;
+};
+
+}  // namespace gapfarm

@@ -1,0 +1,34 @@
+// Derivatives of predictions that stay where the robot can be simulated.
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <vector>
+
+#include "common/base/result.h"
+#include "master/diagnose/predictor.h"
+
+namespace gapfarm {
+
+struct SlopeRequest {
+  std::size_t row = 0;
+  double step = 0;  // > 0, as long as there is room for it
+};
+
+// Change of every trial's end a unit of the parameter.
+using Slope = std::vector<Eigen::Vector3d>;
+
+// At `at`, whose ends are `ends`, in the axes of those.  One-sided: upward, or downward where the
+// bounds or the simulation end above, with a tenth of the step where neither can be simulated; none
+// where that cannot be either.  Errors: the farm's.
+Result<std::vector<std::optional<Slope>>> slopes_at(Predictor& predictor, const Overrides& at,
+                                                    const std::vector<Pose>& ends,
+                                                    const std::vector<SlopeRequest>& requests);
+
+// Between `up` and `down`, which lie `step` on either side of the middle; one of them alone is held
+// against the middle; none without both.
+std::optional<Slope> central_slope(const std::vector<Pose>& middle,
+                                   const std::optional<std::vector<Pose>>& up,
+                                   const std::optional<std::vector<Pose>>& down, double step);
+
+}  // namespace gapfarm

@@ -1,0 +1,33 @@
+// What is wrong with a log or with its fit to a config, as a person would doubt it.
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace gapfarm {
+
+enum class Severity {
+  kNote,      // worth knowing; a diagnosis goes on
+  kDoubt,     // nothing is named because of it
+  kUnusable,  // whatever a diagnosis said would be about this and not about the robot
+};
+
+struct SanityFinding {
+  std::string name;    // "unit_error", "axes_swapped", ...: docs/diagnosis.md lists them
+  std::string text;    // the evidence, one or two sentences with figures
+  std::string remedy;  // what to do, one sentence
+  Severity severity = Severity::kUnusable;
+  // Effects of the catalogue's kind: what a file or log has the wrong way round, rather than what
+  // it lacks.  Those that would explain the evidence as well stand in `or_else`.
+  bool names_an_effect = false;
+  std::vector<std::string> or_else = {};
+};
+
+inline bool any_unusable(const std::vector<SanityFinding>& findings) {
+  for (const SanityFinding& f : findings) {
+    if (f.severity == Severity::kUnusable) return true;
+  }
+  return false;
+}
+
+}  // namespace gapfarm

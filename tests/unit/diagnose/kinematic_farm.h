@@ -1,0 +1,104 @@
+// A farm that answers by plain kinematics, and fails where it is told to.
+#pragma once
+
+#include <cmath>
+#include <functional>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "common/problem/problem.h"
+#include "common/score/motion_model.h"
+#include "master/farm/farm.h"
+
+namespace gapfarm {
+
+class KinematicFarm : public Farm {
+ public:
+  using Fails = std::function<bool(const ParameterValues&)>;
+  explicit KinematicFarm(Fails fails = {}) : fails_(std::move(fails)) {}
+
+  std::string add_problem(const v1::Problem& problem) override {
+    const std::string hash = problem_hash(problem);
+    problems_[hash] = from_proto(problem).value();
+    return hash;
+  }
+
+  Result<std::vector<v1::TaskResult>> run(
+      const std::string& hash, const std::vector<v1::Task>& tasks,
+      const std::function<void(const FarmProgress&)>& = {}) override {
+    std::vector<v1::TaskResult> results;
+    for (const v1::Task& task : tasks)
+      results.push_back(answer(problems_.at(hash), task.predict()));
+    asked += tasks.size();
+    return results;
+  }
+
+  std::vector<WorkerStatus> workers() const override { return {}; }
+  std::uint64_t retries() const override { return 0; }
+
+  std::size_t asked = 0;
+
+ private:
+  v1::TaskResult answer(const Problem& problem, const v1::PredictTask& task) const {
+    v1::TaskResult result;
+    ParameterValues values = problem.values;
+    for (const v1::Override& o : task.point().overrides()) values[o.parameter()] = o.value();
+    if (fails_ && fails_(values)) {
+      result.set_outcome(v1::NEVER_RESTED);
+      return result;
+    }
+    result.set_outcome(v1::OK);
+    result.mutable_predict();
+    std::vector<std::uint32_t> wanted(task.trials().begin(), task.trials().end());
+    for (std::uint32_t i = 0; wanted.empty() && i < problem.log.trials.size(); ++i) {
+      add(problem, values, i, result.mutable_predict());
+    }
+    for (std::uint32_t i : wanted) add(problem, values, i, result.mutable_predict());
+    return result;
+  }
+
+  static void add(const Problem& problem, const ParameterValues& values, std::uint32_t i,
+                  v1::PredictResult* to) {
+    const Trial& trial = problem.log.trials[i];
+    const CommandSpec c = resolved_command(trial, problem.commands);
+    const double speed = values[row_of(Srv1::kFullSpeed)];
+    const double width = values[row_of(Srv1::kTrackGauge)] + values[row_of(Srv1::kContactLength)];
+    v1::Predicted* predicted = to->add_predictions();
+    predicted->set_trial(i);
+    const Twist way(speed * (c.left + c.right) / 2 * c.duration_s, 0,
+                    speed * (c.right - c.left) / width * c.duration_s);
+    *predicted->mutable_end() = to_proto(trial.X_WS * exp(way));
+  }
+
+  Fails fails_;
+  std::map<std::string, Problem> problems_;
+};
+
+// A log that this farm's robot drives at the problem's own values.
+inline Problem kinematic_log(std::size_t count) {
+  Problem problem;
+  problem.values = problem.table().nominal();
+  problem.commands = default_commands("srv1");
+  for (std::size_t i = 0; i < count; ++i) {
+    Trial t;
+    t.session = "s";
+    t.trial = static_cast<std::int64_t>(i);
+    t.command = problem.commands[i % problem.commands.size()].name;
+    t.duration_s = 0.5 + 0.5 * static_cast<double>(i % 3);
+    const double angle = 2.4 * static_cast<double>(i);
+    t.X_WS = {std::cos(angle), std::sin(angle), wrap_angle(1.7 * angle)};
+    problem.log.trials.push_back(t);
+  }
+  for (Trial& t : problem.log.trials) {
+    const CommandSpec c = resolved_command(t, problem.commands);
+    const double speed = problem.values[row_of(Srv1::kFullSpeed)];
+    const double width =
+        problem.values[row_of(Srv1::kTrackGauge)] + problem.values[row_of(Srv1::kContactLength)];
+    t.X_WE = t.X_WS * exp({speed * (c.left + c.right) / 2 * c.duration_s, 0,
+                           speed * (c.right - c.left) / width * c.duration_s});
+  }
+  return problem;
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,238 @@
+// Doubts about logs of drives that were drawn from plain kinematics and then spoiled in one way.
+#include "master/sanity/sanity.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <numbers>
+
+#include "common/random/stream.h"
+#include "master/sanity/words.h"
+
+namespace gapfarm {
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+
+struct Robot {
+  double speed_m_s = 0.25;
+  double turn_rad_s = 1.5;  // for a difference of one full duty
+};
+
+Pose driven(const Robot& robot, const CommandSpec& c) {
+  const double way = robot.speed_m_s * (c.left + c.right) / 2 * c.duration_s;
+  const double turn = robot.turn_rad_s * (c.right - c.left) * c.duration_s;
+  return exp({way, 0, turn});
+}
+
+// All six commands at three levels and durations, from anywhere in an arena of 2 m.
+Problem drawn_drives(std::size_t count, const Robot& robot = {}, std::uint64_t seed = 1) {
+  Problem problem;
+  problem.values = problem.table().nominal();
+  problem.commands = default_commands("srv1");
+  Stream stream({.run_seed = seed});
+  for (std::size_t i = 0; i < count; ++i) {
+    const CommandSpec& own = problem.commands[stream.below(problem.commands.size())];
+    const double level = 0.5 + 0.25 * static_cast<double>(stream.below(3));
+    Trial t;
+    t.session = "s" + std::to_string(1 + i * 2 / count);
+    t.trial = static_cast<std::int64_t>(i);
+    t.t_s = 5.0 * static_cast<double>(i);
+    t.command = own.name;
+    t.left = level * own.left;
+    t.right = level * own.right;
+    t.duration_s = 0.5 * static_cast<double>(1 + stream.below(3));
+    t.X_WS = {2 * stream.uniform(), 2 * stream.uniform(), kPi * (2 * stream.uniform() - 1)};
+    const Pose noise{0.002 * stream.normal(), 0.002 * stream.normal(), 0.01 * stream.normal()};
+    t.X_WE = t.X_WS * driven(robot, {"", *t.left, *t.right, *t.duration_s}) * noise;
+    problem.log.trials.push_back(t);
+  }
+  return problem;
+}
+
+// Changes every logged pose.
+Problem spoiled(Problem problem, const std::function<Pose(const Pose&)>& change) {
+  for (Trial& t : problem.log.trials) {
+    for (Pose* X : {&t.X_WS, &t.X_WE}) {
+      *X = change(*X);
+      X->theta = wrap_angle(X->theta);
+    }
+  }
+  return problem;
+}
+
+std::string first_name(const Problem& problem) {
+  const auto findings = check_sanity(problem);
+  return findings.empty() ? "" : findings.front().name;
+}
+
+TEST(Sanity, HasNoDoubtsAboutASoundLog) {
+  for (std::uint64_t seed : {1, 2, 3}) EXPECT_EQ(first_name(drawn_drives(200, {}, seed)), "");
+}
+
+TEST(Sanity, IsTheSameWhereverTheLogLiesAndHoweverItIsTurned) {
+  const Problem log = drawn_drives(200);
+  EXPECT_EQ(first_name(spoiled(log,
+                               [](const Pose& X) {
+                                 return Pose{X.x + 5000, X.y - 3000, X.theta};
+                               })),
+            "");
+  EXPECT_EQ(first_name(spoiled(log, [](const Pose& X) { return Pose{0, 0, 2.1} * X; })), "");
+}
+
+TEST(Sanity, NamesWhatIsTheWrongWayRound) {
+  const struct {
+    const char* name;
+    std::function<Pose(const Pose&)> change;
+  } cases[] = {
+      {"axis_mirrored",
+       [](const Pose& X) {
+         return Pose{X.x, -X.y, X.theta};
+       }},
+      {"axis_mirrored",
+       [](const Pose& X) {
+         return Pose{-X.x, X.y, X.theta};
+       }},
+      {"axes_swapped",
+       [](const Pose& X) {
+         return Pose{X.y, X.x, X.theta};
+       }},
+      {"heading_flipped",
+       [](const Pose& X) {
+         return Pose{X.x, X.y, -X.theta};
+       }},
+      {"heading_flipped",
+       [](const Pose& X) {
+         return Pose{X.x, X.y, kPi / 2 - X.theta};
+       }},
+      {"heading_turned",
+       [](const Pose& X) {
+         return Pose{X.x, X.y, X.theta + kPi};
+       }},
+      {"heading_turned",
+       [](const Pose& X) {
+         return Pose{X.x, X.y, X.theta - kPi / 2};
+       }},
+      {"sides_swapped",
+       [](const Pose& X) {
+         return Pose{X.x, -X.y, -X.theta};
+       }},
+      {"unit_error",
+       [](const Pose& X) {
+         return Pose{100 * X.x, 100 * X.y, X.theta};
+       }},
+      {"unit_error",
+       [](const Pose& X) {
+         return Pose{1000 * X.x, 1000 * X.y, X.theta};
+       }},
+      {"unit_error",
+       [](const Pose& X) {
+         return Pose{X.x, X.y, X.theta * kPi / 180};
+       }},
+  };
+  for (std::uint64_t seed : {4, 5}) {
+    for (const auto& c : cases) {
+      EXPECT_EQ(first_name(spoiled(drawn_drives(150, {}, seed), c.change)), c.name);
+    }
+  }
+}
+
+TEST(Sanity, SaysWhichUnitAndWhichAxis) {
+  const Problem log = drawn_drives(150);
+  const auto text_of = [](const Problem& problem) {
+    const SanityFinding f = check_sanity(problem).front();
+    return f.text + " " + f.remedy;
+  };
+  const std::string cm = text_of(spoiled(log, [](const Pose& X) {
+    return Pose{100 * X.x, 100 * X.y, X.theta};
+  }));
+  EXPECT_NE(cm.find("centimetres"), std::string::npos) << cm;
+  const std::string x = text_of(spoiled(log, [](const Pose& X) {
+    return Pose{-X.x, X.y, X.theta};
+  }));
+  EXPECT_NE(x.find("sign of x0 and x1"), std::string::npos) << x;
+}
+
+TEST(Sanity, SwappedCommandsAreSwappedSides) {
+  Problem log = drawn_drives(150);
+  for (Trial& t : log.log.trials) std::swap(t.left, t.right);
+  EXPECT_EQ(first_name(log), "sides_swapped");
+}
+
+// Wild rows, a lens, an asymmetric motor: a diagnosis's business.
+TEST(Sanity, HasNoDoubtsAboutWhatTheCatalogueExplains) {
+  Problem log = drawn_drives(300);
+  for (std::size_t i = 0; i < 300; i += 100) log.log.trials[i].X_WE.theta = 1;
+  EXPECT_EQ(first_name(log), "");
+  EXPECT_EQ(first_name(spoiled(log,
+                               [](const Pose& X) {
+                                 return Pose{X.x, 1.2 * X.y, X.theta};
+                               })),
+            "");
+  EXPECT_EQ(first_name(spoiled(log,
+                               [](const Pose& X) {
+                                 return Pose{X.x, X.y, X.theta + 0.2};
+                               })),
+            "");
+}
+
+TEST(Sanity, SetsAsideAFewImpossibleRows) {
+  Problem log = drawn_drives(300);
+  log.log.trials[7].X_WE.x += 40;
+  log.log.trials[211].X_WE.y -= 3;
+  EXPECT_EQ(impossible_trials(log), (std::vector<std::size_t>{7, 211}));
+  const auto findings = check_sanity(log);
+  ASSERT_EQ(findings.size(), 1u);
+  EXPECT_EQ(findings[0].name, "impossible_rows");
+  EXPECT_FALSE(any_unusable(findings));
+}
+
+TEST(Sanity, DoubtsWhatCannotSayAnything) {
+  EXPECT_EQ(first_name(drawn_drives(39)), "too_few_trials");
+  EXPECT_EQ(first_name(drawn_drives(1)), "too_few_trials");
+  EXPECT_EQ(first_name(drawn_drives(40)), "");
+  const Problem still = spoiled(drawn_drives(100), [](const Pose&) { return Pose{1, 1, 0.3}; });
+  EXPECT_EQ(first_name(still), "no_motion");
+  Problem idle = drawn_drives(100);
+  for (Trial& t : idle.log.trials) t.left = t.right = 0.0;
+  EXPECT_EQ(first_name(idle), "no_motion");
+}
+
+TEST(Sanity, DoubtsCopiesAndClocksThatRunBackward) {
+  Problem log = drawn_drives(100);
+  Problem twice = log;
+  for (Trial t : log.log.trials) {
+    t.session += "b";
+    twice.log.trials.push_back(t);
+  }
+  EXPECT_EQ(first_name(twice), "duplicates");
+  for (Trial& t : log.log.trials) t.t_s = 1000 - *t.t_s;
+  EXPECT_EQ(first_name(log), "clock_backward");
+}
+
+TEST(Sanity, ARobotThatTurnsFasterThanItsSidesAllowIsAnotherOne) {
+  EXPECT_EQ(first_name(drawn_drives(150, {0.19, 2.5})), "robot_out_of_bounds");
+  EXPECT_EQ(first_name(drawn_drives(150, {1.5, 2.5})), "robot_out_of_bounds");
+}
+
+// One angle of turn only: 200 degrees one way may be 160 the other.
+TEST(Sanity, DoesNotGuessWhichWayALongTurnWent) {
+  Problem log = drawn_drives(200, {0.25, 5});
+  std::erase_if(log.log.trials, [](const Trial& t) { return t.command.rfind("turn", 0) != 0; });
+  for (Trial& t : log.log.trials) {
+    const double sign = *t.right > 0 ? 1 : -1;
+    t.left = -0.35 * sign, t.right = 0.35 * sign, t.duration_s = 1.0;
+    t.X_WE = t.X_WS * driven({0.25, 5}, {"", *t.left, *t.right, 1});
+  }
+  EXPECT_EQ(first_name(log), "");
+}
+
+TEST(Sanity, EveryFindingHasAPhrase) {
+  for (const char* name : {"axes_swapped", "unit_error", "too_few_trials", "base_on_bounds"}) {
+    EXPECT_NE(finding_phrase({name, "", ""}), name);
+  }
+}
+
+}  // namespace
+}  // namespace gapfarm
