@@ -43,6 +43,7 @@ struct Arguments {
   double lifetime_s = 0;
   ProcessLimits limits;
   bool local = false;
+  bool announce = false;
   int parent = 0;
   std::string replaces;
   std::string replaced_end = "left";
@@ -87,6 +88,7 @@ void describe(CLI::App& app, Arguments* arguments) {
       ->type_name("SECONDS");
   // For the processes that start this one; no user needs them.
   app.add_flag("--local", arguments->local)->group("");
+  app.add_flag("--announce", arguments->announce)->group("");
   app.add_option("--parent", arguments->parent)->group("");
   app.add_option("--replaces", arguments->replaces)->group("");
   app.add_option("--replaced-end", arguments->replaced_end)
@@ -142,6 +144,7 @@ int work(const Arguments& arguments) {
     options.session.deadline_s = monotonic_seconds() + arguments.lifetime_s;
   }
   options.drain = arguments.drain;
+  options.announce = arguments.announce;
   const auto page = ProgressPage::inherit();
   if (!page) return complain(page.error(), 1);
   options.progress = &**page;

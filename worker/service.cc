@@ -10,6 +10,7 @@
 
 #include "common/net/socket.h"
 #include "common/process/process_pool.h"
+#include "worker/master_wait.h"
 #include "worker/pump.h"
 
 namespace gapfarm {
@@ -26,7 +27,8 @@ class Service {
         session_(options.session),
         socket_(socket),
         evaluation_(evaluation),
-        stop_(stop) {}
+        stop_(stop),
+        wait_(options.endpoint) {}
 
   Result<ServiceEnd> run() {
     for (;;) {
@@ -36,6 +38,7 @@ class Service {
       notice_trouble();
       const bool received = pump_in(socket_, session_, now);
       hand_over(now);
+      announce(now);
       pump_out(socket_, session_);
       if (session_.state() == WorkerSession::State::kRefused) return Error{session_.reason()};
       if (session_.state() == WorkerSession::State::kDismissed) {
@@ -67,6 +70,14 @@ class Service {
     const std::string trouble = socket_.take_trouble();
     if (!trouble.empty()) {
       std::fprintf(stderr, "gapfarm-worker: %s; trying again\n", trouble.c_str());
+    }
+  }
+
+  void announce(double now) {
+    if (!options_.announce) return;
+    const bool working = session_.state() == WorkerSession::State::kWorking;
+    if (const auto words = wait_.say(working, now)) {
+      std::fprintf(stderr, "gapfarm-worker: %s\n", words->c_str());
     }
   }
 
@@ -111,6 +122,7 @@ class Service {
   DealerSocket& socket_;
   EvaluationThread& evaluation_;
   StopSource& stop_;
+  MasterWait wait_;
 };
 
 }  // namespace

@@ -20,6 +20,8 @@ struct ServiceOptions {
   bool local = false;
   // A stop request finishes all jobs in hand instead of the one in work.
   bool drain = false;
+  // Says on stderr that it waits for a master, and for which; one of a supervisor's workers does.
+  bool announce = false;
   WorkerProgress* progress = nullptr;  // shows that this thread answers; may be null
 };
 

@@ -35,11 +35,13 @@ ProcessPoolOptions pool_options(const SupervisorOptions& options) {
   pool.name_prefix = options.name;
   pool.failure_limit = {};
   pool.limits = options.limits;
-  pool.arguments = [arguments = options.arguments, parent = std::to_string(getpid()),
-                    deadline = options.deadline_s](const std::string& name,
-                                                   const ProcessEnded* replaced) {
+  pool.arguments = [arguments = options.arguments, prefix = options.name,
+                    parent = std::to_string(getpid()), deadline = options.deadline_s](
+                       const std::string& name, const ProcessEnded* replaced) {
     std::vector<std::string> all = arguments;
     all.insert(all.end(), {"--name", name, "--parent", parent});
+    // One speaks for all: the first place's.
+    if (name.rfind(prefix + "-1.", 0) == 0) all.push_back("--announce");
     if (replaced != nullptr) {
       all.insert(all.end(), {"--replaces", replaced->name, "--replaced-end", word(replaced->cause),
                              "--replaced-epoch", std::to_string(replaced->epoch),

@@ -2,6 +2,8 @@
 
 #include <spdlog/logger.h>
 #include <spdlog/pattern_formatter.h>
+#include <spdlog/sinks/null_sink.h>
+#include <spdlog/sinks/rotating_file_sink.h>
 #include <spdlog/sinks/stdout_sinks.h>
 
 #include <algorithm>
@@ -63,15 +65,29 @@ std::unique_ptr<spdlog::formatter> formatter_of(const LogOptions& options) {
 }  // namespace
 
 struct Log::Impl {
-  explicit Impl(const std::string& program)
-      : logger(program, std::make_shared<spdlog::sinks::stderr_sink_mt>()) {}
+  Impl(const std::string& program, spdlog::sink_ptr sink) : logger(program, std::move(sink)) {}
   spdlog::logger logger;
   std::mutex mutex;
   std::vector<LogField> context;
+  Log* copy = nullptr;
 };
 
-Log::Log(const LogOptions& options)
-    : impl_(std::make_unique<Impl>(options.program)), format_(options.format) {
+Log::Log(const LogOptions& options) : format_(options.format) {
+  spdlog::sink_ptr sink;
+  if (options.file.empty()) {
+    sink = std::make_shared<spdlog::sinks::stderr_sink_mt>();
+  } else {
+    try {
+      sink = std::make_shared<spdlog::sinks::rotating_file_sink_mt>(options.file,
+                                                                    options.file_bytes, 1);
+    } catch (const std::exception& e) {
+      trouble_ = e.what();
+      sink = std::make_shared<spdlog::sinks::null_sink_mt>();
+    }
+  }
+  impl_ = std::make_unique<Impl>(options.program, std::move(sink));
+  // A full disk is no reason to stop, nor to repeat it for every line.
+  if (!options.file.empty()) impl_->logger.set_error_handler([](const std::string&) {});
   impl_->logger.set_formatter(formatter_of(options));
   impl_->logger.set_level(spdlog_level(options.level));
   impl_->logger.flush_on(spdlog::level::trace);
@@ -92,7 +108,18 @@ void Log::set(LogField field) {
   }
 }
 
+void Log::copy_to(Log* other) {
+  const std::lock_guard lock(impl_->mutex);
+  impl_->copy = other;
+}
+
 void Log::write(LogLevel level, std::string_view text, const std::vector<LogField>& fields) {
+  Log* copy = nullptr;
+  {
+    const std::lock_guard lock(impl_->mutex);
+    copy = impl_->copy;
+  }
+  if (copy != nullptr) copy->write(level, text, fields);
   if (!wants(level)) return;
   const bool json = format_ == LogFormat::kJson;
   std::string line = json ? "\"text\":" + json_of(nlohmann::json(text)) : one_line(text);

@@ -35,12 +35,20 @@ std::string key_path_of(const BlindCheckSettings& settings) {
   return settings.key_path.empty() ? settings.out + ".key" : settings.key_path;
 }
 
+// Whether the folder holds this very check, stopped.
+bool goes_on(const BlindCheckSettings& settings, const CheckPaths& paths) {
+  if (settings.asked.empty() || !fs::exists(paths.state())) return false;
+  const Result<CheckState> state = read_check_state(paths.state());
+  return state && state->asked == settings.asked && !fs::exists(paths.result());
+}
+
 // A folder to start in: new, empty, or one whose making was cut short.
 Status check_fresh(const CheckPaths& paths) {
   if (!fs::exists(paths.state())) return {};
-  return Error{paths.out +
-               ": holds a blind check already; give --resume to go on with it, or "
-               "another --out"};
+  return Error{
+      paths.out +
+      ": holds another blind check, or a finished one; give --resume to go on with it as it "
+      "was asked, or another --out"};
 }
 
 Status make_out(const std::string& out) {
@@ -85,7 +93,7 @@ Result<InHand> make_cases(const Config& config, const BlindCheckSettings& settin
     return s.error();
   }
   // Last: from here on the check can be resumed.
-  const CheckState state{content_hash(config.text), design->out_of_reach};
+  const CheckState state{content_hash(config.text), design->out_of_reach, settings.asked};
   if (Status s = write_check_state(state, paths.state()); !s) return s.error();
   return hand;
 }
@@ -186,8 +194,7 @@ ScoredCase scored(const Truth& truth, const CheckPaths& paths) {
 }
 
 Status write_report(const BlindReport& report, const CheckPaths& paths) {
-  if (Status s = write_file_atomically(paths.out + "/blind_check.json", format_blind_json(report));
-      !s) {
+  if (Status s = write_file_atomically(paths.result(), format_blind_json(report)); !s) {
     return s;
   }
   return write_file_atomically(paths.out + "/blind_check.md", format_blind_markdown(report));
@@ -210,7 +217,7 @@ Status diagnose_blindly(const InHand& hand, const std::vector<Truth>& truths,
   if (Status s = write_private_file(key_path, hand.key.text()); !s) return s;
   if (hooks.note)
     hooks.note("stopped; the key of the truths is in " + key_path +
-               ", and --resume goes on from here");
+               ", and the same command goes on from here");
   return diagnosed;
 }
 
@@ -234,13 +241,17 @@ Result<Problem> planned_problem(const Config& config, const SessionPlans& plan, 
 Result<BlindReport> run_blind_check(const Config& config, const BlindCheckSettings& settings,
                                     const BlindCheckHooks& hooks) {
   const CheckPaths paths{settings.out};
-  const Result<InHand> hand = settings.resume ? take_up(config, settings, paths)
-                                              : make_cases(config, settings, hooks, paths);
+  const Result<InHand> hand = settings.resume || goes_on(settings, paths)
+                                  ? take_up(config, settings, paths)
+                                  : make_cases(config, settings, hooks, paths);
   if (!hand) return hand.error();
   const auto truths = truths_of(*hand);
   if (!truths) return truths.error();
   if (hooks.note) {
     hooks.note(std::to_string(truths->size()) + " cases sealed, see " + paths.seals());
+  }
+  if (hooks.on_sealed) {
+    if (Status s = hooks.on_sealed(); !s) return s.error();
   }
   if (Status s = diagnose_blindly(*hand, *truths, settings, hooks, paths); !s) return s.error();
   if (Status s = open_truths(*hand, settings, paths); !s) return s.error();
@@ -267,9 +278,10 @@ Result<BlindReport> run_foreign_check(const std::string& cases, const std::strin
   std::sort(open.begin(), open.end(),
             [](const OpenCase& a, const OpenCase& b) { return a.id < b.id; });
   const std::string made_of = fs::weakly_canonical(cases, code).string();
-  if (!settings.resume) {
+  if (!settings.resume && !goes_on(settings, paths)) {
     if (Status s = check_fresh(paths); !s) return s.error();
-    if (Status s = write_check_state({made_of, {}}, paths.state()); !s) return s.error();
+    if (Status s = write_check_state({made_of, {}, settings.asked}, paths.state()); !s)
+      return s.error();
   } else {
     const Result<CheckState> state = read_check_state(paths.state());
     if (!state) return state.error();

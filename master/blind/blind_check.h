@@ -4,7 +4,7 @@
 //   seals.txt             a seal a case, published before the first diagnosis
 //   truths.box            truths and salts, sealed up until all cases are diagnosed
 //   cases/ID/trials.csv   all that a diagnosis is given, beside the config
-//   diagnoses/ID/         what it answered, log.txt, and outcome.json once it has ended
+//   diagnoses/ID/         what it answered, output.txt, and outcome.json once it has ended
 //   truth/ID.json, truth/salts.txt, truth.key    when opened
 //   blind_check.json, blind_check.md             the result
 //
@@ -34,6 +34,9 @@ struct BlindCheckHooks {
                      double elapsed_s)>
       progress;
   std::function<void(const std::string& sentence)> note;
+  // Before the first diagnosis, with the truths sealed: whatever else would tell them has to go.
+  // May be empty.
+  std::function<Status()> on_sealed;
   StopSource* stop = nullptr;  // not owned
 };
 
@@ -54,12 +57,14 @@ struct BlindCheckSettings {
   DiagnoseSettings diagnose;
   std::string out;
   std::string key_path;  // empty: `out` + ".key", written only when the check is stopped
-  bool resume = false;
+  bool resume = false;   // also a check that is opened, or whose `asked` is another
+  // What the check is asked, in any words; one that was stopped goes on when it is asked the same.
+  std::string asked;
   SessionPlans plan;  // of every case; empty: each draws its own as the config says
   std::vector<std::pair<std::string, std::string>> provenance;  // for the report
 };
 
-// Errors: `out` holds another check, or one to resume without `resume`; seals that do not match; a
+// Errors: `out` holds another check, or a finished one without `resume`; seals that do not match; a
 // lost key; kStopRequested, when everything is in place to resume; the farm's and the file
 // system's own.
 Result<BlindReport> run_blind_check(const Config& config, const BlindCheckSettings& settings,

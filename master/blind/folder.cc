@@ -44,11 +44,15 @@ Status write_outcome(const ChildEnd& end, const std::string& path) {
   return write_file_atomically(path, json.dump(1) + "\n");
 }
 
-// An empty folder: a diagnosis that was cut short starts anew.
+// A diagnosis that was cut short goes on with what it simulated; nothing else of it stays.
 Status make_empty(const std::string& folder) {
   std::error_code code;
-  std::filesystem::remove_all(folder, code);
   std::filesystem::create_directories(folder, code);
+  std::vector<std::filesystem::path> others;
+  for (const auto& entry : std::filesystem::directory_iterator(folder, code)) {
+    if (entry.path().filename() != "simulations.sqlite") others.push_back(entry.path());
+  }
+  for (const std::filesystem::path& other : others) std::filesystem::remove_all(other, code);
   if (code) return Error{folder + ": cannot be made: " + code.message()};
   return {};
 }
@@ -60,7 +64,10 @@ Status write_check_state(const CheckState& state, const std::string& path) {
   for (const OutOfReach& o : state.out_of_reach) {
     out_of_reach.push_back({{"effect", o.effect}, {"level", o.level}, {"size", o.size}});
   }
-  const Json json = {{"version", 1}, {"made_of", state.made_of}, {"out_of_reach", out_of_reach}};
+  const Json json = {{"version", 1},
+                     {"made_of", state.made_of},
+                     {"asked", state.asked},
+                     {"out_of_reach", out_of_reach}};
   return write_file_atomically(path, json.dump(1) + "\n");
 }
 
@@ -73,6 +80,9 @@ Result<CheckState> read_check_state(const std::string& path) {
   }
   CheckState state;
   state.made_of = json["made_of"].get<std::string>();
+  if (json.contains("asked") && json["asked"].is_string()) {
+    state.asked = json["asked"].get<std::string>();
+  }
   const Json out_of_reach = json.value("out_of_reach", Json::array());
   for (const Json& o : out_of_reach) {
     state.out_of_reach.push_back(
@@ -89,7 +99,7 @@ Status diagnose_cases(const std::vector<OpenCase>& cases, const CheckPaths& path
     if (std::filesystem::exists(paths.outcome(id))) continue;
     if (Status s = make_empty(paths.diagnosis(id)); !s) return s;
     jobs.push_back(
-        {id, diagnose_command(cases[i], i + 1, paths, settings), paths.diagnosis(id) + "/log.txt"});
+        {id, diagnose_command(cases[i], i + 1, paths, settings), paths.diagnosis(id) + "/output.txt"});
   }
   if (jobs.size() < cases.size() && hooks.note) {
     hooks.note(std::to_string(cases.size() - jobs.size()) + " cases are diagnosed already");

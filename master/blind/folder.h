@@ -21,6 +21,7 @@ struct CheckPaths {
   std::string diagnosis(const std::string& id) const { return out + "/diagnoses/" + id; }
   std::string outcome(const std::string& id) const { return diagnosis(id) + "/outcome.json"; }
   std::string truth(const std::string& id) const { return out + "/truth/" + id + ".json"; }
+  std::string result() const { return out + "/blind_check.json"; }
   std::string salts() const { return out + "/truth/salts.txt"; }
 };
 
@@ -28,6 +29,7 @@ struct CheckPaths {
 struct CheckState {
   std::string made_of;  // hash of the config's text, or the folder of foreign cases
   std::vector<OutOfReach> out_of_reach;
+  std::string asked;  // BlindCheckSettings::asked
 };
 Status write_check_state(const CheckState& state, const std::string& path);
 Result<CheckState> read_check_state(const std::string& path);

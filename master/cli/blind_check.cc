@@ -7,11 +7,13 @@
 #include <thread>
 
 #include "common/base/build_info.h"
+#include "common/base/hash.h"
 #include "common/config/config.h"
 #include "common/process/process_pool.h"
 #include "common/trials/files.h"
 #include "common/trials/read.h"
 #include "master/cli/inputs.h"
+#include "master/cli/long_command.h"
 #include "master/cli/outputs.h"
 #include "master/experiment/plan.h"
 
@@ -88,39 +90,54 @@ DiagnoseSettings diagnose_of(const BlindCheckOptions& options) {
   return diagnose;
 }
 
-Result<std::unique_ptr<SocketFarm>> start(const BlindCheckOptions& options, const Config& config,
-                                          CliContext& context) {
+// Diagnoses take by far the most.
+std::vector<ProgressStage> stages() {
+  return {{"find strengths", 4}, {"drive the cases", 1}, {"diagnose", 94}, {"judge", 1}};
+}
+
+// What is being done, in the words of the check, as a stage of the whole.
+std::size_t stage_of(const std::string& what, std::size_t now) {
+  if (what == "strengths") return 0;
+  if (what == "sessions simulated") return now >= 2 ? 3 : 1;
+  return what == "cases diagnosed" ? 2 : 3;
+}
+
+Result<std::unique_ptr<Farm>> start(const BlindCheckOptions& options, const Config& config,
+                                    CliContext& context) {
   // Cases are made and scored while no diagnosis runs: with all the workers together.
   FarmOptions farm;
   const DiagnoseSettings diagnose = diagnose_of(options);
   farm.workers = static_cast<int>(diagnose.workers * diagnose.jobs);
-  return start_farm(farm, config.farm, context);
+  auto started = start_farm(farm, config.farm, context);
+  if (!started) return started.error();
+  if (!context.work->begun()) context.work->stage(0);
+  return context.work->over(*std::move(started));
 }
 
 BlindCheckHooks hooks_of(const BlindCheckOptions& options, const Config& config,
                          CliContext& context) {
   BlindCheckHooks hooks;
   hooks.stop = &context.stop;
-  hooks.start_farm = [&options, &config, &context]() -> Result<std::unique_ptr<Farm>> {
-    auto farm = start(options, config, context);
-    if (!farm) return farm.error();
-    return std::unique_ptr<Farm>(std::move(*farm));
-  };
+  hooks.start_farm = [&options, &config, &context] { return start(options, config, context); };
   hooks.note = [&context](const std::string& sentence) { context.console.note(sentence); };
-  hooks.progress = [&context](const std::string& what, std::size_t done, std::size_t total,
-                              double elapsed_s) {
-    const double rate = elapsed_s > 0 ? static_cast<double>(done) / elapsed_s : 0;
-    std::optional<double> left_s;
-    if (done > 0)
-      left_s = elapsed_s * static_cast<double>(total - done) / static_cast<double>(done);
-    context.console.progress(progress_text(
-        what + " " + std::to_string(done) + " of " + std::to_string(total), rate, left_s));
+  hooks.progress = [&context, stage = std::size_t{0}](const std::string& what, std::size_t done,
+                                                      std::size_t total,
+                                                      double /*elapsed_s*/) mutable {
+    const std::size_t k = stage_of(what, stage);
+    if (k != stage) context.work->stage(k);
+    stage = k;
+    context.work->advance(done, total);
+  };
+  hooks.on_sealed = [&context] {
+    return context.work->keeps() ? context.work->answers().forget() : Status();
   };
   return hooks;
 }
 
 int dry_run(const BlindCheckOptions& options, const Config& config, const SessionPlans& plan,
             DesignSettings design, CliContext& context) {
+  LongCommand::begin_if_possible("blind-check", KeepOption{}.place("blind-check", ""),
+                                 {{"find strengths"}}, context);
   const auto farm = start(options, config, context);
   if (!farm) return failed(farm.error(), context);
   const auto planned = planned_problem(config, plan, config.seed, **farm);
@@ -153,17 +170,30 @@ int dry_run(const BlindCheckOptions& options, const Config& config, const Sessio
 
 int finish(const Result<BlindReport>& report, const BlindCheckOptions& options,
            CliContext& context) {
-  if (!report) {
-    if (context.stop.requested() && report.error().message == kStopRequested) {
-      context.console.clear_progress();
-      return kExitResumable;
-    }
-    return failed(report.error(), context);
-  }
+  if (!report) return failed(report.error(), context);
   context.console.print(context.console.json() ? format_blind_json(*report)
                                                : format_blind_summary(*report));
   context.console.note("tables: " + options.out + "/blind_check.md");
   return kExitDone;
+}
+
+// All that makes the cases and what is asked of them; not how many workers do it.
+std::string asked(const BlindCheckOptions& options, const std::string& config_text) {
+  std::string text = config_text;
+  const auto add = [&](const std::string& word) { text += '\0' + word; };
+  for (const std::string& word : {options.foreign, options.truth, options.like, options.model}) {
+    add(word);
+  }
+  for (const auto* words : {&options.effects, &options.sizes}) {
+    for (const std::string& word : *words) add(word);
+    add("");
+  }
+  for (const unsigned n : {options.nulls, options.pairs, options.left_out, options.per_effect,
+                           options.trials.value_or(0)}) {
+    add(std::to_string(n));
+  }
+  add(options.seed ? std::to_string(*options.seed) : "");
+  return content_hash(text);
 }
 
 int run_blind(const BlindCheckOptions& options, CliContext& context) {
@@ -194,6 +224,11 @@ int run_blind(const BlindCheckOptions& options, CliContext& context) {
       {"command", command_line()},
       {"program", "gapfarm " + build_info().version + ", build " + build_info().fingerprint},
       {"seed", std::to_string(config->seed)}};
+  settings.asked = asked(options, config->text);
+  const KeepingPlace place{options.out, /*passing=*/false, /*forget=*/true};
+  if (Status s = LongCommand::begin("blind-check", place, stages(), context); !s) {
+    return failed(s.error(), context);
+  }
   const BlindCheckHooks hooks = hooks_of(options, *config, context);
   return finish(options.foreign.empty()
                     ? run_blind_check(*config, settings, hooks)
@@ -237,9 +272,13 @@ SubcommandRun setup_blind_check(CLI::App& app) {
   app.add_option("--key", options->key,
                  "Keep the truths' key in this file, outside the folder, so that even a killed "
                  "check can be resumed (default: OUT.key, written when stopped)");
-  app.add_flag("--resume", options->resume, "Go on with the check in the folder");
+  app.add_flag(
+      "--resume", options->resume,
+      "Go on with the check in the folder as it was asked, whatever is asked now, or judge "
+      "a finished one again; the same command goes on by itself");
   app.add_flag("--dry-run", options->dry_run,
                "Only say which strengths would be needed for every effect to be that large");
+  declare_on_end(app);
   app.footer(
       "Examples:\n"
       "  gapfarm blind-check configs/srv1.toml --dry-run\n"

@@ -3,7 +3,6 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include <chrono>
 #include <cmath>
 #include <filesystem>
 #include <memory>
@@ -15,6 +14,7 @@
 #include "common/trials/files.h"
 #include "common/trials/read.h"
 #include "master/cli/inputs.h"
+#include "master/cli/long_command.h"
 #include "master/cli/outputs.h"
 #include "master/compare/summary.h"
 
@@ -156,21 +156,6 @@ Status write_all(const CompareCommand& command, const Inputs& inputs,
   return {};
 }
 
-Result<std::vector<ComparedRun>> run_all(const Inputs& inputs, Farm& farm, CliContext& context) {
-  const auto total = static_cast<double>(inputs.options.evaluations * inputs.options.seeds *
-                                         inputs.variants.size());
-  const auto began = std::chrono::steady_clock::now();
-  return compare(
-      inputs.variants, inputs.options, farm_scorer(farm, inputs.variants), [&](std::uint64_t done) {
-        const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - began;
-        const double rate = static_cast<double>(done) / std::max(spent.count(), 1e-6);
-        std::optional<double> left;
-        if (done > 0) left = (total - static_cast<double>(done)) / rate;
-        context.console.progress(
-            progress_text(fmt::format("{} of {:.0f} evaluations", done, total), rate, left));
-      });
-}
-
 nlohmann::ordered_json to_json(const ComparisonSummary& summary) {
   using Json = nlohmann::ordered_json;
   const auto number = [](const std::optional<double>& v) {
@@ -218,12 +203,18 @@ int run_compare(CompareCommand& command, CliContext& context) {
   }
   add_random_search(inputs->variants);
   const Config& first = inputs->variants.front().config;
+  if (Status s = LongCommand::begin("compare", {command.out}, {{"evaluate"}}, context); !s) {
+    return failed(s.error(), context);
+  }
   auto farm = start_farm(command.farm, first.farm, context);
   if (!farm) return failed(farm.error(), context);
-  const auto as_written = untuned(**farm, first.problem);
+  const auto asked = context.work->over(**farm);
+  context.work->stage(
+      0, 1 + inputs->options.evaluations * inputs->options.seeds * inputs->variants.size());
+  const auto as_written = untuned(*asked, first.problem);
   if (!as_written) return failed(as_written.error(), context);
-  const auto runs = run_all(*inputs, **farm, context);
-  context.console.clear_progress();
+  const auto runs =
+      compare(inputs->variants, inputs->options, farm_scorer(*asked, inputs->variants));
   if (!runs) return failed(runs.error(), context);
   ComparisonSummary summary =
       summarise_comparison(inputs->variants, *runs, inputs->options, inputs->target);
@@ -255,6 +246,7 @@ SubcommandRun setup_compare(CLI::App& app) {
   app.add_option("--target", command->target, "Fitness whose reaching counts as success");
   command->outputs.declare(app);
   command->farm.declare(app, true);
+  declare_on_end(app);
   app.footer(
       "Random search, constant-velocity motion and the config's own values are always among the\n"
       "baselines.\n\n"

@@ -12,10 +12,14 @@
 namespace gapfarm {
 namespace {
 
+bool dumb_terminal() {
+  const char* term = std::getenv("TERM");
+  return term && std::string_view(term) == "dumb";
+}
+
 bool colour_wanted() {
   const char* no_color = std::getenv("NO_COLOR");
-  const char* term = std::getenv("TERM");
-  return !(no_color && *no_color) && !(term && std::string_view(term) == "dumb");
+  return !(no_color && *no_color) && !dumb_terminal();
 }
 
 void write_all(std::FILE* file, std::string_view text) {
@@ -32,12 +36,14 @@ std::string formatted(const char* format, Values... values) {
 
 }  // namespace
 
-Console::Console(std::FILE* out, std::FILE* err)
+Console::Console(std::FILE* out, std::FILE* err, Clock clock)
     : out_(out),
       err_(err),
+      clock_(clock),
       out_is_terminal_(::isatty(::fileno(out)) == 1),
       err_is_terminal_(::isatty(::fileno(err)) == 1),
-      colour_(out_is_terminal_ && colour_wanted()) {}
+      colour_(out_is_terminal_ && colour_wanted()),
+      redraws_(err_is_terminal_ && !dumb_terminal()) {}
 
 Console::~Console() { clear_progress(); }
 
@@ -62,8 +68,20 @@ void Console::print(std::string_view text) {
   write_all(out_, text);
 }
 
+Status Console::keep(const std::string& file) {
+  LogOptions options;
+  options.program = "gapfarm";
+  options.level = LogLevel::kInfo;
+  options.file = file;
+  auto log = std::make_unique<Log>(options);
+  if (!log->trouble().empty()) return Error{file + ": cannot keep a log: " + log->trouble()};
+  kept_ = std::move(log);
+  return {};
+}
+
 void Console::note(std::string_view text) {
   if (log_ != nullptr) return log_->write(LogLevel::kInfo, text);
+  if (kept_) kept_->write(LogLevel::kInfo, text);
   clear_progress();
   write_all(err_, std::string(text) + "\n");
 }
@@ -71,12 +89,20 @@ void Console::note(std::string_view text) {
 void Console::error(const Error& error) {
   errors_ += (errors_.empty() ? "" : "\n") + error.message;
   if (log_ != nullptr) return log_->write(LogLevel::kError, error.message);
-  note("gapfarm: " + error.message);
+  if (kept_) kept_->write(LogLevel::kError, error.message);
+  clear_progress();
+  write_all(err_, "gapfarm: " + error.message + "\n");
 }
 
-void Console::progress(std::string_view text) {
-  if (!err_is_terminal_ || log_ != nullptr) return;
-  const double now = steady_now_s();
+void Console::progress(std::string_view text, bool news) {
+  const double now = clock_();
+  if (news) lines_ = LineCadence();
+  if (lines_.due(now)) {
+    if (log_ != nullptr) return log_->write(LogLevel::kInfo, text);
+    if (kept_) kept_->write(LogLevel::kInfo, text);
+    if (!redraws_) write_all(err_, std::string(text) + "\n");
+  }
+  if (!redraws_ || log_ != nullptr) return;
   if (progress_shown_ && now - last_progress_s_ < 0.1) return;
   last_progress_s_ = now;
   progress_shown_ = true;
@@ -102,15 +128,6 @@ std::string Console::styled(std::string_view text, const char* code) const {
   return "\x1b[" + std::string(code) + "m" + std::string(text) + "\x1b[0m";
 }
 
-std::string format_duration(double seconds) {
-  if (!(seconds >= 0) || seconds > 1e9) return "?";
-  if (seconds < 9.95) return formatted("%.1f s", seconds);
-  const long whole = std::lround(seconds);
-  if (whole < 60) return formatted("%ld s", whole);
-  if (whole < 3600) return formatted("%ld min %02ld s", whole / 60, whole % 60);
-  return formatted("%ld h %02ld min", whole / 3600, whole / 60 % 60);
-}
-
 std::string format_number(const std::optional<double>& value, int digits) {
   return value ? formatted("%.*g", digits, *value) : "-";
 }
@@ -124,7 +141,7 @@ std::string progress_text(std::string_view what, double rate_per_s,
                           std::optional<double> time_left_s) {
   std::string text(what);
   text += ", " + formatted("%.3g", rate_per_s) + "/s";
-  if (time_left_s) text += ", " + format_duration(*time_left_s) + " left";
+  if (time_left_s) text += ", about " + format_duration(*time_left_s) + " left";
   return text;
 }
 

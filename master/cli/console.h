@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdio>
+#include <memory>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
@@ -10,12 +11,19 @@
 
 #include "common/base/result.h"
 #include "common/log/log.h"
+#include "master/progress/overall_progress.h"
+#include "master/progress/words.h"
 
 namespace gapfarm {
 
+// Of a clock that only goes forward, from any beginning.
+double steady_now_s();
+
 class Console {
  public:
-  explicit Console(std::FILE* out = stdout, std::FILE* err = stderr);
+  using Clock = double (*)();  // seconds; never goes back
+
+  explicit Console(std::FILE* out = stdout, std::FILE* err = stderr, Clock clock = steady_now_s);
   ~Console();
   Console(const Console&) = delete;
   Console& operator=(const Console&) = delete;
@@ -32,18 +40,24 @@ class Console {
 
   // To stdout, as it is and at once.
   void print(std::string_view text);
-  // From now on notes and errors are lines of this log, and no progress is shown.  It outlives
-  // this.
+  // From now on notes, errors and progress are lines of this log, which copies them to the kept
+  // file itself (Log::copy_to).  It outlives this or is taken back with null.
   void use(Log* log) { log_ = log; }
+  // From now on notes, errors and a line of progress a minute also go to the end of this file,
+  // whose older lines go once there are many (LogOptions::file).  Error: it cannot be written.
+  Status keep(const std::string& file);
+  // That file as a log; null: none.
+  Log* kept() { return kept_.get(); }
 
   // A line to stderr.
   void note(std::string_view text);
   // "gapfarm: MESSAGE" to stderr.
   void error(const Error& error);
 
-  // Shows `text` on the last line of the terminal in place of the last progress; at most ten times
-  // a second, and never where stderr is no terminal.
-  void progress(std::string_view text);
+  // Shows `text` on the last line of the terminal in place of the last progress, at most ten times
+  // a second.  Where stderr is no terminal it is a line at once and then one a minute, and a line
+  // when `news` says that this is not just more of the same.
+  void progress(std::string_view text, bool news = false);
   void clear_progress();
 
   bool out_is_terminal() const { return out_is_terminal_; }
@@ -58,24 +72,24 @@ class Console {
  private:
   std::FILE* out_;
   std::FILE* err_;
+  Clock clock_;
   bool out_is_terminal_;
   bool err_is_terminal_;
   bool colour_;
   bool progress_shown_ = false;
+  bool redraws_;  // stderr is a terminal that can take a line back
   bool json_ = false;
   bool printed_ = false;
   std::string errors_;
   Log* log_ = nullptr;
+  std::unique_ptr<Log> kept_;
   double last_progress_s_ = -1;
+  LineCadence lines_;
 };
 
-// Of a clock that only goes forward, from any beginning.
-double steady_now_s();
-// "1 h 02 min", "3 min 20 s", "12 s", "0.4 s".
-std::string format_duration(double seconds);
 // Six significant digits, "-" for none.
 std::string format_number(const std::optional<double>& value, int digits = 6);
-// "generation 41 of 100, 210/s, 12 s left": the text of a progress line.
+// "generation 41 of 100, 210/s, about 12 s left": the text of a progress line.
 std::string progress_text(std::string_view what, double rate_per_s,
                           std::optional<double> time_left_s);
 // `text` with control bytes as '?': what came from elsewhere cannot steer the terminal.

@@ -13,6 +13,7 @@
 #include "common/trials/select.h"
 #include "master/cli/effect_ranking.h"
 #include "master/cli/inputs.h"
+#include "master/cli/long_command.h"
 #include "master/cli/parameter_options.h"
 #include "master/cli/subcommand.h"
 
@@ -30,6 +31,7 @@ struct CrossfitOptions {
   unsigned folds = 5;
   std::optional<std::uint64_t> evaluations, seed;
   FarmOptions farm;
+  KeepOption keep;
 };
 
 std::vector<std::string> words_of(const std::string& text) {
@@ -154,15 +156,23 @@ Status apply(const CrossfitOptions& options, Config& config) {
   return check_evolvable(config);
 }
 
+void begin(const CrossfitOptions& options, CliContext& context) {
+  LongCommand::begin_if_possible("crossfit", options.keep.place("crossfit", ""), {{"fit"}},
+                                 context);
+}
+
 int run_ranking(const CrossfitOptions& options, const Config& config, CliContext& context) {
-  const auto plan = ranking_plan_of(options, config);
+  auto plan = ranking_plan_of(options, config);
   if (!plan) {
     context.console.error(plan.error());
     return kExitBadUsage;
   }
+  begin(options, context);
+  plan->hooks = context.work->hooks();
   auto farm = start_farm(options.farm, config.farm, context);
   if (!farm) return failed(farm.error(), context);
-  const auto ranking = rank_effects(config.problem, *plan, **farm);
+  const auto asked = context.work->over(**farm);
+  const auto ranking = rank_effects(config.problem, *plan, *asked);
   if (!ranking) return failed(ranking.error(), context);
   context.console.result(ranking_text(config.problem, *ranking, *plan),
                          ranking_json(config.problem, *ranking));
@@ -174,9 +184,13 @@ int run_crossfit(const CrossfitOptions& options, CliContext& context) {
                                   [&](Config& read) { return apply(options, read); });
   if (!config) return kExitBadUsage;
   if (!options.effects.empty()) return run_ranking(options, *config, context);
+  begin(options, context);
+  CrossfitPlan plan = plan_of(options, *config);
+  plan.hooks = context.work->hooks();
   auto farm = start_farm(options.farm, config->farm, context);
   if (!farm) return failed(farm.error(), context);
-  const auto groups = crossfit(config->problem, plan_of(options, *config), **farm);
+  const auto asked = context.work->over(**farm);
+  const auto groups = crossfit(config->problem, plan, *asked);
   if (!groups) return failed(groups.error(), context);
   Json all = Json::array();
   std::string text;
@@ -231,7 +245,9 @@ SubcommandRun setup_crossfit(CLI::App& app) {
                  "Stop each fit after the generation in which so many are reached, in place of the "
                  "config's");
   app.add_option("--seed", options->seed, "In place of the config's");
+  options->keep.declare(app);
   options->farm.declare(app, false);
+  declare_on_end(app);
   app.footer(
       "Examples:\n"
       "  gapfarm crossfit configs/push.toml --trials pushes.csv --by object \\\n"

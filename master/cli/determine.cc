@@ -9,7 +9,9 @@
 #include "common/config/config.h"
 #include "common/trials/shifted.h"
 #include "master/cli/inputs.h"
+#include "master/cli/long_command.h"
 #include "master/cli/outputs.h"
+#include "master/cli/run_model.h"
 #include "master/evolve/evaluation.h"
 
 namespace gapfarm {
@@ -21,6 +23,7 @@ struct DetermineCommand {
   DetermineSettings settings;
   Outputs outputs;
   FarmOptions farm;
+  KeepOption keep;
 };
 
 // The problem at the model's values, scored by likelihood whatever it was tuned by.
@@ -88,8 +91,9 @@ nlohmann::ordered_json to_json(const DetermineReport& report, const ParameterTab
 }
 
 // The problem, and that its table can be written.
-Result<Problem> open_problem(DetermineCommand& command, const std::optional<Config>& config) {
-  const Result<Model> model = read_model_of(command.model);
+Result<Problem> open_problem(DetermineCommand& command, const std::optional<Config>& config,
+                             Console& console) {
+  const Result<Model> model = read_model_of(command.model, console);
   if (!model) return model.error();
   command.outputs.reads(config->problem.log);
   command.outputs.reads(command.config);
@@ -102,7 +106,7 @@ Result<Problem> open_problem(DetermineCommand& command, const std::optional<Conf
 int run_determine(DetermineCommand& command, CliContext& context) {
   const auto config = open_config(command.config, command.trials, context.console, check_evolvable);
   if (!config) return kExitBadUsage;
-  const Result<Problem> problem = open_problem(command, config);
+  const Result<Problem> problem = open_problem(command, config, context.console);
   if (!problem) {
     context.console.error(problem.error());
     return kExitBadUsage;
@@ -113,10 +117,13 @@ int run_determine(DetermineCommand& command, CliContext& context) {
   }
   DetermineSettings settings = command.settings;
   settings.seed = config->seed;
+  LongCommand::begin_if_possible("determine", command.keep.place("determine", command.out),
+                                 {{"evaluate"}}, context);
   auto farm = start_farm(command.farm, config->farm, context);
   if (!farm) return failed(farm.error(), context);
-  const auto report =
-      determine(*problem, point, farm_likelihood(**farm, *problem, config->seed), settings);
+  const auto asked = context.work->over(**farm);
+  const auto report = determine(*problem, point, farm_likelihood(*asked, *problem, config->seed),
+                                settings, context.work->hooks());
   if (!report) return failed(report.error(), context);
   if (!command.out.empty()) {
     const Status written =
@@ -160,7 +167,9 @@ SubcommandRun setup_determine(CLI::App& app) {
       ->check(CLI::Range(0.01, 1.0))
       ->capture_default_str();
   command->outputs.declare(app);
+  command->keep.declare(app);
   command->farm.declare(app, true);
+  declare_on_end(app);
   app.footer(
       "The curvature of the log likelihood about the model says how far each parameter could be\n"
       "elsewhere, all others moving along.\n\n"

@@ -10,11 +10,11 @@
 
 #include "common/base/build_info.h"
 #include "master/cli/inputs.h"
+#include "master/cli/long_command.h"
 #include "master/cli/outputs.h"
 #include "master/cli/question_stamp.h"
+#include "master/cli/run_model.h"
 #include "master/diagnose/diagnosis_json.h"
-#include "master/diagnose/stage_pace.h"
-#include "master/experiment/recorded_farm.h"
 #include "master/report/report_html.h"
 
 namespace gapfarm {
@@ -130,15 +130,10 @@ Status plan_outputs(DiagnoseCommand& command, const Config& config, const Questi
   return {};
 }
 
-// Every simulation goes into the folder: a stopped diagnosis goes on where it was, and what a
-// figure rests on can be looked up.
-Result<AnswerStore> open_answers(const std::string& out) {
-  std::error_code code;
-  std::filesystem::create_directories(out, code);
-  if (code) {
-    return Error{out + ": cannot make the folder: " + code.message() + "; choose another --out"};
-  }
-  return AnswerStore::open(std::filesystem::path(out) / kAnswers, build_info().fingerprint);
+std::vector<ProgressStage> stages() {
+  std::vector<ProgressStage> all;
+  for (const DiagnosisStage& stage : kDiagnosisStages) all.push_back({stage.name, stage.share});
+  return all;
 }
 
 std::string summary(const Diagnosis& d) {
@@ -180,10 +175,10 @@ nlohmann::ordered_json summary_json(const Diagnosis& diagnosis, const DiagnoseCo
 
 // What the command line says of the problem, on top of the config.
 Status apply_options(const DiagnoseCommand& command, Config& config, std::vector<Gene>& searched,
-                     std::optional<Eigen::Vector2d>& frame) {
+                     std::optional<Eigen::Vector2d>& frame, Console& console) {
   if (command.seed) config.seed = *command.seed;
   if (!command.model.empty()) {
-    const Result<Model> model = read_model_of(command.model);
+    const Result<Model> model = read_model_of(command.model, console);
     if (!model) return model.error();
     config.problem.values = model->values;
     frame = {model->frame_x_m, model->frame_y_m};
@@ -194,82 +189,46 @@ Status apply_options(const DiagnoseCommand& command, Config& config, std::vector
   return {};
 }
 
-// What is simulated now, and how long the rest may take.
-class StageProgress {
- public:
-  StageProgress(Console& console, RecordedFarm& farm) : console_(console), farm_(farm) {
-    farm_.watch([this](std::uint64_t simulated) { show(simulated); });
-  }
-
-  void begin(const std::string& stage) {
-    stage_ = stage;
-    farm_.set_stage(stage);
-    pace_.begin(stage, steady_now_s());
-    console_.progress(stage);
-  }
-
- private:
-  void show(std::uint64_t simulated) {
-    std::string text = fmt::format("{}, {} simulations", stage_, simulated);
-    if (const auto left = pace_.time_left_s(steady_now_s())) {
-      text += ", about " + format_duration(*left) + " left";
-    }
-    console_.progress(text);
-  }
-
-  Console& console_;
-  RecordedFarm& farm_;
-  StagePace pace_;
-  std::string stage_;
-};
-
 int run_diagnose(DiagnoseCommand& command, CliContext& context) {
   DiagnoseOptions options;
   const auto config = open_config(
       command.config, command.trials, context.console,
-      [&](Config& read) { return apply_options(command, read, options.genes, options.frame_m); });
+      [&](Config& read) {
+        return apply_options(command, read, options.genes, options.frame_m, context.console);
+      });
   if (!config) return kExitBadUsage;
   const QuestionStamp stamp = stamp_of(*config, command, options.genes);
   if (Status s = plan_outputs(command, *config, stamp); !s) {
     context.console.error(s.error());
     return kExitBadUsage;
   }
+  // Every simulation goes into the folder: what a figure rests on can be looked up.
+  if (Status s = LongCommand::begin("diagnose", {command.out}, stages(), context); !s) {
+    return failed(s.error(), context);
+  }
   auto farm = start_farm(command.farm, config->farm, context);
   if (!farm) return failed(farm.error(), context);
   options.keep_base = !command.model.empty();
   options.left_out = command.leave_out;
   options.seed = config->seed;
-  auto answers = open_answers(command.out);
-  if (!answers) return failed(answers.error(), context);
   const std::string stamp_file = (std::filesystem::path(command.out) / kStampFile).string();
   if (Status s = command.outputs.write(stamp_file, format_stamp(stamp)); !s) {
     return failed(s.error(), context);
   }
-  const Result<std::int64_t> at_hand = answers->count();
-  if (!at_hand) return failed(at_hand.error(), context);
-  RecordedFarm recorded(**farm, *answers);
-  StageProgress progress(context.console, recorded);
-  options.on_stage = [&](const std::string& stage) { progress.begin(stage); };
-  auto result = diagnose(recorded, config->problem, options);
-  context.console.clear_progress();
-  if (*at_hand > 0) {
-    context.console.note(
-        fmt::format("{} of {} simulations were in {}/{} already", recorded.remembered(),
-                    recorded.remembered() + recorded.simulated(), command.out, kAnswers));
-  }
-  if (!result) {
-    if (result.error().message == kStopRequested) {
-      context.console.note("what was simulated is kept; the same command goes on from there");
-      return kExitResumable;
-    }
-    return failed(result.error(), context);
-  }
+  LongCommand& work = *context.work;
+  const auto asked = work.over(**farm);
+  options.on_stage = [&](const std::string& stage) { work.stage(stage); };
+  auto result = diagnose(*asked, config->problem, options);
+  if (!result) return failed(result.error(), context);
   add_provenance(*config, command, &result->diagnosis);
   for (const auto& [fit, tasks] : result->fits) {
-    result->diagnosis.provenance.emplace_back(
-        "predictions of " + fit,
-        fmt::format("{}, question {} and the {} after it", kAnswers,
-                    answers->key(result->problem, tasks.front()), tasks.size() - 1));
+    // A stop may have come between them: their numbers need not follow one another.
+    std::string questions;
+    for (const v1::Task& task : tasks) {
+      questions += (questions.empty() ? "" : ", ") + work.answers().key(result->problem, task);
+    }
+    result->diagnosis.provenance.emplace_back("predictions of " + fit,
+                                              fmt::format("{}, questions {}", kAnswers, questions));
   }
   if (Status s = write_all(*config, command, *result); !s) return failed(s.error(), context);
   context.console.result(summary(result->diagnosis), summary_json(result->diagnosis, command));
@@ -289,6 +248,7 @@ SubcommandRun setup_diagnose(CLI::App& app) {
   app.add_option("--seed", command->seed, "Of the bootstrap");
   command->outputs.declare(app);
   command->farm.declare(app, true);
+  declare_on_end(app);
   app.footer(
       "Examples:\n"
       "  gapfarm diagnose configs/srv1.toml --trials log.csv --out diagnosis\n"

@@ -12,7 +12,9 @@
 #include "common/trials/read.h"
 #include "common/trials/waypoint_log.h"
 #include "master/cli/inputs.h"
+#include "master/cli/long_command.h"
 #include "master/cli/outputs.h"
+#include "master/cli/run_model.h"
 #include "master/drive/drive_report.h"
 
 namespace gapfarm {
@@ -266,7 +268,7 @@ Status plan_outputs(DriveCommand& command) {
 }
 
 int run_drive(DriveCommand& command, CliContext& context) {
-  const auto model = read_model_of(command.model);
+  const auto model = read_model_of(command.model, context.console);
   if (!model) {
     context.console.error(model.error());
     return kExitBadUsage;
@@ -279,10 +281,19 @@ int run_drive(DriveCommand& command, CliContext& context) {
     context.console.error(task.error());
     return kExitBadUsage;
   }
+  const Problem problem = problem_of(*model);
+  // The commands' nominal motions, then the runs; way-points are a turn and a way each.
+  const std::uint64_t legs = task->targets.empty() ? 1 : 2 * task->targets.size();
+  const std::uint64_t tasks = problem.commands.size() + legs * command.runs;
+  const KeepingPlace place{command.out, /*passing=*/false, /*forget=*/true};
+  if (Status s = LongCommand::begin("drive", place, {{"drive", 1, tasks}}, context); !s) {
+    return failed(s.error(), context);
+  }
   auto farm = start_farm(command.farm, {}, context);
   if (!farm) return failed(farm.error(), context);
-  const Problem problem = problem_of(*model);
-  const auto report = Driving(command, *task, problem, **farm, context.console).run();
+  const auto asked = context.work->over(**farm);
+  context.work->stage(0);
+  const auto report = Driving(command, *task, problem, *asked, context.console).run();
   if (!report) return failed(report.error(), context);
   const std::filesystem::path out(command.out);
   const std::pair<const char*, std::string> files[] = {
@@ -328,6 +339,7 @@ SubcommandRun setup_drive(CLI::App& app) {
   app.add_option("--out", command->out, "Folder for the tables and the page")->required();
   command->outputs.declare(app);
   command->farm.declare(app, true);
+  declare_on_end(app);
   app.footer(
       "Constant velocity, and with --mined the motion model mined from a log, drive the same "
       "list.\n"

@@ -158,6 +158,11 @@ EvolutionOverrides EvolutionOverrides::from_json(const std::string& text) {
 
 int run_evolution(RunStore& store, const EvolutionRun& run, CliContext& context) {
   run.log.set({"run", store.run().string()});
+  // Without it the run goes on all the same.
+  if (Status s = context.console.keep((store.run() / "log.txt").string()); !s) {
+    context.console.error(s.error());
+  }
+  run.log.copy_to(context.console.kept());
   const auto checkpoint = store.checkpoint();
   if (!checkpoint) return failed(checkpoint.error(), context);
   const auto plan = read_stages(run.config);

@@ -4,7 +4,6 @@
 
 #include "master/cli/farm_metrics.h"
 #include "master/evolve/evaluation.h"
-#include "master/evolve/time_left.h"
 
 namespace gapfarm {
 namespace {
@@ -56,7 +55,8 @@ FarmProgressWriter::FarmProgressWriter(RunStore& store, const SocketFarm& farm,
       settings_(settings),
       clock_(clock),
       console_(console),
-      began_s_(clock.now_s()) {
+      began_s_(clock.now_s()),
+      wait_(farm.endpoints()) {
   if (!resumed) return;
   generation_ = resumed->generation;
   evaluations_of_others_ = resumed->evaluations;
@@ -103,6 +103,16 @@ void FarmProgressWriter::on_generation(const GenerationRecord& record, std::opti
   refresh(clock_.now_s());
 }
 
+std::string FarmProgressWriter::words(const Pace& pace) const {
+  std::string text = "generation " + std::to_string(generation_ + 1) + " of " +
+                     std::to_string(settings_.generations) +
+                     (best_.empty() ? "" : ", best " + best_);
+  if (last_.time_left_s && pace.wall_s > 0) {
+    text += ", " + format_share(pace.wall_s / (pace.wall_s + *last_.time_left_s)) + " done";
+  }
+  return progress_text(text, last_.rate_per_s, last_.time_left_s);
+}
+
 void FarmProgressWriter::refresh(double now_s) {
   const double spent_s = now_s - began_s_;
   const std::uint64_t done = evaluations_before_ + last_.done;
@@ -118,15 +128,16 @@ void FarmProgressWriter::refresh(double now_s) {
   pace.evaluations_here = done;
   pace.wall_here_s = spent_s;
   last_.time_left_s = time_left_s(settings_, pace);
-  console_.progress(progress_text("generation " + std::to_string(generation_ + 1) + " of " +
-                                      std::to_string(settings_.generations) +
-                                      (best_.empty() ? "" : ", best " + best_),
-                                  last_.rate_per_s, last_.time_left_s));
+  const std::vector<WorkerStatus> workers = farm_.workers();
+  const bool waited = !last_.waiting.empty();
+  last_.waiting = wait_.words(workers.size(), now_s).value_or("");
+  console_.progress("evolve: " + (last_.waiting.empty() ? words(pace) : last_.waiting),
+                    waited == last_.waiting.empty());
   if (now_s - written_s_ < kWriteInterval_s) return;
   written_s_ = now_s;
   publish();
   last_.workers.clear();
-  for (const WorkerStatus& w : farm_.workers()) {
+  for (const WorkerStatus& w : workers) {
     last_.workers.push_back({w.name, w.host, w.state, w.jobs, w.finished, w.rate_per_s});
   }
   last_.farm = tally_of(farm_);

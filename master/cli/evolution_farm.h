@@ -8,8 +8,10 @@
 #include "common/problem/problem.h"
 #include "master/cli/console.h"
 #include "master/evolve/evolve.h"
+#include "master/evolve/time_left.h"
 #include "master/farm/socket_farm.h"
 #include "master/metrics/metrics_server.h"
+#include "master/progress/worker_wait.h"
 #include "master/store/run_store.h"
 
 namespace gapfarm {
@@ -36,6 +38,7 @@ class FarmProgressWriter {
 
  private:
   void refresh(double now_s);
+  std::string words(const Pace& pace) const;
   void publish();
 
   RunStore& store_;
@@ -55,6 +58,7 @@ class FarmProgressWriter {
   Progress last_;
   Log* log_ = nullptr;
   MetricsServer* metrics_ = nullptr;
+  WorkerWait wait_;
 };
 
 // Candidates to EvaluateTasks and back.

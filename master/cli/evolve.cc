@@ -4,6 +4,7 @@
 
 #include "common/config/config.h"
 #include "master/cli/evolution.h"
+#include "master/cli/long_command.h"
 #include "master/cli/outputs.h"
 #include "master/cli/validation.h"
 
@@ -80,6 +81,7 @@ SubcommandRun setup_evolve(CLI::App& app) {
   app.add_option("--seed", command->seed, "In place of the config's");
   command->overrides.declare(app);
   command->farm.declare(app, true);
+  declare_on_end(app);
   app.add_option("--shuffle", command->shuffle,
                  "Hand jobs out in an order shuffled by this seed; the results do not change");
   app.footer(

@@ -62,4 +62,14 @@ void report_to(Log& log, SocketFarmOptions& options) {
   };
 }
 
+void report_to(Console& console, SocketFarmOptions& options) {
+  options.on_event = [&console](const FarmEvent& event) {
+    const std::string text =
+        (event.worker.empty() ? std::string() : "worker " + event.worker + ": ") + event.text;
+    // Not what the command fails with: it may go on.
+    if (level_of(event.kind) != LogLevel::kInfo) return console.note("gapfarm: " + text);
+    if (console.kept() != nullptr) console.kept()->write(LogLevel::kInfo, text);
+  };
+}
+
 }  // namespace gapfarm

@@ -36,5 +36,7 @@ class NotesGoTo {
 
 // Lets `options` report events, and single jobs at level debug, to `log`, which outlives the farm.
 void report_to(Log& log, SocketFarmOptions& options);
+// Lets `options` report what went wrong to the user, and all events to the console's kept file.
+void report_to(Console& console, SocketFarmOptions& options);
 
 }  // namespace gapfarm

@@ -8,6 +8,7 @@
 
 #include "common/config/config.h"
 #include "master/cli/inputs.h"
+#include "master/cli/long_command.h"
 #include "master/cli/outputs.h"
 #include "master/cli/traced.h"
 
@@ -65,12 +66,16 @@ int run_influence(InfluenceCommand command, CliContext& context) {
   const ParameterTable& table = config->problem.table();
   const std::vector<Gene> genes =
       config->problem.genes.empty() ? all_base_genes(table) : config->problem.genes;
+  // The paths are large, and no figure refers to them.
+  const KeepingPlace place{command.out, /*passing=*/false, /*forget=*/true};
+  if (Status s = LongCommand::begin("influence", place, {{"trace paths"}}, context); !s) {
+    return failed(s.error(), context);
+  }
   auto farm = start_farm(command.farm, config->farm, context);
   if (!farm) return failed(farm.error(), context);
+  const auto asked = context.work->over(**farm);
   const auto report =
-      find_influence(**farm, config->problem, genes, command.settings,
-                     [&](const std::string& what) { context.console.progress(what); });
-  context.console.clear_progress();
+      find_influence(*asked, config->problem, genes, command.settings, context.work->hooks());
   if (!report) return failed(report.error(), context);
   const std::filesystem::path out(command.out);
   const std::pair<const char*, std::string> files[] = {
@@ -119,6 +124,7 @@ SubcommandRun setup_influence(CLI::App& app) {
   command->traced.declare(app);
   command->outputs.declare(app);
   command->farm.declare(app, true);
+  declare_on_end(app);
   app.footer(
       "Examples:\n"
       "  gapfarm influence configs/racquetball.toml --out influence\n"

@@ -1,11 +1,11 @@
 #include "master/cli/inputs.h"
 
 #include <algorithm>
-#include <filesystem>
 #include <thread>
 
 #include "common/config/config.h"
 #include "common/trials/read.h"
+#include "master/cli/long_command.h"
 
 namespace gapfarm {
 
@@ -46,17 +46,6 @@ std::optional<Config> open_config(const std::string& config_path, const TrialOpt
   }
   show_notes(config->problem.log, console);
   return std::move(*config);
-}
-
-Result<Model> read_model_of(const std::string& run_or_model) {
-  const std::filesystem::path path(run_or_model);
-  std::error_code ignored;
-  if (!std::filesystem::is_directory(path, ignored)) return read_model(run_or_model);
-  const std::filesystem::path model = path / "model.toml";
-  if (std::filesystem::exists(model, ignored)) return read_model(model.string());
-  return Error{run_or_model +
-               ": has no model.toml; a run leaves it when it ends, see `gapfarm "
-               "status` and `gapfarm resume`"};
 }
 
 void FarmOptions::declare(CLI::App& app, bool remote) {
@@ -141,12 +130,19 @@ Result<std::unique_ptr<SocketFarm>> start_farm(const FarmOptions& options,
   base.copies.straggler_factor = settings.straggler_factor;
   base.allow_mixed_numeric_classes = settings.allow_mixed_numeric_classes;
   base.stop = &context.stop;
+  if (!base.on_event) report_to(context.console, base);
   return SocketFarm::create(std::move(base));
 }
 
 int failed(const Error& error, CliContext& context) {
   context.console.clear_progress();
-  if (context.stop.requested()) return kExitSignalBase + context.stop.signal();
+  if (context.stop.requested()) {
+    if (context.work == nullptr || !context.work->keeps()) {
+      return kExitSignalBase + context.stop.signal();
+    }
+    context.console.note(context.work->how_to_go_on());
+    return kExitResumable;
+  }
   context.console.error(error);
   return kExitFailed;
 }

@@ -30,9 +30,6 @@ Result<Config> read_config_and_trials(const std::string& config_path, const Tria
 std::optional<Config> open_config(const std::string& config_path, const TrialOptions& trials,
                                   Console& console, const std::function<Status(Config&)>& finish);
 
-// A model file, or the model.toml of a run folder.
-Result<Model> read_model_of(const std::string& run_or_model);
-
 // --workers, --listen and what goes with them.
 struct FarmOptions {
   int workers = -1;  // -1: as the config says, else one a core
@@ -56,7 +53,8 @@ Result<std::unique_ptr<SocketFarm>> start_farm(const FarmOptions& options,
                                                const FarmSettings& settings, CliContext& context,
                                                SocketFarmOptions base = {});
 
-// 130 or 143 after a signal, else kExitFailed; the error is shown unless it was the user's wish.
+// After a signal kExitResumable, with a sentence how to go on, where the command keeps what it
+// simulates (LongCommand), else 130 or 143; without one kExitFailed, and the error is shown.
 int failed(const Error& error, CliContext& context);
 
 }  // namespace gapfarm

@@ -4,6 +4,7 @@
 #include "common/base/suggest.h"
 #include "common/usage/usage.h"
 #include "master/cli/app.h"
+#include "master/cli/long_command.h"
 #include "master/cli/signals.h"
 
 namespace gapfarm {
@@ -70,9 +71,11 @@ int run(const std::vector<std::string>& words) {
   const UserInterrupts interrupts(&stop);
   CliContext context{console, stop};
   for (std::size_t i = 0; i < program->runs.size(); ++i) {
-    if (program->app->got_subcommand(subcommands()[i].name)) {
-      return console.end(program->runs[i](context));
-    }
+    const char* name = subcommands()[i].name;
+    if (!program->app->got_subcommand(name)) continue;
+    const int exit_code = console.end(program->runs[i](context));
+    conclude_command(*program->app->get_subcommand(name), exit_code, context);
+    return exit_code;
   }
   return kExitBadUsage;
 }

@@ -9,6 +9,7 @@
 #include <filesystem>
 
 #include "common/trials/files.h"
+#include "master/store/command_record.h"
 
 namespace gapfarm {
 namespace {
@@ -27,6 +28,13 @@ constexpr Marker kMarkers[] = {
     {FolderKind::kDiagnosis, "diagnosis.json", "a diagnosis"},
     {FolderKind::kBlindCheck, "seals.txt", "a blind check"},
 };
+
+// Of the long command that keeps its simulations in the folder; empty: of an older diagnosis, or
+// none.
+std::string command_in(const fs::path& folder) {
+  const auto record = command_status(folder, 0);
+  return record && *record ? (*record)->command : std::string();
+}
 
 bool same_file(const std::string& a, const std::string& b) {
   std::error_code code;
@@ -76,8 +84,16 @@ Status check_folder(const std::string& folder, FolderKind kind) {
   if (fs::exists(folder, code) && !fs::is_directory(folder, code)) {
     return Error{folder + ": is a file, expected a folder; choose another --out"};
   }
+  const std::string command = command_in(folder);
+  const bool alone = kind == FolderKind::kDiagnosis || kind == FolderKind::kRun;
+  if (alone && !command.empty() && command != "diagnose") {
+    return Error{folder + ": holds what `gapfarm " + command +
+                 "` simulated, and nothing else belongs there; choose another --out"};
+  }
   for (const Marker& marker : kMarkers) {
     if (marker.kind == kind || !fs::exists(fs::path(folder) / marker.file, code)) continue;
+    const bool of_another = !command.empty() && command != "diagnose";
+    if (std::string_view(marker.file) == "simulations.sqlite" && of_another) continue;
     return Error{folder + ": holds " + marker.words +
                  ", and nothing else belongs there; choose another --out"};
   }

@@ -1,9 +1,12 @@
 // gapfarm predict RUN|MODEL: the predictive distribution of every trial of a log.
 #include <Eigen/Core>
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <numeric>
+#include <tuple>
 
 #include "common/score/fitness.h"
 #include "common/score/motion_model.h"
@@ -11,7 +14,9 @@
 #include "common/trials/shifted.h"
 #include "master/cli/baseline_notes.h"
 #include "master/cli/inputs.h"
+#include "master/cli/long_command.h"
 #include "master/cli/outputs.h"
+#include "master/cli/run_model.h"
 #include "master/report/prediction_table.h"
 
 namespace gapfarm {
@@ -24,7 +29,30 @@ struct PredictOptions {
   std::string out = "-";
   Outputs outputs;
   FarmOptions farm;
+  KeepOption keep;
 };
+
+// The log in parts that many workers can have and a stop does not lose; trials of one command stay
+// together, since a condition is simulated once a part.
+std::vector<v1::Task> predict_tasks(const TrialLog& log) {
+  constexpr std::size_t kMostTrials = 500;  // a part
+  std::vector<std::uint32_t> order(log.trials.size());
+  std::iota(order.begin(), order.end(), 0u);
+  const auto key = [&](std::uint32_t i) {
+    const Trial& t = log.trials[i];
+    return std::tuple(t.command, t.left, t.right, t.duration_s);
+  };
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::uint32_t a, std::uint32_t b) { return key(a) < key(b); });
+  const std::size_t parts = (order.size() + kMostTrials - 1) / kMostTrials;
+  std::vector<v1::Task> tasks(std::max<std::size_t>(1, parts));
+  for (v1::Task& task : tasks) task.mutable_predict();
+  if (tasks.size() == 1) return tasks;
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    tasks[i * parts / order.size()].mutable_predict()->add_trials(order[i]);
+  }
+  return tasks;
+}
 
 Result<std::vector<PredictedTrial>> predict_by_model(const Model& model, const TrialLog& log,
                                                      const PredictOptions& options,
@@ -33,18 +61,26 @@ Result<std::vector<PredictedTrial>> predict_by_model(const Model& model, const T
   problem.log = shifted(log, -model.frame_x_m, -model.frame_y_m);
   // Any fitness will do; this one asks nothing of the log.
   problem.fitness.kind = FitnessKind::kLogScore;
+  const std::vector<v1::Task> tasks = predict_tasks(log);
+  LongCommand::begin_if_possible("predict", options.keep.place("predict", options.out),
+                                 {{"predict", 1, tasks.size()}}, context);
   auto farm = start_farm(options.farm, {}, context);
   if (!farm) return farm.error();
-  v1::Task task;
-  task.mutable_predict();
-  const auto results = (*farm)->run((*farm)->add_problem(to_proto(problem)), {task});
+  const auto asked = context.work->over(**farm);
+  context.work->stage(0);
+  const auto results = asked->run(asked->add_problem(to_proto(problem)), tasks);
   if (!results) return results.error();
-  const v1::TaskResult& result = results->front();
-  if (result.outcome() != v1::OK) {
-    return Error{options.model + ": the simulation ended with " +
-                 v1::Outcome_Name(result.outcome()) + " (" + result.message() + ")"};
+  v1::PredictResult whole;
+  for (const v1::TaskResult& result : *results) {
+    if (result.outcome() != v1::OK) {
+      return Error{options.model + ": the simulation ended with " +
+                   v1::Outcome_Name(result.outcome()) + " (" + result.message() + ")"};
+    }
+    whole.MergeFrom(result.predict());
   }
-  std::vector<PredictedTrial> predictions = world_predictions(result.predict());
+  std::sort(whole.mutable_predictions()->begin(), whole.mutable_predictions()->end(),
+            [](const v1::Predicted& a, const v1::Predicted& b) { return a.trial() < b.trial(); });
+  std::vector<PredictedTrial> predictions = world_predictions(whole);
   for (PredictedTrial& p : predictions) {
     p.X_WE.x += model.frame_x_m;
     p.X_WE.y += model.frame_y_m;
@@ -118,7 +154,7 @@ int run_predict(PredictOptions& options, CliContext& context) {
     return kExitBadUsage;
   }
   Result<Model> model =
-      options.mined.empty() ? read_model_of(options.model) : nominal_model("srv1");
+      options.mined.empty() ? read_model_of(options.model, console) : nominal_model("srv1");
   if (!model) {
     console.error(model.error());
     return kExitBadUsage;
@@ -170,7 +206,9 @@ SubcommandRun setup_predict(CLI::App& app) {
                  "Predict by the motion model mined from these logs, P(M' | M, u), in place of a "
                  "simulation");
   options->outputs.declare(app);
+  options->keep.declare(app);
   options->farm.declare(app, false);
+  declare_on_end(app);
   app.footer(
       "Examples:\n"
       "  gapfarm predict run/demo --trials trials.csv --out predictions.csv\n"

@@ -9,6 +9,7 @@
 #include "master/cli/evolution_farm.h"
 #include "master/cli/inputs.h"
 #include "master/cli/outputs.h"
+#include "master/cli/run_model.h"
 #include "master/evolve/evaluation.h"
 #include "master/evolve/individual.h"
 #include "master/experiment/plan.h"
@@ -196,11 +197,7 @@ Result<bool> replay(ReplayOptions& options, CliContext& context, bool& begun) {
   const Result<RunReader> reader = RunReader::open(options.run);
   if (!reader) return reader.error();
   const RunInfo& info = reader->info();
-  v1::Problem message;
-  if (!message.ParseFromString(info.problem)) {
-    return Error{options.run + ": the stored problem cannot be read; the run store is damaged"};
-  }
-  const Result<Problem> problem = from_proto(message);
+  const Result<Problem> problem = stored_problem(*reader);
   if (!problem) return problem.error();
   const Result<Found> found = find(*reader, options);
   if (!found) return found.error();

@@ -3,6 +3,7 @@
 
 #include "common/config/config.h"
 #include "master/cli/evolution.h"
+#include "master/cli/long_command.h"
 
 namespace gapfarm {
 namespace {
@@ -61,6 +62,7 @@ SubcommandRun setup_resume(CLI::App& app) {
                  "Continue after this generation; later ones are moved to a file of their own");
   command->overrides.declare(app);
   command->farm.declare(app, true);
+  declare_on_end(app);
   app.add_option("--shuffle", command->shuffle,
                  "Hand jobs out in an order shuffled by this seed; the results do not change");
   app.footer(

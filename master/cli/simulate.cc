@@ -8,6 +8,7 @@
 #include "common/trials/read.h"
 #include "common/trials/write.h"
 #include "master/cli/inputs.h"
+#include "master/cli/long_command.h"
 #include "master/cli/outputs.h"
 #include "master/cli/parameter_options.h"
 #include "master/experiment/plan.h"
@@ -27,6 +28,7 @@ struct SimulateOptions {
   std::optional<double> path_interval_s;
   Outputs outputs;
   FarmOptions farm;
+  KeepOption keep;
 };
 
 // A config or a model as a config without trials.
@@ -99,15 +101,19 @@ Result<Plan> plan_and_outputs(SimulateOptions& options, const Config& config, Cl
 
 Result<TrialLog> simulate(const SimulateOptions& options, const Config& config, const Plan& plan,
                           CliContext& context) {
+  LongCommand::begin_if_possible("simulate", options.keep.place("simulate", options.out),
+                                 {{"drive sessions", 1, plan.size()}}, context);
   auto farm = start_farm(options.farm, config.farm, context);
   if (!farm) return farm.error();
+  const auto asked = context.work->over(**farm);
+  context.work->stage(0);
   Problem problem = config.problem;
   problem.log = {};
   problem.genes.clear();
   problem.fitness.kind = FitnessKind::kLogScore;
-  const std::string hash = (*farm)->add_problem(to_proto(problem));
+  const std::string hash = asked->add_problem(to_proto(problem));
   const auto results =
-      (*farm)->run(hash, simulate_tasks(plan, {}, config.seed, config.simulate.path_interval_s));
+      asked->run(hash, simulate_tasks(plan, {}, config.seed, config.simulate.path_interval_s));
   if (!results) return results.error();
   TrialLog log;
   for (const v1::TaskResult& result : *results) {
@@ -174,7 +180,9 @@ SubcommandRun setup_simulate(CLI::App& app) {
   app.add_option("--paths", options->path_interval_s, "s between samples of paths.csv; 0: none")
       ->check(CLI::Range(0.0, 10.0));
   options->outputs.declare(app);
+  options->keep.declare(app);
   options->farm.declare(app, false);
+  declare_on_end(app);
   app.footer(
       "Examples:\n"
       "  gapfarm simulate configs/srv1.toml --out trials.csv --sessions 3 --trials 100\n"

@@ -10,6 +10,7 @@
 #include "common/base/build_info.h"
 #include "common/config/config.h"
 #include "master/cli/inputs.h"
+#include "master/cli/long_command.h"
 #include "master/cli/outputs.h"
 #include "master/cli/traced.h"
 
@@ -79,12 +80,16 @@ int run_stability(StabilityCommand command, CliContext& context) {
   }
   show_notes(config->problem.log, context.console);
   command.settings.evolution = config->evolution;
+  // The paths are large, and no figure refers to them.
+  const KeepingPlace place{command.out, /*passing=*/false, /*forget=*/true};
+  if (Status s = LongCommand::begin("stability", place, {{"trace paths"}}, context); !s) {
+    return failed(s.error(), context);
+  }
   auto farm = start_farm(command.farm, config->farm, context);
   if (!farm) return failed(farm.error(), context);
+  const auto asked = context.work->over(**farm);
   const auto report =
-      find_stability(**farm, config->problem, command.settings,
-                     [&](const std::string& what) { context.console.progress(what); });
-  context.console.clear_progress();
+      find_stability(*asked, config->problem, command.settings, context.work->hooks());
   if (!report) return failed(report.error(), context);
   if (Status s = write_all(command, *config, *report); !s) return failed(s.error(), context);
   const ParameterTable& table = config->problem.table();
@@ -133,6 +138,7 @@ SubcommandRun setup_stability(CLI::App& app) {
   command->traced.declare(app);
   command->outputs.declare(app);
   command->farm.declare(app, true);
+  declare_on_end(app);
   app.footer(
       "The tiny changes are the scenario's own noise: of the start and launch in racquetball, of "
       "the\n"

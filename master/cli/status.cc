@@ -1,13 +1,15 @@
-// gapfarm status RUN: how a run is doing, from its store alone.
+// gapfarm status FOLDER: how a run or another long command is doing, from its store alone.
 #include <poll.h>
 
 #include <chrono>
+#include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
 
 #include "master/cli/status_view.h"
 #include "master/cli/subcommand.h"
 #include "master/store/run_status.h"
+#include "master/store/schema.h"
 
 namespace gapfarm {
 namespace {
@@ -19,36 +21,67 @@ struct StatusOptions {
   bool watch = false;
 };
 
-Result<RunStatus> look(const std::string& run) {
-  const Result<RunReader> reader = RunReader::open(run);
-  if (!reader) return reader.error();
+double unix_now_s() {
   const auto now = std::chrono::system_clock::now().time_since_epoch();
-  return run_status(*reader, std::chrono::duration<double>(now).count());
+  return std::chrono::duration<double>(now).count();
 }
 
-void show(const RunStatus& status, const StatusOptions& options, Console& console) {
+struct Look {
+  nlohmann::ordered_json json;
+  std::string screen;
+  bool running = false;
+};
+
+// The folder where the command keeps what it simulates: `path` itself, or, where that is a file or
+// is to be one, the folder beside it.
+std::filesystem::path command_folder(const std::string& path) {
+  std::error_code ignored;
+  const std::filesystem::path partial = path + ".partial";
+  return std::filesystem::exists(answer_file(partial), ignored) ? partial
+                                                                : std::filesystem::path(path);
+}
+
+Result<Look> look(const std::string& run, const Console& console) {
+  const double now_s = unix_now_s();
+  std::error_code ignored;
+  if (!std::filesystem::exists(run_store_file(run), ignored) || command_folder(run) != run) {
+    const auto record = command_status(command_folder(run), now_s);
+    if (!record) return record.error();
+    if (*record) {
+      return Look{to_json(**record), command_screen(**record, run, now_s, console),
+                  (*record)->state == "running"};
+    }
+  }
+  const Result<RunReader> reader = RunReader::open(run);
+  if (!reader) return reader.error();
+  const Result<RunStatus> status = run_status(*reader, now_s);
+  if (!status) return status.error();
+  return Look{to_json(*status), status_screen(*status, run, console),
+              status->state == RunState::kRunning};
+}
+
+void show(const Look& seen, const StatusOptions& options, Console& console) {
   if (console.json()) {
     // Watched: one line a look, for `jq` and the like.
     const int indent = options.watch ? -1 : 2;
     console.print(
-        to_json(status).dump(indent, ' ', false, nlohmann::ordered_json::error_handler_t::replace) +
+        seen.json.dump(indent, ' ', false, nlohmann::ordered_json::error_handler_t::replace) +
         "\n");
     return;
   }
-  const std::string screen = status_screen(status, options.run, console);
   if (options.watch && console.out_is_terminal()) console.print("\x1b[H\x1b[2J");
-  console.print(screen);
+  console.print(seen.screen);
 }
 
 int run_status_command(const StatusOptions& options, CliContext& context) {
   for (;;) {
-    const Result<RunStatus> status = look(options.run);
-    if (!status) {
-      context.console.error(status.error());
+    const Result<Look> seen = look(options.run, context.console);
+    if (!seen) {
+      context.console.error(seen.error());
       return kExitBadUsage;
     }
-    show(*status, options, context.console);
-    if (!options.watch || status->state != RunState::kRunning) return kExitDone;
+    show(*seen, options, context.console);
+    if (!options.watch || !seen->running) return kExitDone;
     pollfd stop{context.stop.fd(), POLLIN, 0};
     ::poll(&stop, 1, kWatchInterval_ms);
     if (context.stop.requested()) return kExitSignalBase + context.stop.signal();
@@ -59,12 +92,14 @@ int run_status_command(const StatusOptions& options, CliContext& context) {
 
 SubcommandRun setup_status(CLI::App& app) {
   auto options = std::make_shared<StatusOptions>();
-  app.add_option("RUN", options->run, "Folder of the run")->required();
-  app.add_flag("--watch", options->watch, "Look again every second until the run ends");
+  app.add_option("RUN", options->run, "Folder of a run, a diagnosis, a comparison or a study")
+      ->required();
+  app.add_flag("--watch", options->watch, "Look again every second until it ends");
   app.footer(
       "Examples:\n"
       "  gapfarm status run/demo\n"
       "  gapfarm status run/demo --watch\n"
+      "  gapfarm status diagnosis\n"
       "  gapfarm status run/demo --json | jq .best_fitness");
   return [options](CliContext& context) { return run_status_command(*options, context); };
 }

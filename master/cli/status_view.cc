@@ -11,16 +11,10 @@ constexpr std::size_t kMostWorkers = 8;
 constexpr std::size_t kMostParameters = 12;
 constexpr std::size_t kMostIncidents = 4;  // of a kind
 
-const char* state_style(const RunStatus& status) {
-  switch (status.state) {
-    case RunState::kRunning:
-      return "1;32";
-    case RunState::kFinished:
-      return "1;34";
-    case RunState::kStopped:
-      return "1;33";
-  }
-  return "0";
+const char* state_style(const std::string& state) {
+  if (state == "running") return "1;32";
+  if (state == "finished") return "1;34";
+  return state == "failed" ? "1;31" : "1;33";
 }
 
 std::string label(const Console& console, const std::string& name) {
@@ -49,9 +43,8 @@ std::string best_values(const RunStatus& status, const Console& console) {
   return text;
 }
 
-std::string worker_lines(const RunStatus& status, const Console& console) {
+std::string worker_lines(const std::vector<StoredWorker>& workers, const Console& console) {
   std::string text;
-  const std::vector<StoredWorker>& workers = status.progress.workers;
   for (std::size_t i = 0; i < workers.size(); ++i) {
     if (i == kMostWorkers) {
       text +=
@@ -146,9 +139,12 @@ std::string sparkline(const std::vector<std::optional<double>>& values, std::siz
 }
 
 std::string status_screen(const RunStatus& status, const std::string& run, const Console& console) {
-  std::string text = console.styled(run, "1") + "  " +
-                     console.styled(run_state_name(status.state), state_style(status));
-  if (!status.stop_reason.empty()) text += ": " + printable(status.stop_reason);
+  std::string text =
+      console.styled(run, "1") + "  " +
+      console.styled(run_state_name(status.state), state_style(run_state_name(status.state)));
+  const bool running = status.state == RunState::kRunning;
+  const std::string& why = running ? status.progress.waiting : status.stop_reason;
+  if (!why.empty()) text += ": " + printable(why);
   text += "\n";
 
   text += label(console, "generation") + std::to_string(status.generation);
@@ -174,7 +170,7 @@ std::string status_screen(const RunStatus& status, const std::string& run, const
             console.styled(" best by generation", "2");
   }
   text += "\n";
-  text += best_values(status, console) + worker_lines(status, console);
+  text += best_values(status, console) + worker_lines(status.progress.workers, console);
   if (status.state == RunState::kRunning && status.heartbeat_age_s > 5) {
     text += label(console, "heartbeat") + format_duration(status.heartbeat_age_s) + " ago\n";
   }
@@ -183,6 +179,44 @@ std::string status_screen(const RunStatus& status, const std::string& run, const
   if (!status.digest.empty()) text += label(console, "digest") + status.digest + "\n";
   if (status.state == RunState::kStopped) {
     text += label(console, "go on with") + "gapfarm resume " + run + "\n";
+  }
+  return text;
+}
+
+std::string command_screen(const CommandRecord& record, const std::string& folder,
+                           double now_unix_s, const Console& console) {
+  std::string text = console.styled(folder, "1") + "  " + printable(record.command) + " " +
+                     console.styled(record.state, state_style(record.state));
+  const std::string& why = record.state == "running" ? record.waiting : record.reason;
+  if (!why.empty()) text += ": " + printable(why);
+  text += "\n";
+  const bool over = record.state == "finished";
+  if (!over && record.stage_number > 0) {
+    text += label(console, "stage") + std::to_string(record.stage_number) + " of " +
+            std::to_string(record.stages) + ": " + printable(record.stage);
+    if (record.total > 0) {
+      text += ", " + std::to_string(record.done) + " of " + std::to_string(record.total);
+    }
+    text += "\n";
+  }
+  text += label(console, "done") + format_share(over ? 1 : record.share);
+  if (record.state == "running") text += ", " + format_number(record.rate_per_s, 3) + "/s";
+  if (!over && record.time_left_s) {
+    text += ", about " + format_duration(*record.time_left_s) + " left";
+  }
+  text += "\n" + label(console, "simulated") + std::to_string(record.simulated);
+  if (record.remembered > 0) text += ", and " + std::to_string(record.remembered) + " remembered";
+  text += "\n" + label(console, "took") +
+          format_duration((record.state == "running" ? now_unix_s : record.heartbeat_unix_s) -
+                          record.began_unix_s) +
+          ", process " + std::to_string(record.pid) + " on " + printable(record.host) + "\n";
+  text += worker_lines(record.workers, console);
+  const double age_s = now_unix_s - record.heartbeat_unix_s;
+  if (record.state == "running" && age_s > 5) {
+    text += label(console, "heartbeat") + format_duration(age_s) + " ago\n";
+  }
+  if (record.state == "stopped") {
+    text += label(console, "go on with") + printable(record.arguments) + "\n";
   }
   return text;
 }

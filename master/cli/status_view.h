@@ -1,4 +1,4 @@
-// One screen about a run.
+// One screen about a run or another long command.
 #pragma once
 
 #include <optional>
@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "master/cli/console.h"
+#include "master/store/command_record.h"
 #include "master/store/run_status.h"
 
 namespace gapfarm {
@@ -17,5 +18,9 @@ std::string sparkline(const std::vector<std::optional<double>>& values, std::siz
                       bool higher_is_better);
 
 std::string status_screen(const RunStatus& status, const std::string& run, const Console& console);
+
+// One about a diagnosis, a comparison or a study in `folder`.
+std::string command_screen(const CommandRecord& record, const std::string& folder,
+                           double now_unix_s, const Console& console);
 
 }  // namespace gapfarm

@@ -4,6 +4,7 @@
 
 #include <CLI/CLI.hpp>
 #include <functional>
+#include <memory>
 #include <span>
 
 #include "common/process/stop.h"
@@ -20,9 +21,12 @@ enum ExitCode : int {
   kExitSignalBase = 128,  // + the signal, 130 or 143: stopped, and nothing is kept
 };
 
+class LongCommand;
+
 struct CliContext {
   Console& console;
   StopSource& stop;  // requested by SIGINT and SIGTERM; a second one ends the program at once
+  std::shared_ptr<LongCommand> work{};  // of a long command, once it has begun
 };
 
 // Runs after the command line was parsed; returns an ExitCode.

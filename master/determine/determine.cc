@@ -6,6 +6,7 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include "common/random/stream.h"
 
@@ -116,8 +117,12 @@ void add_genes(const Problem& problem, const Genome& point, const std::vector<st
 class Study {
  public:
   Study(const Problem& problem, const Genome& point, const LikelihoodOf& likelihood,
-        const DetermineSettings& settings)
-      : problem_(problem), point_(point), likelihood_(likelihood), settings_(settings) {
+        const DetermineSettings& settings, const StageHooks& hooks)
+      : problem_(problem),
+        point_(point),
+        likelihood_(likelihood),
+        settings_(settings),
+        hooks_(hooks) {
     for (std::size_t i = 0; i < problem.genes.size(); ++i) {
       if (takes_part(problem.table(), problem.genes[i])) moving_.push_back(i);
     }
@@ -129,10 +134,21 @@ class Study {
       return Error{
           "none of the genes is a number with room to move; there is nothing to determine"};
     }
+    // Most often the first box will do.
+    const std::uint64_t probes = 1 + 2 * std::size(kProbes) * moving_.size();
+    const std::uint64_t points = points_of_a_box();
+    const auto real = [](std::uint64_t tasks) { return static_cast<double>(tasks); };
+    hooks_.planned({{"find how far to look", real(probes), probes},
+                    {"fit the likelihood", real(points), points}});
+    hooks_.began(0);
     if (Status s = find_widths(); !s) return s.error();
+    hooks_.began(1);
     Quadratic quadratic;
     for (std::uint64_t round = 0; round < kRounds && !report_.reliable; ++round) {
-      if (round > 0) widths_ /= 2;
+      if (round > 0) {
+        widths_ /= 2;
+        hooks_.began(1, points);
+      }
       auto fitted = fit_box(round);
       if (!fitted) return fitted.error();
       quadratic = *std::move(fitted);
@@ -146,6 +162,10 @@ class Study {
 
  private:
   Eigen::Index size() const { return static_cast<Eigen::Index>(moving_.size()); }
+  std::size_t points_of_a_box() const {
+    return static_cast<std::size_t>(
+        std::ceil(settings_.points_a_term * static_cast<double>(terms(moving_.size()))));
+  }
   std::size_t gene(Eigen::Index k) const { return moving_[static_cast<std::size_t>(k)]; }
 
   Result<std::vector<double>> nats(const std::vector<Genome>& genomes) {
@@ -199,10 +219,7 @@ class Study {
       centre_[k] = std::clamp(point_[gene(k)], widths_[k], 1 - widths_[k]);
     }
     Design design;
-    design.offsets.resize(
-        static_cast<Eigen::Index>(
-            std::ceil(settings_.points_a_term * static_cast<double>(terms(moving_.size())))),
-        size());
+    design.offsets.resize(static_cast<Eigen::Index>(points_of_a_box()), size());
     Stream stream(
         {.run_seed = settings_.seed, .purpose = Purpose::kStatistics, .generation = round});
     for (Eigen::Index i = 0; i < design.offsets.rows(); ++i) {
@@ -271,6 +288,7 @@ class Study {
   const Genome& point_;
   const LikelihoodOf& likelihood_;
   const DetermineSettings& settings_;
+  const StageHooks& hooks_;
   std::vector<std::size_t> moving_;  // genes that take part
   Eigen::VectorXd widths_, centre_;
   DetermineReport report_;
@@ -279,9 +297,9 @@ class Study {
 }  // namespace
 
 Result<DetermineReport> determine(const Problem& problem, const Genome& point,
-                                  const LikelihoodOf& likelihood,
-                                  const DetermineSettings& settings) {
-  return Study(problem, point, likelihood, settings).run();
+                                  const LikelihoodOf& likelihood, const DetermineSettings& settings,
+                                  const StageHooks& hooks) {
+  return Study(problem, point, likelihood, settings, hooks).run();
 }
 
 std::string determine_text(const DetermineReport& report, const ParameterTable& table) {

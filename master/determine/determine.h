@@ -15,6 +15,7 @@
 #include "common/base/interval.h"
 #include "common/base/result.h"
 #include "common/problem/problem.h"
+#include "master/progress/overall_progress.h"
 
 namespace gapfarm {
 
@@ -58,8 +59,8 @@ using LikelihoodOf = std::function<Result<std::vector<double>>(const std::vector
 // at least ten levels take part; the others keep the point's value.  Errors: none take part, of the
 // likelihood, fewer usable points than coefficients.
 Result<DetermineReport> determine(const Problem& problem, const Genome& point,
-                                  const LikelihoodOf& likelihood,
-                                  const DetermineSettings& settings);
+                                  const LikelihoodOf& likelihood, const DetermineSettings& settings,
+                                  const StageHooks& hooks = {});
 
 std::string determine_text(const DetermineReport& report, const ParameterTable& table);
 std::string determine_csv(const DetermineReport& report, const ParameterTable& table);

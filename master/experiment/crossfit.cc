@@ -169,6 +169,19 @@ class Crossfit {
   Farm& farm_;
 };
 
+// A stage each group: its evaluations, its sets, its sweeps.
+std::vector<ProgressStage> stages_of(const std::vector<std::string>& groups,
+                                     const CrossfitPlan& plan) {
+  const std::uint64_t tasks = expected_evaluations(plan.tuning.evolution) +
+                              2 * (1 + plan.tests.size()) +
+                              2 * plan.sweeps.size() * plan.sweep_points;
+  std::vector<ProgressStage> stages;
+  for (const std::string& group : groups) {
+    stages.push_back({group.empty() ? "fit" : "fit " + plan.by + "=" + group, 1, tasks});
+  }
+  return stages;
+}
+
 }  // namespace
 
 double end_error(const Problem& problem, const Trial& trial, const Pose& X_WE) {
@@ -201,6 +214,8 @@ Result<std::vector<CrossfitGroup>> crossfit(const Problem& problem, const Crossf
   Crossfit fit(problem, plan, farm);
   std::vector<CrossfitGroup> groups;
   if (plan.by.empty()) {
+    plan.hooks.planned(stages_of({""}, plan));
+    plan.hooks.began(0);
     auto group = fit.group("", problem.log);
     if (!group) return group.error();
     groups.push_back(std::move(*group));
@@ -208,7 +223,10 @@ Result<std::vector<CrossfitGroup>> crossfit(const Problem& problem, const Crossf
   }
   const auto by = trial_column_reader(problem.log, plan.by);
   if (!by) return by.error();
-  for (const std::string& value : values_in(problem.log, *by)) {
+  const std::vector<std::string> values = values_in(problem.log, *by);
+  plan.hooks.planned(stages_of(values, plan));
+  for (const std::string& value : values) {
+    plan.hooks.began(groups.size());
     const std::string filter = plan.by + "=" + value;
     const auto log = select_trials(problem.log, {&filter, 1});
     if (!log) return log.error();

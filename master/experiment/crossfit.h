@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "master/experiment/tuning.h"
+#include "master/progress/overall_progress.h"
 
 namespace gapfarm {
 
@@ -34,6 +35,7 @@ struct CrossfitPlan {
   std::vector<std::string> sweeps;              // parameters to vary alone around the tuned values
   unsigned sweep_points = 11;
   TuningSettings tuning;
+  StageHooks hooks;  // a stage each fit
 };
 
 struct CrossfitSet {

@@ -66,9 +66,12 @@ class Ranking {
     if (Status s = divide(); !s) return s.error();
     const auto effects = chosen_effects();
     if (!effects) return effects.error();
+    plan_.hooks.planned(stages(*effects));
+    plan_.hooks.began(0);
     if (Status s = fit_base(); !s) return s.error();
     std::vector<std::vector<double>> gains;
     for (const std::size_t e : *effects) {
+      plan_.hooks.began(gains.size() + 1);
       auto gain = try_effect(e, gains);
       if (!gain) return gain.error();
       ranking_.effects.push_back(std::move(*gain));
@@ -127,6 +130,24 @@ class Ranking {
     }
     if (chosen.empty()) return Error{"there is no effect to try beside the genes of the base"};
     return chosen;
+  }
+
+  std::vector<ProgressStage> stages(const std::vector<std::size_t>& effects) const {
+    const std::uint64_t fits = 1 + parts_.size();
+    const std::uint64_t each = expected_evaluations(plan_.tuning.evolution);
+    const auto stage = [](const std::string& name, std::uint64_t tasks) {
+      return ProgressStage{name, static_cast<double>(tasks), tasks};
+    };
+    std::vector<ProgressStage> all = {stage("fit the base", 2 * fits * each + 2 * parts_.size())};
+    for (const std::size_t e : effects) {
+      const std::uint64_t more =
+          plan_.tuning.evolution.evaluations
+              ? each * genes_with(e).size() / std::max<std::size_t>(1, problem_.genes.size())
+              : each;
+      all.push_back(
+          stage("try " + problem_.table().effects()[e].name, fits * more + parts_.size()));
+    }
+    return all;
   }
 
   Problem with(const ParameterValues& values, const std::vector<Gene>& genes,

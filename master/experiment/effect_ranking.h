@@ -25,6 +25,7 @@ struct EffectRankingPlan {
   // Of the base, which is fitted twice, the second time from where the first ended; a fit with more
   // genes gets evaluations in proportion.
   TuningSettings tuning;
+  StageHooks hooks;  // the base is a stage, and each effect
 };
 
 struct FittedParameter {

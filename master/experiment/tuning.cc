@@ -1,5 +1,7 @@
 #include "master/experiment/tuning.h"
 
+#include <algorithm>
+
 #include "master/evolve/evolve.h"
 #include "master/evolve/optimisers.h"
 
@@ -56,6 +58,11 @@ class NoClock : public EvolveClock {
 };
 
 }  // namespace
+
+std::uint64_t expected_evaluations(const EvolutionSettings& settings) {
+  const std::uint64_t all = settings.generations * settings.population;
+  return settings.evaluations ? std::min(*settings.evaluations, all) : all;
+}
 
 Result<Tuned> tune(const Problem& problem, Farm& farm, const TuningSettings& settings) {
   OptimiserSetup setup;

@@ -212,6 +212,7 @@ void JobQueue::accept(Job& job, v1::TaskResult* result, const WorkerIdentityPtr&
                       Losers* losers) {
   job.result.Swap(result);
   job.answered_by = worker;
+  if (watcher_) watcher_(index_of(job), job.result);
   const std::uint64_t id = first_job_ + index_of(job);
   if (chosen_for_audit(job.task, id, copies_.audit_share)) {
     opinions_.audit(taken_answer(job.task, job.result, worker), problem_hash_, job.task, id);

@@ -12,6 +12,7 @@
 
 #include "common/process/process_pool.h"
 #include "gapfarm/v1/farm.pb.h"
+#include "master/farm/answer_watch.h"
 #include "master/farm/second_opinions.h"
 #include "master/farm/worker_identity.h"
 
@@ -105,6 +106,9 @@ class JobQueue {
   // Ends the batch without results.
   void abandon();
 
+  // Called with the place and the answer of every job that a worker answers.
+  void watch_answers(AnswerWatcher watcher) { watcher_ = std::move(watcher); }
+
   // Of evaluations, lately; negative: none has come back yet.
   double mean_wall() const { return mean_wall_; }
   std::uint64_t compared() const { return opinions_.compared() + compared_; }
@@ -166,6 +170,7 @@ class JobQueue {
   std::size_t committed_ = 0;
   double mean_wall_ = -1;
   SecondOpinions opinions_;
+  AnswerWatcher watcher_;
   std::uint64_t compared_ = 0;
   std::uint64_t copied_ = 0;
 };

@@ -218,6 +218,10 @@ Result<std::vector<v1::TaskResult>> SocketFarm::run(
   return impl_->scheduler->finish();
 }
 
+void SocketFarm::watch_answers(AnswerWatcher watcher) {
+  impl_->scheduler->watch_answers(std::move(watcher));
+}
+
 std::vector<WorkerStatus> SocketFarm::workers() const { return impl_->scheduler->worker_status(); }
 
 std::uint64_t SocketFarm::retries() const { return impl_->scheduler->counts().retries; }

@@ -11,6 +11,7 @@
 #include "common/base/result.h"
 #include "common/net/socket.h"
 #include "common/process/stop.h"
+#include "master/farm/answer_watch.h"
 #include "master/farm/farm.h"
 #include "master/farm/scheduler.h"
 
@@ -37,11 +38,11 @@ struct SocketFarmOptions {
   std::function<void(const JobEvent&)> on_job;     // may be empty
 };
 
-// Belongs to the thread that made it, which must live as long: the local workers die with it.
 // Error: a problem too large for a message to a worker.
 Status check_sendable(const v1::Problem& problem);
 
-class SocketFarm : public Farm {
+// Belongs to the thread that made it, which must live as long: the local workers die with it.
+class SocketFarm : public Farm, public AnswerSource {
  public:
   // Listens and starts the local workers.  Errors: an endpoint that cannot be bound, no worker
   // program, neither local workers nor an endpoint.
@@ -56,6 +57,7 @@ class SocketFarm : public Farm {
       const std::string& problem_hash, const std::vector<v1::Task>& tasks,
       const std::function<void(const FarmProgress&)>& on_progress = {}) override;
 
+  void watch_answers(AnswerWatcher watcher) override;
   std::vector<WorkerStatus> workers() const override;
   std::uint64_t retries() const override;
 

@@ -19,21 +19,20 @@ constexpr double kLeast_m = 1e-9;
 // Repeats of different uses must not share noise.
 constexpr std::uint64_t kLevelNoise = 1u << 20, kMorrisNoise = 1u << 24;
 
-using Progress = std::function<void(const std::string&)>;
-
 class Study {
  public:
   Study(Farm& farm, const Problem& problem, const std::vector<Gene>& genes,
-        const InfluenceSettings& settings, Progress progress)
+        const InfluenceSettings& settings, const StageHooks& hooks)
       : farm_(farm),
         problem_(problem),
         genes_(genes),
         settings_(settings),
         distance_(path_distances()[settings.distance].distance),
-        progress_(std::move(progress)) {}
+        hooks_(hooks) {}
 
   Result<InfluenceReport> run() {
     for (const Gene& gene : genes_) report_.factors.push_back({gene, {}, {}});
+    plan();
     if (Status s = standard(); !s) return s.error();
     if (Status s = one_at_a_time(); !s) return s.error();
     if (Status s = morris(); !s) return s.error();
@@ -50,12 +49,22 @@ class Study {
     return a.ok && b.ok ? set_distance(a, b, distance_, samples_) : kFailed_m;
   }
 
-  void say(const std::string& words) const {
-    if (progress_) progress_(words);
+  // Later stages trace only to the horizon.
+  void plan() const {
+    const std::uint64_t traces = traces_of_a_set(problem_, settings_.trace);
+    std::uint64_t levels = 0;
+    for (const Gene& gene : genes_) levels += levels_of(gene).size();
+    const std::uint64_t standard = traces * (1 + 2 * settings_.repeats);
+    const std::uint64_t alone = traces * levels * settings_.repeats;
+    const std::uint64_t walks = traces * settings_.trajectories * (genes_.size() + 3);
+    const auto real = [](std::uint64_t tasks) { return static_cast<double>(tasks); };
+    hooks_.planned({{"repeat the standard", real(standard), standard},
+                    {"move one parameter at a time", real(alone), alone},
+                    {"walk through the box (Morris)", real(walks), walks}});
   }
 
   Status standard() {
-    say("repeating the standard");
+    hooks_.began(0);
     std::vector<TraceRequest> requests = {{{}, std::nullopt}};
     for (unsigned r = 0; r < 2 * settings_.repeats; ++r) requests.push_back({{}, r});
     auto sets = trace_paths(farm_, problem_, settings_.trace, requests);
@@ -127,10 +136,10 @@ class Study {
   }
 
   Status one_at_a_time() {
+    hooks_.began(1);
     std::vector<double> p;
     for (std::size_t f = 0; f < report_.factors.size(); ++f) {
       FactorInfluence& factor = report_.factors[f];
-      say("one at a time: " + problem_.table()[factor.gene.row].key);
       const std::vector<double> levels = levels_of(factor.gene);
       std::vector<TraceRequest> requests;
       for (std::size_t l = 0; l < levels.size(); ++l) {
@@ -194,7 +203,7 @@ class Study {
   }
 
   Status morris() {
-    say("Morris: " + std::to_string(settings_.trajectories) + " walks through the box");
+    hooks_.began(2);
     const std::size_t k = genes_.size();
     std::vector<TraceRequest> requests;
     std::vector<std::vector<std::size_t>> orders;
@@ -281,7 +290,7 @@ class Study {
   const std::vector<Gene>& genes_;
   InfluenceSettings settings_;
   PathDistance distance_;
-  Progress progress_;
+  const StageHooks& hooks_;
   InfluenceReport report_;
   PathSet nominal_;
   std::vector<PathSet> repeats_, others_;
@@ -293,10 +302,9 @@ class Study {
 
 Result<InfluenceReport> find_influence(Farm& farm, const Problem& problem,
                                        const std::vector<Gene>& genes,
-                                       const InfluenceSettings& settings,
-                                       const std::function<void(const std::string&)>& on_progress) {
+                                       const InfluenceSettings& settings, const StageHooks& hooks) {
   if (genes.empty()) return Error{"there are no parameters to look at"};
-  return Study(farm, problem, genes, settings, on_progress).run();
+  return Study(farm, problem, genes, settings, hooks).run();
 }
 
 std::vector<Gene> all_base_genes(const ParameterTable& table) {

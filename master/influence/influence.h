@@ -69,12 +69,12 @@ struct InfluenceReport {
   std::vector<FactorInfluence> factors;  // most influential alone first
 };
 
-// `genes`: the parameters in question and their ranges.  `on_progress` gets sentences.  Errors: of
+// `genes`: the parameters in question and their ranges.  Errors: of
 // the tracing, the standard itself not ending well, no genes.
-Result<InfluenceReport> find_influence(
-    Farm& farm, const Problem& problem, const std::vector<Gene>& genes,
-    const InfluenceSettings& settings,
-    const std::function<void(const std::string&)>& on_progress = {});
+Result<InfluenceReport> find_influence(Farm& farm, const Problem& problem,
+                                       const std::vector<Gene>& genes,
+                                       const InfluenceSettings& settings,
+                                       const StageHooks& hooks = {});
 
 // Ranges in the table's own bounds of every base row (effects left out).
 std::vector<Gene> all_base_genes(const ParameterTable& table);

@@ -53,6 +53,10 @@ std::span<const PathPoint> first(const std::vector<PathPoint>& path, std::size_t
 
 }  // namespace
 
+std::size_t traces_of_a_set(const Problem& problem, const TraceSettings& settings) {
+  return settings.trials.size() + (problem.pieces.empty() ? settings.commands.size() : 0);
+}
+
 Result<std::vector<PathSet>> trace_paths(Farm& farm, const Problem& problem,
                                          const TraceSettings& settings,
                                          std::span<const TraceRequest> requests) {

@@ -12,6 +12,7 @@
 #include "common/problem/problem.h"
 #include "common/score/path_distance.h"
 #include "master/farm/farm.h"
+#include "master/progress/overall_progress.h"
 
 namespace gapfarm {
 
@@ -35,6 +36,9 @@ struct TraceRequest {
   std::vector<v1::Override> overrides;
   std::optional<std::uint64_t> repeat;  // names the noise; none: the nominal motion
 };
+
+// Tasks that trace_paths() asks for each request.
+std::size_t traces_of_a_set(const Problem& problem, const TraceSettings& settings);
 
 // Errors: of the farm, and a refused task (which names what is wrong with it).
 Result<std::vector<PathSet>> trace_paths(Farm& farm, const Problem& problem,

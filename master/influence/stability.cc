@@ -80,14 +80,18 @@ std::optional<double> end_spread(std::span<const PathSet> repeats) {
 }
 
 Result<StabilityReport> find_stability(Farm& farm, const Problem& problem,
-                                       const StabilitySettings& settings,
-                                       const std::function<void(const std::string&)>& on_progress) {
+                                       const StabilitySettings& settings, const StageHooks& hooks) {
   OptimiserSetup setup = optimiser_setup(settings.evolution, problem, settings.trace.seed);
   setup.noisy = false;
   auto optimiser = make_optimiser(setup);
   if (!optimiser) return optimiser.error();
   const Search search(farm, problem, settings);
   StabilityReport report;
+  // The config's own values, then the points, then those two and the best on fresh repeats.
+  const std::uint64_t tasks =
+      traces_of_a_set(problem, settings.trace) * settings.repeats * (settings.evaluations + 3);
+  hooks.planned({{"try points", 1, tasks}});
+  hooks.began(0);
   auto standard = search.spreads({{}}, 0);
   if (!standard) return standard.error();
   report.standard_spread = standard->front();
@@ -102,10 +106,6 @@ Result<StabilityReport> find_stability(Farm& farm, const Problem& problem,
     }
     (*optimiser)->tell(scores_of(*spreads));
     idle = genomes.empty() ? idle + 1 : 0;
-    if (on_progress) {
-      on_progress(std::to_string((*optimiser)->evaluations()) + " of " +
-                  std::to_string(settings.evaluations) + " points");
-    }
   }
   report.evaluations = (*optimiser)->evaluations();
   const Member& best = (*optimiser)->best();

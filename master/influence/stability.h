@@ -34,8 +34,8 @@ struct StabilityReport {
 
 // Over the problem's genes.  The repeats' noise is the same at every point, so the search itself is
 // not noisy.  Errors: no genes, of the tracing, no point that ends well.
-Result<StabilityReport> find_stability(
-    Farm& farm, const Problem& problem, const StabilitySettings& settings,
-    const std::function<void(const std::string&)>& on_progress = {});
+Result<StabilityReport> find_stability(Farm& farm, const Problem& problem,
+                                       const StabilitySettings& settings,
+                                       const StageHooks& hooks = {});
 
 }  // namespace gapfarm

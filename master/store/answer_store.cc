@@ -20,6 +20,10 @@ CREATE TABLE IF NOT EXISTS answers (
   task BLOB NOT NULL,          -- gapfarm.v1.Task
   result BLOB NOT NULL         -- gapfarm.v1.TaskResult
 ) STRICT;
+CREATE TABLE IF NOT EXISTS command (  -- one row: what the command last said about itself
+  id INTEGER PRIMARY KEY CHECK (id = 1),
+  record TEXT NOT NULL         -- JSON, as `gapfarm status --json` prints it
+) STRICT;
 )sql";
 
 Status check_identity(const Database& database) {
@@ -47,7 +51,18 @@ Result<AnswerStore> AnswerStore::open(const std::filesystem::path& file,
   if (!transaction) return transaction.error();
   if (Status s = database->exec(tables, "keep answers"); !s) return s.error();
   if (Status s = transaction->commit(); !s) return s.error();
-  return AnswerStore(std::move(*database), fingerprint);
+  const auto last =
+      database->integer("SELECT coalesce(max(number), 0) FROM answers", "read the answers");
+  if (!last) return last.error();
+  AnswerStore store(std::move(*database), fingerprint);
+  store.next_number_ = *last + 1;
+  return store;
+}
+
+std::int64_t AnswerStore::reserve(std::size_t count) {
+  const std::int64_t first = next_number_;
+  next_number_ += static_cast<std::int64_t>(count);
+  return first;
 }
 
 Status AnswerStore::add_problem(const std::string& hash, const std::string& bytes) {
@@ -77,15 +92,14 @@ Status AnswerStore::add(const std::string& problem_hash, const std::string& stag
                         const std::vector<Answer>& answers) {
   auto transaction = SqlTransaction::begin(database_);
   if (!transaction) return transaction.error();
-  auto insert = database_.prepare(
-      "INSERT OR IGNORE INTO answers VALUES "
-      "(?, (SELECT coalesce(max(number), 0) + 1 FROM answers), ?, ?, ?, ?, ?)",
-      "keep answers");
+  auto insert = database_.prepare("INSERT OR IGNORE INTO answers VALUES (?, ?, ?, ?, ?, ?, ?)",
+                                  "keep answers");
   if (!insert) return insert.error();
   for (const Answer& answer : answers) {
-    insert->bind_text(1, answer.key).bind_text(2, problem_hash).bind_text(3, fingerprint_);
-    insert->bind_text(4, stage).bind_blob(5, answer.task->SerializeAsString());
-    insert->bind_blob(6, answer.result->SerializeAsString());
+    insert->bind_text(1, answer.key).bind(2, answer.number).bind_text(3, problem_hash);
+    insert->bind_text(4, fingerprint_).bind_text(5, stage);
+    insert->bind_blob(6, answer.task->SerializeAsString());
+    insert->bind_blob(7, answer.result->SerializeAsString());
     if (Status s = insert->run(); !s) return s;
   }
   return transaction->commit();
@@ -93,6 +107,34 @@ Status AnswerStore::add(const std::string& problem_hash, const std::string& stag
 
 Result<std::int64_t> AnswerStore::count() const {
   return database_.integer("SELECT count(*) FROM answers", "count answers");
+}
+
+Status AnswerStore::forget() {
+  return database_.exec("DELETE FROM answers; DELETE FROM problems; VACUUM", "forget the answers");
+}
+
+Status AnswerStore::set_command(const std::string& json) {
+  auto insert =
+      database_.prepare("INSERT OR REPLACE INTO command VALUES (1, ?)", "say how far it is");
+  if (!insert) return insert.error();
+  return insert->bind_text(1, json).run();
+}
+
+Result<std::optional<std::string>> read_command(const std::filesystem::path& file) {
+  auto database = Database::open(file, Database::Mode::kQueryOnly);
+  if (!database) return database.error();
+  if (Status s = check_identity(*database); !s) return s.error();
+  const auto there = database->integer("SELECT count(*) FROM sqlite_master WHERE name = 'command'",
+                                       "read the command");
+  if (!there) return there.error();
+  std::optional<std::string> json;
+  if (*there == 0) return json;  // of an older program
+  auto select = database->prepare("SELECT record FROM command", "read the command");
+  if (!select) return select.error();
+  const auto row = select->step();
+  if (!row) return row.error();
+  if (*row) json = select->text(0);
+  return json;
 }
 
 }  // namespace gapfarm

@@ -28,8 +28,13 @@ class AnswerStore {
   std::string key(const std::string& problem_hash, const v1::Task& task) const;
   Result<std::optional<v1::TaskResult>> find(const std::string& key) const;
 
+  // The first of `count` numbers that no answer has: questions keep the order in which they were
+  // asked, whenever they are answered.
+  std::int64_t reserve(std::size_t count);
+
   struct Answer {
     std::string key;
+    std::int64_t number = 0;  // of those reserved
     const v1::Task* task = nullptr;
     const v1::TaskResult* result = nullptr;
   };
@@ -38,6 +43,11 @@ class AnswerStore {
              const std::vector<Answer>& answers);
 
   Result<std::int64_t> count() const;
+  // Takes all answers, questions and problems out of the file, whose space is given back.
+  Status forget();
+
+  // What the command that asks says about itself: one JSON text, replaced each time.
+  Status set_command(const std::string& json);
 
  private:
   AnswerStore(Database database, std::string fingerprint)
@@ -45,6 +55,11 @@ class AnswerStore {
 
   Database database_;
   std::string fingerprint_;
+  std::int64_t next_number_ = 1;
 };
+
+// What the command that wrote `file` last said about itself, from a file that may be in use or in
+// a folder that cannot be written; none: it says nothing.  Errors: no answer store.
+Result<std::optional<std::string>> read_command(const std::filesystem::path& file);
 
 }  // namespace gapfarm

@@ -108,6 +108,7 @@ const char* incident_name(IncidentKind kind);  // "quarantine", "alarm"
 struct Progress {
   RunState state = RunState::kRunning;
   std::string stop_reason;  // empty while running
+  std::string waiting;      // while running: what it waits for, empty when it does not
   double rate_per_s = 0;    // evaluations
   std::optional<double> time_left_s;
   std::uint64_t done = 0, total = 0;  // tasks of the generation in work

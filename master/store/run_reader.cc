@@ -53,8 +53,8 @@ Result<RunReader> RunReader::open(const std::filesystem::path& run) {
   std::error_code ignored;
   if (!std::filesystem::exists(file, ignored)) {
     return Error{run.string() +
-                 ": holds no run (there is no run.sqlite); give the folder that "
-                 "`gapfarm evolve --out` wrote"};
+                 ": holds no run and no other long command (there is neither a run.sqlite nor a "
+                 "simulations.sqlite with one); give the folder that --out names"};
   }
   Result<Database> database = Database::open(file, Database::Mode::kQueryOnly);
   if (!database) return database.error();
@@ -165,7 +165,8 @@ Result<Progress> RunReader::progress() const {
   Progress progress;
   if (!*row) return progress;
   progress.state = state_of(select->text(0));
-  progress.stop_reason = select->text(1);
+  const bool running = progress.state == RunState::kRunning;
+  (running ? progress.waiting : progress.stop_reason) = select->text(1);
   progress.pid = select->integer(2);
   progress.host = select->text(3);
   progress.heartbeat_unix_s = select->real(4);

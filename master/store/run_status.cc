@@ -105,6 +105,7 @@ Json to_json(const RunStatus& status) {
   Json json;
   json["state"] = run_state_name(status.state);
   json["stop_reason"] = status.stop_reason;
+  json["waiting"] = status.state == RunState::kRunning ? status.progress.waiting : "";
   json["generation"] = status.generation;
   json["evaluations"] = status.evaluations;
   json["best_fitness"] = number_or_null(status.best);

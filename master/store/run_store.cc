@@ -303,7 +303,10 @@ Status RunStore::set_progress(const Progress& progress) {
       "rate_per_s = ?, time_left_s = ?, done = ?, total = ?, workers = ?, epoch = ?, farm = ?",
       "write the progress");
   if (!update) return update.error();
-  update->bind_text(1, run_state_name(progress.state)).bind_text(2, progress.stop_reason);
+  // One column for both: a run that waits has not stopped.
+  const bool running = progress.state == RunState::kRunning;
+  update->bind_text(1, run_state_name(progress.state));
+  update->bind_text(2, running ? progress.waiting : progress.stop_reason);
   update->bind(3, std::int64_t{::getpid()}).bind_text(4, host_name());
   update->bind(5, unix_now_s()).bind(6, progress.rate_per_s).bind(7, progress.time_left_s);
   update->bind(8, static_cast<std::int64_t>(progress.done));

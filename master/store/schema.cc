@@ -53,7 +53,7 @@ CREATE INDEX individuals_by_birth ON individuals (birth_id);
 CREATE TABLE progress (        -- one row: what the master last said about itself
   id INTEGER PRIMARY KEY CHECK (id = 1),
   state TEXT NOT NULL,
-  stop_reason TEXT NOT NULL,
+  stop_reason TEXT NOT NULL,   -- while it runs: what it waits for
   pid INTEGER NOT NULL,
   host TEXT NOT NULL,
   heartbeat REAL NOT NULL,     -- Unix time

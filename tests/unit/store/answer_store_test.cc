@@ -19,19 +19,22 @@ v1::Task echo(const std::string& payload) {
 }
 
 // Answers with the payload, counts what it is asked, and stops when told to.
-class EchoFarm : public Farm {
+class EchoFarm : public Farm, public AnswerSource {
  public:
   std::string add_problem(const v1::Problem&) override { return "hash"; }
+  void watch_answers(AnswerWatcher watcher) override { watcher_ = std::move(watcher); }
   Result<std::vector<v1::TaskResult>> run(
       const std::string&, const std::vector<v1::Task>& tasks,
       const std::function<void(const FarmProgress&)>&) override {
     if (stopped) return Error{kStopRequested};
     std::vector<v1::TaskResult> results;
     for (const v1::Task& task : tasks) {
+      if (task.echo().payload() == stop_at) return Error{kStopRequested};
       asked.push_back(task.echo().payload());
       v1::TaskResult& result = results.emplace_back();
       result.set_outcome(task.echo().payload() == "bad worker" ? v1::WORKER_FAILED : v1::OK);
       result.set_echo(task.echo().payload());
+      if (watcher_) watcher_(results.size() - 1, result);
     }
     return results;
   }
@@ -40,6 +43,10 @@ class EchoFarm : public Farm {
 
   std::vector<std::string> asked;
   bool stopped = false;
+  std::string stop_at;  // a payload
+
+ private:
+  AnswerWatcher watcher_;
 };
 
 class AnswerStoreTest : public StoreTest {
@@ -52,7 +59,7 @@ TEST_F(AnswerStoreTest, AFarmIsAskedOnlyOnceAndAnswersKeepTheirOrder) {
   for (const bool again : {false, true}) {
     auto store = AnswerStore::open(answers(), "build");
     ASSERT_TRUE(store.ok()) << store.error().message;
-    RecordedFarm recorded(farm, *store);
+    RecordedFarm recorded(farm, *store, &farm);
     const std::string hash = recorded.add_problem({});
     const auto first = recorded.run(hash, {echo("a"), echo("b")});
     ASSERT_TRUE(first.ok());
@@ -71,7 +78,7 @@ TEST_F(AnswerStoreTest, AStopLosesNothingThatWasAnswered) {
   EchoFarm farm;
   auto store = AnswerStore::open(answers(), "build");
   ASSERT_TRUE(store.ok());
-  RecordedFarm recorded(farm, *store);
+  RecordedFarm recorded(farm, *store, &farm);
   const std::string hash = recorded.add_problem({});
   ASSERT_TRUE(recorded.run(hash, {echo("a")}).ok());
   farm.stopped = true;
@@ -81,12 +88,67 @@ TEST_F(AnswerStoreTest, AStopLosesNothingThatWasAnswered) {
   EXPECT_TRUE(recorded.run(hash, {echo("a")}).ok()) << "no farm is needed for what is known";
 }
 
+// One batch may be the whole of a command's work.
+TEST_F(AnswerStoreTest, AStopWithinABatchLosesNothingThatWasAnswered) {
+  EchoFarm farm;
+  auto store = AnswerStore::open(answers(), "build");
+  ASSERT_TRUE(store.ok());
+  farm.stop_at = "c";
+  {
+    RecordedFarm recorded(farm, *store, &farm);
+    const auto stopped = recorded.run(recorded.add_problem({}), {echo("a"), echo("b"), echo("c")});
+    ASSERT_FALSE(stopped.ok());
+    EXPECT_EQ(*store->count(), 2);
+  }
+  farm.stop_at.clear();
+  RecordedFarm recorded(farm, *store, &farm);
+  RecordedProgress last;
+  recorded.watch([&](const RecordedProgress& progress) { last = progress; });
+  const auto whole = recorded.run(recorded.add_problem({}), {echo("a"), echo("b"), echo("c")});
+  ASSERT_TRUE(whole.ok());
+  EXPECT_EQ((*whole)[1].echo(), "b");
+  EXPECT_THAT(farm.asked, testing::ElementsAre("a", "b", "c"));
+  EXPECT_EQ(last.remembered, 2u);
+  EXPECT_EQ(last.simulated, 1u);
+  EXPECT_EQ(last.asked, 3u);
+}
+
+TEST_F(AnswerStoreTest, ALongBatchIsKeptAsItGoes) {
+  static double now_s;
+  now_s = 0;
+  class SlowFarm : public EchoFarm {
+   public:
+    explicit SlowFarm(AnswerStore& store) : store_(store) {}
+    void watch_answers(AnswerWatcher watcher) override {
+      EchoFarm::watch_answers([this, watcher](std::size_t task, const v1::TaskResult& result) {
+        now_s += 0.4;
+        if (watcher) watcher(task, result);
+        kept.push_back(*store_.count());
+      });
+    }
+    std::vector<std::int64_t> kept;
+
+   private:
+    AnswerStore& store_;
+  };
+  auto store = AnswerStore::open(answers(), "build");
+  ASSERT_TRUE(store.ok());
+  SlowFarm farm(*store);
+  {
+    RecordedFarm recorded(farm, *store, &farm, [] { return now_s; });
+    ASSERT_TRUE(
+        recorded.run(recorded.add_problem({}), {echo("a"), echo("b"), echo("c"), echo("d")}).ok());
+  }
+  EXPECT_THAT(farm.kept, testing::ElementsAre(0, 0, 3, 3));
+  EXPECT_EQ(*store->count(), 4);
+}
+
 TEST_F(AnswerStoreTest, OtherBuildsAndFailedWorkersAreNoAnswers) {
   EchoFarm farm;
   for (const char* build : {"one", "two"}) {
     auto store = AnswerStore::open(answers(), build);
     ASSERT_TRUE(store.ok());
-    RecordedFarm recorded(farm, *store);
+    RecordedFarm recorded(farm, *store, &farm);
     const std::string hash = recorded.add_problem({});
     ASSERT_TRUE(recorded.run(hash, {echo("a"), echo("bad worker")}).ok());
     ASSERT_TRUE(recorded.run(hash, {echo("a"), echo("bad worker")}).ok());

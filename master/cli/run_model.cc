@@ -1,0 +1,90 @@
+#include "master/cli/run_model.h"
+
+#include <filesystem>
+
+#include "common/base/build_info.h"
+#include "common/config/config.h"
+#include "master/store/schema.h"
+
+namespace gapfarm {
+
+Result<Problem> stored_problem(const RunReader& run) {
+  v1::Problem message;
+  if (!message.ParseFromString(run.info().problem)) {
+    return Error{run.run().string() +
+                 ": the stored problem cannot be read; the run store is damaged"};
+  }
+  return from_proto(message);
+}
+
+Result<Model> best_so_far(const RunReader& run) {
+  const auto generations = run.generations();
+  if (!generations) return generations.error();
+  const std::string name = run.run().string();
+  if (generations->empty()) {
+    return Error{name +
+                 ": no generation is complete yet; wait for the first, see `gapfarm status " +
+                 name + "`"};
+  }
+  const StoredGeneration& last = generations->back();
+  // By number: another generation may be committed meanwhile.
+  const auto members = run.individuals(last.generation);
+  if (!members) return members.error();
+  if (members->empty() || !members->front().fitness) {
+    return Error{name + ": nothing has ended well yet; see `gapfarm status " + name + "`"};
+  }
+  const Result<Problem> problem = stored_problem(run);
+  if (!problem) return problem.error();
+  const StoredIndividual& best = members->front();
+  Model model;
+  model.scenario = problem->scenario;
+  model.version = build_info().version;
+  model.fingerprint = build_info().fingerprint;
+  model.values = problem->values_of(best.genome);
+  model.commands = problem->commands;
+  model.pieces = problem->pieces;
+  model.fitness = problem->fitness;
+  model.spread = problem->spread;
+  model.score = best.fitness;
+  model.data = {run.info().problem_hash, problem->log.trials.size(), {}};
+  if (const auto config = parse_config(run.info().config_text, run.info().config_path)) {
+    model.data.files = config->trial_files;
+  }
+  model.origin = {name, run.info().seed, last.generation, last.evaluations};
+  return model;
+}
+
+Result<Model> read_model_of(const std::string& run_or_model, Console& console) {
+  namespace fs = std::filesystem;
+  const fs::path path(run_or_model);
+  std::error_code ignored;
+  if (!fs::is_directory(path, ignored)) return read_model(run_or_model);
+  const fs::path file = path / "model.toml";
+  std::optional<Model> left;
+  if (fs::exists(file, ignored)) {
+    Result<Model> model = read_model(file.string());
+    if (!model) return model;
+    left = std::move(*model);
+  }
+  if (!fs::exists(run_store_file(path), ignored)) {
+    if (left) return *std::move(left);
+    return Error{run_or_model +
+                 ": has neither a model.toml nor a run in it; give a model file or "
+                 "the folder of a run or a diagnosis"};
+  }
+  const Result<RunReader> run = RunReader::open(path);
+  if (!run) return run.error();
+  // A finished run that was resumed has gone on from what it left.
+  const auto generations = run->generations();
+  if (!generations) return generations.error();
+  const std::uint64_t reached = generations->empty() ? 0 : generations->back().generation;
+  if (left && left->origin.generation >= reached) return *std::move(left);
+  Result<Model> model = best_so_far(*run);
+  if (!model) return model;
+  console.note(run_or_model + ": this run is not finished; taking its best so far, " +
+               run->info().fitness + " " + format_number(model->score) + " of generation " +
+               std::to_string(model->origin.generation));
+  return model;
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,101 @@
+// How far a command of several stages is, and how long the whole of it will still take.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace gapfarm {
+
+struct ProgressStage {
+  std::string name;         // "screen the catalogue"
+  double share = 1;         // of the whole command's time, in any unit; a guess
+  std::uint64_t tasks = 0;  // that it will ask; 0: only it knows, so its own time is the guide
+};
+
+// How a study tells its caller of its stages; either may be empty.
+struct StageHooks {
+  // Before the first stage: all of them.
+  std::function<void(std::vector<ProgressStage>)> plan;
+  // Stage `k` of them begins, or goes on with more: see OverallProgress::begin().
+  std::function<void(std::size_t k, std::uint64_t tasks)> begin;
+
+  void planned(std::vector<ProgressStage> stages) const {
+    if (plan) plan(std::move(stages));
+  }
+  void began(std::size_t k, std::uint64_t tasks = 0) const {
+    if (begin) begin(k, tasks);
+  }
+};
+
+// What can be said of it now.
+struct ProgressView {
+  std::string stage;
+  std::size_t number = 0, stages = 0;  // of the stage, from 1; 0: none has begun
+  std::uint64_t done = 0, total = 0;   // tasks of the stage; total 0: unknown
+  double share = 0;                    // of the whole, [0, 1]; never goes back
+  double rate_per_s = 0;               // tasks simulated, mean since the stage began
+  std::optional<double> time_left_s;   // of the whole; none before there is a pace to go by
+  std::uint64_t remembered = 0, simulated = 0;  // tasks of all stages
+};
+
+// Times are seconds of one clock of the caller's.  The pace is that of what was simulated: tasks
+// whose answers were at hand take no time worth counting.
+class OverallProgress {
+ public:
+  explicit OverallProgress(std::vector<ProgressStage> stages);
+
+  // Stage `k` begins; those before it are over.  `tasks`, if not 0, replaces the plan's.  When it
+  // is in work already, it has so many more, and the whole is longer.
+  void begin(std::size_t k, double now_s, std::uint64_t tasks = 0);
+  // The stage with this name; false: there is none, and nothing changes.
+  bool begin(const std::string& name, double now_s);
+  // Tasks of the present stage that are answered, in all since it began.
+  void answered(std::uint64_t remembered, std::uint64_t simulated);
+  // The present stage turns out to have so many tasks.
+  void expect(std::uint64_t tasks);
+
+  ProgressView at(double now_s) const;
+
+ private:
+  struct Passed {
+    double share = 0;  // of the stage, done
+    double fresh = 0;  // of it, what had to be simulated
+  };
+  Passed present(double now_s) const;
+  double fresh_part() const;
+
+  std::vector<ProgressStage> stages_;
+  double whole_ = 0;  // sum of shares
+  bool begun_ = false;
+  std::size_t stage_ = 0;
+  double first_s_ = 0, stage_s_ = 0;              // when the first and the present stage began
+  double behind_ = 0, behind_fresh_ = 0;          // shares of the stages before the present one
+  std::uint64_t remembered_ = 0, simulated_ = 0;  // of the present stage
+  std::uint64_t remembered_before_ = 0, simulated_before_ = 0;  // of those before
+  mutable double shown_ = 0;
+};
+
+// "stage 3 of 6, screen the catalogue: 41 % done, 85/s, about 2 min 10 s left".  A command of one
+// stage is not numbered, and known tasks are counted: "evaluate: 410 of 1000, ...".
+std::string progress_words(const ProgressView& view);
+
+// When a line that stays is due: at once, and then every `interval_s`.
+class LineCadence {
+ public:
+  explicit LineCadence(double interval_s = 60) : interval_s_(interval_s) {}
+  bool due(double now_s) {
+    if (last_s_ && now_s - *last_s_ < interval_s_) return false;
+    last_s_ = now_s;
+    return true;
+  }
+
+ private:
+  double interval_s_;
+  std::optional<double> last_s_;
+};
+
+}  // namespace gapfarm

@@ -1,0 +1,136 @@
+#include "master/store/command_record.h"
+
+#include <nlohmann/json.hpp>
+
+#include "master/store/answer_store.h"
+#include "master/store/run_lock.h"
+
+namespace gapfarm {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+// Commands beat about once a second, less often while they compute themselves.
+constexpr double kFreshHeartbeat_s = 120;
+
+template <class T>
+void read(const Json& json, const char* key, T& to) {
+  const auto found = json.find(key);
+  if (found == json.end()) return;
+  if constexpr (std::is_same_v<T, std::string>) {
+    if (found->is_string()) to = found->get<T>();
+  } else {
+    if (found->is_number()) to = found->get<T>();
+  }
+}
+
+bool lives(const std::filesystem::path& folder, const CommandRecord& record, double now_unix_s) {
+  const std::optional<bool> held = run_lock_held(folder);
+  if (held.value_or(false)) return true;
+  const bool blind = !held || record.host != host_name();
+  return blind && now_unix_s - record.heartbeat_unix_s < kFreshHeartbeat_s;
+}
+
+}  // namespace
+
+std::filesystem::path answer_file(const std::filesystem::path& folder) {
+  return folder / "simulations.sqlite";
+}
+
+Json to_json(const CommandRecord& record) {
+  Json workers = Json::array();
+  for (const StoredWorker& worker : record.workers) {
+    workers.push_back({{"name", worker.name},
+                       {"state", worker.state},
+                       {"jobs", worker.jobs},
+                       {"host", worker.host},
+                       {"finished", worker.finished},
+                       {"rate_per_s", worker.rate_per_s}});
+  }
+  Json json;
+  json["command"] = record.command;
+  json["state"] = record.state;
+  json["stop_reason"] = record.reason;
+  json["stage"] = record.stage;
+  json["stage_number"] = record.stage_number;
+  json["stages"] = record.stages;
+  json["done"] = record.done;
+  json["total"] = record.total;
+  json["share"] = record.share;
+  json["rate_per_s"] = record.rate_per_s;
+  json["time_left_s"] = record.time_left_s ? Json(*record.time_left_s) : Json(nullptr);
+  json["remembered"] = record.remembered;
+  json["simulated"] = record.simulated;
+  json["waiting"] = record.waiting;
+  json["workers"] = std::move(workers);
+  json["began"] = record.began_unix_s;
+  json["heartbeat"] = record.heartbeat_unix_s;
+  json["pid"] = record.pid;
+  json["host"] = record.host;
+  json["arguments"] = record.arguments;
+  return json;
+}
+
+CommandRecord command_record_of(const Json& json) {
+  CommandRecord record;
+  if (!json.is_object()) return record;
+  read(json, "command", record.command);
+  read(json, "state", record.state);
+  read(json, "stop_reason", record.reason);
+  read(json, "stage", record.stage);
+  read(json, "stage_number", record.stage_number);
+  read(json, "stages", record.stages);
+  read(json, "done", record.done);
+  read(json, "total", record.total);
+  read(json, "share", record.share);
+  read(json, "rate_per_s", record.rate_per_s);
+  if (json.contains("time_left_s") && json["time_left_s"].is_number()) {
+    record.time_left_s = json["time_left_s"].get<double>();
+  }
+  read(json, "remembered", record.remembered);
+  read(json, "simulated", record.simulated);
+  read(json, "waiting", record.waiting);
+  read(json, "began", record.began_unix_s);
+  read(json, "heartbeat", record.heartbeat_unix_s);
+  read(json, "pid", record.pid);
+  read(json, "host", record.host);
+  read(json, "arguments", record.arguments);
+  if (!json.contains("workers") || !json["workers"].is_array()) return record;
+  for (const Json& json_worker : json["workers"]) {
+    StoredWorker& worker = record.workers.emplace_back();
+    if (!json_worker.is_object()) continue;
+    read(json_worker, "name", worker.name);
+    read(json_worker, "state", worker.state);
+    read(json_worker, "jobs", worker.jobs);
+    read(json_worker, "host", worker.host);
+    read(json_worker, "finished", worker.finished);
+    read(json_worker, "rate_per_s", worker.rate_per_s);
+  }
+  return record;
+}
+
+Result<std::optional<CommandRecord>> command_status(const std::filesystem::path& folder,
+                                                    double now_unix_s) {
+  std::error_code ignored;
+  if (!std::filesystem::exists(answer_file(folder), ignored)) {
+    return std::optional<CommandRecord>();
+  }
+  const auto text = read_command(answer_file(folder));
+  if (!text) return text.error();
+  if (!*text) return std::optional<CommandRecord>();
+  CommandRecord record = command_record_of(Json::parse(**text, nullptr, false));
+  if (record.state == "running" && !lives(folder, record, now_unix_s)) {
+    record.state = "stopped";
+    record.reason = "crashed: process " + std::to_string(record.pid) + " on " + record.host +
+                    " is gone without a word";
+  }
+  if (record.state != "running") {
+    record.time_left_s.reset();
+    if (record.state == "finished") record.time_left_s = 0;
+    record.workers.clear();
+    record.waiting.clear();
+  }
+  return std::optional<CommandRecord>(std::move(record));
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,48 @@
+// What a long command that is no run says about itself, in the folder where it keeps its
+// simulations: for `gapfarm status`, live and dead.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/base/result.h"
+#include "master/store/records.h"
+
+namespace gapfarm {
+
+// simulations.sqlite of a command's folder.
+std::filesystem::path answer_file(const std::filesystem::path& folder);
+
+struct CommandRecord {
+  std::string command;        // "diagnose"
+  std::string arguments;      // the whole command line
+  std::string state;          // "running", "finished", "stopped", "failed"
+  std::string reason;         // how it ended; empty while it runs
+  std::string stage;          // "screen the catalogue"
+  std::uint64_t stage_number = 0, stages = 0;  // from 1
+  std::uint64_t done = 0, total = 0;           // tasks of the stage; total 0: unknown
+  double share = 0;                            // of the whole, [0, 1]
+  double rate_per_s = 0;                       // tasks simulated
+  std::optional<double> time_left_s;           // of the whole
+  std::uint64_t remembered = 0, simulated = 0;  // answers at hand, and new ones
+  std::string waiting;  // what it waits for; empty: nothing
+  std::vector<StoredWorker> workers;
+  double began_unix_s = 0, heartbeat_unix_s = 0;
+  std::int64_t pid = 0;
+  std::string host;
+};
+
+nlohmann::ordered_json to_json(const CommandRecord& record);
+// Fields that are missing or of another kind are left as they are by default.
+CommandRecord command_record_of(const nlohmann::ordered_json& json);
+
+// What the command in `folder` last said; one that says it runs but whose process is gone has
+// stopped, with the reason.  None: the folder holds no command.  Errors: of reading its file.
+Result<std::optional<CommandRecord>> command_status(const std::filesystem::path& folder,
+                                                    double now_unix_s);
+
+}  // namespace gapfarm

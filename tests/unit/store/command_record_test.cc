@@ -1,0 +1,96 @@
+#include "master/store/command_record.h"
+
+#include <gmock/gmock.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "master/store/answer_store.h"
+#include "master/store/run_lock.h"
+#include "tests/unit/store/store_fixture.h"
+
+namespace gapfarm {
+namespace {
+
+using testing::HasSubstr;
+
+class CommandRecordTest : public StoreTest {
+ protected:
+  static CommandRecord example() {
+    CommandRecord record;
+    record.command = "compare";
+    record.arguments = "gapfarm compare a.toml --out compared";
+    record.state = "running";
+    record.stage = "evaluate";
+    record.stage_number = record.stages = 1;
+    record.done = 10;
+    record.total = 40;
+    record.share = 0.25;
+    record.time_left_s = 30;
+    record.waiting = "waiting for workers";
+    record.workers = {{"local-1", "here", "busy", 2, 10, 5.0}};
+    record.heartbeat_unix_s = 1000;
+    record.pid = 7;
+    record.host = host_name();
+    return record;
+  }
+  void write(const CommandRecord& record) const {
+    auto store = AnswerStore::open(answer_file(folder_), "build");
+    ASSERT_TRUE(store.ok());
+    ASSERT_TRUE(store->set_command(to_json(record).dump()).ok());
+  }
+};
+
+TEST_F(CommandRecordTest, ALiveCommandIsWhatItSaid) {
+  write(example());
+  const auto lock = RunLock::take(folder_);
+  ASSERT_TRUE(lock.ok());
+  const auto record = command_status(folder_, 1e6);
+  ASSERT_TRUE(record.ok() && *record);
+  EXPECT_EQ(to_json(**record), to_json(example())) << "however old its last word: it holds the lock";
+}
+
+TEST_F(CommandRecordTest, ADeadOneIsStoppedAndPromisesNothing) {
+  write(example());
+  const auto record = command_status(folder_, 1e6);
+  ASSERT_TRUE(record.ok() && *record);
+  EXPECT_EQ((*record)->state, "stopped");
+  EXPECT_THAT((*record)->reason, HasSubstr("crashed: process 7"));
+  EXPECT_FALSE((*record)->time_left_s);
+  EXPECT_TRUE((*record)->workers.empty());
+  EXPECT_EQ((*record)->share, 0.25);
+}
+
+TEST_F(CommandRecordTest, OfAnotherHostTheHeartbeatDecides) {
+  CommandRecord record = example();
+  record.host = "elsewhere";
+  write(record);
+  EXPECT_EQ((*command_status(folder_, 1010))->state, "running");
+  EXPECT_EQ((*command_status(folder_, 2000))->state, "stopped");
+}
+
+TEST_F(CommandRecordTest, FoldersWithoutACommandHaveNone) {
+  EXPECT_FALSE((*command_status(folder_, 0)).has_value());
+  ASSERT_TRUE(AnswerStore::open(answer_file(folder_), "build").ok());
+  EXPECT_FALSE((*command_status(folder_, 0)).has_value()) << "of an older program";
+}
+
+TEST_F(CommandRecordTest, ForgettingTakesAnswersOutOfTheFileAndLeavesTheRecord) {
+  auto store = AnswerStore::open(answer_file(folder_), "build");
+  ASSERT_TRUE(store.ok());
+  v1::Task task;
+  task.mutable_echo()->set_payload("a telling word");
+  v1::TaskResult result;
+  ASSERT_TRUE(store->add_problem("hash", "problem").ok());
+  ASSERT_TRUE(store->add("hash", "stage", {{store->key("hash", task), 1, &task, &result}}).ok());
+  ASSERT_TRUE(store->set_command(to_json(example()).dump()).ok());
+  ASSERT_TRUE(store->forget().ok());
+  EXPECT_EQ(*store->count(), 0);
+  std::ifstream file(answer_file(folder_), std::ios::binary);
+  const std::string bytes((std::istreambuf_iterator<char>(file)), {});
+  EXPECT_EQ(bytes.find("a telling word"), bytes.npos);
+  EXPECT_NE(bytes.find("compared"), bytes.npos);
+}
+
+}  // namespace
+}  // namespace gapfarm

@@ -1,0 +1,25 @@
+// What a worker says that has no master.
+#pragma once
+
+#include <optional>
+#include <string>
+
+namespace gapfarm {
+
+class MasterWait {
+ public:
+  explicit MasterWait(std::string endpoint) : endpoint_(std::move(endpoint)) {}
+
+  // What is to be said now: at once that it waits and for whom, every minute that it still does,
+  // and when a master comes or goes.  `working`: some master has welcomed this worker.  Times are
+  // of one clock of the caller's.
+  std::optional<std::string> say(bool working, double now_s);
+
+ private:
+  std::string endpoint_;
+  bool working_ = false;
+  std::optional<double> since_s_;  // it waits
+  double said_s_ = 0;
+};
+
+}  // namespace gapfarm
