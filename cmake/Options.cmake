@@ -23,7 +23,7 @@ if(GAPFARM_SANITIZE)
 endif()
 
 find_program(CCACHE ccache)
-if(CCACHE)
+if(CCACHE AND GAPFARM_CCACHE)
   set(CMAKE_CXX_COMPILER_LAUNCHER ${CCACHE})
 endif()
 
@@ -38,15 +38,25 @@ function(gapfarm_precompile name)
   endif()
 endfunction()
 
-# gapfarm_library(NAME SOURCES a.cc b.cc DEPS x y [PRECOMPILE <header>...]): one library a folder,
-# sources listed by hand.
+# gapfarm_join(TARGET [SOURCE...]): compiles the target's sources several at a time, where
+# GAPFARM_JOIN asks for it, and these each by itself.  Headers are read once a dozen sources.
+function(gapfarm_join name)
+  if(GAPFARM_JOIN)
+    set_target_properties(${name} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 12)
+    set_source_files_properties(${ARGN} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
+  endif()
+endfunction()
+
+# gapfarm_library(NAME SOURCES a.cc b.cc DEPS x y [SEPARATE c.cc...] [PRECOMPILE <header>...]): one
+# library a folder, sources listed by hand; SEPARATE ones define names that others define too.
 function(gapfarm_library name)
-  cmake_parse_arguments(ARG "" "" "SOURCES;DEPS;PRECOMPILE" ${ARGN})
+  cmake_parse_arguments(ARG "" "" "SOURCES;SEPARATE;DEPS;PRECOMPILE" ${ARGN})
   if(ARG_SOURCES)
-    add_library(${name} STATIC ${ARG_SOURCES})
+    add_library(${name} STATIC ${ARG_SOURCES} ${ARG_SEPARATE})
     target_include_directories(${name} PUBLIC ${PROJECT_SOURCE_DIR} ${PROJECT_BINARY_DIR})
     target_link_libraries(${name} PUBLIC ${ARG_DEPS})
     gapfarm_precompile(${name} ${ARG_PRECOMPILE})
+    gapfarm_join(${name} ${ARG_SEPARATE})
   else()
     add_library(${name} INTERFACE)
     target_include_directories(${name} INTERFACE ${PROJECT_SOURCE_DIR} ${PROJECT_BINARY_DIR})

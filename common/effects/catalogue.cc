@@ -5,8 +5,6 @@
 namespace gapfarm {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
-
 std::vector<Effect> build_catalogue() {
   using enum EffectStage;
   return {
@@ -52,13 +50,19 @@ std::vector<Effect> build_catalogue() {
        kStartHeading,
        "the floor falls away toward a direction",
        {{"angle", "rad", 0, 0, 0.3, "slope", {}},
-        {"direction", "rad", 0, -kPi, kPi, "downhill, world frame", {}}}},
+        {"direction", "rad", 0, -std::numbers::pi, std::numbers::pi, "downhill, world frame", {}}}},
       {"floor_nap",
        kFloor,
        kStartHeading,
        "drag, as a share of weight, greatest when travelling against the nap",
        {{"strength", "-", 0, 0, 1, "drag over weight against the nap", {}},
-        {"direction", "rad", 0, -kPi, kPi, "travel in this direction is free, world frame", {}}}},
+        {"direction",
+         "rad",
+         0,
+         -std::numbers::pi,
+         std::numbers::pi,
+         "travel in this direction is free, world frame",
+         {}}}},
       {"friction_patch",
        kFloor,
        kStartHeading | kStartPlace,

@@ -6,9 +6,7 @@
 namespace gapfarm {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
-
-std::vector<Effect> build_catalogue() {
+std::vector<Effect> build_push_catalogue() {
   using enum EffectStage;
   return {
       {"friction_anisotropy",
@@ -16,7 +14,13 @@ std::vector<Effect> build_catalogue() {
        kStartHeading,
        "the table's friction differs along and across its grain",
        {{"ratio", "-", 1, 0.3, 3, "friction across over friction along the grain", {}},
-        {"direction", "rad", 0, -kPi / 2, kPi / 2, "of the grain, world frame", {}}}},
+        {"direction",
+         "rad",
+         0,
+         -std::numbers::pi / 2,
+         std::numbers::pi / 2,
+         "of the grain, world frame",
+         {}}}},
       {"friction_speed",
        kFloor,
        kNoContext,
@@ -35,7 +39,7 @@ std::vector<Effect> build_catalogue() {
        kStartHeading,
        "the table falls away toward a direction",
        {{"angle", "rad", 0, 0, 0.3, "slope", {}},
-        {"direction", "rad", 0, -kPi, kPi, "downhill, world frame", {}}}},
+        {"direction", "rad", 0, -std::numbers::pi, std::numbers::pi, "downhill, world frame", {}}}},
       {"com_offset",
        kFloor,
        kNoContext,
@@ -48,7 +52,13 @@ std::vector<Effect> build_catalogue() {
        kNoContext,
        "the support plate is drawn out along one direction of the piece",
        {{"stretch", "-", 0, -0.8, 0.8, "log of its length over its width", {}},
-        {"direction", "rad", 0, -kPi / 2, kPi / 2, "of the length, in the piece's frame", {}}}},
+        {"direction",
+         "rad",
+         0,
+         -std::numbers::pi / 2,
+         std::numbers::pi / 2,
+         "of the length, in the piece's frame",
+         {}}}},
       {"finger_compliance",
        kDrive,
        kNoContext,
@@ -87,7 +97,7 @@ std::vector<Effect> build_catalogue() {
 }  // namespace
 
 std::span<const Effect> push_effects() {
-  static const std::vector<Effect> catalogue = build_catalogue();
+  static const std::vector<Effect> catalogue = build_push_catalogue();
   return catalogue;
 }
 

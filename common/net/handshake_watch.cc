@@ -7,11 +7,12 @@
 namespace gapfarm {
 namespace {
 
-constexpr const char* kMonitorEndpoint = "inproc://handshakes";
-constexpr int kEvents = ZMQ_EVENT_HANDSHAKE_SUCCEEDED | ZMQ_EVENT_HANDSHAKE_FAILED_NO_DETAIL |
-                        ZMQ_EVENT_HANDSHAKE_FAILED_PROTOCOL | ZMQ_EVENT_HANDSHAKE_FAILED_AUTH;
+constexpr const char* kHandshakes = "inproc://handshakes";
+constexpr int kHandshakeEvents =
+    ZMQ_EVENT_HANDSHAKE_SUCCEEDED | ZMQ_EVENT_HANDSHAKE_FAILED_NO_DETAIL |
+    ZMQ_EVENT_HANDSHAKE_FAILED_PROTOCOL | ZMQ_EVENT_HANDSHAKE_FAILED_AUTH;
 
-double seconds() {
+double now_s() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
@@ -23,10 +24,10 @@ HandshakeWatch::HandshakeWatch(zmq::context_t& context, zmq::socket_t& socket, s
       monitor_(context, zmq::socket_type::pair),
       endpoint_(std::move(endpoint)),
       retry_s_(retry_s) {
-  if (zmq_socket_monitor(socket.handle(), kMonitorEndpoint, kEvents) != 0) throw zmq::error_t();
+  if (zmq_socket_monitor(socket.handle(), kHandshakes, kHandshakeEvents) != 0) throw zmq::error_t();
   monitor_.set(zmq::sockopt::linger, 0);
   monitor_.set(zmq::sockopt::rcvhwm, 0);  // the I/O thread must never wait for this one
-  monitor_.connect(kMonitorEndpoint);
+  monitor_.connect(kHandshakes);
 }
 
 HandshakeWatch::~HandshakeWatch() { zmq_socket_monitor(socket_.handle(), nullptr, 0); }
@@ -42,7 +43,7 @@ void HandshakeWatch::look() {
     std::memcpy(&value, static_cast<const char*>(event.data()) + sizeof kind, sizeof value);
     on_event(kind, value);
   }
-  if (retry_at_ < 0 || seconds() < retry_at_) return;
+  if (retry_at_ < 0 || now_s() < retry_at_) return;
   retry_at_ = -1;
   zmq_disconnect(socket_.handle(), endpoint_.c_str());  // may have gone already
   socket_.connect(endpoint_);
@@ -53,7 +54,7 @@ void HandshakeWatch::on_event(unsigned event, int value) {
     last_failure_ = 0;
     return;
   }
-  if (event == ZMQ_EVENT_HANDSHAKE_FAILED_PROTOCOL) retry_at_ = seconds() + retry_s_;
+  if (event == ZMQ_EVENT_HANDSHAKE_FAILED_PROTOCOL) retry_at_ = now_s() + retry_s_;
   if (event == last_failure_) return;
   last_failure_ = event;
   const std::string master = "the master at " + endpoint_;

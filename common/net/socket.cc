@@ -13,15 +13,16 @@
 #include "common/net/link_guard.h"
 
 namespace gapfarm {
-namespace {
-
-int milliseconds(double seconds) { return static_cast<int>(std::lround(seconds * 1000)); }
 
 // A context each: its I/O thread is the socket's own, and closing waits for nobody else.
 struct OwnedSocket {
   zmq::context_t context{1};
   zmq::socket_t socket;
 };
+
+namespace {
+
+int milliseconds(double seconds) { return static_cast<int>(std::lround(seconds * 1000)); }
 
 void configure(zmq::socket_t& socket, const SocketOptions& options) {
   socket.set(zmq::sockopt::linger, milliseconds(options.linger_s));

@@ -12,7 +12,7 @@ namespace gapfarm {
 namespace {
 
 constexpr double kCentimetresPerMetre = 100;
-constexpr double kAngleTolerance = 1e-6;
+constexpr double kPrintedAngleTolerance = 1e-6;
 constexpr double kGreatestCoordinate_cm = 1e6;
 
 // Reads one line from left to right; the first failure sticks.
@@ -65,7 +65,7 @@ class LineReader {
     expect(";", "';' after x");
     pose.y = number("y in cm", kGreatestCoordinate_cm) / kCentimetresPerMetre;
     expect(";", "';' after y");
-    pose.theta = wrap_angle(number("a heading in rad", std::numbers::pi + kAngleTolerance));
+    pose.theta = wrap_angle(number("a heading in rad", std::numbers::pi + kPrintedAngleTolerance));
     return pose;
   }
 
@@ -126,7 +126,7 @@ std::string_view take_line(std::string_view& text) {
   return line;
 }
 
-bool is_blank(std::string_view text) { return text.find_first_not_of(" \t\r\n") == text.npos; }
+bool is_blank_line(std::string_view text) { return text.find_first_not_of(" \t\r\n") == text.npos; }
 
 }  // namespace
 
@@ -143,7 +143,7 @@ Result<TrialLog> parse_bbautotune(std::string_view text, const std::string& file
   TrialLog log;
   for (std::size_t number = 1; !text.empty(); ++number) {
     const std::string_view line = take_line(text);
-    if (is_blank(line)) continue;
+    if (is_blank_line(line)) continue;
     LineReader reader(line, number, file);
     Trial trial;
     trial.session = session;
@@ -156,7 +156,7 @@ Result<TrialLog> parse_bbautotune(std::string_view text, const std::string& file
     trial.X_WE = reader.pose();
     reader.expect_end();
     if (reader.error()) {
-      if (!reader.cut_short() || !is_blank(text) || log.trials.empty()) return *reader.error();
+      if (!reader.cut_short() || !is_blank_line(text) || log.trials.empty()) return *reader.error();
       log.notes.push_back(reader.error()->message + "; the last line breaks off and was left out");
       break;
     }

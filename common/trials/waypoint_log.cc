@@ -13,7 +13,7 @@ namespace {
 constexpr double kDay_s = 86400;
 constexpr double kUnit_m = 0.01;
 
-std::vector<std::string_view> words_of(std::string_view line) {
+std::vector<std::string_view> split_words(std::string_view line) {
   std::vector<std::string_view> words;
   std::size_t at = 0;
   while ((at = line.find_first_not_of(" \t\r", at)) != std::string_view::npos) {
@@ -109,7 +109,7 @@ Result<WaypointLog> parse_waypoint_log(std::string_view text, const std::string&
   while (!text.empty()) {
     const std::size_t end = std::min(text.find('\n'), text.size());
     ++line_number;
-    if (const auto expected = reader.take(words_of(text.substr(0, end)))) {
+    if (const auto expected = reader.take(split_words(text.substr(0, end)))) {
       return text_error(file, {line_number, 1}, "a broken line", *expected);
     }
     text.remove_prefix(std::min(end + 1, text.size()));

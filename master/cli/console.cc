@@ -22,7 +22,7 @@ bool colour_wanted() {
   return !(no_color && *no_color) && !dumb_terminal();
 }
 
-void write_all(std::FILE* file, std::string_view text) {
+void write_whole(std::FILE* file, std::string_view text) {
   std::fwrite(text.data(), 1, text.size(), file);
   std::fflush(file);
 }
@@ -65,7 +65,7 @@ int Console::end(int exit_code) {
 void Console::print(std::string_view text) {
   clear_progress();
   printed_ = true;
-  write_all(out_, text);
+  write_whole(out_, text);
 }
 
 Status Console::keep(const std::string& file) {
@@ -83,7 +83,7 @@ void Console::note(std::string_view text) {
   if (log_ != nullptr) return log_->write(LogLevel::kInfo, text);
   if (kept_) kept_->write(LogLevel::kInfo, text);
   clear_progress();
-  write_all(err_, std::string(text) + "\n");
+  write_whole(err_, std::string(text) + "\n");
 }
 
 void Console::error(const Error& error) {
@@ -91,7 +91,7 @@ void Console::error(const Error& error) {
   if (log_ != nullptr) return log_->write(LogLevel::kError, error.message);
   if (kept_) kept_->write(LogLevel::kError, error.message);
   clear_progress();
-  write_all(err_, "gapfarm: " + error.message + "\n");
+  write_whole(err_, "gapfarm: " + error.message + "\n");
 }
 
 void Console::progress(std::string_view text, bool news) {
@@ -100,20 +100,20 @@ void Console::progress(std::string_view text, bool news) {
   if (lines_.due(now)) {
     if (log_ != nullptr) return log_->write(LogLevel::kInfo, text);
     if (kept_) kept_->write(LogLevel::kInfo, text);
-    if (!redraws_) write_all(err_, std::string(text) + "\n");
+    if (!redraws_) write_whole(err_, std::string(text) + "\n");
   }
   if (!redraws_ || log_ != nullptr) return;
   if (progress_shown_ && now - last_progress_s_ < 0.1) return;
   last_progress_s_ = now;
   progress_shown_ = true;
   // A line that wraps could not be taken back.
-  write_all(err_, "\r\x1b[K" + std::string(text.substr(0, std::max(1u, width()) - 1)));
+  write_whole(err_, "\r\x1b[K" + std::string(text.substr(0, std::max(1u, width()) - 1)));
 }
 
 void Console::clear_progress() {
   if (!progress_shown_) return;
   progress_shown_ = false;
-  write_all(err_, "\r\x1b[K");
+  write_whole(err_, "\r\x1b[K");
 }
 
 unsigned Console::width() const {

@@ -3,6 +3,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <cmath>
+#include <nlohmann/json.hpp>
 
 namespace gapfarm {
 namespace {

@@ -1,7 +1,7 @@
 // What `gapfarm crossfit --effects` shows.
 #pragma once
 
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 
 #include "master/experiment/effect_ranking.h"

@@ -9,7 +9,7 @@
 namespace gapfarm {
 namespace {
 
-enum class Way { kManyStarts, kAfterOpposite, kLate };
+enum class StartKind { kManyStarts, kAfterOpposite, kLate };
 
 constexpr int kStarts = 5;  // no harmonic of the heading up to the fourth repeats on five
 constexpr double kFirstHeading = 0.3;  // rad
@@ -54,13 +54,13 @@ Trial trial_of(const CommandSpec& c, const Pose& start, double t_s, const std::s
 
 // Every trial has a session of its own, so that what went before is what the design says.
 std::vector<std::uint32_t> add_trials(const std::vector<Pose>& starts, const CommandSpec& command,
-                                      Way way, std::vector<Trial>* log) {
+                                      StartKind way, std::vector<Trial>* log) {
   std::vector<std::uint32_t> indices;
-  const std::size_t count = way == Way::kManyStarts ? starts.size() : 1;
+  const std::size_t count = way == StartKind::kManyStarts ? starts.size() : 1;
   for (std::size_t k = 0; k < count; ++k) {
     const std::string session = "d" + std::to_string(log->size());
-    double t_s = way == Way::kLate ? kLate_s : kEarly_s;
-    if (way == Way::kAfterOpposite) {
+    double t_s = way == StartKind::kLate ? kLate_s : kEarly_s;
+    if (way == StartKind::kAfterOpposite) {
       CommandSpec opposite = command;
       opposite.left = -opposite.left;
       opposite.right = -opposite.right;
@@ -69,16 +69,16 @@ std::vector<std::uint32_t> add_trials(const std::vector<Pose>& starts, const Com
     }
     indices.push_back(static_cast<std::uint32_t>(log->size()));
     log->push_back(trial_of(command, starts[k], t_s, session));
-    log->back().trial = way == Way::kAfterOpposite ? 1 : 0;
+    log->back().trial = way == StartKind::kAfterOpposite ? 1 : 0;
   }
   return indices;
 }
 
-std::string drive_words(const CommandSpec& command, double level, Way way, bool many_starts) {
+std::string drive_words(const CommandSpec& command, double level, StartKind way, bool many_starts) {
   std::string how = " from any start";
   if (many_starts) how = " from several headings and places";
-  if (way == Way::kAfterOpposite) how = " straight after driving the opposite way";
-  if (way == Way::kLate) how = " " + plain_number(kLate_s / 60) + " minutes into a session";
+  if (way == StartKind::kAfterOpposite) how = " straight after driving the opposite way";
+  if (way == StartKind::kLate) how = " " + plain_number(kLate_s / 60) + " minutes into a session";
   return "Drive " + command.name + " for " + plain_number(command.duration_s) + " s at " +
          (level == 1 ? "full" : "half") + " level" + how;
 }
@@ -99,13 +99,14 @@ ExperimentPlan plan_drives(const Problem& problem) {
         command.right *= level;
         command.duration_s = duration;
         std::uint32_t ordinary = 0;
-        for (const Way way : {Way::kManyStarts, Way::kAfterOpposite, Way::kLate}) {
+        for (const StartKind way :
+             {StartKind::kManyStarts, StartKind::kAfterOpposite, StartKind::kLate}) {
           Design design;
           design.group = command.name;
           design.trials = add_trials(starts, command, way, &plan.problem.log.trials);
-          design.cost = duration + (way == Way::kManyStarts ? 0 : kTrouble_s);
-          if (way == Way::kManyStarts) ordinary = design.trials.front();
-          if (way != Way::kManyStarts) design.ordinary = ordinary;
+          design.cost = duration + (way == StartKind::kManyStarts ? 0 : kTrouble_s);
+          if (way == StartKind::kManyStarts) ordinary = design.trials.front();
+          if (way != StartKind::kManyStarts) design.ordinary = ordinary;
           design.action = [command, level, way](bool many_starts) {
             return drive_words(command, level, way, many_starts);
           };

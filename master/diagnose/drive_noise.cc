@@ -11,7 +11,7 @@ namespace {
 
 constexpr double kLeast = 1e-4;  // keeps logarithms and covariances finite
 constexpr double kMost = 0.5;
-constexpr double kFarSquared = 14;  // chi-square with 3 degrees of freedom: one in 340
+constexpr double kTailFromSquared = 14;  // chi-square with 3 degrees of freedom: one in 340
 
 struct Likelihood {
   std::span<const ResidualTrial> trials;
@@ -35,7 +35,9 @@ struct Likelihood {
       const Eigen::Matrix3d cov = covariance(trials[i], noise);
       const double d2 = residuals[i].dot(cov.inverse() * residuals[i]);
       const double bounded =
-          d2 > kFarSquared ? kFarSquared + tail * std::log1p((d2 - kFarSquared) / tail) : d2;
+          d2 > kTailFromSquared
+              ? kTailFromSquared + tail * std::log1p((d2 - kTailFromSquared) / tail)
+              : d2;
       sum += 0.5 * (std::log(cov.determinant()) + bounded);
     }
     return sum;

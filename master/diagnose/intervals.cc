@@ -5,6 +5,7 @@
 #include <map>
 #include <string>
 
+#include "master/diagnose/seam.h"
 #include "master/diagnose/signatures.h"
 
 namespace gapfarm {
@@ -26,7 +27,6 @@ constexpr double kDirectionError_rad = 0.02;  // of a tilt or a nap
 // radius, and of its ratio's distance from 1 as a share, for a gain of half a nat.
 constexpr double kPatchPlace_m = 0.25;
 constexpr double kPatchRatio = 1;
-constexpr double kSeamStep_m = 0.005;  // to which a seam's position is searched
 
 // Standard deviation of a parameter beyond what the fit says, in its unit.
 double search_error(const Parameter& p, double value, double gain) {

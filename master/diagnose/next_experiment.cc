@@ -14,7 +14,7 @@
 namespace gapfarm {
 namespace {
 
-constexpr std::uint64_t kFewestTrials = 3;
+constexpr std::uint64_t kFewestRepeats = 3;
 constexpr double kAlikeFromAnywhere = 0.7;  // least over mean divergence of the starts
 constexpr double kWorthTheTrouble = 1.5;    // divergence of a special way over the ordinary one's
 
@@ -211,7 +211,7 @@ std::uint64_t trials_needed(double divergence) {
   constexpr double kMost = 1e15;
   if (!(divergence > 0)) return static_cast<std::uint64_t>(kMost);
   const double needed = std::ceil(std::min(kMost, 2 * kQuantile * kQuantile / divergence));
-  return std::max(kFewestTrials, static_cast<std::uint64_t>(needed));
+  return std::max(kFewestRepeats, static_cast<std::uint64_t>(needed));
 }
 
 Result<std::vector<NextExperiment>> next_experiments(Farm& farm, const ExperimentPlan& plan,

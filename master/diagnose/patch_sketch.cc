@@ -13,8 +13,8 @@ namespace {
 constexpr int kMoments = 16;  // of a way
 // A fitted share of the mark scales it, so one smaller and one larger friction stand for all.
 constexpr std::array<double, 2> kRatios = {0.4, 2.5};
-constexpr std::array<double, 6> kRadii_m = {0.14, 0.20, 0.28, 0.38, 0.50, 0.65};
-constexpr double kGrid_m = 0.1;
+constexpr std::array<double, 6> kPatchRadii_m = {0.14, 0.20, 0.28, 0.38, 0.50, 0.65};
+constexpr double kPatchStep_m = 0.1;
 constexpr double kApart_m = 0.08;  // discs nearer than this, in all of x, y and radius, are one
 constexpr Eigen::Index kFewestMarked = 30;  // rows, three a trial
 constexpr double kMostSteps = 20;           // of the grid, along each axis
@@ -81,10 +81,10 @@ void PatchSketch::lay_grid() {
     low = low.cwiseMin(Eigen::Vector2d(t.X_WS.x, t.X_WS.y));
     high = high.cwiseMax(Eigen::Vector2d(t.X_WS.x, t.X_WS.y));
   }
-  const double step = std::max(kGrid_m, (high - low).maxCoeff() / kMostSteps);
+  const double step = std::max(kPatchStep_m, (high - low).maxCoeff() / kMostSteps);
   std::vector<Eigen::VectorXd> marks;
   for (std::size_t r = 0; r < kRatios.size(); ++r) {
-    for (double radius : kRadii_m) {
+    for (double radius : kPatchRadii_m) {
       for (double x = low.x(); x <= high.x(); x += step) {
         for (double y = low.y(); y <= high.y(); y += step) {
           const Patch patch = {x, y, radius, kRatios[r]};

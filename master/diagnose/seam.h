@@ -8,6 +8,8 @@
 
 namespace gapfarm {
 
+constexpr double kSeamStep_m = 0.005;  // to which a seam's position is searched
+
 // Shift of the readings beyond a line: two offsets, then two slopes along it about `middle`.
 Signature seam_signature(const Study& study, int axis, double position_m);
 

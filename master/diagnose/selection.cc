@@ -29,7 +29,6 @@ const Family kFamilies[] = {
     {{"motor_deadband", "rolling_resistance", "timing_offset", "motor_lag"}, 0.75},
     {{"floor_tilt", "floor_nap"}, 0.15},
 };
-constexpr double kSeamStep_m = 0.005;
 constexpr int kSeamSteps = 10;
 constexpr int kMostPatchSearches = 4;
 constexpr double kWorthRelinearising = 40;  // nats: curvature of weaker effects is below the noise

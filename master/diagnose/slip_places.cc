@@ -13,8 +13,8 @@
 namespace gapfarm {
 namespace {
 
-constexpr double kGrid_m = 0.1;
-constexpr std::array<double, 6> kRadii_m = {0.1, 0.15, 0.2, 0.3, 0.4, 0.55};
+constexpr double kPlaceStep_m = 0.1;
+constexpr std::array<double, 6> kPlaceRadii_m = {0.1, 0.15, 0.2, 0.3, 0.4, 0.55};
 constexpr double kLineStep_m = 0.05;
 constexpr double kAbout_m = 0.03;   // of a line: readings near it count as across
 constexpr double kMostPlaces = 40;  // along an axis
@@ -91,10 +91,10 @@ std::vector<Place> places(const std::vector<Way>& ways) {
   }
   const Eigen::Vector2d extent = high - low;
   std::vector<Place> all;
-  const double grid = std::max(kGrid_m, extent.maxCoeff() / kMostPlaces);
+  const double grid = std::max(kPlaceStep_m, extent.maxCoeff() / kMostPlaces);
   for (double x = low.x(); x <= high.x(); x += grid) {
     for (double y = low.y(); y <= high.y(); y += grid) {
-      for (double radius : kRadii_m) all.push_back(disc({x, y}, radius));
+      for (double radius : kPlaceRadii_m) all.push_back(disc({x, y}, radius));
     }
   }
   for (int axis : {0, 1}) {

@@ -23,9 +23,9 @@ using boost::math::complement;
 constexpr double kOutlierSds = 3.2905;  // square root of the 0.999 quantile of chi2, 1 dof
 constexpr double kOutlierShare = 0.001;
 constexpr double kTrialsForCells = 4;  // a cell, on average, for cell means to be worth their cost
-constexpr std::size_t kFewestTrials = 8;
-constexpr double kClearMotion = 5;  // s.d.s of the end by which a unit gain must move it
-constexpr int kMostRounds = 12;     // dependences taken out of one component
+constexpr std::size_t kFewestTold = 8;
+constexpr double kClearMotion = 5;    // s.d.s of the end by which a unit gain must move it
+constexpr int kMostDependences = 12;  // dependences taken out of one component
 const char* const kComponents[] = {"x", "y", "theta"};
 
 // One component of one selection of trials.
@@ -100,13 +100,13 @@ class Looker {
     std::vector<Selection> some;
     if (commands.size() > 1) some = {all, motion};
     for (const auto& [c, own] : commands) some.push_back(own);
-    std::erase_if(some, [](const Selection& s) { return s.trials.size() < kFewestTrials; });
+    std::erase_if(some, [](const Selection& s) { return s.trials.size() < kFewestTold; });
     return some;
   }
 
   // The clearest dependence of the component is told and taken out, then the next clearest.
   void look_for_means(const std::vector<Selection>& selections, double level) {
-    for (int round = 0; round < kMostRounds; ++round) {
+    for (int round = 0; round < kMostDependences; ++round) {
       std::optional<Found> best;
       for (const Selection& s : selections) {
         const View v = view(s);

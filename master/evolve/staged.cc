@@ -195,7 +195,7 @@ class StagedOptimiser final : public Optimiser {
   std::vector<Member> last_members_;
 };
 
-Status check(const OptimiserSetup& setup, const std::vector<Stage>& stages) {
+Status check_stages(const OptimiserSetup& setup, const std::vector<Stage>& stages) {
   if (setup.nominal.size() != setup.genes.size()) {
     return Error{"stages need the config's own values to begin with"};
   }
@@ -217,7 +217,7 @@ Status check(const OptimiserSetup& setup, const std::vector<Stage>& stages) {
 
 Result<std::unique_ptr<Optimiser>> make_staged(const OptimiserSetup& setup,
                                                const std::vector<Stage>& stages) {
-  if (Status s = check(setup, stages); !s) return s.error();
+  if (Status s = check_stages(setup, stages); !s) return s.error();
   auto optimiser = std::make_unique<StagedOptimiser>(setup, stages);
   if (Status s = optimiser->begin(); !s) return s.error();
   return std::unique_ptr<Optimiser>(std::move(optimiser));
@@ -226,7 +226,7 @@ Result<std::unique_ptr<Optimiser>> make_staged(const OptimiserSetup& setup,
 Result<std::unique_ptr<Optimiser>> restore_staged(const OptimiserSetup& setup,
                                                   const std::vector<Stage>& stages,
                                                   std::string_view state) {
-  if (Status s = check(setup, stages); !s) return s.error();
+  if (Status s = check_stages(setup, stages); !s) return s.error();
   auto optimiser = std::make_unique<StagedOptimiser>(setup, stages);
   if (Status s = optimiser->restore(state); !s) return s.error();
   return std::unique_ptr<Optimiser>(std::move(optimiser));

@@ -14,7 +14,7 @@ namespace {
 constexpr std::array<GapUnit, 3> kUnits = {GapUnit::kNats, GapUnit::kMillimetres,
                                            GapUnit::kMilliradians};
 constexpr double kLeastScaleNats = 0.2;
-constexpr int kHatches = 5;  // as many as the page defines
+constexpr int kHatchCount = 5;  // as many as the page defines
 
 const GapFigures& figures(const Diagnosis& diagnosis, GapUnit unit) {
   switch (unit) {
@@ -72,7 +72,7 @@ Look look(const GapPart& part, int effect) {
     case GapPart::Kind::kEffect:
       break;
   }
-  return {fmt::format("part-effect-{}", (effect - 1) % kHatches + 1), std::to_string(effect)};
+  return {fmt::format("part-effect-{}", (effect - 1) % kHatchCount + 1), std::to_string(effect)};
 }
 
 double drawn(const GapPart& part) {

@@ -6,7 +6,7 @@
 namespace gapfarm {
 namespace {
 
-constexpr const char* kTables = R"sql(
+constexpr const char* kAnswerTables = R"sql(
 CREATE TABLE IF NOT EXISTS problems (
   hash TEXT PRIMARY KEY,
   problem BLOB NOT NULL        -- gapfarm.v1.Problem
@@ -46,7 +46,7 @@ Result<AnswerStore> AnswerStore::open(const std::filesystem::path& file,
   if (!database) return database.error();
   if (Status s = check_identity(*database); !s) return s.error();
   const std::string tables =
-      kTables + ("PRAGMA application_id = " + std::to_string(kAnswerStoreApplicationId));
+      kAnswerTables + ("PRAGMA application_id = " + std::to_string(kAnswerStoreApplicationId));
   auto transaction = SqlTransaction::begin(*database);
   if (!transaction) return transaction.error();
   if (Status s = database->exec(tables, "keep answers"); !s) return s.error();

@@ -39,6 +39,26 @@ outside master/input '(bzlib|lz4|zstd)' 'only master/input unpacks'
 outside common/config 'toml' 'only common/config includes toml++'
 outside master/robot '(tinyxml2|yaml-cpp)' 'only master/robot includes tinyxml2 and yaml-cpp'
 
+# Headers that take seconds to read: in these places only, and in no header but those named.
+# heavy PATTERN PLACES REMEDY: PLACES is a regular expression of file names.
+heavy() {
+  local found
+  found=$(grep -rnE --include='*.h' --include='*.cc' "^#include [<\"]$1" common worker master \
+    | grep -vE "^($2):" || true)
+  if [[ -n "$found" ]]; then
+    printf '%s\n    %s\n' "$found" "$3 (a heavy header: scripts/build_times.sh)"
+    failures=$((failures + 1))
+  fi
+}
+source='[a-z_0-9]*\.cc'
+heavy 'CLI/' "master/cli/.*|worker/main.cc" 'command lines are read in master/cli and worker/main.cc'
+heavy 'nlohmann/json\.hpp' "common/log/$source|master/.*/$source" \
+  'headers include json_fwd.hpp, and the worker writes no JSON'
+heavy 'Eigen/(Dense|SVD|Eigenvalues|QR|Geometry|LU|Cholesky)' ".*/$source" \
+  'headers include Eigen/Core'
+heavy 'spdlog/' "common/log/$source|master/.*/$source" 'logs go through common/log, fmt is for sources'
+heavy '(google/protobuf|boost)/' ".*/$source" 'sources only'
+
 globs=$(grep -rnE --include=CMakeLists.txt 'file\((GLOB|GLOB_RECURSE)' common worker master tests \
   proto || true)
 if [[ -n "$globs" ]]; then

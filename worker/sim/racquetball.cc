@@ -17,7 +17,7 @@ constexpr double kReach_m = 2.5;    // from the paddle to a ball that it strikes
 constexpr double kHalfThickness_m = 0.15;
 constexpr double kFollow_m_s = 30;  // sideways
 constexpr double kForceTime_s = 0.1;
-constexpr double kTimeSlack_s = 1e-9;
+constexpr double kSampleSlack_s = 1e-9;
 // No parameter could make the ball that fast.
 constexpr double kDiverged_m_s = 1e4;
 
@@ -237,7 +237,8 @@ BallFlight fly_ball(const RacquetballSettings& settings, double duration_s, doub
   const double dt_s = 1 / (settings.step_rate_hz * settings.sub_steps);
   Eigen::Vector3d before = court.position();
   flight.path.push_back({0, before});
-  const auto samples = static_cast<std::size_t>(std::floor(duration_s / interval_s + kTimeSlack_s));
+  const auto samples =
+      static_cast<std::size_t>(std::floor(duration_s / interval_s + kSampleSlack_s));
   for (std::uint64_t step = 0; flight.path.size() <= samples; ++step) {
     const double t_s = static_cast<double>(step) * dt_s;
     court.step(t_s, dt_s);
@@ -249,7 +250,7 @@ BallFlight fly_ball(const RacquetballSettings& settings, double duration_s, doub
     const Eigen::Vector3d now = court.position();
     for (;;) {
       const double due_s = static_cast<double>(flight.path.size()) * interval_s;
-      if (flight.path.size() > samples || due_s > t_s + dt_s + kTimeSlack_s) break;
+      if (flight.path.size() > samples || due_s > t_s + dt_s + kSampleSlack_s) break;
       const double share = std::clamp((due_s - t_s) / dt_s, 0.0, 1.0);
       flight.path.push_back({due_s, before + share * (now - before)});
     }

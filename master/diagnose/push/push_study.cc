@@ -13,7 +13,7 @@ namespace gapfarm {
 namespace {
 
 constexpr double kRetuningStep = 0.05;  // of the logarithm
-constexpr int kTuningRounds = 4;
+constexpr int kPushTuningRounds = 4;
 constexpr std::size_t kMostGridTrials = 120;
 constexpr double kGridFactors[] = {0.25, 0.4, 0.55, 0.7, 0.85, 1.0};
 constexpr double kGridFrictions[] = {0.1, 0.25, 0.45, 0.7};
@@ -311,7 +311,7 @@ Status tune_push_base(Predictor& predictor, bool keep, Study* study) {
     if (keep || round == 1) break;
     const Eigen::MatrixXd none(static_cast<Eigen::Index>(3 * study->size()), 0);
     auto fit = fit_jointly(predictor, *study, {}, study->base, BaseParameters::kFitted, none,
-                           kTuningRounds);
+                           kPushTuningRounds);
     if (!fit) return fit.error();
     study->base = fit->at;
   }
