@@ -226,8 +226,8 @@ std::string case_name(std::size_t number) {
   return "case" + std::string(digits.size() < 3 ? 3 - digits.size() : 0, '0') + digits;
 }
 
-Design deal(const ParameterTable& table, const DesignSettings& settings, Drafts drafts) {
-  Design design;
+BlindDesign deal(const ParameterTable& table, const DesignSettings& settings, Drafts drafts) {
+  BlindDesign design;
   std::vector<bool> possible(drafts.cases.size(), true);
   for (const Sizing& sizing : drafts.sizings) {
     if (sizing.out_of_reach) {
@@ -288,8 +288,8 @@ std::map<std::string, double> draw_robot(const Problem& problem, Stream& stream)
   return robot;
 }
 
-Result<Design> draw_design(const Problem& planned, const DesignSettings& settings, Farm& farm,
-                           const DesignProgress& progress) {
+Result<BlindDesign> draw_design(const Problem& planned, const DesignSettings& settings, Farm& farm,
+                                const DesignProgress& progress) {
   const ParameterTable& table = planned.table();
   if (Status s = check_effects(table, settings.effects); !s) return s.error();
   const std::vector<std::size_t> effects = chosen_effects(table, settings.effects);

@@ -39,7 +39,7 @@ struct OutOfReach {
   double size = 1;  // at the last strength tried
 };
 
-struct Design {
+struct BlindDesign {
   std::vector<Truth> cases;  // shuffled: names tell nothing
   std::vector<OutOfReach> out_of_reach;
 };
@@ -61,8 +61,8 @@ std::map<std::string, double> draw_robot(const Problem& problem, Stream& stream)
 // Draws robots and effects, and searches every strength on the farm, all cases side by side, on
 // the trials of `planned`: a log of the experiment with the config's own robot.
 // Errors: an unknown effect; the farm's own.
-Result<Design> draw_design(const Problem& planned, const DesignSettings& settings, Farm& farm,
-                           const DesignProgress& progress = {});
+Result<BlindDesign> draw_design(const Problem& planned, const DesignSettings& settings, Farm& farm,
+                                const DesignProgress& progress = {});
 
 // What differs from the problem's values in a case.
 std::vector<v1::Override> overrides_of(const ParameterTable& table, const Truth& truth);

@@ -309,7 +309,7 @@ std::string format_blind_summary(const BlindReport& report) {
   return text;
 }
 
-std::string format_design(const Design& design, const ParameterTable& table) {
+std::string format_design(const BlindDesign& design, const ParameterTable& table) {
   std::map<std::string, unsigned> kinds;
   std::string text = formatted("%-9s %-8s %-8s %6s  %s\n", "case", "kind", "level", "size",
                                "effect and parameters");

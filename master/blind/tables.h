@@ -24,6 +24,6 @@ std::string format_blind_markdown(const BlindReport& report);
 std::string format_blind_summary(const BlindReport& report);
 
 // What would be made: every effect with its drawn parameters and size, and what is out of reach.
-std::string format_design(const Design& design, const ParameterTable& table);
+std::string format_design(const BlindDesign& design, const ParameterTable& table);
 
 }  // namespace gapfarm

@@ -16,18 +16,18 @@ double degrees(double rad) { return rad * 180 / M_PI; }
 double shown(const EffectRanking& ranking, double gain) { return ranking.nats ? gain : 1e3 * gain; }
 const char* unit(const EffectRanking& ranking) { return ranking.nats ? "nats" : "mm"; }
 
-std::string parameters_text(const ParameterTable& table, const std::vector<FittedParameter>& all) {
+std::string parameters_text(const ParameterTable& table, const std::vector<RankedParameter>& all) {
   std::string text;
-  for (const FittedParameter& p : all) {
+  for (const RankedParameter& p : all) {
     text += fmt::format("{}{} {:.4g} [{:.3g}, {:.3g}]", text.empty() ? "" : ", ", table[p.row].key,
                         p.value, p.folds.lower, p.folds.upper);
   }
   return text;
 }
 
-Json parameters_json(const ParameterTable& table, const std::vector<FittedParameter>& all) {
+Json parameters_json(const ParameterTable& table, const std::vector<RankedParameter>& all) {
   Json json = Json::object();
-  for (const FittedParameter& p : all) {
+  for (const RankedParameter& p : all) {
     json[table[p.row].key] = {{"value", p.value},
                               {"folds_lo", p.folds.lower},
                               {"folds_hi", p.folds.upper},

@@ -14,16 +14,16 @@ namespace {
 constexpr double kMeasuredSpeed = 0.28;
 
 struct Misfit {
-  DriveKind kind;
+  MotionKind kind;
   int component;   // 0 x, 1 y, 2 heading
   double fixed;    // m or rad
   double growing;  // per second at full level
 };
 
 constexpr Misfit kMisfits[] = {
-    {DriveKind::kStraight, 0, 0.0002, 0.0003}, {DriveKind::kTurn, 2, 0.002, 0.005},
-    {DriveKind::kWide, 0, 0.0005, 0.0025},     {DriveKind::kWide, 1, 0.0005, 0.0025},
-    {DriveKind::kWide, 2, 0.003, 0.008},
+    {MotionKind::kStraight, 0, 0.0002, 0.0003}, {MotionKind::kTurn, 2, 0.002, 0.005},
+    {MotionKind::kWide, 0, 0.0005, 0.0025},     {MotionKind::kWide, 1, 0.0005, 0.0025},
+    {MotionKind::kWide, 2, 0.003, 0.008},
 };
 
 double misfit_size(const Misfit& misfit, double path, double speed_m_s) {
@@ -37,7 +37,7 @@ void add_column(const Study& study, const std::vector<Eigen::Vector3d>& values, 
 
 // A misfit of one kind of drive at one level and duration.
 void add_misfits(const Study& study, std::vector<Eigen::VectorXd>* columns) {
-  std::set<std::tuple<DriveKind, double, double>> conditions;
+  std::set<std::tuple<MotionKind, double, double>> conditions;
   for (const Cell& c : study.cells) {
     conditions.insert({c.kind, std::round(c.level * 100) / 100, c.command.duration_s});
   }
@@ -50,7 +50,7 @@ void add_misfits(const Study& study, std::vector<Eigen::VectorXd>* columns) {
         const bool here = c.kind == kind && std::abs(c.level - level) < 0.006 &&
                           c.command.duration_s == duration_s;
         if (!here) continue;
-        const bool mirrors = misfit.component != 0 || kind == DriveKind::kStraight;
+        const bool mirrors = misfit.component != 0 || kind == MotionKind::kStraight;
         values[i][misfit.component] = mirrors ? c.mirror : 1;
       }
       add_column(study, values, misfit_size(misfit, level * duration_s, study.speed_m_s), columns);

@@ -16,12 +16,12 @@
 namespace gapfarm {
 
 // How the two sides run against each other.
-enum class DriveKind { kStraight, kTurn, kWide };
+enum class MotionKind { kStraight, kTurn, kWide };
 
 // Trials with the same command, duties and duration.
 struct Cell {
   CommandSpec command;
-  DriveKind kind = DriveKind::kStraight;
+  MotionKind kind = MotionKind::kStraight;
   double level = 1;  // duty over the command's own in the config
   double path = 1;   // level times duration: what the motion grows with
   int mirror = 1;    // -1 for the mirror image of the other one: backward, clockwise

@@ -63,7 +63,7 @@ std::vector<Probe> probes(const Eigen::Vector2d& middle, double own_height_m) {
 // Whether a drive sticks: Coulomb treads then give way to no small force, real ones creep in
 // proportion to it.
 bool straight(const Study& study, std::size_t i) {
-  return study.cells[study.trials[i].cell].kind == DriveKind::kStraight;
+  return study.cells[study.trials[i].cell].kind == MotionKind::kStraight;
 }
 
 // Straight drives slowed by (1 - cos(travel - nap)) / 2 of their path.
@@ -177,7 +177,7 @@ bool depends_on_contact(const std::string& effect) {
 Eigen::MatrixXd split_by_kind(const Study& study, const Eigen::MatrixXd& columns) {
   std::vector<Eigen::VectorXd> parts;
   for (Eigen::Index k = 0; k < columns.cols(); ++k) {
-    for (DriveKind kind : {DriveKind::kStraight, DriveKind::kTurn, DriveKind::kWide}) {
+    for (MotionKind kind : {MotionKind::kStraight, MotionKind::kTurn, MotionKind::kWide}) {
       Eigen::VectorXd part = columns.col(k);
       for (std::size_t i = 0; i < study.size(); ++i) {
         if (study.cells[study.trials[i].cell].kind != kind)

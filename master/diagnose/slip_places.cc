@@ -34,7 +34,7 @@ struct Place {
 // Expected slips of every trial if they fell anywhere.
 std::vector<double> expected(const Study& study, std::span<const double> slipped,
                              const std::vector<bool>& tells) {
-  std::map<std::pair<DriveKind, double>, std::pair<double, double>> groups;  // slips, trials
+  std::map<std::pair<MotionKind, double>, std::pair<double, double>> groups;  // slips, trials
   const auto group_of = [&](std::size_t i) {
     const Cell& cell = study.cells[study.trials[i].cell];
     return std::pair(cell.kind, cell.path);

@@ -20,9 +20,9 @@ namespace {
 constexpr double kFirstCommon = 0.012;
 constexpr double kFirstSide = 0.010;
 
-DriveKind kind_of(double left, double right) {
-  if (left == right) return DriveKind::kStraight;
-  return left == -right ? DriveKind::kTurn : DriveKind::kWide;
+MotionKind kind_of(double left, double right) {
+  if (left == right) return MotionKind::kStraight;
+  return left == -right ? MotionKind::kTurn : MotionKind::kWide;
 }
 
 Cell make_cell(const CommandSpec& driven, const CommandSpec& own) {
@@ -33,7 +33,8 @@ Cell make_cell(const CommandSpec& driven, const CommandSpec& own) {
   const double duty = std::max(std::abs(driven.left), std::abs(driven.right));
   cell.level = most > 0 ? duty / most : duty;
   cell.path = cell.level * driven.duration_s;
-  const double sense = cell.kind == DriveKind::kStraight ? driven.left : driven.right - driven.left;
+  const double sense =
+      cell.kind == MotionKind::kStraight ? driven.left : driven.right - driven.left;
   cell.mirror = sense < 0 ? -1 : 1;
   return cell;
 }

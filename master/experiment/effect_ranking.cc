@@ -229,10 +229,10 @@ class Ranking {
     return {};
   }
 
-  std::vector<FittedParameter> fitted(const Fits& fits, const std::vector<Gene>& genes) const {
-    std::vector<FittedParameter> all;
+  std::vector<RankedParameter> fitted(const Fits& fits, const std::vector<Gene>& genes) const {
+    std::vector<RankedParameter> all;
     for (const Gene& gene : genes) {
-      FittedParameter p{gene.row, fits.whole[gene.row], {}};
+      RankedParameter p{gene.row, fits.whole[gene.row], {}};
       p.folds = {fits.folds.front()[gene.row], fits.folds.front()[gene.row]};
       for (const ParameterValues& values : fits.folds) {
         p.folds.lower = std::min(p.folds.lower, values[gene.row]);

@@ -28,7 +28,7 @@ struct EffectRankingPlan {
   StageHooks hooks;  // the base is a stage, and each effect
 };
 
-struct FittedParameter {
+struct RankedParameter {
   std::size_t row = 0;
   double value = 0;  // fitted to all trials
   Interval folds;    // least and greatest of the fits that leave a part out
@@ -45,7 +45,7 @@ struct EffectGain {
   bool above_none = false;
   bool alike = false;                       // above none, and the data cannot tell it from the best
   EndErrors errors;                         // of held-out trials
-  std::vector<FittedParameter> parameters;  // the base's genes, then the effect's
+  std::vector<RankedParameter> parameters;  // the base's genes, then the effect's
 };
 
 struct EffectRanking {
@@ -54,7 +54,7 @@ struct EffectRanking {
   EndErrors own;                            // at the problem's own values, nothing fitted
   EndErrors base;                           // base alone, of held-out trials
   EndErrors stay;                           // as if nothing moved
-  std::vector<FittedParameter> parameters;  // of the base
+  std::vector<RankedParameter> parameters;  // of the base
   std::vector<EffectGain> effects;          // best first
   // The best effect, if the interval of its gain lies above 0; else empty.
   std::string best;

@@ -17,8 +17,8 @@ constexpr double kSpeed_m_s = 0.28;
 Study drives(const Problem& problem) {
   Study study;
   study.speed_m_s = kSpeed_m_s;
-  study.cells = {{problem.command("forward"), DriveKind::kStraight, 1, 1, 1, 300},
-                 {problem.command("turn_ccw"), DriveKind::kTurn, 1, 1, 1, 300}};
+  study.cells = {{problem.command("forward"), MotionKind::kStraight, 1, 1, 1, 300},
+                 {problem.command("turn_ccw"), MotionKind::kTurn, 1, 1, 1, 300}};
   Stream stream({.run_seed = 5});
   for (std::size_t i = 0; i < 600; ++i) {
     ResidualTrial t;

@@ -125,7 +125,7 @@ Scene scene(std::uint64_t seed) {
   s.study.trials = draw(seed).trials;
   s.study.cells.resize(6);
   for (std::size_t c = 0; c < 6; ++c) {
-    s.study.cells[c].kind = c % 2 == 1 ? DriveKind::kTurn : DriveKind::kStraight;
+    s.study.cells[c].kind = c % 2 == 1 ? MotionKind::kTurn : MotionKind::kStraight;
     s.study.cells[c].path = 0.5 * static_cast<double>(1 + c % 3);
   }
   for (std::size_t i = 0; i < s.study.size(); ++i) s.study.trials[i].cell = i % 6;

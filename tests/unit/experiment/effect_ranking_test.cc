@@ -70,9 +70,9 @@ EffectRankingPlan small_plan() {
   return plan;
 }
 
-const FittedParameter& parameter(const EffectGain& gain, const char* key) {
+const RankedParameter& parameter(const EffectGain& gain, const char* key) {
   const std::size_t row = push_table().row(key);
-  for (const FittedParameter& p : gain.parameters) {
+  for (const RankedParameter& p : gain.parameters) {
     if (p.row == row) return p;
   }
   ADD_FAILURE() << key;
@@ -102,7 +102,7 @@ TEST(EffectRanking, NamesTheEffectThatThePushesHave) {
   EXPECT_NEAR(first.gain, ranking->base.mean_m - first.errors.mean_m, 1e-12);
   EXPECT_NEAR(parameter(first, "placement_bias.x").value, 0.006, 1e-3);
   EXPECT_NEAR(parameter(first, "placement_bias.y").value, -0.004, 1e-3);
-  for (const FittedParameter& p : first.parameters) {
+  for (const RankedParameter& p : first.parameters) {
     EXPECT_LE(p.folds.lower, p.folds.upper);
   }
 }
