@@ -18,7 +18,7 @@ constexpr double kHeightPerGauge = 0.2;  // centre of mass over the floor
 constexpr double kMass_kg = 10;          // hardly matters to Coulomb friction
 constexpr double kTrackPerBase = 0.6;    // of a car
 
-std::string number(double value) {
+std::string digits4(double value) {
   char text[32];
   std::snprintf(text, sizeof text, "%.4g", value);
   return text;
@@ -161,7 +161,7 @@ class Completion {
       ratio = std::sqrt(multiplier - 1) / r_.friction_ratio;
       assume("the axles " + number(2 * half_gauge * ratio) +
              " m apart, which makes a skid turn as wide as wheel_separation_multiplier " +
-             number(multiplier) + " says");
+             digits4(multiplier) + " says");
     } else {
       assume("the axles as far apart as the wheels: " + number(2 * half_gauge) + " m");
     }
@@ -268,7 +268,7 @@ class Completion {
                          : k.wheel_separation_m   ? *k.wheel_separation_m
                                                   : kTrackPerBase * *k.wheelbase_m;
     if (!k.traction_track_width_m && !k.wheel_separation_m) {
-      assume("a track of " + number(track) + " m");
+      assume("a track of " + digits4(track) + " m");
     }
     k.traction_track_width_m = track;
     const double front = k.steering_track_width_m.value_or(track);
@@ -292,7 +292,7 @@ class Completion {
                          : k.wheel_separation_m   ? *k.wheel_separation_m
                                                   : kTrackPerBase * *k.wheelbase_m;
     if (!k.traction_track_width_m && !k.wheel_separation_m) {
-      assume("a track of " + number(track) + " m");
+      assume("a track of " + digits4(track) + " m");
     }
     k.traction_track_width_m = track;
     const bool made = find("front") == nullptr;
@@ -347,10 +347,10 @@ class Completion {
         assumed = assumed || w.driven;
       }
     }
-    if (assumed) assume("wheel radii of " + number(kWheelPerGauge * across / 2) + " m");
+    if (assumed) assume("wheel radii of " + digits4(kWheelPerGauge * across / 2) + " m");
     if (!r_.mass_kg) {
       r_.mass_kg = kMass_kg;
-      assume("a mass of " + number(kMass_kg) + " kg");
+      assume("a mass of " + digits4(kMass_kg) + " kg");
     }
     if (!r_.com_x_m) r_.com_x_m = middle(&RobotWheel::x_m);
     if (!r_.com_y_m) r_.com_y_m = middle(&RobotWheel::y_m);

@@ -16,7 +16,7 @@ std::string name_of(const std::string& path) {
   return std::filesystem::path(path).filename().string();
 }
 
-std::string_view trimmed(std::string_view text) {
+std::string_view without_blanks(std::string_view text) {
   constexpr const char* kBlanks = " \t\r";
   const std::size_t begin = text.find_first_not_of(kBlanks);
   if (begin == text.npos) return {};
@@ -28,11 +28,11 @@ bool is_hash(std::string_view word) {
 }
 
 LogMark mark_of(std::string_view text) {
-  text = trimmed(text);
+  text = without_blanks(text);
   const std::size_t blank = text.find_last_of(" \t");
   const std::string_view last = blank == text.npos ? text : text.substr(blank + 1);
   if (!is_hash(last)) return {std::string(text), {}};
-  return {std::string(trimmed(text.substr(0, text.size() - last.size()))), std::string(last)};
+  return {std::string(without_blanks(text.substr(0, text.size() - last.size()))), std::string(last)};
 }
 
 }  // namespace
