@@ -32,7 +32,8 @@ LogMark mark_of(std::string_view text) {
   const std::size_t blank = text.find_last_of(" \t");
   const std::string_view last = blank == text.npos ? text : text.substr(blank + 1);
   if (!is_hash(last)) return {std::string(text), {}};
-  return {std::string(without_blanks(text.substr(0, text.size() - last.size()))), std::string(last)};
+  return {std::string(without_blanks(text.substr(0, text.size() - last.size()))),
+          std::string(last)};
 }
 
 }  // namespace

@@ -98,8 +98,8 @@ Status diagnose_cases(const std::vector<OpenCase>& cases, const CheckPaths& path
     const std::string& id = cases[i].id;
     if (std::filesystem::exists(paths.outcome(id))) continue;
     if (Status s = make_empty(paths.diagnosis(id)); !s) return s;
-    jobs.push_back(
-        {id, diagnose_command(cases[i], i + 1, paths, settings), paths.diagnosis(id) + "/output.txt"});
+    jobs.push_back({id, diagnose_command(cases[i], i + 1, paths, settings),
+                    paths.diagnosis(id) + "/output.txt"});
   }
   if (jobs.size() < cases.size() && hooks.note) {
     hooks.note(std::to_string(cases.size() - jobs.size()) + " cases are diagnosed already");

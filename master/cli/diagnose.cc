@@ -191,9 +191,8 @@ Status apply_options(const DiagnoseCommand& command, Config& config, std::vector
 
 int run_diagnose(DiagnoseCommand& command, CliContext& context) {
   DiagnoseOptions options;
-  const auto config = open_config(
-      command.config, command.trials, context.console,
-      [&](Config& read) {
+  const auto config =
+      open_config(command.config, command.trials, context.console, [&](Config& read) {
         return apply_options(command, read, options.genes, options.frame_m, context.console);
       });
   if (!config) return kExitBadUsage;

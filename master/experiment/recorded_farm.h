@@ -41,8 +41,8 @@ class RecordedFarm : public Farm {
 
   std::string add_problem(const v1::Problem& problem) override;
   // Errors: the farm's and the store's.  Answers are kept as they come (AnswerSource), so that
-  // neither an error nor the end of this process loses more than about a second's; those that say more of the
-  // workers than of the question (WORKER_FAILED) are not kept.
+  // neither an error nor the end of this process loses more than about a second's; those that say
+  // more of the workers than of the question (WORKER_FAILED) are not kept.
   Result<std::vector<v1::TaskResult>> run(
       const std::string& problem_hash, const std::vector<v1::Task>& tasks,
       const std::function<void(const FarmProgress&)>& on_progress = {}) override;

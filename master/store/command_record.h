@@ -18,18 +18,18 @@ namespace gapfarm {
 std::filesystem::path answer_file(const std::filesystem::path& folder);
 
 struct CommandRecord {
-  std::string command;        // "diagnose"
-  std::string arguments;      // the whole command line
-  std::string state;          // "running", "finished", "stopped", "failed"
-  std::string reason;         // how it ended; empty while it runs
-  std::string stage;          // "screen the catalogue"
-  std::uint64_t stage_number = 0, stages = 0;  // from 1
-  std::uint64_t done = 0, total = 0;           // tasks of the stage; total 0: unknown
-  double share = 0;                            // of the whole, [0, 1]
-  double rate_per_s = 0;                       // tasks simulated
-  std::optional<double> time_left_s;           // of the whole
+  std::string command;                          // "diagnose"
+  std::string arguments;                        // the whole command line
+  std::string state;                            // "running", "finished", "stopped", "failed"
+  std::string reason;                           // how it ended; empty while it runs
+  std::string stage;                            // "screen the catalogue"
+  std::uint64_t stage_number = 0, stages = 0;   // from 1
+  std::uint64_t done = 0, total = 0;            // tasks of the stage; total 0: unknown
+  double share = 0;                             // of the whole, [0, 1]
+  double rate_per_s = 0;                        // tasks simulated
+  std::optional<double> time_left_s;            // of the whole
   std::uint64_t remembered = 0, simulated = 0;  // answers at hand, and new ones
-  std::string waiting;  // what it waits for; empty: nothing
+  std::string waiting;                          // what it waits for; empty: nothing
   std::vector<StoredWorker> workers;
   double began_unix_s = 0, heartbeat_unix_s = 0;
   std::int64_t pid = 0;

@@ -47,7 +47,8 @@ TEST_F(CommandRecordTest, ALiveCommandIsWhatItSaid) {
   ASSERT_TRUE(lock.ok());
   const auto record = command_status(folder_, 1e6);
   ASSERT_TRUE(record.ok() && *record);
-  EXPECT_EQ(to_json(**record), to_json(example())) << "however old its last word: it holds the lock";
+  EXPECT_EQ(to_json(**record), to_json(example()))
+      << "however old its last word: it holds the lock";
 }
 
 TEST_F(CommandRecordTest, ADeadOneIsStoppedAndPromisesNothing) {
