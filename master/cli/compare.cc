@@ -21,6 +21,8 @@
 namespace gapfarm {
 namespace {
 
+using Json = nlohmann::ordered_json;
+
 struct CompareCommand {
   std::vector<std::string> files;
   TrialOptions trials;
@@ -157,7 +159,6 @@ Status write_all(const CompareCommand& command, const Inputs& inputs,
 }
 
 nlohmann::ordered_json to_json(const ComparisonSummary& summary) {
-  using Json = nlohmann::ordered_json;
   const auto number = [](const std::optional<double>& v) {
     return v && std::isfinite(*v) ? Json(*v) : Json();
   };
