@@ -213,6 +213,7 @@ TEST(HeadingGrid, AgreesWithDirectSimulationWithinItsCheckedError) {
     for (const CommandSpec& c : commands()) {
       ConditionGroup group;
       group.drive = {c.left, c.right, 1};
+      group.trials = 100;  // enough to share motions
       const GroupResult result = simulate_group(robot, group, true, {});
       ASSERT_EQ(result.outcome, v1::OK);
       if (result.motion.jumps_over_heading()) continue;  // simulated trial by trial instead
@@ -229,6 +230,7 @@ TEST(HeadingGrid, SaysWhenNoInterpolationWillDo) {
   Srv1Robot robot(noiseless(nap(0.5, 2.5)));
   ConditionGroup group;
   group.drive = driven("wide_ccw");
+  group.trials = 100;
   const GroupResult result = simulate_group(robot, group, true, {});
   ASSERT_EQ(result.outcome, v1::OK);
   EXPECT_TRUE(result.motion.jumps_over_heading());
