@@ -27,7 +27,7 @@ Study drives(const std::vector<CommandSpec>& commands) {
   for (const CommandSpec& c : commands) {
     ResidualTrial t;
     t.cell = study.cells.size();
-    study.cells.push_back({c, DriveKind::kWide, 1, 1, 1, 1});
+    study.cells.push_back({c, MotionKind::kWide, 1, 1, 1, 1});
     t.X_WS = {0.4, 0.7, 1.1};
     t.X_WP = t.X_WS * exp(twist_of(c));
     const auto end_with = [&](double left, double right) {
