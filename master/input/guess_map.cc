@@ -186,7 +186,10 @@ class Guess {
       const std::string column = column_of(table, role.aliases);
       if (!column.empty()) found.columns.push_back({role.name, column, ""});
     }
-    const bool quaternion = found.find("qx") != nullptr && found.find("qw") != nullptr;
+    bool quaternion = true;
+    for (const char* part : {"qx", "qy", "qz", "qw"}) {
+      quaternion = quaternion && found.find(part) != nullptr;
+    }
     const bool place = found.find("x") != nullptr && found.find("y") != nullptr;
     if (!place || (!quaternion && found.find("theta") == nullptr)) return;
     if (table.type == "motive") found.up = "y";

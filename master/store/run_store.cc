@@ -149,7 +149,8 @@ Status RunStore::discard(RunStore store, bool with_folder) {
     const Database closing = std::move(store.database_);
   }
   std::error_code code;
-  for (const char* name : {"run.sqlite", "run.sqlite-wal", "run.sqlite-shm", "run.lock"}) {
+  for (const char* name :
+       {"run.sqlite", "run.sqlite-wal", "run.sqlite-shm", "log.txt", "run.lock"}) {
     fs::remove(run / name, code);
     if (code) {
       return Error{(run / name).string() + ": cannot be taken away: " + code.message() +
