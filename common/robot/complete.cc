@@ -104,7 +104,7 @@ class Completion {
     const auto gauge = separation();
     if (!gauge) return missing("wheel_separation in m, or the wheels' y");
     if (*gauge > 0) return {};
-    return Error{"wheel_separation is " + number(*gauge) + " m, expected more than 0"};
+    return Error{"wheel_separation is " + digits4(*gauge) + " m, expected more than 0"};
   }
 
   void sides() {
@@ -135,7 +135,7 @@ class Completion {
       caster.y_m = 0;
       caster.radius_m = 0.1 * reach_m;
       r_.wheels.push_back(caster);
-      assume("a caster without drag at x = " + number(*caster.x_m) + " m (" + caster.name + ")");
+      assume("a caster without drag at x = " + digits4(*caster.x_m) + " m (" + caster.name + ")");
     }
   }
 
@@ -159,11 +159,11 @@ class Completion {
     double ratio = kSquare;
     if (multiplier > 1.01) {
       ratio = std::sqrt(multiplier - 1) / r_.friction_ratio;
-      assume("the axles " + number(2 * half_gauge * ratio) +
+      assume("the axles " + digits4(2 * half_gauge * ratio) +
              " m apart, which makes a skid turn as wide as wheel_separation_multiplier " +
              digits4(multiplier) + " says");
     } else {
-      assume("the axles as far apart as the wheels: " + number(2 * half_gauge) + " m");
+      assume("the axles as far apart as the wheels: " + digits4(2 * half_gauge) + " m");
     }
     r_.controller.wheelbase_m = 2 * half_gauge * ratio;
     return half_gauge * ratio;
@@ -356,12 +356,12 @@ class Completion {
     if (!r_.com_y_m) r_.com_y_m = middle(&RobotWheel::y_m);
     if (!r_.com_z_m) {
       r_.com_z_m = kHeightPerGauge * across;
-      assume("the centre of mass " + number(*r_.com_z_m) + " m over the floor");
+      assume("the centre of mass " + digits4(*r_.com_z_m) + " m over the floor");
     }
     if (!r_.yaw_inertia_kg_m2) {
       // A plate of the wheels' circle, of even mass.
       r_.yaw_inertia_kg_m2 = *r_.mass_kg * reach() * reach() / 2;
-      assume("a yaw inertia of " + number(*r_.yaw_inertia_kg_m2) + " kg m^2");
+      assume("a yaw inertia of " + digits4(*r_.yaw_inertia_kg_m2) + " kg m^2");
     }
     return {};
   }
