@@ -10,6 +10,7 @@
 #include "common/base/build_info.h"
 #include "common/net/keys.h"
 #include "common/process/process_pool.h"
+#include "common/usage/manual.h"
 #include "common/usage/usage.h"
 #include "worker/evaluate.h"
 #include "worker/service.h"
@@ -54,6 +55,7 @@ struct Arguments {
 void describe(CLI::App& app, Arguments* arguments) {
   app.footer(kExamples);
   app.set_version_flag("-V,--version", build_summary("gapfarm-worker"));
+  add_manual_flag(app, "gapfarm " + build_info().version);
   app.add_option("--connect", arguments->endpoint, "The master: tcp://HOST:PORT or ipc://PATH")
       ->required()
       ->type_name("ENDPOINT");

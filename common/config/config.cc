@@ -2,6 +2,7 @@
 
 #include <filesystem>
 
+#include "common/base/shipped.h"
 #include "common/base/suggest.h"
 #include "common/config/sections.h"
 #include "common/trials/csv.h"
@@ -72,9 +73,10 @@ Result<Config> parse_config(std::string_view text, const std::string& path) {
 }
 
 Result<Config> read_config(const std::string& path) {
-  auto text = read_text_file(path);
+  const std::string file = shipped_file(path);
+  auto text = read_text_file(file);
   if (!text.ok()) return text.error();
-  return parse_config(*text, path);
+  return parse_config(*text, file);
 }
 
 Status check_evolvable(const Config& config) {

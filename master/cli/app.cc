@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "common/base/build_info.h"
+#include "common/usage/manual.h"
 
 namespace gapfarm {
 namespace {
@@ -35,6 +36,7 @@ std::unique_ptr<Program> make_program() {
   CLI::App& app = *program->app;
   app.name("gapfarm");
   app.set_version_flag("-V,--version", build_summary("gapfarm"), "Print version and build");
+  add_manual_flag(app, "gapfarm " + build_info().version);
   app.require_subcommand(1);
   app.footer(kExamples);
   app.get_formatter()->column_width(26);

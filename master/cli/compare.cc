@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "common/base/build_info.h"
+#include "common/base/shipped.h"
 #include "common/config/config.h"
 #include "common/score/constant_velocity.h"
 #include "common/trials/files.h"
@@ -45,7 +46,8 @@ struct Inputs {
 // Comparison files give variants and settings, configs a variant each; the command line outranks.
 Result<Inputs> read_inputs(const CompareCommand& command) {
   Inputs inputs;
-  for (const std::string& file : command.files) {
+  for (const std::string& named : command.files) {
+    const std::string file = shipped_file(named);
     const auto text = read_text_file(file);
     if (!text) return text.error();
     if (is_comparison(*text)) {

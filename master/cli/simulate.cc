@@ -2,6 +2,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "common/base/shipped.h"
 #include "common/base/suggest.h"
 #include "common/config/config.h"
 #include "common/trials/files.h"
@@ -32,7 +33,8 @@ struct SimulateOptions {
 };
 
 // A config or a model as a config without trials.
-Result<Config> read_source(const std::string& path) {
+Result<Config> read_source(const std::string& named) {
+  const std::string path = shipped_file(named);
   const Result<std::string> text = read_text_file(path);
   if (!text) return text.error();
   if (!is_model(*text)) return parse_config(*text, path);

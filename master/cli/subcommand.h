@@ -45,6 +45,7 @@ std::span<const Subcommand> subcommands();
 SubcommandRun setup_blind_check(CLI::App& app);
 SubcommandRun setup_check(CLI::App& app);
 SubcommandRun setup_compare(CLI::App& app);
+SubcommandRun setup_completion(CLI::App& app);
 SubcommandRun setup_crossfit(CLI::App& app);
 SubcommandRun setup_determine(CLI::App& app);
 SubcommandRun setup_diagnose(CLI::App& app);

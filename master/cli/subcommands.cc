@@ -32,6 +32,7 @@ std::span<const Subcommand> subcommands() {
       {"check", "validate everything that a run would need; run nothing", "Data", setup_check},
       {"robot", "say what a robot is, from its URDF and controller file", "Data", setup_robot},
       {"import", "turn other programs' logs into a trial log", "Data", setup_import},
+      {"completion", "print what makes a shell complete these commands", "Shell", setup_completion},
   };
   return kTable;
 }

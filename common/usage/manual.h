@@ -1,0 +1,20 @@
+// A program's manual page, made of its own command line.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <string>
+
+namespace gapfarm {
+
+// "gapfarm evolve [OPTIONS] CONFIG": what is typed for `app`, REQUIRES: its name begins with
+// `words`.
+std::string synopsis(const CLI::App& app, const std::string& words);
+
+// A page of section 1 for man(7): name, options, every command with its own, examples.  `version`
+// is "gapfarm 0.1.0".
+std::string manual_page(const CLI::App& app, const std::string& version);
+
+// --manual, which no help shows: prints the page, as --version prints the version.
+void add_manual_flag(CLI::App& app, const std::string& version);
+
+}  // namespace gapfarm

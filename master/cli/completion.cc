@@ -1,0 +1,96 @@
+// gapfarm completion SHELL: scripts for shells.  They ask `gapfarm completion words`, so they know
+// what this program knows.
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "master/cli/app.h"
+#include "master/cli/next_words.h"
+
+namespace gapfarm {
+namespace {
+
+struct CompletionOptions {
+  std::string shell;
+  std::vector<std::string> words;
+};
+
+constexpr const char* kBash = R"(# gapfarm for bash: gapfarm completion bash
+_gapfarm() {
+  local line words=("${COMP_WORDS[@]:1:COMP_CWORD}")
+  COMPREPLY=()
+  while IFS= read -r line; do
+    COMPREPLY+=("${line%%$'\t'*}")
+  done < <(gapfarm completion words -- "${words[@]}" 2>/dev/null)
+  if [[ ${#COMPREPLY[@]} -eq 1 && ${COMPREPLY[0]} == *[/=] ]]; then compopt -o nospace; fi
+}
+complete -F _gapfarm gapfarm
+)";
+
+constexpr const char* kZsh = R"(#compdef gapfarm
+# gapfarm for zsh: gapfarm completion zsh
+_gapfarm() {
+  local line
+  local -a whole more
+  for line in "${(@f)$(gapfarm completion words -- "${(@)words[2,CURRENT]}" 2>/dev/null)}"; do
+    [[ -n $line ]] || continue
+    if [[ ${line%%$'\t'*} == *[/=] ]]; then
+      more+=("${line%%$'\t'*}")
+    else
+      whole+=("${${line%%$'\t'*}//:/\\:}:${line#*$'\t'}")
+    fi
+  done
+  (( ${#whole} )) && _describe gapfarm whole
+  (( ${#more} )) && compadd -S '' -a more
+}
+if [[ ${funcstack[1]} == _gapfarm ]]; then _gapfarm "$@"; else compdef _gapfarm gapfarm; fi
+)";
+
+constexpr const char* kFish = R"(# gapfarm for fish: gapfarm completion fish
+function __gapfarm_words
+    set -l words (commandline -opc) (commandline -ct)
+    gapfarm completion words -- $words[2..-1] 2>/dev/null
+end
+complete -c gapfarm -f -a '(__gapfarm_words)'
+)";
+
+int print_words(const CompletionOptions& options, CliContext& context) {
+  const std::unique_ptr<Program> program = make_program();
+  std::string text;
+  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  for (const NextWord& c : next_words(*program->app, options.words)) {
+    text += c.word + "\t" + c.summary + "\n";
+    list.push_back({{"word", c.word}, {"summary", c.summary}});
+  }
+  context.console.result(text, list);
+  return kExitDone;
+}
+
+int run_completion(const CompletionOptions& options, CliContext& context) {
+  if (options.shell == "words") return print_words(options, context);
+  const char* script = options.shell == "bash" ? kBash : options.shell == "zsh" ? kZsh : kFish;
+  context.console.result(script, {{"shell", options.shell}, {"script", script}});
+  return kExitDone;
+}
+
+}  // namespace
+
+SubcommandRun setup_completion(CLI::App& app) {
+  auto options = std::make_shared<CompletionOptions>();
+  app.add_option("SHELL", options->shell,
+                 "bash, zsh or fish: its script; words: what may stand in place of the last WORD")
+      ->required()
+      ->check(CLI::IsMember({"bash", "zsh", "fish", "words"}));
+  app.add_option("WORDS", options->words, "Of a command line that is being typed; after --");
+  app.footer(
+      "Packages install the scripts.  Elsewhere:\n"
+      "  bash: source <(gapfarm completion bash)     in ~/.bashrc\n"
+      "  zsh:  source <(gapfarm completion zsh)      in ~/.zshrc, after compinit\n"
+      "  fish: gapfarm completion fish | source      in ~/.config/fish/config.fish\n"
+      "\n"
+      "Examples:\n"
+      "  gapfarm completion bash\n"
+      "  gapfarm completion words -- evolve --lis");
+  return [options](CliContext& context) { return run_completion(*options, context); };
+}
+
+}  // namespace gapfarm
