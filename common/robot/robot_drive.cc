@@ -52,7 +52,7 @@ double CommandTrack::next_motion(double t_s) const {
   return std::numeric_limits<double>::infinity();
 }
 
-RobotDrive::RobotDrive(const GroundRobot& robot, std::span<const CommandRow> commands, double t_s,
+RobotDrive::RobotDrive(const GroundRobot& robot, std::span<const CommandRow> commands,
                        double speed_m_s)
     : robot_(robot),
       track_(commands, robot.channels.size(), robot.motors.command_timeout_s),
@@ -63,7 +63,6 @@ RobotDrive::RobotDrive(const GroundRobot& robot, std::span<const CommandRow> com
       speeds_(robot.wheels.size(), 0.0),
       motions_(robot.wheels.size()),
       throttle_m_s_(speed_m_s) {
-  (void)t_s;
   const auto& names = robot.channels;
   for (const RobotWheel& wheel : robot.wheels) {
     int channel = index_of(names, wheel.name);

@@ -39,10 +39,9 @@ class CommandTrack {
 
 class RobotDrive {
  public:
-  // `robot` is complete and outlives this, as do the commands.  Throttle begins at `speed_m_s`;
-  // motors begin at the commands' speed when they begin at `t_s`.
-  RobotDrive(const GroundRobot& robot, std::span<const CommandRow> commands, double t_s,
-             double speed_m_s = 0);
+  // `robot` is complete and outlives this, as do the commands.  A throttle begins at `speed_m_s`,
+  // motors at the speed that the first step's commands ask for.
+  RobotDrive(const GroundRobot& robot, std::span<const CommandRow> commands, double speed_m_s = 0);
 
   // Over [t_s, t_s + dt_s], one a wheel of the robot.  `yaw_rate_rad_s` is the robot's own.
   // REQUIRES: steps that follow one another.

@@ -68,15 +68,14 @@ class Cutter {
     // Poses so rare that every way between two is a window of its own.
     const bool rare = median_interval(poses) > horizon;
     while (from + 1 < poses.size()) {
-      const double wanted = poses[from].t_s + (1 - kSlack) * horizon;
+      const double wanted = poses[from].t_s + horizon;
       std::size_t end = from + 1;
       while (end < poses.size() && poses[end].t_s < wanted) ++end;
-      if (end == poses.size()) return;
-      // The nearer of two.
-      const double late = poses[end].t_s - poses[from].t_s;
-      if (end + 1 < poses.size() && late < horizon &&
-          std::abs(poses[end + 1].t_s - poses[from].t_s - horizon) < horizon - late) {
-        ++end;
+      // The pose before may be nearer, and the last one near enough.
+      const bool early = end - 1 > from && poses[end - 1].t_s >= wanted - kSlack * horizon;
+      if (end == poses.size() && !early) return;
+      if (early && (end == poses.size() || wanted - poses[end - 1].t_s < poses[end].t_s - wanted)) {
+        --end;
       }
       const bool gap = poses[end].t_s - poses[from].t_s > kGap * horizon;
       if (!gap || rare) add(index, from, end);

@@ -107,11 +107,14 @@ class Follower {
       : patches_(patches),
         robot_(robot),
         step_s_(step_s),
-        drive_(robot, commands, start.t_s, start.twist.vx_m_s),
+        drive_(robot, commands, start.twist.vx_m_s),
         start_s_(start.t_s),
         times_(times) {
     patches_.reset(start.twist);
     now_.t_s = start.t_s;
+    const auto driven = std::count_if(robot.wheels.begin(), robot.wheels.end(),
+                                      [](const RobotWheel& w) { return w.driven; });
+    driven_ = std::max(1.0, static_cast<double>(driven));
   }
 
   GroundMotion run() {
@@ -127,6 +130,8 @@ class Follower {
       take();
     }
     motion_.simulated_s = static_cast<double>(stepped_) * step_s_;
+    motion_.max_roll_rad = std::asin(std::min(roll_sine_, 1.0));
+    motion_.max_pitch_rad = std::asin(std::min(pitch_sine_, 1.0));
     return std::move(motion_);
   }
 
@@ -149,9 +154,11 @@ class Follower {
 
   void skip() {
     const double until = std::min(drive_.next_motion(now_.t_s), times_.back() + step_s_);
+    now_.X_SR = patches_.pose();
     const long steps = static_cast<long>(std::floor((until - now_.t_s) / step_s_)) - 1;
     if (steps > 0) step_ += steps;
-    last_.t_s = now_.t_s = time_of(step_);
+    now_.t_s = time_of(step_);
+    last_ = now_;
     for (; next_ < times_.size() && times_[next_] <= now_.t_s; ++next_) {
       motion_.samples.push_back({times_[next_], now_.X_SR, now_.travel_m});
     }
@@ -166,13 +173,13 @@ class Follower {
     ++stepped_;
     double travel = 0;
     for (const WheelMotion& w : wheels) travel += std::abs(w.speed_m_s);
-    const auto driven = static_cast<double>(std::count_if(
-        robot_.wheels.begin(), robot_.wheels.end(), [](const RobotWheel& w) { return w.driven; }));
-    now_ = {time_of(step_), patches_.pose(),
-            now_.travel_m + travel * step_s_ / std::max(1.0, driven)};
+    now_.t_s = time_of(step_);
+    now_.travel_m += travel * step_s_ / driven_;
+    // Poses cost; only those round a sample are looked at.
+    if (times_[next_] <= now_.t_s + 2 * step_s_) now_.X_SR = patches_.pose();
     if (!patches_.sane()) return MotionOutcome::kDiverged;
-    motion_.max_roll_rad = std::max(motion_.max_roll_rad, std::abs(patches_.roll_rad()));
-    motion_.max_pitch_rad = std::max(motion_.max_pitch_rad, std::abs(patches_.pitch_rad()));
+    roll_sine_ = std::max(roll_sine_, std::abs(patches_.roll_sine()));
+    pitch_sine_ = std::max(pitch_sine_, std::abs(patches_.pitch_sine()));
     motion_.max_heave_m = std::max(motion_.max_heave_m, std::abs(patches_.height_m()));
     if (patches_.fallen()) return MotionOutcome::kFellOver;
     const BodyTwist v = patches_.twist();
@@ -191,7 +198,9 @@ class Follower {
   std::size_t next_ = 0;
   long step_ = 0;
   long stepped_ = 0;
+  double driven_ = 1;  // wheels
   double stood_s_ = 0;
+  double roll_sine_ = 0, pitch_sine_ = 0;
   GroundSample last_, now_;
   std::vector<PatchMotion> motions_;
   GroundMotion motion_;

@@ -199,11 +199,9 @@ bool PatchRobot::sane() const {
   return is_sane(impl_->body().getLinearVelocity(), impl_->body().getAngularVelocity());
 }
 bool PatchRobot::fallen() const { return has_fallen(impl_->body().getWorldTransform().getBasis()); }
-double PatchRobot::roll_rad() const {
-  return clamped_asin(impl_->body().getWorldTransform().getBasis()[2][1]);
-}
-double PatchRobot::pitch_rad() const {
-  return -clamped_asin(impl_->body().getWorldTransform().getBasis()[2][0]);
+double PatchRobot::roll_sine() const { return impl_->body().getWorldTransform().getBasis()[2][1]; }
+double PatchRobot::pitch_sine() const {
+  return -impl_->body().getWorldTransform().getBasis()[2][0];
 }
 double PatchRobot::height_m() const {
   return (impl_->body().getWorldTransform() * impl_->origin()).z();

@@ -63,8 +63,8 @@ class PatchRobot {
   // False when the integration has failed.
   bool sane() const;
   bool fallen() const;
-  double roll_rad() const;
-  double pitch_rad() const;
+  double roll_sine() const;
+  double pitch_sine() const;
   double height_m() const;  // of R's origin over the floor
   // Share of the weight on each patch in the last step.
   std::vector<double> loads() const;

@@ -19,7 +19,7 @@ GroundRobot robot() {
 // How far the left wheel's surface goes in `until_s`, in steps of `dt_s`.
 double travel(const GroundRobot& robot, const std::vector<CommandRow>& rows, double until_s,
               double dt_s = 0.01) {
-  RobotDrive drive(robot, rows, 0);
+  RobotDrive drive(robot, rows);
   double sum = 0;
   const long steps = std::lround(until_s / dt_s);
   for (long k = 0; k < steps; ++k) {
@@ -93,7 +93,7 @@ TEST(RobotDrive, AThrottleSettlesWhereItsForcesBalance) {
   car.motors.lag_s = 0.05;
   ASSERT_TRUE(complete_robot(&car).ok());
   const std::vector<CommandRow> rows = {{0, {0.5, 0.5}}};
-  RobotDrive drive(car, rows, 0);
+  RobotDrive drive(car, rows);
   for (int k = 0; k < 4000; ++k) (void)drive.advance(0.005 * k, 0.005, 0);
   EXPECT_NEAR(drive.traction_m_s(), (0.3 * 10 - 0.1) / (0.3 * 2 + 0.3), 1e-3);
   EXPECT_NEAR(drive.curvature(), std::tan(0.21) / 0.17, 1e-9);
