@@ -29,6 +29,35 @@ void read_top(TomlSection& top, Config& config) {
   }
 }
 
+// [robot] and [runs].  False when there is no robot to go on with.
+bool read_robot_section(TomlSection& top, Config& config) {
+  auto section = top.section("robot");
+  if (!section) {
+    top.errors().add(top.table().source().begin,
+                     "scenario ground needs a robot:\n  [robot]\n  file = \"robot.toml\"");
+    return false;
+  }
+  std::string file;
+  section->read("file", file);
+  section->finish();
+  const std::string path = beside(config.path, file);
+  const auto text = read_text_file(path);
+  const Status known = text ? config.problem.set_robot(*text, path) : Status(text.error());
+  if (!known) {
+    top.errors().add(section->table().source().begin, known.error().message);
+    return false;
+  }
+  auto runs = top.section("runs");
+  if (!runs) return true;
+  for (const std::string& folder : runs->strings("folders").value_or(std::vector<std::string>())) {
+    config.trial_files.push_back(beside(config.path, folder));
+  }
+  if (auto horizons = runs->numbers("horizons", 0, 1e5, "s")) config.windows.horizons_s = *horizons;
+  runs->read("run_in", config.windows.run_in_s, 0, 1e3, "s");
+  runs->finish();
+  return true;
+}
+
 }  // namespace
 
 Result<Config> parse_config(std::string_view text, const std::string& path) {
@@ -49,6 +78,9 @@ Result<Config> parse_config(std::string_view text, const std::string& path) {
   TomlSection top(*parsed, "", errors);
   read_top(top, config);
   Problem& problem = config.problem;
+  if (scenario_form(problem.scenario).robot && !read_robot_section(top, config)) {
+    return errors.error();
+  }
   const ParameterTable& table = problem.table();
   problem.values = table.nominal();
   problem.commands = default_commands(problem.scenario);

@@ -18,13 +18,15 @@ class GeneReader {
   GeneReader(const ParameterTable& table, TomlErrors& errors, std::vector<Gene>& genes)
       : table_(table), errors_(errors), genes_(genes) {}
 
-  void read_table(const toml::table& section) {
+  void read_table(const toml::table& section, const std::string& prefix = "") {
     for (const auto& [key, node] : section) {
-      const std::string word(key.str());
+      const std::string word = prefix + std::string(key.str());
       if (const auto row = table_.find(word)) {
         read_gene(*row, node);
       } else if (const auto effect = effect_of(word)) {
         read_effect(*effect, node);
+      } else if (node.is_table() && begins_a_row(word)) {
+        read_table(*node.as_table(), word + ".");
       } else {
         unknown(key, word, known_words());
       }
@@ -32,6 +34,12 @@ class GeneReader {
   }
 
  private:
+  bool begins_a_row(const std::string& word) const {
+    return std::any_of(table_.rows().begin(), table_.rows().end(), [&](const Parameter& row) {
+      return row.effect.empty() && row.key.rfind(word + ".", 0) == 0;
+    });
+  }
+
   std::optional<std::size_t> effect_of(const std::string& name) const {
     for (std::size_t e = 0; e < table_.effects().size(); ++e) {
       if (table_.effects()[e].name == name) return e;

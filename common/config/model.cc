@@ -146,7 +146,9 @@ void read_origin(TomlSection& top, Model& model) {
 
 }  // namespace
 
-const ParameterTable& Model::table() const { return *parameter_table(scenario).value(); }
+const ParameterTable& Model::table() const {
+  return ground ? ground->table() : *parameter_table(scenario).value();
+}
 
 Result<Model> nominal_model(std::string_view scenario) {
   auto table = parameter_table(scenario);
@@ -166,6 +168,8 @@ Problem problem_of(const Model& model) {
   problem.values = model.values;
   problem.commands = model.commands;
   problem.pieces = model.pieces;
+  problem.robot_file = model.robot_file;
+  problem.ground = model.ground;
   problem.fitness = model.fitness;
   problem.spread = model.spread;
   return problem;
@@ -200,6 +204,14 @@ Result<Model> parse_model(std::string_view text, const std::string& path) {
   model.version.clear();
   model.fingerprint.clear();
   top.read("kind", model.kind);
+  if (scenario_form(scenario).robot) {
+    Problem problem = problem_of(model);
+    const std::string text = top.string("robot").value_or("");
+    if (Status s = problem.set_robot(text, path + ": robot"); !s) return s.error();
+    model.robot_file = problem.robot_file;
+    model.ground = problem.ground;
+    model.values = problem.values;
+  }
   read_base(top, "parameters", model);
   read_base(top, "noise", model);
   read_model_effects(top, model);

@@ -47,6 +47,10 @@ struct Model {
   ModelData data;
   ModelOrigin origin;
 
+  // Where the scenario has a robot: its file, and what it says.
+  std::string robot_file;
+  std::shared_ptr<const GroundTable> ground;
+
   const ParameterTable& table() const;  // REQUIRES: a known scenario
 };
 

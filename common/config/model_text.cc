@@ -90,6 +90,15 @@ std::string effect_sections(const Model& model) {
   return text;
 }
 
+// The file as it is, line by line.
+std::string robot_text(const Model& model) {
+  if (model.robot_file.empty()) return "";
+  if (model.robot_file.find("'''") != std::string::npos) {
+    return "robot = " + toml_string(model.robot_file) + "\n";
+  }
+  return "robot = '''\n" + model.robot_file + "'''\n";
+}
+
 std::string piece_sections(const Model& model) {
   std::string text;
   for (const Piece& piece : model.pieces) {
@@ -107,7 +116,9 @@ std::string piece_sections(const Model& model) {
 }
 
 std::string command_sections(const Model& model) {
-  if (scenario_form(model.scenario).pieces) return piece_sections(model);
+  const ScenarioForm& form = scenario_form(model.scenario);
+  if (form.pieces) return piece_sections(model);
+  if (form.robot) return "";
   std::string text;
   for (const CommandSpec& command : model.commands) {
     text += "\n[commands." + command.name + "]\nleft = " + toml_number(command.left) +
@@ -163,7 +174,7 @@ std::string format_model(const Model& model) {
   return "# A gapfarm model: 'gapfarm predict' and 'gapfarm simulate' take it.\nmodel = 1\n"
          "scenario = " +
          toml_string(model.scenario) + "\nkind = " + toml_string(model.kind) + "\n" +
-         base_section(model, "parameters", false) + base_section(model, "noise", true) +
+         robot_text(model) + base_section(model, "parameters", false) + base_section(model, "noise", true) +
          effect_sections(model) + frame_section(model) + command_sections(model) +
          score_sections(model) + origin_sections(model);
 }

@@ -125,7 +125,9 @@ struct Config {
   EvolutionSettings evolution;
   FarmSettings farm;
   SimulateSettings simulate;
-  std::vector<std::string> trial_files;  // as written, made relative to the config's folder
+  std::vector<std::string> trial_files;  // as written, made relative to the config's folder; where
+                                         // trials are windows of runs: folders of these
+  WindowSettings windows;
   std::uint64_t seed = 1;
 };
 

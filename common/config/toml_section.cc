@@ -66,7 +66,14 @@ std::string number_range(double lower, double upper, std::string_view unit) {
 
 const toml::node* TomlSection::find(std::string_view key) {
   known_.emplace_back(key);
-  return table_->get(key);
+  if (const toml::node* node = table_->get(key)) return node;
+  const toml::table* table = table_;
+  for (std::size_t dot = key.find('.'); dot != key.npos && table != nullptr; dot = key.find('.')) {
+    const toml::node* node = table->get(key.substr(0, dot));
+    table = node == nullptr ? nullptr : node->as_table();
+    key.remove_prefix(dot + 1);
+  }
+  return table == nullptr || table == table_ ? nullptr : table->get(key);
 }
 
 void TomlSection::wrong_type(std::string_view key, const toml::node& node,
@@ -252,13 +259,20 @@ void TomlSection::fail(std::string_view key, const std::string& sentence) {
   if (const toml::node* node = table_->get(key)) errors_->add(*node, sentence);
 }
 
-void TomlSection::finish() {
-  for (const auto& [key, node] : *table_) {
-    if (std::find(known_.begin(), known_.end(), key.str()) != known_.end()) continue;
+void TomlSection::finish(const toml::table& table, const std::string& prefix) {
+  for (const auto& [key, node] : table) {
+    const std::string word = prefix + std::string(key.str());
+    if (std::find(known_.begin(), known_.end(), word) != known_.end()) continue;
+    const bool begun = std::any_of(known_.begin(), known_.end(), [&](const std::string& known) {
+      return known.rfind(word + ".", 0) == 0;
+    });
+    if (begun && node.is_table()) {
+      finish(*node.as_table(), word + ".");
+      continue;
+    }
     const std::string kind = node.is_table() ? "unknown section " : "unknown key ";
     const std::string where = name_.empty() ? "" : " in " + name_;
-    errors_->add(key.source().begin,
-                 kind + quoted_word(key.str()) + where + suggestion(key.str(), known_));
+    errors_->add(key.source().begin, kind + quoted_word(word) + where + suggestion(word, known_));
   }
 }
 

@@ -60,7 +60,8 @@ class TomlSection {
   const std::string& name() const { return name_; }
   TomlErrors& errors() { return *errors_; }
 
-  // The node at `key`, or null.  The key counts as known from now on.
+  // The node at `key`, or null.  The key counts as known from now on.  Where there is no key "a.b",
+  // it is key "b" of section "a".
   const toml::node* find(std::string_view key);
 
   std::optional<double> number(std::string_view key, double lower, double upper,
@@ -94,9 +95,10 @@ class TomlSection {
   void fail(std::string_view key, const std::string& sentence);
 
   // An error for every key that nobody asked for, with a suggestion.
-  void finish();
+  void finish() { finish(*table_, ""); }
 
  private:
+  void finish(const toml::table& table, const std::string& prefix);
   void wrong_type(std::string_view key, const toml::node& node, const std::string& expected);
   std::optional<double> number_of(std::string_view key, const toml::node& node, double lower,
                                   double upper, std::string_view unit);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "common/parameters/ground.h"
 #include "common/parameters/push.h"
 #include "common/parameters/racquetball.h"
 
@@ -163,8 +164,10 @@ struct ScenarioTable {
   const char* scenario;
   const ParameterTable& (*table)();
 };
-constexpr ScenarioTable kScenarioTables[] = {
-    {"srv1", srv1_table}, {"push", push_table}, {"racquetball", racquetball_table}};
+constexpr ScenarioTable kScenarioTables[] = {{"srv1", srv1_table},
+                                             {"push", push_table},
+                                             {"racquetball", racquetball_table},
+                                             {"ground", ground_table}};
 
 Parameter effect_parameter(const Effect& effect, const EffectParameter& p) {
   return {effect.name + "." + p.key,

@@ -3,6 +3,8 @@
 #include <cassert>
 #include <string>
 
+#include "common/robot/robot_file.h"
+
 namespace gapfarm {
 namespace {
 
@@ -15,8 +17,13 @@ std::vector<CommandSpec> no_commands() { return {}; }
 
 std::vector<CommandSpec> racquetball_commands() { return {{"serve", 1, 1, 5}}; }
 
-constexpr ScenarioForm kForms[] = {
-    {"srv1", srv1_commands}, {"push", no_commands, true}, {"racquetball", racquetball_commands}};
+// Windows bring their own durations and commands.
+std::vector<CommandSpec> ground_commands() { return {{kWindowCommand, 0, 0, 0}}; }
+
+constexpr ScenarioForm kForms[] = {{"srv1", srv1_commands},
+                                   {"push", no_commands, true},
+                                   {"racquetball", racquetball_commands},
+                                   {"ground", ground_commands, false, true}};
 
 }  // namespace
 
@@ -53,7 +60,18 @@ const char* fitness_unit(FitnessKind kind) {
   return "?";
 }
 
-const ParameterTable& Problem::table() const { return *parameter_table(scenario).value(); }
+const ParameterTable& Problem::table() const {
+  return ground ? ground->table() : *parameter_table(scenario).value();
+}
+
+Status Problem::set_robot(const std::string& text, const std::string& path) {
+  const auto robot = parse_robot(text, path);
+  if (!robot) return robot.error();
+  robot_file = text;
+  ground = std::make_shared<const GroundTable>(*robot);
+  values = table().nominal();
+  return {};
+}
 
 ParameterValues Problem::values_of(const Genome& genome) const {
   ParameterValues all = values;

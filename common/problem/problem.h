@@ -2,13 +2,16 @@
 // genome, with a hash that names it.
 #pragma once
 
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "common/base/result.h"
 #include "common/parameters/genome.h"
+#include "common/parameters/ground.h"
 #include "common/parameters/table.h"
 #include "common/problem/piece.h"
+#include "common/runs/windows.h"
 #include "common/trials/trial.h"
 #include "gapfarm/v1/problem.pb.h"
 
@@ -61,8 +64,15 @@ struct Problem {
   FitnessSettings fitness;
   SpreadSettings spread;
   TrialLog log;
+  // Scenario `ground` only: the robot's file, what it says, and the runs of which `log` is windows.
+  std::string robot_file;
+  std::shared_ptr<const GroundTable> ground;
+  std::vector<CommandedRun> runs;
 
-  const ParameterTable& table() const;  // REQUIRES: a known scenario
+  // Of the robot where there is one, else of the scenario.  REQUIRES: a known scenario.
+  const ParameterTable& table() const;
+  // Takes the robot; `values` become its own.  Errors: parse_robot()'s, `path` naming the file.
+  Status set_robot(const std::string& text, const std::string& path);
   // The problem's values with the genes of `genome` put in; an empty genome changes nothing.
   ParameterValues values_of(const Genome& genome) const;
   // REQUIRES: the command exists.
@@ -78,6 +88,8 @@ struct ScenarioForm {
   std::vector<CommandSpec> (*commands)();
   // Trials name pieces of the config and come with the way of a finger.
   bool pieces = false;
+  // There is a robot's file, and trials are windows of runs.
+  bool robot = false;
 };
 // REQUIRES: a scenario that has a parameter table.
 const ScenarioForm& scenario_form(std::string_view scenario);

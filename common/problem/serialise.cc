@@ -127,6 +127,57 @@ Status check_tip(const Trial& trial, bool wanted, const std::string& where) {
                  " s, expected up to 120 s; t is in s");
 }
 
+// A robot and what it was told, where the scenario has them.
+Status read_runs(const v1::Problem& message, Problem* problem) {
+  if (!scenario_form(problem->scenario).robot) {
+    if (message.robot().empty() && message.runs_size() == 0) return {};
+    return invalid("scenario '" + problem->scenario + "' has neither robot nor runs");
+  }
+  if (message.robot().empty()) return invalid("scenario 'ground' needs a robot");
+  if (Status s = problem->set_robot(message.robot(), "robot"); !s)
+    return invalid(s.error().message);
+  problem->values.clear();
+  const std::size_t channels = problem->ground->robot().channels.size();
+  for (const v1::Run& run : message.runs()) {
+    CommandedRun to{run.start(), run.speed(), run.turn(), {}};
+    if (static_cast<std::size_t>(run.values_size()) != run.t().size() * channels) {
+      return invalid("a run with half a command");
+    }
+    double sum = to.start_s + to.speed_m_s + to.turn_rad_s;
+    for (int i = 0; i < run.t_size(); ++i) {
+      CommandRow row{run.t(i), {}};
+      for (std::size_t c = 0; c < channels; ++c) {
+        row.values.push_back(
+            run.values(static_cast<int>(static_cast<std::size_t>(i) * channels + c)));
+        sum += row.values.back();
+      }
+      sum += row.t_s;
+      if (i > 0 && row.t_s < run.t(i - 1)) return invalid("a run whose times go back");
+      to.commands.push_back(std::move(row));
+    }
+    if (!std::isfinite(sum)) return invalid("a run with numbers that are not finite");
+    problem->runs.push_back(std::move(to));
+  }
+  return {};
+}
+
+// A window lies in a run and after its start.
+Status check_window(const Trial& trial, const Problem& problem, const std::string& where) {
+  if (!scenario_form(problem.scenario).robot) {
+    return trial.run ? Status(invalid(where + ": is a window of a run")) : Status();
+  }
+  if (!trial.run || *trial.run >= problem.runs.size() || !trial.t_s || !trial.duration_s) {
+    return invalid(where + ": is no window of one of the problem's runs");
+  }
+  constexpr double kLongest_s = 1e5;
+  const CommandedRun& run = problem.runs[*trial.run];
+  if (run.commands.empty() || !(*trial.t_s >= run.start_s) || !(*trial.duration_s > 0) ||
+      !(*trial.t_s + *trial.duration_s - run.start_s < kLongest_s)) {
+    return invalid(where + ": does not lie in its run");
+  }
+  return {};
+}
+
 Status read_commands(const v1::Problem& message, Problem* problem) {
   for (const v1::Command& c : message.commands()) {
     const bool duties = std::abs(c.left()) <= 1 && std::abs(c.right()) <= 1;
@@ -152,13 +203,14 @@ Status read_trials(const v1::Problem& message, Problem* problem) {
     }
     if (!finite(trial.X_WS) || !finite(trial.X_WE))
       return invalid(where + ": a pose is not finite");
-    const bool bounded = std::abs(trial.left.value_or(0)) <= 1 &&
-                         std::abs(trial.right.value_or(0)) <= 1 &&
-                         trial.duration_s.value_or(0) >= 0 && trial.duration_s.value_or(0) <= 60;
+    const bool bounded =
+        std::abs(trial.left.value_or(0)) <= 1 && std::abs(trial.right.value_or(0)) <= 1 &&
+        trial.duration_s.value_or(0) >= 0 && (trial.run || trial.duration_s.value_or(0) <= 60);
     if (!bounded || !std::isfinite(trial.t_s.value_or(0))) {
       return invalid(where + ": needs duties in [-1, 1], a duration in [0, 60] s and a finite t");
     }
     if (Status s = check_tip(trial, !problem->pieces.empty(), where); !s) return s;
+    if (Status s = check_window(trial, *problem, where); !s) return s;
     problem->log.trials.push_back(std::move(trial));
   }
   return {};
@@ -213,6 +265,7 @@ v1::Trial to_proto(const Trial& trial) {
     to->set_t(sample.t_s);
     *to->mutable_pose() = to_proto(sample.pose);
   }
+  if (trial.run) message.set_run(*trial.run);
   for (const TipSample& sample : trial.tip) {
     v1::TipSample* to = message.add_tip();
     to->set_t(sample.t_s);
@@ -239,6 +292,7 @@ Trial from_proto(const v1::Trial& message) {
   for (const v1::TipSample& sample : message.tip()) {
     trial.tip.push_back({sample.t(), sample.x(), sample.y()});
   }
+  if (message.has_run()) trial.run = message.run();
   return trial;
 }
 
@@ -265,6 +319,17 @@ v1::Problem to_proto(const Problem& problem) {
   message.mutable_spread()->set_replicates(problem.spread.replicates);
   for (const Piece& piece : problem.pieces) *message.add_pieces() = to_proto(piece);
   for (const Trial& trial : problem.log.trials) *message.add_trials() = to_proto(trial);
+  if (!problem.robot_file.empty()) message.set_robot(problem.robot_file);
+  for (const CommandedRun& run : problem.runs) {
+    v1::Run* to = message.add_runs();
+    to->set_start(run.start_s);
+    to->set_speed(run.speed_m_s);
+    to->set_turn(run.turn_rad_s);
+    for (const CommandRow& row : run.commands) {
+      to->add_t(row.t_s);
+      for (const double value : row.values) to->add_values(value);
+    }
+  }
   return message;
 }
 
@@ -272,6 +337,7 @@ Result<Problem> from_proto(const v1::Problem& message) {
   Problem problem;
   problem.scenario = message.scenario();
   if (auto table = parameter_table(problem.scenario); !table) return table.error();
+  if (Status s = read_runs(message, &problem); !s) return s.error();
   if (Status s = read_values(message, &problem); !s) return s.error();
   if (Status s = read_commands(message, &problem); !s) return s.error();
   if (Status s = read_pieces(message, &problem); !s) return s.error();

@@ -186,9 +186,13 @@ std::string describe(const Config& config, const Summary& summary, unsigned work
     text += std::string(f.severity == Severity::kUnusable ? "doubt" : "note ") + "        " +
             f.name + ": " + f.text + " " + f.remedy + "\n";
   }
-  // The first row of every table is the model that is simulated.
-  text += "scenario     " + problem.scenario + ", " + problem.table()[0].key + " " +
-          problem.table().format(0, problem.values[0]) + "\n";
+  // The first row of every other table is the model that is simulated.
+  text += "scenario     " + problem.scenario + ", ";
+  if (problem.ground) {
+    text += drive_words()[static_cast<std::size_t>(problem.ground->robot().drive)] + "\n";
+  } else {
+    text += problem.table()[0].key + " " + problem.table().format(0, problem.values[0]) + "\n";
+  }
   text += "trials       " + std::to_string(summary.trials) + " in " +
           std::to_string(summary.sessions) + " sessions:";
   for (const auto& [command, count] : summary.commands) {

@@ -4,6 +4,7 @@
 #include <thread>
 
 #include "common/config/config.h"
+#include "common/problem/run_files.h"
 #include "common/trials/read.h"
 #include "master/cli/long_command.h"
 
@@ -20,8 +21,16 @@ Result<Config> read_config_and_trials(const std::string& config_path, const Tria
   if (!config) return config.error();
   if (!trials.files.empty()) config->trial_files = trials.files;
   if (config->trial_files.empty()) {
-    return Error{config_path +
-                 ": names no trial files; add them to the config or give --trials FILE"};
+    const bool runs = scenario_form(config->problem.scenario).robot;
+    return Error{config_path + (runs ? ": names no runs; add [runs] with folders = [\"FOLDER\"] or "
+                                       "give --trials FOLDER"
+                                     : ": names no trial files; add them to the config or give "
+                                       "--trials FILE")};
+  }
+  if (scenario_form(config->problem.scenario).robot) {
+    const Status read = read_problem_runs(config->trial_files, config->windows, &config->problem);
+    if (!read) return read.error();
+    return config;
   }
   Result<TrialLog> log =
       read_trial_files(config->trial_files, command_names(config->problem.commands), trials.read);

@@ -22,6 +22,8 @@ Model model_of(const RunStore& store, const Problem& problem, const Config& conf
   model.values = problem.values_of(summary.best->genome);
   model.commands = problem.commands;
   model.pieces = problem.pieces;
+  model.robot_file = problem.robot_file;
+  model.ground = problem.ground;
   model.fitness = problem.fitness;
   model.spread = problem.spread;
   model.score = fitness_of_cost(problem.fitness.kind, summary.best->cost);

@@ -22,6 +22,8 @@ std::span<const Subcommand> subcommands() {
        setup_influence},
       {"stability", "find parameters at which tiny changes of the start matter least", "Models",
        setup_stability},
+      {"horizons", "say how far off a ground robot's simulation is at several horizons", "Models",
+       setup_horizons},
       {"diagnose", "say where the sim-to-real gap lies and which effect causes it", "Diagnosis",
        setup_diagnose},
       {"report", "draw the report of a diagnosis again", "Diagnosis", setup_report},

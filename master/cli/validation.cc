@@ -12,6 +12,11 @@ namespace gapfarm {
 
 Result<std::optional<TrialLog>> read_validation(const StagePlan& plan, const Config& config) {
   if (plan.validation_files.empty()) return std::optional<TrialLog>();
+  if (config.problem.ground) {
+    return Error{
+        "[validation] is for trials; predict runs that were kept apart by `gapfarm horizons "
+        "RUN --trials FOLDER`"};
+  }
   for (const std::string& file : plan.validation_files) {
     const auto same = [&](const std::string& other) {
       std::error_code code;

@@ -1,5 +1,6 @@
 #include <array>
 
+#include "worker/scenarios/ground.h"
 #include "worker/scenarios/push.h"
 #include "worker/scenarios/racquetball.h"
 #include "worker/scenarios/scenario.h"
@@ -11,6 +12,7 @@ std::span<const Scenario> scenarios() {
   static constexpr std::array rows = {
       Scenario{"srv1", "tracked robot, six atomic commands", prepare_srv1},
       Scenario{"push", "flat pieces pushed across a table by a finger", prepare_push},
+      Scenario{"ground", "any robot on wheels or tracks, from its file", prepare_ground},
       Scenario{"racquetball", "ball in a closed court, struck by a paddle", prepare_racquetball},
   };
   return rows;

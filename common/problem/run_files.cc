@@ -1,0 +1,39 @@
+#include "common/problem/run_files.h"
+
+#include <filesystem>
+
+#include "common/runs/read.h"
+
+namespace gapfarm {
+
+Result<RunLog> read_run_folders(std::span<const std::string> folders,
+                                std::span<const std::string> channels) {
+  RunLog all;
+  for (const std::string& folder : folders) {
+    const std::filesystem::path path(folder);
+    auto log = read_runs((path / "commands.csv").string(), (path / "poses.csv").string(), channels);
+    if (!log) return log.error();
+    for (LoggedRun& run : log->runs) {
+      // Runs of two folders may bear one name.
+      if (folders.size() > 1 && run.session.empty()) run.session = path.filename().string();
+      all.runs.push_back(std::move(run));
+    }
+    all.notes.insert(all.notes.end(), log->notes.begin(), log->notes.end());
+  }
+  return all;
+}
+
+Status read_problem_runs(std::span<const std::string> folders, const WindowSettings& windows,
+                         Problem* problem) {
+  const auto all = read_run_folders(folders, problem->ground->robot().channels);
+  if (!all) return all.error();
+  auto cut = cut_windows(*all, windows);
+  if (!cut) return cut.error();
+  for (const std::string& note : problem->ground->robot().notes) cut->log.notes.push_back(note);
+  problem->runs = std::move(cut->runs);
+  problem->log = std::move(cut->log);
+  const Result<Problem> sound = from_proto(to_proto(*problem));
+  return sound ? Status() : Status(sound.error());
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,21 @@
+// The runs of a problem from their files.
+#pragma once
+
+#include <span>
+#include <string>
+
+#include "common/problem/problem.h"
+#include "common/runs/run.h"
+
+namespace gapfarm {
+
+// Reads commands.csv and poses.csv of each folder, one after another.
+Result<RunLog> read_run_folders(std::span<const std::string> folders,
+                                std::span<const std::string> channels);
+
+// Reads commands.csv and poses.csv of each folder, cuts them into windows and makes those the
+// problem's trials, checked as from_proto() does.  REQUIRES: a problem with a robot.
+Status read_problem_runs(std::span<const std::string> folders, const WindowSettings& windows,
+                         Problem* problem);
+
+}  // namespace gapfarm

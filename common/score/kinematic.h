@@ -1,0 +1,34 @@
+// The kinematic model of a ground robot: its own equations, without slip, inertia or friction, with
+// gains, clock and marker fitted by least squares.  What any simulation has to beat.
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "common/base/result.h"
+#include "common/problem/problem.h"
+
+namespace gapfarm {
+
+// Fitted values beside the robot's file.
+struct Kinematics {
+  std::vector<std::string> names;  // "left", "right", "separation", "lag", "delay", ...
+  Eigen::VectorXd values;
+  double rms_m = 0;  // of the windows that it was fitted to
+  double rms_rad = 0;
+};
+
+// As the robot's file has it: gains 1, its delay, lag and marker.
+Kinematics nominal_kinematics(const GroundRobot& robot);
+
+// The measured end pose that the kinematics expect of every trial.  REQUIRES: a problem with a
+// robot whose trials are windows.
+std::vector<Pose> kinematic_ends(const Problem& problem, const Kinematics& kinematics);
+
+// Levenberg's and Marquardt's least squares on the problem's windows, Huber's weights beyond two
+// robust standard deviations.  The delay is found first, by a scan of +-1 s round the file's.
+// Errors: no windows.
+Result<Kinematics> fit_kinematics(const Problem& problem);
+
+}  // namespace gapfarm

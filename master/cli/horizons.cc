@@ -1,0 +1,95 @@
+// gapfarm horizons RUN|CONFIG: how far off a ground robot's simulation is at several horizons.
+#include "master/ground/horizons.h"
+
+#include <filesystem>
+#include <memory>
+
+#include "common/problem/run_files.h"
+#include "common/runs/read.h"
+#include "master/cli/inputs.h"
+#include "master/cli/run_model.h"
+#include "master/store/run_reader.h"
+
+namespace gapfarm {
+namespace {
+
+struct HorizonsCommand {
+  std::string source;
+  std::vector<std::string> runs;
+  std::vector<double> horizons = {0.5, 2, 5, 0};
+  FarmOptions farm;
+};
+
+// What was fitted to, and at which values the simulation is measured.
+struct Fitted {
+  Problem problem;
+  ParameterValues values;
+  WindowSettings windows;
+  std::vector<std::string> folders;
+};
+
+Result<Fitted> open_fitted(const std::string& source, Console& console) {
+  std::error_code ignored;
+  if (!std::filesystem::is_directory(source, ignored)) {
+    auto config = read_config_and_trials(source, {});
+    if (!config) return config.error();
+    return Fitted{config->problem, config->problem.values, config->windows, config->trial_files};
+  }
+  const auto reader = RunReader::open(source);
+  if (!reader) return reader.error();
+  auto problem = stored_problem(*reader);
+  if (!problem) return problem.error();
+  const auto model = read_model_of(source, console);
+  if (!model) return model.error();
+  return Fitted{*problem, model->values, {}, model->data.files};
+}
+
+int run_horizons(const HorizonsCommand& command, CliContext& context) {
+  Console& console = context.console;
+  auto fitted = open_fitted(command.source, console);
+  if (fitted && !fitted->problem.ground) {
+    fitted = Error{command.source + ": scenario " + fitted->problem.scenario +
+                   " has no runs to cut into windows; gapfarm predict compares its trials"};
+  }
+  if (!fitted) {
+    console.error(fitted.error());
+    return kExitBadUsage;
+  }
+  const auto runs = read_run_folders(command.runs.empty() ? fitted->folders : command.runs,
+                                     fitted->problem.ground->robot().channels);
+  if (!runs) {
+    console.error(runs.error());
+    return kExitBadUsage;
+  }
+  for (const std::string& note : runs->notes) console.note(note);
+  auto farm = start_farm(command.farm, {}, context);
+  if (!farm) return failed(farm.error(), context);
+  const auto horizons = measure_horizons(**farm, fitted->problem, fitted->values, *runs,
+                                         {command.horizons, fitted->windows.run_in_s});
+  if (!horizons) return failed(horizons.error(), context);
+  console.print(format_horizons(*horizons));
+  return kExitDone;
+}
+
+}  // namespace
+
+SubcommandRun setup_horizons(CLI::App& app) {
+  auto command = std::make_shared<HorizonsCommand>();
+  app.add_option("RUN|CONFIG", command->source,
+                 "A finished run, or a config for its own values, of scenario ground")
+      ->required();
+  app.add_option("--trials", command->runs,
+                 "Folders with commands.csv and poses.csv (default: those that were fitted to)");
+  app.add_option("--horizons", command->horizons, "Lengths of windows, s; 0: whole runs")
+      ->capture_default_str();
+  command->farm.declare(app, false);
+  app.footer(
+      "Beside the simulation stand the robot's own kinematics, fitted to the same windows by least "
+      "squares,\nand constant velocity.\n\n"
+      "Examples:\n"
+      "  gapfarm horizons run/warthog --trials held_out\n"
+      "  gapfarm horizons warthog.toml --horizons 1 10");
+  return [command](CliContext& context) { return run_horizons(*command, context); };
+}
+
+}  // namespace gapfarm

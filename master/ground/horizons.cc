@@ -1,0 +1,155 @@
+#include "master/ground/horizons.h"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "common/score/fitness.h"
+
+namespace gapfarm {
+namespace {
+
+constexpr double kSpeedSpan_s = 0.5;  // of poses before a window, for constant velocity
+// Windows in which the robot hardly went anywhere have no error a metre.
+constexpr double kLeastWayShare = 0.1;  // of the median way
+
+double median(std::vector<double> values) {
+  if (values.empty()) return 0;
+  const auto middle = values.begin() + static_cast<long>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+// Windows of one horizon: trials of a problem, one after another.
+struct Tiles {
+  double horizon_s = 0;
+  std::size_t first = 0;
+  std::size_t count = 0;
+};
+
+// Length of the marker's measured way in a window.
+double way_of(const RunLog& runs, const Trial& trial) {
+  const std::vector<PoseRow>& poses = runs.runs[*trial.run].poses;
+  double sum = 0;
+  for (std::size_t i = 1; i < poses.size(); ++i) {
+    if (poses[i - 1].t_s < *trial.t_s || poses[i].t_s > *trial.t_s + *trial.duration_s) continue;
+    const Pose& a = poses[i - 1].X_WM;
+    const Pose& b = poses[i].X_WM;
+    sum += std::hypot(b.x - a.x, b.y - a.y);
+  }
+  return sum;
+}
+
+Pose constant_end(const RunLog& runs, const Trial& trial) {
+  const std::vector<PoseRow>& poses = runs.runs[*trial.run].poses;
+  const auto here = std::lower_bound(poses.begin(), poses.end(), *trial.t_s,
+                                     [](const PoseRow& p, double t) { return p.t_s < t; });
+  auto before = here;
+  while (before != poses.begin() && (before - 1)->t_s >= *trial.t_s - kSpeedSpan_s) --before;
+  if (before == here) return trial.X_WS;
+  const double factor = *trial.duration_s / (here->t_s - before->t_s);
+  return trial.X_WS * exp(Twist(factor * log(between(before->X_WM, here->X_WM))));
+}
+
+WindowErrors errors_of(const std::vector<Pose>& ends, const Problem& problem, const Tiles& tiles,
+                       const std::vector<double>& ways) {
+  std::vector<double> position, heading, position_m, heading_m;
+  const double least = kLeastWayShare * median(ways);
+  for (std::size_t k = 0; k < tiles.count; ++k) {
+    const std::size_t i = tiles.first + k;
+    const Eigen::Vector3d d = local_difference(ends[i], problem.log.trials[i].X_WE);
+    position.push_back(d.head<2>().norm());
+    heading.push_back(std::abs(d[2]));
+    if (!(ways[k] > least)) continue;
+    position_m.push_back(position.back() / ways[k]);
+    heading_m.push_back(heading.back() / ways[k]);
+  }
+  return {median(position), median(heading), median(position_m), median(heading_m)};
+}
+
+std::string cells(const WindowErrors& e) {
+  return fmt::format(" {:8.1f} {:8.1f} {:7.1f} {:7.1f} |", 1e3 * e.position_m, 1e3 * e.heading_rad,
+                     1e3 * e.position_m_m, 1e3 * e.heading_rad_m);
+}
+
+}  // namespace
+
+Result<Horizons> measure_horizons(Farm& farm, const Problem& fitted, const ParameterValues& values,
+                                  const RunLog& runs, const WindowSettings& windows) {
+  Problem asked = fitted;
+  asked.values = values;
+  asked.fitness.kind = FitnessKind::kLogScore;
+  asked.log = {};
+  std::vector<Tiles> tiles;
+  for (const double horizon : windows.horizons_s) {
+    auto cut = cut_windows(runs, {{horizon}, windows.run_in_s});
+    if (!cut) continue;  // longer than every run
+    tiles.push_back({horizon, asked.log.trials.size(), cut->log.trials.size()});
+    asked.runs = std::move(cut->runs);
+    for (Trial& trial : cut->log.trials) asked.log.trials.push_back(std::move(trial));
+  }
+  if (tiles.empty()) return Error{"no window of any horizon fits into the runs"};
+  v1::Task task;
+  task.mutable_predict();
+  const auto results = farm.run(farm.add_problem(to_proto(asked)), {task});
+  if (!results) return results.error();
+  const v1::TaskResult& result = results->front();
+  if (result.outcome() != v1::OK) {
+    return Error{"the simulation ended with " + v1::Outcome_Name(result.outcome()) + " (" +
+                 result.message() + ")"};
+  }
+  auto kinematics = fit_kinematics(fitted);
+  if (!kinematics) return kinematics.error();
+  Horizons horizons;
+  horizons.kinematics = *kinematics;
+  std::vector<Pose> simulated, constant;
+  for (const v1::Predicted& p : result.predict().predictions()) {
+    simulated.push_back(from_proto(p.end()));
+  }
+  for (const Trial& trial : asked.log.trials) constant.push_back(constant_end(runs, trial));
+  const std::vector<Pose> kinematic = kinematic_ends(asked, *kinematics);
+  for (const Tiles& t : tiles) {
+    HorizonRow row;
+    row.horizon_s = t.horizon_s;
+    row.windows = t.count;
+    std::vector<double> ways;
+    for (std::size_t k = 0; k < t.count; ++k) {
+      const auto i = static_cast<int>(t.first + k);
+      ways.push_back(way_of(runs, asked.log.trials[t.first + k]));
+      row.log_score += result.predict().predictions(i).log_score() / static_cast<double>(t.count);
+    }
+    row.way_m = median(ways);
+    row.simulation = errors_of(simulated, asked, t, ways);
+    row.kinematics = errors_of(kinematic, asked, t, ways);
+    row.constant_velocity = errors_of(constant, asked, t, ways);
+    horizons.rows.push_back(row);
+  }
+  return horizons;
+}
+
+std::string format_horizons(const Horizons& horizons) {
+  std::string text = "Medians over windows: mm, mrad, and of each a metre of way\n";
+  text += fmt::format("{:>7} {:>7} {:>6} |{:^34}|{:^34}|{:^34}| {:>9}\n", "horizon", "windows",
+                      "way m", "simulation", "fitted kinematics", "constant velocity", "nats");
+  text += fmt::format("{:>7} {:>7} {:>6} |", "s", "", "");
+  for (int i = 0; i < 3; ++i) {
+    text += fmt::format(" {:>8} {:>8} {:>7} {:>7} |", "mm", "mrad", "mm/m", "mrad/m");
+  }
+  text += "\n";
+  for (const HorizonRow& row : horizons.rows) {
+    const std::string name = row.horizon_s > 0 ? fmt::format("{:g}", row.horizon_s) : "whole";
+    text += fmt::format("{:>7} {:>7} {:>6.2f} |", name, row.windows, row.way_m) +
+            cells(row.simulation) + cells(row.kinematics) + cells(row.constant_velocity) +
+            fmt::format(" {:>9.3f}\n", row.log_score);
+  }
+  text += "kinematics:";
+  for (std::size_t i = 0; i < horizons.kinematics.names.size(); ++i) {
+    text += fmt::format(" {} {:.4g}", horizons.kinematics.names[i],
+                        horizons.kinematics.values[static_cast<Eigen::Index>(i)]);
+  }
+  return text + "\n";
+}
+
+}  // namespace gapfarm

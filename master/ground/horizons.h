@@ -1,0 +1,45 @@
+// How far off a ground robot's simulation is over windows of several lengths, beside its own
+// kinematics and constant velocity.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "common/base/result.h"
+#include "common/problem/problem.h"
+#include "common/runs/run.h"
+#include "common/score/kinematic.h"
+#include "master/farm/farm.h"
+
+namespace gapfarm {
+
+// Medians over windows.
+struct WindowErrors {
+  double position_m = 0;
+  double heading_rad = 0;
+  double position_m_m = 0;  // per metre that the marker went
+  double heading_rad_m = 0;
+};
+
+struct HorizonRow {
+  double horizon_s = 0;  // 0: whole runs
+  std::size_t windows = 0;
+  double way_m = 0;      // median of the marker's way
+  double log_score = 0;  // of the simulation, mean, nats a window
+  WindowErrors simulation, kinematics, constant_velocity;
+};
+
+struct Horizons {
+  Kinematics kinematics;  // fitted to the fitted windows
+  std::vector<HorizonRow> rows;
+};
+
+// `fitted` holds the windows that were fitted to, `values` what the simulation is to be measured
+// at, `runs` what is predicted.  Constant velocity is that of the half second of poses before a
+// window.  Errors: no window fits, the simulation did not end well.
+Result<Horizons> measure_horizons(Farm& farm, const Problem& fitted, const ParameterValues& values,
+                                  const RunLog& runs, const WindowSettings& windows);
+
+std::string format_horizons(const Horizons& horizons);
+
+}  // namespace gapfarm
