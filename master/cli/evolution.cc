@@ -203,10 +203,7 @@ int run_evolution(RunStore& store, const EvolutionRun& run, CliContext& context)
   EvolveOptions options;
   options.settings = run.config.evolution;
   options.fitness = run.problem.fitness.kind;
-  if (*checkpoint) {
-    options.digest = (*checkpoint)->digest;
-    options.spent_s = (*checkpoint)->wall_s;
-  }
+  if (*checkpoint) options.spent_s = (*checkpoint)->wall_s;
   const auto summary =
       evolve(**optimiser, backend, sink, clock, options, [&] { return context.stop.requested(); });
   context.console.clear_progress();

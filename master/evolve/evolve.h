@@ -27,22 +27,14 @@ class EvaluationBackend {
   virtual Result<std::vector<Score>> evaluate(std::span<const Candidate> candidates) = 0;
 };
 
-// Over the members whose outcome is OK; `best` is the optimiser's best, which under noise need not
-// be the least cost.
-struct CostSummary {
-  double best = 0, mean = 0, median = 0, worst = 0;
-};
-
 struct GenerationRecord {
-  std::uint64_t generation = 0;      // from 1
-  std::optional<CostSummary> costs;  // none when no member is OK
+  std::uint64_t generation = 0;  // from 1
   double diversity = 0;
   std::vector<NamedNumber> operator_probabilities;
   std::uint64_t evaluations = 0;  // since the run began
   double wall_s = 0;              // spent on this generation
   std::vector<Member> members;    // best first
   std::string optimiser_state;    // after this generation
-  std::string digest;             // of every generation up to this one
 };
 
 // Keeps a generation; it counts as done once commit() returned.
@@ -67,13 +59,11 @@ enum class StopReason {
   kTime,
   kStagnation
 };
-const char* stop_reason_name(StopReason reason);  // "requested", "target_fitness", ...
 
 // When to stop, and what a resumed run did before.
 struct EvolveOptions {
   EvolutionSettings settings;  // the stop conditions
   FitnessKind fitness = FitnessKind::kLogScore;
-  std::string digest;  // of the generations before; empty at the start
   double spent_s = 0;  // wall time before
 };
 
@@ -82,15 +72,9 @@ struct EvolveSummary {
   std::string text;  // "completed 100 of 100 generations"
   std::uint64_t generations = 0;
   std::uint64_t evaluations = 0;
-  double wall_s = 0;  // with what was spent before
-  std::string digest;
+  double wall_s = 0;           // with what was spent before
   std::optional<Member> best;  // none before the first generation
 };
-
-// Digest of a generation after `previous`: its number and each member's birth id, genome, outcome,
-// cost and number of scores, by their bits.
-std::string chain_digest(const std::string& previous, std::uint64_t generation,
-                         std::span<const Member> members);
 
 // The first condition that holds now, if any, with a sentence: a request, the target fitness,
 // generations, evaluations, time, stagnation.  They are looked at between generations, so a run may

@@ -5,12 +5,11 @@
 
 namespace gapfarm {
 
-// Everything but the wall time.  `previous`: digest of the generation before.
-GenerationRecord record_generation(const Optimiser& optimiser, const std::string& previous);
+// Everything but the wall time.
+GenerationRecord record_generation(const Optimiser& optimiser);
 
 EvolveSummary summarise(const Optimiser& optimiser,
-                        const std::pair<StopReason, std::string>& reason, double wall_s,
-                        const std::string& digest);
+                        const std::pair<StopReason, std::string>& reason, double wall_s);
 
 Error wrong_count(std::size_t candidates, std::size_t scores);
 

@@ -8,6 +8,7 @@
 
 #include "common/random/stream.h"
 #include "master/evolve/evolve.h"
+#include "tests/unit/evolve/members_digest.h"
 #include "tests/unit/evolve/toy_problems.h"
 
 namespace gapfarm {
@@ -181,18 +182,6 @@ TEST(SelfAdaptation, UnitsOfTheCostDoNotMatter) {
   EXPECT_EQ(plain.optimiser().best().genome, scaled.optimiser().best().genome);
   EXPECT_EQ(probability_of(plain.optimiser(), "blend"),
             probability_of(scaled.optimiser(), "blend"));
-}
-
-std::vector<std::string> digests(ToyRun& run, int generations, bool reload_each_time) {
-  std::vector<std::string> all;
-  std::string digest;
-  for (int i = 0; i < generations; ++i) {
-    if (reload_each_time) run.reload();
-    run.generation();
-    digest = chain_digest(digest, run.optimiser().generation(), run.optimiser().members());
-    all.push_back(digest + run.optimiser().state());
-  }
-  return all;
 }
 
 Score noisy_score(const ToyRun& run, const Toy& toy, const Candidate& candidate) {

@@ -8,6 +8,7 @@
 #include "common/config/sections.h"
 #include "common/random/stream.h"
 #include "master/evolve/evolve.h"
+#include "tests/unit/evolve/members_digest.h"
 #include "tests/unit/evolve/toy_problems.h"
 
 namespace gapfarm {
@@ -173,18 +174,6 @@ TEST_P(EveryOptimiser, SurvivesFailures) {
       EXPECT_NEAR(run.optimiser().best().cost, 0.5, 0.1);
     }
   }
-}
-
-std::vector<std::string> digests(ToyRun& run, int generations, bool reload_each_time) {
-  std::vector<std::string> all;
-  std::string digest;
-  for (int i = 0; i < generations; ++i) {
-    if (reload_each_time) run.reload();
-    run.generation();
-    digest = chain_digest(digest, run.optimiser().generation(), run.optimiser().members());
-    all.push_back(digest + run.optimiser().state());
-  }
-  return all;
 }
 
 TEST_P(EveryOptimiser, ContinuesBitForBitFromEveryGeneration) {
