@@ -4,7 +4,7 @@
 
 #include <cassert>
 
-namespace gapfarm::testing {
+namespace gapfarm::tests {
 
 std::string WorkerFarm::add_problem(const v1::Problem& problem) {
   const std::string hash = problem_hash(problem);
@@ -48,4 +48,4 @@ Folder::~Folder() {
   std::filesystem::remove_all(path_, ignored);
 }
 
-}  // namespace gapfarm::testing
+}  // namespace gapfarm::tests

@@ -10,7 +10,7 @@
 #include "master/farm/farm.h"
 #include "worker/evaluate.h"
 
-namespace gapfarm::testing {
+namespace gapfarm::tests {
 
 class WorkerFarm : public Farm {
  public:
@@ -41,4 +41,4 @@ class Folder {
   std::filesystem::path path_;
 };
 
-}  // namespace gapfarm::testing
+}  // namespace gapfarm::tests

@@ -24,7 +24,7 @@ class Drive : public ::testing::Test {
                                "known.toml")
                                .value()
                                .problem;
-  ::gapfarm::testing::WorkerFarm farm_;
+  tests::WorkerFarm farm_;
 };
 
 // A log simulated from a known model: of paths that the band has not seen 90 % lie inside, whole.

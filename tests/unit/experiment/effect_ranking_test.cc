@@ -10,10 +10,10 @@
 namespace gapfarm {
 namespace {
 
-using testing::end_of;
-using testing::predicted;
-using testing::push_problem;
-using testing::push_value;
+using tests::end_of;
+using tests::predicted;
+using tests::push_problem;
+using tests::push_value;
 using testing::WorkerFarm;
 
 constexpr int kPushes = 18;

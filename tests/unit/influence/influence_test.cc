@@ -39,7 +39,7 @@ class RacquetballInfluence : public ::testing::Test {
     return settings;
   }
 
-  ::gapfarm::testing::WorkerFarm farm_;
+  tests::WorkerFarm farm_;
   Config config_;
 };
 
@@ -84,7 +84,7 @@ TEST_F(RacquetballInfluence, TheHorizonEndsWhereRepeatsPart) {
 }
 
 TEST(Influence, OfTheTrackedRobotKnowsWhatTreadsDoNotHave) {
-  ::gapfarm::testing::WorkerFarm farm;
+  tests::WorkerFarm farm;
   const Config config =
       parse_config(
           "[parameters]\nstep_rate = 120\n[genes]\nfull_speed = [0.1, 0.5]\n"
@@ -112,7 +112,7 @@ TEST(EndSpread, IsTheScatterOfTheLastPoints) {
 }
 
 TEST(Stability, FindsCalmerSettings) {
-  ::gapfarm::testing::WorkerFarm farm;
+  tests::WorkerFarm farm;
   const Config config = parse_config(
                             "scenario = \"racquetball\"\n[commands.serve]\nduration = 2.5\n"
                             "[genes]\nball_restitution = [0.5, 1]\nlinear_damping = [0, 0.9]\n",
@@ -132,8 +132,8 @@ TEST(Stability, FindsCalmerSettings) {
 
 // Corners keep their distances on every path; ends scatter as the starts do.
 TEST(PushPaths, FollowEveryCornerOfEveryPush) {
-  Problem problem = ::gapfarm::testing::push_problem();
-  ::gapfarm::testing::WorkerFarm farm;
+  Problem problem = tests::push_problem();
+  tests::WorkerFarm farm;
   TraceSettings settings;
   settings.trials = {2, 5};  // a square and a triangle
   const std::vector<TraceRequest> requests = {{{}, 0}, {{}, 1}, {{}, 2}, {{}, 3}};
@@ -149,7 +149,7 @@ TEST(PushPaths, FollowEveryCornerOfEveryPush) {
   ASSERT_TRUE(spread);
   EXPECT_GT(*spread, 1e-4);
   for (const char* noise : {"pose_noise_position", "pose_noise_heading"}) {
-    ::gapfarm::testing::push_value(problem, noise) /= 10;
+    tests::push_value(problem, noise) /= 10;
   }
   const auto calmer = trace_paths(farm, problem, settings, requests);
   ASSERT_TRUE(calmer.ok()) << calmer.error().message;

@@ -8,7 +8,7 @@
 
 #include "worker/sim/ground.h"
 
-namespace gapfarm::testing {
+namespace gapfarm::tests {
 
 inline GroundRobot ground_robot(DriveKind drive,
                                 std::vector<std::string> channels = {"left", "right"}) {
@@ -71,4 +71,4 @@ inline double turn_rate(const GroundRobot& robot, std::vector<double> told, doub
   return turned;
 }
 
-}  // namespace gapfarm::testing
+}  // namespace gapfarm::tests

@@ -7,11 +7,11 @@ namespace gapfarm {
 namespace {
 
 using std::numbers::pi;
-using testing::completed;
-using testing::driven;
-using testing::ground_robot;
-using testing::turn_rate;
-using testing::twisted;
+using tests::completed;
+using tests::driven;
+using tests::ground_robot;
+using tests::turn_rate;
+using tests::twisted;
 
 constexpr double kV = 0.4;                               // m/s: 4 rad/s of a wheel of 0.1 m
 constexpr double kStart = 0.4 / (2 * 0.7 * 9.81) * 0.4;  // m lost while friction brings it to speed

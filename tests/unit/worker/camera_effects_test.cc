@@ -11,14 +11,14 @@
 namespace gapfarm {
 namespace {
 
-using gapfarm::testing::Changes;
-using gapfarm::testing::commands;
-using gapfarm::testing::driven;
-using gapfarm::testing::end_of;
-using gapfarm::testing::full_speed;
-using gapfarm::testing::noiseless;
-using gapfarm::testing::small_problem;
-using gapfarm::testing::value;
+using tests::Changes;
+using tests::commands;
+using tests::driven;
+using tests::end_of;
+using tests::full_speed;
+using tests::noiseless;
+using tests::small_problem;
+using tests::value;
 
 ActiveEffects effects(const Changes& changes) { return {srv1_table(), noiseless(changes)}; }
 

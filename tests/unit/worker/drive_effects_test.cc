@@ -11,13 +11,13 @@
 namespace gapfarm {
 namespace {
 
-using gapfarm::testing::Changes;
-using gapfarm::testing::commands;
-using gapfarm::testing::CoulombTurn;
-using gapfarm::testing::driven;
-using gapfarm::testing::end_of;
-using gapfarm::testing::full_speed;
-using gapfarm::testing::noiseless;
+using tests::Changes;
+using tests::commands;
+using tests::CoulombTurn;
+using tests::driven;
+using tests::end_of;
+using tests::full_speed;
+using tests::noiseless;
 
 // Treads at v -+ s, s = v ratio / (2 + ratio), turn at the rate of treads at -+ s, and the way is
 // driven at the mean of both speeds.
@@ -134,7 +134,7 @@ TEST(EffectSignature, BacklashCostsItsTravelOnceASideReverses) {
 
 // Straight drives of a robot that slips now and then.
 std::vector<Pose> simulated_drives(const Changes& changes, int count) {
-  Problem problem = gapfarm::testing::empty_problem();
+  Problem problem = tests::empty_problem();
   problem.values = noiseless(changes);
   v1::Task task;
   for (int i = 0; i < count; ++i) {

@@ -9,7 +9,7 @@
 #include "tests/unit/worker/problems.h"
 #include "worker/scenarios/srv1_robot.h"
 
-namespace gapfarm::testing {
+namespace gapfarm::tests {
 
 using Changes = std::vector<std::pair<std::string, double>>;
 
@@ -58,4 +58,4 @@ struct CoulombTurn {
   double sliding_2() const { return along_m_s * along_m_s + across_m_s * across_m_s; }
 };
 
-}  // namespace gapfarm::testing
+}  // namespace gapfarm::tests

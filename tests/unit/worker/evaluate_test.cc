@@ -10,7 +10,7 @@
 namespace gapfarm {
 namespace {
 
-using gapfarm::testing::small_problem;
+using tests::small_problem;
 
 std::unique_ptr<PreparedProblem> prepared(const Problem& problem) {
   auto p = prepare(to_proto(problem));

@@ -12,13 +12,13 @@
 namespace gapfarm {
 namespace {
 
-using gapfarm::testing::Changes;
-using gapfarm::testing::commands;
-using gapfarm::testing::CoulombTurn;
-using gapfarm::testing::driven;
-using gapfarm::testing::end_of;
-using gapfarm::testing::full_speed;
-using gapfarm::testing::noiseless;
+using tests::Changes;
+using tests::commands;
+using tests::CoulombTurn;
+using tests::driven;
+using tests::end_of;
+using tests::full_speed;
+using tests::noiseless;
 
 constexpr double kPi = std::numbers::pi;
 

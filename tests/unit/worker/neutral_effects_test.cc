@@ -10,7 +10,7 @@
 namespace gapfarm {
 namespace {
 
-using gapfarm::testing::small_problem;
+using tests::small_problem;
 
 std::string answer(const Problem& problem, const v1::Task& task) {
   const auto prepared = prepare(to_proto(problem));
@@ -86,7 +86,7 @@ TEST(NeutralEffects, SlipEventsNeedBothTheirStrengths) {
   const std::string simulated = answer(problem, simulate(problem));
   for (const char* key : {"slip_events.probability", "slip_events.loss"}) {
     Problem half = problem;
-    gapfarm::testing::value(half, key) = 0.5;
+    tests::value(half, key) = 0.5;
     EXPECT_EQ(answer(half, predict()), predicted) << key;
     EXPECT_EQ(answer(half, simulate(problem)), simulated) << key;
   }

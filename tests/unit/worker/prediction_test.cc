@@ -13,9 +13,9 @@
 namespace gapfarm {
 namespace {
 
-using gapfarm::testing::empty_problem;
-using gapfarm::testing::small_problem;
-using gapfarm::testing::value;
+using tests::empty_problem;
+using tests::small_problem;
+using tests::value;
 
 v1::TaskResult predict(const Problem& problem, bool means_only = false) {
   v1::Task task;

@@ -7,7 +7,7 @@
 #include "common/problem/problem.h"
 #include "common/random/stream.h"
 
-namespace gapfarm::testing {
+namespace gapfarm::tests {
 
 inline Problem empty_problem() {
   Problem problem;
@@ -39,4 +39,4 @@ inline double& value(Problem& problem, const std::string& key) {
   return problem.values[srv1_table().row(key)];
 }
 
-}  // namespace gapfarm::testing
+}  // namespace gapfarm::tests

@@ -5,7 +5,7 @@
 #include "common/problem/problem.h"
 #include "worker/evaluate.h"
 
-namespace gapfarm::testing {
+namespace gapfarm::tests {
 
 inline Problem push_problem() {
   Problem problem;
@@ -53,4 +53,4 @@ inline Pose end_of(const v1::TaskResult& result, int trial) {
   return from_proto(result.predict().predictions(trial).end());
 }
 
-}  // namespace gapfarm::testing
+}  // namespace gapfarm::tests
