@@ -9,8 +9,16 @@
 
 namespace gapfarm {
 
+// What a caller may have to tell apart; everything else is for people to read.
+enum class ErrorCode {
+  kOther,
+  kStopped,     // by request
+  kSimulation,  // a simulation did not end well, or cannot be asked for
+};
+
 struct Error {
   std::string message;
+  ErrorCode code = ErrorCode::kOther;
 };
 
 template <class T>

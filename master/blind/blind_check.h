@@ -65,7 +65,7 @@ struct BlindCheckSettings {
 };
 
 // Errors: `out` holds another check, or a finished one without `resume`; seals that do not match; a
-// lost key; kStopRequested, when everything is in place to resume; the farm's and the file
+// lost key; kStopped, when everything is in place to resume; the farm's and the file
 // system's own.
 Result<BlindReport> run_blind_check(const Config& config, const BlindCheckSettings& settings,
                                     const BlindCheckHooks& hooks);

@@ -174,7 +174,7 @@ Status run_children(const std::vector<ChildJob>& jobs, const ChildrenOptions& op
   std::size_t started = 0;
   std::size_t ended = 0;
   while (ended < jobs.size()) {
-    if (options.stop && options.stop->requested()) return Error{kStopRequested};
+    if (options.stop && options.stop->requested()) return stop_requested();
     while (started < jobs.size() && crowd.size() < std::max(1u, options.at_once)) {
       const Result<Child> child = start_child(jobs[started]);
       if (!child) return child.error();

@@ -43,7 +43,7 @@ Result<DiagnosisResult> diagnose(Farm& farm, const Problem& problem,
     run.stage(kDiagnosisStages[k].name);
     const Status s = steps[k]();
     if (s) continue;
-    if (!run.simulation_failed()) return s.error();
+    if (s.error().code != ErrorCode::kSimulation) return s.error();
     run.stage("");
     return run.give_up(kDiagnosisStages[k].name, s.error());
   }

@@ -43,7 +43,7 @@ Status DiagnosisRun::plan_next() {
       rivals.push_back(std::move(rival));
     }
     auto next = next_experiments(farm_, subject_.experiments(problem_), rivals);
-    if (!next && next.error().message == kStopRequested) return next.error();
+    if (!next && next.error().code == ErrorCode::kStopped) return next.error();
     if (!next) {
       result_.diagnosis.cautions.push_back(
           "What to drive next could not be planned: " + next.error().message + ".");

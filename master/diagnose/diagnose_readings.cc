@@ -58,7 +58,7 @@ Status DiagnosisRun::date_latency(const std::vector<Eigen::Vector3d>& velocity) 
   std::vector<CommandSpec> commands;
   for (const Cell& cell : study_.cells) commands.push_back(cell.command);
   const auto paths = predictor_.paths(study_.base, commands, kPathInterval_s);
-  if (!paths && predictor_.simulation_failed()) {
+  if (!paths && paths.error().code == ErrorCode::kSimulation) {
     latency_from_rest_s_ = latency_.latency_s;
     return {};
   }
@@ -110,7 +110,7 @@ Status DiagnosisRun::look_for_latency() {
 Status DiagnosisRun::look_for_lag() {
   if (!looks_for("motor_lag", kLooksForLag)) return {};
   auto lag = fit_path_lag(predictor_, study_);
-  if (!lag && predictor_.simulation_failed()) {
+  if (!lag && lag.error().code == ErrorCode::kSimulation) {
     predictor_.leave_out("motor_lag");
     return {};
   }

@@ -153,7 +153,7 @@ Status DiagnosisRun::fit_final() {
   const Eigen::MatrixXd none(static_cast<Eigen::Index>(3 * study_.size()), 0);
   auto fit = fit_jointly(predictor_, nested_studies_.back(), {}, estimates_->at,
                          BaseParameters::kFitted, none, options_.keep_base ? 0 : 2);
-  if (!fit && !predictor_.simulation_failed()) return fit.error();
+  if (!fit && fit.error().code != ErrorCode::kSimulation) return fit.error();
   final_at_ = fit ? fit->at : estimates_->at;
   return {};
 }

@@ -144,7 +144,7 @@ Result<JointFit> DiagnosisRun::estimate(const std::vector<EffectCandidate>& effe
 
 Result<Relinearised> DiagnosisRun::relinearise(const std::vector<EffectCandidate>& effects) {
   auto fit = estimate(effects, 2);
-  if (!fit && predictor_.simulation_failed()) return Relinearised{};
+  if (!fit && fit.error().code == ErrorCode::kSimulation) return Relinearised{};
   if (!fit) return fit.error();
   std::vector<PredictionRequest> without;
   for (const EffectCandidate& effect : effects) {

@@ -53,7 +53,6 @@ class DiagnosisRun {
   Status report();
   DiagnosisResult take() { return std::move(result_); }
   // Whether a stage's error is a simulation's, which is no reason to be without a report.
-  bool simulation_failed() const { return predictor_.simulation_failed(); }
   DiagnosisResult give_up(const std::string& stage, const Error& error);
 
  private:

@@ -69,7 +69,8 @@ Status DiagnosisRun::fit_correction() {
   const Eigen::MatrixXd none(static_cast<Eigen::Index>(3 * study_.size()), 0);
   auto fit =
       fit_jointly(predictor_, study_, effects, start, BaseParameters::kFitted, none, kMostRounds);
-  if (!fit) return predictor_.simulation_failed() ? Status{} : fit.error();
+  if (!fit && fit.error().code == ErrorCode::kSimulation) return Status{};
+  if (!fit) return fit.error();
   std::string name;
   for (const std::string& effect : names) name += (name.empty() ? "" : " and ") + effect;
   const auto task = predictor_.tasks(fit->at);

@@ -304,7 +304,7 @@ Result<JointFit> fit_jointly(Predictor& predictor, const Study& study,
         moved = differentiate(predictor, study, &next);
         if (moved) break;
       }
-      if (!moved && !predictor.simulation_failed()) return moved.error();
+      if (!moved && moved.error().code != ErrorCode::kSimulation) return moved.error();
       const bool level = moved && now < best + kSettled;
       if (level || half == kMostHalvings) {
         // No way on: the present values stay, with the standard errors found here.

@@ -48,8 +48,9 @@ std::string point_words(const Problem& problem, const Overrides& at) {
 
 Error bad_point(const Problem& problem, const Overrides& at, const v1::TaskResult& result) {
   const std::string why = result.message().empty() ? "" : " (" + result.message() + ")";
-  return Error{"the simulation ended with " + v1::Outcome_Name(result.outcome()) + why +
-               point_words(problem, at)};
+  return {"the simulation ended with " + v1::Outcome_Name(result.outcome()) + why +
+              point_words(problem, at),
+          ErrorCode::kSimulation};
 }
 
 Status within_bounds(const Problem& problem, const Overrides& at) {
@@ -117,7 +118,6 @@ Result<std::vector<std::vector<Pose>>> Predictor::ends(
   std::vector<std::vector<Pose>> ends;
   for (std::size_t k = 0; k < requests.size(); ++k) {
     if (!(*all)[k]) {
-      simulation_failed_ = true;
       last_failure_ = errors[k]->message;
       return *errors[k];
     }
@@ -126,9 +126,8 @@ Result<std::vector<std::vector<Pose>>> Predictor::ends(
   return ends;
 }
 
-Error Predictor::failed(const std::string& what) {
-  simulation_failed_ = true;
-  return Error{what + ": " + last_failure_};
+Error Predictor::failed(const std::string& what) const {
+  return {what + ": " + last_failure_, ErrorCode::kSimulation};
 }
 
 Result<std::vector<std::optional<std::vector<Pose>>>> Predictor::attempt(
@@ -149,7 +148,7 @@ Result<std::vector<std::optional<std::vector<Pose>>>> Predictor::simulate(
   std::vector<std::pair<std::size_t, std::vector<std::uint32_t>>> asked;  // request, trials
   for (std::size_t k = 0; k < requests.size(); ++k) {
     if (const Status s = within_bounds(problem_, requests[k].at); !s) {
-      (*errors)[k] = s.error();
+      (*errors)[k] = Error{s.error().message, ErrorCode::kSimulation};
       continue;
     }
     // As many whoever works, so that the answers do not depend on it.
@@ -160,7 +159,6 @@ Result<std::vector<std::optional<std::vector<Pose>>>> Predictor::simulate(
       asked.emplace_back(k, std::move(part));
     }
   }
-  simulation_failed_ = false;
   const auto results = farm_.run(hash_, tasks);
   if (!results) return results.error();
   predictions_ += requests.size();
@@ -204,7 +202,6 @@ Result<std::vector<std::vector<PathSample>>> Predictor::paths(
     trace->mutable_command()->set_duration(command.duration_s);
     trace->set_interval(interval_s);
   }
-  simulation_failed_ = false;
   const auto results = farm_.run(hash_, tasks);
   if (!results) return results.error();
   predictions_ += tasks.size();

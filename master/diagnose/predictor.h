@@ -50,10 +50,7 @@ class Predictor {
                                                      const std::vector<CommandSpec>& commands,
                                                      double interval_s);
   // The last failure as an error of the simulation's.
-  Error failed(const std::string& what);
-  // Whether the last error of ends(), paths() or failed() was a simulation's rather than the
-  // farm's.
-  bool simulation_failed() const { return simulation_failed_; }
+  Error failed(const std::string& what) const;
 
  private:
   // Trials of one share a simulation, unless their places matter.
@@ -70,7 +67,6 @@ class Predictor {
   std::string hash_;
   std::vector<std::uint32_t> by_condition_;  // trials, those that share a simulation in a row
   std::uint64_t predictions_ = 0;
-  bool simulation_failed_ = false;
   std::string last_failure_;
   std::map<std::string, std::string> left_out_;
 };

@@ -43,7 +43,7 @@ class Farm {
   virtual std::uint64_t retries() const = 0;
 };
 
-// The message of the error that run() returns when a stop was requested.
-inline constexpr const char* kStopRequested = "stopped by request";
+// What run() returns when a stop was requested; its code is kStopped.
+inline Error stop_requested() { return {"stopped by request", ErrorCode::kStopped}; }
 
 }  // namespace gapfarm

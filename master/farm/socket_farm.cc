@@ -151,7 +151,7 @@ Status SocketFarm::Impl::loop(const std::function<void(const FarmProgress&)>& on
   double next_progress = 0;
   bool busy = false;
   for (;;) {
-    if (options.stop != nullptr && options.stop->requested()) return Error{kStopRequested};
+    if (options.stop != nullptr && options.stop->requested()) return stop_requested();
     const double now = monotonic_seconds();
     if (!busy || now >= next_reap) reap(now);
     busy = pump(*socket, *scheduler, now);

@@ -116,7 +116,7 @@ TEST(Farm, AStopRequestInterruptsARunAndEndsTheWorkers) {
     stop.request();
   });
   ASSERT_FALSE(results.ok());
-  EXPECT_EQ(results.error().message, kStopRequested);
+  EXPECT_EQ(results.error().code, ErrorCode::kStopped);
   farm->reset();
   EXPECT_LT(monotonic_seconds() - begun, 20);
   ASSERT_EQ(pids.size(), 2u);

@@ -132,7 +132,7 @@ TEST_F(BlindCheck, ResumesWithoutRunningFinishedCasesAgain) {
   };
   const auto stopped = run();
   ASSERT_FALSE(stopped.ok());
-  EXPECT_EQ(stopped.error().message, kStopRequested);
+  EXPECT_EQ(stopped.error().code, ErrorCode::kStopped);
   EXPECT_TRUE(fs::exists(settings_.out + ".key"));
 
   const auto again = run();

@@ -58,7 +58,7 @@ TEST_F(Children, StopEndsThemUnreported) {
   const auto begin = std::chrono::steady_clock::now();
   const Status status = run_children({shell("slow", "exec sleep 60")}, with);
   ASSERT_FALSE(status.ok());
-  EXPECT_EQ(status.error().message, kStopRequested);
+  EXPECT_EQ(status.error().code, ErrorCode::kStopped);
   EXPECT_TRUE(ends.empty());
   EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(30));
 }

@@ -31,8 +31,9 @@ TEST(Predictor, LeavesOutWhatCannotBeSimulated) {
   EXPECT_FALSE((*tried)[1]);
   EXPECT_FALSE((*tried)[2]);  // beyond its bounds: nobody is asked
   EXPECT_NE(predictor.last_failure().find("contact_length"), std::string::npos);
-  EXPECT_FALSE(predictor.ends({{{{row, 0.11}}, {}}}).ok());
-  EXPECT_TRUE(predictor.simulation_failed());
+  const auto ends = predictor.ends({{{{row, 0.11}}, {}}});
+  ASSERT_FALSE(ends.ok());
+  EXPECT_EQ(ends.error().code, ErrorCode::kSimulation);
 }
 
 TEST(Slopes, StayWithinBoundsAndWhereTheRobotComesToRest) {

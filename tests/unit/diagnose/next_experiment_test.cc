@@ -30,7 +30,7 @@ class FakeFarm : public Farm {
   Result<std::vector<v1::TaskResult>> run(
       const std::string&, const std::vector<v1::Task>& tasks,
       const std::function<void(const FarmProgress&)>&) override {
-    if (broken) return Error{kStopRequested};
+    if (broken) return stop_requested();
     std::vector<v1::TaskResult> results;
     for (const v1::Task& task : tasks) results.push_back(answer(task.predict()));
     return results;
@@ -203,7 +203,7 @@ TEST(NextExperiments, PassOnFaults) {
   const auto stopped =
       next_experiments(farm, plan_drives(make_problem()), {rival("a", 0), rival("b", 1)});
   ASSERT_FALSE(stopped.ok());
-  EXPECT_EQ(stopped.error().message, kStopRequested);
+  EXPECT_EQ(stopped.error().code, ErrorCode::kStopped);
 }
 
 }  // namespace

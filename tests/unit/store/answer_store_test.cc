@@ -26,10 +26,10 @@ class EchoFarm : public Farm, public AnswerSource {
   Result<std::vector<v1::TaskResult>> run(
       const std::string&, const std::vector<v1::Task>& tasks,
       const std::function<void(const FarmProgress&)>&) override {
-    if (stopped) return Error{kStopRequested};
+    if (stopped) return stop_requested();
     std::vector<v1::TaskResult> results;
     for (const v1::Task& task : tasks) {
-      if (task.echo().payload() == stop_at) return Error{kStopRequested};
+      if (task.echo().payload() == stop_at) return stop_requested();
       asked.push_back(task.echo().payload());
       v1::TaskResult& result = results.emplace_back();
       result.set_outcome(task.echo().payload() == "bad worker" ? v1::WORKER_FAILED : v1::OK);
@@ -84,7 +84,7 @@ TEST_F(AnswerStoreTest, AStopLosesNothingThatWasAnswered) {
   farm.stopped = true;
   const auto stopped = recorded.run(hash, {echo("a"), echo("b")});
   ASSERT_FALSE(stopped.ok());
-  EXPECT_EQ(stopped.error().message, kStopRequested);
+  EXPECT_EQ(stopped.error().code, ErrorCode::kStopped);
   EXPECT_TRUE(recorded.run(hash, {echo("a")}).ok()) << "no farm is needed for what is known";
 }
 
