@@ -112,18 +112,4 @@ double gaussian_energy_score(const Eigen::Vector3d& residual, const Eigen::Matri
          expected_norm(Eigen::Vector3d::Zero(), scaled) * std::numbers::sqrt2 / 2;
 }
 
-double ensemble_energy_score(const Eigen::Vector3d& residual,
-                             const std::vector<Eigen::Vector3d>& ensemble) {
-  assert(!ensemble.empty());
-  const auto count = static_cast<double>(ensemble.size());
-  double to_residual = 0, among = 0;
-  for (std::size_t i = 0; i < ensemble.size(); ++i) {
-    to_residual += in_metres(ensemble[i] - residual).norm();
-    for (std::size_t j = i + 1; j < ensemble.size(); ++j) {
-      among += in_metres(ensemble[i] - ensemble[j]).norm();
-    }
-  }
-  return to_residual / count - among / (count * count);
-}
-
 }  // namespace gapfarm

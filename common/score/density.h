@@ -56,9 +56,4 @@ double expected_norm(const Eigen::Ref<const Eigen::VectorXd>& mean,
 // a prediction X ~ N(0, S) for the residual r, headings scaled by kHeadingLength_m.
 double gaussian_energy_score(const Eigen::Vector3d& residual, const Eigen::Matrix3d& covariance);
 
-// The same of an ensemble of predicted residuals (x, y, theta not wrapped here), all pairs.
-// REQUIRES: not empty.
-double ensemble_energy_score(const Eigen::Vector3d& residual,
-                             const std::vector<Eigen::Vector3d>& ensemble);
-
 }  // namespace gapfarm

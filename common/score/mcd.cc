@@ -238,18 +238,6 @@ double small_sample(const Deficit& half, const Deficit& most, double n, double s
 
 }  // namespace
 
-const char* mcd_outcome_name(McdOutcome outcome) {
-  switch (outcome) {
-    case McdOutcome::kRegular:
-      return "regular";
-    case McdOutcome::kSingular:
-      return "singular";
-    case McdOutcome::kTooFew:
-      return "too few points";
-  }
-  return "?";
-}
-
 double mcd_consistency(double share, int p) {
   if (share >= 1) return 1;
   const double q = boost::math::quantile(boost::math::chi_squared(p), share);

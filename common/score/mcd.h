@@ -34,7 +34,6 @@ enum class McdOutcome {
   // singular; nothing was trimmed.
   kTooFew,
 };
-const char* mcd_outcome_name(McdOutcome outcome);
 
 struct RobustEstimate {
   McdOutcome outcome = McdOutcome::kRegular;

@@ -40,15 +40,6 @@ double mean(std::span<const double> values) {
 
 double median(std::span<const double> values) { return quantile(values, 0.5); }
 
-double mad(std::span<const double> values) {
-  const double centre = median(values);
-  std::vector<double> deviations;
-  deviations.reserve(values.size());
-  for (double value : values) deviations.push_back(std::abs(value - centre));
-  constexpr double kNormalConsistency = 1.482602218505602;  // 1 / Phi^-1(3/4)
-  return kNormalConsistency * median(deviations);
-}
-
 double circular_mean(std::span<const double> angles_rad) {
   double sine = 0, cosine = 0;
   for (double angle : angles_rad) {
@@ -121,19 +112,6 @@ std::vector<double> holm(std::span<const double> p_values) {
   for (std::size_t i = 0; i < order.size(); ++i) {
     const double scaled = static_cast<double>(order.size() - i) * p_values[order[i]];
     running = std::max(running, std::min(1.0, scaled));
-    adjusted[order[i]] = running;
-  }
-  return adjusted;
-}
-
-std::vector<double> benjamini_hochberg(std::span<const double> p_values) {
-  std::vector<double> adjusted(p_values.size());
-  const std::vector<std::size_t> order = ascending_order(p_values);
-  double running = 1;
-  for (std::size_t i = order.size(); i-- > 0;) {
-    const double scaled =
-        p_values[order[i]] * static_cast<double>(order.size()) / static_cast<double>(i + 1);
-    running = std::min(running, scaled);
     adjusted[order[i]] = running;
   }
   return adjusted;

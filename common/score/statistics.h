@@ -18,10 +18,6 @@ double mean(std::span<const double> values);
 // The median; the mean of the middle two for an even count.  REQUIRES: not empty, all finite.
 double median(std::span<const double> values);
 
-// Median absolute deviation from the median, times 1.4826: the s.d. of a normal sample.
-// REQUIRES: not empty, all finite.
-double mad(std::span<const double> values);
-
 // Sample quantile, linear between order statistics (type 7 of Hyndman and Fan 1996).
 // REQUIRES: not empty, all finite, `share` in [0, 1].
 double quantile(std::span<const double> values, double share);
@@ -57,9 +53,7 @@ Interval bootstrap_interval(std::span<const std::vector<std::size_t>> blocks,
                             double coverage, unsigned repeats, Stream& stream);
 
 // Adjusted p-values in the input's order, each in [0, 1]: rejecting those below a level keeps the
-// family-wise error (Holm 1979) or, under independence, the false discovery rate (Benjamini and
-// Hochberg 1995) at that level.
+// family-wise error at that level (Holm 1979).
 std::vector<double> holm(std::span<const double> p_values);
-std::vector<double> benjamini_hochberg(std::span<const double> p_values);
 
 }  // namespace gapfarm

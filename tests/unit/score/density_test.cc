@@ -133,6 +133,23 @@ TEST(ExpectedNorm, MatchesClosedForms) {
       folded, 1e-6);
 }
 
+// Of an ensemble of predicted residuals, over all pairs.
+double ensemble_energy_score(const Eigen::Vector3d& residual,
+                             const std::vector<Eigen::Vector3d>& ensemble) {
+  const auto in_metres = [](const Eigen::Vector3d& d) {
+    return Eigen::Vector3d(d[0], d[1], kHeadingLength_m * d[2]);
+  };
+  const auto count = static_cast<double>(ensemble.size());
+  double to_residual = 0, among = 0;
+  for (std::size_t i = 0; i < ensemble.size(); ++i) {
+    to_residual += in_metres(ensemble[i] - residual).norm();
+    for (std::size_t j = i + 1; j < ensemble.size(); ++j) {
+      among += in_metres(ensemble[i] - ensemble[j]).norm();
+    }
+  }
+  return to_residual / count - among / (count * count);
+}
+
 TEST(EnergyScore, EnsembleApproachesTheGaussian) {
   const Eigen::Matrix3d matrix = example_covariance();
   const Covariance3 S = factorised(matrix);

@@ -24,15 +24,6 @@ TEST(Quantile, InterpolatesBetweenOrderStatistics) {
   EXPECT_EQ(median(std::vector<double>{7}), 7);
 }
 
-TEST(Mad, IsTheSdOfANormalSampleAndIgnoresAMinority) {
-  Stream draws({.run_seed = 1});
-  std::vector<double> values;
-  for (int i = 0; i < 20000; ++i) values.push_back(5 + 3 * draws.normal());
-  EXPECT_NEAR(mad(values), 3, 0.08);
-  for (int i = 0; i < 20; ++i) values.push_back(1e9);
-  EXPECT_NEAR(mad(values), 3, 0.08);
-}
-
 TEST(CircularMean, CrossesTheWrap) {
   using std::numbers::pi;
   EXPECT_NEAR(std::abs(circular_mean(std::vector<double>{pi - 0.1, -pi + 0.1})), pi, 1e-12);
@@ -93,7 +84,6 @@ TEST(Bootstrap, IntervalCoversTheMean) {
 TEST(Corrections, MatchHandComputedValues) {
   const std::vector<double> p = {0.01, 0.04, 0.03, 0.005};
   EXPECT_THAT(holm(p), Pointwise(DoubleNear(1e-12), {0.03, 0.06, 0.06, 0.02}));
-  EXPECT_THAT(benjamini_hochberg(p), Pointwise(DoubleNear(1e-12), {0.02, 0.04, 0.04, 0.02}));
   EXPECT_TRUE(holm({}).empty());
   EXPECT_THAT(holm(std::vector<double>{0.9, 0.8}), ElementsAre(1, 1));
 }
