@@ -31,7 +31,7 @@ void evaluate_often(benchmark::State& state, const Problem& problem) {
 }
 
 void BM_Trials(benchmark::State& state) {
-  evaluate_often(state, testing::small_problem(static_cast<std::size_t>(state.range(0))));
+  evaluate_often(state, tests::small_problem(static_cast<std::size_t>(state.range(0))));
   state.SetComplexityN(state.range(0));
 }
 BENCHMARK(BM_Trials)
@@ -41,7 +41,7 @@ BENCHMARK(BM_Trials)
 
 // As many conditions as asked for, in 960 trials: every command with several durations about 1 s.
 void BM_Conditions(benchmark::State& state) {
-  Problem problem = testing::small_problem(960);
+  Problem problem = tests::small_problem(960);
   const std::size_t durations = static_cast<std::size_t>(state.range(0)) / problem.commands.size();
   for (std::size_t i = 0; i < problem.log.trials.size(); ++i) {
     const std::size_t which = i / problem.commands.size() % durations;
@@ -59,7 +59,7 @@ BENCHMARK(BM_Conditions)
 
 // The first rows of the table from the mass on, searched or not: what a gene adds.
 void BM_Genes(benchmark::State& state) {
-  Problem problem = testing::small_problem(120);
+  Problem problem = tests::small_problem(120);
   const std::size_t first = row_of(Srv1::kMass);
   for (std::size_t row = first; row < first + static_cast<std::size_t>(state.range(0)); ++row) {
     const Parameter& parameter = problem.table().rows()[row];

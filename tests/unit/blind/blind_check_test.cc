@@ -30,7 +30,7 @@ class BlindCheck : public ::testing::Test {
     settings_.design.left_out = 1;
     settings_.diagnose.config_path = "small.toml";
     hooks_.start_farm = []() -> Result<std::unique_ptr<Farm>> {
-      return std::unique_ptr<Farm>(std::make_unique<testing::WorkerFarm>());
+      return std::unique_ptr<Farm>(std::make_unique<tests::WorkerFarm>());
     };
     hooks_.stop = &stop_;
     Model model = *nominal_model("srv1");

@@ -128,7 +128,7 @@ TEST(DrawRobot, StaysWithinTheGenes) {
 }
 
 TEST(Design, SizesAreWhatWasAskedForAndShuffled) {
-  testing::WorkerFarm farm;
+  tests::WorkerFarm farm;
   const Config config = testing::small_config();
   const auto planned = planned_problem(config, {}, 3, farm);
   ASSERT_TRUE(planned.ok());
@@ -184,7 +184,7 @@ double residual_moment(const Config& config, const Truth& truth, bool with_effec
 }
 
 TEST(Design, SizesShowInSimulatedResiduals) {
-  testing::WorkerFarm farm;
+  tests::WorkerFarm farm;
   Config config = testing::small_config();
   config.simulate.trials_per_session = 200;
   const auto planned = planned_problem(config, {}, 5, farm);

@@ -34,7 +34,7 @@ Study drives(const Problem& problem) {
 
 class PatchSketchTest : public ::testing::Test {
  protected:
-  const Problem problem_ = testing::empty_problem();
+  const Problem problem_ = tests::empty_problem();
   const Study study_ = drives(problem_);
   const PatchSketch sketch_{problem_, study_};
 };

@@ -14,7 +14,7 @@ using tests::end_of;
 using tests::predicted;
 using tests::push_problem;
 using tests::push_value;
-using testing::WorkerFarm;
+using tests::WorkerFarm;
 
 constexpr int kPushes = 18;
 

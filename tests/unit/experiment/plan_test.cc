@@ -12,7 +12,7 @@ namespace {
 
 std::vector<Trial> drawn(const SimulateSettings& settings, std::uint64_t seed = 5) {
   std::vector<Trial> trials;
-  for (const auto& session : draw_plan(testing::empty_problem(), settings, seed)) {
+  for (const auto& session : draw_plan(tests::empty_problem(), settings, seed)) {
     for (const v1::PlannedTrial& planned : session) trials.push_back(from_proto(planned.trial()));
   }
   return trials;

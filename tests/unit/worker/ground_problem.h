@@ -8,7 +8,7 @@
 #include "common/problem/problem.h"
 #include "worker/sim/ground.h"
 
-namespace gapfarm::testing {
+namespace gapfarm::tests {
 
 inline constexpr const char* kSkidFile = R"(drive = "skid"
 commands = ["left", "right"]
@@ -65,4 +65,4 @@ inline double& ground_value(Problem& problem, const std::string& key) {
   return problem.values[problem.table().row(key)];
 }
 
-}  // namespace gapfarm::testing
+}  // namespace gapfarm::tests

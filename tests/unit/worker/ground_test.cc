@@ -8,10 +8,10 @@
 namespace gapfarm {
 namespace {
 
-using testing::driven_run;
-using testing::ground_problem;
-using testing::ground_value;
-using testing::take_runs;
+using tests::driven_run;
+using tests::ground_problem;
+using tests::ground_value;
+using tests::take_runs;
 
 v1::TaskResult ask(const Problem& problem, bool predict) {
   const auto prepared = prepare(to_proto(problem));
