@@ -206,8 +206,8 @@ Result<Model> parse_model(std::string_view text, const std::string& path) {
   top.read("kind", model.kind);
   if (scenario_form(scenario).robot) {
     Problem problem = problem_of(model);
-    const std::string text = top.string("robot").value_or("");
-    if (Status s = problem.set_robot(text, path + ": robot"); !s) return s.error();
+    const std::string file = top.string("robot").value_or("");
+    if (Status s = problem.set_robot(file, path + ": robot"); !s) return s.error();
     model.robot_file = problem.robot_file;
     model.ground = problem.ground;
     model.values = problem.values;
