@@ -1,6 +1,10 @@
-file(GLOB_RECURSE sources RELATIVE ${SOURCE_DIR}
-     ${SOURCE_DIR}/proto/*.proto ${SOURCE_DIR}/common/*.h ${SOURCE_DIR}/common/*.cc
-     ${SOURCE_DIR}/worker/*.h ${SOURCE_DIR}/worker/*.cc)
+string(REPLACE "," ";" FOLDERS "${FOLDERS}")
+set(sources)
+foreach(folder IN LISTS FOLDERS)
+  file(GLOB found RELATIVE ${SOURCE_DIR} ${SOURCE_DIR}/${folder}/*.h ${SOURCE_DIR}/${folder}/*.cc
+       ${SOURCE_DIR}/${folder}/gapfarm/v1/*.proto)
+  list(APPEND sources ${found})
+endforeach()
 list(SORT sources)
 set(all "${COMPILER};${BULLET};${EIGEN};${BUILD_TYPE};${SANITIZE}")
 foreach(source IN LISTS sources)
