@@ -23,6 +23,11 @@ class BlockBuilder {
     return v;
   }
 
+  // The feature by how far the trial's command takes the robot.
+  Values by_path(const Feature& feature) const {
+    return values([&](const ResidualTrial& t) { return feature(t) * cell(t).path; });
+  }
+
   const Cell& cell(const ResidualTrial& t) const { return study_.cells[t.cell]; }
 
   // Every feature in every group of trials and every component.
@@ -112,14 +117,39 @@ std::vector<Values> by_command(const Study& study) {
   return commands;
 }
 
+// Of what was driven before.
+std::vector<CovariateBlock> blocks_before(const Study& study, const BlockBuilder& b,
+                                          const std::vector<Values>& commands) {
+  std::vector<CovariateBlock> blocks;
+  const std::vector<Values> same_or_against = {
+      b.values([&](const ResidualTrial& t) {
+        return b.cell(t).command.left * b.cell(t).command.right > 0 ? 1.0 : 0.0;
+      }),
+      b.values([&](const ResidualTrial& t) {
+        return b.cell(t).command.left * b.cell(t).command.right < 0 ? 1.0 : 0.0;
+      })};
+  std::vector<Values> previous;
+  for (std::size_t c = 1; c < commands.size(); ++c) {
+    Values after = b.by_path([](const ResidualTrial&) { return 1.0; });
+    for (std::size_t i = 0; i < study.size(); ++i) {
+      const auto& before = study.trials[i].context.previous;
+      if (!before || commands[c][*before] == 0) after[i] = 0;
+    }
+    previous.push_back(std::move(after));
+  }
+  if (!previous.empty()) blocks.push_back(b.block("command before", previous, same_or_against));
+  const auto work = [&study](const ResidualTrial& t) {
+    return t.context.previous ? study.cells[study.trials[*t.context.previous].cell].path : 0.0;
+  };
+  blocks.push_back(b.block("work before", {b.by_path(work)}, commands));
+  return blocks;
+}
+
 }  // namespace
 
 std::vector<CovariateBlock> covariate_blocks(const Study& study) {
   const BlockBuilder b(study);
-  const auto path = [&](const ResidualTrial& t) { return b.cell(t).path; };
-  const auto scaled = [&](const Feature& f) {
-    return b.values([=](const ResidualTrial& t) { return f(t) * path(t); });
-  };
+  const auto scaled = [&](const Feature& f) { return b.by_path(f); };
   const auto heading = [&](int h) {
     return std::vector<Values>{
         scaled([=](const ResidualTrial& t) { return std::cos(h * t.X_WS.theta); }),
@@ -182,28 +212,9 @@ std::vector<CovariateBlock> covariate_blocks(const Study& study) {
   blocks.push_back(b.block(
       "unrecorded move before",
       {scaled([](const ResidualTrial& t) { return t.context.moved ? 1.0 : 0.0; })}, commands));
-  // What was driven before, by the share of work that it was.
-  const std::vector<Values> same_or_against = {
-      b.values([&](const ResidualTrial& t) {
-        return b.cell(t).command.left * b.cell(t).command.right > 0 ? 1.0 : 0.0;
-      }),
-      b.values([&](const ResidualTrial& t) {
-        return b.cell(t).command.left * b.cell(t).command.right < 0 ? 1.0 : 0.0;
-      })};
-  std::vector<Values> previous;
-  for (std::size_t c = 1; c < commands.size(); ++c) {
-    Values after = scaled([](const ResidualTrial&) { return 1.0; });
-    for (std::size_t i = 0; i < study.size(); ++i) {
-      const auto& before = study.trials[i].context.previous;
-      if (!before || commands[c][*before] == 0) after[i] = 0;
-    }
-    previous.push_back(std::move(after));
+  for (CovariateBlock& block : blocks_before(study, b, commands)) {
+    blocks.push_back(std::move(block));
   }
-  if (!previous.empty()) blocks.push_back(b.block("command before", previous, same_or_against));
-  const auto work = [&study](const ResidualTrial& t) {
-    return t.context.previous ? study.cells[study.trials[*t.context.previous].cell].path : 0.0;
-  };
-  blocks.push_back(b.block("work before", {scaled(work)}, commands));
   return blocks;
 }
 
