@@ -1,5 +1,5 @@
-// What a config file says, typed.  Plain data: master and worker build their objects from it and
-// nothing reads the file later.
+// What a config file says, typed.  Plain data: master and worker build their objects from it.  Of
+// the text only [[stages]] and [validation] are read later (common/config/stages.h).
 #pragma once
 
 #include <cstdint>

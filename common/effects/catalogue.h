@@ -44,7 +44,8 @@ struct Effect {
 };
 
 // The catalogue of each scenario, in a fixed order.  An effect of one name in two catalogues has
-// the same parameters in both and one implementation.
+// parameters of the same keys and units in both (bounds and neutral values may differ) and one
+// implementation.
 std::span<const Effect> srv1_effects();
 std::span<const Effect> push_effects();
 

@@ -42,7 +42,8 @@ FitnessSettings read_fitness(const v1::Fitness& from) {
           from.rest_limit()};
 }
 
-// What config files are held to (common/config/model.cc); a message may come from anywhere.
+// What config files are held to (common/config/problem_sections.cc); a message may come from
+// anywhere.
 Status check_score(const FitnessSettings& fitness, const SpreadSettings& spread) {
   if (!(fitness.outlier_share >= 0 && fitness.outlier_share <= 0.5)) {
     return invalid("the outlier share must be in [0, 0.5]");

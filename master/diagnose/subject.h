@@ -1,6 +1,7 @@
 // What a diagnosis has to know of a scenario, as a row of a table.
 //
-// The rest of the diagnosis is linear algebra over three whitened rows a trial, whatever moves.
+// Most of the rest is linear algebra over three whitened rows a trial, whatever moves; stages that
+// look for a named effect (a lag, late poses, slips, a seam) ask whether the scenario has it.
 #pragma once
 
 #include <Eigen/Core>
