@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <thread>
 
+#include "common/base/shipped.h"
 #include "common/config/config.h"
 #include "common/problem/run_files.h"
+#include "common/trials/files.h"
 #include "common/trials/read.h"
 #include "master/cli/long_command.h"
 
@@ -40,6 +42,18 @@ Result<Config> read_config_and_trials(const std::string& config_path, const Tria
   const Result<Problem> sound = from_proto(message);
   if (!sound) return sound.error();
   if (Status s = check_sendable(message); !s) return s.error();
+  return config;
+}
+
+Result<Config> read_source(const std::string& named) {
+  const std::string path = shipped_file(named);
+  const Result<std::string> text = read_text_file(path);
+  if (!text) return text.error();
+  if (!is_model(*text)) return parse_config(*text, path);
+  const Result<Model> model = parse_model(*text, path);
+  if (!model) return model.error();
+  Config config;
+  config.problem = problem_of(*model);
   return config;
 }
 

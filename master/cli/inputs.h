@@ -24,6 +24,9 @@ std::vector<std::string> command_names(const std::vector<CommandSpec>& commands)
 // file, and whatever reading either finds.
 Result<Config> read_config_and_trials(const std::string& config_path, const TrialOptions& trials);
 
+// A config, or a model as a config without trials.
+Result<Config> read_source(const std::string& path);
+
 // The config that a command works on, with its trials and the log's notes shown.  `finish` puts in
 // what the command line changes and checks what the command needs.  Nothing when any of it went
 // wrong: that was shown, and the command is to end with kExitBadUsage.

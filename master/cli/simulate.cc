@@ -2,7 +2,6 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "common/base/shipped.h"
 #include "common/base/suggest.h"
 #include "common/config/config.h"
 #include "common/trials/files.h"
@@ -31,19 +30,6 @@ struct SimulateOptions {
   FarmOptions farm;
   KeepOption keep;
 };
-
-// A config or a model as a config without trials.
-Result<Config> read_source(const std::string& named) {
-  const std::string path = shipped_file(named);
-  const Result<std::string> text = read_text_file(path);
-  if (!text) return text.error();
-  if (!is_model(*text)) return parse_config(*text, path);
-  const Result<Model> model = parse_model(*text, path);
-  if (!model) return model.error();
-  Config config;
-  config.problem = problem_of(*model);
-  return config;
-}
 
 Status apply_options(const SimulateOptions& options, Config& config) {
   SimulateSettings& s = config.simulate;

@@ -56,6 +56,7 @@ SubcommandRun setup_horizons(CLI::App& app);
 SubcommandRun setup_import(CLI::App& app);
 SubcommandRun setup_influence(CLI::App& app);
 SubcommandRun setup_keys(CLI::App& app);
+SubcommandRun setup_plan(CLI::App& app);
 SubcommandRun setup_predict(CLI::App& app);
 SubcommandRun setup_replay(CLI::App& app);
 SubcommandRun setup_report(CLI::App& app);

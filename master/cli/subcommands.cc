@@ -26,6 +26,8 @@ std::span<const Subcommand> subcommands() {
        setup_horizons},
       {"diagnose", "say where the sim-to-real gap lies and which effect causes it", "Diagnosis",
        setup_diagnose},
+      {"plan", "say what to drive so that effects show, and from which size", "Diagnosis",
+       setup_plan},
       {"report", "draw the report of a diagnosis again", "Diagnosis", setup_report},
       {"blind-check", "the diagnosis against sealed truths", "Diagnosis", setup_blind_check},
       {"effects", "list the catalogue of effects, or draw what each does", "Diagnosis",

@@ -1,0 +1,214 @@
+// gapfarm plan CONFIG|MODEL: what to drive so that a diagnosis sees most.
+#include <spdlog/fmt/fmt.h>
+
+#include <charconv>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "common/trials/write.h"
+#include "master/cli/inputs.h"
+#include "master/cli/long_command.h"
+#include "master/cli/outputs.h"
+#include "master/diagnose/findings.h"
+#include "master/plan/design.h"
+#include "master/plan/picture.h"
+
+namespace gapfarm {
+namespace {
+
+constexpr double kAlike = 0.9;  // |cosine| from which two effects are said to look alike
+
+struct PlanOptions {
+  std::string source;
+  std::string out;
+  std::string picture;
+  std::string place;
+  std::string effects = "all";
+  plan::PlanSettings settings;
+  std::optional<unsigned> sessions, chain;
+  std::vector<double> levels, durations;
+  Outputs outputs;
+  FarmOptions farm;
+  KeepOption keep;
+};
+
+// "2" or "2x2": the width of a square, m.
+Result<double> width_of_place(const std::string& text) {
+  const auto wrong = [&] {
+    return Error{"--place is '" + text +
+                 "', expected the width of a square floor in metres, such as 2 or 2x2"};
+  };
+  const std::size_t x = text.find('x');
+  double width = 0, depth = 0;
+  const auto read = [](std::string_view part, double* value) {
+    const auto [end, error] = std::from_chars(part.data(), part.data() + part.size(), *value);
+    return error == std::errc() && end == part.data() + part.size();
+  };
+  if (!read(std::string_view(text).substr(0, x), &width)) return wrong();
+  depth = width;
+  if (x != std::string::npos && !read(std::string_view(text).substr(x + 1), &depth)) return wrong();
+  if (!(width > 0 && width <= 1000) || depth != width) return wrong();
+  return width;
+}
+
+Status apply_options(PlanOptions& options, Config& config) {
+  SimulateSettings& s = config.simulate;
+  if (!options.place.empty()) {
+    const Result<double> width = width_of_place(options.place);
+    if (!width) return width.error();
+    s.arena_m = *width / 0.7;  // robots are put down within the middle 0.7 of it
+  }
+  if (options.sessions) s.sessions = *options.sessions;
+  if (options.chain) s.chain = *options.chain;
+  if (!options.levels.empty()) s.levels = options.levels;
+  if (!options.durations.empty()) s.durations_s = options.durations;
+  if (options.settings.trials < s.sessions * std::max(1U, s.chain)) {
+    return Error{
+        fmt::format("{} trials are fewer than one chain of {} in each of {} sessions; ask "
+                    "for more --trials, or fewer --sessions or a shorter --chain",
+                    options.settings.trials, s.chain, s.sessions)};
+  }
+  std::string name;
+  for (const char c : options.effects + ",") {
+    if (c != ',') {
+      name += c;
+      continue;
+    }
+    if (!name.empty() && name != "all") options.settings.effects.push_back(name);
+    name.clear();
+  }
+  return {};
+}
+
+std::string size_words(const plan::Visibility& seen) {
+  if (!seen.size) return "-";
+  return plain_number(*seen.size) + (seen.unit == "-" ? "" : " " + seen.unit);
+}
+
+std::string table_text(const plan::DesignedPlan& plan) {
+  std::string text = fmt::format("{:<32} {:>14} {:>14}  {}\n", "named 9 times in 10 from", "here",
+                                 "random plan", "looks like");
+  for (std::size_t k = 0; k < plan.seen.size(); ++k) {
+    const plan::Visibility& seen = plan.seen[k];
+    text +=
+        fmt::format("{:<32} {:>14} {:>14}  {}\n", seen.parameter, size_words(seen),
+                    size_words(plan.seen_at_random[k]), seen.likeness >= kAlike ? seen.like : "");
+  }
+  const auto list = [&](const std::vector<std::string>& names, const std::string& words) {
+    for (std::size_t k = 0; k < names.size(); ++k) text += (k == 0 ? "" : ", ") + names[k];
+    if (!names.empty()) text += words + "\n";
+  };
+  list(plan.not_planned_for, ": do not move where trials end, only how far repeats scatter");
+  list(plan.without_shift, ": could not be simulated with this robot");
+  text +=
+      "Sizes are distances from neutral; -: not within the catalogue's bounds. What does not show "
+      "in "
+      "poses at rest (motor_lag) needs paths: log them too.\n";
+  return text;
+}
+
+nlohmann::ordered_json table_json(const plan::DesignedPlan& plan) {
+  nlohmann::ordered_json rows = nlohmann::ordered_json::array();
+  for (std::size_t k = 0; k < plan.seen.size(); ++k) {
+    const plan::Visibility& seen = plan.seen[k];
+    nlohmann::ordered_json row = {{"effect", seen.effect},    {"parameter", seen.parameter},
+                                  {"unit", seen.unit},        {"size", nullptr},
+                                  {"size_random", nullptr},   {"like", seen.like},
+                                  {"likeness", seen.likeness}};
+    if (seen.size) row["size"] = *seen.size;
+    if (plan.seen_at_random[k].size) row["size_random"] = *plan.seen_at_random[k].size;
+    rows.push_back(std::move(row));
+  }
+  nlohmann::ordered_json power = nlohmann::ordered_json::array();
+  for (const plan::PowerPoint& p : plan.power) {
+    power.push_back({{"trials", p.trials}, {"planned", p.planned}, {"random", p.random}});
+  }
+  return {{"effects", rows},
+          {"power", power},
+          {"not_planned_for", plan.not_planned_for},
+          {"without_shift", plan.without_shift}};
+}
+
+Result<plan::DesignedPlan> design(const PlanOptions& options, const Config& config,
+                                  CliContext& context) {
+  LongCommand::begin_if_possible("plan", options.keep.place("plan", options.out),
+                                 {{"candidates", 10, 0}, {"what they show", 3, 0}}, context);
+  auto farm = start_farm(options.farm, config.farm, context);
+  if (!farm) return farm.error();
+  const auto asked = context.work->over(**farm);
+  context.work->stage(0);
+  bool first = true;
+  return plan::design_plan(*asked, config, options.settings, [&](const std::string& /*what*/) {
+    if (!first) context.work->stage(1);
+    first = false;
+  });
+}
+
+int run_plan(PlanOptions& options, CliContext& context) {
+  Result<Config> config = read_source(options.source);
+  if (config) {
+    if (Status s = apply_options(options, *config); !s) config = s.error();
+  }
+  Status planned = config ? Status{} : Status(config.error());
+  options.outputs.reads(options.source);
+  if (planned) planned = options.outputs.plan({options.out, options.picture});
+  if (!planned) {
+    context.console.error(planned.error());
+    return kExitBadUsage;
+  }
+  const auto plan = design(options, *config, context);
+  if (!plan) return failed(plan.error(), context);
+  std::vector<std::pair<std::string, std::string>> files = {
+      {options.out, format_trials(plan->log)}};
+  if (!options.picture.empty()) {
+    files.emplace_back(options.picture, plan::plan_picture(config->problem, *plan));
+  }
+  for (const auto& [path, text] : files) {
+    if (Status s = options.outputs.write(path, text); !s) return failed(s.error(), context);
+  }
+  nlohmann::ordered_json json = table_json(*plan);
+  json["out"] = options.out;
+  json["trials"] = plan->log.trials.size();
+  context.console.result(
+      table_text(*plan) +
+          fmt::format("{}: {} trials to drive, in this order; x1, y1, theta1 are where the model "
+                      "says the robot stops\n",
+                      options.out, plan->log.trials.size()),
+      json);
+  return kExitDone;
+}
+
+}  // namespace
+
+SubcommandRun setup_plan(CLI::App& app) {
+  auto options = std::make_shared<PlanOptions>();
+  app.add_option("CONFIG|MODEL", options->source, "The robot as far as it is known")->required();
+  app.add_option("--out", options->out, "Trial log to write: what to drive")->required();
+  app.add_option("--picture", options->picture, "SVG to write: the floor, and power by trials");
+  app.add_option("--trials", options->settings.trials, "In all; rounded up to whole chains")
+      ->check(CLI::Range(1, 5000));
+  app.add_option("--effects", options->effects, "Names with commas between, or all");
+  app.add_option("--place", options->place, "Square floor to start on, m: 2x2");
+  app.add_option("--sessions", options->sessions, "Sessions")->check(CLI::Range(1, 100));
+  app.add_option("--chain", options->chain, "Trials before the robot is put down anew")
+      ->check(CLI::Range(1, 1000));
+  app.add_option("--levels", options->levels, "Factors of the commands' duties")
+      ->check(CLI::Range(0.0, 1.0));
+  app.add_option("--durations", options->durations, "s")->check(CLI::Range(0.0, 60.0));
+  app.add_option("--pool", options->settings.pool, "Chains to choose each one from")
+      ->check(CLI::Range(2, 100));
+  app.add_option("--seed", options->settings.seed, "Of the chains to choose from");
+  options->outputs.declare(app);
+  options->keep.declare(app);
+  options->farm.declare(app, false);
+  declare_on_end(app);
+  app.footer(
+      "Examples:\n"
+      "  gapfarm plan configs/srv1.toml --trials 120 --place 2x2 --out plan.csv\n"
+      "  gapfarm plan run/demo/model.toml --effects floor_tilt,motor_asymmetry --out plan.csv "
+      "--picture plan.svg\n"
+      "  gapfarm simulate configs/srv1.toml --like plan.csv --out trials.csv");
+  return [options](CliContext& context) { return run_plan(*options, context); };
+}
+
+}  // namespace gapfarm
