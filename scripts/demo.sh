@@ -24,5 +24,6 @@ echo "== Done in $((SECONDS - start)) s"
 build/release/bin/gapfarm status "$run"
 echo
 echo "model    $run/model.toml   (gapfarm predict $run/model.toml --trials FILE)"
+echo "report   $run/report.html  (fitness, parameters, the floor, drives; open it in a browser)"
 echo "picture  $run/poses.svg    (measured and simulated end poses, before and after)"
 echo "run      $run/run.sqlite   (docs/run_store.md)"

@@ -15,11 +15,10 @@ packages=(
 )
 if [[ "${1:-}" == --tests ]]; then
   packages+=(chromium clang-format fonts-dejavu-core)
+  if ! command -v node >/dev/null; then packages+=(nodejs); fi  # drives the browser
   # Farms over Slurm and ssh, and Kubernetes' types (tests/launch).
   packages+=(iproute2 munge openssh-client openssh-server python3-kubernetes python3-yaml slurm-wlm)
 fi
-# npm packs the report's plotting library at build time; without it reports fall back to plain SVG.
-if ! command -v npm >/dev/null; then packages+=(npm); fi
 
 missing=()
 for package in "${packages[@]}"; do

@@ -69,14 +69,24 @@ Result<std::string> baseline_note_of_run(const Problem& problem, const Genome& g
   const auto results = farm.run(farm.add_problem(to_proto(problem)), {task});
   if (!results) return results.error();
   if (results->front().outcome() != v1::OK) return std::string();
-  std::vector<double> scores;
-  for (const v1::Predicted& p : results->front().predict().predictions()) {
-    scores.push_back(p.log_score());
+  const auto beside = baselines_beside(problem, results->front().predict());
+  if (!beside) return beside.error();
+  const std::string sentence = baseline_sentence(*beside, "the model");
+  return sentence.empty() ? sentence
+                          : std::string("without a simulation, ") + kFromOthers + ": " + sentence;
+}
+
+Result<std::vector<BaselineComparison>> baselines_beside(const Problem& problem,
+                                                         const v1::PredictResult& prediction) {
+  if (!has_baselines(problem.scenario) || problem.log.trials.empty()) {
+    return std::vector<BaselineComparison>();
   }
+  std::vector<double> scores;
+  for (const v1::Predicted& p : prediction.predictions()) scores.push_back(p.log_score());
   const auto baselines =
       crossfitted_baselines(problem.log, problem.commands, session_folds(problem.log));
   if (!baselines) return baselines.error();
-  return note(baselines, scores, kFromOthers);
+  return compare_with_baselines(*baselines, scores);
 }
 
 }  // namespace gapfarm

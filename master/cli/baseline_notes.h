@@ -30,4 +30,8 @@ Result<std::string> baseline_note(const Model& model, const TrialLog& log,
 // the other sessions; empty also where the genome's simulation does not end well.
 Result<std::string> baseline_note_of_run(const Problem& problem, const Genome& genome, Farm& farm);
 
+// The same beside a prediction of the problem's trials; none where baselines make no sense.
+Result<std::vector<BaselineComparison>> baselines_beside(const Problem& problem,
+                                                         const v1::PredictResult& prediction);
+
 }  // namespace gapfarm

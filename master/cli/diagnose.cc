@@ -137,7 +137,7 @@ std::vector<ProgressStage> stages() {
 }
 
 std::string summary(const Diagnosis& d) {
-  std::string text = d.headline + "\n";
+  std::string text = d.headline + "\n  " + d.action + "\n";
   for (const SanityFinding& f : d.sanity) {
     text += "  " + f.name + ": " + f.text + " " + f.remedy + "\n";
   }

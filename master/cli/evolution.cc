@@ -35,16 +35,17 @@ Result<std::unique_ptr<Optimiser>> optimiser_at(const std::optional<Checkpoint>&
   return checkpoint ? restore_optimiser(setup, checkpoint->optimiser_state) : make_optimiser(setup);
 }
 
-// Adds how the run's results do on the trials that were kept apart.
-Status add_validation(RunStore& store, const EvolutionRun& run, const TrialLog& log, Farm& farm,
-                      const Genome& best, std::string& text, Json& json) {
+// How the run's results do on the trials that were kept apart; added to the text and the JSON, too.
+Result<std::vector<Validated>> add_validation(RunStore& store, const EvolutionRun& run,
+                                              const TrialLog& log, Farm& farm, const Genome& best,
+                                              std::string& text, Json& json) {
   const auto checkpoint = store.checkpoint();
   if (!checkpoint) return checkpoint.error();
   std::vector<Genome> stages;
   if (*checkpoint) {
     stages = stage_results((*checkpoint)->optimiser_state, run.problem.genes.size());
   }
-  const auto rows = validate(farm, run.problem, log, stages, best);
+  auto rows = validate(farm, run.problem, log, stages, best);
   if (!rows) return rows.error();
   text += fmt::format("validation on {} trials kept apart, {}:\n", log.trials.size(),
                       fitness_name(run.problem.fitness.kind));
@@ -54,7 +55,7 @@ Status add_validation(RunStore& store, const EvolutionRun& run, const TrialLog& 
     json["validation"].push_back(
         {{"name", row.name}, {"fitness", row.fitness ? Json(*row.fitness) : Json()}});
   }
-  return {};
+  return rows;
 }
 
 Status write_end(RunStore& store, const FarmProgressWriter& writer, RunState state,
@@ -221,19 +222,21 @@ int run_evolution(RunStore& store, const EvolutionRun& run, CliContext& context)
     return kExitResumable;
   }
   if (summary->best && summary->best->outcome == v1::OK) {
-    const Status left = leave_behind(store, run.problem, run.config, *summary, **farm);
+    std::vector<Validated> validated;
+    if (*kept_apart) {
+      show_notes(**kept_apart, context.console);
+      auto added =
+          add_validation(store, run, **kept_apart, **farm, summary->best->genome, text, json);
+      if (!added) return failed(added.error(), context);
+      validated = std::move(*added);
+    }
+    const Status left = leave_behind(store, run.problem, run.config, *summary, **farm, validated);
     if (!left) return failed(left.error(), context);
     const auto beside = baseline_note_of_run(run.problem, summary->best->genome, **farm);
     if (!beside) return failed(beside.error(), context);
     if (!beside->empty()) context.console.note(*beside);
-    if (*kept_apart) {
-      show_notes(**kept_apart, context.console);
-      const Status added =
-          add_validation(store, run, **kept_apart, **farm, summary->best->genome, text, json);
-      if (!added) return failed(added.error(), context);
-    }
     const char* separator = "left behind: ";
-    for (const char* name : {"model.toml", "poses.svg", "fitness.svg"}) {
+    for (const char* name : {"model.toml", "report.html", "poses.svg", "fitness.svg"}) {
       text += separator + (store.run() / name).string();
       json["files"].push_back((store.run() / name).string());
       separator = ", ";

@@ -5,6 +5,8 @@
 #include "common/base/build_info.h"
 #include "common/config/model.h"
 #include "common/trials/files.h"
+#include "master/cli/baseline_notes.h"
+#include "master/cli/run_page.h"
 #include "master/report/fitness_chart.h"
 #include "master/report/pose_panels.h"
 #include "master/report/pose_picture.h"
@@ -38,24 +40,44 @@ v1::Task predict_task(const Genome& genome) {
   return task;
 }
 
-Status write_poses(const RunStore& store, const Problem& problem, const EvolveSummary& summary,
-                   Farm& farm) {
+// Each beside what the best scores on the trials that it can predict.
+std::vector<ScoreRow> baseline_rows(const std::vector<BaselineComparison>& comparisons) {
+  std::vector<ScoreRow> rows;
+  for (const BaselineComparison& c : comparisons) {
+    rows.push_back({fmt::format("{}, {} trials", c.name, c.trials), c.baseline, {}, {}});
+    rows.push_back({"the best, on the same trials", c.model, {}, {}});
+  }
+  return rows;
+}
+
+Status write_poses(RunStore& store, const Problem& problem, const EvolveSummary& summary,
+                   Farm& farm, const std::vector<Validated>& validated) {
   // As the config had them, and as evolved.
   const auto results = farm.run(farm.add_problem(to_proto(problem)),
                                 {predict_task({}), predict_task(summary.best->genome)});
   if (!results) return results.error();
   std::vector<PredictionOfLog> predictions;
   const char* const labels[] = {"before", "after"};
+  const PredictionOfLog* known[] = {nullptr, nullptr};
+  predictions.reserve(results->size());
   for (std::size_t i = 0; i < results->size(); ++i) {
     if ((*results)[i].outcome() != v1::OK) continue;  // a nominal robot may fall over
-    predictions.push_back({labels[i], (*results)[i].predict()});
+    known[i] = &predictions.emplace_back(PredictionOfLog{labels[i], (*results)[i].predict()});
   }
-  const std::string title = fmt::format(
-      "End poses seen from the start: {} measured trials, simulated before and after evolution",
-      problem.log.trials.size());
-  return write_file_atomically((store.run() / "poses.svg").string(),
-                               pose_picture(pose_panels(problem, predictions), title,
-                                            "Ellipses hold 90 % of the simulated positions"));
+  RunOutcome outcome = run_outcome(problem, known[0], known[1], validated);
+  if (known[1] != nullptr) {
+    const auto beside = baselines_beside(problem, known[1]->prediction);
+    if (!beside) return beside.error();
+    outcome.baselines = baseline_rows(*beside);
+  }
+  if (Status s = store.keep_document(kOutcomeDocument, to_json(outcome)); !s) return s;
+  const std::string title =
+      fmt::format("End poses of {} trials, measured and simulated", problem.log.trials.size());
+  return write_file_atomically(
+      (store.run() / "poses.svg").string(),
+      pose_picture(pose_panels(problem, predictions), title,
+                   "Seen from the start, before and after evolution; ellipses hold 90 % of "
+                   "the simulated positions"));
 }
 
 Status write_fitness(const RunStore& store) {
@@ -73,14 +95,22 @@ Status write_fitness(const RunStore& store) {
                                              info.fitness_unit, info.higher_is_better));
 }
 
+Status write_page(const RunStore& store) {
+  const auto report = read_run_report(store.run());
+  if (!report) return report.error();
+  return write_file_atomically((store.run() / "report.html").string(), run_html(*report));
+}
+
 }  // namespace
 
-Status leave_behind(const RunStore& store, const Problem& problem, const Config& config,
-                    const EvolveSummary& summary, Farm& farm) {
+Status leave_behind(RunStore& store, const Problem& problem, const Config& config,
+                    const EvolveSummary& summary, Farm& farm,
+                    const std::vector<Validated>& validated) {
   const Model model = model_of(store, problem, config, summary);
   if (Status s = write_model(model, (store.run() / "model.toml").string()); !s) return s;
-  if (Status s = write_poses(store, problem, summary, farm); !s) return s;
-  return write_fitness(store);
+  if (Status s = write_poses(store, problem, summary, farm, validated); !s) return s;
+  if (Status s = write_fitness(store); !s) return s;
+  return write_page(store);
 }
 
 }  // namespace gapfarm

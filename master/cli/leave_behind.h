@@ -1,15 +1,20 @@
-// What a finished evolution leaves in its run folder: model.toml, poses.svg, fitness.svg.
+// What a finished evolution leaves in its run folder: model.toml, report.html, poses.svg,
+// fitness.svg.
 #pragma once
 
+#include <vector>
+
 #include "common/config/settings.h"
+#include "master/cli/validation.h"
 #include "master/evolve/evolve.h"
 #include "master/farm/farm.h"
 #include "master/store/run_store.h"
 
 namespace gapfarm {
 
-// REQUIRES: a best member whose outcome is OK.
-Status leave_behind(const RunStore& store, const Problem& problem, const Config& config,
-                    const EvolveSummary& summary, Farm& farm);
+// `validated`: what is known of trials kept apart.  REQUIRES: a best member whose outcome is OK.
+Status leave_behind(RunStore& store, const Problem& problem, const Config& config,
+                    const EvolveSummary& summary, Farm& farm,
+                    const std::vector<Validated>& validated);
 
 }  // namespace gapfarm

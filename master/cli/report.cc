@@ -1,40 +1,65 @@
-// gapfarm report DIAGNOSIS: draw the report of a diagnosis again.
+// gapfarm report RUN|DIAGNOSIS: the page of a run or of a diagnosis, from what they keep alone.
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
 
 #include "common/trials/files.h"
 #include "master/cli/outputs.h"
+#include "master/cli/run_page.h"
 #include "master/cli/subcommand.h"
 #include "master/diagnose/diagnosis_json.h"
 #include "master/report/report_html.h"
+#include "master/report/run_report.h"
 
 namespace gapfarm {
 namespace {
 
 struct ReportCommand {
-  std::string diagnosis;
+  std::string from;
   std::string out;
   Outputs outputs;
 };
 
-int run_report(ReportCommand& command, CliContext& context) {
-  std::filesystem::path from(command.diagnosis);
-  std::error_code ignored;
-  if (std::filesystem::is_directory(from, ignored)) from /= "diagnosis.json";
-  const std::string out =
-      command.out.empty() ? (from.parent_path() / "report.html").string() : command.out;
+struct Page {
+  std::string html;
+  std::filesystem::path from;  // what was read
+  std::filesystem::path out;   // where it goes unless told otherwise
+};
+
+Result<Page> page_of_diagnosis(const std::filesystem::path& from) {
   const Result<std::string> text = read_text_file(from.string());
-  if (!text) {
-    context.console.error(text.error());
-    return kExitBadUsage;
-  }
+  if (!text) return text.error();
   const auto diagnosis = parse_diagnosis(*text);
-  if (!diagnosis) {
-    context.console.error(Error{from.string() + ": " + diagnosis.error().message});
+  if (!diagnosis) return Error{from.string() + ": " + diagnosis.error().message};
+  return Page{report_html(*diagnosis), from, from.parent_path() / "report.html"};
+}
+
+Result<Page> page_of_run(const std::filesystem::path& run) {
+  const auto report = read_run_report(run);
+  if (!report) return report.error();
+  return Page{run_html(*report), run / "run.sqlite", run / "report.html"};
+}
+
+Result<Page> page_of(const std::filesystem::path& from) {
+  std::error_code ignored;
+  if (!std::filesystem::is_directory(from, ignored)) return page_of_diagnosis(from);
+  if (std::filesystem::exists(from / "diagnosis.json", ignored)) {
+    return page_of_diagnosis(from / "diagnosis.json");
+  }
+  if (std::filesystem::exists(from / "run.sqlite", ignored)) return page_of_run(from);
+  return Error{from.string() +
+               ": holds neither a diagnosis.json nor a run.sqlite; give a folder that diagnose or "
+               "evolve wrote"};
+}
+
+int run_report(ReportCommand& command, CliContext& context) {
+  const Result<Page> page = page_of(command.from);
+  if (!page) {
+    context.console.error(page.error());
     return kExitBadUsage;
   }
-  command.outputs.reads(from.string());
+  const std::string out = command.out.empty() ? page->out.string() : command.out;
+  command.outputs.reads(page->from.string());
   // Its own page is what it is there to draw again.
   Status planned =
       command.out.empty() ? command.outputs.plan_again(out) : command.outputs.plan(out);
@@ -42,7 +67,7 @@ int run_report(ReportCommand& command, CliContext& context) {
     context.console.error(planned.error());
     return kExitBadUsage;
   }
-  if (Status s = command.outputs.write(out, report_html(*diagnosis)); !s) {
+  if (Status s = command.outputs.write(out, page->html); !s) {
     context.console.error(s.error());
     return kExitFailed;
   }
@@ -54,12 +79,14 @@ int run_report(ReportCommand& command, CliContext& context) {
 
 SubcommandRun setup_report(CLI::App& app) {
   auto command = std::make_shared<ReportCommand>();
-  app.add_option("DIAGNOSIS", command->diagnosis, "Folder of a diagnosis, or its diagnosis.json")
+  app.add_option("RUN|DIAGNOSIS", command->from,
+                 "Folder of a run or of a diagnosis, or a diagnosis.json")
       ->required();
   app.add_option("--out", command->out, "HTML file; default: report.html beside it");
   command->outputs.declare(app);
   app.footer(
       "Examples:\n"
+      "  gapfarm report run/demo\n"
       "  gapfarm report diagnosis\n"
       "  gapfarm report diagnosis/diagnosis.json --out page.html");
   return [command](CliContext& context) { return run_report(*command, context); };

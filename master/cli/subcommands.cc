@@ -28,7 +28,7 @@ std::span<const Subcommand> subcommands() {
        setup_diagnose},
       {"plan", "say what to drive so that effects show, and from which size", "Diagnosis",
        setup_plan},
-      {"report", "draw the report of a diagnosis again", "Diagnosis", setup_report},
+      {"report", "the page of a run or a diagnosis again", "Diagnosis", setup_report},
       {"blind-check", "the diagnosis against sealed truths", "Diagnosis", setup_blind_check},
       {"effects", "list the catalogue of effects, or draw what each does", "Diagnosis",
        setup_effects},

@@ -7,6 +7,7 @@
 #include "master/diagnose/diagnose_steps.h"
 #include "master/diagnose/digits.h"
 #include "master/diagnose/findings.h"
+#include "master/diagnose/headline.h"
 #include "master/sanity/words.h"
 
 namespace gapfarm {
@@ -177,8 +178,10 @@ DiagnosisResult DiagnosisRun::give_up(const std::string& stage, const Error& err
                           "without an effect.",
                    base ? Severity::kUnusable : Severity::kDoubt});
   d.trials.clear();
+  d.drives.clear();
+  d.parameters.clear();
   say_what_was_left_out();
-  d.headline = headline(d);
+  tell(subject_.effect_words, &d);
   result_.tuned = problem_.values;
   for (const auto& [row, value] : study_.base) result_.tuned[row] = value;
   result_.final_ = result_.tuned;

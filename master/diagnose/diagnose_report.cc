@@ -10,6 +10,7 @@
 #include "master/diagnose/confidence.h"
 #include "master/diagnose/diagnose_steps.h"
 #include "master/diagnose/findings.h"
+#include "master/diagnose/headline.h"
 #include "master/diagnose/intervals.h"
 
 namespace gapfarm {
@@ -315,6 +316,8 @@ Status DiagnosisRun::report() {
     if (Status s = look_for_second_places(); !s) return s;
   }
   if (Status s = compare_with_baselines(); !s) return s;
+  fill_parameters();
+  if (Status s = show_drives(); !s) return s;
   complete_screening();
   say_what_was_left_out();
   if (frame_m_.x() != 0 || frame_m_.y() != 0) {
@@ -324,8 +327,9 @@ Status DiagnosisRun::report() {
         plain_number(frame_m_.x()) + " m, y = " + plain_number(frame_m_.y()) +
         " m (its [frame]), and a seam's shift is the one there.");
   }
-  d.headline = headline(d);
-  return plan_next();
+  if (Status s = plan_next(); !s) return s;
+  tell(subject_.effect_words, &d);
+  return {};
 }
 
 }  // namespace gapfarm

@@ -129,6 +129,9 @@ class DiagnosisRun {
   void fill_gap();
   void fill_trials();
   void fill_values();
+  void fill_parameters();
+  std::vector<v1::Override> without_chance(ParameterValues values) const;
+  Status show_drives();
 
   const Problem& problem_;
   const DiagnosisSubject& subject_;

@@ -9,6 +9,8 @@
 #include <vector>
 
 #include "common/pose/pose.h"
+#include "common/trials/trial.h"
+#include "master/diagnose/parameter_row.h"
 #include "master/sanity/finding.h"
 
 namespace gapfarm {
@@ -127,9 +129,19 @@ struct DiagnosedTrial {
   std::vector<double> covariates;                  // one a Diagnosis::shown
 };
 
+// One real drive beside the simulated ones, from its measured start.  A path that is not known is
+// empty.
+struct ShownDrive {
+  std::size_t trial = 0;  // index into Diagnosis::trials
+  std::string why;        // "worst of forward"
+  std::vector<PathSample> measured, tuned, final_;
+};
+
 struct Diagnosis {
   Verdict verdict = Verdict::kNone;
-  std::string headline;  // one sentence
+  std::string headline;               // the cause on one line, in plain words
+  std::string action;                 // what to do about it, on one line
+  std::vector<std::string> findings;  // the same at length, a sentence each
   std::vector<NamedEffect> effects;
   GapFigures gap;          // nats/trial
   GapFigures position_mm;  // root mean square
@@ -142,7 +154,10 @@ struct Diagnosis {
   std::vector<SelectionRecord> steps;
   std::vector<ResidualCheck> checks;  // most significant first
   std::vector<NextExperiment> next;
-  std::vector<std::string> cautions;  // thin data and the like, one sentence each
+  std::vector<std::string> cautions;               // thin data and the like, one sentence each
+  std::vector<ParameterRow> parameters;            // what was tuned, and of the named effects
+  std::vector<ParameterCorrelation> correlations;  // strong ones, strongest first
+  std::vector<ShownDrive> drives;
   std::vector<DiagnosedTrial> trials;
   std::vector<ShownCovariate> shown;
   PictureWords words;

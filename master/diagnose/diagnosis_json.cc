@@ -276,9 +276,13 @@ Json summary_json(const Diagnosis& diagnosis) {
   Json summary = {{"version", kVersion},
                   {"verdict", verdict_name(diagnosis.verdict)},
                   {"headline", diagnosis.headline},
+                  {"action", diagnosis.action},
+                  {"findings", diagnosis.findings},
                   {"sanity", sanity_json(diagnosis.sanity)},
                   {"effects", std::move(effects)},
                   {"gap", std::move(gap)},
+                  {"parameters", parameters_json(diagnosis.parameters)},
+                  {"correlations", correlations_json(diagnosis.correlations)},
                   {"where", where_json(diagnosis.where)},
                   {"unexplained", where_json(diagnosis.unexplained)},
                   {"screening", screening_json(diagnosis.screening)},
@@ -288,6 +292,7 @@ Json summary_json(const Diagnosis& diagnosis) {
                   {"cautions", diagnosis.cautions},
                   {"provenance", std::move(provenance)},
                   {"timing", std::move(timing)}};
+  if (!diagnosis.drives.empty()) summary["drives"] = drives_json(diagnosis.drives);
   if (!diagnosis.shown.empty()) summary["pictures"] = pictures_json(diagnosis);
   return summary;
 }
@@ -329,6 +334,8 @@ Result<Diagnosis> parse_diagnosis(std::string_view text) {
   }
   if (!error.empty()) return Error{error};
   root.read_if_there("headline", diagnosis.headline);
+  root.read_if_there("action", diagnosis.action);
+  root.read_if_there("findings", diagnosis.findings);
   root.for_each("effects", [&](const Json& item, const std::string& path, const auto&) {
     diagnosis.effects.push_back(read_effect(item, path, error));
   });
@@ -338,7 +345,12 @@ Result<Diagnosis> parse_diagnosis(std::string_view text) {
   read_findings(root, "unexplained", diagnosis.unexplained);
   read_screening(root, diagnosis);
   read_remainder(root, diagnosis);
+  read_parameters(root, &diagnosis.parameters);
+  read_correlations(root, &diagnosis.correlations);
   if (!error.empty()) return Error{error};
+  if (json.contains("drives")) {
+    if (Status s = read_drives(json["drives"], &diagnosis.drives); !s) return s.error();
+  }
   if (json.contains("pictures")) {
     if (Status s = read_pictures(json["pictures"], &diagnosis); !s) return s.error();
   }

@@ -34,4 +34,14 @@ Result<std::vector<DiagnosedTrial>> parse_trials(const nlohmann::ordered_json& t
 nlohmann::ordered_json pictures_json(const Diagnosis& diagnosis);
 Status read_pictures(const nlohmann::ordered_json& pictures, Diagnosis* diagnosis);
 
+// Parameters, what makes up for what, and drives beside their simulations (paths as
+// [t s, x m, y m, heading rad] from the start); and back.
+class Fields;
+nlohmann::ordered_json parameters_json(const std::vector<ParameterRow>& rows);
+void read_parameters(Fields& root, std::vector<ParameterRow>* rows);
+nlohmann::ordered_json correlations_json(const std::vector<ParameterCorrelation>& correlations);
+void read_correlations(Fields& root, std::vector<ParameterCorrelation>* correlations);
+nlohmann::ordered_json drives_json(const std::vector<ShownDrive>& drives);
+Status read_drives(const nlohmann::ordered_json& json, std::vector<ShownDrive>* drives);
+
 }  // namespace gapfarm

@@ -9,7 +9,6 @@
 #include "common/score/statistics.h"
 #include "master/diagnose/free_commands.h"
 #include "master/diagnose/selection.h"
-#include "master/sanity/words.h"
 
 namespace gapfarm {
 namespace {
@@ -39,7 +38,8 @@ const EffectWordsByName& robot_effect_words() {
        {"The floor has a nap that drags with %1 of the weight against %2",
         {{"strength", 100, " %"}, {"direction", kDegrees, " degrees"}}}},
       {"friction_patch",
-       {"A patch of floor around x = %2, y = %3 of radius %4 has %1 times the friction",
+       {"A patch of floor around x = %2, y = %3 of the world, of radius %4 has %1 times the "
+        "friction",
         {{"ratio", 1, ""}, {"x", 1, " m"}, {"y", 1, " m"}, {"radius", 1000, " mm"}}}},
       {"rolling_resistance", {"Rolling drags with %1 of the weight", {{"coefficient", 100, " %"}}}},
       {"com_offset",
@@ -47,7 +47,7 @@ const EffectWordsByName& robot_effect_words() {
         {{"x", 1000, " mm"}, {"y", 1000, " mm"}}}},
       {"camera_aspect", {"The camera's y scale is %1 times its x scale", {{"ratio", 1, ""}}}},
       {"camera_distortion",
-       {"The lens distorts radially with k1 = %1 about x = %2, y = %3",
+       {"The lens distorts radially with k1 = %1 about x = %2, y = %3 of the world",
         {{"k1", 1, " 1/m^2"}, {"x", 1, " m"}, {"y", 1, " m"}}}},
       {"camera_seam",
        {"Beyond a seam at %a = %1 the poses are shifted by %2 in x and %3 in y",
@@ -63,9 +63,9 @@ const EffectWordsByName& robot_effect_words() {
   return words;
 }
 
-std::string told(const Estimate& e, double factor, const std::string& unit) {
+std::string told(const Estimate& e, double factor, const std::string& unit, bool intervals) {
   std::string text = plain_number(factor * e.value) + unit;
-  if (!std::isfinite(e.lo) || !std::isfinite(e.hi) || !(e.lo < e.hi)) return text;
+  if (!intervals || !std::isfinite(e.lo) || !std::isfinite(e.hi) || !(e.lo < e.hi)) return text;
   return text + " (" + plain_number(factor * e.lo) + " to " + plain_number(factor * e.hi) + ")";
 }
 
@@ -77,10 +77,11 @@ const Estimate* find(const NamedEffect& effect, std::string_view key) {
 }
 
 // Without the words of a table: "name with key value unit, ...".
-std::string plain_claim(const NamedEffect& effect) {
+std::string plain_claim(const NamedEffect& effect, bool intervals) {
   std::vector<std::string> values;
   for (const Estimate& e : effect.parameters) {
-    values.push_back(e.key + " " + told(e, 1, e.unit.empty() || e.unit == "-" ? "" : " " + e.unit));
+    values.push_back(e.key + " " +
+                     told(e, 1, e.unit.empty() || e.unit == "-" ? "" : " " + e.unit, intervals));
   }
   return "The data show " + effect.name + (values.empty() ? "" : " with " + listed(values));
 }
@@ -90,10 +91,10 @@ const EffectWords* words_in(const EffectWordsByName& table, const std::string& e
   return found == table.end() ? nullptr : &found->second;
 }
 
-std::string claim(const NamedEffect& effect, const EffectWordsByName* own) {
+std::string claim(const NamedEffect& effect, const EffectWordsByName* own, bool intervals) {
   const EffectWords* found = own != nullptr ? words_in(*own, effect.name) : nullptr;
   if (found == nullptr) found = words_in(robot_effect_words(), effect.name);
-  if (found == nullptr) return plain_claim(effect);
+  if (found == nullptr) return plain_claim(effect, intervals);
   const EffectWords& words = *found;
   std::string text;
   for (const char* c = words.sentence; *c != 0; ++c) {
@@ -107,8 +108,8 @@ std::string claim(const NamedEffect& effect, const EffectWordsByName* own) {
     }
     const Telling& telling = words.parameters[static_cast<std::size_t>(*c - '1')];
     const Estimate* e = find(effect, telling.key);
-    if (e == nullptr) return plain_claim(effect);
-    text += told(*e, telling.factor, telling.unit);
+    if (e == nullptr) return plain_claim(effect, intervals);
+    text += told(*e, telling.factor, telling.unit, intervals);
   }
   return text;
 }
@@ -196,7 +197,7 @@ std::string change_words(const GapFigures& position_mm, const GapFigures& headin
 }
 
 std::string effect_sentence(const NamedEffect& effect, const EffectWordsByName* words) {
-  std::string text = claim(effect, words);
+  std::string text = claim(effect, words, true);
   if (std::isfinite(effect.closed) && effect.closed > 0) {
     text += "; adding that closes " + percent(effect.closed) + " of the gap in log score";
     if (effect.position_mm_before && effect.position_mm_after && effect.heading_mrad_before &&
@@ -208,43 +209,42 @@ std::string effect_sentence(const NamedEffect& effect, const EffectWordsByName* 
   return text + ".";
 }
 
-std::string headline(const Diagnosis& diagnosis) {
+std::string effect_claim(const NamedEffect& effect, const EffectWordsByName* words) {
+  return claim(effect, words, false);
+}
+
+std::vector<std::string> findings(const Diagnosis& diagnosis) {
   const std::vector<std::string> names = names_of(diagnosis);
   const double gap = diagnosis.gap.tuned - diagnosis.gap.floor;
   const double closed = gap > 0 ? (diagnosis.gap.tuned - diagnosis.gap.final_) / gap : 0;
-  std::string where;
-  if (!diagnosis.unexplained.empty()) where = diagnosis.unexplained.front().text;
-  if (where.empty() && !diagnosis.where.empty()) where = diagnosis.where.front().text;
+  std::vector<std::string> text;
+  for (const NamedEffect& effect : diagnosis.effects) {
+    text.push_back(effect.text.empty() ? effect_sentence(effect) : effect.text);
+  }
+  if (names.size() > 1) {
+    text.push_back("Together they close " + percent(closed) + " of the gap" +
+                   change_words(diagnosis.position_mm, diagnosis.heading_mrad) + ".");
+  }
   switch (diagnosis.verdict) {
     case Verdict::kNone:
-      return "Nothing is missing that these data could show: the tuned model predicts them as well "
-             "as their own noise allows.";
-    case Verdict::kUnusable:
-      return "Not usable as it is: " + (diagnosis.sanity.empty()
-                                            ? std::string("something is wrong with it.")
-                                            : finding_phrase(diagnosis.sanity.front()) + ". " +
-                                                  diagnosis.sanity.front().remedy);
+      text.emplace_back("The tuned model predicts the log as well as its own noise allows.");
+      break;
     case Verdict::kUnknown:
-      if (!diagnosis.sanity.empty() && diagnosis.sanity.front().severity == Severity::kDoubt) {
-        return "No cause can be named: " + finding_phrase(diagnosis.sanity.front()) + ". " +
-               diagnosis.sanity.front().remedy;
-      }
-      return "Something is missing from the simulation that no effect of the catalogue explains." +
-             (where.empty() ? "" : " " + where);
-    case Verdict::kEffect:
-      if (diagnosis.effects.size() == 1) {
-        const NamedEffect& only = diagnosis.effects.front();
-        return only.text.empty() ? effect_sentence(only) : only.text;
-      }
-      return "The gap comes from " + listed(names) + "; adding them closes " + percent(closed) +
-             " of it" + change_words(diagnosis.position_mm, diagnosis.heading_mrad) + ".";
     case Verdict::kEffectAndUnknown:
-      return "Adding " + listed(names) + " closes " + percent(closed) + " of the gap" +
-             change_words(diagnosis.position_mm, diagnosis.heading_mrad) +
-             ", but something remains that no effect of the catalogue explains." +
-             (where.empty() ? "" : " " + where);
+      if (diagnosis.verdict == Verdict::kEffectAndUnknown) {
+        text.emplace_back("Something remains that no effect of the catalogue explains.");
+      }
+      if (!diagnosis.unexplained.empty()) {
+        text.push_back(diagnosis.unexplained.front().text);
+      } else if (!diagnosis.where.empty()) {
+        text.push_back(diagnosis.where.front().text);
+      }
+      break;
+    case Verdict::kEffect:
+    case Verdict::kUnusable:
+      break;
   }
-  return "";
+  return text;
 }
 
 LogVariety log_variety(std::span<const ResidualTrial> trials, std::span<const Cell> cells,

@@ -47,8 +47,11 @@ using EffectWordsByName = std::map<std::string, EffectWords, std::less<>>;
 // tracked robot.  Effects without words, or without their parameters, are named with what is there.
 std::string effect_sentence(const NamedEffect& effect, const EffectWordsByName* words = nullptr);
 
-// The verdict and its first reason.
-std::string headline(const Diagnosis& diagnosis);
+// Its claim alone, without intervals and full stop.
+std::string effect_claim(const NamedEffect& effect, const EffectWordsByName* words = nullptr);
+
+// The verdict and its reasons, a sentence each.
+std::vector<std::string> findings(const Diagnosis& diagnosis);
 
 // How much of what effects look at varies in a log.
 struct LogVariety {

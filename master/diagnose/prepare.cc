@@ -6,7 +6,7 @@
 #include "common/score/statistics.h"
 #include "common/trials/shifted.h"
 #include "master/diagnose/confidence.h"
-#include "master/diagnose/findings.h"
+#include "master/diagnose/headline.h"
 #include "master/sanity/sanity.h"
 
 namespace gapfarm {
@@ -66,7 +66,7 @@ DiagnosisResult unusable_result(const PreparedLog& log) {
     effect.text = f.text + " " + f.remedy;
     d.effects.push_back(std::move(effect));
   }
-  d.headline = headline(d);
+  tell(nullptr, &d);
   result.tuned = result.final_ = log.problem.values;
   result.intervals.assign(result.final_.size(), {1, 0});
   return result;

@@ -1,5 +1,4 @@
-# cmake -DOUT=x.cc "-DSTYLES=a.css|b.css" "-DSCRIPTS=a.js|b.js" -DLIBRARY=name [-DLICENSE=file]
-#       -P embed.cmake
+# cmake -DOUT=x.cc "-DSTYLES=a.css|b.css" "-DSCRIPTS=a.js|b.js" -P embed.cmake
 # Writes a C++ source with the files as string literals (master/report/assets.h).
 function(literals list variable names)
   set(text "")
@@ -18,11 +17,6 @@ endfunction()
 
 literals("${STYLES}" styles kStyles)
 literals("${SCRIPTS}" scripts kScripts)
-if(LICENSE)  # the library's licence goes wherever the library goes
-  file(READ ${LICENSE} licence)
-  string(REPLACE "kScripts[] = {\n    R\"asset(" "kScripts[] = {\n    R\"asset(/*\n${licence}*/\n" scripts
-                 "${scripts}")
-endif()
 file(WRITE ${OUT}
 "#include \"master/report/assets.h\"
 
@@ -35,7 +29,6 @@ ${scripts}
 
 std::span<const std::string_view> page_styles() { return kStyles; }
 std::span<const std::string_view> page_scripts() { return kScripts; }
-std::string_view plot_library() { return \"${LIBRARY}\"; }
 
 }  // namespace gapfarm
 ")

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 
+#include "master/report/glossary.h"
 #include "master/report/html.h"
 
 namespace gapfarm {
@@ -75,15 +76,44 @@ Look look(const GapPart& part, int effect) {
   return {fmt::format("part-effect-{}", (effect - 1) % kHatchCount + 1), std::to_string(effect)};
 }
 
-double drawn(const GapPart& part) {
-  return std::isfinite(part.amount) ? std::max(part.amount, 0.0) : 0;
+// A stretch of a bar.
+struct Stretch {
+  double length = 0;
+  Look look;
+  std::string label;
+};
+
+double above_zero(double amount) { return std::isfinite(amount) ? std::max(amount, 0.0) : 0; }
+
+// The parts of one bar, which add up to the tuned gap before and to the final one after.  What an
+// effect made worse was not there before and is afterwards.
+std::vector<Stretch> stretches(const GapSplit& split, bool before) {
+  double worse = 0;
+  for (const GapPart& part : split.parts) {
+    if (part.kind == GapPart::Kind::kEffect) worse += above_zero(-part.amount);
+  }
+  if (split.parts.size() == 2) worse = 0;
+  std::vector<Stretch> list;
+  int effect = 0;
+  for (const GapPart& part : split.parts) {
+    const bool is_effect = part.kind == GapPart::Kind::kEffect;
+    if (is_effect) ++effect;
+    const double amount =
+        part.kind == GapPart::Kind::kUnexplained ? part.amount - worse : part.amount;
+    const Look own = look(part, effect);
+    if (!is_effect || before) list.push_back({above_zero(amount), own, part.label});
+    if (is_effect && !before) {
+      list.push_back({above_zero(-part.amount),
+                      {"part-worse", "+" + own.badge},
+                      part.label + " made it worse"});
+    }
+  }
+  return list;
 }
 
 double drawn_total(const GapSplit& split, bool before) {
   double total = 0;
-  for (const GapPart& part : split.parts) {
-    if (before || part.kind != GapPart::Kind::kEffect) total += drawn(part);
-  }
+  for (const Stretch& stretch : stretches(split, before)) total += stretch.length;
   return total;
 }
 
@@ -92,26 +122,22 @@ std::string stacked_bar(const GapSplit& split, bool before, double scale) {
   std::string svg =
       R"(<svg class="stack" aria-hidden="true"><rect class="track" width="100%" height="100%"/>)";
   double at = 0;
-  int effect = 0;
-  for (const GapPart& part : split.parts) {
-    const bool is_effect = part.kind == GapPart::Kind::kEffect;
-    if (is_effect) ++effect;
-    const double width = scale > 0 ? 100 * drawn(part) / scale : 0;
-    if ((is_effect && !before) || width <= 0) continue;
-    const Look l = look(part, effect);
+  for (const Stretch& stretch : stretches(split, before)) {
+    const double width = scale > 0 ? 100 * stretch.length / scale : 0;
+    if (width <= 0) continue;
     svg += fmt::format(
         R"(<svg x="{:.3f}%" width="{:.3f}%"><rect class="part {}" width="100%" height="100%"/>)",
-        at, width, l.css_class);
+        at, width, stretch.look.css_class);
     // A name is drawn where the bar is surely wide enough for it, a badge where that fits.
     const double share = width / 100;
     const auto middle = [&](const char* css_class, const std::string& words) {
       svg += fmt::format(R"(<text class="{}" x="50%" y="50%">{}</text>)", css_class, words);
     };
-    if (share > 0.03 + 0.0135 * static_cast<double>(part.label.size())) {
-      middle("wide", html_escaped(part.label));
-      middle("narrow", l.badge);
+    if (share > 0.03 + 0.0135 * static_cast<double>(stretch.label.size())) {
+      middle("wide", html_escaped(stretch.label));
+      middle("narrow", stretch.look.badge);
     } else if (share > 0.05) {
-      middle("badge", l.badge);
+      middle("badge", stretch.look.badge);
     }
     svg += "</svg>";
     at += width;
@@ -139,6 +165,17 @@ const GapPart* find_part(const GapSplit& split, const GapPart& like) {
   return nullptr;
 }
 
+// With what a sign other than the usual one means.
+std::string amount_text(const GapPart& part, const GapSplit& split) {
+  const std::string text = number_text(part.amount);
+  if (!(part.amount < 0)) return text;
+  if (part.kind == GapPart::Kind::kEffect) {
+    return text + R"( <small class="worse">▲ worse</small>)";
+  }
+  const bool little = std::abs(part.amount) < 0.1 * std::abs(split.tuned);
+  return text + (little ? " <small>within the floor</small>" : " <small>below the floor</small>");
+}
+
 // Rows in the order of the cause of most interest: effects, unexplained, floor.
 std::string parts_table(const std::vector<GapSplit>& splits) {
   std::string rows;
@@ -160,7 +197,7 @@ std::string parts_table(const std::vector<GapSplit>& splits) {
       const GapPart* same = find_part(split, *part);
       const UnitWords w = words(split.unit);
       rows += fmt::format(R"(<td class="number" data-label="{}">{}</td>)", w.unit,
-                          same ? number_text(same->amount) : "with the others");
+                          same ? amount_text(*same, split) : "with the others");
     }
     rows += "</tr>";
   }
@@ -169,7 +206,7 @@ std::string parts_table(const std::vector<GapSplit>& splits) {
     rows += fmt::format(R"(<td class="number" data-label="{}">{}</td>)", words(split.unit).unit,
                         number_text(split.tuned));
   }
-  return R"(<table class="parts"><caption class="unseen">The gap by cause</caption><thead><tr><th scope="col">part</th>)"
+  return R"(<table class="parts" data-file="gap"><caption class="unseen">The gap by cause</caption><thead><tr><th scope="col">part</th>)"
          R"(<th scope="col" class="number">nats a trial</th><th scope="col" class="number">position, mm</th>)"
          R"(<th scope="col" class="number">heading, mrad</th></tr></thead><tbody>)" +
          rows + "</tr></tbody></table>";
@@ -214,10 +251,11 @@ std::string gap_split_html(const Diagnosis& diagnosis) {
   }
   return R"(<figure class="gap-split"><div class="splits">)" + html + "</div><figcaption>" +
          "Before: the tuned base model. After: with the named effects. An effect's part is how "
-         "much the gap fell when it was added, in the order found, on trials that the fit did not "
-         "see. The floor is what repeating a trial in reality varies by; the log score is "
-         "counted from it.</figcaption></figure>" +
-         parts_table(splits);
+         "much the gap fell when it was added, in the order found, on " +
+         term("held-out", "trials that the fit did not see") +
+         "; one that made it worse lengthens the bar after. The " + term("floor", "floor") +
+         " is what repeating a trial in reality varies by; the log score is counted from it, in " +
+         term("nat", "nats a trial") + ".</figcaption></figure>" + parts_table(splits);
 }
 
 }  // namespace gapfarm

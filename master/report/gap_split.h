@@ -14,8 +14,8 @@ struct GapPart {
   enum class Kind { kFloor, kUnexplained, kEffect };
   Kind kind = Kind::kFloor;
   std::string label;
-  // In the split's unit.  Negative when adding the effect made held-out trials worse, or when the
-  // final model does better than the floor: within noise, and drawn as nothing.
+  // In the split's unit.  Negative when adding the effect made held-out trials worse, which
+  // lengthens the bar after, or when the final model does better than the floor: drawn as nothing.
   double amount = 0;
 };
 

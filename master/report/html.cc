@@ -6,15 +6,25 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdlib>
 
 namespace gapfarm {
 namespace {
 
 constexpr const char* kDash = "–";
 constexpr const char* kMinus = "−";
+constexpr const char* kRaised[] = {"⁰", "¹", "²", "³", "⁴", "⁵", "⁶", "⁷", "⁸", "⁹"};
 
 double clamped_percent(double share) {
   return std::isfinite(share) ? 100 * std::clamp(share, 0.0, 1.0) : 0;
+}
+
+// "4.1 × 10⁻⁶".
+std::string scientific_text(double size, int digits) {
+  const int power = static_cast<int>(std::floor(std::log10(size)));
+  std::string raised = power < 0 ? "⁻" : "";
+  for (const char digit : std::to_string(std::abs(power))) raised += kRaised[digit - '0'];
+  return fmt::format("{:.{}g} × 10{}", size / std::pow(10, power), digits, raised);
 }
 
 }  // namespace
@@ -69,13 +79,22 @@ std::string script_safe(std::string json) {
 
 std::string number_text(double value, int digits) {
   if (!std::isfinite(value)) return kDash;
-  const double size = std::abs(value);
-  std::string text;
+  double size = std::abs(value);
+  if (size < 1000) size = std::strtod(fmt::format("{:.{}e}", size, digits - 1).c_str(), nullptr);
+  std::string text = "0";
   if (size >= 1000 && size < 1e15) {
     text = fmt::format("{:.0f}", size);
     for (std::size_t at = text.size(); at > 3;) text.insert(at -= 3, ",");
-  } else {
-    text = fmt::format("{:.{}g}", size, digits);
+  } else if (size != 0 && (size < 1e-4 || size >= 1e15)) {
+    text = scientific_text(size, digits);
+  } else if (size != 0) {
+    // Never with an exponent: 130, not 1.3e+02.
+    const int power = static_cast<int>(std::floor(std::log10(size)));
+    text = fmt::format("{:.{}f}", size, std::max(0, digits - 1 - power));
+    if (text.find('.') != std::string::npos) {
+      text.erase(text.find_last_not_of('0') + 1);
+      if (text.back() == '.') text.pop_back();
+    }
   }
   return (value < 0 && text != "0" ? kMinus : "") + text;
 }

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "master/report/glossary.h"
 #include "master/report/html.h"
 
 namespace gapfarm {
@@ -46,15 +47,16 @@ std::string names(const std::vector<std::string>& list, const char* separator = 
   return out;
 }
 
-std::string tile(const char* title, const GapFigures& figures, bool changed, const char* unit) {
+std::string tile(const std::string& title, const GapFigures& figures, bool changed,
+                 const std::string& unit) {
   const std::string from =
       changed ? fmt::format(R"(<span class="from">{}</span> <span aria-label="to">→</span> )",
                             number_text(figures.tuned))
               : "";
   return fmt::format(
-      R"(<div class="tile"><dt>{}</dt><dd>{}<strong>{}</strong> {}<small>floor {}</small></dd></div>)",
+      R"(<div class="tile"><dt>{}</dt><dd>{}<strong>{}</strong> {}<small>{} {}</small></dd></div>)",
       title, from, number_text(changed ? figures.final_ : figures.tuned), unit,
-      number_text(figures.floor));
+      term("floor", "floor"), number_text(figures.floor));
 }
 
 std::string cell(const char* label, const std::string& html, const char* css_class = "") {
@@ -69,7 +71,13 @@ std::string meter(double share, const char* css_class, const std::string& number
          "</span></span>";
 }
 
-std::string heads(std::initializer_list<std::pair<const char*, bool>> columns) {
+// A dependence that makes nothing worse, less scatter than was allowed, say, has no bar.
+std::string share_text(double share) {
+  if (std::isfinite(share) && share < 0.005) return "under 1 %";
+  return meter(share, "fill", percent_text(share));
+}
+
+std::string heads(std::initializer_list<std::pair<std::string, bool>> columns) {
   std::string html = "<thead><tr>";
   for (const auto& [title, is_number] : columns) {
     html +=
@@ -90,10 +98,26 @@ std::string estimates(const NamedEffect& effect) {
         R"(<tr><th scope="row"><code>{}</code></th><td class="number">{}</td><td class="number">{} to {}</td></tr>)",
         html_escaped(e.key), with_unit(e.value, e.unit), number_text(e.lo), number_text(e.hi));
   }
+  if (!effect.axis.empty()) {
+    rows += fmt::format(
+        R"(<tr><th scope="row"><code>axis</code></th><td class="number">{}</td><td></td></tr>)",
+        html_escaped(effect.axis));
+  }
   if (rows.empty()) return "";
   return R"(<table class="plain"><thead><tr><th scope="col">parameter</th><th scope="col" class="number">estimate</th>)"
          R"(<th scope="col" class="number">90 % interval</th></tr></thead><tbody>)" +
          rows + "</tbody></table>";
+}
+
+// "66 → 58.6 mm", or a dash where it was not measured.
+std::string step_text(std::optional<double> before, std::optional<double> after, const char* unit) {
+  if (!before || !after) return "–";
+  return fmt::format("{} → {} {}{}", number_text(*before), number_text(*after), unit,
+                     *after > *before ? R"( <small class="worse">▲ worse</small>)" : "");
+}
+
+std::string confidence_text(double confidence) {
+  return confidence > 0.99 ? "over 99 %" : percent_text(confidence);
 }
 
 std::string effect_card(const NamedEffect& effect, std::size_t number) {
@@ -102,14 +126,19 @@ std::string effect_card(const NamedEffect& effect, std::size_t number) {
       html_escaped(effect.name));
   if (!effect.text.empty()) html += "<p>" + html_escaped(effect.text) + "</p>";
   html += fmt::format(
-      R"(<div class="closed"><span class="closed-value"><strong>{}</strong> of the explainable gap closed)"
+      R"(<div class="closed"><span class="closed-value">{} <strong>{}</strong> of the gap)"
       R"(<small>90 % interval {} to {}</small></span>{}<span class="scale" aria-hidden="true"><span>0 %</span><span>50 %</span><span>100 %</span></span></div>)",
-      percent_text(effect.closed), percent_text(effect.closed_lo), percent_text(effect.closed_hi),
+      term("closed", "closes"), percent_text(effect.closed), percent_text(effect.closed_lo),
+      percent_text(effect.closed_hi),
       interval_svg(effect.closed, effect.closed_lo, effect.closed_hi));
   html += fmt::format(
-      R"(<dl class="facts"><div><dt>held-out gap</dt><dd>{} → {} nats/trial</dd></div><div><dt>confidence</dt><dd>{}</dd></div>)",
-      number_text(effect.gap_before), number_text(effect.gap_after),
-      percent_text(effect.confidence));
+      R"(<dl class="facts"><div><dt>gap, {}</dt><dd>{} → {} {}</dd></div><div><dt>{}</dt><dd>{}</dd></div>)"
+      R"(<div><dt>position, rms</dt><dd>{}</dd></div><div><dt>heading, rms</dt><dd>{}</dd></div>)",
+      term("held-out", "held out"), number_text(effect.gap_before), number_text(effect.gap_after),
+      term("nat", "nats/trial"), term("confidence", "confidence"),
+      confidence_text(effect.confidence),
+      step_text(effect.position_mm_before, effect.position_mm_after, "mm"),
+      step_text(effect.heading_mrad_before, effect.heading_mrad_after, "mrad"));
   if (!effect.aliases.empty()) {
     html +=
         R"(<div class="wide"><dt>or, just as well on these data</dt><dd>)" + names(effect.aliases);
@@ -164,14 +193,27 @@ std::string screened_row(const Diagnosis& diagnosis, const Screened& s, double l
 std::string summary_section(const Diagnosis& diagnosis) {
   const VerdictWords words = verdict_words(diagnosis.verdict);
   std::string html = fmt::format(
-      R"(<section id="summary"><p class="verdict {}"><span aria-hidden="true">{}</span> {}</p><h1>{}</h1>)",
+      R"(<section id="summary"><p class="verdict {}"><span aria-hidden="true">{}</span> {}</p><h1 data-file="diagnosis">{}</h1>)",
       words.css_class, words.sign, words.title,
       html_escaped(diagnosis.headline.empty() ? words.meaning : diagnosis.headline));
+  if (!diagnosis.action.empty()) {
+    html += R"(<p class="action"><span aria-hidden="true">→</span> )" +
+            html_escaped(diagnosis.action) + "</p>";
+  }
   const bool changed = !diagnosis.effects.empty();
   if (diagnosis.verdict == Verdict::kUnusable) return html + "</section>";
-  html += R"(<dl class="tiles">)" + tile("Gap, held out", diagnosis.gap, changed, "nats/trial") +
-          tile("Position, rms", diagnosis.position_mm, changed, "mm") +
-          tile("Heading, rms", diagnosis.heading_mrad, changed, "mrad") + "</dl>";
+  html += R"(<dl class="tiles">)" +
+          tile(term("gap", "Gap") + ", " + term("held-out", "held out"), diagnosis.gap, changed,
+               term("nat", "nats/trial")) +
+          tile("Position, " + term("rms", "rms"), diagnosis.position_mm, changed, "mm") +
+          tile("Heading, " + term("rms", "rms"), diagnosis.heading_mrad, changed, "mrad") + "</dl>";
+  if (!diagnosis.findings.empty()) {
+    html += R"(<ul class="long">)";
+    for (const std::string& sentence : diagnosis.findings) {
+      html += "<li>" + html_escaped(sentence) + "</li>";
+    }
+    html += "</ul>";
+  }
   if (!diagnosis.cautions.empty()) {
     html += fmt::format(
         R"(<p class="caution-link">▲ <a href="#cautions">{} caution{}</a> to read before relying on this.</p>)",
@@ -190,7 +232,7 @@ std::string sanity_section(const Diagnosis& diagnosis) {
   return html + "</ul></section>\n";
 }
 
-std::string where_table(const std::vector<Where>& findings, const char* caption) {
+std::string where_table(const std::vector<Where>& findings, const char* caption, const char* file) {
   std::string rows;
   for (const Where& w : findings) {
     const char* unit = w.component == "theta" ? "mrad" : "mm";
@@ -203,18 +245,19 @@ std::string where_table(const std::vector<Where>& findings, const char* caption)
         cell("command", html_escaped(w.command)) +
         cell("part", html_escaped(w.component + " " + w.kind)) + cell("depends on", covariate) +
         cell("size", number_text(w.size, 2) + " " + unit, "number") +
-        cell("share", meter(w.share, "fill", percent_text(w.share)), "number with-bar") +
-        cell("p", p_text(w.p), "number") + "</tr>";
+        cell("share", share_text(w.share), "number with-bar") + cell("p", p_text(w.p), "number") +
+        "</tr>";
   }
-  return fmt::format(R"(<table class="cards findings"><caption class="unseen">{}</caption>)",
-                     caption) +
+  return fmt::format(
+             R"(<table class="cards findings" data-file="{}"><caption class="unseen">{}</caption>)",
+             file, caption) +
          heads({{"finding", false},
                 {"command", false},
-                {"part", false},
+                {term("trend", "part"), false},
                 {"depends on", false},
                 {"size", true},
-                {"share of the gap", true},
-                {"p, corrected", true}}) +
+                {term("share", "share of the gap"), true},
+                {term("p", "p, corrected"), true}}) +
          "<tbody>" + rows + "</tbody></table>";
 }
 
@@ -235,11 +278,11 @@ std::string screening_section(const Diagnosis& diagnosis) {
   return R"(<section id="screening"><h2>Which effect: the whole catalogue</h2><p>What each effect could add to the )"
          R"(tuned model once everything that retuning absorbs is taken out. The p-value is against that effect's own luck )"
          R"(on data with nothing to find. Effects that look alike leave parallel traces in these data.</p>)"
-         R"(<table class="cards screening"><caption class="unseen">Screening of the catalogue</caption>)" +
+         R"(<table class="cards screening" data-file="catalogue"><caption class="unseen">Screening of the catalogue</caption>)" +
          heads({{"effect", false},
-                {"gain, nats in all", true},
+                {term("gain", "gain, nats in all"), true},
                 {"p", true},
-                {"held out, nats a trial", true},
+                {term("held-out", "held out") + ", " + term("nat", "nats a trial"), true},
                 {"best strength", false},
                 {"remarks", false}}) +
          "<tbody>" + rows + "</tbody></table></section>";

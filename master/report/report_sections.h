@@ -14,8 +14,8 @@ std::string summary_section(const Diagnosis& diagnosis);
 // What the sanity stage found; empty where nothing.
 std::string sanity_section(const Diagnosis& diagnosis);
 
-// Dependences of residuals, with buttons that show them in the plots.
-std::string where_table(const std::vector<Where>& findings, const char* caption);
+// Dependences of residuals, with buttons that show them in the plots; `file`: of its CSV.
+std::string where_table(const std::vector<Where>& findings, const char* caption, const char* file);
 
 std::string screening_section(const Diagnosis& diagnosis);
 std::string shrinkage_section(const Diagnosis& diagnosis);

@@ -104,6 +104,12 @@ struct Incident {
 };
 const char* incident_name(IncidentKind kind);  // "quarantine", "alarm"
 
+// A text that was kept for later.
+struct StoredDocument {
+  std::uint64_t generation = 0;
+  std::string json;
+};
+
 // The live part: what a running master last said about itself.
 struct Progress {
   RunState state = RunState::kRunning;

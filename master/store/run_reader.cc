@@ -11,6 +11,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr std::int64_t kSchemaWithIncidents = 2;
+constexpr std::int64_t kSchemaWithDocuments = 3;
 
 // What was written by hand or damaged reads as empty: status is no place to die over it.
 Json parse(const std::string& text) { return Json::parse(text, nullptr, false); }
@@ -151,6 +152,19 @@ Result<std::vector<Incident>> RunReader::incidents() const {
                          static_cast<std::uint64_t>(select->integer(0)), select->real(2),
                          select->text(3)});
   }
+}
+
+Result<std::optional<StoredDocument>> RunReader::document(const std::string& name) const {
+  if (schema_ < kSchemaWithDocuments) return std::optional<StoredDocument>();
+  Result<SqlStatement> select =
+      database_.prepare("SELECT generation, content FROM documents WHERE name = ?", "read " + name);
+  if (!select) return select.error();
+  select->bind_text(1, name);
+  const Result<bool> row = select->step();
+  if (!row) return row.error();
+  if (!*row) return std::optional<StoredDocument>();
+  return std::optional<StoredDocument>(
+      {static_cast<std::uint64_t>(select->integer(0)), select->text(1)});
 }
 
 Result<Progress> RunReader::progress() const {

@@ -30,6 +30,8 @@ class RunReader {
   Result<std::optional<StoredIndividual>> best() const;
   // In the order in which they happened.
   Result<std::vector<Incident>> incidents() const;
+  // What RunStore::keep_document() kept under `name`; none when there is no such text.
+  Result<std::optional<StoredDocument>> document(const std::string& name) const;
   // As the master last wrote it.  What it says of a master that crashed is stale: run_status().
   Result<Progress> progress() const;
 

@@ -347,6 +347,16 @@ Result<std::optional<Checkpoint>> RunStore::checkpoint(
   return std::optional<Checkpoint>(std::move(checkpoint));
 }
 
+Status RunStore::keep_document(const std::string& name, const std::string& json) {
+  Result<SqlStatement> insert =
+      database_.prepare("INSERT OR REPLACE INTO documents VALUES (?, ?, ?)", "keep " + name);
+  if (!insert) return insert.error();
+  insert->bind_text(1, name);
+  insert->bind(2, static_cast<std::int64_t>(last_generation_.value_or(0)));
+  insert->bind_text(3, json);
+  return insert->run();
+}
+
 Result<fs::path> RunStore::truncate_after(std::uint64_t generation) {
   const Result<std::optional<Checkpoint>> kept = checkpoint(generation);
   if (!kept) return kept.error();
@@ -365,10 +375,11 @@ Result<fs::path> RunStore::truncate_after(std::uint64_t generation) {
   // The individuals go with their generations.
   Result<SqlTransaction> transaction = SqlTransaction::begin(database_);
   if (!transaction) return transaction.error();
-  if (Status s =
-          database_.exec("DELETE FROM generations WHERE generation > " +
-                             std::to_string(generation) + "; " + forget_quarantines(generation + 1),
-                         "forget the generations after " + std::to_string(generation));
+  if (Status s = database_.exec(
+          "DELETE FROM generations WHERE generation > " + std::to_string(generation) +
+              "; DELETE FROM documents WHERE generation > " + std::to_string(generation) + "; " +
+              forget_quarantines(generation + 1),
+          "forget the generations after " + std::to_string(generation));
       !s) {
     return s.error();
   }

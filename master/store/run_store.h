@@ -54,6 +54,9 @@ class RunStore {
   // committed are forgotten when the run is opened again: it is evaluated again.
   Status add_incident(IncidentKind kind, const std::string& text);
 
+  // Keeps a JSON text under `name`, of the last generation, in place of what was there.
+  Status keep_document(const std::string& name, const std::string& json);
+
   // Tasks given up in all committed generations, by this master or those before it.
   Result<std::uint64_t> quarantined() const;
 

@@ -78,6 +78,13 @@ CREATE TABLE incidents (       -- what somebody should look at, as it happened
   text TEXT NOT NULL
 ) STRICT;
 )sql",
+    R"sql(
+CREATE TABLE documents (       -- what was worked out once, so that a report needs no simulation
+  name TEXT PRIMARY KEY,       -- "outcome": the log as the best predicts it (docs/run_store.md)
+  generation INTEGER NOT NULL, -- it is of
+  content TEXT NOT NULL        -- JSON
+) STRICT;
+)sql",
 };
 static_assert(std::size(kUpgrades) + 1 == kRunStoreSchema);
 

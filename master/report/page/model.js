@@ -3,6 +3,8 @@
 // in mrad unless a name says otherwise.
 
 const readJson = (id) => JSON.parse(document.getElementById(id).textContent);
+const wrapped = (angle) => angle - 2 * Math.PI * Math.round(angle / (2 * Math.PI));
+const degrees = (angle) => (angle * 180) / Math.PI;
 
 // Rows of the trials table as objects with the columns' names.
 function readTrials() {
@@ -13,7 +15,10 @@ function readTrials() {
   return trials;
 }
 
+// What the page is of, "diagnosis" or "run", and how it calls the two models of each trial.
+const PAGE = readJson("page");
 const MODELS = ["tuned", "final"];
+const MODEL_NAME = PAGE.models;
 const AXES = ["x", "y", "theta"];
 const UNIT = { x: "mm", y: "mm", theta: "mrad" };
 const COMPONENT = { x: "along x", y: "along y", theta: "heading" };
@@ -22,7 +27,7 @@ const COMPONENT = { x: "along x", y: "along y", theta: "heading" };
 const COVARIATES = [
   { key: "time", label: "time in the session, min", matches: /time/, of: (t) => t.session_time_s / 60 },
   { key: "heading", label: "start heading, degrees", matches: /head/,
-    of: (t) => (t.start_theta * 180) / Math.PI },
+    of: (t) => degrees(t.start_theta) },
   { key: "place", label: "place in the run", matches: /place in|run/, of: (t) => t.place_in_run },
   { key: "level", label: "level, duty", matches: /level|duty/, of: (t) => t.level },
   { key: "duration", label: "duration, s", matches: /duration/, of: (t) => t.duration_s },
@@ -34,7 +39,7 @@ const COVARIATES = [
 ];
 
 // What a diagnosis of something else than driven commands brings of its own.
-const PICTURES = readJson("diagnosis").pictures;
+const PICTURES = PAGE.pictures;
 if (PICTURES) {
   COMPONENT.x = PICTURES.x;
   COMPONENT.y = PICTURES.y;
@@ -48,7 +53,6 @@ const covariateOf = (words) => {
   return lower ? COVARIATES.find((c) => c.matches.test(lower)) : undefined;
 };
 
-const isNumber = (v) => typeof v === "number" && Number.isFinite(v);
 const mean = (list) => list.reduce((sum, v) => sum + v, 0) / list.length;
 
 function quantile(sorted, share) {
@@ -66,13 +70,6 @@ function groupBy(list, key) {
     groups.get(k).push(item);
   }
   return groups;
-}
-
-// Short numbers for people: three significant digits, a real minus sign.
-function words(value, digits = 3) {
-  if (!isNumber(value)) return "–";
-  const text = Number(Math.abs(value).toPrecision(digits)).toString();
-  return (value < 0 && text !== "0" ? "−" : "") + text;
 }
 
 // The 2 x 2 block of a covariance for two of "x", "y", "theta", as [aa, ab, bb].
@@ -128,3 +125,11 @@ function turned([xx, xy, yy], angle) {
     s * s * xx + 2 * c * s * xy + c * c * yy,
   ];
 }
+
+// The pose B of A's frame, in the frame that A's pose is told in.
+function composed(a, b) {
+  const [c, s] = [Math.cos(a.theta), Math.sin(a.theta)];
+  return { x: a.x + c * b.x - s * b.y, y: a.y + s * b.x + c * b.y, theta: wrapped(a.theta + b.theta) };
+}
+
+const poseOf = (trial, name) => ({ x: trial[`${name}_x`], y: trial[`${name}_y`], theta: trial[`${name}_theta`] });

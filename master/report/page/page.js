@@ -29,7 +29,7 @@ function checks(parent, title, keys, changed) {
   const inputs = keys.map((key) => {
     const input = Object.assign(document.createElement("input"), { type: "checkbox", value: key, checked: true });
     input.addEventListener("change", changed);
-    return labelled(set, input, key);
+    return labelled(set, input, MODEL_NAME[key] || key);
   });
   return () => inputs.filter((input) => input.checked).map((input) => input.value);
 }
@@ -69,13 +69,20 @@ function startTheme() {
 }
 
 startTheme();
+startTerms();
+startTables();
+startCopies();
+startProgress();
 const pageTrials = readTrials();
 if (pageTrials.length) {
+  startDrives(pageTrials);
+  startFloor(pageTrials);
   startPoses(pageTrials);
-  startResiduals(pageTrials, readJson("diagnosis").where);
+  startResiduals(pageTrials, PAGE.where || []);
 } else {
-  for (const id of ["pose-plots", "residual-plots"]) {
-    document.getElementById(id).textContent = "This diagnosis was kept without its trials.";
+  for (const id of ["floor-plot", "drive-plots", "pose-plots", "residual-plots"]) {
+    const place = document.getElementById(id);
+    if (place) place.textContent = PAGE.without_trials;
   }
 }
-document.documentElement.dataset.ready = window.uPlot ? "uplot" : "svg";
+document.documentElement.dataset.ready = "true";

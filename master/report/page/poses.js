@@ -19,18 +19,9 @@ function describeTrial(trial) {
   const error = (model) => `${r(model, "x")}, ${r(model, "y")} mm, ${r(model, "theta")} mrad`;
   return (
     `${trial.session}, trial ${trial.trial}, ${commandName(trial.command)}` +
-    `${PICTURES ? "" : ` ${words(trial.duration_s)} s at ${words(trial.level)}`}${trial.held_out ? ", held out" : ""}: off by ${error("tuned")} (tuned), ` +
-    `${error("final")} (final)`
+    `${PICTURES ? "" : ` ${words(trial.duration_s)} s at ${words(trial.level)}`}${trial.held_out ? ", held out" : ""}: off by ${error("tuned")} (${MODEL_NAME.tuned}), ` +
+    `${error("final")} (${MODEL_NAME.final})`
   );
-}
-
-// Limits around points along one axis, with a margin.
-function limits(points, k) {
-  const values = points.map((p) => p[k]).filter(isNumber);
-  const min = Math.min(...values);
-  const max = Math.max(...values);
-  const margin = 0.06 * (max - min) || 1;
-  return values.length ? { min: min - margin, max: max + margin } : { min: -1, max: 1 };
 }
 
 // A push is a condition of its own: there is no choosing among them.
@@ -51,7 +42,48 @@ function drivenSpec(trials, shown) {
     const points = trials.map((t) => [...place(t, "measured"), t]);
     layers.unshift({ kind: "points", shape: "cross", style: "measured", points, faint: true });
   }
-  return { layers, labels: ["x, mm", "y, mm"], equal: true };
+  return { layers, labels: ["ahead of the start, mm", "left of the start, mm"], equal: true };
+}
+
+// In turns on the spot x and y show nothing: the heading is what was driven.
+function turnsOnTheSpot(trials) {
+  if (PICTURES || !trials.length) return false;
+  const middle = (of) => quantile(trials.map(of).sort((a, b) => a - b), 0.5);
+  const way = middle((t) => Math.hypot(t.measured_x, t.measured_y));
+  return way < 0.05 * middle((t) => Math.abs(t.measured_theta));
+}
+
+const circularMean = (angles) =>
+  Math.atan2(mean(angles.map(Math.sin)), mean(angles.map(Math.cos)));
+
+// A row a condition: headings about their own mean, with each model's mean and 90 % interval.
+function headingSpec(trials, shown) {
+  const rows = [...groupBy(trials, conditionOf).entries()]
+    .map(([condition, group]) => ({ condition, group, middle: circularMean(group.map((t) => t.measured_theta)) }))
+    .sort((a, b) => Math.abs(a.middle) - Math.abs(b.middle));
+  const layers = [];
+  const bars = { tuned: [], final: [] };
+  const crosses = [];
+  rows.forEach(({ group, middle }, row) => {
+    const off = (angle) => 1000 * wrapped(angle - middle);
+    group.forEach((t, i) => crosses.push([off(t.measured_theta), row + 0.16 * Math.sin(7 * i), t]));
+    for (const model of MODELS) {
+      const means = group.map((t) => off(t[`${model}_theta`]));
+      const at = mean(means);
+      const spread = mean(means.map((m) => (m - at) ** 2)) + 1e6 * mean(group.map((t) => t[`${model}_cov_tt`]));
+      const half = 1.645 * Math.sqrt(spread);
+      const y = row + (model === "tuned" ? 0.3 : -0.3);
+      bars[model].push([at - half, y], [at + half, y], [NaN, NaN], [at, y - 0.12], [at, y + 0.12], [NaN, NaN]);
+    }
+  });
+  if (shown.has("measured")) layers.push({ kind: "points", shape: "cross", style: "measured", points: crosses, faint: true });
+  for (const model of MODELS.filter((m) => shown.has(m))) {
+    layers.push({ kind: "line", style: model, points: bars[model], width: 2.5, dashed: model === "tuned" });
+  }
+  const label = ({ group, middle }) =>
+    `${words(group[0].duration_s)} s · ${words(degrees(middle), 2)}°`;
+  return { layers, labels: ["heading about the mean of its row, mrad", ""],
+           rows: rows.map((r, i) => [i, label(r)]) };
 }
 
 function errorSpec(trials, shown, [a, b]) {
@@ -69,7 +101,7 @@ function errorSpec(trials, shown, [a, b]) {
   layers.push(...ellipses);
   for (const { style, points } of ellipses) {
     const end = points.reduce((top, p) => (style === "tuned" ? p[1] > top[1] : p[1] < top[1]) ? p : top);
-    layers.push({ kind: "text", style, points: [end], text: style, anchor: "middle", below: style === "final" });
+    layers.push({ kind: "text", style, points: [end], text: MODEL_NAME[style], anchor: "middle", below: style === "final" });
   }
   return { layers, labels: [a, b].map((k) => `${COMPONENT[k]}, ${UNIT[k]}`), equal: b !== "theta" };
 }
@@ -79,8 +111,8 @@ function coverage(trials, [a, b]) {
   const share = (model) =>
     mean(trials.map((t) =>
       inside(t[`${model}_residual_${a}`], t[`${model}_residual_${b}`], block(t, model, a, b)) ? 100 : 0));
-  return `${trials.length} trials; inside their 90 % ellipse: tuned ${words(share("tuned"), 2)} %, ` +
-    `final ${words(share("final"), 2)} %`;
+  return `${trials.length} trials; inside their 90 % ellipse: ${MODEL_NAME.tuned} ${words(share("tuned"), 2)} %, ` +
+    `${MODEL_NAME.final} ${words(share("final"), 2)} %.`;
 }
 
 function startPoses(trials) {
@@ -94,19 +126,29 @@ function startPoses(trials) {
   const condition = PICTURES ? () => "all"
     : choice(controls, "Condition", ["all", ...conditions].map((c) => [c, c]), draw);
 
+  // The frame holds the bulk of the trials and all of the models' ellipses.
+  function frame(spec, k) {
+    if (spec.rows && k) return { min: -0.7, max: spec.rows.length - 0.3, label: "", room: 88, ticks: spec.rows };
+    const of = (kinds) => spec.layers.filter((l) => kinds.includes(l.kind)).flatMap((l) => l.points.map((p) => p[k]));
+    return { ...robustLimits(of(["points"]), of(["line"])), label: spec.labels[k] };
+  }
+
+  function specOf(some, visible, axes) {
+    if (axes) return errorSpec(some, visible, axes);
+    return turnsOnTheSpot(some) ? headingSpec(some, visible) : drivenSpec(some, visible);
+  }
+
   function draw() {
     const { axes } = POSE_VIEWS.find((v) => v.key === view());
     const visible = new Set(shown());
     commands.forEach(([command, all], i) => {
       const some = condition() === "all" ? all : all.filter((t) => conditionOf(t) === condition());
-      const spec = axes ? errorSpec(some, visible, axes) : drivenSpec(some, visible);
-      const points = spec.layers.flatMap((l) => l.points);
+      const spec = specOf(some, visible, axes);
       panels[i].show(
-        { layers: spec.layers, equal: spec.equal, describe: describeTrial,
-          x: { ...limits(points, 0), label: spec.labels[0] },
-          y: { ...limits(points, 1), label: spec.labels[1] } },
+        { layers: spec.layers, equal: spec.equal, describe: describeTrial, picked: showDrive,
+          x: frame(spec, 0), y: frame(spec, 1) },
         commandName(command),
-        some.length ? coverage(some, axes || ["x", "y"]) : "no trials of this condition",
+        some.length ? coverage(some, axes || (spec.rows ? ["y", "theta"] : ["x", "y"])) : "No trials of this condition.",
       );
     });
   }

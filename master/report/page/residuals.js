@@ -31,37 +31,27 @@ function nameLayers(layers) {
   const ends = layers.filter((l) => l.bins.length).map((l) => ({ model: l.model, end: l.bins.at(-1) }));
   ends.sort((a, b) => b.end.y - a.end.y);
   return ends.map(({ model, end }, i) => ({
-    kind: "text", style: model, text: model, anchor: "end", below: i > 0,
+    kind: "text", style: model, text: MODEL_NAME[model], anchor: "end", below: i > 0,
     points: [[end.x, end.y + (i > 0 ? -end.half : end.half)]],
   }));
 }
 
-// Limits that a few wild trials do not stretch: the middle 98 % and every mean.
-function residualLimits(layers) {
-  const values = layers.flatMap((l) => l.marks.points.map((p) => p[1])).filter(isNumber).sort((a, b) => a - b);
-  if (!values.length) return [-1, 1];
-  const means = layers.flatMap((l) => l.bins.flatMap((b) => [b.y - b.half, b.y + b.half]));
-  const min = Math.min(quantile(values, 0.01), 0, ...means);
-  const max = Math.max(quantile(values, 0.99), 0, ...means);
-  const margin = 0.1 * (max - min) || 1;
-  return [min - margin, max + margin];
-}
-
 function showResidual(chart, trials, models, covariate, component) {
   const layers = models.map((model) => residualLayers(trials, model, covariate, component));
-  const [low, high] = residualLimits(layers);
+  // Every mean is within the frame; a few wild trials need not be.
+  const y = robustLimits(layers.flatMap((l) => l.marks.points.map((p) => p[1])),
+    [0, ...layers.flatMap((l) => l.bins.flatMap((b) => [b.y - b.half, b.y + b.half]))]);
   const xs = trials.map(covariate.of).filter(isNumber);
   const [from, to] = xs.length ? [Math.min(...xs), Math.max(...xs)] : [0, 1];
   const margin = 0.04 * (to - from) || 0.5;
-  const outside = layers.flatMap((l) => l.marks.points).filter((p) => p[1] < low || p[1] > high).length;
   const zero = { kind: "line", style: "quiet", points: [[from - margin, 0], [to + margin, 0]], width: 1 };
   chart.show(
     { x: { min: from - margin, max: to + margin, label: covariate.label },
-      y: { min: low, max: high, label: `${COMPONENT[component]}, ${UNIT[component]}` },
+      y: { ...y, label: `${COMPONENT[component]}, ${UNIT[component]}` },
       layers: [zero, ...layers.map((l) => l.marks), ...layers.flatMap((l) => l.over), ...nameLayers(layers)],
-      describe: describeTrial },
+      describe: describeTrial, picked: showDrive },
     `${COMPONENT[component]}, ${UNIT[component]}`,
-    outside ? `${outside} point${outside > 1 ? "s" : ""} beyond the frame.` : "",
+    "",
   );
 }
 
@@ -74,7 +64,7 @@ function startResiduals(trials, findings) {
   const offered = usable.length ? usable : COVARIATES.slice(0, 1);
   const commands = commandsOf(trials);
   const against = choice(controls, "Against",
-    offered.map((c) => [c.key, c.label + (telling.has(c.key) ? " ◆ telling" : "")]), draw);
+    offered.map((c) => [c.key, c.label + (telling.has(c.key) ? " ◆ a finding" : "")]), draw);
   const command = choice(controls, "Command", [["all", "all"], ...commands.map((c) => [c, commandName(c)])], draw);
   const shown = checks(controls, "Show", MODELS, draw);
 
@@ -97,10 +87,7 @@ function startResiduals(trials, findings) {
     button.hidden = false;
     button.addEventListener("click", () => {
       aim(covariate, button.dataset.command);
-      const title = document.getElementById("residual-title");
-      title.tabIndex = -1;
-      title.focus({ preventScroll: true });
-      title.scrollIntoView({ behavior: matchMedia("(prefers-reduced-motion: reduce)").matches ? "auto" : "smooth" });
+      goTo("residual-title");
     });
   }
   const first = findings.find((w) => offered.includes(covariateOf(w.covariate)));

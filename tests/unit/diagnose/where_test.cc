@@ -10,6 +10,7 @@
 #include "common/effects/catalogue.h"
 #include "common/random/stream.h"
 #include "master/diagnose/findings.h"
+#include "master/diagnose/headline.h"
 #include "master/diagnose/trend_test.h"
 
 namespace gapfarm {
@@ -251,18 +252,57 @@ TEST(Findings, TellEffectsInPlainUnits) {
   }
 }
 
-TEST(Findings, HeadlinesNameWhatIsThereAndWhatIsNot) {
+TEST(Findings, TellAtLengthWhatTheHeadlineIsOf) {
+  const auto text = [](const Diagnosis& d) { return listed(findings(d)); };
   Diagnosis d;
-  EXPECT_NE(headline(d).find("Nothing is missing"), std::string::npos);
+  EXPECT_NE(text(d).find("as well as its own noise allows"), std::string::npos);
   d.verdict = Verdict::kUnknown;
   d.where = {{"all", "x", "bias", "", 1, 1, 0, "All motions end 1 mm too far ahead on average."}};
-  EXPECT_NE(headline(d).find("All motions end 1 mm"), std::string::npos);
-  d.effects = {sag()};
-  d.verdict = Verdict::kEffect;
-  EXPECT_EQ(headline(d), effect_sentence(sag()));
+  EXPECT_NE(text(d).find("All motions end 1 mm"), std::string::npos);
+  d.effects = {sag(), sag()};
   d.verdict = Verdict::kEffectAndUnknown;
   d.gap = {1, 0.25, 0};
-  EXPECT_NE(headline(d).find("75 %"), std::string::npos) << headline(d);
+  EXPECT_NE(text(d).find("75 %"), std::string::npos) << text(d);
+}
+
+// One line and one action, whatever was found.
+TEST(Findings, AHeadlineIsALineAndAnAction) {
+  Diagnosis d;
+  EXPECT_EQ(headline(d), "Nothing is missing that these data could show.");
+  EXPECT_NE(action(d).find("tuned.toml"), std::string::npos);
+  d.verdict = Verdict::kUnknown;
+  d.where = {{"forward", "x", "trend", "time", 1, 1, 0, "..."}};
+  EXPECT_NE(action(d).find("forward depend on time"), std::string::npos) << action(d);
+  for (const Effect& effect : srv1_effects()) {
+    NamedEffect e;
+    e.name = effect.name;
+    for (const EffectParameter& p : effect.parameters) {
+      if (p.choices.empty()) e.parameters.push_back({p.key, -0.1, -0.2, -0.05, p.unit});
+      if (!p.choices.empty()) e.axis = p.choices[1];
+    }
+    d.effects = {e, e, e};
+    d.verdict = Verdict::kEffectAndUnknown;
+    for (const std::string& line : {headline(d), action(d)}) {
+      EXPECT_LT(line.size(), 140u) << line;
+      EXPECT_EQ(line.find('@'), std::string::npos) << line;
+      EXPECT_EQ(line.find('\n'), std::string::npos) << line;
+    }
+  }
+}
+
+// Of which axis a place is.
+TEST(Findings, ASeamIsToldWithItsAxis) {
+  NamedEffect seam;
+  seam.name = "camera_seam";
+  seam.parameters = {{"offset_x", -0.22, -0.3, -0.2, "m"},
+                     {"offset_y", 0, -0.1, 0.1, "m"},
+                     {"position", 1.335, 1.23, 1.45, "m"}};
+  seam.axis = "y";
+  EXPECT_NE(effect_sentence(seam).find("y = 1.33"), std::string::npos) << effect_sentence(seam);
+  Diagnosis d;
+  d.verdict = Verdict::kEffect;
+  d.effects = {seam};
+  EXPECT_EQ(headline(d), "Two cameras disagree at y = 1.33 m.") << headline(d);
 }
 
 TEST(Findings, SayWhatThinDataCannotShow) {

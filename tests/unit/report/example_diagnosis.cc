@@ -175,6 +175,57 @@ std::vector<Screened> example_screening() {
           {"pose_quantisation", 0, 1, "", {}, {}, {}, ""}};
 }
 
+std::vector<ParameterRow> example_parameters() {
+  return {
+      {"contact_length", "m", "", "front to rear contact", 0.051, 0.02, 0.02, 0.023, 0.02, 0.14, "",
+       ""},
+      {"full_speed", "m/s", "", "of a tread at full duty", 0.271, 0.283, 0.281, 0.285, 0.05, 0.8,
+       "", ""},
+      {"friction",
+       "-",
+       "",
+       "between treads and floor",
+       0.5,
+       0.5,
+       {},
+       {},
+       0.05,
+       2,
+       "",
+       "the data hardly move it: it stays near the config's value"},
+      {"battery_sag.rate",
+       "1/min",
+       "battery_sag",
+       "share of the speed lost a minute",
+       {},
+       0.0061,
+       0.0056,
+       0.0067,
+       -0.05,
+       0.05,
+       "",
+       ""},
+      {"floor_tilt.angle", "rad", "floor_tilt", "slope", {}, 0.021, 0.017, 0.026, 0, 0.3, "", ""},
+      {"floor_tilt.direction",
+       "rad",
+       "floor_tilt",
+       "downhill, world frame",
+       {},
+       0.71,
+       0.6,
+       0.83,
+       -3.14159,
+       3.14159,
+       "",
+       ""}};
+}
+
+std::vector<PathSample> straight(double reach_m) {
+  std::vector<PathSample> path;
+  for (int i = 0; i <= 10; ++i) path.push_back({0.1 * i, {reach_m * i / 10, 0, 0}});
+  return path;
+}
+
 }  // namespace
 
 Diagnosis example_diagnosis() {
@@ -207,6 +258,12 @@ Diagnosis example_diagnosis() {
   d.cautions = {"End poses only: motor_lag and pose_latency cannot be seen without paths.csv.",
                 "Three sessions: the interval over sessions is wide."};
   d.trials = example_trials(true);
+  d.action = "Charge before a session, or paste the parameters below into your config.";
+  d.findings = {d.effects[0].text, d.effects[1].text};
+  d.parameters = example_parameters();
+  d.correlations = {{"full_speed", "battery_sag.rate", 0.93}};
+  d.drives = {{7, "worst of all", {}, straight(0.3), straight(0.28)},
+              {20, "median of all", straight(0.29), straight(0.3), straight(0.28)}};
   add_inputs(d);
   return d;
 }

@@ -6,9 +6,12 @@
 #include <limits>
 #include <regex>
 
+#include "common/config/config.h"
 #include "master/report/assets.h"
 #include "master/report/gap_split.h"
 #include "master/report/html.h"
+#include "master/report/parameters_section.h"
+#include "master/report/run_report.h"
 #include "tests/unit/report/example_diagnosis.h"
 
 namespace gapfarm {
@@ -45,6 +48,30 @@ TEST(GapSplit, UnmeasuredStepsShareOnePart) {
   EXPECT_EQ(split_gap(d, GapUnit::kMilliradians).parts.size(), 4u);
 }
 
+// What is drawn after an effect that did harm is longer than what was there before: in proportion.
+TEST(GapSplit, WhatGetsWorseIsDrawnLonger) {
+  Diagnosis d = example_diagnosis();
+  d.heading_mrad = {59.7, 83.7, 11.0};
+  d.effects[0].heading_mrad_after = 50.0;
+  d.effects[1].heading_mrad_after = 83.7;
+  const std::string html = gap_split_html(d);
+  const auto from = html.find("Heading");
+  const auto drawn = [&](const char* name) {
+    const auto row = html.find(std::string(">") + name + "</span>", from);
+    const std::string bar = html.substr(row, html.find("split-value", row) - row);
+    double width = 0;
+    const std::regex stretch("<svg x=\"[0-9.]+%\" width=\"([0-9.]+)%\"");
+    for (std::sregex_iterator it(bar.begin(), bar.end(), stretch), end; it != end; ++it) {
+      width += std::stod((*it)[1]);
+    }
+    return width;
+  };
+  EXPECT_NEAR(drawn("after"), 100, 0.1);
+  EXPECT_NEAR(drawn("before"), 100 * 59.7 / 83.7, 0.1);
+  EXPECT_THAT(html, HasSubstr("part-worse"));
+  EXPECT_THAT(html, HasSubstr("▲ worse"));
+}
+
 TEST(GapSplit, NothingNamedLeavesAllUnexplained) {
   const GapSplit split = split_gap(null_diagnosis(), GapUnit::kNats);
   ASSERT_EQ(split.parts.size(), 2u);
@@ -56,6 +83,12 @@ TEST(Html, NumbersReadWell) {
   EXPECT_EQ(number_text(-3.25, 2), "−3.2");
   EXPECT_EQ(number_text(1234567), "1,234,567");
   EXPECT_EQ(number_text(-0.0), "0");
+  EXPECT_EQ(number_text(134.2, 2), "130");  // not 1.3e+02
+  EXPECT_EQ(number_text(319.6, 2), "320");
+  EXPECT_EQ(number_text(0.5), "0.5");
+  EXPECT_EQ(number_text(999.96), "1,000");
+  EXPECT_EQ(number_text(0.00041), "0.00041");
+  EXPECT_EQ(number_text(4.12e-6), "4.12 × 10⁻⁶");
   EXPECT_EQ(number_text(std::nan("")), "–");
   EXPECT_EQ(percent_text(0.884), "88 %");
   EXPECT_EQ(percent_text(std::numeric_limits<double>::infinity()), "–");
@@ -71,8 +104,9 @@ TEST(Html, HashesLikeTheStandard) {
 TEST(ReportHtml, SectionsComeInTheirOrder) {
   const std::string html = report_html(example_diagnosis());
   std::size_t last = 0;
-  for (const char* id : {"summary", "gap", "poses", "residuals", "screening", "shrinkage",
-                         "unexplained", "next", "cautions", "provenance"}) {
+  for (const char* id :
+       {"summary", "gap", "parameters", "floor", "drives", "poses", "residuals", "screening",
+        "shrinkage", "unexplained", "next", "cautions", "provenance", "words"}) {
     const auto at = html.find("<section id=\"" + std::string(id) + "\"");
     ASSERT_NE(at, std::string::npos) << id;
     EXPECT_GT(at, last) << id;
@@ -107,10 +141,93 @@ TEST(ReportHtml, PolicyCoversWhatIsThere) {
   EXPECT_THAT(html, Not(HasSubstr(" onclick=")));
 }
 
+TEST(ReportHtml, ParametersHaveIntervalsBoundsAndWhatMakesUpForWhat) {
+  const std::string html = report_html(example_diagnosis());
+  EXPECT_THAT(html, HasSubstr("<code>full_speed</code>"));
+  EXPECT_THAT(html, HasSubstr("0.281 to 0.285"));
+  EXPECT_THAT(html, HasSubstr("▲ at its lower bound, 0.02 m"));
+  EXPECT_THAT(html, HasSubstr("<code>full_speed</code> and <code>battery_sag.rate</code>: 0.93"));
+  EXPECT_THAT(html, HasSubstr("[effects.battery_sag]\nrate = 0.0061"));
+}
+
+TEST(Parameters, AZeroThatEndsASizeIsNoBound) {
+  ParameterRow row{"drive_noise_side", "-", "", "", {}, 0, {}, {}, 0, 0.3, "", ""};
+  EXPECT_EQ(bound_hit(row), BoundHit::kNone);
+  row.after = 0.29999;
+  EXPECT_EQ(bound_hit(row), BoundHit::kUpper);
+  row.lower = -0.3, row.after = -0.3;
+  EXPECT_EQ(bound_hit(row), BoundHit::kLower);
+  row.key = "floor_tilt.direction";
+  EXPECT_EQ(bound_hit(row), BoundHit::kNone);
+}
+
+// What the page offers to paste is a config.
+TEST(Parameters, TheSnippetIsReadAsAConfig) {
+  std::vector<ParameterRow> rows = example_diagnosis().parameters;
+  rows.push_back({"camera_seam.axis", "-", "camera_seam", "", {}, 1, {}, {}, 0, 1, "y", ""});
+  rows.push_back(
+      {"camera_seam.position", "m", "camera_seam", "", {}, 1.3351234, 1.2, 1.4, -10, 10, "", ""});
+  const auto config = parse_config(config_snippet(rows), "snippet.toml");
+  ASSERT_TRUE(config.ok()) << config.error().message << config_snippet(rows);
+  const Problem& problem = config->problem;
+  for (const ParameterRow& row : rows) {
+    const double value = problem.values[problem.table().row(row.key)];
+    EXPECT_NEAR(value, row.after, 1e-5 * std::abs(row.after)) << row.key;
+  }
+}
+
+// Every word that is a link has its explanation on the page, and the headline is one line.
+TEST(ReportHtml, TermsAreExplained) {
+  for (const std::string& html :
+       {report_html(example_diagnosis()), report_html(null_diagnosis()), run_html(RunReport{})}) {
+    const std::regex link("href=\"#(term-[a-z-]+)\"");
+    for (std::sregex_iterator it(html.begin(), html.end(), link), end; it != end; ++it) {
+      EXPECT_THAT(html, HasSubstr("<div id=\"" + std::string((*it)[1]) + "\"><dt>"));
+    }
+  }
+}
+
+TEST(ReportHtml, AnUnusableLogIsToldWithoutEmptyPlots) {
+  Diagnosis d;
+  d.verdict = Verdict::kUnusable;
+  d.headline = "Not usable as it is: left and right are exchanged.";
+  d.sanity = {{"axes_swapped", "Forward drives go sideways.", "Exchange x and y."}};
+  const std::string html = report_html(d);
+  EXPECT_THAT(html, HasSubstr("Exchange x and y."));
+  EXPECT_THAT(html, Not(HasSubstr("id=\"floor\"")));
+  EXPECT_THAT(html, Not(HasSubstr("id=\"gap\"")));
+}
+
+TEST(RunHtml, KeepsWhatItWasGiven) {
+  RunOutcome outcome;
+  outcome.trials = null_diagnosis().trials;
+  outcome.trials[3].tuned_residual.setConstant(std::nan(""));
+  outcome.validation = {{"the best", 9.5, {}, {}}, {"after stage 1", {}, {}, {}}};
+  outcome.baselines = {{"constant motion", 6.695, 20, 30}};
+  const auto back = parse_run_outcome(to_json(outcome));
+  ASSERT_TRUE(back.ok()) << back.error().message;
+  EXPECT_EQ(to_json(*back), to_json(outcome));
+  RunReport report;
+  report.outcome = *back;
+  report.headline = "</h1><script>";
+  report.parameters = example_diagnosis().parameters;
+  const std::string html = run_html(report);
+  EXPECT_THAT(html, Not(HasSubstr("</h1><script>")));
+  EXPECT_THAT(html, HasSubstr("constant motion"));
+  EXPECT_THAT(html, HasSubstr("▲ at its lower bound"));
+  EXPECT_FALSE(parse_run_outcome("{}").ok());
+}
+
 TEST(ReportHtml, NamesCannotInject) {
   const std::string attack = "\"'><script>alert(1)</script><!--";
   Diagnosis d = example_diagnosis();
-  d.headline = attack;
+  d.headline = d.action = attack;
+  d.findings = {attack};
+  d.parameters[0].key = d.parameters[0].summary = d.parameters[0].note = attack;
+  d.parameters[3].effect = d.parameters[0].unit = d.parameters[0].choice = attack;
+  d.correlations = {{attack, attack, 1}};
+  d.effects[0].axis = attack;
+  d.drives[0].why = attack;
   d.effects[0].name = d.effects[0].text = d.effects[0].alias_reason = attack;
   d.effects[0].aliases = {attack};
   d.effects[0].parameters[0] = {attack, 1, 0, 2, attack};

@@ -1,0 +1,196 @@
+#include "master/cli/run_page.h"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <Eigen/Core>
+#include <cmath>
+#include <limits>
+
+#include "common/score/motion_model.h"
+#include "common/score/statistics.h"
+#include "common/trials/context.h"
+#include "master/report/html.h"
+#include "master/report/prediction_table.h"
+#include "master/store/run_reader.h"
+
+namespace gapfarm {
+namespace {
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+struct Foretold {
+  Pose X_SE{kNaN, kNaN, kNaN};
+  Eigen::Matrix3d cov = Eigen::Matrix3d::Constant(kNaN);
+  Eigen::Vector3d residual = Eigen::Vector3d::Constant(kNaN);
+  double score = kNaN;
+};
+
+Foretold foretold(const PredictionOfLog* prediction, std::size_t trial, const Trial& logged) {
+  if (prediction == nullptr) return {};
+  const v1::Predicted& p = prediction->prediction.predictions(static_cast<int>(trial));
+  const Pose X_WP = from_proto(p.end());
+  return {between(logged.X_WS, X_WP), local_covariance(p), local_difference(X_WP, logged.X_WE),
+          p.log_score()};
+}
+
+ParameterRow row_of(const Problem& problem, const Gene& gene, double before, double after,
+                    std::vector<double> last) {
+  const Parameter& p = problem.table()[gene.row];
+  ParameterRow row{p.key, p.unit, p.effect,   p.summary,  before, after,
+                   {},    {},     gene.lower, gene.upper, "",     ""};
+  if (!p.choices.empty()) row.choice = p.choices[static_cast<std::size_t>(after)];
+  if (p.choices.empty() && last.size() >= 4) {
+    row.lo = quantile(last, 0.05);
+    row.hi = quantile(last, 0.95);
+  }
+  return row;
+}
+
+std::vector<ParameterRow> parameter_rows(const Problem& problem,
+                                         const std::vector<StoredIndividual>& last,
+                                         const StoredIndividual& best) {
+  const ParameterValues after = problem.values_of(best.genome);
+  std::vector<ParameterRow> rows;
+  for (const Gene& gene : problem.genes) {
+    std::vector<double> values;
+    for (const StoredIndividual& individual : last) {
+      if (individual.genome.size() != problem.genes.size()) continue;
+      values.push_back(problem.values_of(individual.genome)[gene.row]);
+    }
+    rows.push_back(
+        row_of(problem, gene, problem.values[gene.row], after[gene.row], std::move(values)));
+  }
+  return rows;
+}
+
+std::string action(const RunReport& report, const RunInfo& info) {
+  for (const ParameterRow& row : report.parameters) {
+    if (bound_hit(row) == BoundHit::kNone) continue;
+    return "Widen the range of " + row.key + " in [genes]: the best value lies at its end.";
+  }
+  if (!report.outcome) return "gapfarm resume " + report.name + " goes on.";
+  if (report.outcome->validation.empty()) {
+    return "Judge it on trials that it has not seen: gapfarm predict RUN --trials OTHER.csv";
+  }
+  return "Ask what is missing: gapfarm diagnose " + info.config_path + " --out DIAGNOSIS";
+}
+
+std::string headline(const RunReport& report) {
+  if (report.generations.empty()) return "No generation was completed yet.";
+  const RunGeneration& last = report.generations.back();
+  const std::string best = last.best ? number_text(*last.best, 6) : "none that ended well";
+  return fmt::format("Best {} {}{} after {} generations", report.fitness, best,
+                     report.unit == "-" || !last.best ? "" : " " + report.unit, last.generation);
+}
+
+Result<std::optional<RunOutcome>> stored_outcome(const RunReader& reader, std::uint64_t last,
+                                                 RunReport* report) {
+  const auto document = reader.document(kOutcomeDocument);
+  if (!document) return document.error();
+  if (!*document) {
+    report->without_outcome =
+        "How the best moves is worked out when a run ends, and this one has not; gapfarm resume "
+        "goes on.";
+    return std::optional<RunOutcome>();
+  }
+  if ((*document)->generation != last) {
+    report->without_outcome = fmt::format(
+        "How the best moves was last worked out for generation {}; gapfarm resume goes on and does "
+        "it again at the end.",
+        (*document)->generation);
+    return std::optional<RunOutcome>();
+  }
+  auto outcome = parse_run_outcome((*document)->json);
+  if (!outcome) return outcome.error();
+  return std::optional<RunOutcome>(std::move(*outcome));
+}
+
+}  // namespace
+
+RunOutcome run_outcome(const Problem& problem, const PredictionOfLog* before,
+                       const PredictionOfLog* after, const std::vector<Validated>& validated) {
+  std::vector<DrivenCommand> driven;
+  for (const Trial& trial : problem.log.trials) {
+    const CommandSpec c = resolved_command(trial, problem.commands);
+    driven.push_back({c.left, c.right, c.duration_s});
+  }
+  const std::vector<TrialContext> contexts = trial_contexts(problem.log, driven);
+  RunOutcome outcome;
+  for (std::size_t i = 0; i < problem.log.trials.size(); ++i) {
+    const Trial& logged = problem.log.trials[i];
+    DiagnosedTrial trial;
+    trial.session = logged.session;
+    trial.trial = logged.trial;
+    trial.command = logged.command;
+    trial.session_time_s = contexts[i].session_time_s;
+    trial.place_in_run = contexts[i].place_in_run;
+    trial.duration_s = driven[i].duration_s;
+    trial.level = std::max(std::abs(driven[i].left), std::abs(driven[i].right));
+    trial.X_WS = logged.X_WS;
+    trial.measured = between(logged.X_WS, logged.X_WE);
+    const Foretold first = foretold(before, i, logged), last = foretold(after, i, logged);
+    trial.tuned = first.X_SE, trial.final_ = last.X_SE;
+    trial.tuned_cov = first.cov, trial.final_cov = last.cov;
+    trial.tuned_residual = first.residual, trial.final_residual = last.residual;
+    trial.tuned_score = first.score, trial.final_score = last.score;
+    outcome.trials.push_back(std::move(trial));
+  }
+  for (const Validated& row : validated) {
+    outcome.validation.push_back({row.name, row.fitness, {}, {}});
+  }
+  return outcome;
+}
+
+Result<RunReport> read_run_report(const std::filesystem::path& run) {
+  const auto reader = RunReader::open(run);
+  if (!reader) return reader.error();
+  const RunInfo& info = reader->info();
+  v1::Problem message;
+  if (!message.ParseFromString(info.problem)) {
+    return Error{run.string() + ": the stored problem cannot be read; the run store is damaged"};
+  }
+  const Result<Problem> problem = from_proto(message);
+  if (!problem) return problem.error();
+  const auto generations = reader->generations();
+  if (!generations) return generations.error();
+  RunReport report;
+  report.name = run.string();
+  report.fitness = info.fitness;
+  report.unit = info.fitness_unit;
+  report.higher_is_better = info.higher_is_better;
+  report.pieces = !problem->pieces.empty();
+  double wall_s = 0;
+  for (const StoredGeneration& g : *generations) {
+    wall_s += g.wall_s;
+    report.generations.push_back({g.generation, g.best, g.median, g.worst, g.evaluations, wall_s});
+  }
+  const std::uint64_t last = generations->empty() ? 0 : generations->back().generation;
+  const auto best = reader->best();
+  if (!best) return best.error();
+  if (*best) {
+    const auto individuals = reader->individuals(last);
+    if (!individuals) return individuals.error();
+    report.parameters = parameter_rows(*problem, *individuals, **best);
+  }
+  auto outcome = stored_outcome(*reader, last, &report);
+  if (!outcome) return outcome.error();
+  report.outcome = std::move(*outcome);
+  report.headline = headline(report);
+  report.action = action(report, info);
+  report.provenance = {
+      {"config", info.config_path},   {"trials", std::to_string(problem->log.trials.size())},
+      {"problem", info.problem_hash}, {"seed", std::to_string(info.seed)},
+      {"begun", info.created},        {"program", info.program_version + ", " + info.fingerprint}};
+  if (!generations->empty()) {
+    const StoredGeneration& g = generations->back();
+    report.provenance.emplace_back("digest", g.digest);
+    report.provenance.emplace_back("evaluations", std::to_string(g.evaluations));
+    report.provenance.emplace_back(
+        "best genome", *best ? fmt::format("{}; gapfarm replay {} --genome {}", (*best)->birth_id,
+                                           run.string(), (*best)->birth_id)
+                             : "none");
+  }
+  return report;
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,27 @@
+// A run's page, from its store alone.
+#pragma once
+
+#include <filesystem>
+#include <vector>
+
+#include "common/base/result.h"
+#include "common/problem/problem.h"
+#include "master/cli/validation.h"
+#include "master/report/pose_panels.h"
+#include "master/report/run_report.h"
+
+namespace gapfarm {
+
+// The log as the config's values and the best predict it, for RunStore::keep_document().  Where one
+// of the two did not end well its poses are not numbers.
+RunOutcome run_outcome(const Problem& problem, const PredictionOfLog* before,
+                       const PredictionOfLog* after, const std::vector<Validated>& validated);
+
+// The document's name in the store.
+inline constexpr const char* kOutcomeDocument = "outcome";
+
+// Whatever the store of a run holds, running, stopped or finished.  Errors: RunReader::open()'s, a
+// problem that cannot be read.
+Result<RunReport> read_run_report(const std::filesystem::path& run);
+
+}  // namespace gapfarm

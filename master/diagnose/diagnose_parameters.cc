@@ -1,0 +1,205 @@
+// Parameters and single drives, as the report shows them.
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "master/diagnose/diagnose_steps.h"
+#include "master/diagnose/intervals.h"
+#include "master/experiment/plan.h"
+
+namespace gapfarm {
+namespace {
+
+constexpr double kHardlyMoved = 0.8;  // of the prior's spread: the data add next to nothing
+constexpr double kPathInterval_s = 0.05;
+constexpr std::size_t kMostSamples = 40;  // of a path that is shown
+
+// Prior of a fitted base parameter, in its own unit.
+double prior_sd(const Study& study, std::size_t k) {
+  const BaseParameter& p = study.base_parameters[k];
+  return p.prior_log_sd * std::abs(study.base.at(p.row));
+}
+
+// Covariance of the fit's parameters, for noise of unit variance.
+Eigen::MatrixXd covariance_of(const Study& study, const JointFit& fit) {
+  Eigen::MatrixXd normal = fit.jacobian.transpose() * fit.jacobian;
+  for (std::size_t k = 0; k < fit.base_parameters; ++k) {
+    const double sd = prior_sd(study, k);
+    const auto i = static_cast<Eigen::Index>(k);
+    if (sd > 0) normal(i, i) += 1 / (sd * sd);
+  }
+  return normal.fullPivLu().isInvertible() ? normal.inverse() : Eigen::MatrixXd();
+}
+
+std::vector<ParameterCorrelation> strong_correlations(const ParameterTable& table,
+                                                      const JointFit& fit,
+                                                      const Eigen::MatrixXd& cov) {
+  std::vector<ParameterCorrelation> strong;
+  for (Eigen::Index i = 0; i < cov.rows(); ++i) {
+    for (Eigen::Index j = i + 1; j < cov.cols(); ++j) {
+      const double r = cov(i, j) / std::sqrt(cov(i, i) * cov(j, j));
+      if (!(std::abs(r) >= kStrongCorrelation)) continue;
+      const auto key = [&](Eigen::Index k) {
+        return table[fit.parameters[static_cast<std::size_t>(k)].row].key;
+      };
+      strong.push_back({key(i), key(j), std::clamp(r, -1.0, 1.0)});
+    }
+  }
+  std::stable_sort(strong.begin(), strong.end(),
+                   [](const auto& a, const auto& b) { return std::abs(a.r) > std::abs(b.r); });
+  return strong;
+}
+
+ParameterRow row_of(const Parameter& p, double before, double after) {
+  ParameterRow row{p.key, p.unit, p.effect, p.summary, {}, after, {}, {}, p.lower, p.upper, "", ""};
+  if (p.effect.empty()) row.before = before;
+  if (!p.choices.empty()) row.choice = p.choices[static_cast<std::size_t>(after)];
+  return row;
+}
+
+// Places are told in the world, not in the log's own frame.
+void to_world(double frame, ParameterRow* row) {
+  for (double* value : {&row->after, &row->lower, &row->upper}) *value += frame;
+  if (row->lo && row->hi) *row->lo += frame, *row->hi += frame;
+}
+
+// Every k-th sample and the last one; to a micrometre, so that the file stays small.
+std::vector<PathSample> shown_path(const std::vector<PathSample>& path, const Pose& X_WS) {
+  std::vector<PathSample> shown;
+  const std::size_t every = 1 + path.size() / kMostSamples;
+  const auto rounded = [](double v) { return std::round(v * 1e6) / 1e6; };
+  for (std::size_t i = 0; i < path.size(); ++i) {
+    if (i % every != 0 && i + 1 != path.size()) continue;
+    const Pose X = between(X_WS, path[i].pose);
+    shown.push_back({rounded(path[i].t_s), {rounded(X.x), rounded(X.y), rounded(X.theta)}});
+  }
+  return shown;
+}
+
+// The worst and the median trial of all and of every command, by the tuned model's log score.
+std::vector<ShownDrive> drives_to_show(const std::vector<DiagnosedTrial>& trials) {
+  std::vector<std::string> commands;
+  for (const DiagnosedTrial& t : trials) {
+    if (std::find(commands.begin(), commands.end(), t.command) == commands.end()) {
+      commands.push_back(t.command);
+    }
+  }
+  std::vector<ShownDrive> drives;
+  std::set<std::size_t> taken;
+  const auto add = [&](const std::string& command) {
+    std::vector<std::size_t> order;
+    for (std::size_t i = 0; i < trials.size(); ++i) {
+      const bool fits = command == "all" || trials[i].command == command;
+      if (fits && std::isfinite(trials[i].tuned_score)) order.push_back(i);
+    }
+    if (order.empty()) return;
+    std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+      return trials[a].tuned_score < trials[b].tuned_score;
+    });
+    for (const auto& [what, i] :
+         {std::pair{"worst", order.front()}, std::pair{"median", order[order.size() / 2]}}) {
+      if (taken.insert(i).second) drives.push_back({i, what + (" of " + command), {}, {}, {}});
+    }
+  };
+  add("all");
+  if (commands.size() > 1) std::for_each(commands.begin(), commands.end(), add);
+  return drives;
+}
+
+}  // namespace
+
+void DiagnosisRun::fill_parameters() {
+  const ParameterTable& table = problem_.table();
+  const JointFit& fit = nested_.back();
+  const Study& study = nested_studies_.back();
+  std::set<std::size_t> told;
+  for (const NoiseRow& noise : {subject_.drive_common, subject_.drive_side, subject_.pose_position,
+                                subject_.pose_heading}) {
+    told.insert(noise.row);
+  }
+  for (std::size_t k = 0; k < fit.base_parameters; ++k) told.insert(fit.parameters[k].row);
+  for (const NamedEffect& effect : result_.diagnosis.effects) {
+    for (std::size_t row = 0; row < table.size(); ++row) {
+      if (table[row].effect == effect.name) told.insert(row);
+    }
+  }
+  Diagnosis& d = result_.diagnosis;
+  for (const std::size_t at : told) {
+    ParameterRow row = row_of(table[at], result_.tuned[at], result_.final_[at]);
+    const auto& [lo, hi] = result_.intervals[at];
+    if (lo < hi) row.lo = lo, row.hi = hi;
+    to_world(frame_of(row.key, nested_.back().at), &row);
+    d.parameters.push_back(std::move(row));
+  }
+  // Of the base, which only this fit knows the spread of.
+  for (std::size_t k = 0; k < fit.base_parameters; ++k) {
+    const FittedParameter& p = fit.parameters[k];
+    const auto row = std::find_if(d.parameters.begin(), d.parameters.end(),
+                                  [&](const ParameterRow& r) { return r.key == table[p.row].key; });
+    const double half = kNormal90 * p.standard_error * std::sqrt(scale_);
+    if (half > 0) {
+      row->lo = std::max(row->after - half, row->lower);
+      row->hi = std::min(row->after + half, row->upper);
+    }
+    if (p.standard_error > kHardlyMoved * prior_sd(study, k)) {
+      row->note = "the data hardly move it: it stays near the config's value";
+    }
+  }
+  const Eigen::MatrixXd cov = covariance_of(study, fit);
+  if (cov.size() > 0) d.correlations = strong_correlations(table, fit, cov);
+}
+
+// The values without anything random, as differences from the problem's.
+std::vector<v1::Override> DiagnosisRun::without_chance(ParameterValues values) const {
+  const ParameterTable& table = problem_.table();
+  for (const NoiseRow& noise : {subject_.drive_common, subject_.drive_side, subject_.pose_position,
+                                subject_.pose_heading}) {
+    values[noise.row] = table[noise.row].lower;
+  }
+  for (const char* key : {"slip_events.probability", "pose_latency.share"}) {
+    if (const auto row = table.find(key)) values[*row] = 0;
+  }
+  std::vector<v1::Override> overrides;
+  for (std::size_t row = 0; row < values.size(); ++row) {
+    if (values[row] == problem_.values[row]) continue;
+    v1::Override& to = overrides.emplace_back();
+    to.set_parameter(static_cast<std::uint32_t>(row));
+    to.set_value(values[row]);
+  }
+  return overrides;
+}
+
+// Some drives once more from where they began, by both models.  One that does not end well is left
+// out: the picture can do without.
+Status DiagnosisRun::show_drives() {
+  Diagnosis& d = result_.diagnosis;
+  if (!subject_.words.ends.empty()) return {};  // another scenario's, whose paths say nothing
+  d.drives = drives_to_show(d.trials);
+  if (d.drives.empty()) return {};
+  std::vector<v1::Task> tasks;
+  for (const ParameterValues* values : {&result_.tuned, &result_.final_}) {
+    const std::vector<v1::Override> overrides = without_chance(*values);
+    for (const ShownDrive& drive : d.drives) {
+      v1::PlannedTrial planned;
+      *planned.mutable_trial() = to_proto(problem_.log.trials[drive.trial]);
+      planned.mutable_trial()->clear_path();
+      planned.set_moved(true);
+      tasks.push_back(simulate_tasks({{planned}}, overrides, options_.seed, kPathInterval_s)[0]);
+    }
+  }
+  const auto results = farm_.run(farm_.add_problem(to_proto(problem_)), tasks);
+  if (!results) return results.error();
+  for (std::size_t k = 0; k < results->size(); ++k) {
+    ShownDrive& drive = d.drives[k % d.drives.size()];
+    const Trial& logged = problem_.log.trials[drive.trial];
+    drive.measured = shown_path(logged.path, logged.X_WS);
+    if ((*results)[k].outcome() != v1::OK) continue;
+    const Trial simulated = from_proto((*results)[k].simulate().trials(0));
+    (k < d.drives.size() ? drive.tuned : drive.final_) = shown_path(simulated.path, simulated.X_WS);
+  }
+  return {};
+}
+
+}  // namespace gapfarm

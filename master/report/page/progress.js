@@ -1,0 +1,53 @@
+"use strict";
+// A run: its fitness as it went on.
+
+const AGAINST = [
+  { key: "generation", label: "generation", of: (g) => g.generation },
+  { key: "evaluations", label: "evaluations", of: (g) => g.evaluations },
+  { key: "minutes", label: "wall time, min", of: (g) => g.wall_s / 60 },
+];
+
+function startProgress() {
+  const parent = document.getElementById("progress-plot");
+  const { generations, fitness } = PAGE;
+  if (!parent || !generations?.length) return;
+  const controls = document.getElementById("progress-controls");
+  const chart = new Chart(parent, 0.45);
+  chart.figure.classList.add("large");
+  const against = choice(controls, "Against", AGAINST.map((a) => [a.key, a.label]), draw);
+  const all = generations.flatMap((g) => [g.best, g.median]).filter(isNumber);
+  const canLog = all.length && all.every((v) => v > 0);
+  const scale = canLog
+    ? radios(controls, "Scale", [{ key: "linear", label: "linear" }, { key: "log", label: "log" }], draw) : () => "linear";
+
+  function draw() {
+    const { of, label } = AGAINST.find((a) => a.key === against());
+    const known = generations.filter((g) => isNumber(g.best));
+    const line = (key) => known.map((g) => [of(g), g[key]]);
+    const marks = known.map((g) => [of(g), g.best, g]);
+    const low = (g) => (isNumber(g.worst) ? g.worst : g.best);
+    // The first generations' worst would leave no room for what matters: bests, and most medians.
+    const medians = known.map((g) => g.median).filter(isNumber).sort((a, b) => a - b);
+    const usual = medians.length ? [quantile(medians, fitness.higher_is_better ? 0.1 : 0.9)] : [];
+    const values = [...known.map((g) => g.best), ...usual];
+    const [min, max] = [Math.min(...values), Math.max(...values)];
+    const room = 0.06 * (max - min) || 0.05 * Math.abs(max) || 1;
+    const log = scale() === "log";
+    const xs = known.map(of);
+    const unit = fitness.unit && fitness.unit !== "-" ? `, ${fitness.unit}` : "";
+    chart.show(
+      { x: { min: Math.min(...xs), max: Math.max(...xs) > Math.min(...xs) ? Math.max(...xs) : Math.min(...xs) + 1, label },
+        y: { min: log ? min / 1.05 : min - room, max: log ? max * 1.05 : max + room, log, label: `${fitness.name}${unit}` },
+        layers: [
+          { kind: "band", style: "final", points: known.map((g) => [of(g), Math.min(low(g), g.best), Math.max(low(g), g.best)]), name: "best to worst" },
+          { kind: "line", style: "quiet", points: line("median"), dashed: true, name: "median" },
+          { kind: "line", style: "final", points: line("best"), width: 2.5, name: "best" },
+          { kind: "points", style: "final", shape: "dot", points: marks, faint: known.length > 200 ? 0.01 : 0.6, name: "best" },
+        ],
+        describe: (g) => `generation ${g.generation}, ${words(g.evaluations, 6)} evaluations: best ${words(g.best, 6)}, median ${words(g.median, 4)}, worst ${words(g.worst, 4)}` },
+      `${fitness.name} by ${label}`,
+      `Line: best; dashed: median; shaded: best to worst. ${fitness.higher_is_better ? "Higher" : "Lower"} is better.`,
+    );
+  }
+  draw();
+}

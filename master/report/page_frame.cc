@@ -1,0 +1,130 @@
+#include "master/report/page_frame.h"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <nlohmann/json.hpp>
+#include <span>
+#include <string_view>
+
+#include "master/report/assets.h"
+#include "master/report/html.h"
+
+namespace gapfarm {
+namespace {
+
+std::string security_policy() {
+  const auto hashes = [](std::span<const std::string_view> contents) {
+    std::string list;
+    for (const std::string_view content : contents) list += " '" + csp_hash(content) + "'";
+    return list;
+  };
+  return "default-src 'none'; base-uri 'none'; form-action 'none'; img-src data:; script-src" +
+         hashes(page_scripts()) + "; style-src" + hashes(page_styles());
+}
+
+std::string head(const PageFrame& frame) {
+  std::string html = fmt::format(
+      R"(<!DOCTYPE html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta http-equiv="Content-Security-Policy" content="{}">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<meta name="color-scheme" content="light dark">
+<meta name="generator" content="gapfarm">
+<link rel="icon" href="data:,">
+<title>{}</title>
+)",
+      security_policy(), html_escaped(frame.title));
+  for (const std::string_view style : page_styles()) {
+    html += fmt::format("<style>{}</style>\n", style);
+  }
+  return html + "</head>\n";
+}
+
+// Patterns tell the parts of the gap apart without colour.
+constexpr const char* kHatches =
+    R"html(<svg class="hatches" width="0" height="0" aria-hidden="true"><defs>
+<pattern id="hatch-1" width="8" height="8" patternUnits="userSpaceOnUse"><rect class="ground-1" width="8" height="8"/></pattern>
+<pattern id="hatch-2" width="8" height="8" patternUnits="userSpaceOnUse" patternTransform="rotate(45)"><rect class="ground-2" width="8" height="8"/><rect class="ink" width="2.5" height="8"/></pattern>
+<pattern id="hatch-3" width="7" height="7" patternUnits="userSpaceOnUse"><rect class="ground-3" width="7" height="7"/><circle class="ink" cx="3.5" cy="3.5" r="1.6"/></pattern>
+<pattern id="hatch-4" width="8" height="8" patternUnits="userSpaceOnUse"><rect class="ground-4" width="8" height="8"/><rect class="ink" width="8" height="2.2"/></pattern>
+<pattern id="hatch-5" width="8" height="8" patternUnits="userSpaceOnUse"><rect class="ground-5" width="8" height="8"/><path class="ink-line" d="M0 0 8 8M8 0 0 8"/></pattern>
+<pattern id="hatch-unexplained" width="9" height="9" patternUnits="userSpaceOnUse" patternTransform="rotate(-45)"><rect class="ground-unexplained" width="9" height="9"/><rect class="ink" width="4.5" height="9"/></pattern>
+<pattern id="hatch-worse" width="6" height="6" patternUnits="userSpaceOnUse" patternTransform="rotate(45)"><rect class="ground-worse" width="6" height="6"/><rect class="ink" width="3" height="6"/></pattern>
+<pattern id="hatch-floor" width="6" height="6" patternUnits="userSpaceOnUse"><rect class="ground-floor" width="6" height="6"/></pattern>
+</defs></svg>
+)html";
+
+std::string top(const PageFrame& frame) {
+  std::string links;
+  for (const auto& [id, words] : frame.places) {
+    links += fmt::format(R"(<a href="#{}">{}</a>)", id, words);
+  }
+  return fmt::format(R"(<a class="skip" href="#{}">Skip to the first section</a>
+<header class="top"><span class="brand">gapfarm <span>{}</span></span>
+<nav aria-label="Sections">{}</nav>
+<button type="button" id="theme" hidden>Dark</button></header>
+)",
+                     frame.places.front().first, html_escaped(frame.brand), links);
+}
+
+std::string data_block(const char* id, const nlohmann::ordered_json& json) {
+  return fmt::format(
+      "<script type=\"application/json\" id=\"{}\">{}</script>\n", id,
+      script_safe(json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace)));
+}
+
+}  // namespace
+
+const char* const kNoScript =
+    R"(<noscript><p class="quiet">The plots need scripts; the tables do not.</p></noscript>)";
+
+std::string plot_key(std::string_view items) {
+  return fmt::format(R"(<ul class="key" aria-label="Key">{}</ul>)", items);
+}
+
+std::string measured_key() {
+  return R"(<li><svg class="mark" aria-hidden="true"><path class="measured" d="M7 7l6 6M13 7l-6 6"/></svg>measured</li>)";
+}
+
+std::string model_keys(std::string_view tuned, std::string_view final_) {
+  return fmt::format(
+      R"(<li><svg class="mark" aria-hidden="true"><path class="tuned" d="M1 10h18"/><path class="tuned solid" d="M10 5.5l4.5 4.5-4.5 4.5-4.5-4.5z"/></svg>{}</li>
+<li><svg class="mark" aria-hidden="true"><path class="final" d="M1 10h18"/><circle class="final" cx="10" cy="10" r="3.5"/></svg>{}</li>)",
+      tuned, final_);
+}
+
+std::string floor_section() {
+  std::string html = R"(<section id="floor"><h2>Where on the floor</h2>
+<p>Every drive from where it began to where it ended, coloured by how far off its prediction was. Black arrows point from the measured end along the error, drawn longer than it is. What a named effect has to do with a place or a direction is drawn in. Drag to zoom, click a drive to see it below.</p>
+<div class="controls" id="floor-controls"></div><ul class="key" id="floor-legend" aria-label="Colours"></ul>
+<div id="floor-plot"></div>)";
+  html += kNoScript;
+  return html + "</section>\n";
+}
+
+std::string drives_section(std::string_view tuned, std::string_view final_) {
+  return R"(<section id="drives"><h2>One real drive over the simulated ones</h2>
+<p>The worst and the median drive, by the first model's log score.</p>)" +
+         plot_key(measured_key() + model_keys(tuned, final_)) +
+         R"(<div class="controls" id="drive-controls"></div><div class="grid two" id="drive-plots"></div>)" +
+         kNoScript + "</section>\n";
+}
+
+std::string framed_page(const PageFrame& frame, const nlohmann::ordered_json& page,
+                        const nlohmann::ordered_json& trials) {
+  std::string html =
+      head(frame) + "<body>\n" + kHatches + top(frame) + "<main>\n" + frame.body +
+      "</main>\n<footer>Made by gapfarm. This page needs no network. "
+      R"(<button type="button" id="all-trials" hidden>All trials as CSV</button></footer>)"
+      "\n";
+  html += data_block("page", page);
+  html += data_block("trials", trials);
+  for (const std::string_view script : page_scripts()) {
+    html += fmt::format("<script>{}</script>\n", script);
+  }
+  return html + "</body>\n</html>\n";
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,36 @@
+// What the program's pages have in common: policy, styles, scripts, data, navigation.
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace gapfarm {
+
+struct PageFrame {
+  std::string title;
+  std::string brand;                                        // "diagnosis", "run"
+  std::vector<std::pair<const char*, const char*>> places;  // of the navigation: id and words
+  std::string body;                                         // sections
+};
+
+// One self-contained file, UTF-8: no network, its own scripts and styles only, named by their
+// hashes in its content security policy.  `page` and `trials` are the data of its plots.
+std::string framed_page(const PageFrame& frame, const nlohmann::ordered_json& page,
+                        const nlohmann::ordered_json& trials);
+
+// A key to the marks of the plots: `items` are <li> elements.
+std::string plot_key(std::string_view items);
+std::string measured_key();
+// Of the two models, by what the page calls them.
+std::string model_keys(std::string_view tuned, std::string_view final_);
+
+// Without scripts the plots have nothing to show; everything else is text.
+extern const char* const kNoScript;
+
+// The sections that only hold plots of trials.
+std::string floor_section();
+std::string drives_section(std::string_view tuned, std::string_view final_);
+
+}  // namespace gapfarm

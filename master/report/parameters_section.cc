@@ -1,0 +1,151 @@
+#include "master/report/parameters_section.h"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "master/report/glossary.h"
+#include "master/report/html.h"
+
+namespace gapfarm {
+namespace {
+
+std::string with_unit(double value, const std::string& unit) {
+  const std::string text = number_text(value, 4);
+  return unit.empty() || unit == "-" ? text : text + " " + html_escaped(unit);
+}
+
+std::string cell(std::string_view label, const std::string& html, const char* css_class = "") {
+  // Where rows become cards, on a narrow screen, cells without content are left out.
+  const char* empty = html.empty() || html == "–" ? " empty" : "";
+  return fmt::format(R"(<td class="{}{}" data-label="{}">{}</td>)", css_class, empty, label, html);
+}
+
+// Between its bounds: where the value lies, with its interval.
+std::string bounds_svg(const ParameterRow& row) {
+  const double range = row.upper - row.lower;
+  if (!(range > 0) || !row.choice.empty()) return "";
+  const auto share = [&](double v) { return (v - row.lower) / range; };
+  return interval_svg(share(row.after), share(row.lo.value_or(row.after)),
+                      share(row.hi.value_or(row.after)));
+}
+
+std::string remarks(const ParameterRow& row) {
+  std::string html;
+  if (const BoundHit hit = bound_hit(row); hit != BoundHit::kNone) {
+    const bool low = hit == BoundHit::kLower;
+    html = fmt::format(R"(<strong class="warning">▲ at its {} bound, {}</strong>)",
+                       low ? "lower" : "upper", with_unit(low ? row.lower : row.upper, row.unit));
+  }
+  if (!row.note.empty()) html += (html.empty() ? "" : "<br>") + html_escaped(row.note);
+  return html;
+}
+
+std::string row_html(const ParameterRow& row, const ParameterColumns& columns) {
+  const std::string after =
+      row.choice.empty() ? with_unit(row.after, row.unit) : html_escaped(row.choice);
+  const std::string between =
+      row.choice.empty() ? number_text(row.lower) + " to " + number_text(row.upper) : "";
+  return fmt::format(R"(<tr><th scope="row"><code>{}</code><small>{}</small></th>)",
+                     html_escaped(row.key), html_escaped(row.summary)) +
+         cell(columns.before.words, row.before ? with_unit(*row.before, row.unit) : "–", "number") +
+         cell(columns.after.words, "<strong>" + after + "</strong>", "number") +
+         cell(columns.interval.words,
+              row.lo && row.hi ? number_text(*row.lo, 4) + " to " + number_text(*row.hi, 4) : "–",
+              "number") +
+         cell("searched between", bounds_svg(row) + "<small>" + between + "</small>", "between") +
+         cell("remarks", remarks(row)) + "</tr>";
+}
+
+std::string plain_head(const std::string& html, const char* css_class = "") {
+  return fmt::format(R"(<th scope="col" class="{}">{}</th>)", css_class, html);
+}
+
+std::string head(const TermColumn& column) {
+  return plain_head(term(column.term, column.words), "number");
+}
+
+std::string warnings(const std::vector<ParameterRow>& rows) {
+  std::string keys;
+  for (const ParameterRow& row : rows) {
+    if (bound_hit(row) == BoundHit::kNone) continue;
+    keys += (keys.empty() ? "<code>" : ", <code>") + html_escaped(row.key) + "</code>";
+  }
+  if (keys.empty()) return "";
+  return "<p class=\"caution-box\">▲ At a bound: " + keys +
+         ". The search wanted to go on: widen the range where it makes sense, and trust the rest "
+         "of "
+         "the page less until it does not.</p>";
+}
+
+std::string correlations_html(const std::vector<ParameterCorrelation>& correlations) {
+  if (correlations.empty()) return "";
+  std::string items;
+  for (const ParameterCorrelation& c : correlations) {
+    items += fmt::format("<li><code>{}</code> and <code>{}</code>: {}</li>", html_escaped(c.a),
+                         html_escaped(c.b), number_text(c.r, 2));
+  }
+  return "<h3>What makes up for what</h3><p>Strong " + term("correlation", "correlations") +
+         ": the log tells a combination of the two better than either.</p><ul "
+         "class=\"correlations\">" +
+         items + "</ul>";
+}
+
+std::string toml_value(const ParameterRow& row) {
+  if (!row.choice.empty()) return '"' + row.choice + '"';
+  return fmt::format("{:.6g}", row.after);
+}
+
+std::string toml_comment(const ParameterRow& row) {
+  std::string text = row.unit == "-" ? "" : row.unit;
+  if (row.lo && row.hi) {
+    text += (text.empty() ? "" : ", ") + fmt::format("90 % {:.4g} to {:.4g}", *row.lo, *row.hi);
+  }
+  return text.empty() ? "" : "  # " + text;
+}
+
+}  // namespace
+
+std::string config_snippet(const std::vector<ParameterRow>& rows) {
+  std::string base, effects, section;
+  for (const ParameterRow& row : rows) {
+    if (row.effect.empty()) {
+      base += row.key + " = " + toml_value(row) + toml_comment(row) + "\n";
+      continue;
+    }
+    if (row.effect != section) effects += "\n[effects." + row.effect + "]\n";
+    section = row.effect;
+    effects +=
+        row.key.substr(row.key.find('.') + 1) + " = " + toml_value(row) + toml_comment(row) + "\n";
+  }
+  const std::string text = (base.empty() ? "" : "[parameters]\n" + base) + effects;
+  return text.empty() || text[0] != '\n' ? text : text.substr(1);
+}
+
+std::string parameters_section(const std::vector<ParameterRow>& rows,
+                               const std::vector<ParameterCorrelation>& correlations,
+                               const ParameterColumns& columns) {
+  std::string html = R"(<section id="parameters"><h2>Parameters</h2>)";
+  if (rows.empty()) {
+    return html +
+           "<p>None were kept with this file: make it again with this program.</p></section>\n";
+  }
+  html += warnings(rows);
+  std::string body;
+  for (const ParameterRow& row : rows) body += row_html(row, columns);
+  html +=
+      R"(<table class="cards parameters" data-file="parameters"><caption class="unseen">Parameters</caption><thead><tr>)" +
+      plain_head("parameter") + head(columns.before) + head(columns.after) +
+      head(columns.interval) + plain_head(term("bound", "searched between")) +
+      plain_head("remarks") + "</tr></thead><tbody>" + body + "</tbody></table>";
+  html += correlations_html(correlations);
+  return html +
+         R"(<h3>For your config</h3><p>Paste it in place of the same keys; )"
+         R"(<code>gapfarm check</code> reads it. What each effect does, for other simulators, is in docs/effects.md.</p>)"
+         R"(<div class="snippet"><button type="button" class="copy" data-of="snippet" hidden>Copy</button>)"
+         R"(<pre id="snippet" tabindex="0">)" +
+         html_escaped(config_snippet(rows)) + "</pre></div></section>\n";
+}
+
+}  // namespace gapfarm

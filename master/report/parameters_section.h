@@ -1,0 +1,29 @@
+// A table of parameters before and after, and what to paste into a config.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "master/diagnose/parameter_row.h"
+
+namespace gapfarm {
+
+// How a page calls a column, and which word of the glossary (glossary.h) says what it is.
+struct TermColumn {
+  std::string_view term, words;
+};
+struct ParameterColumns {
+  TermColumn before, after, interval;
+};
+
+// The section of the page: values with units, intervals, where they lie between their bounds with a
+// warning at one, what makes up for what, and config_snippet() with a button that copies it.
+std::string parameters_section(const std::vector<ParameterRow>& rows,
+                               const std::vector<ParameterCorrelation>& correlations,
+                               const ParameterColumns& columns);
+
+// [parameters] and [effects.NAME] as a config takes them (docs/configuration.md).
+std::string config_snippet(const std::vector<ParameterRow>& rows);
+
+}  // namespace gapfarm
