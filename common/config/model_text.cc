@@ -174,9 +174,9 @@ std::string format_model(const Model& model) {
   return "# A gapfarm model: 'gapfarm predict' and 'gapfarm simulate' take it.\nmodel = 1\n"
          "scenario = " +
          toml_string(model.scenario) + "\nkind = " + toml_string(model.kind) + "\n" +
-         robot_text(model) + base_section(model, "parameters", false) + base_section(model, "noise", true) +
-         effect_sections(model) + frame_section(model) + command_sections(model) +
-         score_sections(model) + origin_sections(model);
+         robot_text(model) + base_section(model, "parameters", false) +
+         base_section(model, "noise", true) + effect_sections(model) + frame_section(model) +
+         command_sections(model) + score_sections(model) + origin_sections(model);
 }
 
 Status check_model(const Model& model) {

@@ -100,6 +100,50 @@ Json outcome_json(const RunStore& store, const EvolutionRun& run, const EvolveSu
   return json;
 }
 
+Result<std::unique_ptr<SocketFarm>> start_farm_of(RunStore& store, const EvolutionRun& run,
+                                                  CliContext& context) {
+  SocketFarmOptions base;
+  base.epoch = store.epoch();
+  base.numeric_class = store.info().numeric_class;
+  base.shuffle_seed = run.shuffle_seed;
+  report_to(run.log, base);
+  keep_incidents(store, context.console, base);
+  auto farm = start_farm(run.farm, run.config.farm, context, base);
+  if (!farm) return farm;
+  for (const std::string& endpoint : (*farm)->endpoints()) {
+    if (endpoint.rfind("ipc://", 0) != 0) {
+      context.console.note("listening for workers: gapfarm-worker --connect " + endpoint);
+    }
+  }
+  return farm;
+}
+
+// What a finished run is for: its model, held against trials kept apart and against no simulation.
+Status leave_model(RunStore& store, const EvolutionRun& run,
+                   const std::optional<TrialLog>& kept_apart, const EvolveSummary& summary,
+                   Farm& farm, CliContext& context, std::string& text, Json& json) {
+  std::vector<Validated> validated;
+  if (kept_apart) {
+    show_notes(*kept_apart, context.console);
+    auto added = add_validation(store, run, *kept_apart, farm, summary.best->genome, text, json);
+    if (!added) return added.error();
+    validated = std::move(*added);
+  }
+  const Status left = leave_behind(store, run.problem, run.config, summary, farm, validated);
+  if (!left) return left;
+  const auto beside = baseline_note_of_run(run.problem, summary.best->genome, farm);
+  if (!beside) return beside.error();
+  if (!beside->empty()) context.console.note(*beside);
+  const char* separator = "left behind: ";
+  for (const char* name : {"model.toml", "report.html", "poses.svg", "fitness.svg"}) {
+    text += separator + (store.run() / name).string();
+    json["files"].push_back((store.run() / name).string());
+    separator = ", ";
+  }
+  text += "\n";
+  return {};
+}
+
 }  // namespace
 
 void EvolutionOverrides::declare(CLI::App& app) {
@@ -173,12 +217,6 @@ int run_evolution(RunStore& store, const EvolutionRun& run, CliContext& context)
   auto optimiser = optimiser_at(*checkpoint, run, *plan);
   if (!optimiser) return failed(optimiser.error(), context);
 
-  SocketFarmOptions base;
-  base.epoch = store.epoch();
-  base.numeric_class = store.info().numeric_class;
-  base.shuffle_seed = run.shuffle_seed;
-  report_to(run.log, base);
-  keep_incidents(store, context.console, base);
   std::unique_ptr<MetricsServer> metrics;
   if (run.farm.metrics_port) {
     auto server = MetricsServer::listen(*run.farm.metrics_port);
@@ -187,13 +225,8 @@ int run_evolution(RunStore& store, const EvolutionRun& run, CliContext& context)
     context.console.note("metrics: http://127.0.0.1:" + std::to_string(metrics->port()) +
                          "/metrics");
   }
-  auto farm = start_farm(run.farm, run.config.farm, context, base);
+  auto farm = start_farm_of(store, run, context);
   if (!farm) return failed(farm.error(), context);
-  for (const std::string& endpoint : (*farm)->endpoints()) {
-    if (endpoint.rfind("ipc://", 0) != 0) {
-      context.console.note("listening for workers: gapfarm-worker --connect " + endpoint);
-    }
-  }
 
   const SteadyClock clock;
   FarmProgressWriter progress(store, **farm, run.config.evolution, *checkpoint, clock,
@@ -222,26 +255,8 @@ int run_evolution(RunStore& store, const EvolutionRun& run, CliContext& context)
     return kExitResumable;
   }
   if (summary->best && summary->best->outcome == v1::OK) {
-    std::vector<Validated> validated;
-    if (*kept_apart) {
-      show_notes(**kept_apart, context.console);
-      auto added =
-          add_validation(store, run, **kept_apart, **farm, summary->best->genome, text, json);
-      if (!added) return failed(added.error(), context);
-      validated = std::move(*added);
-    }
-    const Status left = leave_behind(store, run.problem, run.config, *summary, **farm, validated);
+    const Status left = leave_model(store, run, *kept_apart, *summary, **farm, context, text, json);
     if (!left) return failed(left.error(), context);
-    const auto beside = baseline_note_of_run(run.problem, summary->best->genome, **farm);
-    if (!beside) return failed(beside.error(), context);
-    if (!beside->empty()) context.console.note(*beside);
-    const char* separator = "left behind: ";
-    for (const char* name : {"model.toml", "report.html", "poses.svg", "fitness.svg"}) {
-      text += separator + (store.run() / name).string();
-      json["files"].push_back((store.run() / name).string());
-      separator = ", ";
-    }
-    text += "\n";
   }
   // Of earlier masters' generations too, and of what was done after the last one.
   const auto given_up = store.quarantined();
