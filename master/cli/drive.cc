@@ -282,6 +282,8 @@ int run_drive(DriveCommand& command, CliContext& context) {
     return kExitBadUsage;
   }
   const Problem problem = problem_of(*model);
+  command.settings.frame_x_m = model->frame_x_m;
+  command.settings.frame_y_m = model->frame_y_m;
   // The commands' nominal motions, then the runs; way-points are a turn and a way each.
   const std::uint64_t legs = task->targets.empty() ? 1 : 2 * task->targets.size();
   const std::uint64_t tasks = problem.commands.size() + legs * command.runs;

@@ -45,16 +45,20 @@ Result<Config> read_config_and_trials(const std::string& config_path, const Tria
   return config;
 }
 
-Result<Config> read_source(const std::string& named) {
+Result<Source> read_source(const std::string& named) {
   const std::string path = shipped_file(named);
   const Result<std::string> text = read_text_file(path);
   if (!text) return text.error();
-  if (!is_model(*text)) return parse_config(*text, path);
+  if (!is_model(*text)) {
+    auto config = parse_config(*text, path);
+    if (!config) return config.error();
+    return Source{std::move(*config)};
+  }
   const Result<Model> model = parse_model(*text, path);
   if (!model) return model.error();
-  Config config;
-  config.problem = problem_of(*model);
-  return config;
+  Source source{{}, model->frame_x_m, model->frame_y_m};
+  source.config.problem = problem_of(*model);
+  return source;
 }
 
 std::optional<Config> open_config(const std::string& config_path, const TrialOptions& trials,

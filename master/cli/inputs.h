@@ -25,7 +25,11 @@ std::vector<std::string> command_names(const std::vector<CommandSpec>& commands)
 Result<Config> read_config_and_trials(const std::string& config_path, const TrialOptions& trials);
 
 // A config, or a model as a config without trials.
-Result<Config> read_source(const std::string& path);
+struct Source {
+  Config config;
+  double frame_x_m = 0, frame_y_m = 0;  // world position that its places count from
+};
+Result<Source> read_source(const std::string& path);
 
 // The config that a command works on, with its trials and the log's notes shown.  `finish` puts in
 // what the command line changes and checks what the command needs.  Nothing when any of it went

@@ -145,23 +145,23 @@ Result<plan::DesignedPlan> design(const PlanOptions& options, const Config& conf
 }
 
 int run_plan(PlanOptions& options, CliContext& context) {
-  Result<Config> config = read_source(options.source);
-  if (config) {
-    if (Status s = apply_options(options, *config); !s) config = s.error();
+  Result<Source> source = read_source(options.source);
+  if (source) {
+    if (Status s = apply_options(options, source->config); !s) source = s.error();
   }
-  Status planned = config ? Status{} : Status(config.error());
+  Status planned = source ? Status{} : Status(source.error());
   options.outputs.reads(options.source);
   if (planned) planned = options.outputs.plan({options.out, options.picture});
   if (!planned) {
     context.console.error(planned.error());
     return kExitBadUsage;
   }
-  const auto plan = design(options, *config, context);
+  const auto plan = design(options, source->config, context);
   if (!plan) return failed(plan.error(), context);
   std::vector<std::pair<std::string, std::string>> files = {
-      {options.out, format_trials(plan->log)}};
+      {options.out, format_trials(shifted(plan->log, source->frame_x_m, source->frame_y_m))}};
   if (!options.picture.empty()) {
-    files.emplace_back(options.picture, plan::plan_picture(config->problem, *plan));
+    files.emplace_back(options.picture, plan::plan_picture(source->config.problem, *plan));
   }
   for (const auto& [path, text] : files) {
     if (Status s = options.outputs.write(path, text); !s) return failed(s.error(), context);

@@ -6,6 +6,7 @@
 #include "common/config/config.h"
 #include "common/trials/files.h"
 #include "common/trials/read.h"
+#include "common/trials/shifted.h"
 #include "common/trials/write.h"
 #include "master/cli/inputs.h"
 #include "master/cli/long_command.h"
@@ -58,8 +59,10 @@ Status apply_options(const SimulateOptions& options, Config& config) {
 
 using Plan = std::vector<std::vector<v1::PlannedTrial>>;
 
-// What is to be driven, and that its log can be written.
-Result<Plan> plan_and_outputs(SimulateOptions& options, const Config& config, CliContext& context) {
+// What is to be driven, and that its log can be written.  A plan that is drawn lies about the
+// source's own origin; one of a log is where that was recorded.
+Result<Plan> plan_and_outputs(SimulateOptions& options, const Source& source, CliContext& context) {
+  const Config& config = source.config;
   Outputs& outputs = options.outputs;
   Plan plan;
   bool tips = false;
@@ -72,7 +75,7 @@ Result<Plan> plan_and_outputs(SimulateOptions& options, const Config& config, Cl
     show_notes(*log, context.console);
     outputs.reads(*log);
     tips = log->has_tips();
-    plan = plan_of(config.problem, *log);
+    plan = plan_of(config.problem, shifted(*log, -source.frame_x_m, -source.frame_y_m));
   }
   outputs.reads(options.source);
   if (options.out == "-") {
@@ -87,8 +90,9 @@ Result<Plan> plan_and_outputs(SimulateOptions& options, const Config& config, Cl
   return plan;
 }
 
-Result<TrialLog> simulate(const SimulateOptions& options, const Config& config, const Plan& plan,
+Result<TrialLog> simulate(const SimulateOptions& options, const Source& source, const Plan& plan,
                           CliContext& context) {
+  const Config& config = source.config;
   LongCommand::begin_if_possible("simulate", options.keep.place("simulate", options.out),
                                  {{"drive sessions", 1, plan.size()}}, context);
   auto farm = start_farm(options.farm, config.farm, context);
@@ -112,21 +116,21 @@ Result<TrialLog> simulate(const SimulateOptions& options, const Config& config, 
     for (const v1::Trial& trial : result.simulate().trials())
       log.trials.push_back(from_proto(trial));
   }
-  return log;
+  return shifted(std::move(log), source.frame_x_m, source.frame_y_m);
 }
 
 int run_simulate(SimulateOptions& options, CliContext& context) {
-  Result<Config> config = read_source(options.source);
-  if (config) {
-    if (Status s = apply_options(options, *config); !s) config = s.error();
+  Result<Source> source = read_source(options.source);
+  if (source) {
+    if (Status s = apply_options(options, source->config); !s) source = s.error();
   }
   const Result<Plan> plan =
-      config ? plan_and_outputs(options, *config, context) : Result<Plan>(config.error());
+      source ? plan_and_outputs(options, *source, context) : Result<Plan>(source.error());
   if (!plan) {
     context.console.error(plan.error());
     return kExitBadUsage;
   }
-  const Result<TrialLog> log = simulate(options, *config, *plan, context);
+  const Result<TrialLog> log = simulate(options, *source, *plan, context);
   if (!log) return failed(log.error(), context);
   if (options.out == "-") {
     context.console.print(format_trials(*log));
@@ -140,11 +144,12 @@ int run_simulate(SimulateOptions& options, CliContext& context) {
     }
   }
   context.console.result(options.out + ": " + std::to_string(log->trials.size()) +
-                             " simulated trials, seed " + std::to_string(config->seed) + "\n",
+                             " simulated trials, seed " + std::to_string(source->config.seed) +
+                             "\n",
                          {{"out", options.out},
                           {"trials", log->trials.size()},
                           {"paths", log->has_paths()},
-                          {"seed", config->seed}});
+                          {"seed", source->config.seed}});
   return kExitDone;
 }
 

@@ -59,6 +59,13 @@ Status drive_leg(const Mover& mover, std::uint64_t leg, std::vector<Pose>& at,
 
 }  // namespace
 
+void move_path(double dx_m, double dy_m, std::vector<PathSample>* path) {
+  for (PathSample& sample : *path) {
+    sample.pose.x += dx_m;
+    sample.pose.y += dy_m;
+  }
+}
+
 Result<std::vector<ConstantVelocity>> nominal_velocities(Farm& farm, const Problem& problem) {
   std::vector<v1::Task> tasks;
   for (const CommandSpec& command : problem.commands) {
@@ -106,7 +113,9 @@ Result<std::vector<DrivenRun>> drive_commands(Farm& farm, const Problem& problem
     for (std::size_t c = 0; c < commands.size(); ++c) {
       v1::PlannedTrial* plan = simulate->add_plan();
       plan->set_moved(c == 0);
-      *plan->mutable_trial() = to_proto(planned(commands[c], c, t_s, X_WS));
+      *plan->mutable_trial() =
+          to_proto(planned(commands[c], c, t_s,
+                           {X_WS.x - settings.frame_x_m, X_WS.y - settings.frame_y_m, X_WS.theta}));
       t_s += commands[c].duration_s + kPause_s;
     }
     tasks.push_back(std::move(task));
@@ -122,6 +131,7 @@ Result<std::vector<DrivenRun>> drive_commands(Farm& farm, const Problem& problem
     DrivenRun run;
     for (std::size_t c = 0; c < commands.size(); ++c) {
       run.push_back({commands[c], from_proto(result.simulate().trials(static_cast<int>(c))).path});
+      move_path(settings.frame_x_m, settings.frame_y_m, &run.back().path);
     }
     driven.push_back(std::move(run));
   }

@@ -20,6 +20,9 @@ struct Leg {
 };
 using DrivenRun = std::vector<Leg>;
 
+// Moves a path along the world's axes, m.
+void move_path(double dx_m, double dy_m, std::vector<PathSample>* path);
+
 // Drives one command in every run, each from where it stands.
 class Mover {
  public:
@@ -36,6 +39,8 @@ class Mover {
 struct DriveSettings {
   std::uint64_t seed = 1;
   double interval_s = 0.05;  // between samples of a path
+  // World position that the problem's places count from (a model's [frame]), m.
+  double frame_x_m = 0, frame_y_m = 0;
 };
 
 // The simulation with its drive noise; poses are the true ones, without the camera's noise.

@@ -134,12 +134,13 @@ class SimulatedMover final : public Mover {
                      v1::Outcome_Name(result.outcome()) + " " + result.message()};
       }
       legs.push_back({starts[i].command, from_proto(result.simulate().trials(0)).path});
+      move_path(settings_.frame_x_m, settings_.frame_y_m, &legs.back().path);
     }
     return legs;
   }
 
  private:
-  static v1::Trial planned_trial(const Start& start) {
+  v1::Trial planned_trial(const Start& start) const {
     Trial trial;
     trial.session = "drive";
     trial.trial = static_cast<std::int64_t>(start.leg) + 1;
@@ -148,7 +149,9 @@ class SimulatedMover final : public Mover {
     trial.left = start.command.left;
     trial.right = start.command.right;
     trial.duration_s = start.command.duration_s;
-    trial.X_WS = trial.X_WE = start.X_WS;
+    trial.X_WS = {start.X_WS.x - settings_.frame_x_m, start.X_WS.y - settings_.frame_y_m,
+                  start.X_WS.theta};
+    trial.X_WE = trial.X_WS;
     return to_proto(trial);
   }
 

@@ -44,6 +44,31 @@ TEST_F(Drive, HeldOutPathsLieInsideTheBand) {
   EXPECT_LE(inside / 400, 0.95);
 }
 
+// A model made of a log far from the origin counts places from the log's own middle.
+TEST_F(Drive, PlacesOfTheModelCountFromItsFrame) {
+  Problem seamed = problem_;
+  seamed.values[seamed.table().row("camera_seam.offset_y")] = 0.1;
+  seamed.values[seamed.table().row("camera_seam.position")] = 0.15;
+  const std::vector<CommandSpec> commands = {problem_.command("forward")};
+  DriveSettings framed;
+  framed.frame_x_m = 100;
+  framed.frame_y_m = -50;
+  const auto expect_moved = [](const Result<std::vector<DrivenRun>>& runs,
+                               const Result<std::vector<DrivenRun>>& moved) {
+    ASSERT_TRUE(runs.ok() && moved.ok());
+    for (std::size_t r = 0; r < runs->size(); ++r) {
+      const Pose &a = (*runs)[r].back().path.back().pose, &b = (*moved)[r].back().path.back().pose;
+      EXPECT_NEAR(b.x - a.x, 100, 1e-9);
+      EXPECT_NEAR(b.y - a.y, -50, 1e-9);
+      EXPECT_NEAR(a.y, 0.1, 0.05) << "the end lies beyond the seam";
+    }
+  };
+  expect_moved(drive_commands(farm_, seamed, {}, commands, 8, {}),
+               drive_commands(farm_, seamed, {100, -50, 0}, commands, 8, framed));
+  expect_moved(drive_commands(*simulated_mover(farm_, seamed, {}), {}, commands, 8),
+               drive_commands(*simulated_mover(farm_, seamed, framed), {100, -50, 0}, commands, 8));
+}
+
 TEST_F(Drive, WaypointsAreReachedUnderACamera) {
   const auto nominal = nominal_velocities(farm_, problem_);
   ASSERT_TRUE(nominal.ok()) << nominal.error().message;
