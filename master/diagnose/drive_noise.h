@@ -8,6 +8,9 @@
 
 namespace gapfarm {
 
+// The tail among free commands: no cell's spread holds the noise there.
+inline constexpr double kFreeNoiseTail = 7;
+
 // Robust maximum likelihood over the drive's two standard deviations (and the readings' two, with
 // `fit_pose`): squared distances beyond 14 count by their logarithm, so that rare events do not
 // pass for noise (a Gaussian has one trial in 340 beyond, which narrows the result by 1 %).  Values

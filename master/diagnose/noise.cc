@@ -61,7 +61,8 @@ std::vector<Eigen::Vector3d> estimate_noise(const Regression& nuisances,
   const std::vector<Eigen::Vector3d> residuals = study->unwhiten(studentised(rich, 0.1));
   NoiseEstimate noise =
       refit_drive_noise(study->trials, residuals, study->noise, !study->reading_noise_known,
-                        study->subject->covariance, study->subject->noise_tail);
+                        study->subject->covariance,
+                        study->free_commands ? kFreeNoiseTail : study->subject->noise_tail);
   noise.drive_common = std::max(noise.drive_common, kLeastDriveNoise);
   noise.drive_side = std::max(noise.drive_side, kLeastDriveNoise);
   study->noise = noise;

@@ -66,5 +66,23 @@ TEST(RefitDriveNoise, AFewStrayTrialsHardlyWidenIt) {
   EXPECT_NEAR(fit.drive_side / kTruth.drive_side, 1, 0.2);
 }
 
+// Where every trial is put down by hand the readings' noise is unknown as well, and a fifth that
+// stray far would make it all vanish: the tail of free commands keeps it.
+TEST(RefitDriveNoise, ManyStrayTrialsDoNotMakeItVanish) {
+  for (std::uint64_t seed = 0; seed < 5; ++seed) {
+    Drawn d = draw(seed);
+    for (std::size_t i = 0; i < d.residuals.size(); i += 5) d.residuals[i] *= 20;
+    const NoiseEstimate fit =
+        refit_drive_noise(d.trials, d.residuals, kStart, true, trial_covariance, kFreeNoiseTail);
+    for (const double ratio :
+         {fit.drive_common / kTruth.drive_common, fit.drive_side / kTruth.drive_side,
+          fit.pose.position_m / kTruth.pose.position_m,
+          fit.pose.heading_rad / kTruth.pose.heading_rad}) {
+      EXPECT_GT(ratio, 0.6) << seed;
+      EXPECT_LT(ratio, 4) << seed;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace gapfarm
