@@ -200,8 +200,18 @@ void DiagnosisRun::judge_again() {
 void DiagnosisRun::set_floor(const std::vector<std::size_t>& folds) {
   if (slip_.gain > 0) foresee_slips(folds);
   if (slip_.gain > 0 && !clearly_better(slip_scores_, nested_scores_.back())) drop_slips();
-  const std::optional<double> tailed = slip_.gain == 0 ? fit_tails() : std::nullopt;
+  std::optional<double> tailed = fit_tails();
   if (tailed) score_nested(folds);
+  if (tailed && slip_.gain > 0) {
+    // Whatever else makes single drives stray has heavy tails, which tell of it better than slips.
+    if (mean(nested_scores_.back()) > mean(slip_scores_)) {
+      drop_slips();
+    } else {
+      for (Study& study : nested_studies_) study.predictive.reset();
+      score_nested(folds);
+      tailed.reset();
+    }
+  }
   // What slips scatter is no Gaussian: the best prediction is the mixture fitted to it.
   floor_ =
       slip_.gain > 0
