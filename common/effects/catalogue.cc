@@ -1,5 +1,6 @@
 #include "common/effects/catalogue.h"
 
+#include <algorithm>
 #include <numbers>
 
 namespace gapfarm {
@@ -130,11 +131,46 @@ std::vector<Effect> build_catalogue() {
   };
 }
 
+// Of which there may be two: an arena under four cameras has a seam across each axis.
+constexpr const char* kMayRepeat[] = {"camera_seam"};
+
+std::vector<Effect> with_seconds(std::vector<Effect> effects) {
+  for (const char* kind : kMayRepeat) {
+    const auto first = std::find_if(effects.begin(), effects.end(),
+                                    [&](const Effect& effect) { return effect.name == kind; });
+    Effect second = *first;
+    second.repeats = first->name;
+    second.name += "_2";
+    second.summary += "; a second one";
+    effects.push_back(std::move(second));
+  }
+  return effects;
+}
+
 }  // namespace
 
 std::span<const Effect> srv1_effects() {
   static const std::vector<Effect> catalogue = build_catalogue();
   return catalogue;
+}
+
+std::span<const Effect> srv1_effects_and_seconds() {
+  static const std::vector<Effect> catalogue = with_seconds(build_catalogue());
+  return catalogue;
+}
+
+std::string kind_of(const std::string& effect) {
+  for (const Effect& e : srv1_effects_and_seconds()) {
+    if (e.name == effect) return e.kind();
+  }
+  return effect;
+}
+
+std::string second_of(const std::string& effect) {
+  for (const Effect& e : srv1_effects_and_seconds()) {
+    if (e.repeats == effect) return e.name;
+  }
+  return "";
 }
 
 }  // namespace gapfarm

@@ -41,12 +41,24 @@ struct Effect {
   // How many of `parameters`, from the first, must be neutral for the effect to do nothing; the
   // others (a direction, a place) mean nothing then.
   std::size_t strengths = 1;
+  // Of the second one of a kind ("camera_seam_2"): the effect of which there may be two, whose
+  // parameters and implementation it shares.  Empty: the first, or the only one.
+  std::string repeats = {};
+
+  const std::string& kind() const { return repeats.empty() ? name : repeats; }
 };
 
 // The catalogue of each scenario, in a fixed order.  An effect of one name in two catalogues has
 // parameters of the same keys and units in both (bounds and neutral values may differ) and one
 // implementation.
 std::span<const Effect> srv1_effects();
+// Those, and after them the second one of each effect of which a scene may hold two.
+std::span<const Effect> srv1_effects_and_seconds();
 std::span<const Effect> push_effects();
+
+// "camera_seam" of "camera_seam_2", and of itself.
+std::string kind_of(const std::string& effect);
+// "camera_seam_2" of "camera_seam"; empty where there is but one.
+std::string second_of(const std::string& effect);
 
 }  // namespace gapfarm

@@ -237,7 +237,7 @@ std::string ParameterTable::format(std::size_t row, double value) const {
 }
 
 const ParameterTable& srv1_table() {
-  static const ParameterTable table(srv1_rows(), srv1_effects());
+  static const ParameterTable table(srv1_rows(), srv1_effects_and_seconds());
   return table;
 }
 

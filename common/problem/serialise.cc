@@ -62,15 +62,35 @@ Status check_score(const FitnessSettings& fitness, const SpreadSettings& spread)
   return {};
 }
 
+// Rows that a message must have: those of a second one of a kind, which come last, are left out
+// where they do nothing, so that problems without one are, to the byte, what they were before there
+// could be two.
+std::size_t least_rows(const ParameterTable& table) {
+  for (std::size_t e = 0; e < table.effects().size(); ++e) {
+    if (!table.effects()[e].repeats.empty()) return table.effect_row(e);
+  }
+  return table.size();
+}
+
+std::size_t rows_to_write(const Problem& problem) {
+  std::size_t rows = problem.values.size();
+  const auto found = parameter_table(problem.scenario);
+  if (!found || rows != (*found)->size()) return rows;
+  const ParameterTable& table = **found;
+  while (rows > least_rows(table) && problem.values[rows - 1] == table[rows - 1].nominal) --rows;
+  return rows;
+}
+
 Status read_values(const v1::Problem& message, Problem* problem) {
   const ParameterTable& table = problem->table();
-  if (static_cast<std::size_t>(message.values_size()) != table.size()) {
+  const auto count = static_cast<std::size_t>(message.values_size());
+  if (count < least_rows(table) || count > table.size()) {
     return invalid(std::to_string(message.values_size()) + " parameter values, but scenario '" +
                    problem->scenario + "' has " + std::to_string(table.size()) +
                    "; master and worker must be the same build");
   }
   for (std::size_t i = 0; i < table.size(); ++i) {
-    problem->values.push_back(message.values(static_cast<int>(i)));
+    problem->values.push_back(i < count ? message.values(static_cast<int>(i)) : table[i].nominal);
     if (Status s = table.check(i, problem->values.back()); !s) return s.error();
   }
   for (const v1::Gene& gene : message.genes()) {
@@ -300,7 +320,8 @@ Trial from_proto(const v1::Trial& message) {
 v1::Problem to_proto(const Problem& problem) {
   v1::Problem message;
   message.set_scenario(problem.scenario);
-  for (double value : problem.values) message.add_values(value);
+  const std::size_t rows = rows_to_write(problem);
+  for (std::size_t i = 0; i < rows; ++i) message.add_values(problem.values[i]);
   for (const Gene& gene : problem.genes) {
     v1::Gene* to = message.add_genes();
     to->set_parameter(static_cast<std::uint32_t>(gene.row));

@@ -62,7 +62,11 @@ std::vector<std::size_t> chosen_effects(const ParameterTable& table,
                                         const std::vector<std::string>& names) {
   const std::vector<std::string> known = effect_names(table);
   std::vector<std::size_t> chosen;
-  for (const std::string& name : names.empty() ? known : names) {
+  for (std::size_t e = 0; names.empty() && e < known.size(); ++e) {
+    // By itself a second one of a kind is the first under another name.
+    if (table.effects()[e].repeats.empty()) chosen.push_back(e);
+  }
+  for (const std::string& name : names) {
     const auto found = std::find(known.begin(), known.end(), name);
     chosen.push_back(static_cast<std::size_t>(found - known.begin()));
   }

@@ -45,7 +45,7 @@ Error wrong(const std::string& file, const std::string& what) {
 }  // namespace
 
 const Effect* catalogue_entry(const std::string& name) {
-  for (const std::span<const Effect> catalogue : {srv1_effects(), push_effects()}) {
+  for (const std::span<const Effect> catalogue : {srv1_effects_and_seconds(), push_effects()}) {
     for (const Effect& effect : catalogue) {
       if (effect.name == name) return &effect;
     }

@@ -204,11 +204,18 @@ Result<Config> figure_config(const EffectsOptions& options) {
   return config;
 }
 
+// A second one of a kind, which stand last, does what the first does.
+std::span<const Effect> pictured(const ParameterTable& table) {
+  std::size_t count = 0;
+  while (count < table.effects().size() && table.effects()[count].repeats.empty()) ++count;
+  return table.effects().first(count);
+}
+
 // Pairs of tasks: every effect's drives without it and with it.
 std::vector<v1::Task> figure_tasks(const Problem& problem) {
   const ParameterTable& table = problem.table();
   std::vector<v1::Task> tasks;
-  for (std::size_t e = 0; e < table.effects().size(); ++e) {
+  for (std::size_t e = 0; e < pictured(table).size(); ++e) {
     const Effect& effect = table.effects()[e];
     std::vector<v1::Override> off, on;
     const std::vector<double> values = figure_values(effect);
@@ -226,7 +233,7 @@ int draw_figures(EffectsOptions& options, CliContext& context) {
   Result<Config> config = figure_config(options);
   std::vector<std::string> names;
   if (config) {
-    for (const Effect& effect : config->problem.table().effects()) {
+    for (const Effect& effect : pictured(config->problem.table())) {
       names.push_back(effect.name + ".svg");
     }
     if (!options.config.empty()) options.outputs.reads(options.config);
@@ -242,7 +249,7 @@ int draw_figures(EffectsOptions& options, CliContext& context) {
   const std::string hash = (*farm)->add_problem(to_proto(problem));
   const auto results = (*farm)->run(hash, figure_tasks(problem));
   if (!results) return failed(results.error(), context);
-  const std::span<const Effect> effects = problem.table().effects();
+  const std::span<const Effect> effects = pictured(problem.table());
   for (std::size_t e = 0; e < effects.size(); ++e) {
     for (const v1::TaskResult& result : {(*results)[2 * e], (*results)[2 * e + 1]}) {
       if (result.outcome() == v1::OK) continue;

@@ -8,6 +8,7 @@
 #include "master/diagnose/digits.h"
 #include "master/diagnose/findings.h"
 #include "master/diagnose/headline.h"
+#include "master/diagnose/seam.h"
 #include "master/sanity/words.h"
 
 namespace gapfarm {
@@ -21,7 +22,7 @@ constexpr double kMostMissed = 3;
 
 bool is_place(const std::string& key) {
   return key == "camera_distortion.x" || key == "camera_distortion.y" ||
-         key == "friction_patch.x" || key == "friction_patch.y" || key == "camera_seam.position";
+         key == "friction_patch.x" || key == "friction_patch.y" || is_seam_position(key);
 }
 
 bool at_bound(const Parameter& row, double value) {
@@ -121,7 +122,11 @@ void DiagnosisRun::complete_screening() {
     const std::string& name = effect.name;
     const bool there =
         std::any_of(rows.begin(), rows.end(), [&](const Screened& s) { return s.effect == name; });
-    if (there) continue;
+    // A second one of a kind is looked for where a first was found.
+    const bool named = std::any_of(chosen_.begin(), chosen_.end(), [&](const ChosenEffect& c) {
+      return c.candidate.signature.effect == name;
+    });
+    if (there || (!effect.repeats.empty() && !named)) continue;
     Screened& row = rows.emplace_back();
     row.effect = name;
     row.note = doubted_ ? "not looked for: no effect is to be named" : why_not_screened(name, &row);
@@ -140,6 +145,7 @@ std::string DiagnosisRun::why_not_screened(const std::string& name, Screened* ro
     }
     return note;
   };
+  if (kind_of(name) != name) return "a second one, looked for beside the first";
   if (name == "friction_patch") return "no disc of floor promises enough to be simulated";
   if (name == "slip_events") {
     return told(slip_.gain, "probability", slip_.probability,

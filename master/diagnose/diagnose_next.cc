@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/effects/catalogue.h"
 #include "master/diagnose/diagnose_steps.h"
 
 namespace gapfarm {
@@ -23,7 +24,8 @@ Status DiagnosisRun::plan_next() {
       const std::string& name = c.signature.effect;
       const bool alias = std::any_of(chosen_[k].aliases.begin(), chosen_[k].aliases.end(),
                                      [&](const Alias& a) { return a.effect == name; });
-      if (!alias && name != chosen_[k].candidate.signature.effect) continue;
+      const std::string& own = chosen_[k].candidate.signature.effect;
+      if (!alias && name != kind_of(own)) continue;
       Overrides at = study_.base;
       if (alias) {
         for (const auto& [key, value] : start_values(study_, explained, c.signature)) {
@@ -31,10 +33,10 @@ Status DiagnosisRun::plan_next() {
         }
       } else {
         for (const auto& [row, value] : estimates_->at) {
-          if (problem_.table()[row].effect == name) at[row] = value;
+          if (problem_.table()[row].effect == own) at[row] = value;
         }
       }
-      Rival rival{name, {}};
+      Rival rival{alias ? name : own, {}};
       for (const auto& [row, value] : at) {
         rival.overrides.emplace_back();
         rival.overrides.back().set_parameter(static_cast<std::uint32_t>(row));
@@ -55,11 +57,15 @@ Status DiagnosisRun::plan_next() {
   return {};
 }
 
-// An arena may have two seams, a floor two patches; a model holds one of each.
+// An arena may have more seams, a floor more patches, than a model holds or than were clear enough.
 Status DiagnosisRun::look_for_second_places() {
   const std::pair<const char*, std::vector<const char*>> kPlaces[] = {
       {"camera_seam", {"axis", "position"}}, {"friction_patch", {"x", "y", "radius"}}};
   const Regression explained = this->explained();
+  const auto is_named = [&](const std::string& name) {
+    return std::any_of(chosen_.begin(), chosen_.end(),
+                       [&](const ChosenEffect& c) { return c.candidate.signature.effect == name; });
+  };
   for (const ChosenEffect& effect : chosen_) {
     for (const auto& [name, keys] : kPlaces) {
       if (effect.candidate.signature.effect != name) continue;
@@ -80,10 +86,13 @@ Status DiagnosisRun::look_for_second_places() {
       with_it.add(second->signature.columns);
       const std::vector<Leftover> left = leftovers(with_it, blocks_);
       const bool all = left.empty() || left.front().log10_p >= subject_.unknown_log10_p;
+      const bool two = is_named(second_of(name)), room = !two && !second_of(name).empty();
       result_.diagnosis.cautions.push_back(
-          "A second " + std::string(name) + " (" + place + ") would explain " +
+          std::string(two ? "A third " : "A second ") + name + " (" + place + ") would explain " +
           std::to_string(std::lround(second->gain)) + " nats more of what is left" +
-          (all ? ", and nothing would remain" : "") + "; a model holds one.");
+          (all ? ", and nothing would remain" : "") +
+          (room ? "; that is too little to name it."
+                : std::string("; a model holds ") + (two ? "two." : "one.")));
     }
   }
   return {};

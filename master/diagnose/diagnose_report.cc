@@ -12,6 +12,7 @@
 #include "master/diagnose/findings.h"
 #include "master/diagnose/headline.h"
 #include "master/diagnose/intervals.h"
+#include "master/diagnose/seam.h"
 
 namespace gapfarm {
 namespace {
@@ -128,8 +129,8 @@ NamedEffect DiagnosisRun::named(std::size_t k, const JointFit& estimates) const 
     for (double* told : {&e.value, &e.lo, &e.hi}) *told += frame;
     effect.parameters.push_back(e);
   }
-  if (effect.name == "camera_seam") {
-    effect.axis = estimates.at.at(problem_.table().row("camera_seam.axis")) == 0 ? "x" : "y";
+  if (is_seam(effect.name)) {
+    effect.axis = estimates.at.at(problem_.table().row(effect.name + ".axis")) == 0 ? "x" : "y";
   }
   const std::size_t before = k + (as_logged_ ? 1 : 0);
   effect.gap_before = floor_ - mean(nested_scores_[before]);
@@ -150,8 +151,9 @@ NamedEffect DiagnosisRun::named(std::size_t k, const JointFit& estimates) const 
 double DiagnosisRun::frame_of(const std::string& key, const Overrides& at) const {
   if (key == "camera_distortion.x" || key == "friction_patch.x") return frame_m_.x();
   if (key == "camera_distortion.y" || key == "friction_patch.y") return frame_m_.y();
-  if (key != "camera_seam.position") return 0;
-  const auto axis = at.find(problem_.table().row("camera_seam.axis"));
+  if (!is_seam_position(key)) return 0;
+  const std::string seam = key.substr(0, key.find('.'));
+  const auto axis = at.find(problem_.table().row(seam + ".axis"));
   return axis != at.end() && axis->second != 0 ? frame_m_.y() : frame_m_.x();
 }
 

@@ -11,6 +11,7 @@
 #include "master/diagnose/digits.h"
 #include "master/diagnose/drive_noise.h"
 #include "master/diagnose/noise.h"
+#include "master/diagnose/seam.h"
 #include "master/diagnose/slip_places.h"
 
 namespace gapfarm {
@@ -25,9 +26,9 @@ constexpr double kLeastQuantum_m = 4e-4;
 // error of its place is a large one of the motion.
 bool strays_by(const Signature& chosen, const ResidualTrial& trial) {
   const Eigen::Vector2d from(trial.X_WS.x, trial.X_WS.y), to(trial.X_WP.x, trial.X_WP.y);
-  if (chosen.effect == "camera_seam") {
-    const int axis = chosen.fixed.at("camera_seam.axis") == 0 ? 0 : 1;
-    const double line = chosen.fixed.at("camera_seam.position");
+  if (is_seam(chosen.effect)) {
+    const int axis = chosen.fixed.at(chosen.effect + ".axis") == 0 ? 0 : 1;
+    const double line = chosen.fixed.at(chosen.effect + ".position");
     return std::abs(to[axis] - line) < 0.03 || std::abs(from[axis] - line) < 0.01;
   }
   if (chosen.effect == "friction_patch") {
@@ -94,6 +95,7 @@ Status DiagnosisRun::search_catalogue() {
   auto catalogue = subject_.signatures(predictor_, study_, without);
   if (!catalogue) return catalogue.error();
   selector_ = std::make_unique<Selector>(predictor_, study_, std::move(*catalogue), *base_);
+  selector_->leave_out({options_.left_out.begin(), options_.left_out.end()});
   if (!left_out("friction_patch")) {
     selector_->look_for_patches([this] { return subject_.patches(predictor_, study_); });
   }
@@ -139,7 +141,12 @@ Result<JointFit> DiagnosisRun::estimate(const std::vector<EffectCandidate>& effe
     }
   }
   const BaseParameters base = subject_.base_moves ? BaseParameters::kFitted : BaseParameters::kHeld;
-  return fit_jointly(predictor_, study_, effects, start, base, nuisances_, rounds);
+  auto fit = fit_jointly(predictor_, study_, effects, start, base, nuisances_, rounds);
+  if (!fit) return fit;
+  const auto moved = move_seams(predictor_, study_, nuisances_, &*fit);
+  if (!moved) return moved.error();
+  if (!*moved) return fit;
+  return fit_jointly(predictor_, study_, effects, fit->at, base, nuisances_, rounds);
 }
 
 Result<Relinearised> DiagnosisRun::relinearise(const std::vector<EffectCandidate>& effects) {

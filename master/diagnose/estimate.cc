@@ -63,7 +63,7 @@ std::vector<FittedParameter> parameters_of(const Study& study, const Overrides& 
     for (const auto& [row, value] : start) {
       const Parameter& p = (*study.table)[row];
       // Where a seam runs is searched, not sloped: residuals jump as a trial changes sides.
-      const bool jumps = p.kind != ParameterKind::kReal || p.key == "camera_seam.position";
+      const bool jumps = p.kind != ParameterKind::kReal || is_seam_position(p.key);
       if (p.effect == effect.signature.effect && !jumps) parameters.push_back({row, value, 0});
     }
   }
@@ -176,31 +176,6 @@ Eigen::VectorXd weights_of(const Study& study, const Eigen::VectorXd& z) {
   return weight;
 }
 
-// What a step is to make smaller: Huber's function of every trial's distance once the nuisances
-// have taken their part, and what that and the parameters cost under their priors.
-double objective(const Study& study, const JointFit& fit, const Eigen::MatrixXd& nuisances) {
-  const Eigen::VectorXd z = study.whiten(fit.residuals);
-  const Eigen::VectorXd weight = weights_of(study, z);
-  Eigen::MatrixXd normal = nuisances.transpose() * weight.asDiagonal() * nuisances;
-  normal.diagonal().array() += 1;
-  const Eigen::VectorXd taken =
-      normal.ldlt().solve(nuisances.transpose() * weight.asDiagonal() * z);
-  const Eigen::VectorXd left = z - nuisances * taken;
-  double sum = taken.squaredNorm();
-  for (Eigen::Index i = 0; i < left.size() / 3; ++i) {
-    if (study.ignores(static_cast<std::size_t>(i))) continue;
-    const double d2 = left.segment<3>(3 * i).squaredNorm();
-    sum += d2 > kFarSquared ? 2 * std::sqrt(kFarSquared * d2) - kFarSquared : d2;
-  }
-  const std::vector<BaseParameter>& base = study.base_parameters;
-  for (std::size_t k = 0; k < fit.base_parameters; ++k) {
-    const double tuned = study.base.at(base[k].row);
-    const double away = (fit.parameters[k].value / tuned - 1) / base[k].prior_log_sd;
-    sum += away * away;
-  }
-  return sum;
-}
-
 // One step, with bounded weights for trials far out; fills in the standard errors.
 void step(const Problem& problem, const Study& study, const Eigen::MatrixXd& nuisances,
           JointFit* fit) {
@@ -237,6 +212,29 @@ void step(const Problem& problem, const Study& study, const Eigen::MatrixXd& nui
 
 }  // namespace
 
+double misfit_of(const Study& study, const JointFit& fit, const Eigen::MatrixXd& nuisances) {
+  const Eigen::VectorXd z = study.whiten(fit.residuals);
+  const Eigen::VectorXd weight = weights_of(study, z);
+  Eigen::MatrixXd normal = nuisances.transpose() * weight.asDiagonal() * nuisances;
+  normal.diagonal().array() += 1;
+  const Eigen::VectorXd taken =
+      normal.ldlt().solve(nuisances.transpose() * weight.asDiagonal() * z);
+  const Eigen::VectorXd left = z - nuisances * taken;
+  double sum = taken.squaredNorm();
+  for (Eigen::Index i = 0; i < left.size() / 3; ++i) {
+    if (study.ignores(static_cast<std::size_t>(i))) continue;
+    const double d2 = left.segment<3>(3 * i).squaredNorm();
+    sum += d2 > kFarSquared ? 2 * std::sqrt(kFarSquared * d2) - kFarSquared : d2;
+  }
+  const std::vector<BaseParameter>& base = study.base_parameters;
+  for (std::size_t k = 0; k < fit.base_parameters; ++k) {
+    const double tuned = study.base.at(base[k].row);
+    const double away = (fit.parameters[k].value / tuned - 1) / base[k].prior_log_sd;
+    sum += away * away;
+  }
+  return sum;
+}
+
 std::map<std::string, double> start_values(const Study& study, const Regression& others,
                                            const Signature& signature) {
   // Coefficients of the columns, given everything else.
@@ -265,13 +263,13 @@ std::map<std::string, double> start_values(const Study& study, const Regression&
     }
   }
   if (e == "camera_aspect") values["camera_aspect.ratio"] += 1;
-  if (e == "camera_seam") {
+  if (is_seam(e)) {
     // Slopes were about the middle; the catalogue's are about zero.
     const Eigen::Vector2d middle = middle_of(study);
-    const double along = signature.fixed.at("camera_seam.axis") == 0 ? middle.y() : middle.x();
-    values["camera_seam.position"] = seam_position(study, others, signature, c.head<4>());
-    values["camera_seam.offset_x"] -= along * values["camera_seam.slope_x"];
-    values["camera_seam.offset_y"] -= along * values["camera_seam.slope_y"];
+    const double along = signature.fixed.at(e + ".axis") == 0 ? middle.y() : middle.x();
+    values[e + ".position"] = seam_position(study, others, signature, c.head<4>());
+    values[e + ".offset_x"] -= along * values[e + ".slope_x"];
+    values[e + ".offset_y"] -= along * values[e + ".slope_y"];
   }
   const ParameterTable& table = *study.table;
   for (auto& [key, value] : values) {
@@ -289,7 +287,7 @@ Result<JointFit> fit_jointly(Predictor& predictor, const Study& study,
   fit.parameters = parameters_of(study, start, effects, base, &fit.base_parameters);
   if (Status s = predict(predictor, study, &fit); !s) return s.error();
   if (Status s = differentiate(predictor, study, &fit); !s) return s.error();
-  double best = objective(study, fit, nuisances);
+  double best = misfit_of(study, fit, nuisances);
   for (int round = 0; round < rounds; ++round) {
     JointFit next = fit;
     step(predictor.problem(), study, nuisances, &next);
@@ -299,7 +297,7 @@ Result<JointFit> fit_jointly(Predictor& predictor, const Study& study,
     // past the optimum: half of it, then.
     for (int half = 0;; ++half) {
       Status moved = predict(predictor, study, &next);
-      if (moved) now = objective(study, next, nuisances);
+      if (moved) now = misfit_of(study, next, nuisances);
       if (moved && now <= best) {
         moved = differentiate(predictor, study, &next);
         if (moved) break;

@@ -35,6 +35,15 @@ Result<JointFit> fit_jointly(Predictor& predictor, const Study& study,
                              const std::vector<EffectCandidate>& effects, const Overrides& start,
                              BaseParameters base, const Eigen::MatrixXd& nuisances, int rounds);
 
+// What a fit makes smaller: Huber's function of every trial's distance once the nuisances have
+// taken their part, and what that and the parameters cost under their priors.
+double misfit_of(const Study& study, const JointFit& fit, const Eigen::MatrixXd& nuisances);
+
+// Where the seams of a fit run, searched with everything else held: the derivatives of a fit know
+// of no line.  Whether any moved; residuals and derivatives are then those of before.
+Result<bool> move_seams(Predictor& predictor, const Study& study, const Eigen::MatrixXd& nuisances,
+                        JointFit* fit);
+
 // Parameter values at which a refinement of the effect begins.
 std::map<std::string, double> start_values(const Study& study, const Regression& others,
                                            const Signature& signature);

@@ -5,6 +5,7 @@
 #include <map>
 #include <string>
 
+#include "common/effects/catalogue.h"
 #include "master/diagnose/seam.h"
 #include "master/diagnose/signatures.h"
 
@@ -33,19 +34,19 @@ double search_error(const Parameter& p, double value, double gain) {
   const double weakness = 1 / std::sqrt(2 * std::max(gain, 1.0));
   if (p.key == "friction_patch.ratio") return kPatchRatio * weakness * (value - p.nominal);
   if (p.effect == "friction_patch") return kPatchPlace_m * weakness;
-  return p.key == "camera_seam.position" ? kSeamStep_m : 0;
+  return is_seam_position(p.key) ? kSeamStep_m : 0;
 }
 
 // Within a shift's width of a seam both cameras may have reported a reading: m, standard deviation
 // of where the line runs.
-double seam_ambiguity(const Study& study, const ParameterTable& table, const Overrides& at) {
-  const auto value = [&](const char* key) { return at.at(table.row(key)); };
-  const bool across_x = value("camera_seam.axis") == 0;
+double seam_ambiguity(const Study& study, const ParameterTable& table, const std::string& seam,
+                      const Overrides& at) {
+  const auto value = [&](const char* key) { return at.at(table.row(seam + "." + key)); };
+  const bool across_x = value("axis") == 0;
   const Eigen::Vector2d middle = middle_of(study);
   const double along = across_x ? middle.y() : middle.x();
-  const double shift = across_x
-                           ? value("camera_seam.offset_x") + along * value("camera_seam.slope_x")
-                           : value("camera_seam.offset_y") + along * value("camera_seam.slope_y");
+  const double shift = across_x ? value("offset_x") + along * value("slope_x")
+                                : value("offset_y") + along * value("slope_y");
   return std::abs(shift) / kNormal90;
 }
 
@@ -55,8 +56,8 @@ double model_error(const Parameter& p, double value) {
                          p.key != "floor_tilt.angle";
   if (direction) return kDirectionError_rad;
   if (p.unit == "rad" && p.key != "floor_tilt.angle") return 0;
-  if (!kModelError.count(p.effect)) return 0;
-  return kModelError.at(p.effect) * (value - p.nominal);
+  const auto known = kModelError.find(kind_of(p.effect));
+  return known == kModelError.end() ? 0 : known->second * (value - p.nominal);
 }
 
 }  // namespace
@@ -65,7 +66,7 @@ double error_beyond_fit(const Study& study, const ParameterTable& table, std::si
                         const Overrides& at, double gain) {
   const Parameter& p = table[row];
   const double value = at.at(row);
-  const double seam = p.key == "camera_seam.position" ? seam_ambiguity(study, table, at) : 0;
+  const double seam = is_seam_position(p.key) ? seam_ambiguity(study, table, p.effect, at) : 0;
   return std::hypot(model_error(p, value), search_error(p, value, gain), seam);
 }
 

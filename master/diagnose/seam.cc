@@ -1,9 +1,46 @@
 #include "master/diagnose/seam.h"
 
 #include <cmath>
+#include <map>
 #include <vector>
 
+#include "common/effects/catalogue.h"
+
 namespace gapfarm {
+namespace {
+
+// Where one line is not known better than by a shift's width, two this near are one.
+constexpr double kLeastApart_m = 0.3;
+
+double value_in(const Signature& seam, const char* key) {
+  return seam.fixed.at(seam.effect + "." + key);
+}
+
+}  // namespace
+
+bool is_seam(const std::string& effect) { return kind_of(effect) == "camera_seam"; }
+
+bool is_seam_position(const std::string& key) {
+  return key.ends_with(".position") && is_seam(key.substr(0, key.find('.')));
+}
+
+Signature renamed(Signature signature, const std::string& effect) {
+  const std::size_t own = signature.effect.size();
+  for (std::string& key : signature.parameters) key = effect + key.substr(own);
+  std::map<std::string, double> fixed;
+  for (const auto& [key, value] : signature.fixed) {
+    const bool is_own = key.rfind(signature.effect + ".", 0) == 0;
+    fixed[is_own ? effect + key.substr(own) : key] = value;
+  }
+  signature.fixed = std::move(fixed);
+  signature.effect = effect;
+  return signature;
+}
+
+bool are_two_seams(const Signature& a, const Signature& b) {
+  return value_in(a, "axis") != value_in(b, "axis") ||
+         std::abs(value_in(a, "position") - value_in(b, "position")) >= kLeastApart_m;
+}
 
 Signature seam_signature(const Study& study, int axis, double position_m) {
   const Eigen::Vector2d middle = middle_of(study);
@@ -38,7 +75,7 @@ Signature seam_signature(const Study& study, int axis, double position_m) {
 double seam_position(const Study& study, const Regression& others, const Signature& seam,
                      const Eigen::Vector4d& coefficients) {
   constexpr double kStep_m = 0.0025;
-  const bool across_x = seam.fixed.at("camera_seam.axis") == 0;
+  const bool across_x = value_in(seam, "axis") == 0;
   const Eigen::Vector2d middle = middle_of(study);
   const auto shift = [&](const Pose& X, double line) {
     if ((across_x ? X.x : X.y) <= line) return Pose{};
@@ -46,7 +83,7 @@ double seam_position(const Study& study, const Regression& others, const Signatu
     return Pose{coefficients[0] + coefficients[2] * along,
                 coefficients[1] + coefficients[3] * along, 0};
   };
-  const double about = seam.fixed.at("camera_seam.position");
+  const double about = value_in(seam, "position");
   const double reach = std::abs(coefficients[across_x ? 0 : 1]) + 4 * kStep_m;
   double best = about, least = INFINITY;
   for (double line = about - reach; line <= about + reach; line += kStep_m) {

@@ -10,8 +10,18 @@ namespace gapfarm {
 
 constexpr double kSeamStep_m = 0.005;  // to which a seam's position is searched
 
+// Whether it is a seam, the first or a second one.
+bool is_seam(const std::string& effect);
+// "camera_seam.position" or that of a second one.
+bool is_seam_position(const std::string& key);
+
 // Shift of the readings beyond a line: two offsets, then two slopes along it about `middle`.
 Signature seam_signature(const Study& study, int axis, double position_m);
+// The same as another effect of its kind: a second seam's.
+Signature renamed(Signature signature, const std::string& effect);
+
+// Whether two seams run far enough apart, or across one another, to be two.
+bool are_two_seams(const Signature& a, const Signature& b);
 
 // Where the line of a seam with these coefficients of seam_signature()'s columns runs, m.  Readings
 // lie beyond the line shifted, so which side a pose was seen from follows from the shift, too; the

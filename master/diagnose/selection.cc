@@ -6,6 +6,7 @@
 #include <map>
 #include <utility>
 
+#include "common/effects/catalogue.h"
 #include "master/diagnose/aliases.h"
 #include "master/diagnose/seam.h"
 #include "master/diagnose/subject.h"
@@ -13,9 +14,6 @@
 namespace gapfarm {
 namespace {
 
-constexpr double kWorthRefining = 8;         // nats before the penalty
-constexpr double kWorthSketched = 12.5;      // of patches; where there are none it reaches 11
-constexpr double kWorthRefiningShare = 0.3;  // of the best: no search of places makes up for less
 constexpr double kSecondAlias = 0.8;   // cosine beyond which a further effect is the first again,
 constexpr double kSecondShare = 0.25;  // unless it gains this share of all that is explained
 
@@ -29,19 +27,13 @@ const Family kFamilies[] = {
     {{"motor_deadband", "rolling_resistance", "timing_offset", "motor_lag"}, 0.75},
     {{"floor_tilt", "floor_nap"}, 0.15},
 };
-constexpr int kSeamSteps = 10;
-constexpr int kMostPatchSearches = 4;
+// A second one of a kind: an error of the first's place or bend looks like one.  nats, and of all
+// that is explained.
+constexpr double kLeastSecondOfAKind = 20;
+constexpr double kSecondOfAKindShare = 0.05;
 constexpr double kWorthRelinearising = 40;  // nats: curvature of weaker effects is below the noise
 constexpr int kMostRelinearised = 4;
 constexpr std::size_t kOffered = 6;  // candidates kept of a step
-Patch patch_of(const Signature& s) {
-  return {s.fixed.at("friction_patch.x"), s.fixed.at("friction_patch.y"),
-          s.fixed.at("friction_patch.radius"), s.fixed.at("friction_patch.ratio")};
-}
-
-double net_gain(const Regression& explained, const Signature& s) {
-  return explained.gain(s.columns).squares / 2 - s.penalty;
-}
 
 double cosine(const Eigen::VectorXd& a, const Eigen::VectorXd& b) {
   const double lengths = a.norm() * b.norm();
@@ -52,6 +44,27 @@ double total_gain(const std::vector<EffectCandidate>& chosen) {
   double sum = 0;
   for (const EffectCandidate& c : chosen) sum += c.gain;
   return sum;
+}
+
+bool is_second(const EffectCandidate& c) {
+  return kind_of(c.signature.effect) != c.signature.effect;
+}
+
+// Gain below which an effect is not taken, where so much is explained.
+double least_gain_of(const EffectCandidate& c, const Study& study, double explained) {
+  if (is_second(c)) return std::max(kLeastSecondOfAKind, kSecondOfAKindShare * explained);
+  return std::max(study.subject->least_gain, kLeastShare * explained);
+}
+
+// The second one of a kind whose first has gone is the first now.
+void promote_seconds(std::vector<EffectCandidate>* chosen) {
+  for (EffectCandidate& c : *chosen) {
+    const std::string kind = kind_of(c.signature.effect);
+    const bool first_there =
+        std::any_of(chosen->begin(), chosen->end(),
+                    [&](const EffectCandidate& o) { return o.signature.effect == kind; });
+    if (!first_there) c.signature = renamed(std::move(c.signature), kind);
+  }
 }
 
 std::set<std::string> names_of(const std::vector<EffectCandidate>& chosen,
@@ -65,111 +78,32 @@ std::set<std::string> names_of(const std::vector<EffectCandidate>& chosen,
 
 }  // namespace
 
-void Selector::look_for_patches(std::function<PatchSearch()> make) {
-  make_patch_search_ = std::move(make);
-  patch_search_ = make_patch_search_();
-}
-
-EffectCandidate Selector::refine_seam(const Regression& explained, EffectCandidate best) const {
-  // The gain jumps as readings change sides, so everything near is tried.
-  const int axis = static_cast<int>(best.signature.fixed.at("camera_seam.axis"));
-  const double coarse = best.signature.fixed.at("camera_seam.position");
-  for (int k = -kSeamSteps; k <= kSeamSteps; ++k) {
-    Signature s = seam_signature(study_, axis, coarse + k * kSeamStep_m);
-    study_.drop_ignored(s.columns);
-    const double gain = net_gain(explained, s);
-    if (gain > best.gain) best = {gain, std::move(s)};
+// Empty: not at all.
+std::string Selector::offered_as(const Signature& s, const std::set<std::string>& without,
+                                 const std::vector<EffectCandidate>& beside) const {
+  if (!without.count(s.effect)) return s.effect;
+  const std::string second = second_of(s.effect);
+  if (second.empty() || without.count(second) || left_out_.count(second)) return "";
+  for (const EffectCandidate& first : beside) {
+    if (first.signature.effect == s.effect && are_two_seams(first.signature, s)) return second;
   }
-  return best;
+  return "";
 }
 
-// Simulates discs, in their order; they join the catalogue.
-Result<std::vector<EffectCandidate>> Selector::simulate_patches(const Regression& explained,
-                                                                const std::vector<Patch>& patches) {
-  auto found = patch_signatures(predictor_, study_, patches);
-  if (!found) return found.error();
-  std::vector<EffectCandidate> simulated;
-  for (Signature& s : *found) {
-    study_.drop_ignored(s.columns);
-    simulated.push_back({net_gain(explained, s), s});
-    catalogue_.push_back(std::move(s));
-  }
-  return simulated;
-}
-
-// A disc that the sketch proposes, moved to where the simulation explains most: every step tries
-// both ways along x, y, radius and ratio, then all that helped at once.
-Status Selector::refine_patch(const Regression& explained, EffectCandidate best) {
-  for (double step : {0.04, 0.02, 0.01}) {
-    const Patch from = patch_of(best.signature);
-    std::vector<Patch> moves;
-    for (std::size_t k = 0; k < 8; ++k) {
-      const double sign = k % 2 == 0 ? 1 : -1;
-      Patch& to = moves.emplace_back(from);
-      double& moved = to[k / 2];
-      moved = k < 6 ? moved + sign * step : moved * std::pow(1 + 6 * step, sign);
-      to[2] = std::max(to[2], 0.05);
-      to[3] = std::clamp(to[3], 0.06, 2.9);
-    }
-    auto tried = simulate_patches(explained, moves);
-    if (!tried) return tried.error();
-    const double before = best.gain;
-    Patch together = from;
-    for (std::size_t k = 0; k < 8; k += 2) {
-      const EffectCandidate& better =
-          (*tried)[k].gain > (*tried)[k + 1].gain ? (*tried)[k] : (*tried)[k + 1];
-      if (better.gain > before) together[k / 2] = patch_of(better.signature)[k / 2];
-      if (better.gain > best.gain) best = better;
-    }
-    auto all = simulate_patches(explained, {together});
-    if (!all) return all.error();
-    if (all->front().gain > best.gain) best = all->front();
-  }
-  refined_patches_.push_back(patch_of(best.signature));
-  return {};
-}
-
-// Adds to the catalogue what the sketch finds in the data that are left, where a search has not
-// been yet.
-Status Selector::search_patches(const Regression& explained, double most_gain) {
-  if (!patch_search_ || patch_searches_ >= kMostPatchSearches) return {};
-  const double worth = std::max(kWorthSketched, kWorthRefiningShare * most_gain);
-  std::vector<Patch> starts;
-  const auto places = patch_search_(explained, 3, 2 * worth);
-  if (!places) return places.error();
-  for (const Patch& place : *places) {
-    const bool known =
-        std::any_of(refined_patches_.begin(), refined_patches_.end(), [&](const Patch& p) {
-          return std::hypot(p[0] - place[0], p[1] - place[1], p[2] - place[2]) < 0.15;
-        });
-    if (known) continue;
-    starts.push_back(place);
-    starts.push_back(place);
-    starts.back()[3] = std::sqrt(place[3]);
-  }
-  if (starts.empty()) return {};
-  ++patch_searches_;
-  auto simulated = simulate_patches(explained, starts);
-  if (!simulated) return simulated.error();
-  const EffectCandidate& best = *std::max_element(
-      simulated->begin(), simulated->end(),
-      [](const EffectCandidate& a, const EffectCandidate& b) { return a.gain < b.gain; });
-  if (best.gain + best.signature.penalty < kWorthRefining) return {};
-  return refine_patch(explained, best);
-}
-
-Result<std::vector<EffectCandidate>> Selector::candidates(const Regression& explained,
-                                                          const std::set<std::string>& without) {
+Result<std::vector<EffectCandidate>> Selector::candidates(
+    const Regression& explained, const std::set<std::string>& without,
+    const std::vector<EffectCandidate>& beside) {
   std::map<std::string, EffectCandidate> best;
   double most = 0;
   std::size_t seen = 0;
   const auto see_all = [&] {
     for (; seen < catalogue_.size(); ++seen) {
       const Signature& s = catalogue_[seen];
-      if (without.count(s.effect)) continue;
+      const std::string name = offered_as(s, without, beside);
+      if (name.empty()) continue;
       const double gain = net_gain(explained, s);
       most = std::max(most, gain);
-      const auto [entry, fresh] = best.try_emplace(s.effect, EffectCandidate{gain, s});
+      const auto [entry, fresh] = best.try_emplace(name, EffectCandidate{gain, s});
       if (!fresh && gain > entry->second.gain) entry->second = {gain, s};
     }
   };
@@ -181,7 +115,11 @@ Result<std::vector<EffectCandidate>> Selector::candidates(const Regression& expl
   for (auto& [effect, candidate] : best) {
     if (candidate.gain + candidate.signature.penalty < kWorthRefining) continue;
     if (candidate.gain < kWorthRefiningShare * most) continue;
-    if (effect == "camera_seam") candidate = refine_seam(explained, candidate);
+    if (is_seam(effect)) candidate = refine_seam(explained, candidate);
+  }
+  for (auto& [effect, candidate] : best) {
+    if (candidate.signature.effect != effect)
+      candidate.signature = renamed(std::move(candidate.signature), effect);
   }
   std::vector<EffectCandidate> sorted;
   for (auto& [effect, candidate] : best) sorted.push_back(std::move(candidate));
@@ -244,9 +182,11 @@ bool Selector::is_new(const std::vector<Signature>& first,
 }
 
 void Selector::drop_weak(std::vector<EffectCandidate>* chosen) const {
-  const double least =
-      std::max(study_.subject->least_gain, kLeastShare * (first_gain_ + total_gain(*chosen)));
-  std::erase_if(*chosen, [&](const EffectCandidate& c) { return c.gain <= least; });
+  const double explained = first_gain_ + total_gain(*chosen);
+  std::erase_if(*chosen, [&](const EffectCandidate& c) {
+    return c.gain <= least_gain_of(c, study_, explained);
+  });
+  promote_seconds(chosen);
 }
 
 // Lets every earlier choice be replaced in the light of the later ones, and drops what has become
@@ -258,7 +198,9 @@ Status Selector::replace_each(const std::vector<Signature>& first,
     const Regression others = without(first, *chosen, i);
     std::set<std::string> not_these = names_of(*chosen, i);
     not_these.insert(rejected.begin(), rejected.end());
-    auto better = candidates(others, not_these);
+    std::vector<EffectCandidate> beside = *chosen;
+    beside.erase(beside.begin() + static_cast<std::ptrdiff_t>(i));
+    auto better = candidates(others, not_these, beside);
     if (!better) return better.error();
     EffectCandidate& own = (*chosen)[i];
     own.gain = net_gain(others, own.signature);
@@ -332,7 +274,7 @@ Result<std::vector<ChosenEffect>> Selector::select(const std::vector<Signature>&
     seen.insert(names_of(chosen));
     std::set<std::string> used = names_of(chosen);
     used.insert(taken.begin(), taken.end());
-    auto next = candidates(without(first, chosen, ~std::size_t{0}), used);
+    auto next = candidates(without(first, chosen, ~std::size_t{0}), used, chosen);
     if (!next) return next.error();
     SelectionStep step;
     step.explained.assign(used.begin(), used.end());
@@ -340,12 +282,12 @@ Result<std::vector<ChosenEffect>> Selector::select(const std::vector<Signature>&
       step.offered.emplace_back((*next)[i].signature.effect, (*next)[i].gain);
     }
     steps_.push_back(std::move(step));
+    const double explained = first_gain + total_gain(chosen);
     std::erase_if(*next, [&](const EffectCandidate& c) {
-      return c.gain < study_.subject->least_gain || rejected.count(c.signature.effect) ||
+      return c.gain < least_gain_of(c, study_, explained) || rejected.count(c.signature.effect) ||
              !is_new(first, chosen, c);
     });
-    const double least = kLeastShare * (first_gain + total_gain(chosen));
-    if (next->empty() || next->front().gain < least) break;
+    if (next->empty()) break;
     const std::string added = next->front().signature.effect;
     chosen.push_back(next->front());
     if (chosen.size() > 1) {

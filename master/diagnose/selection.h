@@ -20,10 +20,18 @@ inline constexpr double kLeastShare = 0.02;
 inline constexpr double kAliasCosine = 0.9;
 inline constexpr std::size_t kMostEffects = 4;
 
+// Of a place, that it is worth to be searched for: nats before the penalty, and of the best, since
+// no search makes up for less.
+inline constexpr double kWorthRefining = 8;
+inline constexpr double kWorthRefiningShare = 0.3;
+
 struct EffectCandidate {
   double gain = 0;  // net of the signature's penalty, nats
   Signature signature;
 };
+
+// What a signature gains beyond what is explained, less its penalty.
+double net_gain(const Regression& explained, const Signature& s);
 
 // What the catalogue offered at one step: effect and net gain, best first.
 struct SelectionStep {
@@ -58,9 +66,14 @@ class Selector {
   // From now on candidates() looks for friction patches, too; recount() calls `make` again.
   void look_for_patches(std::function<PatchSearch()> make);
 
-  // The best signature of every effect, best first, beyond what `explained` holds.
+  // These are never offered, whatever the catalogue holds.
+  void leave_out(std::set<std::string> effects) { left_out_ = std::move(effects); }
+
+  // The best signature of every effect, best first, beyond what `explained` holds.  Of what is in
+  // `without` because it is among `beside`, a second one where there may be two.
   Result<std::vector<EffectCandidate>> candidates(const Regression& explained,
-                                                  const std::set<std::string>& without);
+                                                  const std::set<std::string>& without,
+                                                  const std::vector<EffectCandidate>& beside = {});
 
   // The best signature of one effect, which may have been chosen once already: a second seam.
   Result<EffectCandidate> again(const Regression& explained, const std::string& effect);
@@ -82,6 +95,8 @@ class Selector {
   Regression with(const std::vector<const Signature*>& signatures) const;
 
  private:
+  std::string offered_as(const Signature& s, const std::set<std::string>& without,
+                         const std::vector<EffectCandidate>& beside) const;
   Status search_patches(const Regression& explained, double most_gain);
   Result<std::vector<EffectCandidate>> simulate_patches(const Regression& explained,
                                                         const std::vector<Patch>& patches);
@@ -106,6 +121,7 @@ class Selector {
   const Study& study_;
   std::vector<Signature> catalogue_;
   Regression base_;
+  std::set<std::string> left_out_;
   std::function<PatchSearch()> make_patch_search_;
   PatchSearch patch_search_;
   std::vector<SelectionStep> steps_;

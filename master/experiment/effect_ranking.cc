@@ -117,7 +117,8 @@ class Ranking {
     std::vector<std::size_t> chosen;
     for (std::size_t e = 0; e < catalogue.size(); ++e) {
       known.push_back(catalogue[e].name);
-      if (plan_.effects.empty() && !in_base(e)) chosen.push_back(e);
+      const bool second = !catalogue[e].repeats.empty();
+      if (plan_.effects.empty() && !second && !in_base(e)) chosen.push_back(e);
     }
     for (const std::string& name : plan_.effects) {
       const auto found = std::find(known.begin(), known.end(), name);

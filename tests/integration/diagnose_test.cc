@@ -131,6 +131,56 @@ TEST_F(Diagnose, FindsALagInPathsAndNoneWithoutOne) {
   EXPECT_EQ(diagnose()["verdict"], "none");
 }
 
+// Four cameras over an arena; and a seam that is alone has no second.
+TEST_F(Diagnose, FindsASecondSeamWhereThereIsOne) {
+  const std::vector<std::string> one = {"camera_seam.offset_x=0.06", "camera_seam.offset_y=-0.03",
+                                        "camera_seam.position=1.1", "camera_seam.axis=1"};
+  simulate(240, one);
+  const Json alone = diagnose();
+  EXPECT_EQ(alone["verdict"], "effect") << alone["headline"];
+  ASSERT_EQ(alone["effects"].size(), 1u);
+  EXPECT_EQ(alone["effects"][0]["name"], "camera_seam");
+  std::vector<std::string> two = one;
+  two.insert(two.end(), {"camera_seam_2.offset_x=-0.02", "camera_seam_2.offset_y=0.05",
+                         "camera_seam_2.position=0.9"});
+  simulate(240, two);
+  const Json both = diagnose();
+  EXPECT_EQ(both["verdict"], "effect") << both["headline"];
+  ASSERT_EQ(both["effects"].size(), 2u);
+  std::set<std::string> names, axes;
+  for (const Json& effect : both["effects"]) {
+    names.insert(effect["name"]);
+    axes.insert(effect["axis"]);
+    const double line = effect["axis"] == "y" ? 1.1 : 0.9;
+    EXPECT_NEAR(effect["parameters"]["position"]["value"].get<double>(), line, 0.02);
+  }
+  EXPECT_EQ(names, (std::set<std::string>{"camera_seam", "camera_seam_2"}));
+  EXPECT_EQ(axes, (std::set<std::string>{"x", "y"}));
+}
+
+// A model of a log far from the origin simulates that log's plan there.
+TEST_F(Diagnose, ModelsOfLogsFarOffAreSimulatedWhereTheyWereRecorded) {
+  simulate(60, {"motor_asymmetry.ratio=0.05"});
+  const std::string far = move_log(folder_ / "trials.csv", folder_ / "far.csv", 5000, -3000);
+  diagnose_log(config_, far, folder_ / "d");
+  const Finished made = gapfarm_command(
+      {"simulate", folder_ / "d/model.toml", "--like", far, "--out", folder_ / "again.csv"});
+  ASSERT_EQ(made.exit_code, 0) << made.err;
+  const auto start_x_m = [](const std::string& line) {
+    std::istringstream cells(line);
+    std::string cell;
+    for (int c = 0; c < 8; ++c) std::getline(cells, cell, ',');
+    return std::stod(cell);
+  };
+  std::ifstream recorded(far), again(folder_ / "again.csv");
+  std::string a, b;
+  std::size_t rows = 0;
+  for (; std::getline(recorded, a) && std::getline(again, b); ++rows) {
+    if (rows > 0) EXPECT_NEAR(start_x_m(a), start_x_m(b), 1.5) << rows;
+  }
+  EXPECT_GT(rows, 60u);
+}
+
 TEST_F(Diagnose, GoesOnWithWhatWasSimulatedAlready) {
   simulate(60, {"motor_asymmetry.ratio=0.05"});
   Json first = diagnose();

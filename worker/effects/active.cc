@@ -18,13 +18,23 @@ const EffectBehaviour* behaviour_of(const std::string& effect) {
 }  // namespace
 
 ActiveEffects::ActiveEffects(const ParameterTable& table, const ParameterValues& values) {
-  for (std::size_t e = 0; e < table.effects().size(); ++e) {
-    if (table.is_neutral(e, values)) continue;
-    const Effect& effect = table.effects()[e];
+  const std::span<const Effect> effects = table.effects();
+  const auto add = [&](std::size_t e) {
+    if (table.is_neutral(e, values)) return;
+    const Effect& effect = effects[e];
     const auto first = values.begin() + static_cast<std::ptrdiff_t>(table.effect_row(e));
-    active_.push_back({behaviour_of(effect.name),
+    active_.push_back({behaviour_of(effect.kind()),
                        {first, first + static_cast<std::ptrdiff_t>(effect.parameters.size())}});
     if (effect.stage != EffectStage::kCamera) motion_context_ |= effect.context;
+  };
+  // Their order is that of the way from duty to logged pose: a second one of a kind stands by the
+  // first, although its rows come after all others'.
+  for (std::size_t e = 0; e < effects.size(); ++e) {
+    if (!effects[e].repeats.empty()) continue;
+    add(e);
+    for (std::size_t second = e + 1; second < effects.size(); ++second) {
+      if (effects[second].repeats == effects[e].name) add(second);
+    }
   }
 }
 
@@ -66,6 +76,23 @@ Pose ActiveEffects::recover(Pose X_WM) const {
     if (a.behaviour->recover) X_WM = a.behaviour->recover(a.values, X_WM);
   }
   return X_WM;
+}
+
+std::vector<double> ActiveEffects::beyond_lines(const Pose& X_WR) const {
+  std::vector<double> distances;
+  for (const Active& a : active_) {
+    if (a.behaviour->beyond) distances.push_back(a.behaviour->beyond(a.values, X_WR));
+  }
+  return distances;
+}
+
+ActiveEffects ActiveEffects::seen_from(unsigned sides) const {
+  ActiveEffects same = *this;
+  unsigned line = 0;
+  for (Active& a : same.active_) {
+    if (a.behaviour->one_side) a.behaviour->one_side(sides >> line++ & 1, a.values);
+  }
+  return same;
 }
 
 Pose ActiveEffects::place(Pose X_WR) const {

@@ -70,6 +70,10 @@ struct EffectBehaviour {
   // True pose to logged pose, without noise, and back.
   Pose (*observe)(EffectValues p, const Pose& X_WR) = nullptr;
   Pose (*recover)(EffectValues p, const Pose& X_WM) = nullptr;
+  // Where the view jumps across a line: how far a pose lies beyond it, m, and values at which all
+  // poses are seen as those of the one side are.
+  double (*beyond)(EffectValues p, const Pose& X_WR) = nullptr;
+  void (*one_side)(bool far, std::vector<double>& p) = nullptr;
   // A piece's start as the log would have it to where it truly starts, and back.
   Pose (*place)(EffectValues p, const Pose& X_WR) = nullptr;
   Pose (*unplace)(EffectValues p, const Pose& X_WR) = nullptr;
@@ -97,6 +101,10 @@ class ActiveEffects {
   void floor(const Situation& situation, Floor& floor) const;
   Pose observe(Pose X_WR) const;
   Pose recover(Pose X_WM) const;
+  // Lines across which the view jumps: how far a pose lies beyond each, m; and the same effects
+  // seen as from these sides of them (bit k: beyond line k).
+  std::vector<double> beyond_lines(const Pose& X_WR) const;
+  ActiveEffects seen_from(unsigned sides) const;
   Pose place(Pose X_WR) const;
   Pose unplace(Pose X_WR) const;
   std::vector<DriveBranch> branches() const;  // at least the one in which nothing happens

@@ -10,11 +10,11 @@ struct Shift {
   double y = 0;
 };
 
+double across_line(EffectValues p, double x, double y) { return (p[5] == 0 ? x : y) - p[4]; }
+
 Shift shift_at(EffectValues p, double x, double y) {
-  const bool crosses_x = p[5] == 0;
-  const double across = crosses_x ? x : y;
-  const double along = crosses_x ? y : x;
-  if (across <= p[4]) return {};
+  const double along = p[5] == 0 ? y : x;
+  if (across_line(p, x, y) <= 0) return {};
   return {p[0] + p[2] * along, p[1] + p[3] * along};
 }
 
@@ -34,8 +34,19 @@ Pose recover(EffectValues p, const Pose& X_WM) {
   return X_WR;
 }
 
+double beyond(EffectValues p, const Pose& X_WR) { return across_line(p, X_WR.x, X_WR.y); }
+
+void one_side(bool far, std::vector<double>& p) {
+  constexpr double kNowhere_m = 1e9;
+  p[4] = far ? -kNowhere_m : kNowhere_m;
+}
+
 }  // namespace
 
-const EffectBehaviour camera_seam{.name = "camera_seam", .observe = observe, .recover = recover};
+const EffectBehaviour camera_seam{.name = "camera_seam",
+                                  .observe = observe,
+                                  .recover = recover,
+                                  .beyond = beyond,
+                                  .one_side = one_side};
 
 }  // namespace gapfarm::effects

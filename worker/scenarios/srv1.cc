@@ -11,6 +11,7 @@
 #include "common/trials/context.h"
 #include "worker/scenarios/srv1_motions.h"
 #include "worker/scenarios/srv1_simulate.h"
+#include "worker/scenarios/views.h"
 
 namespace gapfarm {
 namespace {
@@ -131,8 +132,8 @@ class Srv1Model : public ScenarioModel {
 
   std::vector<Gains> draws(const Srv1Robot& robot, const PredictOptions& options,
                            std::size_t group) const;
-  TrialPrediction observe(const Srv1Robot& robot, const GroupMotion& motion, const Pose& X_SE,
-                          const Pose& X_WR, bool means_only) const;
+  TrialPrediction observe(const Srv1Robot& robot, const Views& views, const GroupMotion& motion,
+                          const Pose& X_SE, const Pose& X_WS) const;
 
   const Problem& problem_;
   std::vector<PreparedTrial> trials_;
@@ -157,22 +158,31 @@ std::vector<Gains> Srv1Model::draws(const Srv1Robot& robot, const PredictOptions
 }
 
 // From the motion in the start frame to the logged end pose, with the noise of both readings.
-TrialPrediction Srv1Model::observe(const Srv1Robot& robot, const GroupMotion& motion,
-                                   const Pose& X_SE, const Pose& X_WR, bool means_only) const {
+TrialPrediction Srv1Model::observe(const Srv1Robot& robot, const Views& views,
+                                   const GroupMotion& motion, const Pose& X_SE,
+                                   const Pose& X_WS) const {
   TrialPrediction prediction;
-  const Pose X_WE = X_WR * X_SE;
-  if (means_only) return {{{1, robot.effects().observe(X_WE)}}};
   PoseNoise noise = robot.noise().pose;
   // Rounding to a grid adds the variance of a uniform error.
   noise.position_m =
       std::hypot(noise.position_m, robot.effects().reading().quantum_m / std::sqrt(12.0));
+  const std::vector<View> starts = views.recovered(X_WS, noise.position_m);
   for (const GroupMotion::Branch& branch : motion.branches()) {
     const Pose X_SA = X_SE * branch.X_EA;
-    prediction.alternatives.push_back({branch.weight, robot.effects().observe(X_WE * branch.X_EA),
-                                       predictive_covariance(X_SA, motion.drive_cov(), noise)});
-    if (robot.noise().tails.gaussian()) continue;
-    prediction.alternatives.back().reading_cov =
-        predictive_covariance(X_SA, Eigen::Matrix3d::Zero(), noise);
+    Alternative way;
+    way.cov = predictive_covariance(X_SA, motion.drive_cov(), noise);
+    if (!robot.noise().tails.gaussian()) {
+      way.reading_cov = predictive_covariance(X_SA, Eigen::Matrix3d::Zero(), noise);
+    }
+    for (const View& start : starts) {
+      const Pose X_WE = start.pose * X_SE * branch.X_EA;
+      const Eigen::Matrix3d cov = rotate_covariance(way.cov, X_WE.theta);
+      for (const View& end : views.observed(X_WE, cov.diagonal().head<2>().cwiseSqrt())) {
+        way.weight = branch.weight * start.weight * end.weight;
+        way.X_WM = end.pose;
+        prediction.alternatives.push_back(way);
+      }
+    }
   }
   return prediction;
 }
@@ -182,6 +192,7 @@ Prediction Srv1Model::predict(const ParameterValues& values, const PredictOption
   prediction.facts.resize(problem_.commands.size());
   Srv1Robot robot(values, options.steps);
   prediction.tails = robot.noise().tails;
+  const Views views(robot.effects());
   const unsigned context = robot.effects().motion_context();
   const Grouping& grouping = (context & kLastDirection) ? by_drive_and_last_ : by_drive_;
 
@@ -229,7 +240,11 @@ Prediction Srv1Model::predict(const ParameterValues& values, const PredictOption
       if (direct.outcome != MotionOutcome::kOk) return give_up(to_outcome(direct.outcome), group);
       X_SE = motion.spread_end(direct.X_SE);
     }
-    prediction.trials.push_back(observe(robot, motion, X_SE, X_WR, options.means_only));
+    if (options.means_only) {
+      prediction.trials.push_back({{{1, robot.effects().observe(X_WR * X_SE)}}});
+    } else {
+      prediction.trials.push_back(observe(robot, views, motion, X_SE, trial.X_WS));
+    }
   }
   prediction.conditions = robot.runs();
   prediction.simulated_s = robot.simulated_s();
