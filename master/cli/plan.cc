@@ -5,6 +5,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "common/trials/shifted.h"
 #include "common/trials/write.h"
 #include "master/cli/inputs.h"
 #include "master/cli/long_command.h"
