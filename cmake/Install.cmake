@@ -44,6 +44,8 @@ install(TARGETS gapfarm-worker RUNTIME COMPONENT gapfarm-worker)
 install(DIRECTORY configs DESTINATION ${data} COMPONENT gapfarm)
 install(DIRECTORY scripts/launch DESTINATION ${data} COMPONENT gapfarm USE_SOURCE_PERMISSIONS
         PATTERN systemd EXCLUDE)
+install(DIRECTORY scripts/bridges DESTINATION ${data}/scripts COMPONENT gapfarm
+        USE_SOURCE_PERMISSIONS)
 install(DIRECTORY docs/ DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT gapfarm)
 install(FILES README.md DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT gapfarm)
 install(FILES ${made}/gapfarm.1.gz DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT gapfarm)
@@ -58,6 +60,12 @@ install(FILES ${made}/gapfarm.fish COMPONENT gapfarm
 install(FILES ${made}/gapfarm-run@.service DESTINATION ${units} COMPONENT gapfarm)
 install(FILES ${made}/gapfarm-worker.service DESTINATION ${units} COMPONENT gapfarm-worker)
 
+set(packages gapfarm gapfarm-worker)
+if(GAPFARM_PYTHON)
+  list(APPEND packages python3-gapfarm)
+  install(DIRECTORY python/gapfarm DESTINATION lib/python3/dist-packages COMPONENT python3-gapfarm
+          PATTERN __pycache__ EXCLUDE)
+endif()
 set(changed "${PROJECT_SOURCE_DIR}/CHANGELOG.md")
 file(READ LICENSE licence)
 string(REGEX REPLACE "\n" "\n " licence " ${licence}")
@@ -65,7 +73,7 @@ string(REGEX REPLACE "\n *\n" "\n .\n" licence "${licence}")
 string(TIMESTAMP now "%a, %d %b %Y %H:%M:%S +0000" UTC)  # or SOURCE_DATE_EPOCH's
 set(CPACK_PACKAGE_CONTACT "gapfarm developers <gapfarm@packages.debian.org>" CACHE STRING
     "Maintainer in the packages: Name <address>")
-foreach(package gapfarm gapfarm-worker)
+foreach(package ${packages})
   set(folder ${made}/${package})
   file(MAKE_DIRECTORY ${folder})
   configure_file(scripts/debian/copyright.in ${folder}/copyright @ONLY)
@@ -83,7 +91,7 @@ set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_NAME gapfarm)
 set(CPACK_PACKAGE_VENDOR gapfarm)
 set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
-set(CPACK_COMPONENTS_ALL gapfarm gapfarm-worker)
+set(CPACK_COMPONENTS_ALL ${packages})
 set(CPACK_COMPONENTS_GROUPING IGNORE)
 set(CPACK_DEB_COMPONENT_INSTALL ON)
 set(CPACK_STRIP_FILES ON)
@@ -111,6 +119,17 @@ robot moves like the real one.
 
 This package holds the program that simulates, and a service that works for
 the master that /etc/gapfarm/worker.env names.")
+set(CPACK_DEBIAN_PYTHON3-GAPFARM_PACKAGE_NAME python3-gapfarm)
+set(CPACK_DEBIAN_PYTHON3-GAPFARM_PACKAGE_SECTION python)
+set(CPACK_DEBIAN_PYTHON3-GAPFARM_PACKAGE_ARCHITECTURE all)
+set(CPACK_DEBIAN_PYTHON3-GAPFARM_PACKAGE_DEPENDS
+    "gapfarm ${same}, python3:any, python3-numpy, python3-pandas")
+set(CPACK_DEBIAN_PYTHON3-GAPFARM_DESCRIPTION
+"Simulations are tuned, on as many machines as there are, until a simulated
+robot moves like the real one.
+
+This package reads runs, models, diagnoses and logs into pandas, and asks the
+programs for predictions and simulated logs.")
 set(control ${PROJECT_SOURCE_DIR}/scripts/debian)
 set(CPACK_DEBIAN_GAPFARM_PACKAGE_CONTROL_EXTRA ${control}/gapfarm/postinst)
 set(CPACK_DEBIAN_GAPFARM-WORKER_PACKAGE_CONTROL_EXTRA

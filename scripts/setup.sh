@@ -16,6 +16,8 @@ packages=(
 if [[ "${1:-}" == --tests ]]; then
   packages+=(chromium clang-format fonts-dejavu-core)
   if ! command -v node >/dev/null; then packages+=(nodejs); fi  # drives the browser
+  # A simulator by MuJoCo, and the Python package.
+  packages+=(libmujoco-dev python3-numpy python3-pandas python3-pytest)
   # Farms over Slurm and ssh, and Kubernetes' types (tests/launch).
   packages+=(iproute2 munge openssh-client openssh-server python3-kubernetes python3-yaml slurm-wlm)
 fi

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cassert>
+#include <cstdio>
 #include <list>
 #include <string>
 #include <utility>
@@ -44,6 +45,14 @@ class PreparedProblems {
 
   std::list<std::pair<std::string, Entry>> entries_;
 };
+
+// What this worker cannot do another may: it ends like one that crashed, with the attempt still in
+// work, so that the task goes elsewhere and is blamed when it fails there too.
+[[noreturn]] void end_as_failed(const std::string& message) {
+  constexpr int kExitTaskFailed = 70;
+  std::fprintf(stderr, "gapfarm-worker: %s\n", message.c_str());
+  _exit(kExitTaskFailed);
+}
 
 v1::JobResult work_on(const Work& work, PreparedProblems& problems, StepCounter* steps) {
   v1::JobResult result;
@@ -105,6 +114,7 @@ void EvaluationThread::run() {
     progress_.epoch.store(work.job.epoch());
     progress_.attempt.store(work.job.attempt_id());
     v1::JobResult result = work_on(work, problems, &progress_.steps);
+    if (result.result().outcome() == v1::WORKER_FAILED) end_as_failed(result.result().message());
     progress_.attempt.store(0);
     lock.lock();
     begun_ = -1;

@@ -8,6 +8,7 @@
 #include <thread>
 
 #include "common/base/build_info.h"
+#include "common/external/simulator.h"
 #include "common/net/keys.h"
 #include "common/process/process_pool.h"
 #include "common/usage/manual.h"
@@ -43,6 +44,7 @@ struct Arguments {
   bool drain = false;
   double lifetime_s = 0;
   ProcessLimits limits;
+  bool allow_external = false;
   bool local = false;
   bool announce = false;
   int parent = 0;
@@ -88,6 +90,9 @@ void describe(CLI::App& app, Arguments* arguments) {
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str()
       ->type_name("SECONDS");
+  app.add_flag("--allow-external", arguments->allow_external,
+               "Start the simulators that a master names (docs/external.md): only for one that you "
+               "trust with this machine");
   // For the processes that start this one; no user needs them.
   app.add_flag("--local", arguments->local)->group("");
   app.add_flag("--announce", arguments->announce)->group("");
@@ -150,6 +155,8 @@ int work(const Arguments& arguments) {
   const auto page = ProgressPage::inherit();
   if (!page) return complain(page.error(), 1);
   options.progress = &**page;
+  // A master on this machine runs what its user may run anyway.
+  allow_external_programs(arguments.local || arguments.allow_external);
   EvaluationThread evaluation(options.progress);
   const Result<ServiceEnd> end = serve(options, evaluation, stop);
   const int status = end ? 0 : complain(end.error(), kExitRefused);
@@ -179,6 +186,7 @@ int start_workers(const Arguments& arguments) {
                              {"--window", std::to_string(arguments.window)});
   }
   if (arguments.drain) options.arguments.push_back("--drain");
+  if (arguments.allow_external) options.arguments.push_back("--allow-external");
   options.limits = arguments.limits;
   if (arguments.lifetime_s > 0) options.deadline_s = monotonic_seconds() + arguments.lifetime_s;
   const Status status = supervise(options, stop);

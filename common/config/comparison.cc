@@ -38,7 +38,7 @@ Result<Variant> read_variant(const std::string& name, const toml::table& changes
   merge(base, changes);
   std::ostringstream text;
   text << base;
-  Result<Config> config = parse_config(text.str(), base_path);
+  Result<Config> config = parse_config(text.str(), base_path, start_program);
   // Places would be those of the merged text, which nobody has seen.
   if (!config) {
     return Error{path + ": variant \"" + name +

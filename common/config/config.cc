@@ -5,6 +5,8 @@
 #include "common/base/shipped.h"
 #include "common/base/suggest.h"
 #include "common/config/sections.h"
+#include "common/external/simulator.h"
+#include "common/process/process_pool.h"
 #include "common/trials/csv.h"
 #include "common/trials/files.h"
 #include "common/trials/format.h"
@@ -60,7 +62,16 @@ bool read_robot_section(TomlSection& top, Config& config) {
 
 }  // namespace
 
-Result<Config> parse_config(std::string_view text, const std::string& path) {
+Result<std::string> start_no_program(const ExternalCommand& command) {
+  return Error{"would have to start '" + command.words[0] + "', and here nothing is started"};
+}
+
+Result<std::string> start_program(const ExternalCommand& command) {
+  return ExternalSimulator(command, monotonic_seconds).introduce();
+}
+
+Result<Config> parse_config(std::string_view text, const std::string& path,
+                            const ProgramStarter& start) {
   auto parsed = parse_toml(text, path);
   if (!parsed.ok()) {
     const TextFormat format = sniff_format(text);
@@ -79,6 +90,10 @@ Result<Config> parse_config(std::string_view text, const std::string& path) {
   read_top(top, config);
   Problem& problem = config.problem;
   if (scenario_form(problem.scenario).robot && !read_robot_section(top, config)) {
+    return errors.error();
+  }
+  if (scenario_form(problem.scenario).program &&
+      !read_external_section(top, config.path, start, problem)) {
     return errors.error();
   }
   const ParameterTable& table = problem.table();
@@ -108,7 +123,7 @@ Result<Config> read_config(const std::string& path) {
   const std::string file = shipped_file(path);
   auto text = read_text_file(file);
   if (!text.ok()) return text.error();
-  return parse_config(*text, file);
+  return parse_config(*text, file, start_program);
 }
 
 Status check_evolvable(const Config& config) {

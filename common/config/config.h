@@ -1,6 +1,7 @@
 // Configs: TOML files to typed settings (docs/configuration.md).
 #pragma once
 
+#include <functional>
 #include <string>
 #include <string_view>
 
@@ -9,9 +10,18 @@
 
 namespace gapfarm {
 
+using ProgramStarter = std::function<Result<std::string>(const ExternalCommand&)>;
+// An error: whoever only reads starts nothing.
+Result<std::string> start_no_program(const ExternalCommand& command);
+// Starts it, reads its first line and ends it.
+Result<std::string> start_program(const ExternalCommand& command);
+
 // Keys that the file leaves out keep their defaults.  The error lists everything that is wrong, a
 // line each: "file:line:column: sentence", with "did you mean" for unknown words.
-Result<Config> parse_config(std::string_view text, const std::string& path);
+// `start` starts the simulator that scenario `external` names, and returns how it introduces
+// itself.
+Result<Config> parse_config(std::string_view text, const std::string& path,
+                            const ProgramStarter& start = start_no_program);
 // Looks among the shipped ones too (shipped_file).
 Result<Config> read_config(const std::string& path);
 

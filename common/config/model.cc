@@ -144,9 +144,28 @@ void read_origin(TomlSection& top, Model& model) {
   }
 }
 
+// What format_model() wrote; nothing is started.
+Status read_model_program(TomlSection& top, Model& model) {
+  ExternalCommand command;
+  std::string introduction;
+  if (auto section = top.section("external")) {
+    command.words = section->strings("program").value_or(std::vector<std::string>());
+    section->read("folder", command.folder);
+    section->read("answer_limit", command.answer_limit_s, 1e-3, 1e6, "s");
+    section->read("introduction", introduction);
+    section->finish();
+  }
+  auto program = make_external_program(std::move(command), std::move(introduction));
+  if (!program) return program.error();
+  model.external = std::move(*program);
+  model.values = model.table().nominal();
+  return {};
+}
+
 }  // namespace
 
 const ParameterTable& Model::table() const {
+  if (external) return external->table.table();
   return ground ? ground->table() : *parameter_table(scenario).value();
 }
 
@@ -170,6 +189,7 @@ Problem problem_of(const Model& model) {
   problem.pieces = model.pieces;
   problem.robot_file = model.robot_file;
   problem.ground = model.ground;
+  problem.external = model.external;
   problem.fitness = model.fitness;
   problem.spread = model.spread;
   return problem;
@@ -206,11 +226,15 @@ Result<Model> parse_model(std::string_view text, const std::string& path) {
   top.read("kind", model.kind);
   if (scenario_form(scenario).robot) {
     Problem problem = problem_of(model);
-    const std::string file = top.string("robot").value_or("");
-    if (Status s = problem.set_robot(file, path + ": robot"); !s) return s.error();
+    const std::string robot = top.string("robot").value_or("");
+    if (Status s = problem.set_robot(robot, path + ": robot"); !s) return s.error();
     model.robot_file = problem.robot_file;
     model.ground = problem.ground;
     model.values = problem.values;
+  }
+  if (scenario_form(scenario).program) {
+    if (Status s = read_model_program(top, model); !s)
+      return Error{path + ": " + s.error().message};
   }
   read_base(top, "parameters", model);
   read_base(top, "noise", model);

@@ -50,6 +50,8 @@ struct Model {
   // Where the scenario has a robot: its file, and what it says.
   std::string robot_file;
   std::shared_ptr<const GroundTable> ground;
+  // Where a program of the user's simulates.
+  std::shared_ptr<const ExternalProgram> external;
 
   const ParameterTable& table() const;  // REQUIRES: a known scenario
 };

@@ -99,6 +99,18 @@ std::string robot_text(const Model& model) {
   return "robot = '''\n" + model.robot_file + "'''\n";
 }
 
+std::string program_section(const Model& model) {
+  if (!model.external) return "";
+  const ExternalCommand& command = model.external->command;
+  std::string words;
+  for (const std::string& word : command.words) {
+    words += (words.empty() ? "" : ", ") + toml_string(word);
+  }
+  return "\n[external]\nprogram = [" + words + "]\nfolder = " + toml_string(command.folder) +
+         "\nanswer_limit = " + toml_number(command.answer_limit_s) +
+         "\nintroduction = " + toml_string(model.external->introduction) + "\n";
+}
+
 std::string piece_sections(const Model& model) {
   std::string text;
   for (const Piece& piece : model.pieces) {
@@ -174,7 +186,7 @@ std::string format_model(const Model& model) {
   return "# A gapfarm model: 'gapfarm predict' and 'gapfarm simulate' take it.\nmodel = 1\n"
          "scenario = " +
          toml_string(model.scenario) + "\nkind = " + toml_string(model.kind) + "\n" +
-         robot_text(model) + base_section(model, "parameters", false) +
+         robot_text(model) + program_section(model) + base_section(model, "parameters", false) +
          base_section(model, "noise", true) + effect_sections(model) + frame_section(model) +
          command_sections(model) + score_sections(model) + origin_sections(model);
 }

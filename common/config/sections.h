@@ -1,10 +1,15 @@
 // The sections of a config, one function each.  Internal to common/config.
 #pragma once
 
+#include "common/config/config.h"
 #include "common/config/settings.h"
 #include "common/config/toml_section.h"
 
 namespace gapfarm {
+
+// [external].  False when there is no program to go on with.
+bool read_external_section(TomlSection& top, const std::string& config_path,
+                           const ProgramStarter& start, Problem& problem);
 
 // Each reads its section of `top` (when it is there) into the settings and reports what is wrong.
 void read_parameters(TomlSection& top, const ParameterTable& table, ParameterValues& values);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "common/parameters/external.h"
 #include "common/parameters/ground.h"
 #include "common/parameters/push.h"
 #include "common/parameters/racquetball.h"
@@ -167,7 +168,8 @@ struct ScenarioTable {
 constexpr ScenarioTable kScenarioTables[] = {{"srv1", srv1_table},
                                              {"push", push_table},
                                              {"racquetball", racquetball_table},
-                                             {"ground", ground_table}};
+                                             {"ground", ground_table},
+                                             {"external", external_table}};
 
 Parameter effect_parameter(const Effect& effect, const EffectParameter& p) {
   return {effect.name + "." + p.key,

@@ -23,7 +23,8 @@ std::vector<CommandSpec> ground_commands() { return {{kWindowCommand, 0, 0, 0}};
 constexpr ScenarioForm kForms[] = {{"srv1", srv1_commands},
                                    {"push", no_commands, true},
                                    {"racquetball", racquetball_commands},
-                                   {"ground", ground_commands, false, true}};
+                                   {"ground", ground_commands, false, true},
+                                   {"external", srv1_commands, false, false, true}};
 
 }  // namespace
 
@@ -61,6 +62,7 @@ const char* fitness_unit(FitnessKind kind) {
 }
 
 const ParameterTable& Problem::table() const {
+  if (external) return external->table.table();
   return ground ? ground->table() : *parameter_table(scenario).value();
 }
 

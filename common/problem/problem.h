@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "common/base/result.h"
+#include "common/external/protocol.h"
 #include "common/parameters/genome.h"
 #include "common/parameters/ground.h"
 #include "common/parameters/table.h"
@@ -68,8 +69,11 @@ struct Problem {
   std::string robot_file;
   std::shared_ptr<const GroundTable> ground;
   std::vector<CommandedRun> runs;
+  // Scenario `external` only: the program that simulates.
+  std::shared_ptr<const ExternalProgram> external;
 
-  // Of the robot where there is one, else of the scenario.  REQUIRES: a known scenario.
+  // Of the robot or the program where there is one, else of the scenario.  REQUIRES: a known
+  // scenario.
   const ParameterTable& table() const;
   // Takes the robot; `values` become its own.  Errors: parse_robot()'s, `path` naming the file.
   Status set_robot(const std::string& text, const std::string& path);
@@ -90,6 +94,8 @@ struct ScenarioForm {
   bool pieces = false;
   // There is a robot's file, and trials are windows of runs.
   bool robot = false;
+  // A program of the user's simulates.
+  bool program = false;
 };
 // REQUIRES: a scenario that has a parameter table.
 const ScenarioForm& scenario_form(std::string_view scenario);

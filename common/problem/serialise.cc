@@ -9,7 +9,7 @@
 
 #include "common/base/hash.h"
 #include "common/base/suggest.h"
-#include "common/problem/problem.h"
+#include "common/problem/external_problem.h"
 
 namespace gapfarm {
 namespace {
@@ -341,6 +341,7 @@ v1::Problem to_proto(const Problem& problem) {
   message.mutable_spread()->set_replicates(problem.spread.replicates);
   for (const Piece& piece : problem.pieces) *message.add_pieces() = to_proto(piece);
   for (const Trial& trial : problem.log.trials) *message.add_trials() = to_proto(trial);
+  write_external(problem, &message);
   if (!problem.robot_file.empty()) message.set_robot(problem.robot_file);
   for (const CommandedRun& run : problem.runs) {
     v1::Run* to = message.add_runs();
@@ -360,6 +361,7 @@ Result<Problem> from_proto(const v1::Problem& message) {
   problem.scenario = message.scenario();
   if (auto table = parameter_table(problem.scenario); !table) return table.error();
   if (Status s = read_runs(message, &problem); !s) return s.error();
+  if (Status s = read_external(message, &problem); !s) return s.error();
   if (Status s = read_values(message, &problem); !s) return s.error();
   if (Status s = read_commands(message, &problem); !s) return s.error();
   if (Status s = read_pieces(message, &problem); !s) return s.error();

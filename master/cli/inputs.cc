@@ -50,7 +50,7 @@ Result<Source> read_source(const std::string& named) {
   const Result<std::string> text = read_text_file(path);
   if (!text) return text.error();
   if (!is_model(*text)) {
-    auto config = parse_config(*text, path);
+    auto config = parse_config(*text, path, start_program);
     if (!config) return config.error();
     return Source{std::move(*config)};
   }

@@ -26,6 +26,7 @@ Model model_of(const RunStore& store, const Problem& problem, const Config& conf
   model.pieces = problem.pieces;
   model.robot_file = problem.robot_file;
   model.ground = problem.ground;
+  model.external = problem.external;
   model.fitness = problem.fitness;
   model.spread = problem.spread;
   model.score = fitness_of_cost(problem.fitness.kind, summary.best->cost);

@@ -18,7 +18,7 @@ struct ResumeCommand {
 
 // The run's config and problem as they were stored.
 Result<Config> stored_config(const RunInfo& info, const EvolutionOverrides& overrides) {
-  Result<Config> config = parse_config(info.config_text, info.config_path);
+  Result<Config> config = parse_config(info.config_text, info.config_path, start_program);
   if (!config) return config.error();
   v1::Problem message;
   if (!message.ParseFromString(info.problem)) {

@@ -47,7 +47,8 @@ Result<Model> best_so_far(const RunReader& run) {
   model.spread = problem->spread;
   model.score = best.fitness;
   model.data = {run.info().problem_hash, problem->log.trials.size(), {}};
-  if (const auto config = parse_config(run.info().config_text, run.info().config_path)) {
+  if (const auto config =
+          parse_config(run.info().config_text, run.info().config_path, start_program)) {
     model.data.files = config->trial_files;
   }
   model.origin = {name, run.info().seed, last.generation, last.evaluations};

@@ -120,7 +120,7 @@ class Srv1Model : public ScenarioModel {
 
   v1::TaskResult trace(const ParameterValues& values, const v1::TraceTask& task,
                        StepCounter* steps) const override {
-    return trace_command(values, task, steps);
+    return trace_command(problem_, values, task, steps);
   }
 
  private:
@@ -190,7 +190,7 @@ TrialPrediction Srv1Model::observe(const Srv1Robot& robot, const Views& views,
 Prediction Srv1Model::predict(const ParameterValues& values, const PredictOptions& options) const {
   Prediction prediction;
   prediction.facts.resize(problem_.commands.size());
-  Srv1Robot robot(values, options.steps);
+  Srv1Robot robot(problem_, values, options.steps);
   prediction.tails = robot.noise().tails;
   const Views views(robot.effects());
   const unsigned context = robot.effects().motion_context();

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "worker/scenarios/external.h"
+
 namespace gapfarm {
 namespace {
 
@@ -12,6 +14,32 @@ int whole(const ParameterValues& values, Srv1 row) { return static_cast<int>(at(
 SideDrive side_drive(const SideState& side, double full_speed_m_s, double noise_gain) {
   return {side.duty * full_speed_m_s * side.gain * noise_gain, side.lag_s, side.dead_travel_m};
 }
+
+NoiseSettings noise_of(const Problem& problem, const ParameterValues& values) {
+  if (problem.external) {
+    const ExternalTable& e = problem.external->table;
+    return {values[e.drive_noise_common()],
+            values[e.drive_noise_side()],
+            {values[e.pose_noise_position()], values[e.pose_noise_heading()]},
+            {values[e.drive_noise_tail()], values[e.pose_noise_tail()]}};
+  }
+  return {at(values, Srv1::kDriveNoiseCommon),
+          at(values, Srv1::kDriveNoiseSide),
+          {at(values, Srv1::kPoseNoisePosition), at(values, Srv1::kPoseNoiseHeading)},
+          {at(values, Srv1::kDriveNoiseTail), at(values, Srv1::kPoseNoiseTail)}};
+}
+
+class BulletVehicle final : public Vehicle {
+ public:
+  BulletVehicle(const SimSettings& settings, StepCounter* steps) : simulator_(settings, steps) {}
+  Motion run(const DriveInput& drive, const Floor& floor, std::vector<MotionSample>* path,
+             double interval_s) override {
+    return simulator_.run(drive, floor, path, interval_s);
+  }
+
+ private:
+  Simulator simulator_;
+};
 
 }  // namespace
 
@@ -61,14 +89,20 @@ Gains draw_gains(const NoiseSettings& noise, Stream& stream) {
           std::clamp(1 + core * (common + right), 0.0, 2.0)};
 }
 
+std::unique_ptr<Vehicle> make_vehicle(const Problem& problem, const ParameterValues& values,
+                                      const ActiveEffects& effects, StepCounter* steps) {
+  if (problem.external) return make_external_vehicle(problem, values, steps);
+  return std::make_unique<BulletVehicle>(sim_settings(values, effects), steps);
+}
+
 Srv1Robot::Srv1Robot(const ParameterValues& values, StepCounter* steps)
-    : effects_(srv1_table(), values),
-      noise_{at(values, Srv1::kDriveNoiseCommon),
-             at(values, Srv1::kDriveNoiseSide),
-             {at(values, Srv1::kPoseNoisePosition), at(values, Srv1::kPoseNoiseHeading)},
-             {at(values, Srv1::kDriveNoiseTail), at(values, Srv1::kPoseNoiseTail)}},
-      full_speed_m_s_(at(values, Srv1::kFullSpeed)),
-      simulator_(sim_settings(values, effects_), steps) {}
+    : Srv1Robot(Problem{}, values, steps) {}
+
+Srv1Robot::Srv1Robot(const Problem& problem, const ParameterValues& values, StepCounter* steps)
+    : effects_(problem.table(), values),
+      noise_(noise_of(problem, values)),
+      full_speed_m_s_(problem.external ? 1 : at(values, Srv1::kFullSpeed)),
+      vehicle_(make_vehicle(problem, values, effects_, steps)) {}
 
 Motion Srv1Robot::run(const DrivenCommand& drive, const Situation& situation, const Gains& gains,
                       std::vector<MotionSample>* path, double interval_s) {
@@ -81,7 +115,7 @@ Motion Srv1Robot::run(const DrivenCommand& drive, const Situation& situation, co
   effects_.floor(situation, floor);
   const DriveInput input{side_drive(state.left, full_speed_m_s_, gains.left),
                          side_drive(state.right, full_speed_m_s_, gains.right), state.duration_s};
-  const Motion motion = simulator_.run(input, floor, path, interval_s);
+  const Motion motion = vehicle_->run(input, floor, path, interval_s);
   simulated_s_ += motion.duration_s;
   ++runs_;
   return motion;

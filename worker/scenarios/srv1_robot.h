@@ -1,6 +1,7 @@
 // From parameter values to what the simulator is built from, and one driven command.
 #pragma once
 
+#include <memory>
 #include <vector>
 
 #include "common/parameters/table.h"
@@ -10,6 +11,7 @@
 #include "gapfarm/v1/task.pb.h"
 #include "worker/effects/behaviour.h"
 #include "worker/scenarios/outcome.h"
+#include "worker/scenarios/vehicle.h"
 #include "worker/sim/simulator.h"
 
 namespace gapfarm {
@@ -37,7 +39,10 @@ Gains draw_gains(const NoiseSettings& noise, Stream& stream);
 // One robot at one set of parameter values, with the effects that are active there.
 class Srv1Robot {
  public:
+  // Of scenario srv1.
   explicit Srv1Robot(const ParameterValues& values, StepCounter* steps = nullptr);
+  // Of the problem's scenario: srv1, or external, whose effects are a part of srv1's.
+  Srv1Robot(const Problem& problem, const ParameterValues& values, StepCounter* steps);
 
   const ActiveEffects& effects() const { return effects_; }
   const NoiseSettings& noise() const { return noise_; }
@@ -51,7 +56,7 @@ class Srv1Robot {
   ActiveEffects effects_;
   NoiseSettings noise_;
   double full_speed_m_s_ = 0;
-  Simulator simulator_;
+  std::unique_ptr<Vehicle> vehicle_;
   double simulated_s_ = 0;
   unsigned runs_ = 0;
 };

@@ -23,7 +23,7 @@ class Session {
           StepCounter* steps)
       : problem_(problem),
         task_(task),
-        robot_(values, steps),
+        robot_(problem, values, steps),
         reading_(robot_.effects().reading()) {}
 
   v1::TaskResult drive() {
@@ -113,10 +113,10 @@ v1::TaskResult simulate_session(const Problem& problem, const ParameterValues& v
   return Session(problem, values, task, steps).drive();
 }
 
-v1::TaskResult trace_command(const ParameterValues& values, const v1::TraceTask& task,
-                             StepCounter* steps) {
+v1::TaskResult trace_command(const Problem& problem, const ParameterValues& values,
+                             const v1::TraceTask& task, StepCounter* steps) {
   v1::TaskResult result;
-  Srv1Robot robot(values, steps);
+  Srv1Robot robot(problem, values, steps);
   std::vector<MotionSample> path;
   const v1::Command& c = task.command();
   Gains gains;

@@ -14,7 +14,7 @@ v1::TaskResult simulate_session(const Problem& problem, const ParameterValues& v
                                 const v1::SimulateTask& task, StepCounter* steps = nullptr);
 
 // The motion of one command from (0, 0, 0): nominal, or with one draw of drive noise.
-v1::TaskResult trace_command(const ParameterValues& values, const v1::TraceTask& task,
-                             StepCounter* steps = nullptr);
+v1::TaskResult trace_command(const Problem& problem, const ParameterValues& values,
+                             const v1::TraceTask& task, StepCounter* steps = nullptr);
 
 }  // namespace gapfarm

@@ -1,5 +1,6 @@
 #include <array>
 
+#include "worker/scenarios/external.h"
 #include "worker/scenarios/ground.h"
 #include "worker/scenarios/push.h"
 #include "worker/scenarios/racquetball.h"
@@ -13,6 +14,7 @@ std::span<const Scenario> scenarios() {
       Scenario{"srv1", "tracked robot, six atomic commands", prepare_srv1},
       Scenario{"push", "flat pieces pushed across a table by a finger", prepare_push},
       Scenario{"ground", "any robot on wheels or tracks, from its file", prepare_ground},
+      Scenario{"external", "commands driven by a program of the user's", prepare_external},
       Scenario{"racquetball", "ball in a closed court, struck by a paddle", prepare_racquetball},
   };
   return rows;

@@ -1,0 +1,208 @@
+#include "common/external/line_program.h"
+
+#include <fcntl.h>
+#include <poll.h>
+#include <signal.h>
+#include <string.h>
+#include <sys/prctl.h>
+#include <sys/socket.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <utility>
+
+namespace gapfarm {
+namespace {
+
+constexpr std::size_t kShownBytes = 80;
+
+// The beginning of what was said, with control bytes as '?'.
+std::string shown_line(std::string text) {
+  const bool cut = text.size() > kShownBytes;
+  text.resize(std::min(text.size(), kShownBytes));
+  for (char& c : text) {
+    if (static_cast<unsigned char>(c) < ' ' || c == 127) c = '?';
+  }
+  return "'" + text + (cut ? "...'" : "'");
+}
+
+std::string in_seconds(double seconds) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%g s", seconds);
+  return text;
+}
+
+// In the child, after fork: only what is safe there.
+[[noreturn]] void become(const std::vector<char*>& words, const char* folder, int in, int out,
+                         int told, pid_t parent) {
+  prctl(PR_SET_PDEATHSIG, SIGKILL);
+  if (getppid() != parent) _exit(0);
+  sigset_t none;
+  sigemptyset(&none);
+  sigprocmask(SIG_SETMASK, &none, nullptr);
+  dup2(in, STDIN_FILENO);
+  dup2(out, STDOUT_FILENO);
+  if (*folder == '\0' || chdir(folder) == 0) execvp(words[0], words.data());
+  const int error = errno;
+  [[maybe_unused]] const ssize_t n = write(told, &error, sizeof error);
+  _exit(127);
+}
+
+void close_fd(int* fd) {
+  if (*fd >= 0) close(*fd);
+  *fd = -1;
+}
+
+}  // namespace
+
+LineProgram::LineProgram(std::vector<std::string> words, std::string folder, LineLimits limits,
+                         Clock clock)
+    : words_(std::move(words)), folder_(std::move(folder)), limits_(limits), clock_(clock) {}
+
+LineProgram::~LineProgram() { kill(); }
+
+std::string LineProgram::name() const {
+  std::string text;
+  for (const std::string& word : words_) text += (text.empty() ? "" : " ") + word;
+  return text;
+}
+
+void LineProgram::kill() {
+  close_fd(&to_);
+  close_fd(&from_);
+  rest_.clear();
+  if (pid_ <= 0) return;
+  ::kill(pid_, SIGKILL);
+  waitpid(pid_, nullptr, 0);
+  pid_ = 0;
+}
+
+Error LineProgram::failed(const std::string& what) {
+  kill();
+  return Error{"external program '" + name() + "' " + what};
+}
+
+// How it ended, of one that closed its pipe.
+Error LineProgram::ended() {
+  constexpr int kPatience_ms = 1000;  // between closing its pipe and being gone
+  int status = 0;
+  pid_t gone = 0;
+  for (int waited = 0; waited < kPatience_ms; ++waited) {
+    gone = waitpid(pid_, &status, WNOHANG);
+    if (gone != 0) break;
+    poll(nullptr, 0, 1);
+  }
+  if (gone != pid_) return failed("closed its output and goes on; it has to answer on stdout");
+  pid_ = 0;
+  if (WIFSIGNALED(status)) {
+    const int signal = WTERMSIG(status);
+    return failed("crashed with signal " + std::to_string(signal) + " (" + strsignal(signal) + ")");
+  }
+  return failed("ended with status " + std::to_string(WEXITSTATUS(status)) +
+                " instead of answering");
+}
+
+Status LineProgram::start() {
+  if (words_.empty()) return failed("has no name");
+  // A socket, since writing to one that is closed can be told to raise no signal.
+  int in[2], out[2], told[2];
+  if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, in) != 0) {
+    return failed(std::string("got no pipe: ") + strerror(errno));
+  }
+  if (pipe2(out, O_CLOEXEC) != 0 || pipe2(told, O_CLOEXEC) != 0) {
+    return failed(std::string("got no pipe: ") + strerror(errno));
+  }
+  std::vector<char*> words;
+  for (std::string& word : words_) words.push_back(word.data());
+  words.push_back(nullptr);
+  const pid_t parent = getpid();
+  pid_ = fork();
+  if (pid_ == 0) become(words, folder_.c_str(), in[1], out[1], told[1], parent);
+  close(in[1]);
+  close(out[1]);
+  close(told[1]);
+  to_ = in[0];
+  from_ = out[0];
+  int error = pid_ < 0 ? errno : 0;
+  if (pid_ > 0 && read(told[0], &error, sizeof error) <= 0) error = 0;
+  close(told[0]);
+  answered_ = false;
+  if (error == 0) return {};
+  return failed("cannot be started in '" + folder_ + "': " + strerror(error));
+}
+
+bool LineProgram::wait_for(int fd, short events, double until) const {
+  for (;;) {
+    const double left = until - clock_();
+    pollfd one{fd, events, 0};
+    const int ready = poll(&one, 1, left > 0 ? static_cast<int>(std::ceil(left * 1e3)) : 0);
+    if (ready > 0) return true;
+    if (ready == 0 && left <= 0) return false;
+  }
+}
+
+Status LineProgram::send(const std::string& line, double until) {
+  const std::string text = line + "\n";
+  for (std::size_t at = 0; at < text.size();) {
+    if (!wait_for(to_, POLLOUT, until)) return failed("does not read what it is asked");
+    const ssize_t n = ::send(to_, text.data() + at, text.size() - at, MSG_NOSIGNAL | MSG_DONTWAIT);
+    if (n > 0) {
+      at += static_cast<std::size_t>(n);
+    } else if (errno != EAGAIN && errno != EINTR) {
+      return ended();
+    }
+  }
+  return {};
+}
+
+Result<std::string> LineProgram::receive(double until, double limit_s) {
+  for (;;) {
+    const std::size_t end = rest_.find('\n');
+    if (std::min(end, rest_.size()) > limits_.answer_bytes) {
+      return failed("said more than the " + std::to_string(limits_.answer_bytes) +
+                    " bytes that a line may have: " + shown_line(rest_));
+    }
+    if (end != rest_.npos) {
+      std::string line = rest_.substr(0, end);
+      rest_.erase(0, end + 1);
+      return line;
+    }
+    if (!wait_for(from_, POLLIN, until)) {
+      return failed("did not answer within " + in_seconds(limit_s));
+    }
+    char bytes[65536];
+    const ssize_t n = read(from_, bytes, sizeof bytes);
+    if (n > 0) {
+      rest_.append(bytes, static_cast<std::size_t>(n));
+    } else if (n == 0 || errno != EINTR) {
+      return ended();
+    }
+  }
+}
+
+Result<std::string> LineProgram::ask(const std::string& line) {
+  if (!running()) {
+    if (Status s = start(); !s) return s.error();
+  }
+  if (rest_.empty() && wait_for(from_, POLLIN, clock_())) {
+    char bytes[kShownBytes];
+    const ssize_t n = read(from_, bytes, sizeof bytes);
+    if (n <= 0) return ended();
+    rest_.assign(bytes, static_cast<std::size_t>(n));
+  }
+  if (!rest_.empty()) {
+    const char* when = answered_ ? "answered twice, or late: " : "spoke before it was asked: ";
+    return failed(when + shown_line(rest_));
+  }
+  const double limit_s = answered_ ? limits_.answer_s : limits_.start_s;
+  const double until = clock_() + limit_s;
+  if (Status s = send(line, until); !s) return s.error();
+  Result<std::string> answer = receive(until, limit_s);
+  if (answer) answered_ = true;
+  return answer;
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,61 @@
+// A program of the user's that answers lines with lines, over pipes.
+#pragma once
+
+#include <sys/types.h>
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "common/base/result.h"
+
+namespace gapfarm {
+
+struct LineLimits {
+  double answer_s = 60;                // to one line
+  double start_s = 60;                 // to the first one: interpreters take their time
+  std::size_t answer_bytes = 1 << 20;  // of one line
+};
+
+// Started with the first ask() and again after one that failed; dies with the thread that started
+// it.  Its stderr is this process's.  One thread at a time.
+class LineProgram {
+ public:
+  using Clock = double (*)();  // seconds; never goes back
+
+  // `words`: program and arguments, found by PATH, started in `folder`.
+  LineProgram(std::vector<std::string> words, std::string folder, LineLimits limits, Clock clock);
+  ~LineProgram();
+  LineProgram(const LineProgram&) = delete;
+  LineProgram& operator=(const LineProgram&) = delete;
+
+  // The line that answers `line`, both without their end.  Errors name the program and what it did:
+  // it cannot be started, has ended (with what status or signal), does not answer in time, says
+  // more than a line may hold, or said something before it was asked.  After an error it is dead.
+  Result<std::string> ask(const std::string& line);
+
+  bool running() const { return pid_ > 0; }
+  std::string name() const;  // its words, as typed
+  // Ends it with SIGKILL.
+  void kill();
+
+ private:
+  Status start();
+  Status send(const std::string& line, double until);
+  Result<std::string> receive(double until, double limit_s);
+  Error ended();
+  Error failed(const std::string& what);
+  bool wait_for(int fd, short events, double until) const;
+
+  std::vector<std::string> words_;
+  std::string folder_;
+  LineLimits limits_;
+  Clock clock_;
+  pid_t pid_ = 0;
+  int to_ = -1;
+  int from_ = -1;
+  bool answered_ = false;
+  std::string rest_;  // read beyond the last answer
+};
+
+}  // namespace gapfarm

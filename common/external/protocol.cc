@@ -1,0 +1,180 @@
+#include "common/external/protocol.h"
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "common/base/suggest.h"
+
+namespace gapfarm {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr std::size_t kShown = 80;
+
+Error wrong(const std::string& what, const std::string& line) {
+  std::string shown = line.substr(0, kShown);
+  for (char& c : shown) {
+    if (static_cast<unsigned char>(c) < ' ' || c == 127) c = '?';
+  }
+  return Error{what + ": '" + shown + (line.size() > kShown ? "...'" : "'")};
+}
+
+std::string word_of(const Json& json, const char* key) {
+  const auto found = json.find(key);
+  return found != json.end() && found->is_string() ? found->get<std::string>() : "";
+}
+
+double number_of(const Json& json, const char* key, double fallback) {
+  const auto found = json.find(key);
+  if (found == json.end()) return fallback;
+  return found->is_number() ? found->get<double>() : NAN;
+}
+
+Result<unsigned> read_inputs(const Json& json) {
+  unsigned inputs = 0;
+  std::vector<std::string> known;
+  for (const ExternalInputWord& row : kExternalInputWords) known.emplace_back(row.word);
+  for (const Json& word : json.value("inputs", Json::array())) {
+    const std::string text = word.is_string() ? word.get<std::string>() : word.dump();
+    const auto row = std::find_if(std::begin(kExternalInputWords), std::end(kExternalInputWords),
+                                  [&](const ExternalInputWord& r) { return text == r.word; });
+    if (row == std::end(kExternalInputWords)) {
+      return Error{"declares the unknown input '" + text + "'" + suggestion(text, known) +
+                   "; known: lag, dead_travel, floor, path"};
+    }
+    inputs |= row->input;
+  }
+  return inputs;
+}
+
+Parameter read_parameter(const Json& json) {
+  Parameter p;
+  p.key = word_of(json, "key");
+  p.unit = word_of(json, "unit");
+  if (p.unit.empty()) p.unit = "-";
+  p.summary = word_of(json, "summary");
+  p.lower = number_of(json, "lower", NAN);
+  p.upper = number_of(json, "upper", NAN);
+  p.nominal = number_of(json, "nominal", NAN);
+  if (json.value("log", Json(false)) == Json(true)) p.scale = ParameterScale::kLog;
+  return p;
+}
+
+Json to_json(const ExternalSide& side, unsigned inputs) {
+  Json json = {{"speed", side.speed}};
+  if (inputs & kExternalLag) json["lag"] = side.lag_s;
+  if (inputs & kExternalDeadTravel) json["dead_travel"] = side.dead_travel_m;
+  return json;
+}
+
+Json to_json(const ExternalFloor& f) {
+  return {{"tilt", f.tilt_rad},
+          {"tilt_direction", f.tilt_direction_rad},
+          {"nap", f.nap_strength},
+          {"nap_direction", f.nap_direction_rad},
+          {"rolling_resistance", f.rolling_resistance},
+          {"patch", {f.patch_x_m, f.patch_y_m, f.patch_radius_m}},
+          {"patch_ratio", f.patch_ratio}};
+}
+
+// `count` finite numbers, or none.
+std::vector<double> numbers(const Json& json, std::size_t count) {
+  std::vector<double> values;
+  if (!json.is_array() || json.size() != count) return values;
+  for (const Json& value : json) {
+    if (!value.is_number() || !std::isfinite(value.get<double>())) return {};
+    values.push_back(value.get<double>());
+  }
+  return values;
+}
+
+}  // namespace
+
+std::string hello_line() { return Json{{"gapfarm", kExternalProtocol}}.dump(); }
+
+Result<ExternalDeclaration> parse_declaration(const std::string& line) {
+  const Json json = Json::parse(line, nullptr, false);
+  if (!json.is_object()) return wrong("does not introduce itself with a JSON object", line);
+  if (number_of(json, "gapfarm", 0) != kExternalProtocol) {
+    return wrong("does not speak protocol " + std::to_string(kExternalProtocol) +
+                     " (\"gapfarm\": 1 is missing)",
+                 line);
+  }
+  ExternalDeclaration declaration;
+  declaration.name = word_of(json, "name");
+  const Json rows = json.value("parameters", Json::array());
+  if (!rows.is_array() ||
+      !std::all_of(rows.begin(), rows.end(), [](const Json& row) { return row.is_object(); })) {
+    return wrong("declares parameters that are no list of objects", rows.dump());
+  }
+  for (const Json& row : rows) declaration.parameters.push_back(read_parameter(row));
+  if (Status s = check_declaration(declaration); !s) return s.error();
+  const auto inputs = read_inputs(json);
+  if (!inputs) return inputs.error();
+  declaration.inputs = *inputs;
+  return declaration;
+}
+
+Result<std::shared_ptr<const ExternalProgram>> make_external_program(ExternalCommand command,
+                                                                     std::string introduction) {
+  if (command.words.empty()) return Error{"the external program has no name"};
+  auto declaration = parse_declaration(introduction);
+  if (!declaration) {
+    return Error{"external program '" + command.words[0] + "' " + declaration.error().message};
+  }
+  return std::shared_ptr<const ExternalProgram>(new ExternalProgram{
+      std::move(command), std::move(introduction), ExternalTable(std::move(*declaration))});
+}
+
+std::string request_line(const ExternalRequest& request) {
+  const unsigned inputs = request.declaration->inputs;
+  Json parameters = Json::object();
+  for (std::size_t i = 0; i < request.values.size(); ++i) {
+    parameters[request.declaration->parameters[i].key] = request.values[i];
+  }
+  Json json = {{"id", request.id},
+               {"parameters", std::move(parameters)},
+               {"left", to_json(request.left, inputs)},
+               {"right", to_json(request.right, inputs)},
+               {"duration", request.duration_s}};
+  if (inputs & kExternalPath) json["interval"] = request.interval_s;
+  if (inputs & kExternalFloor) json["floor"] = to_json(request.floor);
+  return json.dump();
+}
+
+Result<ExternalAnswer> parse_answer(const std::string& line, const ExternalRequest& request) {
+  const Json json = Json::parse(line, nullptr, false);
+  if (!json.is_object()) return wrong("did not answer with a JSON object", line);
+  const auto id = json.find("id");
+  if (id == json.end() || *id != Json(request.id)) {
+    return wrong("answered another question than " + std::to_string(request.id), line);
+  }
+  ExternalAnswer answer;
+  if (const std::string outcome = word_of(json, "outcome"); !outcome.empty() && outcome != "ok") {
+    if (outcome != "diverged")
+      return wrong("ended with an outcome other than ok or diverged", line);
+    answer.diverged = true;
+    answer.message = word_of(json, "message");
+    return answer;
+  }
+  const std::vector<double> pose = numbers(json.value("pose", Json()), 3);
+  if (pose.empty())
+    return wrong("did not answer with \"pose\": [x, y, theta] of finite numbers", line);
+  answer.X_SE = {pose[0], pose[1], wrap_angle(pose[2])};
+  answer.rest_time_s = number_of(json, "rest", 0);
+  if (!(answer.rest_time_s >= 0)) return wrong("answered a \"rest\" that is no time", line);
+  if (request.interval_s == 0) return answer;
+  for (const Json& row : json.value("path", Json::array())) {
+    const std::vector<double> s = numbers(row, 4);
+    const bool later = answer.path.empty() || (!s.empty() && s[0] >= answer.path.back().t_s);
+    if (s.empty() || !later)
+      return wrong("answered a path that is no list of [t, x, y, theta]", line);
+    answer.path.push_back({s[0], {s[1], s[2], wrap_angle(s[3])}});
+  }
+  if (answer.path.empty()) return wrong("was asked for a path and answered none", line);
+  return answer;
+}
+
+}  // namespace gapfarm

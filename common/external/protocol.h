@@ -1,0 +1,77 @@
+// What gapfarm and a simulator of the user's say to one another: a line of JSON each way
+// (docs/external.md).
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "common/base/result.h"
+#include "common/parameters/external.h"
+#include "common/pose/pose.h"
+
+namespace gapfarm {
+
+inline constexpr int kExternalProtocol = 1;
+
+struct ExternalSide {
+  double speed = 0;  // share of the speed at full duty, effects and noise included
+  double lag_s = 0;
+  double dead_travel_m = 0;
+};
+
+struct ExternalFloor {
+  double tilt_rad = 0, tilt_direction_rad = 0;
+  double nap_strength = 0, nap_direction_rad = 0;
+  double rolling_resistance = 0;
+  double patch_x_m = 0, patch_y_m = 0, patch_radius_m = 0, patch_ratio = 1;
+};
+
+// One command from rest to rest, in the start frame (x ahead, y left).
+struct ExternalRequest {
+  std::uint64_t id = 0;
+  const ExternalDeclaration* declaration = nullptr;  // says what the program takes
+  std::vector<double> values;                        // one a declared parameter
+  ExternalSide left, right;
+  double duration_s = 0;
+  double interval_s = 0;  // between the poses of the path; 0: none wanted
+  ExternalFloor floor;
+};
+
+struct ExternalSample {
+  double t_s = 0;
+  Pose X_SB;
+};
+
+struct ExternalAnswer {
+  bool diverged = false;
+  std::string message;  // of a simulation that did
+  Pose X_SE;
+  std::vector<ExternalSample> path;
+  double rest_time_s = 0;
+};
+
+// The line that begins a conversation; the program answers with what it declares.
+std::string hello_line();
+// Errors: no JSON, another version of the protocol, a parameter that check_declaration() refuses,
+// an input that is none.
+Result<ExternalDeclaration> parse_declaration(const std::string& line);
+
+// A program as a problem has it: how it is started, what it said of itself, the table of that.
+struct ExternalProgram {
+  ExternalCommand command;
+  std::string introduction;  // the line
+  ExternalTable table;
+};
+
+// Errors: no words, parse_declaration()'s.
+Result<std::shared_ptr<const ExternalProgram>> make_external_program(ExternalCommand command,
+                                                                     std::string introduction);
+
+std::string request_line(const ExternalRequest& request);
+// Errors: no JSON, the answer to another question, no pose, numbers that are not finite, a path
+// that was asked for and is not there.
+Result<ExternalAnswer> parse_answer(const std::string& line, const ExternalRequest& request);
+
+}  // namespace gapfarm

@@ -1,0 +1,64 @@
+#include "common/external/simulator.h"
+
+#include <algorithm>
+#include <atomic>
+
+namespace gapfarm {
+namespace {
+
+// Interpreters and physics engines take their time to load.
+constexpr double kLeastStart_s = 60;
+
+std::atomic<bool> programs_allowed{false};
+
+LineLimits limits_of(const ExternalCommand& command) {
+  LineLimits limits;
+  limits.answer_s = command.answer_limit_s;
+  limits.start_s = std::max(kLeastStart_s, command.answer_limit_s);
+  return limits;
+}
+
+}  // namespace
+
+void allow_external_programs(bool allowed) { programs_allowed = allowed; }
+bool external_programs_allowed() { return programs_allowed; }
+
+ExternalSimulator::ExternalSimulator(const ExternalCommand& command, LineProgram::Clock clock)
+    : ExternalSimulator(command, limits_of(command), clock) {}
+
+ExternalSimulator::ExternalSimulator(const ExternalCommand& command, LineLimits limits,
+                                     LineProgram::Clock clock)
+    : program_(command.words, command.folder, limits, clock) {}
+
+Result<std::string> ExternalSimulator::introduce() {
+  if (program_.running()) return introduction_;
+  const Result<std::string> line = program_.ask(hello_line());
+  if (!line) return line;
+  if (const auto declaration = parse_declaration(*line); !declaration) {
+    program_.kill();
+    return Error{"external program '" + program_.name() + "' " + declaration.error().message};
+  }
+  introduction_ = *line;
+  return introduction_;
+}
+
+Result<ExternalAnswer> ExternalSimulator::simulate(ExternalRequest& request,
+                                                   const std::string& declared) {
+  const Result<std::string> introduction = introduce();
+  if (!introduction) return introduction.error();
+  if (*introduction != declared) {
+    program_.kill();
+    return Error{"external program '" + program_.name() +
+                 "' declares other things than when the problem was made; check the config again, "
+                 "and give every machine the same program"};
+  }
+  request.id = ++asked_;
+  const Result<std::string> line = program_.ask(request_line(request));
+  if (!line) return line.error();
+  Result<ExternalAnswer> answer = parse_answer(*line, request);
+  if (answer) return answer;
+  program_.kill();
+  return Error{"external program '" + program_.name() + "' " + answer.error().message};
+}
+
+}  // namespace gapfarm

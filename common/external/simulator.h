@@ -1,0 +1,38 @@
+// A simulator of the user's, asked for one motion at a time.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "common/base/result.h"
+#include "common/external/line_program.h"
+#include "common/external/protocol.h"
+
+namespace gapfarm {
+
+// Whether this process may start the programs that problems name: they come from whoever is the
+// master.  False until it is said.
+void allow_external_programs(bool allowed);
+bool external_programs_allowed();
+
+class ExternalSimulator {
+ public:
+  ExternalSimulator(const ExternalCommand& command, LineProgram::Clock clock);
+  ExternalSimulator(const ExternalCommand& command, LineLimits limits, LineProgram::Clock clock);
+
+  // The line in which it introduces itself; starts it if it does not run.  Errors: LineProgram's
+  // and parse_declaration()'s.
+  Result<std::string> introduce();
+
+  // `declared`: the line that the problem was made with; a program that now declares something else
+  // is an error.  Sets the request's id.  Errors name program and question, and leave it dead: the
+  // next question starts it again.
+  Result<ExternalAnswer> simulate(ExternalRequest& request, const std::string& declared);
+
+ private:
+  LineProgram program_;
+  std::string introduction_;  // of the running program
+  std::uint64_t asked_ = 0;
+};
+
+}  // namespace gapfarm

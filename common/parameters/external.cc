@@ -1,0 +1,101 @@
+#include "common/parameters/external.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace gapfarm {
+namespace {
+
+constexpr Srv1 kNoiseRows[] = {Srv1::kDriveNoiseCommon,  Srv1::kDriveNoiseSide,
+                               Srv1::kPoseNoisePosition, Srv1::kPoseNoiseHeading,
+                               Srv1::kDriveNoiseTail,    Srv1::kPoseNoiseTail};
+
+// What each effect needs of the program beyond speeds and duration.  Effects on the robot's own
+// build are the program's business: a parameter of its own.
+struct EffectNeed {
+  const char* effect;
+  unsigned inputs;
+};
+constexpr EffectNeed kEffectNeeds[] = {
+    {"motor_lag", kExternalLag},        {"backlash", kExternalDeadTravel},
+    {"floor_tilt", kExternalFloor},     {"floor_nap", kExternalFloor},
+    {"friction_patch", kExternalFloor}, {"rolling_resistance", kExternalFloor},
+    {"pose_latency", kExternalPath},
+};
+constexpr const char* kOfTheBuild[] = {"com_offset"};
+
+bool can_be_applied(const Effect& effect, unsigned inputs) {
+  for (const char* name : kOfTheBuild) {
+    if (effect.name == name) return false;
+  }
+  for (const EffectNeed& need : kEffectNeeds) {
+    if (effect.name == need.effect) return (inputs & need.inputs) == need.inputs;
+  }
+  // One that nobody has sorted yet is left out rather than left without effect.
+  return effect.stage != EffectStage::kFloor;
+}
+
+bool is_key(const std::string& key) {
+  const auto bare = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_';
+  };
+  return !key.empty() && key.size() <= 64 && std::all_of(key.begin(), key.end(), bare);
+}
+
+bool is_taken(const std::string& key) {
+  for (const Srv1 row : kNoiseRows) {
+    if (srv1_table()[row_of(row)].key == key) return true;
+  }
+  return std::any_of(srv1_effects().begin(), srv1_effects().end(),
+                     [&](const Effect& effect) { return effect.name == key; });
+}
+
+Status check_row(const Parameter& p) {
+  const auto wrong = [&](const std::string& what) {
+    return Error{"parameter '" + p.key + "' " + what};
+  };
+  if (!is_key(p.key)) return wrong("needs a key of 1 to 64 letters, digits and _");
+  if (is_taken(p.key)) return wrong("has a name that gapfarm uses itself; choose another");
+  if (!std::isfinite(p.lower) || !std::isfinite(p.upper) || !(p.lower < p.upper)) {
+    return wrong("needs finite bounds, lower below upper");
+  }
+  if (!(p.nominal >= p.lower && p.nominal <= p.upper)) {
+    return wrong("has a nominal value outside its bounds");
+  }
+  if (p.scale == ParameterScale::kLog && !(p.lower > 0)) {
+    return wrong("has a log scale, so its lower bound must be more than 0");
+  }
+  return {};
+}
+
+}  // namespace
+
+Status check_declaration(const ExternalDeclaration& declaration) {
+  const auto& rows = declaration.parameters;
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    if (Status s = check_row(rows[i]); !s) return s;
+    for (std::size_t k = 0; k < i; ++k) {
+      if (rows[k].key == rows[i].key) {
+        return Error{"parameter '" + rows[i].key + "' is declared twice"};
+      }
+    }
+  }
+  return {};
+}
+
+ExternalTable::ExternalTable(ExternalDeclaration declaration)
+    : declaration_(std::move(declaration)) {
+  std::vector<Parameter> rows = declaration_.parameters;
+  for (const Srv1 row : kNoiseRows) rows.push_back(srv1_table()[row_of(row)]);
+  for (const Effect& effect : srv1_effects()) {
+    if (can_be_applied(effect, declaration_.inputs)) effects_.push_back(effect);
+  }
+  table_ = std::make_unique<ParameterTable>(std::move(rows), effects_);
+}
+
+const ParameterTable& external_table() {
+  static const ExternalTable table{ExternalDeclaration{}};
+  return table.table();
+}
+
+}  // namespace gapfarm

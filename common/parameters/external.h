@@ -1,0 +1,77 @@
+// The parameter table of scenario `external`: the program's own rows, the noise of drives and
+// readings, and the effects that can be applied around what the program takes in.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "common/effects/catalogue.h"
+#include "common/parameters/table.h"
+
+namespace gapfarm {
+
+// What a request may hold beside the two sides' speeds and the duration.
+enum ExternalInput : unsigned {
+  kExternalLag = 1u << 0,         // time constant of each side's motor
+  kExternalDeadTravel = 1u << 1,  // travel swallowed before a side moves
+  kExternalFloor = 1u << 2,       // tilt, nap, rolling resistance, a patch
+  kExternalPath = 1u << 3,        // poses on the way are answered
+};
+
+struct ExternalInputWord {
+  const char* word;
+  ExternalInput input;
+};
+inline constexpr ExternalInputWord kExternalInputWords[] = {{"lag", kExternalLag},
+                                                            {"dead_travel", kExternalDeadTravel},
+                                                            {"floor", kExternalFloor},
+                                                            {"path", kExternalPath}};
+
+// What a program says of itself.
+struct ExternalDeclaration {
+  std::string name;
+  std::vector<Parameter> parameters;
+  unsigned inputs = 0;  // of ExternalInput
+};
+
+// How it is started.
+struct ExternalCommand {
+  std::vector<std::string> words;  // program and arguments, found by PATH
+  std::string folder;              // where it is started
+  double answer_limit_s = 60;      // for one motion
+
+  bool operator==(const ExternalCommand&) const = default;
+};
+
+class ExternalTable {
+ public:
+  // REQUIRES: check_declaration() is OK.
+  explicit ExternalTable(ExternalDeclaration declaration);
+  ExternalTable(const ExternalTable&) = delete;
+  ExternalTable& operator=(const ExternalTable&) = delete;
+
+  const ExternalDeclaration& declaration() const { return declaration_; }
+  const ParameterTable& table() const { return *table_; }
+  // The first rows are the declaration's, in its order; these follow.
+  std::size_t drive_noise_common() const { return declaration_.parameters.size(); }
+  std::size_t drive_noise_side() const { return drive_noise_common() + 1; }
+  std::size_t pose_noise_position() const { return drive_noise_common() + 2; }
+  std::size_t pose_noise_heading() const { return drive_noise_common() + 3; }
+  std::size_t drive_noise_tail() const { return drive_noise_common() + 4; }
+  std::size_t pose_noise_tail() const { return drive_noise_common() + 5; }
+
+ private:
+  ExternalDeclaration declaration_;
+  std::vector<Effect> effects_;
+  std::unique_ptr<ParameterTable> table_;
+};
+
+// Errors name the parameter: no key, a key that is taken or no TOML bare key, bounds that are
+// empty, not finite or do not hold the nominal value, a log scale that reaches 0.
+Status check_declaration(const ExternalDeclaration& declaration);
+
+// Of a program that declares nothing: what a problem without one has.
+const ParameterTable& external_table();
+
+}  // namespace gapfarm

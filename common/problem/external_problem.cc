@@ -1,0 +1,33 @@
+#include "common/problem/external_problem.h"
+
+namespace gapfarm {
+
+void write_external(const Problem& problem, v1::Problem* message) {
+  if (!problem.external) return;
+  v1::External* to = message->mutable_external();
+  for (const std::string& word : problem.external->command.words) to->add_words(word);
+  to->set_folder(problem.external->command.folder);
+  to->set_answer_limit(problem.external->command.answer_limit_s);
+  to->set_introduction(problem.external->introduction);
+}
+
+Status read_external(const v1::Problem& message, Problem* problem) {
+  const bool wanted = scenario_form(problem->scenario).program;
+  if (wanted != message.has_external()) {
+    return Error{"problem: scenario '" + problem->scenario + "' " + (wanted ? "needs" : "has no") +
+                 " external program"};
+  }
+  if (!wanted) return {};
+  const v1::External& from = message.external();
+  ExternalCommand command{
+      {from.words().begin(), from.words().end()}, from.folder(), from.answer_limit()};
+  if (!(command.answer_limit_s > 0 && command.answer_limit_s <= 1e6)) {
+    return Error{"problem: an external program's answer limit must be in (0, 1000000] s"};
+  }
+  auto program = make_external_program(std::move(command), from.introduction());
+  if (!program) return Error{"problem: " + program.error().message};
+  problem->external = std::move(*program);
+  return {};
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,140 @@
+// Programs of users that fail in every way that they have.  Real processes; time is passed in.
+#include <gmock/gmock.h>
+#include <signal.h>
+
+#include "common/external/line_program.h"
+#include "common/external/simulator.h"
+#include "common/process/process_pool.h"
+
+namespace gapfarm {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+
+// Every look at it is a hundred seconds later.
+double leaping_clock() {
+  static thread_local double now_s = 0;
+  return now_s += 100;
+}
+
+std::vector<std::string> shell(const std::string& script) { return {"sh", "-c", script}; }
+
+std::string error_of(const std::string& script, const std::string& line = "question",
+                     LineLimits limits = {}) {
+  LineProgram program(shell(script), "", limits, monotonic_seconds);
+  const auto answer = program.ask(line);
+  EXPECT_FALSE(answer.ok());
+  EXPECT_FALSE(program.running());
+  return answer ? "" : answer.error().message;
+}
+
+TEST(LineProgram, AnswersLineByLineInItsFolder) {
+  LineProgram program(shell("while read x; do echo \"$x at $(pwd)\"; done"), "/", {},
+                      monotonic_seconds);
+  EXPECT_FALSE(program.running());
+  EXPECT_EQ(program.ask("one").value(), "one at /");
+  EXPECT_EQ(program.ask("two").value(), "two at /");
+  EXPECT_TRUE(program.running());
+}
+
+TEST(LineProgram, NamesOneThatCannotBeStarted) {
+  LineProgram missing({"/no/such/program"}, "", {}, monotonic_seconds);
+  EXPECT_THAT(missing.ask("x").error().message,
+              AllOf(HasSubstr("/no/such/program"), HasSubstr("No such file")));
+  LineProgram nowhere(shell("cat"), "/no/such/folder", {}, monotonic_seconds);
+  EXPECT_THAT(nowhere.ask("x").error().message,
+              HasSubstr("cannot be started in '/no/such/folder'"));
+}
+
+TEST(LineProgram, NamesHowOneEnded) {
+  EXPECT_THAT(error_of("read x; kill -SEGV $$"), HasSubstr("crashed with signal 11"));
+  EXPECT_THAT(error_of("read x; exit 3"), HasSubstr("ended with status 3"));
+  EXPECT_THAT(error_of("exit 4"), HasSubstr("ended with status 4"));
+}
+
+TEST(LineProgram, StartsAgainAfterAFailure) {
+  LineProgram program(shell("read x; [ $x = bad ] && exit 1; echo fine; read x"), "", {},
+                      monotonic_seconds);
+  EXPECT_FALSE(program.ask("bad").ok());
+  EXPECT_EQ(program.ask("good").value(), "fine");
+}
+
+TEST(LineProgram, DoesNotWaitForEver) {
+  LineProgram silent(shell("exec cat >/dev/null"), "", {}, leaping_clock);
+  EXPECT_THAT(silent.ask("x").error().message, HasSubstr("did not answer within 60 s"));
+  // One that does not even read.
+  LineProgram deaf(shell("exec sleep 1000"), "", {}, leaping_clock);
+  EXPECT_THAT(deaf.ask(std::string(10'000'000, 'x')).error().message,
+              HasSubstr("does not read what it is asked"));
+}
+
+TEST(LineProgram, TakesNoEndlessLineAndNothingUnasked) {
+  LineLimits limits;
+  limits.answer_bytes = 1000;
+  EXPECT_THAT(error_of("read x; yes | tr -d '\\n'", "question", limits),
+              AllOf(HasSubstr("more than the 1000 bytes"), HasSubstr("'yyyy")));
+  LineProgram twice(shell("while read x; do printf 'one\\ntwo\\n'; done"), "", {},
+                    monotonic_seconds);
+  EXPECT_EQ(twice.ask("x").value(), "one");
+  EXPECT_THAT(twice.ask("x").error().message, HasSubstr("answered twice, or late: 'two"));
+}
+
+TEST(LineProgram, EndsWithItsOwner) {
+  pid_t pid = 0;
+  {
+    LineProgram program(shell("read x; echo $$; read x"), "", {}, monotonic_seconds);
+    pid = std::stoi(program.ask("who").value());
+    EXPECT_EQ(::kill(pid, 0), 0);
+  }
+  EXPECT_NE(::kill(pid, 0), 0);
+}
+
+// A program that introduces itself well and then answers with `answer`.
+Result<ExternalAnswer> answered(const std::string& answer, double interval_s = 0) {
+  const std::string hello = R"({"gapfarm":1,"inputs":["path"]})";
+  ExternalSimulator simulator(
+      {shell("read x; echo '" + hello + "'; while read x; do echo '" + answer + "'; done"), "", 60},
+      monotonic_seconds);
+  const ExternalDeclaration declaration = parse_declaration(hello).value();
+  ExternalRequest request;
+  request.declaration = &declaration;
+  request.interval_s = interval_s;
+  return simulator.simulate(request, hello);
+}
+
+TEST(ExternalSimulator, NamesAnswersThatAreNone) {
+  const auto message = [](const std::string& answer, double interval_s = 0) {
+    const auto result = answered(answer, interval_s);
+    EXPECT_FALSE(result.ok()) << answer;
+    return result ? "" : result.error().message;
+  };
+  EXPECT_TRUE(answered(R"({"id": 1, "pose": [1, 2, 0.5]})").ok());
+  EXPECT_THAT(message("rubbish"), HasSubstr("did not answer with a JSON object: 'rubbish'"));
+  EXPECT_THAT(message(R"({"id": 2, "pose": [0, 0, 0]})"), HasSubstr("another question than 1"));
+  EXPECT_THAT(message(R"({"id": 1, "pose": [0, 0]})"), HasSubstr("[x, y, theta]"));
+  EXPECT_THAT(message(R"({"id": 1, "pose": [0, 1e999, 0]})"), HasSubstr("JSON object"));
+  EXPECT_THAT(message(R"({"id": 1, "pose": [0, null, 0]})"), HasSubstr("finite numbers"));
+  EXPECT_THAT(message(R"({"id": 1, "pose": [0, 0, 0]})", 0.1), HasSubstr("answered none"));
+  EXPECT_THAT(message(R"({"id": 1, "outcome": "tired"})"), HasSubstr("other than ok or diverged"));
+}
+
+TEST(ExternalSimulator, ADivergedSimulationIsAnAnswer) {
+  const auto result = answered(R"({"id": 1, "outcome": "diverged", "message": "NaN"})");
+  ASSERT_TRUE(result.ok());
+  EXPECT_TRUE(result->diverged);
+}
+
+TEST(ExternalSimulator, RefusesOneThatDeclaresSomethingElseThanBefore) {
+  ExternalSimulator simulator({shell("read x; echo '{\"gapfarm\":1}'; read x"), "", 60},
+                              monotonic_seconds);
+  const ExternalDeclaration declaration;
+  ExternalRequest request;
+  request.declaration = &declaration;
+  const auto result = simulator.simulate(request, R"({"gapfarm":1,"name":"other"})");
+  ASSERT_FALSE(result.ok());
+  EXPECT_THAT(result.error().message, HasSubstr("declares other things"));
+}
+
+}  // namespace
+}  // namespace gapfarm

@@ -1,0 +1,83 @@
+// The protocol with simulators of users, and the parameter table that a declaration makes.
+#include "common/external/protocol.h"
+
+#include <gmock/gmock.h>
+
+#include <nlohmann/json.hpp>
+
+namespace gapfarm {
+namespace {
+
+using testing::HasSubstr;
+
+std::string declaration_with(const std::string& parameter, const std::string& inputs = "[]") {
+  return R"({"gapfarm": 1, "name": "mine", "inputs": )" + inputs + R"(, "parameters": [)" +
+         parameter + "]}";
+}
+
+std::string error_of(const std::string& line) {
+  const auto declaration = parse_declaration(line);
+  EXPECT_FALSE(declaration.ok()) << line;
+  return declaration ? "" : declaration.error().message;
+}
+
+constexpr const char* kMass =
+    R"({"key": "mass", "unit": "kg", "lower": 0.1, "upper": 2, "nominal": 1, "log": true})";
+
+TEST(ExternalDeclaration, RefusesWhatCannotBeATable) {
+  EXPECT_THAT(error_of("hello"), HasSubstr("JSON object"));
+  EXPECT_THAT(error_of(R"({"gapfarm": 2})"), HasSubstr("does not speak protocol 1"));
+  EXPECT_THAT(error_of(declaration_with(std::string(kMass) + "," + kMass)), HasSubstr("twice"));
+  EXPECT_THAT(error_of(declaration_with(R"({"key": "a b"})")), HasSubstr("'a b' needs a key"));
+  EXPECT_THAT(error_of(declaration_with(R"({"key": "motor_lag"})")), HasSubstr("uses itself"));
+  EXPECT_THAT(error_of(declaration_with(R"({"key": "m", "lower": 1, "upper": 1, "nominal": 1})")),
+              HasSubstr("lower below upper"));
+  EXPECT_THAT(error_of(declaration_with(R"({"key": "m", "lower": 1, "upper": "2", "nominal": 1})")),
+              HasSubstr("finite bounds"));
+  EXPECT_THAT(error_of(declaration_with(R"({"key": "m", "lower": 1, "upper": 2, "nominal": 3})")),
+              HasSubstr("outside its bounds"));
+  EXPECT_THAT(error_of(declaration_with(
+                  R"({"key": "m", "lower": 0, "upper": 2, "nominal": 1, "log": true})")),
+              HasSubstr("log scale"));
+  EXPECT_THAT(error_of(declaration_with(kMass, R"(["paths"])")), HasSubstr("did you mean 'path'"));
+}
+
+TEST(ExternalTable, HasTheProgramsRowsThenNoiseThenEffectsThatCanBeApplied) {
+  const ExternalTable plain(parse_declaration(declaration_with(kMass)).value());
+  EXPECT_EQ(plain.table()[0].key, "mass");
+  EXPECT_EQ(plain.table()[0].scale, ParameterScale::kLog);
+  EXPECT_EQ(plain.table()[plain.drive_noise_common()].key, "drive_noise_common");
+  EXPECT_EQ(plain.table()[plain.pose_noise_tail()].key, "pose_noise_tail");
+  EXPECT_TRUE(plain.table().find("motor_asymmetry.ratio") ||
+              plain.table().find("camera_aspect.ratio"));
+  for (const char* needs : {"motor_lag.tau", "floor_tilt.angle", "backlash.travel"}) {
+    EXPECT_FALSE(plain.table().find(needs)) << needs;
+  }
+  const ExternalTable rich(
+      parse_declaration(declaration_with(kMass, R"(["lag", "dead_travel", "floor", "path"])"))
+          .value());
+  EXPECT_TRUE(rich.table().find("motor_lag.tau"));
+  // All of srv1's but one on the robot's build.
+  EXPECT_EQ(rich.table().effects().size() + 1, srv1_effects().size());
+}
+
+TEST(ExternalRequest, HoldsWhatTheProgramDeclaredAndNothingElse) {
+  const ExternalDeclaration declaration =
+      parse_declaration(declaration_with(kMass, R"(["lag"])")).value();
+  ExternalRequest request;
+  request.declaration = &declaration;
+  request.id = 7;
+  request.values = {0.5};
+  request.left = {1, 0.25, 0.01};
+  request.duration_s = 2;
+  const auto json = nlohmann::json::parse(request_line(request));
+  EXPECT_EQ(json["id"], 7);
+  EXPECT_EQ(json["parameters"]["mass"], 0.5);
+  EXPECT_EQ(json["left"], (nlohmann::json{{"speed", 1}, {"lag", 0.25}}));
+  EXPECT_FALSE(json.contains("floor"));
+  EXPECT_FALSE(json.contains("interval"));
+  EXPECT_EQ(json["duration"], 2);
+}
+
+}  // namespace
+}  // namespace gapfarm
