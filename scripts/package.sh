@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Makes the Debian packages gapfarm and gapfarm-worker of the sources that are checked out.
+# Makes the Debian packages gapfarm, gapfarm-worker and python3-gapfarm of the sources that are checked out.
 #   scripts/package.sh [--build FOLDER] [--out FOLDER]     (build/release; build/packages)
 # FOLDER of a build that is not there yet is made by the preset of its name.  lintian judges the
 # packages where it is installed; an error of it is one.
@@ -25,9 +25,9 @@ mkdir -p "$out"
 out=$(cd "$out" && pwd)
 rm -f "$out"/*.deb
 if [[ -e "$build/CMakeCache.txt" ]]; then
-  cmake "$build" >/dev/null
+  cmake -DGAPFARM_PYTHON=ON "$build" >/dev/null
 else
-  cmake --preset "$(basename "$build")" >/dev/null
+  cmake --preset "$(basename "$build")" -DGAPFARM_PYTHON=ON >/dev/null
 fi
 cmake --build "$build" --target gapfarm gapfarm-worker install_files -- --quiet
 (cd "$build" && cpack -G DEB -B "$out" >"$out/cpack.log") || { cat "$out/cpack.log"; exit 1; }

@@ -1,0 +1,75 @@
+"""Diagnoses: what is missing from the simulation."""
+
+from __future__ import annotations
+
+import json
+import os
+from typing import Any, Optional, Sequence
+
+import pandas as pd
+
+from ._logs import Path
+from ._model import Model
+from ._program import Progress, command
+
+
+class Diagnosis:
+    """The folder of a diagnosis, or its diagnosis.json.  Read once; pickles."""
+
+    def __init__(self, path: Path):
+        self.path = os.fspath(path)
+        file = os.path.join(self.path, "diagnosis.json") if os.path.isdir(self.path) else self.path
+        with open(file, encoding="utf-8") as opened:
+            #: Everything in diagnosis.json (docs/formats.md).
+            self.data: dict[str, Any] = json.load(opened)
+
+    def __repr__(self) -> str:
+        return f"gapfarm.Diagnosis({self.path!r}): {self.headline}"
+
+    @property
+    def verdict(self) -> str:
+        """In one word: "explained", "nothing", "unknown", "unusable", ..."""
+        return self.data["verdict"]
+
+    @property
+    def headline(self) -> str:
+        """In one sentence."""
+        return self.data["headline"]
+
+    @property
+    def effects(self) -> pd.DataFrame:
+        """A row a parameter of each named effect: effect, parameter, value with its 95 % interval lo
+        and hi, unit, confidence, gap_before and gap_after (nats a trial), aliases."""
+        columns = ["effect", "parameter", "value", "lo", "hi", "unit"]
+        columns += ["confidence", "gap_before", "gap_after", "aliases"]
+        rows = []
+        for effect in self.data["effects"]:
+            rest = {k: effect[k] for k in ("confidence", "gap_before", "gap_after", "aliases")}
+            for parameter, value in effect["parameters"].items():
+                rows.append({"effect": effect["name"], "parameter": parameter, **value, **rest})
+        return pd.DataFrame(rows, columns=columns)
+
+    @property
+    def where(self) -> pd.DataFrame:
+        """Where the gap lies: command, component, kind, covariate, size, share, p, text."""
+        return pd.DataFrame(self.data["where"])
+
+    @property
+    def model(self) -> Model:
+        """With the effects that were named."""
+        return Model(self.path if os.path.isdir(self.path) else os.path.dirname(self.path))
+
+
+def diagnose(
+    config: Path,
+    out: Path,
+    *options: str,
+    trials: Sequence[Path] = (),
+    progress: Optional[Progress] = None,
+) -> Diagnosis:
+    """`gapfarm diagnose CONFIG --out OUT`; `options` are more of its words.  Raises GapfarmError."""
+    words = ["diagnose", os.fspath(config), "--out", os.fspath(out), *options]
+    if trials:
+        words += ["--trials", *map(os.fspath, trials)]
+    command(words, progress)
+    return Diagnosis(out)

@@ -1,0 +1,89 @@
+"""Models: parameters, predictions, simulated logs."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from typing import Any, Optional, Sequence, Union
+
+import numpy as np
+import pandas as pd
+
+from ._logs import Path, read_trials, write_trials
+from ._program import command
+
+try:
+    import tomllib as _toml
+except ModuleNotFoundError:  # before Python 3.11
+    import tomli as _toml  # type: ignore[no-redef]
+
+_UNITS = {"x": "m", "y": "m", "theta": "rad", "log_score": "nats"}
+
+
+class Model:
+    """A model.toml, or a folder with one: of a run or a diagnosis.  Simulations are done by local
+    workers, as `gapfarm predict` and `gapfarm simulate` do.  Pickles; may be used from several threads."""
+
+    def __init__(self, path: Path):
+        self.path = os.fspath(path)
+        if not os.path.exists(self.path):
+            raise FileNotFoundError(f"{self.path}: there is no model")
+
+    def __repr__(self) -> str:
+        return f"gapfarm.Model({self.path!r})"
+
+    def _file(self) -> str:
+        return os.path.join(self.path, "model.toml") if os.path.isdir(self.path) else self.path
+
+    @property
+    def data(self) -> dict[str, Any]:
+        """Everything in the file, by sections (docs/configuration.md)."""
+        with open(self._file(), "rb") as file:
+            return _toml.load(file)
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """Value of every base parameter, the noise's too; choices are words, SI units."""
+        data = self.data
+        rows = {**data.get("parameters", {}), **data.get("noise", {})}
+        return {key: row.get("value") if isinstance(row, dict) else row for key, row in rows.items()}
+
+    def predict(
+        self, trials: Union[pd.DataFrame, Path, Sequence[Path]], workers: Optional[int] = None
+    ) -> pd.DataFrame:
+        """Where every trial should have ended: session, trial, x, y (m), theta (rad), the covariance
+        cov_xx ... cov_tt of these (m^2, m rad, rad^2), log_score (nats) of what was measured.  A row a
+        trial, in the log's order."""
+        with tempfile.TemporaryDirectory(prefix="gapfarm-") as folder:
+            files: list[str]
+            if isinstance(trials, pd.DataFrame):
+                files = [os.path.join(folder, "trials.csv")]
+                write_trials(trials, files[0])
+            elif isinstance(trials, (str, os.PathLike)):
+                files = [os.fspath(trials)]
+            else:
+                files = [os.fspath(file) for file in trials]
+            out = os.path.join(folder, "predictions.csv")
+            words = ["predict", self.path, "--trials", *files, "--out", out]
+            command(words + ([] if workers is None else ["--workers", str(workers)]))
+            table = pd.read_csv(out, dtype={"session": str})
+        table.attrs["units"] = dict(_UNITS)
+        return table
+
+    @staticmethod
+    def covariances(predictions: pd.DataFrame) -> np.ndarray:
+        """Of predict(): float64 of shape (trials, 3, 3), axes x, y, theta."""
+        upper = predictions[["cov_xx", "cov_xy", "cov_xt", "cov_yy", "cov_yt", "cov_tt"]].to_numpy()
+        full = np.empty((len(upper), 3, 3))
+        for column, (i, k) in enumerate([(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)]):
+            full[:, i, k] = full[:, k, i] = upper[:, column]
+        return full
+
+    def simulate(self, *options: str, seed: Optional[int] = None) -> pd.DataFrame:
+        """A trial log made by the model, as read_trials() gives it; `options` are words of
+        `gapfarm simulate` ("--sessions", "2", "--set", "friction=0.4")."""
+        with tempfile.TemporaryDirectory(prefix="gapfarm-") as folder:
+            out = os.path.join(folder, "trials.csv")
+            words = ["simulate", self._file(), "--out", out, *options]
+            command(words + ([] if seed is None else ["--seed", str(seed)]))
+            return read_trials(out)

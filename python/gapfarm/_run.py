@@ -1,0 +1,136 @@
+"""Runs: what evolution has committed, read from the run store."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import sqlite3
+from typing import Any, Optional, Sequence
+
+import numpy as np
+import pandas as pd
+
+from ._model import Model
+from ._program import Progress, command
+
+_SCHEMA = 2
+
+
+class Run:
+    """A run's folder.  Every property reads the store anew, so a run that goes on can be watched.
+
+    Holds nothing but the path: pickles, and may be used from several threads.
+    """
+
+    def __init__(self, folder: "str | os.PathLike[str]"):
+        self.folder = os.fspath(folder)
+        store = os.path.join(self.folder, "run.sqlite")
+        if not os.path.exists(store):
+            raise FileNotFoundError(f"{store}: there is no run")
+        with self._open() as db:
+            (schema,) = db.execute("PRAGMA user_version").fetchone()
+        if schema > _SCHEMA:
+            raise ValueError(f"{store}: schema {schema}, this package knows up to {_SCHEMA}")
+
+    def __repr__(self) -> str:
+        return f"gapfarm.Run({self.folder!r})"
+
+    def _open(self):
+        # A reader that keeps its transaction open would make the master wait.
+        path = os.path.abspath(os.path.join(self.folder, "run.sqlite"))
+        return contextlib.closing(sqlite3.connect(f"file:{path}?mode=ro", uri=True, timeout=60))
+
+    def _table(self, query: str, values: Sequence[Any] = ()) -> pd.DataFrame:
+        with self._open() as db:
+            return pd.read_sql_query(query, db, params=list(values))
+
+    @property
+    def info(self) -> dict[str, Any]:
+        """What was fixed at the start: config, seed, fitness and its unit, build, ..."""
+        row = self._table(
+            "SELECT program_version, fingerprint, created, config_path, config, overrides, "
+            "problem_hash, seed, numeric_class, fitness, fitness_unit, higher_is_better FROM run"
+        ).iloc[0]
+        info = {str(k): v for k, v in row.items()}
+        info["seed"] = int(info["seed"])
+        info["overrides"] = json.loads(info["overrides"])
+        info["higher_is_better"] = bool(info["higher_is_better"])
+        return info
+
+    @property
+    def generations(self) -> pd.DataFrame:
+        """A row a generation: best, mean, median, worst fitness, diversity, evaluations since the
+        start, wall_s of it, quarantined, digest; indexed by generation."""
+        table = self._table(
+            "SELECT generation, best, mean, median, worst, diversity, evaluations, wall_s, "
+            "quarantined, digest FROM generations ORDER BY generation"
+        ).set_index("generation")
+        unit = self.info["fitness_unit"]
+        table.attrs["units"] = dict.fromkeys(("best", "mean", "median", "worst"), unit)
+        table.attrs["units"]["wall_s"] = "s"
+        return table
+
+    def individuals(self, generation: Optional[int] = None) -> pd.DataFrame:
+        """Members of a generation (default: the last; 0: of all): rank, birth_id, fitness (NaN unless
+        the outcome is OK), outcome, scores, operators, then a column a parameter, SI units."""
+        where, values = "", []  # type: tuple[str, list[int]]
+        if generation is None:
+            where = "WHERE generation = (SELECT max(generation) FROM generations)"
+        elif generation != 0:
+            where, values = "WHERE generation = ?", [generation]
+        table = self._table(
+            "SELECT generation, rank, birth_id, fitness, outcome, scores, operators, parameters "
+            f"FROM individuals {where} ORDER BY generation, rank",
+            values,
+        )
+        parameters = pd.DataFrame([json.loads(p) for p in table.pop("parameters")])
+        return pd.concat([table, parameters], axis=1)
+
+    def genomes(self, generation: Optional[int] = None) -> np.ndarray:
+        """float64 of shape (individuals, genes), values in [0, 1], best first."""
+        which = "(SELECT max(generation) FROM generations)" if generation is None else "?"
+        with self._open() as db:
+            rows = db.execute(
+                f"SELECT genome FROM individuals WHERE generation = {which} ORDER BY rank",
+                [] if generation is None else [generation],
+            ).fetchall()
+        return np.array([np.frombuffer(genome, dtype=np.float64) for (genome,) in rows])
+
+    @property
+    def best(self) -> pd.Series:
+        """The best member of the last generation, as in individuals()."""
+        return self.individuals().iloc[0]
+
+    @property
+    def incidents(self) -> pd.DataFrame:
+        """What somebody should look at: generation, kind, time (UTC), text."""
+        table = self._table("SELECT generation, kind, time, text FROM incidents ORDER BY time")
+        table["time"] = pd.to_datetime(table["time"], unit="s", utc=True)
+        return table
+
+    def status(self) -> dict[str, Any]:
+        """`gapfarm status RUN --json` (docs/formats.md)."""
+        return command(["status", self.folder])
+
+    @property
+    def model(self) -> Model:
+        """What the run left behind, or its best so far."""
+        return Model(self.folder)
+
+
+def evolve(
+    config: "str | os.PathLike[str]",
+    out: "str | os.PathLike[str]",
+    *options: str,
+    trials: Sequence["str | os.PathLike[str]"] = (),
+    progress: Optional[Progress] = None,
+) -> Run:
+    """`gapfarm evolve CONFIG --out OUT`; `options` are more of its words ("--workers", "4").
+
+    Raises GapfarmError; one of exit code 85 was stopped and can be resumed."""
+    words = ["evolve", os.fspath(config), "--out", os.fspath(out), *options]
+    if trials:
+        words += ["--trials", *map(os.fspath, trials)]
+    command(words, progress)
+    return Run(out)

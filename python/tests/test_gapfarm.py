@@ -1,0 +1,137 @@
+"""The Python package against the programs of this build: GAPFARM names them, by ctest."""
+
+import concurrent.futures
+import json
+import os
+import pathlib
+import pickle
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import gapfarm
+
+ROOT = pathlib.Path(__file__).parents[2]
+DEMO = ROOT / "configs" / "demo.toml"
+LOG = ROOT / "configs" / "demo" / "trials.csv"
+
+
+@pytest.fixture(scope="session")
+def said():
+    return []
+
+
+@pytest.fixture(scope="session")
+def run(tmp_path_factory, said):
+    folder = tmp_path_factory.mktemp("run") / "demo"
+    return gapfarm.evolve(
+        DEMO, folder, "--generations", "3", "--population", "8", "--workers", "1",
+        progress=said.append,
+    )
+
+
+def test_evolve_tells_its_progress(run, said):
+    assert any("evolving 7 parameters" in line for line in said)
+    assert run.status()["state"] == "finished"
+
+
+def test_generations_are_those_of_the_store(run):
+    generations = run.generations
+    assert list(generations.index) == [1, 2, 3]
+    assert (generations.best >= generations["median"]).all()
+    assert generations.best.is_monotonic_increasing
+    assert generations.attrs["units"]["best"] == "nats/trial"
+    assert run.info["seed"] == 1 and run.info["higher_is_better"] is True
+    assert run.incidents.empty
+
+
+def test_individuals_have_parameters_and_genomes(run):
+    last = run.individuals()
+    assert len(last) == 8 and list(last["rank"]) == list(range(8))
+    assert last.friction.between(0.1, 1.5).all()
+    assert len(run.individuals(0)) == 24
+    genomes = run.genomes()
+    assert genomes.shape == (8, 7) and genomes.dtype == np.float64
+    assert ((genomes >= 0) & (genomes <= 1)).all()
+    assert run.best.fitness == run.generations.best.iloc[-1]
+
+
+def test_the_model_holds_the_best(run):
+    assert run.model.parameters["full_speed"] == pytest.approx(run.best.full_speed, rel=1e-12)
+    assert run.model.parameters["robot"] == "treads"
+
+
+def test_predictions_of_a_table_and_of_its_file_agree(run):
+    trials = gapfarm.read_trials(LOG)
+    assert trials.attrs["units"]["x0"] == "m"
+    by_file = run.model.predict(LOG, workers=1)
+    by_table = run.model.predict(trials, workers=1)
+    pd.testing.assert_frame_equal(by_file, by_table)
+    assert len(by_file) == len(trials)
+    covariances = gapfarm.Model.covariances(by_file)
+    assert covariances.shape == (len(trials), 3, 3)
+    assert (np.linalg.eigvalsh(covariances) > 0).all()
+    assert by_file.log_score.mean() == pytest.approx(run.best.fitness, abs=1e-6)
+
+
+def test_a_simulated_log_follows_its_seed(run, tmp_path):
+    words = ("--sessions", "1", "--trials", "5", "--workers", "1")
+    first = run.model.simulate(*words, seed=3)
+    pd.testing.assert_frame_equal(first, run.model.simulate(*words, seed=3))
+    assert not first.x1.equals(run.model.simulate(*words, seed=4).x1)
+    gapfarm.write_trials(first, tmp_path / "log.csv")
+    again = gapfarm.read_trials(tmp_path / "log.csv")
+    np.testing.assert_array_equal(first.theta1, again.theta1)
+
+
+def test_errors_are_gapfarms_own(tmp_path):
+    with pytest.raises(gapfarm.GapfarmError, match="none.toml") as error:
+        gapfarm.evolve(tmp_path / "none.toml", tmp_path / "run")
+    assert error.value.exit_code == 2
+    assert pickle.loads(pickle.dumps(error.value)).exit_code == 2
+    with pytest.raises(FileNotFoundError):
+        gapfarm.Run(tmp_path)
+    with pytest.raises(FileNotFoundError):
+        gapfarm.Model(tmp_path / "model.toml")
+
+
+def test_runs_pickle_and_may_be_read_by_threads(run):
+    again = pickle.loads(pickle.dumps(run))
+    with concurrent.futures.ThreadPoolExecutor(4) as pool:
+        tables = list(pool.map(lambda _: again.generations, range(8)))
+    for table in tables:
+        pd.testing.assert_frame_equal(table, run.generations)
+
+
+def test_a_diagnosis_is_tables(tmp_path):
+    effect = {
+        "name": "motor_asymmetry", "aliases": [], "alias_reason": "", "confidence": 0.99,
+        "parameters": {"ratio": {"value": 0.05, "lo": 0.04, "hi": 0.06, "unit": "-"}},
+        "gap_before": 2.0, "gap_after": 0.1,
+    }
+    where = {"command": "forward", "component": "y", "kind": "bias", "covariate": "", "size": 0.1,
+             "share": 0.5, "p": 1e-9, "text": "left"}
+    data = {"version": 1, "verdict": "explained", "headline": "motor_asymmetry", "effects": [effect],
+            "where": [where]}
+    (tmp_path / "diagnosis.json").write_text(json.dumps(data))
+    diagnosis = gapfarm.Diagnosis(tmp_path)
+    assert diagnosis.verdict == "explained"
+    row = diagnosis.effects.iloc[0]
+    assert (row.effect, row.parameter, row.value, row.unit) == ("motor_asymmetry", "ratio", 0.05, "-")
+    assert diagnosis.where.command[0] == "forward"
+    data["effects"] = []
+    (tmp_path / "diagnosis.json").write_text(json.dumps(data))
+    assert gapfarm.Diagnosis(tmp_path).effects.empty
+
+
+def test_the_page_of_examples_runs(run, tmp_path, monkeypatch):
+    """Every block of docs/python.md, in order, in one program."""
+    page = (ROOT / "docs" / "python.md").read_text()
+    blocks = [b.split("```")[0] for b in page.split("```python\n")[1:]]
+    assert blocks
+    monkeypatch.chdir(tmp_path)
+    os.symlink(ROOT / "configs", tmp_path / "configs")
+    scope: dict = {}
+    for block in blocks:
+        exec(compile(block, "docs/python.md", "exec"), scope)
