@@ -1,6 +1,7 @@
 // gapfarm evolve CONFIG: evolve parameters against a trial log.
 #include <filesystem>
 #include <memory>
+#include <nlohmann/json.hpp>
 
 #include "common/config/config.h"
 #include "master/cli/evolution.h"
@@ -19,7 +20,30 @@ struct EvolveCommand {
   std::optional<std::uint64_t> shuffle;
   EvolutionOverrides overrides;
   FarmOptions farm;
+  bool dry_run = false;
 };
+
+int say_plan(const EvolveCommand& command, const Config& config, Console& console) {
+  const std::size_t genes = config.problem.genes.size(), trials = config.problem.log.trials.size();
+  const unsigned workers = local_workers(command.farm, config.farm);
+  std::string text = "dry run: nothing was simulated, started or written\nwould evolve " +
+                     std::to_string(genes) + " parameters on " + std::to_string(trials) +
+                     " trials into " + command.out + ", seed " + std::to_string(config.seed) +
+                     ", population " + std::to_string(config.evolution.population) + ", at most " +
+                     std::to_string(config.evolution.generations) + " generations\nwould start " +
+                     std::to_string(workers) + " local workers";
+  for (const std::string& endpoint : command.farm.listen) text += " and listen at " + endpoint;
+  console.result(text + "\n", {{"dry_run", true},
+                               {"out", command.out},
+                               {"genes", genes},
+                               {"trials", trials},
+                               {"seed", config.seed},
+                               {"population", config.evolution.population},
+                               {"generations", config.evolution.generations},
+                               {"workers", workers},
+                               {"listen", command.farm.listen}});
+  return kExitDone;
+}
 
 RunInfo run_info(const Config& config, const EvolutionOverrides& overrides) {
   const v1::Problem problem = to_proto(config.problem);
@@ -49,6 +73,7 @@ int run_evolve(const EvolveCommand& command, CliContext& context) {
         return check_folder(command.out, FolderKind::kRun);
       });
   if (!config) return kExitBadUsage;
+  if (command.dry_run) return say_plan(command, *config, context.console);
   std::error_code ignored;
   const bool folder_was_there = std::filesystem::exists(command.out, ignored);
   Result<RunStore> store = RunStore::create(command.out, run_info(*config, command.overrides));
@@ -84,6 +109,8 @@ SubcommandRun setup_evolve(CLI::App& app) {
   declare_on_end(app);
   app.add_option("--shuffle", command->shuffle,
                  "Hand jobs out in an order shuffled by this seed; the results do not change");
+  app.add_flag("--dry-run", command->dry_run,
+               "Check everything and say what would be done; do nothing");
   app.footer(
       "Examples:\n"
       "  gapfarm evolve configs/demo.toml --out run/demo\n"

@@ -55,6 +55,7 @@ SubcommandRun setup_evolve(CLI::App& app);
 SubcommandRun setup_horizons(CLI::App& app);
 SubcommandRun setup_import(CLI::App& app);
 SubcommandRun setup_influence(CLI::App& app);
+SubcommandRun setup_init(CLI::App& app);
 SubcommandRun setup_keys(CLI::App& app);
 SubcommandRun setup_plan(CLI::App& app);
 SubcommandRun setup_predict(CLI::App& app);

@@ -1,0 +1,191 @@
+// gapfarm init LOG...: a config for a log, with what the log says put in and what it cannot say as
+// questions.
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "common/config/config.h"
+#include "common/score/motion_model.h"
+#include "common/score/statistics.h"
+#include "common/trials/read.h"
+#include "master/cli/inputs.h"
+#include "master/cli/outputs.h"
+
+namespace gapfarm {
+namespace {
+
+struct InitOptions {
+  TrialOptions trials;
+  std::string out = "-";
+  Outputs outputs;
+};
+
+// What of a robot can be read off a log of commands.
+struct LogFigures {
+  std::vector<CommandSpec> commands;  // of the log, each as it was mostly given
+  std::map<std::string, std::size_t> counts;
+  std::size_t sessions = 0;
+  std::optional<double> speed_m_s;  // at full duty, of straight drives
+};
+
+bool drives_straight(const CommandSpec& c) { return c.left == c.right && c.left != 0; }
+
+LogFigures figures_of(const TrialLog& log, const std::vector<CommandSpec>& known) {
+  LogFigures figures;
+  std::set<std::string> sessions;
+  std::map<std::string, std::vector<CommandSpec>> given;
+  std::vector<double> speeds;
+  for (const Trial& trial : log.trials) {
+    const CommandSpec c = resolved_command(trial, known);
+    sessions.insert(trial.session);
+    ++figures.counts[trial.command];
+    given[trial.command].push_back(c);
+    if (!drives_straight(c) || c.duration_s <= 0) continue;
+    const Pose X_SE = between(trial.X_WS, trial.X_WE);
+    speeds.push_back(std::hypot(X_SE.x, X_SE.y) / (std::abs(c.left) * c.duration_s));
+  }
+  figures.sessions = sessions.size();
+  if (!speeds.empty()) figures.speed_m_s = median(speeds);
+  for (const auto& [name, all] : given) {
+    CommandSpec typical{name, 0, 0, 0};
+    const auto middle = [&](double CommandSpec::*of) {
+      std::vector<double> values;
+      for (const CommandSpec& c : all) values.push_back(c.*of);
+      return median(values);
+    };
+    typical.left = middle(&CommandSpec::left);
+    typical.right = middle(&CommandSpec::right);
+    typical.duration_s = middle(&CommandSpec::duration_s);
+    figures.commands.push_back(typical);
+  }
+  return figures;
+}
+
+// As the config names it: relative to where the config will lie.
+std::string seen_from(const std::string& out, const std::string& file) {
+  std::error_code error;
+  const auto folder = std::filesystem::absolute(out == "-" ? "." : out, error).parent_path();
+  const auto base = out == "-" ? std::filesystem::current_path(error) : folder;
+  const auto path = std::filesystem::proximate(file, base, error);
+  return error || path.empty() ? file : path.string();
+}
+
+std::string speed_gene(const LogFigures& figures) {
+  const Parameter& row = srv1_table()[row_of(Srv1::kFullSpeed)];
+  if (!figures.speed_m_s) {
+    return "# QUESTION: how fast is it at full duty?  No command of the log drives straight.\n"
+           "full_speed = \"table\"             # m/s\n";
+  }
+  const double lower = std::clamp(*figures.speed_m_s / 2, row.lower, row.upper / 2);
+  const double upper = std::clamp(*figures.speed_m_s * 2, lower * 1.01, row.upper);
+  return fmt::format("full_speed = [{:.3g}, {:.3g}]      # m/s; straight drives made {:.3g}\n",
+                     lower, upper, *figures.speed_m_s);
+}
+
+std::string command_text(const LogFigures& figures, const std::vector<CommandSpec>& known) {
+  std::string text;
+  for (const CommandSpec& c : figures.commands) {
+    const auto same = [&](const CommandSpec& k) {
+      return k.name == c.name && k.left == c.left && k.right == c.right &&
+             k.duration_s == c.duration_s;
+    };
+    if (std::any_of(known.begin(), known.end(), same)) continue;
+    text += fmt::format(
+        "\n[commands.{}]          # the middle of its {} trials\nleft = {:g}\nright = {:g}\n"
+        "duration = {:g}\n",
+        c.name, figures.counts.at(c.name), c.left, c.right, c.duration_s);
+  }
+  return text;
+}
+
+std::string config_of_log(const LogFigures& figures, const TrialLog& log,
+                          const std::vector<CommandSpec>& known, const InitOptions& options) {
+  std::string files, counts;
+  for (const std::string& file : options.trials.files) {
+    files += (files.empty() ? "\"" : ", \"") + seen_from(options.out, file) + "\"";
+  }
+  for (const auto& [name, count] : figures.counts) counts += fmt::format(" {} {},", count, name);
+  counts.pop_back();
+  return fmt::format(
+             "# Made by `gapfarm init` of {} trials in {} sessions:{}.\n"
+             "# Lines with QUESTION are guesses; answer them, then `gapfarm check` this file.\n",
+             log.trials.size(), figures.sessions, counts) +
+         "scenario = \"srv1\"     # a robot on two sides that stands still before and after a "
+         "command\n"
+         "seed = 1\ntrials = [" +
+         files +
+         "]\n\n[parameters]\n"
+         "robot = \"treads\"      # QUESTION: treads, or wheels (four)?\n"
+         "mass = 0.35           # kg.  QUESTION: what does it weigh?\n"
+         "track_gauge = 0.085   # m.  QUESTION: how far apart are its two sides?\n"
+         "mass_height = 0.03    # m.  QUESTION: how high over the floor is its centre of mass?\n"
+         "\n# What evolution searches.\n[genes]\n" +
+         speed_gene(figures) +
+         "# QUESTION: how long is the contact with the floor?  Half to twice that serves.\n"
+         "contact_length = \"table\"         # m\n"
+         "friction = [0.1, 1.5]\n"
+         "drive_noise_common = [0.0, 0.15]\ndrive_noise_side = [0.0, 0.15]\n"
+         "# QUESTION: how well does the camera see?  Its repeats on a robot at rest say it.\n"
+         "pose_noise_position = [0.0005, 0.03]   # m\npose_noise_heading = [0.002, 0.15]     # "
+         "rad\n" +
+         command_text(figures, known) +
+         "\n[fitness]\nkind = \"log_score\"\n\n[evolution]\npopulation = 24\n\n[evolution.stop]\n"
+         "generations = 60\nstagnation_generations = 20\n";
+}
+
+int run_init(InitOptions& options, CliContext& context) {
+  Console& console = context.console;
+  const std::vector<CommandSpec> known = default_commands("srv1");
+  const Result<TrialLog> log =
+      read_trial_files(options.trials.files, command_names(known), options.trials.read);
+  Status ready = log ? Status() : Status(log.error());
+  if (ready && log->trials.empty()) ready = Error{"the logs hold no trial to make a config of"};
+  if (ready) {
+    show_notes(*log, console);
+    options.outputs.reads(*log);
+    ready = options.outputs.plan(options.out);
+  }
+  if (!ready) {
+    console.error(ready.error());
+    return kExitBadUsage;
+  }
+  const LogFigures figures = figures_of(*log, known);
+  const std::string text = config_of_log(figures, *log, known, options);
+  nlohmann::ordered_json json = {{"out", options.out}, {"trials", log->trials.size()}};
+  if (figures.speed_m_s) json["full_speed"] = *figures.speed_m_s;
+  if (options.out == "-") {
+    json["config"] = text;
+    console.result(text, json);
+    return kExitDone;
+  }
+  if (Status s = options.outputs.write(options.out, text); !s) return failed(s.error(), context);
+  console.result(options.out + ": a config for " + std::to_string(log->trials.size()) +
+                     " trials; answer its QUESTIONs, then: gapfarm check " + options.out + "\n",
+                 json);
+  return kExitDone;
+}
+
+}  // namespace
+
+SubcommandRun setup_init(CLI::App& app) {
+  auto options = std::make_shared<InitOptions>();
+  app.add_option("LOG", options->trials.files, "Trial logs of a robot on two sides")->required();
+  app.add_option("--out", options->out, "Config to write; - for stdout")->capture_default_str();
+  options->trials.declare_reading(app);
+  options->outputs.declare(app);
+  app.footer(
+      "A robot with a URDF: `gapfarm robot FILE --out robot.toml`, and docs/ground.md.\n"
+      "\n"
+      "Examples:\n"
+      "  gapfarm init logs/monday.csv --out robot.toml\n"
+      "  gapfarm init logs/*.dat");
+  return [options](CliContext& context) { return run_init(*options, context); };
+}
+
+}  // namespace gapfarm
