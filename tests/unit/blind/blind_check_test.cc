@@ -58,7 +58,7 @@ class BlindCheck : public ::testing::Test {
   Result<BlindReport> run() { return run_blind_check(config_, settings_, hooks_); }
 
   testing::Folder folder_;
-  Config config_ = testing::small_config();
+  Config config_ = tests::small_config();
   BlindCheckSettings settings_;
   BlindCheckHooks hooks_;
   StopSource stop_;

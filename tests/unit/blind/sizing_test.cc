@@ -115,7 +115,7 @@ TEST(DrawEffect, IsNeutralAtZeroAndWithinBoundsAtOne) {
 }
 
 TEST(DrawRobot, StaysWithinTheGenes) {
-  Problem problem = testing::small_config().problem;
+  Problem problem = tests::small_config().problem;
   problem.genes = {{row_of(Srv1::kMass), 0.34, 0.36, ParameterScale::kLinear}};
   Stream stream({1, Purpose::kTest, 0, 0, 0});
   for (int i = 0; i < 50; ++i) {
@@ -129,7 +129,7 @@ TEST(DrawRobot, StaysWithinTheGenes) {
 
 TEST(Design, SizesAreWhatWasAskedForAndShuffled) {
   tests::WorkerFarm farm;
-  const Config config = testing::small_config();
+  const Config config = tests::small_config();
   const auto planned = planned_problem(config, {}, 3, farm);
   ASSERT_TRUE(planned.ok());
   DesignSettings settings;
@@ -185,7 +185,7 @@ double residual_moment(const Config& config, const Truth& truth, bool with_effec
 
 TEST(Design, SizesShowInSimulatedResiduals) {
   tests::WorkerFarm farm;
-  Config config = testing::small_config();
+  Config config = tests::small_config();
   config.simulate.trials_per_session = 200;
   const auto planned = planned_problem(config, {}, 5, farm);
   ASSERT_TRUE(planned.ok());

@@ -23,6 +23,12 @@ inline ParameterValues noiseless(const Changes& changes = {}) {
   return problem.values;
 }
 
+inline ActiveEffects effects(const Changes& changes) { return {srv1_table(), noiseless(changes)}; }
+
+inline Pose random_pose(Stream& stream) {
+  return {stream.uniform(0, 2), stream.uniform(0, 2), stream.uniform(-3.1, 3.1)};
+}
+
 inline const std::vector<CommandSpec>& commands() {
   static const std::vector<CommandSpec> all = default_commands("srv1");
   return all;
