@@ -2,7 +2,7 @@
 #include "worker/effects/table.h"
 
 namespace gapfarm::effects {
-namespace {
+namespace backlash_hooks {
 
 // A side has no direction to differ from before its first command in the session, nor after an
 // unrecorded move: a hand that puts the robot down elsewhere turns its treads.
@@ -15,8 +15,8 @@ void drive(EffectValues p, const Situation& situation, DriveState& drive) {
   take_up(p[0], situation.last_right, drive.right);
 }
 
-}  // namespace
+}  // namespace backlash_hooks
 
-const EffectBehaviour backlash{.name = "backlash", .drive = drive};
+const EffectBehaviour backlash{.name = "backlash", .drive = backlash_hooks::drive};
 
 }  // namespace gapfarm::effects

@@ -4,7 +4,7 @@
 #include "worker/effects/table.h"
 
 namespace gapfarm::effects {
-namespace {
+namespace battery_sag_hooks {
 
 void drive(EffectValues p, const Situation& situation, DriveState& drive) {
   const double left_over = std::max(0.0, 1 - p[0] * situation.session_time_s / 60);
@@ -12,8 +12,8 @@ void drive(EffectValues p, const Situation& situation, DriveState& drive) {
   drive.right.gain *= left_over;
 }
 
-}  // namespace
+}  // namespace battery_sag_hooks
 
-const EffectBehaviour battery_sag{.name = "battery_sag", .drive = drive};
+const EffectBehaviour battery_sag{.name = "battery_sag", .drive = battery_sag_hooks::drive};
 
 }  // namespace gapfarm::effects

@@ -4,7 +4,7 @@
 #include "worker/effects/table.h"
 
 namespace gapfarm::effects {
-namespace {
+namespace camera_aspect_hooks {
 
 // Lengths along y are logged p[0] times as long as along x; the geometric mean of the scales stays
 // 1, since a common scale is the base's speed.  Headings are logged as they are: a tracker reads
@@ -23,9 +23,10 @@ Pose recover(EffectValues p, const Pose& X_WM) {
   return scaled(X_WM, root, 1 / root);
 }
 
-}  // namespace
+}  // namespace camera_aspect_hooks
 
-const EffectBehaviour camera_aspect{
-    .name = "camera_aspect", .observe = observe, .recover = recover};
+const EffectBehaviour camera_aspect{.name = "camera_aspect",
+                                    .observe = camera_aspect_hooks::observe,
+                                    .recover = camera_aspect_hooks::recover};
 
 }  // namespace gapfarm::effects

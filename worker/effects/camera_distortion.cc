@@ -5,7 +5,7 @@
 #include "worker/effects/table.h"
 
 namespace gapfarm::effects {
-namespace {
+namespace camera_distortion_hooks {
 
 constexpr int kMostRounds = 60;
 
@@ -37,9 +37,10 @@ Pose recover(EffectValues p, const Pose& X_WM) {
   return {p[1] + shrink * dx, p[2] + shrink * dy, X_WM.theta};
 }
 
-}  // namespace
+}  // namespace camera_distortion_hooks
 
-const EffectBehaviour camera_distortion{
-    .name = "camera_distortion", .observe = observe, .recover = recover};
+const EffectBehaviour camera_distortion{.name = "camera_distortion",
+                                        .observe = camera_distortion_hooks::observe,
+                                        .recover = camera_distortion_hooks::recover};
 
 }  // namespace gapfarm::effects

@@ -2,7 +2,7 @@
 #include "worker/effects/table.h"
 
 namespace gapfarm::effects {
-namespace {
+namespace camera_seam_hooks {
 
 // The shift at a place, beyond the line; it is nothing at the near side.
 struct Shift {
@@ -41,12 +41,12 @@ void one_side(bool far, std::vector<double>& p) {
   p[4] = far ? -kNowhere_m : kNowhere_m;
 }
 
-}  // namespace
+}  // namespace camera_seam_hooks
 
 const EffectBehaviour camera_seam{.name = "camera_seam",
-                                  .observe = observe,
-                                  .recover = recover,
-                                  .beyond = beyond,
-                                  .one_side = one_side};
+                                  .observe = camera_seam_hooks::observe,
+                                  .recover = camera_seam_hooks::recover,
+                                  .beyond = camera_seam_hooks::beyond,
+                                  .one_side = camera_seam_hooks::one_side};
 
 }  // namespace gapfarm::effects

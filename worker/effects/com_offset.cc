@@ -3,7 +3,7 @@
 #include "worker/sim/push.h"
 
 namespace gapfarm::effects {
-namespace {
+namespace com_offset_hooks {
 
 void settings(EffectValues p, SimSettings& settings) {
   settings.com_x_m += p[0];
@@ -15,8 +15,9 @@ void push(EffectValues p, PushSettings& settings) {
   settings.com_y_m += p[1];
 }
 
-}  // namespace
+}  // namespace com_offset_hooks
 
-const EffectBehaviour com_offset{.name = "com_offset", .settings = settings, .push = push};
+const EffectBehaviour com_offset{
+    .name = "com_offset", .settings = com_offset_hooks::settings, .push = com_offset_hooks::push};
 
 }  // namespace gapfarm::effects

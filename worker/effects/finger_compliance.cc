@@ -3,12 +3,13 @@
 #include "worker/sim/push.h"
 
 namespace gapfarm::effects {
-namespace {
+namespace finger_compliance_hooks {
 
 void push(EffectValues p, PushSettings& settings) { settings.finger_compliance_m_n = p[0]; }
 
-}  // namespace
+}  // namespace finger_compliance_hooks
 
-const EffectBehaviour finger_compliance{.name = "finger_compliance", .push = push};
+const EffectBehaviour finger_compliance{.name = "finger_compliance",
+                                        .push = finger_compliance_hooks::push};
 
 }  // namespace gapfarm::effects

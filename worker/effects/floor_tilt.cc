@@ -2,17 +2,17 @@
 #include "worker/effects/table.h"
 
 namespace gapfarm::effects {
-namespace {
+namespace floor_tilt_hooks {
 
 void floor(EffectValues p, const Situation& situation, Floor& floor) {
   floor.tilt_rad = p[0];
   floor.tilt_direction_rad = wrap_angle(p[1] - situation.X_WR.theta);
 }
 
-}  // namespace
+}  // namespace floor_tilt_hooks
 
-const EffectBehaviour floor_tilt{.name = "floor_tilt", .floor = floor};
+const EffectBehaviour floor_tilt{.name = "floor_tilt", .floor = floor_tilt_hooks::floor};
 // The same under a piece.
-const EffectBehaviour table_tilt{.name = "table_tilt", .floor = floor};
+const EffectBehaviour table_tilt{.name = "table_tilt", .floor = floor_tilt_hooks::floor};
 
 }  // namespace gapfarm::effects

@@ -3,15 +3,16 @@
 #include "worker/effects/table.h"
 
 namespace gapfarm::effects {
-namespace {
+namespace friction_anisotropy_hooks {
 
 void floor(EffectValues p, const Situation& situation, Floor& floor) {
   floor.grain_ratio = p[0];
   floor.grain_direction_rad = wrap_angle(p[1] - situation.X_WR.theta);
 }
 
-}  // namespace
+}  // namespace friction_anisotropy_hooks
 
-const EffectBehaviour friction_anisotropy{.name = "friction_anisotropy", .floor = floor};
+const EffectBehaviour friction_anisotropy{.name = "friction_anisotropy",
+                                          .floor = friction_anisotropy_hooks::floor};
 
 }  // namespace gapfarm::effects

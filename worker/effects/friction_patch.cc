@@ -2,7 +2,7 @@
 #include "worker/effects/table.h"
 
 namespace gapfarm::effects {
-namespace {
+namespace friction_patch_hooks {
 
 void floor(EffectValues p, const Situation& situation, Floor& floor) {
   const Pose centre_S = between(situation.X_WR, {p[1], p[2], 0});
@@ -12,8 +12,9 @@ void floor(EffectValues p, const Situation& situation, Floor& floor) {
   floor.patch_ratio = p[0];
 }
 
-}  // namespace
+}  // namespace friction_patch_hooks
 
-const EffectBehaviour friction_patch{.name = "friction_patch", .floor = floor};
+const EffectBehaviour friction_patch{.name = "friction_patch",
+                                     .floor = friction_patch_hooks::floor};
 
 }  // namespace gapfarm::effects

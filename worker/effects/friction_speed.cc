@@ -2,14 +2,15 @@
 #include "worker/effects/table.h"
 
 namespace gapfarm::effects {
-namespace {
+namespace friction_speed_hooks {
 
 void floor(EffectValues p, const Situation& /*situation*/, Floor& floor) {
   floor.speed_slope_s_m = p[0];
 }
 
-}  // namespace
+}  // namespace friction_speed_hooks
 
-const EffectBehaviour friction_speed{.name = "friction_speed", .floor = floor};
+const EffectBehaviour friction_speed{.name = "friction_speed",
+                                     .floor = friction_speed_hooks::floor};
 
 }  // namespace gapfarm::effects

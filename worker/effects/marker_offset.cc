@@ -2,15 +2,16 @@
 #include "worker/effects/table.h"
 
 namespace gapfarm::effects {
-namespace {
+namespace marker_offset_hooks {
 
 Pose observe(EffectValues p, const Pose& X_WR) { return X_WR * Pose{p[0], p[1], 0}; }
 
 Pose recover(EffectValues p, const Pose& X_WM) { return X_WM * Pose{-p[0], -p[1], 0}; }
 
-}  // namespace
+}  // namespace marker_offset_hooks
 
-const EffectBehaviour marker_offset{
-    .name = "marker_offset", .observe = observe, .recover = recover};
+const EffectBehaviour marker_offset{.name = "marker_offset",
+                                    .observe = marker_offset_hooks::observe,
+                                    .recover = marker_offset_hooks::recover};
 
 }  // namespace gapfarm::effects

@@ -2,7 +2,7 @@
 #include "worker/effects/table.h"
 
 namespace gapfarm::effects {
-namespace {
+namespace motor_asymmetry_hooks {
 
 // Split evenly, so that the mean speed stays the base's: right over left is 1 + ratio.
 void drive(EffectValues p, const Situation&, DriveState& drive) {
@@ -11,8 +11,9 @@ void drive(EffectValues p, const Situation&, DriveState& drive) {
   drive.right.gain *= left * (1 + p[0]);
 }
 
-}  // namespace
+}  // namespace motor_asymmetry_hooks
 
-const EffectBehaviour motor_asymmetry{.name = "motor_asymmetry", .drive = drive};
+const EffectBehaviour motor_asymmetry{.name = "motor_asymmetry",
+                                      .drive = motor_asymmetry_hooks::drive};
 
 }  // namespace gapfarm::effects

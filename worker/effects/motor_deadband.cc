@@ -4,7 +4,7 @@
 #include "worker/effects/table.h"
 
 namespace gapfarm::effects {
-namespace {
+namespace motor_deadband_hooks {
 
 double shrunk(double duty, double band) {
   return std::abs(duty) <= band ? 0 : std::copysign(std::abs(duty) - band, duty);
@@ -15,8 +15,9 @@ void drive(EffectValues p, const Situation&, DriveState& drive) {
   drive.right.duty = shrunk(drive.right.duty, p[0]);
 }
 
-}  // namespace
+}  // namespace motor_deadband_hooks
 
-const EffectBehaviour motor_deadband{.name = "motor_deadband", .drive = drive};
+const EffectBehaviour motor_deadband{.name = "motor_deadband",
+                                     .drive = motor_deadband_hooks::drive};
 
 }  // namespace gapfarm::effects

@@ -2,15 +2,15 @@
 #include "worker/effects/table.h"
 
 namespace gapfarm::effects {
-namespace {
+namespace motor_lag_hooks {
 
 void drive(EffectValues p, const Situation&, DriveState& drive) {
   drive.left.lag_s += p[0];
   drive.right.lag_s += p[0];
 }
 
-}  // namespace
+}  // namespace motor_lag_hooks
 
-const EffectBehaviour motor_lag{.name = "motor_lag", .drive = drive};
+const EffectBehaviour motor_lag{.name = "motor_lag", .drive = motor_lag_hooks::drive};
 
 }  // namespace gapfarm::effects

@@ -2,15 +2,15 @@
 #include "worker/effects/table.h"
 
 namespace gapfarm::effects {
-namespace {
+namespace pose_latency_hooks {
 
 void reading(EffectValues p, Reading& reading) {
   reading.stale_share = p[0];
   reading.stale_age_s = p[1];
 }
 
-}  // namespace
+}  // namespace pose_latency_hooks
 
-const EffectBehaviour pose_latency{.name = "pose_latency", .reading = reading};
+const EffectBehaviour pose_latency{.name = "pose_latency", .reading = pose_latency_hooks::reading};
 
 }  // namespace gapfarm::effects

@@ -2,12 +2,13 @@
 #include "worker/effects/table.h"
 
 namespace gapfarm::effects {
-namespace {
+namespace pose_quantisation_hooks {
 
 void reading(EffectValues p, Reading& reading) { reading.quantum_m = p[0]; }
 
-}  // namespace
+}  // namespace pose_quantisation_hooks
 
-const EffectBehaviour pose_quantisation{.name = "pose_quantisation", .reading = reading};
+const EffectBehaviour pose_quantisation{.name = "pose_quantisation",
+                                        .reading = pose_quantisation_hooks::reading};
 
 }  // namespace gapfarm::effects

@@ -3,15 +3,16 @@
 #include "worker/sim/push.h"
 
 namespace gapfarm::effects {
-namespace {
+namespace pressure_distribution_hooks {
 
 void push(EffectValues p, PushSettings& settings) {
   settings.stretch = p[0];
   settings.stretch_direction_rad = p[1];
 }
 
-}  // namespace
+}  // namespace pressure_distribution_hooks
 
-const EffectBehaviour pressure_distribution{.name = "pressure_distribution", .push = push};
+const EffectBehaviour pressure_distribution{.name = "pressure_distribution",
+                                            .push = pressure_distribution_hooks::push};
 
 }  // namespace gapfarm::effects

@@ -5,7 +5,7 @@
 #include "worker/effects/table.h"
 
 namespace gapfarm::effects {
-namespace {
+namespace slip_events_hooks {
 
 struct SideCase {
   double weight;
@@ -44,8 +44,10 @@ DriveBranch draw(EffectValues p, Stream& stream) {
   return branch;
 }
 
-}  // namespace
+}  // namespace slip_events_hooks
 
-const EffectBehaviour slip_events{.name = "slip_events", .branches = branches, .draw = draw};
+const EffectBehaviour slip_events{.name = "slip_events",
+                                  .branches = slip_events_hooks::branches,
+                                  .draw = slip_events_hooks::draw};
 
 }  // namespace gapfarm::effects
