@@ -14,6 +14,9 @@ std::string html_escaped(std::string_view text);
 // comment.  Still the same JSON.
 std::string script_safe(std::string json);
 
+// Of numbers in a page's data: plots do not need more, and the page stays small.
+inline constexpr int kPlotDigits = 7;
+
 // "0.412", "1,230", "−3.2": about three significant digits; "–" when not finite.
 std::string number_text(double value, int digits = 3);
 

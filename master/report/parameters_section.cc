@@ -11,7 +11,7 @@
 namespace gapfarm {
 namespace {
 
-std::string with_unit(double value, const std::string& unit) {
+std::string rounded_with_unit(double value, const std::string& unit) {
   const std::string text = number_text(value, 4);
   return unit.empty() || unit == "-" ? text : text + " " + html_escaped(unit);
 }
@@ -36,7 +36,8 @@ std::string remarks(const ParameterRow& row) {
   if (const BoundHit hit = bound_hit(row); hit != BoundHit::kNone) {
     const bool low = hit == BoundHit::kLower;
     html = fmt::format(R"(<strong class="warning">▲ at its {} bound, {}</strong>)",
-                       low ? "lower" : "upper", with_unit(low ? row.lower : row.upper, row.unit));
+                       low ? "lower" : "upper",
+                       rounded_with_unit(low ? row.lower : row.upper, row.unit));
   }
   if (!row.note.empty()) html += (html.empty() ? "" : "<br>") + html_escaped(row.note);
   return html;
@@ -44,12 +45,13 @@ std::string remarks(const ParameterRow& row) {
 
 std::string row_html(const ParameterRow& row, const ParameterColumns& columns) {
   const std::string after =
-      row.choice.empty() ? with_unit(row.after, row.unit) : html_escaped(row.choice);
+      row.choice.empty() ? rounded_with_unit(row.after, row.unit) : html_escaped(row.choice);
   const std::string between =
       row.choice.empty() ? number_text(row.lower) + " to " + number_text(row.upper) : "";
   return fmt::format(R"(<tr><th scope="row"><code>{}</code><small>{}</small></th>)",
                      html_escaped(row.key), html_escaped(row.summary)) +
-         cell(columns.before.words, row.before ? with_unit(*row.before, row.unit) : "–", "number") +
+         cell(columns.before.words, row.before ? rounded_with_unit(*row.before, row.unit) : "–",
+              "number") +
          cell(columns.after.words, "<strong>" + after + "</strong>", "number") +
          cell(columns.interval.words,
               row.lo && row.hi ? number_text(*row.lo, 4) + " to " + number_text(*row.hi, 4) : "–",

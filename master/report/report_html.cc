@@ -15,9 +15,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// Plots do not need more, and the page stays small.  diagnosis.json has every bit.
-constexpr int kPlotDigits = 7;
-
 constexpr const char* kDrivenEnds =
     R"(One picture a command, seen from where each trial began; turns on the spot by their headings, a row a condition. An ellipse or a bar should hold nine trials in ten. As driven, there is one a condition, so a model that looks at more than the command spreads its predictions; an error takes each trial's own prediction away.)";
 constexpr const char* kDrivenResiduals =

@@ -10,13 +10,13 @@
 namespace gapfarm {
 namespace {
 
-struct Problem {
+struct BoxProblem {
   Eigen::MatrixXd a;
   Eigen::VectorXd b, lower, upper;
 };
 
 // Badly scaled, with some entries unbounded and some bounds that the free minimum breaks.
-Problem draw(std::uint64_t seed) {
+BoxProblem draw_box(std::uint64_t seed) {
   Stream stream({.run_seed = seed});
   const auto n = static_cast<Eigen::Index>(1 + stream.below(8));
   Eigen::MatrixXd root(n + 2, n);
@@ -24,7 +24,7 @@ Problem draw(std::uint64_t seed) {
     const double scale = std::exp(stream.uniform(-6, 6));
     for (Eigen::Index i = 0; i < n + 2; ++i) root(i, j) = scale * stream.normal();
   }
-  Problem p{root.transpose() * root, Eigen::VectorXd(n), Eigen::VectorXd(n), Eigen::VectorXd(n)};
+  BoxProblem p{root.transpose() * root, Eigen::VectorXd(n), Eigen::VectorXd(n), Eigen::VectorXd(n)};
   Eigen::VectorXd free(n);
   for (double& v : free) v = stream.normal();
   p.b = p.a * free;
@@ -39,7 +39,7 @@ Problem draw(std::uint64_t seed) {
 TEST(BoundedMinimum, NothingWithinTheBoundsIsLower) {
   int held = 0;
   for (std::uint64_t seed = 0; seed < 2000; ++seed) {
-    const Problem p = draw(seed);
+    const BoxProblem p = draw_box(seed);
     const Eigen::VectorXd x = bounded_minimum(p.a, p.b, p.lower, p.upper);
     const Eigen::VectorXd down = p.b - p.a * x;
     for (Eigen::Index i = 0; i < x.size(); ++i) {
@@ -69,7 +69,7 @@ TEST(BoundedMinimum, WhatABoundStopsTheOthersDoNotFollow) {
 }
 
 TEST(BoundedMinimum, WithoutBoundsItIsTheSolution) {
-  Problem p = draw(7);
+  BoxProblem p = draw_box(7);
   p.lower.setConstant(-INFINITY);
   p.upper.setConstant(INFINITY);
   const Eigen::VectorXd x = bounded_minimum(p.a, p.b, p.lower, p.upper);
