@@ -14,6 +14,8 @@ HOSTS: host,host,... or @FILE with a host on each line (# begins a comment), as 
 Options:
   --bin FOLDER      where gapfarm-worker is on the hosts (gapfarm/bin in the home folder)
   --keys FOLDER     key folder on the hosts (.config/gapfarm/keys in the home folder)
+  --package FILE    for start: a gapfarm-worker .deb to unpack on hosts without the program; root is
+                    not needed, the libraries that it depends on are
   --processes N     on each host (one a core)
   --name NAME       tells farms apart that share hosts (default)
   --lines N         for logs (20)
@@ -25,6 +27,7 @@ Exit status: 0 all hosts did, 1 some did not.
 
 Examples:
   scripts/launch/ssh.sh start rack1,rack2 --connect tcp://10.0.0.5:5555
+  scripts/launch/ssh.sh start @hosts.txt --connect tcp://10.0.0.5:5555 --package gapfarm-worker.deb
   scripts/launch/ssh.sh status @hosts.txt
   scripts/launch/ssh.sh stop @hosts.txt --dry-run
 TEXT
@@ -35,10 +38,10 @@ fail() {
 }
 
 bin=gapfarm/bin keys=.config/gapfarm/keys processes='' name=default lines=20 connect='' insecure='' dry=''
-ssh_config='' hosts='' verb=''
+ssh_config='' package='' hosts='' verb=''
 while [[ $# -gt 0 ]]; do
   case $1 in
-    --bin | --keys | --processes | --name | --lines | --connect | --ssh-config)
+    --bin | --keys | --processes | --name | --lines | --connect | --ssh-config | --package)
       [[ $# -gt 1 ]] || fail "$1 needs a value"
       option=${1#--}
       printf -v "${option//-/_}" '%s' "$2"
@@ -54,6 +57,7 @@ while [[ $# -gt 0 ]]; do
   shift
 done
 [[ -n $verb && -n $hosts ]] || { usage >&2; exit 2; }
+[[ -z $package || -r $package ]] || fail "cannot read '$package'"
 [[ $name =~ ^[A-Za-z0-9._-]+$ ]] || fail "--name takes letters, digits, . _ -"
 if [[ $hosts == @* ]]; then
   [[ -r ${hosts#@} ]] || fail "cannot read '${hosts#@}'"
@@ -93,8 +97,26 @@ echo still finishing, pid \$pid; exit 1"
   *) fail "unknown verb '$verb'; see --help" ;;
 esac
 
+# Unpacks the package, which comes on stdin, beside the folder of programs.
+have="[ -x $bin/gapfarm-worker ]"
+bring="mkdir -p $bin .cache/gapfarm && cat >.cache/gapfarm/worker.deb &&
+dpkg-deb -x .cache/gapfarm/worker.deb $bin/.package && ln -s .package/usr/bin/gapfarm-worker $bin/ &&
+if ! $bin/gapfarm-worker --version; then
+rm $bin/gapfarm-worker; echo install what it depends on, or the package as root: $(basename "$package"); exit 1; fi"
+# on_host HOST: all that the verb does there.
+on_host() {
+  if [[ $verb == start && -n $package ]] && ! "${ssh[@]}" "$1" "$have"; then
+    "${ssh[@]/-n/-T}" "$1" "$bring" <"$package" || return 1
+  fi
+  "${ssh[@]}" "$1" "$script"
+}
+
 if [[ -n $dry ]]; then
   for host in "${list[@]}"; do
+    if [[ $verb == start && -n $package ]]; then
+      printf '%q ' "${ssh[@]/-n/-T}" "$host" "$bring"
+      echo "<$package   # where $bin/gapfarm-worker is missing"
+    fi
     printf '%q ' "${ssh[@]}" "$host" "$script"
     echo
   done
@@ -103,7 +125,7 @@ fi
 results=$(mktemp -d)
 trap 'rm -r "$results"' EXIT
 for i in "${!list[@]}"; do
-  { "${ssh[@]}" "${list[i]}" "$script" 2>&1 && touch "$results/$i.ok"; } |
+  { on_host "${list[i]}" 2>&1 && touch "$results/$i.ok"; } |
     sed "s/^/${list[i]//\//\\/}: /" &
 done
 wait

@@ -34,15 +34,40 @@ TEST(CliUsage, AnswersWhatPeopleTry) {
 TEST(CliUsage, HelpFitsAScreenAndHasExamplesEverywhere) {
   const Finished help = gapfarm_command({"--help"});
   EXPECT_EQ(help.exit_code, 0);
-  EXPECT_LE(std::count(help.out.begin(), help.out.end(), '\n'), 46);
+  EXPECT_LE(std::count(help.out.begin(), help.out.end(), '\n'), 50);
   for (const char* command : {"evolve", "resume", "status", "simulate", "predict", "effects",
                               "check", "import", "keys"}) {
     EXPECT_THAT(help.out, HasSubstr(command));
     const Finished one = gapfarm_command({command, "--help"});
     EXPECT_EQ(one.exit_code, 0) << command;
     EXPECT_THAT(one.out, HasSubstr("Examples:\n  gapfarm " + std::string(command))) << command;
-    EXPECT_LE(std::count(one.out.begin(), one.out.end(), '\n'), 42) << command;
+    EXPECT_LE(std::count(one.out.begin(), one.out.end(), '\n'), 44) << command;
   }
+}
+
+TEST(CliUsage, InitWritesAConfigThatChecksAndSaysWhatItGuessed) {
+  const TemporaryFolder folder;
+  const std::string log = GAPFARM_SOURCE_DIR "/configs/demo/trials.csv", out = folder / "mine.toml";
+  const Finished made = gapfarm_command({"init", log, "--out", out});
+  EXPECT_EQ(made.exit_code, 0) << made.err;
+  const Finished shown = gapfarm_command({"init", log});
+  EXPECT_THAT(shown.out, HasSubstr("# QUESTION: how long is the contact"));
+  EXPECT_THAT(shown.out, HasSubstr("straight drives made 0.26"));
+  const Finished checked = gapfarm_command({"check", out});
+  EXPECT_EQ(checked.exit_code, 0) << checked.err;
+  EXPECT_THAT(checked.out, HasSubstr("trials       120 in "));
+  EXPECT_EQ(gapfarm_command({"init", log, "--out", out}).exit_code, 2) << "it is there already";
+}
+
+TEST(CliUsage, ADryRunRunsNothingAndSaysSo) {
+  const TemporaryFolder folder;
+  const Finished dry = gapfarm_command({"evolve", GAPFARM_SOURCE_DIR "/configs/demo.toml", "--out",
+                                        folder / "run", "--workers", "3", "--dry-run"});
+  EXPECT_EQ(dry.exit_code, 0) << dry.err;
+  EXPECT_THAT(dry.out, HasSubstr("dry run: nothing was simulated"));
+  EXPECT_THAT(dry.out, HasSubstr("7 parameters on 120 trials"));
+  EXPECT_THAT(dry.out, HasSubstr("3 local workers"));
+  EXPECT_FALSE(std::filesystem::exists(folder / "run"));
 }
 
 TEST(CliUsage, WrongWordsExitWithTwoAndASuggestion) {

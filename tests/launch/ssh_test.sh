@@ -40,7 +40,8 @@ for i in 1 2 3; do
   ip -n "h$i" link set lo up
   ip -n "h$i" route add default via "10.77.$i.1"
   mkdir -p "$T/home$i/gapfarm/bin" "$T/home$i/.config/gapfarm"
-  ln -s "$BIN/gapfarm-worker" "$T/home$i/gapfarm/bin/gapfarm-worker"
+  # The third lacks the program, and is brought it.
+  [[ $i == 3 ]] || ln -s "$BIN/gapfarm-worker" "$T/home$i/gapfarm/bin/gapfarm-worker"
   "$BIN/gapfarm" keys worker "h$i" --keys "$T/keys" --out "$T/home$i/.config/gapfarm/keys" \
     >/dev/null || fail "no keys for h$i"
   cat >"$T/sshd$i.conf" <<TEXT
@@ -77,7 +78,13 @@ start_master 10.77.0.1
 for i in 1 2 3; do
   wait_for "h$i answers" ssh -n -F "$T/ssh_config" -o BatchMode=yes "h$i" true
 done
-launch start --connect "$endpoint" --processes 1 || fail start
+mkdir -p "$T/deb/DEBIAN" "$T/deb/usr/bin"
+cp "$BIN/gapfarm-worker" "$T/deb/usr/bin/"
+printf 'Package: gapfarm-worker\nVersion: 1\nArchitecture: all\nMaintainer: x\nDescription: x\n' \
+  >"$T/deb/DEBIAN/control"
+dpkg-deb -b "$T/deb" "$T/worker.deb" >/dev/null || fail 'no package'
+launch start --connect "$endpoint" --processes 1 && fail 'started where there is no program'
+launch start --connect "$endpoint" --processes 1 --package "$T/worker.deb" || fail start
 launch status || fail status
 workers_are() {
   [[ $(status "$T/run" 'sum(w["state"] != "gone" for w in s["workers"])') == "$1" ]]
