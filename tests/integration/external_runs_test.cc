@@ -1,0 +1,100 @@
+// Runs whose simulator is a program of a user's, and what the farm makes of its misbehaviour.
+#include <gmock/gmock.h>
+
+#include <nlohmann/json.hpp>
+
+#include "tests/integration/run_program.h"
+
+namespace gapfarm {
+namespace {
+
+using nlohmann::json;
+using ::testing::HasSubstr;
+
+// A robot that goes `speed` times duration ahead.  `misbehave` is Python, run before each answer.
+std::string simulator(const std::string& misbehave) {
+  return "import json, os, sys\n"
+         "for line in sys.stdin:\n"
+         "    task = json.loads(line)\n"
+         "    if 'id' not in task:\n"
+         "        print(json.dumps({'gapfarm': 1, 'name': 'ahead', 'parameters': [\n"
+         "            {'key': 'speed', 'unit': 'm/s', 'lower': 0.1, 'upper': 1,\n"
+         "             'nominal': 0.3}]}), flush=True)\n"
+         "        continue\n"
+         "    speed, extra = task['parameters']['speed'], 0\n" +
+         misbehave +
+         "    x = speed * task['duration'] * (task['left']['speed'] + task['right']['speed']) / 2\n"
+         "    print(json.dumps({'id': task['id'], 'pose': [x + extra, 0, 0]}), flush=True)\n";
+}
+
+class ExternalRuns : public ::testing::Test {
+ protected:
+  std::string config(const std::string& misbehave, const std::string& more = "") const {
+    folder_.write("simulator.py", simulator(misbehave));
+    folder_.write("log.csv",
+                  "session,trial,command,x0,y0,theta0,x1,y1,theta1\n"
+                  "s,0,forward,0,0,0,0.41,0,0\ns,1,forward,0,0,0,0.40,0.01,0\n"
+                  "s,2,forward,0,0,0,0.39,0,0.01\ns,3,backward,0,0,0,-0.4,0,0\n");
+    return folder_.write("run.toml",
+                         "scenario = \"external\"\ntrials = [\"log.csv\"]\n"
+                         "[external]\nprogram = [\"python3\", \"simulator.py\"]\n"
+                         "[genes]\nspeed = [0.1, 1]\n[evolution]\npopulation = 6\n" +
+                             more);
+  }
+  Finished evolve(const std::string& config, const std::string& run, const std::string& generations,
+                  const std::string& workers = "2") const {
+    return gapfarm_command({"evolve", config, "--out", folder_ / run, "--generations", generations,
+                            "--workers", workers});
+  }
+  json status(const std::string& run) const {
+    return json::parse(gapfarm_command({"status", folder_ / run, "--json"}).out);
+  }
+
+  const TemporaryFolder folder_;
+};
+
+TEST_F(ExternalRuns, EvolveResumeAndPredict) {
+  const std::string calm = config("");
+  const Finished whole = evolve(calm, "whole", "4");
+  ASSERT_EQ(whole.exit_code, 0) << whole.err;
+  EXPECT_EQ(evolve(calm, "parts", "2", "1").exit_code, 0);
+  const Finished resumed =
+      gapfarm_command({"resume", folder_ / "parts", "--generations", "4", "--workers", "2"});
+  EXPECT_EQ(resumed.exit_code, 0) << resumed.err;
+  EXPECT_EQ(status("parts")["digest"], status("whole")["digest"]);
+  const Finished predicted = gapfarm_command(
+      {"predict", folder_ / "whole", "--trials", folder_ / "log.csv", "--out", "-"});
+  EXPECT_EQ(predicted.exit_code, 0) << predicted.err;
+  EXPECT_THAT(predicted.out, HasSubstr("s,3,"));
+}
+
+TEST_F(ExternalRuns, WhatCrashesThreeTimesIsGivenUpAndTheRunGoesOn) {
+  const Finished finished = evolve(config("    if speed > 0.7: os._exit(9)\n"), "run", "2");
+  EXPECT_EQ(finished.exit_code, 3) << finished.err;
+  EXPECT_THAT(finished.err, HasSubstr("ended with status 9 instead of answering"));
+  const json found = status("run");
+  EXPECT_EQ(found["generation"], 2);
+  EXPECT_GT(found["quarantined"], 0);
+  EXPECT_EQ(found["incidents"][0]["kind"], "quarantine");
+}
+
+TEST_F(ExternalRuns, WhatAnswersDifferentlyTwiceIsNamed) {
+  const Finished finished =
+      evolve(config("    extra = os.getpid() * 1e-9\n", "[farm]\naudit_share = 1.0\n"), "run", "2");
+  ASSERT_EQ(finished.exit_code, 0) << finished.err;
+  const json incidents = status("run")["incidents"];
+  ASSERT_FALSE(incidents.empty());
+  EXPECT_EQ(incidents[0]["kind"], "alarm");
+}
+
+TEST_F(ExternalRuns, RubbishIsFoundBeforeTheRunBegins) {
+  const std::string file = config("");
+  folder_.write("simulator.py", "print('hello, I am a simulator', flush=True)\n");
+  const Finished finished = evolve(file, "run", "1");
+  EXPECT_EQ(finished.exit_code, 2);
+  EXPECT_THAT(finished.err, HasSubstr("does not introduce itself"));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "run"));
+}
+
+}  // namespace
+}  // namespace gapfarm
