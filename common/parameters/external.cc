@@ -24,6 +24,12 @@ constexpr EffectNeed kEffectNeeds[] = {
 };
 constexpr const char* kOfTheBuild[] = {"com_offset"};
 
+std::vector<Parameter> noise_rows() {
+  std::vector<Parameter> rows;
+  for (const Srv1 row : kNoiseRows) rows.push_back(srv1_table()[row_of(row)]);
+  return rows;
+}
+
 bool can_be_applied(const Effect& effect, unsigned inputs) {
   for (const char* name : kOfTheBuild) {
     if (effect.name == name) return false;
@@ -86,7 +92,7 @@ Status check_declaration(const ExternalDeclaration& declaration) {
 ExternalTable::ExternalTable(ExternalDeclaration declaration)
     : declaration_(std::move(declaration)) {
   std::vector<Parameter> rows = declaration_.parameters;
-  for (const Srv1 row : kNoiseRows) rows.push_back(srv1_table()[row_of(row)]);
+  for (const Parameter& row : noise_rows()) rows.push_back(row);
   for (const Effect& effect : srv1_effects()) {
     if (can_be_applied(effect, declaration_.inputs)) effects_.push_back(effect);
   }
@@ -94,8 +100,8 @@ ExternalTable::ExternalTable(ExternalDeclaration declaration)
 }
 
 const ParameterTable& external_table() {
-  static const ExternalTable table{ExternalDeclaration{}};
-  return table.table();
+  static const ParameterTable table(noise_rows(), {});
+  return table;
 }
 
 }  // namespace gapfarm

@@ -71,7 +71,7 @@ class ExternalTable {
 // empty, not finite or do not hold the nominal value, a log scale that reaches 0.
 Status check_declaration(const ExternalDeclaration& declaration);
 
-// Of a program that declares nothing: what a problem without one has.
+// What a problem without a program has: noise, and nothing that moves.
 const ParameterTable& external_table();
 
 }  // namespace gapfarm
