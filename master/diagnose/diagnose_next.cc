@@ -91,7 +91,7 @@ Status DiagnosisRun::look_for_second_places() {
           std::string(two ? "A third " : "A second ") + name + " (" + place + ") would explain " +
           std::to_string(std::lround(second->gain)) + " nats more of what is left" +
           (all ? ", and nothing would remain" : "") +
-          (room ? "; that is too little to name it."
+          (room ? "; that is too little, or too near the first, to name it."
                 : std::string("; a model holds ") + (two ? "two." : "one.")));
     }
   }
