@@ -176,7 +176,8 @@ TEST_F(Diagnose, ModelsOfLogsFarOffAreSimulatedWhereTheyWereRecorded) {
   std::string a, b;
   std::size_t rows = 0;
   for (; std::getline(recorded, a) && std::getline(again, b); ++rows) {
-    if (rows > 0) EXPECT_NEAR(start_x_m(a), start_x_m(b), 1.5) << rows;
+    if (rows == 0) continue;
+    EXPECT_NEAR(start_x_m(a), start_x_m(b), 1.5) << rows;
   }
   EXPECT_GT(rows, 60u);
 }
