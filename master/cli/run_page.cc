@@ -9,6 +9,7 @@
 #include "common/score/motion_model.h"
 #include "common/score/statistics.h"
 #include "common/trials/context.h"
+#include "master/cli/run_history.h"
 #include "master/report/html.h"
 #include "master/report/prediction_table.h"
 #include "master/store/run_reader.h"
@@ -175,6 +176,7 @@ Result<RunReport> read_run_report(const std::filesystem::path& run) {
   auto outcome = stored_outcome(*reader, last, &report);
   if (!outcome) return outcome.error();
   report.outcome = std::move(*outcome);
+  if (Status s = add_history(*reader, *problem, *generations, &report); !s) return s.error();
   report.headline = headline(report);
   report.action = action(report, info);
   report.provenance = {

@@ -63,6 +63,7 @@ SubcommandRun setup_replay(CLI::App& app);
 SubcommandRun setup_report(CLI::App& app);
 SubcommandRun setup_resume(CLI::App& app);
 SubcommandRun setup_robot(CLI::App& app);
+SubcommandRun setup_serve(CLI::App& app);
 SubcommandRun setup_simulate(CLI::App& app);
 SubcommandRun setup_stability(CLI::App& app);
 SubcommandRun setup_status(CLI::App& app);

@@ -9,6 +9,7 @@ std::span<const Subcommand> subcommands() {
       {"resume", "continue a run, bit for bit", "Runs", setup_resume},
       {"status", "say how a run, a diagnosis or a study is doing, live or dead", "Runs",
        setup_status},
+      {"serve", "show runs and diagnoses in a browser, live or dead", "Runs", setup_serve},
       {"compare", "run searches side by side over seeds", "Runs", setup_compare},
       {"replay", "evaluate one individual of a run again, to the bit", "Runs", setup_replay},
       {"simulate", "make a trial log from a parameter set", "Models", setup_simulate},

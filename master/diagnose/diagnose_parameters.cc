@@ -13,7 +13,7 @@ namespace gapfarm {
 namespace {
 
 constexpr double kHardlyMoved = 0.8;  // of the prior's spread: the data add next to nothing
-constexpr double kDrawnPathInterval_s = 0.05;
+constexpr double kShownInterval_s = 0.05;
 constexpr std::size_t kMostSamples = 40;  // of a path that is shown
 
 // Prior of a fitted base parameter, in its own unit.
@@ -186,7 +186,7 @@ Status DiagnosisRun::show_drives() {
       *planned.mutable_trial() = to_proto(problem_.log.trials[drive.trial]);
       planned.mutable_trial()->clear_path();
       planned.set_moved(true);
-      tasks.push_back(simulate_tasks({{planned}}, overrides, options_.seed, kDrawnPathInterval_s)[0]);
+      tasks.push_back(simulate_tasks({{planned}}, overrides, options_.seed, kShownInterval_s)[0]);
     }
   }
   const auto results = farm_.run(farm_.add_problem(to_proto(problem_)), tasks);

@@ -11,7 +11,7 @@ namespace gapfarm {
 namespace {
 
 constexpr std::size_t kLine = 100;  // characters, about what fits on one line in large print
-constexpr double kDegrees = 180 / std::numbers::pi;
+constexpr double kDegreesEach = 180 / std::numbers::pi;
 
 // %: the size of the parameter; @: the choice of the effect that is no number ("y").
 struct ShortWords {
@@ -103,7 +103,7 @@ std::string cause_of(const Diagnosis& d, const NamedEffect& effect, const Effect
   std::string line = filled(opposite ? words->opposite : words->cause, effect, *words, size->value);
   for (const Estimate& e : effect.parameters) {
     if (effect.name == "floor_tilt" && e.key == "direction") {
-      line += " toward " + plain_number(std::round(kDegrees * e.value)) + " degrees";
+      line += " toward " + plain_number(std::round(kDegreesEach * e.value)) + " degrees";
     }
   }
   return line;

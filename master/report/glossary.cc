@@ -71,6 +71,8 @@ constexpr Entry kEntries[] = {
     {"telling", "a finding", "Marked ◆: the residuals depend on this, as the table above says."},
     {"generation", "generation",
      "One round of evolution: the individuals that the one before left are varied and evaluated."},
+    {"operator", "operator",
+     "A way to make a new individual of old ones: crossing two, or changing one by a little."},
     {"population", "last generation",
      "The middle nine tenths of the last generation's values. It is narrow where the search has "
      "settled, which does not mean that the data determine the value: `gapfarm determine` says "
@@ -116,8 +118,8 @@ const std::vector<std::string_view>& diagnosis_terms() {
 
 const std::vector<std::string_view>& run_terms() {
   static const std::vector<std::string_view> ids = {
-      "nat",        "before",   "after", "generation", "population", "bound",
-      "validation", "baseline", "rms",   "residual",   "ellipse"};
+      "nat",   "before",     "after",    "generation", "population", "operator",
+      "bound", "validation", "baseline", "rms",        "residual",   "ellipse"};
   return ids;
 }
 

@@ -12,14 +12,16 @@
 namespace gapfarm {
 namespace {
 
-std::string security_policy() {
+std::string security_policy(bool served) {
   const auto hashes = [](std::span<const std::string_view> contents) {
     std::string list;
     for (const std::string_view content : contents) list += " '" + csp_hash(content) + "'";
     return list;
   };
-  return "default-src 'none'; base-uri 'none'; form-action 'none'; img-src data:; script-src" +
-         hashes(page_scripts()) + "; style-src" + hashes(page_styles());
+  static const std::string known =
+      "; script-src" + hashes(page_scripts()) + "; style-src" + hashes(page_styles());
+  const std::string own = served ? "connect-src 'self'; form-action 'self'" : "form-action 'none'";
+  return "default-src 'none'; base-uri 'none'; " + own + "; img-src data:" + known;
 }
 
 std::string head(const PageFrame& frame) {
@@ -35,7 +37,7 @@ std::string head(const PageFrame& frame) {
 <link rel="icon" href="data:,">
 <title>{}</title>
 )",
-      security_policy(), html_escaped(frame.title));
+      security_policy(frame.served), html_escaped(frame.title));
   for (const std::string_view style : page_styles()) {
     html += fmt::format("<style>{}</style>\n", style);
   }
@@ -61,12 +63,15 @@ std::string top(const PageFrame& frame) {
   for (const auto& [id, words] : frame.places) {
     links += fmt::format(R"(<a href="#{}">{}</a>)", id, words);
   }
-  return fmt::format(R"(<a class="skip" href="#{}">Skip to the first section</a>
-<header class="top"><span class="brand">gapfarm <span>{}</span></span>
+  return fmt::format(
+      R"(<a class="skip" href="#{}">Skip to the first section</a>
+<header class="top"><span class="brand">{} <span>{}</span></span>
 <nav aria-label="Sections">{}</nav>
 <button type="button" id="theme" hidden>Dark</button></header>
 )",
-                     frame.places.front().first, html_escaped(frame.brand), links);
+      frame.places.front().first,
+      frame.served ? R"(<a href="/" title="All runs and diagnoses">gapfarm</a>)" : "gapfarm",
+      html_escaped(frame.brand), links);
 }
 
 std::string data_block(const char* id, const nlohmann::ordered_json& json) {
@@ -112,11 +117,24 @@ std::string drives_section(std::string_view tuned, std::string_view final_) {
          kNoScript + "</section>\n";
 }
 
+std::string watch_section() {
+  return R"(<section id="watch"><h2>Watch a drive</h2>
+<p>Any trial of the log, seen from above: as it was measured, and as the config's values and the best of a generation drive it without chance. The server simulates what is asked for.</p>)" +
+         plot_key(measured_key() + model_keys("before", "best")) +
+         R"(<div class="controls" id="watch-controls"></div><p class="quiet" id="watch-said" role="status"></p><div id="watch-plot"></div>)" +
+         kNoScript + "</section>\n";
+}
+
 std::string framed_page(const PageFrame& frame, const nlohmann::ordered_json& page,
                         const nlohmann::ordered_json& trials) {
   std::string html =
       head(frame) + "<body>\n" + kHatches + top(frame) + "<main>\n" + frame.body +
-      "</main>\n<footer>Made by gapfarm. This page needs no network. "
+      (frame.served
+           ? R"(<p id="live" class="live" role="status"></p><noscript><p class="quiet">Reload the page to look again.</p></noscript></main>)"
+           : "</main>") +
+      "\n<footer>Made by gapfarm. " +
+      (frame.served ? "What stands here is read from stores; nothing here can change them. "
+                    : "This page needs no network. ") +
       R"(<button type="button" id="all-trials" hidden>All trials as CSV</button></footer>)"
       "\n";
   html += data_block("page", page);

@@ -13,6 +13,8 @@ struct PageFrame {
   std::string brand;                                        // "diagnosis", "run"
   std::vector<std::pair<const char*, const char*>> places;  // of the navigation: id and words
   std::string body;                                         // sections
+  // By a server: the page has a way back to the list and looks again while it is open.
+  bool served = false;
 };
 
 // One self-contained file, UTF-8: no network, its own scripts and styles only, named by their
@@ -32,5 +34,7 @@ extern const char* const kNoScript;
 // The sections that only hold plots of trials.
 std::string floor_section();
 std::string drives_section(std::string_view tuned, std::string_view final_);
+// Any trial's drive, played; of pages that a server shows.
+std::string watch_section();
 
 }  // namespace gapfarm

@@ -11,12 +11,13 @@
 namespace gapfarm {
 namespace {
 
-std::string rounded_with_unit(double value, const std::string& unit) {
+std::string value_with_unit(double value, const std::string& unit) {
   const std::string text = number_text(value, 4);
   return unit.empty() || unit == "-" ? text : text + " " + html_escaped(unit);
 }
 
-std::string cell(std::string_view label, const std::string& html, const char* css_class = "") {
+std::string parameter_cell(std::string_view label, const std::string& html,
+                           const char* css_class = "") {
   // Where rows become cards, on a narrow screen, cells without content are left out.
   const char* empty = html.empty() || html == "–" ? " empty" : "";
   return fmt::format(R"(<td class="{}{}" data-label="{}">{}</td>)", css_class, empty, label, html);
@@ -37,7 +38,7 @@ std::string remarks(const ParameterRow& row) {
     const bool low = hit == BoundHit::kLower;
     html = fmt::format(R"(<strong class="warning">▲ at its {} bound, {}</strong>)",
                        low ? "lower" : "upper",
-                       rounded_with_unit(low ? row.lower : row.upper, row.unit));
+                       value_with_unit(low ? row.lower : row.upper, row.unit));
   }
   if (!row.note.empty()) html += (html.empty() ? "" : "<br>") + html_escaped(row.note);
   return html;
@@ -45,26 +46,28 @@ std::string remarks(const ParameterRow& row) {
 
 std::string row_html(const ParameterRow& row, const ParameterColumns& columns) {
   const std::string after =
-      row.choice.empty() ? rounded_with_unit(row.after, row.unit) : html_escaped(row.choice);
+      row.choice.empty() ? value_with_unit(row.after, row.unit) : html_escaped(row.choice);
   const std::string between =
       row.choice.empty() ? number_text(row.lower) + " to " + number_text(row.upper) : "";
   return fmt::format(R"(<tr><th scope="row"><code>{}</code><small>{}</small></th>)",
                      html_escaped(row.key), html_escaped(row.summary)) +
-         cell(columns.before.words, row.before ? rounded_with_unit(*row.before, row.unit) : "–",
-              "number") +
-         cell(columns.after.words, "<strong>" + after + "</strong>", "number") +
-         cell(columns.interval.words,
-              row.lo && row.hi ? number_text(*row.lo, 4) + " to " + number_text(*row.hi, 4) : "–",
-              "number") +
-         cell("searched between", bounds_svg(row) + "<small>" + between + "</small>", "between") +
-         cell("remarks", remarks(row)) + "</tr>";
+         parameter_cell(columns.before.words,
+                        row.before ? value_with_unit(*row.before, row.unit) : "–", "number") +
+         parameter_cell(columns.after.words, "<strong>" + after + "</strong>", "number") +
+         parameter_cell(
+             columns.interval.words,
+             row.lo && row.hi ? number_text(*row.lo, 4) + " to " + number_text(*row.hi, 4) : "–",
+             "number") +
+         parameter_cell("searched between", bounds_svg(row) + "<small>" + between + "</small>",
+                        "between") +
+         parameter_cell("remarks", remarks(row)) + "</tr>";
 }
 
 std::string plain_head(const std::string& html, const char* css_class = "") {
   return fmt::format(R"(<th scope="col" class="{}">{}</th>)", css_class, html);
 }
 
-std::string head(const TermColumn& column) {
+std::string column_head(const TermColumn& column) {
   return plain_head(term(column.term, column.words), "number");
 }
 
@@ -138,8 +141,8 @@ std::string parameters_section(const std::vector<ParameterRow>& rows,
   for (const ParameterRow& row : rows) body += row_html(row, columns);
   html +=
       R"(<table class="cards parameters" data-file="parameters"><caption class="unseen">Parameters</caption><thead><tr>)" +
-      plain_head("parameter") + head(columns.before) + head(columns.after) +
-      head(columns.interval) + plain_head(term("bound", "searched between")) +
+      plain_head("parameter") + column_head(columns.before) + column_head(columns.after) +
+      column_head(columns.interval) + plain_head(term("bound", "searched between")) +
       plain_head("remarks") + "</tr></thead><tbody>" + body + "</tbody></table>";
   html += correlations_html(correlations);
   return html +

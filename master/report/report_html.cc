@@ -64,14 +64,16 @@ std::string unexplained_section(const Diagnosis& diagnosis) {
 
 }  // namespace
 
-std::string report_html(const Diagnosis& diagnosis) {
+std::string report_html(const Diagnosis& diagnosis, bool served) {
   PageFrame frame;
   frame.title = diagnosis.headline.empty() ? "gapfarm diagnosis" : diagnosis.headline;
   frame.brand = "diagnosis";
+  frame.served = served;
   const bool driven = diagnosis.words.ends.empty();
   Json page = summary_json(diagnosis);
   page["drives"] = drives_json(diagnosis.drives);
   page["models"] = {{"tuned", "tuned"}, {"final", "final"}};
+  page["served"] = served;
   page["without_trials"] = "This diagnosis was kept without its trials.";
   const Json trials = trials_json(diagnosis, kPlotDigits);
   if (diagnosis.verdict == Verdict::kUnusable) {

@@ -10,6 +10,7 @@ namespace gapfarm {
 // The whole file, UTF-8.  It holds the diagnosis as JSON too (see script_safe() for how), plots it
 // with scripts whose hashes its content security policy names, and reads as text without them.
 // The same diagnosis gives the same bytes.
-std::string report_html(const Diagnosis& diagnosis);
+// `served`: by `gapfarm serve`.
+std::string report_html(const Diagnosis& diagnosis, bool served = false);
 
 }  // namespace gapfarm

@@ -9,6 +9,7 @@
 #include "master/report/html.h"
 #include "master/report/page_frame.h"
 #include "master/report/parameters_section.h"
+#include "master/report/run_live.h"
 #include "master/report/run_report.h"
 
 namespace gapfarm {
@@ -16,22 +17,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-Json number_or_null(const std::optional<double>& value) {
-  return value ? Json(*value) : Json(nullptr);
-}
-
-Json generations_json(const std::vector<RunGeneration>& generations) {
-  Json list = Json::array();
-  for (const RunGeneration& g : generations) {
-    list.push_back({{"generation", g.generation},
-                    {"best", number_or_null(g.best)},
-                    {"median", number_or_null(g.median)},
-                    {"worst", number_or_null(g.worst)},
-                    {"evaluations", g.evaluations},
-                    {"wall_s", g.wall_s}});
-  }
-  return list;
-}
+constexpr int kRunPlotDigits = 7;
 
 struct Errors {
   double position_mm = 0, heading_mrad = 0, score = 0;
@@ -59,12 +45,13 @@ std::string tile(const std::string& title, double before, double after, const st
 
 std::string summary(const RunReport& report) {
   std::string html = fmt::format(
-      R"(<section id="summary"><p class="verdict verdict-none">Run {}</p><h1 data-file="run">{}</h1>)",
+      R"(<section id="summary"><p class="verdict verdict-none">Run {}</p><h1 data-file="run" id="headline" data-live>{}</h1>)",
       html_escaped(report.name), html_escaped(report.headline));
   if (!report.action.empty()) {
     html += R"(<p class="action"><span aria-hidden="true">→</span> )" +
             html_escaped(report.action) + "</p>";
   }
+  if (!report.farm.state.empty()) html += state_line(report.farm);
   if (!report.outcome || report.outcome->trials.empty()) {
     return html + "<p>" + html_escaped(report.without_outcome) + "</p></section>\n";
   }
@@ -169,7 +156,12 @@ Json page_json(const RunReport& report) {
                 {{"name", report.fitness},
                  {"unit", report.unit},
                  {"higher_is_better", report.higher_is_better}}},
-               {"generations", generations_json(report.generations)},
+               {"generations", generations_json(report)},
+               {"operators", operators_json(report)},
+               {"genes", densities_json(report)},
+               {"served", report.served},
+               {"run", report.name},
+               {"logged_trials", report.trials},
                {"parameters", parameters_json(report.parameters)},
                {"effects", Json::array()},
                {"where", Json::array()}};
@@ -195,7 +187,10 @@ std::string run_html(const RunReport& report) {
   PageFrame frame;
   frame.title = "gapfarm run " + report.name;
   frame.brand = "run";
-  frame.places = {{"progress", "Fitness"}, {"parameters", "Parameters"}, {"scores", "Kept apart"}};
+  frame.served = report.served;
+  frame.places = {{"progress", "Fitness"}, {"parameters", "Parameters"}};
+  if (!report.densities.empty()) frame.places.emplace_back("genes", "Genes");
+  frame.places.emplace_back("scores", "Kept apart");
   if (driven) {
     frame.places.emplace_back("floor", "Floor");
     frame.places.emplace_back("drives", "Drives");
@@ -204,20 +199,25 @@ std::string run_html(const RunReport& report) {
     frame.places.emplace_back("poses", "Poses");
     frame.places.emplace_back("residuals", "Residuals");
   }
+  const bool farmed = !report.farm.state.empty();
+  if (farmed) frame.places.emplace_back("farm", "Farm");
   frame.places.emplace_back("provenance", "Inputs");
   frame.places.emplace_back("words", "Words");
   std::string& body = frame.body;
-  body = summary(report) + progress(report) +
+  body = summary(report) + progress(report) + operators_section(report) +
          parameters_section(
              report.parameters, {},
              {{"before", "before"}, {"after", "after"}, {"population", "last generation"}}) +
-         scores(report);
+         densities_section(report) + scores(report);
   if (driven) body += floor_section() + drives_section("before", "after");
   if (poses) body += pose_sections();
+  if (report.served && !report.pieces && !report.genomes.empty()) body += watch_section();
+  body += genomes_section(report);
+  if (farmed) body += farm_section(report.farm);
   body += provenance(report) + glossary_section(run_terms());
   Diagnosis table;
   if (report.outcome) table.trials = report.outcome->trials;
-  return framed_page(frame, page_json(report), trials_json(table, kPlotDigits));
+  return framed_page(frame, page_json(report), trials_json(table, kRunPlotDigits));
 }
 
 }  // namespace gapfarm

@@ -1,6 +1,7 @@
 // What the page of a run shows.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -37,6 +38,40 @@ std::string to_json(const RunOutcome& outcome);
 // Errors: not what to_json() wrote.
 Result<RunOutcome> parse_run_outcome(const std::string& json);
 
+// Where a gene's population was, generation by generation.
+struct GeneDensity {
+  std::string key, unit;
+  std::vector<double> edges;                  // of the bins, in the parameter's unit, ascending
+  std::vector<std::uint64_t> generations;     // those that are drawn, ascending
+  std::vector<std::vector<unsigned>> counts;  // [generation][bin]
+  std::vector<double> best;                   // of those generations
+};
+
+struct RunWorker {
+  std::string name, host, state;
+  unsigned jobs = 0;
+  std::uint64_t finished = 0;
+  double rate_per_s = 0;
+};
+
+// A member of the last generation.
+struct RunGenome {
+  std::uint64_t birth_id = 0;
+  std::optional<double> fitness;
+  std::string outcome, operators;
+  std::vector<std::uint64_t> parents;
+};
+
+// The farm as its master last told of it.
+struct RunFarm {
+  std::string state;                                       // "running"
+  std::string told;                                        // what it waits for, or how it ended
+  std::vector<std::pair<std::string, std::string>> facts;  // "rate": "38.1 evaluations/s"
+  std::vector<RunWorker> workers;
+  std::vector<std::string> incidents;  // latest first
+  std::vector<std::string> log;        // the last lines of log.txt
+};
+
 struct RunReport {
   std::string name;      // of the folder
   std::string headline;  // one line
@@ -49,8 +84,38 @@ struct RunReport {
   std::optional<RunOutcome> outcome;
   std::string without_outcome;  // why there is none
   bool pieces = false;          // the trials are pushes of pieces
+  std::vector<std::string> operators;
+  // [probability_generations][operators]: of some generations, in order.
+  std::vector<std::vector<double>> probabilities;
+  std::vector<std::uint64_t> probability_generations;
+  std::vector<GeneDensity> densities;
+  std::vector<RunGenome> genomes;  // best first, a few
+  RunFarm farm;
+  std::size_t trials = 0;  // of the log
+  bool served = false;     // by `gapfarm serve`: the page looks again while it is open
   std::vector<std::pair<std::string, std::string>> provenance;
 };
+
+// About `most` of `points`, in order: the first, the last, and of each stretch between them the
+// least and the greatest by `value`.
+template <class Point, class Value>
+std::vector<Point> decimated(const std::vector<Point>& points, std::size_t most, Value value) {
+  if (points.size() <= most) return points;
+  const std::size_t stretches = most / 2 - 1;
+  std::vector<Point> kept = {points.front()};
+  for (std::size_t k = 0; k < stretches; ++k) {
+    std::size_t least = 1 + k * (points.size() - 2) / stretches, most_at = least;
+    const std::size_t end = 1 + (k + 1) * (points.size() - 2) / stretches;
+    for (std::size_t i = least; i < end; ++i) {
+      if (value(points[i]) < value(points[least])) least = i;
+      if (value(points[i]) > value(points[most_at])) most_at = i;
+    }
+    kept.push_back(points[std::min(least, most_at)]);
+    if (least != most_at) kept.push_back(points[std::max(least, most_at)]);
+  }
+  kept.push_back(points.back());
+  return kept;
+}
 
 // The whole file, UTF-8, as report_html() makes one.
 std::string run_html(const RunReport& report);

@@ -137,4 +137,20 @@ Result<std::optional<std::string>> read_command(const std::filesystem::path& fil
   return json;
 }
 
+Result<std::vector<AnsweredStage>> read_stages(const std::filesystem::path& file) {
+  auto database = Database::open(file, Database::Mode::kQueryOnly);
+  if (!database) return database.error();
+  if (Status s = check_identity(*database); !s) return s.error();
+  auto select = database->prepare(
+      "SELECT stage, count(*) FROM answers GROUP BY stage ORDER BY min(number)", "read the stages");
+  if (!select) return select.error();
+  std::vector<AnsweredStage> stages;
+  for (;;) {
+    const auto row = select->step();
+    if (!row) return row.error();
+    if (!*row) return stages;
+    stages.push_back({select->text(0), select->integer(1)});
+  }
+}
+
 }  // namespace gapfarm

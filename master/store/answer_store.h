@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "common/base/result.h"
 #include "gapfarm/v1/task.pb.h"
@@ -57,6 +58,14 @@ class AnswerStore {
   std::string fingerprint_;
   std::int64_t next_number_ = 1;
 };
+
+// How many answers each stage asked for first.
+struct AnsweredStage {
+  std::string name;
+  std::int64_t answers = 0;
+};
+// In the order in which they began, from a file that may be in use.  Errors: no answer store.
+Result<std::vector<AnsweredStage>> read_stages(const std::filesystem::path& file);
 
 // What the command that wrote `file` last said about itself, from a file that may be in use or in
 // a folder that cannot be written; none: it says nothing.  Errors: no answer store.

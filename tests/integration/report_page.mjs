@@ -3,107 +3,12 @@
 // zoomed and taken away, nothing hostile runs, keys work, terms are told where they stand, and a
 // phone's width suffices.
 // REPORT_PICTURES=folder keeps screenshots for a person.
-import { spawn } from "node:child_process";
-import { existsSync, mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
-import { tmpdir } from "node:os";
+import { existsSync, mkdirSync, readFileSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
 import { pathToFileURL } from "node:url";
+import { check, end, failures, open, pictures, profile, send } from "./browser.mjs";
 
-const [chromium, folder] = process.argv.slice(2);
-const profile = mkdtempSync(join(tmpdir(), "report-page-"));
-const pictures = process.env.REPORT_PICTURES;
-const TIME_LIMIT_MS = 240_000;  // on a machine with many other things to do
-
-const failures = [];
-const check = (good, words) => {
-  if (!good) failures.push(words);
-};
-
-// --- DevTools protocol over a pipe: JSON messages that end with a NUL ---
-
-const flags = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
-  "--disable-background-networking", "--disable-component-update", "--disable-sync",
-  "--disable-dev-shm-usage", `--user-data-dir=${profile}`, "--remote-debugging-pipe"];
-const browser = spawn(chromium, flags, { stdio: ["ignore", "ignore", "ignore", "pipe", "pipe"] });
-const limit = setTimeout(() => {
-  console.error("the browser did not answer in time");
-  browser.kill("SIGKILL");
-  process.exit(1);
-}, TIME_LIMIT_MS);
-
-let lastId = 0;
-let rest = "";
-const waiting = new Map();
-let onEvent = () => {};
-browser.stdio[4].setEncoding("utf8");
-browser.stdio[4].on("data", (chunk) => {
-  const messages = (rest + chunk).split("\0");
-  rest = messages.pop();
-  for (const text of messages) {
-    const message = JSON.parse(text);
-    if (message.id) {
-      const { resolve, reject } = waiting.get(message.id);
-      waiting.delete(message.id);
-      if (message.error) reject(new Error(message.error.message));
-      else resolve(message.result);
-    } else {
-      onEvent(message.method, message.params);
-    }
-  }
-});
-
-function send(method, params = {}, sessionId = undefined) {
-  const id = ++lastId;
-  browser.stdio[3].write(`${JSON.stringify({ id, method, params, sessionId })}\0`);
-  return new Promise((resolve, reject) => waiting.set(id, { resolve, reject }));
-}
-
-// --- a page ---
-
-async function open(file, { width = 1280, height = 900, dark = false } = {}) {
-  const { targetId } = await send("Target.createTarget", { url: "about:blank" });
-  const { sessionId } = await send("Target.attachToTarget", { targetId, flatten: true });
-  const call = (method, params) => send(method, params, sessionId);
-  const complaints = [];
-  const url = pathToFileURL(file).href;
-  let loaded;
-  const load = new Promise((resolve) => { loaded = resolve; });
-  onEvent = (method, params) => {
-    if (method === "Runtime.exceptionThrown") complaints.push(params.exceptionDetails.exception?.description);
-    if (method === "Runtime.consoleAPICalled") complaints.push(`console: ${JSON.stringify(params.args)}`);
-    if (method === "Log.entryAdded") complaints.push(params.entry.text);
-    if (method === "Page.loadEventFired") loaded();
-    if (method === "Network.requestWillBeSent" && params.request.url !== url && !params.request.url.startsWith("data:")) {
-      complaints.push(`request for ${params.request.url}`);
-    }
-  };
-  for (const domain of ["Page", "Runtime", "Log", "Network"]) await call(`${domain}.enable`);
-  await call("Emulation.setDeviceMetricsOverride", { width, height, deviceScaleFactor: 1, mobile: width < 600 });
-  await call("Emulation.setEmulatedMedia", { features: [{ name: "prefers-color-scheme", value: dark ? "dark" : "light" }] });
-  await call("Page.navigate", { url });
-  await load;
-  const page = {
-    complaints,
-    call,
-    async run(expression) {
-      const { result, exceptionDetails } = await call("Runtime.evaluate", { expression, returnByValue: true, awaitPromise: true });
-      if (exceptionDetails) throw new Error(`${expression}: ${exceptionDetails.exception?.description}`);
-      return result.value;
-    },
-    async key(key) {
-      for (const type of ["keyDown", "keyUp"]) await call("Input.dispatchKeyEvent", { type, key, code: key });
-    },
-    async picture(name) {
-      if (!pictures) return;
-      const { data } = await call("Page.captureScreenshot", { captureBeyondViewport: true, format: "png" });
-      writeFileSync(join(pictures, `${name}.png`), Buffer.from(data, "base64"));
-    },
-    close: () => send("Target.closeTarget", { targetId }),
-  };
-  // Two frames, so that observers of sizes have run and the plots are drawn.
-  await page.run("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => setTimeout(done))))");
-  return page;
-}
+const folder = process.argv[3];
 
 // How many plots show marks beyond their axes.
 const DRAWN = `[...document.querySelectorAll(".plot .canvas")].filter((plot) =>
@@ -228,7 +133,7 @@ async function judgeDrives(page) {
 }
 
 try {
-  const file = (name) => join(folder, `${name}.html`);
+  const file = (name) => pathToFileURL(join(folder, `${name}.html`)).href;
   const phone = { width: 390, height: 844 };
   for (const [name, path, options, plots] of [
     ["wide", file("example"), {}, 12],
@@ -265,12 +170,5 @@ try {
 } catch (error) {
   failures.push(error.stack);
 } finally {
-  clearTimeout(limit);
-  const gone = new Promise((resolve) => { browser.once("exit", resolve); });
-  browser.kill();
-  await gone;
-  rmSync(profile, { recursive: true, force: true, maxRetries: 5 });
+  await end("report page");
 }
-for (const failure of failures) console.error(`FAILED ${failure}`);
-console.log(failures.length ? `${failures.length} failures` : "report page: fine");
-process.exitCode = failures.length ? 1 : 0;

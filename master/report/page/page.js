@@ -73,6 +73,10 @@ startTerms();
 startTables();
 startCopies();
 startProgress();
+startOperators();
+startGenes();
+startCompared();
+startWatch();
 const pageTrials = readTrials();
 if (pageTrials.length) {
   startDrives(pageTrials);
@@ -85,4 +89,5 @@ if (pageTrials.length) {
     if (place) place.textContent = PAGE.without_trials;
   }
 }
+startLive();
 document.documentElement.dataset.ready = "true";

@@ -9,20 +9,20 @@ const AGAINST = [
 
 function startProgress() {
   const parent = document.getElementById("progress-plot");
-  const { generations, fitness } = PAGE;
-  if (!parent || !generations?.length) return;
+  const { fitness } = PAGE;
+  if (!parent || !PAGE.generations?.length) return;
   const controls = document.getElementById("progress-controls");
   const chart = new Chart(parent, 0.45);
   chart.figure.classList.add("large");
   const against = choice(controls, "Against", AGAINST.map((a) => [a.key, a.label]), draw);
-  const all = generations.flatMap((g) => [g.best, g.median]).filter(isNumber);
+  const all = PAGE.generations.flatMap((g) => [g.best, g.median]).filter(isNumber);
   const canLog = all.length && all.every((v) => v > 0);
   const scale = canLog
     ? radios(controls, "Scale", [{ key: "linear", label: "linear" }, { key: "log", label: "log" }], draw) : () => "linear";
 
   function draw() {
     const { of, label } = AGAINST.find((a) => a.key === against());
-    const known = generations.filter((g) => isNumber(g.best));
+    const known = PAGE.generations.filter((g) => isNumber(g.best));
     const line = (key) => known.map((g) => [of(g), g[key]]);
     const marks = known.map((g) => [of(g), g.best, g]);
     const low = (g) => (isNumber(g.worst) ? g.worst : g.best);
@@ -47,7 +47,9 @@ function startProgress() {
         describe: (g) => `generation ${g.generation}, ${words(g.evaluations, 6)} evaluations: best ${words(g.best, 6)}, median ${words(g.median, 4)}, worst ${words(g.worst, 4)}` },
       `${fitness.name} by ${label}`,
       `Line: best; dashed: median; shaded: best to worst. ${fitness.higher_is_better ? "Higher" : "Lower"} is better.`,
+      Boolean(chart.zoom),
     );
   }
+  redraws.push(draw);
   draw();
 }

@@ -44,8 +44,9 @@ const cellText = (cell) => {
   return copy.textContent.trim().replace(/\s+/g, " ").replaceAll("−", "-");
 };
 
-function startTables() {
-  for (const table of document.querySelectorAll("table[data-file]")) {
+// Of all tables within `root`.
+function startTables(root = document) {
+  for (const table of root.querySelectorAll("table[data-file]")) {
     const button = Object.assign(document.createElement("button"), { type: "button", className: "take", textContent: "CSV" });
     button.title = "Save this table as CSV";
     button.setAttribute("aria-label", `Save the table ${table.caption?.textContent || table.dataset.file} as CSV`);
@@ -55,12 +56,13 @@ function startTables() {
     });
     table.after(button);
   }
+  if (root !== document) return;
   const all = document.getElementById("all-trials");
   all?.addEventListener("click", () => {
     const { columns, rows } = readJson("trials");
     offer("trials.csv", "text/csv", csvText([columns, ...rows]));
   });
-  if (all) all.hidden = false;
+  if (all) all.hidden = !readJson("trials").rows.length;
 }
 
 async function copyText(source) {

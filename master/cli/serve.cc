@@ -1,0 +1,79 @@
+// gapfarm serve [DIR...]: runs and diagnoses in a browser, from their stores alone.
+#include <unistd.h>
+
+#include <chrono>
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "master/cli/run_page.h"
+#include "master/cli/serve_drive.h"
+#include "master/cli/subcommand.h"
+#include "master/serve/http_server.h"
+#include "master/serve/site.h"
+
+namespace gapfarm {
+namespace {
+
+struct ServeOptions {
+  std::vector<std::string> folders = {"."};
+  unsigned port = 8421;
+};
+
+std::string machine_name() {
+  char name[256] = {};
+  return ::gethostname(name, sizeof name - 1) == 0 ? name : "this-machine";
+}
+
+int run_serve(const ServeOptions& options, CliContext& context) {
+  for (const std::string& folder : options.folders) {
+    std::error_code ignored;
+    if (std::filesystem::is_directory(folder, ignored)) continue;
+    context.console.error(Error{folder + ": no such folder; name one with runs or diagnoses"});
+    return kExitBadUsage;
+  }
+  DriveShower shower(context);
+  SiteSources sources;
+  sources.folders.assign(options.folders.begin(), options.folders.end());
+  sources.unix_now_s = [] {
+    const auto now = std::chrono::system_clock::now().time_since_epoch();
+    return std::chrono::duration<double>(now).count();
+  };
+  sources.read_run = [](const std::filesystem::path& run) { return read_run_report(run); };
+  sources.drive = [&](const DriveQuestion& question) { return shower.show(question); };
+  Site site(std::move(sources));
+  auto server =
+      HttpServer::listen(static_cast<std::uint16_t>(options.port),
+                         [&](const HttpRequest& request) { return site.answer(request); });
+  if (!server) {
+    context.console.error(server.error());
+    return kExitBadUsage;
+  }
+  const std::string port = std::to_string((*server)->port());
+  const std::string address = "http://127.0.0.1:" + port + "/";
+  const std::string tunnel = "ssh -L " + port + ":127.0.0.1:" + port + " " + machine_name();
+  context.console.result(
+      "serving " + address + "\nfrom another machine: " + tunnel + ", then open " + address + "\n",
+      {{"address", address}, {"ssh", tunnel}});
+  (*server)->run(context.stop.fd());
+  return kExitSignalBase + context.stop.signal();
+}
+
+}  // namespace
+
+SubcommandRun setup_serve(CLI::App& app) {
+  auto options = std::make_shared<ServeOptions>();
+  app.add_option("DIR", options->folders, "Folders; what lies up to four folders beneath is found")
+      ->capture_default_str();
+  app.add_option("--port", options->port, "On 127.0.0.1; 0: any that is free")
+      ->check(CLI::Range(0u, 65535u))
+      ->capture_default_str();
+  app.footer(
+      "Examples:\n"
+      "  gapfarm serve\n"
+      "  gapfarm serve run diagnosis --port 9000\n"
+      "It reads stores and needs no master; nothing can be changed through it.  Ctrl-C ends it.");
+  return [options](CliContext& context) { return run_serve(*options, context); };
+}
+
+}  // namespace gapfarm

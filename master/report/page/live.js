@@ -1,0 +1,69 @@
+"use strict";
+// A page that a server shows looks again while it is open: what changed is put in its place.
+
+const LOOK_MS = 2000;
+const redraws = [];  // of plots whose data may change
+
+// What a person has chosen or stands on, by what it says.
+const nameOf = (e) => e.getAttribute("href") || `${e.name || ""}=${e.value || e.id}`;
+
+function putInPlace(element, html) {
+  const inside = element.contains(document.activeElement) ? nameOf(document.activeElement) : null;
+  const checked = new Set([...element.querySelectorAll("input:checked")].map(nameOf));
+  element.innerHTML = html;
+  for (const input of element.querySelectorAll("input")) input.checked = checked.has(nameOf(input));
+  if (inside) [...element.querySelectorAll("a, button, input")].find((e) => nameOf(e) === inside)?.focus({ preventScroll: true });
+  startTables(element);
+}
+
+function startLive() {
+  if (!PAGE.served) return;
+  const told = document.getElementById("live");
+  const shown = new Map();
+  const sections = (page) => [...page.querySelectorAll("section")].map((s) => s.id).join(" ");
+  let etag = "";
+  let since = null;
+
+  function say(trouble) {
+    since = trouble ? since ?? new Date().toLocaleTimeString() : null;
+    const text = trouble ? `${trouble} What stands here is from ${since} or before; it is asked again every ${LOOK_MS / 1000} s.` : "";
+    if (told.textContent !== text) told.textContent = text;
+  }
+
+  function update(text) {
+    const page = new DOMParser().parseFromString(text, "text/html");
+    if (sections(page) !== sections(document)) return location.reload();
+    document.title = page.title;
+    for (const fresh of page.querySelectorAll("[data-live]")) {
+      const element = document.getElementById(fresh.id);
+      if (element && shown.get(fresh.id) !== fresh.innerHTML) putInPlace(element, fresh.innerHTML);
+      shown.set(fresh.id, fresh.innerHTML);
+    }
+    Object.assign(PAGE, JSON.parse(page.getElementById("page").textContent));
+    redraws.forEach((draw) => draw());
+  }
+
+  async function look() {
+    try {
+      const answer = await fetch(location.href.split("#")[0], {
+        cache: "no-store", headers: etag ? { "If-None-Match": etag } : {}, signal: AbortSignal.timeout(8000),
+      });
+      if (answer.status === 304) return say("");
+      if (!answer.ok) return say(`The server says: ${(await answer.text()).slice(0, 200).trim()}`);
+      update(await answer.text());
+      etag = answer.headers.get("ETag") || "";
+      say("");
+    } catch {
+      say("The server does not answer; gapfarm serve starts it again.");
+    }
+    document.documentElement.dataset.looked = String(Number(document.documentElement.dataset.looked || 0) + 1);
+  }
+
+  // One look after the other, none while nobody sees the page.
+  const again = async () => {
+    if (!document.hidden) await look();
+    setTimeout(again, LOOK_MS);
+  };
+  document.addEventListener("visibilitychange", () => document.hidden || look());
+  setTimeout(again, LOOK_MS);
+}

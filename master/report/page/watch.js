@@ -1,0 +1,121 @@
+"use strict";
+// Any drive of a run's log, measured and simulated, played from above.  A server simulates it.
+
+const placeAt = (path, t) => {
+  const next = path.findIndex((p) => p[0] >= t);
+  if (next === 0) return path[0];
+  if (next < 0) return path.at(-1);
+  const [a, b] = [path[next - 1], path[next]];
+  const s = (t - a[0]) / (b[0] - a[0] || 1);
+  return a.map((v, i) => v + s * (b[i] - v));
+};
+
+const WATCHED = [
+  { key: "before", style: "tuned", dashed: true, shape: "diamond" },
+  { key: "best", style: "final", shape: "dot" },
+  { key: "measured", style: "measured", shape: "cross" },
+];
+
+// An end alone becomes an arc, which is drawn faintly.
+function watchedPaths(drive) {
+  return WATCHED.filter(({ key }) => drive[key]?.length).map((line) => {
+    const path = drive[line.key];
+    const known = path.length > 1;
+    const [, x, y, theta] = path[0];
+    return { ...line, known, path: unwrapped(known ? path : arcTo({ x, y, theta }, drive.duration_s)) };
+  });
+}
+
+function watchSpec(lines, t) {
+  const layers = lines.map(({ key, style, dashed, known, path }) => (
+    { kind: "line", style, dashed: dashed || !known, width: 2, faint: known ? 0.8 : 0.4, name: `${key} path`, points: path.map(([, x, y]) => [1000 * x, 1000 * y]) }));
+  const spec = framed(layers, ["ahead of the start, mm", "left of the start, mm"]);
+  const reach = Math.max(20, ...lines.flatMap(({ path }) => path.map(([, x, y]) => 1000 * Math.hypot(x, y))));
+  for (const { key, style, shape, path } of lines) {
+    const [, x, y, theta] = placeAt(path, t);
+    layers.push({ kind: "arrows", style, width: 2.5, name: `${key} heading`, arrows: [tick({ x, y, theta }, 0.1 * reach)] });
+    layers.push({ kind: "points", style, shape, name: `${key} now`, points: [[1000 * x, 1000 * y]] });
+  }
+  return { ...spec, equal: true };
+}
+
+function element(parent, name, properties, text) {
+  const e = parent.appendChild(Object.assign(document.createElement(name), properties));
+  if (text) e.append(text);
+  return e;
+}
+
+function startWatch() {
+  const parent = document.getElementById("watch-plot");
+  if (!parent) return;
+  const controls = document.getElementById("watch-controls");
+  const number = (title, most) => {
+    const label = element(controls, "label", {}, `${title} `);
+    return element(label, "input", { type: "number", min: 1, max: most, step: 1, name: title });
+  };
+  const trial = number("Trial", PAGE.logged_trials);
+  const generation = number("Best of generation", PAGE.generations.at(-1)?.generation || 1);
+  const asked = new URLSearchParams(location.search);
+  trial.value = asked.get("trial") || 1;
+  generation.placeholder = "last";
+  generation.value = asked.get("generation") || "";
+  const show = element(controls, "button", { type: "button" }, "Show");
+  const play = element(controls, "button", { type: "button", disabled: true }, "Play");
+  const scrub = element(element(controls, "label", { className: "scrub" }, "Time "), "input", { type: "range", min: 0, max: 1000, value: 1000, disabled: true });
+  const said = document.getElementById("watch-said");
+  const chart = new Chart(parent, 0.7);
+  chart.figure.classList.add("large");
+  let [drive, lines, end, frame] = [null, [], 1, 0];
+
+  const time = () => (scrub.valueAsNumber / 1000) * end;
+  const draw = () => {
+    scrub.setAttribute("aria-valuetext", `${words(time())} s of ${words(end)} s`);
+    chart.show(watchSpec(lines, time()), `${drive.title}, at ${time().toFixed(2)} s of ${words(end)} s`, drive.note, true);
+  };
+  const stop = () => {
+    cancelAnimationFrame(frame);
+    frame = 0;
+    play.textContent = "Play";
+  };
+  function start() {
+    if (scrub.valueAsNumber >= 1000) scrub.value = 0;
+    const from = performance.now() - 1000 * time();
+    play.textContent = "Pause";
+    const step = (now) => {
+      scrub.value = Math.min(1000, (now - from) / end);
+      draw();
+      if (scrub.valueAsNumber >= 1000) return stop();
+      frame = requestAnimationFrame(step);
+    };
+    frame = requestAnimationFrame(step);
+  }
+
+  async function load() {
+    stop();
+    said.textContent = "Asked for it; a simulation takes about a second.";
+    const wanted = new URLSearchParams({ of: PAGE.run, trial: trial.value || "1" });
+    if (generation.value) wanted.set("generation", generation.value);
+    try {
+      const answer = await fetch(`/drive?${wanted}`, { signal: AbortSignal.timeout(30000) });
+      if (!answer.ok) throw new Error((await answer.text()).trim());
+      drive = await answer.json();
+      lines = watchedPaths(drive);
+      end = Math.max(...lines.map(({ path }) => path.at(-1)[0]));
+      scrub.disabled = play.disabled = false;
+      scrub.value = 1000;
+      said.textContent = drive.said;
+      chart.zoom = null;
+      draw();
+      history.replaceState(null, "", `/view?${wanted}${location.hash}`);
+    } catch (error) {
+      said.textContent = `It cannot be shown: ${error.message}`;
+    }
+    parent.dataset.shown = said.textContent;
+  }
+
+  show.addEventListener("click", load);
+  for (const input of [trial, generation]) input.addEventListener("keydown", (event) => event.key === "Enter" && load());
+  play.addEventListener("click", () => (frame ? stop() : start()));
+  scrub.addEventListener("input", () => { stop(); draw(); });
+  load();
+}

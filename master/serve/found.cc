@@ -1,0 +1,203 @@
+#include "master/serve/found.h"
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "common/problem/problem.h"
+#include "common/trials/files.h"
+#include "master/store/run_status.h"
+#include "master/store/schema.h"
+
+namespace gapfarm {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kDeepest = 4;
+constexpr std::size_t kMostFound = 2000;
+constexpr std::size_t kMostFiles = 50000;
+constexpr std::size_t kMostPoints = 60;
+constexpr double kLookAgain_s = 5;  // at what says that it runs: its master may have died
+
+constexpr const char* kTelling[] = {"run.sqlite",         "run.sqlite-wal",
+                                    "simulations.sqlite", "simulations.sqlite-wal",
+                                    "diagnosis.json",     "log.txt"};
+
+std::optional<FoundWork> work_in(const fs::path& folder) {
+  std::error_code ignored;
+  const auto has = [&](const char* name) { return fs::is_regular_file(folder / name, ignored); };
+  FoundWork found{FoundWork::Kind::kRun, folder.lexically_normal().string(), folder};
+  if (has("run.sqlite")) return found;
+  found.kind = FoundWork::Kind::kDiagnosis;
+  if (has("diagnosis.json")) return found;
+  found.kind = FoundWork::Kind::kCommand;
+  if (has("simulations.sqlite")) return found;
+  return std::nullopt;
+}
+
+struct Search {
+  std::size_t files = 0;
+  std::vector<FoundWork> found;
+
+  bool full() const { return files >= kMostFiles || found.size() >= kMostFound; }
+
+  void look_into(const fs::path& folder, int depth) {
+    if (auto work = work_in(folder)) found.push_back(*std::move(work));
+    if (depth == kDeepest) return;
+    std::vector<fs::path> below;
+    std::error_code error;
+    fs::directory_iterator it(folder, fs::directory_options::skip_permission_denied, error);
+    for (; !error && it != fs::directory_iterator() && !full(); it.increment(error)) {
+      ++files;
+      std::error_code ignored;
+      const std::string name = it->path().filename().string();
+      if (!name.starts_with('.') && it->is_directory(ignored) && !it->is_symlink(ignored)) {
+        below.push_back(it->path());
+      }
+    }
+    std::sort(below.begin(), below.end());
+    for (const fs::path& next : below) {
+      if (full()) return;
+      look_into(next, depth + 1);
+    }
+  }
+};
+
+std::size_t trials_of(const RunInfo& info) {
+  v1::Problem message;
+  return message.ParseFromString(info.problem) ? static_cast<std::size_t>(message.trials_size())
+                                               : 0;
+}
+
+void read_run(const FoundWork& found, double now_unix_s, WorkEntry* entry) {
+  const auto reader = RunReader::open(found.path);
+  if (!reader) {
+    entry->trouble = reader.error().message;
+    return;
+  }
+  const auto status = run_status(*reader, now_unix_s);
+  if (!status) {
+    entry->trouble = status.error().message;
+    return;
+  }
+  const Progress& progress = status->progress;
+  entry->state = run_state_name(status->state);
+  const bool running = status->state == RunState::kRunning;
+  entry->told = running ? progress.waiting : status->stop_reason;
+  entry->fitness = status->info.fitness;
+  entry->unit = status->info.fitness_unit;
+  entry->best = status->best;
+  const auto& all = status->best_by_generation;
+  const std::size_t each = std::max<std::size_t>(1, (all.size() + kMostPoints - 1) / kMostPoints);
+  for (std::size_t i = all.size(); i > 0; i -= std::min(i, each)) {
+    if (all[i - 1])
+      entry->best_by_generation.insert(entry->best_by_generation.begin(), *all[i - 1]);
+  }
+  entry->generation = status->generation;
+  entry->evaluations = status->evaluations;
+  entry->trials = trials_of(status->info);
+  entry->seed = status->info.seed;
+  entry->config = status->info.config_path;
+  entry->rate_per_s = running ? status->rate_per_s : 0;
+  entry->time_left_s = running ? status->time_left_s : std::nullopt;
+  entry->given_up = status->quarantined;
+  entry->alarms = progress.farm.alarms;
+  entry->changed_unix_s = progress.heartbeat_unix_s;
+  for (const StoredWorker& worker : progress.workers) {
+    entry->workers += running && worker.state != "gone" ? 1 : 0;
+  }
+}
+
+void read_command_of(const FoundWork& found, double now_unix_s, WorkEntry* entry) {
+  const auto record = command_status(found.path, now_unix_s);
+  if (!record) {
+    entry->trouble = record.error().message;
+    return;
+  }
+  if (!*record) return;
+  const CommandRecord& r = **record;
+  const bool running = r.state == "running";
+  entry->what = r.command.empty() ? entry->what : r.command;
+  entry->state = r.state;
+  entry->told = running ? (r.waiting.empty() ? r.stage : r.waiting) : r.reason;
+  entry->config = r.arguments;
+  entry->share = r.share;
+  entry->rate_per_s = running ? r.rate_per_s : 0;
+  entry->time_left_s = running ? r.time_left_s : std::nullopt;
+  entry->changed_unix_s = r.heartbeat_unix_s;
+  for (const StoredWorker& worker : r.workers) {
+    entry->workers += running && worker.state != "gone" ? 1 : 0;
+  }
+}
+
+// The headline alone: trials and drives stay unread.
+void read_headline(const FoundWork& found, WorkEntry* entry) {
+  const auto text = read_text_file((found.path / "diagnosis.json").string());
+  if (!text) return;
+  const auto json = nlohmann::json::parse(*text, nullptr, false);
+  if (!json.is_object()) return;
+  if (json.contains("headline") && json["headline"].is_string()) {
+    entry->told = json["headline"].get<std::string>();
+  }
+  if (entry->state.empty()) entry->state = "finished";
+}
+
+}  // namespace
+
+std::vector<FoundWork> find_work(const std::vector<fs::path>& roots) {
+  Search search;
+  for (const fs::path& root : roots) search.look_into(root, 0);
+  return std::move(search.found);
+}
+
+std::string stamp_of(const fs::path& folder) {
+  std::string stamp;
+  for (const char* name : kTelling) {
+    std::error_code no_size, no_time;
+    const auto size = fs::file_size(folder / name, no_size);
+    const auto time = fs::last_write_time(folder / name, no_time);
+    stamp += no_size || no_time
+                 ? "-"
+                 : std::to_string(size) + "@" + std::to_string(time.time_since_epoch().count());
+    stamp += ' ';
+  }
+  return stamp;
+}
+
+WorkEntry entry_of(const FoundWork& found, double now_unix_s) {
+  WorkEntry entry;
+  entry.kind = found.kind;
+  entry.name = found.name;
+  entry.what = found.kind == FoundWork::Kind::kRun         ? "run"
+               : found.kind == FoundWork::Kind::kDiagnosis ? "diagnosis"
+                                                           : "command";
+  if (found.kind == FoundWork::Kind::kRun) {
+    read_run(found, now_unix_s, &entry);
+    return entry;
+  }
+  std::error_code ignored;
+  if (fs::exists(answer_file(found.path), ignored)) read_command_of(found, now_unix_s, &entry);
+  if (found.kind == FoundWork::Kind::kDiagnosis && entry.state != "running") {
+    read_headline(found, &entry);
+  }
+  return entry;
+}
+
+std::vector<WorkEntry> WorkEntries::now(const std::vector<FoundWork>& found, double now_unix_s) {
+  std::map<std::string, Known> still;
+  std::vector<WorkEntry> entries;
+  for (const FoundWork& f : found) {
+    std::string stamp = stamp_of(f.path);
+    const auto known = known_.find(f.name);
+    const bool same = known != known_.end() && known->second.stamp == stamp &&
+                      (known->second.entry.state != "running" ||
+                       now_unix_s - known->second.read_unix_s < kLookAgain_s);
+    Known& next = still[f.name];
+    next = same ? known->second : Known{std::move(stamp), now_unix_s, entry_of(f, now_unix_s)};
+    entries.push_back(next.entry);
+  }
+  known_ = std::move(still);
+  return entries;
+}
+
+}  // namespace gapfarm

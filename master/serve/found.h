@@ -1,0 +1,72 @@
+// What lies beneath the folders that a page is of: runs, diagnoses, comparisons and the like, live
+// or dead, from their stores alone.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "master/store/command_record.h"
+
+namespace gapfarm {
+
+struct FoundWork {
+  enum class Kind { kRun, kDiagnosis, kCommand };
+  Kind kind = Kind::kRun;
+  std::string name;            // how it is shown and asked for: the path as it was found
+  std::filesystem::path path;  // its folder
+};
+
+// Folders down to four beneath each of `roots`, in order of their names; hidden ones and symbolic
+// links are left out.  At most 2,000, of at most 50,000 files.
+std::vector<FoundWork> find_work(const std::vector<std::filesystem::path>& roots);
+
+// When what is in `folder` last changed, as far as its size and times tell: equal stamps, equal
+// content.
+std::string stamp_of(const std::filesystem::path& folder);
+
+// One line of the list.
+struct WorkEntry {
+  FoundWork::Kind kind = FoundWork::Kind::kRun;
+  std::string name;
+  std::string what;   // "run", "diagnosis", "compare"
+  std::string state;  // "running", "finished", "stopped", "failed"
+  std::string told;   // the headline, why it stopped or what it waits for
+  std::string fitness, unit;
+  std::optional<double> best;
+  std::vector<double> best_by_generation;  // those that there are, at most 60
+  std::uint64_t generation = 0, evaluations = 0;
+  std::size_t trials = 0;
+  std::uint64_t seed = 0;
+  std::string config;
+  double rate_per_s = 0;
+  std::optional<double> time_left_s;
+  std::optional<double> share;  // of a command, [0, 1]
+  std::size_t workers = 0;      // that are there
+  std::uint64_t given_up = 0;   // tasks
+  std::uint64_t alarms = 0;
+  double changed_unix_s = 0;
+  std::string trouble;  // why it cannot be read
+};
+
+// Never fails: what cannot be read says so in `trouble`.
+WorkEntry entry_of(const FoundWork& found, double now_unix_s);
+
+// WorkEntries, each read again when its folder changed or its master may have died.
+class WorkEntries {
+ public:
+  std::vector<WorkEntry> now(const std::vector<FoundWork>& found, double now_unix_s);
+
+ private:
+  struct Known {
+    std::string stamp;
+    double read_unix_s = 0;
+    WorkEntry entry;
+  };
+  std::map<std::string, Known> known_;
+};
+
+}  // namespace gapfarm

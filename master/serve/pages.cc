@@ -1,0 +1,303 @@
+#include "master/serve/pages.h"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+#include <cmath>
+#include <ctime>
+#include <nlohmann/json.hpp>
+
+#include "master/progress/words.h"
+#include "master/report/html.h"
+#include "master/report/page_frame.h"
+#include "master/report/run_live.h"
+#include "master/serve/request.h"
+#include "master/store/answer_store.h"
+
+namespace gapfarm {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+const Json kNoTrials = {{"columns", Json::array()}, {"rows", Json::array()}};
+
+Json plain_page_json() {
+  return {{"models", Json::object()}, {"served", true}, {"without_trials", ""}};
+}
+
+std::string list_cell(const char* label, const std::string& html, bool is_number = false) {
+  return fmt::format(R"(<td data-label="{}"{}>{}</td>)", label,
+                     is_number ? R"( class="number")" : "", html);
+}
+
+// The best by generation, worst tenth left out of its scale.
+std::string spark(const std::vector<double>& values) {
+  if (values.size() < 2) return "";
+  std::vector<double> sorted = values;
+  std::sort(sorted.begin(), sorted.end());
+  const double low = sorted[sorted.size() / 10], high = sorted[sorted.size() * 9 / 10];
+  const double span = sorted.back() - sorted.front();
+  if (!(span > 0)) return "";
+  const double from = low - 0.1 * (high - low), to = std::max(sorted.back(), high);
+  std::string d;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const double share = std::clamp((values[i] - from) / (to - from), 0.0, 1.0);
+    d += fmt::format("{}{:.0f} {:.1f}", i == 0 ? 'M' : 'L',
+                     100.0 * static_cast<double>(i) / static_cast<double>(values.size() - 1),
+                     20 - 18 * share);
+  }
+  return R"(<svg class="spark" viewBox="0 0 100 22" preserveAspectRatio="none" aria-hidden="true"><path d=")" +
+         d + R"("/></svg>)";
+}
+
+std::string state_words(const WorkEntry& e) {
+  if (!e.trouble.empty()) {
+    return R"(<span class="warning">cannot be read</span><small>)" + html_escaped(e.trouble) +
+           "</small>";
+  }
+  std::string text = fmt::format(R"(<strong class="state-{}">{}</strong>)", e.state, e.state);
+  if (e.share && e.state == "running") text += " " + percent_text(*e.share);
+  if (e.time_left_s) text += ", about " + format_duration(*e.time_left_s) + " left";
+  if (e.state == "running")
+    text += fmt::format(", {} worker{}", e.workers, e.workers == 1 ? "" : "s");
+  if (e.rate_per_s > 0) text += ", " + number_text(e.rate_per_s) + "/s";
+  if (e.alarms + e.given_up > 0) {
+    text += fmt::format(R"( <span class="warning">▲ {} given up, {} alarms</span>)", e.given_up,
+                        e.alarms);
+  }
+  return text + (e.told.empty() ? "" : "<small>" + html_escaped(e.told) + "</small>");
+}
+
+std::string row_of_entry(const WorkEntry& e) {
+  const bool run = e.kind == FoundWork::Kind::kRun && e.trouble.empty();
+  const std::string box =
+      run ? fmt::format(
+                R"(<input type="checkbox" name="of" value="{0}" aria-label="compare {0}"> )",
+                html_escaped(e.name))
+          : "";
+  std::string best;
+  if (e.best) {
+    best = number_text(*e.best, 6) +
+           (e.unit.empty() || e.unit == "-" ? "" : " " + html_escaped(e.unit)) + "<small>" +
+           html_escaped(e.fitness) + "</small>";
+  }
+  std::string extent;
+  if (run) {
+    extent =
+        fmt::format("generation {}<small>{} evaluations, {} trials, seed {}</small>", e.generation,
+                    number_text(static_cast<double>(e.evaluations), 9), e.trials, e.seed);
+  }
+  return fmt::format(
+             R"(<tr><th scope="row">{}<a href="/view?of={}">{}</a><small>{} {}</small></th>)", box,
+             percent_encoded(e.name), html_escaped(e.name), html_escaped(e.what),
+             html_escaped(e.config)) +
+         list_cell("state", state_words(e)) + list_cell("best", best, true) +
+         list_cell("by generation", spark(e.best_by_generation)) + list_cell("so far", extent) +
+         list_cell("last heard of", utc_text(e.changed_unix_s)) + "</tr>";
+}
+
+std::string sorted_head(const char* key, const char* words, const std::string& sort,
+                        bool is_number = false) {
+  return fmt::format(R"(<th scope="col"{}{}><a href="/?sort={}">{}</a></th>)",
+                     is_number ? R"( class="number")" : "",
+                     sort == key ? R"( aria-sort="descending")" : "", key, words);
+}
+
+void sort_entries(std::vector<WorkEntry>* entries, const std::string& sort) {
+  const auto before = [&](const WorkEntry& a, const WorkEntry& b) {
+    if (sort == "name") return a.name < b.name;
+    if (sort == "state") return a.state > b.state;
+    // Of different fitnesses there is no better one.
+    if (sort == "best" && a.fitness != b.fitness) return a.fitness > b.fitness;
+    if (sort == "best") return a.best.value_or(-HUGE_VAL) > b.best.value_or(-HUGE_VAL);
+    return a.changed_unix_s > b.changed_unix_s;
+  };
+  std::stable_sort(entries->begin(), entries->end(), before);
+}
+
+std::string stage_rows(const CommandRecord& r, const std::vector<AnsweredStage>& stages) {
+  std::string rows;
+  for (const AnsweredStage& stage : stages) {
+    const bool now = r.state == "running" && stage.name == r.stage;
+    rows +=
+        fmt::format(R"(<tr><th scope="row">{}</th>)", html_escaped(stage.name)) +
+        list_cell("simulations kept", number_text(static_cast<double>(stage.answers), 9), true) +
+        list_cell("", now ? R"(<span class="tag">now</span>)" : "") + "</tr>";
+  }
+  return rows;
+}
+
+std::string command_tiles(const CommandRecord& r) {
+  const auto tile_of = [](const char* title, const std::string& value, const std::string& small) {
+    return fmt::format(
+        R"(<div class="tile"><dt>{}</dt><dd><strong>{}</strong><small>{}</small></dd></div>)",
+        title, value, small);
+  };
+  const bool running = r.state == "running";
+  std::string html = R"(<dl class="tiles" id="tiles" data-live>)";
+  html += tile_of("Done", percent_text(r.share), bar_svg(r.share, "fill-named"));
+  html += tile_of("Stage", fmt::format("{} of {}", r.stage_number, r.stages),
+                  html_escaped(r.stage) +
+                      (r.total > 0 ? fmt::format(": {} of {} simulations", r.done, r.total) : ""));
+  html += tile_of(
+      running ? "Time left" : "Took",
+      running ? (r.time_left_s ? "about " + format_duration(*r.time_left_s) : "not known yet")
+              : format_duration(r.heartbeat_unix_s - r.began_unix_s),
+      fmt::format("{} simulated, {} at hand; {} simulations/s", r.simulated, r.remembered,
+                  number_text(r.rate_per_s)));
+  return html + "</dl>";
+}
+
+std::string comparison_table(std::span<const RunReport> runs) {
+  std::vector<const ParameterRow*> keys;
+  for (const RunReport& run : runs) {
+    for (const ParameterRow& row : run.parameters) {
+      const bool there = std::any_of(keys.begin(), keys.end(),
+                                     [&](const ParameterRow* k) { return k->key == row.key; });
+      if (!there) keys.push_back(&row);
+    }
+  }
+  std::string html =
+      R"(<table class="cards" data-file="compared"><caption class="unseen">Parameters side by side</caption><thead><tr><th scope="col">parameter</th>)";
+  for (const RunReport& run : runs) {
+    html += R"(<th scope="col" class="number">)" + html_escaped(run.name) + "</th>";
+  }
+  html += "</tr></thead><tbody>";
+  for (const ParameterRow* key : keys) {
+    html += R"(<tr><th scope="row"><code>)" + html_escaped(key->key) + "</code><small>" +
+            html_escaped(key->unit == "-" ? "" : key->unit) + "</small></th>";
+    for (const RunReport& run : runs) {
+      const auto row = std::find_if(run.parameters.begin(), run.parameters.end(),
+                                    [&](const ParameterRow& r) { return r.key == key->key; });
+      std::string value = "–";
+      if (row != run.parameters.end()) {
+        value = row->choice.empty() ? number_text(row->after, 4) : html_escaped(row->choice);
+        if (bound_hit(*row) != BoundHit::kNone)
+          value += R"( <small class="worse">▲ at its bound</small>)";
+      }
+      html += list_cell(html_escaped(run.name).c_str(), value, true);
+    }
+    html += "</tr>";
+  }
+  return html + "</tbody></table>";
+}
+
+}  // namespace
+
+std::string utc_text(double unix_s) {
+  if (!(unix_s > 0)) return "–";
+  const auto seconds = static_cast<std::time_t>(unix_s);
+  std::tm utc{};
+  gmtime_r(&seconds, &utc);
+  return fmt::format("{:04}-{:02}-{:02} {:02}:{:02} UTC", utc.tm_year + 1900, utc.tm_mon + 1,
+                     utc.tm_mday, utc.tm_hour, utc.tm_min);
+}
+
+std::string list_page(std::vector<WorkEntry> entries, const std::string& sort,
+                      const std::vector<std::string>& folders) {
+  sort_entries(&entries, sort);
+  const auto running = std::count_if(entries.begin(), entries.end(),
+                                     [](const WorkEntry& e) { return e.state == "running"; });
+  PageFrame frame;
+  frame.served = true;
+  frame.title = fmt::format("gapfarm: {} running", running);
+  frame.brand = "runs and diagnoses";
+  frame.places = {{"work", "All"}};
+  std::string where;
+  for (const std::string& folder : folders) where += (where.empty() ? "" : ", ") + folder;
+  frame.body = fmt::format(
+      R"(<section id="work"><h1 id="headline" data-file="gapfarm" data-live>{} here, {} running</h1><p>Beneath <code>{}</code>: runs, diagnoses, comparisons and studies, as their stores tell. Tick two runs or more to see them beside each other.</p>)",
+      entries.size(), running, html_escaped(where));
+  if (entries.empty()) {
+    frame.body +=
+        "<p>There is nothing yet: <code>gapfarm evolve configs/demo.toml --out run/demo"
+        "</code> makes a run. This page shows it by itself.</p>";
+  }
+  frame.body += R"(<form action="/compare"><div id="entries" data-live>)";
+  if (!entries.empty()) {
+    frame.body +=
+        R"(<table class="cards work" data-file="work"><caption class="unseen">Runs and diagnoses</caption><thead><tr>)" +
+        sorted_head("name", "name", sort) + sorted_head("state", "state", sort) +
+        sorted_head("best", "best", sort, true) + R"(<th scope="col">by generation</th>)" +
+        R"(<th scope="col">so far</th>)" + sorted_head("changed", "last heard of", sort) +
+        "</tr></thead><tbody>";
+    for (const WorkEntry& e : entries) frame.body += row_of_entry(e);
+    frame.body += "</tbody></table>";
+  }
+  frame.body += R"(</div><button>Compare the ticked runs</button></form></section>)";
+  return framed_page(frame, plain_page_json(), kNoTrials);
+}
+
+Result<std::string> command_page(const FoundWork& found, double now_unix_s) {
+  const auto record = command_status(found.path, now_unix_s);
+  if (!record) return record.error();
+  const CommandRecord r = record->value_or(CommandRecord());
+  const auto stages = read_stages(answer_file(found.path));
+  if (!stages) return stages.error();
+  PageFrame frame;
+  frame.served = true;
+  frame.title = r.command + " " + r.state + ": " + found.name;
+  frame.brand = r.command.empty() ? "simulations" : r.command;
+  frame.places = {{"summary", "State"}, {"stages", "Stages"}, {"workers", "Workers"}};
+  const std::string told =
+      r.state == "running" ? (r.waiting.empty() ? r.stage : r.waiting) : r.reason;
+  frame.body = fmt::format(
+      R"(<section id="summary"><div id="now" data-live><p class="verdict verdict-none">{}</p><h1 data-file="{}">{}</h1><p>{}</p></div>{}</section>)",
+      html_escaped(r.state.empty() ? "unknown" : r.state), html_escaped(r.command),
+      html_escaped(told.empty() ? found.name : told), html_escaped(r.arguments), command_tiles(r));
+  frame.body +=
+      R"(<section id="stages"><h2>What has been simulated</h2><p>By stage, in the order in which they began. What is kept is not simulated again.</p><div id="stage-table" data-live><table class="cards" data-file="stages"><caption class="unseen">Stages</caption><thead><tr><th scope="col">stage</th><th scope="col" class="number">simulations kept</th><th scope="col"></th></tr></thead><tbody>)" +
+      stage_rows(r, *stages) + "</tbody></table></div></section>\n";
+  std::string workers;
+  for (const StoredWorker& w : r.workers) {
+    workers += R"(<tr><th scope="row">)" + html_escaped(w.name) + "</th>" +
+               list_cell("host", html_escaped(w.host)) + list_cell("state", html_escaped(w.state)) +
+               list_cell("finished", number_text(static_cast<double>(w.finished), 9), true) +
+               list_cell("jobs/s", number_text(w.rate_per_s), true) + "</tr>";
+  }
+  frame.body +=
+      R"(<section id="workers"><h2>Workers</h2><div id="worker-table" data-live>)" +
+      (workers.empty()
+           ? std::string("<p>No worker has been heard of.</p>")
+           : R"(<table class="cards" data-file="workers"><caption class="unseen">Workers</caption><thead><tr><th scope="col">worker</th><th scope="col">host</th><th scope="col">state</th><th scope="col" class="number">finished</th><th scope="col" class="number">jobs/s</th></tr></thead><tbody>)" +
+                 workers + "</tbody></table>") +
+      "</div></section>\n";
+  return framed_page(frame, plain_page_json(), kNoTrials);
+}
+
+std::string compare_page(std::span<const RunReport> runs) {
+  PageFrame frame;
+  frame.served = true;
+  frame.title = fmt::format("gapfarm: {} runs", runs.size());
+  frame.brand = "runs beside each other";
+  frame.places = {{"compared", "Fitness"}, {"sides", "Parameters"}};
+  Json page = plain_page_json();
+  page["fitness"] = {{"name", runs.front().fitness},
+                     {"unit", runs.front().unit},
+                     {"higher_is_better", runs.front().higher_is_better}};
+  page["compared"] = Json::array();
+  std::string key, others;
+  for (const RunReport& run : runs) {
+    page["compared"].push_back({{"name", run.name}, {"generations", generations_json(run)}});
+    key += fmt::format(R"(<li><a href="/view?of={}">{}</a>: {}</li>)", percent_encoded(run.name),
+                       html_escaped(run.name), html_escaped(run.headline));
+    if (run.fitness != runs.front().fitness) others = run.fitness;
+  }
+  frame.body =
+      R"(<section id="compared"><h1 data-file="runs">Runs beside each other</h1><ul class="long" id="runs" data-live>)" +
+      key + "</ul>";
+  if (!others.empty()) {
+    frame.body += R"(<p class="caution-box">Their fitnesses differ ()" +
+                  html_escaped(runs.front().fitness + ", " + others) +
+                  "): the lines cannot be held against each other.</p>";
+  }
+  frame.body +=
+      R"(<div class="controls" id="compared-controls"></div><div id="compared-plot"></div>)";
+  frame.body += kNoScript;
+  frame.body +=
+      R"(</section><section id="sides"><h2>Parameters side by side</h2><div id="side-table" data-live>)" +
+      comparison_table(runs) + "</div></section>\n";
+  return framed_page(frame, page, kNoTrials);
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,30 @@
+// The pages that a server makes by itself.  The others are those that commands leave behind.
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "common/base/result.h"
+#include "master/report/run_report.h"
+#include "master/serve/found.h"
+
+namespace gapfarm {
+
+// Every entry in a table, sorted by "name", "state", "best" or "changed", latest first by default.
+std::string list_page(std::vector<WorkEntry> entries, const std::string& sort,
+                      const std::vector<std::string>& folders);
+
+// A diagnosis, a comparison or a study: its stages, how far it is, its workers.
+Result<std::string> command_page(const FoundWork& found, double now_unix_s);
+
+// Their best fitness in one plot, their parameters side by side.  REQUIRES: one at least.
+std::string compare_page(std::span<const RunReport> runs);
+
+// Prometheus' text format.
+std::string metrics_text(const std::vector<WorkEntry>& entries, double now_unix_s);
+
+// "2026-11-22 02:41 UTC"; a dash for 0.
+std::string utc_text(double unix_s);
+
+}  // namespace gapfarm
