@@ -9,7 +9,7 @@ namespace {
 
 constexpr std::size_t kMostWorkers = 8;
 constexpr std::size_t kMostParameters = 12;
-constexpr std::size_t kMostIncidents = 4;  // of a kind
+constexpr std::size_t kMostOfAKind = 4;  // incidents
 
 const char* state_style(const std::string& state) {
   if (state == "running") return "1;32";
@@ -82,7 +82,7 @@ std::string incident_lines(const RunStatus& status, IncidentKind kind, const Con
     if (incident.kind == kind) all.push_back(&incident);
   }
   std::string text;
-  const std::size_t first = all.size() - std::min(all.size(), kMostIncidents);
+  const std::size_t first = all.size() - std::min(all.size(), kMostOfAKind);
   for (std::size_t i = first; i < all.size(); ++i) {
     text += label(console, "") + "generation " + std::to_string(all[i]->generation) + ": " +
             printable(all[i]->text) + "\n";

@@ -10,6 +10,7 @@
 
 #include "common/base/hash.h"
 #include "common/parameters/racquetball.h"
+#include "tests/unit/worker/ground_problem.h"
 #include "tests/unit/worker/problems.h"
 #include "tests/unit/worker/push_problem.h"
 #include "worker/evaluate.h"
@@ -30,12 +31,13 @@ std::string arithmetic_class() {
   return hasher.finish().substr(0, 8);
 }
 
-// What `problem` predicts, with `only_trace` a path of each command instead.
-void add_answers(const Problem& problem, bool only_trace, Hasher& hasher) {
+enum class Asked { kPredictions, kMeans, kPaths };
+
+void add_answers(const Problem& problem, Asked asked, Hasher& hasher) {
   const auto prepared = prepare(to_proto(problem));
   ASSERT_TRUE(prepared.ok()) << prepared.error().message;
   std::vector<v1::Task> tasks;
-  if (only_trace) {
+  if (asked == Asked::kPaths) {
     for (const CommandSpec& command : problem.commands) {
       v1::TraceTask* trace = tasks.emplace_back().mutable_trace();
       trace->mutable_command()->set_name(command.name);
@@ -43,7 +45,7 @@ void add_answers(const Problem& problem, bool only_trace, Hasher& hasher) {
       trace->set_interval(0.1);
     }
   } else {
-    tasks.emplace_back().mutable_predict();
+    tasks.emplace_back().mutable_predict()->set_means_only(asked == Asked::kMeans);
   }
   for (const v1::Task& task : tasks) {
     const v1::TaskResult result = evaluate(prepared->get(), task);
@@ -58,11 +60,18 @@ void add_answers(const Problem& problem, bool only_trace, Hasher& hasher) {
   }
 }
 
-// The problem as it is, then with each effect of its catalogue at 0.6 of its range.
-std::string golden(const Problem& problem, bool only_trace = false) {
+// The problem as it is.
+std::string golden(const Problem& problem, Asked asked = Asked::kPredictions) {
+  Hasher hasher;
+  add_answers(problem, asked, hasher);
+  return hasher.finish();
+}
+
+// Then its means with each effect of its catalogue at 0.6 of its range.
+std::string golden_with_effects(const Problem& problem) {
   const ParameterTable& table = problem.table();
   Hasher hasher;
-  add_answers(problem, only_trace, hasher);
+  add_answers(problem, Asked::kPredictions, hasher);
   for (std::size_t e = 0; e < table.effects().size(); ++e) {
     Problem with = problem;
     for (std::size_t k = 0; k < table.effects()[e].parameters.size(); ++k) {
@@ -71,7 +80,7 @@ std::string golden(const Problem& problem, bool only_trace = false) {
       const double value = p.lower + 0.6 * (p.upper - p.lower);
       with.values[row] = p.kind == ParameterKind::kReal ? value : std::floor(value);
     }
-    add_answers(with, only_trace, hasher);
+    add_answers(with, Asked::kMeans, hasher);
   }
   return hasher.finish();
 }
@@ -99,7 +108,7 @@ void expect_stored(const std::string& scenario, const std::string& hash) {
 }
 
 Problem wheels() {
-  Problem problem = tests::small_problem(12);
+  Problem problem = tests::small_problem(3);
   problem.values[row_of(Srv1::kRobot)] = 1;
   return problem;
 }
@@ -112,10 +121,17 @@ Problem racquetball() {
   return problem;
 }
 
-TEST(Golden, Treads) { expect_stored("treads", golden(tests::small_problem(12))); }
-TEST(Golden, Wheels) { expect_stored("wheels", golden(wheels())); }
-TEST(Golden, Pushes) { expect_stored("push", golden(tests::push_problem())); }
-TEST(Golden, Racquetball) { expect_stored("racquetball", golden(racquetball(), true)); }
+Problem ground() {
+  Problem problem = tests::ground_problem();
+  tests::take_runs(problem, {tests::driven_run(problem, problem.values, 4)});
+  return problem;
+}
+
+TEST(Golden, Treads) { expect_stored("treads", golden_with_effects(tests::small_problem(6))); }
+TEST(Golden, Wheels) { expect_stored("wheels", golden(wheels(), Asked::kMeans)); }
+TEST(Golden, Pushes) { expect_stored("push", golden_with_effects(tests::push_problem())); }
+TEST(Golden, Racquetball) { expect_stored("racquetball", golden(racquetball(), Asked::kPaths)); }
+TEST(Golden, Ground) { expect_stored("ground", golden(ground())); }
 
 }  // namespace
 }  // namespace gapfarm

@@ -200,10 +200,10 @@ TEST(RobustPose, HeadingsNearHalfATurnDoNotWrap) {
   }
   Stream a = stream(1), b = stream(1), c = stream(1);
   const RobustPose zero = robust_pose(at_zero, {}, a);
-  const RobustPose pi = robust_pose(at_pi, {}, b);
+  const RobustPose half_turn = robust_pose(at_pi, {}, b);
   const RobustPose again = robust_pose(turned, {}, c);
-  EXPECT_NEAR(wrap_angle(pi.mean.theta - zero.mean.theta - std::numbers::pi), 0, 1e-9);
-  EXPECT_TRUE(pi.covariance.isApprox(zero.covariance, 1e-9));
+  EXPECT_NEAR(wrap_angle(half_turn.mean.theta - zero.mean.theta - std::numbers::pi), 0, 1e-9);
+  EXPECT_TRUE(half_turn.covariance.isApprox(zero.covariance, 1e-9));
   EXPECT_TRUE(again.covariance.isApprox(zero.covariance, 1e-9));
   EXPECT_NEAR(zero.mean.theta, 0, 0.06);
   EXPECT_NEAR(std::sqrt(zero.covariance(2, 2)), 0.1, 0.04);
