@@ -2,6 +2,7 @@
 
 #include <filesystem>
 
+#include "common/runs/afresh.h"
 #include "common/runs/read.h"
 
 namespace gapfarm {
@@ -29,6 +30,9 @@ Status read_problem_runs(std::span<const std::string> folders, const WindowSetti
   if (!all) return all.error();
   auto cut = cut_windows(*all, windows);
   if (!cut) return cut.error();
+  if (problem->ground->robot().command == CommandKind::kThrottleSteering) {
+    *cut = begin_afresh(*all, *std::move(cut), windows.run_in_s, kWindowMargin_s);
+  }
   for (const std::string& note : problem->ground->robot().notes) cut->log.notes.push_back(note);
   problem->runs = std::move(cut->runs);
   problem->log = std::move(cut->log);

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "common/runs/afresh.h"
 #include "common/score/fitness.h"
 
 namespace gapfarm {
@@ -30,8 +31,8 @@ struct Tiles {
 };
 
 // Length of the marker's measured way in a window.
-double way_of(const RunLog& runs, const Trial& trial) {
-  const std::vector<PoseRow>& poses = runs.runs[*trial.run].poses;
+double way_of(const LoggedRun& run, const Trial& trial) {
+  const std::vector<PoseRow>& poses = run.poses;
   double sum = 0;
   for (std::size_t i = 1; i < poses.size(); ++i) {
     if (poses[i - 1].t_s < *trial.t_s || poses[i].t_s > *trial.t_s + *trial.duration_s) continue;
@@ -42,8 +43,8 @@ double way_of(const RunLog& runs, const Trial& trial) {
   return sum;
 }
 
-Pose constant_end(const RunLog& runs, const Trial& trial) {
-  const std::vector<PoseRow>& poses = runs.runs[*trial.run].poses;
+Pose constant_end(const LoggedRun& run, const Trial& trial) {
+  const std::vector<PoseRow>& poses = run.poses;
   const auto here = std::lower_bound(poses.begin(), poses.end(), *trial.t_s,
                                      [](const PoseRow& p, double t) { return p.t_s < t; });
   auto before = here;
@@ -83,12 +84,22 @@ Result<Horizons> measure_horizons(Farm& farm, const Problem& fitted, const Param
   asked.fitness.kind = FitnessKind::kLogScore;
   asked.log = {};
   std::vector<Tiles> tiles;
+  std::vector<std::size_t> run_of;  // of each window, in the log
+  const bool afresh = fitted.ground->robot().command == CommandKind::kThrottleSteering;
+  asked.runs.clear();
   for (const double horizon : windows.horizons_s) {
     auto cut = cut_windows(runs, {{horizon}, windows.run_in_s});
     if (!cut) continue;  // longer than every run
     tiles.push_back({horizon, asked.log.trials.size(), cut->log.trials.size()});
-    asked.runs = std::move(cut->runs);
-    for (Trial& trial : cut->log.trials) asked.log.trials.push_back(std::move(trial));
+    for (const Trial& trial : cut->log.trials) run_of.push_back(*trial.run);
+    if (afresh) *cut = begin_afresh(runs, *std::move(cut), windows.run_in_s, kWindowMargin_s);
+    const auto before = static_cast<std::uint32_t>(afresh ? asked.runs.size() : 0);
+    if (!afresh) asked.runs.clear();
+    for (CommandedRun& run : cut->runs) asked.runs.push_back(std::move(run));
+    for (Trial& trial : cut->log.trials) {
+      *trial.run += before;
+      asked.log.trials.push_back(std::move(trial));
+    }
   }
   if (tiles.empty()) return Error{"no window of any horizon fits into the runs"};
   v1::Task task;
@@ -108,7 +119,9 @@ Result<Horizons> measure_horizons(Farm& farm, const Problem& fitted, const Param
   for (const v1::Predicted& p : result.predict().predictions()) {
     simulated.push_back(from_proto(p.end()));
   }
-  for (const Trial& trial : asked.log.trials) constant.push_back(constant_end(runs, trial));
+  for (std::size_t i = 0; i < run_of.size(); ++i) {
+    constant.push_back(constant_end(runs.runs[run_of[i]], asked.log.trials[i]));
+  }
   const std::vector<Pose> kinematic = kinematic_ends(asked, *kinematics);
   for (const Tiles& t : tiles) {
     HorizonRow row;
@@ -117,7 +130,7 @@ Result<Horizons> measure_horizons(Farm& farm, const Problem& fitted, const Param
     std::vector<double> ways;
     for (std::size_t k = 0; k < t.count; ++k) {
       const auto i = static_cast<int>(t.first + k);
-      ways.push_back(way_of(runs, asked.log.trials[t.first + k]));
+      ways.push_back(way_of(runs.runs[run_of[t.first + k]], asked.log.trials[t.first + k]));
       row.log_score += result.predict().predictions(i).log_score() / static_cast<double>(t.count);
     }
     row.way_m = median(ways);

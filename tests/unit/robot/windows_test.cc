@@ -3,7 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+
+#include "common/runs/afresh.h"
 
 namespace gapfarm {
 namespace {
@@ -90,6 +93,34 @@ TEST(Windows, HeadingsUnwrapOnLoops) {
   ASSERT_TRUE(cut.ok());
   for (const Trial& t : cut->log.trials) {
     EXPECT_NEAR(between(t.X_WS, t.X_WE).theta, 0.25 * *t.duration_s, 1e-9);
+  }
+}
+
+TEST(Windows, BeginAfreshAtTheSpeedMeasuredThere) {
+  // Speeds up: x = t^2 / 2.
+  LoggedRun run;
+  run.run = "1";
+  for (int i = 0; i <= 100; ++i) {
+    const double t = 0.1 * i;
+    run.poses.push_back({t, {t * t / 2, 0, 0}});
+    run.commands.push_back({t, {t, 0}});
+  }
+  const RunLog log{{"throttle", "steering"}, {}, {run, run}, {}};
+  const auto cut = cut_windows(log, {{2}, 0.5});
+  ASSERT_TRUE(cut.ok());
+  const WindowedRuns afresh = begin_afresh(log, *cut, 0.5, 1);
+  ASSERT_EQ(afresh.runs.size(), cut->log.trials.size());
+  for (std::size_t i = 0; i < afresh.runs.size(); ++i) {
+    const Trial& trial = afresh.log.trials[i];
+    const CommandedRun& own = afresh.runs[*trial.run];
+    EXPECT_EQ(*trial.run, i);
+    EXPECT_EQ(trial.session, cut->log.trials[i].session);
+    EXPECT_NEAR(own.start_s, *trial.t_s - 0.5, 1e-9);
+    EXPECT_NEAR(own.speed_m_s, own.start_s, 0.06);
+    // What holds a second before its start is the first command, and a second after its end the
+    // last.
+    EXPECT_NEAR(own.commands.front().t_s, std::max(0.0, own.start_s - 1), 0.11);
+    EXPECT_NEAR(own.commands.back().t_s, std::min(10.0, *trial.t_s + *trial.duration_s + 1), 0.11);
   }
 }
 
