@@ -11,12 +11,7 @@
 namespace gapfarm {
 namespace {
 
-constexpr double kStep_s = 0.02;
-constexpr double kScan_s = 1;  // of the delay, either way
-constexpr double kScanStep_s = 0.05;
-constexpr double kHuber = 2;     // robust standard deviations
-constexpr int kRounds = 3;       // of weights
-constexpr int kIterations = 12;  // of least squares a round
+constexpr double kStep_s = 0.04;
 
 bool steered(const GroundRobot& robot) {
   return robot.drive == DriveKind::kAckermann || robot.drive == DriveKind::kTricycle;
@@ -69,8 +64,59 @@ class Body {
       put(at.names[i], at.values[static_cast<Eigen::Index>(i)]);
     }
     if (holonomic(robot_)) invert_wheels();
+    separation_ratio_ = separation_;
     const auto& k = robot_.controller;
     separation_ *= k.wheel_separation_m.value_or(1) * k.wheel_separation_multiplier;
+  }
+
+  // The robot's file with these gains in its sizes.
+  GroundRobot corrected() const {
+    GroundRobot robot = robot_;
+    const bool skids = robot.drive == DriveKind::kSkid || robot.drive == DriveKind::kTracked;
+    ControllerKinematics& k = robot.controller;
+    // By four-point Coulomb theory the multiplier is 1 + (ratio wheelbase / wheel_separation)^2.
+    const double multiplier = k.wheel_separation_multiplier * separation_ratio_;
+    double along = 1, across = 1;
+    if (!skids) {
+      across = separation_ratio_;
+      if (k.wheel_separation_m) *k.wheel_separation_m *= across;
+    } else {
+      if (multiplier > 1.01 && k.wheel_separation_multiplier > 1.01) {
+        along = std::sqrt((multiplier - 1) / (k.wheel_separation_multiplier - 1));
+      }
+      k.wheel_separation_multiplier = multiplier;
+      if (k.wheelbase_m) *k.wheelbase_m *= along;
+    }
+    for (RobotWheel& w : robot.wheels) {
+      if (w.kind == WheelKind::kCaster) continue;
+      *w.x_m *= along;
+      *w.y_m *= across;
+      const double side = w.side == WheelSide::kLeft    ? left_
+                          : w.side == WheelSide::kRight ? right_
+                                                        : ahead_;
+      *w.radius_m *= side;
+    }
+    return robot;
+  }
+
+  // What a tracker with these scales reports of a pose.
+  Pose observed(const Pose& X) const { return {scale_ * X.x, scale_ * aspect_ * X.y, X.theta}; }
+  Pose unobserved(const Pose& X) const { return {X.x / scale_, X.y / scale_ / aspect_, X.theta}; }
+
+  // The commands as this robot takes them: later by a clock that drifts, weaker by a battery that
+  // sags, both counted from `began_s`.
+  std::vector<CommandRow> taken(std::vector<CommandRow> rows, double began_s) const {
+    if (sag_ == 0 && drift_ == 0) return rows;
+    const bool throttled = robot_.command == CommandKind::kThrottleSteering;
+    for (CommandRow& row : rows) {
+      const double left = std::max(0.0, 1 - sag_ * (row.t_s - began_s) / 60);
+      for (std::size_t c = 0; c < row.values.size(); ++c) {
+        const bool power = robot_.channels[c] != "steering";
+        if (power && (!throttled || robot_.channels[c] == "throttle")) row.values[c] *= left;
+      }
+      row.t_s += drift_ * (row.t_s - began_s);
+    }
+    return rows;
   }
 
   const GroundRobot& robot() const { return robot_; }
@@ -106,13 +152,33 @@ class Body {
  private:
   void put(const std::string& name, double value) {
     RobotThrottle& t = robot_.throttle;
-    if (name == "left") left_ = value;
-    if (name == "right") right_ = value;
+    if (name == "left") left_ *= value;
+    if (name == "right") right_ *= value;
+    if (name == "travel") left_ *= value;
+    if (name == "travel") right_ *= value;
+    if (name == "travel") ahead_ *= value;
     if (name == "separation") separation_ = value;
-    if (name == "ahead") ahead_ = value;
+    if (name == "ahead") ahead_ *= value;
     if (name == "aside") aside_ = value;
     if (name == "turn") turn_ = value;
     if (name == "steering_gain") robot_.steering.gain *= value;
+    if (name == "steering_left" || name == "steering_right") {
+      const double sign = name == "steering_left" ? 1 : -1;
+      for (RobotSteering::Point& p : robot_.steering.table) {
+        if (p.command * sign > 0) p.angle_rad *= value;
+      }
+    }
+    if (name == "wheelbase") *robot_.controller.wheelbase_m *= value;
+    if (name == "power") t.gain *= value;
+    if (name == "dead_band") robot_.motors.dead_band = value;
+    if (name == "ramp") {
+      robot_.motors.acceleration_limit_m_s2 =
+          std::abs(value) > 1e-6 ? std::optional(1 / std::abs(value)) : std::nullopt;
+    }
+    if (name == "sag") sag_ = value;
+    if (name == "drift") drift_ = value;
+    if (name == "pose_scale") scale_ = value;
+    if (name == "aspect") aspect_ = value;
     if (name == "steering_offset") robot_.steering.offset_rad += value;
     if (name == "understeer") robot_.steering.understeer_s2_m2 = value;
     if (name == "gain") t.gain = value;
@@ -144,14 +210,17 @@ class Body {
 
   GroundRobot robot_;
   double left_ = 1, right_ = 1, separation_ = 1, ahead_ = 1, aside_ = 1, turn_ = 1;
+  double separation_ratio_ = 1;
+  double sag_ = 0, drift_ = 0, scale_ = 1, aspect_ = 1;
   Eigen::MatrixXd inverse_;
 };
 
 // The robot's way through one run, at the times that are asked for.
-std::map<double, Pose> way(const Body& body, const CommandedRun& run,
+std::map<double, Pose> way(const Body& body, const CommandedRun& run, double began_s,
                            const std::vector<double>& times) {
   std::map<double, Pose> poses;
-  RobotDrive drive(body.robot(), run.commands, run.speed_m_s);
+  const std::vector<CommandRow> commands = body.taken(run.commands, began_s);
+  RobotDrive drive(body.robot(), commands, run.speed_m_s);
   Pose X;
   double omega = run.turn_rad_s;
   std::size_t next = 0;
@@ -168,90 +237,6 @@ std::map<double, Pose> way(const Body& body, const CommandedRun& run,
   return poses;
 }
 
-// Residuals of every trial in the predicted end's axes.
-std::vector<Eigen::Vector3d> residuals(const Problem& problem, const Kinematics& at) {
-  const std::vector<Pose> ends = kinematic_ends(problem, at);
-  std::vector<Eigen::Vector3d> r;
-  for (std::size_t i = 0; i < ends.size(); ++i) {
-    r.push_back(local_difference(ends[i], problem.log.trials[i].X_WE));
-  }
-  return r;
-}
-
-double robust_scale(const std::vector<Eigen::Vector3d>& r, int from, int to) {
-  std::vector<double> sizes;
-  for (const Eigen::Vector3d& d : r) {
-    for (int c = from; c < to; ++c) sizes.push_back(std::abs(d[c]));
-  }
-  const auto middle = sizes.begin() + static_cast<long>(sizes.size() / 2);
-  std::nth_element(sizes.begin(), middle, sizes.end());
-  return std::max(1.4826 * *middle, 1e-6);
-}
-
-Eigen::VectorXd weighted(const std::vector<Eigen::Vector3d>& r, const Eigen::VectorXd& weights) {
-  Eigen::VectorXd all(weights.size());
-  for (std::size_t i = 0; i < r.size(); ++i) {
-    const auto row = static_cast<Eigen::Index>(3 * i);
-    all.segment<3>(row) = weights.segment<3>(row).cwiseProduct(r[i]);
-  }
-  return all;
-}
-
-// 1 / s.d. of each residual, less beyond kHuber of them.
-Eigen::VectorXd weights_of(const std::vector<Eigen::Vector3d>& r) {
-  const double m = robust_scale(r, 0, 2);
-  const double rad = robust_scale(r, 2, 3);
-  Eigen::VectorXd weights(static_cast<Eigen::Index>(3 * r.size()));
-  for (std::size_t i = 0; i < r.size(); ++i) {
-    for (int c = 0; c < 3; ++c) {
-      const double scale = c < 2 ? m : rad;
-      const double size = std::abs(r[i][c]) / scale;
-      weights[static_cast<Eigen::Index>(3 * i) + c] =
-          std::sqrt(std::min(1.0, kHuber / std::max(size, 1e-9))) / scale;
-    }
-  }
-  return weights;
-}
-
-void descend(const Problem& problem, const Eigen::VectorXd& weights, Kinematics* at) {
-  const auto cost_at = [&](const Kinematics& k) {
-    return weighted(residuals(problem, k), weights);
-  };
-  Eigen::VectorXd r = cost_at(*at);
-  double damping = 1e-3;
-  const Eigen::Index n = at->values.size();
-  for (int it = 0; it < kIterations; ++it) {
-    Eigen::MatrixXd J(r.size(), n);
-    for (Eigen::Index i = 0; i < n; ++i) {
-      Kinematics moved = *at;
-      const double step = 1e-4 * std::max(1.0, std::abs(at->values[i]));
-      moved.values[i] += step;
-      J.col(i) = (cost_at(moved) - r) / step;
-    }
-    const Eigen::MatrixXd H = J.transpose() * J;
-    const Eigen::VectorXd g = J.transpose() * r;
-    bool better = false;
-    for (int attempt = 0; attempt < 6 && !better; ++attempt) {
-      Eigen::MatrixXd damped = H;
-      damped.diagonal() += damping * H.diagonal() + Eigen::VectorXd::Constant(n, 1e-9);
-      Kinematics moved = *at;
-      moved.values -= damped.ldlt().solve(g);
-      const Eigen::VectorXd next = cost_at(moved);
-      better = next.squaredNorm() < r.squaredNorm();
-      if (better) {
-        const double gained = 1 - next.squaredNorm() / r.squaredNorm();
-        *at = moved;
-        r = next;
-        damping = std::max(damping / 5, 1e-9);
-        if (gained < 1e-5) return;
-      } else {
-        damping *= 10;
-      }
-    }
-    if (!better) return;
-  }
-}
-
 }  // namespace
 
 Kinematics nominal_kinematics(const GroundRobot& robot) {
@@ -265,56 +250,41 @@ Kinematics nominal_kinematics(const GroundRobot& robot) {
   return k;
 }
 
+GroundRobot robot_with(const GroundRobot& robot, const Kinematics& kinematics) {
+  return Body(robot, kinematics).corrected();
+}
+
 std::vector<Pose> kinematic_ends(const Problem& problem, const Kinematics& kinematics) {
-  const Body body(problem.ground->robot(), kinematics);
-  std::vector<std::vector<double>> times(problem.runs.size());
-  for (const Trial& trial : problem.log.trials) {
+  return kinematic_ends(problem.ground->robot(), problem.runs, problem.log.trials, kinematics);
+}
+
+std::vector<Pose> kinematic_ends(const GroundRobot& robot, std::span<const CommandedRun> runs,
+                                 std::span<const Trial> trials, const Kinematics& kinematics) {
+  const Body body(robot, kinematics);
+  std::vector<std::vector<double>> times(runs.size());
+  double began_s = 0;
+  for (const CommandedRun& run : runs) {
+    if (run.commands.empty()) continue;
+    began_s = run.commands.front().t_s;
+    break;
+  }
+  for (const Trial& trial : trials) {
     times[*trial.run].push_back(*trial.t_s);
     times[*trial.run].push_back(*trial.t_s + *trial.duration_s);
   }
-  std::vector<std::map<double, Pose>> ways(problem.runs.size());
+  std::vector<std::map<double, Pose>> ways(runs.size());
   for (std::size_t i = 0; i < times.size(); ++i) {
     std::sort(times[i].begin(), times[i].end());
-    if (!times[i].empty()) ways[i] = way(body, problem.runs[i], times[i]);
+    if (!times[i].empty()) ways[i] = way(body, runs[i], began_s, times[i]);
   }
   const Pose& X_RM = body.robot().X_RM;
   std::vector<Pose> ends;
-  for (const Trial& trial : problem.log.trials) {
+  for (const Trial& trial : trials) {
     const auto& poses = ways[*trial.run];
     const Pose X_SE = between(poses.at(*trial.t_s), poses.at(*trial.t_s + *trial.duration_s));
-    ends.push_back(trial.X_WS * inverse(X_RM) * X_SE * X_RM);
+    ends.push_back(body.observed(body.unobserved(trial.X_WS) * inverse(X_RM) * X_SE * X_RM));
   }
   return ends;
-}
-
-Result<Kinematics> fit_kinematics(const Problem& problem) {
-  if (problem.log.trials.empty() || !problem.ground) {
-    return Error{"kinematics need windows of logged runs, but there are none"};
-  }
-  Kinematics best = nominal_kinematics(problem.ground->robot());
-  const auto delay = std::find(best.names.begin(), best.names.end(), "delay") - best.names.begin();
-  const double own = best.values[delay];
-  double least = 0;
-  for (double shift = -kScan_s; shift <= kScan_s + 1e-9; shift += kScanStep_s) {
-    Kinematics moved = best;
-    moved.values[delay] = own + shift;
-    const double scale = robust_scale(residuals(problem, moved), 0, 3);
-    if (least == 0 || scale < least) {
-      least = scale;
-      best.values[delay] = own + shift;
-    }
-  }
-  for (int round = 0; round < kRounds; ++round) {
-    descend(problem, weights_of(residuals(problem, best)), &best);
-  }
-  const std::vector<Eigen::Vector3d> r = residuals(problem, best);
-  for (const Eigen::Vector3d& d : r) {
-    best.rms_m += d.head<2>().squaredNorm() / static_cast<double>(r.size());
-    best.rms_rad += d[2] * d[2] / static_cast<double>(r.size());
-  }
-  best.rms_m = std::sqrt(best.rms_m);
-  best.rms_rad = std::sqrt(best.rms_rad);
-  return best;
 }
 
 }  // namespace gapfarm

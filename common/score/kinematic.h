@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -25,6 +26,19 @@ Kinematics nominal_kinematics(const GroundRobot& robot);
 // The measured end pose that the kinematics expect of every trial.  REQUIRES: a problem with a
 // robot whose trials are windows.
 std::vector<Pose> kinematic_ends(const Problem& problem, const Kinematics& kinematics);
+
+// The same of windows that are no problem's.  Beside those of nominal_kinematics() these names may
+// stand: "travel" (ratio of both sides), "steering_left" and "_right" (ratio of the table's angles
+// that way), "wheelbase" (ratio), "power" (ratio of the throttle's gain), "dead_band" (the
+// command's unit), "ramp" (s^2/m: 1 over the acceleration limit), "sag" (share of the command lost
+// a minute), "drift" (s that the command's clock loses a second), "pose_scale" and "aspect" (of the
+// tracker: all that it reports, its y over its x).
+std::vector<Pose> kinematic_ends(const GroundRobot& robot, std::span<const CommandedRun> runs,
+                                 std::span<const Trial> trials, const Kinematics& kinematics);
+
+// The robot's file with the values put in: what may be pasted back.  What no file has a word for
+// (a battery that sags, a clock that drifts) is left out.
+GroundRobot robot_with(const GroundRobot& robot, const Kinematics& kinematics);
 
 // Levenberg's and Marquardt's least squares on the problem's windows, Huber's weights beyond two
 // robust standard deviations.  The delay is found first, by a scan of +-1 s round the file's.

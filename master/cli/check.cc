@@ -6,11 +6,13 @@
 #include <set>
 
 #include "common/config/config.h"
+#include "common/problem/run_files.h"
 #include "common/trials/context.h"
 #include "master/cli/inputs.h"
 #include "master/cli/subcommand.h"
 #include "master/cli/validation.h"
 #include "master/evolve/evaluation.h"
+#include "master/ground/diagnose_ground.h"
 #include "master/sanity/sanity.h"
 #include "master/sanity/words.h"
 
@@ -112,7 +114,17 @@ std::size_t count_conditions(const Problem& problem, unsigned context) {
   return conditions.size();
 }
 
-Summary summarise(const Problem& problem) {
+// What is the wrong way round in a ground robot's runs.
+std::vector<SanityFinding> doubts(const Config& config) {
+  const Problem& problem = config.problem;
+  if (!problem.ground) return check_sanity(problem);
+  const GroundRobot robot = problem.ground->robot_at(problem.values);
+  const auto runs = read_run_folders(config.trial_files, robot.channels);
+  return runs ? check_ground_log(robot, *runs) : std::vector<SanityFinding>();
+}
+
+Summary summarise(const Config& config) {
+  const Problem& problem = config.problem;
   Summary summary;
   std::set<std::string> sessions;
   for (const Trial& trial : problem.log.trials) {
@@ -128,7 +140,7 @@ Summary summarise(const Problem& problem) {
     summary.effects.push_back(effect.name);
   }
   summary.conditions = count_conditions(problem, context);
-  summary.sanity = check_sanity(problem);
+  summary.sanity = doubts(config);
   return summary;
 }
 
@@ -234,7 +246,7 @@ int run_check(const CheckOptions& options, CliContext& context) {
   const auto config = open_config(options.config, options.trials, console, check_runnable);
   if (!config) return kExitBadUsage;
   const unsigned workers = local_workers({}, config->farm);
-  Summary summary = summarise(config->problem);
+  Summary summary = summarise(*config);
   const auto measured = measure_evaluation(*config, context);
   if (!measured) return failed(measured.error(), context);
   summary.evaluation_s = *measured;

@@ -9,12 +9,15 @@
 #include <set>
 
 #include "common/base/build_info.h"
+#include "common/problem/run_files.h"
+#include "common/robot/robot_file.h"
 #include "master/cli/inputs.h"
 #include "master/cli/long_command.h"
 #include "master/cli/outputs.h"
 #include "master/cli/question_stamp.h"
 #include "master/cli/run_model.h"
 #include "master/diagnose/diagnosis_json.h"
+#include "master/ground/diagnose_ground.h"
 #include "master/report/report_html.h"
 
 namespace gapfarm {
@@ -122,7 +125,9 @@ Status plan_outputs(DiagnoseCommand& command, const Config& config, const Questi
   outputs.reads(command.model);
   const auto state = compare_stamp(command.out, kResult, stamp, outputs.force());
   if (!state) return state.error();
-  for (const char* name : {kStampFile, "model.toml", "tuned.toml", "report.html", kResult}) {
+  std::vector<const char*> names = {kStampFile, "model.toml", "tuned.toml", "report.html", kResult};
+  if (config.problem.ground) names = {kStampFile, "robot.toml", "report.html", kResult};
+  for (const char* name : names) {
     const std::string path = (std::filesystem::path(command.out) / name).string();
     const Status s = *state == FolderState::kNew ? outputs.plan(path) : outputs.plan_again(path);
     if (!s) return s;
@@ -189,6 +194,41 @@ Status apply_options(const DiagnoseCommand& command, Config& config, std::vector
   return {};
 }
 
+// A ground robot: its file and its runs, by its kinematics.  Nothing is simulated.
+int run_diagnose_ground(DiagnoseCommand& command, const Config& config, const QuestionStamp& stamp,
+                        CliContext& context) {
+  const GroundRobot robot = config.problem.ground->robot_at(config.problem.values);
+  const auto runs = read_run_folders(config.trial_files, robot.channels);
+  if (!runs) return failed(runs.error(), context);
+  GroundDiagnoseOptions options;
+  options.left_out = command.leave_out;
+  options.seed = config.seed;
+  options.windows.run_in_s = config.windows.run_in_s;
+  options.on_stage = [&](const std::string& stage) { context.console.note(stage); };
+  auto result = diagnose_ground(robot, *runs, options);
+  if (!result) return failed(result.error(), context);
+  add_provenance(config, command, &result->diagnosis);
+  const std::filesystem::path out(command.out);
+  const std::pair<const char*, std::string> files[] = {
+      {kStampFile, format_stamp(stamp)},
+      {"robot.toml", format_robot(result->corrected)},
+      {"report.html", report_html(result->diagnosis)},
+      {kResult, to_json(result->diagnosis)}};
+  std::error_code code;
+  std::filesystem::create_directories(out, code);
+  if (code)
+    return failed(Error{command.out + ": cannot be made (" + code.message() + ")"}, context);
+  for (const auto& [name, text] : files) {
+    if (Status s = command.outputs.write((out / name).string(), text); !s) {
+      return failed(s.error(), context);
+    }
+  }
+  context.console.result(summary(result->diagnosis), summary_json(result->diagnosis, command));
+  context.console.note("left behind: " + command.out +
+                       "/report.html, diagnosis.json, and robot.toml with what was named put in");
+  return kExitDone;
+}
+
 int run_diagnose(DiagnoseCommand& command, CliContext& context) {
   DiagnoseOptions options;
   const auto config =
@@ -201,6 +241,7 @@ int run_diagnose(DiagnoseCommand& command, CliContext& context) {
     context.console.error(s.error());
     return kExitBadUsage;
   }
+  if (config->problem.ground) return run_diagnose_ground(command, *config, stamp, context);
   // Every simulation goes into the folder: what a figure rests on can be looked up.
   if (Status s = LongCommand::begin("diagnose", {command.out}, stages(), context); !s) {
     return failed(s.error(), context);
@@ -253,6 +294,7 @@ SubcommandRun setup_diagnose(CLI::App& app) {
       "  gapfarm diagnose configs/srv1.toml --trials log.csv --out diagnosis\n"
       "  gapfarm diagnose configs/srv1.toml --trials log.csv --out d2 --model run/srv1\n"
       "  gapfarm diagnose configs/push.toml --trials pushes.csv --out d3\n"
+      "  gapfarm diagnose husky.toml --out d4    (scenario ground: robot file and logged runs)\n"
       "Stopped?  The same command goes on: simulations are kept in OUT/simulations.sqlite.");
   return [command](CliContext& context) { return run_diagnose(*command, context); };
 }

@@ -1,0 +1,132 @@
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+
+#include "common/score/kinematic.h"
+
+namespace gapfarm {
+namespace {
+
+constexpr double kScan_s = 1;  // of the delay, either way
+constexpr double kScanStep_s = 0.05;
+constexpr double kHuber = 2;     // robust standard deviations
+constexpr int kRounds = 3;       // of weights
+constexpr int kIterations = 12;  // of least squares a round
+
+// Residuals of every trial in the predicted end's axes.
+std::vector<Eigen::Vector3d> residuals(const Problem& problem, const Kinematics& at) {
+  const std::vector<Pose> ends = kinematic_ends(problem, at);
+  std::vector<Eigen::Vector3d> r;
+  for (std::size_t i = 0; i < ends.size(); ++i) {
+    r.push_back(local_difference(ends[i], problem.log.trials[i].X_WE));
+  }
+  return r;
+}
+
+double robust_scale(const std::vector<Eigen::Vector3d>& r, int from, int to) {
+  std::vector<double> sizes;
+  for (const Eigen::Vector3d& d : r) {
+    for (int c = from; c < to; ++c) sizes.push_back(std::abs(d[c]));
+  }
+  const auto middle = sizes.begin() + static_cast<long>(sizes.size() / 2);
+  std::nth_element(sizes.begin(), middle, sizes.end());
+  return std::max(1.4826 * *middle, 1e-6);
+}
+
+Eigen::VectorXd weighted(const std::vector<Eigen::Vector3d>& r, const Eigen::VectorXd& weights) {
+  Eigen::VectorXd all(weights.size());
+  for (std::size_t i = 0; i < r.size(); ++i) {
+    const auto row = static_cast<Eigen::Index>(3 * i);
+    all.segment<3>(row) = weights.segment<3>(row).cwiseProduct(r[i]);
+  }
+  return all;
+}
+
+// 1 / s.d. of each residual, less beyond kHuber of them.
+Eigen::VectorXd weights_of(const std::vector<Eigen::Vector3d>& r) {
+  const double m = robust_scale(r, 0, 2);
+  const double rad = robust_scale(r, 2, 3);
+  Eigen::VectorXd weights(static_cast<Eigen::Index>(3 * r.size()));
+  for (std::size_t i = 0; i < r.size(); ++i) {
+    for (int c = 0; c < 3; ++c) {
+      const double scale = c < 2 ? m : rad;
+      const double size = std::abs(r[i][c]) / scale;
+      weights[static_cast<Eigen::Index>(3 * i) + c] =
+          std::sqrt(std::min(1.0, kHuber / std::max(size, 1e-9))) / scale;
+    }
+  }
+  return weights;
+}
+
+void descend(const Problem& problem, const Eigen::VectorXd& weights, Kinematics* at) {
+  const auto cost_at = [&](const Kinematics& k) {
+    return weighted(residuals(problem, k), weights);
+  };
+  Eigen::VectorXd r = cost_at(*at);
+  double damping = 1e-3;
+  const Eigen::Index n = at->values.size();
+  for (int it = 0; it < kIterations; ++it) {
+    Eigen::MatrixXd J(r.size(), n);
+    for (Eigen::Index i = 0; i < n; ++i) {
+      Kinematics moved = *at;
+      const double step = 1e-4 * std::max(1.0, std::abs(at->values[i]));
+      moved.values[i] += step;
+      J.col(i) = (cost_at(moved) - r) / step;
+    }
+    const Eigen::MatrixXd H = J.transpose() * J;
+    const Eigen::VectorXd g = J.transpose() * r;
+    bool better = false;
+    for (int attempt = 0; attempt < 6 && !better; ++attempt) {
+      Eigen::MatrixXd damped = H;
+      damped.diagonal() += damping * H.diagonal() + Eigen::VectorXd::Constant(n, 1e-9);
+      Kinematics moved = *at;
+      moved.values -= damped.ldlt().solve(g);
+      const Eigen::VectorXd next = cost_at(moved);
+      better = next.squaredNorm() < r.squaredNorm();
+      if (better) {
+        const double gained = 1 - next.squaredNorm() / r.squaredNorm();
+        *at = moved;
+        r = next;
+        damping = std::max(damping / 5, 1e-9);
+        if (gained < 1e-5) return;
+      } else {
+        damping *= 10;
+      }
+    }
+    if (!better) return;
+  }
+}
+
+}  // namespace
+
+Result<Kinematics> fit_kinematics(const Problem& problem) {
+  if (problem.log.trials.empty() || !problem.ground) {
+    return Error{"kinematics need windows of logged runs, but there are none"};
+  }
+  Kinematics best = nominal_kinematics(problem.ground->robot());
+  const auto delay = std::find(best.names.begin(), best.names.end(), "delay") - best.names.begin();
+  const double own = best.values[delay];
+  double least = 0;
+  for (double shift = -kScan_s; shift <= kScan_s + 1e-9; shift += kScanStep_s) {
+    Kinematics moved = best;
+    moved.values[delay] = own + shift;
+    const double scale = robust_scale(residuals(problem, moved), 0, 3);
+    if (least == 0 || scale < least) {
+      least = scale;
+      best.values[delay] = own + shift;
+    }
+  }
+  for (int round = 0; round < kRounds; ++round) {
+    descend(problem, weights_of(residuals(problem, best)), &best);
+  }
+  const std::vector<Eigen::Vector3d> r = residuals(problem, best);
+  for (const Eigen::Vector3d& d : r) {
+    best.rms_m += d.head<2>().squaredNorm() / static_cast<double>(r.size());
+    best.rms_rad += d[2] * d[2] / static_cast<double>(r.size());
+  }
+  best.rms_m = std::sqrt(best.rms_m);
+  best.rms_rad = std::sqrt(best.rms_rad);
+  return best;
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,362 @@
+#include "master/ground/ground_report.h"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+#include <cmath>
+#include <tuple>
+
+#include "common/random/stream.h"
+
+namespace gapfarm {
+namespace {
+
+constexpr std::size_t kMostAliases = 3;
+constexpr int kGroundDraws = 400;
+constexpr double kAlmostSure = 0.99;  // no log makes surer than this
+
+// What was found, with what is needed to put it into words and figures.
+class GroundReport {
+ public:
+  GroundReport(const GroundRobot& robot, const GroundSearch& search,
+               const GroundDiagnoseOptions& options)
+      : robot_(robot),
+        search_(search),
+        options_(options),
+        fitter_(robot, search.windows),
+        intervals_(fitter_.intervals(search.fit, options.seed)) {}
+
+  Diagnosis write();
+
+ private:
+  void left_out();
+  void faults();
+  void values();
+  void figures();
+  void screening();
+  void trials();
+  NamedEffect effect_of(const GroundStep& step, std::size_t place);
+  std::string sentence(const GroundHypothesis& h, const NamedEffect& effect) const;
+  void name_headline();
+  double sum(const std::vector<double>& nats) const;
+  double rms_mm(const WindowFit& fit) const;
+  double rms_mrad(const WindowFit& fit) const;
+  std::pair<double, double> closed_interval(std::size_t place) const;
+
+  const GroundRobot& robot_;
+  const GroundSearch& search_;
+  const GroundDiagnoseOptions& options_;
+  WindowFitter fitter_;
+  Eigen::MatrixX2d intervals_;
+  WindowFit floor_;  // predictions of what was left out with every row free
+  Diagnosis d_;
+};
+
+double GroundReport::rms_mm(const WindowFit& fit) const {
+  double sum = 0;
+  for (const Eigen::Vector3d& r : fitter_.raw_residuals(fit)) sum += r.head<2>().squaredNorm();
+  return 1e3 * std::sqrt(sum / static_cast<double>(fit.residuals.size()));
+}
+double GroundReport::rms_mrad(const WindowFit& fit) const {
+  double sum = 0;
+  for (const Eigen::Vector3d& r : fitter_.raw_residuals(fit)) sum += r[2] * r[2];
+  return 1e3 * std::sqrt(sum / static_cast<double>(fit.residuals.size()));
+}
+
+void add_alias(const std::string& name, NamedEffect* effect) {
+  if (name == effect->name || effect->aliases.size() >= kMostAliases) return;
+  const auto& have = effect->aliases;
+  if (std::find(have.begin(), have.end(), name) == have.end()) effect->aliases.push_back(name);
+}
+
+void GroundReport::left_out() {
+  std::vector<FitRow> all = search_.rows;
+  for (FitRow& row : all) row.free = true;
+  floor_ = fit_left_out(fitter_, all, search_.free_fit.values);
+}
+
+double GroundReport::sum(const std::vector<double>& nats) const {
+  double sum = 0;
+  for (const double n : nats) sum += n;
+  return sum / static_cast<double>(nats.size());
+}
+
+// By blocks drawn with replacement.
+std::pair<double, double> GroundReport::closed_interval(std::size_t place) const {
+  const auto blocks = static_cast<std::size_t>(search_.windows.blocks);
+  const bool named_best = sum(search_.chain.back().nats) > sum(floor_.nats);
+  const WindowFit& best = named_best ? search_.chain.back() : floor_;
+  std::vector<double> gained(blocks, 0.0), explainable(blocks, 0.0);
+  for (std::size_t i = 0; i < floor_.nats.size(); ++i) {
+    const auto b = static_cast<std::size_t>(search_.windows.block[i]);
+    gained[b] += search_.chain[place + 1].nats[i] - search_.chain[place].nats[i];
+    explainable[b] += best.nats[i] - search_.chain[0].nats[i];
+  }
+  Stream stream({options_.seed, Purpose::kStatistics, 1, place, 0});
+  std::vector<double> shares;
+  for (int d = 0; d < kGroundDraws; ++d) {
+    double up = 0, all = 0;
+    for (std::size_t k = 0; k < blocks; ++k) {
+      const auto pick = static_cast<std::size_t>(stream.below(blocks));
+      up += gained[pick];
+      all += explainable[pick];
+    }
+    shares.push_back(all > 0 ? std::clamp(up / all, 0.0, 1.0) : 0.0);
+  }
+  std::sort(shares.begin(), shares.end());
+  return {shares[kGroundDraws / 20], shares[kGroundDraws - 1 - kGroundDraws / 20]};
+}
+
+NamedEffect GroundReport::effect_of(const GroundStep& step, std::size_t place) {
+  const GroundHypothesis& h = search_.catalogue[step.chosen];
+  NamedEffect effect;
+  effect.name = h.name;
+  for (const std::string& alias : h.aliases) add_alias(alias, &effect);
+  for (const std::size_t other : step.not_told_apart) {
+    add_alias(search_.catalogue[other].name, &effect);
+  }
+  if (!effect.aliases.empty()) {
+    effect.alias_reason = "They move this robot alike on these runs.";
+  }
+  for (const KinematicRow& row : h.freed) {
+    for (std::size_t j = 0; j < search_.rows.size(); ++j) {
+      if (search_.rows[j].row.name != row.name) continue;
+      const auto k = static_cast<Eigen::Index>(j);
+      effect.parameters.push_back({row.key, search_.fit.values[k] - row.nominal,
+                                   intervals_(k, 0) - row.nominal, intervals_(k, 1) - row.nominal,
+                                   row.unit});
+    }
+  }
+  const double floor = std::max(sum(floor_.nats), sum(search_.chain.back().nats));
+  effect.gap_before = floor - sum(search_.chain[place].nats);
+  effect.gap_after = floor - sum(search_.chain[place + 1].nats);
+  effect.position_mm_before = rms_mm(search_.chain[place]);
+  effect.position_mm_after = rms_mm(search_.chain[place + 1]);
+  effect.heading_mrad_before = rms_mrad(search_.chain[place]);
+  effect.heading_mrad_after = rms_mrad(search_.chain[place + 1]);
+  const double gap = floor - sum(search_.chain[0].nats);
+  const double gained = effect.gap_before - effect.gap_after;
+  effect.closed = gap > 0 ? std::clamp(gained / gap, 0.0, 1.0) : 0;
+  std::tie(effect.closed_lo, effect.closed_hi) = closed_interval(place);
+  // What was gained over what would just have been worth a name.
+  effect.confidence = std::min(kAlmostSure, 1 - 0.5 * std::exp((kLeastGroundGain - step.gain) / 2));
+  effect.text = sentence(h, effect);
+  return effect;
+}
+
+// The value to paste into the robot's file.
+std::string in_file(const GroundRobot& robot, const KinematicRow& row, const Estimate& e) {
+  const auto of_group = [&](const char* group) {
+    for (const RobotWheel& w : robot.wheels) {
+      const bool side = (w.side == WheelSide::kLeft) == (std::string(group) == "left");
+      if (w.driven && side && w.side != WheelSide::kNone) return *w.radius_m;
+    }
+    return 0.0;
+  };
+  const auto ratio = [&](const char* word, double own, const char* unit) {
+    return fmt::format("{} {:.5g} [{:.5g}, {:.5g}]{}; the file has {:.5g}", word,
+                       own * (1 + e.value), own * (1 + e.lo), own * (1 + e.hi), unit, own);
+  };
+  const auto& k = robot.controller;
+  const double base = row.nominal;
+  if (row.name == "left" || row.name == "right") {
+    const double own = of_group(row.name.c_str());
+    return ratio(("wheels." + row.name + ".radius").c_str(), own, " m");
+  }
+  if (row.name == "separation" && k.wheel_separation_m) {
+    const double own = k.wheel_separation_multiplier;
+    if (own != 1 || robot.drive == DriveKind::kSkid || robot.drive == DriveKind::kTracked) {
+      return ratio("wheel_separation_multiplier", own, "");
+    }
+    return ratio("wheel_separation", *k.wheel_separation_m, " m");
+  }
+  if (e.key == "ratio" || e.key == "rate") {
+    return fmt::format("{:+.4g} [{:+.4g}, {:+.4g}] {}", e.value, e.lo, e.hi,
+                       e.unit == "-" ? "of what the file has" : e.unit);
+  }
+  return fmt::format("{} {:.5g} [{:.5g}, {:.5g}] {}; the file has {:.5g}", row.name, base + e.value,
+                     base + e.lo, base + e.hi, e.unit, base);
+}
+
+std::string GroundReport::sentence(const GroundHypothesis& h, const NamedEffect& effect) const {
+  std::string text = h.thing + " is off: ";
+  for (std::size_t k = 0; k < h.freed.size() && k < effect.parameters.size(); ++k) {
+    text += (k > 0 ? "; " : "") + in_file(robot_, h.freed[k], effect.parameters[k]);
+  }
+  text += ".";
+  text[0] = static_cast<char>(std::toupper(text[0]));
+  return text;
+}
+
+void GroundReport::faults() {
+  for (std::size_t k = 0; k < search_.faults.size(); ++k) {
+    const GroundHypothesis& h = search_.catalogue[search_.faults[k]];
+    NamedEffect effect;
+    effect.name = h.name;
+    for (const std::string& alias : h.aliases) add_alias(alias, &effect);
+    effect.confidence = kAlmostSure;
+    effect.closed = effect.closed_hi = 1;
+    const double stretches = static_cast<double>(search_.windows.trials.size()) /
+                             static_cast<double>(search_.windows.horizons);
+    effect.gap_before = search_.fault_gains[k] / stretches;
+    const double shrinks = std::exp(effect.gap_before / 3);
+    effect.text = fmt::format(
+        "The log is wrong in {}: put right, what the robot's file expects is {:.1f} times as near "
+        "to "
+        "what was measured. {}",
+        h.thing, shrinks, h.remedy);
+    d_.sanity.push_back({h.name, effect.text, h.remedy, Severity::kNote, true, effect.aliases});
+    d_.effects.push_back(std::move(effect));
+  }
+}
+
+void GroundReport::values() {
+  for (std::size_t k = 0; k < search_.steps.size(); ++k) {
+    d_.effects.push_back(effect_of(search_.steps[k], k));
+  }
+}
+
+void GroundReport::figures() {
+  const double floor = std::max(sum(floor_.nats), sum(search_.chain.back().nats));
+  d_.gap = {floor - sum(search_.chain.front().nats), floor - sum(search_.chain.back().nats), 0};
+  d_.position_mm = {rms_mm(search_.chain.front()), rms_mm(search_.chain.back()), rms_mm(floor_)};
+  d_.heading_mrad = {rms_mrad(search_.chain.front()), rms_mrad(search_.chain.back()),
+                     rms_mrad(floor_)};
+  const double left = search_.free_fit.objective - search_.fit.objective;
+  const bool unknown = left > kUnknownGroundGain;
+  const bool named = !d_.effects.empty();
+  d_.verdict = named ? (unknown ? Verdict::kEffectAndUnknown : Verdict::kEffect)
+                     : (unknown ? Verdict::kUnknown : Verdict::kNone);
+  if (unknown) {
+    d_.cautions.push_back(fmt::format(
+        "Freeing every value of the file at once gains another {:.0f} nats: several are a little "
+        "off, or something moves the robot that its kinematics do not have.",
+        left));
+  }
+  if (search_.windows.blocks < 8) {
+    d_.cautions.push_back("Few runs: intervals are from runs drawn again, and these are few.");
+  }
+  if (robot_.measured) {
+    d_.cautions.push_back(
+        "Wheel speeds were measured: what lies before them (dead time, ramps) "
+        "cannot show.");
+  }
+}
+
+void GroundReport::screening() {
+  if (search_.offers.empty()) return;
+  for (const Offer& offer : search_.offers.front()) {
+    const GroundHypothesis& h = search_.catalogue[offer.hypothesis];
+    Screened s;
+    s.effect = h.name;
+    s.gain = offer.gain;
+    s.p = std::exp(-std::max(0.0, offer.gain));
+    const bool fitted = offer.values.size() > 0;
+    for (std::size_t k = 0; fitted && k < h.freed.size(); ++k) {
+      s.estimate += fmt::format("{}{} {:+.4g} {}", k > 0 ? ", " : "", h.freed[k].key,
+                                offer.values[static_cast<Eigen::Index>(k)] - h.freed[k].nominal,
+                                h.freed[k].unit);
+    }
+    s.note = h.thing;
+    d_.screening.push_back(std::move(s));
+  }
+  for (const auto& offers : search_.offers) {
+    SelectionRecord record;
+    for (std::size_t k = 0; k < d_.steps.size(); ++k) {
+      record.explained.push_back(search_.catalogue[search_.steps[k].chosen].name);
+    }
+    for (std::size_t k = 0; k < std::min<std::size_t>(offers.size(), 5); ++k) {
+      record.offered.emplace_back(search_.catalogue[offers[k].hypothesis].name, offers[k].gain);
+    }
+    d_.steps.push_back(std::move(record));
+  }
+}
+
+void GroundReport::trials() {
+  const auto cov_of = [&](const WindowFit& fit, std::size_t i) {
+    const Eigen::Vector3d s = fit.scales[static_cast<std::size_t>(search_.windows.horizon[i])];
+    return Eigen::Matrix3d(s.cwiseProduct(s).asDiagonal());
+  };
+  const auto tuned = fitter_.raw_residuals(search_.chain.front());
+  const auto last = fitter_.raw_residuals(search_.chain.back());
+  for (std::size_t i = 0; i < search_.windows.trials.size(); ++i) {
+    const Trial& from = search_.windows.trials[i];
+    DiagnosedTrial t;
+    t.session = from.session;
+    t.trial = static_cast<std::int64_t>(i);
+    t.command = fmt::format("{:g} s", options_.windows.horizons_s.at(std::min<std::size_t>(
+                                          static_cast<std::size_t>(search_.windows.horizon[i]),
+                                          options_.windows.horizons_s.size() - 1)));
+    t.session_time_s = *from.t_s;
+    t.duration_s = *from.duration_s;
+    t.held_out = true;
+    t.X_WS = from.X_WS;
+    t.measured = between(from.X_WS, from.X_WE);
+    // The prediction is where the measured end lies off by the residual.
+    const auto predicted = [&](const Eigen::Vector3d& r) {
+      const double theta = t.measured.theta - r[2];
+      const double c = std::cos(theta), s = std::sin(theta);
+      return Pose{t.measured.x - c * r[0] + s * r[1], t.measured.y - s * r[0] - c * r[1],
+                  wrap_angle(theta)};
+    };
+    t.tuned_residual = tuned[i];
+    t.final_residual = last[i];
+    t.tuned = predicted(t.tuned_residual);
+    t.final_ = predicted(t.final_residual);
+    t.tuned_cov = cov_of(search_.chain.front(), i);
+    t.final_cov = cov_of(search_.chain.back(), i);
+    t.tuned_score = search_.chain.front().nats[i];
+    t.final_score = search_.chain.back().nats[i];
+    d_.trials.push_back(std::move(t));
+  }
+}
+
+void GroundReport::name_headline() {
+  if (d_.effects.empty()) {
+    d_.headline =
+        d_.verdict == Verdict::kNone
+            ? "Nothing of the robot's file or log is wrong by more than a well-kept file's "
+              "values are."
+            : "Something is wrong that nothing of the catalogue explains alone.";
+    return;
+  }
+  d_.headline = d_.effects.front().text;
+  if (d_.effects.size() > 1) {
+    d_.headline += " Beside it: ";
+    for (std::size_t k = 1; k < d_.effects.size(); ++k) {
+      d_.headline += (k > 1 ? ", " : "") + d_.effects[k].name;
+    }
+    d_.headline += ".";
+  }
+}
+
+Diagnosis GroundReport::write() {
+  left_out();
+  faults();
+  values();
+  figures();
+  screening();
+  trials();
+  name_headline();
+  return std::move(d_);
+}
+
+}  // namespace
+
+Diagnosis report_ground(const GroundRobot& robot, const GroundSearch& search,
+                        const GroundDiagnoseOptions& options) {
+  return GroundReport(robot, search, options).write();
+}
+
+Kinematics chosen_values(const GroundSearch& search) {
+  Kinematics at;
+  for (std::size_t j = 0; j < search.rows.size(); ++j) {
+    if (!search.rows[j].free) continue;
+    at.names.push_back(search.rows[j].row.name);
+    at.values.conservativeResize(at.values.size() + 1);
+    at.values[at.values.size() - 1] = search.fit.values[static_cast<Eigen::Index>(j)];
+  }
+  return at;
+}
+
+}  // namespace gapfarm

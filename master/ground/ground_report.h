@@ -1,0 +1,16 @@
+// From what a ground robot's search found to what its diagnosis says.
+#pragma once
+
+#include "common/score/kinematic.h"
+#include "master/ground/diagnose_ground.h"
+#include "master/ground/search.h"
+
+namespace gapfarm {
+
+Diagnosis report_ground(const GroundRobot& robot, const GroundSearch& search,
+                        const GroundDiagnoseOptions& options);
+
+// What was chosen, as fitted.
+Kinematics chosen_values(const GroundSearch& search);
+
+}  // namespace gapfarm

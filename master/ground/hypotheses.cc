@@ -1,0 +1,328 @@
+#include "master/ground/hypotheses.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+namespace gapfarm {
+namespace {
+
+using std::numbers::pi;
+
+// What the value of a well-kept file may be off by: sizes by their own share, times by what clocks
+// and pollers lose, the marker by a share of the robot.
+constexpr double kRadiusShare = 0.005;
+constexpr double kSeparationShare = 0.015;
+// How far skidding wheels roll and turn is the floor's to say as well.
+constexpr double kSkidRadiusShare = 0.02;
+constexpr double kSkidSeparationShare = 0.05;
+constexpr double kGainShare = 0.02;
+constexpr double kPowerShare = 0.05;
+constexpr double kDelay_s = 0.015;
+constexpr double kLag_s = 0.03;
+constexpr double kMarkerShare = 0.02;  // of the wheels' reach
+// Tyres that slip sideways move the point that a car turns about, as if its marker stood elsewhere.
+constexpr double kCarMarkerShare = 0.15;
+constexpr double kCarMarkerYaw_rad = 0.02;
+constexpr double kMarkerYaw_rad = 0.01;
+constexpr double kSteering_rad = 0.003;
+
+bool is_steered(const GroundRobot& robot) {
+  return robot.drive == DriveKind::kAckermann || robot.drive == DriveKind::kTricycle;
+}
+bool is_holonomic(const GroundRobot& robot) {
+  return robot.drive == DriveKind::kOmni || robot.drive == DriveKind::kMecanum;
+}
+bool skids(const GroundRobot& robot) {
+  return robot.drive == DriveKind::kSkid || robot.drive == DriveKind::kTracked;
+}
+bool is_throttled(const GroundRobot& robot) {
+  return robot.command == CommandKind::kThrottleSteering;
+}
+
+double wheel_reach_m(const GroundRobot& robot) {
+  double farthest = 1e-3;
+  for (const RobotWheel& w : robot.wheels) {
+    farthest = std::max(farthest, std::hypot(w.x_m.value_or(0), w.y_m.value_or(0)));
+  }
+  return farthest;
+}
+
+// Channels that change places when left and right do.
+std::vector<std::pair<std::size_t, std::size_t>> channel_pairs(const GroundRobot& robot) {
+  std::vector<std::pair<std::size_t, std::size_t>> pairs;
+  for (std::size_t i = 0; i < robot.channels.size(); ++i) {
+    std::string other = robot.channels[i];
+    const auto at = other.find("left");
+    if (at == std::string::npos) continue;
+    other.replace(at, 4, "right");
+    for (std::size_t j = 0; j < robot.channels.size(); ++j) {
+      if (robot.channels[j] == other) pairs.emplace_back(i, j);
+    }
+  }
+  return pairs;
+}
+
+using CommandChange = std::function<void(std::vector<double>&)>;
+using PoseChange = std::function<void(Pose&)>;
+
+std::function<void(RunLog*)> change_commands(CommandChange change) {
+  return [change = std::move(change)](RunLog* log) {
+    for (LoggedRun& run : log->runs) {
+      for (CommandRow& row : run.commands) change(row.values);
+    }
+  };
+}
+std::function<void(RunLog*)> change_poses(PoseChange change) {
+  return [change = std::move(change)](RunLog* log) {
+    for (LoggedRun& run : log->runs) {
+      for (PoseRow& row : run.poses) {
+        change(row.X_WM);
+        row.X_WM.theta = wrap_angle(row.X_WM.theta);
+      }
+    }
+  };
+}
+
+class Catalogue {
+ public:
+  explicit Catalogue(const GroundRobot& robot) : robot_(robot), rows_(kinematic_rows(robot)) {}
+
+  void wrong_commands();
+  void wrong_poses();
+  void sizes();
+  void steering();
+  void motors();
+  void tracker();
+
+  std::vector<GroundHypothesis> all;
+
+ private:
+  KinematicRow row(const std::string& name) const {
+    return *std::find_if(rows_.begin(), rows_.end(),
+                         [&](const KinematicRow& r) { return r.name == name; });
+  }
+  void value(const std::string& name, std::vector<std::string> aliases, const std::string& thing,
+             std::vector<KinematicRow> freed) {
+    all.push_back({name, std::move(aliases), thing, std::move(freed), {}, 1, "", false});
+  }
+  void more(const std::string& name, std::vector<std::string> aliases, const std::string& thing,
+            std::vector<KinematicRow> freed) {
+    value(name, std::move(aliases), thing, std::move(freed));
+    all.back().only_more = true;
+  }
+  void fault(const std::string& name, const std::string& thing, const std::string& remedy,
+             std::function<void(RunLog*)> put_right, double metres = 1,
+             std::vector<std::string> aliases = {}) {
+    all.push_back(
+        {name, std::move(aliases), thing, {}, std::move(put_right), metres, remedy, false});
+  }
+
+  const GroundRobot& robot_;
+  std::vector<KinematicRow> rows_;
+};
+
+void Catalogue::wrong_commands() {
+  const auto pairs = channel_pairs(robot_);
+  if (!pairs.empty()) {
+    fault("sides_swapped", "left and right of the commands", "Swap the columns of the two sides.",
+          change_commands([pairs](std::vector<double>& v) {
+            for (const auto& [l, r] : pairs) std::swap(v[l], v[r]);
+          }));
+    for (const bool left : {true, false}) {
+      fault("side_reversed", std::string("the sign of the ") + (left ? "left" : "right") + " side",
+            "Turn the sign of that column.", change_commands([pairs, left](std::vector<double>& v) {
+              for (const auto& [l, r] : pairs) v[left ? l : r] *= -1;
+            }),
+            1, {"command_sign"});
+    }
+  }
+  fault("command_reversed", "the sign of every command", "Turn the sign of the commands.",
+        change_commands([](std::vector<double>& v) {
+          for (double& value : v) value = -value;
+        }),
+        1, {"command_sign"});
+  for (std::size_t c = 0; c < robot_.channels.size(); ++c) {
+    const std::string& channel = robot_.channels[c];
+    if (channel != "steering" && channel != "omega" && channel != "vy" && channel != "v") continue;
+    const bool turns = channel == "steering" || channel == "omega";
+    fault(turns ? "steering_reversed" : "command_reversed", "the sign of " + channel,
+          "Turn the sign of that column.",
+          change_commands([c](std::vector<double>& v) { v[c] *= -1; }), 1, {"command_sign"});
+  }
+  if (robot_.command != CommandKind::kWheelSpeeds) return;
+  for (const auto& [unit, factor] : {std::pair{"rpm", 2 * pi / 60},
+                                     {"degrees a second", pi / 180},
+                                     {"turns a second", 2 * pi}}) {
+    fault("unit_error", std::string("the unit of the wheel speeds: ") + unit,
+          std::string("Multiply them by ") + std::to_string(factor) + ".",
+          change_commands([f = factor](std::vector<double>& v) {
+            for (double& value : v) value *= f;
+          }),
+          1, {"command_units", "wheel_radius"});
+  }
+}
+
+void Catalogue::wrong_poses() {
+  fault("heading_flipped", "the sign of the headings", "Turn the sign of theta.",
+        change_poses([](Pose& X) { X.theta = -X.theta; }), 1, {"heading_sign"});
+  fault("axes_mirrored", "a world frame that is left-handed",
+        "Turn the sign of y, and that of theta when it follows the robot's turns the wrong way.",
+        change_poses([](Pose& X) { X.y = -X.y; }), 1, {"axes_swapped"});
+  fault("axes_swapped", "x and y of the poses", "Swap the columns x and y.",
+        change_poses([](Pose& X) { std::swap(X.x, X.y); }), 1, {"axes_mirrored"});
+  fault("heading_unit", "headings in degrees", "Multiply theta by pi / 180.",
+        change_poses([](Pose& X) { X.theta *= pi / 180; }), 1, {"unit_error"});
+  for (const double turn : {pi / 2, -pi / 2, pi}) {
+    fault("heading_turned",
+          "headings that count from another axis, " + std::to_string(std::lround(turn * 180 / pi)) +
+              " degrees on",
+          "State the marker's yaw.", change_poses([turn](Pose& X) { X.theta -= turn; }), 1,
+          {"marker_yaw", "heading_offset"});
+  }
+  for (const auto& [unit, metres] : {std::pair{"millimetres", 0.001},
+                                     {"centimetres", 0.01},
+                                     {"decimetres", 0.1},
+                                     {"inches", 0.0254},
+                                     {"feet", 0.3048}}) {
+    fault("unit_error", std::string("positions in ") + unit,
+          "Multiply x and y by " + std::to_string(metres) + ".",
+          change_poses([m = metres](Pose& X) {
+            X.x *= m;
+            X.y *= m;
+          }),
+          metres, {"pose_units", "pose_scale"});
+  }
+}
+
+void Catalogue::sizes() {
+  const double share = skids(robot_) ? kSkidRadiusShare : kRadiusShare;
+  if (is_throttled(robot_)) return;
+  if (is_holonomic(robot_)) {
+    value("wheel_radius", {"speed_gain"}, "the radius of all wheels",
+          {{"travel", 1, share, "ratio", "-"}});
+    value("ahead_gain", {"roller_drag", "speed_gain"}, "travel ahead", {row("ahead")});
+    value("aside_gain", {"roller_drag"}, "travel aside", {row("aside")});
+    value("wheel_separation", {"robot_radius", "turn_gain"},
+          "how far the wheels stand from the middle", {row("turn")});
+    return;
+  }
+  if (is_steered(robot_)) {
+    value("wheel_radius", {"speed_gain"}, "the radius of the driving wheel", {row("ahead")});
+    return;
+  }
+  value("wheel_radius", {"motor_asymmetry"}, "the radius of the right wheels", {row("right")});
+  value("wheel_radius", {"motor_asymmetry"}, "the radius of the left wheels", {row("left")});
+  value("wheel_radius", {"speed_gain"}, "the radius of all wheels",
+        {{"travel", 1, share, "ratio", "-"}});
+  value("wheel_separation", {"icr_track", "friction_anisotropy"},
+        "the distance between the sides, as they roll", {row("separation")});
+}
+
+void Catalogue::steering() {
+  if (!is_steered(robot_)) return;
+  value("steering_offset", {}, "where the wheels point when told straight",
+        {row("steering_offset")});
+  value("steering_gain", {"wheelbase"}, "the angle that is steered over that told",
+        {row("steering_gain")});
+  value("understeer", {"friction_anisotropy"}, "the loss of curvature with speed",
+        {row("understeer")});
+  if (!robot_.steering.table.empty()) {
+    value("steering_asymmetry", {"steering_gain"}, "the steering's gain to the left",
+          {{"steering_left", 1, kGainShare, "ratio", "-"}});
+    value("steering_asymmetry", {"steering_gain"}, "the steering's gain to the right",
+          {{"steering_right", 1, kGainShare, "ratio", "-"}});
+  }
+}
+
+void Catalogue::motors() {
+  value("command_delay", {"pose_latency", "clock_offset"}, "the time from a command to its pose",
+        {row("delay")});
+  value(is_steered(robot_) ? "steering_lag" : "motor_lag", {"motor_lag"},
+        is_steered(robot_) ? "the lag of the steering" : "the lag of the wheels", {row("lag")});
+  value("clock_drift", {"clock_offset"}, "the rate of one clock against the other",
+        {{"drift", 0, 2e-5, "rate", "s/s"}});
+  more("battery_sag", {}, "what the drive loses a minute", {{"sag", 0, 0.005, "rate", "1/min"}});
+  if (is_throttled(robot_)) {
+    value("throttle_gain", {"payload", "battery_voltage"}, "the acceleration a unit of throttle",
+          {{"power", 1, kPowerShare, "ratio", "-"}});
+    value("throttle_zero", {"motor_deadband"}, "the throttle that moves nothing", {row("zero")});
+    value("rolling_resistance", {"drag"}, "the deceleration a m/s", {row("drag")});
+    return;
+  }
+  const double band = robot_.command == CommandKind::kWheelSpeeds ? 0.1 : 0.01;
+  more("motor_deadband", {}, "commands that move nothing",
+       {{"dead_band", robot_.motors.dead_band, band, "width", "of the command"}});
+  const double ramp =
+      robot_.motors.acceleration_limit_m_s2 ? 1 / *robot_.motors.acceleration_limit_m_s2 : 0;
+  more("acceleration_limit", {"motor_lag"}, "the ramp of the wheels' speed",
+       {{"ramp", ramp, 0.03, "ramp", "s^2/m"}});
+}
+
+void Catalogue::tracker() {
+  value("marker_offset", {"com_offset"}, "the tracked point on the robot",
+        {row("marker_x"), row("marker_y")});
+  value("marker_yaw", {"heading_offset"}, "the heading of the tracked point", {row("marker_yaw")});
+  value("pose_scale", {"unit_error", "camera_scale"}, "the scale of all positions",
+        {{"pose_scale", 1, 0.01, "ratio", "-"}});
+  value("camera_aspect", {}, "the scale of y over that of x", {{"aspect", 1, 0.01, "ratio", "-"}});
+}
+
+}  // namespace
+
+std::vector<KinematicRow> kinematic_rows(const GroundRobot& robot) {
+  std::vector<KinematicRow> rows;
+  if (is_holonomic(robot)) {
+    rows = {{"ahead", 1, kGainShare, "ratio", "-"},
+            {"aside", 1, kGainShare, "ratio", "-"},
+            {"turn", 1, kGainShare, "ratio", "-"}};
+  } else if (is_steered(robot)) {
+    const double slow = robot.steering.understeer_s2_m2;
+    rows = {{"steering_offset", 0, kSteering_rad, "angle", "rad"},
+            {"steering_gain", 1, kGainShare, "ratio", "-"},
+            {"understeer", slow, 0.01 + 0.2 * slow, "understeer", "s^2/m^2"}};
+    if (is_throttled(robot)) {
+      const RobotThrottle& t = robot.throttle;
+      const auto put = [&](const char* name, double own, double least, const char* unit) {
+        rows.push_back({name, own, least + kPowerShare * own, name, unit});
+      };
+      put("gain", t.gain, 0, "m/s^2");
+      put("zero", t.zero, 0.003, "-");
+      put("back_emf", t.back_emf, 0.05, "1/s");
+      put("drag", t.drag, 0.02, "1/s");
+      put("coulomb", t.coulomb, 0.02, "m/s^2");
+      put("cornering", t.cornering, 0.02, "-");
+    } else {
+      rows.push_back({"ahead", 1, kRadiusShare, "ratio", "-"});
+    }
+  } else {
+    const double radius = skids(robot) ? kSkidRadiusShare : kRadiusShare;
+    const double separation = skids(robot) ? kSkidSeparationShare : kSeparationShare;
+    rows = {{"left", 1, radius, "ratio", "-"},
+            {"right", 1, radius, "ratio", "-"},
+            {"separation", 1, separation, "ratio", "-"}};
+  }
+  const double marker = (is_steered(robot) ? kCarMarkerShare : kMarkerShare) * wheel_reach_m(robot);
+  const Pose& X = robot.X_RM;
+  rows.push_back({"lag", robot.motors.lag_s, kLag_s, "tau", "s"});
+  rows.push_back({"delay", robot.motors.delay_s, kDelay_s, "latency", "s"});
+  rows.push_back({"marker_x", X.x, marker, "x", "m"});
+  rows.push_back({"marker_y", X.y, marker, "y", "m"});
+  rows.push_back({"marker_yaw", X.theta, is_steered(robot) ? kCarMarkerYaw_rad : kMarkerYaw_rad,
+                  "angle", "rad"});
+  return rows;
+}
+
+std::vector<GroundHypothesis> ground_hypotheses(const GroundRobot& robot) {
+  Catalogue catalogue(robot);
+  catalogue.wrong_commands();
+  catalogue.wrong_poses();
+  catalogue.sizes();
+  catalogue.steering();
+  catalogue.motors();
+  catalogue.tracker();
+  return std::move(catalogue.all);
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,43 @@
+// What may be wrong with a ground robot's file or log, one thing at a time: the catalogue of its
+// diagnosis (docs/ground.md).
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "common/robot/robot.h"
+#include "common/runs/run.h"
+
+namespace gapfarm {
+
+// A number of the kinematic model (common/score/kinematic.h).
+struct KinematicRow {
+  std::string name;
+  double nominal = 0;
+  // How far off the value of a well-kept file still is, as a standard deviation; also the size of
+  // a step that shows in the motion.
+  double tolerance = 0;
+  std::string key;   // in a diagnosis: "ratio", "angle", "x"
+  std::string unit;  // of the difference from nominal
+};
+
+struct GroundHypothesis {
+  std::string name;
+  std::vector<std::string> aliases;  // other words for what logs cannot tell apart
+  std::string thing;                 // "the radius of the right wheels"
+  std::vector<KinematicRow> freed;
+  // A log that is the wrong way round or in another unit, put right; empty: nothing to put right.
+  std::function<void(RunLog*)> put_right;
+  double metres = 1;  // logged positions times this are metres
+  std::string remedy;
+  bool only_more = false;  // less than the file's value has no meaning
+};
+
+// Rows that every fit moves a little, within their tolerances.
+std::vector<KinematicRow> kinematic_rows(const GroundRobot& robot);
+
+// In the order in which equals are preferred: simple first.
+std::vector<GroundHypothesis> ground_hypotheses(const GroundRobot& robot);
+
+}  // namespace gapfarm

@@ -1,0 +1,397 @@
+#include "master/ground/window_fit.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+
+#include "common/random/stream.h"
+#include "common/runs/afresh.h"
+#include "common/score/kinematic.h"
+
+namespace gapfarm {
+namespace {
+
+constexpr double kTail = 4;          // degrees of freedom of a residual's density
+constexpr int kLeastBlocks = 10;     // fewer runs than this are cut into stretches
+constexpr int kSteps = 6;            // of Gauss and Newton a round
+constexpr int kDraws = 400;          // of the bootstrap
+constexpr double kStepShare = 0.05;  // of a row's tolerance: to find slopes
+constexpr double kMargin_s = 11;     // of commands round a window: clocks may be 10 s apart
+constexpr double kFaster = 0.02;     // to find how ends move with speed
+constexpr double kEnough = 1e-3;     // nats a step
+
+double log_density(double r, double s) {
+  static const double constant = std::lgamma((kTail + 1) / 2) - std::lgamma(kTail / 2) -
+                                 0.5 * std::log(kTail * std::acos(-1.0));
+  const double z = r / s;
+  return constant - std::log(s) - (kTail + 1) / 2 * std::log1p(z * z / kTail);
+}
+
+double weight(double r, double s) {
+  const double z = r / s;
+  return (kTail + 1) / (kTail + z * z) / (s * s);
+}
+
+// A free row has a prior so wide that it only keeps the equations sound.
+double precision(const FitRow& row) {
+  return (row.free ? 1e-6 : 1) / (row.row.tolerance * row.row.tolerance);
+}
+
+double robust_deviation(std::vector<double>* sizes) {
+  const auto middle = sizes->begin() + static_cast<long>(sizes->size() / 2);
+  std::nth_element(sizes->begin(), middle, sizes->end());
+  return std::max(1.4826 * *middle, 1e-5);
+}
+
+double prior(const WindowFit& fit) {
+  double sum = 0;
+  for (std::size_t i = 0; i < fit.rows.size(); ++i) {
+    if (fit.rows[i].free) continue;
+    const KinematicRow& row = fit.rows[i].row;
+    const double z = (fit.values[static_cast<Eigen::Index>(i)] - row.nominal) / row.tolerance;
+    sum -= z * z / 2;
+  }
+  return sum;
+}
+
+bool alike(const std::vector<Trial>& a, std::size_t from_a, const std::vector<Trial>& b) {
+  if (a.size() - from_a != b.size()) return false;
+  for (std::size_t i = 0; i < b.size(); ++i) {
+    const Trial& x = a[from_a + i];
+    if (x.run != b[i].run || x.t_s != b[i].t_s || x.duration_s != b[i].duration_s) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+Result<WindowSet> window_set(const GroundRobot& robot, const RunLog& log,
+                             const WindowSettings& settings) {
+  WindowSet set;
+  const bool afresh = robot.command == CommandKind::kThrottleSteering;
+  std::vector<std::size_t> run_of;  // of each trial, in the log
+  std::size_t last = 0;
+  for (const double horizon : settings.horizons_s) {
+    auto cut = cut_windows(log, {{horizon}, settings.run_in_s});
+    if (!cut) continue;
+    if (!afresh && set.horizons > 0 && alike(set.trials, last, cut->log.trials)) continue;
+    last = set.trials.size();
+    for (const Trial& trial : cut->log.trials) run_of.push_back(*trial.run);
+    if (afresh) {
+      *cut = begin_afresh(log, std::move(*cut), settings.run_in_s, kMargin_s);
+      for (Trial& trial : cut->log.trials) *trial.run += static_cast<std::uint32_t>(last);
+      set.runs.insert(set.runs.end(), cut->runs.begin(), cut->runs.end());
+    } else {
+      set.runs = std::move(cut->runs);
+    }
+    for (Trial& trial : cut->log.trials) {
+      set.trials.push_back(std::move(trial));
+      set.horizon.push_back(set.horizons);
+    }
+    ++set.horizons;
+  }
+  if (set.trials.empty()) return Error{"no window of any horizon fits into the runs"};
+  std::vector<double> begin(log.runs.size()), length(log.runs.size());
+  double all = 0;
+  for (std::size_t i = 0; i < log.runs.size(); ++i) {
+    if (log.runs[i].poses.size() < 2) continue;
+    begin[i] = log.runs[i].poses.front().t_s;
+    length[i] = log.runs[i].poses.back().t_s - begin[i];
+    all += length[i];
+  }
+  // Stretches of one length, none over two runs.
+  std::vector<int> first(log.runs.size());
+  const bool few = log.runs.size() < kLeastBlocks;
+  for (std::size_t i = 0; i < log.runs.size(); ++i) {
+    first[i] = set.blocks;
+    const double pieces = few ? std::ceil(kLeastBlocks * length[i] / std::max(all, 1e-9)) : 1;
+    set.blocks += std::max(1, static_cast<int>(pieces));
+  }
+  for (std::size_t i = 0; i < set.trials.size(); ++i) {
+    const Trial& trial = set.trials[i];
+    const std::size_t run = run_of[i];
+    const int pieces = (run + 1 < first.size() ? first[run + 1] : set.blocks) - first[run];
+    const double middle = *trial.t_s + *trial.duration_s / 2 - begin[run];
+    const int piece = static_cast<int>(pieces * middle / std::max(length[run], 1e-9));
+    set.block.push_back(first[run] + std::clamp(piece, 0, pieces - 1));
+  }
+  return set;
+}
+
+WindowFitter::WindowFitter(const GroundRobot& robot, const WindowSet& windows)
+    : robot_(robot), windows_(windows) {
+  if (robot.command == CommandKind::kThrottleSteering) shape_by_speed();
+}
+
+void WindowFitter::shape_by_speed() {
+  const std::vector<FitRow> rows = {{{"ahead", 1, 0.02, "ratio", "-"}, false}};
+  const auto here = residuals(rows, Eigen::VectorXd::Constant(1, 1.0));
+  const auto faster = residuals(rows, Eigen::VectorXd::Constant(1, 1 + kFaster));
+  const auto n = static_cast<std::size_t>(windows_.horizons);
+  std::vector<Eigen::Vector3d> ways(here.size());
+  std::vector<std::vector<double>> shares(n), rests(3 * n);
+  for (std::size_t i = 0; i < here.size(); ++i) {
+    const auto h = static_cast<std::size_t>(windows_.horizon[i]);
+    ways[i] = (faster[i] - here[i]) / kFaster;
+    const double share = ways[i].dot(here[i]) / std::max(ways[i].squaredNorm(), 1e-12);
+    shares[h].push_back(std::abs(share));
+    const Eigen::Vector3d rest = here[i] - share * ways[i];
+    for (std::size_t c = 0; c < 3; ++c) {
+      rests[3 * h + c].push_back(std::abs(rest[static_cast<Eigen::Index>(c)]));
+    }
+  }
+  std::vector<Eigen::Matrix3d> shapes(here.size());
+  for (std::size_t i = 0; i < here.size(); ++i) {
+    const auto h = static_cast<std::size_t>(windows_.horizon[i]);
+    Eigen::Vector3d s;
+    for (std::size_t c = 0; c < 3; ++c) {
+      s[static_cast<Eigen::Index>(c)] = robust_deviation(&rests[3 * h + c]);
+    }
+    const Eigen::Vector3d d = robust_deviation(&shares[h]) * ways[i].cwiseQuotient(s);
+    // (1 + d d')^-1/2 in units of s.
+    const double square = d.squaredNorm();
+    Eigen::Matrix3d root = Eigen::Matrix3d::Identity();
+    if (square > 0) root += (1 / std::sqrt(1 + square) - 1) / square * d * d.transpose();
+    shapes[i] = s.asDiagonal() * root * s.cwiseInverse().asDiagonal();
+  }
+  shapes_ = std::move(shapes);
+}
+
+std::vector<Eigen::Vector3d> WindowFitter::raw_residuals(const WindowFit& fit) const {
+  std::vector<Eigen::Vector3d> raw = fit.residuals;
+  for (std::size_t i = 0; i < shapes_.size(); ++i) raw[i] = shapes_[i].inverse() * raw[i];
+  return raw;
+}
+
+std::vector<Eigen::Vector3d> WindowFitter::residuals(const std::vector<FitRow>& rows,
+                                                     const Eigen::VectorXd& values) const {
+  Kinematics at;
+  at.values = values;
+  for (const FitRow& row : rows) at.names.push_back(row.row.name);
+  const std::vector<Pose> ends = kinematic_ends(robot_, windows_.runs, windows_.trials, at);
+  std::vector<Eigen::Vector3d> r;
+  r.reserve(ends.size());
+  for (std::size_t i = 0; i < ends.size(); ++i) {
+    r.push_back(local_difference(ends[i], windows_.trials[i].X_WE));
+    if (!shapes_.empty()) r.back() = shapes_[i] * r.back();
+  }
+  return r;
+}
+
+std::vector<double> WindowFitter::uses(const std::vector<char>& left_out) const {
+  std::vector<double> use(windows_.trials.size());
+  for (std::size_t i = 0; i < use.size(); ++i) {
+    const bool out = !left_out.empty() && left_out[static_cast<std::size_t>(windows_.block[i])];
+    // Windows of several horizons tell of the same stretch.
+    use[i] = out ? 0 : 1.0 / windows_.horizons;
+  }
+  return use;
+}
+
+// Scales of Student's density, by its iteration.
+void WindowFitter::rescale(WindowFit* fit, const std::vector<double>& use) const {
+  const auto n = static_cast<std::size_t>(windows_.horizons);
+  if (fit->scales.empty()) {
+    std::vector<std::vector<double>> sizes(3 * n);
+    for (std::size_t i = 0; i < use.size(); ++i) {
+      for (std::size_t c = 0; c < 3 && use[i] > 0; ++c) {
+        const auto h = static_cast<std::size_t>(windows_.horizon[i]);
+        sizes[3 * h + c].push_back(std::abs(fit->residuals[i][static_cast<Eigen::Index>(c)]));
+      }
+    }
+    fit->scales.assign(n, Eigen::Vector3d::Constant(1e-5));
+    for (std::size_t k = 0; k < sizes.size(); ++k) {
+      if (sizes[k].empty()) continue;
+      const auto middle = sizes[k].begin() + static_cast<long>(sizes[k].size() / 2);
+      std::nth_element(sizes[k].begin(), middle, sizes[k].end());
+      fit->scales[k / 3][static_cast<Eigen::Index>(k % 3)] = std::max(1.3 * *middle, 1e-5);
+    }
+  }
+  for (int round = 0; round < 20; ++round) {
+    std::vector<Eigen::Vector3d> sums(n, Eigen::Vector3d::Zero());
+    std::vector<double> counts(n, 0.0);
+    for (std::size_t i = 0; i < use.size(); ++i) {
+      const auto h = static_cast<std::size_t>(windows_.horizon[i]);
+      counts[h] += use[i];
+      for (Eigen::Index c = 0; c < 3; ++c) {
+        const double r = fit->residuals[i][c];
+        const double s = fit->scales[h][c];
+        sums[h][c] += use[i] * weight(r, s) * s * s * r * r;
+      }
+    }
+    for (std::size_t h = 0; h < n; ++h) {
+      if (counts[h] == 0) continue;
+      for (Eigen::Index c = 0; c < 3; ++c) {
+        fit->scales[h][c] = std::max(std::sqrt(sums[h][c] / counts[h]), 1e-5);
+      }
+    }
+  }
+}
+
+double WindowFitter::score(WindowFit* fit, const std::vector<double>& use) const {
+  fit->nats.assign(use.size(), 0.0);
+  fit->objective = prior(*fit);
+  for (std::size_t i = 0; i < use.size(); ++i) {
+    const Eigen::Vector3d& s = fit->scales[static_cast<std::size_t>(windows_.horizon[i])];
+    for (Eigen::Index c = 0; c < 3; ++c) {
+      fit->nats[i] += log_density(fit->residuals[i][c], s[c]);
+    }
+    fit->objective += use[i] * fit->nats[i];
+  }
+  return fit->objective;
+}
+
+void WindowFitter::slope(const WindowFit& fit, Eigen::Index k,
+                         std::vector<Eigen::MatrixXd>* J) const {
+  const double step = kStepShare * fit.rows[static_cast<std::size_t>(k)].row.tolerance;
+  Eigen::VectorXd moved = fit.values;
+  moved[k] += step;
+  const auto r = residuals(fit.rows, moved);
+  for (std::size_t i = 0; i < r.size(); ++i) (*J)[i].col(k) = (r[i] - fit.residuals[i]) / step;
+}
+
+std::vector<Eigen::MatrixXd> WindowFitter::slopes(const WindowFit& fit) const {
+  std::vector<Eigen::MatrixXd> J(fit.residuals.size(), Eigen::MatrixXd(3, fit.values.size()));
+  for (Eigen::Index k = 0; k < fit.values.size(); ++k) slope(fit, k, &J);
+  return J;
+}
+
+void WindowFitter::normal_equations(const WindowFit& fit, const std::vector<Eigen::MatrixXd>& J,
+                                    const std::vector<double>& use, Eigen::MatrixXd* H,
+                                    Eigen::VectorXd* g) const {
+  const Eigen::Index n = fit.values.size();
+  *H = Eigen::MatrixXd::Zero(n, n);
+  *g = Eigen::VectorXd::Zero(n);
+  for (std::size_t i = 0; i < use.size(); ++i) {
+    if (use[i] == 0) continue;
+    const Eigen::Vector3d& s = fit.scales[static_cast<std::size_t>(windows_.horizon[i])];
+    for (Eigen::Index c = 0; c < 3; ++c) {
+      const double w = use[i] * weight(fit.residuals[i][c], s[c]);
+      *H += w * J[i].row(c).transpose() * J[i].row(c);
+      *g += w * J[i].row(c).transpose() * fit.residuals[i][c];
+    }
+  }
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const FitRow& row = fit.rows[static_cast<std::size_t>(k)];
+    (*H)(k, k) += precision(row);
+    if (!row.free) (*g)[k] += precision(row) * (fit.values[k] - row.row.nominal);
+  }
+}
+
+double WindowFitter::promise(const WindowFit& fit, const std::vector<Eigen::MatrixXd>& fit_slopes,
+                             const std::vector<FitRow>& rows, const Eigen::VectorXd& values) const {
+  WindowFit moved = fit;
+  moved.rows = rows;
+  moved.values = values;
+  std::vector<Eigen::MatrixXd> J(fit_slopes.size(), Eigen::MatrixXd(3, values.size()));
+  for (std::size_t i = 0; i < J.size(); ++i) J[i].leftCols(fit.values.size()) = fit_slopes[i];
+  for (Eigen::Index k = fit.values.size(); k < values.size(); ++k) slope(moved, k, &J);
+  Eigen::MatrixXd H;
+  Eigen::VectorXd g;
+  normal_equations(moved, J, uses({}), &H, &g);
+  return prior(moved) - prior(fit) + g.dot(H.ldlt().solve(g)) / 2;
+}
+
+bool WindowFitter::step(WindowFit* fit, const std::vector<double>& use, double* damping) const {
+  Eigen::MatrixXd H;
+  Eigen::VectorXd g;
+  normal_equations(*fit, slopes(*fit), use, &H, &g);
+  for (int attempt = 0; attempt < 5; ++attempt) {
+    Eigen::MatrixXd damped = H;
+    damped.diagonal() *= 1 + *damping;
+    WindowFit next = *fit;
+    next.values -= damped.ldlt().solve(g);
+    if (next.values.allFinite()) {
+      next.residuals = residuals(next.rows, next.values);
+      if (score(&next, use) > fit->objective) {
+        const double gained = next.objective - fit->objective;
+        *fit = std::move(next);
+        *damping = std::max(*damping / 10, 1e-6);
+        return gained > kEnough;
+      }
+    }
+    *damping = std::max(*damping, 1e-3) * 10;
+  }
+  return false;
+}
+
+WindowFit WindowFitter::hold(const std::vector<FitRow>& rows, const Eigen::VectorXd& values,
+                             const std::vector<char>& left_out) const {
+  WindowFit fit;
+  fit.rows = rows;
+  fit.values = values;
+  fit.residuals = residuals(rows, values);
+  const std::vector<double> use = uses(left_out);
+  rescale(&fit, use);
+  score(&fit, use);
+  return fit;
+}
+
+WindowFit WindowFitter::fit(const std::vector<FitRow>& rows, const std::vector<char>& left_out,
+                            const Eigen::VectorXd& values, int rounds) const {
+  Eigen::VectorXd start(static_cast<Eigen::Index>(rows.size()));
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    start[static_cast<Eigen::Index>(i)] = rows[i].row.nominal;
+  }
+  if (values.size() == start.size()) start = values;
+  WindowFit fit = hold(rows, start, left_out);
+  const std::vector<double> use = uses(left_out);
+  for (int round = 0; round < rounds && !rows.empty(); ++round) {
+    const double before = fit.objective;
+    double damping = 1e-3;
+    for (int k = 0; k < kSteps && step(&fit, use, &damping); ++k) {
+    }
+    rescale(&fit, use);
+    score(&fit, use);
+    if (fit.objective - before < 0.01) break;
+  }
+  return fit;
+}
+
+Eigen::MatrixX2d WindowFitter::intervals(const WindowFit& fit, std::uint64_t seed) const {
+  const Eigen::Index n = fit.values.size();
+  const auto blocks = static_cast<std::size_t>(windows_.blocks);
+  const std::vector<double> use = uses({});
+  const std::vector<Eigen::MatrixXd> J = slopes(fit);
+  std::vector<Eigen::MatrixXd> H(blocks, Eigen::MatrixXd::Zero(n, n));
+  std::vector<Eigen::VectorXd> g(blocks, Eigen::VectorXd::Zero(n));
+  for (std::size_t i = 0; i < use.size(); ++i) {
+    const auto b = static_cast<std::size_t>(windows_.block[i]);
+    const Eigen::Vector3d& s = fit.scales[static_cast<std::size_t>(windows_.horizon[i])];
+    for (Eigen::Index c = 0; c < 3; ++c) {
+      const double w = use[i] * weight(fit.residuals[i][c], s[c]);
+      H[b] += w * J[i].row(c).transpose() * J[i].row(c);
+      g[b] += w * J[i].row(c).transpose() * fit.residuals[i][c];
+    }
+  }
+  Eigen::MatrixXd P = Eigen::MatrixXd::Zero(n, n);
+  Eigen::VectorXd p = Eigen::VectorXd::Zero(n);
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const FitRow& row = fit.rows[static_cast<std::size_t>(k)];
+    P(k, k) = precision(row);
+    if (!row.free) p[k] = precision(row) * (fit.values[k] - row.row.nominal);
+  }
+  Stream stream({seed, Purpose::kStatistics, 0, 0, 0});
+  Eigen::MatrixXd drawn(n, kDraws);
+  for (int d = 0; d < kDraws; ++d) {
+    Eigen::MatrixXd A = P;
+    Eigen::VectorXd b = p;
+    for (std::size_t k = 0; k < blocks; ++k) {
+      const auto pick = static_cast<std::size_t>(stream.below(blocks));
+      A += H[pick];
+      b += g[pick];
+    }
+    drawn.col(d) = fit.values - A.ldlt().solve(b);
+  }
+  Eigen::MatrixX2d bounds(n, 2);
+  for (Eigen::Index k = 0; k < n; ++k) {
+    std::vector<double> row(drawn.cols());
+    for (Eigen::Index d = 0; d < drawn.cols(); ++d) row[static_cast<std::size_t>(d)] = drawn(k, d);
+    std::sort(row.begin(), row.end());
+    bounds(k, 0) = row[kDraws / 20];
+    bounds(k, 1) = row[kDraws - 1 - kDraws / 20];
+  }
+  return bounds;
+}
+
+}  // namespace gapfarm
