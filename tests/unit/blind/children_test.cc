@@ -23,7 +23,7 @@ class Children : public ::testing::Test {
     return options;
   }
 
-  testing::Folder folder_;
+  tests::Folder folder_;
 };
 
 TEST_F(Children, EveryWayToEndIsAnOutcome) {

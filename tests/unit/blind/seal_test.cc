@@ -69,7 +69,7 @@ TEST(TruthBox, KeyReadsBack) {
 }
 
 TEST(TruthBox, PrivateFilesAreTheOwnersAlone) {
-  const testing::Folder folder;
+  const tests::Folder folder;
   ASSERT_TRUE(write_private_file(folder / "key", "secret").ok());
   struct stat status = {};
   ASSERT_EQ(::stat((folder / "key").c_str(), &status), 0);
