@@ -124,14 +124,18 @@ Result<TrialLog> Designer::driven(const Sessions& plan) {
       farm_.run(farm_.add_problem(to_proto(problem)), simulate_tasks(plan, {}, settings_.seed, 0));
   if (!results) return results.error();
   TrialLog log;
-  for (const v1::TaskResult& result : *results) {
+  for (std::size_t s = 0; s < results->size(); ++s) {
+    const v1::TaskResult& result = (*results)[s];
     if (result.outcome() != v1::OK) {
       return Error{"the simulation ended with " + v1::Outcome_Name(result.outcome()) + " (" +
                        result.message() + "); these parameters do not make a robot that drives",
                    ErrorCode::kSimulation};
     }
-    for (const v1::Trial& trial : result.simulate().trials()) {
-      log.trials.push_back(from_proto(trial));
+    for (std::size_t i = 0; i < plan[s].size(); ++i) {
+      Trial trial = from_proto(result.simulate().trials(static_cast<int>(i)));
+      // What the least noise leaves between two readings of one place is no move.
+      if (!plan[s][i].moved() && i > 0) trial.X_WS = log.trials.back().X_WE;
+      log.trials.push_back(std::move(trial));
     }
   }
   return log;

@@ -91,7 +91,13 @@ struct Golden {
   const char* hash;
 };
 
-constexpr Golden kStored[] = {};
+constexpr Golden kStored[] = {
+    {"7234afc4", "treads", "e44d8a6a29c23447b7731aee324a65a8"},
+    {"7234afc4", "wheels", "4e3872c234c8ad27a31bc38ab204359c"},
+    {"7234afc4", "push", "e4e92d2b3bb3e95a7ca0d362c89ad38b"},
+    {"7234afc4", "racquetball", "03c980b4d323b1759d7fb9b3e8389633"},
+    {"7234afc4", "ground", "def2513467d91d0d22ecf1a43274c3b5"},
+};
 
 void expect_stored(const std::string& scenario, const std::string& hash) {
   const std::string arithmetic = arithmetic_class();
