@@ -34,7 +34,7 @@ TEST(CliUsage, AnswersWhatPeopleTry) {
 TEST(CliUsage, HelpFitsAScreenAndHasExamplesEverywhere) {
   const Finished help = gapfarm_command({"--help"});
   EXPECT_EQ(help.exit_code, 0);
-  EXPECT_LE(std::count(help.out.begin(), help.out.end(), '\n'), 50);
+  EXPECT_LE(std::count(help.out.begin(), help.out.end(), '\n'), 56);
   for (const char* command : {"evolve", "resume", "status", "simulate", "predict", "effects",
                               "check", "import", "keys"}) {
     EXPECT_THAT(help.out, HasSubstr(command));
