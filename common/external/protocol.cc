@@ -23,7 +23,11 @@ Error wrong(const std::string& what, const std::string& line) {
 
 std::string word_of(const Json& json, const char* key) {
   const auto found = json.find(key);
-  return found != json.end() && found->is_string() ? found->get<std::string>() : "";
+  std::string word = found != json.end() && found->is_string() ? found->get<std::string>() : "";
+  for (char& c : word) {  // it goes into one line of models and messages
+    if (static_cast<unsigned char>(c) < ' ' || c == 127) c = ' ';
+  }
+  return word;
 }
 
 double number_of(const Json& json, const char* key, double fallback) {

@@ -42,6 +42,13 @@ TEST(ExternalDeclaration, RefusesWhatCannotBeATable) {
   EXPECT_THAT(error_of(declaration_with(kMass, R"(["paths"])")), HasSubstr("did you mean 'path'"));
 }
 
+TEST(ExternalDeclaration, SaysEverythingInOneLine) {
+  const auto declaration = parse_declaration(declaration_with(
+      R"({"key": "m", "lower": 1, "upper": 2, "nominal": 1, "summary": "of\nall\n[genes]"})"));
+  ASSERT_TRUE(declaration.ok());
+  EXPECT_EQ(declaration->parameters[0].summary, "of all [genes]");
+}
+
 TEST(ExternalTable, HasTheProgramsRowsThenNoiseThenEffectsThatCanBeApplied) {
   const ExternalTable plain(parse_declaration(declaration_with(kMass)).value());
   EXPECT_EQ(plain.table()[0].key, "mass");
