@@ -143,7 +143,9 @@ void add_facts(const RunStatus& status, RunFarm* farm) {
   if (progress.epoch > 1) add("masters so far", std::to_string(progress.epoch));
   if (status.quarantined > 0) add("tasks given up", std::to_string(status.quarantined));
   for (const FarmTally::Row& row : FarmTally::kRows) {
-    if (progress.farm.*row.count > 0) add(row.key, std::to_string(progress.farm.*row.count));
+    std::string label = row.key;
+    std::replace(label.begin(), label.end(), '_', ' ');
+    farm->tally.emplace_back(std::move(label), std::to_string(progress.farm.*row.count));
   }
 }
 

@@ -3,6 +3,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "common/score/motion_model.h"
@@ -20,13 +21,16 @@ constexpr double kPlayedInterval_s = 0.02;
 constexpr std::size_t kMostPlayed = 400;  // samples of a path
 constexpr std::size_t kMostKept = 200;    // answers
 
+// More digits than a screen can show would only be sent.
+double micro(double value) { return std::round(1e6 * value) / 1e6; }
+
 Json path_json(const std::vector<PathSample>& path, const Pose& X_WS) {
   Json list = Json::array();
   const std::size_t each = std::max<std::size_t>(1, (path.size() + kMostPlayed - 1) / kMostPlayed);
   for (std::size_t i = 0; i < path.size(); ++i) {
     if (i % each != 0 && i + 1 != path.size()) continue;
     const Pose X_SP = between(X_WS, path[i].pose);
-    list.push_back({path[i].t_s, X_SP.x, X_SP.y, X_SP.theta});
+    list.push_back({path[i].t_s, micro(X_SP.x), micro(X_SP.y), micro(X_SP.theta)});
   }
   return list;
 }

@@ -99,7 +99,11 @@ std::string farm_section(const RunFarm& farm) {
           ? std::string("<p>No worker has been heard of by this run's last master.</p>")
           : R"(<table class="cards" data-file="workers"><caption class="unseen">Workers</caption><thead><tr><th scope="col">worker</th><th scope="col">host</th><th scope="col">state</th><th scope="col" class="number">jobs in hand</th><th scope="col" class="number">finished</th><th scope="col" class="number">jobs/s</th></tr></thead><tbody>)" +
                 worker_rows(farm.workers) + "</tbody></table>";
-  html += "<h3>What somebody should look at</h3>";
+  html += R"(<h3>What it coped with</h3><dl class="provenance">)";
+  for (const auto& [label, value] : farm.tally) {
+    html += "<div><dt>" + html_escaped(label) + "</dt><dd>" + html_escaped(value) + "</dd></div>";
+  }
+  html += "</dl><h3>What somebody should look at</h3>";
   html += farm.incidents.empty()
               ? std::string("<p>Nothing: no task was given up, and no two answers differed.</p>")
               : list_of(farm.incidents, "cautions");

@@ -67,6 +67,8 @@ struct RunFarm {
   std::string state;                                       // "running"
   std::string told;                                        // what it waits for, or how it ended
   std::vector<std::pair<std::string, std::string>> facts;  // "rate": "38.1 evaluations/s"
+  // What it coped with, counted over all masters: "retries": "3".
+  std::vector<std::pair<std::string, std::string>> tally;
   std::vector<RunWorker> workers;
   std::vector<std::string> incidents;  // latest first
   std::vector<std::string> log;        // the last lines of log.txt

@@ -164,7 +164,7 @@ std::string comparison_table(std::span<const RunReport> runs) {
   }
   html += "</tr></thead><tbody>";
   for (const ParameterRow* key : keys) {
-    html += R"(<tr><th scope="row"><code>)" + html_escaped(key->key) + "</code><small>" +
+    html += R"(<tr><th scope="row"><code>)" + html_escaped(key->key) + "</code> <small>" +
             html_escaped(key->unit == "-" ? "" : key->unit) + "</small></th>";
     for (const RunReport& run : runs) {
       const auto row = std::find_if(run.parameters.begin(), run.parameters.end(),

@@ -6,7 +6,7 @@ import { join } from "node:path";
 
 export const pictures = process.env.REPORT_PICTURES;  // a folder that keeps screenshots for a person
 export const profile = mkdtempSync(join(tmpdir(), "report-page-"));
-const TIME_LIMIT_MS = 240_000;  // on a machine with many other things to do
+const TIME_LIMIT_MS = 600_000;  // on a machine with many other things to do
 
 export const failures = [];
 export const check = (good, words) => {
@@ -19,6 +19,7 @@ const flags = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", 
   "--disable-dev-shm-usage", `--user-data-dir=${profile}`, "--remote-debugging-pipe"];
 const browser = spawn(chromium, flags, { stdio: ["ignore", "ignore", "ignore", "pipe", "pipe"] });
 const limit = setTimeout(() => {
+  for (const failure of failures) console.error(`FAILED ${failure}`);
   console.error("the browser did not answer in time");
   browser.kill("SIGKILL");
   process.exit(1);
