@@ -253,11 +253,11 @@ void Catalogue::motors() {
   }
   const double band = robot_.command == CommandKind::kWheelSpeeds ? 0.1 : 0.01;
   more("motor_deadband", {}, "commands that move nothing",
-       {{"dead_band", robot_.motors.dead_band, band, "width", "of the command"}});
+       {{"dead_band", robot_.motors.dead_band, band, "width", "of the command", true}});
   const double ramp =
       robot_.motors.acceleration_limit_m_s2 ? 1 / *robot_.motors.acceleration_limit_m_s2 : 0;
   more("acceleration_limit", {"motor_lag"}, "the ramp of the wheels' speed",
-       {{"ramp", ramp, 0.03, "ramp", "s^2/m"}});
+       {{"ramp", ramp, 0.03, "ramp", "s^2/m", true}});
 }
 
 void Catalogue::tracker() {
@@ -285,7 +285,7 @@ std::vector<KinematicRow> kinematic_rows(const GroundRobot& robot) {
     if (is_throttled(robot)) {
       const RobotThrottle& t = robot.throttle;
       const auto put = [&](const char* name, double own, double least, const char* unit) {
-        rows.push_back({name, own, least + kPowerShare * own, name, unit});
+        rows.push_back({name, own, least + kPowerShare * own, name, unit, true});
       };
       put("gain", t.gain, 0, "m/s^2");
       put("zero", t.zero, 0.003, "-");
@@ -305,7 +305,7 @@ std::vector<KinematicRow> kinematic_rows(const GroundRobot& robot) {
   }
   const double marker = (is_steered(robot) ? kCarMarkerShare : kMarkerShare) * wheel_reach_m(robot);
   const Pose& X = robot.X_RM;
-  rows.push_back({"lag", robot.motors.lag_s, kLag_s, "tau", "s"});
+  rows.push_back({"lag", robot.motors.lag_s, kLag_s, "tau", "s", true});
   rows.push_back({"delay", robot.motors.delay_s, kDelay_s, "latency", "s"});
   rows.push_back({"marker_x", X.x, marker, "x", "m"});
   rows.push_back({"marker_y", X.y, marker, "y", "m"});

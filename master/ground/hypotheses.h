@@ -18,8 +18,9 @@ struct KinematicRow {
   // How far off the value of a well-kept file still is, as a standard deviation; also the size of
   // a step that shows in the motion.
   double tolerance = 0;
-  std::string key;   // in a diagnosis: "ratio", "angle", "x"
-  std::string unit;  // of the difference from nominal
+  std::string key;        // in a diagnosis: "ratio", "angle", "x"
+  std::string unit;       // of the difference from nominal
+  bool positive = false;  // below 0 it has no meaning
 };
 
 struct GroundHypothesis {

@@ -5,18 +5,15 @@
 #include <cmath>
 
 #include "common/random/stream.h"
-#include "common/runs/afresh.h"
 #include "common/score/kinematic.h"
 
 namespace gapfarm {
 namespace {
 
 constexpr double kTail = 4;          // degrees of freedom of a residual's density
-constexpr int kLeastBlocks = 10;     // fewer runs than this are cut into stretches
 constexpr int kSteps = 6;            // of Gauss and Newton a round
 constexpr int kDraws = 400;          // of the bootstrap
 constexpr double kStepShare = 0.05;  // of a row's tolerance: to find slopes
-constexpr double kMargin_s = 11;     // of commands round a window: clocks may be 10 s apart
 constexpr double kFaster = 0.02;     // to find how ends move with speed
 constexpr double kEnough = 1e-3;     // nats a step
 
@@ -54,69 +51,7 @@ double prior(const WindowFit& fit) {
   return sum;
 }
 
-bool alike(const std::vector<Trial>& a, std::size_t from_a, const std::vector<Trial>& b) {
-  if (a.size() - from_a != b.size()) return false;
-  for (std::size_t i = 0; i < b.size(); ++i) {
-    const Trial& x = a[from_a + i];
-    if (x.run != b[i].run || x.t_s != b[i].t_s || x.duration_s != b[i].duration_s) return false;
-  }
-  return true;
-}
-
 }  // namespace
-
-Result<WindowSet> window_set(const GroundRobot& robot, const RunLog& log,
-                             const WindowSettings& settings) {
-  WindowSet set;
-  const bool afresh = robot.command == CommandKind::kThrottleSteering;
-  std::vector<std::size_t> run_of;  // of each trial, in the log
-  std::size_t last = 0;
-  for (const double horizon : settings.horizons_s) {
-    auto cut = cut_windows(log, {{horizon}, settings.run_in_s});
-    if (!cut) continue;
-    if (!afresh && set.horizons > 0 && alike(set.trials, last, cut->log.trials)) continue;
-    last = set.trials.size();
-    for (const Trial& trial : cut->log.trials) run_of.push_back(*trial.run);
-    if (afresh) {
-      *cut = begin_afresh(log, std::move(*cut), settings.run_in_s, kMargin_s);
-      for (Trial& trial : cut->log.trials) *trial.run += static_cast<std::uint32_t>(last);
-      set.runs.insert(set.runs.end(), cut->runs.begin(), cut->runs.end());
-    } else {
-      set.runs = std::move(cut->runs);
-    }
-    for (Trial& trial : cut->log.trials) {
-      set.trials.push_back(std::move(trial));
-      set.horizon.push_back(set.horizons);
-    }
-    ++set.horizons;
-  }
-  if (set.trials.empty()) return Error{"no window of any horizon fits into the runs"};
-  std::vector<double> begin(log.runs.size()), length(log.runs.size());
-  double all = 0;
-  for (std::size_t i = 0; i < log.runs.size(); ++i) {
-    if (log.runs[i].poses.size() < 2) continue;
-    begin[i] = log.runs[i].poses.front().t_s;
-    length[i] = log.runs[i].poses.back().t_s - begin[i];
-    all += length[i];
-  }
-  // Stretches of one length, none over two runs.
-  std::vector<int> first(log.runs.size());
-  const bool few = log.runs.size() < kLeastBlocks;
-  for (std::size_t i = 0; i < log.runs.size(); ++i) {
-    first[i] = set.blocks;
-    const double pieces = few ? std::ceil(kLeastBlocks * length[i] / std::max(all, 1e-9)) : 1;
-    set.blocks += std::max(1, static_cast<int>(pieces));
-  }
-  for (std::size_t i = 0; i < set.trials.size(); ++i) {
-    const Trial& trial = set.trials[i];
-    const std::size_t run = run_of[i];
-    const int pieces = (run + 1 < first.size() ? first[run + 1] : set.blocks) - first[run];
-    const double middle = *trial.t_s + *trial.duration_s / 2 - begin[run];
-    const int piece = static_cast<int>(pieces * middle / std::max(length[run], 1e-9));
-    set.block.push_back(first[run] + std::clamp(piece, 0, pieces - 1));
-  }
-  return set;
-}
 
 WindowFitter::WindowFitter(const GroundRobot& robot, const WindowSet& windows)
     : robot_(robot), windows_(windows) {
@@ -292,6 +227,34 @@ double WindowFitter::promise(const WindowFit& fit, const std::vector<Eigen::Matr
   return prior(moved) - prior(fit) + g.dot(H.ldlt().solve(g)) / 2;
 }
 
+namespace {
+
+// Values after a step of Gauss and Newton; what would fall below where it has a meaning stays at 0.
+Eigen::VectorXd stepped(const WindowFit& fit, const Eigen::MatrixXd& H, const Eigen::VectorXd& g) {
+  std::vector<char> at_zero(fit.rows.size(), 0);
+  while (true) {
+    Eigen::MatrixXd A = H;
+    Eigen::VectorXd b = g;
+    for (Eigen::Index k = 0; k < g.size(); ++k) {
+      if (!at_zero[static_cast<std::size_t>(k)]) continue;
+      A.row(k).setZero();
+      A(k, k) = 1;
+      b[k] = fit.values[k];
+    }
+    const Eigen::VectorXd next = fit.values - A.partialPivLu().solve(b);
+    bool more = false;
+    for (std::size_t k = 0; k < at_zero.size(); ++k) {
+      const bool below = fit.rows[k].row.positive && next[static_cast<Eigen::Index>(k)] < 0;
+      if (!below || at_zero[k]) continue;
+      at_zero[k] = 1;
+      more = true;
+    }
+    if (!more) return next;
+  }
+}
+
+}  // namespace
+
 bool WindowFitter::step(WindowFit* fit, const std::vector<double>& use, double* damping) const {
   Eigen::MatrixXd H;
   Eigen::VectorXd g;
@@ -300,7 +263,7 @@ bool WindowFitter::step(WindowFit* fit, const std::vector<double>& use, double* 
     Eigen::MatrixXd damped = H;
     damped.diagonal() *= 1 + *damping;
     WindowFit next = *fit;
-    next.values -= damped.ldlt().solve(g);
+    next.values = stepped(*fit, damped, g);
     if (next.values.allFinite()) {
       next.residuals = residuals(next.rows, next.values);
       if (score(&next, use) > fit->objective) {

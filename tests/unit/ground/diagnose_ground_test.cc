@@ -74,13 +74,16 @@ RunLog driven(const GroundRobot& robot, const Kinematics& truly) {
     for (int k = 1; k < 60; ++k) {
       Trial way;
       way.X_WS = {0.3 * r, -0.2, 1.1 * r};
-      way.run = 0;
+      way.run = 1;
       way.t_s = began;
       way.duration_s = 0.2 * k;
       ways.push_back(way);
     }
-    const std::vector<Pose> ends =
-        kinematic_ends(robot, std::span<const CommandedRun>(&commanded, 1), ways, truly);
+    // The session's clock begins with the first run.
+    CommandedRun session;
+    session.commands = {{0, std::vector<double>(robot.channels.size())}};
+    const std::vector<CommandedRun> runs = {session, commanded};
+    const std::vector<Pose> ends = kinematic_ends(robot, runs, ways, truly);
     for (std::size_t k = 0; k < ends.size(); ++k) {
       Pose X = ends[k];
       X.x += 3e-4 * stream.normal();
