@@ -294,7 +294,7 @@ SubcommandRun setup_diagnose(CLI::App& app) {
       "  gapfarm diagnose configs/srv1.toml --trials log.csv --out diagnosis\n"
       "  gapfarm diagnose configs/srv1.toml --trials log.csv --out d2 --model run/srv1\n"
       "  gapfarm diagnose configs/push.toml --trials pushes.csv --out d3\n"
-      "  gapfarm diagnose husky.toml --out d4    (scenario ground: robot file and logged runs)\n"
+      "  gapfarm diagnose husky.toml --out d4\n"
       "Stopped?  The same command goes on: simulations are kept in OUT/simulations.sqlite.");
   return [command](CliContext& context) { return run_diagnose(*command, context); };
 }

@@ -207,8 +207,7 @@ SubcommandRun setup_plan(CLI::App& app) {
       "Examples:\n"
       "  gapfarm plan configs/srv1.toml --trials 120 --place 2x2 --out plan.csv\n"
       "  gapfarm plan run/demo/model.toml --effects floor_tilt,motor_asymmetry --out plan.csv "
-      "--picture plan.svg\n"
-      "  gapfarm simulate configs/srv1.toml --like plan.csv --out trials.csv");
+      "--picture plan.svg");
   return [options](CliContext& context) { return run_plan(*options, context); };
 }
 

@@ -46,7 +46,7 @@ TEST_F(CliReport, ARunLeavesAPageThatIsMadeAgainFromItsStoreAlone) {
   const std::string file = folder_.write("apart.csv", header + "\n" + apart);
   const Finished evolved = evolve("[validation]\ntrials = [\"" + file + "\"]\n", "2");
   ASSERT_EQ(evolved.exit_code, 0) << evolved.err;
-  EXPECT_THAT(evolved.err, HasSubstr("report.html"));
+  EXPECT_THAT(evolved.out, HasSubstr("report.html"));
   const std::string page = text_of(run_ + "/report.html");
   // Before and after, with bounds, on the trials evolved on and on those kept apart.
   EXPECT_THAT(page, HasSubstr("<code>contact_length</code>"));

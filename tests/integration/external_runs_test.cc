@@ -32,9 +32,9 @@ class ExternalRuns : public ::testing::Test {
   std::string config(const std::string& misbehave, const std::string& more = "") const {
     folder_.write("simulator.py", simulator(misbehave));
     folder_.write("log.csv",
-                  "session,trial,command,x0,y0,theta0,x1,y1,theta1\n"
-                  "s,0,forward,0,0,0,0.41,0,0\ns,1,forward,0,0,0,0.40,0.01,0\n"
-                  "s,2,forward,0,0,0,0.39,0,0.01\ns,3,backward,0,0,0,-0.4,0,0\n");
+                  "session,trial,t,command,left,right,duration,x0,y0,theta0,x1,y1,theta1\n"
+                  "s,0,0,forward,,,,0,0,0,0.41,0,0\ns,1,5,forward,,,,0,0,0,0.40,0.01,0\n"
+                  "s,2,10,forward,,,,0,0,0,0.39,0,0.01\ns,3,15,backward,,,,0,0,0,-0.4,0,0\n");
     return folder_.write("run.toml",
                          "scenario = \"external\"\ntrials = [\"log.csv\"]\n"
                          "[external]\nprogram = [\"python3\", \"simulator.py\"]\n"

@@ -56,7 +56,7 @@ TEST(Completion, KnowsCommandsAndTheirOptions) {
 
 TEST(Completion, KnowsEffectsAndParameters) {
   EXPECT_THAT(after({"diagnose", "none.toml", "--leave-out", "camera_s"}),
-              ElementsAre("camera_seam"));
+              ElementsAre("camera_seam", "camera_seam_2"));
   EXPECT_THAT(after({"simulate", "none.toml", "--set", "fric"}),
               ElementsAre("friction=", "friction_patch.radius=", "friction_patch.ratio=",
                           "friction_patch.x=", "friction_patch.y=", "friction_ratio="));
