@@ -38,6 +38,18 @@ class CliReport : public ::testing::Test {
   const std::string run_ = folder_ / "run";
 };
 
+// Without what a master still says of itself and logs once the page is written.
+std::string without_farm(std::string page) {
+  const auto cut = [&](const std::string& from, const std::string& to) {
+    const std::size_t begin = page.find(from), end = page.find(to, begin);
+    EXPECT_NE(end, std::string::npos) << from;
+    if (end != std::string::npos) page.erase(begin, end - begin);
+  };
+  cut("<p id=\"state\"", "</p>");
+  cut("<section id=\"farm\"", "</section>");
+  return page;
+}
+
 TEST_F(CliReport, ARunLeavesAPageThatIsMadeAgainFromItsStoreAlone) {
   std::ifstream log(GAPFARM_SOURCE_DIR "/configs/demo/trials.csv");
   std::string header, row, apart;
@@ -60,7 +72,7 @@ TEST_F(CliReport, ARunLeavesAPageThatIsMadeAgainFromItsStoreAlone) {
   std::filesystem::remove(file);
   const Finished again = report(run_);
   EXPECT_EQ(again.exit_code, 0) << again.err;
-  EXPECT_EQ(text_of(folder_ / "page.html"), page);
+  EXPECT_EQ(without_farm(text_of(folder_ / "page.html")), without_farm(page));
 }
 
 // What a stopped run has is shown, and what it has not is said.
