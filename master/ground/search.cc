@@ -17,7 +17,7 @@ constexpr double kLeastPromise = kLeastGroundGain / 3;
 constexpr int kFolds = 5;
 // Standard errors by which what is named must be better on stretches that were left out: the first
 // name has its gain to speak for it, further ones are to be rare.
-constexpr double kLeastSureFirst = 0.5;
+constexpr double kLeastSureFirst = 1;
 constexpr double kLeastSureNext = 2;
 constexpr double kNear_s = 1, kMiddle_s = 3, kFar_s = 10;  // either way of the file's delay
 
