@@ -57,7 +57,7 @@ Status apply_options(PlanOptions& options, Config& config) {
   if (!options.place.empty()) {
     const Result<double> width = width_of_place(options.place);
     if (!width) return width.error();
-    s.arena_m = *width / 0.7;  // robots are put down within the middle 0.7 of it
+    s.arena_m = *width;
   }
   if (options.sessions) s.sessions = *options.sessions;
   if (options.chain) s.chain = *options.chain;
@@ -189,7 +189,7 @@ SubcommandRun setup_plan(CLI::App& app) {
   app.add_option("--trials", options->settings.trials, "In all; rounded up to whole chains")
       ->check(CLI::Range(1, 5000));
   app.add_option("--effects", options->effects, "Names with commas between, or all");
-  app.add_option("--place", options->place, "Square floor to start on, m: 2x2");
+  app.add_option("--place", options->place, "Square floor to stay on, from the origin, m: 2x2");
   app.add_option("--sessions", options->sessions, "Sessions")->check(CLI::Range(1, 100));
   app.add_option("--chain", options->chain, "Trials before the robot is put down anew")
       ->check(CLI::Range(1, 1000));

@@ -64,6 +64,8 @@ class Designer {
     return signals(farm_, config_.problem, log, {effects_, 4, settings_.seed});
   }
   Result<std::vector<Chain>> choose();
+  // Whether all of these trials end within the arena.
+  bool stays(const TrialLog& log, std::size_t first, std::size_t count) const;
   unsigned chain() const { return std::max(1U, config_.simulate.chain); }
   std::vector<PowerPoint> power(const Signals& planned, const TrialLog& planned_log,
                                 const Signals& random, const TrialLog& random_log,
@@ -141,6 +143,13 @@ Result<TrialLog> Designer::driven(const Sessions& plan) {
   return log;
 }
 
+bool Designer::stays(const TrialLog& log, std::size_t first, std::size_t count) const {
+  const auto within = [&](double at) { return at >= 0 && at <= config_.simulate.arena_m; };
+  return std::all_of(log.trials.begin() + static_cast<std::ptrdiff_t>(first),
+                     log.trials.begin() + static_cast<std::ptrdiff_t>(first + count),
+                     [&](const Trial& t) { return within(t.X_WE.x) && within(t.X_WE.y); });
+}
+
 Result<std::vector<Chain>> Designer::choose() {
   const Sessions pool = draw(settings_.pool, settings_.seed);
   const auto log = driven(pool);
@@ -157,11 +166,15 @@ Result<std::vector<Chain>> Designer::choose() {
     scales.push_back(std::sqrt(kInformation * trials / (settings_.trials * all)));
   }
   const Eigen::Index nuisances = told->nuisances.cols();
-  const std::vector<Chain> chains = chains_of(pool);
+  std::vector<Chain> chains;  // that stay on the floor
   std::vector<Rows> candidates;
   Eigen::Index first = 0;
-  for (const Chain& chain : chains) {
+  for (Chain& chain : chains_of(pool)) {
     const auto rows = static_cast<Eigen::Index>(3 * chain.size());
+    if (!stays(*log, static_cast<std::size_t>(first / 3), chain.size())) {
+      first += rows;
+      continue;
+    }
     Rows candidate(rows, static_cast<Eigen::Index>(shifts.size()) + nuisances);
     for (std::size_t k = 0; k < shifts.size(); ++k) {
       candidate.col(static_cast<Eigen::Index>(k)) =
@@ -169,10 +182,19 @@ Result<std::vector<Chain>> Designer::choose() {
     }
     candidate.rightCols(nuisances) = told->nuisances.middleRows(first, rows);
     candidates.push_back(std::move(candidate));
+    chains.push_back(std::move(chain));
     first += rows;
   }
   std::vector<Chain> chosen;
   const std::size_t wanted = (settings_.trials + chain() - 1) / chain();
+  if (chains.size() < wanted) {
+    return Error{"only " + std::to_string(chains.size()) + " of " +
+                 std::to_string(wanted * settings_.pool) + " chains of " + std::to_string(chain()) +
+                 " drives stay on a floor of " + std::to_string(config_.simulate.arena_m) +
+                 " m, and " + std::to_string(wanted) +
+                 " are wanted; give more --place, a shorter --chain or --durations, or a greater "
+                 "--pool"};
+  }
   for (const std::size_t c : select(candidates, nuisances, wanted)) chosen.push_back(chains[c]);
   return chosen;
 }

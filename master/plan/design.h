@@ -43,10 +43,10 @@ struct DesignedPlan {
 using PlanProgress = std::function<void(const std::string& what)>;
 
 // Draws `pool` times the chains that are wanted, as the config's [simulate] has them (levels,
-// durations, chain, arena), and takes those that tell most (selection.h) in that order: whoever
-// stops early has driven the best of them.  Pure: the same for one config, settings and build.
-// Errors: a scenario without a diagnosis; an unknown effect; the farm's; a robot that does not
-// drive.
+// durations, chain, arena), leaves out those that leave the arena, and takes those that tell most
+// (selection.h) in that order: whoever stops early has driven the best of them.  Pure: the same for
+// one config, settings and build.  Errors: a scenario without a diagnosis; an unknown effect; too
+// few chains that stay in the arena; the farm's; a robot that does not drive.
 Result<DesignedPlan> design_plan(Farm& farm, const Config& config, const PlanSettings& settings,
                                  const PlanProgress& progress = {});
 

@@ -100,8 +100,8 @@ void draw_power(Svg& svg, const std::vector<PowerPoint>& power) {
     return SvgPoint{left + trials / most * kPower_px, kTop_px + kFloor_px * (1 - share)};
   };
   svg.rectangle({left, kTop_px}, kPower_px, kFloor_px, {.stroke = "#999999"});
-  for (const double share : {0.0, 0.25, 0.5, 0.75, 1.0}) {
-    svg.text({left - 6, at(0, share).y + 4}, tick_label(share, 0.25),
+  for (const double share : {0.0, 0.2, 0.4, 0.6, 0.8, 1.0}) {
+    svg.text({left - 6, at(0, share).y + 4}, tick_label(share, 0.2),
              {.size = 11, .colour = "#555555", .anchor = SvgAnchor::kEnd});
   }
   for (const double trials : axis_ticks(0, most, 5)) {
@@ -117,7 +117,7 @@ void draw_power(Svg& svg, const std::vector<PowerPoint>& power) {
     }
     const std::string colour = planned ? series_colour(0) : "#777777";
     svg.polyline(line, {.stroke = colour, .stroke_width = 2, .dash = planned ? "" : "6 4"});
-    svg.text({line.back().x - 6, line.back().y + (planned ? -8 : 18)},
+    svg.text({line.back().x - 6, line.back().y + (planned ? -8 : 24)},
              planned ? "this plan" : "random", {.colour = colour, .anchor = SvgAnchor::kEnd});
   }
 }

@@ -73,6 +73,20 @@ TEST_F(DesignTest, IsALogThatCanBeDriven) {
   EXPECT_EQ(moved, 12U);  // what `simulate --like` makes of it
 }
 
+TEST_F(DesignTest, StaysOnItsFloorOrSaysThatThereIsNoRoom) {
+  Config c = config();
+  const DesignedPlan plan = designed(settings());
+  for (const Trial& trial : plan.log.trials) {
+    EXPECT_GE(std::min(trial.X_WE.x, trial.X_WE.y), 0);
+    EXPECT_LE(std::max(trial.X_WE.x, trial.X_WE.y), c.simulate.arena_m);
+  }
+  c.simulate.arena_m = 0.1;
+  tests::WorkerFarm farm;
+  const auto none = design_plan(farm, c, {12, 2, {"motor_asymmetry"}, 1});
+  ASSERT_FALSE(none.ok());
+  EXPECT_NE(none.error().message.find("--place"), std::string::npos) << none.error().message;
+}
+
 TEST_F(DesignTest, IsAFunctionOfItsSettings) {
   const DesignedPlan a = designed(settings()), b = designed(settings());
   ASSERT_EQ(a.log.trials.size(), b.log.trials.size());
