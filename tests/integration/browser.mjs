@@ -105,9 +105,10 @@ export async function open(url, { width = 1280, height = 900, dark = false, scri
 export async function end(name) {
   clearTimeout(limit);
   const gone = new Promise((resolve) => { browser.once("exit", resolve); });
-  browser.kill();
+  send("Browser.close").catch(() => browser.kill());
   await gone;
-  rmSync(profile, { recursive: true, force: true, maxRetries: 5 });
+  // Its children may write into the profile for a moment longer.
+  rmSync(profile, { recursive: true, force: true, maxRetries: 20, retryDelay: 100 });
   for (const failure of failures) console.error(`FAILED ${failure}`);
   console.log(failures.length ? `${failures.length} failures` : `${name}: fine`);
   process.exitCode = failures.length ? 1 : 0;
