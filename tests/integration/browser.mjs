@@ -108,7 +108,15 @@ export async function end(name) {
   send("Browser.close").catch(() => browser.kill());
   await gone;
   // Its children may write into the profile for a moment longer.
-  rmSync(profile, { recursive: true, force: true, maxRetries: 20, retryDelay: 100 });
+  for (let tries = 1; ; ++tries) {
+    try {
+      rmSync(profile, { recursive: true, force: true });
+      break;
+    } catch (error) {
+      if (tries === 50) throw error;
+      await new Promise((again) => { setTimeout(again, 100); });
+    }
+  }
   for (const failure of failures) console.error(`FAILED ${failure}`);
   console.log(failures.length ? `${failures.length} failures` : `${name}: fine`);
   process.exitCode = failures.length ? 1 : 0;
