@@ -54,9 +54,10 @@ in_box() {
 }
 as_user() {
   in_box setpriv --reuid=4711 --regid=4711 --clear-groups \
-    env HOME=/home/ada bash -c "cd && set -e; $1"
+    env HOME="$home" bash -c "cd && set -e; $1"
 }
 in_box useradd --uid 4711 --create-home ada
+home=$(in_box getent passwd ada | cut -d: -f6)
 in_box apt-get update -qq
 # What the machine has before: adduser comes with the worker and stays.
 in_box apt-get install -y -qq --no-install-recommends adduser >/dev/null 2>&1
