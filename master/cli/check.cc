@@ -11,6 +11,7 @@
 #include "master/cli/inputs.h"
 #include "master/cli/subcommand.h"
 #include "master/cli/validation.h"
+#include "master/diagnose/diagnosis_json.h"
 #include "master/evolve/evaluation.h"
 #include "master/ground/diagnose_ground.h"
 #include "master/sanity/sanity.h"
@@ -142,17 +143,6 @@ Summary summarise(const Config& config) {
   summary.conditions = count_conditions(problem, context);
   summary.sanity = doubts(config);
   return summary;
-}
-
-Json sanity_json(const std::vector<SanityFinding>& findings) {
-  Json list = Json::array();
-  for (const SanityFinding& f : findings) {
-    list.push_back({{"name", f.name},
-                    {"severity", severity_name(f.severity)},
-                    {"text", f.text},
-                    {"remedy", f.remedy}});
-  }
-  return list;
 }
 
 Json to_json(const Config& config, const Summary& summary, unsigned workers) {

@@ -45,17 +45,6 @@ Json effect_json(const NamedEffect& effect) {
   return json;
 }
 
-Json sanity_json(const std::vector<SanityFinding>& findings) {
-  Json list = Json::array();
-  for (const SanityFinding& f : findings) {
-    list.push_back({{"name", f.name},
-                    {"severity", severity_name(f.severity)},
-                    {"text", f.text},
-                    {"remedy", f.remedy}});
-  }
-  return list;
-}
-
 Json figures_json(const GapFigures& figures) {
   return {{"tuned", figures.tuned}, {"final", figures.final_}, {"floor", figures.floor}};
 }
@@ -246,6 +235,17 @@ void read_remainder(Fields& root, Diagnosis& diagnosis) {
 }
 
 }  // namespace
+
+Json sanity_json(const std::vector<SanityFinding>& findings) {
+  Json list = Json::array();
+  for (const SanityFinding& f : findings) {
+    list.push_back({{"name", f.name},
+                    {"severity", severity_name(f.severity)},
+                    {"text", f.text},
+                    {"remedy", f.remedy}});
+  }
+  return list;
+}
 
 const char* verdict_name(Verdict verdict) {
   for (const auto& [value, name] : kVerdicts) {

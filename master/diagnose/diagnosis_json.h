@@ -22,6 +22,9 @@ Result<Diagnosis> parse_diagnosis(std::string_view text);
 // Everything but the trials.
 nlohmann::ordered_json summary_json(const Diagnosis& diagnosis);
 
+// [{"name", "severity", "text", "remedy"}, ...]
+nlohmann::ordered_json sanity_json(const std::vector<SanityFinding>& findings);
+
 // {"columns": ["session", ...], "rows": [[...], ...]}: a table, since there are many trials.
 // `digits` significant digits a number; 0: as many as it takes to read back the same bits.
 nlohmann::ordered_json trials_json(const Diagnosis& diagnosis, int digits = 0);
