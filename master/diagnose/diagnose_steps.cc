@@ -256,13 +256,11 @@ void DiagnosisRun::fill_screening(const std::vector<EffectCandidate>& candidates
   }
 }
 
-// Events that slow one side in some trials show as a heavy tail along that side's derivative.
+// Events that slow one side in some trials show as a tail along that side's derivative: a long one
+// when they are rare, a lopsided one when they are not.
 void DiagnosisRun::look_for_slip(const Regression& explained) {
   if (!looks_for("slip_events", kLooksForSlips)) return;
   const Eigen::VectorXd z = studentised(explained, 0.2);
-  std::size_t far = 0;
-  for (Eigen::Index i = 0; i < z.size(); i += 3) far += z.segment<3>(i).squaredNorm() > 13 ? 1 : 0;
-  if (far <= 4 && residual_kurtosis(z) <= 3.2) return;
   const std::vector<Eigen::Vector3d> left = study_.unwhiten(z);
   const std::vector<bool> tells = tells_of_slips();
   slip_ = fit_slip(study_.trials, left, tells, study_.noise);

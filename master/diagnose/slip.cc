@@ -118,7 +118,7 @@ SlipFit fit_slip(std::span<const ResidualTrial> trials, std::span<const Eigen::V
       40, &plain);
   SlipFit fit;
   fit.noise = noise;
-  for (double probability : {0.04, 0.1, 0.2}) {
+  for (double probability : {0.04, 0.1, 0.2, 0.4}) {
     for (double loss : {0.06, 0.12, 0.25, 0.5}) {
       for (double less : {1.0, 0.85}) {
         const double gain = mixture.log_likelihood(less * noise.drive_common,

@@ -17,7 +17,7 @@ struct SlipFit {
 };
 
 // In each trial each side loses, with the probability, a share of its speed uniform in (0, loss).
-// Worth its time only where tails are heavy; Gaussian residuals stay below a gain of 8.
+// Gaussian residuals stay below a gain of 8.
 // Both hypotheses with the drive's noise refitted.  Trials with a false `mask` do not count.
 SlipFit fit_slip(std::span<const ResidualTrial> trials, std::span<const Eigen::Vector3d> residuals,
                  const std::vector<bool>& mask, const NoiseEstimate& start);

@@ -29,6 +29,18 @@ TEST(FitSlip, FindsEvents) {
   }
 }
 
+// So frequent and small that no tail is heavy: they show in the sides' lopsidedness alone.
+TEST(FitSlip, FindsFrequentSmallEvents) {
+  const std::vector<bool> all(600, true);
+  for (std::uint64_t seed = 0; seed < 3; ++seed) {
+    const Drawn d = draw(seed, 0.46, 0.21);
+    const SlipFit fit = fit_slip(d.trials, d.residuals, all, kStart);
+    EXPECT_GT(fit.gain, 20) << seed;
+    EXPECT_NEAR(fit.probability, 0.46, 0.15) << seed;
+    EXPECT_NEAR(fit.loss, 0.21, 0.06) << seed;
+  }
+}
+
 TEST(FitSlip, FindsNoneInGaussianResiduals) {
   const std::vector<bool> all(600, true);
   for (std::uint64_t seed = 0; seed < 20; ++seed) {
