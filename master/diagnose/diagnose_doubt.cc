@@ -19,6 +19,7 @@ constexpr double kAtBound = 1e-3;
 // Nats a trial: the worst of 11 practice logs and of the real forward log keep 0.2 with their
 // effects.
 constexpr double kMostMissed = 3;
+constexpr double kLittleClosed = 0.05;  // of the gap
 
 bool is_place(const std::string& key) {
   return key == "camera_distortion.x" || key == "camera_distortion.y" ||
@@ -80,11 +81,19 @@ void DiagnosisRun::doubt_misses() {
 
 // The chosen effect that is to be dropped and why: trials that no fit saw are predicted no better
 // with it, or its best size is none or more than there can be.
+// What closes next to nothing has to do so without doubt: beside a large gap a few nats are to be
+// had by anything.
 std::optional<std::pair<std::size_t, std::string>> DiagnosisRun::effect_to_drop() const {
   const std::size_t before = as_logged_ ? 1 : 0;
+  const double perfect =
+      std::max(mean(nested_scores_.back()),
+               floor_score(nested_studies_.back(), problem_.fitness.outlier_share));
+  const double gap = perfect - mean(nested_scores_.front());
   for (std::size_t k = chosen_.size(); k-- > 0;) {
-    const std::size_t with = before + k + 1;
-    if (mean(nested_scores_[with]) > mean(nested_scores_[with - 1])) continue;
+    const std::vector<double>&with = nested_scores_[before + k + 1],
+          &without = nested_scores_[before + k];
+    const double gain = mean(with) - mean(without);
+    if (gain > 0 && (gain > kLittleClosed * gap || clearly_better(with, without))) continue;
     return std::pair{k, std::string(" seemed to explain some of it, too, but trials that the fit "
                                     "did not see are predicted no better with it.")};
   }

@@ -102,14 +102,25 @@ Status DiagnosisRun::refit_nested() {
   return {};
 }
 
+// Each where it does best beside the others that are chosen now.
+Status DiagnosisRun::estimate_chosen() {
+  if (chosen_.empty()) return {};
+  std::vector<EffectCandidate> effects;
+  for (const ChosenEffect& c : chosen_) effects.push_back(c.candidate);
+  auto fit = estimate(effects, estimates_ ? 1 : 2);
+  if (!fit) return fit.error();
+  const auto moved = move_patch(predictor_, study_, nuisances_, &*fit);
+  if (!moved) return moved.error();
+  estimates_ = std::move(*fit);
+  if (!*moved) return {};
+  fit = estimate(effects, 1);
+  if (!fit) return fit.error();
+  estimates_ = std::move(*fit);
+  return {};
+}
+
 Status DiagnosisRun::refit() {
-  if (!chosen_.empty()) {
-    std::vector<EffectCandidate> effects;
-    for (const ChosenEffect& c : chosen_) effects.push_back(c.candidate);
-    auto fit = estimate(effects, estimates_ ? 1 : 2);
-    if (!fit) return fit.error();
-    estimates_ = std::move(*fit);
-  }
+  if (Status s = estimate_chosen(); !s) return s;
   const std::vector<std::size_t> folds = subject_.folds(study_);
   const std::size_t found = chosen_.size();
   for (;;) {
@@ -120,12 +131,16 @@ Status DiagnosisRun::refit() {
       if (Status s = estimate_beside_base(); !s) return s;
       worthless = effect_at_bound();
     }
+    if (!worthless) {
+      if (chosen_.size() < found) judge_again();
+      if (Status s = fit_correction(); !s) return s;
+      set_floor(folds);
+      worthless = effect_to_drop();  // by the noise's own tails, if it has any
+    }
     if (!worthless) break;
     drop_effect(worthless->first, worthless->second);
+    if (Status s = estimate_chosen(); !s) return s;
   }
-  if (chosen_.size() < found) judge_again();
-  if (Status s = fit_correction(); !s) return s;
-  set_floor(folds);
   doubt_misses();
   if (misses_) return name_none_for_misses(folds);
   return fit_final();
@@ -138,7 +153,6 @@ Status DiagnosisRun::name_none_for_misses(const std::vector<std::size_t>& folds)
   nested_.clear();
   nested_studies_.clear();
   nested_scores_.clear();
-  slip_scores_.clear();
   result_.fits.clear();
   doubt(*misses_);
   if (Status s = refit_nested(); !s) return s;
@@ -233,6 +247,7 @@ void DiagnosisRun::set_floor(const std::vector<std::size_t>& folds) {
 void DiagnosisRun::foresee_slips(const std::vector<std::size_t>& folds) {
   const std::vector<Eigen::Vector3d> residuals =
       held_out_residuals(nested_studies_.back(), nested_.back(), folds);
+  slip_scores_.clear();
   for (const SlipTrial& t : trials_with_slips(study_.trials, residuals, slip_, mean_loss_of_slips(),
                                               problem_.fitness.outlier_share)) {
     slip_scores_.push_back(t.score);
