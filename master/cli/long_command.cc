@@ -4,7 +4,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cstdlib>
 #include <nlohmann/json.hpp>
 
@@ -19,11 +18,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr double kWriteInterval_s = 1;  // each costs a disk write
-
-double unix_now_s() {
-  const auto now = std::chrono::system_clock::now().time_since_epoch();
-  return std::chrono::duration<double>(now).count();
-}
 
 // Words of this process's command line, without the program.
 std::vector<std::string> own_arguments() {

@@ -1,13 +1,13 @@
 // gapfarm status FOLDER: how a run or another long command is doing, from its store alone.
 #include <poll.h>
 
-#include <chrono>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
 
 #include "master/cli/status_view.h"
 #include "master/cli/subcommand.h"
+#include "master/store/run_lock.h"
 #include "master/store/run_status.h"
 #include "master/store/schema.h"
 
@@ -20,11 +20,6 @@ struct StatusOptions {
   std::string run;
   bool watch = false;
 };
-
-double unix_now_s() {
-  const auto now = std::chrono::system_clock::now().time_since_epoch();
-  return std::chrono::duration<double>(now).count();
-}
 
 struct Look {
   nlohmann::ordered_json json;

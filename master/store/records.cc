@@ -20,7 +20,7 @@ const char* run_state_name(RunState state) {
   return "stopped";
 }
 
-const std::array<FarmTally::Row, 9> FarmTally::kRows = {{
+const std::array<FarmTally::Row, 13> FarmTally::kRows = {{
     {"retries", &FarmTally::retries},
     {"hung", &FarmTally::hung},
     {"copies", &FarmTally::copies},
@@ -30,6 +30,10 @@ const std::array<FarmTally::Row, 9> FarmTally::kRows = {{
     {"late", &FarmTally::late},
     {"foreign", &FarmTally::foreign},
     {"malformed", &FarmTally::malformed},
+    {"links", &FarmTally::links},
+    {"refused_keys", &FarmTally::refused_keys},
+    {"failed_handshakes", &FarmTally::failed_handshakes},
+    {"dropped_links", &FarmTally::dropped_links},
 }};
 
 FarmTally& FarmTally::operator+=(const FarmTally& other) {

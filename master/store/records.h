@@ -77,12 +77,16 @@ struct FarmTally {
   std::uint64_t late = 0;         // answers to jobs that had one
   std::uint64_t foreign = 0;      // answers to nothing that was asked
   std::uint64_t malformed = 0;    // messages that made no sense
+  std::uint64_t links = 0;        // TCP connections that were accepted
+  std::uint64_t refused_keys = 0;       // handshakes with keys that are not listed
+  std::uint64_t failed_handshakes = 0;  // of any kind
+  std::uint64_t dropped_links = 0;      // connections closed by the limits
 
   struct Row {
     const char* key;
     std::uint64_t FarmTally::*count;
   };
-  static const std::array<Row, 9> kRows;  // every count, by its name in the store and in status
+  static const std::array<Row, 13> kRows;  // every count, by its name in the store and in status
 
   FarmTally& operator+=(const FarmTally& other);
   // A JSON object, and back; what is no such object counts nothing.
@@ -103,6 +107,15 @@ struct Incident {
   std::string text;  // a sentence that names tasks, workers and hosts
 };
 const char* incident_name(IncidentKind kind);  // "quarantine", "alarm"
+
+// A worker that came or went, or a master.
+struct StoredWorkerEvent {
+  double unix_s = 0;
+  std::string kind;    // "joined", "returned", "left", "silent", "died", "refused"; "master", "end"
+  std::string worker;  // its name; of a master: empty
+  std::string host;
+  std::string text;  // "was killed by signal 9 (Killed)"
+};
 
 // A text that was kept for later.
 struct StoredDocument {

@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <chrono>
 #include <cstring>
 #include <fstream>
 #include <utility>
@@ -75,6 +76,10 @@ std::optional<bool> run_lock_held(const std::filesystem::path& run) {
   ::close(fd);
   if (code != 0) return std::nullopt;
   return request.l_type != F_UNLCK;
+}
+
+double unix_now_s() {
+  return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
 }
 
 std::string host_name() {

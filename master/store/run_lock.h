@@ -32,4 +32,7 @@ std::optional<bool> run_lock_held(const std::filesystem::path& run);
 // This machine's name.
 std::string host_name();
 
+// Seconds since 1970: for people, never for results.
+double unix_now_s();
+
 }  // namespace gapfarm

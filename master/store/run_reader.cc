@@ -12,6 +12,10 @@ using Json = nlohmann::ordered_json;
 
 constexpr std::int64_t kSchemaWithIncidents = 2;
 constexpr std::int64_t kSchemaWithDocuments = 3;
+constexpr std::int64_t kSchemaWithWorkerEvents = 4;
+
+constexpr const char* kMemberColumns =
+    "birth_id, genome, parameters, outcome, fitness, scores, parents, operators";
 
 // What was written by hand or damaged reads as empty: status is no place to die over it.
 Json parse(const std::string& text) { return Json::parse(text, nullptr, false); }
@@ -27,6 +31,22 @@ RunState state_of(const std::string& name) {
     if (name == run_state_name(state)) return state;
   }
   return RunState::kStopped;
+}
+
+// Of kMemberColumns, the first being column `at`.
+StoredIndividual individual_of(const SqlStatement& row, int at) {
+  StoredIndividual individual;
+  individual.birth_id = static_cast<std::uint64_t>(row.integer(at));
+  individual.genome = genome_of(row.blob(at + 1));
+  individual.values = row.text(at + 2);
+  individual.outcome = row.text(at + 3);
+  individual.fitness = row.optional_real(at + 4);
+  individual.scores = static_cast<unsigned>(row.integer(at + 5));
+  for (const Json& parent : parse(row.text(at + 6))) {
+    if (parent.is_number_unsigned()) individual.parents.push_back(parent.get<std::uint64_t>());
+  }
+  individual.operators = row.text(at + 7);
+  return individual;
 }
 
 std::vector<StoredWorker> workers_of(const std::string& text) {
@@ -102,10 +122,10 @@ Result<std::vector<StoredGeneration>> RunReader::generations() const {
 }
 
 Result<std::vector<StoredIndividual>> RunReader::individuals(std::uint64_t generation) const {
-  Result<SqlStatement> select = database_.prepare(
-      "SELECT birth_id, genome, parameters, outcome, fitness, scores, parents, operators FROM "
-      "individuals WHERE generation = ? ORDER BY rank",
-      "read the individuals");
+  Result<SqlStatement> select =
+      database_.prepare(std::string("SELECT ") + kMemberColumns +
+                            " FROM individuals WHERE generation = ? ORDER BY rank",
+                        "read the individuals");
   if (!select) return select.error();
   select->bind(1, static_cast<std::int64_t>(generation));
   std::vector<StoredIndividual> individuals;
@@ -113,17 +133,56 @@ Result<std::vector<StoredIndividual>> RunReader::individuals(std::uint64_t gener
     const Result<bool> row = select->step();
     if (!row) return row.error();
     if (!*row) return individuals;
-    StoredIndividual& individual = individuals.emplace_back();
-    individual.birth_id = static_cast<std::uint64_t>(select->integer(0));
-    individual.genome = genome_of(select->blob(1));
-    individual.values = select->text(2);
-    individual.outcome = select->text(3);
-    individual.fitness = select->optional_real(4);
-    individual.scores = static_cast<unsigned>(select->integer(5));
-    for (const Json& parent : parse(select->text(6))) {
-      if (parent.is_number_unsigned()) individual.parents.push_back(parent.get<std::uint64_t>());
-    }
-    individual.operators = select->text(7);
+    individuals.push_back(individual_of(*select, 0));
+  }
+}
+
+Result<std::vector<RunReader::Member>> RunReader::members(const std::string& where,
+                                                          std::int64_t bound) const {
+  Result<SqlStatement> select = database_.prepare(
+      "SELECT generation, " + std::string(kMemberColumns) + " FROM individuals " + where,
+      "read the individuals");
+  if (!select) return select.error();
+  select->bind(1, bound);
+  std::vector<Member> members;
+  for (;;) {
+    const Result<bool> row = select->step();
+    if (!row) return row.error();
+    if (!*row) return members;
+    members.push_back({static_cast<std::uint64_t>(select->integer(0)), individual_of(*select, 1)});
+  }
+}
+
+Result<std::optional<RunReader::Member>> RunReader::member(std::uint64_t birth_id) const {
+  auto found = members("WHERE birth_id = ? ORDER BY generation LIMIT 1",
+                       static_cast<std::int64_t>(birth_id));
+  if (!found) return found.error();
+  if (found->empty()) return std::optional<Member>();
+  return std::optional<Member>(std::move(found->front()));
+}
+
+Result<std::vector<RunReader::Member>> RunReader::given_up(std::size_t most) const {
+  return members(
+      "WHERE generation IN (SELECT generation FROM generations WHERE quarantined > 0) AND outcome "
+      "= 'WORKER_FAILED' ORDER BY generation DESC, birth_id LIMIT ?",
+      static_cast<std::int64_t>(most));
+}
+
+Result<std::vector<StoredWorkerEvent>> RunReader::worker_events(std::size_t most) const {
+  std::vector<StoredWorkerEvent> events;
+  if (schema_ < kSchemaWithWorkerEvents) return events;
+  Result<SqlStatement> select = database_.prepare(
+      "SELECT time, kind, worker, host, text FROM (SELECT rowid AS place, * FROM worker_events "
+      "ORDER BY rowid DESC LIMIT ?) ORDER BY place",
+      "read who came and went");
+  if (!select) return select.error();
+  select->bind(1, static_cast<std::int64_t>(most));
+  for (;;) {
+    const Result<bool> row = select->step();
+    if (!row) return row.error();
+    if (!*row) return events;
+    events.push_back(
+        {select->real(0), select->text(1), select->text(2), select->text(3), select->text(4)});
   }
 }
 

@@ -30,6 +30,16 @@ class RunReader {
   Result<std::optional<StoredIndividual>> best() const;
   // In the order in which they happened.
   Result<std::vector<Incident>> incidents() const;
+  // Likewise; at most the latest `most`.
+  Result<std::vector<StoredWorkerEvent>> worker_events(std::size_t most) const;
+  // Of whatever generation it was a member of first; none when nobody has that birth id.
+  struct Member {
+    std::uint64_t generation = 0;
+    StoredIndividual individual;
+  };
+  Result<std::optional<Member>> member(std::uint64_t birth_id) const;
+  // Members whose tasks were given up, latest first, at most `most`.
+  Result<std::vector<Member>> given_up(std::size_t most) const;
   // What RunStore::keep_document() kept under `name`; none when there is no such text.
   Result<std::optional<StoredDocument>> document(const std::string& name) const;
   // As the master last wrote it.  What it says of a master that crashed is stale: run_status().
@@ -38,6 +48,8 @@ class RunReader {
  private:
   RunReader(std::filesystem::path run, Database database)
       : run_(std::move(run)), database_(std::move(database)) {}
+
+  Result<std::vector<Member>> members(const std::string& where, std::int64_t bound) const;
 
   std::filesystem::path run_;
   Database database_;

@@ -4,7 +4,6 @@
 #include <unistd.h>
 
 #include <cerrno>
-#include <chrono>
 #include <cstring>
 #include <ctime>
 #include <nlohmann/json.hpp>
@@ -18,11 +17,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
-
-// The store is the one place that looks at the wall clock: for people, never for results.
-double unix_now_s() {
-  return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
-}
 
 std::string utc_now() {
   const std::time_t now = std::time(nullptr);
@@ -206,7 +200,7 @@ Result<RunStore> RunStore::open(const fs::path& run) {
 
 Status RunStore::load_before() {
   Result<SqlStatement> before =
-      database_.prepare("SELECT epoch, farm FROM progress", "read the run store");
+      database_.prepare("SELECT epoch, farm, heartbeat, host FROM progress", "read the run store");
   if (!before) return before.error();
   const Result<bool> row = before->step();
   if (!row) return row.error();
@@ -216,6 +210,8 @@ Status RunStore::load_before() {
   }
   epoch_ = static_cast<std::uint64_t>(before->integer(0)) + 1;
   farm_before_ = FarmTally::from_json(before->text(1));
+  end_before_ = {before->real(2), "end", "", before->text(3),
+                 "the last that was heard of a master"};
   return {};
 }
 
@@ -224,16 +220,11 @@ Status RunStore::begin_epoch() {
   if (Status s = database_.exec(forget_quarantines(next_generation()), "write the run store"); !s) {
     return s;
   }
+  std::vector<StoredWorkerEvent> events = {
+      {unix_now_s(), "master", "", host_name(), "master " + std::to_string(epoch_) + " begins"}};
+  if (epoch_ > 1) events.insert(events.begin(), end_before_);
+  if (Status s = add_worker_events(events); !s) return s;
   return set_progress({});
-}
-
-Status RunStore::add_incident(IncidentKind kind, const std::string& text) {
-  Result<SqlStatement> insert =
-      database_.prepare("INSERT INTO incidents VALUES (?, ?, ?, ?)", "write down what happened");
-  if (!insert) return insert.error();
-  insert->bind(1, static_cast<std::int64_t>(next_generation()));
-  insert->bind_text(2, incident_name(kind)).bind(3, unix_now_s()).bind_text(4, text);
-  return insert->run();
 }
 
 Result<std::uint64_t> RunStore::quarantined() const {
@@ -345,16 +336,6 @@ Result<std::optional<Checkpoint>> RunStore::checkpoint(
   checkpoint.digest = select->text(3);
   checkpoint.wall_s = select->real(4);
   return std::optional<Checkpoint>(std::move(checkpoint));
-}
-
-Status RunStore::keep_document(const std::string& name, const std::string& json) {
-  Result<SqlStatement> insert =
-      database_.prepare("INSERT OR REPLACE INTO documents VALUES (?, ?, ?)", "keep " + name);
-  if (!insert) return insert.error();
-  insert->bind_text(1, name);
-  insert->bind(2, static_cast<std::int64_t>(last_generation_.value_or(0)));
-  insert->bind_text(3, json);
-  return insert->run();
 }
 
 Result<fs::path> RunStore::truncate_after(std::uint64_t generation) {

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "common/base/result.h"
 #include "master/store/database.h"
@@ -54,6 +55,9 @@ class RunStore {
   // committed are forgotten when the run is opened again: it is evaluated again.
   Status add_incident(IncidentKind kind, const std::string& text);
 
+  // Keeps who came and went, in one transaction.
+  Status add_worker_events(const std::vector<StoredWorkerEvent>& events);
+
   // Keeps a JSON text under `name`, of the last generation, in place of what was there.
   Status keep_document(const std::string& name, const std::string& json);
 
@@ -82,7 +86,8 @@ class RunStore {
   Database database_;
   RunInfo info_;
   std::uint64_t epoch_ = 0;
-  FarmTally farm_before_;  // of earlier masters
+  FarmTally farm_before_;         // of earlier masters
+  StoredWorkerEvent end_before_;  // of the master before
   std::optional<std::uint64_t> last_generation_;
   std::string digest_;
 };

@@ -85,6 +85,15 @@ CREATE TABLE documents (       -- what was worked out once, so that a report nee
   content TEXT NOT NULL        -- JSON
 ) STRICT;
 )sql",
+    R"sql(
+CREATE TABLE worker_events (   -- who came and went, and why
+  time REAL NOT NULL,          -- Unix time
+  kind TEXT NOT NULL,          -- joined, returned, left, silent, died, refused; master, end (of one)
+  worker TEXT NOT NULL,        -- its name; of a master: empty
+  host TEXT NOT NULL,
+  text TEXT NOT NULL
+) STRICT;
+)sql",
 };
 static_assert(std::size(kUpgrades) + 1 == kRunStoreSchema);
 

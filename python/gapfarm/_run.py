@@ -14,7 +14,7 @@ import pandas as pd
 from ._model import Model
 from ._program import Progress, command
 
-_SCHEMA = 3
+_SCHEMA = 4
 
 
 class Run:

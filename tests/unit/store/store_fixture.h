@@ -68,7 +68,8 @@ class StoreTest : public ::testing::Test {
     Result<Database> database = Database::open(file(), Database::Mode::kWrite);
     ASSERT_TRUE(database.ok());
     ASSERT_TRUE(database
-                    ->exec("DROP TABLE documents; DROP TABLE incidents; ALTER TABLE progress DROP "
+                    ->exec("DROP TABLE worker_events; DROP TABLE documents; DROP TABLE incidents; "
+                           "ALTER TABLE progress DROP "
                            "COLUMN farm; "
                            "PRAGMA user_version = 1",
                            "test")
