@@ -14,6 +14,7 @@
 #include "master/cli/inputs.h"
 #include "master/cli/long_command.h"
 #include "master/cli/outputs.h"
+#include "master/cli/page_along.h"
 #include "master/cli/question_stamp.h"
 #include "master/cli/run_model.h"
 #include "master/diagnose/diagnosis_json.h"
@@ -35,6 +36,7 @@ struct DiagnoseCommand {
   std::optional<std::uint64_t> seed;
   Outputs outputs;
   FarmOptions farm;
+  PageOption page;
 };
 
 Model model_of(const Config& config, const DiagnosisResult& result, const ParameterValues& values,
@@ -197,6 +199,10 @@ Status apply_options(const DiagnoseCommand& command, Config& config, std::vector
 // A ground robot: its file and its runs, by its kinematics.  Nothing is simulated.
 int run_diagnose_ground(DiagnoseCommand& command, const Config& config, const QuestionStamp& stamp,
                         CliContext& context) {
+  if (command.page.wanted()) {
+    context.console.note("--page: nothing is simulated here; `gapfarm serve " + command.out +
+                         "` shows the diagnosis when it is there");
+  }
   const GroundRobot robot = config.problem.ground->robot_at(config.problem.values);
   const auto runs = read_run_folders(config.trial_files, robot.channels);
   if (!runs) return failed(runs.error(), context);
@@ -246,6 +252,8 @@ int run_diagnose(DiagnoseCommand& command, CliContext& context) {
   if (Status s = LongCommand::begin("diagnose", {command.out}, stages(), context); !s) {
     return failed(s.error(), context);
   }
+  const auto page = open_page(command.page, command.out, context);
+  if (!page) return failed(page.error(), context);
   auto farm = start_farm(command.farm, config->farm, context);
   if (!farm) return failed(farm.error(), context);
   options.keep_base = !command.model.empty();
@@ -288,6 +296,7 @@ SubcommandRun setup_diagnose(CLI::App& app) {
   app.add_option("--seed", command->seed, "Of the bootstrap");
   command->outputs.declare(app);
   command->farm.declare(app, true);
+  command->page.declare(app);
   declare_on_end(app);
   app.footer(
       "Examples:\n"

@@ -100,14 +100,14 @@ Json outcome_json(const RunStore& store, const EvolutionRun& run, const EvolveSu
   return json;
 }
 
-Result<std::unique_ptr<SocketFarm>> start_farm_of(RunStore& store, const EvolutionRun& run,
-                                                  CliContext& context) {
+Result<std::unique_ptr<SocketFarm>> start_farm_of(const RunStore& store, const EvolutionRun& run,
+                                                  FarmEventKeeper& events, CliContext& context) {
   SocketFarmOptions base;
   base.epoch = store.epoch();
   base.numeric_class = store.info().numeric_class;
   base.shuffle_seed = run.shuffle_seed;
   report_to(run.log, base);
-  keep_incidents(store, context.console, base);
+  events.listen(base);
   auto farm = start_farm(run.farm, run.config.farm, context, base);
   if (!farm) return farm;
   for (const std::string& endpoint : (*farm)->endpoints()) {
@@ -217,21 +217,16 @@ int run_evolution(RunStore& store, const EvolutionRun& run, CliContext& context)
   auto optimiser = optimiser_at(*checkpoint, run, *plan);
   if (!optimiser) return failed(optimiser.error(), context);
 
-  std::unique_ptr<MetricsServer> metrics;
-  if (run.farm.metrics_port) {
-    auto server = MetricsServer::listen(*run.farm.metrics_port);
-    if (!server) return failed(server.error(), context);
-    metrics = std::move(*server);
-    context.console.note("metrics: http://127.0.0.1:" + std::to_string(metrics->port()) +
-                         "/metrics");
-  }
-  auto farm = start_farm_of(store, run, context);
+  const auto page = open_page(run.page, store.run(), context);
+  if (!page) return failed(page.error(), context);
+  FarmEventKeeper events(store, context.console);
+  auto farm = start_farm_of(store, run, events, context);
   if (!farm) return failed(farm.error(), context);
 
   const SteadyClock clock;
   FarmProgressWriter progress(store, **farm, run.config.evolution, *checkpoint, clock,
                               context.console);
-  progress.watch(&run.log, metrics.get());
+  progress.watch(&run.log, &events);
   FarmBackend backend(**farm, run.problem, run.config.seed, progress);
   StoreSink sink(store, run.problem, **farm, progress);
   EvolveOptions options;
@@ -241,6 +236,7 @@ int run_evolution(RunStore& store, const EvolutionRun& run, CliContext& context)
   const auto summary =
       evolve(**optimiser, backend, sink, clock, options, [&] { return context.stop.requested(); });
   context.console.clear_progress();
+  events.flush();
   if (!summary) {
     // Where even that cannot be written, status finds the master gone, and the error is on stderr.
     static_cast<void>(write_end(store, progress, RunState::kStopped, summary.error().message));

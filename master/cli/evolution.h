@@ -5,6 +5,7 @@
 
 #include "common/config/settings.h"
 #include "master/cli/inputs.h"
+#include "master/cli/page_along.h"
 #include "master/store/run_store.h"
 
 namespace gapfarm {
@@ -31,6 +32,7 @@ struct EvolutionRun {
   const FarmOptions& farm;
   Log& log;
   std::optional<std::uint64_t> shuffle_seed;
+  PageOption page;
 };
 
 // Evolves from the store's last checkpoint, committing every generation, and leaves model.toml,

@@ -2,14 +2,14 @@
 
 #include <algorithm>
 
-#include "master/cli/farm_metrics.h"
 #include "master/evolve/evaluation.h"
 
 namespace gapfarm {
 namespace {
 
 constexpr unsigned kMostAlarms = 100;
-constexpr double kWriteInterval_s = 1;  // each costs a disk write
+constexpr std::size_t kMostWorkerEvents = 20000;  // of a master
+constexpr double kWriteInterval_s = 1;            // each costs a disk write
 
 FarmTally tally_of(const SocketFarm& farm) {
   const SchedulerCounts& counts = farm.counts();
@@ -23,6 +23,11 @@ FarmTally tally_of(const SocketFarm& farm) {
   tally.late = counts.late;
   tally.foreign = counts.foreign;
   tally.malformed = counts.malformed;
+  const LinkCounts links = farm.link_counts();
+  tally.links = links.accepted;
+  tally.refused_keys = links.refused_keys;
+  tally.failed_handshakes = links.failed_handshakes;
+  tally.dropped_links = links.dropped;
   return tally;
 }
 
@@ -32,18 +37,60 @@ std::optional<IncidentKind> incident_of(FarmEvent::Kind kind) {
   return std::nullopt;
 }
 
+// As the store names it; null: nobody came or went.
+const char* coming_or_going(FarmEvent::Kind kind) {
+  switch (kind) {
+    case FarmEvent::kJoined:
+      return "joined";
+    case FarmEvent::kReturned:
+      return "returned";
+    case FarmEvent::kRefused:
+      return "refused";
+    case FarmEvent::kLeft:
+      return "left";
+    case FarmEvent::kSilent:
+      return "silent";
+    case FarmEvent::kDied:
+      return "died";
+    case FarmEvent::kBadMessage:
+      return "refused";
+    default:
+      return nullptr;
+  }
+}
+
 }  // namespace
 
-void keep_incidents(RunStore& store, Console& console, SocketFarmOptions& options) {
-  options.on_event = [&store, &console, next = options.on_event,
-                      alarms = 0u](const FarmEvent& event) mutable {
-    const std::optional<IncidentKind> kind = incident_of(event.kind);
-    if (kind && (*kind != IncidentKind::kAlarm || alarms++ < kMostAlarms)) {
-      // The run goes on when it cannot be written, as with the live row.
-      if (Status s = store.add_incident(*kind, event.text); !s) console.error(s.error());
-    }
+void FarmEventKeeper::listen(SocketFarmOptions& options) {
+  options.on_event = [this, next = options.on_event](const FarmEvent& event) {
+    keep(event);
     if (next) next(event);
   };
+}
+
+void FarmEventKeeper::keep(const FarmEvent& event) {
+  const std::optional<IncidentKind> kind = incident_of(event.kind);
+  if (kind && (*kind != IncidentKind::kAlarm || alarms_++ < kMostAlarms)) {
+    // The run goes on when it cannot be written, as with the live row.
+    if (Status s = store_.add_incident(*kind, event.text); !s) console_.error(s.error());
+  }
+  const char* name = coming_or_going(event.kind);
+  // Whoever comes and is refused again and again is not to fill the disk.
+  if (name == nullptr || kept_ >= kMostWorkerEvents) return;
+  ++kept_;
+  std::string host = event.host;
+  if (event.kind == FarmEvent::kJoined || event.kind == FarmEvent::kReturned) {
+    hosts_[event.worker] = host;
+  } else if (const auto known = hosts_.find(event.worker); known != hosts_.end()) {
+    host = known->second;
+    hosts_.erase(known);
+  }
+  waiting_.push_back({unix_now_s(), name, event.worker, std::move(host), event.text});
+}
+
+void FarmEventKeeper::flush() {
+  if (Status s = store_.add_worker_events(waiting_); !s) console_.error(s.error());
+  waiting_.clear();
 }
 
 FarmProgressWriter::FarmProgressWriter(RunStore& store, const SocketFarm& farm,
@@ -75,16 +122,9 @@ void FarmProgressWriter::on_progress(const FarmProgress& progress) {
   refresh(clock_.now_s());
 }
 
-void FarmProgressWriter::watch(Log* log, MetricsServer* metrics) {
+void FarmProgressWriter::watch(Log* log, FarmEventKeeper* events) {
   log_ = log;
-  metrics_ = metrics;
-  publish();
-}
-
-void FarmProgressWriter::publish() {
-  if (metrics_ == nullptr) return;
-  metrics_->publish(
-      metrics_page(farm_, last_, {generation_, evaluations_before_ + last_.done, best_fitness_}));
+  events_ = events;
 }
 
 void FarmProgressWriter::on_generation(const GenerationRecord& record, std::optional<double> best) {
@@ -92,7 +132,6 @@ void FarmProgressWriter::on_generation(const GenerationRecord& record, std::opti
   last_.done = last_.total = 0;
   ++generations_;
   generation_ = record.generation;
-  best_fitness_ = best;
   best_ = format_number(best);
   if (log_ != nullptr) {
     log_->set({"generation", record.generation});
@@ -135,7 +174,7 @@ void FarmProgressWriter::refresh(double now_s) {
                     waited == last_.waiting.empty());
   if (now_s - written_s_ < kWriteInterval_s) return;
   written_s_ = now_s;
-  publish();
+  if (events_ != nullptr) events_->flush();
   last_.workers.clear();
   for (const WorkerStatus& w : workers) {
     last_.workers.push_back({w.name, w.host, w.state, w.jobs, w.finished, w.rate_per_s});

@@ -1,8 +1,10 @@
 // Where the evolution loop meets the farm and the run store.
 #pragma once
 
+#include <map>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "common/log/log.h"
 #include "common/problem/problem.h"
@@ -10,16 +12,32 @@
 #include "master/evolve/evolve.h"
 #include "master/evolve/time_left.h"
 #include "master/farm/socket_farm.h"
-#include "master/metrics/metrics_server.h"
 #include "master/progress/worker_wait.h"
 #include "master/store/run_store.h"
 
 namespace gapfarm {
 
-// Keeps what a farm reports as lost or contradictory in the store, besides what `options` does with
-// it.  Of the alarms only the first hundred: each costs a disk write, and a machine that computes
-// wrongly raises one after the other.  `store` and `console` outlive the farm.
-void keep_incidents(RunStore& store, Console& console, SocketFarmOptions& options);
+// Keeps what a farm reports in the store, besides what `options` does with it: at once what was
+// lost or is contradictory (of the alarms only the first hundred: each costs a disk write, and a
+// machine that computes wrongly raises one after the other), at the next flush() who came and went.
+// `store` and `console` outlive it, and it the farm.
+class FarmEventKeeper {
+ public:
+  FarmEventKeeper(RunStore& store, Console& console) : store_(store), console_(console) {}
+
+  void listen(SocketFarmOptions& options);
+  void flush();
+
+ private:
+  void keep(const FarmEvent& event);
+
+  RunStore& store_;
+  Console& console_;
+  unsigned alarms_ = 0;
+  std::size_t kept_ = 0;                      // of who came and went
+  std::map<std::string, std::string> hosts_;  // of workers that are there
+  std::vector<StoredWorkerEvent> waiting_;
+};
 
 // Keeps the store's live row and the terminal's progress line fresh, about once a second.
 class FarmProgressWriter {
@@ -33,13 +51,12 @@ class FarmProgressWriter {
   void on_generation(const GenerationRecord& record, std::optional<double> best);
   // As last shown, with the farm's counts as they are now.
   Progress now() const;
-  // Where generations and figures also go; neither is owned, both may be null.
-  void watch(Log* log, MetricsServer* metrics);
+  // Where generations also go, and what is written when the live row is; neither is owned.
+  void watch(Log* log, FarmEventKeeper* events);
 
  private:
   void refresh(double now_s);
   std::string words(const Pace& pace) const;
-  void publish();
 
   RunStore& store_;
   const SocketFarm& farm_;
@@ -54,10 +71,9 @@ class FarmProgressWriter {
   std::uint64_t evaluations_of_others_ = 0;  // of earlier masters
   double wall_of_others_s_ = 0;
   std::string best_;
-  std::optional<double> best_fitness_;
   Progress last_;
   Log* log_ = nullptr;
-  MetricsServer* metrics_ = nullptr;
+  FarmEventKeeper* events_ = nullptr;
   WorkerWait wait_;
 };
 

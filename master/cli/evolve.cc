@@ -20,6 +20,7 @@ struct EvolveCommand {
   std::optional<std::uint64_t> shuffle;
   EvolutionOverrides overrides;
   FarmOptions farm;
+  PageOption page;
   bool dry_run = false;
 };
 
@@ -85,7 +86,8 @@ int run_evolve(const EvolveCommand& command, CliContext& context) {
                        " parameters on " + std::to_string(config->problem.log.trials.size()) +
                        " trials, seed " + std::to_string(config->seed));
   const int code = run_evolution(
-      *store, {*config, config->problem, command.farm, *log, command.shuffle}, context);
+      *store, {*config, config->problem, command.farm, *log, command.shuffle, command.page},
+      context);
   // What failed before its first generation is not to be in the way of the next attempt.
   const auto checkpoint = store->checkpoint();
   if (code == kExitFailed && checkpoint && !*checkpoint) {
@@ -106,6 +108,7 @@ SubcommandRun setup_evolve(CLI::App& app) {
   app.add_option("--seed", command->seed, "In place of the config's");
   command->overrides.declare(app);
   command->farm.declare(app, true);
+  command->page.declare(app);
   declare_on_end(app);
   app.add_option("--shuffle", command->shuffle,
                  "Hand jobs out in an order shuffled by this seed; the results do not change");

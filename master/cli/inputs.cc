@@ -88,10 +88,6 @@ void FarmOptions::declare(CLI::App& app, bool remote) {
   app.add_flag("--insecure-anywhere", insecure_anywhere,
                "With --insecure: on every network that --listen names")
       ->needs(open);
-  app.add_option("--metrics", metrics_port,
-                 "Serve figures for Prometheus on this port of 127.0.0.1 (0: any)")
-      ->check(CLI::Range(0, 65535))
-      ->type_name("PORT");
   log.declare(app);
 }
 

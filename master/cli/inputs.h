@@ -44,7 +44,6 @@ struct FarmOptions {
   std::string keys = KeyFolder::default_path();
   bool insecure = false;
   bool insecure_anywhere = false;
-  std::optional<unsigned> metrics_port;
   LogFlags log;
 
   void declare(CLI::App& app, bool remote);

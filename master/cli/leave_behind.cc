@@ -97,7 +97,7 @@ Status write_fitness(const RunStore& store) {
 }
 
 Status write_page(const RunStore& store) {
-  const auto report = read_run_report(store.run());
+  const auto report = read_run_report({store.run(), {}, {}});
   if (!report) return report.error();
   return write_file_atomically((store.run() / "report.html").string(), run_html(*report));
 }

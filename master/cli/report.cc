@@ -35,7 +35,7 @@ Result<Page> page_of_diagnosis(const std::filesystem::path& from) {
 }
 
 Result<Page> page_of_run(const std::filesystem::path& run) {
-  const auto report = read_run_report(run);
+  const auto report = read_run_report({run, {}, {}});
   if (!report) return report.error();
   return Page{run_html(*report), run / "run.sqlite", run / "report.html"};
 }

@@ -14,6 +14,7 @@ struct ResumeCommand {
   std::optional<std::uint64_t> shuffle;
   EvolutionOverrides overrides;
   FarmOptions farm;
+  PageOption page;
 };
 
 // The run's config and problem as they were stored.
@@ -49,8 +50,9 @@ int run_resume(const ResumeCommand& command, CliContext& context) {
     if (!kept) return failed(kept.error(), context);
     if (!kept->empty()) context.console.note("later generations are kept in " + kept->string());
   }
-  return run_evolution(*store, {*config, config->problem, command.farm, *log, command.shuffle},
-                       context);
+  return run_evolution(
+      *store, {*config, config->problem, command.farm, *log, command.shuffle, command.page},
+      context);
 }
 
 }  // namespace
@@ -62,6 +64,7 @@ SubcommandRun setup_resume(CLI::App& app) {
                  "Continue after this generation; later ones are moved to a file of their own");
   command->overrides.declare(app);
   command->farm.declare(app, true);
+  command->page.declare(app);
   declare_on_end(app);
   app.add_option("--shuffle", command->shuffle,
                  "Hand jobs out in an order shuffled by this seed; the results do not change");

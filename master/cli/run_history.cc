@@ -3,13 +3,9 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
-#include <chrono>
-#include <cmath>
-#include <ctime>
-#include <fstream>
 
-#include "master/progress/words.h"
-#include "master/store/run_status.h"
+#include "master/cli/run_farm_history.h"
+#include "master/report/html.h"
 
 namespace gapfarm {
 namespace {
@@ -20,9 +16,7 @@ constexpr std::size_t kBins = 20;
 constexpr std::size_t kMostDensities = 16;  // genes
 constexpr std::size_t kMostSteps = 400;     // of operators' probabilities
 constexpr std::size_t kMostGenomes = 10;
-constexpr std::size_t kMostIncidents = 50;
-constexpr std::size_t kMostLogLines = 20;
-constexpr std::streamoff kLogTail = 8192;
+constexpr std::size_t kMostElite = 30;
 
 // About `most` of `count` indices, evenly, the last among them.
 std::vector<std::size_t> some_of(std::size_t count, std::size_t most) {
@@ -81,6 +75,31 @@ void add_column(const Problem& problem, std::uint64_t generation,
       decode_gene(problem.table(), problem.genes[gene], std::clamp(best->genome[gene], 0.0, 1.0)));
 }
 
+// Searched by its logarithm, a gene's share of the range is that of the logarithm.
+void add_elite(const Problem& problem, const std::vector<StoredIndividual>& last, RunElite* elite) {
+  const ParameterTable& table = problem.table();
+  const auto value = [&](const Gene& gene, double share) {
+    const Parameter& p = table[gene.row];
+    const double v = decode_gene(table, gene, share);
+    return p.choices.empty() ? number_text(v, 4) : p.choices[static_cast<std::size_t>(v)];
+  };
+  for (const Gene& gene : problem.genes) {
+    const Parameter& p = table[gene.row];
+    elite->axes.push_back({p.key, p.unit, value(gene, 0), value(gene, 1)});
+  }
+  for (const StoredIndividual& one : last) {
+    if (elite->lines.size() == kMostElite) break;
+    if (one.outcome != "OK" || one.genome.size() != problem.genes.size()) continue;
+    RunElite::Line& line = elite->lines.emplace_back();
+    line.birth_id = one.birth_id;
+    line.fitness = one.fitness;
+    for (std::size_t g = 0; g < one.genome.size(); ++g) {
+      line.shares.push_back(std::clamp(one.genome[g], 0.0, 1.0));
+      line.values.push_back(value(problem.genes[g], line.shares.back()));
+    }
+  }
+}
+
 Status add_densities(const RunReader& reader, const Problem& problem,
                      const std::vector<StoredGeneration>& generations, RunReport* report) {
   std::vector<std::size_t> genes;
@@ -97,88 +116,66 @@ Status add_densities(const RunReader& reader, const Problem& problem,
     }
   }
   std::erase_if(report->densities, [](const GeneDensity& d) { return d.generations.empty(); });
-  for (const StoredIndividual& one : *last) {
+  add_elite(problem, *last, &report->elite);
+  return {};
+}
+
+RunGenome genome_of_member(const RunReader::Member& member) {
+  const StoredIndividual& one = member.individual;
+  return {one.birth_id,  member.generation, one.fitness, one.outcome,
+          one.operators, one.parents,       {}};
+}
+
+Status add_genomes(const RunReader& reader, std::uint64_t generation, RunReport* report) {
+  const auto members = reader.individuals(generation);
+  if (!members) return members.error();
+  report->genomes_of = generation;
+  for (const StoredIndividual& one : *members) {
     if (report->genomes.size() == kMostGenomes) break;
-    report->genomes.push_back({one.birth_id, one.fitness, one.outcome, one.operators, one.parents});
+    report->genomes.push_back(genome_of_member({generation, one}));
   }
   return {};
 }
 
-std::vector<std::string> log_tail(const std::filesystem::path& run) {
-  std::ifstream file(run / "log.txt", std::ios::binary | std::ios::ate);
-  if (!file) return {};
-  const std::streamoff size = file.tellg();
-  const std::streamoff from = std::max<std::streamoff>(0, size - kLogTail);
-  file.seekg(from);
-  std::vector<std::string> lines;
-  std::string line;
-  if (from > 0) std::getline(file, line);  // a part of one
-  while (std::getline(file, line)) lines.push_back(line);
-  if (lines.size() > kMostLogLines) {
-    lines.erase(lines.begin(), lines.end() - static_cast<std::ptrdiff_t>(kMostLogLines));
+Status look_up(const RunReader& reader, const Problem& problem, std::uint64_t birth_id,
+               RunReport* report) {
+  const auto member = reader.member(birth_id);
+  if (!member) return member.error();
+  if (!*member) {
+    report->without_looked_up =
+        fmt::format("No member of a committed generation is genome {}.", birth_id);
+    return {};
   }
-  return lines;
-}
-
-std::string time_of_day(double unix_s) {
-  const auto seconds = static_cast<std::time_t>(unix_s);
-  std::tm utc{};
-  gmtime_r(&seconds, &utc);
-  return fmt::format("{:02}-{:02} {:02}:{:02} UTC", utc.tm_mon + 1, utc.tm_mday, utc.tm_hour,
-                     utc.tm_min);
-}
-
-void add_facts(const RunStatus& status, RunFarm* farm) {
-  const auto add = [&](const std::string& label, const std::string& value) {
-    farm->facts.emplace_back(label, value);
-  };
-  const Progress& progress = status.progress;
-  add("evaluations", std::to_string(status.evaluations));
-  if (status.state == RunState::kRunning) {
-    add("rate", fmt::format("{:.3g} evaluations/s", status.rate_per_s));
-    add("tasks of this generation", fmt::format("{} of {}", progress.done, progress.total));
-    if (status.time_left_s) add("time left", "about " + format_duration(*status.time_left_s));
+  report->looked_up = genome_of_member(**member);
+  const std::vector<double>& genome = (*member)->individual.genome;
+  if (genome.size() != problem.genes.size()) return {};
+  for (std::size_t g = 0; g < genome.size(); ++g) {
+    const Parameter& p = problem.table()[problem.genes[g].row];
+    const double v =
+        decode_gene(problem.table(), problem.genes[g], std::clamp(genome[g], 0.0, 1.0));
+    const std::string text =
+        p.choices.empty() ? number_text(v, 6) : p.choices[static_cast<std::size_t>(v)];
+    report->looked_up->values.emplace_back(p.key, text + (p.unit == "-" ? "" : " " + p.unit));
   }
-  add("last heard of", time_of_day(progress.heartbeat_unix_s) + " on " + progress.host);
-  if (progress.epoch > 1) add("masters so far", std::to_string(progress.epoch));
-  if (status.quarantined > 0) add("tasks given up", std::to_string(status.quarantined));
-  for (const FarmTally::Row& row : FarmTally::kRows) {
-    std::string label = row.key;
-    std::replace(label.begin(), label.end(), '_', ' ');
-    farm->tally.emplace_back(std::move(label), std::to_string(progress.farm.*row.count));
-  }
-}
-
-Status add_farm(const RunReader& reader, RunReport* report) {
-  const auto now = std::chrono::system_clock::now().time_since_epoch();
-  const auto status = run_status(reader, std::chrono::duration<double>(now).count());
-  if (!status) return status.error();
-  RunFarm& farm = report->farm;
-  farm.state = run_state_name(status->state);
-  const bool running = status->state == RunState::kRunning;
-  farm.told = running ? status->progress.waiting : status->stop_reason;
-  add_facts(*status, &farm);
-  for (const StoredWorker& w : status->progress.workers) {
-    // Whoever is not watched any more is neither busy nor idle.
-    farm.workers.push_back(
-        {w.name, w.host, running ? w.state : "was " + w.state, w.jobs, w.finished, w.rate_per_s});
-  }
-  for (auto it = status->incidents.rbegin(); it != status->incidents.rend(); ++it) {
-    if (farm.incidents.size() == kMostIncidents) break;
-    farm.incidents.push_back(fmt::format("{}, generation {}, {}: {}", time_of_day(it->unix_s),
-                                         it->generation, incident_name(it->kind), it->text));
-  }
-  farm.log = log_tail(reader.run());
   return {};
 }
 
 }  // namespace
 
 Status add_history(const RunReader& reader, const Problem& problem,
-                   const std::vector<StoredGeneration>& generations, RunReport* report) {
+                   const std::vector<StoredGeneration>& generations, const RunQuestion& question,
+                   RunReport* report) {
   report->trials = problem.log.trials.size();
   if (Status s = add_farm(reader, report); !s) return s;
+  if (question.genome) {
+    if (Status s = look_up(reader, problem, *question.genome, report); !s) return s;
+  }
   if (generations.empty()) return {};
+  const std::uint64_t last = generations.back().generation;
+  const std::uint64_t asked = question.generation.value_or(last);
+  if (Status s = add_genomes(reader, asked >= 1 && asked <= last ? asked : last, report); !s) {
+    return s;
+  }
   add_operators(generations, report);
   return add_densities(reader, problem, generations, report);
 }

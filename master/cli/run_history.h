@@ -4,13 +4,15 @@
 #include "common/base/result.h"
 #include "common/problem/problem.h"
 #include "master/report/run_report.h"
+#include "master/serve/site.h"
 #include "master/store/run_reader.h"
 
 namespace gapfarm {
 
-// Fills in operators, densities, genomes and the farm.  Of long runs some generations are read, so
-// that any run's page takes as long as another's.  Errors: of reading the store.
+// Fills in operators, densities, elite, genomes and the farm.  Of long runs some generations are
+// read, so that any run's page takes as long as another's.  Errors: of reading the store.
 Status add_history(const RunReader& reader, const Problem& problem,
-                   const std::vector<StoredGeneration>& generations, RunReport* report);
+                   const std::vector<StoredGeneration>& generations, const RunQuestion& question,
+                   RunReport* report);
 
 }  // namespace gapfarm

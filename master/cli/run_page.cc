@@ -3,12 +3,17 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <limits>
+#include <sstream>
 
+#include "common/config/stages.h"
 #include "common/score/motion_model.h"
 #include "common/score/statistics.h"
 #include "common/trials/context.h"
+#include "common/trials/files.h"
 #include "master/cli/run_history.h"
 #include "master/report/html.h"
 #include "master/report/prediction_table.h"
@@ -62,6 +67,31 @@ std::vector<ParameterRow> parameter_rows(const Problem& problem,
         row_of(problem, gene, problem.values[gene.row], after[gene.row], std::move(values)));
   }
   return rows;
+}
+
+// Intervals that `gapfarm determine` worked out for these very values, as remarks.
+void add_determined(const std::filesystem::path& file, std::vector<ParameterRow>* rows) {
+  const auto text = read_text_file(file.string());
+  if (!text) return;
+  std::istringstream lines(*text);
+  for (std::string line; std::getline(lines, line);) {
+    std::vector<std::string> cells;
+    std::istringstream in(line);
+    for (std::string cell; std::getline(in, cell, ',');) cells.push_back(std::move(cell));
+    const auto row = std::find_if(rows->begin(), rows->end(), [&](const ParameterRow& r) {
+      return !cells.empty() && r.key == cells[0];
+    });
+    if (cells.size() < 6 || row == rows->end() || !row->choice.empty()) continue;
+    const auto number = [&](std::size_t i) { return std::strtod(cells[i].c_str(), nullptr); };
+    if (std::abs(number(1) - row->after) > 1e-4 * (row->upper - row->lower)) {
+      row->note = "gapfarm determine was asked about another value of it";
+      continue;
+    }
+    const std::string unit = row->unit == "-" ? "" : " " + row->unit;
+    row->note = fmt::format("95 % by gapfarm determine: {} to {}{}{}", number_text(number(2), 4),
+                            number_text(number(3), 4), unit,
+                            cells[5] == "1" ? "" : "; the data do not determine it");
+  }
 }
 
 std::string action(const RunReport& report, const RunInfo& info) {
@@ -142,7 +172,18 @@ RunOutcome run_outcome(const Problem& problem, const PredictionOfLog* before,
   return outcome;
 }
 
-Result<RunReport> read_run_report(const std::filesystem::path& run) {
+Result<std::optional<TrialLog>> trials_kept_apart(const RunInfo& info, const Problem& problem) {
+  Config config;
+  config.path = info.config_path;
+  config.text = info.config_text;
+  config.problem = problem;
+  const auto plan = read_stages(config);
+  if (!plan) return plan.error();
+  return read_validation(*plan, config);
+}
+
+Result<RunReport> read_run_report(const RunQuestion& question) {
+  const std::filesystem::path& run = question.run;
   const auto reader = RunReader::open(run);
   if (!reader) return reader.error();
   const RunInfo& info = reader->info();
@@ -172,11 +213,16 @@ Result<RunReport> read_run_report(const std::filesystem::path& run) {
     const auto individuals = reader->individuals(last);
     if (!individuals) return individuals.error();
     report.parameters = parameter_rows(*problem, *individuals, **best);
+    add_determined(run / kDeterminedFile, &report.parameters);
   }
   auto outcome = stored_outcome(*reader, last, &report);
   if (!outcome) return outcome.error();
   report.outcome = std::move(*outcome);
-  if (Status s = add_history(*reader, *problem, *generations, &report); !s) return s.error();
+  if (Status s = add_history(*reader, *problem, *generations, question, &report); !s) {
+    return s.error();
+  }
+  const auto apart = trials_kept_apart(info, *problem);
+  if (apart && *apart) report.kept_apart = (*apart)->trials.size();
   report.headline = headline(report);
   report.action = action(report, info);
   report.provenance = {

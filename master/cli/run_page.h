@@ -9,6 +9,8 @@
 #include "master/cli/validation.h"
 #include "master/report/pose_panels.h"
 #include "master/report/run_report.h"
+#include "master/serve/site.h"
+#include "master/store/records.h"
 
 namespace gapfarm {
 
@@ -22,6 +24,13 @@ inline constexpr const char* kOutcomeDocument = "outcome";
 
 // Whatever the store of a run holds, running, stopped or finished.  Errors: RunReader::open()'s, a
 // problem that cannot be read.
-Result<RunReport> read_run_report(const std::filesystem::path& run);
+Result<RunReport> read_run_report(const RunQuestion& question);
+
+// The trials that the run's config keeps apart; none when it names none.  Errors: of reading them,
+// which may have gone since.
+Result<std::optional<TrialLog>> trials_kept_apart(const RunInfo& info, const Problem& problem);
+
+// Beside a run: what `gapfarm determine --out` wrote of it.
+inline constexpr const char* kDeterminedFile = "determined.csv";
 
 }  // namespace gapfarm

@@ -1,29 +1,23 @@
 // gapfarm serve [DIR...]: runs and diagnoses in a browser, from their stores alone.
-#include <unistd.h>
-
-#include <chrono>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "master/cli/page_along.h"
 #include "master/cli/run_page.h"
 #include "master/cli/serve_drive.h"
 #include "master/cli/subcommand.h"
 #include "master/serve/http_server.h"
 #include "master/serve/site.h"
+#include "master/store/run_lock.h"
 
 namespace gapfarm {
 namespace {
 
 struct ServeOptions {
   std::vector<std::string> folders = {"."};
-  unsigned port = 8421;
+  unsigned port = kPagePort;
 };
-
-std::string machine_name() {
-  char name[256] = {};
-  return ::gethostname(name, sizeof name - 1) == 0 ? name : "this-machine";
-}
 
 int run_serve(const ServeOptions& options, CliContext& context) {
   for (const std::string& folder : options.folders) {
@@ -35,11 +29,8 @@ int run_serve(const ServeOptions& options, CliContext& context) {
   DriveShower shower(context);
   SiteSources sources;
   sources.folders.assign(options.folders.begin(), options.folders.end());
-  sources.unix_now_s = [] {
-    const auto now = std::chrono::system_clock::now().time_since_epoch();
-    return std::chrono::duration<double>(now).count();
-  };
-  sources.read_run = [](const std::filesystem::path& run) { return read_run_report(run); };
+  sources.unix_now_s = unix_now_s;
+  sources.read_run = read_run_report;
   sources.drive = [&](const DriveQuestion& question) { return shower.show(question); };
   Site site(std::move(sources));
   auto server =
@@ -51,7 +42,7 @@ int run_serve(const ServeOptions& options, CliContext& context) {
   }
   const std::string port = std::to_string((*server)->port());
   const std::string address = "http://127.0.0.1:" + port + "/";
-  const std::string tunnel = "ssh -L " + port + ":127.0.0.1:" + port + " " + machine_name();
+  const std::string tunnel = "ssh -L " + port + ":127.0.0.1:" + port + " " + host_name();
   context.console.result(
       "serving " + address + "\nfrom another machine: " + tunnel + ", then open " + address + "\n",
       {{"address", address}, {"ssh", tunnel}});

@@ -9,6 +9,7 @@
 #include "common/score/motion_model.h"
 #include "master/cli/inputs.h"
 #include "master/cli/run_model.h"
+#include "master/cli/run_page.h"
 #include "master/experiment/plan.h"
 #include "master/store/run_reader.h"
 
@@ -90,6 +91,14 @@ Result<BestOf> best_of(const RunReader& reader, std::optional<std::uint64_t> gen
   return BestOf{individuals->front(), *generation};
 }
 
+// Those that were evolved on, then those that were kept apart, where they can still be read.
+std::vector<Trial> all_trials(const RunInfo& info, const Problem& problem) {
+  std::vector<Trial> all = problem.log.trials;
+  const auto apart = trials_kept_apart(info, problem);
+  if (apart && *apart) all.insert(all.end(), (*apart)->trials.begin(), (*apart)->trials.end());
+  return all;
+}
+
 std::string title_of(const Trial& trial, std::size_t number) {
   return fmt::format("Trial {} ({}, {} of session {})", number, trial.command, trial.trial,
                      trial.session);
@@ -103,11 +112,14 @@ Result<std::string> DriveShower::show(const DriveQuestion& question) {
   const auto problem = stored_problem(*reader);
   if (!problem) return problem.error();
   if (!problem->pieces.empty()) return Error{"pushes of pieces have no drive to show"};
-  const auto& trials = problem->log.trials;
+  const auto trials = all_trials(reader->info(), *problem);
   if (question.trial >= trials.size()) {
     return Error{
-        fmt::format("the log has {} trials, and no trial {}", trials.size(), question.trial + 1)};
+        fmt::format("the run has {} trials, those that it kept apart included, and no "
+                    "trial {}",
+                    trials.size(), question.trial + 1)};
   }
+  const bool apart = question.trial >= problem->log.trials.size();
   const auto best = best_of(*reader, question.generation);
   if (!best) return best.error();
   const std::string key =
@@ -128,7 +140,8 @@ Result<std::string> DriveShower::show(const DriveQuestion& question) {
                   drive_task(*problem, trial, problem->values_of(best->individual.genome))});
   if (!results) return results.error();
   const double duration_s = resolved_command(trial, problem->commands).duration_s;
-  Json json = {{"title", title_of(trial, question.trial + 1)},
+  Json json = {{"title", title_of(trial, question.trial + 1) + (apart ? ", kept apart" : "")},
+               {"kept_apart", apart},
                {"duration_s", duration_s},
                {"measured", measured_json(trial, duration_s)}};
   std::string failed;
@@ -147,9 +160,10 @@ Result<std::string> DriveShower::show(const DriveQuestion& question) {
       reader->info().fitness,
       best->individual.fitness ? fmt::format("{:.6g}", *best->individual.fitness) : "unknown",
       failed);
-  json["note"] = trial.path.size() > 1
-                     ? ""
-                     : "Faint: no path was measured, an arc joins the start to the measured end.";
+  json["note"] = std::string(apart ? "▲ Kept apart: evolution never saw this trial. " : "") +
+                 (trial.path.size() > 1 ? ""
+                                        : "Faint: no path was measured, an arc joins the start to "
+                                          "the measured end.");
   if (shown_.size() >= kMostKept) shown_.clear();
   return shown_[key] = json.dump();
 }

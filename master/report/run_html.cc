@@ -159,9 +159,12 @@ Json page_json(const RunReport& report) {
                {"generations", generations_json(report)},
                {"operators", operators_json(report)},
                {"genes", densities_json(report)},
+               {"elite", elite_json(report)},
+               {"timeline", timeline_json(report.farm)},
                {"served", report.served},
                {"run", report.name},
                {"logged_trials", report.trials},
+               {"kept_apart", report.kept_apart},
                {"parameters", parameters_json(report.parameters)},
                {"effects", Json::array()},
                {"where", Json::array()}};
@@ -190,6 +193,7 @@ std::string run_html(const RunReport& report) {
   frame.served = report.served;
   frame.places = {{"progress", "Fitness"}, {"parameters", "Parameters"}};
   if (!report.densities.empty()) frame.places.emplace_back("genes", "Genes");
+  if (!report.elite.lines.empty()) frame.places.emplace_back("elite", "Elite");
   frame.places.emplace_back("scores", "Kept apart");
   if (driven) {
     frame.places.emplace_back("floor", "Floor");
@@ -200,6 +204,9 @@ std::string run_html(const RunReport& report) {
     frame.places.emplace_back("residuals", "Residuals");
   }
   const bool farmed = !report.farm.state.empty();
+  const bool watched = report.served && !report.pieces && !report.genomes.empty();
+  if (watched) frame.places.emplace_back("watch", "Watch");
+  if (!report.genomes.empty()) frame.places.emplace_back("genomes", "Genomes");
   if (farmed) frame.places.emplace_back("farm", "Farm");
   frame.places.emplace_back("provenance", "Inputs");
   frame.places.emplace_back("words", "Words");
@@ -208,10 +215,10 @@ std::string run_html(const RunReport& report) {
          parameters_section(
              report.parameters, {},
              {{"before", "before"}, {"after", "after"}, {"population", "last generation"}}) +
-         densities_section(report) + scores(report);
+         densities_section(report) + elite_section(report) + scores(report);
   if (driven) body += floor_section() + drives_section("before", "after");
   if (poses) body += pose_sections();
-  if (report.served && !report.pieces && !report.genomes.empty()) body += watch_section();
+  if (watched) body += watch_section();
   body += genomes_section(report);
   if (farmed) body += farm_section(report.farm);
   body += provenance(report) + glossary_section(run_terms());

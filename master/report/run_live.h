@@ -12,6 +12,7 @@ namespace gapfarm {
 std::string state_line(const RunFarm& farm);
 std::string operators_section(const RunReport& report);
 std::string densities_section(const RunReport& report);
+std::string elite_section(const RunReport& report);
 std::string genomes_section(const RunReport& report);
 std::string farm_section(const RunFarm& farm);
 
@@ -19,5 +20,7 @@ std::string farm_section(const RunFarm& farm);
 nlohmann::ordered_json generations_json(const RunReport& report);
 nlohmann::ordered_json operators_json(const RunReport& report);
 nlohmann::ordered_json densities_json(const RunReport& report);
+nlohmann::ordered_json elite_json(const RunReport& report);
+nlohmann::ordered_json timeline_json(const RunFarm& farm);
 
 }  // namespace gapfarm

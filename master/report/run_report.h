@@ -52,14 +52,56 @@ struct RunWorker {
   unsigned jobs = 0;
   std::uint64_t finished = 0;
   double rate_per_s = 0;
+  std::string failure;  // the last of this name, with its time; empty: none
 };
 
-// A member of the last generation.
 struct RunGenome {
   std::uint64_t birth_id = 0;
+  std::uint64_t generation = 0;  // it was a member of, first
   std::optional<double> fitness;
   std::string outcome, operators;
   std::vector<std::uint64_t> parents;
+  // Of one that was looked up: each searched parameter and its value with unit.
+  std::vector<std::pair<std::string, std::string>> values;
+};
+
+// The best of the last generation over all genes, best first.
+struct RunElite {
+  struct Axis {
+    std::string key, unit;
+    std::string lower, upper;  // ends of the range, for people
+  };
+  struct Line {
+    std::uint64_t birth_id = 0;
+    std::optional<double> fitness;
+    std::vector<double> shares;       // of the ranges as they are searched, [0, 1]
+    std::vector<std::string> values;  // for people
+  };
+  std::vector<Axis> axes;
+  std::vector<Line> lines;
+};
+
+// Which workers were there, all masters of the run together.  Empty where the store does not tell.
+struct RunTimeline {
+  struct Count {
+    double unix_s = 0;
+    unsigned workers = 0;  // from then on
+  };
+  struct Mark {
+    double unix_s = 0;
+    unsigned workers = 0;
+    std::string kind;  // "joined", "left", "failed", "master"
+    std::string text;  // a sentence with its time
+  };
+  struct Span {
+    std::string name, host;
+    double from_unix_s = 0, to_unix_s = 0;
+    std::string end;  // how it ended, when that was a failure
+  };
+  std::vector<Count> counts;
+  std::vector<Mark> marks;  // a few hundred at most, the latest
+  std::vector<Span> spans;  // of every worker, when these are few; else empty
+  double end_unix_s = 0;    // the last that was heard of the run
 };
 
 // The farm as its master last told of it.
@@ -70,6 +112,9 @@ struct RunFarm {
   // What it coped with, counted over all masters: "retries": "3".
   std::vector<std::pair<std::string, std::string>> tally;
   std::vector<RunWorker> workers;
+  RunTimeline timeline;
+  std::vector<std::string> failures;   // of workers, latest first
+  std::vector<RunGenome> given_up;     // whose tasks were, latest first
   std::vector<std::string> incidents;  // latest first
   std::vector<std::string> log;        // the last lines of log.txt
 };
@@ -91,10 +136,15 @@ struct RunReport {
   std::vector<std::vector<double>> probabilities;
   std::vector<std::uint64_t> probability_generations;
   std::vector<GeneDensity> densities;
-  std::vector<RunGenome> genomes;  // best first, a few
+  std::vector<RunGenome> genomes;      // best first, a few
+  std::uint64_t genomes_of = 0;        // the generation that they are of
+  std::optional<RunGenome> looked_up;  // the one that was asked for
+  std::string without_looked_up;       // why there is none, when one was asked for
+  RunElite elite;
   RunFarm farm;
-  std::size_t trials = 0;  // of the log
-  bool served = false;     // by `gapfarm serve`: the page looks again while it is open
+  std::size_t trials = 0;      // of the log
+  std::size_t kept_apart = 0;  // trials of [validation], as far as they can be read
+  bool served = false;         // by `gapfarm serve`: the page looks again while it is open
   std::vector<std::pair<std::string, std::string>> provenance;
 };
 

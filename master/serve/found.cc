@@ -19,9 +19,9 @@ constexpr std::size_t kMostFiles = 50000;
 constexpr std::size_t kMostPoints = 60;
 constexpr double kLookAgain_s = 5;  // at what says that it runs: its master may have died
 
-constexpr const char* kTelling[] = {"run.sqlite",         "run.sqlite-wal",
-                                    "simulations.sqlite", "simulations.sqlite-wal",
-                                    "diagnosis.json",     "log.txt"};
+constexpr const char* kTelling[] = {
+    "run.sqlite",     "run.sqlite-wal", "simulations.sqlite", "simulations.sqlite-wal",
+    "diagnosis.json", "log.txt",        "determined.csv"};
 
 std::optional<FoundWork> work_in(const fs::path& folder) {
   std::error_code ignored;
@@ -69,6 +69,14 @@ std::size_t trials_of(const RunInfo& info) {
                                                : 0;
 }
 
+void count_workers(const std::vector<StoredWorker>& workers, bool running, WorkEntry* entry) {
+  if (!running) return;
+  for (const StoredWorker& worker : workers) {
+    ++entry->workers_by_state[worker.state];
+    entry->workers += worker.state != "gone" ? 1 : 0;
+  }
+}
+
 void read_run(const FoundWork& found, double now_unix_s, WorkEntry* entry) {
   const auto reader = RunReader::open(found.path);
   if (!reader) {
@@ -101,11 +109,11 @@ void read_run(const FoundWork& found, double now_unix_s, WorkEntry* entry) {
   entry->rate_per_s = running ? status->rate_per_s : 0;
   entry->time_left_s = running ? status->time_left_s : std::nullopt;
   entry->given_up = status->quarantined;
-  entry->alarms = progress.farm.alarms;
+  entry->farm = progress.farm;
+  entry->tasks = running ? progress.total : 0;
+  entry->tasks_done = running ? progress.done : 0;
   entry->changed_unix_s = progress.heartbeat_unix_s;
-  for (const StoredWorker& worker : progress.workers) {
-    entry->workers += running && worker.state != "gone" ? 1 : 0;
-  }
+  count_workers(progress.workers, running, entry);
 }
 
 void read_command_of(const FoundWork& found, double now_unix_s, WorkEntry* entry) {
@@ -125,9 +133,9 @@ void read_command_of(const FoundWork& found, double now_unix_s, WorkEntry* entry
   entry->rate_per_s = running ? r.rate_per_s : 0;
   entry->time_left_s = running ? r.time_left_s : std::nullopt;
   entry->changed_unix_s = r.heartbeat_unix_s;
-  for (const StoredWorker& worker : r.workers) {
-    entry->workers += running && worker.state != "gone" ? 1 : 0;
-  }
+  entry->tasks = running ? r.total : 0;
+  entry->tasks_done = running ? r.done : 0;
+  count_workers(r.workers, running, entry);
 }
 
 // The headline alone: trials and drives stay unread.
@@ -183,17 +191,28 @@ WorkEntry entry_of(const FoundWork& found, double now_unix_s) {
   return entry;
 }
 
-std::vector<WorkEntry> WorkEntries::now(const std::vector<FoundWork>& found, double now_unix_s) {
+bool WorkEntries::holds(const Known& known, const std::string& stamp, double now_unix_s) const {
+  const double age_s = now_unix_s - known.read_unix_s;
+  if (age_s < 0) return false;
+  if (age_s < good_for_s(known.cost_s)) return true;
+  return known.entry.stamp == stamp && (known.entry.state != "running" || age_s < kLookAgain_s);
+}
+
+std::vector<WorkEntry> WorkEntries::now(const std::vector<FoundWork>& found) {
   std::map<std::string, Known> still;
   std::vector<WorkEntry> entries;
   for (const FoundWork& f : found) {
     std::string stamp = stamp_of(f.path);
+    const double now_unix_s = unix_now_s_();
     const auto known = known_.find(f.name);
-    const bool same = known != known_.end() && known->second.stamp == stamp &&
-                      (known->second.entry.state != "running" ||
-                       now_unix_s - known->second.read_unix_s < kLookAgain_s);
     Known& next = still[f.name];
-    next = same ? known->second : Known{std::move(stamp), now_unix_s, entry_of(f, now_unix_s)};
+    if (known != known_.end() && holds(known->second, stamp, now_unix_s)) {
+      next = known->second;
+    } else {
+      next = {now_unix_s, 0, entry_of(f, now_unix_s)};
+      next.entry.stamp = std::move(stamp);
+      next.cost_s = unix_now_s_() - now_unix_s;
+    }
     entries.push_back(next.entry);
   }
   known_ = std::move(still);

@@ -4,12 +4,14 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "master/store/command_record.h"
+#include "master/store/records.h"
 
 namespace gapfarm {
 
@@ -44,28 +46,39 @@ struct WorkEntry {
   std::string config;
   double rate_per_s = 0;
   std::optional<double> time_left_s;
-  std::optional<double> share;  // of a command, [0, 1]
-  std::size_t workers = 0;      // that are there
-  std::uint64_t given_up = 0;   // tasks
-  std::uint64_t alarms = 0;
+  std::optional<double> share;              // of a command, [0, 1]
+  std::size_t workers = 0;                  // that are there
+  std::uint64_t given_up = 0;               // tasks
+  std::uint64_t tasks = 0, tasks_done = 0;  // of the generation or stage under way
+  std::map<std::string, unsigned> workers_by_state;
+  FarmTally farm;  // of a run, over all its masters
   double changed_unix_s = 0;
   std::string trouble;  // why it cannot be read
+  std::string stamp;    // stamp_of() its folder, when it was read
 };
 
 // Never fails: what cannot be read says so in `trouble`.
 WorkEntry entry_of(const FoundWork& found, double now_unix_s);
 
-// WorkEntries, each read again when its folder changed or its master may have died.
+// How long what took so long to work out is good for: work is at most a hundredth of the time.
+inline double good_for_s(double cost_s) { return 100 * cost_s; }
+
+// WorkEntries, each read again when its folder changed or its master may have died, but none more
+// often than good_for_s() allows.
 class WorkEntries {
  public:
-  std::vector<WorkEntry> now(const std::vector<FoundWork>& found, double now_unix_s);
+  explicit WorkEntries(std::function<double()> unix_now_s) : unix_now_s_(std::move(unix_now_s)) {}
+
+  std::vector<WorkEntry> now(const std::vector<FoundWork>& found);
 
  private:
   struct Known {
-    std::string stamp;
-    double read_unix_s = 0;
+    double read_unix_s = 0, cost_s = 0;
     WorkEntry entry;
   };
+  bool holds(const Known& known, const std::string& stamp, double now_unix_s) const;
+
+  std::function<double()> unix_now_s_;
   std::map<std::string, Known> known_;
 };
 

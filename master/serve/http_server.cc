@@ -2,13 +2,18 @@
 
 #include <unistd.h>
 
+#include <array>
+#include <boost/asio/buffer.hpp>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/posix/stream_descriptor.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/asio/write.hpp>
 #include <boost/beast/core.hpp>
 #include <boost/beast/http.hpp>
 #include <list>
 #include <optional>
+#include <sstream>
 #include <utility>
 
 namespace gapfarm {
@@ -19,13 +24,32 @@ namespace beast = boost::beast;
 namespace http = boost::beast::http;
 using tcp = asio::ip::tcp;
 
+constexpr unsigned kQuietTicks = 15;  // after so many a stream says that it is still there
+
+// The head that all answers have.
+template <class Response>
+void set_policies(Response& r) {
+  r.set(http::field::cache_control, "no-cache");
+  r.set("X-Content-Type-Options", "nosniff");
+  r.set(http::field::x_frame_options, "DENY");
+  r.set("Referrer-Policy", "no-referrer");
+  r.set("Cross-Origin-Resource-Policy", "same-origin");
+  r.set("Cross-Origin-Opener-Policy", "same-origin");
+}
+
 // Errors of connections are their own end: there is nobody to tell.
 class Connection : public std::enable_shared_from_this<Connection> {
  public:
   using List = std::list<std::shared_ptr<Connection>>;
 
-  Connection(tcp::socket socket, const HttpHandler& handler, const HttpLimits& limits, List& list)
-      : stream_(std::move(socket)), handler_(handler), limits_(limits), list_(list) {}
+  Connection(tcp::socket socket, const HttpHandler& handler, const HttpLimits& limits, List& list,
+             std::size_t& streams)
+      : stream_(std::move(socket)),
+        handler_(handler),
+        limits_(limits),
+        list_(list),
+        streams_(streams),
+        timer_(stream_.get_executor()) {}
 
   void start() {
     place_ = list_.insert(list_.end(), shared_from_this());
@@ -35,6 +59,9 @@ class Connection : public std::enable_shared_from_this<Connection> {
   void close() {
     if (!place_) return;
     const auto place = *std::exchange(place_, std::nullopt);
+    if (watched_) --streams_;
+    watched_ = nullptr;
+    timer_.cancel();
     beast::error_code ignored;
     stream_.socket().shutdown(tcp::socket::shutdown_both, ignored);
     stream_.close();
@@ -57,7 +84,9 @@ class Connection : public std::enable_shared_from_this<Connection> {
     if (!place_) return;
     if (!error) {
       list_.splice(list_.end(), list_, *place_);  // the latest to be heard of
-      return write(answer(), parser_->get().keep_alive());
+      HttpResponse response = answer();
+      if (response.watched) return watch(std::move(response));
+      return write(std::move(response), parser_->get().keep_alive());
     }
     if (error == http::error::header_limit) return write(plain_response(431, "Too long."), false);
     if (error == http::error::body_limit) {
@@ -89,12 +118,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
     response_.emplace(static_cast<http::status>(from.status), 11);
     auto& r = *response_;
     r.set(http::field::content_type, from.content_type);
-    r.set(http::field::cache_control, "no-cache");
-    r.set("X-Content-Type-Options", "nosniff");
-    r.set(http::field::x_frame_options, "DENY");
-    r.set("Referrer-Policy", "no-referrer");
-    r.set("Cross-Origin-Resource-Policy", "same-origin");
-    r.set("Cross-Origin-Opener-Policy", "same-origin");
+    set_policies(r);
     if (!from.etag.empty()) r.set(http::field::etag, from.etag);
     if (!from.allow.empty()) r.set(http::field::allow, from.allow);
     r.keep_alive(keep);
@@ -114,10 +138,84 @@ class Connection : public std::enable_shared_from_this<Connection> {
     }
   }
 
+  // --- a stream of events: it has no end, and its length is not known ---
+
+  void watch(HttpResponse from) {
+    if (parser_->get().method() == http::verb::head) return write(plain_response(200, ""), false);
+    if (streams_ >= limits_.streams) {
+      return write(plain_response(503,
+                                  "Too many pages are open for each to be told of what is "
+                                  "new; this one has to ask by itself."),
+                   false);
+    }
+    ++streams_;
+    watched_ = std::move(from.watched);
+    http::response<http::empty_body> r(http::status::ok, 11);
+    r.set(http::field::content_type, "text/event-stream");
+    set_policies(r);
+    r.keep_alive(false);
+    std::ostringstream head;
+    head << r.base();
+    stream_.expires_never();
+    hear_end();
+    send(head.str() + "retry: 4000\n\n");
+    tick();
+  }
+
+  // Nothing is expected; what comes is the end, or somebody who does not know what this is.
+  void hear_end() {
+    stream_.socket().async_read_some(asio::buffer(unexpected_),
+                                     [self = shared_from_this()](beast::error_code, std::size_t) {
+                                       if (self->place_) self->close();
+                                     });
+  }
+
+  void tick() {
+    if (!place_) return;
+    // Whoever did not take what was sent ticks ago is gone or does not read.
+    if (sending_ && ++late_ * limits_.watch_interval > limits_.time) return close();
+    if (!sending_) {
+      late_ = 0;
+      if (std::string now = watched_(); now != told_) {
+        told_ = std::move(now);
+        send("data: " + told_ + "\n\n");
+      } else if (++quiet_ >= kQuietTicks) {
+        send(": still here\n\n");
+      }
+    }
+    timer_.expires_after(limits_.watch_interval);
+    timer_.async_wait([self = shared_from_this()](beast::error_code error) {
+      if (!error) self->tick();
+    });
+  }
+
+  void send(std::string text) {
+    list_.splice(list_.end(), list_, *place_);
+    outgoing_ += std::move(text);
+    quiet_ = 0;
+    if (sending_) return;
+    sending_ = true;
+    on_wire_ = std::exchange(outgoing_, {});
+    asio::async_write(stream_.socket(), asio::buffer(on_wire_),
+                      [self = shared_from_this()](beast::error_code error, std::size_t) {
+                        if (!self->place_) return;
+                        self->sending_ = false;
+                        if (error) return self->close();
+                        if (!self->outgoing_.empty()) self->send({});
+                      });
+  }
+
   beast::tcp_stream stream_;
   const HttpHandler& handler_;
   const HttpLimits& limits_;
   List& list_;
+  std::size_t& streams_;  // of all connections
+  asio::steady_timer timer_;
+  std::function<std::string()> watched_;  // of a stream
+  std::string told_, outgoing_, on_wire_;
+  bool sending_ = false;
+  unsigned quiet_ = 0, late_ = 0;  // ticks
+  std::array<char, 64> unexpected_;
   std::optional<List::iterator> place_;  // none: closed
   beast::flat_buffer buffer_{64 * 1024};
   std::optional<http::request_parser<http::empty_body>> parser_;
@@ -170,7 +268,8 @@ class BeastServer : public HttpServer {
       }
       if (!error) {
         while (connections_.size() >= limits_.connections) connections_.front()->close();
-        std::make_shared<Connection>(std::move(socket), handler_, limits_, connections_)->start();
+        std::make_shared<Connection>(std::move(socket), handler_, limits_, connections_, streams_)
+            ->start();
       }
       if (acceptor_.is_open()) accept();
     });
@@ -181,6 +280,7 @@ class BeastServer : public HttpServer {
   asio::io_context context_{1};
   tcp::acceptor acceptor_{context_};
   Connection::List connections_;
+  std::size_t streams_ = 0;
 };
 
 }  // namespace

@@ -14,6 +14,8 @@ struct HttpLimits {
   std::size_t connections = 64;  // one more closes the one that has been quiet for longest
   std::uint32_t header_bytes = 8192;
   std::chrono::milliseconds time{10000};  // to say what is wanted, and to take the answer
+  std::size_t streams = 16;               // of events, among the connections; one more is refused
+  std::chrono::milliseconds watch_interval{1000};
 };
 
 class HttpServer {

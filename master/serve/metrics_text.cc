@@ -1,4 +1,8 @@
-#include "master/metrics/metrics_server.h"
+#include <array>
+#include <cmath>
+#include <cstdio>
+
+#include "master/serve/metrics_page.h"
 #include "master/serve/pages.h"
 
 namespace gapfarm {
@@ -11,51 +15,97 @@ struct MetricRow {
   double (*of)(const WorkEntry& entry, double now_unix_s);
 };
 
+constexpr auto kGauge = MetricsPage::kGauge;
+constexpr auto kCounter = MetricsPage::kCounter;
+
 constexpr MetricRow kMetricRows[] = {
-    {"run_running", MetricsPage::kGauge, "1 while its process lives.",
+    {"running", kGauge, "1 while its process lives.",
      [](const WorkEntry& e, double) { return e.state == "running" ? 1.0 : 0.0; }},
-    {"run_generation", MetricsPage::kGauge, "Generations committed.",
-     [](const WorkEntry& e, double) { return static_cast<double>(e.generation); }},
-    {"run_evaluations_total", MetricsPage::kCounter, "Evaluations committed.",
-     [](const WorkEntry& e, double) { return static_cast<double>(e.evaluations); }},
-    {"run_rate_per_second", MetricsPage::kGauge, "Evaluations or simulations.",
-     [](const WorkEntry& e, double) { return e.rate_per_s; }},
-    {"run_workers", MetricsPage::kGauge, "Workers that are there.",
-     [](const WorkEntry& e, double) { return static_cast<double>(e.workers); }},
-    {"run_given_up_total", MetricsPage::kCounter, "Tasks given up.",
-     [](const WorkEntry& e, double) { return static_cast<double>(e.given_up); }},
-    {"run_alarms_total", MetricsPage::kCounter, "Answers that differed.",
-     [](const WorkEntry& e, double) { return static_cast<double>(e.alarms); }},
-    {"run_heartbeat_age_seconds", MetricsPage::kGauge, "Since its process was last heard of.",
+    {"heartbeat_age_seconds", kGauge, "Since its process was last heard of.",
      [](const WorkEntry& e, double now_unix_s) { return now_unix_s - e.changed_unix_s; }},
+    {"generation", kGauge, "Generations committed.",
+     [](const WorkEntry& e, double) { return static_cast<double>(e.generation); }},
+    {"evaluations_total", kCounter, "Evaluations committed, since the run began.",
+     [](const WorkEntry& e, double) { return static_cast<double>(e.evaluations); }},
+    {"evaluations_per_second", kGauge, "Of a command that is no run: simulations.",
+     [](const WorkEntry& e, double) { return e.rate_per_s; }},
+    {"tasks", kGauge, "Tasks of the generation or stage under way.",
+     [](const WorkEntry& e, double) { return static_cast<double>(e.tasks); }},
+    {"tasks_done", kGauge, "Those of them that are answered.",
+     [](const WorkEntry& e, double) { return static_cast<double>(e.tasks_done); }},
+    {"quarantined_total", kCounter, "Tasks that were given up.",
+     [](const WorkEntry& e, double) { return static_cast<double>(e.given_up); }},
 };
 
-// As Prometheus' text format wants the value of a label.
-std::string label_of(const std::string& name) {
-  std::string out;
-  for (const char c : name) {
-    if (c == '\\' || c == '"') out += '\\';
-    out += static_cast<unsigned char>(c) < 0x20 ? '?' : c;
+std::string number_of_metric(double value) {
+  if (std::isnan(value)) return "NaN";
+  if (std::isinf(value)) return value > 0 ? "+Inf" : "-Inf";
+  std::array<char, 32> text;
+  std::snprintf(text.data(), text.size(), "%.17g", value);
+  return text.data();
+}
+
+void add_optional(const std::vector<WorkEntry>& entries, const char* name, const char* help,
+                  std::optional<double> WorkEntry::*value, MetricsPage* page) {
+  for (const WorkEntry& e : entries) {
+    if (!e.trouble.empty() || !(e.*value)) continue;
+    page->add(name, kGauge, help, MetricsPage::label("of", e.name), *(e.*value));
   }
-  return out;
+}
+
+void add_farms(const std::vector<WorkEntry>& entries, MetricsPage* page) {
+  for (const char* state : {"busy", "idle", "gone"}) {
+    for (const WorkEntry& e : entries) {
+      if (!e.trouble.empty()) continue;
+      const auto count = e.workers_by_state.find(state);
+      page->add("workers", kGauge, "Workers by state.",
+                MetricsPage::label("of", e.name) + "," + MetricsPage::label("state", state),
+                count == e.workers_by_state.end() ? 0 : count->second);
+    }
+  }
+  for (const FarmTally::Row& row : FarmTally::kRows) {
+    for (const WorkEntry& e : entries) {
+      if (e.kind != FoundWork::Kind::kRun || !e.trouble.empty()) continue;
+      page->add(std::string(row.key) + "_total", kCounter,
+                "What its farm coped with, over all masters.", MetricsPage::label("of", e.name),
+                static_cast<double>(e.farm.*row.count));
+    }
+  }
 }
 
 }  // namespace
+
+void MetricsPage::add(const std::string& name, Type type, const std::string& help,
+                      const std::string& labels, double value) {
+  if (name != last_) {
+    last_ = name;
+    text_ += "# HELP gapfarm_" + name + " " + help + "\n# TYPE gapfarm_" + name +
+             (type == kGauge ? " gauge\n" : " counter\n");
+  }
+  text_ += "gapfarm_" + name + "{" + labels + "} " + number_of_metric(value) + "\n";
+}
+
+std::string MetricsPage::label(const std::string& key, const std::string& value) {
+  std::string out = key + "=\"";
+  for (const char c : value) {
+    if (c == '\\' || c == '"') out += '\\';
+    out += static_cast<unsigned char>(c) < 0x20 ? '?' : c;
+  }
+  return out + "\"";
+}
 
 std::string metrics_text(const std::vector<WorkEntry>& entries, double now_unix_s) {
   MetricsPage page;
   for (const MetricRow& row : kMetricRows) {
     for (const WorkEntry& e : entries) {
       if (!e.trouble.empty()) continue;
-      page.add_labelled(row.name, row.type, row.help, "of", label_of(e.name),
-                        row.of(e, now_unix_s));
+      page.add(row.name, row.type, row.help, MetricsPage::label("of", e.name),
+               row.of(e, now_unix_s));
     }
   }
-  for (const WorkEntry& e : entries) {
-    if (!e.best) continue;
-    page.add_labelled("run_best_fitness", MetricsPage::kGauge, "In its own sense and unit.", "of",
-                      label_of(e.name), *e.best);
-  }
+  add_optional(entries, "best_fitness", "In its own sense and unit.", &WorkEntry::best, &page);
+  add_optional(entries, "time_left_seconds", "Until it is done.", &WorkEntry::time_left_s, &page);
+  add_farms(entries, &page);
   return page.text();
 }
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <ctime>
 #include <nlohmann/json.hpp>
+#include <sstream>
 
 #include "master/progress/words.h"
 #include "master/report/html.h"
@@ -61,9 +62,9 @@ std::string state_words(const WorkEntry& e) {
   if (e.state == "running")
     text += fmt::format(", {} worker{}", e.workers, e.workers == 1 ? "" : "s");
   if (e.rate_per_s > 0) text += ", " + number_text(e.rate_per_s) + "/s";
-  if (e.alarms + e.given_up > 0) {
+  if (e.farm.alarms + e.given_up > 0) {
     text += fmt::format(R"( <span class="warning">▲ {} given up, {} alarms</span>)", e.given_up,
-                        e.alarms);
+                        e.farm.alarms);
   }
   return text + (e.told.empty() ? "" : "<small>" + html_escaped(e.told) + "</small>");
 }
@@ -83,24 +84,31 @@ std::string row_of_entry(const WorkEntry& e) {
   }
   std::string extent;
   if (run) {
-    extent =
-        fmt::format("generation {}<small>{} evaluations, {} trials, seed {}</small>", e.generation,
-                    number_text(static_cast<double>(e.evaluations), 9), e.trials, e.seed);
+    extent = fmt::format("generation {}<small>{} evaluations</small>", e.generation,
+                         number_text(static_cast<double>(e.evaluations), 9));
   }
-  return fmt::format(
-             R"(<tr><th scope="row">{}<a href="/view?of={}">{}</a><small>{} {}</small></th>)", box,
-             percent_encoded(e.name), html_escaped(e.name), html_escaped(e.what),
-             html_escaped(e.config)) +
+  return fmt::format(R"(<tr><th scope="row">{}<a href="/view?of={}">{}</a><small>{}</small></th>)",
+                     box, percent_encoded(e.name), html_escaped(e.name), html_escaped(e.what)) +
          list_cell("state", state_words(e)) + list_cell("best", best, true) +
          list_cell("by generation", spark(e.best_by_generation)) + list_cell("so far", extent) +
+         list_cell("trials", run ? std::to_string(e.trials) : "", true) +
+         list_cell("seed", run ? std::to_string(e.seed) : "", true) +
+         list_cell(run ? "config" : "command", "<small>" + html_escaped(e.config) + "</small>") +
          list_cell("last heard of", utc_text(e.changed_unix_s)) + "</tr>";
 }
 
-std::string sorted_head(const char* key, const char* words, const std::string& sort,
+std::string list_address(const ListView& view, const std::string& sort) {
+  std::string address = "/?sort=" + sort;
+  if (!view.words.empty()) address += "&q=" + percent_encoded(view.words);
+  if (!view.state.empty()) address += "&state=" + percent_encoded(view.state);
+  return html_escaped(address);
+}
+
+std::string sorted_head(const char* key, const char* words, const ListView& view,
                         bool is_number = false) {
-  return fmt::format(R"(<th scope="col"{}{}><a href="/?sort={}">{}</a></th>)",
-                     is_number ? R"( class="number")" : "",
-                     sort == key ? R"( aria-sort="descending")" : "", key, words);
+  return fmt::format(
+      R"(<th scope="col"{}{}><a href="{}">{}</a></th>)", is_number ? R"( class="number")" : "",
+      view.sort == key ? R"( aria-sort="descending")" : "", list_address(view, key), words);
 }
 
 void sort_entries(std::vector<WorkEntry>* entries, const std::string& sort) {
@@ -110,9 +118,43 @@ void sort_entries(std::vector<WorkEntry>* entries, const std::string& sort) {
     // Of different fitnesses there is no better one.
     if (sort == "best" && a.fitness != b.fitness) return a.fitness > b.fitness;
     if (sort == "best") return a.best.value_or(-HUGE_VAL) > b.best.value_or(-HUGE_VAL);
+    if (sort == "trials") return a.trials > b.trials;
+    if (sort == "seed") return a.seed < b.seed;
+    if (sort == "config") return a.config < b.config;
     return a.changed_unix_s > b.changed_unix_s;
   };
   std::stable_sort(entries->begin(), entries->end(), before);
+}
+
+std::string lowered(std::string text) {
+  for (char& c : text) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  return text;
+}
+
+bool is_wanted(const WorkEntry& e, const ListView& view) {
+  if (!view.state.empty() && e.state != view.state) return false;
+  const std::string all = lowered(e.name + " " + e.what + " " + e.config + " " + e.told + " seed " +
+                                  std::to_string(e.seed));
+  std::istringstream words(lowered(view.words));
+  for (std::string word; words >> word;) {
+    if (all.find(word) == all.npos) return false;
+  }
+  return true;
+}
+
+// Works without scripts, too; with them while it is typed (list.js).
+std::string filter_form(const ListView& view) {
+  std::string options;
+  for (const char* state : {"", "running", "finished", "stopped", "failed"}) {
+    options += fmt::format(R"(<option value="{}"{}>{}</option>)", state,
+                           view.state == state ? " selected" : "", *state == '\0' ? "any" : state);
+  }
+  return fmt::format(
+      R"(<form action="/" class="controls" id="filter" role="search"><label>Filter <input type="search" name="q" value="{}" placeholder="name, config, seed"></label><label>State <select name="state">{}</select></label>{}<button>Filter</button></form>)",
+      html_escaped(view.words), options,
+      view.sort.empty()
+          ? ""
+          : R"(<input type="hidden" name="sort" value=")" + html_escaped(view.sort) + R"(">)");
 }
 
 std::string stage_rows(const CommandRecord& r, const std::vector<AnsweredStage>& stages) {
@@ -193,11 +235,13 @@ std::string utc_text(double unix_s) {
                      utc.tm_mday, utc.tm_hour, utc.tm_min);
 }
 
-std::string list_page(std::vector<WorkEntry> entries, const std::string& sort,
+std::string list_page(std::vector<WorkEntry> entries, const ListView& view,
                       const std::vector<std::string>& folders) {
-  sort_entries(&entries, sort);
+  const std::size_t all = entries.size();
   const auto running = std::count_if(entries.begin(), entries.end(),
                                      [](const WorkEntry& e) { return e.state == "running"; });
+  std::erase_if(entries, [&](const WorkEntry& e) { return !is_wanted(e, view); });
+  sort_entries(&entries, view.sort);
   PageFrame frame;
   frame.served = true;
   frame.title = fmt::format("gapfarm: {} running", running);
@@ -206,23 +250,27 @@ std::string list_page(std::vector<WorkEntry> entries, const std::string& sort,
   std::string where;
   for (const std::string& folder : folders) where += (where.empty() ? "" : ", ") + folder;
   frame.body = fmt::format(
-      R"(<section id="work"><h1 id="headline" data-file="gapfarm" data-live>{} here, {} running</h1><p>Beneath <code>{}</code>: runs, diagnoses, comparisons and studies, as their stores tell. Tick two runs or more to see them beside each other.</p>)",
-      entries.size(), running, html_escaped(where));
-  if (entries.empty()) {
+      R"(<section id="work"><h1 id="headline" data-file="gapfarm" data-live>{} here, {} running{}</h1><p>Beneath <code>{}</code>: runs, diagnoses, comparisons and studies, as their stores tell. Tick two runs or more to see them beside each other.</p>)",
+      all, running, entries.size() == all ? "" : fmt::format("; {} shown", entries.size()),
+      html_escaped(where));
+  if (all == 0) {
     frame.body +=
         "<p>There is nothing yet: <code>gapfarm evolve configs/demo.toml --out run/demo"
         "</code> makes a run. This page shows it by itself.</p>";
   }
-  frame.body += R"(<form action="/compare"><div id="entries" data-live>)";
+  frame.body += filter_form(view) + R"(<form action="/compare"><div id="entries" data-live>)";
   if (!entries.empty()) {
     frame.body +=
         R"(<table class="cards work" data-file="work"><caption class="unseen">Runs and diagnoses</caption><thead><tr>)" +
-        sorted_head("name", "name", sort) + sorted_head("state", "state", sort) +
-        sorted_head("best", "best", sort, true) + R"(<th scope="col">by generation</th>)" +
-        R"(<th scope="col">so far</th>)" + sorted_head("changed", "last heard of", sort) +
-        "</tr></thead><tbody>";
+        sorted_head("name", "name", view) + sorted_head("state", "state", view) +
+        sorted_head("best", "best", view, true) + R"(<th scope="col">by generation</th>)" +
+        R"(<th scope="col">so far</th>)" + sorted_head("trials", "trials", view, true) +
+        sorted_head("seed", "seed", view, true) + sorted_head("config", "config", view) +
+        sorted_head("changed", "last heard of", view) + "</tr></thead><tbody>";
     for (const WorkEntry& e : entries) frame.body += row_of_entry(e);
     frame.body += "</tbody></table>";
+  } else if (all > 0) {
+    frame.body += R"(<p>None of them fits the filter. <a href="/">Show all</a></p>)";
   }
   frame.body += R"(</div><button>Compare the ticked runs</button></form></section>)";
   return framed_page(frame, plain_page_json(), kNoTrials);

@@ -11,8 +11,14 @@
 
 namespace gapfarm {
 
-// Every entry in a table, sorted by "name", "state", "best" or "changed", latest first by default.
-std::string list_page(std::vector<WorkEntry> entries, const std::string& sort,
+// Which entries a list shows, as its address says.
+struct ListView {
+  std::string sort;  // "name", "state", "best", "trials", "seed", "config"; else latest first
+  std::string
+      words;  // each in an entry's name, command, config, seed or headline, whatever the case
+  std::string state;  // empty: any
+};
+std::string list_page(std::vector<WorkEntry> entries, const ListView& view,
                       const std::vector<std::string>& folders);
 
 // A diagnosis, a comparison or a study: its stages, how far it is, its workers.

@@ -25,6 +25,9 @@ struct HttpResponse {
   std::string body;
   std::string etag;   // with quotes; empty: none
   std::string allow;  // of a 405
+  // Of a stream of events: what is watched as it is now.  It is asked about once a second, and what
+  // is not as before is sent.  Empty: the body is the answer.
+  std::function<std::string()> watched;
 };
 
 using HttpHandler = std::function<HttpResponse(const HttpRequest&)>;

@@ -14,18 +14,10 @@ namespace {
 
 constexpr double kSearchAgain_s = 2;
 constexpr std::size_t kMostCompared = 8;
+constexpr std::size_t kMostKept = 12;  // pages, of two megabytes at most
 
-std::string quoted_hash(const std::string& content) {
-  // A strong tag: what has it is the same byte by byte.
-  return "\"" + csp_hash(content).substr(7, 32) + "\"";
-}
-
-HttpResponse page(std::string html, std::string etag) {
-  HttpResponse response;
-  response.body = std::move(html);
-  response.etag = std::move(etag);
-  return response;
-}
+// A strong tag: what has it is the same byte by byte.
+std::string hash_of(const std::string& content) { return csp_hash(content).substr(7, 32); }
 
 HttpResponse unchanged(const std::string& etag) {
   HttpResponse response;
@@ -35,8 +27,8 @@ HttpResponse unchanged(const std::string& etag) {
 }
 
 // What a page says of itself changes with its folder and with whether its process lives.
-std::string etag_of(const FoundWork& found, const WorkEntry& entry) {
-  return quoted_hash(stamp_of(found.path) + entry.state + "|" + entry.told);
+std::string words_of(const WorkEntry& entry) {
+  return entry.stamp + entry.state + "|" + entry.told + "|";
 }
 
 std::optional<std::uint64_t> whole_number(const std::string& text) {
@@ -46,15 +38,42 @@ std::optional<std::uint64_t> whole_number(const std::string& text) {
   return value;
 }
 
+ListView list_view(const Target& target) {
+  return {target.value("sort"), target.value("q"), target.value("state")};
+}
+
+// Of everything that a page depends on beside the stores.
+std::string key_of(const Target& target) {
+  std::string key = target.path;
+  for (const char* name : {"of", "sort", "q", "state", "genome", "best_of"}) {
+    const auto values = target.query.find(name);
+    if (values == target.query.end()) continue;
+    for (const std::string& value : values->second) {
+      key += std::string("&") + name + "=" + percent_encoded(value);
+    }
+  }
+  return key;
+}
+
+std::string no_such(const std::string& name) {
+  return "Nothing is called '" + name.substr(0, 200) + "' here (any more); / lists what there is.";
+}
+
 }  // namespace
 
 void Site::look() {
   const double now_s = sources_.unix_now_s();
-  if (now_s - searched_unix_s_ >= kSearchAgain_s || now_s < searched_unix_s_) {
+  const double looked_s = now_s - looked_unix_s_;
+  if (looked_s >= 0 && looked_s < good_for_s(look_cost_s_)) return;
+  const double searched_s = now_s - searched_unix_s_;
+  if (searched_s < 0 || searched_s >= std::max(kSearchAgain_s, good_for_s(search_cost_s_))) {
     found_ = find_work(sources_.folders);
     searched_unix_s_ = now_s;
+    search_cost_s_ = sources_.unix_now_s() - now_s;
   }
-  entries_ = known_entries_.now(found_, now_s);
+  looked_unix_s_ = sources_.unix_now_s();
+  entries_ = known_entries_.now(found_);
+  look_cost_s_ = sources_.unix_now_s() - looked_unix_s_;
 }
 
 const FoundWork* Site::find(const std::string& name) const {
@@ -67,95 +86,162 @@ const WorkEntry& Site::entry(const FoundWork& found) const {
   return entries_[static_cast<std::size_t>(&found - found_.data())];
 }
 
-HttpResponse Site::no_such(const std::string& name) const {
-  return plain_response(404, "Nothing is called '" + name.substr(0, 200) +
-                                 "' here (any more); / lists what there is.");
-}
-
 HttpResponse Site::answer(const HttpRequest& request) {
   if (auto refused = refusal(request)) return *std::move(refused);
   const auto target = parse_target(request.target);
   look();
-  return page_at(*target, request.if_none_match);
+  return answer_at(*target, request.if_none_match);
 }
 
-HttpResponse Site::page_at(const Target& target, const std::string& known) {
-  if (target.path == "/") return list(target, known);
-  if (target.path == "/view") return view(target, known);
-  if (target.path == "/compare") return compare(target, known);
-  if (target.path == "/drive") return drive(target);
-  if (target.path == "/metrics") {
-    HttpResponse response = plain_response(200, "");
-    response.content_type = "text/plain; version=0.0.4; charset=utf-8";
-    response.body = metrics_text(entries_, sources_.unix_now_s());
-    return response;
+HttpResponse Site::answer_at(const Target& target, const std::string& known) {
+  if (target.path == "/" || target.path == "/view" || target.path == "/compare") {
+    return shown(target, known);
   }
+  if (target.path == "/events") return events(target);
+  if (target.path == "/drive") return drive(target);
+  if (target.path == "/metrics") return metrics();
   return plain_response(404, "There is no such page; / lists what there is.");
 }
 
-HttpResponse Site::list(const Target& target, const std::string& known) const {
-  std::vector<std::string> folders;
-  for (const auto& folder : sources_.folders) folders.push_back(folder.string());
-  std::string html = list_page(entries_, target.value("sort"), folders);
-  const std::string etag = quoted_hash(html);
-  return etag == known ? unchanged(etag) : page(std::move(html), etag);
+HttpResponse Site::metrics() const {
+  HttpResponse response;
+  response.content_type = "text/plain; version=0.0.4; charset=utf-8";
+  response.body = metrics_text(entries_, sources_.unix_now_s());
+  return response;
 }
 
-HttpResponse Site::view(const Target& target, const std::string& known) {
-  const FoundWork* found = find(target.value("of"));
-  if (found == nullptr) return no_such(target.value("of"));
-  const WorkEntry& now = entry(*found);
-  const std::string etag = etag_of(*found, now);
-  if (etag == known) return unchanged(etag);
-  if (found->kind == FoundWork::Kind::kRun) {
-    auto report = sources_.read_run(found->path);
-    if (!report) return plain_response(500, report.error().message);
-    report->name = found->name;
-    report->served = true;
-    return page(run_html(*report), etag);
+Result<Site::Standing> Site::standing(const Target& target) const {
+  Standing now;
+  if (target.path == "/") {
+    for (const WorkEntry& e : entries_) {
+      now.tag += e.name + words_of(e);
+      now.state += e.name + e.state + "|";
+    }
+  } else {
+    const auto names = target.query.find("of");
+    if (names == target.query.end()) return Error{no_such("")};
+    for (const std::string& name : names->second) {
+      const FoundWork* found = find(name);
+      if (found == nullptr) return Error{no_such(name)};
+      now.tag += words_of(entry(*found));
+      now.state += entry(*found).state + "|";
+    }
   }
-  if (found->kind == FoundWork::Kind::kDiagnosis && now.state != "running") {
-    const auto text = read_text_file((found->path / "diagnosis.json").string());
-    if (!text) return plain_response(500, text.error().message);
-    const auto diagnosis = parse_diagnosis(*text);
-    if (!diagnosis) return plain_response(500, found->name + ": " + diagnosis.error().message);
-    return page(report_html(*diagnosis, true), etag);
-  }
-  auto html = command_page(*found, sources_.unix_now_s());
-  if (!html) return plain_response(500, html.error().message);
-  return page(*std::move(html), etag);
+  now.tag = hash_of(now.tag + key_of(target));
+  return now;
 }
 
-HttpResponse Site::compare(const Target& target, const std::string& known) {
-  const auto names = target.query.find("of");
-  if (names == target.query.end()) {
+const Site::Kept* Site::kept(const std::string& key, const Standing& now) const {
+  const auto found = kept_.find(key);
+  if (found == kept_.end()) return nullptr;
+  const Kept& page = found->second;
+  if (page.tag == now.tag) return &page;
+  const double age_s = sources_.unix_now_s() - page.made_unix_s;
+  const bool good = page.state == now.state && age_s >= 0 && age_s < good_for_s(page.cost_s);
+  return good ? &page : nullptr;
+}
+
+void Site::keep(const std::string& key, Kept page) {
+  if (kept_.size() >= kMostKept && !kept_.contains(key)) {
+    kept_.erase(std::min_element(kept_.begin(), kept_.end(), [](const auto& a, const auto& b) {
+      return a.second.made_unix_s < b.second.made_unix_s;
+    }));
+  }
+  kept_[key] = std::move(page);
+}
+
+HttpResponse Site::shown(const Target& target, const std::string& known) {
+  if (target.path == "/compare" && !target.query.contains("of")) {
     return plain_response(400, "Choose runs in the list: /compare?of=RUN&of=RUN.");
   }
-  if (names->second.size() > kMostCompared) return plain_response(400, "At most 8 runs at a time.");
-  std::string tags;
-  std::vector<const FoundWork*> chosen;
-  for (const std::string& name : names->second) {
-    const FoundWork* found = find(name);
-    if (found == nullptr) return no_such(name);
-    if (found->kind != FoundWork::Kind::kRun) return plain_response(400, name + " is no run.");
-    chosen.push_back(found);
-    tags += etag_of(*found, entry(*found));
+  const auto now = standing(target);
+  if (!now) return plain_response(404, now.error().message);
+  const std::string key = key_of(target);
+  const Kept* page = kept(key, *now);
+  if (page == nullptr) {
+    const double began_unix_s = sources_.unix_now_s();
+    auto html = made(target);
+    if (!html) return plain_response(target.path == "/compare" ? 400 : 500, html.error().message);
+    const double ended_unix_s = sources_.unix_now_s();
+    keep(key, {now->tag, *std::move(html), now->state, ended_unix_s, ended_unix_s - began_unix_s});
+    page = &kept_.at(key);
   }
-  const std::string etag = quoted_hash(tags);
+  const std::string etag = "\"" + page->tag + "\"";
   if (etag == known) return unchanged(etag);
+  HttpResponse response;
+  response.body = page->html;
+  response.etag = etag;
+  return response;
+}
+
+HttpResponse Site::events(const Target& target) {
+  Target watched = target;
+  watched.path = target.value("at");
+  watched.query.erase("at");
+  const bool known = watched.path == "/" || watched.path == "/view" || watched.path == "/compare";
+  if (!known) return plain_response(404, "Nothing is to be told of there: / lists what there is.");
+  if (const auto now = standing(watched); !now) return plain_response(404, now.error().message);
+  HttpResponse response;
+  response.watched = [this, watched] {
+    look();
+    const auto now = standing(watched);
+    if (!now) return std::string("gone");
+    const Kept* page = kept(key_of(watched), *now);
+    return page != nullptr ? page->tag : now->tag;
+  };
+  return response;
+}
+
+Result<std::string> Site::made(const Target& target) const {
+  if (target.path == "/view") return view(target);
+  if (target.path == "/compare") return compare(target);
+  std::vector<std::string> folders;
+  for (const auto& folder : sources_.folders) folders.push_back(folder.string());
+  return list_page(entries_, list_view(target), folders);
+}
+
+Result<std::string> Site::view(const Target& target) const {
+  const FoundWork* found = find(target.value("of"));
+  if (found == nullptr) return Error{no_such(target.value("of"))};
+  if (found->kind == FoundWork::Kind::kRun) {
+    auto report = sources_.read_run(
+        {found->path, whole_number(target.value("genome")), whole_number(target.value("best_of"))});
+    if (!report) return report.error();
+    report->name = found->name;
+    report->served = true;
+    return run_html(*report);
+  }
+  if (found->kind == FoundWork::Kind::kDiagnosis && entry(*found).state != "running") {
+    const auto text = read_text_file((found->path / "diagnosis.json").string());
+    if (!text) return text.error();
+    const auto diagnosis = parse_diagnosis(*text);
+    if (!diagnosis) return Error{found->name + ": " + diagnosis.error().message};
+    return report_html(*diagnosis, true);
+  }
+  return command_page(*found, sources_.unix_now_s());
+}
+
+Result<std::string> Site::compare(const Target& target) const {
+  const std::vector<std::string>& names = target.query.at("of");
+  if (names.size() > kMostCompared) return Error{"At most 8 runs at a time."};
   std::vector<RunReport> runs;
-  for (const FoundWork* found : chosen) {
-    auto report = sources_.read_run(found->path);
-    if (!report) return plain_response(500, report.error().message);
+  for (const std::string& name : names) {
+    const FoundWork* found = find(name);
+    if (found == nullptr) return Error{no_such(name)};
+    if (found->kind != FoundWork::Kind::kRun) return Error{name + " is no run."};
+    auto report = sources_.read_run({found->path, {}, {}});
+    if (!report) return report.error();
     report->name = found->name;
     runs.push_back(*std::move(report));
   }
-  return page(compare_page(runs), etag);
+  return compare_page(runs);
 }
 
 HttpResponse Site::drive(const Target& target) {
   const FoundWork* found = find(target.value("of"));
-  if (found == nullptr || found->kind != FoundWork::Kind::kRun) return no_such(target.value("of"));
+  if (found == nullptr || found->kind != FoundWork::Kind::kRun) {
+    return plain_response(404, no_such(target.value("of")));
+  }
   const auto trial = whole_number(target.value("trial"));
   const std::string generation = target.value("generation");
   const auto of_generation = whole_number(generation);

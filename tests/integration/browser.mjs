@@ -52,6 +52,9 @@ export function send(method, params = {}, sessionId = undefined) {
   return new Promise((resolve, reject) => waiting.set(id, { resolve, reject }));
 }
 
+// What some keys do depends on their numbers, or on what they write.
+const KEYS = { Tab: [9], Enter: [13, "\r"], Escape: [27], " ": [32, " "], End: [35], Home: [36], ArrowLeft: [37], ArrowUp: [38], ArrowRight: [39], ArrowDown: [40] };
+
 // --- a page ---
 
 // `may` says which requests beside the page itself are fine.
@@ -85,8 +88,11 @@ export async function open(url, { width = 1280, height = 900, dark = false, scri
       if (exceptionDetails) throw new Error(`${expression}: ${exceptionDetails.exception?.description}`);
       return result.value;
     },
-    async key(key) {
-      for (const type of ["keyDown", "keyUp"]) await call("Input.dispatchKeyEvent", { type, key, code: key });
+    async key(key, modifiers = 0) {
+      const [windowsVirtualKeyCode, text] = KEYS[key] || [0, key.length === 1 ? key : undefined];
+      for (const type of ["keyDown", "keyUp"]) {
+        await call("Input.dispatchKeyEvent", { type, key, code: key, modifiers, windowsVirtualKeyCode, text: type === "keyDown" ? text : undefined });
+      }
     },
     async picture(name) {
       if (!pictures) return;

@@ -45,15 +45,19 @@ std::vector<json> log_lines(const std::string& text) {
   return lines;
 }
 
+// Empty: nobody is there.
 std::string fetch(int port, const std::string& request) {
   const int fd = ::socket(AF_INET, SOCK_STREAM, 0);
   sockaddr_in address = {};
   address.sin_family = AF_INET;
   address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
   address.sin_port = htons(static_cast<std::uint16_t>(port));
-  EXPECT_EQ(::connect(fd, reinterpret_cast<sockaddr*>(&address), sizeof address), 0);
-  EXPECT_GT(::send(fd, request.data(), request.size(), MSG_NOSIGNAL), 0);
   std::string answer;
+  if (::connect(fd, reinterpret_cast<sockaddr*>(&address), sizeof address) != 0) {
+    ::close(fd);
+    return answer;
+  }
+  EXPECT_GT(::send(fd, request.data(), request.size(), MSG_NOSIGNAL), 0);
   std::array<char, 4096> bytes;
   for (ssize_t n = 0; (n = ::recv(fd, bytes.data(), bytes.size(), 0)) > 0;) {
     answer.append(bytes.data(), static_cast<std::size_t>(n));
@@ -85,27 +89,65 @@ TEST_F(Observability, EveryLineOfAJsonLogIsAnObjectWithItsPlace) {
   EXPECT_EQ(joined, 1u);
 }
 
+int port_after(const RunningProgram& program, const std::string& marker) {
+  std::size_t at = std::string::npos;
+  while (at == std::string::npos || program.err().find('\n', at) == std::string::npos) {
+    at = program.err().find(marker);
+    std::this_thread::yield();
+  }
+  return std::stoi(program.err().substr(at + marker.size()));
+}
+
 TEST_F(Observability, FiguresAreServedOnThisMachine) {
   RunningProgram master("gapfarm", evolve("run", {"--workers", "0", "--listen",
                                                   "ipc://" + folder_ / "farm", "--metrics", "0"}));
-  const std::string marker = "http://127.0.0.1:";
-  std::size_t at = std::string::npos;
-  while (at == std::string::npos || master.err().find('\n', at) == std::string::npos) {
-    at = master.err().find(marker);
-    std::this_thread::yield();
-  }
-  const int port = std::stoi(master.err().substr(at + marker.size()));
+  const int port = port_after(master, "metrics: http://127.0.0.1:");
+  const std::string close = " HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n";
   std::string page;
   while (page.find("gapfarm_generation") == std::string::npos) {
-    page = fetch(port, "GET /metrics HTTP/1.1\r\nHost: x\r\n\r\n");
+    page = fetch(port, "GET /metrics" + close);
   }
   EXPECT_THAT(page, HasSubstr("200 OK"));
-  EXPECT_THAT(page, HasSubstr("\n# TYPE gapfarm_retries_total counter\ngapfarm_retries_total 0\n"));
-  EXPECT_THAT(page, HasSubstr("gapfarm_workers{state=\"busy\"} 0\n"));
-  EXPECT_THAT(fetch(port, "GET /etc/passwd HTTP/1.1\r\n\r\n"), HasSubstr("404"));
-  EXPECT_THAT(fetch(port, "nonsense\r\n\r\n"), HasSubstr("404"));
+  const std::string of = "{of=\"" + folder_ / "run" + "\"";
+  EXPECT_THAT(page, HasSubstr("\n# TYPE gapfarm_retries_total counter\n"));
+  EXPECT_THAT(page, HasSubstr("\ngapfarm_retries_total" + of + "} 0\n"));
+  EXPECT_THAT(page, HasSubstr("gapfarm_workers" + of + ",state=\"busy\"} 0\n"));
+  EXPECT_THAT(fetch(port, "GET /etc/passwd" + close), HasSubstr("404"));
+  EXPECT_THAT(fetch(port, "nonsense\r\n\r\n"), HasSubstr("400"));
   master.send(SIGTERM);
   master.wait();
+}
+
+// The page comes with the run and goes with it, however that ends.
+TEST_F(Observability, APageComesAlong) {
+  const std::string get = "GET /view?of=" + folder_ / "run" +
+                          " HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n";
+  for (const int signal : {SIGTERM, SIGKILL}) {
+    std::filesystem::remove_all(folder_ / "run");
+    RunningProgram master("gapfarm",
+                          evolve("run", {"--workers", "0", "--listen", "ipc://" + folder_ / "farm",
+                                         "--page-port", "0"}));
+    const int port = port_after(master, "page: http://127.0.0.1:");
+    EXPECT_THAT(fetch(port, get), HasSubstr("No generation was completed yet"));
+    EXPECT_THAT(master.err(), HasSubstr("ssh -L " + std::to_string(port)));
+    master.send(signal);
+    master.wait();
+    // The kernel ends it when it learns of a killed parent.
+    while (!fetch(port, get).empty()) std::this_thread::yield();
+  }
+  std::filesystem::remove_all(folder_ / "run");
+}
+
+TEST_F(Observability, APageOnATakenPortIsSaid) {
+  RunningProgram first("gapfarm", {"serve", folder_.path().string(), "--port", "0"});
+  while (first.out().find("then open") == std::string::npos) std::this_thread::yield();
+  const std::string marker = "127.0.0.1:";
+  const int port = std::stoi(first.out().substr(first.out().find(marker) + marker.size()));
+  const Finished run =
+      gapfarm_command(evolve("run", {"--workers", "1", "--page-port", std::to_string(port)}));
+  EXPECT_EQ(run.exit_code, 1);
+  EXPECT_THAT(run.err, HasSubstr("cannot listen on 127.0.0.1:" + std::to_string(port)));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "run"));
 }
 
 TEST_F(Observability, AnIndividualIsReplayedToTheBit) {

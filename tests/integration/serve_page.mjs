@@ -1,9 +1,10 @@
 // node serve_page.mjs CHROMIUM BIN SOURCE FOLDER: evolves, serves and looks, as a person would.
-// A run seen while it is alive, its master killed with -9 and resumed under the open page, two runs
-// compared, an address opened again, a drive played, a phone, dark, without scripts, and a server
-// that goes away.
+// A run from its first generation to its end, another whose worker and then master are killed with -9
+// and which is resumed under the open page, a diagnosis from its first stage to its report, two runs
+// compared, addresses opened again, a drive played, keys only, a phone, dark, without events, without
+// scripts, and a server that goes away.
 import { spawn } from "node:child_process";
-import { mkdirSync, rmSync, writeFileSync } from "node:fs";
+import { mkdirSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
 import { check, end, failures, open } from "./browser.mjs";
 
@@ -41,7 +42,85 @@ const saidBy = (child, pattern) => new Promise((resolve) => {
 
 const generation = `Number(/after (\\d+) generations/.exec(document.getElementById("headline").textContent)?.[1] || 0)`;
 const OVERFLOW = "document.documentElement.scrollWidth - document.documentElement.clientWidth";
+const DIAGNOSED = `scenario = "srv1"
+[parameters]
+step_rate = 60
+tread_creep = 0.05
+drive_noise_common = 0.012
+drive_noise_side = 0.01
+pose_noise_position = 0.0015
+pose_noise_heading = 0.008
+[simulate]
+sessions = 2
+levels = [0.5, 1.0]
+durations = [0.5, 1.0]
+`;
 const may = (url) => url.startsWith("http://127.0.0.1:");
+
+// Through the list into a run, along its plots, with keys alone.
+async function byKeys(address) {
+  const page = await open(`${address}?sort=name`, { may });
+  const at = () => page.run(`document.activeElement.getAttribute("href") || document.activeElement.className || document.activeElement.name`);
+  const tabTo = async (pattern) => {
+    for (let i = 0; i < 80; ++i) {
+      await page.key("Tab");
+      const now = await at();
+      if (pattern.test(now)) return true;
+    }
+    check(false, `keys: never came to ${pattern}`);
+    return false;
+  };
+  await page.key("Tab");
+  check((await at()) === "#work", "keys: the first stop is not the way to the content");
+  await tabTo(/sort=seed/);
+  await page.key("Enter");
+  await until(page, `location.search.includes("sort=seed")`, "keys: sorted");
+  await tabTo(/view\?of=short/);
+  await page.key("Enter");
+  await until(page, `location.pathname === "/view" && document.documentElement.dataset.ready`, "keys: a run is opened");
+  if (await tabTo(/canvas/)) {
+    await page.key("ArrowRight");
+    await until(page, `document.querySelector("#progress-plot .readout").textContent.includes("generation 1")`, "keys: a mark is read");
+    await page.key("+");
+    await until(page, `document.querySelector("#progress-plot svg.chart text") !== null`, "keys: zoomed");
+    check(await page.run(`getComputedStyle(document.activeElement).outlineStyle !== "none"`), "keys: nobody sees where the focus is");
+  }
+  await page.call("Page.navigateToHistoryEntry", { entryId: (await page.call("Page.getNavigationHistory")).entries.at(-2).id });
+  await until(page, `location.search.includes("sort=seed")`, "keys: back leads to the sorted list");
+  await page.close();
+}
+
+// Where no events come through, the page asks by itself.
+async function withoutEvents(url, resume) {
+  const page = await open(url, { may });
+  await page.call("Network.setBlockedURLs", { urls: ["*/events*"] });
+  await page.call("Page.reload");
+  await until(page, `document.documentElement.dataset.ready`, "without events: loaded");
+  const before = await page.run(generation);
+  const run = resume();
+  await until(page, `${generation} > ${before}`, "without events: the page goes on");
+  check((await page.run(`document.documentElement.dataset.told`)) !== "true", "without events: it says that it is told");
+  run.kill("SIGINT");
+  await run.ended;
+  await page.close();
+}
+
+// From its first stage to its report.
+async function diagnosed(view) {
+  writeFileSync(join(folder, "d.toml"), DIAGNOSED);
+  const made = start("simulate", "d.toml", "--trials", "60", "--seed", "3", "--set", "motor_lag.tau=0.06", "--out", "d.csv", "--workers", "1");
+  check((await made.ended) === 0, `nothing to diagnose: ${made.said}`);
+  const diagnosis = start("diagnose", "d.toml", "--trials", "d.csv", "--out", "d", "--workers", "1");
+  const page = await open(view("d"), { may });
+  const stage = `document.querySelector("#tiles")?.innerText || ""`;
+  await until(page, `/[1-9] of 6/.test(${stage}) || (document.querySelector("#tiles") || location.reload(), false)`, "a diagnosis is seen at work");
+  await page.picture("serve-diagnosis-live");
+  await until(page, `document.getElementById("shrinkage") || document.getElementById("screening")`, "the diagnosis becomes its report", 400_000);
+  check((await diagnosis.ended) === 0, `the diagnosis did not end well: ${diagnosis.said}`);
+  for (const complaint of page.complaints) check(/404/.test(complaint), `diagnosis: ${complaint}`);
+  await page.picture("serve-diagnosis");
+  await page.close();
+}
 
 try {
   rmSync(folder, { recursive: true, force: true });
@@ -56,14 +135,39 @@ try {
   if (!address) throw new Error(`serve said ${server.said}`);
   const view = (name) => `${address}view?of=${name}`;
 
+  // From before its first generation to its end.
+  const whole = evolve("whole", "--generations", "8");
+  await saidBy(whole, /evolving/);
+  const first = await open(view("whole"), { may });
+  await until(first, `document.getElementById("headline") !== null || (location.reload(), false)`, "a new run is found");
+  await until(first, `${generation} >= 1`, "its first generation is shown");
+  await until(first, `/^finished/.test(document.getElementById("state").textContent)`, "it is seen to end");
+  check((await first.run(generation)) === 8, "not all of its generations are shown");
+  await until(first, `document.querySelectorAll("#pose-plots .canvas path").length > 3`, "its end poses are drawn");
+  check((await whole.ended) === 0, "the whole run did not end well");
+  await first.picture("serve-whole");
+  await first.close();
+
   const list = await open(address, { may });
-  await until(list, `/2 here, 1 running/.test(document.getElementById("headline").textContent)`, "both runs are listed, one runs");
+  await until(list, `/3 here, 1 running/.test(document.getElementById("headline").textContent)`, "both runs are listed, one runs");
   await list.picture("serve-list");
+  await list.run(`(() => { const f = document.getElementById("filter"); f.q.value = "short"; f.q.dispatchEvent(new Event("input", { bubbles: true })); })()`);
+  await until(list, `document.querySelectorAll("#entries tbody tr").length === 1 && location.search.includes("q=short")`, "the list is filtered and its address says so");
+  await list.close();
 
   const page = await open(view("live"), { may });
   await until(page, `${generation} >= 2`, "a live run goes on under the open page");
   await until(page, `document.querySelectorAll("#gene-plots .canvas rect").length > 10`, "genes are drawn");
   check(/busy|idle/.test(await page.run(`document.getElementById("farm-now").innerText`)), "no worker is told of");
+  await until(page, `document.documentElement.dataset.told === "true"`, "the server tells of what is new");
+  check((await page.run(`document.querySelectorAll("#elite-plot .canvas path").length`)) > 10, "the elite is not drawn");
+
+  // A worker that dies is told of, with its reason.
+  const workerOf = (pid) => Number(readFileSync(`/proc/${pid}/task/${pid}/children`, "utf8").trim().split(" ")[0]);
+  process.kill(workerOf(live.pid), "SIGKILL");
+  await until(page, `/killed by signal 9/.test(document.getElementById("farm-past").textContent)`, "a dead worker is told of");
+  await until(page, `document.querySelectorAll("#timeline-plot figure").length === 2`, "who was there is drawn");
+  await page.run(`document.getElementById("farm").scrollIntoView()`);
   await page.picture("serve-live");
   live.kill("SIGKILL");
   await live.ended;
@@ -91,9 +195,23 @@ try {
   await again.run(`document.getElementById("watch").scrollIntoView()`);
   await again.picture("serve-watch");
 
+  // What was chosen stands in the address, and comes back with it.
+  await again.run(`(() => { const s = document.querySelector("#progress-controls select"); s.value = "evaluations"; s.dispatchEvent(new Event("change")); })()`);
+  const chosen = await again.run("location.href");
+  check(/against=evaluations/.test(chosen) && /trial=7/.test(chosen), `the address does not say what was chosen: ${chosen}`);
+  const reopened = await open(chosen, { may });
+  check((await reopened.run(`document.querySelector("#progress-controls select").value`)) === "evaluations", "the address does not choose again");
+  await reopened.close();
+  await again.close();
+
   const compared = await open(`${address}compare?of=live&of=short`, { may });
   await until(compared, `document.querySelectorAll("#compared-plot path").length > 3`, "two runs are drawn");
   await compared.picture("serve-compare");
+  await compared.close();
+
+  await byKeys(address);
+  await withoutEvents(view("live"), () => start("resume", "live", "--workers", "1"));
+  await diagnosed(view);
 
   for (const [name, url, options] of [
     ["serve-phone", view("short"), { width: 390, height: 844, dark: true }],

@@ -7,7 +7,7 @@ function startCompared() {
   const controls = document.getElementById("compared-controls");
   const chart = new Chart(parent, 0.45);
   chart.figure.classList.add("large");
-  const against = choice(controls, "Against", AGAINST.map((a) => [a.key, a.label]), draw);
+  const against = choice(controls, "Against", AGAINST.map((a) => [a.key, a.label]), draw, "against");
   function draw() {
     const { of, label } = AGAINST.find((a) => a.key === against());
     const style = (i) => LINE_STYLES[i % LINE_STYLES.length];

@@ -1,7 +1,11 @@
 "use strict";
-// A page that a server shows looks again while it is open: what changed is put in its place.
+// A page that a server shows looks again while it is open: what changed is put in its place.  The
+// server says when there is something new (server-sent events); where it cannot, or does not, the
+// page asks by itself.
 
 const LOOK_MS = 2000;
+const TOLD_LOOK_MS = 60000;  // while it is told
+let lookNow = () => {};
 const redraws = [];  // of plots whose data may change
 
 // What a person has chosen or stands on, by what it says.
@@ -14,20 +18,24 @@ function putInPlace(element, html) {
   for (const input of element.querySelectorAll("input")) input.checked = checked.has(nameOf(input));
   if (inside) [...element.querySelectorAll("a, button, input")].find((e) => nameOf(e) === inside)?.focus({ preventScroll: true });
   startTables(element);
+  startCopies(element);
 }
 
 function startLive() {
   if (!PAGE.served) return;
-  const told = document.getElementById("live");
+  const said = document.getElementById("live");
   const shown = new Map();
   const sections = (page) => [...page.querySelectorAll("section")].map((s) => s.id).join(" ");
+  const path = location.pathname;
   let etag = "";
   let since = null;
+  let events = null;
+  let looking = null;
 
   function say(trouble) {
     since = trouble ? since ?? new Date().toLocaleTimeString() : null;
-    const text = trouble ? `${trouble} What stands here is from ${since} or before; it is asked again every ${LOOK_MS / 1000} s.` : "";
-    if (told.textContent !== text) told.textContent = text;
+    const text = trouble ? `${trouble} What stands here is from ${since} or before; it is asked again all the time.` : "";
+    if (said.textContent !== text) said.textContent = text;
   }
 
   function update(text) {
@@ -46,7 +54,7 @@ function startLive() {
   async function look() {
     try {
       const answer = await fetch(location.href.split("#")[0], {
-        cache: "no-store", headers: etag ? { "If-None-Match": etag } : {}, signal: AbortSignal.timeout(8000),
+        cache: "no-store", headers: etag ? { "If-None-Match": etag } : {}, signal: AbortSignal.timeout(20000),
       });
       if (answer.status === 304) return say("");
       if (!answer.ok) return say(`The server says: ${(await answer.text()).slice(0, 200).trim()}`);
@@ -60,10 +68,43 @@ function startLive() {
   }
 
   // One look after the other, none while nobody sees the page.
-  const again = async () => {
-    if (!document.hidden) await look();
-    setTimeout(again, LOOK_MS);
+  lookNow = () => {
+    looking = (looking || Promise.resolve()).then(() => (document.hidden ? null : look()));
+    return looking;
   };
-  document.addEventListener("visibilitychange", () => document.hidden || look());
+
+  // A page that nobody sees gives its connection back.
+  function listen() {
+    if (document.hidden || events || !window.EventSource) return;
+    const query = new URLSearchParams(location.search);
+    query.set("at", path);
+    events = new EventSource(`/events?${query}`);
+    events.onmessage = ({ data }) => `"${data}"` !== etag && lookNow();
+    events.onerror = () => {
+      // Refused: there is no asking again.  Else the browser connects again by itself.
+      if (events.readyState === EventSource.CLOSED) events = null;
+    };
+  }
+  const told = () => events?.readyState === EventSource.OPEN;
+  document.addEventListener("visibilitychange", () => {
+    if (document.hidden) {
+      events?.close();
+      events = null;
+    } else {
+      lookNow();
+      listen();
+    }
+  });
+
+  let asked = performance.now();
+  const again = async () => {
+    if (performance.now() - asked >= (told() ? TOLD_LOOK_MS : LOOK_MS)) {
+      await lookNow();
+      asked = performance.now();
+    }
+    document.documentElement.dataset.told = String(Boolean(told()));
+    setTimeout(again, LOOK_MS / 2);
+  };
+  listen();
   setTimeout(again, LOOK_MS);
 }

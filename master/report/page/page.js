@@ -13,12 +13,17 @@ function fieldset(parent, title) {
   return set;
 }
 
-// Each control returns a function that reads it.
-function radios(parent, title, options, changed) {
+// Each control returns a function that reads it.  Where it has a `place` its choice stands there in
+// the address.
+function radios(parent, title, options, changed, place) {
   const set = fieldset(parent, title);
-  const inputs = options.map(({ key, label }, i) => {
-    const input = Object.assign(document.createElement("input"), { type: "radio", name: title, value: key, checked: !i });
-    input.addEventListener("change", changed);
+  const known = place && options.some(({ key }) => key === address.get(place)) ? address.get(place) : options[0].key;
+  const inputs = options.map(({ key, label }) => {
+    const input = Object.assign(document.createElement("input"), { type: "radio", name: title, value: key, checked: key === known });
+    input.addEventListener("change", () => {
+      if (place) address.set({ [place]: key === options[0].key ? "" : key });
+      changed();
+    });
     return labelled(set, input, label);
   });
   return () => inputs.find((input) => input.checked).value;
@@ -34,11 +39,15 @@ function checks(parent, title, keys, changed) {
   return () => inputs.filter((input) => input.checked).map((input) => input.value);
 }
 
-function choice(parent, title, options, changed) {
+function choice(parent, title, options, changed, place) {
   const label = parent.appendChild(document.createElement("label"));
   const select = document.createElement("select");
   for (const [value, text] of options) select.add(new Option(text, value));
-  select.addEventListener("change", changed);
+  if (place && options.some(([value]) => value === address.get(place))) select.value = address.get(place);
+  select.addEventListener("change", () => {
+    if (place) address.set({ [place]: select.value === options[0][0] ? "" : select.value });
+    changed();
+  });
   label.append(`${title} `, select);
   const read = () => select.value;
   read.set = (value) => { select.value = value; };
@@ -75,7 +84,10 @@ startCopies();
 startProgress();
 startOperators();
 startGenes();
+startElite();
+startTimeline();
 startCompared();
+startFilter();
 startWatch();
 const pageTrials = readTrials();
 if (pageTrials.length) {

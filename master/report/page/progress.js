@@ -14,11 +14,11 @@ function startProgress() {
   const controls = document.getElementById("progress-controls");
   const chart = new Chart(parent, 0.45);
   chart.figure.classList.add("large");
-  const against = choice(controls, "Against", AGAINST.map((a) => [a.key, a.label]), draw);
+  const against = choice(controls, "Against", AGAINST.map((a) => [a.key, a.label]), draw, "against");
   const all = PAGE.generations.flatMap((g) => [g.best, g.median]).filter(isNumber);
   const canLog = all.length && all.every((v) => v > 0);
   const scale = canLog
-    ? radios(controls, "Scale", [{ key: "linear", label: "linear" }, { key: "log", label: "log" }], draw) : () => "linear";
+    ? radios(controls, "Scale", [{ key: "linear", label: "linear" }, { key: "log", label: "log" }], draw, "scale") : () => "linear";
 
   function draw() {
     const { of, label } = AGAINST.find((a) => a.key === against());

@@ -79,8 +79,8 @@ async function copyText(source) {
   }
 }
 
-function startCopies() {
-  for (const button of document.querySelectorAll("button.copy")) {
+function startCopies(root = document) {
+  for (const button of root.querySelectorAll("button.copy")) {
     button.hidden = false;
     const said = button.textContent;
     button.addEventListener("click", async () => {

@@ -53,12 +53,14 @@ function startWatch() {
     const label = element(controls, "label", {}, `${title} `);
     return element(label, "input", { type: "number", min: 1, max: most, step: 1, name: title });
   };
-  const trial = number("Trial", PAGE.logged_trials);
+  const trial = number("Trial", PAGE.logged_trials + PAGE.kept_apart);
+  if (PAGE.kept_apart) {
+    element(controls, "span", { className: "quiet" }, `${PAGE.logged_trials + 1} to ${PAGE.logged_trials + PAGE.kept_apart}: kept apart`);
+  }
   const generation = number("Best of generation", PAGE.generations.at(-1)?.generation || 1);
-  const asked = new URLSearchParams(location.search);
-  trial.value = asked.get("trial") || 1;
+  trial.value = address.get("trial") || 1;
   generation.placeholder = "last";
-  generation.value = asked.get("generation") || "";
+  generation.value = address.get("generation");
   const show = element(controls, "button", { type: "button" }, "Show");
   const play = element(controls, "button", { type: "button", disabled: true }, "Play");
   const scrub = element(element(controls, "label", { className: "scrub" }, "Time "), "input", { type: "range", min: 0, max: 1000, value: 1000, disabled: true });
@@ -70,6 +72,7 @@ function startWatch() {
   const time = () => (scrub.valueAsNumber / 1000) * end;
   const draw = () => {
     scrub.setAttribute("aria-valuetext", `${words(time())} s of ${words(end)} s`);
+    chart.figure.classList.toggle("apart", drive.kept_apart);
     chart.show(watchSpec(lines, time()), `${drive.title}, at ${time().toFixed(2)} s of ${words(end)} s`, drive.note, true);
   };
   const stop = () => {
@@ -106,7 +109,7 @@ function startWatch() {
       said.textContent = drive.said;
       chart.zoom = null;
       draw();
-      history.replaceState(null, "", `/view?${wanted}${location.hash}`);
+      address.set({ trial: wanted.get("trial"), generation: wanted.get("generation") });
     } catch (error) {
       said.textContent = `It cannot be shown: ${error.message}`;
     }

@@ -7,6 +7,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <random>
 #include <thread>
 
@@ -40,6 +41,13 @@ class Client {
            static_cast<ssize_t>(bytes.size());
   }
   void say_no_more() const { ::shutdown(fd_, SHUT_WR); }
+  // Until it has said `words`, or nothing more.
+  std::string hear_until(const std::string& words) const {
+    std::string all;
+    char byte;
+    while (all.find(words) == all.npos && ::recv(fd_, &byte, 1, 0) == 1) all += byte;
+    return all;
+  }
   // Until the other side has nothing more to say.
   std::string hear() const {
     std::string all;
@@ -61,8 +69,13 @@ class Served : public testing::Test {
   void start(const HttpLimits& limits) {
     auto server = HttpServer::listen(
         0,
-        [](const HttpRequest& request) {
+        [this](const HttpRequest& request) {
           if (auto refused = refusal(request)) return *refused;
+          if (request.target == "/events") {
+            HttpResponse stream;
+            stream.watched = [this] { return "state " + std::to_string(state_.load()); };
+            return stream;
+          }
           HttpResponse response = plain_response(200, "asked for " + request.target);
           response.etag = "\"one\"";
           if (request.if_none_match == response.etag) response.status = 304;
@@ -94,6 +107,7 @@ class Served : public testing::Test {
   void still_answers() const { EXPECT_THAT(get("/well"), HasSubstr("asked for /well")); }
 
   StopSource stop_;
+  std::atomic<int> state_ = 1;
   std::unique_ptr<HttpServer> server_;
   std::thread thread_;
 };
@@ -191,6 +205,64 @@ TEST_F(Served, SlowClientsAreHungUpOn) {
   client.say("GET / HTTP/1.1\r\nHo");
   EXPECT_EQ(client.hear(), "");
   still_answers();
+}
+
+constexpr const char* kListen = "GET /events HTTP/1.1\r\nHost: localhost\r\n\r\n";
+
+TEST_F(Served, TellsOfWhatIsNew) {
+  halt();
+  HttpLimits limits;
+  limits.watch_interval = std::chrono::milliseconds(5);
+  start(limits);
+  const Client client(server_->port());
+  client.say(kListen);
+  const std::string head = client.hear_until("data: state 1\n\n");
+  EXPECT_THAT(head, StartsWith("HTTP/1.1 200 OK"));
+  EXPECT_THAT(head, HasSubstr("text/event-stream"));
+  EXPECT_THAT(head, testing::Not(HasSubstr("Content-Length")));
+  state_ = 2;
+  EXPECT_THAT(client.hear_until("data: state 2\n\n"), HasSubstr("data: state 2\n\n"));
+  EXPECT_THAT(client.hear_until(": still here\n\n"), testing::Not(HasSubstr("data")));
+  still_answers();
+}
+
+TEST_F(Served, TellsSoManyAndRefusesTheNext) {
+  halt();
+  HttpLimits limits;
+  limits.streams = 2;
+  limits.watch_interval = std::chrono::milliseconds(5);
+  start(limits);
+  const Client first(server_->port());
+  {
+    const Client second(server_->port());
+    for (const Client* client : {&first, &second}) {
+      client->say(kListen);
+      EXPECT_THAT(client->hear_until("state 1"), HasSubstr("state 1"));
+    }
+    EXPECT_THAT(ask(kListen), StartsWith("HTTP/1.1 503"));
+  }
+  // The one that left has made room, as soon as the server knows.
+  for (std::string answer = "HTTP/1.1 503"; answer.starts_with("HTTP/1.1 503");) {
+    const Client third(server_->port());
+    third.say(kListen);
+    answer = third.hear_until("state 1");
+  }
+  still_answers();
+}
+
+// Streams count as connections, so they give way to others, too.
+TEST_F(Served, StreamsGiveWayToNewConnections) {
+  halt();
+  HttpLimits limits;
+  limits.connections = 4;
+  start(limits);
+  const Client stream(server_->port());
+  stream.say(kListen);
+  stream.hear_until("state 1");
+  std::vector<std::unique_ptr<Client>> silent;
+  for (int i = 0; i < 20; ++i) silent.push_back(std::make_unique<Client>(server_->port()));
+  still_answers();
+  stream.hear();  // ends
 }
 
 TEST_F(Served, SaysWhenAPortIsTaken) {

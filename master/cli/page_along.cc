@@ -1,0 +1,152 @@
+#include "master/cli/page_along.h"
+
+#include <fcntl.h>
+#include <poll.h>
+#include <signal.h>
+#include <sys/prctl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <charconv>
+#include <cstring>
+#include <string_view>
+#include <vector>
+
+#include "common/process/process_pool.h"
+#include "master/cli/subcommand.h"
+#include "master/serve/request.h"
+
+namespace gapfarm {
+namespace {
+
+constexpr int kStartLimit_ms = 20000;
+constexpr int kEndLimit_ms = 3000;
+constexpr int kLower = 10;  // a page can wait, a simulation should not
+constexpr std::string_view kAddress = "serving http://127.0.0.1:";
+constexpr std::string_view kTunnel = "from another machine: ";
+
+// After fork(): only what may be done there.
+[[noreturn]] void become_server(char* const* argv, int out, pid_t parent) {
+  ::prctl(PR_SET_PDEATHSIG, SIGTERM);
+  if (::getppid() != parent) ::_exit(1);
+  ::setpgid(0, 0);  // Ctrl-C is for the command, which ends this when it is done
+  sigset_t none;
+  ::sigemptyset(&none);
+  ::sigprocmask(SIG_SETMASK, &none, nullptr);
+  if (::nice(kLower) < 0) errno = 0;
+  const int nowhere = ::open("/dev/null", O_RDONLY);
+  ::dup2(nowhere, STDIN_FILENO);
+  // Whoever listens stops at the address: what comes later is dropped and blocks nobody.
+  ::fcntl(out, F_SETFL, O_NONBLOCK);
+  ::dup2(out, STDOUT_FILENO);
+  ::dup2(out, STDERR_FILENO);
+  ::execv(argv[0], argv);
+  ::_exit(127);
+}
+
+std::string up_to(std::string_view text, std::string_view mark, std::string_view end) {
+  const std::size_t at = text.find(mark);
+  if (at == text.npos) return "";
+  text.remove_prefix(at + mark.size());
+  return std::string(text.substr(0, text.find(end)));
+}
+
+// Of what a server that did not come up says, the sentence.
+std::string complaint(std::string said) {
+  constexpr std::string_view kProgram = "gapfarm: ";
+  if (said.starts_with(kProgram)) said.erase(0, kProgram.size());
+  while (!said.empty() && said.back() == '\n') said.pop_back();
+  return said.empty() ? "it ended without a word" : said;
+}
+
+}  // namespace
+
+void PageOption::declare(CLI::App& app) {
+  app.add_flag("--page", along,
+               "Show it in a browser while it goes on (`gapfarm serve`), and print the address");
+  app.add_option("--page-port", port, "The same on this port of 127.0.0.1 (0: any)")
+      ->check(CLI::Range(0, 65535))
+      ->type_name("PORT");
+  app.add_option("--metrics", metrics_port,
+                 "The same; the page's server has /metrics for Prometheus, too")
+      ->check(CLI::Range(0, 65535))
+      ->type_name("PORT");
+}
+
+Result<std::unique_ptr<PageAlong>> PageAlong::start(const std::filesystem::path& folder,
+                                                    unsigned port) {
+  std::vector<std::string> words = {executable_path(),    "serve", "--port",
+                                    std::to_string(port), "--",    folder.string()};
+  std::vector<char*> argv;
+  for (std::string& word : words) argv.push_back(word.data());
+  argv.push_back(nullptr);
+  std::array<int, 2> ends = {};
+  if (::pipe2(ends.data(), O_CLOEXEC) != 0) {
+    return Error{std::string("the page cannot be started: ") + std::strerror(errno)};
+  }
+  const pid_t self = ::getpid();
+  const pid_t pid = ::fork();
+  if (pid == 0) become_server(argv.data(), ends[1], self);
+  ::close(ends[1]);
+  if (pid < 0) {
+    ::close(ends[0]);
+    return Error{std::string("the page cannot be started: ") + std::strerror(errno)};
+  }
+  std::unique_ptr<PageAlong> page(new PageAlong(pid, ends[0]));
+  const std::string said = page->hear();
+  const std::string digits = up_to(said, kAddress, "/");
+  page->tunnel_ = up_to(said, kTunnel, ",");
+  const auto [end, error] =
+      std::from_chars(digits.data(), digits.data() + digits.size(), page->port_);
+  if (digits.empty() || error != std::errc() || page->tunnel_.empty()) {
+    return Error{"the page cannot be shown: " + complaint(said)};
+  }
+  return page;
+}
+
+std::string PageAlong::hear() const {
+  std::string said;
+  std::array<char, 1024> bytes;
+  const double until_s = monotonic_seconds() + 1e-3 * kStartLimit_ms;
+  while (said.find(", then open") == said.npos) {
+    const double left_s = until_s - monotonic_seconds();
+    pollfd polled = {out_, POLLIN, 0};
+    if (left_s <= 0 || ::poll(&polled, 1, static_cast<int>(1e3 * left_s) + 1) <= 0) break;
+    const ssize_t n = ::read(out_, bytes.data(), bytes.size());
+    if (n <= 0) break;
+    said.append(bytes.data(), static_cast<std::size_t>(n));
+  }
+  return said;
+}
+
+PageAlong::~PageAlong() {
+  ::kill(pid_, SIGTERM);
+  int status = 0;
+  for (int waited_ms = 0; ::waitpid(pid_, &status, WNOHANG) == 0; waited_ms += 10) {
+    if (waited_ms == kEndLimit_ms) ::kill(pid_, SIGKILL);
+    ::poll(nullptr, 0, 10);
+  }
+  ::close(out_);
+}
+
+Result<std::unique_ptr<PageAlong>> open_page(const PageOption& option,
+                                             const std::filesystem::path& folder,
+                                             CliContext& context) {
+  if (!option.wanted()) return std::unique_ptr<PageAlong>();
+  const std::optional<unsigned> named = option.port ? option.port : option.metrics_port;
+  auto page = PageAlong::start(folder, named.value_or(kPagePort));
+  if (!page && !named) page = PageAlong::start(folder, 0);
+  if (!page) return page.error();
+  const std::string address = "http://127.0.0.1:" + std::to_string((*page)->port()) + "/";
+  const std::string view =
+      address + "view?of=" + percent_encoded(folder.lexically_normal().string());
+  context.console.note("page: " + view + "\n  from another machine first: " + (*page)->tunnel() +
+                       "\n  it ends with this command; gapfarm serve " + folder.string() +
+                       " shows the same at any time");
+  if (option.metrics_port) context.console.note("metrics: " + address + "metrics");
+  return page;
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,79 @@
+"use strict";
+// Of a run: which workers were there, who came, who went and who failed.
+
+const CAME = {
+  joined: { style: "final", shape: "dot", words: "joined" },
+  left: { style: "quiet", shape: "diamond", words: "left" },
+  failed: { style: "tuned", shape: "cross", words: "failed" },
+  master: { style: "place", shape: "diamond", words: "a master began or ended" },
+};
+
+// Minutes or hours since the run began, whichever is easier to read.
+function timeAxis({ counts, end }) {
+  const from = counts[0][0];
+  const span = Math.max(end - from, 1);
+  const [unit, seconds] = span > 3 * 3600 ? ["hours", 3600] : span > 180 ? ["minutes", 60] : ["seconds", 1];
+  const began = new Date(1000 * from).toISOString().slice(0, 16).replace("T", " ");
+  return { of: (unix) => (unix - from) / seconds, axis: { min: 0, max: 1.02 * (span / seconds), label: `${unit} since ${began} UTC` } };
+}
+
+function countSpec(timeline) {
+  const { of, axis } = timeAxis(timeline);
+  const steps = [];
+  timeline.counts.forEach(([at, workers]) => {
+    if (steps.length) steps.push([of(at), steps.at(-1)[1]]);
+    steps.push([of(at), workers]);
+  });
+  const most = Math.max(1, ...timeline.counts.map(([, workers]) => workers));
+  return {
+    x: axis,
+    y: { min: 0, max: 1.08 * most, label: "workers", ticks: most <= 8 ? Array.from({ length: most + 1 }, (_, i) => [i, String(i)]) : undefined },
+    layers: [
+      { kind: "line", style: "final", width: 2, name: "workers", points: steps },
+      ...Object.entries(CAME).map(([kind, { style, shape }]) => (
+        { kind: "points", style, shape, name: kind, points: timeline.marks.filter((m) => m.kind === kind).map((m) => [of(m.at), m.workers, m]) })),
+    ],
+    describe: (m) => m.text,
+  };
+}
+
+function spanSpec(timeline) {
+  const { of, axis } = timeAxis(timeline);
+  const { spans } = timeline;
+  const row = (i) => spans.length - 1 - i;
+  const short = (name) => (name.length > 20 ? `…${name.slice(-19)}` : name);
+  const told = (s) => `${s.name}${s.host ? ` on ${s.host}` : ""}, for ${words((s.to - s.from) / 60)} min${s.end ? `, then it ${s.end}` : ""}`;
+  return {
+    x: axis,
+    y: { min: -0.7, max: spans.length - 0.3, label: "", room: Math.min(150, 16 + 6.6 * Math.max(...spans.map(({ name }) => short(name).length))), ticks: spans.map(({ name }, i) => [row(i), short(name)]) },
+    layers: [
+      ...spans.map((s, i) => ({ kind: "line", style: "final", width: 6, name: s.name, points: [[of(s.from), row(i)], [Math.max(of(s.to), of(s.from) + 0.003 * axis.max), row(i)]] })),
+      { kind: "points", style: "final", shape: "dot", faint: 0.01, name: "there", points: spans.map((s, i) => [of(s.to), row(i), s]) },
+      { kind: "points", style: "tuned", shape: "cross", name: "failed", points: spans.flatMap((s, i) => (s.end ? [[of(s.to), row(i), s]] : [])) },
+    ],
+    describe: told,
+  };
+}
+
+function startTimeline() {
+  const parent = document.getElementById("timeline-plot");
+  if (!parent || !PAGE.timeline?.counts.length) return;
+  const count = new Chart(parent, 0.24);
+  count.figure.classList.add("large");
+  let spans = null;
+  function draw() {
+    const { timeline } = PAGE;
+    if (!timeline?.counts.length) return;
+    const note = "Dot: joined; grey diamond: left; cross: failed; purple diamond: a master began or ended.";
+    count.show(countSpec(timeline), "Workers", note, Boolean(count.zoom));
+    if (!timeline.spans.length) return;
+    if (!spans) {
+      spans = new Chart(parent, 0.3);
+      spans.figure.classList.add("large");
+    }
+    spans.aspect = Math.max(0.14, 0.028 * timeline.spans.length + 0.08);
+    spans.show(spanSpec(timeline), "From when to when each was there", "A cross at the end: it failed.", Boolean(spans.zoom));
+  }
+  redraws.push(draw);
+  draw();
+}

@@ -1,0 +1,141 @@
+// What a site answers of real stores, by a clock of the test's own.
+#include "master/serve/site.h"
+
+#include <gmock/gmock.h>
+
+#include "tests/unit/store/store_fixture.h"
+
+namespace gapfarm {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+
+class SiteTest : public StoreTest {
+ protected:
+  SiteTest() : site_(sources()) {}
+
+  SiteSources sources() {
+    SiteSources sources;
+    sources.folders = {folder_};
+    sources.unix_now_s = [this] { return now_s_; };
+    sources.read_run = [this](const RunQuestion& question) -> Result<RunReport> {
+      ++made_;
+      now_s_ += cost_s_;
+      RunReport report;
+      report.headline = "made " + std::to_string(made_);
+      report.name = question.run.string();
+      return report;
+    };
+    sources.drive = [](const DriveQuestion&) -> Result<std::string> { return Error{"none"}; };
+    return sources;
+  }
+  RunStore make(const std::string& name, std::uint64_t seed = 1) const {
+    RunInfo info = example_info();
+    info.seed = seed;
+    auto store = RunStore::create(folder_ / name, info);
+    EXPECT_TRUE(store.ok()) << store.error().message;
+    EXPECT_TRUE(store->commit(example_generation(1)).ok());
+    return *std::move(store);
+  }
+  HttpResponse get(const std::string& target, const std::string& known = "") {
+    return site_.answer({"GET", target, "localhost", known});
+  }
+  std::string view(const std::string& name) const {
+    return "/view?of=" + percent_encoded((folder_ / name).string());
+  }
+  // Long enough for anything that was made to be old.
+  void wait() { now_s_ += 1e6; }
+
+  double now_s_ = 1e9, cost_s_ = 0;
+  int made_ = 0;
+  Site site_;
+};
+
+TEST_F(SiteTest, ListsFiltersAndSorts) {
+  const RunStore first = make("alpha", 7), second = make("beta", 3);
+  const std::string all = get("/").body;
+  EXPECT_THAT(all, HasSubstr("2 here, 2 running"));
+  EXPECT_THAT(all, HasSubstr("configs/srv1.toml"));
+  const std::string filtered = get("/?q=ALPH").body;
+  EXPECT_THAT(filtered, HasSubstr("1 shown"));
+  EXPECT_THAT(filtered, HasSubstr("/alpha</a>"));
+  EXPECT_THAT(filtered, Not(HasSubstr("/beta</a>")));
+  EXPECT_THAT(get("/?q=seed+3").body, Not(HasSubstr("/alpha</a>")));
+  EXPECT_THAT(get("/?state=finished").body, HasSubstr("0 shown"));
+  // What is chosen stays while it is sorted.
+  EXPECT_THAT(get("/?q=a&state=running").body, HasSubstr("?sort=seed&amp;q=a&amp;state=running"));
+  const std::string sorted = get("/?sort=seed").body;
+  EXPECT_LT(sorted.find("/beta</a>"), sorted.find("/alpha</a>"));
+  EXPECT_THAT(get("/?q=%3Cb%3Ex").body, Not(HasSubstr("<b>x")));
+}
+
+TEST_F(SiteTest, SaysThatNothingChangedUntilItDoes) {
+  RunStore store = make("run");
+  const HttpResponse first = get(view("run"));
+  EXPECT_EQ(first.status, 200u);
+  EXPECT_EQ(get(view("run"), first.etag).status, 304u);
+  ASSERT_TRUE(store.commit(example_generation(2)).ok());
+  const HttpResponse second = get(view("run"), first.etag);
+  EXPECT_EQ(second.status, 200u);
+  EXPECT_THAT(second.body, HasSubstr("made 2"));
+}
+
+TEST_F(SiteTest, WhatTookLongIsGoodForLong) {
+  RunStore store = make("run");
+  cost_s_ = 0.5;
+  const HttpResponse first = get(view("run"));
+  ASSERT_TRUE(store.commit(example_generation(2)).ok());
+  now_s_ += 40;
+  EXPECT_EQ(get(view("run"), first.etag).status, 304u) << "half a second is good for fifty";
+  now_s_ += 20;
+  EXPECT_THAT(get(view("run"), first.etag).body, HasSubstr("made 2"));
+  // That a run has ended is told at once.
+  Progress end;
+  end.state = RunState::kFinished;
+  ASSERT_TRUE(store.set_progress(end).ok());
+  now_s_ += 6;  // the list looks after its state
+  EXPECT_THAT(get(view("run"), first.etag).body, HasSubstr("made 3"));
+}
+
+TEST_F(SiteTest, EventsTellWhatThePageStandsAt) {
+  RunStore store = make("run");
+  const std::string of = percent_encoded((folder_ / "run").string());
+  const HttpResponse stream = get("/events?at=/view&of=" + of);
+  ASSERT_TRUE(stream.watched);
+  const HttpResponse page = get(view("run"));
+  EXPECT_EQ("\"" + stream.watched() + "\"", page.etag);
+  ASSERT_TRUE(store.commit(example_generation(2)).ok());
+  wait();
+  const std::string after = stream.watched();
+  EXPECT_NE("\"" + after + "\"", page.etag);
+  EXPECT_EQ(get(view("run")).etag, "\"" + after + "\"");
+  EXPECT_EQ(get("/events?at=/metrics").status, 404u);
+  EXPECT_EQ(get("/events?at=/view&of=nothing").status, 404u);
+  EXPECT_TRUE(get("/events?at=/").watched);
+}
+
+TEST_F(SiteTest, FindsNothingOutsideOfItsFolders) {
+  const RunStore store = make("run");
+  for (const char* name : {"/etc", "..", "run/../run", ""}) {
+    EXPECT_EQ(get("/view?of=" + percent_encoded(name)).status, 404u) << name;
+    EXPECT_EQ(get("/compare?of=" + percent_encoded(name)).status, 404u) << name;
+  }
+}
+
+TEST_F(SiteTest, FiguresHaveLabels) {
+  RunStore store = make("ru\"n");
+  Progress progress;
+  progress.workers = {{"w", "h", "busy", 1, 2, 3}};
+  progress.farm.retries = 5;
+  ASSERT_TRUE(store.set_progress(progress).ok());
+  const std::string text = get("/metrics").body;
+  const std::string label = "{of=\"" + folder_.string() + "/ru\\\"n\"";
+  EXPECT_THAT(text, HasSubstr("# TYPE gapfarm_retries_total counter\n"));
+  EXPECT_THAT(text, HasSubstr("gapfarm_retries_total" + label + "} 5\n"));
+  EXPECT_THAT(text, HasSubstr("gapfarm_generation" + label + "} 1\n"));
+  EXPECT_THAT(text, HasSubstr("gapfarm_workers" + label + ",state=\"busy\"} 1\n"));
+}
+
+}  // namespace
+}  // namespace gapfarm
