@@ -83,12 +83,10 @@ void DiagnosisRun::doubt_misses() {
 // with it, or its best size is none or more than there can be.
 // What closes next to nothing has to do so without doubt: beside a large gap a few nats are to be
 // had by anything.
-std::optional<std::pair<std::size_t, std::string>> DiagnosisRun::effect_to_drop() const {
+std::optional<std::pair<std::size_t, std::string>> DiagnosisRun::effect_to_drop(
+    double perfect) const {
   const std::size_t before = as_logged_ ? 1 : 0;
-  const double perfect =
-      std::max(mean(nested_scores_.back()),
-               floor_score(nested_studies_.back(), problem_.fitness.outlier_share));
-  const double gap = perfect - mean(nested_scores_.front());
+  const double gap = std::max(perfect, mean(nested_scores_.back())) - mean(nested_scores_.front());
   for (std::size_t k = chosen_.size(); k-- > 0;) {
     const std::vector<double>&with = nested_scores_[before + k + 1],
           &without = nested_scores_[before + k];

@@ -126,7 +126,8 @@ Status DiagnosisRun::refit() {
   for (;;) {
     if (Status s = refit_nested(); !s) return s;
     score_nested(folds);
-    auto worthless = effect_to_drop();
+    auto worthless =
+        effect_to_drop(floor_score(nested_studies_.back(), problem_.fitness.outlier_share));
     if (!worthless) {
       if (Status s = estimate_beside_base(); !s) return s;
       worthless = effect_at_bound();
@@ -135,7 +136,7 @@ Status DiagnosisRun::refit() {
       if (chosen_.size() < found) judge_again();
       if (Status s = fit_correction(); !s) return s;
       set_floor(folds);
-      worthless = effect_to_drop();  // by the noise's own tails, if it has any
+      worthless = effect_to_drop(floor_);  // by the noise's own tails, if it has any
     }
     if (!worthless) break;
     drop_effect(worthless->first, worthless->second);

@@ -59,7 +59,8 @@ class DiagnosisRun {
   bool doubts_base();
   void doubt(SanityFinding finding);
   void doubt_misses();
-  std::optional<std::pair<std::size_t, std::string>> effect_to_drop() const;
+  // `perfect`: what a prediction scores that misses nothing.
+  std::optional<std::pair<std::size_t, std::string>> effect_to_drop(double perfect) const;
   std::optional<std::pair<std::size_t, std::string>> effect_at_bound() const;
   void drop_effect(std::size_t k, const std::string& why);
   void say_what_was_left_out();
