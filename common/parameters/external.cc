@@ -32,10 +32,10 @@ std::vector<Parameter> noise_rows() {
 
 bool can_be_applied(const Effect& effect, unsigned inputs) {
   for (const char* name : kOfTheBuild) {
-    if (effect.name == name) return false;
+    if (effect.kind() == name) return false;
   }
   for (const EffectNeed& need : kEffectNeeds) {
-    if (effect.name == need.effect) return (inputs & need.inputs) == need.inputs;
+    if (effect.kind() == need.effect) return (inputs & need.inputs) == need.inputs;
   }
   // One that nobody has sorted yet is left out rather than left without effect.
   return effect.stage != EffectStage::kFloor;
@@ -52,7 +52,8 @@ bool is_taken(const std::string& key) {
   for (const Srv1 row : kNoiseRows) {
     if (srv1_table()[row_of(row)].key == key) return true;
   }
-  return std::any_of(srv1_effects().begin(), srv1_effects().end(),
+  const std::span<const Effect> known = srv1_effects_and_seconds();
+  return std::any_of(known.begin(), known.end(),
                      [&](const Effect& effect) { return effect.name == key; });
 }
 
@@ -93,7 +94,7 @@ ExternalTable::ExternalTable(ExternalDeclaration declaration)
     : declaration_(std::move(declaration)) {
   std::vector<Parameter> rows = declaration_.parameters;
   for (const Parameter& row : noise_rows()) rows.push_back(row);
-  for (const Effect& effect : srv1_effects()) {
+  for (const Effect& effect : srv1_effects_and_seconds()) {
     if (can_be_applied(effect, declaration_.inputs)) effects_.push_back(effect);
   }
   table_ = std::make_unique<ParameterTable>(std::move(rows), effects_);

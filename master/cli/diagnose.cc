@@ -49,6 +49,7 @@ Model model_of(const Config& config, const DiagnosisResult& result, const Parame
   model.values = values;
   model.commands = config.problem.commands;
   model.pieces = config.problem.pieces;
+  model.external = config.problem.external;
   model.fitness = config.problem.fitness;
   model.spread = config.problem.spread;
   model.frame_x_m = result.frame_x_m;

@@ -26,7 +26,7 @@ Status check_left_out(const Problem& problem, const std::vector<std::string>& le
 // The steps in the order of docs/diagnosis.md.
 Result<DiagnosisResult> diagnose(Farm& farm, const Problem& problem,
                                  const DiagnoseOptions& options) {
-  if (diagnosis_subject(problem.scenario) == nullptr) {
+  if (diagnosis_subject(problem) == nullptr) {
     return Error{"scenario " + problem.scenario +
                  " cannot be diagnosed: it has no catalogue of effects; `gapfarm influence` says "
                  "what its parameters do"};

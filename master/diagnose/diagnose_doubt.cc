@@ -203,6 +203,21 @@ DiagnosisResult DiagnosisRun::give_up(const std::string& stage, const Error& err
   return std::move(result_);
 }
 
+void DiagnosisRun::say_what_the_program_lacks() {
+  if (!problem_.external) return;
+  const std::span<const Effect> known = problem_.table().effects();
+  std::string lacking;
+  for (const Effect& effect : srv1_effects()) {
+    const bool there = std::any_of(known.begin(), known.end(),
+                                   [&](const Effect& e) { return e.name == effect.name; });
+    if (!there) lacking += (lacking.empty() ? "" : ", ") + effect.name;
+  }
+  if (lacking.empty()) return;
+  result_.diagnosis.cautions.push_back(
+      "Not looked for, since the program does not take what they need: " + lacking +
+      ". It may declare more inputs, or parameters of its own.");
+}
+
 void DiagnosisRun::say_what_was_left_out() {
   for (const auto& [what, why] : predictor_.left_out()) {
     result_.diagnosis.cautions.push_back("Left out, since it cannot be simulated: " + what + " (" +

@@ -24,6 +24,7 @@ double prior_sd(const Study& study, std::size_t k) {
 
 // Covariance of the fit's parameters, for noise of unit variance.
 Eigen::MatrixXd covariance_of(const Study& study, const JointFit& fit) {
+  if (fit.parameters.empty()) return {};
   Eigen::MatrixXd normal = fit.jacobian.transpose() * fit.jacobian;
   for (std::size_t k = 0; k < fit.base_parameters; ++k) {
     const double sd = prior_sd(study, k);
@@ -176,6 +177,7 @@ std::vector<v1::Override> DiagnosisRun::without_chance(ParameterValues values) c
 Status DiagnosisRun::show_drives() {
   Diagnosis& d = result_.diagnosis;
   if (!subject_.words.ends.empty()) return {};  // another scenario's, whose paths say nothing
+  if (!has_paths()) return {};
   d.drives = drives_to_show(d.trials);
   if (d.drives.empty()) return {};
   std::vector<v1::Task> tasks;

@@ -108,7 +108,7 @@ Status DiagnosisRun::look_for_latency() {
 
 // Where paths were logged they say more of a lag than rest poses do, and have the last word.
 Status DiagnosisRun::look_for_lag() {
-  if (!looks_for("motor_lag", kLooksForLag)) return {};
+  if (!looks_for("motor_lag", kLooksForLag) || !has_paths()) return {};
   auto lag = fit_path_lag(predictor_, study_);
   if (!lag && lag.error().code == ErrorCode::kSimulation) {
     predictor_.leave_out("motor_lag");

@@ -321,6 +321,7 @@ Status DiagnosisRun::report() {
   fill_parameters();
   if (Status s = show_drives(); !s) return s;
   complete_screening();
+  say_what_the_program_lacks();
   say_what_was_left_out();
   if (frame_m_.x() != 0 || frame_m_.y() != 0) {
     d.cautions.push_back(

@@ -55,8 +55,15 @@ void DiagnosisRun::stage(const std::string& name) {
 }
 
 bool DiagnosisRun::left_out(const std::string& effect) const {
+  const std::span<const Effect> known = problem_.table().effects();
   return std::find(options_.left_out.begin(), options_.left_out.end(), effect) !=
-         options_.left_out.end();
+             options_.left_out.end() ||
+         std::none_of(known.begin(), known.end(),
+                      [&](const Effect& e) { return e.name == effect; });
+}
+
+bool DiagnosisRun::has_paths() const {
+  return !problem_.external || (problem_.external->table.declaration().inputs & kExternalPath) != 0;
 }
 
 bool DiagnosisRun::looks_for(const std::string& effect, Looks look) const {

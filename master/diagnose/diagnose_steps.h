@@ -31,7 +31,8 @@ class DiagnosisRun {
   // All three outlive it.
   DiagnosisRun(Farm& farm, const PreparedLog& log, const DiagnoseOptions& options)
       : problem_(log.problem),
-        subject_(*diagnosis_subject(log.problem.scenario)),
+        keeps_subject_(diagnosis_subject(log.problem)),
+        subject_(*keeps_subject_),
         options_(options),
         farm_(farm),
         frame_m_(log.frame_x_m, log.frame_y_m),
@@ -72,7 +73,11 @@ class DiagnosisRun {
   void complete_screening();
   std::string why_not_screened(const std::string& name, Screened* row) const;
   double pose_grid_gain() const;
+  // As asked, or because the scenario's table has no such effect.
   bool left_out(const std::string& effect) const;
+  // Whether there are poses on the way to be had: some programs answer where a drive ends alone.
+  bool has_paths() const;
+  void say_what_the_program_lacks();
   bool looks_for(const std::string& effect, Looks look) const;
   void compare_with_repeats();
   Status search_catalogue();
@@ -136,6 +141,7 @@ class DiagnosisRun {
   Status show_drives();
 
   const Problem& problem_;
+  std::shared_ptr<const DiagnosisSubject> keeps_subject_;
   const DiagnosisSubject& subject_;
   const DiagnoseOptions& options_;
   Farm& farm_;

@@ -51,7 +51,7 @@ void DiagnosisRun::spread_effects(Overrides* at) const {
     noise.drive_common = slip_.noise.drive_common;
     noise.drive_side = slip_.noise.drive_side;
     // Without events in it the fitted speed has made up for those that were not left out.
-    (*at)[subject_.speed] /= 1 - mean_loss_of_slips();
+    if (study_.drive.speed) (*at)[*study_.drive.speed] /= 1 - mean_loss_of_slips();
   }
   set_noise(noise, at);
 }

@@ -287,6 +287,7 @@ Result<JointFit> fit_jointly(Predictor& predictor, const Study& study,
   fit.parameters = parameters_of(study, start, effects, base, &fit.base_parameters);
   if (Status s = predict(predictor, study, &fit); !s) return s.error();
   if (Status s = differentiate(predictor, study, &fit); !s) return s.error();
+  if (fit.parameters.empty()) return fit;
   double best = misfit_of(study, fit, nuisances);
   for (int round = 0; round < rounds; ++round) {
     JointFit next = fit;
@@ -328,6 +329,7 @@ Result<JointFit> fit_jointly(Predictor& predictor, const Study& study,
 
 std::vector<Eigen::Vector3d> held_out_residuals(const Study& study, const JointFit& fit,
                                                 const std::vector<std::size_t>& fold_of) {
+  if (fit.parameters.empty()) return fit.residuals;
   const Eigen::VectorXd z = study.whiten(fit.residuals);
   const std::size_t folds = 1 + *std::max_element(fold_of.begin(), fold_of.end());
   Eigen::VectorXd left = z;

@@ -58,6 +58,17 @@ void add_misfits(const Study& study, std::vector<Eigen::VectorXd>* columns) {
   }
 }
 
+// The base with a parameter moved by a share of its prior's unit.
+Overrides retuned(const Study& study, const RetunedParameter& parameter, double share) {
+  Overrides at = study.base;
+  if (parameter.unit == 0) {
+    at[parameter.row] *= 1 + share;
+  } else {
+    at[parameter.row] += share * parameter.unit;
+  }
+  return at;
+}
+
 }  // namespace
 
 Eigen::Vector3d misfit_sd(const Cell& cell, double speed_m_s) {
@@ -71,24 +82,15 @@ Eigen::Vector3d misfit_sd(const Cell& cell, double speed_m_s) {
 Result<Eigen::MatrixXd> nuisance_columns(Predictor& predictor, const Study& study) {
   constexpr double kStep = 0.05;
   constexpr double kLagStep = 0.02;  // s
-  struct Retuned {
-    std::size_t row;
-    double prior;  // log s.d.
-  };
-  const Retuned retuned[] = {
-      {row_of(Srv1::kContactLength), 0.5}, {row_of(Srv1::kFrictionRatio), 0.5},
-      {row_of(Srv1::kFriction), 0.5},      {row_of(Srv1::kTrackGauge), 0.2},
-      {row_of(Srv1::kTreadCreep), 1},      {row_of(Srv1::kMassHeight), 1}};
   std::vector<PredictionRequest> requests;
-  for (const Retuned& r : retuned) {
-    for (double factor : {1 + kStep, 1 - kStep}) {
-      requests.push_back({study.base, {}});
-      requests.back().at[r.row] *= factor;
-    }
+  for (const RetunedParameter& r : study.drive.retuned) {
+    for (double share : {kStep, -kStep}) requests.push_back({retuned(study, r, share), {}});
   }
-  Overrides lagging = study.base;
-  lagging[predictor.problem().table().row("motor_lag.tau")] = kLagStep;
-  requests.push_back({lagging, {}});
+  const auto lag = predictor.problem().table().find("motor_lag.tau");
+  if (lag) {
+    requests.push_back({study.base, {}});
+    requests.back().at[*lag] = kLagStep;
+  }
   const auto ends = predictor.attempt(requests);
   if (!ends) return ends.error();
 
@@ -98,16 +100,19 @@ Result<Eigen::MatrixXd> nuisance_columns(Predictor& predictor, const Study& stud
   std::vector<Eigen::Vector3d> faster;
   for (const ResidualTrial& t : study.trials) faster.push_back(t.left + t.right);
   add_column(study, faster, 0.3, &columns);
-  for (std::size_t r = 0; r < std::size(retuned); ++r) {
+  for (std::size_t r = 0; r < study.drive.retuned.size(); ++r) {
+    const RetunedParameter& parameter = study.drive.retuned[r];
     const auto slope = central_slope(middle, (*ends)[2 * r], (*ends)[2 * r + 1], kStep);
     if (slope) {
-      add_column(study, *slope, retuned[r].prior, &columns);
+      add_column(study, *slope, parameter.prior_sd, &columns);
     } else {
-      predictor.leave_out("retuning " + predictor.problem().table()[retuned[r].row].key);
+      predictor.leave_out("retuning " + predictor.problem().table()[parameter.row].key);
     }
   }
   // Motors of some hundredths of a second are part of any robot.
-  if (ends->back()) add_column(study, differences(study, *ends->back(), kLagStep), 0.02, &columns);
+  if (lag && ends->back()) {
+    add_column(study, differences(study, *ends->back(), kLagStep), 0.02, &columns);
+  }
   if (study.free_commands) {
     for (Eigen::VectorXd& column : smooth_misfits(study)) columns.push_back(std::move(column));
   } else {

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "common/pose/pose.h"
+#include "common/score/statistics.h"
 #include "master/diagnose/free_commands.h"
 
 namespace gapfarm {
@@ -29,6 +30,33 @@ double value_of(const Problem& problem, const Study& study, const char* key) {
   return tuned != study.base.end() ? tuned->second : problem.values[row];
 }
 
+// What the sketch has to know of a robot.
+struct Footprint {
+  double length_m = 0, gauge_m = 0, friction_ratio = 1, creep = 0;
+};
+
+// Of a program's robot, whose parameters mean what its author wants: as wide as it turns, as long,
+// and with treads that give way like most.
+Footprint footprint_of_turns(const Study& study) {
+  constexpr double kUsualGauge_m = 0.15, kUsualCreep = 0.1, kLeastApart = 0.1;
+  std::vector<double> gauges;
+  for (std::size_t i = 0; i < study.size(); ++i) {
+    const ResidualTrial& trial = study.trials[i];
+    const CommandSpec& c = study.cells[trial.cell].command;
+    const double turned = std::abs((trial.left + trial.right)[2]);
+    const double apart = std::abs(c.right - c.left) * study.speed_m_s * c.duration_s;
+    if (std::abs(c.right - c.left) > kLeastApart && turned > 0) gauges.push_back(apart / turned);
+  }
+  const double gauge_m = gauges.empty() ? kUsualGauge_m : median(gauges);
+  return {gauge_m, gauge_m, 1, kUsualCreep};
+}
+
+Footprint footprint_of(const Problem& problem, const Study& study) {
+  if (problem.external) return footprint_of_turns(study);
+  return {value_of(problem, study, "contact_length"), value_of(problem, study, "track_gauge"),
+          value_of(problem, study, "friction_ratio"), value_of(problem, study, "tread_creep")};
+}
+
 // Shift of the end, in its axes, for a twist in the body axes of a moment from which X leads there.
 Eigen::Matrix3d moved_to_end(const Pose& X) {
   const double c = std::cos(X.theta), s = std::sin(X.theta);
@@ -46,12 +74,12 @@ bool near(const Patch& a, const Patch& b) {
 }  // namespace
 
 PatchSketch::PatchSketch(const Problem& problem, const Study& study) : study_(study) {
-  const double front = value_of(problem, study, "contact_length") / 2;
-  const double side = value_of(problem, study, "track_gauge") / 2;
+  const Footprint footprint = footprint_of(problem, study);
+  const double front = footprint.length_m / 2, side = footprint.gauge_m / 2;
   contacts_ = {Eigen::Vector2d(front, side), Eigen::Vector2d(-front, side),
                Eigen::Vector2d(front, -side), Eigen::Vector2d(-front, -side)};
-  lateral_ = value_of(problem, study, "friction_ratio");
-  creep_ = value_of(problem, study, "tread_creep");
+  lateral_ = footprint.friction_ratio;
+  creep_ = footprint.creep;
   speed_m_s_ = study.speed_m_s;
   for (std::size_t i = 0; i < study.size(); ++i) {
     const ResidualTrial& trial = study.trials[i];

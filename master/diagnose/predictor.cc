@@ -5,6 +5,7 @@
 #include <set>
 #include <tuple>
 
+#include "common/score/motion_model.h"
 #include "master/diagnose/digits.h"
 
 namespace gapfarm {
@@ -51,6 +52,15 @@ Error bad_point(const Problem& problem, const Overrides& at, const v1::TaskResul
   return {"the simulation ended with " + v1::Outcome_Name(result.outcome()) + why +
               point_words(problem, at),
           ErrorCode::kSimulation};
+}
+
+Problem slower(Problem problem, double factor) {
+  for (Trial& trial : problem.log.trials) {
+    const CommandSpec command = resolved_command(trial, problem.commands);
+    trial.left = command.left * factor;
+    trial.right = command.right * factor;
+  }
+  return problem;
 }
 
 Status within_bounds(const Problem& problem, const Overrides& at) {
@@ -113,7 +123,7 @@ std::vector<v1::Task> Predictor::tasks(const Overrides& at) const {
 Result<std::vector<std::vector<Pose>>> Predictor::ends(
     const std::vector<PredictionRequest>& requests) {
   std::vector<std::optional<Error>> errors;
-  auto all = simulate(requests, &errors);
+  auto all = simulate(hash_, requests, &errors);
   if (!all) return all.error();
   std::vector<std::vector<Pose>> ends;
   for (std::size_t k = 0; k < requests.size(); ++k) {
@@ -133,7 +143,7 @@ Error Predictor::failed(const std::string& what) const {
 Result<std::vector<std::optional<std::vector<Pose>>>> Predictor::attempt(
     const std::vector<PredictionRequest>& requests) {
   std::vector<std::optional<Error>> errors;
-  auto all = simulate(requests, &errors);
+  auto all = simulate(hash_, requests, &errors);
   if (!all) return all.error();
   for (const std::optional<Error>& error : errors) {
     if (error) last_failure_ = error->message;
@@ -141,8 +151,18 @@ Result<std::vector<std::optional<std::vector<Pose>>>> Predictor::attempt(
   return all;
 }
 
+Result<std::optional<std::vector<Pose>>> Predictor::attempt_slower(const Overrides& at,
+                                                                   double factor) {
+  std::vector<std::optional<Error>> errors;
+  auto all = simulate(farm_.add_problem(to_proto(slower(problem_, factor))), {{at, {}}}, &errors);
+  if (!all) return all.error();
+  if (errors.front()) last_failure_ = errors.front()->message;
+  return std::move(all->front());
+}
+
 Result<std::vector<std::optional<std::vector<Pose>>>> Predictor::simulate(
-    const std::vector<PredictionRequest>& requests, std::vector<std::optional<Error>>* errors) {
+    const std::string& problem, const std::vector<PredictionRequest>& requests,
+    std::vector<std::optional<Error>>* errors) {
   errors->assign(requests.size(), std::nullopt);
   std::vector<v1::Task> tasks;
   std::vector<std::pair<std::size_t, std::vector<std::uint32_t>>> asked;  // request, trials
@@ -159,7 +179,7 @@ Result<std::vector<std::optional<std::vector<Pose>>>> Predictor::simulate(
       asked.emplace_back(k, std::move(part));
     }
   }
-  const auto results = farm_.run(hash_, tasks);
+  const auto results = farm_.run(problem, tasks);
   if (!results) return results.error();
   predictions_ += requests.size();
   std::vector<std::optional<std::vector<Pose>>> ends(requests.size());

@@ -39,6 +39,9 @@ class Predictor {
   // well, has no ends; last_failure() says why.  Errors: the farm's alone.
   Result<std::vector<std::optional<std::vector<Pose>>>> attempt(
       const std::vector<PredictionRequest>& requests);
+  // The same for all trials at one point, every duty times `factor`, (0, 1]: how drives depend on
+  // the speed of a robot whose parameters may know of none.
+  Result<std::optional<std::vector<Pose>>> attempt_slower(const Overrides& at, double factor);
   const std::string& last_failure() const { return last_failure_; }
   // Keeps the last failure as the reason why `what` ("floor_tilt") had to be left out.
   void leave_out(const std::string& what) { left_out_.try_emplace(what, last_failure_); }
@@ -60,7 +63,8 @@ class Predictor {
   std::vector<std::vector<std::uint32_t>> parts_of(const PredictionRequest& request,
                                                    std::size_t parts) const;
   Result<std::vector<std::optional<std::vector<Pose>>>> simulate(
-      const std::vector<PredictionRequest>& requests, std::vector<std::optional<Error>>* errors);
+      const std::string& problem, const std::vector<PredictionRequest>& requests,
+      std::vector<std::optional<Error>>* errors);
 
   Farm& farm_;
   const Problem& problem_;

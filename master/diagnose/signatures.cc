@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <optional>
 
 #include "master/diagnose/probes.h"
 #include "master/diagnose/seam.h"
@@ -15,7 +16,30 @@ namespace {
 constexpr double kPi = std::numbers::pi;
 constexpr double kLowMass_m = 0.002;  // hardly over the floor
 
-std::vector<Probe> probes(const Eigen::Vector2d& middle, double own_height_m) {
+// A tilt also shifts the load, the more the higher the mass lies, which no flat floor shows.  A
+// program's mass lies where it lies.
+std::vector<Probe> tilt_probes(const std::optional<double>& own_height_m) {
+  std::vector<Probe> all;
+  const auto add = [&](std::map<std::string, double> minus) {
+    for (double direction : {0.0, kPi / 2}) {
+      Probe probe{"floor_tilt",
+                  {{"floor_tilt.angle", 0.05}, {"floor_tilt.direction", direction}},
+                  minus,
+                  0.05};
+      probe.plus.insert(minus.begin(), minus.end());
+      all.push_back(std::move(probe));
+    }
+  };
+  if (!own_height_m) {
+    add({});
+    return all;
+  }
+  for (double height : {*own_height_m, kLowMass_m}) add({{"mass_height", height}});
+  return all;
+}
+
+std::vector<Probe> probes(const Eigen::Vector2d& middle,
+                          const std::optional<double>& own_height_m) {
   std::vector<Probe> all;
   const auto slope = [&](const std::string& effect, const std::string& key, double step,
                          bool central, double neutral = 0) {
@@ -39,17 +63,7 @@ std::vector<Probe> probes(const Eigen::Vector2d& middle, double own_height_m) {
   slope("heading_offset", "angle", 0.02, true);
   slope("marker_offset", "x", 0.005, true);
   slope("marker_offset", "y", 0.005, true);
-  // A tilt also shifts the load, the more the higher the mass lies, which no flat floor shows.
-  for (double height : {own_height_m, kLowMass_m}) {
-    for (double direction : {0.0, kPi / 2}) {
-      all.push_back({"floor_tilt",
-                     {{"floor_tilt.angle", 0.05},
-                      {"floor_tilt.direction", direction},
-                      {"mass_height", height}},
-                     {{"mass_height", height}},
-                     0.05});
-    }
-  }
+  for (Probe& probe : tilt_probes(own_height_m)) all.push_back(std::move(probe));
   for (double direction : {0.0, 2 * kPi / 3, -2 * kPi / 3}) {
     all.push_back({"floor_nap",
                    {{"floor_nap.strength", 0.15}, {"floor_nap.direction", direction}},
@@ -138,6 +152,11 @@ bool changes_only_reach(const std::string& effect) {
          effect == "rolling_resistance";
 }
 
+bool has_effect(const Study& study, const std::string& name) {
+  const std::span<const Effect> known = study.table->effects();
+  return std::any_of(known.begin(), known.end(), [&](const Effect& e) { return e.name == name; });
+}
+
 bool one_condition(const Study& study) {
   const auto same = [&](const Cell& c) {
     return c.kind == study.cells.front().kind && c.level == study.cells.front().level &&
@@ -200,7 +219,10 @@ Eigen::Vector2d middle_of(const Study& study) {
 Result<std::vector<Signature>> signatures(Predictor& predictor, const Study& study,
                                           const std::vector<std::string>& left_out) {
   const Eigen::Vector2d middle = middle_of(study);
-  const std::vector<Probe> all = probes(middle, study.base.at(row_of(Srv1::kMassHeight)));
+  std::optional<double> own_height_m;
+  if (study.drive.mass_height) own_height_m = study.base.at(*study.drive.mass_height);
+  std::vector<Probe> all = probes(middle, own_height_m);
+  std::erase_if(all, [&](const Probe& probe) { return !has_effect(study, probe.effect); });
   auto probed = probe_all(predictor, study, all);
   if (!probed) return probed.error();
 
@@ -222,6 +244,7 @@ Result<std::vector<Signature>> signatures(Predictor& predictor, const Study& stu
     }
     if (effect == "floor_tilt") {
       found.push_back(tilt_signature(study, own[0], own[1]));
+      if (own.size() < 4) continue;
       found.push_back(tilt_signature(study, own[2], own[3]));
       found.back().fixed = {{"mass_height", kLowMass_m}};
       continue;

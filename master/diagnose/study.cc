@@ -41,15 +41,6 @@ Cell make_cell(const CommandSpec& driven, const CommandSpec& own) {
 
 }  // namespace
 
-// Gauge and friction stay: turns depend on them as on length and ratio, and rest poses of another
-// robot's physics would drag them away from anything real.  So would they the ratio, which trades
-// with the length: it is held close.
-std::vector<BaseParameter> tuned_base_parameters() {
-  return {{row_of(Srv1::kFullSpeed), 1},
-          {row_of(Srv1::kContactLength), 0.5},
-          {row_of(Srv1::kFrictionRatio), 0.1}};
-}
-
 Eigen::VectorXd Study::whiten(const std::vector<Eigen::Vector3d>& values) const {
   Eigen::VectorXd rows(static_cast<Eigen::Index>(3 * values.size()));
   for (std::size_t i = 0; i < values.size(); ++i) {
@@ -105,13 +96,14 @@ Eigen::MatrixXd Study::rewhitened(const Study& other, const Eigen::MatrixXd& row
   return changed;
 }
 
-Result<Study> make_study(const Problem& problem) {
+Result<Study> make_study(const Problem& problem, std::span<const Gene> genes) {
   if (problem.log.trials.empty())
     return Error{"the trial log is empty; there is nothing to explain"};
   Study study;
-  study.subject = diagnosis_subject(problem.scenario);
+  study.subject = diagnosis_subject(problem);
   study.table = &problem.table();
-  study.base_parameters = tuned_base_parameters();
+  study.drive = drive_base(problem, genes);
+  study.base_parameters = study.drive.tuned;
   std::vector<DrivenCommand> driven;
   for (const Trial& trial : problem.log.trials) {
     const CommandSpec c = resolved_command(trial, problem.commands);
@@ -150,11 +142,11 @@ Result<Study> make_study(const Problem& problem) {
   // Logs whose trials share one reading say nothing of it.
   study.reading_noise_known = study.noise.pose.position_m > 0 && study.noise.pose.heading_rad > 0;
   if (study.noise.pose.position_m <= 0) {
-    study.noise.pose.position_m = std::max(problem.values[row_of(Srv1::kPoseNoisePosition)],
+    study.noise.pose.position_m = std::max(problem.values[study.subject->pose_position.row],
                                            study.quantum_m / std::sqrt(12.0));
   }
   if (study.noise.pose.heading_rad <= 0) {
-    study.noise.pose.heading_rad = problem.values[row_of(Srv1::kPoseNoiseHeading)];
+    study.noise.pose.heading_rad = problem.values[study.subject->pose_heading.row];
   }
   study.noise.drive_common = kFirstCommon;
   study.noise.drive_side = kFirstSide;

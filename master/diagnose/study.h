@@ -2,23 +2,18 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "common/base/result.h"
+#include "master/diagnose/drive_base.h"
 #include "master/diagnose/predictor.h"
 #include "master/diagnose/residuals.h"
 
 namespace gapfarm {
-
-// A base parameter that tuning moves, with a weak prior on the logarithm of its value: the data
-// cannot tell some of them apart, and the prior keeps those where the config had them.
-struct BaseParameter {
-  std::size_t row = 0;
-  double prior_log_sd = 1;
-};
-std::vector<BaseParameter> tuned_base_parameters();
 
 // A parameter that retuning may move, with a prior on the logarithm of its value, and the change of
 // every trial's end for a change of that logarithm, in the axes of the base's ends.
@@ -30,9 +25,10 @@ struct RetunedPush {
 struct DiagnosisSubject;  // master/diagnose/subject.h
 
 struct Study {
-  const DiagnosisSubject* subject = nullptr;
+  std::shared_ptr<const DiagnosisSubject> subject;
   const ParameterTable* table = nullptr;
   std::vector<BaseParameter> base_parameters;  // that tuning moves
+  DriveBase drive;                             // of scenarios of drives
   std::vector<Cell> cells;
   std::vector<ResidualTrial> trials;
   std::vector<ReadingGap> gaps;
@@ -71,8 +67,9 @@ struct Study {
   Eigen::MatrixXd rewhitened(const Study& other, const Eigen::MatrixXd& rows) const;
 };
 
-// Cells, contexts and reading noise of the problem's log.  Errors: an empty log.
-Result<Study> make_study(const Problem& problem);
+// Cells, contexts and reading noise of the problem's log.  Errors: an empty log.  `genes`: what the
+// config has searched.
+Result<Study> make_study(const Problem& problem, std::span<const Gene> genes);
 
 // Tunes the base parameters on the cells' medians (Gauss-Newton, robust), or keeps those of the
 // problem, and fills in predictions, residuals and gain derivatives.

@@ -6,10 +6,10 @@
 
 #include <Eigen/Core>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "common/base/result.h"
@@ -62,7 +62,6 @@ struct DiagnosisSubject {
   NoiseRow drive_common, drive_side, pose_position, pose_heading;
   std::optional<NoiseRow> drive_tail, pose_tail;  // both or none; the readings then vary a trial by
                                                   // reading_covariance()
-  std::size_t speed = 0;  // row of what slips take a share of; of kLooksForSlips only
   CovarianceOf covariance;
 
   // Errors: an empty log.  `genes`: what the config has searched.
@@ -93,7 +92,7 @@ struct DiagnosisSubject {
   PictureWords words;
 };
 
-// Null where the scenario cannot be diagnosed.
-const DiagnosisSubject* diagnosis_subject(std::string_view scenario);
+// Null where the problem's scenario cannot be diagnosed.
+std::shared_ptr<const DiagnosisSubject> diagnosis_subject(const Problem& problem);
 
 }  // namespace gapfarm

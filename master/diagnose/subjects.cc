@@ -28,10 +28,10 @@ PatchSearch sketched_patches(Predictor& predictor, const Study& study) {
   };
 }
 
-// A tracked robot drives commands.
-DiagnosisSubject srv1_subject() {
+// A robot on two sides drives commands: srv1's, or one that a program of the user's simulates.
+DiagnosisSubject drive_subject(const char* scenario, const ParameterTable& table) {
   DiagnosisSubject s;
-  s.scenario = "srv1";
+  s.scenario = scenario;
   s.looks = kLooksForLateReadings | kLooksForLag | kLooksForSlips | kLooksForRounding;
   // The best of the catalogue gained 4.4 at most in 90 of 100 null logs, 6.7 in 99, and the least
   // p of twelve blocks was 10^-3.8 (400 logs; docs/diagnosis.md).
@@ -40,15 +40,14 @@ DiagnosisSubject srv1_subject() {
   s.farthest = 0;  // slips are looked for
   s.noise_tail = 1;
   s.base_moves = false;
-  s.drive_common = {row_of(Srv1::kDriveNoiseCommon)};
-  s.drive_side = {row_of(Srv1::kDriveNoiseSide)};
-  s.pose_position = {row_of(Srv1::kPoseNoisePosition)};
-  s.pose_heading = {row_of(Srv1::kPoseNoiseHeading)};
-  s.drive_tail = {row_of(Srv1::kDriveNoiseTail)};
-  s.pose_tail = {row_of(Srv1::kPoseNoiseTail)};
-  s.speed = row_of(Srv1::kFullSpeed);
+  s.drive_common = {table.row("drive_noise_common")};
+  s.drive_side = {table.row("drive_noise_side")};
+  s.pose_position = {table.row("pose_noise_position")};
+  s.pose_heading = {table.row("pose_noise_heading")};
+  s.drive_tail = {table.row("drive_noise_tail")};
+  s.pose_tail = {table.row("pose_noise_tail")};
   s.covariance = trial_covariance;
-  s.make_study = [](const Problem& problem, std::span<const Gene>) { return make_study(problem); };
+  s.make_study = make_study;
   s.tune = tune_base;
   s.nuisances = [](Predictor& predictor, Study& study) {
     return nuisance_columns(predictor, study);
@@ -80,12 +79,18 @@ DiagnosisSubject srv1_subject() {
 
 }  // namespace
 
-const DiagnosisSubject* diagnosis_subject(std::string_view scenario) {
-  static const std::array<DiagnosisSubject, 2> subjects = {srv1_subject(), push_subject()};
-  const auto found = std::find_if(subjects.begin(), subjects.end(), [&](const DiagnosisSubject& s) {
-    return scenario == s.scenario;
+std::shared_ptr<const DiagnosisSubject> diagnosis_subject(const Problem& problem) {
+  // A program has rows of its own, so its subject is its problem's.
+  if (problem.external) {
+    return std::make_shared<const DiagnosisSubject>(drive_subject("external", problem.table()));
+  }
+  static const std::array<std::shared_ptr<const DiagnosisSubject>, 2> subjects = {
+      std::make_shared<const DiagnosisSubject>(drive_subject("srv1", srv1_table())),
+      std::make_shared<const DiagnosisSubject>(push_subject())};
+  const auto found = std::find_if(subjects.begin(), subjects.end(), [&](const auto& subject) {
+    return problem.scenario == subject->scenario;
   });
-  return found == subjects.end() ? nullptr : &*found;
+  return found == subjects.end() ? nullptr : *found;
 }
 
 }  // namespace gapfarm

@@ -18,6 +18,9 @@ constexpr double kRelativeStep = 0.02;
 constexpr double kLargestLogStep = 0.4;
 constexpr int kMostHalvings = 4;
 constexpr double kGainStep = 0.02;
+constexpr double kSameSlope = 0.05;  // relative: a parameter that moves the ends as the gain does
+constexpr double kUnknownSpeed = 0.28;  // m/s, where no drive goes ahead
+constexpr double kLeastAhead = 0.05;    // mean duty of a drive that does
 // How near to its bounds a parameter may be tuned.
 constexpr double kAboveLower = 1.1, kBelowUpper = 0.9;
 
@@ -77,6 +80,14 @@ double most_turn(std::vector<double> turns, int round) {
   return std::max(kSureTurn / kShares[round], turns[std::min(kFewest, turns.size()) - 1]);
 }
 
+// Where a parameter may be tuned to; a program may declare narrow bounds.
+std::pair<double, double> tunable(const Parameter& p) {
+  const double lower = p.lower * kAboveLower, upper = p.upper * kBelowUpper;
+  if (lower < upper) return {lower, upper};
+  const double edge = (1 - kBelowUpper) * (p.upper - p.lower);
+  return {p.lower + edge, p.upper - edge};
+}
+
 struct TuningStep {
   double length = 0;   // greatest change of a logarithm
   bool of_all = true;  // no trial was left out
@@ -101,13 +112,13 @@ Eigen::MatrixXd log_slopes(const std::vector<Slope>& slopes, std::size_t trial,
 }
 
 // By the cells' medians.
-Normal normal_of_cells(const Study& study, const std::vector<Slope>& slopes, Eigen::Index p,
-                       int round, bool* of_all) {
+Normal normal_of_cells(const Study& study, const std::vector<Slope>& slopes, const Slope& both,
+                       Eigen::Index p, int round, bool* of_all) {
   Normal normal{Eigen::MatrixXd::Zero(p, p), Eigen::VectorXd::Zero(p)};
   const std::vector<CellResidual> cells = cell_residuals(study);
   std::vector<double> turns;
   for (const CellResidual& cell : cells) {
-    turns.push_back(log_slopes(slopes, cell.trial, 1)(2, 0));
+    turns.push_back(both[cell.trial][2]);
   }
   const double most = most_turn(turns, round);
   for (std::size_t c = 0; c < cells.size(); ++c) {
@@ -164,14 +175,16 @@ Normal normal_of_trials(const Study& study, const std::vector<Slope>& slopes, Ei
   return normal;
 }
 
-// One Gauss-Newton step on the logarithms of the base parameters, of which the speed is the first.
+// One Gauss-Newton step on the logarithms of the base parameters.  `both`: both sides' gain's
+// slope.
 TuningStep tuning_step(const Problem& problem, const std::vector<BaseParameter>& parameters,
-                       const std::vector<Slope>& slopes, int round, Study* study) {
+                       const std::vector<Slope>& slopes, const Slope& both, int round,
+                       Study* study) {
   const auto p = static_cast<Eigen::Index>(parameters.size());
   TuningStep taken;
   auto [normal, right] = study->free_commands
                              ? normal_of_trials(*study, slopes, p, round, &taken.of_all)
-                             : normal_of_cells(*study, slopes, p, round, &taken.of_all);
+                             : normal_of_cells(*study, slopes, both, p, round, &taken.of_all);
   for (Eigen::Index k = 0; k < p; ++k) {
     const BaseParameter& parameter = parameters[static_cast<std::size_t>(k)];
     const double precision = 1 / (parameter.prior_log_sd * parameter.prior_log_sd);
@@ -182,10 +195,10 @@ TuningStep tuning_step(const Problem& problem, const std::vector<BaseParameter>&
   const Eigen::VectorXd step = normal.ldlt().solve(right).head(p);
   for (Eigen::Index k = 0; k < p; ++k) {
     const std::size_t row = parameters[static_cast<std::size_t>(k)].row;
-    const Parameter& bounds = problem.table()[row];
+    const auto [lower, upper] = tunable(problem.table()[row]);
     double& value = study->base[row];
     value *= std::exp(std::clamp(step[k], -kLargestLogStep, kLargestLogStep));
-    value = std::clamp(value, bounds.lower * kAboveLower, bounds.upper * kBelowUpper);
+    value = std::clamp(value, lower, upper);
   }
   taken.length = step.cwiseAbs().maxCoeff();
   return taken;
@@ -234,70 +247,138 @@ std::vector<std::size_t> parameters_on_bounds(const Problem& problem,
                                               const Study& study) {
   std::vector<std::size_t> rows;
   for (const BaseParameter& p : parameters) {
-    const Parameter& row = problem.table()[p.row];
+    const auto [lower, upper] = tunable(problem.table()[p.row]);
     const double value = study.base.at(p.row);
-    if (value <= row.lower * kAboveLower * 1.001 || value >= row.upper * kBelowUpper * 0.999) {
+    if (value <= lower * 1.001 || value >= upper * 0.999) {
       rows.push_back(p.row);
     }
   }
   return rows;
 }
 
-}  // namespace
-
-Status tune_base(Predictor& predictor, bool keep, Study* study) {
-  const Problem& problem = predictor.problem();
-  const std::vector<BaseParameter> parameters = tuned_base_parameters();
-  for (const BaseParameter& p : parameters) study->base[p.row] = problem.values[p.row];
-  for (Srv1 kept : {Srv1::kFriction, Srv1::kTrackGauge, Srv1::kTreadCreep, Srv1::kMassHeight}) {
-    study->base[row_of(kept)] = problem.values[row_of(kept)];
+// Change of every end for both sides' gain, from what lesser duties would do: no duty may be more
+// than full.  The parabola through three points, at its end.
+Result<Slope> slope_of_duties(Predictor& predictor, const Overrides& at,
+                              const std::vector<Pose>& ends) {
+  const auto less = predictor.attempt_slower(at, 1 - kGainStep);
+  if (!less) return less.error();
+  const auto least = predictor.attempt_slower(at, 1 - 2 * kGainStep);
+  if (!least) return least.error();
+  if (!*less || !*least) return predictor.failed("the base model cannot be driven a little slower");
+  Slope slope;
+  for (std::size_t i = 0; i < ends.size(); ++i) {
+    slope.push_back(
+        (local_difference(ends[i], (**least)[i]) - 4 * local_difference(ends[i], (**less)[i])) /
+        (2 * kGainStep));
   }
-  const std::size_t asymmetry = problem.table().row("motor_asymmetry.ratio");
-  const auto with_asymmetry = [&](double ratio) {
-    Overrides at = study->base;
-    at[asymmetry] = ratio;
-    return at;
-  };
-  Overrides simulated;  // the last base that could be
-  for (int round = 0; !keep && round < kTuningRounds; ++round) {
-    auto ends = predict_base(predictor, simulated, study);
-    if (!ends) return ends.error();
-    simulated = study->base;
-    set_predictions(*ends, study);
-    study->speed_m_s = study->base[row_of(Srv1::kFullSpeed)];
-    const auto slopes = base_slopes(predictor, parameters, *ends, *study);
-    if (!slopes) return slopes.error();
-    if (study->free_commands) {
-      const auto turned = predictor.attempt({{with_asymmetry(kGainStep), {}}});
-      if (!turned) return turned.error();
-      if (!turned->front()) return predictor.failed("the base model's sides cannot be parted");
-      const Slope apart = differences(*study, *turned->front(), kGainStep);
-      for (std::size_t i = 0; i < study->size(); ++i) {
-        set_gains(slopes->front()[i], apart[i], i, study);
-      }
+  return slope;
+}
+
+// Of drives that go ahead: at the end of theirs they do at the speed at full duty.
+double speed_by(const Study& study, const Slope& both) {
+  std::vector<double> speeds;
+  for (std::size_t i = 0; i < study.size(); ++i) {
+    const CommandSpec& c = study.cells[study.trials[i].cell].command;
+    const double ahead = (c.left + c.right) / 2;
+    if (std::abs(ahead) > kLeastAhead) speeds.push_back(both[i].x() / (ahead * c.duration_s));
+  }
+  return speeds.empty() ? kUnknownSpeed : std::max(median(speeds), 1e-3);
+}
+
+// A program's parameter that does what the gain of both sides does, if it has one.
+std::optional<std::size_t> speed_among(const std::vector<BaseParameter>& parameters,
+                                       const std::vector<Slope>& slopes, const Slope& both) {
+  for (std::size_t k = 0; k < parameters.size(); ++k) {
+    double apart = 0, all = 0;
+    for (std::size_t i = 0; i < both.size(); ++i) {
+      apart += (slopes[k][i] - both[i]).squaredNorm();
+      all += both[i].squaredNorm();
     }
-    study->use_noise(study->noise);
-    const TuningStep taken = tuning_step(problem, parameters, *slopes, round, study);
-    if (taken.of_all && taken.length < 1e-3) break;
+    if (all > 0 && apart < kSameSlope * kSameSlope * all) return parameters[k].row;
   }
-  const auto ends = predict_base(predictor, simulated, study);
-  if (!ends) return ends.error();
-  set_predictions(*ends, study);
-  study->speed_m_s = study->base[row_of(Srv1::kFullSpeed)];
-  if (!keep) study->on_bounds = parameters_on_bounds(problem, parameters, *study);
+  return std::nullopt;
+}
 
-  const std::size_t speed = row_of(Srv1::kFullSpeed);
-  const auto moved = predictor.attempt({{scaled(study->base, speed, 1 + kGainStep), {}},
-                                        {scaled(study->base, speed, 1 - kGainStep), {}},
-                                        {with_asymmetry(kGainStep), {}},
-                                        {with_asymmetry(-kGainStep), {}}});
-  if (!moved) return moved.error();
-  const auto both = central_slope(*ends, (*moved)[0], (*moved)[1], kGainStep);
-  const auto apart = central_slope(*ends, (*moved)[2], (*moved)[3], kGainStep);
+Overrides with_asymmetry(const Predictor& predictor, const Study& study, double ratio) {
+  Overrides at = study.base;
+  at[predictor.problem().table().row("motor_asymmetry.ratio")] = ratio;
+  return at;
+}
+
+// Both sides' gain at the base, whose ends are `ends`; sets the speed.
+Result<Slope> both_sides(Predictor& predictor, const std::vector<Slope>& slopes,
+                         const std::vector<Pose>& ends, Study* study) {
+  if (!predictor.problem().external) {
+    study->speed_m_s = study->base.at(*study->drive.speed);
+    return slopes.front();
+  }
+  auto both = slope_of_duties(predictor, study->base, ends);
+  if (!both) return both;
+  study->speed_m_s = speed_by(*study, *both);
+  study->drive.speed = speed_among(study->drive.tuned, slopes, *both);
+  return both;
+}
+
+// The tuned base's ends and derivatives.
+Status settle(Predictor& predictor, const std::vector<Pose>& ends, Study* study) {
+  set_predictions(ends, study);
+  const auto turned = predictor.attempt({{with_asymmetry(predictor, *study, kGainStep), {}},
+                                         {with_asymmetry(predictor, *study, -kGainStep), {}}});
+  if (!turned) return turned.error();
+  const auto apart = central_slope(ends, (*turned)[0], (*turned)[1], kGainStep);
+  std::optional<Slope> both;
+  if (predictor.problem().external) {
+    const auto slopes = base_slopes(predictor, study->drive.tuned, ends, *study);
+    if (!slopes) return slopes.error();
+    auto found = both_sides(predictor, *slopes, ends, study);
+    if (!found) return found.error();
+    both = std::move(*found);
+  } else {
+    const std::size_t speed = *study->drive.speed;
+    study->speed_m_s = study->base.at(speed);
+    const auto moved = predictor.attempt({{scaled(study->base, speed, 1 + kGainStep), {}},
+                                          {scaled(study->base, speed, 1 - kGainStep), {}}});
+    if (!moved) return moved.error();
+    both = central_slope(ends, (*moved)[0], (*moved)[1], kGainStep);
+  }
   if (!both || !apart) return predictor.failed("the base model's sides cannot be moved by 2 %");
   for (std::size_t i = 0; i < study->size(); ++i) set_gains((*both)[i], (*apart)[i], i, study);
   study->use_noise(study->noise);
   return {};
+}
+
+}  // namespace
+
+Status tune_base(Predictor& predictor, bool keep, Study* study) {
+  const Problem& problem = predictor.problem();
+  const std::vector<BaseParameter>& parameters = study->drive.tuned;
+  for (const BaseParameter& p : parameters) study->base[p.row] = problem.values[p.row];
+  for (const std::size_t row : study->drive.kept) study->base[row] = problem.values[row];
+  Overrides simulated;  // the last base that could be
+  for (int round = 0; !keep && !parameters.empty() && round < kTuningRounds; ++round) {
+    auto ends = predict_base(predictor, simulated, study);
+    if (!ends) return ends.error();
+    simulated = study->base;
+    set_predictions(*ends, study);
+    const auto slopes = base_slopes(predictor, parameters, *ends, *study);
+    if (!slopes) return slopes.error();
+    const auto both = both_sides(predictor, *slopes, *ends, study);
+    if (!both) return both.error();
+    if (study->free_commands) {
+      const auto turned = predictor.attempt({{with_asymmetry(predictor, *study, kGainStep), {}}});
+      if (!turned) return turned.error();
+      if (!turned->front()) return predictor.failed("the base model's sides cannot be parted");
+      const Slope apart = differences(*study, *turned->front(), kGainStep);
+      for (std::size_t i = 0; i < study->size(); ++i) set_gains((*both)[i], apart[i], i, study);
+    }
+    study->use_noise(study->noise);
+    const TuningStep taken = tuning_step(problem, parameters, *slopes, *both, round, study);
+    if (taken.of_all && taken.length < 1e-3) break;
+  }
+  const auto ends = predict_base(predictor, simulated, study);
+  if (!ends) return ends.error();
+  if (!keep) study->on_bounds = parameters_on_bounds(problem, parameters, *study);
+  return settle(predictor, *ends, study);
 }
 
 }  // namespace gapfarm

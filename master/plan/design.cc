@@ -54,7 +54,7 @@ class Designer {
       : farm_(farm),
         config_(config),
         settings_(settings),
-        subject_(*diagnosis_subject(config.problem.scenario)) {}
+        subject_(diagnosis_subject(config.problem)) {}
 
   Status choose_effects(DesignedPlan* plan);
   Sessions draw(unsigned times, std::uint64_t seed) const;
@@ -76,7 +76,7 @@ class Designer {
   Farm& farm_;
   const Config& config_;
   const PlanSettings& settings_;
-  const DiagnosisSubject& subject_;
+  std::shared_ptr<const DiagnosisSubject> subject_;
   std::vector<std::size_t> effects_;
 };
 
@@ -118,8 +118,8 @@ Result<TrialLog> Designer::driven(const Sessions& plan) {
   problem.log = {};
   problem.genes.clear();
   problem.fitness.kind = FitnessKind::kLogScore;
-  for (const NoiseRow& noise : {subject_.drive_common, subject_.drive_side, subject_.pose_position,
-                                subject_.pose_heading}) {
+  for (const NoiseRow& noise : {subject_->drive_common, subject_->drive_side,
+                                subject_->pose_position, subject_->pose_heading}) {
     problem.values[noise.row] = problem.table()[noise.row].lower;
   }
   const auto results =
@@ -241,7 +241,7 @@ void keep_common(std::vector<Visibility>* a, std::vector<Visibility>* b) {
 
 Result<DesignedPlan> design_plan(Farm& farm, const Config& config, const PlanSettings& settings,
                                  const PlanProgress& progress) {
-  if (diagnosis_subject(config.problem.scenario) == nullptr) {
+  if (diagnosis_subject(config.problem) == nullptr) {
     return Error{"scenario " + config.problem.scenario +
                  " cannot be diagnosed, so there is nothing to plan for"};
   }

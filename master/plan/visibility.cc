@@ -95,7 +95,7 @@ std::map<std::size_t, std::vector<const Shift*>> by_effect(const Signals& signal
 }
 
 double threshold_of(const Problem& problem, std::size_t effect) {
-  return 2 * gain_to_be_named(*diagnosis_subject(problem.scenario),
+  return 2 * gain_to_be_named(*diagnosis_subject(problem),
                               problem.table().effects()[effect].parameters.size());
 }
 
@@ -143,7 +143,8 @@ Signals Signals::of(const std::vector<std::size_t>& trials) const {
 
 Result<Signals> signals(Farm& farm, const Problem& problem, const TrialLog& log,
                         const SignalSettings& settings) {
-  const DiagnosisSubject& subject = *diagnosis_subject(problem.scenario);
+  const std::shared_ptr<const DiagnosisSubject> keeps_subject = diagnosis_subject(problem);
+  const DiagnosisSubject& subject = *keeps_subject;
   Problem planned = problem;
   planned.log = log;
   planned.genes.clear();

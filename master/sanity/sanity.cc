@@ -1,6 +1,7 @@
 #include "master/sanity/sanity.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "master/sanity/axes.h"
 #include "master/sanity/drive_checks.h"
@@ -14,7 +15,15 @@ constexpr double kMostImpossible = 0.05;  // of the trials
 constexpr double kTimesAsFar = 2;
 constexpr double kBeyond_m = 0.3;  // what a camera's seam or a late reading may add
 
+// Nobody says how fast and how wide a program's robot may be, so no log is doubted for it.
+constexpr double kSlowestProgram_m_s = 0.005;
+
+bool has_drives(const Problem& problem) {
+  return problem.scenario == "srv1" || scenario_form(problem.scenario).program;
+}
+
 DriveLimits limits_of(const Problem& problem) {
+  if (scenario_form(problem.scenario).program) return {kSlowestProgram_m_s, INFINITY, 0, 0};
   const Parameter& speed = problem.table()[row_of(Srv1::kFullSpeed)];
   return {speed.lower, speed.upper, problem.values[row_of(Srv1::kFullSpeed)],
           problem.values[row_of(Srv1::kTrackGauge)]};
@@ -54,7 +63,7 @@ void doubt_drives(const Problem& problem, std::vector<SanityFinding>* findings) 
 }  // namespace
 
 std::vector<std::size_t> impossible_trials(const Problem& problem) {
-  if (problem.scenario != "srv1") return {};
+  if (!has_drives(problem)) return {};
   const std::vector<DriveSample> samples = drive_samples(problem);
   const double speed = full_speed_of(samples);
   std::vector<std::size_t> rows;
@@ -70,7 +79,7 @@ std::vector<std::size_t> impossible_trials(const Problem& problem) {
 std::vector<SanityFinding> check_sanity(const Problem& problem) {
   std::vector<SanityFinding> findings;
   if (problem.log.trials.empty()) return findings;
-  if (problem.scenario == "srv1") doubt_drives(problem, &findings);
+  if (has_drives(problem)) doubt_drives(problem, &findings);
   if (problem.scenario == "push") doubt_pushes(problem, &findings);
   for (SanityFinding& f : findings) f.names_an_effect |= f.name == "unit_error";
   doubt_clock(problem.log, &findings);

@@ -251,7 +251,7 @@ Result<Study> make_push_study(const Problem& problem, std::span<const Gene> gene
   const std::vector<Trial>& log = problem.log.trials;
   if (log.empty()) return Error{"the push log is empty; there is nothing to explain"};
   Study study;
-  study.subject = diagnosis_subject(problem.scenario);
+  study.subject = diagnosis_subject(problem);
   study.table = &problem.table();
   std::vector<DrivenCommand> driven;
   for (const Trial& trial : log) {

@@ -24,7 +24,7 @@ constexpr double kAge_s = 0.3;
 SharedLog shared_log(std::uint64_t seed, double share) {
   Stream stream({.run_seed = seed});
   SharedLog log;
-  log.study.subject = diagnosis_subject("srv1");
+  log.study.subject = diagnosis_subject(Problem{});
   const PoseNoise reading{0.004, 0.02};
   const auto read = [&](const Pose& X) {
     return X * Pose{reading.position_m * stream.normal(), reading.position_m * stream.normal(),

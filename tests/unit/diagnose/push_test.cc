@@ -91,7 +91,9 @@ TEST(PushPatch, MattersWhereThePieceComesUponIt) {
 
 TEST(DiagnosisSubjects, AreThoseWithACatalogue) {
   for (const std::string& scenario : scenario_names()) {
-    const DiagnosisSubject* subject = diagnosis_subject(scenario);
+    Problem problem;
+    problem.scenario = scenario;
+    const auto subject = diagnosis_subject(problem);
     EXPECT_EQ(subject != nullptr, !(*parameter_table(scenario))->effects().empty()) << scenario;
     if (subject == nullptr) continue;
     EXPECT_EQ(subject->scenario, scenario);
@@ -119,7 +121,9 @@ TEST(PushWords, TellOfEveryEffectOfTheCatalogue) {
 // One push in forty slips off a corner: what it does is no evidence.
 TEST(FarTrials, CountAsFarAsTheyAreTrusted) {
   Study study;
-  study.subject = diagnosis_subject("push");
+  Problem pushes;
+  pushes.scenario = "push";
+  study.subject = diagnosis_subject(pushes);
   study.noise = {{0.001, 0.01}, 0.02, 0.02};
   Stream stream({1, Purpose::kTest, 0, 0, 0});
   std::vector<Eigen::Vector3d> residuals;

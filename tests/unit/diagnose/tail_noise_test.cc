@@ -28,7 +28,7 @@ Drawn drawn_with_tails(std::uint64_t seed, const NoiseTails& tails) {
 }
 
 NoiseFit fit(const Drawn& d, bool tails) {
-  return fit_predictive_noise(d.trials, d.residuals, kStart, *diagnosis_subject("srv1"), 0.02,
+  return fit_predictive_noise(d.trials, d.residuals, kStart, *diagnosis_subject(Problem{}), 0.02,
                               tails);
 }
 
@@ -40,7 +40,7 @@ TEST(PredictiveNoise, GainsFromTailsWhatIsThere) {
     NoiseEstimate known = kTruth;
     known.tails = truth;
     const std::vector<double> best =
-        predictive_scores(d.trials, d.residuals, known, *diagnosis_subject("srv1"), 0.02);
+        predictive_scores(d.trials, d.residuals, known, *diagnosis_subject(Problem{}), 0.02);
     EXPECT_GT(tailed.nats, std::accumulate(best.begin(), best.end(), 0.0) - 2)
         << "the most likely noise is at least as likely as the true one";
   }
@@ -58,11 +58,12 @@ TEST(PredictiveNoise, APerfectPredictionScoresWhatIsSaid) {
   for (std::uint64_t seed = 0; seed < 4; ++seed) {
     const Drawn d = drawn_with_tails(10 + seed, known.tails);
     for (double s :
-         predictive_scores(d.trials, d.residuals, known, *diagnosis_subject("srv1"), 0.02)) {
+         predictive_scores(d.trials, d.residuals, known, *diagnosis_subject(Problem{}), 0.02)) {
       mean += s / 2400;
     }
   }
-  EXPECT_NEAR(perfect_score(draw(1).trials, known, *diagnosis_subject("srv1"), 0.02), mean, 0.15);
+  EXPECT_NEAR(perfect_score(draw(1).trials, known, *diagnosis_subject(Problem{}), 0.02), mean,
+              0.15);
 }
 
 }  // namespace

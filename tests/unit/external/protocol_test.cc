@@ -65,7 +65,7 @@ TEST(ExternalTable, HasTheProgramsRowsThenNoiseThenEffectsThatCanBeApplied) {
           .value());
   EXPECT_TRUE(rich.table().find("motor_lag.tau"));
   // All of srv1's but one on the robot's build.
-  EXPECT_EQ(rich.table().effects().size() + 1, srv1_effects().size());
+  EXPECT_EQ(rich.table().effects().size() + 1, srv1_effects_and_seconds().size());
 }
 
 TEST(ExternalRequest, HoldsWhatTheProgramDeclaredAndNothingElse) {

@@ -1,0 +1,89 @@
+// gapfarm diagnose with a simulator of the user's: logs of it, of Bullet, and of each other.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "tests/integration/diagnose_program.h"
+
+namespace gapfarm {
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr const char* kDrives =
+    "drive_noise_common = 0.012\ndrive_noise_side = 0.01\npose_noise_position = 0.0015\n"
+    "pose_noise_heading = 0.008\n[simulate]\nsessions = 2\nlevels = [0.5, 1.0]\n"
+    "durations = [0.5, 1.0]\n";
+
+class DiagnoseExternal : public ::testing::Test {
+ protected:
+  static std::string external(const std::string& words, const std::string& genes,
+                              const std::string& more = "") {
+    return "scenario = \"external\"\n[external]\nprogram = [" + words + "]\n[genes]\n" + genes +
+           "[parameters]\n" + more + kDrives;
+  }
+  static std::string two_tracks() {
+    return external("\"python3\", \"" GAPFARM_SOURCE_DIR "/scripts/bridges/two_tracks.py\"",
+                    "full_speed = [0.1, 0.8]\ngauge = [0.06, 0.4]\n");
+  }
+  static std::string srv1() {
+    return "scenario = \"srv1\"\n[parameters]\nstep_rate = 60\ntread_creep = 0.05\n" +
+           std::string(kDrives);
+  }
+
+  // Drives by the one simulator, diagnosed by the other.
+  Json diagnose(const std::string& driven_by, const std::string& diagnosed_by, int trials,
+                const std::vector<std::string>& set, const std::vector<std::string>& more = {}) {
+    const std::string log = folder_ / "trials.csv";
+    simulate_log(folder_.write("driven.toml", driven_by), log, trials, set);
+    return diagnose_log(folder_.write("by.toml", diagnosed_by), log, folder_ / "d", more);
+  }
+
+  static void expect_named(const Json& d, const std::string& name, const std::string& parameter,
+                           double value, double within) {
+    ASSERT_EQ(d["effects"].size(), 1u) << d["headline"];
+    EXPECT_EQ(d["effects"][0]["name"], name);
+    const Json& found = d["effects"][0]["parameters"][parameter];
+    EXPECT_NEAR(found["value"].get<double>(), value, within);
+    EXPECT_LT(found["lo"], value + within / 2);
+    EXPECT_GT(found["hi"], value - within / 2);
+    EXPECT_LT(d["gap"]["final"], d["gap"]["tuned"]);
+  }
+
+  TemporaryFolder folder_;
+};
+
+TEST_F(DiagnoseExternal, NamesAnEffectOfTheMotorsAndLeavesAModelThatPredicts) {
+  // The robot of the log is another one than the config's.
+  const Json d = diagnose(two_tracks(), two_tracks(), 100,
+                          {"motor_asymmetry.ratio=0.05", "full_speed=0.36", "gauge=0.12"});
+  EXPECT_EQ(d["verdict"], "effect") << d["headline"];
+  expect_named(d, "motor_asymmetry", "ratio", 0.05, 0.006);
+  double speed = 0, gauge = 0;
+  for (const Json& row : d["parameters"]) {
+    if (row["key"] == "full_speed") speed = row["final"];
+    if (row["key"] == "gauge") gauge = row["final"];
+  }
+  EXPECT_NEAR(speed, 0.36, 0.005);
+  EXPECT_NEAR(gauge, 0.12, 0.003);
+  EXPECT_FALSE(d["drives"].empty()) << "the program answers paths";
+  const Finished predicted = gapfarm_command(
+      {"predict", folder_ / "d/model.toml", "--trials", folder_ / "trials.csv", "--out", "-"});
+  EXPECT_EQ(predicted.exit_code, 0) << predicted.err;
+}
+
+TEST_F(DiagnoseExternal, NamesAnEffectOfTheCameraAndNoneWhereNothingIsMissing) {
+  expect_named(diagnose(two_tracks(), two_tracks(), 100, {"camera_aspect.ratio=1.08"}),
+               "camera_aspect", "ratio", 1.08, 0.012);
+  const Json none = diagnose(two_tracks(), two_tracks(), 100, {});
+  EXPECT_EQ(none["verdict"], "none") << none["headline"];
+  // What the program does not take is said, and not looked for.
+  const std::string cautions = none["cautions"].dump();
+  EXPECT_NE(cautions.find("floor_tilt, floor_nap"), std::string::npos) << cautions;
+  for (const Json& row : none["screening"]) EXPECT_NE(row["effect"], "floor_tilt");
+}
+
+}  // namespace
+}  // namespace gapfarm
