@@ -1,5 +1,5 @@
 // gapfarm init LOG...: a config for a log, with what the log says put in and what it cannot say as
-// questions.
+// questions; of a robot's URDF: init_robot.cc.
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
@@ -14,6 +14,7 @@
 #include "common/score/motion_model.h"
 #include "common/score/statistics.h"
 #include "common/trials/read.h"
+#include "master/cli/init_robot.h"
 #include "master/cli/inputs.h"
 #include "master/cli/outputs.h"
 
@@ -67,15 +68,6 @@ LogFigures figures_of(const TrialLog& log, const std::vector<CommandSpec>& known
   return figures;
 }
 
-// As the config names it: relative to where the config will lie.
-std::string seen_from(const std::string& out, const std::string& file) {
-  std::error_code error;
-  const auto folder = std::filesystem::absolute(out == "-" ? "." : out, error).parent_path();
-  const auto base = out == "-" ? std::filesystem::current_path(error) : folder;
-  const auto path = std::filesystem::proximate(file, base, error);
-  return error || path.empty() ? file : path.string();
-}
-
 std::string speed_gene(const LogFigures& figures) {
   const Parameter& row = srv1_table()[row_of(Srv1::kFullSpeed)];
   if (!figures.speed_m_s) {
@@ -108,7 +100,7 @@ std::string config_of_log(const LogFigures& figures, const TrialLog& log,
                           const std::vector<CommandSpec>& known, const InitOptions& options) {
   std::string files, counts;
   for (const std::string& file : options.trials.files) {
-    files += (files.empty() ? "\"" : ", \"") + seen_from(options.out, file) + "\"";
+    files += (files.empty() ? "\"" : ", \"") + file_seen_from(options.out, file) + "\"";
   }
   for (const auto& [name, count] : figures.counts) counts += fmt::format(" {} {},", count, name);
   counts.pop_back();
@@ -140,6 +132,9 @@ std::string config_of_log(const LogFigures& figures, const TrialLog& log,
 }
 
 int run_init(InitOptions& options, CliContext& context) {
+  if (names_a_robot(options.trials.files)) {
+    return run_init_robot(options.trials.files, options.out, options.outputs, context);
+  }
   Console& console = context.console;
   const std::vector<CommandSpec> known = default_commands("srv1");
   const Result<TrialLog> log =
@@ -175,16 +170,22 @@ int run_init(InitOptions& options, CliContext& context) {
 
 SubcommandRun setup_init(CLI::App& app) {
   auto options = std::make_shared<InitOptions>();
-  app.add_option("LOG", options->trials.files, "Trial logs of a robot on two sides")->required();
+  app.add_option(
+         "LOG|URDF", options->trials.files,
+         "Trial logs of a robot on two sides; or a robot's URDF, with its controller YAML and "
+         "folders of its runs")
+      ->required();
   app.add_option("--out", options->out, "Config to write; - for stdout")->capture_default_str();
   options->trials.declare_reading(app);
   options->outputs.declare(app);
   app.footer(
-      "A robot with a URDF: `gapfarm robot FILE --out robot.toml`, and docs/ground.md.\n"
+      "Of a URDF it writes the robot, too, as CONFIG_robot.toml beside the config "
+      "(docs/ground.md).\n"
       "\n"
       "Examples:\n"
       "  gapfarm init logs/monday.csv --out robot.toml\n"
-      "  gapfarm init logs/*.dat");
+      "  gapfarm init logs/*.dat\n"
+      "  gapfarm init husky.urdf control.yaml monday --out husky.toml");
   return [options](CliContext& context) { return run_init(*options, context); };
 }
 

@@ -3,11 +3,9 @@
 #include <memory>
 
 #include "common/robot/robot_file.h"
-#include "common/trials/files.h"
 #include "master/cli/outputs.h"
+#include "master/cli/robot_files.h"
 #include "master/cli/subcommand.h"
-#include "master/robot/compare_facts.h"
-#include "master/robot/controllers.h"
 #include "master/robot/robot_text.h"
 
 namespace gapfarm {
@@ -20,71 +18,6 @@ struct RobotOptions {
   std::string picture;
   Outputs outputs;
 };
-
-bool ends_with(const std::string& file, std::initializer_list<const char*> endings) {
-  const std::string extension = std::filesystem::path(file).extension().string();
-  for (const char* ending : endings) {
-    if (extension == ending) return true;
-  }
-  return false;
-}
-
-// A robot.toml says everything itself.
-Result<RobotReading> read_toml(const std::string& file) {
-  Result<GroundRobot> robot = read_robot(file);
-  if (!robot) return robot.error();
-  RobotReading reading;
-  reading.robot = *std::move(robot);
-  reading.robot.notes.clear();
-  reading.sources.resize(reading.robot.wheels.size());
-  reading.evidence.push_back(file + " says so");
-  return reading;
-}
-
-Result<RobotReading> read_urdf(const std::string& file, const std::vector<DriveFacts>& facts) {
-  const Result<std::string> text = read_text_file(file);
-  if (!text) return text.error();
-  const Result<UrdfModel> model = parse_urdf(*text, file);
-  if (!model) return model.error();
-  return understand_robot(*model, facts);
-}
-
-Result<std::vector<DriveFacts>> read_controllers(const std::vector<std::string>& files) {
-  std::vector<DriveFacts> facts;
-  for (const std::string& file : files) {
-    const Result<std::string> text = read_text_file(file);
-    if (!text) return text.error();
-    const Result<ControllerFile> read = parse_controllers(*text, file);
-    if (!read) return read.error();
-    facts.insert(facts.end(), read->drives.begin(), read->drives.end());
-  }
-  return facts;
-}
-
-// The first robot; what others say differently is added to its disagreements.
-Result<RobotReading> read_all(RobotOptions options) {
-  std::vector<std::string> robots;
-  for (const std::string& file : options.files) {
-    (ends_with(file, {".yaml", ".yml"}) ? options.controllers : robots).push_back(file);
-  }
-  const Result<std::vector<DriveFacts>> facts = read_controllers(options.controllers);
-  if (!facts) return facts.error();
-  if (robots.empty()) return understand_controllers(*facts);
-  std::optional<RobotReading> first;
-  for (const std::string& file : robots) {
-    Result<RobotReading> next =
-        ends_with(file, {".toml"}) ? read_toml(file) : read_urdf(file, *facts);
-    if (!next) return next.error();
-    if (!first) {
-      first = *std::move(next);
-      continue;
-    }
-    for (std::string& said : compare_readings(*first, robots[0], *next, file)) {
-      first->disagreements.push_back(std::move(said));
-    }
-  }
-  return *std::move(first);
-}
 
 // Names come from files: they may not steer the terminal.
 std::string plain_lines(const std::string& text) {
@@ -106,7 +39,7 @@ Status plan_outputs(RobotOptions& options) {
 
 int run_robot(RobotOptions& options, CliContext& context) {
   Console& console = context.console;
-  Result<RobotReading> reading = read_all(options);
+  Result<RobotReading> reading = read_robot_files(options.files, options.controllers);
   if (reading) {
     if (Status s = plan_outputs(options); !s) reading = s.error();
   }
