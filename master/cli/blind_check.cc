@@ -30,7 +30,7 @@ struct BlindCheckOptions {
   std::optional<unsigned> trials, workers, jobs;
   std::optional<std::uint64_t> seed;
   double time_limit_s = 1800;
-  bool resume = false, dry_run = false;
+  bool resume = false, strengths = false;
 };
 
 std::string command_line() {
@@ -134,8 +134,8 @@ BlindCheckHooks hooks_of(const BlindCheckOptions& options, const Config& config,
   return hooks;
 }
 
-int dry_run(const BlindCheckOptions& options, const Config& config, const SessionPlans& plan,
-            DesignSettings design, CliContext& context) {
+int show_strengths(const BlindCheckOptions& options, const Config& config, const SessionPlans& plan,
+                   DesignSettings design, CliContext& context) {
   LongCommand::begin_if_possible("blind-check", KeepOption{}.place("blind-check", ""),
                                  {{"find strengths"}}, context);
   const auto farm = start(options, config, context);
@@ -166,6 +166,19 @@ int dry_run(const BlindCheckOptions& options, const Config& config, const Sessio
                           {"pairs", options.pairs},
                           {"left_out", options.left_out}});
   return kExitDone;
+}
+
+int say_check(const BlindCheckOptions& options, const Config& config, CliContext& context) {
+  FarmOptions farm;
+  const DiagnoseSettings diagnose = diagnose_of(options);
+  farm.workers = static_cast<int>(diagnose.workers * diagnose.jobs);
+  const std::string cases = options.foreign.empty()
+                                ? "cases of effects, " + std::to_string(options.nulls) +
+                                      " nulls and " + std::to_string(options.pairs) + " pairs"
+                                : "the cases of " + options.foreign;
+  return say_dry_run("diagnose " + cases + (options.out.empty() ? "" : " into " + options.out),
+                     {{"out", options.out}, {"nulls", options.nulls}, {"pairs", options.pairs}},
+                     farm, config.farm, context);
 }
 
 int finish(const Result<BlindReport>& report, const BlindCheckOptions& options,
@@ -204,8 +217,9 @@ int run_blind(const BlindCheckOptions& options, CliContext& context) {
     context.console.error(design.error());
     return kExitBadUsage;
   }
-  if (options.dry_run && options.foreign.empty()) {
-    return dry_run(options, *config, settings.plan, *design, context);
+  if (context.dry_run) return say_check(options, *config, context);
+  if (options.strengths && options.foreign.empty()) {
+    return show_strengths(options, *config, settings.plan, *design, context);
   }
   if (options.out.empty()) {
     context.console.error(Error{"--out DIR is missing: the folder for cases, seals and result"});
@@ -276,12 +290,12 @@ SubcommandRun setup_blind_check(CLI::App& app) {
       "--resume", options->resume,
       "Go on with the check in the folder as it was asked, whatever is asked now, or judge "
       "a finished one again; the same command goes on by itself");
-  app.add_flag("--dry-run", options->dry_run,
+  app.add_flag("--strengths", options->strengths,
                "Only say which strengths would be needed for every effect to be that large");
-  declare_on_end(app);
+  declare_long_command(app);
   app.footer(
       "Examples:\n"
-      "  gapfarm blind-check configs/srv1.toml --dry-run\n"
+      "  gapfarm blind-check configs/srv1.toml --strengths\n"
       "  gapfarm blind-check configs/srv1.toml --out run/blind --seed 7\n"
       "  gapfarm blind-check configs/push.toml --out run/pushes --sizes clear --trials 90\n"
       "  gapfarm blind-check configs/srv1.toml --out run/foreign --foreign logs/cases \\\n"

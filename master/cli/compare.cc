@@ -206,6 +206,17 @@ int run_compare(CompareCommand& command, CliContext& context) {
   }
   add_random_search(inputs->variants);
   const Config& first = inputs->variants.front().config;
+  if (context.dry_run) {
+    const CompareOptions& options = inputs->options;
+    return say_dry_run(
+        fmt::format("compare {} searches, {} runs of {} evaluations each, into {}",
+                    inputs->variants.size(), options.seeds, options.evaluations, command.out),
+        {{"out", command.out},
+         {"variants", inputs->variants.size()},
+         {"seeds", options.seeds},
+         {"evaluations", options.evaluations}},
+        command.farm, first.farm, context);
+  }
   if (Status s = LongCommand::begin("compare", {command.out}, {{"evaluate"}}, context); !s) {
     return failed(s.error(), context);
   }
@@ -249,7 +260,7 @@ SubcommandRun setup_compare(CLI::App& app) {
   app.add_option("--target", command->target, "Fitness whose reaching counts as success");
   command->outputs.declare(app);
   command->farm.declare(app, true);
-  declare_on_end(app);
+  declare_long_command(app);
   app.footer(
       "Random search, constant-velocity motion and the config's own values are always among the\n"
       "baselines.\n\n"

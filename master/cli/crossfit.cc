@@ -161,12 +161,22 @@ void begin(const CrossfitOptions& options, CliContext& context) {
                                  context);
 }
 
+int say_fits(const CrossfitOptions& options, const Config& config, CliContext& context) {
+  const std::size_t genes = config.problem.genes.size(), trials = config.problem.log.trials.size();
+  std::string would =
+      fmt::format("tune {} parameters on parts of {} trials and try them on others", genes, trials);
+  if (!options.effects.empty()) would += fmt::format(", with {}", fmt::join(options.effects, ", "));
+  return say_dry_run(would, {{"genes", genes}, {"trials", trials}}, options.farm, config.farm,
+                     context);
+}
+
 int run_ranking(const CrossfitOptions& options, const Config& config, CliContext& context) {
   auto plan = ranking_plan_of(options, config);
   if (!plan) {
     context.console.error(plan.error());
     return kExitBadUsage;
   }
+  if (context.dry_run) return say_fits(options, config, context);
   begin(options, context);
   plan->hooks = context.work->hooks();
   auto farm = start_farm(options.farm, config.farm, context);
@@ -184,6 +194,7 @@ int run_crossfit(const CrossfitOptions& options, CliContext& context) {
                                   [&](Config& read) { return apply(options, read); });
   if (!config) return kExitBadUsage;
   if (!options.effects.empty()) return run_ranking(options, *config, context);
+  if (context.dry_run) return say_fits(options, *config, context);
   begin(options, context);
   CrossfitPlan plan = plan_of(options, *config);
   plan.hooks = context.work->hooks();
@@ -247,7 +258,7 @@ SubcommandRun setup_crossfit(CLI::App& app) {
   app.add_option("--seed", options->seed, "In place of the config's");
   options->keep.declare(app);
   options->farm.declare(app, false);
-  declare_on_end(app);
+  declare_long_command(app);
   app.footer(
       "Examples:\n"
       "  gapfarm crossfit configs/push.toml --trials pushes.csv --by object \\\n"

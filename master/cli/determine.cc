@@ -1,6 +1,8 @@
 // gapfarm determine CONFIG: which parameters of a tuned model the data determine.
 #include "master/determine/determine.h"
 
+#include <spdlog/fmt/fmt.h>
+
 #include <cmath>
 #include <filesystem>
 #include <memory>
@@ -117,6 +119,13 @@ int run_determine(DetermineCommand& command, CliContext& context) {
   }
   DetermineSettings settings = command.settings;
   settings.seed = config->seed;
+  if (context.dry_run) {
+    const std::size_t genes = problem->genes.size(), trials = problem->log.trials.size();
+    return say_dry_run(fmt::format("look at the likelihood of {} parameters about {} on {} trials",
+                                   genes, command.model, trials),
+                       {{"out", command.out}, {"genes", genes}, {"trials", trials}}, command.farm,
+                       config->farm, context);
+  }
   LongCommand::begin_if_possible("determine", command.keep.place("determine", command.out),
                                  {{"evaluate"}}, context);
   auto farm = start_farm(command.farm, config->farm, context);
@@ -169,7 +178,7 @@ SubcommandRun setup_determine(CLI::App& app) {
   command->outputs.declare(app);
   command->keep.declare(app);
   command->farm.declare(app, true);
-  declare_on_end(app);
+  declare_long_command(app);
   app.footer(
       "The curvature of the log likelihood about the model says how far each parameter could be\n"
       "elsewhere, all others moving along.\n\n"

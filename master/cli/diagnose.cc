@@ -248,6 +248,14 @@ int run_diagnose(DiagnoseCommand& command, CliContext& context) {
     context.console.error(s.error());
     return kExitBadUsage;
   }
+  if (context.dry_run) {
+    const std::size_t trials = config->problem.log.trials.size();
+    return say_dry_run(
+        fmt::format("diagnose {} trials of {} into {}, {}", trials, command.config, command.out,
+                    command.model.empty() ? "the base tuned on them" : "by " + command.model),
+        {{"out", command.out}, {"trials", trials}, {"seed", config->seed}}, command.farm,
+        config->farm, context);
+  }
   if (config->problem.ground) return run_diagnose_ground(command, *config, stamp, context);
   // Every simulation goes into the folder: what a figure rests on can be looked up.
   if (Status s = LongCommand::begin("diagnose", {command.out}, stages(), context); !s) {
@@ -298,7 +306,7 @@ SubcommandRun setup_diagnose(CLI::App& app) {
   command->outputs.declare(app);
   command->farm.declare(app, true);
   command->page.declare(app);
-  declare_on_end(app);
+  declare_long_command(app);
   app.footer(
       "Examples:\n"
       "  gapfarm diagnose configs/srv1.toml --trials log.csv --out diagnosis\n"

@@ -287,6 +287,12 @@ int run_drive(DriveCommand& command, CliContext& context) {
   // The commands' nominal motions, then the runs; way-points are a turn and a way each.
   const std::uint64_t legs = task->targets.empty() ? 1 : 2 * task->targets.size();
   const std::uint64_t tasks = problem.commands.size() + legs * command.runs;
+  if (context.dry_run) {
+    return say_dry_run(fmt::format("drive {} times by {}, {} simulations, into {}", command.runs,
+                                   command.model, tasks, command.out),
+                       {{"out", command.out}, {"runs", command.runs}, {"simulations", tasks}},
+                       command.farm, {}, context);
+  }
   const KeepingPlace place{command.out, /*passing=*/false, /*forget=*/true};
   if (Status s = LongCommand::begin("drive", place, {{"drive", 1, tasks}}, context); !s) {
     return failed(s.error(), context);
@@ -341,7 +347,7 @@ SubcommandRun setup_drive(CLI::App& app) {
   app.add_option("--out", command->out, "Folder for the tables and the page")->required();
   command->outputs.declare(app);
   command->farm.declare(app, true);
-  declare_on_end(app);
+  declare_long_command(app);
   app.footer(
       "Constant velocity, and with --mined the motion model mined from a log, drive the same "
       "list.\n"

@@ -21,29 +21,23 @@ struct EvolveCommand {
   EvolutionOverrides overrides;
   FarmOptions farm;
   PageOption page;
-  bool dry_run = false;
 };
 
-int say_plan(const EvolveCommand& command, const Config& config, Console& console) {
+int say_plan(const EvolveCommand& command, const Config& config, CliContext& context) {
   const std::size_t genes = config.problem.genes.size(), trials = config.problem.log.trials.size();
-  const unsigned workers = local_workers(command.farm, config.farm);
-  std::string text = "dry run: nothing was simulated, started or written\nwould evolve " +
-                     std::to_string(genes) + " parameters on " + std::to_string(trials) +
-                     " trials into " + command.out + ", seed " + std::to_string(config.seed) +
-                     ", population " + std::to_string(config.evolution.population) + ", at most " +
-                     std::to_string(config.evolution.generations) + " generations\nwould start " +
-                     std::to_string(workers) + " local workers";
-  for (const std::string& endpoint : command.farm.listen) text += " and listen at " + endpoint;
-  console.result(text + "\n", {{"dry_run", true},
-                               {"out", command.out},
-                               {"genes", genes},
-                               {"trials", trials},
-                               {"seed", config.seed},
-                               {"population", config.evolution.population},
-                               {"generations", config.evolution.generations},
-                               {"workers", workers},
-                               {"listen", command.farm.listen}});
-  return kExitDone;
+  const std::string would = "evolve " + std::to_string(genes) + " parameters on " +
+                            std::to_string(trials) + " trials into " + command.out + ", seed " +
+                            std::to_string(config.seed) + ", population " +
+                            std::to_string(config.evolution.population) + ", at most " +
+                            std::to_string(config.evolution.generations) + " generations";
+  return say_dry_run(would,
+                     {{"out", command.out},
+                      {"genes", genes},
+                      {"trials", trials},
+                      {"seed", config.seed},
+                      {"population", config.evolution.population},
+                      {"generations", config.evolution.generations}},
+                     command.farm, config.farm, context);
 }
 
 RunInfo run_info(const Config& config, const EvolutionOverrides& overrides) {
@@ -74,7 +68,7 @@ int run_evolve(const EvolveCommand& command, CliContext& context) {
         return check_folder(command.out, FolderKind::kRun);
       });
   if (!config) return kExitBadUsage;
-  if (command.dry_run) return say_plan(command, *config, context.console);
+  if (context.dry_run) return say_plan(command, *config, context);
   std::error_code ignored;
   const bool folder_was_there = std::filesystem::exists(command.out, ignored);
   Result<RunStore> store = RunStore::create(command.out, run_info(*config, command.overrides));
@@ -109,11 +103,9 @@ SubcommandRun setup_evolve(CLI::App& app) {
   command->overrides.declare(app);
   command->farm.declare(app, true);
   command->page.declare(app);
-  declare_on_end(app);
+  declare_long_command(app);
   app.add_option("--shuffle", command->shuffle,
                  "Hand jobs out in an order shuffled by this seed; the results do not change");
-  app.add_flag("--dry-run", command->dry_run,
-               "Check everything and say what would be done; do nothing");
   app.footer(
       "Examples:\n"
       "  gapfarm evolve configs/demo.toml --out run/demo\n"

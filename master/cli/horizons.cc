@@ -62,6 +62,11 @@ int run_horizons(const HorizonsCommand& command, CliContext& context) {
     return kExitBadUsage;
   }
   for (const std::string& note : runs->notes) console.note(note);
+  if (context.dry_run) {
+    return say_dry_run("measure horizons of " + command.source,
+                       {{"source", command.source}, {"horizons", command.horizons}}, command.farm,
+                       {}, context);
+  }
   auto farm = start_farm(command.farm, {}, context);
   if (!farm) return failed(farm.error(), context);
   const auto horizons = measure_horizons(**farm, fitted->problem, fitted->values, *runs,
@@ -83,6 +88,7 @@ SubcommandRun setup_horizons(CLI::App& app) {
   app.add_option("--horizons", command->horizons, "Lengths of windows, s; 0: whole runs")
       ->capture_default_str();
   command->farm.declare(app, false);
+  declare_long_command(app);
   app.footer(
       "Beside the simulation stand the robot's own kinematics, fitted to the same windows by least "
       "squares,\nand constant velocity.\n\n"

@@ -1,6 +1,8 @@
 // gapfarm influence CONFIG: which parameters move the path further than a repeat does.
 #include "master/influence/influence.h"
 
+#include <spdlog/fmt/fmt.h>
+
 #include <cmath>
 #include <filesystem>
 #include <memory>
@@ -66,6 +68,12 @@ int run_influence(InfluenceCommand command, CliContext& context) {
   const ParameterTable& table = config->problem.table();
   const std::vector<Gene> genes =
       config->problem.genes.empty() ? all_base_genes(table) : config->problem.genes;
+  if (context.dry_run) {
+    return say_dry_run(fmt::format("trace what {} parameters of {} do to paths, into {}",
+                                   genes.size(), command.config, command.out),
+                       {{"out", command.out}, {"parameters", genes.size()}}, command.farm,
+                       config->farm, context);
+  }
   // The paths are large, and no figure refers to them.
   const KeepingPlace place{command.out, /*passing=*/false, /*forget=*/true};
   if (Status s = LongCommand::begin("influence", place, {{"trace paths"}}, context); !s) {
@@ -124,7 +132,7 @@ SubcommandRun setup_influence(CLI::App& app) {
   command->traced.declare(app);
   command->outputs.declare(app);
   command->farm.declare(app, true);
-  declare_on_end(app);
+  declare_long_command(app);
   app.footer(
       "Examples:\n"
       "  gapfarm influence configs/racquetball.toml --out influence\n"

@@ -1,6 +1,7 @@
 #include "master/cli/inputs.h"
 
 #include <algorithm>
+#include <nlohmann/json.hpp>
 #include <thread>
 
 #include "common/base/shipped.h"
@@ -155,6 +156,24 @@ Result<std::unique_ptr<SocketFarm>> start_farm(const FarmOptions& options,
   base.stop = &context.stop;
   if (!base.on_event) report_to(context.console, base);
   return SocketFarm::create(std::move(base));
+}
+
+int say_dry_run(const std::string& would, nlohmann::ordered_json facts, const FarmOptions& options,
+                const FarmSettings& settings, CliContext& context) {
+  if (Status s = check_farm(options, settings); !s) {
+    context.console.error(s.error());
+    return kExitBadUsage;
+  }
+  const unsigned workers = local_workers(options, settings);
+  const std::vector<std::string> endpoints = endpoints_of(options, settings);
+  std::string text = "dry run: nothing was simulated, started or written\nwould " + would +
+                     "\nwould start " + std::to_string(workers) + " local workers";
+  for (const std::string& endpoint : endpoints) text += " and listen at " + endpoint;
+  facts["dry_run"] = true;
+  facts["workers"] = workers;
+  facts["listen"] = endpoints;
+  context.console.result(text + "\n", facts);
+  return kExitDone;
 }
 
 int failed(const Error& error, CliContext& context) {

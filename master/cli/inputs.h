@@ -3,6 +3,7 @@
 
 #include <functional>
 #include <memory>
+#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -58,6 +59,11 @@ Status check_farm(const FarmOptions& options, const FarmSettings& settings);
 Result<std::unique_ptr<SocketFarm>> start_farm(const FarmOptions& options,
                                                const FarmSettings& settings, CliContext& context,
                                                SocketFarmOptions base = {});
+
+// Where --dry-run ends a command whose input is checked: says what `would` be done ("evolve 7
+// parameters ...") and by whom, with `facts` for --json.  Returns the exit code.
+int say_dry_run(const std::string& would, nlohmann::ordered_json facts, const FarmOptions& options,
+                const FarmSettings& settings, CliContext& context);
 
 // After a signal kExitResumable, with a sentence how to go on, where the command keeps what it
 // simulates (LongCommand), else 130 or 143; without one kExitFailed, and the error is shown.

@@ -98,8 +98,10 @@ class LongCommand {
   std::int64_t at_hand_ = 0;
 };
 
-// --on-end, for every long command.
-void declare_on_end(CLI::App& app);
+// --on-end and --dry-run, for every long command.
+void declare_long_command(CLI::App& app);
+// Whether --dry-run was given to it.
+bool is_dry_run(const CLI::App& command);
 
 // When `command` is over with this exit code: ends its work, and runs what --on-end names with
 // GAPFARM_COMMAND, GAPFARM_OUT, GAPFARM_STATE and GAPFARM_EXIT in the environment.  What becomes of

@@ -73,6 +73,7 @@ int run(const std::vector<std::string>& words) {
   for (std::size_t i = 0; i < program->runs.size(); ++i) {
     const char* name = subcommands()[i].name;
     if (!program->app->got_subcommand(name)) continue;
+    context.dry_run = is_dry_run(*program->app->get_subcommand(name));
     const int exit_code = console.end(program->runs[i](context));
     conclude_command(*program->app->get_subcommand(name), exit_code, context);
     return exit_code;

@@ -1,4 +1,4 @@
-// --on-end COMMAND: what a user wants run when a long command is over.
+// --on-end COMMAND: what a user wants run when a long command is over; --dry-run: nothing at all.
 #include <spawn.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -63,18 +63,25 @@ Result<int> run_shell(const std::string& text, const std::vector<std::string>& v
 
 }  // namespace
 
-void declare_on_end(CLI::App& app) {
+void declare_long_command(CLI::App& app) {
   app.add_option_function<std::string>(
          "--on-end", [](const std::string&) {},
          "Shell command to run when this one ends, stops or fails, with GAPFARM_COMMAND, "
          "GAPFARM_OUT, GAPFARM_STATE (finished, stopped, failed) and GAPFARM_EXIT set")
       ->type_name("COMMAND");
+  const std::string summary = "Check everything and say what would be done; do nothing";
+  app.add_flag("--dry-run", summary);
+}
+
+bool is_dry_run(const CLI::App& command) {
+  const CLI::Option* option = command.get_option_no_throw("--dry-run");
+  return option != nullptr && option->count() > 0;
 }
 
 void conclude_command(const CLI::App& command, int exit_code, CliContext& context) {
   if (context.work != nullptr) context.work->end(exit_code);
   const std::string text = value_of(command, "--on-end");
-  if (text.empty()) return;
+  if (text.empty() || context.dry_run) return;
   const auto status =
       run_shell(text, {"GAPFARM_COMMAND=" + command.get_name(), "GAPFARM_OUT=" + out_of(command),
                        std::string("GAPFARM_STATE=") + state_word(exit_code),

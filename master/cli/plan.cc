@@ -157,6 +157,12 @@ int run_plan(PlanOptions& options, CliContext& context) {
     context.console.error(planned.error());
     return kExitBadUsage;
   }
+  if (context.dry_run) {
+    return say_dry_run(fmt::format("plan {} trials for {} into {}", options.settings.trials,
+                                   options.source, options.out),
+                       {{"out", options.out}, {"trials", options.settings.trials}}, options.farm,
+                       source->config.farm, context);
+  }
   const auto plan = design(options, source->config, context);
   if (!plan) return failed(plan.error(), context);
   std::vector<std::pair<std::string, std::string>> files = {
@@ -202,7 +208,7 @@ SubcommandRun setup_plan(CLI::App& app) {
   options->outputs.declare(app);
   options->keep.declare(app);
   options->farm.declare(app, false);
-  declare_on_end(app);
+  declare_long_command(app);
   app.footer(
       "Examples:\n"
       "  gapfarm plan configs/srv1.toml --trials 120 --place 2x2 --out plan.csv\n"

@@ -1,4 +1,6 @@
 // gapfarm predict RUN|MODEL: the predictive distribution of every trial of a log.
+#include <spdlog/fmt/fmt.h>
+
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
@@ -174,6 +176,12 @@ int run_predict(PredictOptions& options, CliContext& context) {
     console.error(s.error());
     return kExitBadUsage;
   }
+  if (context.dry_run) {
+    const std::string by = options.mined.empty() ? options.model : "the mined motion model";
+    return say_dry_run(fmt::format("predict {} trials by {}", log->trials.size(), by),
+                       {{"out", options.out}, {"trials", log->trials.size()}}, options.farm, {},
+                       context);
+  }
   const auto predictions = options.mined.empty() ? predict_by_model(*model, *log, options, context)
                                                  : predict_by_log(*log, options, console);
   if (!predictions) return failed(predictions.error(), context);
@@ -208,7 +216,7 @@ SubcommandRun setup_predict(CLI::App& app) {
   options->outputs.declare(app);
   options->keep.declare(app);
   options->farm.declare(app, false);
-  declare_on_end(app);
+  declare_long_command(app);
   app.footer(
       "Examples:\n"
       "  gapfarm predict run/demo --trials trials.csv --out predictions.csv\n"

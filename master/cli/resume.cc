@@ -1,9 +1,12 @@
 // gapfarm resume RUN: continue a run from its last generation, or from an earlier one.
+#include <algorithm>
 #include <memory>
+#include <nlohmann/json.hpp>
 
 #include "common/config/config.h"
 #include "master/cli/evolution.h"
 #include "master/cli/long_command.h"
+#include "master/store/run_reader.h"
 
 namespace gapfarm {
 namespace {
@@ -35,7 +38,28 @@ Result<Config> stored_config(const RunInfo& info, const EvolutionOverrides& over
   return config;
 }
 
+// By its reader: a store of an older version stays as it is.
+int say_resume(const ResumeCommand& command, CliContext& context) {
+  const auto reader = RunReader::open(command.run);
+  const auto generations =
+      reader ? reader->generations() : Result<std::vector<StoredGeneration>>(reader.error());
+  const Result<Config> config = generations ? stored_config(reader->info(), command.overrides)
+                                            : Result<Config>(generations.error());
+  if (!config) {
+    context.console.error(config.error());
+    return kExitBadUsage;
+  }
+  const std::uint64_t last = generations->empty() ? 0 : generations->back().generation;
+  const std::uint64_t from = std::min(command.generation.value_or(last), last);
+  return say_dry_run(
+      "go on with " + command.run + " after generation " + std::to_string(from) + " to at most " +
+          std::to_string(config->evolution.generations),
+      {{"run", command.run}, {"generation", from}, {"generations", config->evolution.generations}},
+      command.farm, config->farm, context);
+}
+
 int run_resume(const ResumeCommand& command, CliContext& context) {
+  if (context.dry_run) return say_resume(command, context);
   const std::unique_ptr<Log> log = command.farm.log.open();
   const NotesGoTo notes(*log, context.console);
   Result<RunStore> store = RunStore::open(command.run);
@@ -65,7 +89,7 @@ SubcommandRun setup_resume(CLI::App& app) {
   command->overrides.declare(app);
   command->farm.declare(app, true);
   command->page.declare(app);
-  declare_on_end(app);
+  declare_long_command(app);
   app.add_option("--shuffle", command->shuffle,
                  "Hand jobs out in an order shuffled by this seed; the results do not change");
   app.footer(

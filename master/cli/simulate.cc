@@ -130,6 +130,15 @@ int run_simulate(SimulateOptions& options, CliContext& context) {
     context.console.error(plan.error());
     return kExitBadUsage;
   }
+  if (context.dry_run) {
+    std::size_t trials = 0;
+    for (const auto& session : *plan) trials += session.size();
+    return say_dry_run("simulate " + std::to_string(trials) + " trials in " +
+                           std::to_string(plan->size()) + " sessions into " + options.out +
+                           ", seed " + std::to_string(source->config.seed),
+                       {{"out", options.out}, {"trials", trials}, {"seed", source->config.seed}},
+                       options.farm, source->config.farm, context);
+  }
   const Result<TrialLog> log = simulate(options, *source, *plan, context);
   if (!log) return failed(log.error(), context);
   if (options.out == "-") {
@@ -175,7 +184,7 @@ SubcommandRun setup_simulate(CLI::App& app) {
   options->outputs.declare(app);
   options->keep.declare(app);
   options->farm.declare(app, false);
-  declare_on_end(app);
+  declare_long_command(app);
   app.footer(
       "Examples:\n"
       "  gapfarm simulate configs/srv1.toml --out trials.csv --sessions 3 --trials 100\n"

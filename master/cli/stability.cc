@@ -80,6 +80,14 @@ int run_stability(StabilityCommand command, CliContext& context) {
   }
   show_notes(config->problem.log, context.console);
   command.settings.evolution = config->evolution;
+  if (context.dry_run) {
+    const std::size_t genes = config->problem.genes.size();
+    return say_dry_run(
+        fmt::format("search {} parameters of {} for the least spread over {} repeats, into {}",
+                    genes, command.config, command.settings.repeats, command.out),
+        {{"out", command.out}, {"genes", genes}, {"repeats", command.settings.repeats}},
+        command.farm, config->farm, context);
+  }
   // The paths are large, and no figure refers to them.
   const KeepingPlace place{command.out, /*passing=*/false, /*forget=*/true};
   if (Status s = LongCommand::begin("stability", place, {{"trace paths"}}, context); !s) {
@@ -138,7 +146,7 @@ SubcommandRun setup_stability(CLI::App& app) {
   command->traced.declare(app);
   command->outputs.declare(app);
   command->farm.declare(app, true);
-  declare_on_end(app);
+  declare_long_command(app);
   app.footer(
       "The tiny changes are the scenario's own noise: of the start and launch in racquetball, of "
       "the\n"

@@ -27,6 +27,7 @@ struct CliContext {
   Console& console;
   StopSource& stop;  // requested by SIGINT and SIGTERM; a second one ends the program at once
   std::shared_ptr<LongCommand> work{};  // of a long command, once it has begun
+  bool dry_run = false;                 // all is to be checked and said, and nothing done
 };
 
 // Runs after the command line was parsed; returns an ExitCode.

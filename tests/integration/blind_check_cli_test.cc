@@ -20,7 +20,7 @@ trials_per_session = 20
 TEST(BlindCheckCli, DryRunSaysHowStrongEffectsHaveToBe) {
   const TemporaryFolder folder;
   const Finished finished =
-      gapfarm_command({"blind-check", folder.write("c.toml", kConfig), "--dry-run", "--effects",
+      gapfarm_command({"blind-check", folder.write("c.toml", kConfig), "--strengths", "--effects",
                        "motor_asymmetry", "pose_quantisation", "--workers", "1"});
   EXPECT_EQ(finished.exit_code, 0) << finished.err;
   EXPECT_THAT(finished.out, HasSubstr("40 trials a case"));
@@ -35,10 +35,10 @@ TEST(BlindCheckCli, WrongUsageIsSaidBeforeAnythingIsRun) {
   EXPECT_EQ(no_out.exit_code, 2);
   EXPECT_THAT(no_out.err, HasSubstr("--out"));
   const Finished unknown =
-      gapfarm_command({"blind-check", config, "--dry-run", "--effects", "batery_sag"});
+      gapfarm_command({"blind-check", config, "--strengths", "--effects", "batery_sag"});
   EXPECT_EQ(unknown.exit_code, 2);
   EXPECT_THAT(unknown.err, HasSubstr("battery_sag"));
-  const Finished size = gapfarm_command({"blind-check", config, "--dry-run", "--sizes", "huge"});
+  const Finished size = gapfarm_command({"blind-check", config, "--strengths", "--sizes", "huge"});
   EXPECT_EQ(size.exit_code, 2);
   EXPECT_THAT(size.err, HasSubstr("subtle"));
 }

@@ -70,6 +70,59 @@ TEST(CliUsage, ADryRunRunsNothingAndSaysSo) {
   EXPECT_FALSE(std::filesystem::exists(folder / "run"));
 }
 
+TEST(CliUsage, EveryLongCommandHasADryRunThatLeavesNothing) {
+  const TemporaryFolder folder;
+  const std::string demo = GAPFARM_SOURCE_DIR "/configs/demo.toml",
+                    log = GAPFARM_SOURCE_DIR "/configs/demo/trials.csv", out = folder / "out";
+  const std::vector<std::pair<std::vector<std::string>, const char*>> commands = {
+      {{"diagnose", demo, "--out", out}, "would diagnose 120 trials"},
+      {{"compare", demo, "--seeds", "3", "--evaluations", "50", "--out", out},
+       "would compare 2 searches, 3 runs of 50 evaluations each"},
+      {{"crossfit", demo}, "would tune 7 parameters on parts of 120 trials"},
+      {{"blind-check", demo, "--out", out}, "would diagnose cases of effects"},
+      {{"simulate", demo, "--sessions", "2", "--trials", "5", "--out", out},
+       "would simulate 10 trials in 2 sessions"},
+      {{"influence", demo, "--command", "forward", "--out", out}, "would trace"},
+      {{"stability", demo, "--command", "forward", "--out", out}, "would search 7 parameters"},
+      {{"plan", demo, "--out", out}, "would plan 120 trials"},
+      {{"predict", "--mined", log, "--trials", log, "--out", out}, "would predict 120 trials"},
+  };
+  for (auto [words, would] : commands) {
+    const std::string mark = folder / "ended";
+    words.insert(words.end(), {"--dry-run", "--on-end", "touch " + mark});
+    const Finished dry = gapfarm_command(words);
+    EXPECT_EQ(dry.exit_code, 0) << words[0] << ": " << dry.err;
+    EXPECT_THAT(dry.out, StartsWith("dry run: nothing was simulated, started or written\n"));
+    EXPECT_THAT(dry.out, HasSubstr(would));
+    EXPECT_TRUE(std::filesystem::is_empty(folder.path())) << words[0];
+  }
+}
+
+TEST(CliUsage, InitOfAURDFWritesTheRobotAndAConfigThatNamesIt) {
+  const TemporaryFolder folder;
+  const std::string urdf = GAPFARM_SOURCE_DIR "/tests/fuzz/corpus/urdf/car.urdf";
+  const Finished shown = gapfarm_command({"init", urdf});
+  EXPECT_EQ(shown.exit_code, 0) << shown.err;
+  EXPECT_THAT(shown.out, HasSubstr("scenario = \"ground\""));
+  EXPECT_THAT(shown.out, HasSubstr("# QUESTION: where are its runs?"));
+  EXPECT_THAT(shown.out, HasSubstr("steering.offset = \"table\""));
+  std::filesystem::create_directory(folder / "monday");
+  folder.write("monday/commands.csv", "run,t,speed,steering\na,0,0.2,0\na,2,0,0\n");
+  std::string poses = "run,t,x,y,theta\n";
+  for (int i = 0; i < 240; ++i) {
+    poses += "a," + std::to_string(0.05 * i) + "," + std::to_string(0.01 * i) + ",0,0\n";
+  }
+  folder.write("monday/poses.csv", poses);
+  const Finished made =
+      gapfarm_command({"init", urdf, folder / "monday", "--out", folder / "car.toml"});
+  EXPECT_EQ(made.exit_code, 0) << made.err;
+  EXPECT_TRUE(std::filesystem::exists(folder / "car_robot.toml"));
+  const Finished checked = gapfarm_command({"check", folder / "car.toml"});
+  EXPECT_EQ(checked.exit_code, 0) << checked.err;
+  EXPECT_EQ(gapfarm_command({"init", urdf, "--out", folder / "car.toml"}).exit_code, 2)
+      << "it is there already";
+}
+
 TEST(CliUsage, WrongWordsExitWithTwoAndASuggestion) {
   const Finished command = gapfarm_command({"statsu", "run"});
   EXPECT_EQ(command.exit_code, 2);
