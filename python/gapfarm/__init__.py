@@ -6,7 +6,7 @@ m, s and rad; a table's ``attrs["units"]`` says the unit of each column that has
 """
 
 from ._diagnosis import Diagnosis, diagnose
-from ._logs import read_trials, read_windows, write_trials
+from ._logs import read_paths, read_trials, read_windows, write_trials, write_windows
 from ._model import Model
 from ._program import GapfarmError, command, version
 from ._run import Run, evolve
@@ -19,8 +19,10 @@ __all__ = [
     "command",
     "diagnose",
     "evolve",
+    "read_paths",
     "read_trials",
     "read_windows",
     "version",
     "write_trials",
+    "write_windows",
 ]

@@ -28,7 +28,7 @@ class Diagnosis:
 
     @property
     def verdict(self) -> str:
-        """In one word: "explained", "nothing", "unknown", "unusable", ..."""
+        """In one word: "effect", "none", "unknown", "effect+unknown" or "unusable"."""
         return self.data["verdict"]
 
     @property
@@ -38,7 +38,7 @@ class Diagnosis:
 
     @property
     def effects(self) -> pd.DataFrame:
-        """A row a parameter of each named effect: effect, parameter, value with its 95 % interval lo
+        """A row a parameter of each named effect: effect, parameter, value with its 90 % interval lo
         and hi, unit, confidence, gap_before and gap_after (nats a trial), aliases."""
         columns = ["effect", "parameter", "value", "lo", "hi", "unit"]
         columns += ["confidence", "gap_before", "gap_after", "aliases"]
@@ -51,12 +51,13 @@ class Diagnosis:
 
     @property
     def where(self) -> pd.DataFrame:
-        """Where the gap lies: command, component, kind, covariate, size, share, p, text."""
+        """Where the gap lies, a row a finding: command, component, kind, covariate, size (m or rad),
+        share of the gap, p, text."""
         return pd.DataFrame(self.data["where"])
 
     @property
     def model(self) -> Model:
-        """With the effects that were named."""
+        """The tuned model with the effects that were named."""
         return Model(self.path if os.path.isdir(self.path) else os.path.dirname(self.path))
 
 
@@ -67,7 +68,11 @@ def diagnose(
     trials: Sequence[Path] = (),
     progress: Optional[Progress] = None,
 ) -> Diagnosis:
-    """`gapfarm diagnose CONFIG --out OUT`; `options` are more of its words.  Raises GapfarmError."""
+    """`gapfarm diagnose CONFIG --out OUT` of the trial logs `trials`, else of the config's own.
+
+    `options` are more of its words ("--workers", "4"); `progress` is called with every line that it
+    says.  Raises GapfarmError; one of exit code 85 was stopped, and the same call goes on.
+    """
     words = ["diagnose", os.fspath(config), "--out", os.fspath(out), *options]
     if trials:
         words += ["--trials", *map(os.fspath, trials)]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from typing import Union
+from typing import Any, Mapping, Union
 
 import pandas as pd
 
@@ -21,20 +21,65 @@ TRIAL_UNITS = {
 }
 
 
-def read_trials(file: Path) -> pd.DataFrame:
-    """A trial log (docs/formats.md): a row a trial, poses in m and rad; empty fields are NaN."""
-    table = pd.read_csv(file, comment="#", dtype={"session": str, "command": str})
-    table.attrs["units"] = {k: u for k, u in TRIAL_UNITS.items() if k in table.columns}
+PATH_UNITS = {"t": "s", "x": "m", "y": "m", "theta": "rad"}
+
+
+def _with_units(table: pd.DataFrame, units: Mapping[str, str]) -> pd.DataFrame:
+    table.attrs["units"] = {k: u for k, u in units.items() if k in table.columns}
     return table
 
 
+def read_table(file: Path, **options: Any) -> pd.DataFrame:
+    """A CSV as pandas reads it, but numbers to the last digit: its own parser rounds them."""
+    return pd.read_csv(file, float_precision="round_trip", **options)
+
+
+def read_trials(file: Path) -> pd.DataFrame:
+    """A trial log (docs/formats.md): a row a trial, in the file's order; empty fields are NaN.
+
+    session, trial, t (s since the session began), command, left and right (duties), duration (s),
+    start pose x0, y0 (m), theta0 (rad), end pose x1, y1 (m), theta1 (rad), and further columns as the
+    file has them.
+    """
+    table = read_table(file, comment="#", dtype={"session": str, "command": str})
+    return _with_units(table, TRIAL_UNITS)
+
+
 def write_trials(trials: pd.DataFrame, file: Path) -> None:
-    """Writes a trial log that gapfarm reads; numbers keep all their digits."""
+    """Writes a trial log that gapfarm reads, a line a row; numbers keep all their digits.
+
+    Columns and units as of read_trials().
+    """
     trials.to_csv(file, index=False, na_rep="")
 
 
+def read_paths(file: Path) -> pd.DataFrame:
+    """Paths of a trial log, its paths.csv: a row a sample.
+
+    session, trial, t (s since the command began), x, y (m), theta (rad) in the world.
+    """
+    table = read_table(file, comment="#", dtype={"session": str})
+    return _with_units(table, PATH_UNITS)
+
+
 def read_windows(folder: Path) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """A ground robot's logged run (docs/ground.md): (commands, poses), a row a sample."""
-    commands = pd.read_csv(os.path.join(folder, "commands.csv"), comment="#")
-    poses = pd.read_csv(os.path.join(folder, "poses.csv"), comment="#")
-    return commands, poses
+    """A ground robot's logged runs (docs/formats.md): (commands, poses), a row a sample each.
+
+    Both have run and t (s); commands a column a command channel of the robot, a row of which holds
+    until the next one; poses x, y (m), theta (rad) of the marker in the world.
+    """
+    tables = []
+    for name in ("commands.csv", "poses.csv"):
+        table = read_table(os.path.join(folder, name), comment="#", dtype={"run": str})
+        tables.append(_with_units(table, PATH_UNITS))
+    return tables[0], tables[1]
+
+
+def write_windows(commands: pd.DataFrame, poses: pd.DataFrame, folder: Path) -> None:
+    """Writes runs into a folder that configs of scenario `ground` name, a line a row.
+
+    Columns and units as of read_windows(); the folder is made if it is not there.
+    """
+    os.makedirs(folder, exist_ok=True)
+    for name, table in (("commands.csv", commands), ("poses.csv", poses)):
+        table.to_csv(os.path.join(folder, name), index=False, na_rep="")

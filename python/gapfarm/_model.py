@@ -9,7 +9,7 @@ from typing import Any, Optional, Sequence, Union
 import numpy as np
 import pandas as pd
 
-from ._logs import Path, read_trials, write_trials
+from ._logs import Path, read_paths, read_table, read_trials, write_trials
 from ._program import command
 
 try:
@@ -21,8 +21,11 @@ _UNITS = {"x": "m", "y": "m", "theta": "rad", "log_score": "nats"}
 
 
 class Model:
-    """A model.toml, or a folder with one: of a run or a diagnosis.  Simulations are done by local
-    workers, as `gapfarm predict` and `gapfarm simulate` do.  Pickles; may be used from several threads."""
+    """A model.toml, or a folder with one: of a run or a diagnosis.
+
+    Simulations are done by local workers, as `gapfarm predict` and `gapfarm simulate` do.  Holds nothing
+    but the path: pickles, and may be used from several threads.
+    """
 
     def __init__(self, path: Path):
         self.path = os.fspath(path)
@@ -51,9 +54,12 @@ class Model:
     def predict(
         self, trials: Union[pd.DataFrame, Path, Sequence[Path]], workers: Optional[int] = None
     ) -> pd.DataFrame:
-        """Where every trial should have ended: session, trial, x, y (m), theta (rad), the covariance
-        cov_xx ... cov_tt of these (m^2, m rad, rad^2), log_score (nats) of what was measured.  A row a
-        trial, in the log's order."""
+        """Where every trial should have ended, a row a trial, in the log's order.
+
+        session, trial, x, y (m), theta (rad), the covariance cov_xx ... cov_tt of these (m^2, m rad,
+        rad^2), log_score (nats) of what was measured.  `trials`: a table as of read_trials(), or trial
+        logs.  `workers`: processes, else one a core.
+        """
         with tempfile.TemporaryDirectory(prefix="gapfarm-") as folder:
             files: list[str]
             if isinstance(trials, pd.DataFrame):
@@ -66,7 +72,7 @@ class Model:
             out = os.path.join(folder, "predictions.csv")
             words = ["predict", self.path, "--trials", *files, "--out", out]
             command(words + ([] if workers is None else ["--workers", str(workers)]))
-            table = pd.read_csv(out, dtype={"session": str})
+            table = read_table(out, dtype={"session": str})
         table.attrs["units"] = dict(_UNITS)
         return table
 
@@ -80,10 +86,25 @@ class Model:
         return full
 
     def simulate(self, *options: str, seed: Optional[int] = None) -> pd.DataFrame:
-        """A trial log made by the model, as read_trials() gives it; `options` are words of
-        `gapfarm simulate` ("--sessions", "2", "--set", "friction=0.4")."""
+        """A trial log made by the model, a row a trial as read_trials() gives it, m, s and rad.
+
+        `options` are words of `gapfarm simulate` ("--sessions", "2", "--set", "friction=0.4").
+        """
+        return self._simulated(options, seed)[0]
+
+    def simulate_paths(
+        self, *options: str, interval: float = 0.05, seed: Optional[int] = None
+    ) -> tuple[pd.DataFrame, pd.DataFrame]:
+        """(trials, paths): simulate()'s log, and a row a sample of every `interval` s of its ways as
+        read_paths() gives them, m and rad in the world."""
+        return self._simulated((*options, "--paths", repr(float(interval))), seed)
+
+    def _simulated(
+        self, options: Sequence[str], seed: Optional[int]
+    ) -> tuple[pd.DataFrame, pd.DataFrame]:
         with tempfile.TemporaryDirectory(prefix="gapfarm-") as folder:
             out = os.path.join(folder, "trials.csv")
             words = ["simulate", self._file(), "--out", out, *options]
             command(words + ([] if seed is None else ["--seed", str(seed)]))
-            return read_trials(out)
+            paths = os.path.join(folder, "paths.csv")
+            return read_trials(out), read_paths(paths) if os.path.exists(paths) else pd.DataFrame()

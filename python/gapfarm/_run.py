@@ -15,6 +15,7 @@ from ._model import Model
 from ._program import Progress, command
 
 _SCHEMA = 4
+_FIRST_WITH_INCIDENTS = 2
 
 
 class Run:
@@ -60,8 +61,8 @@ class Run:
 
     @property
     def generations(self) -> pd.DataFrame:
-        """A row a generation: best, mean, median, worst fitness, diversity, evaluations since the
-        start, wall_s of it, quarantined, digest; indexed by generation."""
+        """A row a generation: best, mean, median, worst fitness (in info["fitness_unit"]), diversity,
+        evaluations since the start, wall_s of it (s), quarantined, digest; indexed by generation."""
         table = self._table(
             "SELECT generation, best, mean, median, worst, diversity, evaluations, wall_s, "
             "quarantined, digest FROM generations ORDER BY generation"
@@ -72,8 +73,9 @@ class Run:
         return table
 
     def individuals(self, generation: Optional[int] = None) -> pd.DataFrame:
-        """Members of a generation (default: the last; 0: of all): rank, birth_id, fitness (NaN unless
-        the outcome is OK), outcome, scores, operators, then a column a parameter, SI units."""
+        """A row a member of a generation (default: the last; 0: of all), best first: rank, birth_id,
+        fitness (NaN unless the outcome is OK), outcome, scores, operators, then a column a parameter,
+        SI units."""
         where, values = "", []  # type: tuple[str, list[int]]
         if generation is None:
             where = "WHERE generation = (SELECT max(generation) FROM generations)"
@@ -104,7 +106,11 @@ class Run:
 
     @property
     def incidents(self) -> pd.DataFrame:
-        """What somebody should look at: generation, kind, time (UTC), text."""
+        """What somebody should look at, a row an incident: generation, kind, time (UTC), text."""
+        with self._open() as db:
+            (schema,) = db.execute("PRAGMA user_version").fetchone()
+        if schema < _FIRST_WITH_INCIDENTS:  # of 0.1: read as it is
+            return pd.DataFrame(columns=["generation", "kind", "time", "text"])
         table = self._table("SELECT generation, kind, time, text FROM incidents ORDER BY time")
         table["time"] = pd.to_datetime(table["time"], unit="s", utc=True)
         return table

@@ -1,10 +1,13 @@
 """The Python package against the programs of this build: GAPFARM names them, by ctest."""
 
 import concurrent.futures
+import inspect
 import json
 import os
 import pathlib
 import pickle
+import re
+import typing
 
 import numpy as np
 import pandas as pd
@@ -135,3 +138,92 @@ def test_the_page_of_examples_runs(run, tmp_path, monkeypatch):
     scope: dict = {}
     for block in blocks:
         exec(compile(block, "docs/python.md", "exec"), scope)
+
+
+def test_the_notebook_runs(tmp_path, monkeypatch):
+    """Every cell of docs/python.ipynb, in order, in one program."""
+    cells = json.loads((ROOT / "docs" / "python.ipynb").read_text())["cells"]
+    code = ["".join(cell["source"]) for cell in cells if cell["cell_type"] == "code"]
+    assert code and all(not cell.get("outputs") for cell in cells), "clear outputs before a commit"
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+    os.symlink(ROOT / "configs", tmp_path / "configs")
+    scope: dict = {}
+    for number, text in enumerate(code):
+        exec(compile(text, f"docs/python.ipynb, code cell {number + 1}", "exec"), scope)
+    assert any("stage 1 of 6" in line for line in scope["said"]), "diagnose tells its progress"
+    diagnosis = scope["diagnosis"]
+    again = pickle.loads(pickle.dumps(diagnosis))
+    pd.testing.assert_frame_equal(again.effects, diagnosis.effects)
+    row = diagnosis.effects.iloc[0]
+    assert row.lo < 0.05 < row.hi and row.unit == "-"
+
+
+def test_paths_come_with_a_simulated_log(run):
+    words = ("--sessions", "1", "--trials", "4", "--workers", "1")
+    trials, paths = run.model.simulate_paths(*words, interval=0.1, seed=3)
+    assert paths.attrs["units"] == {"t": "s", "x": "m", "y": "m", "theta": "rad"}
+    assert list(paths.groupby("trial").t.min()) == [0.0] * len(trials)
+    pd.testing.assert_frame_equal(trials, run.model.simulate(*words, seed=3))
+
+
+def test_windows_go_out_and_in_again(tmp_path):
+    t = np.arange(5) * 0.1
+    commands = pd.DataFrame({"run": "007", "t": t, "left": 0.1 + t / 3, "right": 0.2})
+    poses = pd.DataFrame({"run": "007", "t": t, "x": t / 7, "y": 0.0, "theta": -t})
+    gapfarm.write_windows(commands, poses, tmp_path / "monday")
+    read = gapfarm.read_windows(tmp_path / "monday")
+    for back, table in zip(read, (commands, poses)):
+        pd.testing.assert_frame_equal(back, table, check_exact=True)
+        assert back.attrs["units"]["t"] == "s"
+
+
+def test_models_may_be_used_from_several_threads(run):
+    model = pickle.loads(pickle.dumps(run.model))
+    with concurrent.futures.ThreadPoolExecutor(3) as pool:
+        tables = list(pool.map(lambda _: model.predict(LOG, workers=1), range(3)))
+    for table in tables[1:]:
+        pd.testing.assert_frame_equal(table, tables[0])
+
+
+def public_names():
+    """(name, object) of what the package shows, methods and properties of its classes with it."""
+    for name in gapfarm.__all__:
+        thing = getattr(gapfarm, name)
+        yield name, thing
+        if not inspect.isclass(thing) or issubclass(thing, Exception):
+            continue
+        for key, member in vars(thing).items():
+            if key.startswith("_"):
+                continue
+            if isinstance(member, property):
+                member = member.fget
+            elif isinstance(member, staticmethod):
+                member = member.__func__
+            yield f"{name}.{key}", member
+
+
+@pytest.mark.parametrize("name, thing", list(public_names()), ids=lambda x: x if isinstance(x, str) else "")
+def test_every_public_name_says_what_it_is(name, thing):
+    text = inspect.getdoc(thing)
+    assert text, f"{name} has no docstring"
+    if inspect.isclass(thing):
+        return
+    hints = typing.get_type_hints(thing)
+    wanted = [p for p in inspect.signature(thing).parameters if p != "self"]
+    assert "return" in hints and all(p in hints for p in wanted), f"{name} is not annotated"
+    returned = str(hints["return"])
+    if "ndarray" in returned:
+        assert "shape" in text and ("float64" in text or "int64" in text), f"{name}: shape and type"
+    if "DataFrame" in returned:
+        assert re.search(r"\ba row an? \w+", text, re.I) or "as read_trials" in text, f"{name}: rows"
+        assert re.search(r"\b(m|rad|s|nats|SI units|UTC|unit)\b", text), f"{name}: units"
+
+
+def test_the_package_says_that_it_is_typed():
+    package = pathlib.Path(gapfarm.__file__).parent
+    assert (package / "py.typed").exists()
+    api = pytest.importorskip("mypy.api")
+    said, wrong, code = api.run(["--strict", "--ignore-missing-imports", "--no-error-summary",
+                                 "--disable-error-code=type-arg", str(package)])
+    assert code == 0, said + wrong
