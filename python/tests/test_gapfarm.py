@@ -1,12 +1,14 @@
 """The Python package against the programs of this build: GAPFARM names them, by ctest."""
 
 import concurrent.futures
+import contextlib
 import inspect
 import json
 import os
 import pathlib
 import pickle
 import re
+import sqlite3
 import typing
 
 import numpy as np
@@ -138,6 +140,14 @@ def test_the_page_of_examples_runs(run, tmp_path, monkeypatch):
     scope: dict = {}
     for block in blocks:
         exec(compile(block, "docs/python.md", "exec"), scope)
+
+
+def test_a_run_of_version_0_1_is_read_as_it_is(tmp_path):
+    with contextlib.closing(sqlite3.connect(tmp_path / "run.sqlite")) as db:
+        db.executescript((ROOT / "tests" / "integration" / "run_of_0_1.sql").read_text())
+    run = gapfarm.Run(tmp_path)
+    assert list(run.generations.index) == [1, 2] and run.info["program_version"] == "0.1.0"
+    assert run.genomes().shape == (4, 2) and run.incidents.empty
 
 
 def test_the_notebook_runs(tmp_path, monkeypatch):

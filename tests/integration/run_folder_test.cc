@@ -107,6 +107,41 @@ TEST_F(RunFolder, AFullDiskStopsARunThatGoesOnWhenThereIsRoom) {
   EXPECT_THAT(tried.err, AllOf(HasSubstr(file_), HasSubstr("free some disk space")));
 }
 
+// A stored run whose tables are those of 0.1: it is read as it is, and resumed by this version.
+TEST_F(RunFolder, OfVersion01IsReadAsItIsAndUpgradedByResume) {
+  std::filesystem::create_directory(run_);
+  {
+    auto database = Database::open(file_, Database::Mode::kCreate);
+    ASSERT_TRUE(database.ok()) << database.error().message;
+    const Status made =
+        database->exec(bytes(GAPFARM_SOURCE_DIR "/tests/integration/run_of_0_1.sql"), "make it");
+    ASSERT_TRUE(made.ok()) << made.error().message;
+  }
+  const auto schema = [this] {
+    const auto database = Database::open(file_, Database::Mode::kQueryOnly);
+    return *database->integer("PRAGMA user_version", "test");
+  };
+  ASSERT_EQ(schema(), 1);
+  EXPECT_EQ(status(run_)["generation"], 2);
+  const Finished page = gapfarm_command({"report", run_, "--out", folder_ / "page.html"});
+  EXPECT_EQ(page.exit_code, 0) << page.err;
+  const Finished dry = gapfarm_command({"resume", run_, "--generations", "4", "--dry-run"});
+  EXPECT_EQ(dry.exit_code, 0) << dry.err;
+  EXPECT_THAT(dry.out, HasSubstr("after generation 2 to at most 4"));
+  EXPECT_EQ(schema(), 1) << "reading changes nothing";
+  const std::string digest = status(run_)["digest"];
+
+  const Finished resumed = resume(run_, "4");
+  EXPECT_EQ(resumed.exit_code, 0) << resumed.err;
+  EXPECT_EQ(schema(), 3);
+  EXPECT_EQ(status(run_)["generation"], 4);
+  const auto database = Database::open(file_, Database::Mode::kQueryOnly);
+  auto kept = database->prepare("SELECT digest FROM generations WHERE generation = 2", "test");
+  ASSERT_TRUE(*kept->step());
+  EXPECT_EQ(kept->text(0), digest) << "what was there is as it was";
+  EXPECT_TRUE(std::filesystem::exists(run_ + "/model.toml"));
+}
+
 TEST_F(RunFolder, DamageIsNoticedBeforeAnythingIsWritten) {
   ASSERT_EQ(evolve(run_, "20").exit_code, 0);
   {
