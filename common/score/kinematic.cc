@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <optional>
 #include <span>
 
 #include "common/robot/robot_drive.h"
@@ -12,6 +13,7 @@ namespace gapfarm {
 namespace {
 
 constexpr double kStep_s = 0.04;
+constexpr double kGravity_m_s2 = 9.81;
 
 bool steered(const GroundRobot& robot) {
   return robot.drive == DriveKind::kAckermann || robot.drive == DriveKind::kTricycle;
@@ -72,6 +74,7 @@ class Body {
   // The robot's file with these gains in its sizes.
   GroundRobot corrected() const {
     GroundRobot robot = robot_;
+    if (grip_m_s2_) robot.friction = *grip_m_s2_ / kGravity_m_s2 / robot.friction_ratio;
     const bool skids = robot.drive == DriveKind::kSkid || robot.drive == DriveKind::kTracked;
     ControllerKinematics& k = robot.controller;
     // By four-point Coulomb theory the multiplier is 1 + (ratio wheelbase / wheel_separation)^2.
@@ -123,8 +126,7 @@ class Body {
 
   Twist velocity(std::span<const WheelMotion> wheels, const RobotDrive& drive) const {
     if (steered(robot_)) {
-      const double v = ahead_ * drive.traction_m_s();
-      return {v, 0, v * drive.curvature()};
+      return on_floor(ahead_ * drive.traction_m_s(), drive.curvature());
     }
     if (holonomic(robot_)) {
       Eigen::VectorXd speeds(inverse_.cols());
@@ -177,6 +179,11 @@ class Body {
     }
     if (name == "sag") sag_ = value;
     if (name == "drift") drift_ = value;
+    if (name == "grip") {
+      grip_m_s2_ = std::exp(value);
+      robot_.steering.understeer_s2_m2 = 0;  // is what tyres that slip look like
+    }
+    if (name == "slip_angle") slip_angle_rad_ = value;
     if (name == "pose_scale") scale_ = value;
     if (name == "aspect") aspect_ = value;
     if (name == "steering_offset") robot_.steering.offset_rad += value;
@@ -192,6 +199,15 @@ class Body {
     if (name == "marker_x") robot_.X_RM.x = value;
     if (name == "marker_y") robot_.X_RM.y = value;
     if (name == "marker_yaw") robot_.X_RM.theta = value;
+  }
+
+  // What tyres make of a speed and a curvature: the acceleration to the side nears what the floor
+  // holds and does not pass it, and the rear axle slips outwards by its share of that.
+  Twist on_floor(double v, double curvature) const {
+    if (!grip_m_s2_) return {v, 0, v * curvature};
+    const double asked = v * v * curvature / *grip_m_s2_;
+    const double held = 1 / std::sqrt(1 + asked * asked);
+    return {v, -slip_angle_rad_ * v * asked * held, v * curvature * held};
   }
 
   // e1 (v + w x p) = s of every driven wheel, in the least-squares sense.
@@ -212,6 +228,8 @@ class Body {
   double left_ = 1, right_ = 1, separation_ = 1, ahead_ = 1, aside_ = 1, turn_ = 1;
   double separation_ratio_ = 1;
   double sag_ = 0, drift_ = 0, scale_ = 1, aspect_ = 1;
+  std::optional<double> grip_m_s2_;  // none: no speed slips
+  double slip_angle_rad_ = 0;
   Eigen::MatrixXd inverse_;
 };
 

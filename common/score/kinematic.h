@@ -31,8 +31,10 @@ std::vector<Pose> kinematic_ends(const Problem& problem, const Kinematics& kinem
 // stand: "travel" (ratio of both sides), "steering_left" and "_right" (ratio of the table's angles
 // that way), "wheelbase" (ratio), "power" (ratio of the throttle's gain), "dead_band" (the
 // command's unit), "ramp" (s^2/m: 1 over the acceleration limit), "sag" (share of the command lost
-// a minute), "drift" (s that the command's clock loses a second), "pose_scale" and "aspect" (of the
-// tracker: all that it reports, its y over its x).
+// a minute), "drift" (s that the command's clock loses a second), "grip" (of cars: logarithm of the
+// acceleration to the side that the floor holds, m/s^2) with "slip_angle" (rad, of the rear axle
+// there; in place of the file's understeer), "pose_scale" and "aspect" (of the tracker: all that it
+// reports, its y over its x).
 std::vector<Pose> kinematic_ends(const GroundRobot& robot, std::span<const CommandedRun> runs,
                                  std::span<const Trial> trials, const Kinematics& kinematics);
 

@@ -1,0 +1,31 @@
+#include "common/score/kinematic_start.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/score/kinematic.h"
+
+namespace gapfarm {
+
+ParameterValues kinematic_start(const Problem& problem) {
+  ParameterValues values = problem.values;
+  if (!problem.ground || problem.log.trials.empty()) return values;
+  const auto fitted = fit_kinematics(problem);
+  if (!fitted || !fitted->values.allFinite()) return values;
+  const GroundRobot robot = robot_with(problem.ground->robot(), *fitted);
+  if (!check_robot(robot)) return values;
+  const GroundTable there(robot), here(problem.ground->robot());
+  for (const Gene& gene : problem.genes) {
+    const Parameter& row = problem.table()[gene.row];
+    const auto now = there.table().find(row.key), before = here.table().find(row.key);
+    const bool noise = row.key.find("_noise_") != std::string::npos;  // in the robot's proportion
+    if (!now || !before || noise) continue;
+    const double wanted = there.table()[*now].nominal;
+    // What kinematics have no word for stays as the config has it.
+    if (wanted == here.table()[*before].nominal) continue;
+    values[gene.row] = std::clamp(wanted, gene.lower, gene.upper);
+  }
+  return values;
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,13 @@
+// Where a search of a ground robot's values begins.
+#pragma once
+
+#include "common/problem/problem.h"
+
+namespace gapfarm {
+
+// The problem's values with those of its genes that the robot's own kinematics tell (radii, sizes,
+// clock, lag, marker, steering), fitted to its windows by least squares and kept within the genes'
+// ranges.  The problem's own where it has no ground robot or no windows.
+ParameterValues kinematic_start(const Problem& problem);
+
+}  // namespace gapfarm
