@@ -11,6 +11,7 @@
 #include "common/base/build_info.h"
 #include "common/problem/run_files.h"
 #include "common/robot/robot_file.h"
+#include "master/cli/diagnose_command.h"
 #include "master/cli/inputs.h"
 #include "master/cli/long_command.h"
 #include "master/cli/outputs.h"
@@ -18,48 +19,12 @@
 #include "master/cli/question_stamp.h"
 #include "master/cli/run_model.h"
 #include "master/diagnose/diagnosis_json.h"
-#include "master/ground/diagnose_ground.h"
 #include "master/report/report_html.h"
 
 namespace gapfarm {
-namespace {
 
-constexpr const char* kAnswers = "simulations.sqlite";
-constexpr const char* kResult = "diagnosis.json";
-
-struct DiagnoseCommand {
-  std::string config;
-  TrialOptions trials;
-  std::string out;
-  std::string model;
-  std::vector<std::string> leave_out;
-  std::optional<std::uint64_t> seed;
-  Outputs outputs;
-  FarmOptions farm;
-  PageOption page;
-};
-
-Model model_of(const Config& config, const DiagnosisResult& result, const ParameterValues& values,
-               const std::string& kind) {
-  Model model;
-  model.scenario = config.problem.scenario;
-  model.kind = kind;
-  model.version = build_info().version;
-  model.fingerprint = build_info().fingerprint;
-  model.values = values;
-  model.commands = config.problem.commands;
-  model.pieces = config.problem.pieces;
-  model.external = config.problem.external;
-  model.fitness = config.problem.fitness;
-  model.spread = config.problem.spread;
-  model.frame_x_m = result.frame_x_m;
-  model.frame_y_m = result.frame_y_m;
-  model.data = {problem_hash(to_proto(config.problem)), config.problem.log.trials.size(),
-                config.trial_files};
-  return model;
-}
-
-void add_provenance(const Config& config, const DiagnoseCommand& command, Diagnosis* diagnosis) {
+void add_diagnosis_provenance(const Config& config, const DiagnoseCommand& command,
+                              Diagnosis* diagnosis) {
   auto& to = diagnosis->provenance;
   const TrialLog& log = config.problem.log;
   std::set<std::string> sessions;
@@ -77,74 +42,7 @@ void add_provenance(const Config& config, const DiagnoseCommand& command, Diagno
   to.emplace_back("seed", std::to_string(config.seed));
 }
 
-Status write_model(const Model& model, const std::filesystem::path& path, const Outputs& outputs) {
-  if (Status s = check_model(model); !s) return Error{path.string() + ": " + s.error().message};
-  return outputs.write(path.string(), format_model(model));
-}
-
-Status write_all(const Config& config, const DiagnoseCommand& command,
-                 const DiagnosisResult& result) {
-  const std::filesystem::path out(command.out);
-  Model model = model_of(config, result, result.final_, "diagnosed");
-  model.intervals.resize(model.values.size());
-  for (std::size_t i = 0; i < result.intervals.size(); ++i) {
-    const auto& [lo, hi] = result.intervals[i];
-    if (lo < hi) model.intervals[i] = Interval{lo, hi};
-  }
-  if (Status s = write_model(model, out / "model.toml", command.outputs); !s) return s;
-  const Model tuned = model_of(config, result, result.tuned, "tuned");
-  if (Status s = write_model(tuned, out / "tuned.toml", command.outputs); !s) return s;
-  const Status report =
-      command.outputs.write((out / "report.html").string(), report_html(result.diagnosis));
-  if (!report) return report;
-  // Last: whoever sees it sees the rest.
-  return command.outputs.write((out / kResult).string(), to_json(result.diagnosis));
-}
-
-QuestionStamp stamp_of(const Config& config, const DiagnoseCommand& command,
-                       const std::vector<Gene>& searched) {
-  QuestionStamp stamp;
-  stamp.command = "diagnose";
-  stamp.problem = problem_hash(to_proto(config.problem));
-  nlohmann::ordered_json genes = nlohmann::ordered_json::object();
-  for (const Gene& gene : searched) {
-    genes[config.problem.table()[gene.row].key] = {gene.lower, gene.upper};
-  }
-  stamp.options = {{"genes", genes},
-                   {"model", !command.model.empty()},
-                   {"leave-out", command.leave_out},
-                   {"seed", config.seed}};
-  stamp.about = {{"config", config.path}, {"trials", config.trial_files}};
-  stamp.build = build_info().fingerprint;
-  return stamp;
-}
-
-// Makes sure that the folder takes this diagnosis, a new one or the same again.
-Status plan_outputs(DiagnoseCommand& command, const Config& config, const QuestionStamp& stamp) {
-  Outputs& outputs = command.outputs;
-  if (Status s = check_folder(command.out, FolderKind::kDiagnosis); !s) return s;
-  outputs.reads(config.problem.log);
-  outputs.reads(command.config);
-  outputs.reads(command.model);
-  const auto state = compare_stamp(command.out, kResult, stamp, outputs.force());
-  if (!state) return state.error();
-  std::vector<const char*> names = {kStampFile, "model.toml", "tuned.toml", "report.html", kResult};
-  if (config.problem.ground) names = {kStampFile, "robot.toml", "report.html", kResult};
-  for (const char* name : names) {
-    const std::string path = (std::filesystem::path(command.out) / name).string();
-    const Status s = *state == FolderState::kNew ? outputs.plan(path) : outputs.plan_again(path);
-    if (!s) return s;
-  }
-  return {};
-}
-
-std::vector<ProgressStage> stages() {
-  std::vector<ProgressStage> all;
-  for (const DiagnosisStage& stage : kDiagnosisStages) all.push_back({stage.name, stage.share});
-  return all;
-}
-
-std::string summary(const Diagnosis& d) {
+std::string diagnosis_summary(const Diagnosis& d) {
   std::string text = d.headline + "\n  " + d.action + "\n";
   for (const SanityFinding& f : d.sanity) {
     text += "  " + f.name + ": " + f.text + " " + f.remedy + "\n";
@@ -174,11 +72,106 @@ std::string summary(const Diagnosis& d) {
 }
 
 // diagnosis.json without its trials.
-nlohmann::ordered_json summary_json(const Diagnosis& diagnosis, const DiagnoseCommand& command) {
+nlohmann::ordered_json diagnosis_summary_json(const Diagnosis& diagnosis,
+                                              const DiagnoseCommand& command) {
   auto json = nlohmann::ordered_json::parse(to_json(diagnosis), nullptr, false);
   json.erase("trials");
   json["out"] = command.out;
   return json;
+}
+
+namespace {
+
+constexpr const char* kAnswers = "simulations.sqlite";
+
+Model model_of(const Config& config, const DiagnosisResult& result, const ParameterValues& values,
+               const std::string& kind) {
+  Model model;
+  model.scenario = config.problem.scenario;
+  model.kind = kind;
+  model.version = build_info().version;
+  model.fingerprint = build_info().fingerprint;
+  model.values = values;
+  model.commands = config.problem.commands;
+  model.pieces = config.problem.pieces;
+  model.external = config.problem.external;
+  model.fitness = config.problem.fitness;
+  model.spread = config.problem.spread;
+  model.frame_x_m = result.frame_x_m;
+  model.frame_y_m = result.frame_y_m;
+  model.data = {problem_hash(to_proto(config.problem)), config.problem.log.trials.size(),
+                config.trial_files};
+  return model;
+}
+
+Status write_model(const Model& model, const std::filesystem::path& path, const Outputs& outputs) {
+  if (Status s = check_model(model); !s) return Error{path.string() + ": " + s.error().message};
+  return outputs.write(path.string(), format_model(model));
+}
+
+Status write_all(const Config& config, const DiagnoseCommand& command,
+                 const DiagnosisResult& result) {
+  const std::filesystem::path out(command.out);
+  Model model = model_of(config, result, result.final_, "diagnosed");
+  model.intervals.resize(model.values.size());
+  for (std::size_t i = 0; i < result.intervals.size(); ++i) {
+    const auto& [lo, hi] = result.intervals[i];
+    if (lo < hi) model.intervals[i] = Interval{lo, hi};
+  }
+  if (Status s = write_model(model, out / "model.toml", command.outputs); !s) return s;
+  const Model tuned = model_of(config, result, result.tuned, "tuned");
+  if (Status s = write_model(tuned, out / "tuned.toml", command.outputs); !s) return s;
+  const Status report =
+      command.outputs.write((out / "report.html").string(), report_html(result.diagnosis));
+  if (!report) return report;
+  // Last: whoever sees it sees the rest.
+  return command.outputs.write((out / kDiagnosisFile).string(), to_json(result.diagnosis));
+}
+
+QuestionStamp stamp_of(const Config& config, const DiagnoseCommand& command,
+                       const std::vector<Gene>& searched) {
+  QuestionStamp stamp;
+  stamp.command = "diagnose";
+  stamp.problem = problem_hash(to_proto(config.problem));
+  nlohmann::ordered_json genes = nlohmann::ordered_json::object();
+  for (const Gene& gene : searched) {
+    genes[config.problem.table()[gene.row].key] = {gene.lower, gene.upper};
+  }
+  stamp.options = {{"genes", genes},
+                   {"model", !command.model.empty()},
+                   {"leave-out", command.leave_out},
+                   {"seed", config.seed}};
+  if (command.reference_log) stamp.options["reference"] = log_hash(*command.reference_log);
+  stamp.about = {{"config", config.path}, {"trials", config.trial_files}};
+  stamp.build = build_info().fingerprint;
+  return stamp;
+}
+
+// Makes sure that the folder takes this diagnosis, a new one or the same again.
+Status plan_outputs(DiagnoseCommand& command, const Config& config, const QuestionStamp& stamp) {
+  Outputs& outputs = command.outputs;
+  if (Status s = check_folder(command.out, FolderKind::kDiagnosis); !s) return s;
+  outputs.reads(config.problem.log);
+  outputs.reads(command.config);
+  outputs.reads(command.model);
+  const auto state = compare_stamp(command.out, kDiagnosisFile, stamp, outputs.force());
+  if (!state) return state.error();
+  std::vector<const char*> names = {kStampFile, "model.toml", "tuned.toml", "report.html",
+                                    kDiagnosisFile};
+  if (config.problem.ground)
+    names = {kStampFile, "robot.toml", "values.json", "report.html", kDiagnosisFile};
+  for (const char* name : names) {
+    const std::string path = (std::filesystem::path(command.out) / name).string();
+    const Status s = *state == FolderState::kNew ? outputs.plan(path) : outputs.plan_again(path);
+    if (!s) return s;
+  }
+  return {};
+}
+
+std::vector<ProgressStage> stages() {
+  std::vector<ProgressStage> all;
+  for (const DiagnosisStage& stage : kDiagnosisStages) all.push_back({stage.name, stage.share});
+  return all;
 }
 
 // What the command line says of the problem, on top of the config.
@@ -197,45 +190,6 @@ Status apply_options(const DiagnoseCommand& command, Config& config, std::vector
   return {};
 }
 
-// A ground robot: its file and its runs, by its kinematics.  Nothing is simulated.
-int run_diagnose_ground(DiagnoseCommand& command, const Config& config, const QuestionStamp& stamp,
-                        CliContext& context) {
-  if (command.page.wanted()) {
-    context.console.note("--page: nothing is simulated here; `gapfarm serve " + command.out +
-                         "` shows the diagnosis when it is there");
-  }
-  const GroundRobot robot = config.problem.ground->robot_at(config.problem.values);
-  const auto runs = read_run_folders(config.trial_files, robot.channels);
-  if (!runs) return failed(runs.error(), context);
-  GroundDiagnoseOptions options;
-  options.left_out = command.leave_out;
-  options.seed = config.seed;
-  options.windows.run_in_s = config.windows.run_in_s;
-  options.on_stage = [&](const std::string& stage) { context.console.note(stage); };
-  auto result = diagnose_ground(robot, *runs, options);
-  if (!result) return failed(result.error(), context);
-  add_provenance(config, command, &result->diagnosis);
-  const std::filesystem::path out(command.out);
-  const std::pair<const char*, std::string> files[] = {
-      {kStampFile, format_stamp(stamp)},
-      {"robot.toml", format_robot(result->corrected)},
-      {"report.html", report_html(result->diagnosis)},
-      {kResult, to_json(result->diagnosis)}};
-  std::error_code code;
-  std::filesystem::create_directories(out, code);
-  if (code)
-    return failed(Error{command.out + ": cannot be made (" + code.message() + ")"}, context);
-  for (const auto& [name, text] : files) {
-    if (Status s = command.outputs.write((out / name).string(), text); !s) {
-      return failed(s.error(), context);
-    }
-  }
-  context.console.result(summary(result->diagnosis), summary_json(result->diagnosis, command));
-  context.console.note("left behind: " + command.out +
-                       "/report.html, diagnosis.json, and robot.toml with what was named put in");
-  return kExitDone;
-}
-
 int run_diagnose(DiagnoseCommand& command, CliContext& context) {
   DiagnoseOptions options;
   const auto config =
@@ -243,6 +197,10 @@ int run_diagnose(DiagnoseCommand& command, CliContext& context) {
         return apply_options(command, read, options.genes, options.frame_m, context.console);
       });
   if (!config) return kExitBadUsage;
+  if (Status s = read_reference(&command, *config, context.console); !s) {
+    context.console.error(s.error());
+    return kExitBadUsage;
+  }
   const QuestionStamp stamp = stamp_of(*config, command, options.genes);
   if (Status s = plan_outputs(command, *config, stamp); !s) {
     context.console.error(s.error());
@@ -256,7 +214,9 @@ int run_diagnose(DiagnoseCommand& command, CliContext& context) {
         {{"out", command.out}, {"trials", trials}, {"seed", config->seed}}, command.farm,
         config->farm, context);
   }
-  if (config->problem.ground) return run_diagnose_ground(command, *config, stamp, context);
+  if (config->problem.ground) {
+    return run_diagnose_ground(command, *config, format_stamp(stamp), context);
+  }
   // Every simulation goes into the folder: what a figure rests on can be looked up.
   if (Status s = LongCommand::begin("diagnose", {command.out}, stages(), context); !s) {
     return failed(s.error(), context);
@@ -277,7 +237,7 @@ int run_diagnose(DiagnoseCommand& command, CliContext& context) {
   options.on_stage = [&](const std::string& stage) { work.stage(stage); };
   auto result = diagnose(*asked, config->problem, options);
   if (!result) return failed(result.error(), context);
-  add_provenance(*config, command, &result->diagnosis);
+  add_diagnosis_provenance(*config, command, &result->diagnosis);
   for (const auto& [fit, tasks] : result->fits) {
     // A stop may have come between them: their numbers need not follow one another.
     std::string questions;
@@ -288,7 +248,8 @@ int run_diagnose(DiagnoseCommand& command, CliContext& context) {
                                               fmt::format("{}, questions {}", kAnswers, questions));
   }
   if (Status s = write_all(*config, command, *result); !s) return failed(s.error(), context);
-  context.console.result(summary(result->diagnosis), summary_json(result->diagnosis, command));
+  context.console.result(diagnosis_summary(result->diagnosis),
+                         diagnosis_summary_json(result->diagnosis, command));
   context.console.note("left behind: " + command.out + "/report.html, diagnosis.json, model.toml");
   return (*farm)->counts().quarantined > 0 ? kExitQuarantined : kExitDone;
 }
@@ -301,6 +262,10 @@ SubcommandRun setup_diagnose(CLI::App& app) {
   command->trials.declare(app);
   app.add_option("--out", command->out, "Folder for report, diagnosis and models")->required();
   app.add_option("--model", command->model, "Base model (run or model.toml); default: tuned here");
+  app.add_option("--reference", command->reference,
+                 "Of ground robots: an earlier log, or a run or model and so its log; asks what "
+                 "changed since")
+      ->type_name("FOLDER|RUN|MODEL");
   app.add_option("--leave-out", command->leave_out, "Effects that the catalogue is to be without");
   app.add_option("--seed", command->seed, "Of the bootstrap");
   command->outputs.declare(app);
@@ -313,7 +278,9 @@ SubcommandRun setup_diagnose(CLI::App& app) {
       "  gapfarm diagnose configs/srv1.toml --trials log.csv --out d2 --model run/srv1\n"
       "  gapfarm diagnose configs/push.toml --trials pushes.csv --out d3\n"
       "  gapfarm diagnose husky.toml --out d4\n"
-      "Stopped?  The same command goes on: simulations are kept in OUT/simulations.sqlite.");
+      "  gapfarm diagnose husky.toml --reference monday --trials friday --out changed\n"
+      "Stopped?  The same command goes on: simulations are kept in OUT/simulations.sqlite,\n"
+      "fits of ground robots in OUT/fits.jsonl.");
   return [command](CliContext& context) { return run_diagnose(*command, context); };
 }
 

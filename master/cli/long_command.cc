@@ -305,8 +305,14 @@ void LongCommand::write_record() {
 }
 
 std::string LongCommand::how_to_go_on() const {
-  return "stopped; what was simulated is kept in " + answer_file(place_.folder).string() +
+  return "stopped; what was " + (also_.empty() ? "simulated" : also_) + " is kept in " +
+         (also_.empty() ? answer_file(place_.folder).string() : also_in_) +
          ", and the same command goes on from there";
+}
+
+void LongCommand::keeps_also(const std::string& done, const fs::path& file) {
+  also_ = done;
+  also_in_ = file.string();
 }
 
 void LongCommand::end(int exit_code) {

@@ -72,6 +72,8 @@ class LongCommand {
   bool keeps() const { return answers_ != nullptr; }
   AnswerStore& answers() { return *answers_; }  // REQUIRES: keeps()
   std::string how_to_go_on() const;
+  // What is kept beside simulations: "fitted", in that file.
+  void keeps_also(const std::string& done, const std::filesystem::path& file);
   // The command is over: says so in the folder, or takes it away.
   void end(int exit_code);
 
@@ -89,6 +91,7 @@ class LongCommand {
   OverallProgress progress_;
   std::optional<RunLock> lock_;
   std::unique_ptr<AnswerStore> answers_;
+  std::string also_, also_in_;
   std::string stage_;
   RecordedProgress before_, now_, stage_began_;  // of farms that are gone; in all; then
   std::string waiting_;                          // for workers; empty: not

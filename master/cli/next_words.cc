@@ -46,7 +46,8 @@ constexpr OptionTakes kOptionTakes[] = {
     {"--paths", Takes::kFile},        {"--mined", Takes::kFile},
     {"--like", Takes::kFile},         {"--log", Takes::kFile},
     {"--out", Takes::kFile},          {"--map", Takes::kFile},
-    {"--picture", Takes::kFile},      {"--controllers", Takes::kFile},
+    {"--picture", Takes::kFile},      {"--urdf", Takes::kFile},
+    {"--reference", Takes::kFolder},  {"--controllers", Takes::kFile},
     {"--key", Takes::kFile},
 };
 

@@ -6,46 +6,83 @@
 #include <chrono>
 
 #include "master/ground/ground_report.h"
+#include "master/ground/reference.h"
 
 namespace gapfarm {
 
-Result<GroundDiagnosis> diagnose_ground(const GroundRobot& robot, const RunLog& log,
-                                        const GroundDiagnoseOptions& options) {
-  std::vector<GroundHypothesis> catalogue = ground_hypotheses(robot);
-  for (const std::string& name : options.left_out) {
+namespace {
+
+// How long each stage took.
+class StageClock {
+ public:
+  explicit StageClock(std::function<void(const std::string&)> on_stage)
+      : on_stage_(std::move(on_stage)) {}
+
+  void begin(const std::string& name) {
+    const auto now = std::chrono::steady_clock::now();
+    if (!running_.empty()) {
+      timing_s.emplace_back(running_, std::chrono::duration<double>(now - began_).count());
+    }
+    running_ = name;
+    began_ = now;
+    if (on_stage_ && !name.empty()) on_stage_(name);
+  }
+
+  std::vector<std::pair<std::string, double>> timing_s;
+
+ private:
+  std::function<void(const std::string&)> on_stage_;
+  std::string running_;
+  std::chrono::steady_clock::time_point began_;
+};
+
+GroundQuestion ask_what_is_wrong(const GroundRobot& robot) {
+  return {kinematic_rows(robot), ground_hypotheses(robot), {}};
+}
+
+Status leave_out(const std::vector<std::string>& names, std::vector<GroundHypothesis>* catalogue) {
+  for (const std::string& name : names) {
     const auto wanted = [&](const GroundHypothesis& h) { return h.name == name; };
-    if (std::none_of(catalogue.begin(), catalogue.end(), wanted)) {
+    if (std::none_of(catalogue->begin(), catalogue->end(), wanted)) {
       return Error{"--leave-out: this robot's catalogue has no \"" + name + "\""};
     }
-    std::erase_if(catalogue, wanted);
+    std::erase_if(*catalogue, wanted);
   }
-  Diagnosis timed;
-  auto began = std::chrono::steady_clock::now();
-  std::string running;
-  const auto stage = [&](const std::string& name) {
-    const auto now = std::chrono::steady_clock::now();
-    if (!running.empty()) {
-      timed.timing_s.emplace_back(running, std::chrono::duration<double>(now - began).count());
-    }
-    running = name;
-    began = now;
-    if (options.on_stage && !name.empty()) options.on_stage(name);
-  };
-  auto search = search_ground(robot, log, options.windows, catalogue, stage);
+  return {};
+}
+
+}  // namespace
+
+Result<GroundDiagnosis> diagnose_ground(const GroundRobot& robot, const RunLog& log,
+                                        const GroundDiagnoseOptions& options) {
+  StageClock clock(options.on_stage);
+  GroundQuestion question = ask_what_is_wrong(robot);
+  if (options.reference) {
+    clock.begin(kGroundStages[0].name);
+    auto asked =
+        ask_what_changed(robot, *options.reference, options.windows, options.seed, options.memo);
+    if (!asked) return asked.error();
+    question = std::move(*asked);
+  }
+  if (Status s = leave_out(options.left_out, &question.catalogue); !s) return s.error();
+  const GroundWork work = {[&](const std::string& stage) { clock.begin(stage); },
+                           options.on_progress, options.stopped, options.memo};
+  auto search = search_ground(robot, log, options.windows, question, work);
   if (!search) return search.error();
-  stage("predict what was not fitted");
-  GroundDiagnosis result{report_ground(robot, *search, options),
-                         robot_with(robot, chosen_values(*search))};
-  stage("");
-  result.diagnosis.timing_s = std::move(timed.timing_s);
+  clock.begin(std::end(kGroundStages)[-1].name);
+  GroundDiagnosis result;
+  result.diagnosis = report_ground(robot, *search, options, &result.values);
+  result.corrected = robot_with(robot, chosen_values(*search));
+  clock.begin("");
+  result.diagnosis.timing_s = std::move(clock.timing_s);
   return result;
 }
 
 std::vector<SanityFinding> check_ground_log(const GroundRobot& robot, const RunLog& log) {
-  const std::vector<GroundHypothesis> catalogue = ground_hypotheses(robot);
-  const auto fault = find_ground_fault(robot, log, catalogue, {{2}, 0.5});
+  const GroundQuestion question = ask_what_is_wrong(robot);
+  const auto fault = find_ground_fault(robot, log, question, {{2}, 0.5});
   if (!fault) return {};
-  const GroundHypothesis& h = catalogue[fault->hypothesis];
+  const GroundHypothesis& h = question.catalogue[fault->hypothesis];
   return {
       {h.name,
        fmt::format("With {} put right, what the robot's file expects is {:.1f} times as near to "

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -12,6 +13,8 @@
 #include "common/runs/run.h"
 #include "common/runs/windows.h"
 #include "master/diagnose/diagnosis.h"
+#include "master/ground/search.h"
+#include "master/ground/values_file.h"
 
 namespace gapfarm {
 
@@ -19,15 +22,33 @@ struct GroundDiagnoseOptions {
   WindowSettings windows = {{0.5, 2, 5}, 0.5};
   std::vector<std::string> left_out;  // hypotheses that are not to be thought of
   std::uint64_t seed = 1;             // of the bootstrap
+  // Of the same robot: asks what changed since; none: asks what of the file or the log is wrong.
+  std::optional<RunLog> reference;
   std::function<void(const std::string& stage)> on_stage;
+  std::function<void(std::size_t done, std::size_t total)> on_progress;  // of the stage
+  std::function<bool()> stopped;  // by the user; looked at between fits
+  FitMemo* memo = nullptr;        // outlives the diagnosis; none: every fit is made
 };
+
+// Every stage in its order, with its share of the time, for progress.
+struct GroundStage {
+  const char* name;
+  double share;
+};
+inline constexpr GroundStage kGroundStages[] = {{"fit the reference", 0.2},
+                                                {kFaultStage, 0.1},
+                                                {kCatalogueStage, 0.5},
+                                                {kRestStage, 0.1},
+                                                {"predict what was not fitted", 0.3}};
 
 struct GroundDiagnosis {
   Diagnosis diagnosis;
   GroundRobot corrected;  // the robot with what was named put in
+  std::vector<SaidValue> values;
 };
 
-// Errors: no window fits, a hypothesis to leave out that there is not.
+// Errors: no window fits, a hypothesis to leave out that there is not, a reference whose log is the
+// wrong way round, stopped.
 Result<GroundDiagnosis> diagnose_ground(const GroundRobot& robot, const RunLog& log,
                                         const GroundDiagnoseOptions& options);
 

@@ -7,12 +7,14 @@
 #include <tuple>
 
 #include "common/random/stream.h"
+#include "master/ground/ground_words.h"
 
 namespace gapfarm {
 namespace {
 
 constexpr std::size_t kMostAliases = 3;
 constexpr int kGroundDraws = 400;
+constexpr double kSureOfUnknown = 2;  // standard errors
 constexpr double kAlmostSure = 0.99;  // no log makes surer than this
 
 // What was found, with what is needed to put it into words and figures.
@@ -23,10 +25,12 @@ class GroundReport {
       : robot_(robot),
         search_(search),
         options_(options),
-        fitter_(robot, search.windows),
+        fitter_(robot, search.windows, search.reference ? &*search.reference : nullptr,
+                options.memo),
         intervals_(fitter_.intervals(search.fit, options.seed)) {}
 
   Diagnosis write();
+  std::vector<SaidValue> said() const;
 
  private:
   void left_out();
@@ -36,8 +40,8 @@ class GroundReport {
   void screening();
   void trials();
   NamedEffect effect_of(const GroundStep& step, std::size_t place);
-  std::string sentence(const GroundHypothesis& h, const NamedEffect& effect) const;
   void name_headline();
+  bool tells_more_left_out() const;
   double sum(const std::vector<double>& nats) const;
   double rms_mm(const WindowFit& fit) const;
   double rms_mrad(const WindowFit& fit) const;
@@ -122,9 +126,8 @@ NamedEffect GroundReport::effect_of(const GroundStep& step, std::size_t place) {
     for (std::size_t j = 0; j < search_.rows.size(); ++j) {
       if (search_.rows[j].row.name != row.name) continue;
       const auto k = static_cast<Eigen::Index>(j);
-      effect.parameters.push_back({row.key, search_.fit.values[k] - row.nominal,
-                                   intervals_(k, 0) - row.nominal, intervals_(k, 1) - row.nominal,
-                                   row.unit});
+      effect.parameters.push_back(
+          estimate_of(row, search_.fit.values[k], intervals_(k, 0), intervals_(k, 1)));
     }
   }
   const double floor = std::max(sum(floor_.nats), sum(search_.chain.back().nats));
@@ -140,52 +143,9 @@ NamedEffect GroundReport::effect_of(const GroundStep& step, std::size_t place) {
   std::tie(effect.closed_lo, effect.closed_hi) = closed_interval(place);
   // What was gained over what would just have been worth a name.
   effect.confidence = std::min(kAlmostSure, 1 - 0.5 * std::exp((kLeastGroundGain - step.gain) / 2));
-  effect.text = sentence(h, effect);
+  effect.text = search_.reference ? words_of_change(robot_, h, effect) + "."
+                                  : words_of_value(robot_, h, effect);
   return effect;
-}
-
-// The value to paste into the robot's file.
-std::string in_file(const GroundRobot& robot, const KinematicRow& row, const Estimate& e) {
-  const auto of_group = [&](const char* group) {
-    for (const RobotWheel& w : robot.wheels) {
-      const bool side = (w.side == WheelSide::kLeft) == (std::string(group) == "left");
-      if (w.driven && side && w.side != WheelSide::kNone) return *w.radius_m;
-    }
-    return 0.0;
-  };
-  const auto ratio = [&](const char* word, double own, const char* unit) {
-    return fmt::format("{} {:.5g} [{:.5g}, {:.5g}]{}; the file has {:.5g}", word,
-                       own * (1 + e.value), own * (1 + e.lo), own * (1 + e.hi), unit, own);
-  };
-  const auto& k = robot.controller;
-  const double base = row.nominal;
-  if (row.name == "left" || row.name == "right") {
-    const double own = of_group(row.name.c_str());
-    return ratio(("wheels." + row.name + ".radius").c_str(), own, " m");
-  }
-  if (row.name == "separation" && k.wheel_separation_m) {
-    const double own = k.wheel_separation_multiplier;
-    if (own != 1 || robot.drive == DriveKind::kSkid || robot.drive == DriveKind::kTracked) {
-      return ratio("wheel_separation_multiplier", own, "");
-    }
-    return ratio("wheel_separation", *k.wheel_separation_m, " m");
-  }
-  if (e.key == "ratio" || e.key == "rate") {
-    return fmt::format("{:+.4g} [{:+.4g}, {:+.4g}] {}", e.value, e.lo, e.hi,
-                       e.unit == "-" ? "of what the file has" : e.unit);
-  }
-  return fmt::format("{} {:.5g} [{:.5g}, {:.5g}] {}; the file has {:.5g}", row.name, base + e.value,
-                     base + e.lo, base + e.hi, e.unit, base);
-}
-
-std::string GroundReport::sentence(const GroundHypothesis& h, const NamedEffect& effect) const {
-  std::string text = h.thing + " is off: ";
-  for (std::size_t k = 0; k < h.freed.size() && k < effect.parameters.size(); ++k) {
-    text += (k > 0 ? "; " : "") + in_file(robot_, h.freed[k], effect.parameters[k]);
-  }
-  text += ".";
-  text[0] = static_cast<char>(std::toupper(text[0]));
-  return text;
 }
 
 void GroundReport::faults() {
@@ -216,6 +176,14 @@ void GroundReport::values() {
   }
 }
 
+// Whether everything free tells more of what was left out than small moves do: two logs that were
+// driven otherwise differ in what the model has wrong, which is no change of the robot.
+bool GroundReport::tells_more_left_out() const {
+  if (!search_.reference) return true;
+  const WindowFit moved = fit_left_out(fitter_, search_.rows, search_.fit.values);
+  return surely_better(search_.windows, floor_, moved) > kSureOfUnknown;
+}
+
 void GroundReport::figures() {
   const double floor = std::max(sum(floor_.nats), sum(search_.chain.back().nats));
   d_.gap = {floor - sum(search_.chain.front().nats), floor - sum(search_.chain.back().nats), 0};
@@ -223,7 +191,12 @@ void GroundReport::figures() {
   d_.heading_mrad = {rms_mrad(search_.chain.front()), rms_mrad(search_.chain.back()),
                      rms_mrad(floor_)};
   const double left = search_.free_fit.objective - search_.fit.objective;
-  const bool unknown = left > kUnknownGroundGain;
+  const bool unknown = left > kUnknownGroundGain && tells_more_left_out();
+  if (search_.reference) {
+    d_.cautions.push_back(
+        "Against the reference's log: sizes and intervals are of the change, what the reference "
+        "leaves unsure is in them.");
+  }
   const bool named = !d_.effects.empty();
   d_.verdict = named ? (unknown ? Verdict::kEffectAndUnknown : Verdict::kEffect)
                      : (unknown ? Verdict::kUnknown : Verdict::kNone);
@@ -312,15 +285,24 @@ void GroundReport::trials() {
 }
 
 void GroundReport::name_headline() {
+  const bool changes = search_.reference.has_value();
   if (d_.effects.empty()) {
+    const bool nothing = d_.verdict == Verdict::kNone;
     d_.headline =
-        d_.verdict == Verdict::kNone
-            ? "Nothing of the robot's file or log is wrong by more than a well-kept file's "
-              "values are."
-            : "Something is wrong that nothing of the catalogue explains alone.";
+        changes   ? (nothing ? "Nothing changed by more than a robot does from log to log."
+                             : "Something changed that nothing of the catalogue explains alone.")
+        : nothing ? "Nothing of the robot's file or log is wrong by more than a well-kept file's "
+                    "values are."
+                  : "Something is wrong that nothing of the catalogue explains alone.";
     return;
   }
   d_.headline = d_.effects.front().text;
+  if (changes && d_.effects.size() == 1 && !d_.headline.empty()) {
+    d_.headline.back() = ';';
+    d_.headline += d_.verdict == Verdict::kEffect
+                       ? " nothing else."
+                       : " no other value, but not all is explained by that.";
+  }
   if (d_.effects.size() > 1) {
     d_.headline += " Beside it: ";
     for (std::size_t k = 1; k < d_.effects.size(); ++k) {
@@ -328,6 +310,24 @@ void GroundReport::name_headline() {
     }
     d_.headline += ".";
   }
+}
+
+std::vector<SaidValue> GroundReport::said() const {
+  const std::vector<KinematicRow> file = change_rows(robot_);
+  std::vector<SaidValue> values;
+  for (std::size_t j = 0; j < search_.rows.size(); ++j) {
+    const FitRow& row = search_.rows[j];
+    const auto k = static_cast<Eigen::Index>(j);
+    const auto own = std::find_if(file.begin(), file.end(),
+                                  [&](const KinematicRow& r) { return r.name == row.row.name; });
+    // Against a reference every value is the two logs' own.
+    values.push_back({row.row.name,
+                      own == file.end() ? row.row.nominal : own->nominal,
+                      search_.fit.values[k],
+                      {intervals_(k, 0), intervals_(k, 1)},
+                      row.free || search_.reference.has_value()});
+  }
+  return values;
 }
 
 Diagnosis GroundReport::write() {
@@ -344,8 +344,10 @@ Diagnosis GroundReport::write() {
 }  // namespace
 
 Diagnosis report_ground(const GroundRobot& robot, const GroundSearch& search,
-                        const GroundDiagnoseOptions& options) {
-  return GroundReport(robot, search, options).write();
+                        const GroundDiagnoseOptions& options, std::vector<SaidValue>* values) {
+  GroundReport report(robot, search, options);
+  *values = report.said();
+  return report.write();
 }
 
 Kinematics chosen_values(const GroundSearch& search) {
@@ -355,6 +357,13 @@ Kinematics chosen_values(const GroundSearch& search) {
     at.names.push_back(search.rows[j].row.name);
     at.values.conservativeResize(at.values.size() + 1);
     at.values[at.values.size() - 1] = search.fit.values[static_cast<Eigen::Index>(j)];
+  }
+  for (std::size_t k = 0; search.reference && k < search.reference->names.size(); ++k) {
+    const std::string& name = search.reference->names[k];
+    if (std::find(at.names.begin(), at.names.end(), name) != at.names.end()) continue;
+    at.names.push_back(name);
+    at.values.conservativeResize(at.values.size() + 1);
+    at.values[at.values.size() - 1] = search.reference->values[static_cast<Eigen::Index>(k)];
   }
   return at;
 }

@@ -7,8 +7,9 @@
 
 namespace gapfarm {
 
+// `values`: every value of the robot's kinematics, as the log has it.
 Diagnosis report_ground(const GroundRobot& robot, const GroundSearch& search,
-                        const GroundDiagnoseOptions& options);
+                        const GroundDiagnoseOptions& options, std::vector<SaidValue>* values);
 
 // What was chosen, as fitted.
 Kinematics chosen_values(const GroundSearch& search);

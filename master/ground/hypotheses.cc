@@ -5,49 +5,12 @@
 #include <numbers>
 #include <utility>
 
+#include "master/ground/tolerances.h"
+
 namespace gapfarm {
 namespace {
 
 using std::numbers::pi;
-
-// What the value of a well-kept file may be off by: sizes by their own share, times by what clocks
-// and pollers lose, the marker by a share of the robot.
-constexpr double kRadiusShare = 0.005;
-constexpr double kSeparationShare = 0.015;
-// How far skidding wheels roll and turn is the floor's to say as well.
-constexpr double kSkidRadiusShare = 0.02;
-constexpr double kSkidSeparationShare = 0.05;
-constexpr double kGainShare = 0.02;
-constexpr double kPowerShare = 0.05;
-constexpr double kDelay_s = 0.015;
-constexpr double kLag_s = 0.03;
-constexpr double kMarkerShare = 0.02;  // of the wheels' reach
-// Tyres that slip sideways move the point that a car turns about, as if its marker stood elsewhere.
-constexpr double kCarMarkerShare = 0.15;
-constexpr double kCarMarkerYaw_rad = 0.02;
-constexpr double kMarkerYaw_rad = 0.01;
-constexpr double kSteering_rad = 0.003;
-
-bool is_steered(const GroundRobot& robot) {
-  return robot.drive == DriveKind::kAckermann || robot.drive == DriveKind::kTricycle;
-}
-bool is_holonomic(const GroundRobot& robot) {
-  return robot.drive == DriveKind::kOmni || robot.drive == DriveKind::kMecanum;
-}
-bool skids(const GroundRobot& robot) {
-  return robot.drive == DriveKind::kSkid || robot.drive == DriveKind::kTracked;
-}
-bool is_throttled(const GroundRobot& robot) {
-  return robot.command == CommandKind::kThrottleSteering;
-}
-
-double wheel_reach_m(const GroundRobot& robot) {
-  double farthest = 1e-3;
-  for (const RobotWheel& w : robot.wheels) {
-    farthest = std::max(farthest, std::hypot(w.x_m.value_or(0), w.y_m.value_or(0)));
-  }
-  return farthest;
-}
 
 // Channels that change places when left and right do.
 std::vector<std::pair<std::size_t, std::size_t>> channel_pairs(const GroundRobot& robot) {
@@ -87,18 +50,25 @@ std::function<void(RunLog*)> change_poses(PoseChange change) {
 
 class Catalogue {
  public:
-  explicit Catalogue(const GroundRobot& robot) : robot_(robot), rows_(kinematic_rows(robot)) {}
+  Catalogue(const GroundRobot& robot, std::vector<KinematicRow> rows)
+      : robot_(robot), rows_(std::move(rows)) {}
 
   void wrong_commands();
   void wrong_poses();
   void sizes();
   void steering();
   void motors();
+  void marker();
   void tracker();
+  void floors();
 
   std::vector<GroundHypothesis> all;
 
  private:
+  bool has(const std::string& name) const {
+    return std::any_of(rows_.begin(), rows_.end(),
+                       [&](const KinematicRow& r) { return r.name == name; });
+  }
   KinematicRow row(const std::string& name) const {
     return *std::find_if(rows_.begin(), rows_.end(),
                          [&](const KinematicRow& r) { return r.name == name; });
@@ -226,8 +196,10 @@ void Catalogue::steering() {
         {row("steering_offset")});
   value("steering_gain", {"wheelbase"}, "the angle that is steered over that told",
         {row("steering_gain")});
-  value("understeer", {"friction_anisotropy"}, "the loss of curvature with speed",
-        {row("understeer")});
+  if (has("understeer")) {
+    value("understeer", {"friction_anisotropy"}, "the loss of curvature with speed",
+          {row("understeer")});
+  }
   if (!robot_.steering.table.empty()) {
     value("steering_asymmetry", {"steering_gain"}, "the steering's gain to the left",
           {{"steering_left", 1, kGainShare, "ratio", "-"}});
@@ -260,67 +232,70 @@ void Catalogue::motors() {
        {{"ramp", ramp, 0.03, "ramp", "s^2/m", true}});
 }
 
-void Catalogue::tracker() {
+void Catalogue::marker() {
   value("marker_offset", {"com_offset"}, "the tracked point on the robot",
         {row("marker_x"), row("marker_y")});
   value("marker_yaw", {"heading_offset"}, "the heading of the tracked point", {row("marker_yaw")});
+}
+
+void Catalogue::tracker() {
   value("pose_scale", {"unit_error", "camera_scale"}, "the scale of all positions",
         {{"pose_scale", 1, 0.01, "ratio", "-"}});
   value("camera_aspect", {}, "the scale of y over that of x", {{"aspect", 1, 0.01, "ratio", "-"}});
 }
 
+// What another floor changes.
+void Catalogue::floors() {
+  if (is_steered(robot_)) {
+    value("friction", {"friction_anisotropy"}, "friction across the wheels",
+          {row("grip"), row("slip_angle")});
+  } else if (skids(robot_)) {
+    value("friction_across", {"wheel_separation", "icr_track", "friction_anisotropy"},
+          "how hard the floor makes it to turn (the separation of the sides, as they roll)",
+          {row("separation")});
+    value("wheel_slip", {"wheel_radius", "speed_gain"}, "how far the wheels travel a turn",
+          {{"travel", 1, kSlipShare, "ratio", "-"}});
+    value("floor", {"wheel_slip", "friction_across"},
+          "how the wheels slip:", {{"travel", 1, kSlipShare, "ratio", "-"}, row("separation")});
+    all.back().price = kPriceOfAValue;
+  } else if (is_holonomic(robot_)) {
+    value("wheel_slip", {"wheel_radius", "speed_gain"}, "how far the wheels travel a turn",
+          {{"travel", 1, kSlipShare, "ratio", "-"}});
+  }
+}
+
 }  // namespace
 
-std::vector<KinematicRow> kinematic_rows(const GroundRobot& robot) {
-  std::vector<KinematicRow> rows;
-  if (is_holonomic(robot)) {
-    rows = {{"ahead", 1, kGainShare, "ratio", "-"},
-            {"aside", 1, kGainShare, "ratio", "-"},
-            {"turn", 1, kGainShare, "ratio", "-"}};
-  } else if (is_steered(robot)) {
-    const double slow = robot.steering.understeer_s2_m2;
-    rows = {{"steering_offset", 0, kSteering_rad, "angle", "rad"},
-            {"steering_gain", 1, kGainShare, "ratio", "-"},
-            {"understeer", slow, 0.01 + 0.2 * slow, "understeer", "s^2/m^2"}};
-    if (is_throttled(robot)) {
-      const RobotThrottle& t = robot.throttle;
-      const auto put = [&](const char* name, double own, double least, const char* unit) {
-        rows.push_back({name, own, least + kPowerShare * own, name, unit, true});
-      };
-      put("gain", t.gain, 0, "m/s^2");
-      put("zero", t.zero, 0.003, "-");
-      put("back_emf", t.back_emf, 0.05, "1/s");
-      put("drag", t.drag, 0.02, "1/s");
-      put("coulomb", t.coulomb, 0.02, "m/s^2");
-      put("cornering", t.cornering, 0.02, "-");
-    } else {
-      rows.push_back({"ahead", 1, kRadiusShare, "ratio", "-"});
+std::vector<GroundHypothesis> change_hypotheses(const GroundRobot& robot,
+                                                const std::vector<KinematicRow>& rows) {
+  Catalogue catalogue(robot, rows);
+  catalogue.wrong_commands();
+  catalogue.wrong_poses();
+  catalogue.floors();
+  catalogue.sizes();
+  catalogue.steering();
+  catalogue.motors();
+  catalogue.marker();
+  // What turns or travels on another floor has the floor's name.
+  for (GroundHypothesis& h : catalogue.all) {
+    for (GroundHypothesis& other : catalogue.all) {
+      if (&h >= &other || h.freed.empty() || h.freed.size() != other.freed.size()) continue;
+      if (h.freed[0].name == other.freed[0].name) other.freed.clear();
     }
-  } else {
-    const double radius = skids(robot) ? kSkidRadiusShare : kRadiusShare;
-    const double separation = skids(robot) ? kSkidSeparationShare : kSeparationShare;
-    rows = {{"left", 1, radius, "ratio", "-"},
-            {"right", 1, radius, "ratio", "-"},
-            {"separation", 1, separation, "ratio", "-"}};
   }
-  const double marker = (is_steered(robot) ? kCarMarkerShare : kMarkerShare) * wheel_reach_m(robot);
-  const Pose& X = robot.X_RM;
-  rows.push_back({"lag", robot.motors.lag_s, kLag_s, "tau", "s", true});
-  rows.push_back({"delay", robot.motors.delay_s, kDelay_s, "latency", "s"});
-  rows.push_back({"marker_x", X.x, marker, "x", "m"});
-  rows.push_back({"marker_y", X.y, marker, "y", "m"});
-  rows.push_back({"marker_yaw", X.theta, is_steered(robot) ? kCarMarkerYaw_rad : kMarkerYaw_rad,
-                  "angle", "rad"});
-  return rows;
+  std::erase_if(catalogue.all,
+                [](const GroundHypothesis& h) { return h.freed.empty() && !h.put_right; });
+  return std::move(catalogue.all);
 }
 
 std::vector<GroundHypothesis> ground_hypotheses(const GroundRobot& robot) {
-  Catalogue catalogue(robot);
+  Catalogue catalogue(robot, kinematic_rows(robot));
   catalogue.wrong_commands();
   catalogue.wrong_poses();
   catalogue.sizes();
   catalogue.steering();
   catalogue.motors();
+  catalogue.marker();
   catalogue.tracker();
   return std::move(catalogue.all);
 }

@@ -18,7 +18,7 @@ struct KinematicRow {
   // How far off the value of a well-kept file still is, as a standard deviation; also the size of
   // a step that shows in the motion.
   double tolerance = 0;
-  std::string key;        // in a diagnosis: "ratio", "angle", "x"
+  std::string key;        // in a diagnosis: "ratio", "angle", "x"; "log" of a logarithm
   std::string unit;       // of the difference from nominal
   bool positive = false;  // below 0 it has no meaning
 };
@@ -33,6 +33,7 @@ struct GroundHypothesis {
   double metres = 1;  // logged positions times this are metres
   std::string remedy;
   bool only_more = false;  // less than the file's value has no meaning
+  double price = 0;        // nats that it must tell more, having more values than others
 };
 
 // Rows that every fit moves a little, within their tolerances.
@@ -40,5 +41,12 @@ std::vector<KinematicRow> kinematic_rows(const GroundRobot& robot);
 
 // In the order in which equals are preferred: simple first.
 std::vector<GroundHypothesis> ground_hypotheses(const GroundRobot& robot);
+
+// The same of what may change from one log of a robot to another.  Tolerances are what a robot
+// changes by when nobody touched it; tyres of cars, which slip sideways, have rows of their own.
+std::vector<KinematicRow> change_rows(const GroundRobot& robot);
+// `rows`: those of change_rows(), their nominals as another log has them.
+std::vector<GroundHypothesis> change_hypotheses(const GroundRobot& robot,
+                                                const std::vector<KinematicRow>& rows);
 
 }  // namespace gapfarm

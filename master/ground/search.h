@@ -24,6 +24,11 @@ inline constexpr double kLeastGroundGain = 6;
 // What is left when everything moves freely and is no chance any more.
 inline constexpr double kUnknownGroundGain = 25;
 
+// Stages of a search, in their order.
+inline constexpr const char* kFaultStage = "look for faults of the log";
+inline constexpr const char* kCatalogueStage = "try the catalogue";
+inline constexpr const char* kRestStage = "measure what is left";
+
 struct Offer {
   std::size_t hypothesis = 0;
   double gain = 0;         // nats over all windows, beyond what was chosen before
@@ -37,8 +42,25 @@ struct GroundStep {
   std::vector<std::size_t> not_told_apart;
 };
 
+// What a search is about.
+struct GroundQuestion {
+  std::vector<KinematicRow> rows;
+  std::vector<GroundHypothesis> catalogue;
+  std::optional<GroundReference> reference;  // the log that the rows' nominals are from
+};
+
+// Who waits for a search.
+struct GroundWork {
+  std::function<void(const std::string&)> on_stage;
+  // Of the present stage; `total` may grow.
+  std::function<void(std::size_t done, std::size_t total)> on_progress;
+  std::function<bool()> stopped;
+  FitMemo* memo = nullptr;
+};
+
 struct GroundSearch {
   std::vector<GroundHypothesis> catalogue;
+  std::optional<GroundReference> reference;
   std::vector<std::size_t> faults;  // of the log, as found; put right in `log`
   std::vector<double> fault_gains;
   RunLog log;
@@ -63,13 +85,21 @@ struct GroundFault {
   double objective = 0;  // with the file's values, in nats of the log as it was
 };
 std::optional<GroundFault> find_ground_fault(const GroundRobot& robot, const RunLog& log,
-                                             const std::vector<GroundHypothesis>& catalogue,
+                                             const GroundQuestion& question,
                                              const WindowSettings& settings);
 
+// Errors: no window fits, stopped.
 Result<GroundSearch> search_ground(const GroundRobot& robot, const RunLog& log,
-                                   const WindowSettings& settings,
-                                   const std::vector<GroundHypothesis>& catalogue,
-                                   const std::function<void(const std::string&)>& on_stage);
+                                   const WindowSettings& settings, const GroundQuestion& question,
+                                   const GroundWork& work);
+
+// Standard errors, by blocks, by which one prediction of what was left out is better than another.
+double surely_better(const WindowSet& windows, const WindowFit& with, const WindowFit& without);
+
+// Values whose delay is the best of those within 10 s of where it stands: one that is far off is
+// no slope away.
+Eigen::VectorXd scan_delay(const WindowFitter& fitter, const std::vector<FitRow>& rows,
+                           const Eigen::VectorXd& values);
 
 // Nats of every window with the rows fitted to other blocks than its own (five folds); no rows:
 // the file's values as they are.

@@ -4,34 +4,22 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/random/stream.h"
 #include "common/score/kinematic.h"
+#include "master/ground/window_prior.h"
 
 namespace gapfarm {
 namespace {
 
-constexpr double kTail = 4;          // degrees of freedom of a residual's density
 constexpr int kSteps = 6;            // of Gauss and Newton a round
-constexpr int kDraws = 400;          // of the bootstrap
 constexpr double kStepShare = 0.05;  // of a row's tolerance: to find slopes
 constexpr double kFaster = 0.02;     // to find how ends move with speed
 constexpr double kEnough = 1e-3;     // nats a step
 
 double log_density(double r, double s) {
-  static const double constant = std::lgamma((kTail + 1) / 2) - std::lgamma(kTail / 2) -
-                                 0.5 * std::log(kTail * std::acos(-1.0));
+  static const double constant = std::lgamma((kWindowTail + 1) / 2) - std::lgamma(kWindowTail / 2) -
+                                 0.5 * std::log(kWindowTail * std::acos(-1.0));
   const double z = r / s;
-  return constant - std::log(s) - (kTail + 1) / 2 * std::log1p(z * z / kTail);
-}
-
-double weight(double r, double s) {
-  const double z = r / s;
-  return (kTail + 1) / (kTail + z * z) / (s * s);
-}
-
-// A free row has a prior so wide that it only keeps the equations sound.
-double precision(const FitRow& row) {
-  return (row.free ? 1e-6 : 1) / (row.row.tolerance * row.row.tolerance);
+  return constant - std::log(s) - (kWindowTail + 1) / 2 * std::log1p(z * z / kWindowTail);
 }
 
 double robust_deviation(std::vector<double>* sizes) {
@@ -40,21 +28,12 @@ double robust_deviation(std::vector<double>* sizes) {
   return std::max(1.4826 * *middle, 1e-5);
 }
 
-double prior(const WindowFit& fit) {
-  double sum = 0;
-  for (std::size_t i = 0; i < fit.rows.size(); ++i) {
-    if (fit.rows[i].free) continue;
-    const KinematicRow& row = fit.rows[i].row;
-    const double z = (fit.values[static_cast<Eigen::Index>(i)] - row.nominal) / row.tolerance;
-    sum -= z * z / 2;
-  }
-  return sum;
-}
-
 }  // namespace
 
-WindowFitter::WindowFitter(const GroundRobot& robot, const WindowSet& windows)
-    : robot_(robot), windows_(windows) {
+WindowFitter::WindowFitter(const GroundRobot& robot, const WindowSet& windows,
+                           const GroundReference* reference, FitMemo* memo)
+    : robot_(robot), windows_(windows), reference_(reference), memo_(memo) {
+  if (memo != nullptr) question_ = question_of(robot, windows, reference);
   if (robot.command == CommandKind::kThrottleSteering) shape_by_speed();
 }
 
@@ -103,6 +82,13 @@ std::vector<Eigen::Vector3d> WindowFitter::residuals(const std::vector<FitRow>& 
   Kinematics at;
   at.values = values;
   for (const FitRow& row : rows) at.names.push_back(row.row.name);
+  for (std::size_t k = 0; reference_ != nullptr && k < reference_->names.size(); ++k) {
+    const std::string& name = reference_->names[k];
+    if (std::find(at.names.begin(), at.names.end(), name) != at.names.end()) continue;
+    at.names.push_back(name);
+    at.values.conservativeResize(at.values.size() + 1);
+    at.values[at.values.size() - 1] = reference_->values[static_cast<Eigen::Index>(k)];
+  }
   const std::vector<Pose> ends = kinematic_ends(robot_, windows_.runs, windows_.trials, at);
   std::vector<Eigen::Vector3d> r;
   r.reserve(ends.size());
@@ -151,7 +137,7 @@ void WindowFitter::rescale(WindowFit* fit, const std::vector<double>& use) const
       for (Eigen::Index c = 0; c < 3; ++c) {
         const double r = fit->residuals[i][c];
         const double s = fit->scales[h][c];
-        sums[h][c] += use[i] * weight(r, s) * s * s * r * r;
+        sums[h][c] += use[i] * window_weight(r, s) * s * s * r * r;
       }
     }
     for (std::size_t h = 0; h < n; ++h) {
@@ -201,16 +187,14 @@ void WindowFitter::normal_equations(const WindowFit& fit, const std::vector<Eige
     if (use[i] == 0) continue;
     const Eigen::Vector3d& s = fit.scales[static_cast<std::size_t>(windows_.horizon[i])];
     for (Eigen::Index c = 0; c < 3; ++c) {
-      const double w = use[i] * weight(fit.residuals[i][c], s[c]);
+      const double w = use[i] * window_weight(fit.residuals[i][c], s[c]);
       *H += w * J[i].row(c).transpose() * J[i].row(c);
       *g += w * J[i].row(c).transpose() * fit.residuals[i][c];
     }
   }
-  for (Eigen::Index k = 0; k < n; ++k) {
-    const FitRow& row = fit.rows[static_cast<std::size_t>(k)];
-    (*H)(k, k) += precision(row);
-    if (!row.free) (*g)[k] += precision(row) * (fit.values[k] - row.row.nominal);
-  }
+  const Eigen::MatrixXd P = prior_precision(fit.rows);
+  *H += P;
+  *g += P * from_middle(fit.rows, fit.values);
 }
 
 double WindowFitter::promise(const WindowFit& fit, const std::vector<Eigen::MatrixXd>& fit_slopes,
@@ -297,6 +281,10 @@ WindowFit WindowFitter::fit(const std::vector<FitRow>& rows, const std::vector<c
     start[static_cast<Eigen::Index>(i)] = rows[i].row.nominal;
   }
   if (values.size() == start.size()) start = values;
+  const std::string key = memo_ != nullptr ? key_of(rows, left_out, start, rounds) : "";
+  if (const auto kept = memo_ != nullptr ? memo_->find(key) : std::nullopt) {
+    return fit_from(rows, left_out, *kept);
+  }
   WindowFit fit = hold(rows, start, left_out);
   const std::vector<double> use = uses(left_out);
   for (int round = 0; round < rounds && !rows.empty(); ++round) {
@@ -308,53 +296,19 @@ WindowFit WindowFitter::fit(const std::vector<FitRow>& rows, const std::vector<c
     score(&fit, use);
     if (fit.objective - before < 0.01) break;
   }
+  if (memo_ != nullptr) memo_->keep(key, {fit.values, fit.scales});
   return fit;
 }
 
-Eigen::MatrixX2d WindowFitter::intervals(const WindowFit& fit, std::uint64_t seed) const {
-  const Eigen::Index n = fit.values.size();
-  const auto blocks = static_cast<std::size_t>(windows_.blocks);
-  const std::vector<double> use = uses({});
-  const std::vector<Eigen::MatrixXd> J = slopes(fit);
-  std::vector<Eigen::MatrixXd> H(blocks, Eigen::MatrixXd::Zero(n, n));
-  std::vector<Eigen::VectorXd> g(blocks, Eigen::VectorXd::Zero(n));
-  for (std::size_t i = 0; i < use.size(); ++i) {
-    const auto b = static_cast<std::size_t>(windows_.block[i]);
-    const Eigen::Vector3d& s = fit.scales[static_cast<std::size_t>(windows_.horizon[i])];
-    for (Eigen::Index c = 0; c < 3; ++c) {
-      const double w = use[i] * weight(fit.residuals[i][c], s[c]);
-      H[b] += w * J[i].row(c).transpose() * J[i].row(c);
-      g[b] += w * J[i].row(c).transpose() * fit.residuals[i][c];
-    }
-  }
-  Eigen::MatrixXd P = Eigen::MatrixXd::Zero(n, n);
-  Eigen::VectorXd p = Eigen::VectorXd::Zero(n);
-  for (Eigen::Index k = 0; k < n; ++k) {
-    const FitRow& row = fit.rows[static_cast<std::size_t>(k)];
-    P(k, k) = precision(row);
-    if (!row.free) p[k] = precision(row) * (fit.values[k] - row.row.nominal);
-  }
-  Stream stream({seed, Purpose::kStatistics, 0, 0, 0});
-  Eigen::MatrixXd drawn(n, kDraws);
-  for (int d = 0; d < kDraws; ++d) {
-    Eigen::MatrixXd A = P;
-    Eigen::VectorXd b = p;
-    for (std::size_t k = 0; k < blocks; ++k) {
-      const auto pick = static_cast<std::size_t>(stream.below(blocks));
-      A += H[pick];
-      b += g[pick];
-    }
-    drawn.col(d) = fit.values - A.ldlt().solve(b);
-  }
-  Eigen::MatrixX2d bounds(n, 2);
-  for (Eigen::Index k = 0; k < n; ++k) {
-    std::vector<double> row(drawn.cols());
-    for (Eigen::Index d = 0; d < drawn.cols(); ++d) row[static_cast<std::size_t>(d)] = drawn(k, d);
-    std::sort(row.begin(), row.end());
-    bounds(k, 0) = row[kDraws / 20];
-    bounds(k, 1) = row[kDraws - 1 - kDraws / 20];
-  }
-  return bounds;
+WindowFit WindowFitter::fit_from(const std::vector<FitRow>& rows, const std::vector<char>& left_out,
+                                 const KeptFit& kept) const {
+  WindowFit fit;
+  fit.rows = rows;
+  fit.values = kept.values;
+  fit.scales = kept.scales;
+  fit.residuals = residuals(rows, fit.values);
+  score(&fit, uses(left_out));
+  return fit;
 }
 
 }  // namespace gapfarm

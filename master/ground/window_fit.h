@@ -3,6 +3,8 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -33,6 +35,14 @@ struct FitRow {
   bool free = false;  // no prior
 };
 
+// What a fit to another log says of the values, and how sure that is.
+struct GroundReference {
+  std::vector<std::string> names;
+  Eigen::VectorXd values;  // hold where they are not among the rows of a fit
+  Eigen::MatrixXd draws;   // a column each: how far off the values may be, all at once
+  Eigen::MatrixXd covariance;
+};
+
 struct WindowFit {
   std::vector<FitRow> rows;
   Eigen::VectorXd values;
@@ -42,10 +52,26 @@ struct WindowFit {
   double objective = 0;                    // nats of the windows of its blocks, and the prior
 };
 
+// A fit as far as it cannot be had in no time.
+struct KeptFit {
+  Eigen::VectorXd values;
+  std::vector<Eigen::Vector3d> scales;
+};
+
+// Fits that were made before, so that what was stopped goes on from there.
+class FitMemo {
+ public:
+  virtual ~FitMemo() = default;
+  virtual std::optional<KeptFit> find(const std::string& key) = 0;
+  virtual void keep(const std::string& key, const KeptFit& fit) = 0;
+};
+
 class WindowFitter {
  public:
-  // Both outlive the fitter.
-  WindowFitter(const GroundRobot& robot, const WindowSet& windows);
+  // All outlive the fitter.  With a reference its values are in place of the robot's, and rows are
+  // held to them by their tolerance and by how sure it is of them.
+  WindowFitter(const GroundRobot& robot, const WindowSet& windows,
+               const GroundReference* reference = nullptr, FitMemo* memo = nullptr);
 
   // Maximum over windows whose block is not in `left_out` (one flag a block; empty: none).
   // Starts at `values` where that has the size of `rows`, else at the rows' nominals; fewer rounds
@@ -63,8 +89,10 @@ class WindowFitter {
   double promise(const WindowFit& fit, const std::vector<Eigen::MatrixXd>& fit_slopes,
                  const std::vector<FitRow>& rows, const Eigen::VectorXd& values) const;
 
-  // 90 % intervals by blocks drawn with replacement, one Gauss-Newton step each; a row of (lo, hi)
-  // for each of the fit's.
+  // Values by blocks drawn with replacement, one Gauss-Newton step each, a column a draw.
+  Eigen::MatrixXd draws(const WindowFit& fit, std::uint64_t seed) const;
+  // 90 % intervals of them; a row of (lo, hi) for each of the fit's.  With a reference: of how far
+  // they are from it, which is not sure either, beside its values.
   Eigen::MatrixX2d intervals(const WindowFit& fit, std::uint64_t seed) const;
 
   const WindowSet& windows() const { return windows_; }
@@ -85,11 +113,25 @@ class WindowFitter {
                         Eigen::VectorXd* g) const;
   bool step(WindowFit* fit, const std::vector<double>& use, double* damping) const;
   std::vector<double> uses(const std::vector<char>& left_out) const;
+  // Of the prior of these rows, and how far from its middle the values are.
+  Eigen::MatrixXd prior_precision(const std::vector<FitRow>& rows) const;
+  Eigen::VectorXd from_middle(const std::vector<FitRow>& rows, const Eigen::VectorXd& values) const;
+  double prior(const WindowFit& fit) const;
+  // Of a row in the reference; -1: it is not there.
+  Eigen::Index in_reference(const FitRow& row) const;
+  WindowFit fit_from(const std::vector<FitRow>& rows, const std::vector<char>& left_out,
+                     const KeptFit& kept) const;
+  // A name for this very fit.
+  std::string key_of(const std::vector<FitRow>& rows, const std::vector<char>& left_out,
+                     const Eigen::VectorXd& start, int rounds) const;
 
   void shape_by_speed();
 
   const GroundRobot& robot_;
   const WindowSet& windows_;
+  const GroundReference* reference_;
+  FitMemo* memo_;
+  std::string question_;  // hash of robot, windows and reference; empty without a memo
   // Where a throttle leaves the speed unsure, the ends of a window err along its way above all:
   // what residuals are multiplied by, a window, so that the way counts less; empty: nothing.
   std::vector<Eigen::Matrix3d> shapes_;

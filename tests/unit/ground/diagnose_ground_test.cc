@@ -4,104 +4,10 @@
 
 #include <cmath>
 
-#include "common/random/stream.h"
-#include "common/robot/robot_file.h"
-#include "common/score/kinematic.h"
+#include "tests/unit/ground/driven_log.h"
 
 namespace gapfarm {
 namespace {
-
-constexpr const char* kDifferential = R"(drive = "differential"
-commands = ["left", "right"]
-wheel_separation = 0.3
-lag = 0.1
-[wheels.left]
-radius = 0.05
-[wheels.right]
-radius = 0.05
-[marker]
-x = 0.02
-y = 0.01
-)";
-
-constexpr const char* kCar = R"(drive = "ackermann"
-commands = ["throttle", "steering"]
-wheelbase = 0.3
-lag = 0.1
-steering_table = [[-1.0, -0.4], [0.0, 0.0], [1.0, 0.4]]
-[throttle]
-gain = 8
-zero = 0.1
-back_emf = 1
-drag = 0.5
-coulomb = 0.0
-cornering = 0.0
-)";
-
-GroundRobot robot_of(const char* text) {
-  auto robot = parse_robot(text, "robot.toml");
-  EXPECT_TRUE(robot.ok()) << robot.error().message;
-  return *robot;
-}
-
-CommandRow row_at(const GroundRobot& robot, int run, int second) {
-  const double t = second;
-  if (robot.command == CommandKind::kThrottleSteering) {
-    return {t, {0.3 + 0.1 * std::sin(0.8 * t + run), 0.8 * std::sin(1.9 * t + 2 * run)}};
-  }
-  return {t, {5 + 4 * std::sin(1.7 * t + run), 5 + 4 * std::cos(2.3 * t + run)}};
-}
-
-// What a robot that is `truly` off its file logs: five runs on one clock, poses of 0.3 mm and
-// 1 mrad.
-RunLog driven(const GroundRobot& robot, const Kinematics& truly) {
-  Stream stream({7, Purpose::kTest, 0, 0, 0});
-  RunLog log;
-  log.channels = robot.channels;
-  for (int r = 0; r < 5; ++r) {
-    const double began = 40.0 * r;
-    LoggedRun run;
-    run.run = std::to_string(r + 1);
-    CommandedRun commanded;
-    commanded.start_s = began;
-    for (int second = 0; second < 13; ++second) {
-      CommandRow row = row_at(robot, r, second);
-      row.t_s += began;
-      run.commands.push_back(row);
-    }
-    commanded.commands = run.commands;
-    std::vector<Trial> ways;
-    for (int k = 1; k < 60; ++k) {
-      Trial way;
-      way.X_WS = {0.3 * r, -0.2, 1.1 * r};
-      way.run = 1;
-      way.t_s = began;
-      way.duration_s = 0.2 * k;
-      ways.push_back(way);
-    }
-    // The session's clock begins with the first run.
-    CommandedRun session;
-    session.commands = {{0, std::vector<double>(robot.channels.size())}};
-    const std::vector<CommandedRun> runs = {session, commanded};
-    const std::vector<Pose> ends = kinematic_ends(robot, runs, ways, truly);
-    for (std::size_t k = 0; k < ends.size(); ++k) {
-      Pose X = ends[k];
-      X.x += 3e-4 * stream.normal();
-      X.y += 3e-4 * stream.normal();
-      X.theta = wrap_angle(X.theta + 1e-3 * stream.normal());
-      run.poses.push_back({began + *ways[k].duration_s, X});
-    }
-    log.runs.push_back(std::move(run));
-  }
-  return log;
-}
-
-Kinematics off_by(std::vector<std::string> names, std::vector<double> values) {
-  Kinematics at;
-  at.names = std::move(names);
-  at.values = Eigen::Map<Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
-  return at;
-}
 
 GroundDiagnosis diagnosis_of(const GroundRobot& robot, const RunLog& log) {
   auto result = diagnose_ground(robot, log, {});

@@ -1,0 +1,19 @@
+// The log that another one of the same robot is asked about: what changed?
+#pragma once
+
+#include <cstdint>
+
+#include "common/base/result.h"
+#include "common/robot/robot.h"
+#include "common/runs/run.h"
+#include "master/ground/search.h"
+
+namespace gapfarm {
+
+// Fits the robot to the log, from its file's values however far they are off, and says how sure
+// each value is.  Errors: no window fits; a log that is the wrong way round, with the remedy.
+Result<GroundQuestion> ask_what_changed(const GroundRobot& robot, const RunLog& reference,
+                                        const WindowSettings& settings, std::uint64_t seed,
+                                        FitMemo* memo);
+
+}  // namespace gapfarm

@@ -1,0 +1,34 @@
+// values.json of a ground robot's diagnosis: what its file had and what the log says, for programs
+// and for gapfarm export.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/base/interval.h"
+#include "common/base/result.h"
+#include "common/robot/robot.h"
+
+namespace gapfarm {
+
+// A number of the kinematic model.
+struct SaidValue {
+  std::string name;  // "separation", "left", ...
+  double had = 0;    // by the robot's file
+  double says = 0;
+  Interval interval;   // 90 %
+  bool named = false;  // the log says that it is another; else it is within what files are off by
+};
+
+struct SaidValues {
+  GroundRobot given;              // the robot as its file has it
+  std::vector<std::string> logs;  // folders
+  std::vector<SaidValue> values;
+};
+
+std::string format_values(const SaidValues& values);
+// Errors: `path` names the text, which is no such file.
+Result<SaidValues> parse_values(const std::string& text, const std::string& path);
+
+}  // namespace gapfarm

@@ -1,0 +1,131 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <map>
+
+#include "master/ground/diagnose_ground.h"
+#include "tests/unit/ground/driven_log.h"
+
+namespace gapfarm {
+namespace {
+
+constexpr const char* kSkid = R"(drive = "skid"
+commands = ["left", "right"]
+wheel_separation = 0.5
+wheel_separation_multiplier = 1.6
+[wheels.left]
+radius = 0.1
+[wheels.right]
+radius = 0.1
+)";
+
+GroundDiagnosis changed(const GroundRobot& robot, const RunLog& before, const RunLog& after) {
+  GroundDiagnoseOptions options;
+  options.reference = before;
+  auto result = diagnose_ground(robot, after, options);
+  EXPECT_TRUE(result.ok()) << result.error().message;
+  return *std::move(result);
+}
+
+// A file that is off in several things: of what changed it says nothing.
+Kinematics cars_own(double grip_m_s2, double steering_offset_rad = 0.02) {
+  return off_by({"grip", "slip_angle", "steering_gain", "steering_offset", "delay"},
+                {std::log(grip_m_s2), 0.17, 1.1, steering_offset_rad, 0.1});
+}
+
+TEST(WhatChanged, SaysNothingOfAFileThatIsWrongWhereNothingChanged) {
+  const GroundRobot car = robot_of(kCar);
+  const GroundDiagnosis same = changed(car, driven(car, cars_own(7)), driven(car, cars_own(7), 5));
+  EXPECT_TRUE(same.diagnosis.effects.empty()) << same.diagnosis.headline;
+  EXPECT_EQ(same.diagnosis.verdict, Verdict::kNone);
+  EXPECT_NE(same.diagnosis.headline.find("Nothing changed"), std::string::npos);
+  const GroundRobot skid = robot_of(kSkid);
+  const Kinematics off = off_by({"left", "separation"}, {0.9, 1.15});
+  const GroundDiagnosis again = changed(skid, driven(skid, off), driven(skid, off, 5));
+  EXPECT_TRUE(again.diagnosis.effects.empty()) << again.diagnosis.headline;
+}
+
+TEST(WhatChanged, TellsAnotherFloorFromOtherSteering) {
+  const GroundRobot car = robot_of(kCar);
+  const RunLog before = driven(car, cars_own(7));
+  const GroundDiagnosis floor = changed(car, before, driven(car, cars_own(7 * 0.6), 5));
+  ASSERT_EQ(floor.diagnosis.effects.size(), 1u) << floor.diagnosis.headline;
+  const NamedEffect& friction = floor.diagnosis.effects.front();
+  EXPECT_EQ(friction.name, "friction");
+  ASSERT_FALSE(friction.parameters.empty());
+  EXPECT_NEAR(friction.parameters[0].value, -0.4, 0.03);
+  EXPECT_LT(friction.parameters[0].lo, -0.38);
+  EXPECT_GT(friction.parameters[0].hi, -0.42);
+  EXPECT_NE(floor.diagnosis.headline.find("fell by"), std::string::npos);
+  EXPECT_NE(floor.diagnosis.headline.find("nothing else"), std::string::npos);
+  EXPECT_NEAR(floor.corrected.friction, 7 * 0.6 / 9.81, 0.05);
+  const GroundDiagnosis bent = changed(car, before, driven(car, cars_own(7, 0.05), 5));
+  ASSERT_EQ(bent.diagnosis.effects.size(), 1u) << bent.diagnosis.headline;
+  EXPECT_EQ(bent.diagnosis.effects.front().name, "steering_offset");
+  EXPECT_NEAR(bent.diagnosis.effects.front().parameters.at(0).value, 0.03, 0.003);
+}
+
+TEST(WhatChanged, GivesASkidSteersMultiplierBeforeAndAfter) {
+  const GroundRobot skid = robot_of(kSkid);
+  const GroundDiagnosis found =
+      changed(skid, driven(skid, off_by({"left", "separation"}, {0.9, 1.0})),
+              driven(skid, off_by({"left", "separation"}, {0.9, 1.1}), 5));
+  ASSERT_EQ(found.diagnosis.effects.size(), 1u) << found.diagnosis.headline;
+  const NamedEffect& effect = found.diagnosis.effects.front();
+  EXPECT_EQ(effect.name, "friction_across");
+  EXPECT_NEAR(effect.parameters.at(0).value, 0.1, 0.01);
+  EXPECT_NE(effect.text.find("from 1.6 to 1.7"), std::string::npos) << effect.text;
+  EXPECT_NEAR(found.corrected.controller.wheel_separation_multiplier, 1.76, 0.02);
+}
+
+TEST(WhatChanged, RefusesAReferenceThatIsTheWrongWayRound) {
+  const GroundRobot skid = robot_of(kSkid);
+  RunLog before = driven(skid, {});
+  for (LoggedRun& run : before.runs) {
+    for (CommandRow& row : run.commands) std::swap(row.values[0], row.values[1]);
+  }
+  GroundDiagnoseOptions options;
+  options.reference = before;
+  const auto result = diagnose_ground(skid, driven(skid, {}, 5), options);
+  ASSERT_FALSE(result.ok());
+  EXPECT_NE(result.error().message.find("left and right"), std::string::npos);
+}
+
+// Remembers fits, and counts those that were made.
+class Memo : public FitMemo {
+ public:
+  std::optional<KeptFit> find(const std::string& key) override {
+    const auto found = kept.find(key);
+    return found == kept.end() ? std::nullopt : std::optional(found->second);
+  }
+  void keep(const std::string& key, const KeptFit& fit) override { kept[key] = fit; }
+  std::map<std::string, KeptFit> kept;
+};
+
+TEST(WhatChanged, GoesOnFromTheFitsOfADiagnosisThatWasStopped) {
+  const GroundRobot robot = robot_of(kDifferential);
+  const RunLog log = driven(robot, off_by({"right"}, {0.96}));
+  Memo memo;
+  GroundDiagnoseOptions options;
+  options.memo = &memo;
+  int asked = 0;
+  options.stopped = [&] { return ++asked > 24; };
+  const auto stopped = diagnose_ground(robot, log, options);
+  ASSERT_FALSE(stopped.ok());
+  const std::size_t before = memo.kept.size();
+  EXPECT_GT(before, 1u);
+  options.stopped = {};
+  const auto on = diagnose_ground(robot, log, options);
+  ASSERT_TRUE(on.ok());
+  EXPECT_GT(memo.kept.size(), before);
+  options.memo = nullptr;
+  const auto fresh = diagnose_ground(robot, log, options);
+  ASSERT_TRUE(fresh.ok());
+  EXPECT_EQ(on->diagnosis.headline, fresh->diagnosis.headline);
+  EXPECT_EQ(on->diagnosis.gap.tuned, fresh->diagnosis.gap.tuned);
+  EXPECT_EQ(on->diagnosis.effects.front().parameters[0].lo,
+            fresh->diagnosis.effects.front().parameters[0].lo);
+}
+
+}  // namespace
+}  // namespace gapfarm
