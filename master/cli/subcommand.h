@@ -53,6 +53,7 @@ SubcommandRun setup_diagnose(CLI::App& app);
 SubcommandRun setup_drive(CLI::App& app);
 SubcommandRun setup_effects(CLI::App& app);
 SubcommandRun setup_evolve(CLI::App& app);
+SubcommandRun setup_export(CLI::App& app);
 SubcommandRun setup_horizons(CLI::App& app);
 SubcommandRun setup_import(CLI::App& app);
 SubcommandRun setup_influence(CLI::App& app);

@@ -40,6 +40,8 @@ std::span<const Subcommand> subcommands() {
        setup_init},
       {"robot", "say what a robot is, from its URDF and controller file", "Data", setup_robot},
       {"import", "turn other programs' logs into a trial log", "Data", setup_import},
+      {"export", "what a log says of a ground robot, for its controller file and URDF", "Data",
+       setup_export},
   };
   return kTable;
 }

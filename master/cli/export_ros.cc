@@ -1,0 +1,243 @@
+// gapfarm export ros RUN|DIAGNOSIS: what a log says, in the words of its user's own files.
+#include <algorithm>
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "common/problem/run_files.h"
+#include "common/trials/files.h"
+#include "master/cli/inputs.h"
+#include "master/cli/outputs.h"
+#include "master/cli/run_model.h"
+#include "master/ground/reference.h"
+#include "master/ground/ros_export.h"
+#include "master/robot/controllers.h"
+#include "master/robot/understand.h"
+#include "master/store/run_reader.h"
+
+namespace gapfarm {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct ExportCommand {
+  std::string format;
+  std::string source;
+  std::string controllers;
+  std::string urdf;
+  std::string out;
+  Outputs outputs;
+};
+
+constexpr double kLow = 0.05, kHigh = 0.95;
+
+// Every value of the robot's kinematics by the log that a run was fitted to.
+Result<SaidValues> values_of_run(const Problem& problem, const Model& model, Console& console) {
+  SaidValues said;
+  said.given = problem.ground->robot();
+  said.logs = model.data.files;
+  const auto log = read_run_folders(said.logs, said.given.channels);
+  if (!log) return log.error();
+  console.note("fitting the robot's kinematics to the log of the run, for intervals");
+  const auto asked = ask_what_changed(said.given, *log, {{0.5, 2, 5}, 0.5}, 1, nullptr);
+  if (!asked) return asked.error();
+  const GroundReference& fit = *asked->reference;
+  const std::vector<KinematicRow> file = change_rows(said.given);
+  for (std::size_t k = 0; k < fit.names.size(); ++k) {
+    const auto i = static_cast<Eigen::Index>(k);
+    std::vector<double> drawn;
+    for (Eigen::Index d = 0; d < fit.draws.cols(); ++d) {
+      drawn.push_back(fit.values[i] + fit.draws(i, d));
+    }
+    std::sort(drawn.begin(), drawn.end());
+    const auto at = [&](double share) {
+      return drawn[static_cast<std::size_t>(share * static_cast<double>(drawn.size() - 1))];
+    };
+    said.values.push_back(
+        {fit.names[k], file[k].nominal, fit.values[i], {at(kLow), at(kHigh)}, true});
+  }
+  return said;
+}
+
+// Friction as the run has it, where the run searched for it.
+RosFriction simulated_friction(const Problem& problem, const Model& model) {
+  RosFriction friction;
+  for (const Gene& gene : problem.genes) {
+    const std::string& key = problem.table()[gene.row].key;
+    if (key != "friction" && key != "friction_ratio") continue;
+    const GroundRobot robot = problem.ground->robot_at(model.values);
+    friction.along = robot.friction;
+    friction.across = robot.friction * robot.friction_ratio;
+    friction.from = "as evolved; other values may explain the motion as well";
+  }
+  return friction;
+}
+
+struct Said {
+  SaidValues values;
+  RosFriction friction;
+};
+
+Result<Said> read_source_of_export(const std::string& source, Console& console) {
+  const fs::path values = fs::path(source) / "values.json";
+  std::error_code ignored;
+  if (fs::exists(values, ignored)) {
+    const auto text = read_text_file(values.string());
+    if (!text) return text.error();
+    auto said = parse_values(*text, values.string());
+    if (!said) return said.error();
+    const RosFriction friction = ros_friction(*said);
+    return Said{*std::move(said), friction};
+  }
+  const auto reader = RunReader::open(source);
+  if (!reader) {
+    return Error{source + ": neither the diagnosis of a ground robot nor a run (" +
+                 reader.error().message + ")"};
+  }
+  const auto problem = stored_problem(*reader);
+  if (!problem) return problem.error();
+  if (!problem->ground) {
+    return Error{source + ": scenario " + problem->scenario +
+                 " has no robot file whose values could go back; only ground robots have"};
+  }
+  const auto model = read_model_of(source, console);
+  if (!model) return model.error();
+  auto said = values_of_run(*problem, *model, console);
+  if (!said) return said.error();
+  RosFriction friction = simulated_friction(*problem, *model);
+  if (!friction.across) friction = ros_friction(*said);
+  return Said{*std::move(said), friction};
+}
+
+std::string usual_controller(DriveKind drive) {
+  switch (drive) {
+    case DriveKind::kMecanum:
+      return "mecanum_drive_controller";
+    case DriveKind::kOmni:
+      return "omni_wheel_drive_controller";
+    case DriveKind::kAckermann:
+      return "ackermann_steering_controller";
+    case DriveKind::kTricycle:
+      return "tricycle_steering_controller";
+    default:
+      return "diff_drive_controller";
+  }
+}
+
+Status name_wheels_of_export(const std::string& urdf, const GroundRobot& robot, RosExport* data) {
+  if (urdf.empty()) {
+    for (const RobotWheel& w : robot.wheels) {
+      if (w.driven) data->wheels.push_back({w.name + "_link", {}, {}});
+    }
+    return {};
+  }
+  const auto text = read_text_file(urdf);
+  if (!text) return text.error();
+  const auto model = parse_urdf(*text, urdf);
+  if (!model) return model.error();
+  const auto reading = understand_robot(*model, {});
+  if (!reading) return reading.error();
+  for (std::size_t i = 0; i < reading->sources.size(); ++i) {
+    const WheelSource& source = reading->sources[i];
+    if (reading->robot.wheels[i].driven) {
+      data->wheels.push_back({source.link, source.mu1, source.mu2});
+    }
+  }
+  return {};
+}
+
+Result<RosExport> export_of(const ExportCommand& command, Console& console) {
+  auto said = read_source_of_export(command.source, console);
+  if (!said) return said.error();
+  RosExport data;
+  data.source = command.source;
+  data.logs = said->values.logs;
+  data.controller = usual_controller(said->values.given.drive);
+  if (!command.controllers.empty()) {
+    const auto text = read_text_file(command.controllers);
+    if (!text) return text.error();
+    const auto read = parse_controllers(*text, command.controllers);
+    if (!read) return read.error();
+    data.controller = read->drives.front().name;
+  }
+  data.values = ros_values(said->values);
+  data.remarks = ros_remarks(said->values);
+  data.friction = said->friction;
+  if (Status s = name_wheels_of_export(command.urdf, said->values.given, &data); !s) {
+    return s.error();
+  }
+  return data;
+}
+
+nlohmann::ordered_json export_json(const RosExport& data) {
+  nlohmann::ordered_json rows = nlohmann::ordered_json::array();
+  for (const RosValue& row : data.values) {
+    rows.push_back({{"key", row.key},
+                    {"had", row.had},
+                    {"says", row.says},
+                    {"lo", row.interval.lower},
+                    {"hi", row.interval.upper},
+                    {"known", row.known}});
+  }
+  nlohmann::ordered_json json = {{"controller", data.controller}, {"values", rows}};
+  if (data.friction.across) json["mu1"] = *data.friction.along;
+  if (data.friction.across) json["mu2"] = *data.friction.across;
+  return json;
+}
+
+int run_export(ExportCommand& command, CliContext& context) {
+  Console& console = context.console;
+  for (const std::string* path : {&command.controllers, &command.urdf}) {
+    if (!path->empty()) command.outputs.reads(*path);
+  }
+  Status planned;
+  if (!command.out.empty()) {
+    planned = command.outputs.plan_in(command.out, {"controllers.yaml", "gazebo.xml"});
+  }
+  auto data = planned ? export_of(command, console) : Result<RosExport>(planned.error());
+  if (!data) {
+    console.error(data.error());
+    return kExitBadUsage;
+  }
+  const std::string yaml = ros_yaml(*data), gazebo = ros_gazebo(*data);
+  std::string text = ros_table(*data);
+  if (command.out.empty()) {
+    text += "\n" + yaml + (gazebo.empty() ? "" : "\n" + gazebo);
+    console.result(text, export_json(*data));
+    return kExitDone;
+  }
+  const std::pair<const char*, const std::string*> files[] = {{"controllers.yaml", &yaml},
+                                                              {"gazebo.xml", &gazebo}};
+  for (const auto& [name, content] : files) {
+    if (content->empty()) continue;
+    const std::string path = (fs::path(command.out) / name).string();
+    if (Status s = command.outputs.write(path, *content); !s) return failed(s.error(), context);
+  }
+  console.result(text, export_json(*data));
+  console.note("left behind: " + command.out + "/controllers.yaml" +
+               (gazebo.empty() ? "" : ", gazebo.xml"));
+  return kExitDone;
+}
+
+}  // namespace
+
+SubcommandRun setup_export(CLI::App& app) {
+  auto command = std::make_shared<ExportCommand>();
+  app.add_option("TOOLS", command->format, "ros: controllers.yaml and <gazebo> tags")
+      ->required()
+      ->check(CLI::IsMember({"ros"}));
+  app.add_option("RUN|DIAGNOSIS", command->source, "Of a ground robot")->required();
+  app.add_option("--controllers", command->controllers,
+                 "Your controller file: its controller's name is taken");
+  app.add_option("--urdf", command->urdf, "Your URDF: its wheels' links and friction are taken");
+  app.add_option("--out", command->out, "Folder to write to (default: all is printed)");
+  command->outputs.declare(app);
+  app.footer(
+      "Examples:\n"
+      "  gapfarm export ros run/husky\n"
+      "  gapfarm export ros diagnosis --controllers control.yaml --urdf husky.urdf --out ros");
+  return [command](CliContext& context) { return run_export(*command, context); };
+}
+
+}  // namespace gapfarm
