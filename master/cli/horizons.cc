@@ -7,7 +7,9 @@
 #include "common/problem/run_files.h"
 #include "common/runs/read.h"
 #include "master/cli/inputs.h"
+#include "master/cli/outputs.h"
 #include "master/cli/run_model.h"
+#include "master/ground/paths.h"
 #include "master/store/run_reader.h"
 
 namespace gapfarm {
@@ -17,6 +19,8 @@ struct HorizonsCommand {
   std::string source;
   std::vector<std::string> runs;
   std::vector<double> horizons = {0.5, 2, 5, 0};
+  std::string picture;
+  Outputs outputs;
   FarmOptions farm;
 };
 
@@ -44,8 +48,23 @@ Result<Fitted> open_fitted(const std::string& source, Console& console) {
   return Fitted{*problem, model->values, {}, model->data.files};
 }
 
-int run_horizons(const HorizonsCommand& command, CliContext& context) {
+// Whole runs, before and after, as a picture.
+Status draw_runs(const HorizonsCommand& command, const Fitted& fitted, const RunLog& runs,
+                 Farm& farm, Console& console) {
+  if (command.picture.empty()) return {};
+  const auto paths = drive_paths(farm, fitted.problem, fitted.values, runs);
+  if (!paths) return paths.error();
+  if (Status s = command.outputs.write(command.picture, draw_paths(*paths)); !s) return s;
+  console.note("paths drawn in " + command.picture);
+  return {};
+}
+
+int run_horizons(HorizonsCommand& command, CliContext& context) {
   Console& console = context.console;
+  if (Status s = command.outputs.plan(command.picture); !s) {
+    console.error(s.error());
+    return kExitBadUsage;
+  }
   auto fitted = open_fitted(command.source, console);
   if (fitted && !fitted->problem.ground) {
     fitted = Error{command.source + ": scenario " + fitted->problem.scenario +
@@ -72,6 +91,9 @@ int run_horizons(const HorizonsCommand& command, CliContext& context) {
   const auto horizons = measure_horizons(**farm, fitted->problem, fitted->values, *runs,
                                          {command.horizons, fitted->windows.run_in_s});
   if (!horizons) return failed(horizons.error(), context);
+  if (Status s = draw_runs(command, *fitted, *runs, **farm, console); !s) {
+    return failed(s.error(), context);
+  }
   console.print(format_horizons(*horizons));
   return kExitDone;
 }
@@ -87,13 +109,16 @@ SubcommandRun setup_horizons(CLI::App& app) {
                  "Folders with commands.csv and poses.csv (default: those that were fitted to)");
   app.add_option("--horizons", command->horizons, "Lengths of windows, s; 0: whole runs")
       ->capture_default_str();
+  app.add_option("--picture", command->picture,
+                 "Draw the runs: logged, as simulated before and after the fit (SVG)");
+  command->outputs.declare(app);
   command->farm.declare(app, false);
   declare_long_command(app);
   app.footer(
       "Beside the simulation stand the robot's own kinematics, fitted to the same windows by least "
       "squares,\nand constant velocity.\n\n"
       "Examples:\n"
-      "  gapfarm horizons run/warthog --trials held_out\n"
+      "  gapfarm horizons run/warthog --trials held_out --picture paths.svg\n"
       "  gapfarm horizons warthog.toml --horizons 1 10");
   return [command](CliContext& context) { return run_horizons(*command, context); };
 }

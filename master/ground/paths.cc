@@ -1,0 +1,169 @@
+#include "master/ground/paths.h"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/runs/windows.h"
+#include "master/report/svg.h"
+
+namespace gapfarm {
+namespace {
+
+constexpr double kEvery_s = 0.2;  // of a path's points
+constexpr const char* kLogged = "#888888";
+constexpr const char* kBefore = "#d55e00";
+constexpr const char* kAfter = "#0072b2";
+constexpr double kPanel = 300, kPad = 34, kLegend = 46;
+
+// Trials that all begin with their run and end further and further on.
+Status put_stretches(const RunLog& runs, Problem* to, DrivenPaths* paths) {
+  const auto whole = cut_windows(runs, {{0}, 0});
+  if (!whole) return whole.error();
+  to->runs = whole->runs;
+  to->log = {};
+  for (const Trial& run : whole->log.trials) {
+    const LoggedRun& logged = runs.runs[*run.run];
+    DrivenPath path{run.session, {run.X_WS}, {run.X_WS}, {run.X_WS}};
+    double last_s = *run.t_s;
+    for (const PoseRow& pose : logged.poses) {
+      if (pose.t_s < last_s + kEvery_s && &pose != &logged.poses.back()) continue;
+      if (pose.t_s <= *run.t_s) continue;
+      last_s = pose.t_s;
+      Trial stretch = run;
+      stretch.duration_s = pose.t_s - *run.t_s;
+      stretch.X_WE = pose.X_WM;
+      stretch.trial = static_cast<std::int64_t>(to->log.trials.size());
+      to->log.trials.push_back(std::move(stretch));
+      path.logged.push_back(pose.X_WM);
+    }
+    paths->runs.push_back(std::move(path));
+  }
+  return {};
+}
+
+Result<std::vector<Pose>> simulated_ends(Farm& farm, const Problem& problem) {
+  v1::Task task;
+  task.mutable_predict();
+  const auto results = farm.run(farm.add_problem(to_proto(problem)), {task});
+  if (!results) return results.error();
+  const v1::TaskResult& result = results->front();
+  if (result.outcome() != v1::OK) {
+    return Error{"the simulation ended with " + v1::Outcome_Name(result.outcome()) + " (" +
+                 result.message() + ")"};
+  }
+  std::vector<Pose> ends;
+  for (const v1::Predicted& p : result.predict().predictions()) ends.push_back(from_proto(p.end()));
+  return ends;
+}
+
+double middle_of(std::vector<double> values) {
+  if (values.empty()) return 0;
+  const auto middle = values.begin() + static_cast<long>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+double end_distance(const std::vector<Pose>& a, const std::vector<Pose>& b) {
+  return std::hypot(a.back().x - b.back().x, a.back().y - b.back().y);
+}
+
+// Metres to pixels of one panel.
+struct Scale {
+  SvgPoint corner;
+  double least_x = 0, most_y = 0, per_m = 1;
+
+  SvgPoint at(const Pose& X) const {
+    return {corner.x + (X.x - least_x) * per_m, corner.y + (most_y - X.y) * per_m};
+  }
+};
+
+Scale scale_of(const DrivenPath& path, SvgPoint corner) {
+  double x0 = 1e9, x1 = -1e9, y0 = 1e9, y1 = -1e9;
+  for (const auto* poses : {&path.logged, &path.before, &path.after}) {
+    for (const Pose& X : *poses) {
+      x0 = std::min(x0, X.x);
+      x1 = std::max(x1, X.x);
+      y0 = std::min(y0, X.y);
+      y1 = std::max(y1, X.y);
+    }
+  }
+  const double room = kPanel - 2 * kPad;
+  const double per_m = room / std::max({x1 - x0, y1 - y0, 1e-3});
+  return {{corner.x + kPad + (room - (x1 - x0) * per_m) / 2, corner.y + kPad}, x0, y1, per_m};
+}
+
+void draw_path(const std::vector<Pose>& poses, const Scale& scale, const char* colour, double width,
+               Svg* svg) {
+  std::vector<SvgPoint> points;
+  for (const Pose& X : poses) points.push_back(scale.at(X));
+  svg->polyline(points, {"none", colour, width, {}, 0.9});
+  svg->circle(points.back(), 3.5, {colour, "none"});
+}
+
+void draw_panel(const DrivenPath& path, SvgPoint corner, Svg* svg) {
+  const Scale scale = scale_of(path, corner);
+  svg->rectangle({corner.x + 6, corner.y + 6}, kPanel - 12, kPanel - 12, {"none", "#dddddd"});
+  svg->text({corner.x + 14, corner.y + 22}, "run " + path.run, {});
+  draw_path(path.logged, scale, kLogged, 3, svg);
+  draw_path(path.before, scale, kBefore, 1.5, svg);
+  draw_path(path.after, scale, kAfter, 1.5, svg);
+  svg->circle(scale.at(path.logged.front()), 4, {"#ffffff", "#222222", 1.5});
+  const SvgPoint bar = {corner.x + 14, corner.y + kPanel - 14};
+  svg->line(bar, {bar.x + scale.per_m * 0.5, bar.y}, {"none", "#222222", 1.5});
+  svg->text({bar.x, bar.y - 5}, "0.5 m", {10});
+}
+
+}  // namespace
+
+Result<DrivenPaths> drive_paths(Farm& farm, const Problem& fitted, const ParameterValues& values,
+                                const RunLog& runs) {
+  Problem asked = fitted;
+  asked.fitness.kind = FitnessKind::kLogScore;
+  DrivenPaths paths;
+  if (Status s = put_stretches(runs, &asked, &paths); !s) return s.error();
+  const auto before = simulated_ends(farm, asked);
+  if (!before) return before.error();
+  asked.values = values;
+  const auto after = simulated_ends(farm, asked);
+  if (!after) return after.error();
+  std::size_t next = 0;
+  std::vector<double> off_before, off_after;
+  for (DrivenPath& path : paths.runs) {
+    for (std::size_t k = 1; k < path.logged.size(); ++k, ++next) {
+      path.before.push_back((*before)[next]);
+      path.after.push_back((*after)[next]);
+    }
+    off_before.push_back(end_distance(path.before, path.logged));
+    off_after.push_back(end_distance(path.after, path.logged));
+  }
+  paths.before_m = middle_of(off_before);
+  paths.after_m = middle_of(off_after);
+  return paths;
+}
+
+std::string draw_paths(const DrivenPaths& paths, std::size_t most) {
+  const std::size_t count = std::min(most, paths.runs.size());
+  const std::size_t across = std::min<std::size_t>(3, std::max<std::size_t>(count, 1));
+  const std::size_t down = (count + across - 1) / across;
+  const double width = static_cast<double>(across) * kPanel;
+  Svg svg(width, static_cast<double>(down) * kPanel + kLegend);
+  for (std::size_t k = 0; k < count; ++k) {
+    draw_panel(paths.runs[k],
+               {static_cast<double>(k % across) * kPanel, static_cast<double>(k / across) * kPanel},
+               &svg);
+  }
+  const double y = static_cast<double>(down) * kPanel + 18;
+  const auto name = [&](double x, double row, const char* colour, const std::string& words) {
+    svg.line({x, row - 4}, {x + 22, row - 4}, {"none", colour, 3});
+    svg.text({x + 28, row}, words, {});
+  };
+  name(14, y, kLogged, "logged");
+  name(110, y, kBefore,
+       fmt::format("as its files say: ends {:.2f} m off (median)", paths.before_m));
+  name(110, y + 18, kAfter, fmt::format("fitted: {:.2f} m", paths.after_m));
+  return svg.finish();
+}
+
+}  // namespace gapfarm
