@@ -68,16 +68,16 @@ struct StoredWorker {
 
 // What the farm went through, counted over all masters that have written to the run.
 struct FarmTally {
-  std::uint64_t retries = 0;      // jobs that went back into the line
-  std::uint64_t hung = 0;         // workers that were killed because their simulation hung
-  std::uint64_t copies = 0;       // of stragglers' jobs, given to idle workers
-  std::uint64_t compared = 0;     // answers held against another worker's: audits and copies
-  std::uint64_t alarms = 0;       // of those, answers that differed
-  std::uint64_t handed_over = 0;  // answers that workers kept from one master to the next
-  std::uint64_t late = 0;         // answers to jobs that had one
-  std::uint64_t foreign = 0;      // answers to nothing that was asked
-  std::uint64_t malformed = 0;    // messages that made no sense
-  std::uint64_t links = 0;        // TCP connections that were accepted
+  std::uint64_t retries = 0;            // jobs that went back into the line
+  std::uint64_t hung = 0;               // workers that were killed because their simulation hung
+  std::uint64_t copies = 0;             // of stragglers' jobs, given to idle workers
+  std::uint64_t compared = 0;           // answers held against another worker's: audits and copies
+  std::uint64_t alarms = 0;             // of those, answers that differed
+  std::uint64_t handed_over = 0;        // answers that workers kept from one master to the next
+  std::uint64_t late = 0;               // answers to jobs that had one
+  std::uint64_t foreign = 0;            // answers to nothing that was asked
+  std::uint64_t malformed = 0;          // messages that made no sense
+  std::uint64_t links = 0;              // TCP connections that were accepted
   std::uint64_t refused_keys = 0;       // handshakes with keys that are not listed
   std::uint64_t failed_handshakes = 0;  // of any kind
   std::uint64_t dropped_links = 0;      // connections closed by the limits

@@ -16,6 +16,11 @@ Status RunStore::add_worker_events(const std::vector<StoredWorkerEvent>& events)
   if (events.empty()) return {};
   Result<SqlTransaction> transaction = SqlTransaction::begin(database_);
   if (!transaction) return transaction.error();
+  if (Status s = insert_worker_events(events); !s) return s;
+  return transaction->commit();
+}
+
+Status RunStore::insert_worker_events(const std::vector<StoredWorkerEvent>& events) {
   Result<SqlStatement> insert = database_.prepare(
       "INSERT INTO worker_events VALUES (?, ?, ?, ?, ?)", "write down who came and went");
   if (!insert) return insert.error();
@@ -24,7 +29,7 @@ Status RunStore::add_worker_events(const std::vector<StoredWorkerEvent>& events)
     insert->bind_text(4, event.host).bind_text(5, event.text);
     if (Status s = insert->run(); !s) return s;
   }
-  return transaction->commit();
+  return {};
 }
 
 Status RunStore::keep_document(const std::string& name, const std::string& json) {

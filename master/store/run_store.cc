@@ -217,14 +217,17 @@ Status RunStore::load_before() {
 
 Status RunStore::begin_epoch() {
   if (Status s = load_before(); !s) return s;
-  if (Status s = database_.exec(forget_quarantines(next_generation()), "write the run store"); !s) {
-    return s;
-  }
   std::vector<StoredWorkerEvent> events = {
       {unix_now_s(), "master", "", host_name(), "master " + std::to_string(epoch_) + " begins"}};
   if (epoch_ > 1) events.insert(events.begin(), end_before_);
-  if (Status s = add_worker_events(events); !s) return s;
-  return set_progress({});
+  Result<SqlTransaction> transaction = SqlTransaction::begin(database_);
+  if (!transaction) return transaction.error();
+  if (Status s = database_.exec(forget_quarantines(next_generation()), "write the run store"); !s) {
+    return s;
+  }
+  if (Status s = insert_worker_events(events); !s) return s;
+  if (Status s = set_progress({}); !s) return s;
+  return transaction->commit();
 }
 
 Result<std::uint64_t> RunStore::quarantined() const {

@@ -76,6 +76,7 @@ class RunStore {
   RunStore(std::filesystem::path run, RunLock lock, Database database)
       : run_(std::move(run)), lock_(std::move(lock)), database_(std::move(database)) {}
 
+  Status insert_worker_events(const std::vector<StoredWorkerEvent>& events);
   Status insert_individuals(const StoredGeneration& generation);
   Status load_before();
   Status begin_epoch();
