@@ -142,8 +142,9 @@ Result<std::unique_ptr<PageAlong>> open_page(const PageOption& option,
   const std::string address = "http://127.0.0.1:" + std::to_string((*page)->port()) + "/";
   const std::string view =
       address + "view?of=" + percent_encoded(folder.lexically_normal().string());
-  context.console.note("page: " + view + "\n  from another machine first: " + (*page)->tunnel() +
-                       "\n  it ends with this command; gapfarm serve " + folder.string() +
+  context.console.note("page: " + view);
+  context.console.note("  from another machine first: " + (*page)->tunnel());
+  context.console.note("  it ends with this command; gapfarm serve " + folder.string() +
                        " shows the same at any time");
   if (option.metrics_port) context.console.note("metrics: " + address + "metrics");
   return page;

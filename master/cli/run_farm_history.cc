@@ -3,9 +3,12 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
+#include <array>
 #include <ctime>
 #include <fstream>
+#include <iterator>
 #include <map>
+#include <utility>
 
 #include "master/progress/words.h"
 #include "master/store/run_lock.h"
@@ -24,6 +27,23 @@ constexpr std::size_t kMostCounts = 2000;
 constexpr std::size_t kMostMarks = 300;
 constexpr std::size_t kMostSpans = 40;
 constexpr std::size_t kMostWorkers = 200;  // in the table
+
+// Every count of a farm, for people.
+constexpr std::pair<std::uint64_t FarmTally::*, const char*> kTallyWords[] = {
+    {&FarmTally::retries, "retries: jobs given out again"},
+    {&FarmTally::copies, "copies: jobs given to a second worker, the first took long"},
+    {&FarmTally::compared, "audits and copies: answers held against another worker's"},
+    {&FarmTally::alarms, "alarms: those of them that differed"},
+    {&FarmTally::hung, "workers killed because their simulation stood still"},
+    {&FarmTally::handed_over, "answers that workers kept from one master to the next"},
+    {&FarmTally::late, "late: answers to jobs that had one"},
+    {&FarmTally::foreign, "foreign: answers to nothing that was asked"},
+    {&FarmTally::malformed, "malformed: messages that made no sense"},
+    {&FarmTally::links, "TCP connections"},
+    {&FarmTally::refused_keys, "of them refused: keys that are not listed"},
+    {&FarmTally::failed_handshakes, "of them failed: handshakes"},
+    {&FarmTally::dropped_links, "of them closed by the limits"}};
+static_assert(std::size(kTallyWords) == std::tuple_size_v<decltype(FarmTally::kRows)>);
 
 std::vector<std::string> log_tail(const std::filesystem::path& run) {
   std::ifstream file(run / "log.txt", std::ios::binary | std::ios::ate);
@@ -63,10 +83,8 @@ void add_facts(const RunStatus& status, RunFarm* farm) {
   add("last heard of", day_and_time(progress.heartbeat_unix_s) + " on " + progress.host);
   if (progress.epoch > 1) add("masters so far", std::to_string(progress.epoch));
   if (status.quarantined > 0) add("tasks given up", std::to_string(status.quarantined));
-  for (const FarmTally::Row& row : FarmTally::kRows) {
-    std::string label = row.key;
-    std::replace(label.begin(), label.end(), '_', ' ');
-    farm->tally.emplace_back(std::move(label), std::to_string(progress.farm.*row.count));
+  for (const auto& [count, words] : kTallyWords) {
+    farm->tally.emplace_back(words, std::to_string(progress.farm.*count));
   }
 }
 

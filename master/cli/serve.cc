@@ -1,4 +1,6 @@
 // gapfarm serve [DIR...]: runs and diagnoses in a browser, from their stores alone.
+#include <time.h>
+
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -19,6 +21,12 @@ struct ServeOptions {
   unsigned port = kPagePort;
 };
 
+double thread_cpu_now_s() {
+  timespec t = {};
+  ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+}
+
 int run_serve(const ServeOptions& options, CliContext& context) {
   for (const std::string& folder : options.folders) {
     std::error_code ignored;
@@ -30,6 +38,7 @@ int run_serve(const ServeOptions& options, CliContext& context) {
   SiteSources sources;
   sources.folders.assign(options.folders.begin(), options.folders.end());
   sources.unix_now_s = unix_now_s;
+  sources.cpu_now_s = thread_cpu_now_s;
   sources.read_run = read_run_report;
   sources.drive = [&](const DriveQuestion& question) { return shower.show(question); };
   Site site(std::move(sources));

@@ -209,9 +209,10 @@ std::vector<WorkEntry> WorkEntries::now(const std::vector<FoundWork>& found) {
     if (known != known_.end() && holds(known->second, stamp, now_unix_s)) {
       next = known->second;
     } else {
+      const double began_s = cpu_now_s_();
       next = {now_unix_s, 0, entry_of(f, now_unix_s)};
       next.entry.stamp = std::move(stamp);
-      next.cost_s = unix_now_s_() - now_unix_s;
+      next.cost_s = cpu_now_s_() - began_s;
     }
     entries.push_back(next.entry);
   }

@@ -60,14 +60,15 @@ struct WorkEntry {
 // Never fails: what cannot be read says so in `trouble`.
 WorkEntry entry_of(const FoundWork& found, double now_unix_s);
 
-// How long what took so long to work out is good for: work is at most a hundredth of the time.
+// How long what took so much CPU time to work out is good for: work is a hundredth of the time.
 inline double good_for_s(double cost_s) { return 100 * cost_s; }
 
 // WorkEntries, each read again when its folder changed or its master may have died, but none more
 // often than good_for_s() allows.
 class WorkEntries {
  public:
-  explicit WorkEntries(std::function<double()> unix_now_s) : unix_now_s_(std::move(unix_now_s)) {}
+  WorkEntries(std::function<double()> unix_now_s, std::function<double()> cpu_now_s)
+      : unix_now_s_(std::move(unix_now_s)), cpu_now_s_(std::move(cpu_now_s)) {}
 
   std::vector<WorkEntry> now(const std::vector<FoundWork>& found);
 
@@ -78,7 +79,7 @@ class WorkEntries {
   };
   bool holds(const Known& known, const std::string& stamp, double now_unix_s) const;
 
-  std::function<double()> unix_now_s_;
+  std::function<double()> unix_now_s_, cpu_now_s_;
   std::map<std::string, Known> known_;
 };
 

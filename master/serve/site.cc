@@ -67,13 +67,15 @@ void Site::look() {
   if (looked_s >= 0 && looked_s < good_for_s(look_cost_s_)) return;
   const double searched_s = now_s - searched_unix_s_;
   if (searched_s < 0 || searched_s >= std::max(kSearchAgain_s, good_for_s(search_cost_s_))) {
+    const double began_s = sources_.cpu_now_s();
     found_ = find_work(sources_.folders);
     searched_unix_s_ = now_s;
-    search_cost_s_ = sources_.unix_now_s() - now_s;
+    search_cost_s_ = sources_.cpu_now_s() - began_s;
   }
-  looked_unix_s_ = sources_.unix_now_s();
+  const double began_s = sources_.cpu_now_s();
   entries_ = known_entries_.now(found_);
-  look_cost_s_ = sources_.unix_now_s() - looked_unix_s_;
+  looked_unix_s_ = now_s;
+  look_cost_s_ = sources_.cpu_now_s() - began_s;
 }
 
 const FoundWork* Site::find(const std::string& name) const {
@@ -159,11 +161,11 @@ HttpResponse Site::shown(const Target& target, const std::string& known) {
   const std::string key = key_of(target);
   const Kept* page = kept(key, *now);
   if (page == nullptr) {
-    const double began_unix_s = sources_.unix_now_s();
+    const double began_s = sources_.cpu_now_s();
     auto html = made(target);
     if (!html) return plain_response(target.path == "/compare" ? 400 : 500, html.error().message);
-    const double ended_unix_s = sources_.unix_now_s();
-    keep(key, {now->tag, *std::move(html), now->state, ended_unix_s, ended_unix_s - began_unix_s});
+    keep(key, {now->tag, *std::move(html), now->state, sources_.unix_now_s(),
+               sources_.cpu_now_s() - began_s});
     page = &kept_.at(key);
   }
   const std::string etag = "\"" + page->tag + "\"";

@@ -32,6 +32,7 @@ struct RunQuestion {
 struct SiteSources {
   std::vector<std::filesystem::path> folders;
   std::function<double()> unix_now_s;
+  std::function<double()> cpu_now_s;  // of this thread: what pages cost
   std::function<Result<RunReport>(const RunQuestion&)> read_run;
   // One drive, measured and simulated, as JSON for the page (watch.js).
   std::function<Result<std::string>(const DriveQuestion&)> drive;
@@ -45,7 +46,7 @@ struct SiteSources {
 class Site {
  public:
   explicit Site(SiteSources sources)
-      : sources_(std::move(sources)), known_entries_(sources_.unix_now_s) {}
+      : sources_(std::move(sources)), known_entries_(sources_.unix_now_s, sources_.cpu_now_s) {}
 
   HttpResponse answer(const HttpRequest& request);
 

@@ -87,6 +87,7 @@ int measure(const fs::path& folder) {
   SiteSources sources;
   sources.folders = {folder};
   sources.unix_now_s = unix_now_s;
+  sources.cpu_now_s = bench_now_s;
   sources.read_run = read_run_report;
   sources.drive = [](const DriveQuestion&) -> Result<std::string> { return Error{"none"}; };
   Site site(std::move(sources));

@@ -13,6 +13,7 @@ Site& empty_site() {
   static Site site([] {
     SiteSources sources;
     sources.unix_now_s = [] { return 1e9; };
+    sources.cpu_now_s = [] { return 0.0; };
     sources.read_run = [](const RunQuestion&) -> Result<RunReport> {
       promise(false, "a run was read that is not there");
       return Error{""};

@@ -14,7 +14,7 @@ function timeAxis({ counts, end }) {
   const span = Math.max(end - from, 1);
   const [unit, seconds] = span > 3 * 3600 ? ["hours", 3600] : span > 180 ? ["minutes", 60] : ["seconds", 1];
   const began = new Date(1000 * from).toISOString().slice(0, 16).replace("T", " ");
-  return { of: (unix) => (unix - from) / seconds, axis: { min: 0, max: 1.02 * (span / seconds), label: `${unit} since ${began} UTC` } };
+  return { of: (unix) => (unix - from) / seconds, axis: { min: -0.015 * (span / seconds), max: 1.02 * (span / seconds), label: `${unit} since ${began} UTC` } };
 }
 
 function countSpec(timeline) {
@@ -27,7 +27,7 @@ function countSpec(timeline) {
   const most = Math.max(1, ...timeline.counts.map(([, workers]) => workers));
   return {
     x: axis,
-    y: { min: 0, max: 1.08 * most, label: "workers", ticks: most <= 8 ? Array.from({ length: most + 1 }, (_, i) => [i, String(i)]) : undefined },
+    y: { min: -0.06 * most, max: 1.08 * most, label: "workers", ticks: most <= 8 ? Array.from({ length: most + 1 }, (_, i) => [i, String(i)]) : undefined },
     layers: [
       { kind: "line", style: "final", width: 2, name: "workers", points: steps },
       ...Object.entries(CAME).map(([kind, { style, shape }]) => (

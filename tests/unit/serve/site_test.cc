@@ -19,9 +19,10 @@ class SiteTest : public StoreTest {
     SiteSources sources;
     sources.folders = {folder_};
     sources.unix_now_s = [this] { return now_s_; };
+    sources.cpu_now_s = [this] { return cpu_s_; };
     sources.read_run = [this](const RunQuestion& question) -> Result<RunReport> {
       ++made_;
-      now_s_ += cost_s_;
+      cpu_s_ += cost_s_;
       RunReport report;
       report.headline = "made " + std::to_string(made_);
       report.name = question.run.string();
@@ -47,7 +48,7 @@ class SiteTest : public StoreTest {
   // Long enough for anything that was made to be old.
   void wait() { now_s_ += 1e6; }
 
-  double now_s_ = 1e9, cost_s_ = 0;
+  double now_s_ = 1e9, cpu_s_ = 0, cost_s_ = 0;
   int made_ = 0;
   Site site_;
 };
