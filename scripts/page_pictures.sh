@@ -6,11 +6,10 @@ run=${1:?give the folder of a run that has ended}
 run=${run%/}
 here=$(cd "$(dirname "$0")/.." && pwd)
 gapfarm=${GAPFARM:-$here/build/release/bin/gapfarm}
-profile=$(mktemp -d)
-coproc server { exec "$gapfarm" serve "$run" --port 0; }
-trap 'kill "$server_pid"; rm -rf "$profile"' EXIT
-server_pid=$server_PID
-read -r _ address <&"${server[0]}"
-chromium --headless --no-sandbox --disable-gpu --hide-scrollbars --user-data-dir="$profile" \
-  --virtual-time-budget=6000 --window-size=1000,1500 --force-device-scale-factor=0.6 \
-  --screenshot="$here/docs/pictures/page.png" "${address}view?of=$run" 2>/dev/null
+folder=$(mktemp -d)
+trap 'rm -rf "$folder"' EXIT
+# The same page without a server: one that is told of what is new never stops loading.
+"$gapfarm" report "$run" --out "$folder/page.html"
+chromium --headless --no-sandbox --disable-gpu --hide-scrollbars --user-data-dir="$folder/profile" \
+  --virtual-time-budget=6000 --window-size=1000,1900 --force-device-scale-factor=0.7 \
+  --screenshot="$here/docs/pictures/page.png" "file://$folder/page.html" 2>/dev/null

@@ -1,0 +1,140 @@
+// A run's page from a store that was made up, as large as a night's.
+#include "master/cli/run_page.h"
+
+#include <gmock/gmock.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "master/cli/inputs.h"
+#include "master/store/run_store.h"
+
+namespace gapfarm {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+constexpr std::size_t kPopulation = 12;
+
+class RunPage : public testing::Test {
+ protected:
+  RunPage() {
+    std::string pattern = (fs::temp_directory_path() / "gapfarm-page-XXXXXX").string();
+    folder_ = ::mkdtemp(pattern.data());
+    fs::copy_file(GAPFARM_SOURCE_DIR "/configs/demo/trials.csv", folder_ / "apart.csv");
+    std::ofstream(folder_ / "c.toml") << "trials = [\"" GAPFARM_SOURCE_DIR
+                                         "/configs/demo/trials.csv\"]\n[genes]\n"
+                                         "friction = [0.1, 1.5]\nfull_speed = [0.1, 0.6]\n"
+                                         "[validation]\ntrials = [\"apart.csv\"]\n";
+  }
+  ~RunPage() override { fs::remove_all(folder_); }
+
+  fs::path run() const { return folder_ / "run"; }
+
+  // Every individual's genes are its rank's share of the range.
+  static StoredGeneration generation(const Problem& problem, std::uint64_t number) {
+    StoredGeneration g;
+    g.generation = number;
+    g.evaluations = kPopulation * number;
+    g.wall_s = 1.2345678901;
+    g.operator_probabilities = {{"blend", 0.123456789}, {"gaussian", 0.876543211}};
+    for (std::size_t i = 0; i < kPopulation; ++i) {
+      StoredIndividual one;
+      one.birth_id = kPopulation * number + i;
+      one.genome.assign(problem.genes.size(), static_cast<double>(i + 1) / (kPopulation + 1));
+      one.values = readable_values(problem, one.genome);
+      one.fitness = -static_cast<double>(i) - 1.0 / static_cast<double>(number);
+      if (number == 2 && i + 1 == kPopulation) {
+        one.outcome = "WORKER_FAILED";
+        one.fitness.reset();
+        g.quarantined = 1;
+      }
+      g.individuals.push_back(std::move(one));
+    }
+    summarise_fitness(g, true);
+    return g;
+  }
+
+  void make(std::uint64_t generations) const {
+    const auto config = read_config_and_trials((folder_ / "c.toml").string(), TrialOptions{});
+    ASSERT_TRUE(config.ok()) << config.error().message;
+    const v1::Problem problem = to_proto(config->problem);
+    RunInfo info;
+    info.config_path = config->path;
+    info.config_text = config->text;
+    info.problem = serialise(problem);
+    info.problem_hash = problem_hash(problem);
+    info.fitness = "log_score";
+    info.fitness_unit = "nats/trial";
+    auto store = RunStore::create(run(), info);
+    ASSERT_TRUE(store.ok()) << store.error().message;
+    for (std::uint64_t g = 1; g <= generations; ++g) {
+      ASSERT_TRUE(store->commit(generation(config->problem, g)).ok());
+    }
+  }
+
+  RunReport read(std::optional<std::uint64_t> genome = {},
+                 std::optional<std::uint64_t> generation = {}) const {
+    const auto report = read_run_report({run(), genome, generation});
+    EXPECT_TRUE(report.ok()) << report.error().message;
+    return report ? *report : RunReport();
+  }
+
+  fs::path folder_;
+};
+
+TEST_F(RunPage, StaysSmallHoweverLongTheRun) {
+  make(420);
+  RunReport report = read();
+  report.served = true;
+  for (std::uint64_t g = 421; g <= 100000; ++g) {
+    report.generations.push_back({g, -1.0 / static_cast<double>(g), -2.123456789, -3.3, 12 * g, 1});
+  }
+  const std::string page = run_html(report);
+  EXPECT_LT(page.size(), 2'000'000u);
+  EXPECT_LE(report.probabilities.size(), 400u);
+  EXPECT_EQ(report.elite.lines.size(), kPopulation);
+  EXPECT_EQ(report.elite.axes.size(), 2u);
+}
+
+TEST_F(RunPage, FindsAnyGenomeAndTheBestOfAnyGeneration) {
+  make(3);
+  const RunReport report = read(kPopulation * 2 + 3, 1);
+  ASSERT_TRUE(report.looked_up);
+  EXPECT_EQ(report.looked_up->generation, 2u);
+  ASSERT_EQ(report.looked_up->values.size(), 2u);
+  EXPECT_THAT(report.looked_up->values[1].second, HasSubstr("m/s"));
+  EXPECT_EQ(report.genomes_of, 1u);
+  EXPECT_EQ(report.genomes.front().birth_id, kPopulation);
+  EXPECT_THAT(run_html(report), HasSubstr("--genome " + std::to_string(kPopulation * 2 + 3)));
+  EXPECT_THAT(read(999).without_looked_up, HasSubstr("999"));
+  EXPECT_EQ(read({}, 77).genomes_of, 3u) << "there is no generation 77";
+  ASSERT_EQ(report.farm.given_up.size(), 1u);
+  EXPECT_EQ(report.farm.given_up[0].birth_id, kPopulation * 3 - 1);
+}
+
+TEST_F(RunPage, CountsTrialsKeptApartWhileTheirFileIsThere) {
+  make(1);
+  EXPECT_EQ(read().kept_apart, 120u);
+  fs::remove(folder_ / "apart.csv");
+  EXPECT_EQ(read().kept_apart, 0u);
+}
+
+TEST_F(RunPage, ShowsWhatDetermineLeft) {
+  make(1);
+  const RunReport before = read();
+  ASSERT_EQ(before.parameters.size(), 2u);
+  EXPECT_EQ(before.parameters[0].note, "");
+  std::ofstream(run() / kDeterminedFile)
+      << "parameter,value,low_95,high_95,deviation_share,determined,at_bound\n"
+      << "friction," << before.parameters[0].after << ",0.15,0.45,0.1,0,0\n"
+      << "full_speed,0.55,0.5,0.6,0.1,1,0\n";
+  const RunReport after = read();
+  EXPECT_THAT(after.parameters[0].note, HasSubstr("0.15 to 0.45"));
+  EXPECT_THAT(after.parameters[0].note, HasSubstr("do not determine it"));
+  EXPECT_THAT(after.parameters[1].note, HasSubstr("another value"));
+}
+
+}  // namespace
+}  // namespace gapfarm
