@@ -27,8 +27,9 @@ Json plain_page_json() {
 }
 
 std::string list_cell(const char* label, const std::string& html, bool is_number = false) {
-  return fmt::format(R"(<td data-label="{}"{}>{}</td>)", label,
-                     is_number ? R"( class="number")" : "", html);
+  // Where rows become cards, on a narrow screen, cells without content are left out.
+  return fmt::format(R"(<td data-label="{}" class="{}{}">{}</td>)", label,
+                     is_number ? "number" : "", html.empty() ? " empty" : "", html);
 }
 
 // The best by generation, worst tenth left out of its scale.

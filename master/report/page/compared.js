@@ -8,11 +8,15 @@ function startCompared() {
   const chart = new Chart(parent, 0.45);
   chart.figure.classList.add("large");
   const against = choice(controls, "Against", AGAINST.map((a) => [a.key, a.label]), draw, "against");
+  const key = controls.appendChild(document.createElement("ul"));
+  key.className = "key";
+  key.setAttribute("aria-label", "Key");
   function draw() {
     const { of, label } = AGAINST.find((a) => a.key === against());
     const style = (i) => LINE_STYLES[i % LINE_STYLES.length];
     const lines = PAGE.compared.map(({ name, generations }, i) => ({
       name, style: style(i), dashed: i % 2 === 1, points: generations.filter((g) => isNumber(g.best)).map((g) => [of(g), g.best, { name, g }]) }));
+    key.replaceChildren(...lines.map(({ name, style: its, dashed }) => lineKey(name, its, dashed)));
     const points = lines.flatMap((line) => line.points);
     if (!points.length) return;
     const xs = points.map((p) => p[0]);

@@ -3,6 +3,14 @@
 
 const LINE_STYLES = ["final", "tuned", "place", "scale-2", "scale-3", "quiet", "scale-4", "scale-1"];
 
+function lineKey(name, style, dashed) {
+  const item = document.createElement("li");
+  const svg = svgElement(item, "svg", { class: "mark", "aria-hidden": "true" });
+  svgElement(svg, "path", { d: "M1 10h18", stroke: `var(--${style})`, "stroke-dasharray": dashed ? "4 3" : "none" });
+  item.append(name);
+  return item;
+}
+
 function startOperators() {
   const parent = document.getElementById("operator-plot");
   if (!parent || !PAGE.operators?.names.length) return;
@@ -14,13 +22,7 @@ function startOperators() {
   function draw() {
     const { names, generations, probabilities } = PAGE.operators;
     if (!generations.length) return;
-    key.replaceChildren(...names.map((name, i) => {
-      const item = document.createElement("li");
-      const svg = svgElement(item, "svg", { class: "mark", "aria-hidden": "true" });
-      svgElement(svg, "path", { d: "M1 10h18", stroke: `var(--${looks(i).style})`, "stroke-dasharray": looks(i).dashed ? "4 3" : "none" });
-      item.append(name);
-      return item;
-    }));
+    key.replaceChildren(...names.map((name, i) => lineKey(name, looks(i).style, looks(i).dashed)));
     const most = Math.max(...probabilities.flat().filter(isNumber), 0.01);
     const describe = ({ g, name, p }) => `generation ${g}: ${name} ${words(100 * p, 3)} %`;
     chart.show({
