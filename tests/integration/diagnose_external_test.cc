@@ -17,6 +17,25 @@ constexpr const char* kDrives =
     "pose_noise_heading = 0.008\n[simulate]\nsessions = 2\nlevels = [0.5, 1.0]\n"
     "durations = [0.5, 1.0]\n";
 
+// A robot on two sides that answers where it rests, and nothing of its way.
+constexpr const char* kRestOnly = R"(import json, math, sys
+for line in sys.stdin:
+    task = json.loads(line)
+    if 'id' not in task:
+        print(json.dumps({'gapfarm': 1, 'name': 'rest only', 'parameters': [
+            {'key': 'speed', 'unit': 'm/s', 'lower': 0.1, 'upper': 1, 'nominal': 0.25, 'log': True},
+            {'key': 'width', 'unit': 'm', 'lower': 0.05, 'upper': 0.5, 'nominal': 0.2},
+            {'key': 'pull', 'unit': '-', 'lower': -0.1, 'upper': 0.1, 'nominal': 0}]}), flush=True)
+        continue
+    p = task['parameters']
+    left, right = task['left']['speed'] - p['pull'], task['right']['speed'] + p['pull']
+    turn = (right - left) * p['speed'] / p['width'] * task['duration']
+    way = (left + right) / 2 * p['speed'] * task['duration']
+    chord = way if abs(turn) < 1e-9 else way * math.sin(turn / 2) / (turn / 2)
+    pose = [chord * math.cos(turn / 2), chord * math.sin(turn / 2), turn]
+    print(json.dumps({'id': task['id'], 'pose': pose}), flush=True)
+)";
+
 class DiagnoseExternal : public ::testing::Test {
  protected:
   static std::string external(const std::string& words, const std::string& genes,
@@ -83,6 +102,30 @@ TEST_F(DiagnoseExternal, NamesAnEffectOfTheCameraAndNoneWhereNothingIsMissing) {
   const std::string cautions = none["cautions"].dump();
   EXPECT_NE(cautions.find("floor_tilt, floor_nap"), std::string::npos) << cautions;
   for (const Json& row : none["screening"]) EXPECT_NE(row["effect"], "floor_tilt");
+}
+
+// A program without paths, whose one parameter may be negative and does what an effect does.
+TEST_F(DiagnoseExternal, WhatTheProgramExplainsItselfIsNoEffect) {
+  const std::string program = external("\"python3\", \"rest_only.py\"", "speed = [0.1, 1]\n");
+  folder_.write("rest_only.py", kRestOnly);
+  const Json d = diagnose(program, program, 100, {"heading_offset.angle=0.06", "speed=0.3"});
+  expect_named(d, "heading_offset", "angle", 0.06, 0.01);
+  EXPECT_FALSE(d.contains("drives")) << "there are no paths to show";
+  const Json wheels = diagnose(srv1(), program, 100, {"motor_asymmetry.ratio=0.04"});
+  for (const Json& effect : wheels["effects"]) EXPECT_NE(effect["name"], "motor_asymmetry");
+}
+
+TEST_F(DiagnoseExternal, ALogOfMuJoCoIsDiagnosedByBulletAndTheOtherWayRound) {
+  const std::string bridge = GAPFARM_BIN_DIR "/mujoco_bridge";
+  if (!std::filesystem::exists(bridge)) GTEST_SKIP() << "built without GAPFARM_MUJOCO";
+  const std::string mujoco = external(
+      "\"" + bridge + "\", \"" GAPFARM_SOURCE_DIR "/scripts/bridges/mujoco/two_wheeler.xml\"",
+      "full_speed = [0.1, 0.6]\ntrack = [0.05, 0.3]\n");
+  // Wheels of the one do not turn as tracks of the other do, so only a clear effect is named.
+  expect_named(diagnose(mujoco, srv1(), 60, {"motor_asymmetry.ratio=0.12"}), "motor_asymmetry",
+               "ratio", 0.12, 0.03);
+  expect_named(diagnose(srv1(), mujoco, 60, {"motor_asymmetry.ratio=0.06"}), "motor_asymmetry",
+               "ratio", 0.06, 0.02);
 }
 
 }  // namespace
