@@ -71,7 +71,9 @@ file(READ LICENSE licence)
 string(REGEX REPLACE "\n" "\n " licence " ${licence}")
 string(REGEX REPLACE "\n *\n" "\n .\n" licence "${licence}")
 string(TIMESTAMP now "%a, %d %b %Y %H:%M:%S +0000" UTC)  # or SOURCE_DATE_EPOCH's
-set(CPACK_PACKAGE_CONTACT "gapfarm developers <gapfarm@packages.debian.org>" CACHE STRING
+# As the history names them; a packager says -DCPACK_PACKAGE_CONTACT='Name <address>'.
+set(CPACK_PACKAGE_CONTACT
+    "Seed e90f7182 maintainers <maintainers@users.noreply.h-seed-e90f7182.example>" CACHE STRING
     "Maintainer in the packages: Name <address>")
 foreach(package ${packages})
   set(folder ${made}/${package})
