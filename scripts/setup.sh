@@ -16,7 +16,7 @@ packages=(
 if [[ "${1:-}" == --tests ]]; then
   packages+=(chromium clang-format fonts-dejavu-core)
   if ! command -v node >/dev/null; then packages+=(nodejs); fi  # drives the browser
-  packages+=(fish zsh)  # shells that complete commands
+  packages+=(fish lintian zsh)  # shells that complete commands; what judges packages
   # A simulator by MuJoCo, and the Python package.
   packages+=(libmujoco-dev python3-numpy python3-pandas python3-pytest)
   # Farms over Slurm and ssh, and Kubernetes' types (tests/launch).
