@@ -22,9 +22,10 @@ if(GAPFARM_SANITIZE)
   add_link_options(-fsanitize=${GAPFARM_SANITIZE})
 endif()
 
+# From the compiler's list of headers, where ccache would run the preprocessor over each source first.
 find_program(CCACHE ccache)
 if(CCACHE AND GAPFARM_CCACHE)
-  set(CMAKE_CXX_COMPILER_LAUNCHER ${CCACHE})
+  set(CMAKE_CXX_COMPILER_LAUNCHER ${CMAKE_COMMAND} -E env CCACHE_DEPEND=1 ${CCACHE})
 endif()
 
 # gapfarm_linked(TARGET OUT): this project's libraries that TARGET links, itself too if it is one.
@@ -61,25 +62,47 @@ function(gapfarm_precompile name)
   endif()
 endfunction()
 
-# gapfarm_join(TARGET [SOURCE...]): compiles the target's sources several at a time, where
-# GAPFARM_JOIN asks for it, and these each by itself.  Headers are read once a dozen sources.
-function(gapfarm_join name)
+# gapfarm_join(TARGET PARTS [SOURCE...]): compiles the target's sources in so many parts, where
+# GAPFARM_JOIN asks for it, and these each by itself.  Headers are read once a part, and what they
+# are made into (CLI11's parser, Eigen's decompositions) is compiled once a part.
+function(gapfarm_join name parts)
   if(GAPFARM_JOIN)
-    set_target_properties(${name} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 12)
+    get_target_property(sources ${name} SOURCES)
+    list(LENGTH sources count)
+    list(LENGTH ARGN separate)
+    math(EXPR batch "(${count} - ${separate} + ${parts} - 1) / ${parts}")
+    set_target_properties(${name} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE ${batch})
     set_source_files_properties(${ARGN} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
   endif()
 endfunction()
 
-# gapfarm_library(NAME SOURCES a.cc b.cc DEPS x y [SEPARATE c.cc...] [PRECOMPILE <header>...]): one
-# library a folder, sources listed by hand; SEPARATE ones define names that others define too.
+# gapfarm_cold(TARGET): the target's own code never takes the time of a run, which is spent in
+# simulations, scores and the algebra of a diagnosis, all in other libraries.  -O1 compiles in three
+# quarters of -O2's time.  No result depends on it: without -ffast-math and with contraction off,
+# floating point has the same bits at all levels (tests/unit/golden holds -O0 against -O2).
+function(gapfarm_cold name)
+  if(NOT GAPFARM_SANITIZE)
+    target_compile_options(${name} PRIVATE $<$<CONFIG:Release>:-O1>)
+  endif()
+endfunction()
+
+# gapfarm_library(NAME [COLD] [PARTS n] SOURCES a.cc b.cc DEPS x y [SEPARATE c.cc...]
+#                 [PRECOMPILE <header>...]): one library a folder, sources listed by hand; SEPARATE
+# ones define names that others define too; PARTS, where one compilation would be too long.
 function(gapfarm_library name)
-  cmake_parse_arguments(ARG "" "" "SOURCES;SEPARATE;DEPS;PRECOMPILE" ${ARGN})
+  cmake_parse_arguments(ARG "COLD" "PARTS" "SOURCES;SEPARATE;DEPS;PRECOMPILE" ${ARGN})
+  if(NOT ARG_PARTS)
+    set(ARG_PARTS 1)
+  endif()
   if(ARG_SOURCES)
     add_library(${name} STATIC ${ARG_SOURCES} ${ARG_SEPARATE})
     target_include_directories(${name} PUBLIC ${PROJECT_SOURCE_DIR} ${PROJECT_BINARY_DIR})
     target_link_libraries(${name} PUBLIC ${ARG_DEPS})
     gapfarm_precompile(${name} ${ARG_PRECOMPILE})
-    gapfarm_join(${name} ${ARG_SEPARATE})
+    gapfarm_join(${name} ${ARG_PARTS} ${ARG_SEPARATE})
+    if(ARG_COLD)
+      gapfarm_cold(${name})
+    endif()
     set_target_properties(${name} PROPERTIES GAPFARM_SEPARATE "${ARG_SEPARATE}")
   else()
     add_library(${name} INTERFACE)

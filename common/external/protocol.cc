@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "common/base/suggest.h"
+#include "common/json/json.h"
 
 namespace gapfarm {
 namespace {
@@ -41,7 +42,7 @@ Result<unsigned> read_inputs(const Json& json) {
   std::vector<std::string> known;
   for (const ExternalInputWord& row : kExternalInputWords) known.emplace_back(row.word);
   for (const Json& word : json.value("inputs", Json::array())) {
-    const std::string text = word.is_string() ? word.get<std::string>() : word.dump();
+    const std::string text = word.is_string() ? word.get<std::string>() : json_text(word);
     const auto row = std::find_if(std::begin(kExternalInputWords), std::end(kExternalInputWords),
                                   [&](const ExternalInputWord& r) { return text == r.word; });
     if (row == std::end(kExternalInputWords)) {
@@ -96,10 +97,10 @@ std::vector<double> numbers(const Json& json, std::size_t count) {
 
 }  // namespace
 
-std::string hello_line() { return Json{{"gapfarm", kExternalProtocol}}.dump(); }
+std::string hello_line() { return json_text(Json{{"gapfarm", kExternalProtocol}}); }
 
 Result<ExternalDeclaration> parse_declaration(const std::string& line) {
-  const Json json = Json::parse(line, nullptr, false);
+  const Json json = parse_json(line);
   if (!json.is_object()) return wrong("does not introduce itself with a JSON object", line);
   if (number_of(json, "gapfarm", 0) != kExternalProtocol) {
     return wrong("does not speak protocol " + std::to_string(kExternalProtocol) +
@@ -111,7 +112,7 @@ Result<ExternalDeclaration> parse_declaration(const std::string& line) {
   const Json rows = json.value("parameters", Json::array());
   if (!rows.is_array() ||
       !std::all_of(rows.begin(), rows.end(), [](const Json& row) { return row.is_object(); })) {
-    return wrong("declares parameters that are no list of objects", rows.dump());
+    return wrong("declares parameters that are no list of objects", json_text(rows));
   }
   for (const Json& row : rows) declaration.parameters.push_back(read_parameter(row));
   if (Status s = check_declaration(declaration); !s) return s.error();
@@ -145,11 +146,11 @@ std::string request_line(const ExternalRequest& request) {
                {"duration", request.duration_s}};
   if (inputs & kExternalPath) json["interval"] = request.interval_s;
   if (inputs & kExternalFloor) json["floor"] = to_json(request.floor);
-  return json.dump();
+  return json_text(json);
 }
 
 Result<ExternalAnswer> parse_answer(const std::string& line, const ExternalRequest& request) {
-  const Json json = Json::parse(line, nullptr, false);
+  const Json json = parse_json(line);
   if (!json.is_object()) return wrong("did not answer with a JSON object", line);
   const auto id = json.find("id");
   if (id == json.end() || *id != Json(request.id)) {

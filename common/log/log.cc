@@ -10,6 +10,8 @@
 #include <mutex>
 #include <nlohmann/json.hpp>
 
+#include "common/json/json.h"
+
 namespace gapfarm {
 namespace {
 
@@ -28,9 +30,7 @@ spdlog::level::level_enum spdlog_level(LogLevel level) {
   }
 }
 
-std::string json_of(const nlohmann::json& value) {
-  return value.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
-}
+std::string json_of(const nlohmann::json& value) { return json_text(value); }
 
 std::string json_of(const LogField& field) {
   return std::visit([](const auto& value) { return json_of(nlohmann::json(value)); }, field.value);

@@ -2,7 +2,6 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
-#include <boost/math/special_functions/gamma.hpp>
 #include <boost/math/tools/minima.hpp>
 #include <cmath>
 #include <cstdio>
@@ -11,6 +10,7 @@
 #include <tuple>
 
 #include "common/score/density.h"
+#include "common/score/laws.h"
 #include "common/score/motion_model.h"
 
 namespace gapfarm {
@@ -18,20 +18,20 @@ namespace {
 
 constexpr double kLeastFreedom = 1;
 constexpr double kMostFreedom = 200;
-constexpr int kRounds = 60;           // of expectation and maximisation; 20 settle
+constexpr int kStudentRounds = 60;    // of expectation and maximisation; 20 settle
 constexpr unsigned kMcdStarts = 100;  // a log of many sessions is fitted many times
 constexpr int kDigits = 12;           // bits of the freedom's logarithm
 constexpr double kLeastScale = 1e-5;  // m and rad: identical trials would have no density
 constexpr double kLeastVariance = 1e-10;
 
-using Key = std::tuple<std::string, double, double, double>;
-using Ends = std::map<Key, std::vector<Eigen::Vector3d>>;
+using CommandKey = std::tuple<std::string, double, double, double>;
+using Ends = std::map<CommandKey, std::vector<Eigen::Vector3d>>;
 
-Key key_of(const CommandSpec& c) { return {c.name, c.left, c.right, c.duration_s}; }
+CommandKey command_key(const CommandSpec& c) { return {c.name, c.left, c.right, c.duration_s}; }
 
 // Of Student's t about a place, without its scale: n dimensions at the squared distance.
 double log_t(double squared, double freedom, int n) {
-  return boost::math::lgamma((freedom + n) / 2) - boost::math::lgamma(freedom / 2) -
+  return log_gamma((freedom + n) / 2) - log_gamma(freedom / 2) -
          n / 2.0 * std::log(freedom * std::numbers::pi) -
          (freedom + n) / 2 * std::log1p(squared / freedom);
 }
@@ -59,7 +59,7 @@ struct Student {
     double squares = 0;
     for (double v : values) squares += (v - t.place) * (v - t.place);
     t.scale = std::max(kLeastScale, std::sqrt(squares / static_cast<double>(values.size())));
-    for (int round = 0; round < kRounds; ++round) {
+    for (int round = 0; round < kStudentRounds; ++round) {
       double weights = 0, sum = 0, spread = 0;
       for (double v : values) {
         const double z = (v - t.place) / t.scale;
@@ -88,7 +88,7 @@ class ConstantMotion {
  public:
   explicit ConstantMotion(const Ends& ends) {
     for (int k = 0; k < 3; ++k) {
-      std::map<Key, std::vector<double>> values;
+      std::map<CommandKey, std::vector<double>> values;
       for (const auto& [key, all] : ends) {
         for (const Eigen::Vector3d& end : all) values[key].push_back(end[k]);
       }
@@ -106,7 +106,7 @@ class ConstantMotion {
     }
   }
 
-  double log_density(const Key& key, const Eigen::Vector3d& end) const {
+  double log_density(const CommandKey& key, const Eigen::Vector3d& end) const {
     const std::array<Student, 3>& own = places_.at(key);
     double sum = 0;
     for (int k = 0; k < 3; ++k) {
@@ -117,7 +117,7 @@ class ConstantMotion {
 
  private:
   Eigen::Vector3d freedom_;
-  std::map<Key, std::array<Student, 3>> places_;
+  std::map<CommandKey, std::array<Student, 3>> places_;
 };
 
 // About each command's robust mean and covariance.
@@ -126,7 +126,7 @@ class MinedMotion {
   MinedMotion(const MotionModel& model, const Ends& ends) {
     std::vector<double> squares;
     for (const CommandMotion& motion : model.commands()) {
-      const auto own = ends.find(key_of(motion.command));
+      const auto own = ends.find(command_key(motion.command));
       if (own == ends.end()) continue;
       Eigen::Matrix3d covariance = motion.motion.covariance;
       covariance.diagonal().array() += kLeastVariance;
@@ -147,7 +147,7 @@ class MinedMotion {
     scale_ = scale_of(squares, freedom_);
   }
 
-  std::optional<double> log_density(const Key& key, const Eigen::Vector3d& end) const {
+  std::optional<double> log_density(const CommandKey& key, const Eigen::Vector3d& end) const {
     const auto factor = factors_.find(key);
     if (factor == factors_.end()) return std::nullopt;
     return log_t(factor->second.squared_distance(end) / scale_, freedom_, 3) -
@@ -158,7 +158,7 @@ class MinedMotion {
   // Factor of the covariances, of the greatest likelihood at that freedom.
   static double scale_of(const std::vector<double>& squares, double freedom) {
     double scale = 1;
-    for (int round = 0; round < kRounds; ++round) {
+    for (int round = 0; round < kStudentRounds; ++round) {
       double sum = 0;
       for (double q : squares) sum += (freedom + 3) / (freedom + q / scale) * q;
       scale = std::max(kLeastVariance, sum / (3 * static_cast<double>(squares.size())));
@@ -166,7 +166,7 @@ class MinedMotion {
     return scale;
   }
 
-  std::map<Key, Covariance3> factors_;
+  std::map<CommandKey, Covariance3> factors_;
   double freedom_ = 1;
   double scale_ = 1;
 };
@@ -191,12 +191,13 @@ Result<std::vector<BaselineScores>> baseline_scores(const TrialLog& train, const
   const auto check = MotionModel::mine(test, commands, names);
   if (!check) return check.error();
   // Ends about each command's robust mean, in the start's axes.
-  std::map<Key, Pose> about;
+  std::map<CommandKey, Pose> about;
   for (const CommandMotion& motion : mined->commands()) {
-    if (motion.trials >= kLeastBaselineTrials) about[key_of(motion.command)] = motion.motion.mean;
+    if (motion.trials >= kLeastBaselineTrials)
+      about[command_key(motion.command)] = motion.motion.mean;
   }
   const auto seen = [&](const Trial& trial) {
-    const Key key = key_of(resolved_command(trial, commands));
+    const CommandKey key = command_key(resolved_command(trial, commands));
     const Pose end = between(trial.X_WS, trial.X_WE);
     const auto mean = about.find(key);
     std::optional<Eigen::Vector3d> offset;

@@ -1,7 +1,8 @@
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 
+#include "common/score/algebra.h"
 #include "common/score/kinematic.h"
 
 namespace gapfarm {
@@ -80,7 +81,7 @@ void descend(const Problem& problem, const Eigen::VectorXd& weights, Kinematics*
       Eigen::MatrixXd damped = H;
       damped.diagonal() += damping * H.diagonal() + Eigen::VectorXd::Constant(n, 1e-9);
       Kinematics moved = *at;
-      moved.values -= damped.ldlt().solve(g);
+      moved.values -= solve_symmetric(damped, g);
       const Eigen::VectorXd next = cost_at(moved);
       better = next.squaredNorm() < r.squaredNorm();
       if (better) {

@@ -3,12 +3,12 @@
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
-#include <boost/math/distributions/chi_squared.hpp>
 #include <cassert>
 #include <cmath>
 #include <limits>
 #include <numeric>
 
+#include "common/score/laws.h"
 #include "common/score/statistics.h"
 
 namespace gapfarm {
@@ -240,8 +240,8 @@ double small_sample(const Deficit& half, const Deficit& most, double n, double s
 
 double mcd_consistency(double share, int p) {
   if (share >= 1) return 1;
-  const double q = boost::math::quantile(boost::math::chi_squared(p), share);
-  return share / boost::math::cdf(boost::math::chi_squared(p + 2), q);
+  const double q = chi_squared_quantile(p, share);
+  return share / chi_squared_below(p + 2, q);
 }
 
 double mcd_small_sample_raw(std::size_t n, int p, double share) {
@@ -283,8 +283,7 @@ RobustEstimate fast_mcd(const Eigen::MatrixXd& points, const McdSettings& settin
   fit.covariance *= mcd_consistency(share, p) * mcd_small_sample_raw(n, p, share);
   result.raw_covariance = fit.covariance;
 
-  const double cutoff =
-      boost::math::quantile(boost::math::chi_squared(p), settings.reweight_quantile);
+  const double cutoff = chi_squared_quantile(p, settings.reweight_quantile);
   const Eigen::VectorXd distances = Concentration(points, support, ridge).distances(fit);
   result.weights.resize(n);
   for (std::size_t i = 0; i < n; ++i) {

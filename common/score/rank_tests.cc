@@ -1,21 +1,16 @@
 #include "common/score/rank_tests.h"
 
 #include <algorithm>
-#include <boost/math/distributions/binomial.hpp>
-#include <boost/math/distributions/chi_squared.hpp>
-#include <boost/math/distributions/normal.hpp>
 #include <cassert>
 #include <cmath>
 #include <numeric>
+
+#include "common/score/laws.h"
 
 namespace gapfarm {
 namespace {
 
 constexpr std::size_t kExact = 30;
-
-double normal_tail(double z) {
-  return boost::math::cdf(boost::math::complement(boost::math::normal(), z));
-}
 
 // P(U <= u) without ties: the number of ways to choose a's ranks, by their sum.
 double exact_share_up_to(double u, std::size_t a, std::size_t b) {
@@ -86,7 +81,7 @@ RankTest mann_whitney(std::span<const double> a, std::span<const double> b) {
   const double variance = m * n / 12 * (total + 1 - ties / (total * (total - 1)));
   if (!(variance > 0)) return test;
   const double z = std::max(0.0, m * n / 2 - least - 0.5) / std::sqrt(variance);
-  test.p = std::min(1.0, 2 * normal_tail(z));
+  test.p = std::min(1.0, 2 * normal_above(z));
   return test;
 }
 
@@ -108,8 +103,7 @@ RankTest friedman(const std::vector<std::vector<double>>& values) {
   RankTest test;
   if (!(denominator > 1e-12)) return test;
   test.statistic = squares / denominator;
-  test.p =
-      boost::math::cdf(boost::math::complement(boost::math::chi_squared(k - 1), test.statistic));
+  test.p = chi_squared_above(k - 1, test.statistic);
   return test;
 }
 
@@ -118,11 +112,11 @@ Interval median_interval(std::span<const double> values, double coverage) {
   std::vector<double> sorted(values.begin(), values.end());
   std::sort(sorted.begin(), sorted.end());
   const std::size_t n = sorted.size();
-  const boost::math::binomial half(static_cast<double>(n), 0.5);
   // [j, n - 1 - j] holds the median unless j or fewer values lie on one side of it.
   std::size_t j = 0;
   while (j + 1 < n - 1 - j &&
-         1 - 2 * boost::math::cdf(half, static_cast<double>(j + 1)) >= coverage) {
+         1 - 2 * binomial_below(static_cast<double>(n), 0.5, static_cast<double>(j + 1)) >=
+             coverage) {
     ++j;
   }
   return {sorted[j], sorted[n - 1 - j]};
@@ -131,7 +125,7 @@ Interval median_interval(std::span<const double> values, double coverage) {
 Interval wilson_interval(std::size_t successes, std::size_t trials, double coverage) {
   assert(successes <= trials);
   if (trials == 0) return {0, 1};
-  const double z = boost::math::quantile(boost::math::normal(), (1 + coverage) / 2);
+  const double z = normal_quantile((1 + coverage) / 2);
   const auto n = static_cast<double>(trials);
   const double share = static_cast<double>(successes) / n;
   const double centre = (share + z * z / (2 * n)) / (1 + z * z / n);

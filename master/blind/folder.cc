@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "common/json/json.h"
 #include "common/trials/files.h"
 #include "master/diagnose/aliases.h"
 
@@ -41,7 +42,7 @@ Status write_outcome(const ChildEnd& end, const std::string& path) {
                      {"status", end.status},
                      {"wall_s", end.wall_s},
                      {"text", end.text}};
-  return write_file_atomically(path, json.dump(1) + "\n");
+  return write_file_atomically(path, json_text(json, 1) + "\n");
 }
 
 // A diagnosis that was cut short goes on with what it simulated; nothing else of it stays.
@@ -68,13 +69,13 @@ Status write_check_state(const CheckState& state, const std::string& path) {
                      {"made_of", state.made_of},
                      {"asked", state.asked},
                      {"out_of_reach", out_of_reach}};
-  return write_file_atomically(path, json.dump(1) + "\n");
+  return write_file_atomically(path, json_text(json, 1) + "\n");
 }
 
 Result<CheckState> read_check_state(const std::string& path) {
   const Result<std::string> text = read_text_file(path);
   if (!text) return text.error();
-  const Json json = Json::parse(*text, nullptr, false);
+  const Json json = parse_json(*text);
   if (!json.is_object() || !json.value("made_of", Json()).is_string()) {
     return Error{path + ": is not the state of a blind check; choose another --out"};
   }
@@ -126,7 +127,7 @@ Status diagnose_cases(const std::vector<OpenCase>& cases, const CheckPaths& path
 
 ChildEnd read_outcome(const std::string& path) {
   const Result<std::string> text = read_text_file(path);
-  const Json json = text ? Json::parse(*text, nullptr, false) : Json();
+  const Json json = text ? parse_json(*text) : Json();
   ChildEnd end;
   if (!json.is_object()) {
     end.state = ChildState::kFailed;

@@ -5,6 +5,8 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "common/json/json.h"
+
 namespace gapfarm {
 namespace {
 
@@ -40,12 +42,12 @@ SaidEffect said_effect(const Json& json) {
 }  // namespace
 
 Result<Said> parse_said(const std::string& text, const std::string& file) {
-  const Json json = Json::parse(text, nullptr, false);
+  const Json json = parse_json(text);
   if (!json.is_object()) return Error{file + ": is not a JSON object, expected a diagnosis"};
   static constexpr const char* kVerdicts[] = {"effect", "none", "unknown", "effect+unknown"};
   const Json verdict = json.value("verdict", Json());
   if (std::find(std::begin(kVerdicts), std::end(kVerdicts), verdict) == std::end(kVerdicts)) {
-    return Error{file + ": \"verdict\" is " + verdict.dump() +
+    return Error{file + ": \"verdict\" is " + json_text(verdict) +
                  ", expected \"effect\", \"none\", \"unknown\" or \"effect+unknown\""};
   }
   Said said;
@@ -53,7 +55,7 @@ Result<Said> parse_said(const std::string& text, const std::string& file) {
   const Json effects = json.value("effects", Json::array());
   for (const Json& effect : effects) {
     if (!effect.is_object() || !effect.value("name", Json()).is_string()) {
-      return Error{file + ": \"effects\" holds " + effect.dump() +
+      return Error{file + ": \"effects\" holds " + json_text(effect) +
                    ", expected objects with a name"};
     }
     said.effects.push_back(said_effect(effect));

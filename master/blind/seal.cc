@@ -13,6 +13,8 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "common/json/json.h"
+
 namespace gapfarm {
 namespace {
 
@@ -114,7 +116,7 @@ std::string TruthKey::close_box(const std::vector<SealedTruth>& truths) const {
   for (const SealedTruth& t : truths) {
     json.push_back({{"id", t.id}, {"salt", t.salt}, {"truth", t.truth}});
   }
-  const std::string plain = json.dump();
+  const std::string plain = json_text(json);
   std::string box(crypto_secretbox_NONCEBYTES + crypto_secretbox_MACBYTES + plain.size(), '\0');
   auto* bytes = reinterpret_cast<unsigned char*>(box.data());
   randombytes_buf(bytes, crypto_secretbox_NONCEBYTES);
@@ -136,7 +138,7 @@ Result<std::vector<SealedTruth>> TruthKey::open_box(std::string_view box,
                                  cipher.size(), raw(box), bytes_.data()) != 0) {
     return closed;
   }
-  const Json json = Json::parse(plain, nullptr, false);
+  const Json json = parse_json(plain);
   std::vector<SealedTruth> truths;
   for (const Json& t : json) truths.push_back({t["id"], t["salt"], t["truth"]});
   return truths;

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "common/json/json.h"
 #include "common/trials/csv.h"
 
 namespace gapfarm {
@@ -98,7 +99,7 @@ Json case_json(const ScoredCase& c) {
                {"said", c.said ? said_json(*c.said) : Json()}};
   if (!c.end.text.empty()) json["outcome_text"] = c.end.text;
   if (!c.has_truth) return json;
-  json["truth"] = Json::parse(format_truth(c.truth));
+  json["truth"] = parse_json(format_truth(c.truth));
   json["right"] = c.judgement.right;
   json["why"] = c.judgement.why;
   Json coverage = Json::array();
@@ -271,7 +272,7 @@ std::string format_blind_json(const BlindReport& report) {
                      {"confusion", sum.confusion},
                      {"out_of_reach", out_of_reach},
                      {"cases", cases}};
-  return json.dump(1) + "\n";
+  return json_text(json, 1) + "\n";
 }
 
 std::string format_blind_markdown(const BlindReport& report) {

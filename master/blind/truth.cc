@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "common/json/json.h"
+
 namespace gapfarm {
 namespace {
 
@@ -82,18 +84,18 @@ std::string format_truth(const Truth& truth) {
                      {"level", truth.level},      {"left_out", truth.left_out},
                      {"robot", truth.robot},      {"seed", truth.seed},
                      {"answer", answer_of(truth)}};
-  return json.dump(1) + "\n";
+  return json_text(json, 1) + "\n";
 }
 
 Result<Truth> parse_truth(const std::string& text, const std::string& file, const std::string& id) {
-  const Json json = Json::parse(text, nullptr, false);
+  const Json json = parse_json(text);
   if (!json.is_object()) return wrong(file, "is not a JSON object");
   const Json answer = json.value("answer", Json());
   const Json effects = json.value("effects", Json());
   if (answer != "none" && answer != "effect" && answer != "unknown") {
-    return wrong(file, "\"answer\" is " + answer.dump());
+    return wrong(file, "\"answer\" is " + json_text(answer));
   }
-  if (!effects.is_object()) return wrong(file, "\"effects\" is " + effects.dump());
+  if (!effects.is_object()) return wrong(file, "\"effects\" is " + json_text(effects));
   if (answer == "effect" && effects.empty()) return wrong(file, "\"effects\" is empty");
   Truth truth;
   truth.id = json.value("case", Json()).is_string() ? json["case"].get<std::string>() : id;

@@ -33,16 +33,6 @@ struct BlindCheckOptions {
   bool resume = false, strengths = false;
 };
 
-std::string command_line() {
-  const Result<std::string> bytes = read_text_file("/proc/self/cmdline");
-  if (!bytes) return "gapfarm blind-check";
-  std::string text = *bytes;
-  if (!text.empty() && text.back() == '\0') text.pop_back();
-  std::replace(text.begin(), text.end(), '\0', ' ');
-  const std::size_t slash = text.substr(0, text.find(' ')).rfind('/');
-  return slash == text.npos ? text : text.substr(slash + 1);
-}
-
 Result<DesignSettings> design_of(const BlindCheckOptions& options, const Config& config) {
   if (Status s = check_effects(config.problem.table(), options.effects); !s) return s.error();
   DesignSettings design;
@@ -91,7 +81,7 @@ DiagnoseSettings diagnose_of(const BlindCheckOptions& options) {
 }
 
 // Diagnoses take by far the most.
-std::vector<ProgressStage> stages() {
+std::vector<ProgressStage> blind_check_stages() {
   return {{"find strengths", 4}, {"drive the cases", 1}, {"diagnose", 94}, {"judge", 1}};
 }
 
@@ -240,7 +230,7 @@ int run_blind(const BlindCheckOptions& options, CliContext& context) {
       {"seed", std::to_string(config->seed)}};
   settings.asked = asked(options, config->text);
   const KeepingPlace place{options.out, /*passing=*/false, /*forget=*/true};
-  if (Status s = LongCommand::begin("blind-check", place, stages(), context); !s) {
+  if (Status s = LongCommand::begin("blind-check", place, blind_check_stages(), context); !s) {
     return failed(s.error(), context);
   }
   const BlindCheckHooks hooks = hooks_of(options, *config, context);

@@ -9,6 +9,8 @@
 #include <cstdlib>
 #include <nlohmann/json.hpp>
 
+#include "common/json/json.h"
+
 namespace gapfarm {
 namespace {
 
@@ -50,7 +52,7 @@ Console::~Console() { clear_progress(); }
 void Console::result(std::string_view text, const nlohmann::ordered_json& value) {
   if (!json_) return print(text);
   // What comes from a log's text may be anything.
-  print(value.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n");
+  print(json_text(value, 2) + "\n");
 }
 
 int Console::end(int exit_code) {

@@ -9,6 +9,7 @@
 #include <set>
 
 #include "common/base/build_info.h"
+#include "common/json/json.h"
 #include "common/problem/run_files.h"
 #include "common/robot/robot_file.h"
 #include "master/cli/diagnose_command.h"
@@ -74,7 +75,7 @@ std::string diagnosis_summary(const Diagnosis& d) {
 // diagnosis.json without its trials.
 nlohmann::ordered_json diagnosis_summary_json(const Diagnosis& diagnosis,
                                               const DiagnoseCommand& command) {
-  auto json = nlohmann::ordered_json::parse(to_json(diagnosis), nullptr, false);
+  auto json = parse_json(to_json(diagnosis));
   json.erase("trials");
   json["out"] = command.out;
   return json;
@@ -168,7 +169,7 @@ Status plan_outputs(DiagnoseCommand& command, const Config& config, const Questi
   return {};
 }
 
-std::vector<ProgressStage> stages() {
+std::vector<ProgressStage> diagnosis_stages() {
   std::vector<ProgressStage> all;
   for (const DiagnosisStage& stage : kDiagnosisStages) all.push_back({stage.name, stage.share});
   return all;
@@ -218,7 +219,7 @@ int run_diagnose(DiagnoseCommand& command, CliContext& context) {
     return run_diagnose_ground(command, *config, format_stamp(stamp), context);
   }
   // Every simulation goes into the folder: what a figure rests on can be looked up.
-  if (Status s = LongCommand::begin("diagnose", {command.out}, stages(), context); !s) {
+  if (Status s = LongCommand::begin("diagnose", {command.out}, diagnosis_stages(), context); !s) {
     return failed(s.error(), context);
   }
   const auto page = open_page(command.page, command.out, context);

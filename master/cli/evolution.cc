@@ -6,6 +6,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "common/json/json.h"
 #include "master/cli/baseline_notes.h"
 #include "master/cli/evolution_farm.h"
 #include "master/cli/leave_behind.h"
@@ -182,12 +183,12 @@ std::string EvolutionOverrides::to_json() const {
   if (time_s) json["time_s"] = *time_s;
   if (target_fitness) json["target_fitness"] = *target_fitness;
   if (population) json["population"] = *population;
-  return json.dump();
+  return json_text(json);
 }
 
 EvolutionOverrides EvolutionOverrides::from_json(const std::string& text) {
   EvolutionOverrides overrides;
-  const Json json = Json::parse(text, nullptr, false);
+  const Json json = parse_json(text);
   if (!json.is_object()) return overrides;
   const auto read = [&](const char* key, auto& to) {
     using Value = typename std::decay_t<decltype(to)>::value_type;

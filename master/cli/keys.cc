@@ -21,7 +21,7 @@ struct KeysOptions {
   bool worker_only = false;
 };
 
-std::string host_name() {
+std::string key_name_of_host() {
   char name[65] = {};
   if (gethostname(name, sizeof name - 1) != 0 || !is_key_name(name)) return "worker";
   return name;
@@ -62,7 +62,7 @@ int run_make(const KeysOptions& options, CliContext& context) {
   if (!folder) return failed_with(folder.error(), context);
   if (folder->has_pair("worker")) console.note("worker.key is there already and stays");
   const Result<KeyPair> worker =
-      worker_pair(*folder, options.name.empty() ? host_name() : options.name);
+      worker_pair(*folder, options.name.empty() ? key_name_of_host() : options.name);
   if (!worker) return failed_with(worker.error(), context);
   if (options.worker_only) {
     console.result("made the key of worker '" + worker->name + "' in " + folder->path() +

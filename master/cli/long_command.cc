@@ -9,6 +9,7 @@
 
 #include "common/base/build_info.h"
 #include "common/base/hash.h"
+#include "common/json/json.h"
 #include "common/trials/files.h"
 #include "master/cli/subcommand.h"
 
@@ -17,7 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kWriteInterval_s = 1;  // each costs a disk write
+constexpr double kRecordInterval_s = 1;  // each costs a disk write
 
 // Words of this process's command line, without the program.
 std::vector<std::string> own_arguments() {
@@ -34,12 +35,6 @@ std::vector<std::string> own_arguments() {
   }
   if (!words.empty()) words.erase(words.begin());
   return words;
-}
-
-std::string command_line() {
-  std::string text = "gapfarm";
-  for (const std::string& word : own_arguments()) text += " " + word;
-  return text;
 }
 
 // How many workers and how loud changes nothing of what is asked; cheap to leave at that.
@@ -60,6 +55,17 @@ std::string state_of(int exit_code) {
 bool present(const WorkerStatus& worker) { return worker.state != "gone"; }
 
 }  // namespace
+
+double unix_now_s() {
+  const auto now = std::chrono::system_clock::now().time_since_epoch();
+  return std::chrono::duration<double>(now).count();
+}
+
+std::string command_line() {
+  std::string text = "gapfarm";
+  for (const std::string& word : own_arguments()) text += " " + word;
+  return text;
+}
 
 void KeepOption::declare(CLI::App& app) {
   app.add_option("--keep", folder,
@@ -276,7 +282,7 @@ void LongCommand::show(bool news) {
   const ProgressView view = progress_.at(steady_now_s());
   console_.progress(record_.command + ": " + (waiting_.empty() ? progress_words(view) : waiting_),
                     news);
-  if (steady_now_s() - written_s_ >= kWriteInterval_s) write_record();
+  if (steady_now_s() - written_s_ >= kRecordInterval_s) write_record();
 }
 
 void LongCommand::write_record() {
@@ -300,7 +306,7 @@ void LongCommand::write_record() {
   }
   record_.heartbeat_unix_s = unix_now_s();
   // A courtesy: the command goes on when it cannot be written.
-  const auto text = to_json(record_).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+  const auto text = json_text(to_json(record_));
   if (Status s = answers_->set_command(text); !s) console_.error(s.error());
 }
 

@@ -22,6 +22,12 @@ namespace gapfarm {
 
 struct CliContext;
 
+// Seconds since 1970.
+double unix_now_s();
+
+// What this process was called with: "gapfarm diagnose ...".
+std::string command_line();
+
 // Where a command keeps what it simulated.
 struct KeepingPlace {
   std::filesystem::path folder;

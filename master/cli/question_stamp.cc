@@ -2,6 +2,7 @@
 
 #include <filesystem>
 
+#include "common/json/json.h"
 #include "common/trials/files.h"
 
 namespace gapfarm {
@@ -17,7 +18,7 @@ std::string word(const Json& json, const char* key) {
 Result<QuestionStamp> read_stamp(const std::string& file) {
   const auto text = read_text_file(file);
   if (!text) return text.error();
-  const Json json = Json::parse(*text, nullptr, false);
+  const Json json = parse_json(*text);
   if (!json.is_object() || word(json, "problem").empty()) {
     return Error{file + ": does not say what was asked; choose another --out"};
   }
@@ -56,7 +57,7 @@ std::string format_stamp(const QuestionStamp& stamp) {
                      {"options", stamp.options},
                      {"about", stamp.about},
                      {"build", stamp.build}};
-  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+  return json_text(json, 2) + "\n";
 }
 
 Result<FolderState> compare_stamp(const std::string& folder, const std::string& result,

@@ -26,7 +26,7 @@ constexpr std::size_t kMostEvents = 20000;  // that are read
 constexpr std::size_t kMostCounts = 2000;
 constexpr std::size_t kMostMarks = 300;
 constexpr std::size_t kMostSpans = 40;
-constexpr std::size_t kMostWorkers = 200;  // in the table
+constexpr std::size_t kMostRows = 200;  // in the table
 
 // Every count of a farm, for people.
 constexpr std::pair<std::uint64_t FarmTally::*, const char*> kTallyWords[] = {
@@ -158,7 +158,7 @@ Status add_workers(const RunReader& reader, bool running, RunFarm* farm) {
     if (is_failure(*it)) farm->failures.push_back(sentence_of(*it));
   }
   for (const StoredWorker& w : progress->workers) {
-    if (farm->workers.size() == kMostWorkers) break;
+    if (farm->workers.size() == kMostRows) break;
     const auto failure = failures.find(w.name);
     // Whoever is not watched any more is neither busy nor idle.
     farm->workers.push_back(

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "common/json/json.h"
 #include "common/score/motion_model.h"
 #include "master/cli/inputs.h"
 #include "master/cli/run_model.h"
@@ -165,7 +166,7 @@ Result<std::string> DriveShower::show(const DriveQuestion& question) {
                                         : "Faint: no path was measured, an arc joins the start to "
                                           "the measured end.");
   if (shown_.size() >= kMostKept) shown_.clear();
-  return shown_[key] = json.dump();
+  return shown_[key] = json_text(json);
 }
 
 }  // namespace gapfarm

@@ -5,6 +5,8 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "common/json/json.h"
+#include "master/cli/long_command.h"
 #include "master/cli/status_view.h"
 #include "master/cli/subcommand.h"
 #include "master/store/run_lock.h"
@@ -59,9 +61,7 @@ void show(const Look& seen, const StatusOptions& options, Console& console) {
   if (console.json()) {
     // Watched: one line a look, for `jq` and the like.
     const int indent = options.watch ? -1 : 2;
-    console.print(
-        seen.json.dump(indent, ' ', false, nlohmann::ordered_json::error_handler_t::replace) +
-        "\n");
+    console.print(json_text(seen.json, indent) + "\n");
     return;
   }
   if (options.watch && console.out_is_terminal()) console.print("\x1b[H\x1b[2J");

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "common/json/json.h"
+
 namespace gapfarm {
 namespace {
 
@@ -23,7 +25,7 @@ std::string label(const Console& console, const std::string& name) {
 
 std::string best_values(const RunStatus& status, const Console& console) {
   if (!status.best_individual) return {};
-  const auto values = nlohmann::ordered_json::parse(status.best_individual->values, nullptr, false);
+  const auto values = parse_json(status.best_individual->values);
   if (!values.is_object() || values.empty()) return {};
   std::size_t widest = 0, shown = 0;
   for (const auto& [key, value] : values.items()) widest = std::max(widest, key.size());
@@ -36,7 +38,7 @@ std::string best_values(const RunStatus& status, const Console& console) {
     }
     const std::string shown_value =
         value.is_number_float() ? format_number(value.get<double>())
-                                : (value.is_string() ? value.get<std::string>() : value.dump());
+                                : (value.is_string() ? value.get<std::string>() : json_text(value));
     text += label(console, shown == 1 ? "best" : "") + printable(key) +
             std::string(widest - key.size() + 2, ' ') + printable(shown_value) + "\n";
   }

@@ -2,13 +2,13 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/QR>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <iterator>
 
 #include "common/random/stream.h"
+#include "common/score/algebra.h"
 
 namespace gapfarm {
 namespace {
@@ -74,7 +74,7 @@ Quadratic fit(const Eigen::MatrixXd& offsets, const Eigen::VectorXd& values,
   for (Eigen::Index i = 0; i < offsets.rows(); ++i) {
     design.row(i) = features(offsets.row(i).transpose());
   }
-  const Eigen::VectorXd b = design.colPivHouseholderQr().solve(values);
+  const Eigen::VectorXd b = least_squares(design, values);
   Quadratic q;
   q.gradient = b.segment(1, n).cwiseQuotient(widths);
   q.hessian.resize(n, n);
@@ -258,12 +258,12 @@ class Study {
   }
 
   void read_off(const Quadratic& quadratic) {
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(-quadratic.hessian);
-    report_.curvatures = axes.eigenvalues();
-    report_.directions = axes.eigenvectors();
+    const SymmetricAxes axes = axes_of_symmetric(-quadratic.hessian);
+    report_.curvatures = axes.values;
+    report_.directions = axes.vectors;
     const Eigen::VectorXd stiff = report_.curvatures.cwiseMax(kFlat_nats);
     const Eigen::MatrixXd covariance =
-        axes.eigenvectors() * stiff.cwiseInverse().asDiagonal() * axes.eigenvectors().transpose();
+        axes.vectors * stiff.cwiseInverse().asDiagonal() * axes.vectors.transpose();
     // Where the quadratic has its top, seen from the centre.
     const Eigen::VectorXd top = covariance * quadratic.gradient;
     const Eigen::VectorXd reach = 3 * covariance.diagonal().cwiseSqrt() + widths_;

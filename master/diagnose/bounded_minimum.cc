@@ -1,7 +1,9 @@
 #include "master/diagnose/bounded_minimum.h"
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <vector>
+
+#include "common/score/algebra.h"
 
 namespace gapfarm {
 namespace {
@@ -18,7 +20,7 @@ Eigen::VectorXd solve_free(const Eigen::MatrixXd& a, const Eigen::VectorXd& b,
   if (open.empty()) return x;
   const Eigen::VectorXd right = b(open) - a(open, held) * x(held);
   const Eigen::MatrixXd among = a(open, open);
-  x(open) = Eigen::VectorXd(among.ldlt().solve(right));
+  x(open) = solve_symmetric(among, right);
   return x;
 }
 

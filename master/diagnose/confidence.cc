@@ -1,8 +1,9 @@
 #include "master/diagnose/confidence.h"
 
 #include <algorithm>
-#include <boost/math/distributions/beta.hpp>
 #include <cmath>
+
+#include "common/score/laws.h"
 
 namespace gapfarm {
 namespace {
@@ -18,11 +19,11 @@ constexpr Counts kRightDoubts = {121, 121};   // 11 logs, each the wrong way rou
 constexpr double kTail = 0.05;
 
 // Of the posterior after Jeffreys's prior; it leaves room however good the record is.
-boost::math::beta_distribution<> posterior(const Counts& c) {
-  return {c.hits + 0.5, c.of - c.hits + 0.5};
+double posterior(const Counts& c, double share) {
+  return beta_quantile(c.hits + 0.5, c.of - c.hits + 0.5, share);
 }
-double at_least(const Counts& c) { return boost::math::quantile(posterior(c), kTail); }
-double at_most(const Counts& c) { return boost::math::quantile(posterior(c), 1 - kTail); }
+double at_least(const Counts& c) { return posterior(c, kTail); }
+double at_most(const Counts& c) { return posterior(c, 1 - kTail); }
 
 }  // namespace
 

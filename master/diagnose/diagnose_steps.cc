@@ -3,10 +3,10 @@
 #include "master/diagnose/diagnose_steps.h"
 
 #include <algorithm>
-#include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
 
 #include "common/pose/segment.h"
+#include "common/score/laws.h"
 #include "common/score/statistics.h"
 #include "master/diagnose/digits.h"
 #include "master/diagnose/drive_noise.h"
@@ -239,8 +239,7 @@ void DiagnosisRun::fill_screening(const std::vector<EffectCandidate>& candidates
     if (gain.dimensions == 0) {
       row.note = "cannot be seen in this log: the base model absorbs all that it would do";
     } else {
-      row.p = boost::math::cdf(
-          boost::math::complement(boost::math::chi_squared(gain.dimensions), gain.squares));
+      row.p = chi_squared_above(gain.dimensions, gain.squares);
     }
     Overrides start;
     const auto values = start_values(study_, *base_, s);

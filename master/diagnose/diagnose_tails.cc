@@ -14,11 +14,11 @@ namespace {
 
 // Fourth moment of whitened residuals over their squared second: 3 of a Gaussian, with a sampling
 // error of 0.12 on 600 trials.
-constexpr double kWorthFitting = 3.6;
+constexpr double kTailsWorthFitting = 3.6;
 // Nats over all trials that two tail weights must gain; Gaussian residuals stay below 6, 155 drives
 // of a real robot gain 13.
 constexpr double kLeastTailGain = 10;
-constexpr int kMostRounds = 6;  // of a fit that does not settle
+constexpr int kMostTailRounds = 6;  // of a fit that does not settle
 
 }  // namespace
 
@@ -31,7 +31,7 @@ std::optional<double> DiagnosisRun::fit_tails() {
   if (!subject_.drive_tail || !subject_.pose_tail) return std::nullopt;
   const double share = problem_.fitness.outlier_share;
   Study clean = nested_studies_.back();
-  if (residual_kurtosis(clean.whiten(nested_.back().residuals)) < kWorthFitting)
+  if (residual_kurtosis(clean.whiten(nested_.back().residuals)) < kTailsWorthFitting)
     return std::nullopt;
   const auto fit = [&](const Study& study, const std::vector<Eigen::Vector3d>& residuals,
                        bool tails) {
@@ -68,8 +68,8 @@ Status DiagnosisRun::fit_correction() {
     if (effect.empty() || names.count(effect) > 0) start[row] = value;
   }
   const Eigen::MatrixXd none(static_cast<Eigen::Index>(3 * study_.size()), 0);
-  auto fit =
-      fit_jointly(predictor_, study_, effects, start, BaseParameters::kFitted, none, kMostRounds);
+  auto fit = fit_jointly(predictor_, study_, effects, start, BaseParameters::kFitted, none,
+                         kMostTailRounds);
   if (!fit && fit.error().code == ErrorCode::kSimulation) return Status{};
   if (!fit) return fit.error();
   std::string name;

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <type_traits>
 
+#include "common/json/json.h"
 #include "master/diagnose/json_fields.h"
 #include "master/sanity/words.h"
 
@@ -298,28 +299,28 @@ Json summary_json(const Diagnosis& diagnosis) {
 }
 
 std::string to_json(const Diagnosis& diagnosis) {
-  std::string text = dump_json(summary_json(diagnosis), 2);
+  std::string text = json_text(summary_json(diagnosis), 2);
   text.resize(text.size() - 2);  // the closing "\n}", so that the trials follow, a line each
   const Json table = trials_json(diagnosis);
-  text += ",\n  \"trials\": {\n    \"columns\": " + dump_json(table["columns"], -1) +
-          ",\n    \"rows\": [";
+  text +=
+      ",\n  \"trials\": {\n    \"columns\": " + json_text(table["columns"]) + ",\n    \"rows\": [";
   const char* separator = "\n";
   for (const Json& row : table["rows"]) {
-    text += separator + ("      " + dump_json(row, -1));
+    text += separator + ("      " + json_text(row));
     separator = ",\n";
   }
   return text + "\n    ]\n  }\n}\n";
 }
 
 Result<Diagnosis> parse_diagnosis(std::string_view text) {
-  const Json json = Json::parse(text, nullptr, false);
+  const Json json = parse_json(text);
   if (json.is_discarded()) return Error{"diagnosis.json: not JSON; is the file complete?"};
   std::string error;
   Fields root(json, "", error);
   double version = 0;
   root.read("version", version);
   if (error.empty() && version != kVersion) {
-    return Error{"diagnosis.json: version is " + dump_json(json["version"], -1) +
+    return Error{"diagnosis.json: version is " + json_text(json["version"]) +
                  ", this program reads version " + std::to_string(kVersion)};
   }
   Diagnosis diagnosis;

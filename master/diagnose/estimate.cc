@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/score/algebra.h"
 #include "common/score/density.h"
 #include "master/diagnose/bounded_minimum.h"
 #include "master/diagnose/seam.h"
@@ -188,8 +189,7 @@ void step(const Problem& problem, const Study& study, const Eigen::MatrixXd& nui
                 all.transpose() * weight.asDiagonal() * z};
   normal.matrix.diagonal().tail(q).array() += 1;
   add_prior(study, *fit, &normal);
-  const Eigen::LDLT<Eigen::MatrixXd> factor(normal.matrix);
-  const Eigen::MatrixXd inverse = factor.solve(Eigen::MatrixXd::Identity(p + q, p + q));
+  const Eigen::MatrixXd inverse = inverse_of_symmetric(normal.matrix);
   Eigen::VectorXd lower = Eigen::VectorXd::Constant(p + q, -INFINITY), upper = -lower;
   for (Eigen::Index k = 0; k < p; ++k) {
     const FittedParameter& parameter = fit->parameters[static_cast<std::size_t>(k)];
@@ -218,7 +218,7 @@ double misfit_of(const Study& study, const JointFit& fit, const Eigen::MatrixXd&
   Eigen::MatrixXd normal = nuisances.transpose() * weight.asDiagonal() * nuisances;
   normal.diagonal().array() += 1;
   const Eigen::VectorXd taken =
-      normal.ldlt().solve(nuisances.transpose() * weight.asDiagonal() * z);
+      solve_symmetric(normal, nuisances.transpose() * weight.asDiagonal() * z);
   const Eigen::VectorXd left = z - nuisances * taken;
   double sum = taken.squaredNorm();
   for (Eigen::Index i = 0; i < left.size() / 3; ++i) {
@@ -243,7 +243,7 @@ std::map<std::string, double> start_values(const Study& study, const Regression&
   const Eigen::MatrixXd normal = columns.transpose() * columns;
   Eigen::MatrixXd ridged = normal;
   ridged.diagonal() *= 1 + 1e-6;
-  const Eigen::VectorXd c = ridged.ldlt().solve(columns.transpose() * data);
+  const Eigen::VectorXd c = solve_symmetric(ridged, columns.transpose() * data);
   std::map<std::string, double> values = signature.fixed;
   const std::string& e = signature.effect;
   const Polar* polar = polar_of(e);
@@ -345,7 +345,7 @@ std::vector<Eigen::Vector3d> held_out_residuals(const Study& study, const JointF
       normal.right += weight * rows.transpose() * z.segment<3>(at);
     }
     add_prior(study, fit, &normal);
-    const Eigen::VectorXd delta = normal.matrix.ldlt().solve(normal.right);
+    const Eigen::VectorXd delta = solve_symmetric(normal.matrix, normal.right);
     for (std::size_t i = 0; i < study.size(); ++i) {
       if (fold_of[i] != f) continue;
       const auto at = static_cast<Eigen::Index>(3 * i);

@@ -13,8 +13,6 @@
 namespace gapfarm {
 namespace {
 
-constexpr int kSectors = 12;
-constexpr std::size_t kFewTrials = 60;
 constexpr double kFewInCell = 4;
 
 const EffectWordsByName& robot_effect_words() {
@@ -266,7 +264,7 @@ LogVariety log_variety(std::span<const ResidualTrial> trials, std::span<const Ce
     durations.insert(std::lround(1000 * cells[t.cell].command.duration_s));
     levels.insert(std::lround(1000 * cells[t.cell].level));
     const double turn = (t.X_WS.theta + std::numbers::pi) / (2 * std::numbers::pi);
-    sectors.insert(static_cast<int>(std::floor(turn * kSectors)) % kSectors);
+    sectors.insert(static_cast<int>(std::floor(turn * kHeadingSectors)) % kHeadingSectors);
     x0 = std::min(x0, t.X_WS.x), x1 = std::max(x1, t.X_WS.x);
     y0 = std::min(y0, t.X_WS.y), y1 = std::max(y1, t.X_WS.y);
     v.longest_min = std::max(v.longest_min, t.context.session_time_s / 60);
@@ -329,9 +327,10 @@ std::vector<std::string> cautions(std::span<const ResidualTrial> trials,
                                   std::span<const Cell> cells, const TrialLog& log) {
   const LogVariety v = log_variety(trials, cells, log);
   std::vector<std::string> text;
-  if (v.trials < kFewTrials) {
+  if (v.trials < kFewTrialsToTell) {
     text.push_back("There " + std::string(v.trials == 1 ? "is " : "are ") +
-                   counted(v.trials, "trial", "trials") + "; below " + std::to_string(kFewTrials) +
+                   counted(v.trials, "trial", "trials") + "; below " +
+                   std::to_string(kFewTrialsToTell) +
                    " only large effects show, and no claim is sure.");
   }
   if (v.trials == 0) return text;

@@ -15,6 +15,10 @@
 
 namespace gapfarm {
 
+// Drives go in so many directions at most, and fewer trials tell little.
+inline constexpr int kHeadingSectors = 12;
+inline constexpr std::size_t kFewTrialsToTell = 60;
+
 // "3.14" to three significant digits, without trailing zeros and exponents where it can be read.
 std::string plain_number(double value);
 // "a", "a and b", "a, b and c".

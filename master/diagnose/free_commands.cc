@@ -11,11 +11,11 @@
 namespace gapfarm {
 namespace {
 
-constexpr std::size_t kRepeats = 4;       // trials of a cell that make its mean worth something
+constexpr std::size_t kFreedRepeats = 4;  // trials of a cell that make its mean worth something
 constexpr double kFreeShare = 1.0 / 3.0;  // of the trials
 constexpr double kWayTrust = 1e-3;        // of the duties' word on the way, beside the ends'
 // Speed at which the misfits of starting and stopping were measured, m/s.
-constexpr double kMeasuredSpeed = 0.28;
+constexpr double kFreedSpeed = 0.28;
 
 // A command seen along and across: both sides together, and against each other.
 struct Duties {
@@ -105,7 +105,7 @@ bool commands_are_free(std::span<const Cell> cells) {
   std::size_t trials = 0, few = 0;
   for (const Cell& cell : cells) {
     trials += cell.trials;
-    if (cell.trials < kRepeats) few += cell.trials;
+    if (cell.trials < kFreedRepeats) few += cell.trials;
   }
   return static_cast<double>(few) > kFreeShare * static_cast<double>(trials);
 }
@@ -181,7 +181,7 @@ std::vector<Eigen::VectorXd> smooth_misfits(const Study& study) {
       },
       factors);
   for (const auto& carry : {at_start, at_end}) {
-    const double scale = speed / kMeasuredSpeed;
+    const double scale = speed / kFreedSpeed;
     const auto ahead = [&](std::size_t, const Duties& d) { return 0.0015 * scale * d.drive; };
     const auto aside = [&](std::size_t, const Duties& d) {
       return 0.006 * scale * d.drive * d.turn;

@@ -8,11 +8,9 @@
 #include <string>
 #include <vector>
 
-namespace gapfarm {
+#include "common/json/json.h"
 
-inline std::string dump_json(const nlohmann::ordered_json& json, int indent) {
-  return json.dump(indent, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
-}
+namespace gapfarm {
 
 // Reads fields of one object; the first thing that does not fit is kept as a sentence.
 class Fields {
@@ -52,7 +50,7 @@ class Fields {
 
   std::string name(const std::string& key) const { return path_.empty() ? key : path_ + "." + key; }
   void complain(const std::string& key, const nlohmann::ordered_json& found, const char* expected) {
-    fail(name(key) + " is " + dump_json(found, -1).substr(0, 60) + ", expected " + expected);
+    fail(name(key) + " is " + json_text(found).substr(0, 60) + ", expected " + expected);
   }
   std::string& error() { return error_; }
 

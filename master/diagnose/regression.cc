@@ -1,7 +1,9 @@
 #include "master/diagnose/regression.h"
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <cmath>
+
+#include "common/score/algebra.h"
 
 namespace gapfarm {
 namespace {
@@ -16,8 +18,7 @@ Regression::Regression(const Eigen::MatrixXd& nuisances, const Eigen::VectorXd& 
   const Eigen::Index k = nuisances.cols();
   Eigen::MatrixXd all(rows_ + k, k);
   all << nuisances, Eigen::MatrixXd::Identity(k, k);
-  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(all);
-  basis_ = qr.householderQ() * Eigen::MatrixXd::Identity(rows_ + k, k);
+  basis_ = orthonormal(all);
   restart(data);
 }
 
@@ -43,12 +44,12 @@ Eigen::MatrixXd Regression::cut(const Eigen::MatrixXd& columns) const {
 Gain Regression::gain(const Eigen::MatrixXd& columns) const {
   const Eigen::MatrixXd c = cut(columns);
   if (c.cols() == 0) return {};
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(c.transpose() * c);
-  const Eigen::VectorXd b = eigen.eigenvectors().transpose() * (c.transpose() * left_);
+  const SymmetricAxes eigen = axes_of_symmetric(c.transpose() * c);
+  const Eigen::VectorXd b = eigen.vectors.transpose() * (c.transpose() * left_);
   Gain gain;
   for (Eigen::Index i = 0; i < b.size(); ++i) {
-    if (eigen.eigenvalues()[i] <= kAbsorbed) continue;
-    gain.squares += b[i] * b[i] / eigen.eigenvalues()[i];
+    if (eigen.values[i] <= kAbsorbed) continue;
+    gain.squares += b[i] * b[i] / eigen.values[i];
     ++gain.dimensions;
   }
   return gain;
@@ -74,14 +75,14 @@ double Regression::own_squares(const Eigen::VectorXd& column) const {
 Eigen::MatrixXd Regression::directions(const Eigen::MatrixXd& columns) const {
   const Eigen::MatrixXd c = cut(columns);
   if (c.cols() == 0) return c;
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(c.transpose() * c);
-  const Eigen::VectorXd& values = eigen.eigenvalues();  // ascending
+  const SymmetricAxes eigen = axes_of_symmetric(c.transpose() * c);
+  const Eigen::VectorXd& values = eigen.values;  // ascending
   const double least =
       std::max(kAbsorbed, kWeakDirection * kWeakDirection * values[values.size() - 1]);
   Eigen::Index first = 0;
   while (first < values.size() && values[first] <= least) ++first;
   const Eigen::Index count = values.size() - first;
-  return c * eigen.eigenvectors().rightCols(count) *
+  return c * eigen.vectors.rightCols(count) *
          values.tail(count).cwiseSqrt().cwiseInverse().asDiagonal();
 }
 
@@ -95,8 +96,7 @@ void Regression::add(const Eigen::MatrixXd& columns) {
   if (u.cols() == 0) return;
   // Once more, for the digits lost where little was left of a column.
   u -= basis_ * (basis_.transpose() * u);
-  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(u);
-  u = qr.householderQ() * Eigen::MatrixXd::Identity(u.rows(), u.cols());
+  u = orthonormal(u);
   left_ -= u * (u.transpose() * left_);
   const Eigen::Index before = basis_.cols();
   basis_.conservativeResize(Eigen::NoChange, before + u.cols());

@@ -13,8 +13,8 @@
 namespace gapfarm {
 namespace {
 
-constexpr double kLeast = 1e-4;  // keeps logarithms and covariances finite
-constexpr double kMost = 0.3;
+constexpr double kLeastDeviation = 1e-4;  // keeps logarithms and covariances finite
+constexpr double kMostDeviation = 0.3;
 constexpr double kMostPosition_m = 0.1;
 // Half a degree of freedom more than the Cauchy's, which has no core worth the name.
 constexpr double kMostTail = 0.9;
@@ -23,7 +23,7 @@ constexpr double kCore = 0.7;  // a heavy-tailed core over the Gaussian that cov
 constexpr double kNoDensity = -1e3;
 constexpr unsigned kFloorDraws = 16;  // a trial: of 500 trials the mean is known to 0.02
 
-struct Likelihood {
+struct TailLikelihood {
   std::span<const ResidualTrial> trials;
   std::span<const Eigen::Vector3d> residuals;
   const DiagnosisSubject& subject;
@@ -47,16 +47,17 @@ struct Likelihood {
 };
 
 // The nearest hill's top.
-NoiseFit climb(const Likelihood& likelihood, const NoiseEstimate& from, bool tails) {
+NoiseFit climb(const TailLikelihood& likelihood, const NoiseEstimate& from, bool tails) {
   const auto first = [](double value, double unknown, double most) {
-    return std::log(std::clamp(value > 0 ? value : unknown, kLeast, most));
+    return std::log(std::clamp(value > 0 ? value : unknown, kLeastDeviation, most));
   };
-  std::vector<double> x = {first(from.drive_common, 0.01, kMost),
-                           first(from.drive_side, 0.01, kMost),
+  std::vector<double> x = {first(from.drive_common, 0.01, kMostDeviation),
+                           first(from.drive_side, 0.01, kMostDeviation),
                            first(from.pose.position_m, 0.0015, kMostPosition_m),
-                           first(from.pose.heading_rad, 0.008, kMost)};
-  std::vector<double> lower(4, std::log(kLeast)),
-      upper = {std::log(kMost), std::log(kMost), std::log(kMostPosition_m), std::log(kMost)},
+                           first(from.pose.heading_rad, 0.008, kMostDeviation)};
+  std::vector<double> lower(4, std::log(kLeastDeviation)),
+      upper = {std::log(kMostDeviation), std::log(kMostDeviation), std::log(kMostPosition_m),
+               std::log(kMostDeviation)},
       step(4, 0.3);
   if (tails) {
     x.insert(x.end(), {kFirstTail, kFirstTail});
@@ -69,9 +70,9 @@ NoiseFit climb(const Likelihood& likelihood, const NoiseEstimate& from, bool tai
     nlopt::opt search(nlopt::LN_NELDERMEAD, static_cast<unsigned>(x.size()));
     search.set_max_objective(
         [](unsigned n, const double* at, double*, void* self) {
-          return static_cast<const Likelihood*>(self)->nats(Likelihood::at(at, n));
+          return static_cast<const TailLikelihood*>(self)->nats(TailLikelihood::at(at, n));
         },
-        const_cast<Likelihood*>(&likelihood));
+        const_cast<TailLikelihood*>(&likelihood));
     search.set_lower_bounds(lower);
     search.set_upper_bounds(upper);
     search.set_initial_step(step);
@@ -85,7 +86,7 @@ NoiseFit climb(const Likelihood& likelihood, const NoiseEstimate& from, bool tai
       // Roundoff stops the search where nothing is left to gain; x holds the best point so far.
     }
   }
-  NoiseFit fit{Likelihood::at(x.data(), static_cast<unsigned>(x.size())), 0};
+  NoiseFit fit{TailLikelihood::at(x.data(), static_cast<unsigned>(x.size())), 0};
   fit.nats = likelihood.nats(fit.noise);
   return fit;
 }
@@ -96,7 +97,7 @@ NoiseFit fit_predictive_noise(std::span<const ResidualTrial> trials,
                               std::span<const Eigen::Vector3d> residuals,
                               const NoiseEstimate& start, const DiagnosisSubject& subject,
                               double outlier_share, bool tails) {
-  const Likelihood likelihood{trials, residuals, subject, outlier_share};
+  const TailLikelihood likelihood{trials, residuals, subject, outlier_share};
   NoiseEstimate core = start;
   if (tails) {
     core.drive_common *= kCore;

@@ -1,12 +1,14 @@
 #include "master/diagnose/trend_test.h"
 
-#include <Eigen/LU>
+#include <Eigen/Core>
 #include <algorithm>
-#include <boost/math/distributions/fisher_f.hpp>
 #include <cassert>
 #include <set>
 #include <utility>
 #include <vector>
+
+#include "common/score/algebra.h"
+#include "common/score/laws.h"
 
 namespace gapfarm {
 
@@ -67,7 +69,7 @@ TrendTest trend_test(const Eigen::VectorXd& values, const Eigen::MatrixXd& colum
   test.squares = along.squaredNorm();
   test.dimensions = static_cast<int>(k);
   const Eigen::VectorXd solved =
-      (basis.leftCols(k).transpose() * used.leftCols(k)).partialPivLu().solve(along);
+      solve_square(basis.leftCols(k).transpose() * used.leftCols(k), along);
   for (Eigen::Index j = 0; j < k; ++j) {
     test.coefficients[kept[static_cast<std::size_t>(j)]] = solved[j];
   }
@@ -77,7 +79,7 @@ TrendTest trend_test(const Eigen::VectorXd& values, const Eigen::MatrixXd& colum
     return test;
   }
   const double f = test.squares / double(k) / left;
-  test.p = boost::math::cdf(boost::math::complement(boost::math::fisher_f(double(k), freedom), f));
+  test.p = fisher_above(double(k), freedom, f);
   return test;
 }
 

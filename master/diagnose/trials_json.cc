@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <type_traits>
 
+#include "common/json/json.h"
 #include "master/diagnose/diagnosis_json.h"
 
 namespace gapfarm {
@@ -137,9 +138,8 @@ Result<std::vector<DiagnosedTrial>> parse_trials(const Json& table,
     const auto read = [&](const std::string& name, auto& field) {
       const Json& cell = row[column++];
       if (error.empty() && !read_cell(cell, field)) {
-        error = where + ": " + name + " is " +
-                cell.dump(-1, ' ', false, Json::error_handler_t::replace) +
-                ", which is not of its column's type";
+        error =
+            where + ": " + name + " is " + json_text(cell) + ", which is not of its column's type";
       }
     };
     visit_columns(trial, read);

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/score/algebra.h"
 #include "common/score/statistics.h"
 #include "master/diagnose/free_commands.h"
 #include "master/diagnose/nuisance.h"
@@ -16,7 +17,7 @@ namespace {
 constexpr int kTuningRounds = 6;
 constexpr double kRelativeStep = 0.02;
 constexpr double kLargestLogStep = 0.4;
-constexpr int kMostHalvings = 4;
+constexpr int kMostBaseHalvings = 4;
 constexpr double kGainStep = 0.02;
 constexpr double kSameSlope = 0.05;  // relative: a parameter that moves the ends as the gain does
 constexpr double kUnknownSpeed = 0.28;  // m/s, where no drive goes ahead
@@ -93,7 +94,7 @@ struct TuningStep {
   bool of_all = true;  // no trial was left out
 };
 
-struct Normal {
+struct BaseNormal {
   Eigen::MatrixXd matrix;
   Eigen::VectorXd right;
 };
@@ -112,9 +113,9 @@ Eigen::MatrixXd log_slopes(const std::vector<Slope>& slopes, std::size_t trial,
 }
 
 // By the cells' medians.
-Normal normal_of_cells(const Study& study, const std::vector<Slope>& slopes, const Slope& both,
+BaseNormal normal_of_cells(const Study& study, const std::vector<Slope>& slopes, const Slope& both,
                        Eigen::Index p, int round, bool* of_all) {
-  Normal normal{Eigen::MatrixXd::Zero(p, p), Eigen::VectorXd::Zero(p)};
+  BaseNormal normal{Eigen::MatrixXd::Zero(p, p), Eigen::VectorXd::Zero(p)};
   const std::vector<CellResidual> cells = cell_residuals(study);
   std::vector<double> turns;
   for (const CellResidual& cell : cells) {
@@ -145,11 +146,11 @@ Normal normal_of_cells(const Study& study, const std::vector<Slope>& slopes, con
 
 // By every trial, beside the misfits that neighbouring commands have in common; their coefficients
 // come after the parameters.
-Normal normal_of_trials(const Study& study, const std::vector<Slope>& slopes, Eigen::Index p,
-                        int round, bool* of_all) {
+BaseNormal normal_of_trials(const Study& study, const std::vector<Slope>& slopes, Eigen::Index p,
+                            int round, bool* of_all) {
   const std::vector<Eigen::VectorXd> misfits = smooth_misfits(study);
   const auto q = static_cast<Eigen::Index>(misfits.size());
-  Normal normal{Eigen::MatrixXd::Zero(p + q, p + q), Eigen::VectorXd::Zero(p + q)};
+  BaseNormal normal{Eigen::MatrixXd::Zero(p + q, p + q), Eigen::VectorXd::Zero(p + q)};
   normal.matrix.diagonal().tail(q).setOnes();
   std::vector<double> turns;
   for (std::size_t i = 0; i < study.size(); ++i) {
@@ -192,7 +193,7 @@ TuningStep tuning_step(const Problem& problem, const std::vector<BaseParameter>&
     normal(k, k) += precision;
     right[k] -= precision * away;
   }
-  const Eigen::VectorXd step = normal.ldlt().solve(right).head(p);
+  const Eigen::VectorXd step = solve_symmetric(normal, right).head(p);
   for (Eigen::Index k = 0; k < p; ++k) {
     const std::size_t row = parameters[static_cast<std::size_t>(k)].row;
     const auto [lower, upper] = tunable(problem.table()[row]);
@@ -232,11 +233,11 @@ Result<std::vector<Pose>> predict_base(Predictor& predictor, const Overrides& si
     auto ends = predictor.attempt({{study->base, {}}});
     if (!ends) return ends.error();
     if (ends->front()) return std::move(*ends->front());
-    if (simulated.empty() || half == kMostHalvings) {
+    if (simulated.empty() || half == kMostBaseHalvings) {
       return predictor.failed("the base model cannot be simulated");
     }
     for (auto& [row, value] : study->base) {
-      value = half + 1 == kMostHalvings ? simulated.at(row) : (value + simulated.at(row)) / 2;
+      value = half + 1 == kMostBaseHalvings ? simulated.at(row) : (value + simulated.at(row)) / 2;
     }
   }
 }

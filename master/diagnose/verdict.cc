@@ -1,9 +1,9 @@
 #include "master/diagnose/verdict.h"
 
 #include <algorithm>
-#include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
 
+#include "common/score/laws.h"
 #include "common/score/statistics.h"
 #include "master/diagnose/noise.h"
 
@@ -24,8 +24,7 @@ std::vector<Leftover> leftovers(const Regression& explained,
   for (const CovariateBlock& block : blocks) {
     const Gain gain = explained.gain(block.columns);
     if (gain.dimensions == 0) continue;
-    const boost::math::chi_squared chance(gain.dimensions);
-    const double p = boost::math::cdf(boost::math::complement(chance, gain.squares / scale));
+    const double p = chi_squared_above(gain.dimensions, gain.squares / scale);
     all.push_back({block.name, std::log10(std::max(p, 1e-300)),
                    std::max(0.0, (gain.squares - gain.dimensions * scale) / 2)});
   }

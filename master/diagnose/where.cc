@@ -1,8 +1,6 @@
 #include "master/diagnose/where.h"
 
 #include <algorithm>
-#include <boost/math/distributions/binomial.hpp>
-#include <boost/math/distributions/chi_squared.hpp>
 #include <cassert>
 #include <cmath>
 #include <functional>
@@ -11,14 +9,12 @@
 #include <set>
 #include <string>
 
+#include "common/score/laws.h"
 #include "common/score/statistics.h"
 #include "master/diagnose/trend_test.h"
 
 namespace gapfarm {
 namespace {
-
-using boost::math::cdf;
-using boost::math::complement;
 
 constexpr double kOutlierSds = 3.2905;  // square root of the 0.999 quantile of chi2, 1 dof
 constexpr double kOutlierShare = 0.001;
@@ -280,11 +276,10 @@ class Looker {
 
   static void judge(Scatter& s) {
     if (s.freedom < 4) return;
-    const boost::math::chi_squared law(s.freedom);
-    s.p_spread = std::min(1.0, 2 * std::min(cdf(law, s.squares), cdf(complement(law, s.squares))));
+    s.p_spread = std::min(1.0, 2 * std::min(chi_squared_below(s.freedom, s.squares),
+                                            chi_squared_above(s.freedom, s.squares)));
     if (s.beyond.empty()) return;
-    s.p_outliers =
-        cdf(complement(boost::math::binomial(s.count, kOutlierShare), double(s.beyond.size()) - 1));
+    s.p_outliers = binomial_above(s.count, kOutlierShare, double(s.beyond.size()) - 1);
   }
 
   // The commands one by one, and all of them pooled; all when most of them scatter so.

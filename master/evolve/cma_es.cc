@@ -1,10 +1,12 @@
 #include "master/evolve/cma_es.h"
 
-#include <Eigen/Eigenvalues>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cassert>
 #include <cmath>
 #include <numeric>
+
+#include "common/score/algebra.h"
 
 namespace gapfarm {
 namespace {
@@ -21,8 +23,8 @@ struct Axes {
 };
 
 Axes axes_of(const Eigen::MatrixXd& covariance) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(covariance);
-  return {solver.eigenvectors(), solver.eigenvalues().cwiseMax(1e-300).cwiseSqrt()};
+  const SymmetricAxes axes = axes_of_symmetric(covariance);
+  return {axes.vectors, axes.values.cwiseMax(1e-300).cwiseSqrt()};
 }
 
 Eigen::VectorXd to_vector(const Genome& genome) {

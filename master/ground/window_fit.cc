@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/score/algebra.h"
 #include "common/score/kinematic.h"
 #include "master/ground/window_prior.h"
 
@@ -208,7 +209,7 @@ double WindowFitter::promise(const WindowFit& fit, const std::vector<Eigen::Matr
   Eigen::MatrixXd H;
   Eigen::VectorXd g;
   normal_equations(moved, J, uses({}), &H, &g);
-  return prior(moved) - prior(fit) + g.dot(H.ldlt().solve(g)) / 2;
+  return prior(moved) - prior(fit) + g.dot(solve_symmetric(H, g)) / 2;
 }
 
 namespace {
@@ -225,7 +226,7 @@ Eigen::VectorXd stepped(const WindowFit& fit, const Eigen::MatrixXd& H, const Ei
       A(k, k) = 1;
       b[k] = fit.values[k];
     }
-    const Eigen::VectorXd next = fit.values - A.partialPivLu().solve(b);
+    const Eigen::VectorXd next = fit.values - solve_square(A, b);
     bool more = false;
     for (std::size_t k = 0; k < at_zero.size(); ++k) {
       const bool below = fit.rows[k].row.positive && next[static_cast<Eigen::Index>(k)] < 0;

@@ -6,6 +6,7 @@
 #include "common/base/hash.h"
 #include "common/random/stream.h"
 #include "common/robot/robot_file.h"
+#include "common/score/algebra.h"
 
 namespace gapfarm {
 namespace {
@@ -76,7 +77,7 @@ Eigen::MatrixXd WindowFitter::prior_precision(const std::vector<FitRow>& rows) c
       if (b >= 0) covariance(k, l) += reference_->covariance(a, b);
     }
   }
-  return covariance.ldlt().solve(Eigen::MatrixXd::Identity(n, n));
+  return inverse_of_symmetric(covariance);
 }
 
 Eigen::VectorXd WindowFitter::from_middle(const std::vector<FitRow>& rows,
@@ -129,7 +130,7 @@ Eigen::MatrixXd WindowFitter::draws(const WindowFit& fit, std::uint64_t seed) co
       A += H[pick];
       b += g[pick];
     }
-    drawn.col(d) = fit.values - A.ldlt().solve(b);
+    drawn.col(d) = fit.values - solve_symmetric(A, b);
   }
   return drawn;
 }

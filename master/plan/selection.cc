@@ -2,9 +2,9 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
-#include <boost/math/distributions/chi_squared.hpp>
-#include <boost/math/distributions/non_central_chi_squared.hpp>
 #include <cmath>
+
+#include "common/score/laws.h"
 
 namespace gapfarm::plan {
 namespace {
@@ -80,17 +80,13 @@ double likeness(const Eigen::VectorXd& a, const Eigen::VectorXd& b,
 }
 
 double chance_of_exceeding(double threshold, double freedom, double noncentrality) {
-  using boost::math::complement;
-  if (noncentrality <= 0) {
-    return boost::math::cdf(complement(boost::math::chi_squared(freedom), threshold));
-  }
-  return boost::math::cdf(
-      complement(boost::math::non_central_chi_squared(freedom, noncentrality), threshold));
+  return noncentrality <= 0 ? chi_squared_above(freedom, threshold)
+                            : noncentral_chi_squared_above(freedom, noncentrality, threshold);
 }
 
 double noncentrality_for(double power, double threshold, double freedom) {
   if (chance_of_exceeding(threshold, freedom, 0) >= power) return 0;
-  return boost::math::non_central_chi_squared::find_non_centrality(freedom, threshold, 1 - power);
+  return noncentrality_of(freedom, threshold, power);
 }
 
 }  // namespace gapfarm::plan

@@ -6,6 +6,7 @@
 #include <span>
 #include <string_view>
 
+#include "common/json/json.h"
 #include "master/report/assets.h"
 #include "master/report/html.h"
 
@@ -75,9 +76,8 @@ std::string top(const PageFrame& frame) {
 }
 
 std::string data_block(const char* id, const nlohmann::ordered_json& json) {
-  return fmt::format(
-      "<script type=\"application/json\" id=\"{}\">{}</script>\n", id,
-      script_safe(json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace)));
+  return fmt::format("<script type=\"application/json\" id=\"{}\">{}</script>\n", id,
+                     script_safe(json_text(json)));
 }
 
 }  // namespace

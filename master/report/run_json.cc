@@ -1,5 +1,6 @@
 #include <nlohmann/json.hpp>
 
+#include "common/json/json.h"
 #include "master/diagnose/diagnosis_json.h"
 #include "master/diagnose/json_fields.h"
 #include "master/report/run_report.h"
@@ -39,15 +40,15 @@ void read_scores(Fields& root, const char* key, std::vector<ScoreRow>* rows) {
 std::string to_json(const RunOutcome& outcome) {
   Diagnosis table;
   table.trials = outcome.trials;
-  return dump_json({{"version", kVersion},
-                    {"validation", scores_json(outcome.validation)},
-                    {"baselines", scores_json(outcome.baselines)},
-                    {"trials", trials_json(table)}},
-                   -1);
+  const Json json = {{"version", kVersion},
+                     {"validation", scores_json(outcome.validation)},
+                     {"baselines", scores_json(outcome.baselines)},
+                     {"trials", trials_json(table)}};
+  return json_text(json);
 }
 
 Result<RunOutcome> parse_run_outcome(const std::string& text) {
-  const Json json = Json::parse(text, nullptr, false);
+  const Json json = parse_json(text);
   if (json.is_discarded() || !json.is_object() || json.value("version", 0) != kVersion ||
       !json.contains("trials")) {
     return Error{"the run's outcome cannot be read; was it kept by another program?"};

@@ -10,7 +10,7 @@
 namespace gapfarm {
 namespace {
 
-constexpr int kDeepest = 32;                  // maps within maps
+constexpr int kDeepestYaml = 32;              // maps within maps
 constexpr std::size_t kMostBytes = 1u << 20;  // no controller file comes near
 // Aliases of aliases are small in the file and endless to walk; no controller has as many nodes.
 constexpr std::size_t kMostNodes = 100'000;
@@ -33,7 +33,7 @@ YAML::Node parameters_of(const YAML::Node& node) {
 
 void flatten(const YAML::Node& node, const std::string& prefix, int depth,
              std::vector<Entry>& entries) {
-  if (depth > kDeepest) return;
+  if (depth > kDeepestYaml) return;
   for (const auto& pair : node) {
     if (entries.size() > kMostNodes) return;
     const std::string key = prefix + scalar_of(pair.first);
@@ -50,9 +50,9 @@ void flatten(const YAML::Node& node, const std::string& prefix, int depth,
   }
 }
 
-class Reader {
+class YamlReader {
  public:
-  explicit Reader(const std::string& file) { read_.file = file; }
+  explicit YamlReader(const std::string& file) { read_.file = file; }
 
   Result<ControllerFile> read(const YAML::Node& root) {
     collect_types(root, 0);
@@ -81,7 +81,7 @@ class Reader {
 
   // "NAME: {type: T}", wherever it stands; ROS 2 keeps it under controller_manager.
   void collect_types(const YAML::Node& node, int depth) {
-    if (!node.IsMap() || depth > kDeepest || too_many(node)) return;
+    if (!node.IsMap() || depth > kDeepestYaml || too_many(node)) return;
     for (const auto& pair : node) {
       if (!pair.second.IsMap()) continue;
       const YAML::Node type = pair.second["type"];
@@ -91,7 +91,7 @@ class Reader {
   }
 
   void collect_drives(const YAML::Node& node, int depth) {
-    if (!node.IsMap() || depth > kDeepest || too_many(node)) return;
+    if (!node.IsMap() || depth > kDeepestYaml || too_many(node)) return;
     for (const auto& pair : node) {
       if (!pair.second.IsMap()) continue;
       if (!take(scalar_of(pair.first), pair.first, pair.second)) {
@@ -165,7 +165,7 @@ Result<ControllerFile> parse_controllers(std::string_view text, const std::strin
                    ":1: found no YAML map, expected controllers by name; give the file that "
                    "the controller manager loads"};
     }
-    return Reader(file).read(root);
+    return YamlReader(file).read(root);
   } catch (const YAML::Exception& error) {
     return Error{file + ":" + std::to_string(std::max(0, error.mark.line) + 1) +
                  ": found text that is not YAML (" + error.msg +

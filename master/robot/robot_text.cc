@@ -6,6 +6,8 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
+#include "common/json/json.h"
+
 namespace gapfarm {
 namespace {
 
@@ -204,7 +206,7 @@ std::string describe_robot_json(const RobotReading& reading, const GroundRobot& 
                     {"assumed", completed.notes},
                     {"toml", toml}};
   // Names come from files: bytes that are not UTF-8 become marks, not exceptions.
-  return out.dump(2, ' ', false, json::error_handler_t::replace) + "\n";
+  return json_text(out, 2) + "\n";
 }
 
 }  // namespace gapfarm

@@ -12,7 +12,6 @@ namespace gapfarm {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
-constexpr std::size_t kFewestDrives = 8;
 constexpr std::size_t kFewestTurns = 8;
 constexpr double kGoodConcentration = 0.75;
 constexpr double kClearMargin = 0.4;
@@ -140,14 +139,14 @@ std::optional<SanityFinding> turned_finding(const TravelFit& travel, int sense,
 }  // namespace
 
 bool TravelFit::tells() const {
-  return drives >= kFewestDrives && std::max(same, mirrored) > kGoodConcentration &&
+  return drives >= kFewestStraight && std::max(same, mirrored) > kGoodConcentration &&
          std::abs(same - mirrored) > kClearMargin;
 }
 
 TravelFit fit_travel(const std::vector<DriveSample>& samples) {
   const std::vector<DriveSample> straight = straight_samples(samples);
   TravelFit fit;
-  if (straight.size() < kFewestDrives) return fit;
+  if (straight.size() < kFewestStraight) return fit;
   std::vector<double> distances;
   for (const DriveSample& s : straight) distances.push_back(s.distance_m());
   const double typical = median(distances);

@@ -12,7 +12,6 @@
 namespace gapfarm {
 namespace {
 
-constexpr std::size_t kFewestDrives = 8;
 constexpr double kStill = 0.1;  // of what the slowest robot would do
 constexpr double kStillTurn_rad = 0.02;
 constexpr double kTolerance = 1.1;   // of the bounds
@@ -56,7 +55,7 @@ bool doubt_motion(const std::vector<DriveSample>& samples, const DriveLimits& li
 bool doubt_speed(const std::vector<DriveSample>& samples, const DriveLimits& limits,
                  std::vector<SanityFinding>* findings) {
   const double speed = full_speed_of(samples);
-  if (straight_samples(samples).size() < kFewestDrives || speed <= 0) return false;
+  if (straight_samples(samples).size() < kFewestStraight || speed <= 0) return false;
   if (speed < kTolerance * limits.fastest_m_s && speed > limits.slowest_m_s / kTolerance) {
     return false;
   }
@@ -86,7 +85,7 @@ bool doubt_heading_unit(const std::vector<DriveSample>& samples,
   constexpr double kSmall_rad = 0.1, kRadiansADegree = std::numbers::pi / 180;
   constexpr double kGood = 0.75, kBad = 0.6;
   std::vector<DriveSample> straight = straight_samples(samples);
-  if (straight.size() < kFewestDrives) return false;
+  if (straight.size() < kFewestStraight) return false;
   std::vector<double> sizes;
   for (const DriveSample& s : straight) sizes.push_back(std::abs(s.X_WS.theta));
   if (quantile(sizes, 0.95) > kSmall_rad) return false;
@@ -106,7 +105,7 @@ bool doubt_heading_unit(const std::vector<DriveSample>& samples,
 void doubt_turning(const std::vector<DriveSample>& samples, const DriveLimits& limits,
                    std::vector<SanityFinding>* findings) {
   const double speed = full_speed_of(samples);
-  if (straight_samples(samples).size() < kFewestDrives || limits.gauge_m <= 0) return;
+  if (straight_samples(samples).size() < kFewestStraight || limits.gauge_m <= 0) return;
   // Slow turns, so that none has gone round.
   std::vector<double> rates;
   for (const DriveSample& s : samples) {
@@ -114,7 +113,7 @@ void doubt_turning(const std::vector<DriveSample>& samples, const DriveLimits& l
       rates.push_back(s.turned_rad() / s.turn_s);
     }
   }
-  if (rates.size() < kFewestDrives) return;
+  if (rates.size() < kFewestStraight) return;
   const double rate = median(rates), fastest = speed / limits.gauge_m;
   if (rate < kUnslipped * fastest) return;
   findings->push_back(

@@ -9,7 +9,6 @@
 namespace gapfarm {
 namespace {
 
-constexpr std::size_t kFewestStraight = 8;
 constexpr double kStraight = 0.2;  // turn over way, of what counts as straight
 constexpr double kGentle = 0.9;    // and of arcs that end before they have turned round
 

@@ -29,7 +29,10 @@ std::vector<DriveSample> drive_samples(const Problem& problem);
 // gentle arcs; 0 where there are none.
 double full_speed_of(const std::vector<DriveSample>& samples);
 
-// Those that drive straight enough to follow their heading: straight ones where there are eight,
+// Fewer straight drives say nothing.
+inline constexpr std::size_t kFewestStraight = 8;
+
+// Those that drive straight enough to follow their heading: straight ones where there are enough,
 // else gentle arcs.
 std::vector<DriveSample> straight_samples(const std::vector<DriveSample>& samples);
 

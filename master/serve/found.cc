@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "common/json/json.h"
 #include "common/problem/problem.h"
 #include "common/trials/files.h"
 #include "master/store/run_status.h"
@@ -142,7 +143,7 @@ void read_command_of(const FoundWork& found, double now_unix_s, WorkEntry* entry
 void read_headline(const FoundWork& found, WorkEntry* entry) {
   const auto text = read_text_file((found.path / "diagnosis.json").string());
   if (!text) return;
-  const auto json = nlohmann::json::parse(*text, nullptr, false);
+  const auto json = parse_json(*text);
   if (!json.is_object()) return;
   if (json.contains("headline") && json["headline"].is_string()) {
     entry->told = json["headline"].get<std::string>();

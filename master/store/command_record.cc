@@ -2,6 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "common/json/json.h"
 #include "master/store/answer_store.h"
 #include "master/store/run_lock.h"
 
@@ -11,7 +12,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 // Commands beat about once a second, less often while they compute themselves.
-constexpr double kFreshHeartbeat_s = 120;
+constexpr double kFreshRecord_s = 120;
 
 template <class T>
 void read(const Json& json, const char* key, T& to) {
@@ -28,7 +29,7 @@ bool lives(const std::filesystem::path& folder, const CommandRecord& record, dou
   const std::optional<bool> held = run_lock_held(folder);
   if (held.value_or(false)) return true;
   const bool blind = !held || record.host != host_name();
-  return blind && now_unix_s - record.heartbeat_unix_s < kFreshHeartbeat_s;
+  return blind && now_unix_s - record.heartbeat_unix_s < kFreshRecord_s;
 }
 
 }  // namespace
@@ -118,7 +119,7 @@ Result<std::optional<CommandRecord>> command_status(const std::filesystem::path&
   const auto text = read_command(answer_file(folder));
   if (!text) return text.error();
   if (!*text) return std::optional<CommandRecord>();
-  CommandRecord record = command_record_of(Json::parse(**text, nullptr, false));
+  CommandRecord record = command_record_of(parse_json(**text));
   if (record.state == "running" && !lives(folder, record, now_unix_s)) {
     record.state = "stopped";
     record.reason = "crashed: process " + std::to_string(record.pid) + " on " + record.host +

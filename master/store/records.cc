@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "common/base/hash.h"
+#include "common/json/json.h"
 
 namespace gapfarm {
 
@@ -44,12 +45,12 @@ FarmTally& FarmTally::operator+=(const FarmTally& other) {
 std::string FarmTally::to_json() const {
   nlohmann::ordered_json json = nlohmann::ordered_json::object();
   for (const Row& row : kRows) json[row.key] = this->*row.count;
-  return json.dump();
+  return json_text(json);
 }
 
 FarmTally FarmTally::from_json(const std::string& text) {
   FarmTally tally;
-  const auto json = nlohmann::ordered_json::parse(text, nullptr, false);
+  const auto json = parse_json(text);
   if (!json.is_object()) return tally;
   for (const Row& row : kRows) {
     const auto found = json.find(row.key);
@@ -86,7 +87,7 @@ std::string readable_values(const Problem& problem, const Genome& genome) {
         break;
     }
   }
-  return json.dump();
+  return json_text(json);
 }
 
 void summarise_fitness(StoredGeneration& generation, bool higher_is_better) {

@@ -3,6 +3,7 @@
 #include <cstring>
 #include <nlohmann/json.hpp>
 
+#include "common/json/json.h"
 #include "master/store/schema.h"
 
 namespace gapfarm {
@@ -16,9 +17,6 @@ constexpr std::int64_t kSchemaWithWorkerEvents = 4;
 
 constexpr const char* kMemberColumns =
     "birth_id, genome, parameters, outcome, fitness, scores, parents, operators";
-
-// What was written by hand or damaged reads as empty: status is no place to die over it.
-Json parse(const std::string& text) { return Json::parse(text, nullptr, false); }
 
 std::vector<double> genome_of(const std::string& blob) {
   std::vector<double> genome(blob.size() / sizeof(double));
@@ -42,7 +40,7 @@ StoredIndividual individual_of(const SqlStatement& row, int at) {
   individual.outcome = row.text(at + 3);
   individual.fitness = row.optional_real(at + 4);
   individual.scores = static_cast<unsigned>(row.integer(at + 5));
-  for (const Json& parent : parse(row.text(at + 6))) {
+  for (const Json& parent : parse_json(row.text(at + 6))) {
     if (parent.is_number_unsigned()) individual.parents.push_back(parent.get<std::uint64_t>());
   }
   individual.operators = row.text(at + 7);
@@ -51,7 +49,8 @@ StoredIndividual individual_of(const SqlStatement& row, int at) {
 
 std::vector<StoredWorker> workers_of(const std::string& text) {
   std::vector<StoredWorker> workers;
-  const Json json = parse(text);
+  // What was written by hand or damaged reads as empty: status is no place to die over it.
+  const Json json = parse_json(text);
   if (!json.is_array()) return workers;
   for (const Json& entry : json) {
     if (!entry.is_object()) continue;
@@ -108,7 +107,7 @@ Result<std::vector<StoredGeneration>> RunReader::generations() const {
     generation.median = select->optional_real(3);
     generation.worst = select->optional_real(4);
     generation.diversity = select->real(5);
-    const Json operators = parse(select->text(6));
+    const Json operators = parse_json(select->text(6));
     for (const auto& [name, probability] : operators.items()) {
       if (probability.is_number()) {
         generation.operator_probabilities.emplace_back(name, probability.get<double>());

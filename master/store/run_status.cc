@@ -2,6 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "common/json/json.h"
 #include "master/store/run_lock.h"
 
 namespace gapfarm {
@@ -136,7 +137,7 @@ Json to_json(const RunStatus& status) {
   json["epoch"] = status.progress.epoch;
   json["heartbeat_age_s"] = status.heartbeat_age_s;
   if (status.best_individual) {
-    const Json values = Json::parse(status.best_individual->values, nullptr, false);
+    const Json values = parse_json(status.best_individual->values);
     json["best"] = {{"birth_id", status.best_individual->birth_id},
                     {"values", values.is_discarded() ? Json(nullptr) : values}};
   }

@@ -10,6 +10,7 @@
 #include <system_error>
 
 #include "common/base/build_info.h"
+#include "common/json/json.h"
 #include "master/store/schema.h"
 
 namespace gapfarm {
@@ -47,7 +48,7 @@ std::string operator_json(const StoredGeneration& generation) {
   for (const auto& [name, probability] : generation.operator_probabilities) {
     json[name] = probability;
   }
-  return json.dump();
+  return json_text(json);
 }
 
 std::string workers_json(const std::vector<StoredWorker>& workers) {
@@ -60,7 +61,7 @@ std::string workers_json(const std::vector<StoredWorker>& workers) {
                     {"finished", worker.finished},
                     {"rate_per_s", worker.rate_per_s}});
   }
-  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+  return json_text(json);
 }
 
 // Alarms stay: they are about machines, not about generations.
@@ -275,7 +276,7 @@ Status RunStore::insert_individuals(const StoredGeneration& generation) {
     insert->bind_blob(4, genome_bytes(individual.genome)).bind_text(5, individual.values);
     insert->bind_text(6, individual.outcome).bind(7, individual.fitness);
     insert->bind(8, std::int64_t{individual.scores});
-    insert->bind_text(9, Json(individual.parents).dump()).bind_text(10, individual.operators);
+    insert->bind_text(9, json_text(Json(individual.parents))).bind_text(10, individual.operators);
     if (Status s = insert->run(); !s) return s;
   }
   return {};

@@ -37,6 +37,7 @@ outside worker/sim '(bullet|Bullet|LinearMath|btBullet)' 'only worker/sim includ
 outside 'master/(store|input)' 'sqlite3' 'only the run store and the reader of bags include SQLite'
 outside master/input '(bzlib|lz4|zstd)' 'only master/input unpacks'
 outside common/config 'toml' 'only common/config includes toml++'
+outside 'common/score' 'boost/math' 'probabilities are asked of common/score/laws.h'
 outside master/robot '(tinyxml2|yaml-cpp)' 'only master/robot includes tinyxml2 and yaml-cpp'
 
 # Headers that take seconds to read: in these places only, and in no header but those named.
@@ -52,7 +53,7 @@ heavy() {
 }
 source='[a-z_0-9]*\.cc'
 heavy 'CLI/' "master/cli/.*|common/usage/.*|worker/main.cc" 'command lines are read in master/cli and worker/main.cc'
-heavy 'nlohmann/json\.hpp' "common/(log|external)/$source|master/.*/$source|master/cli/question_stamp.h|master/diagnose/json_fields.h" \
+heavy 'nlohmann/json\.hpp' "common/(log|external|json)/$source|master/.*/$source|master/cli/question_stamp.h|master/diagnose/json_fields.h" \
   'headers include json_fwd.hpp, and the worker writes no JSON itself'
 heavy 'Eigen/(Dense|SVD|Eigenvalues|QR|Geometry|LU|Cholesky)' ".*/$source|master/robot/.*" \
   'headers include Eigen/Core'

@@ -10,8 +10,6 @@
 namespace gapfarm {
 namespace {
 
-constexpr double kCreepAtRest_m_s = 1.5e-3;  // as for treads (world.cc)
-constexpr double kErrorReduction = 0.2;
 // Compliance of a contact in units of 1 / mass and step; supports beyond three then share the load
 // as equal springs would.
 constexpr double kSoftness = 3.5e-4;
@@ -109,7 +107,7 @@ void PatchRobot::Impl::step(std::span<const PatchMotion> motions, double dt_s) {
   std::copy(motions.begin(), motions.end(), motions_.begin());
   getSolverInfo().m_warmstartingFactor = last_step_s_ > 0 ? dt_s / last_step_s_ : 1;
   last_step_s_ = dt_s;
-  const double erp = kErrorReduction * dt_s * settings_.step_rate_hz;
+  const double erp = kRepairedShare * dt_s * settings_.step_rate_hz;
   getSolverInfo().m_erp = erp;
   getSolverInfo().m_erp2 = erp;
   stepSimulation(dt_s, 0);

@@ -7,12 +7,8 @@
 namespace gapfarm {
 namespace {
 
-constexpr double kCreepAtRest_m_s = 1.5e-3;  // a standing tread holds, but not like rock
 // Contacts give a little: load sharing among four supports has one answer instead of many.
 constexpr double kContactSoftness = 1e-3;
-// Share of a joint's or contact's position error that a step of full length repairs; a shorter one
-// repairs less, or it would have to move fast.
-constexpr double kErrorReduction = 0.2;
 // Velocity change, squared, (m/s)^2, below which the solver stops iterating early.
 constexpr double kConverged = 1e-20;
 
@@ -108,7 +104,7 @@ void RobotWorld::step(const SideSpeeds& speeds, double dt_s) {
   if (floor_.nap_strength != 0 || floor_.rolling_resistance != 0) apply_drag(dt_s);
   getSolverInfo().m_warmstartingFactor = last_step_s_ > 0 ? dt_s / last_step_s_ : 1;
   last_step_s_ = dt_s;
-  const double erp = kErrorReduction * dt_s * settings_.step_rate_hz * settings_.sub_steps;
+  const double erp = kRepairedShare * dt_s * settings_.step_rate_hz * settings_.sub_steps;
   getSolverInfo().m_erp = erp;
   getSolverInfo().m_erp2 = erp;
   stepSimulation(dt_s, 0);

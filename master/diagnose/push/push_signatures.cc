@@ -11,10 +11,10 @@
 namespace gapfarm {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
+constexpr double kHalfTurn = std::numbers::pi;
 constexpr double kPatchSpacing = 0.75;  // of the radius: a disc anywhere is overlapped by half
 constexpr double kPatchRadius_m = 0.12;
-constexpr double kPatchRatio = 0.4;
+constexpr double kProbedRatio = 0.4;
 constexpr std::size_t kMostPatches = 150;
 
 double typical_speed(const Study& study) {
@@ -42,7 +42,7 @@ std::vector<Probe> push_probes(const Study& study) {
   both("marker_offset", "y", 0.003);
   // A strength and a direction: linear in the strength's cosine and sine.
   constexpr double kLogRatio = 0.2, kStretch = 0.1, kTilt = 0.03;
-  for (double direction : {0.0, kPi / 4}) {
+  for (double direction : {0.0, kHalfTurn / 4}) {
     const auto grain = [&](double log_ratio) {
       return std::map<std::string, double>{{"friction_anisotropy.ratio", std::exp(log_ratio)},
                                            {"friction_anisotropy.direction", direction}};
@@ -54,12 +54,13 @@ std::vector<Probe> push_probes(const Study& study) {
     };
     all.push_back({"pressure_distribution", plate(kStretch), plate(-kStretch), 2 * kStretch});
   }
-  for (double direction : {0.0, kPi / 2}) {
+  for (double direction : {0.0, kHalfTurn / 2}) {
     const auto tilt = [&](double toward) {
       return std::map<std::string, double>{{"table_tilt.angle", kTilt},
                                            {"table_tilt.direction", toward}};
     };
-    all.push_back({"table_tilt", tilt(direction), tilt(wrap_angle(direction + kPi)), 2 * kTilt});
+    all.push_back(
+        {"table_tilt", tilt(direction), tilt(wrap_angle(direction + kHalfTurn)), 2 * kTilt});
   }
   for (Probe& probe : lens_probes(middle_of(study))) all.push_back(std::move(probe));
   return all;
@@ -103,7 +104,7 @@ std::vector<Patch> patch_grid(const Study& study) {
     std::vector<Patch> patches;
     for (const auto& [x, y] : places) {
       patches.push_back({static_cast<double>(x) * spacing, static_cast<double>(y) * spacing,
-                         std::max(kPatchRadius_m, spacing / kPatchSpacing), kPatchRatio});
+                         std::max(kPatchRadius_m, spacing / kPatchSpacing), kProbedRatio});
     }
     return patches;
   }

@@ -14,9 +14,7 @@ namespace gapfarm {
 namespace {
 
 constexpr double kDegrees = 180 / std::numbers::pi;
-constexpr std::size_t kFewTrials = 60;
-constexpr int kSectors = 12;
-constexpr double kFewInCell = 3;
+constexpr double kFewInPlace = 3;
 
 std::string pushes_of(const std::string& piece) {
   return piece == "all" ? "All pushes" : "Pushes of " + piece;
@@ -105,7 +103,7 @@ struct PushVariety {
 
 int sector(double angle_rad) {
   const double turn = (angle_rad + std::numbers::pi) / (2 * std::numbers::pi);
-  return static_cast<int>(std::floor(turn * kSectors)) % kSectors;
+  return static_cast<int>(std::floor(turn * kHeadingSectors)) % kHeadingSectors;
 }
 
 PushVariety variety(const Study& study) {
@@ -161,18 +159,18 @@ std::vector<std::string> push_cautions(const Study& study, const TrialLog& /*log
   const PushVariety v = variety(study);
   std::vector<std::string> text;
   const auto say = [&](const std::string& sentence) { text.push_back(sentence); };
-  if (study.size() < kFewTrials) {
+  if (study.size() < kFewTrialsToTell) {
     say("There " +
         std::string(study.size() == 1 ? "is 1 push"
                                       : "are " + std::to_string(study.size()) + " pushes") +
-        "; below " + std::to_string(kFewTrials) +
+        "; below " + std::to_string(kFewTrialsToTell) +
         " only large effects show, and no claim is sure.");
   }
   if (v.missed > 0) {
     say(std::to_string(v.missed) + " of " + std::to_string(study.size()) +
         " pushes do not touch their piece where the log has it; they say little.");
   }
-  if (v.typical_cell < kFewInCell) {
+  if (v.typical_cell < kFewInPlace) {
     say("Most pushes were done " +
         (v.typical_cell <= 1 ? std::string("once")
                              : "about " + plain_number(v.typical_cell) + " times") +

@@ -1,0 +1,32 @@
+// The decompositions that more than one place needs, compiled once: Eigen makes each anew in every
+// file that asks for it.
+#pragma once
+
+#include <Eigen/Core>
+
+namespace gapfarm {
+
+struct SymmetricAxes {
+  Eigen::VectorXd values;   // ascending
+  Eigen::MatrixXd vectors;  // a column each, of unit length
+};
+
+// Eigenvalues and -vectors of a symmetric matrix; its lower triangle is read.
+SymmetricAxes axes_of_symmetric(const Eigen::MatrixXd& matrix);
+
+// x of A x = b for a symmetric A, positive or negative semidefinite, by L D L'.
+Eigen::VectorXd solve_symmetric(const Eigen::MatrixXd& A, const Eigen::VectorXd& b);
+
+// A^-1 of such an A.
+Eigen::MatrixXd inverse_of_symmetric(const Eigen::MatrixXd& A);
+
+// x of A x = b for an invertible A, by L U with partial pivoting.
+Eigen::VectorXd solve_square(const Eigen::MatrixXd& A, const Eigen::VectorXd& b);
+
+// x that makes |A x - b| least, by Q R with column pivoting.
+Eigen::VectorXd least_squares(const Eigen::MatrixXd& A, const Eigen::VectorXd& b);
+
+// Orthonormal columns that span those of `columns`, REQUIRES: no more of them than rows.
+Eigen::MatrixXd orthonormal(const Eigen::MatrixXd& columns);
+
+}  // namespace gapfarm
