@@ -1,0 +1,274 @@
+// The steps of a diagnosis one by one, on data whose answer is known.
+#include <gtest/gtest.h>
+
+#include <Eigen/Core>
+#include <cmath>
+#include <functional>
+
+#include "master/diagnose/estimate.h"
+#include "master/diagnose/nuisance.h"
+#include "master/diagnose/selection.h"
+#include "master/diagnose/signatures.h"
+#include "master/diagnose/subject.h"
+#include "tests/unit/diagnose/kinematic_farm.h"
+
+namespace gapfarm {
+namespace {
+
+Eigen::MatrixXd no_columns(const Study& study) {
+  return {static_cast<Eigen::Index>(3 * study.size()), 0};
+}
+
+// A log that a robot this much faster than the config's has driven, beside the config's.
+struct Driven {
+  explicit Driven(double faster) : problem(kinematic_log(60)), predictor(farm, problem) {
+    const std::size_t speed = row_of(Srv1::kFullSpeed);
+    for (Trial& t : problem.log.trials) {
+      const Twist way = log(between(t.X_WS, t.X_WE));
+      t.X_WE = t.X_WS * exp(Twist(faster * way));
+    }
+    nominal_speed = problem.values[speed];
+    study = make_study(problem).value();
+    const Status tuned = tune_base(predictor, /*keep=*/true, &study);
+    EXPECT_TRUE(tuned.ok());
+  }
+
+  KinematicFarm farm;
+  Problem problem;
+  Predictor predictor;
+  Study study;
+  double nominal_speed = 0;
+};
+
+TEST(FitJointly, FindsTheSpeedThatDroveTheLog) {
+  Driven d(1.08);
+  const auto fit = fit_jointly(d.predictor, d.study, {}, d.study.base, BaseParameters::kFitted,
+                               no_columns(d.study), 6);
+  ASSERT_TRUE(fit.ok()) << fit.error().message;
+  EXPECT_NEAR(fit->at.at(row_of(Srv1::kFullSpeed)) / d.nominal_speed, 1.08, 2e-3);
+  EXPECT_EQ(fit->base_parameters, d.study.base_parameters.size());
+  double most = 0;
+  for (const Eigen::Vector3d& r : fit->residuals) most = std::max(most, r.head<2>().norm());
+  EXPECT_LT(most, 1e-3);
+}
+
+TEST(FitJointly, StaysWhereNothingIsToBeGained) {
+  Driven d(1);
+  const auto fit = fit_jointly(d.predictor, d.study, {}, d.study.base, BaseParameters::kFitted,
+                               no_columns(d.study), 6);
+  ASSERT_TRUE(fit.ok()) << fit.error().message;
+  for (const auto& [row, value] : fit->at) {
+    EXPECT_NEAR(value, d.study.base.at(row), 1e-6) << d.problem.table()[row].key;
+  }
+  EXPECT_LT(misfit_of(d.study, *fit, no_columns(d.study)), 1e-9);
+}
+
+TEST(FitJointly, NuisancesTakeWhatTheyMay) {
+  Driven d(1.08);
+  const auto fit = fit_jointly(d.predictor, d.study, {}, d.study.base, BaseParameters::kFitted,
+                               no_columns(d.study), 0);
+  ASSERT_TRUE(fit.ok());
+  const auto nuisances = nuisance_columns(d.predictor, d.study);
+  ASSERT_TRUE(nuisances.ok()) << nuisances.error().message;
+  EXPECT_LT(misfit_of(d.study, *fit, *nuisances),
+            0.1 * misfit_of(d.study, *fit, no_columns(d.study)));
+}
+
+// Whitened rows of one column: x of each trial.
+Study plain_study(std::size_t trials) {
+  Study study;
+  study.subject = diagnosis_subject("srv1");
+  study.table = &srv1_table();
+  study.cells = {{{"forward", 1, 1, 1}, MotionKind::kStraight, 1, 1, 1, trials}};
+  study.trials.resize(trials);
+  study.whitener.assign(trials, Eigen::Matrix3d::Identity());
+  return study;
+}
+
+Eigen::VectorXd column(std::size_t trials, const std::function<double(std::size_t)>& x) {
+  Eigen::VectorXd c = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(3 * trials));
+  for (std::size_t i = 0; i < trials; ++i) c[static_cast<Eigen::Index>(3 * i)] = x(i);
+  return c;
+}
+
+TEST(HeldOut, ATrialIsPredictedByTheOtherFoldsAlone) {
+  const Study study = plain_study(4);
+  JointFit fit;
+  fit.jacobian = column(4, [](std::size_t) { return 1; });
+  for (double x : {0.1, 0.2, 0.3, 0.4}) fit.residuals.emplace_back(x, 0, 0);
+  const auto left = held_out_residuals(study, fit, {0, 0, 1, 1});
+  EXPECT_NEAR(left[0].x(), 0.1 - 0.35, 1e-9);
+  EXPECT_NEAR(left[1].x(), 0.2 - 0.35, 1e-9);
+  EXPECT_NEAR(left[2].x(), 0.3 - 0.15, 1e-9);
+  EXPECT_NEAR(left[3].x(), 0.4 - 0.15, 1e-9);
+  // In one fold there is nothing else to learn from.
+  EXPECT_NEAR(held_out_residuals(study, fit, {0, 0, 0, 0})[0].x(), 0.1 - 0.25, 1e-9);
+}
+
+TEST(HeldOut, IgnoredTrialsTeachNothing) {
+  Study study = plain_study(4);
+  study.ignored = {false, false, false, true};
+  JointFit fit;
+  fit.jacobian = column(4, [](std::size_t) { return 1; });
+  for (double x : {0.1, 0.2, 0.3, 0.4}) fit.residuals.emplace_back(x, 0, 0);
+  EXPECT_NEAR(held_out_residuals(study, fit, {0, 0, 1, 1})[0].x(), 0.1 - 0.3, 1e-9);
+}
+
+TEST(HeldOut, FoldsAreSessionsOrElseFiveBlocks) {
+  Study study = plain_study(10);
+  EXPECT_EQ(folds_of(study), (std::vector<std::size_t>{0, 0, 1, 1, 2, 2, 3, 3, 4, 4}));
+  study.sessions = 2;
+  for (std::size_t i = 0; i < 10; ++i) study.trials[i].session = i % 2;
+  EXPECT_EQ(folds_of(study)[3], 1u);
+}
+
+Signature signature_of(const std::string& effect, const Eigen::MatrixXd& columns,
+                       std::vector<std::string> parameters = {}) {
+  Signature s;
+  s.effect = effect;
+  s.columns = columns;
+  s.parameters = std::move(parameters);
+  return s;
+}
+
+double even(std::size_t i) { return i % 2 == 0 ? 1 : 0; }
+double odd(std::size_t i) { return i % 2 == 1 ? 1 : 0; }
+double none(std::size_t) { return 0; }
+
+// A nuisance in rows that nothing else touches.
+Regression beyond_nothing(std::size_t trials, const Eigen::VectorXd& data) {
+  Eigen::VectorXd aside = column(trials, none);
+  aside[1] = 1;
+  return {aside, data};
+}
+
+TEST(StartValues, AreTheCoefficientsWithinTheTable) {
+  const Study study = plain_study(10);
+  const Eigen::VectorXd c = column(10, even);
+  const Signature s = signature_of("motor_asymmetry", c, {"motor_asymmetry.ratio"});
+  const auto start = [&](double size) {
+    return start_values(study, beyond_nothing(10, size * c), s).at("motor_asymmetry.ratio");
+  };
+  EXPECT_NEAR(start(0.05), 0.05, 1e-6);
+  EXPECT_NEAR(start(-0.02), -0.02, 1e-6);
+  EXPECT_EQ(start(10), srv1_table()[srv1_table().row("motor_asymmetry.ratio")].upper);
+}
+
+TEST(StartValues, OfASlopeAreItsSizeAndDirection) {
+  const Study study = plain_study(10);
+  Eigen::MatrixXd c(30, 2);
+  c << column(10, even), column(10, odd);
+  const Signature s = signature_of("floor_tilt", c);
+  const auto values = start_values(study, beyond_nothing(10, 0.03 * c.col(0) + 0.04 * c.col(1)), s);
+  EXPECT_NEAR(values.at("floor_tilt.angle"), 0.05, 1e-6);
+  EXPECT_NEAR(values.at("floor_tilt.direction"), std::atan2(4, 3), 1e-6);
+}
+
+struct Selecting {
+  explicit Selecting(std::vector<Signature> catalogue, const Eigen::VectorXd& data)
+      : study(plain_study(20)),
+        problem(kinematic_log(20)),
+        predictor(farm, problem),
+        nuisances(beyond_nothing(20, data)),
+        selector(predictor, study, std::move(catalogue), nuisances) {}
+
+  std::vector<ChosenEffect> chosen() {
+    const auto effects =
+        selector.select({}, 0, [](const auto&) { return Result<Relinearised>(Relinearised{}); });
+    EXPECT_TRUE(effects.ok());
+    return effects.ok() ? *effects : std::vector<ChosenEffect>{};
+  }
+
+  Study study;
+  KinematicFarm farm;
+  Problem problem;
+  Predictor predictor;
+  Regression nuisances;
+  Selector selector;
+};
+
+TEST(Selector, TakesWhatTheDataHoldAndNothingElse) {
+  const Eigen::VectorXd a = column(20, even), b = column(20, odd);
+  Selecting s({signature_of("motor_asymmetry", a), signature_of("heading_offset", b)}, 3 * a);
+  const std::vector<ChosenEffect> chosen = s.chosen();
+  ASSERT_EQ(chosen.size(), 1u);
+  EXPECT_EQ(chosen[0].candidate.signature.effect, "motor_asymmetry");
+  // Half the squares, less what luck gains.
+  EXPECT_NEAR(chosen[0].candidate.gain, 9 * 10 / 2.0 - 0.5, 1e-6);
+  EXPECT_TRUE(chosen[0].aliases.empty());
+}
+
+TEST(Selector, TakesTwoWhereBothAreThere) {
+  const Eigen::VectorXd a = column(20, even), b = column(20, odd);
+  Selecting s({signature_of("motor_asymmetry", a), signature_of("heading_offset", b)},
+              2 * a + 3 * b);
+  const std::vector<ChosenEffect> chosen = s.chosen();
+  ASSERT_EQ(chosen.size(), 2u);
+  EXPECT_EQ(chosen[0].candidate.signature.effect, "heading_offset");
+  EXPECT_EQ(chosen[1].candidate.signature.effect, "motor_asymmetry");
+}
+
+TEST(Selector, NamesWhatLooksTheSameAsAnAlias) {
+  const Eigen::VectorXd a = column(20, even), b = column(20, odd);
+  Selecting s({signature_of("motor_asymmetry", a), signature_of("heading_offset", a + 0.2 * b)},
+              3 * a);
+  const std::vector<ChosenEffect> chosen = s.chosen();
+  ASSERT_EQ(chosen.size(), 1u);
+  EXPECT_EQ(chosen[0].candidate.signature.effect, "motor_asymmetry");
+  ASSERT_EQ(chosen[0].aliases.size(), 1u);
+  EXPECT_EQ(chosen[0].aliases[0].effect, "heading_offset");
+  EXPECT_GT(chosen[0].aliases[0].cosine, kAliasCosine);
+}
+
+TEST(Selector, TakesNothingFromNoise) {
+  const Eigen::VectorXd a = column(20, even), b = column(20, odd);
+  Selecting s({signature_of("motor_asymmetry", a), signature_of("heading_offset", b)}, a + b);
+  EXPECT_TRUE(s.chosen().empty()) << "5 nats each are below what a name needs";
+}
+
+TEST(Signatures, OfKindsOfDriveAddUpToTheWhole) {
+  Study study = plain_study(6);
+  study.cells.push_back({{"turn_ccw", -1, 1, 1}, MotionKind::kTurn, 1, 1, 1, 3});
+  for (std::size_t i = 3; i < 6; ++i) study.trials[i].cell = 1;
+  const Eigen::VectorXd whole = column(6, [](std::size_t i) { return double(i + 1); });
+  const Eigen::MatrixXd parts = split_by_kind(study, whole);
+  ASSERT_EQ(parts.cols(), 2);  // no wide drives
+  EXPECT_LT((parts.rowwise().sum() - whole).norm(), 1e-12);
+  EXPECT_EQ(parts.col(0).dot(parts.col(1)), 0);
+}
+
+TEST(Nuisances, HoldTheGaugesSlope) {
+  Driven d(1);
+  const auto columns = nuisance_columns(d.predictor, d.study);
+  ASSERT_TRUE(columns.ok()) << columns.error().message;
+  // Speed, then contact length, friction ratio, friction, gauge, with priors of 0.3, 0.5, 0.5, 0.5
+  // and 0.2.  Of the plain robot a turn goes with 1 / (gauge + length).
+  const double gauge = d.problem.values[row_of(Srv1::kTrackGauge)];
+  const double width = gauge + d.problem.values[row_of(Srv1::kContactLength)];
+  const std::vector<Eigen::Vector3d> slope = d.study.unwhiten(columns->col(4) / 0.2);
+  std::size_t turns = 0;
+  for (std::size_t i = 0; i < d.study.size(); ++i) {
+    const Cell& cell = d.study.cells[d.study.trials[i].cell];
+    if (cell.kind != MotionKind::kTurn) continue;
+    ++turns;
+    const CommandSpec& c = cell.command;
+    const double turned = d.nominal_speed * (c.right - c.left) / width * c.duration_s;
+    EXPECT_NEAR(slope[i][2], -turned * gauge / width, 0.01 * std::abs(turned));
+    EXPECT_NEAR(slope[i].head<2>().norm(), 0, 1e-6);
+  }
+  EXPECT_GT(turns, 0u);
+  // Friction is nothing to it.
+  EXPECT_LT(columns->col(3).norm(), 1e-9);
+}
+
+TEST(Nuisances, RespectSymmetry) {
+  const Cell straight{{"forward", 1, 1, 1}, MotionKind::kStraight, 1, 1, 1, 1};
+  const Cell turn{{"turn_ccw", -1, 1, 1}, MotionKind::kTurn, 1, 1, 1, 1};
+  EXPECT_GT(misfit_sd(straight, 0.28).x(), 0);
+  EXPECT_EQ(misfit_sd(straight, 0.28).tail<2>().norm(), 0);
+  EXPECT_GT(misfit_sd(turn, 0.28)[2], 0);
+  EXPECT_EQ(misfit_sd(turn, 0.28).head<2>().norm(), 0);
+}
+
+}  // namespace
+}  // namespace gapfarm
