@@ -40,7 +40,7 @@ TEST(RosExport, GivesMultipliersWithWhatTheUserHad) {
   RosExport data{"diagnosis", said.logs, "husky_velocity_controller", values, {}, {}, {}};
   const std::string yaml = ros_yaml(data);
   EXPECT_NE(yaml.find("husky_velocity_controller:\n  ros__parameters:\n"), std::string::npos);
-  EXPECT_NE(yaml.find("wheel_separation_multiplier: 1.5  # [1.481, 1.538]; you had 1.875"),
+  EXPECT_NE(yaml.find("wheel_separation_multiplier: 1.5  # [1.481, 1.537]; you had 1.875"),
             std::string::npos)
       << yaml;
   EXPECT_NE(yaml.find("monday"), std::string::npos);
