@@ -56,11 +56,6 @@ bool present(const WorkerStatus& worker) { return worker.state != "gone"; }
 
 }  // namespace
 
-double unix_now_s() {
-  const auto now = std::chrono::system_clock::now().time_since_epoch();
-  return std::chrono::duration<double>(now).count();
-}
-
 std::string command_line() {
   std::string text = "gapfarm";
   for (const std::string& word : own_arguments()) text += " " + word;

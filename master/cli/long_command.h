@@ -22,8 +22,6 @@ namespace gapfarm {
 
 struct CliContext;
 
-// Seconds since 1970.
-double unix_now_s();
 
 // What this process was called with: "gapfarm diagnose ...".
 std::string command_line();

@@ -28,7 +28,7 @@ struct Driven {
       t.X_WE = t.X_WS * exp(Twist(faster * way));
     }
     nominal_speed = problem.values[speed];
-    study = make_study(problem).value();
+    study = make_study(problem, {}).value();
     const Status tuned = tune_base(predictor, /*keep=*/true, &study);
     EXPECT_TRUE(tuned.ok());
   }
@@ -77,7 +77,7 @@ TEST(FitJointly, NuisancesTakeWhatTheyMay) {
 // Whitened rows of one column: x of each trial.
 Study plain_study(std::size_t trials) {
   Study study;
-  study.subject = diagnosis_subject("srv1");
+  study.subject = diagnosis_subject(Problem{});
   study.table = &srv1_table();
   study.cells = {{{"forward", 1, 1, 1}, MotionKind::kStraight, 1, 1, 1, trials}};
   study.trials.resize(trials);
