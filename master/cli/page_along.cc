@@ -66,11 +66,8 @@ std::string complaint(std::string said) {
 void PageOption::declare(CLI::App& app) {
   app.add_flag("--page", along,
                "Show it in a browser while it goes on (`gapfarm serve`), and print the address");
-  app.add_option("--page-port", port, "The same on this port of 127.0.0.1 (0: any)")
-      ->check(CLI::Range(0, 65535))
-      ->type_name("PORT");
-  app.add_option("--metrics", metrics_port,
-                 "The same; the page's server has /metrics for Prometheus, too")
+  app.add_option("--page-port,--metrics", port,
+                 "The same on this port of 127.0.0.1 (0: any); /metrics there is for Prometheus")
       ->check(CLI::Range(0, 65535))
       ->type_name("PORT");
 }
@@ -135,7 +132,7 @@ Result<std::unique_ptr<PageAlong>> open_page(const PageOption& option,
                                              const std::filesystem::path& folder,
                                              CliContext& context) {
   if (!option.wanted()) return std::unique_ptr<PageAlong>();
-  const std::optional<unsigned> named = option.port ? option.port : option.metrics_port;
+  const std::optional<unsigned>& named = option.port;
   auto page = PageAlong::start(folder, named.value_or(kPagePort));
   if (!page && !named) page = PageAlong::start(folder, 0);
   if (!page) return page.error();
@@ -146,7 +143,7 @@ Result<std::unique_ptr<PageAlong>> open_page(const PageOption& option,
   context.console.note("  from another machine first: " + (*page)->tunnel());
   context.console.note("  it ends with this command; gapfarm serve " + folder.string() +
                        " shows the same at any time");
-  if (option.metrics_port) context.console.note("metrics: " + address + "metrics");
+  if (named) context.console.note("metrics: " + address + "metrics");
   return page;
 }
 

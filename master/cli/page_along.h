@@ -19,10 +19,9 @@ struct CliContext;
 struct PageOption {
   bool along = false;
   std::optional<unsigned> port;
-  std::optional<unsigned> metrics_port;  // the same server, which has /metrics
 
   void declare(CLI::App& app);
-  bool wanted() const { return along || port || metrics_port; }
+  bool wanted() const { return along || port; }
 };
 
 // `gapfarm serve FOLDER` as a process of its own, at a low priority, which reads the folder's store

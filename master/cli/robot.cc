@@ -120,10 +120,9 @@ SubcommandRun setup_robot(CLI::App& app) {
       "  gapfarm robot husky.urdf --controllers control.yaml --out robot.toml\n"
       "  gapfarm robot burger.urdf --picture burger.svg\n"
       "  gapfarm robot old.urdf new.urdf\n"
-      "From files to a tuned model, in three commands:\n"
       "  gapfarm robot husky.urdf --controllers control.yaml --out robot.toml --config husky.toml\n"
-      "  gapfarm import runs drive.bag --out drive\n"
-      "  gapfarm evolve husky.toml --out run/husky");
+      "Next: gapfarm import runs drive.bag --out drive, then gapfarm evolve husky.toml --out "
+      "run/husky");
   return [options](CliContext& context) { return run_robot(*options, context); };
 }
 

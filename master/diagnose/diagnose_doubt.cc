@@ -19,7 +19,7 @@ constexpr double kAtBound = 1e-3;
 // Nats a trial: the worst of 11 practice logs and of the real forward log keep 0.2 with their
 // effects.
 constexpr double kMostMissed = 3;
-constexpr double kLittleClosed = 0.05;  // of the gap
+constexpr double kLittleClosed = 0.02;  // of the gap
 
 bool is_place(const std::string& key) {
   return key == "camera_distortion.x" || key == "camera_distortion.y" ||

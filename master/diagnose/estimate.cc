@@ -329,7 +329,7 @@ Result<JointFit> fit_jointly(Predictor& predictor, const Study& study,
 
 std::vector<Eigen::Vector3d> held_out_residuals(const Study& study, const JointFit& fit,
                                                 const std::vector<std::size_t>& fold_of) {
-  if (fit.parameters.empty()) return fit.residuals;
+  if (fit.jacobian.cols() == 0) return fit.residuals;
   const Eigen::VectorXd z = study.whiten(fit.residuals);
   const std::size_t folds = 1 + *std::max_element(fold_of.begin(), fold_of.end());
   Eigen::VectorXd left = z;

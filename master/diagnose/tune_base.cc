@@ -114,7 +114,7 @@ Eigen::MatrixXd log_slopes(const std::vector<Slope>& slopes, std::size_t trial,
 
 // By the cells' medians.
 BaseNormal normal_of_cells(const Study& study, const std::vector<Slope>& slopes, const Slope& both,
-                       Eigen::Index p, int round, bool* of_all) {
+                           Eigen::Index p, int round, bool* of_all) {
   BaseNormal normal{Eigen::MatrixXd::Zero(p, p), Eigen::VectorXd::Zero(p)};
   const std::vector<CellResidual> cells = cell_residuals(study);
   std::vector<double> turns;

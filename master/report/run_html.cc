@@ -164,7 +164,7 @@ Json page_json(const RunReport& report) {
                {"served", report.served},
                {"run", report.name},
                {"logged_trials", report.trials},
-               {"kept_apart", report.kept_apart},
+               {"kept_apart", report.served ? report.kept_apart : 0},
                {"parameters", parameters_json(report.parameters)},
                {"effects", Json::array()},
                {"where", Json::array()}};

@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "master/store/database.h"
+#include "master/store/schema.h"
 #include "tests/integration/demo_config.h"
 #include "tests/integration/run_program.h"
 
@@ -133,7 +134,7 @@ TEST_F(RunFolder, OfVersion01IsReadAsItIsAndUpgradedByResume) {
 
   const Finished resumed = resume(run_, "4");
   EXPECT_EQ(resumed.exit_code, 0) << resumed.err;
-  EXPECT_EQ(schema(), 3);
+  EXPECT_EQ(schema(), kRunStoreSchema);
   EXPECT_EQ(status(run_)["generation"], 4);
   const auto database = Database::open(file_, Database::Mode::kQueryOnly);
   auto kept = database->prepare("SELECT digest FROM generations WHERE generation = 2", "test");
