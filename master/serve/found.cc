@@ -203,7 +203,8 @@ std::vector<WorkEntry> WorkEntries::now(const std::vector<FoundWork>& found) {
   std::map<std::string, Known> still;
   std::vector<WorkEntry> entries;
   for (const FoundWork& f : found) {
-    std::string stamp = stamp_of(f.path);
+    // What a folder is taken for may change once its files have stood still.
+    std::string stamp = stamp_of(f.path) + std::to_string(static_cast<int>(f.kind));
     const double now_unix_s = unix_now_s_();
     const auto known = known_.find(f.name);
     Known& next = still[f.name];

@@ -18,6 +18,7 @@ NOT_RUN = {  # a part of the line: why
     "warthog": "a ground robot's evolved run",
     "diagnose husky.toml": "a ground robot's runs",
     "waypoint_1.log": "a blendersim log",
+    "export ros": "a ground robot's run or diagnosis",
     "drive.bag": "a bag",
     "drive.csv": "a table of somebody's logger",
     "--foreign": "somebody else's cases",

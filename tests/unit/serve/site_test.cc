@@ -3,6 +3,8 @@
 
 #include <gmock/gmock.h>
 
+#include <fstream>
+
 #include "tests/unit/store/store_fixture.h"
 
 namespace gapfarm {
@@ -54,7 +56,7 @@ class SiteTest : public StoreTest {
 };
 
 TEST_F(SiteTest, ListsFiltersAndSorts) {
-  const RunStore first = make("alpha", 7), second = make("beta", 3);
+  const RunStore first = make("alpha", 70001), second = make("beta", 30003);
   const std::string all = get("/").body;
   EXPECT_THAT(all, HasSubstr("2 here, 2 running"));
   EXPECT_THAT(all, HasSubstr("configs/srv1.toml"));
@@ -62,7 +64,7 @@ TEST_F(SiteTest, ListsFiltersAndSorts) {
   EXPECT_THAT(filtered, HasSubstr("1 shown"));
   EXPECT_THAT(filtered, HasSubstr("/alpha</a>"));
   EXPECT_THAT(filtered, Not(HasSubstr("/beta</a>")));
-  EXPECT_THAT(get("/?q=seed+3").body, Not(HasSubstr("/alpha</a>")));
+  EXPECT_THAT(get("/?q=seed+30003").body, Not(HasSubstr("/alpha</a>")));
   EXPECT_THAT(get("/?state=finished").body, HasSubstr("0 shown"));
   // What is chosen stays while it is sorted.
   EXPECT_THAT(get("/?q=a&state=running").body, HasSubstr("?sort=seed&amp;q=a&amp;state=running"));
@@ -114,6 +116,21 @@ TEST_F(SiteTest, EventsTellWhatThePageStandsAt) {
   EXPECT_EQ(get("/events?at=/metrics").status, 404u);
   EXPECT_EQ(get("/events?at=/view&of=nothing").status, 404u);
   EXPECT_TRUE(get("/events?at=/").watched);
+}
+
+// The folders are searched less often than those that were found are looked at: a short diagnosis
+// ends while it is still taken for any command.
+TEST_F(SiteTest, WhatAFolderIsTakenForCountsToo) {
+  std::ofstream(folder_ / "diagnosis.json") << R"({"headline": "One motor is slower."})";
+  double now_s = 1e9;
+  WorkEntries entries([&] { return now_s; }, [] { return 0.0; });
+  FoundWork found{FoundWork::Kind::kCommand, "d", folder_};
+  const std::string as_command = entries.now({found}).front().stamp;
+  found.kind = FoundWork::Kind::kDiagnosis;
+  now_s += 1e6;
+  const WorkEntry as_diagnosis = entries.now({found}).front();
+  EXPECT_EQ(as_diagnosis.told, "One motor is slower.");
+  EXPECT_NE(as_diagnosis.stamp, as_command);
 }
 
 TEST_F(SiteTest, FindsNothingOutsideOfItsFolders) {
