@@ -102,25 +102,14 @@ Status DiagnosisRun::refit_nested() {
   return {};
 }
 
-// Each where it does best beside the others that are chosen now.
-Status DiagnosisRun::estimate_chosen() {
-  if (chosen_.empty()) return {};
-  std::vector<EffectCandidate> effects;
-  for (const ChosenEffect& c : chosen_) effects.push_back(c.candidate);
-  auto fit = estimate(effects, estimates_ ? 1 : 2);
-  if (!fit) return fit.error();
-  const auto moved = move_patch(predictor_, study_, nuisances_, &*fit);
-  if (!moved) return moved.error();
-  estimates_ = std::move(*fit);
-  if (!*moved) return {};
-  fit = estimate(effects, 1);
-  if (!fit) return fit.error();
-  estimates_ = std::move(*fit);
-  return {};
-}
-
 Status DiagnosisRun::refit() {
-  if (Status s = estimate_chosen(); !s) return s;
+  if (!chosen_.empty()) {
+    std::vector<EffectCandidate> effects;
+    for (const ChosenEffect& c : chosen_) effects.push_back(c.candidate);
+    auto fit = estimate(effects, estimates_ ? 1 : 2);
+    if (!fit) return fit.error();
+    estimates_ = std::move(*fit);
+  }
   const std::vector<std::size_t> folds = subject_.folds(study_);
   const std::size_t found = chosen_.size();
   for (;;) {
@@ -140,7 +129,6 @@ Status DiagnosisRun::refit() {
     }
     if (!worthless) break;
     drop_effect(worthless->first, worthless->second);
-    if (Status s = estimate_chosen(); !s) return s;
   }
   doubt_misses();
   if (misses_) return name_none_for_misses(folds);

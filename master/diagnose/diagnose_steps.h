@@ -96,7 +96,6 @@ class DiagnosisRun {
   std::vector<bool> tells_of_slips() const;
   Status select();
   Result<JointFit> estimate(const std::vector<EffectCandidate>& effects, int rounds);
-  Status estimate_chosen();
   Result<Relinearised> relinearise(const std::vector<EffectCandidate>& effects);
   Status select_without_slips(const Regression& explained);
   // Base and these effects at their best linear fit.

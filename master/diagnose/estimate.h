@@ -39,16 +39,9 @@ Result<JointFit> fit_jointly(Predictor& predictor, const Study& study,
 // taken their part, and what that and the parameters cost under their priors.
 double misfit_of(const Study& study, const JointFit& fit, const Eigen::MatrixXd& nuisances);
 
-// Of misfit_of(), that a search by simulation moves a place for: trials change sides one by one.
-inline constexpr double kWorthMoving = 2;
-
 // Where the seams of a fit run, searched with everything else held: the derivatives of a fit know
 // of no line.  Whether any moved; residuals and derivatives are then those of before.
 Result<bool> move_seams(Predictor& predictor, const Study& study, const Eigen::MatrixXd& nuisances,
-                        JointFit* fit);
-
-// The same of its patch, if it has one: place, radius and friction by a pattern search.
-Result<bool> move_patch(Predictor& predictor, const Study& study, const Eigen::MatrixXd& nuisances,
                         JointFit* fit);
 
 // Parameter values at which a refinement of the effect begins.

@@ -11,6 +11,8 @@ namespace {
 // A first search as wide as two readings leave a line, then a finer one.
 constexpr double kWideStep_m = 0.01, kFineStep_m = 0.0025;
 constexpr int kWideSteps = 8, kFineSteps = 3;
+// Of the misfit (twice nats), for a move: trials change sides one by one.
+constexpr double kWorthMoving = 2;
 
 std::vector<std::size_t> seam_rows(const ParameterTable& table, const Overrides& at) {
   std::vector<std::size_t> rows;
