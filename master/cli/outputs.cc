@@ -131,8 +131,16 @@ Status Outputs::check(const std::string& path, bool replace) const {
 
 Status Outputs::plan(const std::string& path) {
   if (path.empty() || path == "-") return {};
+  std::error_code ignored;
+  const fs::path own = fs::weakly_canonical(path, ignored);
+  for (const Planned& other : planned_) {
+    if (own != "/dev/null" && fs::weakly_canonical(other.path, ignored) == own) {
+      return Error{path + ": is to be written twice; give one of the outputs another name"};
+    }
+  }
+  if (Status s = check(path, force_); !s) return s;
   planned_.push_back({path, force_});
-  return check(path, force_);
+  return {};
 }
 
 Status Outputs::plan(const std::vector<std::string>& paths) {

@@ -67,6 +67,16 @@ TEST(Outputs, FindsWhatCannotBeWrittenBeforeTheWork) {
 }
 
 // What appears between looking and writing stays too, and no work is lost.
+TEST(Outputs, GivesEachItsOwnFile) {
+  const TemporaryFolder folder;
+  Outputs outputs;
+  ASSERT_EQ(said(outputs.plan(folder.path("a.toml"))), "");
+  EXPECT_THAT(said(outputs.plan(folder.path("./a.toml"))), HasSubstr("is to be written twice"));
+  EXPECT_EQ(said(outputs.plan(folder.path("b.toml"))), "");
+  EXPECT_EQ(said(outputs.plan("/dev/null")), "");
+  EXPECT_EQ(said(outputs.plan("/dev/null")), "");
+}
+
 TEST(Outputs, KeepsWhatAppearsMeanwhile) {
   TemporaryFolder folder;
   const std::string file = folder.path("out.csv");
