@@ -6,30 +6,15 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "common/parameters/ground.h"
 #include "common/robot/robot_file.h"
 #include "master/cli/inputs.h"
 #include "master/cli/robot_files.h"
+#include "master/robot/robot_config.h"
 
 namespace gapfarm {
 namespace {
 
 namespace fs = std::filesystem;
-
-// What a log usually determines, in the order in which it is read; wheels' radii come first.
-constexpr const char* kUsualGenes[] = {"wheel_separation",
-                                       "robot_radius",
-                                       "full_speed",
-                                       "steering.offset",
-                                       "steering.gain",
-                                       "delay",
-                                       "lag",
-                                       "marker.x",
-                                       "marker.y",
-                                       "drive_noise_travel",
-                                       "drive_noise_turn",
-                                       "pose_noise_position",
-                                       "pose_noise_heading"};
 
 bool is_robot_file(const std::string& word) {
   const std::string extension = fs::path(word).extension().string();
@@ -62,31 +47,8 @@ std::string question(const std::string& sentence) {
   return "# QUESTION: " + printable(sentence) + "\n";
 }
 
-std::string toml_key(const std::string& key) {
-  const auto bare = [](char c) {
-    return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_' || c == '-' || c == '.';
-  };
-  return std::all_of(key.begin(), key.end(), bare) ? key : "\"" + key + "\"";
-}
-
-std::string gene_lines(const ParameterTable& table) {
-  std::string text;
-  const auto add = [&](const Parameter& p) {
-    const std::string line = toml_key(p.key) + " = \"table\"";
-    text +=
-        fmt::format("{:<34}{}\n", line, "# " + (p.unit == "-" ? "" : p.unit + ", ") + p.summary);
-  };
-  for (const Parameter& p : table.rows()) {
-    if (p.key.starts_with("wheels.") && p.key.ends_with(".radius")) add(p);
-  }
-  for (const char* key : kUsualGenes) {
-    if (const auto row = table.find(key)) add(table[*row]);
-  }
-  return text;
-}
-
-std::string config_of_robot(const RobotReading& reading, const GroundRobot& completed,
-                            const RobotWords& words, const std::string& out) {
+std::string questioning_config(const RobotReading& reading, const GroundRobot& completed,
+                               const RobotWords& words, const std::string& out) {
   std::string files, folders;
   for (const std::string& file : words.files) files += (files.empty() ? "" : ", ") + file;
   for (const std::string& folder : words.folders) {
@@ -108,13 +70,7 @@ std::string config_of_robot(const RobotReading& reading, const GroundRobot& comp
     folders = "\"drive\"";
   }
   text += "folders = [" + folders + "]   # commands.csv and poses.csv in each\n\n";
-  text +=
-      "# What evolution searches; \"table\": half to twice what the robot's file says.\n[genes]\n";
-  text += gene_lines(GroundTable(completed).table());
-  text +=
-      "\n[optimiser]\nkind = \"cma_es\"\nsigma = 0.1\n\n[evolution]\npopulation = 16\n\n"
-      "[evolution.stop]\ngenerations = 60\nstagnation_generations = 20\n";
-  return text;
+  return text + search_of_driving(completed);
 }
 
 }  // namespace
@@ -155,7 +111,7 @@ int run_init_robot(const std::vector<std::string>& words, const std::string& out
     console.error(ready.error());
     return kExitBadUsage;
   }
-  const std::string text = config_of_robot(*reading, completed, sorted, out);
+  const std::string text = questioning_config(*reading, completed, sorted, out);
   nlohmann::ordered_json json = {{"out", out}, {"robot", robot}, {"runs", sorted.folders}};
   if (out == "-") {
     json["config"] = text;

@@ -1,5 +1,7 @@
 #include "master/robot/robot_config.h"
 
+#include <algorithm>
+#include <cctype>
 #include <set>
 #include <vector>
 
@@ -40,21 +42,37 @@ std::vector<std::string> told_by_driving(const GroundRobot& robot) {
   return keys;
 }
 
+std::string toml_key(const std::string& key) {
+  const auto bare = [](char c) {
+    return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_' || c == '-' || c == '.';
+  };
+  return std::all_of(key.begin(), key.end(), bare) ? key : "\"" + key + "\"";
+}
+
 }  // namespace
+
+std::string search_of_driving(const GroundRobot& robot) {
+  const GroundTable rows(robot);
+  std::string text = "[genes]  # \"table\": half to twice what the robot's file says\n";
+  for (const std::string& key : told_by_driving(robot)) {
+    const auto row = rows.table().find(key);
+    if (!row) continue;
+    const Parameter& p = rows.table()[*row];
+    std::string line = toml_key(key) + " = \"table\"";
+    line.resize(std::max<std::size_t>(line.size() + 1, 34), ' ');
+    text += line + "# " + (p.unit == "-" ? "" : p.unit + ", ") + p.summary + "\n";
+  }
+  return text +
+         "\n[optimiser]\nkind = \"cma_es\"\nsigma = 0.1\n\n"
+         "[evolution]\nstop = { evaluations = 600 }\n";
+}
 
 std::string config_of_robot(const GroundRobot& robot, const std::string& robot_file,
                             const std::string& runs) {
   std::string text = "# A ground robot, fitted to logs of it driving (docs/ground.md).\n";
   text += "scenario = \"ground\"\n\n[robot]\nfile = \"" + robot_file + "\"\n\n";
   text += "[runs]\nfolders = [\"" + runs + "\"]  # of gapfarm import runs\n\n";
-  text += "[genes]  # bounds: half the file's value to twice it; gapfarm check lists them\n";
-  const GroundTable rows(robot);
-  for (const std::string& key : told_by_driving(robot)) {
-    if (rows.table().find(key)) text += key + " = \"table\"\n";
-  }
-  text += "\n[optimiser]\nkind = \"cma_es\"\nsigma = 0.1\n\n";
-  text += "[evolution]\nstop = { evaluations = 600 }\n";
-  return text;
+  return text + search_of_driving(robot);
 }
 
 }  // namespace gapfarm

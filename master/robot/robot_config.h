@@ -7,6 +7,10 @@
 
 namespace gapfarm {
 
+// The sections [genes], [optimiser] and [evolution] that fit what a log of free driving tells of
+// this drive.
+std::string search_of_driving(const GroundRobot& robot);
+
 // Config text of scenario ground that fits what a log of free driving tells of this drive.
 // `robot_file` and `runs` (a folder) as the config is to name them.
 std::string config_of_robot(const GroundRobot& robot, const std::string& robot_file,
