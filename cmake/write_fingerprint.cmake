@@ -2,7 +2,7 @@ string(REPLACE "," ";" FOLDERS "${FOLDERS}")
 set(sources)
 foreach(folder IN LISTS FOLDERS)
   file(GLOB found RELATIVE ${SOURCE_DIR} ${SOURCE_DIR}/${folder}/*.h ${SOURCE_DIR}/${folder}/*.cc
-       ${SOURCE_DIR}/${folder}/gapfarm/v1/*.proto)
+       ${SOURCE_DIR}/${folder}/*.inc ${SOURCE_DIR}/${folder}/gapfarm/v1/*.proto)
   list(APPEND sources ${found})
 endforeach()
 list(SORT sources)

@@ -65,31 +65,9 @@ class ParameterTable {
 
 // Base rows of scenario `srv1`, in table order; `values[row_of(Srv1::kMass)]` is the mass.
 enum class Srv1 : std::size_t {
-  kRobot,              // choice: treads, wheels
-  kMass,               // kg
-  kContactLength,      // m, front to rear contact
-  kTrackGauge,         // m, left to right contact
-  kFriction,           // -, along the treads
-  kFrictionRatio,      // -, lateral over longitudinal friction
-  kTreadCreep,         // -, slip over tread speed at 0.7 of full traction (treads)
-  kMassHeight,         // m, centre of mass over the floor
-  kFullSpeed,          // m/s at full duty
-  kDriveNoiseCommon,   // -, per-trial s.d. of both sides' speed
-  kDriveNoiseSide,     // -, per-trial s.d. of each side's speed
-  kPoseNoisePosition,  // m, s.d. of a measured x and y
-  kPoseNoiseHeading,   // rad, s.d. of a measured heading
-  kDriveNoiseTail,     // -, 1 / degrees of freedom of the drive's noise; 0: Gaussian
-  kPoseNoiseTail,      // -, the same of the readings' noise
-  kGravity,            // m/s^2
-  kStepRate,           // Hz
-  kSubSteps,           // -
-  kSolverIterations,   // -
-  kRestitution,        // -
-  kLinearDamping,      // 1/s as Bullet's fraction per second
-  kAngularDamping,     // same
-  kWheelShape,         // choice: sphere, cylinder, box, hull (wheels)
-  kMaximumVelocity,    // rad/s of a wheel at full duty (wheels)
-  kMotorTorque,        // N m a wheel (wheels)
+#define ROW(name, row) name,
+#define SETTING(name, member, row) name,
+#include "common/parameters/srv1_rows.inc"
   kCount
 };
 constexpr std::size_t row_of(Srv1 p) { return static_cast<std::size_t>(p); }

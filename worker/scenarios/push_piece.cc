@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "worker/scenarios/outcome.h"
+#include "worker/scenarios/put.h"
 
 namespace gapfarm {
 namespace {
@@ -25,7 +26,9 @@ PushNoise push_noise(const ParameterValues& values) {
 PushSettings push_settings(const Piece& piece, std::size_t index, const ParameterValues& values,
                            const ActiveEffects& effects) {
   PushSettings s;
-  s.model = static_cast<PushModel>(static_cast<int>(at(values, Push::kModel)));
+#define ROW(name, row)
+#define SETTING(name, member, row) put(at(values, Push::name), s.member);
+#include "common/parameters/push_rows.inc"
   const Eigen::Vector2d middle = centroid(piece);
   for (const Eigen::Vector2d& corner : piece.corners) s.corners.push_back(corner - middle);
   s.thickness_m = piece.thickness_m;
@@ -33,21 +36,6 @@ PushSettings push_settings(const Piece& piece, std::size_t index, const Paramete
   const Eigen::Vector3d moments = second_moments(piece);
   s.gyration_m2 = moments[0] + moments[1];
   s.shape_factor = shape_factor(index, values);
-  s.ground_friction = at(values, Push::kGroundFriction);
-  s.finger_friction = at(values, Push::kFingerFriction);
-  s.finger_radius_m = at(values, Push::kFingerRadius);
-  s.finger_height = at(values, Push::kFingerHeight);
-  s.contact_margin_m = at(values, Push::kContactMargin);
-  s.gravity_m_s2 = at(values, Push::kGravity);
-  s.length_scale = at(values, Push::kLengthScale);
-  s.step_rate_hz = at(values, Push::kStepRate);
-  s.sub_steps = static_cast<int>(at(values, Push::kSubSteps));
-  s.solver_iterations = static_cast<int>(at(values, Push::kSolverIterations));
-  s.restitution = at(values, Push::kRestitution);
-  s.linear_damping = at(values, Push::kLinearDamping);
-  s.angular_damping = at(values, Push::kAngularDamping);
-  s.error_reduction = at(values, Push::kErrorReduction);
-  s.contact_softness = at(values, Push::kContactSoftness);
   effects.push(s);
   return s;
 }

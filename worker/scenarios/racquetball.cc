@@ -2,6 +2,7 @@
 
 #include "common/parameters/racquetball.h"
 #include "common/random/stream.h"
+#include "worker/scenarios/put.h"
 #include "worker/sim/racquetball.h"
 
 namespace gapfarm {
@@ -12,39 +13,10 @@ constexpr const char* kNoTrials =
     "influence";
 
 RacquetballSettings settings_of(const ParameterValues& values) {
-  const auto at = [&](Racquetball p) { return values[row_of(p)]; };
-  using enum Racquetball;
   RacquetballSettings s;
-  s.gravity_m_s2 = at(kGravity);
-  s.step_rate_hz = at(kStepRate);
-  s.sub_steps = static_cast<int>(at(kSubSteps));
-  s.solver_iterations = static_cast<int>(at(kSolverIterations));
-  s.radius_m = at(kBallRadius);
-  s.mass_kg = at(kBallMass);
-  s.inertia_factor = at(kInertiaFactor);
-  s.restitution = at(kBallRestitution);
-  s.friction = at(kBallFriction);
-  s.rolling_friction_m = at(kRollingFriction);
-  s.anisotropic_friction = at(kAnisotropicFriction);
-  s.wall_restitution = at(kWallRestitution);
-  s.wall_friction = at(kWallFriction);
-  s.linear_damping = at(kLinearDamping);
-  s.angular_damping = at(kAngularDamping);
-  s.maximum_velocity_m_s = at(kMaximumVelocity);
-  s.shape = static_cast<BallShape>(static_cast<int>(at(kCollisionShape)));
-  s.contact_response = at(kContactResponse) != 0;
-  s.continuous = at(kContinuous) != 0;
-  s.error_reduction = at(kErrorReduction);
-  s.sleeping = at(kSleeping) != 0;
-  s.sleep_linear_m_s = at(kSleepLinear);
-  s.sleep_angular_rad_s = at(kSleepAngular);
-  s.launch_m_s = {at(kLaunchSpeed), at(kLaunchSide), at(kLaunchLift)};
-  s.launch_spin_rad_s = at(kLaunchSpin);
-  s.launch_force_n = at(kLaunchForce);
-  s.paddle_speed_m_s = at(kPaddleSpeed);
-  s.paddle_tilt_rad = at(kPaddleTilt);
-  s.paddle_size_m = at(kPaddleSize);
-  s.paddle_spin_rad_s = at(kPaddleSpin);
+#define ROW(name, row)
+#define SETTING(name, member, row) put(values[row_of(Racquetball::name)], s.member);
+#include "common/parameters/racquetball_rows.inc"
   return s;
 }
 

@@ -4,12 +4,12 @@
 #include <cmath>
 
 #include "worker/scenarios/external.h"
+#include "worker/scenarios/put.h"
 
 namespace gapfarm {
 namespace {
 
 double at(const ParameterValues& values, Srv1 row) { return values[row_of(row)]; }
-int whole(const ParameterValues& values, Srv1 row) { return static_cast<int>(at(values, row)); }
 
 SideDrive side_drive(const SideState& side, double full_speed_m_s, double noise_gain) {
   return {side.duty * full_speed_m_s * side.gain * noise_gain, side.lag_s, side.dead_travel_m};
@@ -45,24 +45,10 @@ class BulletVehicle final : public Vehicle {
 
 SimSettings sim_settings(const ParameterValues& values, const ActiveEffects& effects) {
   SimSettings s;
-  s.robot = static_cast<RobotModel>(whole(values, Srv1::kRobot));
-  s.mass_kg = at(values, Srv1::kMass);
-  s.contact_length_m = at(values, Srv1::kContactLength);
-  s.track_gauge_m = at(values, Srv1::kTrackGauge);
-  s.friction = at(values, Srv1::kFriction);
-  s.friction_ratio = at(values, Srv1::kFrictionRatio);
-  if (s.robot == RobotModel::kTreads) s.tread_creep = at(values, Srv1::kTreadCreep);
-  s.mass_height_m = at(values, Srv1::kMassHeight);
-  s.gravity_m_s2 = at(values, Srv1::kGravity);
-  s.step_rate_hz = at(values, Srv1::kStepRate);
-  s.sub_steps = whole(values, Srv1::kSubSteps);
-  s.solver_iterations = whole(values, Srv1::kSolverIterations);
-  s.restitution = at(values, Srv1::kRestitution);
-  s.linear_damping = at(values, Srv1::kLinearDamping);
-  s.angular_damping = at(values, Srv1::kAngularDamping);
-  s.wheel_shape = static_cast<WheelShape>(whole(values, Srv1::kWheelShape));
-  s.maximum_velocity_rad_s = at(values, Srv1::kMaximumVelocity);
-  s.motor_torque_n_m = at(values, Srv1::kMotorTorque);
+#define ROW(name, row)
+#define SETTING(name, member, row) put(at(values, Srv1::name), s.member);
+#include "common/parameters/srv1_rows.inc"
+  if (s.robot != RobotModel::kTreads) s.tread_creep = 0;
   effects.settings(s);
   return s;
 }

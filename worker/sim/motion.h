@@ -35,7 +35,7 @@ struct SimSettings {
   double com_y_m = 0;  // and to its left
   // wheels only
   WheelShape wheel_shape = WheelShape::kSphere;
-  double maximum_velocity_rad_s = 20;  // of a wheel at full duty
+  double maximum_velocity_rad_s = 40;  // of a wheel at full duty
   double motor_torque_n_m = 0.05;      // a wheel
 
   bool operator==(const SimSettings&) const = default;

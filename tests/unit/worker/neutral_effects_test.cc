@@ -10,6 +10,11 @@
 namespace gapfarm {
 namespace {
 
+TEST(Settings, AtNominalParametersAreTheDefaults) {
+  const ParameterValues nominal = srv1_table().nominal();
+  EXPECT_EQ(sim_settings(nominal, ActiveEffects(srv1_table(), nominal)), SimSettings{});
+}
+
 using tests::small_problem;
 
 std::string answer(const Problem& problem, const v1::Task& task) {
