@@ -22,6 +22,10 @@ enum EffectContext : unsigned {
   kUnrecordedMove = 1u << 4,  // whether the robot was moved before the trial
 };
 
+// What repeating a trial shows of an effect: another mean, a wider spread about it, or now and then
+// a trial that strays.
+enum class EffectShows { kMean, kSpread, kChance };
+
 struct EffectParameter {
   std::string key;   // within the effect
   std::string unit;  // "-" when it has none
@@ -44,7 +48,9 @@ struct Effect {
   // Of the second one of a kind ("camera_seam_2"): the effect of which there may be two, whose
   // parameters and implementation it shares.  Empty: the first, or the only one.
   std::string repeats = {};
+  EffectShows shows = EffectShows::kMean;
 
+  bool moves_means() const { return shows == EffectShows::kMean; }
   const std::string& kind() const { return repeats.empty() ? name : repeats; }
 };
 

@@ -84,6 +84,15 @@ ParameterValues ParameterTable::nominal() const {
   return values;
 }
 
+void ParameterTable::without_chance(ParameterValues* values) const {
+  for (std::size_t e = 0; e < effects_.size(); ++e) {
+    if (effects_[e].shows != EffectShows::kChance) continue;
+    for (std::size_t i = 0; i < effects_[e].strengths; ++i) {
+      (*values)[effect_rows_[e] + i] = effects_[e].parameters[i].neutral;
+    }
+  }
+}
+
 bool ParameterTable::is_neutral(std::size_t e, const ParameterValues& values) const {
   for (std::size_t i = 0; i < effects_[e].strengths; ++i) {
     if (values[effect_rows_[e] + i] != effects_[e].parameters[i].neutral) return false;

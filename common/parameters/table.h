@@ -49,6 +49,8 @@ class ParameterTable {
   std::size_t effect_row(std::size_t e) const { return effect_rows_[e]; }
 
   ParameterValues nominal() const;
+  // Every effect that strikes by chance made neutral.
+  void without_chance(ParameterValues* values) const;
   // Whether effect `e` does nothing at `values`.
   bool is_neutral(std::size_t e, const ParameterValues& values) const;
 

@@ -161,7 +161,7 @@ v1::Task predict_task(const Problem& planned, const Truth& truth) {
 
 void tell(const ParameterTable& table, const Arena& arena, const v1::TaskResult& result,
           const v1::PredictResult& base, Sizing& sizing) {
-  const bool by_spread = changes_spread(table.effects()[sizing.effect].name);
+  const bool by_spread = !table.effects()[sizing.effect].moves_means();
   sizing.search.tell(result.outcome() == v1::OK ? size_of(base, result.predict(), by_spread)
                                                 : std::nullopt);
   if (!sizing.search.done() || sizing.search.found()) return;
@@ -198,7 +198,7 @@ Status search_strengths(const Problem& planned, Drafts& drafts, Farm& farm,
       v1::Task task = predict_task(planned, drafts.cases[s.in_case]);
       add_overrides(table, s.effect, effect_values(table, s.draw, s.search.strength()),
                     *task.mutable_predict()->mutable_point());
-      task.mutable_predict()->set_means_only(!changes_spread(table.effects()[s.effect].name));
+      task.mutable_predict()->set_means_only(table.effects()[s.effect].moves_means());
       open.push_back(i);
       round.push_back(std::move(task));
     }

@@ -96,10 +96,6 @@ std::vector<double> effect_values(const ParameterTable& table, const EffectDraw&
   return values;
 }
 
-bool changes_spread(const std::string& effect) {
-  return effect == "slip_events" || effect == "pose_latency" || effect == "pose_quantisation";
-}
-
 std::optional<double> size_of(const v1::PredictResult& base, const v1::PredictResult& effect,
                               bool by_spread) {
   double sum = 0;

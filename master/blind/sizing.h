@@ -38,10 +38,6 @@ EffectDraw draw_effect(const ParameterTable& table, std::size_t effect, const Ar
 std::vector<double> effect_values(const ParameterTable& table, const EffectDraw& draw,
                                   double strength);
 
-// Whether the effect changes the spread of the poses rather than their mean: its size is then told
-// by second moments.  Known by name, for want of any other sign.
-bool changes_spread(const std::string& effect);
-
 // Mean squared shift of the predicted ends in units of the base's predictive covariance S:
 //
 //   mean over trials of 1 + d^T S^-1 d / 3         d: from the base's mean to the effect's

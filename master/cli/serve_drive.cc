@@ -45,8 +45,9 @@ Json measured_json(const Trial& trial, double duration_s) {
 }
 
 // Overrides that take everything random out of `values`, the problem's own.
-std::vector<v1::Override> muted(const Problem& problem, const ParameterValues& values) {
+std::vector<v1::Override> muted(const Problem& problem, ParameterValues values) {
   const ParameterTable& table = problem.table();
+  table.without_chance(&values);
   std::vector<v1::Override> overrides;
   const auto set = [&](std::size_t row, double value) {
     v1::Override& to = overrides.emplace_back();
@@ -56,8 +57,7 @@ std::vector<v1::Override> muted(const Problem& problem, const ParameterValues& v
   for (std::size_t row = 0; row < table.size(); ++row) {
     const std::string& key = table[row].key;
     const bool noise = key.starts_with("drive_noise_") || key.starts_with("pose_noise_");
-    const bool chance = key == "slip_events.probability" || key == "pose_latency.share";
-    const double value = noise ? table[row].lower : chance ? 0 : values[row];
+    const double value = noise ? table[row].lower : values[row];
     if (value != problem.values[row]) set(row, value);
   }
   return overrides;

@@ -159,9 +159,7 @@ std::vector<v1::Override> DiagnosisRun::without_chance(ParameterValues values) c
                                 subject_.pose_heading}) {
     values[noise.row] = table[noise.row].lower;
   }
-  for (const char* key : {"slip_events.probability", "pose_latency.share"}) {
-    if (const auto row = table.find(key)) values[*row] = 0;
-  }
+  table.without_chance(&values);
   std::vector<v1::Override> overrides;
   for (std::size_t row = 0; row < values.size(); ++row) {
     if (values[row] == problem_.values[row]) continue;

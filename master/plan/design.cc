@@ -89,10 +89,11 @@ Status Designer::choose_effects(DesignedPlan* plan) {
     if (found == known.end()) {
       return Error{"there is no effect '" + name + "'" + suggestion(name, known)};
     }
-    if (changes_spread(name)) {
-      plan->not_planned_for.push_back(name);
+    const auto effect = static_cast<std::size_t>(found - known.begin());
+    if (catalogue[effect].moves_means()) {
+      effects_.push_back(effect);
     } else {
-      effects_.push_back(static_cast<std::size_t>(found - known.begin()));
+      plan->not_planned_for.push_back(name);
     }
   }
   if (effects_.empty()) {

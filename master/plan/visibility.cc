@@ -160,7 +160,7 @@ Result<Signals> signals(Farm& farm, const Problem& problem, const TrialLog& log,
   found.nuisances = std::move(*nuisances);
   const Arena arena = arena_of(log);
   for (const std::size_t effect : settings.effects) {
-    if (changes_spread(planned.table().effects()[effect].name)) continue;
+    if (!planned.table().effects()[effect].moves_means()) continue;
     for (unsigned d = 0; d < settings.draws; ++d) {
       Stream stream({settings.seed, Purpose::kSimulation, 2, effect, d});
       found.shifts.push_back(
