@@ -16,8 +16,10 @@ Status DiagnosisRun::compare_with_baselines() {
   const auto baselines = crossfitted_baselines(problem_.log, problem_.commands, folds);
   if (!baselines) return baselines.error();
   const auto by_tuned = gapfarm::compare_with_baselines(*baselines, nested_scores_.front());
-  const auto by_model = gapfarm::compare_with_baselines(
-      *baselines, slip_.gain > 0 ? slip_scores_ : nested_scores_.back());
+  const auto by_model =
+      gapfarm::compare_with_baselines(*baselines, slip_.gain > 0     ? slip_scores_
+                                                  : spreads_.empty() ? nested_scores_.back()
+                                                                     : spreads_.back().scores);
   Diagnosis& d = result_.diagnosis;
   if (by_model.empty()) {
     d.provenance.emplace_back("without a simulation",

@@ -68,7 +68,8 @@ void DiagnosisRun::doubt(SanityFinding finding) {
 void DiagnosisRun::doubt_misses() {
   const double gap = floor_ - mean(nested_scores_.back());
   if (doubted_ || !(gap > kMostMissed)) return;
-  const bool named = !chosen_.empty() || !first_.empty() || slip_.gain > 0 || lag_.gain > 0;
+  const bool named =
+      !chosen_.empty() || !first_.empty() || slip_.gain > 0 || !spreads_.empty() || lag_.gain > 0;
   if (!named && result_.diagnosis.verdict != Verdict::kNone) return;
   misses_ = SanityFinding{
       "base_misses",
@@ -165,6 +166,14 @@ std::string DiagnosisRun::why_not_screened(const std::string& name, Screened* ro
                 latency_from_rest_s_ > 0 ? latency_from_rest_s_ : latency_.latency_s,
                 latency_.gain > 0 ? "by readings that fall behind the next ones"
                                   : "readings of one resting pose agree");
+  }
+  if (const SpreadRow* look = spread_row(name)) {
+    for (const FoundSpread& found : spreads_) {
+      if (found.row != look) continue;
+      const Estimate& first = found.fit.estimates.front();
+      return told(found.fit.gain, first.key.c_str(), first.value, look->found);
+    }
+    return look->missing;
   }
   if (name == "pose_quantisation") {
     return told(

@@ -33,7 +33,7 @@ bool clearly_better(const std::vector<double>& scores, const std::vector<double>
 // what the fit leaves is measured as the tuned base's noise was.  Slips' noise came with them.
 Study DiagnosisRun::study_beside(const JointFit& fit) const {
   Study study = study_;
-  if (slip_.gain > 0) return study;
+  if (slip_.gain > 0 || !spreads_.empty()) return study;
   for (std::size_t i = 0; i < study.size(); ++i) study.trials[i].residual = fit.residuals[i];
   estimate_noise(Regression(nuisances_, study.whitened_residuals()), blocks_, &study);
   return study;
@@ -177,7 +177,8 @@ void DiagnosisRun::score_nested(const std::vector<std::size_t>& folds) {
 // What the remaining effects leave at their estimates.
 void DiagnosisRun::judge_again() {
   const bool odd = !odd_readings_.empty() || !odd_drives_.empty();
-  const bool others = !first_.empty() || slip_.gain > 0 || lag_.gain > 0 || study_.quantum_m > 0;
+  const bool others = !first_.empty() || slip_.gain > 0 || !spreads_.empty() || lag_.gain > 0 ||
+                      study_.quantum_m > 0;
   Verdict& verdict = result_.diagnosis.verdict;
   if (chosen_.empty()) {
     estimates_.reset();
@@ -215,6 +216,7 @@ void DiagnosisRun::set_floor(const std::vector<std::size_t>& folds) {
       tailed.reset();
     }
   }
+  foresee_spreads(folds);
   // What slips scatter is no Gaussian: the best prediction is the mixture fitted to it.
   floor_ =
       slip_.gain > 0
@@ -226,6 +228,7 @@ void DiagnosisRun::set_floor(const std::vector<std::size_t>& folds) {
   for (const std::vector<double>& scores : nested_scores_) {
     reached = std::max(reached, mean(scores));
   }
+  for (const FoundSpread& found : spreads_) reached = std::max(reached, mean(found.scores));
   for (const Leftover& l : leftovers_) {
     if (l.log10_p < subject_.unknown_log10_p) more = std::max(more, l.excess);
   }
@@ -243,14 +246,36 @@ void DiagnosisRun::foresee_slips(const std::vector<std::size_t>& folds) {
   }
 }
 
+// The last of the nested fits, and each effect on the spread foreseen; it is named for that alone.
+void DiagnosisRun::foresee_spreads(const std::vector<std::size_t>& folds) {
+  if (spreads_.empty()) return;
+  const Study& study = nested_studies_.back();
+  const std::vector<Eigen::Vector3d> residuals = held_out_residuals(study, nested_.back(), folds);
+  for (FoundSpread& found : spreads_) {
+    found.scores = found.row->scores(study, residuals, found.fit, problem_.fitness.outlier_share);
+  }
+  std::string dropped;
+  std::erase_if(spreads_, [&](const FoundSpread& found) {
+    if (clearly_better(found.scores, nested_scores_.back())) return false;
+    dropped = found.row->effect;
+    return true;
+  });
+  if (!dropped.empty()) doubt_strays(dropped);
+}
+
 // They explain the scatter less well than a wider noise does: something else makes drives stray.
 void DiagnosisRun::drop_slips() {
   slip_ = {};
-  const bool named = !first_.empty() || !chosen_.empty() || lag_.gain > 0 || study_.quantum_m > 0;
+  doubt_strays("slips");
+}
+
+void DiagnosisRun::doubt_strays(const std::string& effect) {
+  const bool named = !first_.empty() || !chosen_.empty() || !spreads_.empty() || lag_.gain > 0 ||
+                     study_.quantum_m > 0;
   result_.diagnosis.verdict = named ? Verdict::kEffectAndUnknown : Verdict::kUnknown;
-  result_.diagnosis.cautions.emplace_back(
-      "Single drives stray, but not as slips would make them: nothing that was looked for explains "
-      "them.");
+  result_.diagnosis.cautions.push_back(
+      "Single drives stray, but not as " + effect +
+      " would make them: nothing that was looked for explains them.");
 }
 
 // The base that was tuned alone has taken up a part of what the effects do: a share of all speeds,

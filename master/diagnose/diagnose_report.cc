@@ -189,6 +189,10 @@ std::vector<DiagnosisRun::SpreadEffect> DiagnosisRun::spread_effects_found() con
          {{"probability", p, 0.6 * p, 1.6 * p, "-"}, {"loss", loss, 0.7 * loss, 1.4 * loss, "-"}},
          difference(slip_scores_, nested_scores_.back())});
   }
+  for (const FoundSpread& spread : spreads_) {
+    found.push_back({spread.row->effect, spread.fit.gain, spread.fit.estimates,
+                     difference(spread.scores, nested_scores_.back())});
+  }
   if (study_.quantum_m > 0) {
     const double q = study_.quantum_m;
     found.push_back(

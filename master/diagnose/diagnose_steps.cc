@@ -101,6 +101,7 @@ Status DiagnosisRun::search_catalogue() {
   if (lag_.trials > 0) without.emplace_back("motor_lag");
   auto catalogue = subject_.signatures(predictor_, study_, without);
   if (!catalogue) return catalogue.error();
+  for (Signature& s : *catalogue) study_.drop_ignored(s.columns);
   selector_ = std::make_unique<Selector>(predictor_, study_, std::move(*catalogue), *base_);
   selector_->leave_out({options_.left_out.begin(), options_.left_out.end()});
   if (!left_out("friction_patch")) {
@@ -119,6 +120,7 @@ Status DiagnosisRun::screen() {
   if (doubts_base()) return {};
   if (Status s = look_for_latency(); !s) return s;
   if (Status s = look_for_lag(); !s) return s;
+  look_for_spreads();
   if (Status s = search_catalogue(); !s) return s;
   if (subject_.base_moves && estimates_) {
     if (Status s = search_again(); !s) return s;
@@ -196,20 +198,46 @@ Result<Relinearised> DiagnosisRun::relinearise(const std::vector<EffectCandidate
   return at_estimate;
 }
 
-// Trials in which a side slipped pull on every mean: the effects are looked for again without them.
-Status DiagnosisRun::select_without_slips(const Regression& explained) {
-  const Eigen::VectorXd z = studentised(explained, 0.2);
-  study_.ignored.assign(study_.size(), false);
-  for (std::size_t i = 0; i < study_.size(); ++i) {
-    study_.ignored[i] =
-        z.segment<3>(static_cast<Eigen::Index>(3 * i)).squaredNorm() > kSlippedSquared;
+// Before any effect on the mean: trials that stray would pass for a patch of floor or a seam. Those
+// that are foretold better once the effect is foreseen tell nothing of means.
+void DiagnosisRun::look_for_spreads() {
+  constexpr double kStruck_nats = 0.5;
+  const double share = problem_.fitness.outlier_share;
+  const std::vector<Eigen::Vector3d> left = study_.unwhiten(studentised(*base_, 0.2));
+  const std::vector<double> without = scores_of(study_, left, share);
+  for (const SpreadRow* row : spread_rows()) {
+    if (left_out(row->effect)) continue;
+    SpreadFit fit = row->fit(study_, left, share);
+    if (fit.gain < row->least_gain) continue;
+    const std::vector<double> with = row->scores(study_, left, fit, share);
+    study_.ignored.resize(study_.size(), false);
+    for (std::size_t i = 0; i < study_.size(); ++i) {
+      if (with[i] > without[i] + kStruck_nats) study_.ignored[i] = true;
+    }
+    spreads_.push_back({row, std::move(fit), {}});
   }
+  if (!spreads_.empty()) drop_ignored();
+}
+
+void DiagnosisRun::drop_ignored() {
   Eigen::VectorXd residuals = study_.whitened_residuals();
   study_.drop_ignored(residuals);
   study_.drop_ignored(nuisances_);
   for (CovariateBlock& block : blocks_) study_.drop_ignored(block.columns);
   for (Signature& s : first_) study_.drop_ignored(s.columns);
   base_ = std::make_unique<Regression>(nuisances_, residuals);
+}
+
+// Trials in which a side slipped pull on every mean: the effects are looked for again without them.
+Status DiagnosisRun::select_without_slips(const Regression& explained) {
+  const Eigen::VectorXd z = studentised(explained, 0.2);
+  study_.ignored.resize(study_.size(), false);
+  for (std::size_t i = 0; i < study_.size(); ++i) {
+    if (z.segment<3>(static_cast<Eigen::Index>(3 * i)).squaredNorm() > kSlippedSquared) {
+      study_.ignored[i] = true;
+    }
+  }
+  drop_ignored();
   selector_->recount(*base_);
   return select();
 }
@@ -292,6 +320,9 @@ std::vector<bool> DiagnosisRun::tells_of_slips() const {
   for (std::size_t i = 0; i < study_.size(); ++i) {
     const ResidualTrial& trial = study_.trials[i];
     if (!first_.empty() && trial.context.moved) tells[i] = false;
+    for (const FoundSpread& found : spreads_) {
+      if (found.row->strays(trial)) tells[i] = false;
+    }
     for (const ChosenEffect& effect : chosen_) {
       if (strays_by(effect.candidate.signature, trial)) tells[i] = false;
     }
@@ -303,6 +334,7 @@ void DiagnosisRun::name_nothing() {
   first_.clear();
   chosen_.clear();
   slip_ = {};
+  spreads_.clear();
   lag_ = {};
   if (as_logged_) study_ = std::move(*as_logged_);
   as_logged_.reset();
@@ -326,12 +358,13 @@ Status DiagnosisRun::judge() {
   }
   const Regression explained = this->explained();
   judge_leftovers(explained);
-  const double nats = explained_nats(explained) + slip_.gain + (as_logged_ ? latency_.gain : 0);
+  double nats = explained_nats(explained) + slip_.gain + (as_logged_ ? latency_.gain : 0);
+  for (const FoundSpread& found : spreads_) nats += found.fit.gain;
   const bool on_grid =
       (subject_.looks & kLooksForRounding) != 0 && study_.quantum_m > kLeastQuantum_m;
   const bool rounded = on_grid && !left_out("pose_quantisation");
-  const bool named =
-      !first_.empty() || !chosen_.empty() || slip_.gain > 0 || lag_.gain > 0 || rounded;
+  const bool named = !first_.empty() || !chosen_.empty() || slip_.gain > 0 || !spreads_.empty() ||
+                     lag_.gain > 0 || rounded;
   Verdict& verdict = result_.diagnosis.verdict;
   verdict = judge_verdict(named, nats, leftovers_, subject_.unknown_log10_p);
   if (on_grid && !rounded) {

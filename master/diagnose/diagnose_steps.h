@@ -16,6 +16,7 @@
 #include "master/diagnose/prepare.h"
 #include "master/diagnose/selection.h"
 #include "master/diagnose/slip.h"
+#include "master/diagnose/spread_row.h"
 #include "master/diagnose/study.h"
 #include "master/diagnose/subject.h"
 #include "master/diagnose/verdict.h"
@@ -93,6 +94,8 @@ class DiagnosisRun {
   Regression explained() const;  // what is left once all that was chosen is explained
   double explained_nats(const Regression& explained) const;
   void look_for_slip(const Regression& explained);
+  void look_for_spreads();
+  void drop_ignored();
   std::vector<bool> tells_of_slips() const;
   Status select();
   Result<JointFit> estimate(const std::vector<EffectCandidate>& effects, int rounds);
@@ -106,6 +109,8 @@ class DiagnosisRun {
   Status refit_nested();
   void foresee_slips(const std::vector<std::size_t>& folds);
   void drop_slips();
+  void doubt_strays(const std::string& effect);
+  void foresee_spreads(const std::vector<std::size_t>& folds);
   std::optional<double> fit_tails();
   Status fit_correction();
   Status compare_with_baselines();
@@ -157,9 +162,10 @@ class DiagnosisRun {
   double latency_from_rest_s_ = 0;  // as the parameter has it
   PathLag lag_;                     // by paths
   SlipFit slip_;
-  std::string odd_readings_;      // what readings show that no effect looked for explains
-  std::string odd_drives_;        // the same of drives that stray in one place
-  std::vector<Signature> first_;  // explained before anything else
+  std::vector<FoundSpread> spreads_;  // what else makes trials stray
+  std::string odd_readings_;          // what readings show that no effect looked for explains
+  std::string odd_drives_;            // the same of drives that stray in one place
+  std::vector<Signature> first_;      // explained before anything else
   std::vector<ChosenEffect> chosen_;
   std::vector<Leftover> leftovers_;
   std::vector<JointFit> nested_;                    // see refit_nested()

@@ -44,6 +44,11 @@ void DiagnosisRun::spread_effects(Overrides* at) const {
   for (const Signature& s : first_) {
     for (const auto& [key, value] : s.fixed) set(key.c_str(), value);
   }
+  for (const FoundSpread& found : spreads_) {
+    for (const Estimate& e : found.fit.estimates) {
+      set((std::string(found.row->effect) + "." + e.key).c_str(), e.value);
+    }
+  }
   if (lag_.gain > 0) set("motor_lag.tau", lag_.tau_s);
   if (slip_.gain > 0) {
     set("slip_events.probability", std::clamp(slip_.probability, 0.0, 0.5));

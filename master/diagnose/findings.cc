@@ -9,6 +9,7 @@
 #include "common/score/statistics.h"
 #include "master/diagnose/free_commands.h"
 #include "master/diagnose/selection.h"
+#include "master/diagnose/spread_row.h"
 
 namespace gapfarm {
 namespace {
@@ -95,6 +96,8 @@ const EffectWords* words_in(const EffectWordsByName& table, const std::string& e
 std::string claim(const NamedEffect& effect, const EffectWordsByName* own, bool intervals) {
   const EffectWords* found = own != nullptr ? words_in(*own, effect.name) : nullptr;
   if (found == nullptr) found = words_in(robot_effect_words(), effect.name);
+  const SpreadRow* row = found == nullptr ? spread_row(effect.name) : nullptr;
+  if (row != nullptr) found = &row->words;
   if (found == nullptr) return plain_claim(effect, intervals);
   const EffectWords& words = *found;
   std::string text;

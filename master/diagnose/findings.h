@@ -44,6 +44,16 @@ struct EffectWords {
   const char* sentence;  // %1, %2, ...: the tellings' values with their intervals
   std::vector<Telling> parameters;
 };
+// On one line.  %: the size of the parameter; @: the choice of the effect that is no number ("y").
+struct ShortWords {
+  std::string_view effect;
+  const char* key;  // whose size is told
+  double factor;
+  const char* unit;
+  const char* cause;
+  const char* opposite;  // where the value is negative; null: the same
+  const char* remedy;
+};
 using EffectWordsByName = std::map<std::string, EffectWords, std::less<>>;
 
 // "The battery loses 0.35 % of its speed a minute (0.31 to 0.4); adding that closes 88 % of the

@@ -5,6 +5,7 @@
 #include <numbers>
 #include <string_view>
 
+#include "master/diagnose/spread_row.h"
 #include "master/sanity/words.h"
 
 namespace gapfarm {
@@ -12,17 +13,6 @@ namespace {
 
 constexpr std::size_t kLine = 100;  // characters, about what fits on one line in large print
 constexpr double kDegreesEach = 180 / std::numbers::pi;
-
-// %: the size of the parameter; @: the choice of the effect that is no number ("y").
-struct ShortWords {
-  std::string_view effect;
-  const char* key;  // whose size is told
-  double factor;
-  const char* unit;
-  const char* cause;
-  const char* opposite;  // where the value is negative; null: the same
-  const char* remedy;
-};
 
 // Of driven robots.
 constexpr ShortWords kShort[] = {
@@ -70,7 +60,9 @@ const ShortWords* short_words(const Diagnosis& diagnosis, std::string_view effec
   if (!diagnosis.words.ends.empty()) return nullptr;
   const auto* found = std::find_if(std::begin(kShort), std::end(kShort),
                                    [&](const ShortWords& w) { return w.effect == effect; });
-  return found == std::end(kShort) ? nullptr : found;
+  if (found != std::end(kShort)) return found;
+  const SpreadRow* row = spread_row(effect);
+  return row == nullptr ? nullptr : &row->short_words;
 }
 
 const Estimate* size_of(const NamedEffect& effect, const ShortWords& words) {

@@ -136,6 +136,31 @@ DriveBranch ActiveEffects::draw(Stream& stream) const {
   return drawn;
 }
 
+std::vector<StartTurn> ActiveEffects::start_turns(bool moved) const {
+  std::vector<StartTurn> all = {StartTurn{}};
+  for (const Active& a : active_) {
+    if (!a.behaviour->start_turns) continue;
+    std::vector<StartTurn> combined;
+    for (const StartTurn& outer : all) {
+      for (const StartTurn& inner : a.behaviour->start_turns(a.values, moved)) {
+        combined.push_back({outer.weight * inner.weight, outer.turn_rad + inner.turn_rad});
+      }
+    }
+    all = std::move(combined);
+  }
+  return all;
+}
+
+double ActiveEffects::draw_start_turn(bool moved, Stream& stream) const {
+  double turn_rad = 0;
+  for (const Active& a : active_) {
+    if (a.behaviour->draw_start_turn) {
+      turn_rad += a.behaviour->draw_start_turn(a.values, moved, stream);
+    }
+  }
+  return turn_rad;
+}
+
 Reading ActiveEffects::reading() const {
   Reading reading;
   for (const Active& a : active_) {

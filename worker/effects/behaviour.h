@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "common/effects/catalogue.h"
+#include "common/effects/start_turns.h"
 #include "common/parameters/table.h"
 #include "common/pose/pose.h"
 #include "common/random/stream.h"
@@ -81,6 +82,9 @@ struct EffectBehaviour {
   std::vector<DriveBranch> (*branches)(EffectValues p) = nullptr;
   DriveBranch (*draw)(EffectValues p, Stream& stream) = nullptr;
   void (*reading)(EffectValues p, Reading& reading) = nullptr;
+  // By how much the heading of a start may be misread: all alternatives, and one drawn.
+  std::vector<StartTurn> (*start_turns)(EffectValues p, bool moved) = nullptr;
+  double (*draw_start_turn)(EffectValues p, bool moved, Stream& stream) = nullptr;
 };
 
 // One row an effect of any catalogue, by name.
@@ -110,6 +114,8 @@ class ActiveEffects {
   std::vector<DriveBranch> branches() const;  // at least the one in which nothing happens
   DriveBranch draw(Stream& stream) const;
   Reading reading() const;
+  std::vector<StartTurn> start_turns(bool moved) const;  // at least the one without a turn
+  double draw_start_turn(bool moved, Stream& stream) const;
 
  private:
   struct Active {

@@ -12,7 +12,5 @@ void floor(EffectValues p, const Situation& situation, Floor& floor) {
 }  // namespace floor_tilt_hooks
 
 const EffectBehaviour floor_tilt{.name = "floor_tilt", .floor = floor_tilt_hooks::floor};
-// The same under a piece.
-const EffectBehaviour table_tilt{.name = "table_tilt", .floor = floor_tilt_hooks::floor};
 
 }  // namespace gapfarm::effects

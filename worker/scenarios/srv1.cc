@@ -80,6 +80,18 @@ bool patch_in_reach(const Floor& floor, const GroupMotion& motion, const Pose& X
          floor.patch_radius_m + kRobotReach_m + astray;
 }
 
+// Where the robot may truly have been at the start of a trial that was read there.
+std::vector<View> untwisted(std::vector<View> starts, const std::vector<StartTurn>& turns) {
+  if (turns.size() == 1 && turns.front().turn_rad == 0) return starts;
+  std::vector<View> all;
+  for (const StartTurn& turn : turns) {
+    for (const View& start : starts) {
+      all.push_back({turn.weight * start.weight, start.pose * Pose{0, 0, -turn.turn_rad}});
+    }
+  }
+  return all;
+}
+
 // Whether what trials share says too little of one of them.
 bool simulate_alone(const Srv1Robot& robot, const ConditionGroup& group, const GroupMotion& motion,
                     const Situation& situation, const Pose& X_SE) {
@@ -133,7 +145,7 @@ class Srv1Model : public ScenarioModel {
   std::vector<Gains> draws(const Srv1Robot& robot, const PredictOptions& options,
                            std::size_t group) const;
   TrialPrediction observe(const Srv1Robot& robot, const Views& views, const GroupMotion& motion,
-                          const Pose& X_SE, const Pose& X_WS) const;
+                          const Pose& X_SE, const PreparedTrial& trial) const;
 
   const Problem& problem_;
   std::vector<PreparedTrial> trials_;
@@ -160,13 +172,14 @@ std::vector<Gains> Srv1Model::draws(const Srv1Robot& robot, const PredictOptions
 // From the motion in the start frame to the logged end pose, with the noise of both readings.
 TrialPrediction Srv1Model::observe(const Srv1Robot& robot, const Views& views,
                                    const GroupMotion& motion, const Pose& X_SE,
-                                   const Pose& X_WS) const {
+                                   const PreparedTrial& trial) const {
   TrialPrediction prediction;
   PoseNoise noise = robot.noise().pose;
   // Rounding to a grid adds the variance of a uniform error.
   noise.position_m =
       std::hypot(noise.position_m, robot.effects().reading().quantum_m / std::sqrt(12.0));
-  const std::vector<View> starts = views.recovered(X_WS, noise.position_m);
+  const std::vector<View> starts = untwisted(views.recovered(trial.X_WS, noise.position_m),
+                                             robot.effects().start_turns(trial.context.moved));
   for (const GroupMotion::Branch& branch : motion.branches()) {
     const Pose X_SA = X_SE * branch.X_EA;
     Alternative way;
@@ -243,7 +256,7 @@ Prediction Srv1Model::predict(const ParameterValues& values, const PredictOption
     if (options.means_only) {
       prediction.trials.push_back({{{1, robot.effects().observe(X_WR * X_SE)}}});
     } else {
-      prediction.trials.push_back(observe(robot, views, motion, X_SE, trial.X_WS));
+      prediction.trials.push_back(observe(robot, views, motion, X_SE, trial));
     }
   }
   prediction.conditions = robot.runs();

@@ -74,6 +74,8 @@ class Session {
     const Pose X_WS = situation_.X_WR;
     const Pose X_SE = stale ? pose_before_end(path, reading_.stale_age_s) : motion.X_SE;
     trial.X_WS = measured(X_WS);
+    const double turn_rad = robot_.effects().draw_start_turn(moved, stream_);
+    if (turn_rad != 0) trial.X_WS.theta = wrap_angle(trial.X_WS.theta + turn_rad);
     trial.X_WE = measured(X_WS * X_SE);
     if (sampled) {
       for (const MotionSample& s : path) trial.path.push_back({s.t_s, measured(X_WS * s.X_SB)});

@@ -6,11 +6,13 @@
 #include <cmath>
 #include <functional>
 #include <numbers>
+#include <set>
 
 #include "common/effects/catalogue.h"
 #include "common/random/stream.h"
 #include "master/diagnose/findings.h"
 #include "master/diagnose/headline.h"
+#include "master/diagnose/spread_row.h"
 #include "master/diagnose/trend_test.h"
 
 namespace gapfarm {
@@ -249,7 +251,22 @@ TEST(Findings, TellEffectsInPlainUnits) {
     const std::string text = effect_sentence(e);
     EXPECT_EQ(text.find("The data show"), std::string::npos) << text;  // every effect has its words
     EXPECT_EQ(text.find("%1"), std::string::npos) << text;
+    Diagnosis d;
+    d.verdict = Verdict::kEffect;
+    d.effects = {e};
+    EXPECT_NE(action(d).substr(0, 5), "Paste") << effect.name << " has no short words";
   }
+}
+
+// What moves no mean cannot be screened by its probes: whoever adds such an effect says here how it
+// is looked for.
+TEST(Findings, EveryEffectOnTheSpreadIsLookedFor) {
+  const std::set<std::string> engine = {"slip_events", "pose_latency", "pose_quantisation"};
+  for (const Effect& effect : srv1_effects()) {
+    const bool has_row = spread_row(effect.name) != nullptr;
+    EXPECT_EQ(has_row, !effect.moves_means() && engine.count(effect.name) == 0) << effect.name;
+  }
+  for (const SpreadRow* row : spread_rows()) EXPECT_EQ(row->short_words.effect, row->effect);
 }
 
 TEST(Findings, TellAtLengthWhatTheHeadlineIsOf) {

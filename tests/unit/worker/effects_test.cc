@@ -81,7 +81,7 @@ TEST(EffectTable, HooksBelongToTheEffectsStage) {
   for (const auto& catalogue : catalogues()) {
     for (const Effect& effect : catalogue) {
       const EffectBehaviour& b = *behaviour_of(effect.name);
-      const bool camera = b.observe || b.reading || b.place;
+      const bool camera = b.observe || b.reading || b.place || b.start_turns;
       EXPECT_EQ(camera, effect.stage == EffectStage::kCamera) << b.name;
       if (b.drive || b.branches) {
         EXPECT_EQ(effect.stage, EffectStage::kDrive) << b.name;
@@ -93,6 +93,7 @@ TEST(EffectTable, HooksBelongToTheEffectsStage) {
       EXPECT_EQ(b.observe != nullptr, b.recover != nullptr) << b.name;
       EXPECT_EQ(b.place != nullptr, b.unplace != nullptr) << b.name;
       EXPECT_EQ(b.branches != nullptr, b.draw != nullptr) << b.name;
+      EXPECT_EQ(b.start_turns != nullptr, b.draw_start_turn != nullptr) << b.name;
     }
   }
 }
