@@ -4,18 +4,22 @@
 namespace gapfarm::effects {
 namespace camera_seam_hooks {
 
+enum Value : std::size_t { kOffsetX, kOffsetY, kSlopeX, kSlopeY, kPosition, kAxis };
+
 // The shift at a place, beyond the line; it is nothing at the near side.
 struct Shift {
   double x = 0;
   double y = 0;
 };
 
-double across_line(EffectValues p, double x, double y) { return (p[5] == 0 ? x : y) - p[4]; }
+double across_line(EffectValues p, double x, double y) {
+  return (p[kAxis] == 0 ? x : y) - p[kPosition];
+}
 
 Shift shift_at(EffectValues p, double x, double y) {
-  const double along = p[5] == 0 ? y : x;
+  const double along = p[kAxis] == 0 ? y : x;
   if (across_line(p, x, y) <= 0) return {};
-  return {p[0] + p[2] * along, p[1] + p[3] * along};
+  return {p[kOffsetX] + p[kSlopeX] * along, p[kOffsetY] + p[kSlopeY] * along};
 }
 
 Pose observe(EffectValues p, const Pose& X_WR) {
@@ -38,7 +42,7 @@ double beyond(EffectValues p, const Pose& X_WR) { return across_line(p, X_WR.x, 
 
 void one_side(bool far, std::vector<double>& p) {
   constexpr double kNowhere_m = 1e9;
-  p[4] = far ? -kNowhere_m : kNowhere_m;
+  p[kPosition] = far ? -kNowhere_m : kNowhere_m;
 }
 
 }  // namespace camera_seam_hooks

@@ -5,14 +5,16 @@
 namespace gapfarm::effects {
 namespace com_offset_hooks {
 
+enum Value : std::size_t { kX, kY };
+
 void settings(EffectValues p, SimSettings& settings) {
-  settings.com_x_m += p[0];
-  settings.com_y_m += p[1];
+  settings.com_x_m += p[kX];
+  settings.com_y_m += p[kY];
 }
 
 void push(EffectValues p, PushSettings& settings) {
-  settings.com_x_m += p[0];
-  settings.com_y_m += p[1];
+  settings.com_x_m += p[kX];
+  settings.com_y_m += p[kY];
 }
 
 }  // namespace com_offset_hooks

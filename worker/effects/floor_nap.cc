@@ -4,9 +4,11 @@
 namespace gapfarm::effects {
 namespace floor_nap_hooks {
 
+enum Value : std::size_t { kStrength, kDirection };
+
 void floor(EffectValues p, const Situation& situation, Floor& floor) {
-  floor.nap_strength = p[0];
-  floor.nap_direction_rad = wrap_angle(p[1] - situation.X_WR.theta);
+  floor.nap_strength = p[kStrength];
+  floor.nap_direction_rad = wrap_angle(p[kDirection] - situation.X_WR.theta);
 }
 
 }  // namespace floor_nap_hooks

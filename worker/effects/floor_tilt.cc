@@ -4,9 +4,11 @@
 namespace gapfarm::effects {
 namespace floor_tilt_hooks {
 
+enum Value : std::size_t { kAngle, kDirection };
+
 void floor(EffectValues p, const Situation& situation, Floor& floor) {
-  floor.tilt_rad = p[0];
-  floor.tilt_direction_rad = wrap_angle(p[1] - situation.X_WR.theta);
+  floor.tilt_rad = p[kAngle];
+  floor.tilt_direction_rad = wrap_angle(p[kDirection] - situation.X_WR.theta);
 }
 
 }  // namespace floor_tilt_hooks

@@ -5,9 +5,11 @@
 namespace gapfarm::effects {
 namespace friction_anisotropy_hooks {
 
+enum Value : std::size_t { kRatio, kDirection };
+
 void floor(EffectValues p, const Situation& situation, Floor& floor) {
-  floor.grain_ratio = p[0];
-  floor.grain_direction_rad = wrap_angle(p[1] - situation.X_WR.theta);
+  floor.grain_ratio = p[kRatio];
+  floor.grain_direction_rad = wrap_angle(p[kDirection] - situation.X_WR.theta);
 }
 
 }  // namespace friction_anisotropy_hooks

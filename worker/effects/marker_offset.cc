@@ -4,9 +4,11 @@
 namespace gapfarm::effects {
 namespace marker_offset_hooks {
 
-Pose observe(EffectValues p, const Pose& X_WR) { return X_WR * Pose{p[0], p[1], 0}; }
+enum Value : std::size_t { kX, kY };
 
-Pose recover(EffectValues p, const Pose& X_WM) { return X_WM * Pose{-p[0], -p[1], 0}; }
+Pose observe(EffectValues p, const Pose& X_WR) { return X_WR * Pose{p[kX], p[kY], 0}; }
+
+Pose recover(EffectValues p, const Pose& X_WM) { return X_WM * Pose{-p[kX], -p[kY], 0}; }
 
 }  // namespace marker_offset_hooks
 

@@ -4,12 +4,14 @@
 namespace gapfarm::effects {
 namespace placement_bias_hooks {
 
+enum Value : std::size_t { kX, kY, kAngle };
+
 Pose place(EffectValues p, const Pose& X_WR) {
-  return {X_WR.x + p[0], X_WR.y + p[1], wrap_angle(X_WR.theta + p[2])};
+  return {X_WR.x + p[kX], X_WR.y + p[kY], wrap_angle(X_WR.theta + p[kAngle])};
 }
 
 Pose unplace(EffectValues p, const Pose& X_WR) {
-  return {X_WR.x - p[0], X_WR.y - p[1], wrap_angle(X_WR.theta - p[2])};
+  return {X_WR.x - p[kX], X_WR.y - p[kY], wrap_angle(X_WR.theta - p[kAngle])};
 }
 
 }  // namespace placement_bias_hooks

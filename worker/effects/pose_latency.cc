@@ -4,9 +4,11 @@
 namespace gapfarm::effects {
 namespace pose_latency_hooks {
 
+enum Value : std::size_t { kShare, kLatency };
+
 void reading(EffectValues p, Reading& reading) {
-  reading.stale_share = p[0];
-  reading.stale_age_s = p[1];
+  reading.stale_share = p[kShare];
+  reading.stale_age_s = p[kLatency];
 }
 
 }  // namespace pose_latency_hooks

@@ -5,9 +5,11 @@
 namespace gapfarm::effects {
 namespace pressure_distribution_hooks {
 
+enum Value : std::size_t { kStretch, kDirection };
+
 void push(EffectValues p, PushSettings& settings) {
-  settings.stretch = p[0];
-  settings.stretch_direction_rad = p[1];
+  settings.stretch = p[kStretch];
+  settings.stretch_direction_rad = p[kDirection];
 }
 
 }  // namespace pressure_distribution_hooks

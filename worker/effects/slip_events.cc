@@ -7,22 +7,24 @@
 namespace gapfarm::effects {
 namespace slip_events_hooks {
 
+enum Value : std::size_t { kProbability, kLoss };
+
 struct SideCase {
   double weight;
   double gain;
 };
 
-// One side: nothing happens, or a loss uniform in [0, p[1]], by three-point Gauss-Legendre nodes.
+// One side: nothing happens, or a loss uniform in [0, loss], by three-point Gauss-Legendre nodes.
 std::array<SideCase, 4> side_cases(EffectValues p) {
   const double offset = std::sqrt(0.6) / 2;
-  return {{{1 - p[0], 1},
-           {p[0] * 5 / 18, 1 - p[1] * (0.5 - offset)},
-           {p[0] * 8 / 18, 1 - p[1] * 0.5},
-           {p[0] * 5 / 18, 1 - p[1] * (0.5 + offset)}}};
+  return {{{1 - p[kProbability], 1},
+           {p[kProbability] * 5 / 18, 1 - p[kLoss] * (0.5 - offset)},
+           {p[kProbability] * 8 / 18, 1 - p[kLoss] * 0.5},
+           {p[kProbability] * 5 / 18, 1 - p[kLoss] * (0.5 + offset)}}};
 }
 
 // Either parameter alone does nothing.
-bool never(EffectValues p) { return p[0] == 0 || p[1] == 0; }
+bool never(EffectValues p) { return p[kProbability] == 0 || p[kLoss] == 0; }
 
 // Both sides slipping in one trial is kept: at large probabilities it is not rare.
 std::vector<DriveBranch> branches(EffectValues p) {
@@ -39,8 +41,8 @@ std::vector<DriveBranch> branches(EffectValues p) {
 DriveBranch draw(EffectValues p, Stream& stream) {
   DriveBranch branch;
   if (never(p)) return branch;
-  if (stream.bernoulli(p[0])) branch.left_gain = 1 - p[1] * stream.uniform();
-  if (stream.bernoulli(p[0])) branch.right_gain = 1 - p[1] * stream.uniform();
+  if (stream.bernoulli(p[kProbability])) branch.left_gain = 1 - p[kLoss] * stream.uniform();
+  if (stream.bernoulli(p[kProbability])) branch.right_gain = 1 - p[kLoss] * stream.uniform();
   return branch;
 }
 
