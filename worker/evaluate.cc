@@ -16,16 +16,17 @@ namespace {
 
 class Prepared : public PreparedProblem {
  public:
-  Prepared(Problem problem, const Scenario& scenario) : problem_(std::move(problem)) {
-    model_ = scenario.prepare(problem_);
-  }
+  Prepared(Problem problem, const Scenario& scenario)
+      : scenario_(scenario), problem_(std::move(problem)), model_(scenario.prepare(problem_)) {}
 
   const Problem& problem() const override { return problem_; }
+  const Scenario& scenario() const { return scenario_; }
   const ScenarioModel& model() const { return *model_; }
   const FitnessReference& reference() const { return reference_; }
   void set_reference(FitnessReference reference) { reference_ = std::move(reference); }
 
  private:
+  const Scenario& scenario_;
   Problem problem_;
   std::unique_ptr<ScenarioModel> model_;
   FitnessReference reference_;
@@ -169,7 +170,9 @@ v1::TaskResult echo(const v1::EchoTask& task, StepCounter* steps) {
 }
 
 template <class T>
-v1::TaskResult at_point(const Prepared& prepared, const T& task, StepCounter* steps) {
+v1::TaskResult at_point(const Prepared& prepared, ScenarioCan needed, const T& task,
+                        StepCounter* steps) {
+  if ((prepared.scenario().can & needed) == 0) return invalid(prepared.scenario().lacks);
   const auto values = values_at(prepared.problem(), task.point());
   if (!values) return invalid(values.error().message);
   return run(prepared, *values, task, steps);
@@ -180,13 +183,13 @@ v1::TaskResult dispatch(const Prepared* prepared, const v1::Task& task, StepCoun
   if (prepared == nullptr) return invalid("the task needs a problem");
   switch (task.kind_case()) {
     case v1::Task::kEvaluate:
-      return at_point(*prepared, task.evaluate(), steps);
+      return at_point(*prepared, kPredicts, task.evaluate(), steps);
     case v1::Task::kPredict:
-      return at_point(*prepared, task.predict(), steps);
+      return at_point(*prepared, kPredicts, task.predict(), steps);
     case v1::Task::kSimulate:
-      return at_point(*prepared, task.simulate(), steps);
+      return at_point(*prepared, kSimulates, task.simulate(), steps);
     case v1::Task::kTrace:
-      return at_point(*prepared, task.trace(), steps);
+      return at_point(*prepared, kTraces, task.trace(), steps);
     default:
       return invalid("a task of unknown kind; master and worker must be the same build");
   }

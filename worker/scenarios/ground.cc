@@ -13,10 +13,6 @@ namespace {
 
 constexpr double kWayPoint_s = 0.1;  // between poses along which noise adds up
 
-constexpr const char* kNoPlans =
-    "scenario ground follows logged commands: there are no commands of its own to plan or trace; "
-    "use gapfarm predict";
-
 struct DriftNoise {
   double travel = 0;  // m / sqrt(m)
   double turn = 0;    // rad / sqrt(m)
@@ -67,21 +63,7 @@ class GroundModel final : public ScenarioModel {
 
   Prediction predict(const ParameterValues& values, const PredictOptions& options) const override;
 
-  v1::TaskResult simulate(const ParameterValues&, const v1::SimulateTask&,
-                          StepCounter*) const override {
-    return no_plans();
-  }
-  v1::TaskResult trace(const ParameterValues&, const v1::TraceTask&, StepCounter*) const override {
-    return no_plans();
-  }
-
  private:
-  static v1::TaskResult no_plans() {
-    v1::TaskResult result;
-    result.set_outcome(v1::INVALID_REQUEST);
-    result.set_message(kNoPlans);
-    return result;
-  }
   double at(const ParameterValues& values, const char* key) const {
     return values[problem_.table().row(key)];
   }

@@ -8,10 +8,6 @@
 namespace gapfarm {
 namespace {
 
-constexpr const char* kNoTrials =
-    "scenario racquetball has paths and no trials: nothing can be predicted or logged; use gapfarm "
-    "influence";
-
 RacquetballSettings settings_of(const ParameterValues& values) {
   RacquetballSettings s;
 #define ROW(name, row)
@@ -20,27 +16,8 @@ RacquetballSettings settings_of(const ParameterValues& values) {
   return s;
 }
 
-v1::TaskResult no_trials() {
-  v1::TaskResult result;
-  result.set_outcome(v1::INVALID_REQUEST);
-  result.set_message(kNoTrials);
-  return result;
-}
-
 class RacquetballModel final : public ScenarioModel {
  public:
-  Prediction predict(const ParameterValues&, const PredictOptions&) const override {
-    Prediction prediction;
-    prediction.outcome = v1::INVALID_REQUEST;
-    prediction.message = kNoTrials;
-    return prediction;
-  }
-
-  v1::TaskResult simulate(const ParameterValues&, const v1::SimulateTask&,
-                          StepCounter*) const override {
-    return no_trials();
-  }
-
   v1::TaskResult trace(const ParameterValues& values, const v1::TraceTask& task,
                        StepCounter* steps) const override {
     RacquetballSettings settings = settings_of(values);

@@ -55,23 +55,29 @@ struct PredictOptions {
 };
 
 // A scenario with a problem's trials prepared for many genomes.  Const methods are pure; `steps`
-// (may be null) shows that they advance.
+// (may be null) shows that they advance.  Asked only for what the scenario's row says that it can.
 class ScenarioModel {
  public:
   virtual ~ScenarioModel() = default;
-  virtual Prediction predict(const ParameterValues& values,
-                             const PredictOptions& options) const = 0;
-  virtual v1::TaskResult simulate(const ParameterValues& values, const v1::SimulateTask& task,
-                                  StepCounter* steps) const = 0;
-  virtual v1::TaskResult trace(const ParameterValues& values, const v1::TraceTask& task,
-                               StepCounter* steps) const = 0;
+  virtual Prediction predict(const ParameterValues&, const PredictOptions&) const { return {}; }
+  virtual v1::TaskResult simulate(const ParameterValues&, const v1::SimulateTask&,
+                                  StepCounter*) const {
+    return {};
+  }
+  virtual v1::TaskResult trace(const ParameterValues&, const v1::TraceTask&, StepCounter*) const {
+    return {};
+  }
 };
+
+enum ScenarioCan : unsigned { kPredicts = 1, kSimulates = 2, kTraces = 4 };
 
 struct Scenario {
   const char* name;
   const char* summary;
   // `problem` outlives the model.
   std::unique_ptr<ScenarioModel> (*prepare)(const Problem& problem);
+  unsigned can = kPredicts | kSimulates | kTraces;
+  const char* lacks = "";  // why it cannot the rest, and what can be done instead
 };
 
 std::span<const Scenario> scenarios();
