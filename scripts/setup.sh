@@ -8,7 +8,7 @@ packages=(
   build-essential ccache cmake git ninja-build pkg-config
   cppzmq-dev libbenchmark-dev libboost-dev libbullet-dev libbz2-dev libcli11-dev libeigen3-dev
   libgmock-dev
-  libgtest-dev liblz4-dev libnlopt-cxx-dev libprotobuf-dev librandom123-dev librapidcheck-dev libsodium-dev
+  libgtest-dev liblz4-dev libnlopt-cxx-dev libprotobuf-dev librandom123-dev libsodium-dev
   libspdlog-dev libsqlite3-dev libtinyxml2-dev libtomlplusplus-dev libyaml-cpp-dev libzmq3-dev
   libzstd-dev nlohmann-json3-dev
   protobuf-compiler
