@@ -71,6 +71,12 @@ std::vector<Effect> build_catalogue() {
       in_spread(camera("pose_quantisation", kStartHeading | kStartPlace,
                        "positions are rounded to this grid",
                        {real("step", "m", 0, 0, 0.1, "of the grid")})),
+      by_chance(
+          camera("unsettled_start", kUnrecordedMove,
+                 "in a share of the trials after an unrecorded move the start was read "
+                 "before the hand let go",
+                 {real("share", "-", 0, 0, 1, "of the trials that follow an unrecorded move"),
+                  real("angle", "rad", 0.3, 0, 1.6, "by up to which the start's heading is off")})),
   };
 }
 

@@ -2,8 +2,10 @@
 
 namespace gapfarm {
 
+extern const SpreadRow kUnsettledStart;
+
 std::span<const SpreadRow* const> spread_rows() {
-  static const std::vector<const SpreadRow*> rows = {};
+  static const std::vector<const SpreadRow*> rows = {&kUnsettledStart};
   return rows;
 }
 

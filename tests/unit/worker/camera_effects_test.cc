@@ -271,6 +271,55 @@ TEST(EffectSignature, PoseLatencyIsPredictedAsAMixture) {
   }
 }
 
+// The heading of a start that a hand still holds is off by up to the angle, all angles alike; its
+// place is not, and neither is any start that follows a drive.
+TEST(EffectSignature, UnsettledStartTurnsItsShareOfStartsAfterMoves) {
+  constexpr double kAngle = 0.4, kShare = 0.3;
+  constexpr int n = 800;
+  Problem problem = small_problem(0);
+  problem.values =
+      noiseless({{"unsettled_start.share", kShare}, {"unsettled_start.angle", kAngle}});
+  v1::Task task = drives(n);
+  for (int i = 0; i < n; i += 2) task.mutable_simulate()->mutable_plan(i)->set_moved(true);
+  const v1::TaskResult result = run(problem, task);
+  int turned = 0;
+  double squares = 0;
+  for (int i = 0; i < n; ++i) {
+    const v1::Trial& trial = result.simulate().trials(i);
+    const Pose before = i % 2 == 0 ? Pose{} : from_proto(result.simulate().trials(i - 1).end());
+    const Eigen::Vector3d off = local_difference(before, from_proto(trial.start()));
+    EXPECT_LT(off.head<2>().norm(), 1e-3);
+    if (std::abs(off[2]) < 1e-3) continue;
+    EXPECT_EQ(i % 2, 0);
+    EXPECT_LT(std::abs(off[2]), kAngle + 1e-3);
+    squares += off[2] * off[2];
+    ++turned;
+  }
+  EXPECT_NEAR(turned, n / 2 * kShare, 4 * std::sqrt(n / 2 * kShare * (1 - kShare)));
+  EXPECT_NEAR(squares / turned, kAngle * kAngle / 3, 0.3 * kAngle * kAngle / 3);
+}
+
+// As a mixture about the same mean: trials after moves are spread as that law spreads them.
+TEST(EffectSignature, UnsettledStartIsForeseenAfterMovesAlone) {
+  constexpr double kAngle = 0.4, kShare = 0.3;
+  Problem problem = small_problem(12);
+  problem.values =
+      noiseless({{"unsettled_start.share", kShare}, {"unsettled_start.angle", kAngle}});
+  for (std::size_t i = 1; i < problem.log.trials.size(); ++i) {
+    // Every second one goes on from where the last one ended.
+    if (i % 2 == 1) problem.log.trials[i].X_WS = problem.log.trials[i - 1].X_WE;
+  }
+  for (Trial& trial : problem.log.trials) trial.session = "s", trial.command = "forward";
+  v1::Task task;
+  task.mutable_predict();
+  const v1::TaskResult result = run(problem, task);
+  for (const v1::Predicted& p : result.predict().predictions()) {
+    const double heading_variance = p.cov(5);
+    const double expected = p.trial() % 2 == 0 ? kShare * kAngle * kAngle / 3 : 0;
+    EXPECT_NEAR(heading_variance, expected, 0.05 * kAngle * kAngle / 3) << p.trial();
+  }
+}
+
 TEST(EffectSignature, PoseQuantisationRoundsPositionsAndLeavesHeadings) {
   constexpr double kStep = 0.01;
   Problem problem = small_problem(0);

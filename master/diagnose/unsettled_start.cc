@@ -1,0 +1,117 @@
+// Starts that were read before the hand let go: only trials that follow an unrecorded move have
+// them, and only their heading, with what turns with it, is off.
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "common/effects/start_turns.h"
+#include "master/diagnose/estimate.h"
+#include "master/diagnose/intervals.h"
+#include "master/diagnose/spread_row.h"
+
+namespace gapfarm {
+namespace {
+
+constexpr std::size_t kFewestStarts = 20;
+// What does as well within so many nats is not told apart.
+constexpr double kClearer_nats = 4;
+constexpr double kTriedShares[] = {0.01, 0.02, 0.04, 0.06, 0.08, 0.1, 0.15, 0.2, 0.3, 0.5, 0.7};
+
+std::vector<double> tried_angles() {
+  std::vector<double> angles;
+  for (double a = 0.05; a < 1.6; a *= 1.25) angles.push_back(a);
+  return angles;
+}
+
+bool follows_move(const ResidualTrial& trial) { return trial.context.moved; }
+
+// What the logged end misses its prediction by when the start's heading was logged that far to the
+// left of the robot's.
+Eigen::Vector3d missed_by_turn(const ResidualTrial& trial, double turn_rad) {
+  const Pose X_WS = trial.X_WS * Pose{0, 0, -turn_rad};
+  return local_difference(trial.X_WP, X_WS * between(trial.X_WS, trial.X_WP));
+}
+
+// Density of each trial, were its start turned by up to an angle, over that without a turn.
+std::vector<double> turned_ratios(const Study& study, const std::vector<Eigen::Vector3d>& residuals,
+                                  const std::vector<double>& straight, double angle_rad,
+                                  double outlier_share) {
+  std::vector<double> ratio(study.size(), 0);
+  for (const StartTurn& turn : uniform_turns(angle_rad)) {
+    std::vector<Eigen::Vector3d> left = residuals;
+    for (std::size_t i = 0; i < left.size(); ++i) {
+      left[i] -= missed_by_turn(study.trials[i], turn.turn_rad);
+    }
+    const std::vector<double> scores = scores_of(study, left, outlier_share);
+    for (std::size_t i = 0; i < ratio.size(); ++i) {
+      ratio[i] += turn.weight * std::exp(std::min(scores[i] - straight[i], 600.0));
+    }
+  }
+  return ratio;
+}
+
+double gained_by_turns(double share, double ratio) { return std::log(1 - share + share * ratio); }
+
+SpreadFit told(double gain, double share, double angle, double starts) {
+  const double half = kNormal90 * std::sqrt(share * (1 - share) / starts);
+  const double most = std::min(1.0, 1.4 * share + half);
+  return {gain,
+          {{"share", share, std::max(0.0, 0.7 * share - half), most, "-"},
+           {"angle", angle, 0.7 * angle, 1.4 * angle, "rad"}}};
+}
+
+// A share of the starts after moves turned by up to an angle, against none.  No gain where fewer
+// than 20 trials follow a move, or fewer than that do not, since then nothing tells starts from
+// drives; nor where the same share of all trials does nearly as well: drives that stray whatever
+// came before them are something else.
+SpreadFit fit_unsettled(const Study& study, const std::vector<Eigen::Vector3d>& residuals,
+                        double outlier_share) {
+  const auto starts = static_cast<std::size_t>(
+      std::count_if(study.trials.begin(), study.trials.end(), follows_move));
+  if (starts < kFewestStarts || study.size() - starts < kFewestStarts) return {};
+  const std::vector<double> straight = scores_of(study, residuals, outlier_share);
+  SpreadFit best;
+  double anywhere = 0;
+  for (const double angle : tried_angles()) {
+    const auto ratio = turned_ratios(study, residuals, straight, angle, outlier_share);
+    for (const double share : kTriedShares) {
+      double after_moves = 0, others = 0;
+      for (std::size_t i = 0; i < ratio.size(); ++i) {
+        if (study.ignores(i)) continue;
+        (follows_move(study.trials[i]) ? after_moves : others) += gained_by_turns(share, ratio[i]);
+      }
+      anywhere = std::max(anywhere, after_moves + others);
+      if (after_moves > best.gain) best = told(after_moves, share, angle, double(starts));
+    }
+  }
+  return best.gain < anywhere + kClearer_nats ? SpreadFit{} : best;
+}
+
+std::vector<double> scores_with_unsettled(const Study& study,
+                                          const std::vector<Eigen::Vector3d>& residuals,
+                                          const SpreadFit& fit, double outlier_share) {
+  std::vector<double> scores = scores_of(study, residuals, outlier_share);
+  const double share = fit.estimates[0].value, angle = fit.estimates[1].value;
+  const auto ratio = turned_ratios(study, residuals, scores, angle, outlier_share);
+  for (std::size_t i = 0; i < scores.size(); ++i) {
+    if (follows_move(study.trials[i])) scores[i] += gained_by_turns(share, ratio[i]);
+  }
+  return scores;
+}
+
+}  // namespace
+
+extern const SpreadRow kUnsettledStart = {
+    "unsettled_start",
+    14,  // as of late readings, searched on a grid; null logs stay below 8
+    fit_unsettled,
+    scores_with_unsettled,
+    follows_move,
+    "by drives that are turned after an unrecorded move",
+    "drives after an unrecorded move stray no more than others",
+    {"%1 of the starts after unrecorded moves were read in the hand, turned by up to %2",
+     {{"share", 100, " %"}, {"angle", 180 / std::numbers::pi, " degrees"}}},
+    {"unsettled_start", "share", 100, " %", "% of the starts after moves were read too early",
+     nullptr, "Let go of the robot before its pose is read"}};
+
+}  // namespace gapfarm

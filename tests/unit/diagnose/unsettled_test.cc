@@ -1,0 +1,85 @@
+#include <gtest/gtest.h>
+
+#include <numeric>
+
+#include "master/diagnose/estimate.h"
+#include "master/diagnose/spread_row.h"
+#include "master/diagnose/subject.h"
+#include "tests/unit/diagnose/drawn_drives.h"
+
+namespace gapfarm {
+namespace {
+
+constexpr double kOutliers = 0.005;
+
+// Every third trial follows a move; of these, or of all, a share starts turned.
+struct Turned {
+  Turned(std::uint64_t seed, double share, double angle_rad, bool all = false) {
+    Drawn drawn = draw(seed);
+    Stream stream({.run_seed = seed, .purpose = Purpose::kTest});
+    study.subject = diagnosis_subject(Problem{});
+    study.noise = kTruth;
+    residuals = drawn.residuals;
+    for (std::size_t i = 0; i < drawn.trials.size(); ++i) {
+      ResidualTrial& t = drawn.trials[i];
+      t.context.moved = i % 3 == 0;
+      if (!(t.context.moved || all) || !stream.bernoulli(share)) continue;
+      const Pose X_WS = t.X_WS * Pose{0, 0, -angle_rad * (2 * stream.uniform() - 1)};
+      residuals[i] += local_difference(t.X_WP, X_WS * between(t.X_WS, t.X_WP));
+    }
+    study.trials = std::move(drawn.trials);
+  }
+
+  SpreadFit fit() const { return row().fit(study, residuals, kOutliers); }
+  static const SpreadRow& row() { return *spread_row("unsettled_start"); }
+
+  Study study;
+  std::vector<Eigen::Vector3d> residuals;
+};
+
+TEST(Unsettled, FindsTheShareAndTheAngle) {
+  for (std::uint64_t seed = 0; seed < 3; ++seed) {
+    const Turned log(seed, 0.1, 0.5);
+    const SpreadFit fit = log.fit();
+    ASSERT_GT(fit.gain, 30) << seed;
+    EXPECT_NEAR(fit.estimates[0].value, 0.1, 0.06) << seed;
+    EXPECT_NEAR(fit.estimates[1].value, 0.5, 0.2) << seed;
+  }
+}
+
+TEST(Unsettled, FindsNoneInGaussianResiduals) {
+  for (std::uint64_t seed = 0; seed < 6; ++seed) {
+    EXPECT_LT(Turned(seed, 0, 0).fit().gain, 8) << seed;
+  }
+}
+
+TEST(Unsettled, FindsNoneWhereAllDrivesStray) {
+  for (std::uint64_t seed = 0; seed < 3; ++seed) {
+    EXPECT_EQ(Turned(seed, 0.1, 0.5, /*all=*/true).fit().gain, 0) << seed;
+  }
+}
+
+TEST(Unsettled, NeedsDrivesThatFollowNoMove) {
+  Turned log(1, 0.1, 0.5);
+  for (ResidualTrial& t : log.study.trials) t.context.moved = true;
+  EXPECT_EQ(log.fit().gain, 0);
+  for (ResidualTrial& t : log.study.trials) t.context.moved = false;
+  EXPECT_EQ(log.fit().gain, 0);
+}
+
+TEST(Unsettled, ForeseenTheyScoreBetterAndOtherTrialsTheSame) {
+  const Turned log(2, 0.1, 0.5);
+  const SpreadFit fit = log.fit();
+  const std::vector<double> without = scores_of(log.study, log.residuals, kOutliers);
+  const std::vector<double> with = log.row().scores(log.study, log.residuals, fit, kOutliers);
+  for (std::size_t i = 0; i < with.size(); ++i) {
+    if (i % 3 == 0) continue;
+    EXPECT_EQ(with[i], without[i]);
+  }
+  EXPECT_NEAR(std::accumulate(with.begin(), with.end(), 0.0) -
+                  std::accumulate(without.begin(), without.end(), 0.0),
+              fit.gain, 1e-6);
+}
+
+}  // namespace
+}  // namespace gapfarm
