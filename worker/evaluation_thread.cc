@@ -16,6 +16,10 @@
 namespace gapfarm {
 namespace {
 
+// Results of tasks shorter than that (s) are told several at a time, while more is left to do than
+// is to be told: each telling wakes a handful of threads here and at the master.
+constexpr double kShort_s = 0.004;
+
 // Problems that are ready for work, the latest used first.  Belongs to the evaluating thread: it is
 // work to prepare one.
 class PreparedProblems {
@@ -104,6 +108,7 @@ void EvaluationThread::run() {
   PreparedProblems problems;
   std::unique_lock lock(mutex_);
   for (;;) {
+    if (queue_.empty()) tell();
     wake_.wait(lock, [this] { return stop_ || !queue_.empty(); });
     if (stop_) return;
     const Work work = std::move(queue_.front());
@@ -118,11 +123,17 @@ void EvaluationThread::run() {
     progress_.attempt.store(0);
     lock.lock();
     begun_ = -1;
+    const bool later = result.wall() < kShort_s && finished_.size() + 1 < queue_.size();
     finished_.push_back(std::move(result));
-    if (finished_.size() > 1) continue;  // the other thread has been told
-    const std::uint64_t one = 1;
-    [[maybe_unused]] const ssize_t written = write(fd_, &one, sizeof one);
+    if (!later) tell();
   }
+}
+
+void EvaluationThread::tell() {
+  if (told_ || finished_.empty()) return;
+  told_ = true;
+  const std::uint64_t one = 1;
+  [[maybe_unused]] const ssize_t written = write(fd_, &one, sizeof one);
 }
 
 void EvaluationThread::give(std::vector<Work> work) {
@@ -158,8 +169,11 @@ std::vector<AttemptKey> EvaluationThread::drop_all() {
 std::vector<v1::JobResult> EvaluationThread::take_finished() {
   const std::lock_guard lock(mutex_);
   if (finished_.empty()) return {};
-  std::uint64_t count = 0;
-  [[maybe_unused]] const ssize_t got = read(fd_, &count, sizeof count);
+  if (told_) {
+    std::uint64_t count = 0;
+    [[maybe_unused]] const ssize_t got = read(fd_, &count, sizeof count);
+    told_ = false;
+  }
   return std::exchange(finished_, {});
 }
 

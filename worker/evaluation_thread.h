@@ -29,13 +29,15 @@ class EvaluationThread {
   std::vector<AttemptKey> drop_all();
   // Results since the last call, in the order of the work.
   std::vector<v1::JobResult> take_finished();
-  // Readable when take_finished() has something.
+  // Readable when take_finished() has something that should not wait: results of short tasks do,
+  // while more of them are still to come.
   int fd() const { return fd_; }
   bool idle();
   double current_job_age();  // s; 0: idle
 
  private:
   void run();
+  void tell();  // that there are results
 
   WorkerProgress unwatched_;
   WorkerProgress& progress_;
@@ -45,6 +47,7 @@ class EvaluationThread {
   std::deque<Work> queue_;
   std::vector<v1::JobResult> finished_;
   double begun_ = -1;  // s; negative: idle
+  bool told_ = false;
   bool stop_ = false;
   std::thread thread_;  // last: it uses the rest
 };

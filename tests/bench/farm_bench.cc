@@ -3,12 +3,14 @@
 //   bench_farm --benchmark_filter=efficiency
 // link: 0 ipc, 1 tcp, 2 tcp with CURVE.
 #include <benchmark/benchmark.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <time.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <array>
+#include <memory>
 #include <vector>
 
 #include "tests/bench/bench_farm_setup.h"
@@ -54,26 +56,53 @@ double two_loops_s(double cpu_s) {
   return monotonic_seconds() - begun;
 }
 
+// CPU time (s) and waits of this process, or of its children that have ended.
+struct Spent {
+  explicit Spent(int who) {
+    rusage usage = {};
+    getrusage(who, &usage);
+    cpu_s = static_cast<double>(usage.ru_utime.tv_sec + usage.ru_stime.tv_sec) +
+            1e-6 * static_cast<double>(usage.ru_utime.tv_usec + usage.ru_stime.tv_usec);
+    waits = static_cast<double>(usage.ru_nvcsw);
+  }
+  double cpu_s = 0;
+  double waits = 0;
+};
+
 // Arguments: link, microseconds a task, tasks a batch.  Two workers; `efficiency` is the work over
 // the two cores' time.  Where others use the cores as well, two loops that share nothing do not
 // reach 1 either: `two_loops` is what they reached just before and after, and `of_two_loops` the
-// farm's share of that.
+// farm's share of that.  A task costs `master_us` and `worker_us` beyond the work, and makes
+// threads of both wait `waits` times.
 void efficiency(benchmark::State& state) {
-  Bench bench(static_cast<Link>(state.range(0)), 2);
   const auto tasks = echo_tasks(static_cast<std::size_t>(state.range(2)),
                                 static_cast<std::uint64_t>(state.range(1)), 100);
-  bench.run(tasks);
-  const double batch_s =
-      1e-6 * static_cast<double>(state.range(1)) * static_cast<double>(tasks.size()) / 2;
+  const double work_s = 1e-6 * static_cast<double>(state.range(1));
+  const double batch_s = work_s * static_cast<double>(tasks.size()) / 2;
   const double loops_s = std::max(0.5, batch_s);
+  const Spent workers_before(RUSAGE_CHILDREN);
+  auto bench = std::make_unique<Bench>(static_cast<Link>(state.range(0)), 2);
+  bench->run(tasks);
   double alone_s = two_loops_s(loops_s);
+  const Spent master_before(RUSAGE_SELF);
   const double begun = monotonic_seconds();
-  for (auto _ : state) bench.run(tasks);
+  for (auto _ : state) bench->run(tasks);
   const double wall = monotonic_seconds() - begun;
+  const Spent master(RUSAGE_SELF);
   alone_s += two_loops_s(loops_s);
-  state.counters["efficiency"] = batch_s * static_cast<double>(state.iterations()) / wall;
+  bench.reset();
+  const Spent workers(RUSAGE_CHILDREN);
+  const auto runs = static_cast<double>(state.iterations());
+  const auto count = static_cast<double>(tasks.size());
+  state.counters["efficiency"] = batch_s * runs / wall;
   state.counters["two_loops"] = 2 * loops_s / alone_s;
   state.counters["of_two_loops"] = state.counters["efficiency"] / state.counters["two_loops"];
+  state.counters["master_us"] = 1e6 * (master.cpu_s - master_before.cpu_s) / (runs * count);
+  if (state.range(0) != kIpc) return;
+  state.counters["worker_us"] =
+      1e6 * ((workers.cpu_s - workers_before.cpu_s - 4 * loops_s) / ((runs + 1) * count) - work_s);
+  state.counters["waits"] = (master.waits - master_before.waits) / (runs * count) +
+                            (workers.waits - workers_before.waits) / ((runs + 1) * count);
 }
 
 BENCHMARK(throughput)
