@@ -44,7 +44,8 @@ struct StopOnSignals::Saved {
   struct sigaction terminate;
 };
 
-StopOnSignals::StopOnSignals(StopSource* stop, bool ignore_interrupt) : saved_(new Saved) {
+StopOnSignals::StopOnSignals(StopSource* stop, bool ignore_interrupt)
+    : saved_(std::make_unique<Saved>()) {
   assert(signal_target.load() == nullptr);
   signal_target.store(stop);
   struct sigaction action = {};
@@ -65,7 +66,6 @@ StopOnSignals::~StopOnSignals() {
   sigaction(SIGINT, &saved_->interrupt, nullptr);
   sigaction(SIGTERM, &saved_->terminate, nullptr);
   signal_target.store(nullptr);
-  delete saved_;
 }
 
 }  // namespace gapfarm

@@ -61,7 +61,6 @@ class Console {
   void clear_progress();
 
   bool out_is_terminal() const { return out_is_terminal_; }
-  bool err_is_terminal() const { return err_is_terminal_; }
   // Columns of the terminal on stdout; 80 where there is none.
   unsigned width() const;
 
