@@ -8,6 +8,7 @@
 #include <random>
 #include <string>
 
+#include "common/base/host.h"
 #include "common/net/socket.h"
 #include "common/process/process_pool.h"
 #include "worker/master_wait.h"
@@ -126,11 +127,6 @@ class Service {
 };
 
 }  // namespace
-
-std::string host_name() {
-  char name[256] = {};
-  return gethostname(name, sizeof name - 1) == 0 ? name : "unknown";
-}
 
 std::string unique_worker_name(const std::string& prefix) {
   char tail[16];

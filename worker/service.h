@@ -34,7 +34,6 @@ enum class ServiceEnd {
 
 // A name for this process that no other has: PREFIX (or the host) + pid + random tail.
 std::string unique_worker_name(const std::string& prefix);
-std::string host_name();
 
 // Works until told otherwise: one stop request finishes the job in work (or all in hand, with
 // `drain`) and sends its result, a second leaves at once.  The others go to other workers.

@@ -9,6 +9,7 @@
 
 #include "common/base/build_info.h"
 #include "common/base/hash.h"
+#include "common/base/host.h"
 #include "common/json/json.h"
 #include "common/trials/files.h"
 #include "master/cli/subcommand.h"

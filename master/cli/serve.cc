@@ -5,6 +5,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "common/base/host.h"
 #include "master/cli/page_along.h"
 #include "master/cli/run_page.h"
 #include "master/cli/serve_drive.h"

@@ -2,6 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "common/base/host.h"
 #include "common/json/json.h"
 #include "master/store/answer_store.h"
 #include "master/store/run_lock.h"

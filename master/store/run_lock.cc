@@ -9,6 +9,8 @@
 #include <fstream>
 #include <utility>
 
+#include "common/base/host.h"
+
 namespace gapfarm {
 namespace {
 
@@ -80,12 +82,6 @@ std::optional<bool> run_lock_held(const std::filesystem::path& run) {
 
 double unix_now_s() {
   return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
-}
-
-std::string host_name() {
-  char name[256] = {};
-  if (::gethostname(name, sizeof name - 1) != 0) return "localhost";
-  return name;
 }
 
 }  // namespace gapfarm

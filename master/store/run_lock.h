@@ -29,9 +29,6 @@ class RunLock {
 // nothing and writes nothing, so it works on a read-only folder and never disturbs a master.
 std::optional<bool> run_lock_held(const std::filesystem::path& run);
 
-// This machine's name.
-std::string host_name();
-
 // Seconds since 1970: for people, never for results.
 double unix_now_s();
 

@@ -10,6 +10,7 @@
 #include <system_error>
 
 #include "common/base/build_info.h"
+#include "common/base/host.h"
 #include "common/json/json.h"
 #include "master/store/schema.h"
 
