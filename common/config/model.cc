@@ -80,22 +80,13 @@ void read_model_effects(TomlSection& top, Model& model) {
 void read_model_fitness(TomlSection& top, Model& model) {
   auto section = top.section("fitness");
   if (!section) return;
-  FitnessSettings& fitness = model.fitness;
-  if (const auto kind = section->choice("kind", fitness_words())) {
-    fitness.kind = static_cast<FitnessKind>(*kind);
-  }
   // A failed run's best may be infinitely bad; that is no reason not to read its model.
   if (const toml::node* value = section->find("value")) {
     model.score = value->is_number() ? value->value<double>() : std::nullopt;
     if (!model.score)
       section->fail("value", "value is " + toml_type_name(*value) + ", expected a number");
   }
-  section->read("outlier_share", fitness.outlier_share, 0, 0.5);
-  section->read("roll_penalty", fitness.roll_penalty, 0, kUnbounded);
-  section->read("pitch_penalty", fitness.pitch_penalty, 0, kUnbounded);
-  section->read("heave_penalty", fitness.heave_penalty, 0, kUnbounded);
-  section->read("rest_penalty", fitness.rest_penalty, 0, kUnbounded);
-  section->read("rest_limit", fitness.rest_limit_s, 0, 60, "s");
+  read_fitness_of(*section, model.fitness);
   section->finish();
 }
 

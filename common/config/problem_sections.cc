@@ -32,16 +32,20 @@ void read_commands(TomlSection& top, std::vector<CommandSpec>& commands) {
 void read_fitness(TomlSection& top, FitnessSettings& fitness) {
   auto section = top.section("fitness");
   if (!section) return;
-  if (const auto kind = section->choice("kind", fitness_words())) {
+  read_fitness_of(*section, fitness);
+  section->finish();
+}
+
+void read_fitness_of(TomlSection& section, FitnessSettings& fitness) {
+  if (const auto kind = section.choice("kind", fitness_words())) {
     fitness.kind = static_cast<FitnessKind>(*kind);
   }
-  section->read("outlier_share", fitness.outlier_share, 0, 0.5);
-  section->read("roll_penalty", fitness.roll_penalty, 0, kUnbounded, "per rad");
-  section->read("pitch_penalty", fitness.pitch_penalty, 0, kUnbounded, "per rad");
-  section->read("heave_penalty", fitness.heave_penalty, 0, kUnbounded, "per m");
-  section->read("rest_penalty", fitness.rest_penalty, 0, kUnbounded, "per s");
-  section->read("rest_limit", fitness.rest_limit_s, 0, 60, "s");
-  section->finish();
+  section.read("outlier_share", fitness.outlier_share, 0, kMostOutliers);
+  section.read("roll_penalty", fitness.roll_penalty, 0, kUnbounded, "per rad");
+  section.read("pitch_penalty", fitness.pitch_penalty, 0, kUnbounded, "per rad");
+  section.read("heave_penalty", fitness.heave_penalty, 0, kUnbounded, "per m");
+  section.read("rest_penalty", fitness.rest_penalty, 0, kUnbounded, "per s");
+  section.read("rest_limit", fitness.rest_limit_s, 0, 60, "s");
 }
 
 void read_spread(TomlSection& top, SpreadSettings& spread) {

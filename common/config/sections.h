@@ -20,6 +20,8 @@ void read_commands(TomlSection& top, std::vector<CommandSpec>& commands);
 void read_pieces(TomlSection& top, const ScenarioForm& form, std::vector<Piece>& pieces,
                  std::vector<CommandSpec>& commands);
 void read_fitness(TomlSection& top, FitnessSettings& fitness);
+// What of it a model has, too; `section` is not finished.
+void read_fitness_of(TomlSection& section, FitnessSettings& fitness);
 void read_spread(TomlSection& top, SpreadSettings& spread);
 void read_evolution(TomlSection& top, EvolutionSettings& evolution);
 void read_optimiser(TomlSection& top, OptimiserSettings& optimiser);

@@ -28,9 +28,11 @@ struct CommandSpec {
 
 enum class FitnessKind { kLogScore, kRobustMahalanobis, kEnergyScore, kCornerDistance };
 
+inline constexpr double kMostOutliers = 0.5;
+
 struct FitnessSettings {
   FitnessKind kind = FitnessKind::kLogScore;
-  double outlier_share = 0.02;  // weight of the predictive density's heavy tail, [0, 0.5]
+  double outlier_share = 0.02;  // weight of the density's heavy tail, <= kMostOutliers
   double roll_penalty = 1;      // per rad of the greatest roll of a motion
   double pitch_penalty = 1;     // per rad
   double heave_penalty = 10;    // per m

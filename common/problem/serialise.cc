@@ -45,7 +45,7 @@ FitnessSettings read_fitness(const v1::Fitness& from) {
 // What config files are held to (common/config/problem_sections.cc); a message may come from
 // anywhere.
 Status check_score(const FitnessSettings& fitness, const SpreadSettings& spread) {
-  if (!(fitness.outlier_share >= 0 && fitness.outlier_share <= 0.5)) {
+  if (!(fitness.outlier_share >= 0 && fitness.outlier_share <= kMostOutliers)) {
     return invalid("the outlier share must be in [0, 0.5]");
   }
   for (const double value : {fitness.roll_penalty, fitness.pitch_penalty, fitness.heave_penalty,
