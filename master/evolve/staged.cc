@@ -9,19 +9,6 @@
 namespace gapfarm {
 namespace {
 
-// What StagedState.kept holds, in its order.
-enum Kept : std::size_t {
-  kGenerations,
-  kEvaluations,
-  kBirths,
-  kLastImprovement,
-  kBestBirth,
-  kBestOutcome,
-  kBestCost,
-  kBestScores,
-  kKeptCount
-};
-
 bool better(const Member& a, const Member& b) {
   if ((a.outcome == v1::OK) != (b.outcome == v1::OK)) return a.outcome == v1::OK;
   return a.outcome == v1::OK && a.cost < b.cost;
@@ -43,27 +30,26 @@ class StagedOptimiser final : public Optimiser {
     v1::StagedState message;
     const std::size_t genes = setup_.genes.size();
     if (!message.ParseFromArray(state.data(), static_cast<int>(state.size())) ||
-        message.stage() >= stages_.size() || message.kept_size() != kKeptCount ||
+        message.stage() >= stages_.size() || !message.has_best() ||
         static_cast<std::size_t>(message.base_size()) != message.stage() * genes) {
       return Error{
-          "the saved state of the stages is damaged or belongs to other stages; resume with "
-          "the config of the run"};
+          "the saved state of the stages is damaged or belongs to other stages or another "
+          "version; resume with the config and the build of the run"};
     }
     stage_ = message.stage();
     results_ = stage_results(state, genes);
-    const auto kept = [&](Kept k) { return message.kept(static_cast<int>(k)); };
-    generations_ = static_cast<std::uint64_t>(kept(kGenerations));
-    evaluations_ = static_cast<std::uint64_t>(kept(kEvaluations));
-    births_ = static_cast<std::uint64_t>(kept(kBirths));
-    last_improvement_ = static_cast<std::uint64_t>(kept(kLastImprovement));
+    generations_ = message.generations();
+    evaluations_ = message.evaluations();
+    births_ = message.births();
+    last_improvement_ = message.last_improvement();
     auto restored = restore_optimiser(stage_setup(), message.optimiser());
     if (!restored) return restored.error();
     inner_ = *std::move(restored);
     if (stage_ > 0) {
-      kept_best_.birth_id = static_cast<std::uint64_t>(kept(kBestBirth));
-      kept_best_.outcome = static_cast<v1::Outcome>(static_cast<int>(kept(kBestOutcome)));
-      kept_best_.cost = kept(kBestCost);
-      kept_best_.scores = static_cast<unsigned>(kept(kBestScores));
+      kept_best_.birth_id = message.best().birth_id();
+      kept_best_.outcome = static_cast<v1::Outcome>(message.best().outcome());
+      kept_best_.cost = message.best().fitness();
+      kept_best_.scores = message.best().scores();
       kept_best_.genome = results_.back();
       kept_best_.operators = "elite";
     }
@@ -117,15 +103,15 @@ class StagedOptimiser final : public Optimiser {
     message.set_stage(stage_);
     message.set_optimiser(inner_->state());
     for (const Genome& genome : results_) message.mutable_base()->Add(genome.begin(), genome.end());
-    const double kept[kKeptCount] = {static_cast<double>(generations_),
-                                     static_cast<double>(evaluations_),
-                                     static_cast<double>(births_),
-                                     static_cast<double>(last_improvement_),
-                                     static_cast<double>(kept_best_.birth_id),
-                                     static_cast<double>(kept_best_.outcome),
-                                     kept_best_.cost,
-                                     static_cast<double>(kept_best_.scores)};
-    message.mutable_kept()->Add(std::begin(kept), std::end(kept));
+    message.set_generations(generations_);
+    message.set_evaluations(evaluations_);
+    message.set_births(births_);
+    message.set_last_improvement(last_improvement_);
+    v1::Individual* best = message.mutable_best();
+    best->set_birth_id(kept_best_.birth_id);
+    best->set_outcome(static_cast<std::uint32_t>(kept_best_.outcome));
+    best->set_fitness(kept_best_.cost);
+    best->set_scores(kept_best_.scores);
     return message.SerializeAsString();
   }
 
