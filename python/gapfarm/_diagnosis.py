@@ -29,12 +29,12 @@ class Diagnosis:
     @property
     def verdict(self) -> str:
         """In one word: "effect", "none", "unknown", "effect+unknown" or "unusable"."""
-        return self.data["verdict"]
+        return str(self.data["verdict"])
 
     @property
     def headline(self) -> str:
         """In one sentence."""
-        return self.data["headline"]
+        return str(self.data["headline"])
 
     @property
     def effects(self) -> pd.DataFrame:
@@ -75,6 +75,6 @@ def diagnose(
     """
     words = ["diagnose", os.fspath(config), "--out", os.fspath(out), *options]
     if trials:
-        words += ["--trials", *map(os.fspath, trials)]
+        words += ["--trials", *(os.fspath(file) for file in trials)]
     command(words, progress)
     return Diagnosis(out)

@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import os
+import sys
 import tempfile
 from typing import Any, Optional, Sequence, Union
 
 import numpy as np
+import numpy.typing as npt
 import pandas as pd
 
 from ._logs import Path, read_paths, read_table, read_trials, write_trials
 from ._program import command
 
-try:
+if sys.version_info >= (3, 11):
     import tomllib as _toml
-except ModuleNotFoundError:  # before Python 3.11
-    import tomli as _toml  # type: ignore[no-redef]
+else:
+    import tomli as _toml
 
 _UNITS = {"x": "m", "y": "m", "theta": "rad", "log_score": "nats"}
 
@@ -77,7 +79,7 @@ class Model:
         return table
 
     @staticmethod
-    def covariances(predictions: pd.DataFrame) -> np.ndarray:
+    def covariances(predictions: pd.DataFrame) -> npt.NDArray[np.float64]:
         """Of predict(): float64 of shape (trials, 3, 3), axes x, y, theta."""
         upper = predictions[["cov_xx", "cov_xy", "cov_xt", "cov_yy", "cov_yt", "cov_tt"]].to_numpy()
         full = np.empty((len(upper), 3, 3))

@@ -18,7 +18,7 @@ class GapfarmError(Exception):
         super().__init__(message)
         self.exit_code = exit_code
 
-    def __reduce__(self):  # also from other processes
+    def __reduce__(self) -> "tuple[type, tuple[str, int]]":  # also from other processes
         return (GapfarmError, (self.args[0], self.exit_code))
 
 

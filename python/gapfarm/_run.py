@@ -9,6 +9,7 @@ import sqlite3
 from typing import Any, Optional, Sequence
 
 import numpy as np
+import numpy.typing as npt
 import pandas as pd
 
 from ._model import Model
@@ -37,7 +38,7 @@ class Run:
     def __repr__(self) -> str:
         return f"gapfarm.Run({self.folder!r})"
 
-    def _open(self):
+    def _open(self) -> "contextlib.closing[sqlite3.Connection]":
         # A reader that keeps its transaction open would make the master wait.
         path = os.path.abspath(os.path.join(self.folder, "run.sqlite"))
         return contextlib.closing(sqlite3.connect(f"file:{path}?mode=ro", uri=True, timeout=60))
@@ -89,7 +90,7 @@ class Run:
         parameters = pd.DataFrame([json.loads(p) for p in table.pop("parameters")])
         return pd.concat([table, parameters], axis=1)
 
-    def genomes(self, generation: Optional[int] = None) -> np.ndarray:
+    def genomes(self, generation: Optional[int] = None) -> npt.NDArray[np.float64]:
         """float64 of shape (individuals, genes), values in [0, 1], best first."""
         which = "(SELECT max(generation) FROM generations)" if generation is None else "?"
         with self._open() as db:
@@ -117,7 +118,8 @@ class Run:
 
     def status(self) -> dict[str, Any]:
         """`gapfarm status RUN --json` (docs/formats.md)."""
-        return command(["status", self.folder])
+        found: dict[str, Any] = command(["status", self.folder])
+        return found
 
     @property
     def model(self) -> Model:
@@ -137,6 +139,6 @@ def evolve(
     Raises GapfarmError; one of exit code 85 was stopped and can be resumed."""
     words = ["evolve", os.fspath(config), "--out", os.fspath(out), *options]
     if trials:
-        words += ["--trials", *map(os.fspath, trials)]
+        words += ["--trials", *(os.fspath(file) for file in trials)]
     command(words, progress)
     return Run(out)
