@@ -1,5 +1,5 @@
 // gapfarm init LOG...: a config for a log, with what the log says put in and what it cannot say as
-// questions; of a robot's URDF: init_robot.cc.
+// questions; of a robot's URDF: robot_setup.cc.
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
@@ -14,9 +14,9 @@
 #include "common/score/motion_model.h"
 #include "common/score/statistics.h"
 #include "common/trials/read.h"
-#include "master/cli/init_robot.h"
 #include "master/cli/inputs.h"
 #include "master/cli/outputs.h"
+#include "master/cli/robot_setup.h"
 
 namespace gapfarm {
 namespace {
@@ -179,8 +179,8 @@ SubcommandRun setup_init(CLI::App& app) {
   options->trials.declare_reading(app);
   options->outputs.declare(app);
   app.footer(
-      "Of a URDF it writes the robot, too, as CONFIG_robot.toml beside the config "
-      "(docs/ground.md).\n"
+      "Of a URDF it writes what `gapfarm robot URDF --out CONFIG_robot.toml --config CONFIG --runs "
+      "RUNS`\nwrites; that command shows the robot, too, and draws it (docs/ground.md).\n"
       "\n"
       "Examples:\n"
       "  gapfarm init logs/monday.csv --out robot.toml\n"

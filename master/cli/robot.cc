@@ -2,11 +2,7 @@
 #include <filesystem>
 #include <memory>
 
-#include "common/robot/robot_file.h"
-#include "master/cli/outputs.h"
-#include "master/cli/robot_files.h"
-#include "master/cli/subcommand.h"
-#include "master/robot/robot_config.h"
+#include "master/cli/robot_setup.h"
 #include "master/robot/robot_text.h"
 
 namespace gapfarm {
@@ -15,12 +11,8 @@ namespace {
 namespace fs = std::filesystem;
 
 struct RobotOptions {
-  std::vector<std::string> files;
-  std::vector<std::string> controllers;
-  std::string out;
+  RobotSetup setup;
   std::string picture;
-  std::string config;
-  std::string runs = "drive";
   Outputs outputs;
 };
 
@@ -35,66 +27,41 @@ std::string plain_lines(const std::string& text) {
   return out;
 }
 
-// The robot's file as a config beside it names it.
-std::string beside(const std::string& file, const std::string& config) {
-  if (file.empty() || config.empty()) return file;
-  std::error_code code;
-  const fs::path from = fs::absolute(config, code).parent_path();
-  const fs::path way = fs::absolute(file, code).lexically_relative(from);
-  return way.empty() ? file : way.string();
-}
-
-Status plan_outputs(RobotOptions& options) {
-  for (const auto* files : {&options.files, &options.controllers}) {
-    for (const std::string& file : *files) options.outputs.reads(file);
-  }
-  return options.outputs.plan(
-      std::vector<std::string>{options.out, options.picture, options.config});
+std::string next_words_of(const RobotSetup& setup) {
+  if (setup.config.empty()) return "gapfarm import runs LOG --out drive";
+  return "gapfarm import runs LOG --out " + (setup.runs.empty() ? "drive" : setup.runs[0]) +
+         ", then: gapfarm evolve " + setup.config + " --out run/" +
+         fs::path(setup.config).stem().string();
 }
 
 int run_robot(RobotOptions& options, CliContext& context) {
   Console& console = context.console;
-  Result<RobotReading> reading = read_robot_files(options.files, options.controllers);
-  if (reading) {
-    if (Status s = plan_outputs(options); !s) reading = s.error();
-  }
-  if (!reading) {
-    console.error(reading.error());
+  const RobotSetup& setup = options.setup;
+  const Result<RobotTexts> texts = set_up_robot(setup, options.outputs);
+  Status ready = texts ? options.outputs.plan({setup.robot, setup.config, options.picture})
+                       : Status(texts.error());
+  if (!ready) {
+    console.error(ready.error());
     return kExitBadUsage;
   }
-  GroundRobot completed = reading->robot;
-  if (const Status status = complete_robot(&completed); !status) {
-    console.error(Error{options.files[0] + ": " + status.error().message +
-                        "; state it in a robot.toml (docs/formats.md)"});
-    return kExitBadUsage;
+  Status written = write_robot(setup, *texts, options.outputs);
+  if (written && !options.picture.empty()) {
+    written = options.outputs.write(options.picture, draw_robot(texts->reading, texts->completed));
   }
-  const std::string toml = format_robot(completed);
-  const std::pair<const std::string*, std::string> outputs[] = {
-      {&options.out, toml},
-      {&options.config,
-       config_of_robot(completed, beside(options.out, options.config), options.runs)},
-      {&options.picture, options.picture.empty() ? "" : draw_robot(*reading, completed)}};
-  for (const auto& [path, text] : outputs) {
-    if (path->empty()) continue;
-    if (const Status status = options.outputs.write(*path, text); !status) {
-      console.error(status.error());
-      return kExitFailed;
-    }
+  if (!written) {
+    console.error(written.error());
+    return kExitFailed;
   }
   if (console.json()) {
-    console.print(describe_robot_json(*reading, completed, toml));
+    console.print(describe_robot_json(texts->reading, texts->completed, texts->robot));
     return kExitDone;
   }
-  console.print(plain_lines(describe_robot(*reading, completed)));
-  if (options.out.empty()) {
+  console.print(plain_lines(describe_robot(texts->reading, texts->completed)));
+  if (setup.robot.empty()) {
     console.print("\nrobot.toml, to paste and correct (--out robot.toml writes it):\n\n" +
-                  plain_lines(toml));
+                  plain_lines(texts->robot));
   } else {
-    console.note("robot written to " + options.out + "; next: gapfarm import runs LOG --out " +
-                 (options.config.empty()
-                      ? "drive"
-                      : options.runs + ", then: gapfarm evolve " + options.config + " --out run/" +
-                            fs::path(options.config).stem().string()));
+    console.note("robot written to " + setup.robot + "; next: " + next_words_of(setup));
   }
   return kExitDone;
 }
@@ -103,17 +70,17 @@ int run_robot(RobotOptions& options, CliContext& context) {
 
 SubcommandRun setup_robot(CLI::App& app) {
   auto options = std::make_shared<RobotOptions>();
-  app.add_option("FILE", options->files,
+  app.add_option("FILE", options->setup.files,
                  "URDF, controller YAML or robot.toml; further ones are held against the first")
       ->required();
-  app.add_option("--controllers", options->controllers,
+  app.add_option("--controllers", options->setup.controllers,
                  "Controller files (ros_control, ros2_control)");
-  app.add_option("-o,--out", options->out, "Write the robot as TOML");
+  app.add_option("-o,--out", options->setup.robot, "Write the robot as TOML");
   app.add_option("--picture", options->picture, "Draw the robot from above (SVG)");
-  app.add_option("--config", options->config, "Write a config that fits the robot to its logs")
+  app.add_option("--config", options->setup.config,
+                 "Write a config that fits the robot to its runs")
       ->needs("--out");
-  app.add_option("--runs", options->runs, "Folder of the logs that the config names")
-      ->capture_default_str();
+  app.add_option("--runs", options->setup.runs, "Folders of runs that the config names (drive)");
   options->outputs.declare(app);
   app.footer(
       "Examples:\n"
@@ -121,6 +88,7 @@ SubcommandRun setup_robot(CLI::App& app) {
       "  gapfarm robot burger.urdf --picture burger.svg\n"
       "  gapfarm robot old.urdf new.urdf\n"
       "  gapfarm robot husky.urdf --controllers control.yaml --out robot.toml --config husky.toml\n"
+      "gapfarm init URDF [YAML] [RUNS] --out CONFIG writes the same two files in one go.\n"
       "Next: gapfarm import runs drive.bag --out drive, then gapfarm evolve husky.toml --out "
       "run/husky");
   return [options](CliContext& context) { return run_robot(*options, context); };

@@ -1,13 +1,10 @@
-#include "master/cli/init_robot.h"
-
-#include <spdlog/fmt/fmt.h>
+#include "master/cli/robot_setup.h"
 
 #include <algorithm>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "common/robot/robot_file.h"
-#include "master/cli/inputs.h"
 #include "master/cli/robot_files.h"
 #include "master/robot/robot_config.h"
 
@@ -17,22 +14,11 @@ namespace {
 namespace fs = std::filesystem;
 
 bool is_robot_file(const std::string& word) {
+  static constexpr const char* kExtensions[] = {".urdf", ".xacro", ".xml",
+                                                ".yaml", ".yml",   ".toml"};
   const std::string extension = fs::path(word).extension().string();
-  return extension == ".urdf" || extension == ".xacro" || extension == ".xml" ||
-         extension == ".yaml" || extension == ".yml";
-}
-
-struct RobotWords {
-  std::vector<std::string> files, folders;
-};
-
-RobotWords sorted_words(const std::vector<std::string>& words) {
-  RobotWords sorted;
-  std::error_code ignored;
-  for (const std::string& word : words) {
-    (fs::is_directory(word, ignored) ? sorted.folders : sorted.files).push_back(word);
-  }
-  return sorted;
+  return std::any_of(std::begin(kExtensions), std::end(kExtensions),
+                     [&](const char* e) { return extension == e; });
 }
 
 // Where the robot goes: husky.toml has its robot in husky_robot.toml.
@@ -42,38 +28,57 @@ std::string robot_beside(const std::string& out) {
   return (path.parent_path() / (path.stem().string() + "_robot.toml")).string();
 }
 
-// A comment of one line: sentences come from files.
-std::string question(const std::string& sentence) {
-  return "# QUESTION: " + printable(sentence) + "\n";
-}
-
-std::string questioning_config(const RobotReading& reading, const GroundRobot& completed,
-                               const RobotWords& words, const std::string& out) {
-  std::string files, folders;
-  for (const std::string& file : words.files) files += (files.empty() ? "" : ", ") + file;
-  for (const std::string& folder : words.folders) {
-    folders += (folders.empty() ? "\"" : ", \"") + file_seen_from(out, folder) + "\"";
+RobotSetup setup_of_words(const std::vector<std::string>& words, const std::string& out) {
+  RobotSetup setup;
+  std::error_code ignored;
+  for (const std::string& word : words) {
+    (fs::is_directory(word, ignored) ? setup.runs : setup.files).push_back(word);
   }
-  std::string text = fmt::format(
-      "# Made by `gapfarm init` of {}.\n"
-      "# Lines with QUESTION are guesses; answer them, in the robot's file where they are about "
-      "it,\n"
-      "# then `gapfarm check` this file.\n"
-      "scenario = \"ground\"\nseed = 1\n\n",
-      printable(files));
-  for (const auto* sentences : {&reading.disagreements, &reading.remarks, &completed.notes}) {
-    for (const std::string& sentence : *sentences) text += question(sentence);
-  }
-  text += "[robot]\nfile = \"" + fs::path(robot_beside(out)).filename().string() + "\"\n\n[runs]\n";
-  if (folders.empty()) {
-    text += question("where are its runs?  `gapfarm import runs LOG --out drive` makes them.");
-    folders = "\"drive\"";
-  }
-  text += "folders = [" + folders + "]   # commands.csv and poses.csv in each\n\n";
-  return text + search_of_driving(completed);
+  setup.robot = robot_beside(out);
+  setup.config = out;
+  return setup;
 }
 
 }  // namespace
+
+Result<RobotTexts> set_up_robot(const RobotSetup& setup, Outputs& outputs) {
+  Result<RobotReading> reading = read_robot_files(setup.files, setup.controllers);
+  if (!reading) return reading.error();
+  RobotTexts texts;
+  texts.completed = reading->robot;
+  if (const Status s = complete_robot(&texts.completed); !s) {
+    return Error{setup.files[0] + ": " + s.error().message +
+                 "; state it in a robot.toml (docs/formats.md) and give that"};
+  }
+  for (const auto* files : {&setup.files, &setup.controllers}) {
+    for (const std::string& file : *files) outputs.reads(file);
+  }
+  RobotConfigWords words;
+  const auto add = [](const std::vector<std::string>& said, std::vector<std::string>& to) {
+    for (const std::string& text : said) to.push_back(printable(text));
+  };
+  add(setup.files, words.made_of);
+  add(setup.controllers, words.made_of);
+  add(reading->disagreements, words.questions);
+  add(reading->remarks, words.questions);
+  add(texts.completed.notes, words.questions);
+  words.robot = file_seen_from(setup.config, setup.robot);
+  for (const std::string& run : setup.runs) words.runs.push_back(file_seen_from(setup.config, run));
+  texts.robot = format_robot(texts.completed);
+  texts.config = config_of_robot(texts.completed, words);
+  texts.reading = *std::move(reading);
+  return texts;
+}
+
+Status write_robot(const RobotSetup& setup, const RobotTexts& texts, const Outputs& outputs) {
+  const std::pair<const std::string*, const std::string*> files[] = {
+      {&setup.robot, &texts.robot}, {&setup.config, &texts.config}};
+  for (const auto& [path, text] : files) {
+    if (path->empty()) continue;
+    if (Status s = outputs.write(*path, *text); !s) return s;
+  }
+  return {};
+}
 
 std::string file_seen_from(const std::string& out, const std::string& file) {
   std::error_code error;
@@ -90,40 +95,22 @@ bool names_a_robot(const std::vector<std::string>& words) {
 int run_init_robot(const std::vector<std::string>& words, const std::string& out, Outputs& outputs,
                    CliContext& context) {
   Console& console = context.console;
-  const RobotWords sorted = sorted_words(words);
-  const Result<RobotReading> reading = read_robot_files(sorted.files, {});
-  GroundRobot completed;
-  Status ready = reading ? Status() : Status(reading.error());
-  if (ready) {
-    completed = reading->robot;
-    if (ready = complete_robot(&completed); !ready) {
-      ready = Error{sorted.files[0] + ": " + ready.error().message +
-                    "; state it in a robot.toml (docs/formats.md), then gapfarm init that robot's "
-                    "URDF again"};
-    }
-  }
-  const std::string robot = robot_beside(out);
-  if (ready) {
-    for (const std::string& file : sorted.files) outputs.reads(file);
-    if (out != "-") ready = outputs.plan(std::vector<std::string>{out, robot});
-  }
+  const RobotSetup setup = setup_of_words(words, out);
+  const Result<RobotTexts> texts = set_up_robot(setup, outputs);
+  Status ready = texts ? Status() : Status(texts.error());
+  if (ready && out != "-") ready = outputs.plan(std::vector<std::string>{setup.robot, out});
   if (!ready) {
     console.error(ready.error());
     return kExitBadUsage;
   }
-  const std::string text = questioning_config(*reading, completed, sorted, out);
-  nlohmann::ordered_json json = {{"out", out}, {"robot", robot}, {"runs", sorted.folders}};
+  nlohmann::ordered_json json = {{"out", out}, {"robot", setup.robot}, {"runs", setup.runs}};
   if (out == "-") {
-    json["config"] = text;
-    console.result(text, json);
+    json["config"] = texts->config;
+    console.result(texts->config, json);
     return kExitDone;
   }
-  const std::pair<const std::string*, std::string> files[] = {{&robot, format_robot(completed)},
-                                                              {&out, text}};
-  for (const auto& [path, content] : files) {
-    if (Status s = outputs.write(*path, content); !s) return failed(s.error(), context);
-  }
-  console.result(out + ": a config for the robot in " + robot +
+  if (Status s = write_robot(setup, *texts, outputs); !s) return failed(s.error(), context);
+  console.result(out + ": a config for the robot in " + setup.robot +
                      "; answer its QUESTIONs, then: gapfarm check " + out + "\n",
                  json);
   return kExitDone;

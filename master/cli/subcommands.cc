@@ -36,7 +36,7 @@ std::span<const Subcommand> subcommands() {
       {"keys", "make and list the keys of masters and workers", "Setup", setup_keys},
       {"completion", "print what makes a shell complete these commands", "Setup", setup_completion},
       {"check", "validate everything that a run would need; run nothing", "Data", setup_check},
-      {"init", "write a config for a trial log, with the questions that are left", "Data",
+      {"init", "write a config for a trial log or a URDF, with the questions that are left", "Data",
        setup_init},
       {"robot", "say what a robot is, from its URDF and controller file", "Data", setup_robot},
       {"import", "turn other programs' logs into a trial log", "Data", setup_import},

@@ -49,8 +49,7 @@ std::string toml_key(const std::string& key) {
   return std::all_of(key.begin(), key.end(), bare) ? key : "\"" + key + "\"";
 }
 
-}  // namespace
-
+// The sections [genes], [optimiser] and [evolution].
 std::string search_of_driving(const GroundRobot& robot) {
   const GroundTable rows(robot);
   std::string text = "[genes]  # \"table\": half to twice what the robot's file says\n";
@@ -67,11 +66,30 @@ std::string search_of_driving(const GroundRobot& robot) {
          "[evolution]\nstop = { evaluations = 600 }\n";
 }
 
-std::string config_of_robot(const GroundRobot& robot, const std::string& robot_file,
-                            const std::string& runs) {
-  std::string text = "# A ground robot, fitted to logs of it driving (docs/ground.md).\n";
-  text += "scenario = \"ground\"\n\n[robot]\nfile = \"" + robot_file + "\"\n\n";
-  text += "[runs]\nfolders = [\"" + runs + "\"]  # of gapfarm import runs\n\n";
+std::string joined(const std::vector<std::string>& words, const char* around) {
+  std::string text;
+  for (const std::string& word : words) {
+    text += (text.empty() ? "" : ", ") + (around + word) + around;
+  }
+  return text;
+}
+
+}  // namespace
+
+std::string config_of_robot(const GroundRobot& robot, const RobotConfigWords& words) {
+  std::string text =
+      "# A ground robot, fitted to logs of it driving (docs/ground.md), made of " +
+      joined(words.made_of, "") +
+      ".\n"
+      "# Lines with QUESTION are guesses; answer them, in the robot's file where they are about "
+      "it,\n# then `gapfarm check` this file.\nscenario = \"ground\"\nseed = 1\n\n";
+  for (const std::string& sentence : words.questions) text += "# QUESTION: " + sentence + "\n";
+  text += "[robot]\nfile = \"" + words.robot + "\"\n\n[runs]\n";
+  if (words.runs.empty()) {
+    text += "# QUESTION: where are its runs?  `gapfarm import runs LOG --out drive` makes them.\n";
+  }
+  text += "folders = [" + (words.runs.empty() ? "\"drive\"" : joined(words.runs, "\"")) +
+          "]   # commands.csv and poses.csv in each\n\n";
   return text + search_of_driving(robot);
 }
 

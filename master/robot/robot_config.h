@@ -2,18 +2,21 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "common/robot/robot.h"
 
 namespace gapfarm {
 
-// The sections [genes], [optimiser] and [evolution] that fit what a log of free driving tells of
-// this drive.
-std::string search_of_driving(const GroundRobot& robot);
+// What a config says of where it comes from and what it is about, as it is to stand there.
+struct RobotConfigWords {
+  std::vector<std::string> made_of;    // files that the robot was read from
+  std::vector<std::string> questions;  // sentences of a line each
+  std::string robot;                   // its robot.toml
+  std::vector<std::string> runs;       // folders of its runs; none: a guess and a question
+};
 
 // Config text of scenario ground that fits what a log of free driving tells of this drive.
-// `robot_file` and `runs` (a folder) as the config is to name them.
-std::string config_of_robot(const GroundRobot& robot, const std::string& robot_file,
-                            const std::string& runs);
+std::string config_of_robot(const GroundRobot& robot, const RobotConfigWords& words);
 
 }  // namespace gapfarm

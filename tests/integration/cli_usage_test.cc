@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 
 #include "common/base/build_info.h"
+#include "common/trials/files.h"
 #include "tests/integration/run_program.h"
 
 namespace gapfarm {
@@ -9,6 +10,12 @@ namespace {
 
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
+
+std::string text_of(const std::string& file) {
+  const Result<std::string> text = read_text_file(file);
+  EXPECT_TRUE(text.ok()) << text.error().message;
+  return text ? *text : "";
+}
 
 TEST(CliUsage, SaysWhatItIs) {
   const Finished version = gapfarm_command({"--version"});
@@ -121,6 +128,17 @@ TEST(CliUsage, InitOfAURDFWritesTheRobotAndAConfigThatNamesIt) {
   EXPECT_EQ(checked.exit_code, 0) << checked.err;
   EXPECT_EQ(gapfarm_command({"init", urdf, "--out", folder / "car.toml"}).exit_code, 2)
       << "it is there already";
+  // `robot` writes the same two files.
+  std::filesystem::create_directory(folder / "again");
+  const Finished again =
+      gapfarm_command({"robot", urdf, "--out", folder / "again/car_robot.toml", "--config",
+                       folder / "again/car.toml", "--runs", folder / "again/../monday"});
+  EXPECT_EQ(again.exit_code, 0) << again.err;
+  EXPECT_EQ(text_of(folder / "again/car_robot.toml"), text_of(folder / "car_robot.toml"));
+  std::string config = text_of(folder / "again/car.toml");
+  const std::size_t runs = config.find("\"../monday\"");
+  ASSERT_NE(runs, config.npos) << config;
+  EXPECT_EQ(config.replace(runs, 11, "\"monday\""), text_of(folder / "car.toml"));
 }
 
 TEST(CliUsage, WrongWordsExitWithTwoAndASuggestion) {
