@@ -31,12 +31,13 @@ add_custom_target(install_files DEPENDS
   ${made}/gapfarm.1.gz ${made}/gapfarm-worker.1.gz ${made}/gapfarm.bash ${made}/_gapfarm
   ${made}/gapfarm.fish)
 
-# The units name the folder that they are installed for.
-foreach(unit gapfarm-worker.service gapfarm-run@.service)
-  file(READ scripts/launch/systemd/${unit} text)
-  string(REPLACE "/usr/local/bin" "${CMAKE_INSTALL_FULL_BINDIR}" text "${text}")
-  file(CONFIGURE OUTPUT ${made}/${unit} CONTENT "${text}" @ONLY)
-endforeach()
+# The units name the folder that they are installed for, which is known when they are.
+install(CODE "
+  foreach(unit gapfarm-worker gapfarm-run@)
+    file(READ ${PROJECT_SOURCE_DIR}/scripts/launch/systemd/\${unit}.service text)
+    string(REPLACE /usr/local/bin \${CMAKE_INSTALL_PREFIX}/${CMAKE_INSTALL_BINDIR} text \"\${text}\")
+    file(WRITE ${made}/\${unit}.service \"\${text}\")
+  endforeach()" ALL_COMPONENTS)
 set(units lib/systemd/system)  # where Debian 12 looks, also below a prefix of one's own
 
 install(TARGETS gapfarm RUNTIME COMPONENT gapfarm)

@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Installs the Debian 12 packages that gapfarm is built from.  Does nothing when all are there.
-#   scripts/setup.sh [--tests]     --tests: also what only the tests need (format, browser, Slurm,
-#                                sshd)
+#   scripts/setup.sh [--tests] [--boxes]
+# --tests: also what only the tests need (format, browser, Slurm, sshd).  --boxes: also what bare Debians and
+# containers are made with, for machines that let root make them; without it the tests that want them say so.
 set -euo pipefail
 
 packages=(
@@ -13,14 +14,18 @@ packages=(
   libzstd-dev nlohmann-json3-dev
   protobuf-compiler
 )
-if [[ "${1:-}" == --tests ]]; then
+wanted=" $* "
+if [[ $wanted == *' --tests '* ]]; then
   packages+=(chromium clang-format fonts-dejavu-core)
   if ! command -v node >/dev/null; then packages+=(nodejs); fi  # drives the browser
   packages+=(fish lintian zsh)  # shells that complete commands; what judges packages
   # A simulator by MuJoCo, and the Python package.
-  packages+=(libmujoco-dev python3-numpy python3-pandas python3-pytest)
+  packages+=(libmujoco-dev mypy python3-numpy python3-pandas python3-pytest)
   # Farms over Slurm and ssh, and Kubernetes' types (tests/launch).
   packages+=(iproute2 munge openssh-client openssh-server python3-kubernetes python3-yaml slurm-wlm)
+fi
+if [[ $wanted == *' --boxes '* ]]; then
+  packages+=(debootstrap podman)
 fi
 
 missing=()

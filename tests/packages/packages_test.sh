@@ -4,7 +4,7 @@ set -euo pipefail
 build=$1
 cd "$2"
 [[ $(id -u) -eq 0 ]] || { echo 'not run: needs root'; exit 77; }
-command -v debootstrap >/dev/null || { echo 'not run: debootstrap is not installed'; exit 77; }
+command -v debootstrap >/dev/null || { echo 'not run: debootstrap is not installed (scripts/setup.sh --boxes)'; exit 77; }
 out=$(mktemp -d)
 trap 'rm -rf "$out"' EXIT
 scripts/package.sh --build "$build" --out "$out"
