@@ -172,11 +172,14 @@ int sense_of_turns(const std::vector<DriveSample>& samples) {
   }
   if (turns.size() < kFewestTurns) return 0;
   const Rate ccw = best_rate(turns, 1), cw = best_rate(turns, -1);
-  const Rate& better = ccw.agreement > cw.agreement ? ccw : cw;
-  // It must explain most of what no turning at all leaves.
-  const bool explains = 1 - better.agreement < 0.5 * (1 - agreement(turns, 0));
-  if (better.agreement < kGoodConcentration || !explains) return 0;
-  if (std::abs(ccw.agreement - cw.agreement) > 0.15) return &better == &ccw ? 1 : -1;
+  // It must explain most of what no turning at all leaves; where turns are small that is little.
+  const double still = agreement(turns, 0);
+  const auto explains = [still](const Rate& rate) {
+    return rate.agreement >= kGoodConcentration && 1 - rate.agreement < 0.5 * (1 - still);
+  };
+  const bool left = explains(ccw), right = explains(cw);
+  if (!left || !right) return left ? 1 : right ? -1 : 0;
+  if (std::abs(ccw.agreement - cw.agreement) > 0.15) return ccw.agreement > cw.agreement ? 1 : -1;
   // A turn of one angle, or of that less a full one the other way: the shorter is meant where it is
   // much the shorter.
   if (ccw.rate < 0.6 * cw.rate) return 1;

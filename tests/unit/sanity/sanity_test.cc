@@ -160,6 +160,16 @@ TEST(Sanity, SwappedCommandsAreSwappedSides) {
   EXPECT_EQ(first_name(log), "sides_swapped");
 }
 
+// Where turns are small, none at all agrees with most of what is seen, either way round.
+TEST(Sanity, SmallTurnsTellTheirSense) {
+  for (const double rate : {0.6, 0.9, 1.2}) {
+    Problem log = drawn_drives(200, {0.25, rate});
+    EXPECT_EQ(first_name(log), "") << rate;
+    for (Trial& t : log.log.trials) std::swap(t.left, t.right);
+    EXPECT_EQ(first_name(log), "sides_swapped") << rate;
+  }
+}
+
 // Wild rows, a lens, an asymmetric motor: a diagnosis's business.
 TEST(Sanity, HasNoDoubtsAboutWhatTheCatalogueExplains) {
   Problem log = drawn_drives(300);
