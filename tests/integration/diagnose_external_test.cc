@@ -36,6 +36,40 @@ for line in sys.stdin:
     print(json.dumps({'id': task['id'], 'pose': pose}), flush=True)
 )";
 
+// A robot on two tracks on a floor that leans, has a nap and brakes; what it is told of the floor
+// is what it declares.
+std::string on_a_floor(const std::string& inputs, const std::string& floor) {
+  return "import json, math, sys\n"
+         "INPUTS = " +
+         inputs +
+         "\n"
+         "for line in sys.stdin:\n"
+         "    task = json.loads(line)\n"
+         "    floor = " +
+         floor + R"(
+    if 'id' not in task:
+        print(json.dumps({'gapfarm': 1, 'name': 'on a floor', 'inputs': INPUTS, 'parameters': [
+            {'key': 'speed', 'unit': 'm/s', 'lower': 0.1, 'upper': 1, 'nominal': 0.25, 'log': True},
+            {'key': 'width', 'unit': 'm', 'lower': 0.05, 'upper': 0.5, 'nominal': 0.2}]}), flush=True)
+        continue
+    if ('floor' in task) != ('floor' in INPUTS) or len(task['left']) != 1 or 'speed' not in task['left']:
+        sys.exit('told of what was not declared: ' + line)
+    p, step, x, y, theta = task['parameters'], 0.02, 0.0, 0.0, 0.0
+    left, right = (task[side]['speed'] * p['speed'] for side in ('left', 'right'))
+    for _ in range(round(task['duration'] / step)):
+        way, turn = (left + right) / 2 * step, (right - left) / p['width'] * step
+        way *= 1 - floor['rolling_resistance']
+        x += way * math.cos(theta + turn / 2)
+        y += way * math.sin(theta + turn / 2)
+        theta += turn
+        slide = {'tilt': abs(way) * math.tan(floor['tilt']), 'nap': abs(way) * floor['nap']}
+        for kind, size in slide.items():
+            x += size * math.cos(floor[kind + '_direction'])
+            y += size * math.sin(floor[kind + '_direction'])
+    print(json.dumps({'id': task['id'], 'pose': [x, y, theta]}), flush=True)
+)";
+}
+
 class DiagnoseExternal : public ::testing::Test {
  protected:
   static std::string external(const std::string& words, const std::string& genes,
@@ -113,6 +147,30 @@ TEST_F(DiagnoseExternal, WhatTheProgramExplainsItselfIsNoEffect) {
   EXPECT_FALSE(d.contains("drives")) << "there are no paths to show";
   const Json wheels = diagnose(srv1(), program, 100, {"motor_asymmetry.ratio=0.04"});
   for (const Json& effect : wheels["effects"]) EXPECT_NE(effect["name"], "motor_asymmetry");
+}
+
+TEST_F(DiagnoseExternal, AFloorIsForProgramsThatDeclareIt) {
+  folder_.write("floor.py", on_a_floor("['floor']", "task.get('floor')"));
+  folder_.write("bare.py", on_a_floor("[]",
+                                      "dict.fromkeys(['tilt', 'tilt_direction', 'nap', "
+                                      "'nap_direction', 'rolling_resistance'], 0)"));
+  const std::string genes = "speed = [0.1, 1]\nwidth = [0.1, 0.4]\n";
+  const std::string floor = external("\"python3\", \"floor.py\"", genes),
+                    bare = external("\"python3\", \"bare.py\"", genes);
+  const std::vector<std::string> leans = {"floor_tilt.angle=0.1", "floor_tilt.direction=0.7"};
+  const Json told = diagnose(floor, floor, 120, leans);
+  expect_named(told, "floor_tilt", "angle", 0.1, 0.02);
+  EXPECT_NEAR(told["effects"][0]["parameters"]["direction"]["value"].get<double>(), 0.7, 0.2);
+  // The same log: a program without a floor is neither asked about one nor told of one.
+  const Json untold = diagnose(floor, bare, 120, leans);
+  for (const Json& effect : untold["effects"]) EXPECT_NE(effect["name"], "floor_tilt");
+  for (const Json& row : untold["screening"]) EXPECT_NE(row["effect"], "floor_tilt");
+  const std::string cautions = untold["cautions"].dump();
+  EXPECT_NE(cautions.find("floor_tilt, floor_nap"), std::string::npos) << cautions;
+  const Finished refused = gapfarm_command(
+      {"simulate", folder_ / "by.toml", "--out", "-", "--set", "floor_tilt.angle=0.1"});
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_NE(refused.err.find("floor_tilt.angle"), std::string::npos) << refused.err;
 }
 
 TEST_F(DiagnoseExternal, ALogOfMuJoCoIsDiagnosedByBulletAndTheOtherWayRound) {
