@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # A known effect in a log of one simulator, looked for with another one as the base: drives by MuJoCo's
-# two-wheeler diagnosed by Bullet's tracked robot, and the other way round.  One line a log: what was
-# put in, what was named and how large.
+# two-wheeler diagnosed by Bullet's tracked robot, and the other way round.  Each effect is put in ever
+# larger until it is named.  One line a log: what was put in, what was named and how large.
 #
 #   scripts/mujoco_gap.sh [TRIALS]       a session, of two (default 100)
 #
@@ -63,13 +63,31 @@ for e in d["effects"]:
 text = "; ".join(named) or d["verdict"]
 print(f"| {sys.argv[2]} | {sys.argv[3]} | {sys.argv[4]} | {text} | "
       f"{d['gap']['tuned']:.2f} | {d['gap']['final']:.2f} |", flush=True)
+sys.exit(0 if any(e["name"] == sys.argv[4].split(".")[0] for e in d["effects"]) else 10)
 END
+}
+
+# ladder DRIVEN DIAGNOSED EFFECT VALUE...: until it is named.
+ladder() {
+  local driven=$1 diagnosed=$2 effect=$3 value code
+  shift 3
+  for value in "$@"; do
+    code=0
+    row "$driven" "$diagnosed" "$effect=$value" || code=$?
+    case $code in
+      0) return ;;
+      10) ;;
+      *) exit "$code" ;;
+    esac
+  done
 }
 
 echo '| driven by | diagnosed by | put in | named, with 90 % intervals | gap tuned, nats | with it |'
 echo '|---|---|---|---|---|---|'
-for effect in motor_asymmetry.ratio=0.05 motor_asymmetry.ratio=0.1 camera_aspect.ratio=1.06 \
-  heading_offset.angle=0.1 none; do
-  row MuJoCo Bullet "$effect"
-  row Bullet MuJoCo "$effect"
+for ways in 'MuJoCo Bullet' 'Bullet MuJoCo'; do
+  read -r driven diagnosed <<<"$ways"
+  row "$driven" "$diagnosed" none || [[ $? -eq 10 ]]
+  ladder "$driven" "$diagnosed" motor_asymmetry.ratio 0.02 0.05 0.07 0.1 0.15
+  ladder "$driven" "$diagnosed" heading_offset.angle 0.02 0.05 0.1 0.2
+  ladder "$driven" "$diagnosed" camera_aspect.ratio 1.02 1.06 1.12 1.2
 done
