@@ -9,6 +9,7 @@
 
 #include "common/config/config.h"
 #include "master/cli/inputs.h"
+#include "master/cli/long_command.h"
 #include "master/cli/outputs.h"
 #include "master/report/effect_figure.h"
 
@@ -243,6 +244,11 @@ int draw_figures(EffectsOptions& options, CliContext& context) {
     context.console.error(config.error());
     return kExitBadUsage;
   }
+  if (context.dry_run) {
+    return say_dry_run("draw " + std::to_string(names.size()) + " pictures into " + options.figures,
+                       {{"out", options.figures}, {"files", names}}, options.farm, config->farm,
+                       context);
+  }
   auto farm = start_farm(options.farm, config->farm, context);
   if (!farm) return failed(farm.error(), context);
   const Problem& problem = config->problem;
@@ -284,6 +290,7 @@ SubcommandRun setup_effects(CLI::App& app) {
                  "Draw what each effect does to the commands, as SVG, into this folder");
   options->outputs.declare(app);
   options->farm.declare(app, false);
+  declare_long_command(app);
   app.footer(
       "Examples:\n"
       "  gapfarm effects\n"

@@ -31,23 +31,47 @@ struct OptionTakes {
 };
 
 constexpr OptionTakes kOptionTakes[] = {
-    {"CONFIG", Takes::kConfig},       {"RUN", Takes::kRun},
-    {"CONFIG|MODEL", Takes::kConfig}, {"RUN|MODEL", Takes::kModel},
-    {"MODEL", Takes::kModel},         {"DIAGNOSIS", Takes::kDiagnosis},
-    {"FOLDER", Takes::kRun},          {"FILE", Takes::kFile},
-    {"FILES", Takes::kFile},          {"LOG", Takes::kFile},
-    {"--model", Takes::kModel},       {"--effects", Takes::kEffect},
-    {"--leave-out", Takes::kEffect},  {"--set", Takes::kSetting},
-    {"--range", Takes::kSetting},     {"--genes", Takes::kParameter},
-    {"--sweep", Takes::kParameter},   {"--command", Takes::kCommand},
-    {"--commands", Takes::kCommand},  {"--keys", Takes::kFolder},
-    {"--figures", Takes::kFolder},    {"--foreign", Takes::kFolder},
-    {"--truth", Takes::kFolder},      {"--trials", Takes::kFile},
-    {"--paths", Takes::kFile},        {"--mined", Takes::kFile},
-    {"--like", Takes::kFile},         {"--log", Takes::kFile},
-    {"--out", Takes::kFile},          {"--map", Takes::kFile},
-    {"--picture", Takes::kFile},      {"--urdf", Takes::kFile},
-    {"--reference", Takes::kFolder},  {"--controllers", Takes::kFile},
+    {"CONFIG", Takes::kConfig},
+    {"RUN", Takes::kRun},
+    {"CONFIG|MODEL", Takes::kConfig},
+    {"RUN|MODEL", Takes::kModel},
+    {"RUN|CONFIG", Takes::kModel},
+    {"RUN|DIAGNOSIS", Takes::kRun},
+    {"MODEL", Takes::kModel},
+    {"DIAGNOSIS", Takes::kDiagnosis},
+    {"FOLDER", Takes::kRun},
+    {"DIR", Takes::kFolder},
+    {"FILE", Takes::kFile},
+    {"FILES", Takes::kFile},
+    {"LOG", Takes::kFile},
+    {"LOG|URDF", Takes::kFile},
+    {"--model", Takes::kModel},
+    {"--effects", Takes::kEffect},
+    {"--leave-out", Takes::kEffect},
+    {"--set", Takes::kSetting},
+    {"--range", Takes::kSetting},
+    {"--genes", Takes::kParameter},
+    {"--sweep", Takes::kParameter},
+    {"--command", Takes::kCommand},
+    {"--commands", Takes::kCommand},
+    {"--config", Takes::kConfig},
+    {"--keys", Takes::kFolder},
+    {"--keep", Takes::kFolder},
+    {"--runs", Takes::kFolder},
+    {"--figures", Takes::kFolder},
+    {"--foreign", Takes::kFolder},
+    {"--truth", Takes::kFolder},
+    {"--reference", Takes::kRun},
+    {"--trials", Takes::kFile},
+    {"--paths", Takes::kFile},
+    {"--mined", Takes::kFile},
+    {"--like", Takes::kFile},
+    {"--log", Takes::kFile},
+    {"--out", Takes::kFile},
+    {"--map", Takes::kFile},
+    {"--picture", Takes::kFile},
+    {"--urdf", Takes::kFile},
+    {"--controllers", Takes::kFile},
     {"--key", Takes::kFile},
 };
 
@@ -155,7 +179,10 @@ void add_paths(const std::string& begun, Takes takes, std::vector<NextWord>& fou
   }
 }
 
-void add_problem_words(const Place& place, Takes takes, std::vector<NextWord>& found) {
+// `begun` may be a list that has begun: "floor_tilt,motor_a".
+void add_problem_words(const Place& place, Takes takes, const std::string& begun,
+                       std::vector<NextWord>& found) {
+  const std::string list = begun.substr(0, begun.rfind(',') + 1);
   Problem problem;
   problem.commands = default_commands(problem.scenario);
   if (!place.config.empty()) {
@@ -163,7 +190,8 @@ void add_problem_words(const Place& place, Takes takes, std::vector<NextWord>& f
   }
   const ParameterTable& table = problem.table();
   if (takes == Takes::kEffect) {
-    for (const Effect& effect : table.effects()) found.push_back({effect.name, effect.summary});
+    for (const Effect& effect : table.effects())
+      found.push_back({list + effect.name, effect.summary});
   } else if (takes == Takes::kCommand) {
     for (const CommandSpec& command : problem.commands) found.push_back({command.name, ""});
   } else {
@@ -202,7 +230,7 @@ void add_values(const Place& place, const CLI::Option& option, const std::string
     const bool of_problem = row.takes == Takes::kEffect || row.takes == Takes::kParameter ||
                             row.takes == Takes::kSetting || row.takes == Takes::kCommand;
     if (of_problem) {
-      add_problem_words(place, row.takes, found);
+      add_problem_words(place, row.takes, begun, found);
     } else {
       add_paths(begun, row.takes, found);
     }

@@ -92,6 +92,7 @@ TEST(CliUsage, EveryLongCommandHasADryRunThatLeavesNothing) {
       {{"influence", demo, "--command", "forward", "--out", out}, "would trace"},
       {{"stability", demo, "--command", "forward", "--out", out}, "would search 7 parameters"},
       {{"plan", demo, "--out", out}, "would plan 120 trials"},
+      {{"effects", demo, "--figures", out}, " pictures into "},
       {{"predict", "--mined", log, "--trials", log, "--out", out}, "would predict 120 trials"},
   };
   for (auto [words, would] : commands) {
@@ -102,6 +103,34 @@ TEST(CliUsage, EveryLongCommandHasADryRunThatLeavesNothing) {
     EXPECT_THAT(dry.out, StartsWith("dry run: nothing was simulated, started or written\n"));
     EXPECT_THAT(dry.out, HasSubstr(would));
     EXPECT_TRUE(std::filesystem::is_empty(folder.path())) << words[0];
+  }
+}
+
+TEST(CliUsage, ADryRunOfWhatGoesOnFromARunLeavesItAsItIs) {
+  const TemporaryFolder folder;
+  const std::string demo = GAPFARM_SOURCE_DIR "/configs/demo.toml", run = folder / "run",
+                    model = run + "/model.toml", out = folder / "out";
+  ASSERT_EQ(gapfarm_command({"evolve", demo, "--out", run, "--generations", "1", "--population",
+                             "4", "--workers", "1"})
+                .exit_code,
+            0);
+  const std::string store = text_of(run + "/run.sqlite");
+  const std::vector<std::pair<std::vector<std::string>, const char*>> commands = {
+      {{"resume", run, "--generations", "9"}, "after generation 1 to at most 9"},
+      {{"determine", demo, "--model", model, "--out", out}, "would look at the likelihood"},
+      {{"drive", model, "--commands", "forward", "--runs", "10", "--out", out},
+       "would drive 10 times"},
+      {{"predict", run, "--trials", GAPFARM_SOURCE_DIR "/configs/demo/trials.csv", "--out", out},
+       "would predict 120 trials"},
+  };
+  for (auto [words, would] : commands) {
+    words.push_back("--dry-run");
+    const Finished dry = gapfarm_command(words);
+    EXPECT_EQ(dry.exit_code, 0) << words[0] << ": " << dry.err;
+    EXPECT_THAT(dry.out, StartsWith("dry run: nothing was simulated, started or written\n"));
+    EXPECT_THAT(dry.out, HasSubstr(would));
+    EXPECT_FALSE(std::filesystem::exists(out)) << words[0];
+    EXPECT_EQ(text_of(run + "/run.sqlite"), store) << words[0];
   }
 }
 
@@ -126,6 +155,9 @@ TEST(CliUsage, InitOfAURDFWritesTheRobotAndAConfigThatNamesIt) {
   EXPECT_TRUE(std::filesystem::exists(folder / "car_robot.toml"));
   const Finished checked = gapfarm_command({"check", folder / "car.toml"});
   EXPECT_EQ(checked.exit_code, 0) << checked.err;
+  const Finished dry = gapfarm_command({"horizons", folder / "car.toml", "--dry-run"});
+  EXPECT_EQ(dry.exit_code, 0) << dry.err;
+  EXPECT_THAT(dry.out, HasSubstr("would measure horizons of"));
   EXPECT_EQ(gapfarm_command({"init", urdf, "--out", folder / "car.toml"}).exit_code, 2)
       << "it is there already";
   // `robot` writes the same two files.

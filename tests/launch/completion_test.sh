@@ -50,9 +50,12 @@ for shell in bash zsh fish; do
   tried=$((tried + 1))
   expect "$shell" 'gapfarm evo' evolve
   expect "$shell" 'gapfarm evolve --lis' --listen
+  expect "$shell" 'gapfarm evolve configs/de' configs/demo.toml
   expect "$shell" 'gapfarm status run/' run/first
+  expect "$shell" 'gapfarm report run/' run/first
   expect "$shell" 'gapfarm crossfit configs/demo.toml --effects motor_as' motor_asymmetry
   expect "$shell" 'gapfarm simulate configs/demo.toml --set full_sp' full_speed=
+  expect "$shell" 'gapfarm plan configs/demo.toml --effects floor_tilt,motor_as' floor_tilt,motor_asymmetry
   expect "$shell" 'gapfarm completion z' zsh
 done
 [[ $tried -gt 0 ]] || exit 77

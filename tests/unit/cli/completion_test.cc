@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <fstream>
+#include <set>
 
 #include "common/usage/manual.h"
 #include "master/cli/app.h"
@@ -72,6 +73,68 @@ TEST_F(CompletionFiles, ConfigsAreTomlAndRunsHaveAStore) {
   // The first value of an option of many leaves room for the next positional.
   EXPECT_THAT(after({"check", "--trials", at + "log.csv", at + "m"}),
               ElementsAre(at + "mine.toml"));
+}
+
+TEST_F(CompletionFiles, ModelsDiagnosesAndListsGoOnToo) {
+  write("/other/diagnosis.json", "{}");
+  const std::string at = folder_ + "/";
+  EXPECT_THAT(after({"report", at}), ElementsAre(at + "first", at + "other"));
+  EXPECT_THAT(after({"horizons", at}), ElementsAre(at + "first", at + "mine.toml", at + "other/"));
+  EXPECT_THAT(after({"init", at + "l"}), ElementsAre(at + "log.csv"));
+  EXPECT_THAT(after({"plan", "none.toml", "--effects", "floor_tilt,motor_as"}),
+              ElementsAre("floor_tilt,motor_asymmetry"));
+}
+
+// An option of a command, and whether something of all that lies around is offered for it.
+void expect_words(const CLI::App& app, const std::vector<std::string>& words) {
+  static const std::set<std::string> kFree = {
+      // Columns and their values, numbers, addresses, names that are given here, shell commands.
+      "--only",      "--train", "--test",           "--by",     "--per",       "--repeats",
+      "--waypoints", "--start", "--place",          "--listen", "--page-port", "WORDS",
+      "--name",      "NAME",    "--session-prefix", "--on-end"};
+  std::size_t positionals = 0;
+  for (const CLI::Option* option : app.get_options()) {
+    const std::string name = option->get_name(option->get_positional());
+    const std::string type = option->get_type_name();
+    if (option->get_items_expected_max() == 0 || option->get_group().empty()) continue;
+    std::vector<std::string> line = words;
+    if (option->get_positional()) {
+      line.insert(line.end(), positionals++, "x");
+    } else {
+      line.push_back(name);
+    }
+    line.push_back("");
+    const bool number = type.rfind("INT", 0) == 0 || type.rfind("UINT", 0) == 0 ||
+                        type.rfind("FLOAT", 0) == 0 || type.rfind("NUMBER", 0) == 0;
+    if (number || kFree.count(name) != 0) continue;
+    EXPECT_THAT(after(line), Not(IsEmpty())) << app.get_name() << " " << name << " " << type;
+  }
+  for (const CLI::App* sub : app.get_subcommands([](const CLI::App*) { return true; })) {
+    std::vector<std::string> deeper = words;
+    deeper.push_back(sub->get_name());
+    expect_words(*sub, deeper);
+  }
+}
+
+TEST_F(CompletionFiles, EveryOptionThatTakesAWordOffersSome) {
+  const auto before = std::filesystem::current_path();
+  std::filesystem::current_path(folder_);
+  const std::unique_ptr<Program> program = make_program();
+  expect_words(*program->app, {});
+  std::filesystem::current_path(before);
+}
+
+// What starts workers takes long, and can be asked first what it would do.
+TEST(LongCommands, HaveADryRun) {
+  const std::unique_ptr<Program> program = make_program();
+  std::size_t found = 0;
+  for (const CLI::App* app : program->app->get_subcommands([](const CLI::App*) { return true; })) {
+    if (app->get_option_no_throw("--workers") == nullptr) continue;
+    ++found;
+    EXPECT_NE(app->get_option_no_throw("--dry-run"), nullptr) << app->get_name();
+    EXPECT_NE(app->get_option_no_throw("--on-end"), nullptr) << app->get_name();
+  }
+  EXPECT_GE(found, 15u);
 }
 
 TEST(ManualPage, HoldsEveryCommandAndNothingThatRoffWouldTakeForItsOwn) {
