@@ -29,7 +29,8 @@ std::string simulator(const std::string& misbehave) {
 
 class ExternalRuns : public ::testing::Test {
  protected:
-  std::string config(const std::string& misbehave, const std::string& more = "") const {
+  std::string config(const std::string& misbehave, const std::string& more = "",
+                     const std::string& limit = "60") const {
     folder_.write("simulator.py", simulator(misbehave));
     folder_.write("log.csv",
                   "session,trial,t,command,left,right,duration,x0,y0,theta0,x1,y1,theta1\n"
@@ -37,8 +38,10 @@ class ExternalRuns : public ::testing::Test {
                   "s,2,10,forward,,,,0,0,0,0.39,0,0.01\ns,3,15,backward,,,,0,0,0,-0.4,0,0\n");
     return folder_.write("run.toml",
                          "scenario = \"external\"\ntrials = [\"log.csv\"]\n"
-                         "[external]\nprogram = [\"python3\", \"simulator.py\"]\n"
-                         "[genes]\nspeed = [0.1, 1]\n[evolution]\npopulation = 6\n" +
+                         "[external]\nprogram = [\"python3\", \"simulator.py\"]\nanswer_limit = " +
+                             limit +
+                             "\n"
+                             "[genes]\nspeed = [0.1, 1]\n[evolution]\npopulation = 6\n" +
                              more);
   }
   Finished evolve(const std::string& config, const std::string& run, const std::string& generations,
@@ -76,6 +79,33 @@ TEST_F(ExternalRuns, WhatCrashesThreeTimesIsGivenUpAndTheRunGoesOn) {
   EXPECT_EQ(found["generation"], 2);
   EXPECT_GT(found["quarantined"], 0);
   EXPECT_EQ(found["incidents"][0]["kind"], "quarantine");
+}
+
+// Whatever a program does in the middle of a run: it is named, and both generations are committed.
+TEST_F(ExternalRuns, AProgramThatMisbehavesStopsNoRun) {
+  const struct {
+    const char *name, *misbehave, *named;
+  } kinds[] = {
+      {"hang", "    if speed > 0.7: sys.stdin.close(); os.read(os.pipe()[0], 1)\n",
+       "did not answer within 1 s"},
+      {"garbage", "    if speed > 0.7: print('bang', flush=True)\n",
+       "did not answer with a JSON object: 'bang'"},
+      {"flood", "    if speed > 0.7: print('x' * 3000000, flush=True)\n",
+       "said more than the 1048576 bytes"},
+      {"twice",
+       "    if speed > 0.7: print(json.dumps({'id': task['id'], 'pose': [0, 0, 0]}), flush=True)\n",
+       "answered twice, or late"},
+  };
+  ASSERT_EQ(evolve(config(""), "calm", "2").exit_code, 0);
+  const json calm = status("calm");
+  for (const auto& kind : kinds) {
+    const Finished finished = evolve(config(kind.misbehave, "", "1"), kind.name, "2");
+    EXPECT_TRUE(finished.exit_code == 0 || finished.exit_code == 3) << kind.name << finished.err;
+    EXPECT_THAT(finished.err, HasSubstr(kind.named)) << kind.name;
+    const json found = status(kind.name);
+    EXPECT_EQ(found["generation"], 2) << kind.name;
+    EXPECT_EQ(found["evaluations"], calm["evaluations"]) << kind.name << ": nothing is lost";
+  }
 }
 
 TEST_F(ExternalRuns, WhatAnswersDifferentlyTwiceIsNamed) {
