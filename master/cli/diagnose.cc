@@ -236,6 +236,7 @@ int run_diagnose(DiagnoseCommand& command, CliContext& context) {
   LongCommand& work = *context.work;
   const auto asked = work.over(**farm);
   options.on_stage = [&](const std::string& stage) { work.stage(stage); };
+  options.on_finding = [&](Finding finding) { work.found(std::move(finding)); };
   auto result = diagnose(*asked, config->problem, options);
   if (!result) return failed(result.error(), context);
   add_diagnosis_provenance(*config, command, &result->diagnosis);

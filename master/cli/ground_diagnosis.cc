@@ -87,16 +87,14 @@ std::string log_hash(const RunLog& log) {
 
 int run_diagnose_ground(DiagnoseCommand& command, const Config& config, const std::string& stamp,
                         CliContext& context) {
-  if (command.page.wanted()) {
-    context.console.note("--page: nothing is simulated here; `gapfarm serve " + command.out +
-                         "` shows the diagnosis when it is there");
-  }
   const GroundRobot robot = config.problem.ground->robot_at(config.problem.values);
   const auto runs = read_run_folders(config.trial_files, robot.channels);
   if (!runs) return failed(runs.error(), context);
   if (Status s = LongCommand::begin("diagnose", {command.out}, ground_stages(), context); !s) {
     return failed(s.error(), context);
   }
+  const auto page = open_page(command.page, command.out, context);
+  if (!page) return failed(page.error(), context);
   const fs::path out(command.out);
   if (Status s = command.outputs.write((out / kStampFile).string(), stamp); !s) {
     return failed(s.error(), context);
@@ -110,6 +108,7 @@ int run_diagnose_ground(DiagnoseCommand& command, const Config& config, const st
   options.windows.run_in_s = config.windows.run_in_s;
   options.reference = command.reference_log;
   options.on_stage = [&](const std::string& stage) { work.stage(stage); };
+  options.on_finding = [&](Finding finding) { work.found(std::move(finding)); };
   options.on_progress = [&](std::size_t done, std::size_t total) { work.advance(done, total); };
   options.stopped = [&] { return context.stop.requested(); };
   options.memo = &fits;

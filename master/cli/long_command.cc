@@ -143,6 +143,7 @@ LongCommand::LongCommand(std::string command, std::vector<ProgressStage> stages,
   record_.began_unix_s = unix_now_s();
   record_.pid = ::getpid();
   record_.host = host_name();
+  plan_stages();
 }
 
 LongCommand::~LongCommand() = default;
@@ -221,16 +222,27 @@ std::unique_ptr<Farm> LongCommand::over(std::unique_ptr<SocketFarm> farm) {
   return std::make_unique<Owned>(std::move(farm), *this);
 }
 
+void LongCommand::plan_stages() {
+  record_.plan.clear();
+  for (const ProgressStage& stage : progress_.stages()) record_.plan.push_back({stage.name, 0});
+}
+
 StageHooks LongCommand::hooks() {
-  return {
-      [this](std::vector<ProgressStage> stages) { progress_ = OverallProgress(std::move(stages)); },
-      [this](std::size_t k, std::uint64_t tasks) { stage(k, tasks); }};
+  return {[this](std::vector<ProgressStage> stages) {
+            progress_ = OverallProgress(std::move(stages));
+            plan_stages();
+          },
+          [this](std::size_t k, std::uint64_t tasks) { stage(k, tasks); }};
 }
 
 void LongCommand::entered() {
   counts_itself_ = false;
   stage_began_ = now_;
-  stage_ = progress_.at(steady_now_s()).stage;
+  const ProgressView view = progress_.at(steady_now_s());
+  stage_ = view.stage;
+  if (view.number > 0 && view.number <= record_.plan.size()) {
+    record_.plan[view.number - 1].began_unix_s = unix_now_s();
+  }
   show();
 }
 
@@ -242,6 +254,16 @@ void LongCommand::stage(std::size_t k, std::uint64_t tasks) {
 
 void LongCommand::stage(const std::string& name) {
   if (progress_.begin(name, steady_now_s())) entered();
+}
+
+void LongCommand::found(Finding finding) {
+  std::vector<StageFinding>& all = record_.findings;
+  const auto same = std::find_if(all.begin(), all.end(), [&](const StageFinding& f) {
+    return f.found.about == finding.about;
+  });
+  if (same != all.end()) all.erase(same);
+  all.push_back({stage_, std::move(finding)});
+  write_record();
 }
 
 void LongCommand::advance(std::uint64_t done, std::uint64_t total) {

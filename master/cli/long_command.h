@@ -68,6 +68,8 @@ class LongCommand {
   void stage(const std::string& name);
   // Progress of the present stage that is not counted in tasks of over().
   void advance(std::uint64_t done, std::uint64_t total);
+  // Something was found in the present stage; it stands in the folder at once.
+  void found(Finding finding);
   // For a study that knows its stages itself.
   StageHooks hooks();
 
@@ -83,6 +85,7 @@ class LongCommand {
  private:
   class Asked;
   void entered();
+  void plan_stages();
   void on_progress(const RecordedProgress& progress, const SocketFarm& farm, WorkerWait& wait);
   void farm_gone();
   void show(bool news = false);

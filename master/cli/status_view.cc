@@ -212,6 +212,9 @@ std::string command_screen(const CommandRecord& record, const std::string& folde
           format_duration((record.state == "running" ? now_unix_s : record.heartbeat_unix_s) -
                           record.began_unix_s) +
           ", process " + std::to_string(record.pid) + " on " + printable(record.host) + "\n";
+  for (const auto& [stage, found] : record.findings) {
+    text += label(console, "so far") + printable(found.text) + "\n";
+  }
   text += worker_lines(record.workers, console);
   const double age_s = now_unix_s - record.heartbeat_unix_s;
   if (record.state == "running" && age_s > 5) {

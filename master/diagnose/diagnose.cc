@@ -42,7 +42,10 @@ Result<DiagnosisResult> diagnose(Farm& farm, const Problem& problem,
   for (std::size_t k = 0; k < steps.size(); ++k) {
     run.stage(kDiagnosisStages[k].name);
     const Status s = steps[k]();
-    if (s) continue;
+    if (s) {
+      run.tell_of_stage(k);
+      continue;
+    }
     if (s.error().code != ErrorCode::kSimulation) return s.error();
     run.stage("");
     return run.give_up(kDiagnosisStages[k].name, s.error());

@@ -14,6 +14,7 @@
 #include "master/diagnose/diagnosis.h"
 #include "master/diagnose/predictor.h"
 #include "master/farm/farm.h"
+#include "master/progress/finding.h"
 
 namespace gapfarm {
 
@@ -40,6 +41,7 @@ struct DiagnoseOptions {
   std::optional<Eigen::Vector2d> frame_m;
   std::vector<Gene> genes;  // what the config has searched: what may be tuned of the base
   std::function<void(const std::string& stage)> on_stage;
+  OnFinding on_finding;  // of the present stage, for who watches; nothing depends on it
 };
 
 struct DiagnosisResult {

@@ -109,12 +109,14 @@ Status DiagnosisRun::refit() {
     auto fit = estimate(effects, estimates_ ? 1 : 2);
     if (!fit) return fit.error();
     estimates_ = std::move(*fit);
+    tell_of_fit(*estimates_);
   }
   const std::vector<std::size_t> folds = subject_.folds(study_);
   const std::size_t found = chosen_.size();
   for (;;) {
     if (Status s = refit_nested(); !s) return s;
     score_nested(folds);
+    tell_of_gaps();
     auto worthless =
         effect_to_drop(floor_score(nested_studies_.back(), problem_.fitness.outlier_share));
     if (!worthless) {

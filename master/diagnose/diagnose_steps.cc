@@ -113,6 +113,7 @@ Status DiagnosisRun::search_catalogue() {
   if (!all) return all.error();
   result_.diagnosis.screening.clear();
   fill_screening(*all);
+  tell_of_candidates(*all);
   return select();
 }
 
@@ -175,6 +176,7 @@ Result<Relinearised> DiagnosisRun::relinearise(const std::vector<EffectCandidate
     if (!simulated) return Relinearised{};
   }
   estimates_ = std::move(*fit);
+  tell_of_fit(*estimates_);
   Relinearised at_estimate{study_.whiten(estimates_->residuals), {}};
   for (std::size_t k = 0; k < effects.size(); ++k) {
     std::vector<Eigen::Vector3d> contribution;

@@ -53,11 +53,23 @@ class DiagnosisRun {
   Status judge();
   Status refit();
   Status report();
+  // Tells who watches what step `k` of kDiagnosisStages found; changes nothing.
+  void tell_of_stage(std::size_t k) const;
   DiagnosisResult take() { return std::move(result_); }
   // Whether a stage's error is a simulation's, which is no reason to be without a report.
   DiagnosisResult give_up(const std::string& stage, const Error& error);
 
  private:
+  // What tell_of_stage() is made of, and what can be told within a stage (diagnose_so_far.cc).
+  bool watched() const { return options_.on_finding != nullptr; }
+  void tell_of_base() const;
+  void tell_of_noise() const;
+  void tell_of_readings() const;
+  void tell_of_candidates(const std::vector<EffectCandidate>& candidates) const;
+  void tell_of_fit(const JointFit& fit) const;
+  void tell_of_choice() const;
+  void tell_of_verdict() const;
+  void tell_of_gaps() const;
   bool doubts_base();
   void doubt(SanityFinding finding);
   void doubt_misses();

@@ -66,7 +66,7 @@ Result<GroundDiagnosis> diagnose_ground(const GroundRobot& robot, const RunLog& 
   }
   if (Status s = leave_out(options.left_out, &question.catalogue); !s) return s.error();
   const GroundWork work = {[&](const std::string& stage) { clock.begin(stage); },
-                           options.on_progress, options.stopped, options.memo};
+                           options.on_progress, options.stopped, options.memo, options.on_finding};
   auto search = search_ground(robot, log, options.windows, question, work);
   if (!search) return search.error();
   clock.begin(std::end(kGroundStages)[-1].name);

@@ -28,6 +28,7 @@ struct GroundDiagnoseOptions {
   std::function<void(std::size_t done, std::size_t total)> on_progress;  // of the stage
   std::function<bool()> stopped;  // by the user; looked at between fits
   FitMemo* memo = nullptr;        // outlives the diagnosis; none: every fit is made
+  OnFinding on_finding;           // of the present stage, for who watches; nothing depends on it
 };
 
 // Every stage in its order, with its share of the time, for progress.

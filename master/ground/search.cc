@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "master/ground/so_far.h"
+
 namespace gapfarm {
 namespace {
 
@@ -114,6 +116,7 @@ bool take_step(const WindowFitter& fitter, const GroundWork& work, GroundSearch*
     WindowFit fit;
     Offer offer = try_one(fitter, *search, slopes, i, &fit);
     tried.emplace_back(std::move(offer), std::move(fit));
+    tell_of_offers(work, *search, tried);
   }
   std::stable_sort(tried.begin(), tried.end(),
                    [](const auto& a, const auto& b) { return a.first.gain > b.first.gain; });
@@ -130,7 +133,10 @@ bool take_step(const WindowFitter& fitter, const GroundWork& work, GroundSearch*
   WindowFit before = std::exchange(search->fit, std::move(tried.front().second));
   search->steps.push_back(std::move(step));
   search->rows = search->fit.rows;
-  if (confirm_step(fitter, search)) return true;
+  if (confirm_step(fitter, search)) {
+    tell_of_steps(work, *search);
+    return true;
+  }
   search->steps.pop_back();
   search->fit = std::move(before);
   search->rows = search->fit.rows;
@@ -264,17 +270,20 @@ Result<GroundSearch> search_ground(const GroundRobot& robot, const RunLog& log,
   if (Status s = search_faults(robot, settings, question, work.memo, &search); !s) {
     return s.error();
   }
+  tell_of_faults(work, search);
   const WindowFitter fitter(robot, search.windows, reference_of(question), work.memo);
   stage(kCatalogueStage);
   search.chain.push_back(fit_left_out(fitter, {}, {}));
   while (search.steps.size() < kMostSteps && take_step(fitter, work, &search)) {
   }
   if (work.stopped && work.stopped()) return stopped;
+  tell_of_steps(work, search);
   stage(kRestStage);
   std::vector<FitRow> all = search.rows;
   for (FitRow& row : all) row.free = true;
   search.free_fit = fitter.fit(all, {}, search.fit.values);
   if (work.stopped && work.stopped()) return stopped;
+  tell_of_rest(work, search);
   return search;
 }
 

@@ -14,6 +14,7 @@
 #include "common/runs/run.h"
 #include "master/ground/hypotheses.h"
 #include "master/ground/window_fit.h"
+#include "master/progress/finding.h"
 
 namespace gapfarm {
 
@@ -56,6 +57,7 @@ struct GroundWork {
   std::function<void(std::size_t done, std::size_t total)> on_progress;
   std::function<bool()> stopped;
   FitMemo* memo = nullptr;
+  OnFinding on_finding;  // for who watches
 };
 
 struct GroundSearch {

@@ -59,6 +59,7 @@ class OverallProgress {
   void expect(std::uint64_t tasks);
 
   ProgressView at(double now_s) const;
+  const std::vector<ProgressStage>& stages() const { return stages_; }
 
  private:
   struct Passed {

@@ -26,6 +26,50 @@ void read(const Json& json, const char* key, T& to) {
   }
 }
 
+Json findings_json(const std::vector<StageFinding>& findings) {
+  Json list = Json::array();
+  for (const auto& [stage, found] : findings) {
+    Json rows = Json::array();
+    for (const auto& [name, value] : found.rows) rows.push_back({name, value});
+    list.push_back({{"stage", stage},
+                    {"about", found.about},
+                    {"text", found.text},
+                    {"columns", {found.columns.first, found.columns.second}},
+                    {"rows", std::move(rows)}});
+  }
+  return list;
+}
+
+// Two texts; empty ones where there is something else.
+std::pair<std::string, std::string> two_texts(const Json& json) {
+  if (!json.is_array() || json.size() != 2 || !json[0].is_string() || !json[1].is_string()) {
+    return {};
+  }
+  return {json[0].get<std::string>(), json[1].get<std::string>()};
+}
+
+void read_stage_records(const Json& json, CommandRecord* record) {
+  const auto plan = json.find("plan"), findings = json.find("findings");
+  if (plan != json.end() && plan->is_array()) {
+    for (const Json& stage : *plan) {
+      if (!stage.is_object()) continue;
+      read(stage, "name", record->plan.emplace_back().name);
+      read(stage, "began", record->plan.back().began_unix_s);
+    }
+  }
+  if (findings == json.end() || !findings->is_array()) return;
+  for (const Json& finding : *findings) {
+    if (!finding.is_object()) continue;
+    auto& [stage, found] = record->findings.emplace_back();
+    read(finding, "stage", stage);
+    read(finding, "about", found.about);
+    read(finding, "text", found.text);
+    if (finding.contains("columns")) found.columns = two_texts(finding["columns"]);
+    if (!finding.contains("rows") || !finding["rows"].is_array()) continue;
+    for (const Json& row : finding["rows"]) found.rows.push_back(two_texts(row));
+  }
+}
+
 bool lives(const std::filesystem::path& folder, const CommandRecord& record, double now_unix_s) {
   const std::optional<bool> held = run_lock_held(folder);
   if (held.value_or(false)) return true;
@@ -56,6 +100,11 @@ Json to_json(const CommandRecord& record) {
   json["stage"] = record.stage;
   json["stage_number"] = record.stage_number;
   json["stages"] = record.stages;
+  json["plan"] = Json::array();
+  for (const StageRecord& stage : record.plan) {
+    json["plan"].push_back({{"name", stage.name}, {"began", stage.began_unix_s}});
+  }
+  json["findings"] = findings_json(record.findings);
   json["done"] = record.done;
   json["total"] = record.total;
   json["share"] = record.share;
@@ -97,6 +146,7 @@ CommandRecord command_record_of(const Json& json) {
   read(json, "pid", record.pid);
   read(json, "host", record.host);
   read(json, "arguments", record.arguments);
+  read_stage_records(json, &record);
   if (!json.contains("workers") || !json["workers"].is_array()) return record;
   for (const Json& json_worker : json["workers"]) {
     StoredWorker& worker = record.workers.emplace_back();

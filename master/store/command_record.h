@@ -10,12 +10,25 @@
 #include <vector>
 
 #include "common/base/result.h"
+#include "master/progress/finding.h"
 #include "master/store/records.h"
 
 namespace gapfarm {
 
 // simulations.sqlite of a command's folder.
 std::filesystem::path answer_file(const std::filesystem::path& folder);
+
+// One of the stages that a command goes through.
+struct StageRecord {
+  std::string name;
+  double began_unix_s = 0;  // 0: not yet
+};
+
+// What was found in a stage before the command is over.
+struct StageFinding {
+  std::string stage;
+  Finding found;
+};
 
 struct CommandRecord {
   std::string command;                          // "diagnose"
@@ -24,6 +37,8 @@ struct CommandRecord {
   std::string reason;                           // how it ended; empty while it runs
   std::string stage;                            // "screen the catalogue"
   std::uint64_t stage_number = 0, stages = 0;   // from 1
+  std::vector<StageRecord> plan;                // all stages in their order
+  std::vector<StageFinding> findings;           // so far, in the order in which they came
   std::uint64_t done = 0, total = 0;            // tasks of the stage; total 0: unknown
   double share = 0;                             // of the whole, [0, 1]
   double rate_per_s = 0;                        // tasks simulated

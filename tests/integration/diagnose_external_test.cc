@@ -114,6 +114,8 @@ TEST_F(DiagnoseExternal, NamesAnEffectOfTheMotorsAndLeavesAModelThatPredicts) {
                           {"motor_asymmetry.ratio=0.05", "full_speed=0.36", "gauge=0.12"});
   EXPECT_EQ(d["verdict"], "effect") << d["headline"];
   expect_named(d, "motor_asymmetry", "ratio", 0.05, 0.006);
+  const Finished status = gapfarm_command({"status", folder_ / "d"});
+  EXPECT_NE(status.out.find("so far: motor_asymmetry"), std::string::npos) << status.out;
   double speed = 0, gauge = 0;
   for (const Json& row : d["parameters"]) {
     if (row["key"] == "full_speed") speed = row["final"];

@@ -52,6 +52,10 @@ TEST_F(DiagnosePushes, NamesAnEffectWithAnIntervalAndClosesTheGap) {
   EXPECT_EQ(d["verdict"], "effect") << d["headline"];
   ASSERT_EQ(d["effects"].size(), 1u);
   EXPECT_EQ(d["effects"][0]["name"], "com_offset");
+  // What was found on the way stays to be seen.
+  const Finished status = gapfarm_command({"status", folder_ / "d"});
+  EXPECT_NE(status.out.find("Chosen from the catalogue so far: com_offset"), std::string::npos)
+      << status.out;
   const Json& y = d["effects"][0]["parameters"]["y"];
   EXPECT_LT(y["lo"], 0.008);
   EXPECT_GT(y["hi"], 0.008);

@@ -3,6 +3,7 @@
 
 #include "master/diagnose/confidence.h"
 #include "master/diagnose/diagnose.h"
+#include "master/diagnose/diagnosis_json.h"
 #include "master/diagnose/digits.h"
 #include "master/diagnose/findings.h"
 #include "master/diagnose/prepare.h"
@@ -117,6 +118,27 @@ TEST(Diagnose, ABaseThatCannotBeSimulatedEndsInAReport) {
   EXPECT_EQ(result->diagnosis.verdict, Verdict::kUnusable);
   EXPECT_EQ(result->diagnosis.sanity.front().name, "base_not_simulated");
   EXPECT_NE(result->diagnosis.sanity.front().text.find("NEVER_RESTED"), std::string::npos);
+}
+
+TEST(Diagnose, SaysTheSameWhoeverWatches) {
+  Problem problem = kinematic_log(120);
+  for (Trial& t : problem.log.trials) {
+    t.X_WE = t.X_WS * exp(Twist(1.1 * log(between(t.X_WS, t.X_WE))));
+  }
+  KinematicFarm farm;
+  DiagnoseOptions options;
+  auto alone = diagnose(farm, problem, options);
+  ASSERT_TRUE(alone.ok()) << alone.error().message;
+  std::string told;
+  options.on_finding = [&](const Finding& finding) { told += finding.about + ": "; };
+  auto watched = diagnose(farm, problem, options);
+  ASSERT_TRUE(watched.ok()) << watched.error().message;
+  for (auto* result : {&alone, &watched}) (*result)->diagnosis.timing_s.clear();
+  EXPECT_EQ(to_json(alone->diagnosis), to_json(watched->diagnosis));
+  for (const char* about : {"the base model: ", "the noise: ", "where the gap lies: ",
+                            "what the catalogue offers: ", "how far the gap closes: "}) {
+    EXPECT_NE(told.find(about), std::string::npos) << about << "is not among " << told;
+  }
 }
 
 TEST(Confidence, GrowsWithTheGainAndIsNeverSure) {

@@ -46,6 +46,28 @@ TEST(DiagnoseGround, FindsTheWheelThatIsSmallerThanItsFileSays) {
   EXPECT_EQ(*found.corrected.wheel("left")->radius_m, 0.05);
 }
 
+TEST(DiagnoseGround, TellsWhoWatchesAndSaysTheSame) {
+  const GroundRobot robot = robot_of(kDifferential);
+  const RunLog log = driven(robot, off_by({"right"}, {0.96}));
+  std::vector<Finding> told;
+  GroundDiagnoseOptions options;
+  options.on_finding = [&](Finding finding) { told.push_back(std::move(finding)); };
+  const auto found = diagnose_ground(robot, log, options);
+  ASSERT_TRUE(found.ok()) << found.error().message;
+  EXPECT_EQ(found->diagnosis.headline, diagnosis_of(robot, log).diagnosis.headline);
+  const auto about = [&](const std::string& what) {
+    Finding last;
+    for (const Finding& f : told) last = f.about == what ? f : last;
+    return last;
+  };
+  EXPECT_NE(about("faults of the log").text.find("Nothing"), std::string::npos);
+  const Finding named = about("what is named so far");
+  ASSERT_EQ(named.rows.size(), 1u) << named.text;
+  EXPECT_EQ(named.rows[0].first, "the radius of the right wheels");
+  EXPECT_FALSE(about("what the catalogue offers").rows.empty());
+  EXPECT_NE(about("what is left").text.find("no more than chance"), std::string::npos);
+}
+
 TEST(DiagnoseGround, FindsOneOfManyThings) {
   struct Case {
     const char* file;

@@ -52,6 +52,29 @@ TEST_F(CommandRecordTest, ALiveCommandIsWhatItSaid) {
       << "however old its last word: it holds the lock";
 }
 
+TEST_F(CommandRecordTest, KeepsItsStagesAndWhatWasFoundInThem) {
+  CommandRecord record = example();
+  record.plan = {{"tune", 100}, {"screen", 0}};
+  record.findings = {{"tune", {"the noise", "12 \"mm\".", {"noise", "size"}, {{"a", "1 mm"}}}},
+                     {"tune", {"where", "", {}, {}}}};
+  const CommandRecord back = command_record_of(to_json(record));
+  ASSERT_EQ(back.plan.size(), 2u);
+  EXPECT_EQ(back.plan[0].name, "tune");
+  EXPECT_EQ(back.plan[0].began_unix_s, 100);
+  ASSERT_EQ(back.findings.size(), 2u);
+  EXPECT_EQ(back.findings[0].stage, "tune");
+  EXPECT_EQ(back.findings[0].found.text, "12 \"mm\".");
+  EXPECT_EQ(back.findings[0].found.columns, record.findings[0].found.columns);
+  EXPECT_EQ(back.findings[0].found.rows, record.findings[0].found.rows);
+  EXPECT_TRUE(back.findings[1].found.rows.empty());
+  // What another version wrote is left out, not believed.
+  auto json = to_json(record);
+  json["findings"] = {1, {{"about", 3}, {"rows", {"x", {1, 2}}}}};
+  json["plan"] = "none";
+  EXPECT_EQ(command_record_of(json).findings.size(), 1u);
+  EXPECT_TRUE(command_record_of(json).plan.empty());
+}
+
 TEST_F(CommandRecordTest, ADeadOneIsStoppedAndPromisesNothing) {
   write(example());
   const auto record = command_status(folder_, 1e6);
