@@ -9,28 +9,17 @@
 #include <sstream>
 
 #include "master/progress/words.h"
+#include "master/report/glossary.h"
 #include "master/report/html.h"
 #include "master/report/page_frame.h"
 #include "master/report/run_live.h"
+#include "master/serve/page_parts.h"
 #include "master/serve/request.h"
-#include "master/store/answer_store.h"
 
 namespace gapfarm {
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-const Json kNoTrials = {{"columns", Json::array()}, {"rows", Json::array()}};
-
-Json plain_page_json() {
-  return {{"models", Json::object()}, {"served", true}, {"without_trials", ""}};
-}
-
-std::string list_cell(const char* label, const std::string& html, bool is_number = false) {
-  // Where rows become cards, on a narrow screen, cells without content are left out.
-  return fmt::format(R"(<td data-label="{}" class="{}{}">{}</td>)", label,
-                     is_number ? "number" : "", html.empty() ? " empty" : "", html);
-}
 
 // The best by generation, worst tenth left out of its scale.
 std::string spark(const std::vector<double>& values) {
@@ -70,6 +59,11 @@ std::string state_words(const WorkEntry& e) {
   return text + (e.told.empty() ? "" : "<small>" + html_escaped(e.told) + "</small>");
 }
 
+// With what a nat is, where it is one.
+std::string unit_html(const std::string& unit) {
+  return unit == "nats/trial" ? term("nat", unit) : html_escaped(unit);
+}
+
 std::string row_of_entry(const WorkEntry& e) {
   const bool run = e.kind == FoundWork::Kind::kRun && e.trouble.empty();
   const std::string box =
@@ -79,8 +73,7 @@ std::string row_of_entry(const WorkEntry& e) {
           : "";
   std::string best;
   if (e.best) {
-    best = number_text(*e.best, 6) +
-           (e.unit.empty() || e.unit == "-" ? "" : " " + html_escaped(e.unit)) + "<small>" +
+    best = number_text(*e.best, 6) + (e.unit == "-" ? "" : " " + unit_html(e.unit)) + "<small>" +
            html_escaped(e.fitness) + "</small>";
   }
   std::string extent;
@@ -158,39 +151,6 @@ std::string filter_form(const ListView& view) {
           : R"(<input type="hidden" name="sort" value=")" + html_escaped(view.sort) + R"(">)");
 }
 
-std::string stage_rows(const CommandRecord& r, const std::vector<AnsweredStage>& stages) {
-  std::string rows;
-  for (const AnsweredStage& stage : stages) {
-    const bool now = r.state == "running" && stage.name == r.stage;
-    rows +=
-        fmt::format(R"(<tr><th scope="row">{}</th>)", html_escaped(stage.name)) +
-        list_cell("simulations kept", number_text(static_cast<double>(stage.answers), 9), true) +
-        list_cell("", now ? R"(<span class="tag">now</span>)" : "") + "</tr>";
-  }
-  return rows;
-}
-
-std::string command_tiles(const CommandRecord& r) {
-  const auto tile_of = [](const char* title, const std::string& value, const std::string& small) {
-    return fmt::format(
-        R"(<div class="tile"><dt>{}</dt><dd><strong>{}</strong><small>{}</small></dd></div>)",
-        title, value, small);
-  };
-  const bool running = r.state == "running";
-  std::string html = R"(<dl class="tiles" id="tiles" data-live>)";
-  html += tile_of("Done", percent_text(r.share), bar_svg(r.share, "fill-named"));
-  html += tile_of("Stage", fmt::format("{} of {}", r.stage_number, r.stages),
-                  html_escaped(r.stage) +
-                      (r.total > 0 ? fmt::format(": {} of {} simulations", r.done, r.total) : ""));
-  html += tile_of(
-      running ? "Time left" : "Took",
-      running ? (r.time_left_s ? "about " + format_duration(*r.time_left_s) : "not known yet")
-              : format_duration(r.heartbeat_unix_s - r.began_unix_s),
-      fmt::format("{} simulated, {} at hand; {} simulations/s", r.simulated, r.remembered,
-                  number_text(r.rate_per_s)));
-  return html + "</dl>";
-}
-
 std::string comparison_table(std::span<const RunReport> runs) {
   std::vector<const ParameterRow*> keys;
   for (const RunReport& run : runs) {
@@ -216,7 +176,7 @@ std::string comparison_table(std::span<const RunReport> runs) {
       if (row != run.parameters.end()) {
         value = row->choice.empty() ? number_text(row->after, 4) : html_escaped(row->choice);
         if (bound_hit(*row) != BoundHit::kNone)
-          value += R"( <small class="worse">▲ at its bound</small>)";
+          value += R"( <small class="worse">▲ )" + term("bound", "at its bound") + "</small>";
       }
       html += list_cell(html_escaped(run.name).c_str(), value, true);
     }
@@ -274,44 +234,9 @@ std::string list_page(std::vector<WorkEntry> entries, const ListView& view,
     frame.body += R"(<p>None of them fits the filter. <a href="/">Show all</a></p>)";
   }
   frame.body += R"(</div><button>Compare the ticked runs</button></form></section>)";
-  return framed_page(frame, plain_page_json(), kNoTrials);
-}
-
-Result<std::string> command_page(const FoundWork& found, double now_unix_s) {
-  const auto record = command_status(found.path, now_unix_s);
-  if (!record) return record.error();
-  const CommandRecord r = record->value_or(CommandRecord());
-  const auto stages = read_stages(answer_file(found.path));
-  if (!stages) return stages.error();
-  PageFrame frame;
-  frame.served = true;
-  frame.title = r.command + " " + r.state + ": " + found.name;
-  frame.brand = r.command.empty() ? "simulations" : r.command;
-  frame.places = {{"summary", "State"}, {"stages", "Stages"}, {"workers", "Workers"}};
-  const std::string told =
-      r.state == "running" ? (r.waiting.empty() ? r.stage : r.waiting) : r.reason;
-  frame.body = fmt::format(
-      R"(<section id="summary"><div id="now" data-live><p class="verdict verdict-none">{}</p><h1 data-file="{}">{}</h1><p>{}</p></div>{}</section>)",
-      html_escaped(r.state.empty() ? "unknown" : r.state), html_escaped(r.command),
-      html_escaped(told.empty() ? found.name : told), html_escaped(r.arguments), command_tiles(r));
-  frame.body +=
-      R"(<section id="stages"><h2>What has been simulated</h2><p>By stage, in the order in which they began. What is kept is not simulated again.</p><div id="stage-table" data-live><table class="cards" data-file="stages"><caption class="unseen">Stages</caption><thead><tr><th scope="col">stage</th><th scope="col" class="number">simulations kept</th><th scope="col"></th></tr></thead><tbody>)" +
-      stage_rows(r, *stages) + "</tbody></table></div></section>\n";
-  std::string workers;
-  for (const StoredWorker& w : r.workers) {
-    workers += R"(<tr><th scope="row">)" + html_escaped(w.name) + "</th>" +
-               list_cell("host", html_escaped(w.host)) + list_cell("state", html_escaped(w.state)) +
-               list_cell("finished", number_text(static_cast<double>(w.finished), 9), true) +
-               list_cell("jobs/s", number_text(w.rate_per_s), true) + "</tr>";
-  }
-  frame.body +=
-      R"(<section id="workers"><h2>Workers</h2><div id="worker-table" data-live>)" +
-      (workers.empty()
-           ? std::string("<p>No worker has been heard of.</p>")
-           : R"(<table class="cards" data-file="workers"><caption class="unseen">Workers</caption><thead><tr><th scope="col">worker</th><th scope="col">host</th><th scope="col">state</th><th scope="col" class="number">finished</th><th scope="col" class="number">jobs/s</th></tr></thead><tbody>)" +
-                 workers + "</tbody></table>") +
-      "</div></section>\n";
-  return framed_page(frame, plain_page_json(), kNoTrials);
+  frame.places.emplace_back("words", "Words");
+  frame.body += glossary_section({"nat", "generation"});
+  return framed_page(frame, plain_page_json(), no_trials_json());
 }
 
 std::string compare_page(std::span<const RunReport> runs) {
@@ -319,7 +244,7 @@ std::string compare_page(std::span<const RunReport> runs) {
   frame.served = true;
   frame.title = fmt::format("gapfarm: {} runs", runs.size());
   frame.brand = "runs beside each other";
-  frame.places = {{"compared", "Fitness"}, {"sides", "Parameters"}};
+  frame.places = {{"compared", "Fitness"}, {"sides", "Parameters"}, {"words", "Words"}};
   Json page = plain_page_json();
   page["fitness"] = {{"name", runs.front().fitness},
                      {"unit", runs.front().unit},
@@ -340,13 +265,17 @@ std::string compare_page(std::span<const RunReport> runs) {
                   html_escaped(runs.front().fitness + ", " + others) +
                   "): the lines cannot be held against each other.</p>";
   }
+  frame.body += "<p>Best " + html_escaped(runs.front().fitness) +
+                (runs.front().unit == "-" ? "" : ", in " + unit_html(runs.front().unit)) +
+                ", of each " + term("generation", "generation") + ".</p>";
   frame.body +=
       R"(<div class="controls" id="compared-controls"></div><div id="compared-plot"></div>)";
   frame.body += kNoScript;
   frame.body +=
       R"(</section><section id="sides"><h2>Parameters side by side</h2><div id="side-table" data-live>)" +
-      comparison_table(runs) + "</div></section>\n";
-  return framed_page(frame, page, kNoTrials);
+      comparison_table(runs) + "</div></section>\n" +
+      glossary_section({"nat", "generation", "bound"});
+  return framed_page(frame, page, no_trials_json());
 }
 
 }  // namespace gapfarm

@@ -24,6 +24,9 @@ std::string list_page(std::vector<WorkEntry> entries, const ListView& view,
 // A diagnosis, a comparison or a study: its stages, how far it is, its workers.
 Result<std::string> command_page(const FoundWork& found, double now_unix_s);
 
+// What cannot be shown, and why; while it is open it looks again.
+std::string trouble_page(const std::string& what, const std::string& why);
+
 // Their best fitness in one plot, their parameters side by side.  REQUIRES: one at least.
 std::string compare_page(std::span<const RunReport> runs);
 

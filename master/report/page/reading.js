@@ -22,16 +22,22 @@ function startTerms() {
     tip.style.top = `${above ? at.top - tip.offsetHeight - 6 : at.bottom + 6}px`;
   }
 
-  for (const link of document.querySelectorAll("a.term")) {
-    link.setAttribute("aria-describedby", link.getAttribute("href").slice(1));
-    for (const type of ["pointerenter", "focus"]) link.addEventListener(type, () => show(link));
-    for (const type of ["pointerleave", "blur"]) link.addEventListener(type, hide);
-    // A finger has no other way to ask; the glossary is one more tap away.
-    link.addEventListener("click", (event) => {
-      if (tip.hidden) return;
-      if (matchMedia("(hover: none)").matches) event.preventDefault();
+  // Of every term, also of those that a live page puts in place later.
+  const on = (type, act) => document.addEventListener(type, (event) => {
+    const link = event.target.closest?.("a.term");
+    if (link) act(link, event);
+  });
+  for (const type of ["pointerover", "focusin"]) {
+    on(type, (link) => {
+      link.setAttribute("aria-describedby", link.getAttribute("href").slice(1));
+      show(link);
     });
   }
+  for (const type of ["pointerout", "focusout"]) on(type, hide);
+  // A finger has no other way to ask; the glossary is one more tap away.
+  on("click", (link, event) => {
+    if (!tip.hidden && matchMedia("(hover: none)").matches) event.preventDefault();
+  });
   addEventListener("keydown", (event) => event.key === "Escape" && hide());
   addEventListener("scroll", hide, { passive: true });
 }

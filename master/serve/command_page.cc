@@ -1,0 +1,199 @@
+// A command at work: its stages, what it has found, its workers.
+
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "master/progress/words.h"
+#include "master/report/glossary.h"
+#include "master/report/html.h"
+#include "master/report/page_frame.h"
+#include "master/serve/page_parts.h"
+#include "master/serve/pages.h"
+#include "master/store/answer_store.h"
+
+namespace gapfarm {
+namespace {
+
+std::string stage_rows(const CommandRecord& r, const std::vector<AnsweredStage>& stages) {
+  std::string rows;
+  for (const AnsweredStage& stage : stages) {
+    const bool now = r.state == "running" && stage.name == r.stage;
+    rows +=
+        fmt::format(R"(<tr><th scope="row">{}</th>)", html_escaped(stage.name)) +
+        list_cell("simulations kept", number_text(static_cast<double>(stage.answers), 9), true) +
+        list_cell("", now ? R"(<span class="tag">now</span>)" : "") + "</tr>";
+  }
+  return rows;
+}
+
+std::string command_tiles(const CommandRecord& r) {
+  const auto tile_of = [](const char* title, const std::string& value, const std::string& small) {
+    return fmt::format(
+        R"(<div class="tile"><dt>{}</dt><dd><strong>{}</strong><small>{}</small></dd></div>)",
+        title, value, small);
+  };
+  const bool running = r.state == "running";
+  const bool simulates = r.simulated + r.remembered > 0;
+  std::string html = R"(<dl class="tiles" id="tiles" data-live>)";
+  html += tile_of("Done", percent_text(r.share), bar_svg(r.share, "fill-named"));
+  html +=
+      tile_of("Stage", fmt::format("{} of {}", r.stage_number, r.stages),
+              html_escaped(r.stage) + (r.total > 0 ? fmt::format(": {} of {}{}", r.done, r.total,
+                                                                 simulates ? " simulations" : "")
+                                                   : ""));
+  html += tile_of(
+      running ? "Time left" : "Took",
+      running ? (r.time_left_s ? "about " + format_duration(*r.time_left_s) : "not known yet")
+              : format_duration(r.heartbeat_unix_s - r.began_unix_s),
+      simulates ? fmt::format("{} simulated, {} at hand; {} simulations/s", r.simulated,
+                              r.remembered, number_text(r.rate_per_s))
+                : "nothing is simulated so far");
+  return html + "</dl>";
+}
+
+// Words that need it lead to their explanation.
+std::string with_terms(const std::string& text) {
+  std::string html = html_escaped(text);
+  for (const auto& [id, words] : {std::pair{"nat", "nats a trial"},
+                                  {"rms", "root mean square"},
+                                  {"gain", "gain, nats"},
+                                  {"gap", "gap, nats"},
+                                  {"held-out", "trials that a fit did not see"}}) {
+    const std::string found = words;
+    if (const auto at = html.find(found); at != html.npos) {
+      html.replace(at, found.size(), term(id, found));
+    }
+  }
+  return html;
+}
+
+std::string finding_html(const Finding& found) {
+  std::string html =
+      "<h4>" + html_escaped(found.about) + "</h4><p>" + with_terms(found.text) + "</p>";
+  if (found.rows.empty()) return html;
+  html += fmt::format(
+      R"(<table class="parts" data-file="{0}"><caption class="unseen">{0}</caption><thead><tr><th scope="col">{1}</th><th scope="col" class="number">{2}</th></tr></thead><tbody>)",
+      html_escaped(found.about), html_escaped(found.columns.first),
+      with_terms(found.columns.second));
+  for (const auto& [name, value] : found.rows) {
+    html += R"(<tr><th scope="row">)" + html_escaped(name) + "</th>" +
+            list_cell("", html_escaped(value), true) + "</tr>";
+  }
+  return html + "</tbody></table>";
+}
+
+// Whether stage `k` of the plan is over, in work or to come, and how long it took.
+std::string stage_words(const CommandRecord& r, std::size_t k) {
+  const double began_s = r.plan[k].began_unix_s;
+  const bool last = k + 1 >= r.stage_number;
+  if (k + 1 > r.stage_number) return r.state == "running" ? "to come" : "not reached";
+  if (began_s == 0) return "not needed";
+  double ended_s = r.heartbeat_unix_s;
+  for (std::size_t j = k + 1; j < r.plan.size() && !last; ++j) {
+    if (r.plan[j].began_unix_s == 0) continue;
+    ended_s = r.plan[j].began_unix_s;
+    break;
+  }
+  const std::string took = format_duration(std::max(0.0, ended_s - began_s));
+  if (!last || r.state == "finished") return "done in " + took;
+  return r.state == "running" ? "at work, for " + took : r.state + " after " + took;
+}
+
+// The stages in their order, each with what was found in it.
+std::string findings_list(const CommandRecord& r) {
+  std::string html = R"(<ol class="stages">)";
+  for (std::size_t k = 0; k < r.plan.size(); ++k) {
+    const bool now = r.state == "running" && k + 1 == r.stage_number;
+    html +=
+        fmt::format(R"(<li{}><h3>{} <small>{}</small></h3>)", now ? R"( aria-current="step")" : "",
+                    html_escaped(r.plan[k].name), stage_words(r, k));
+    bool any = false;
+    for (const auto& [stage, found] : r.findings) {
+      if (stage != r.plan[k].name) continue;
+      html += finding_html(found);
+      any = true;
+    }
+    if (now && !any) html += "<p>Nothing so far.</p>";
+    html += "</li>";
+  }
+  return html + "</ol>";
+}
+
+std::string found_section(const CommandRecord& r) {
+  return R"(<section id="found"><h2>What has been found so far</h2><p>Stage by stage. None of it is final: the report, which takes this page's place at the end, may say something else.</p><div id="found-list" data-live>)" +
+         findings_list(r) + "</div></section>\n";
+}
+
+std::string stages_section(const CommandRecord& r, const std::vector<AnsweredStage>& stages) {
+  return R"(<section id="stages"><h2>What has been simulated</h2><p>By stage, in the order in which they began. What is kept is not simulated again.</p><div id="stage-table" data-live>)" +
+         (stages.empty()
+              ? std::string("<p>Nothing so far.</p>")
+              : R"(<table class="cards" data-file="stages"><caption class="unseen">Stages</caption><thead><tr><th scope="col">stage</th><th scope="col" class="number">simulations kept</th><th scope="col"></th></tr></thead><tbody>)" +
+                    stage_rows(r, stages) + "</tbody></table>") +
+         "</div></section>\n";
+}
+
+std::string workers_section(const CommandRecord& r) {
+  std::string workers;
+  for (const StoredWorker& w : r.workers) {
+    workers += R"(<tr><th scope="row">)" + html_escaped(w.name) + "</th>" +
+               list_cell("host", html_escaped(w.host)) + list_cell("state", html_escaped(w.state)) +
+               list_cell("finished", number_text(static_cast<double>(w.finished), 9), true) +
+               list_cell("jobs/s", number_text(w.rate_per_s), true) + "</tr>";
+  }
+  const char* none = r.state == "running"
+                         ? "<p>No worker has been heard of.</p>"
+                         : "<p>The command has ended, and with it its workers.</p>";
+  return R"(<section id="workers"><h2>Workers</h2><div id="worker-table" data-live>)" +
+         (workers.empty()
+              ? std::string(none)
+              : R"(<table class="cards" data-file="workers"><caption class="unseen">Workers</caption><thead><tr><th scope="col">worker</th><th scope="col">host</th><th scope="col">state</th><th scope="col" class="number">finished</th><th scope="col" class="number">jobs/s</th></tr></thead><tbody>)" +
+                    workers + "</tbody></table>") +
+         "</div></section>\n";
+}
+
+}  // namespace
+
+std::string trouble_page(const std::string& what, const std::string& why) {
+  PageFrame frame;
+  frame.served = true;
+  frame.title = "gapfarm: " + what + " cannot be shown";
+  frame.brand = "cannot be shown";
+  frame.places = {{"trouble", "Why"}};
+  frame.body =
+      R"(<section id="trouble"><h1 data-file="trouble">)" + html_escaped(what) +
+      R"( cannot be shown</h1><p class="caution-box" id="why" data-live>)" + html_escaped(why) +
+      R"(</p><p>Nothing was changed. This page takes its place as soon as it can be read; <a href="/">everything else</a> can be seen meanwhile.</p></section>)";
+  return framed_page(frame, plain_page_json(), no_trials_json());
+}
+
+Result<std::string> command_page(const FoundWork& found, double now_unix_s) {
+  const auto record = command_status(found.path, now_unix_s);
+  if (!record) return record.error();
+  const CommandRecord r = record->value_or(CommandRecord());
+  const auto stages = read_stages(answer_file(found.path));
+  if (!stages) return stages.error();
+  const bool tells = r.command == "diagnose";
+  PageFrame frame;
+  frame.served = true;
+  frame.title = r.command + " " + r.state + ": " + found.name;
+  frame.brand = r.command.empty() ? "simulations" : r.command;
+  frame.places = {{"summary", "State"}};
+  if (tells) frame.places.emplace_back("found", "Found so far");
+  frame.places.insert(frame.places.end(), {{"stages", "Simulations"}, {"workers", "Workers"}});
+  if (tells) frame.places.emplace_back("words", "Words");
+  const std::string told =
+      r.state == "running" ? (r.waiting.empty() ? r.stage : r.waiting) : r.reason;
+  frame.body = fmt::format(
+      R"(<section id="summary"><div id="now" data-live><p class="verdict verdict-none">{}</p><h1 data-file="{}">{}</h1><p>{}</p></div>{}</section>)",
+      html_escaped(r.state.empty() ? "unknown" : r.state), html_escaped(r.command),
+      html_escaped(told.empty() ? found.name : told), html_escaped(r.arguments), command_tiles(r));
+  if (tells) frame.body += found_section(r);
+  frame.body += stages_section(r, *stages) + workers_section(r);
+  if (tells) frame.body += glossary_section({"nat", "gap", "rms", "gain", "held-out", "alias"});
+  return framed_page(frame, plain_page_json(), no_trials_json());
+}
+
+}  // namespace gapfarm
