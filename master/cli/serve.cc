@@ -12,10 +12,13 @@
 #include "master/cli/subcommand.h"
 #include "master/serve/http_server.h"
 #include "master/serve/site.h"
+#include "master/store/database.h"
 #include "master/store/run_lock.h"
 
 namespace gapfarm {
 namespace {
+
+constexpr int kPatience_ms = 500;
 
 struct ServeOptions {
   std::vector<std::string> folders = {"."};
@@ -35,6 +38,9 @@ int run_serve(const ServeOptions& options, CliContext& context) {
     context.console.error(Error{folder + ": no such folder; name one with runs or diagnoses"});
     return kExitBadUsage;
   }
+  // A master commits within milliseconds; who holds a store for longer is not waited for, since
+  // everybody else would wait, too.
+  set_database_patience_ms(kPatience_ms);
   DriveShower shower(context);
   SiteSources sources;
   sources.folders.assign(options.folders.begin(), options.folders.end());

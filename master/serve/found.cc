@@ -19,6 +19,7 @@ constexpr std::size_t kMostFound = 2000;
 constexpr std::size_t kMostFiles = 50000;
 constexpr std::size_t kMostPoints = 60;
 constexpr double kLookAgain_s = 5;  // at what says that it runs: its master may have died
+constexpr double kBusy_s = 10;      // a store that cannot be read for so long is told of
 
 constexpr const char* kTelling[] = {
     "run.sqlite",     "run.sqlite-wal", "simulations.sqlite", "simulations.sqlite-wal",
@@ -196,7 +197,8 @@ bool WorkEntries::holds(const Known& known, const std::string& stamp, double now
   const double age_s = now_unix_s - known.read_unix_s;
   if (age_s < 0) return false;
   if (age_s < good_for_s(known.cost_s)) return true;
-  return known.entry.stamp == stamp && (known.entry.state != "running" || age_s < kLookAgain_s);
+  const bool may_change = known.entry.state == "running" || !known.entry.trouble.empty();
+  return known.entry.stamp == stamp && (!may_change || age_s < kLookAgain_s);
 }
 
 std::vector<WorkEntry> WorkEntries::now(const std::vector<FoundWork>& found) {
@@ -212,9 +214,16 @@ std::vector<WorkEntry> WorkEntries::now(const std::vector<FoundWork>& found) {
       next = known->second;
     } else {
       const double began_s = cpu_now_s_();
-      next = {now_unix_s, 0, entry_of(f, now_unix_s)};
-      next.entry.stamp = std::move(stamp);
-      next.cost_s = cpu_now_s_() - began_s;
+      WorkEntry fresh = entry_of(f, now_unix_s);
+      fresh.stamp = std::move(stamp);
+      const bool busy = !fresh.trouble.empty() && known != known_.end() &&
+                        known->second.entry.trouble.empty() &&
+                        now_unix_s - known->second.read_unix_s < kBusy_s;
+      if (busy) {
+        next = known->second;  // somebody writes just now: it is looked at again soon
+      } else {
+        next = {now_unix_s, cpu_now_s_() - began_s, std::move(fresh)};
+      }
     }
     entries.push_back(next.entry);
   }

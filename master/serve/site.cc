@@ -14,6 +14,7 @@ namespace {
 
 constexpr double kSearchAgain_s = 2;
 constexpr std::size_t kMostCompared = 8;
+constexpr double kBusyPage_s = 20;
 constexpr std::size_t kMostKept = 12;  // pages, of two megabytes at most
 
 // A strong tag: what has it is the same byte by byte.
@@ -163,16 +164,33 @@ HttpResponse Site::shown(const Target& target, const std::string& known) {
   if (page == nullptr) {
     const double began_s = sources_.cpu_now_s();
     auto html = made(target);
-    if (!html) return plain_response(target.path == "/compare" ? 400 : 500, html.error().message);
+    // Somebody writes just now: what was seen last will do for a while.
+    const auto last = kept_.find(key);
+    const bool lately =
+        last != kept_.end() && sources_.unix_now_s() - last->second.made_unix_s < kBusyPage_s;
+    if (!html && !lately) return trouble(target, html.error());
+    if (!html) return as_asked(last->second, known);
     keep(key, {now->tag, *std::move(html), now->state, sources_.unix_now_s(),
                sources_.cpu_now_s() - began_s});
     page = &kept_.at(key);
   }
-  const std::string etag = "\"" + page->tag + "\"";
+  return as_asked(*page, known);
+}
+
+HttpResponse Site::as_asked(const Kept& page, const std::string& known) {
+  const std::string etag = "\"" + page.tag + "\"";
   if (etag == known) return unchanged(etag);
   HttpResponse response;
-  response.body = page->html;
+  response.body = page.html;
   response.etag = etag;
+  return response;
+}
+
+HttpResponse Site::trouble(const Target& target, const Error& error) const {
+  HttpResponse response;
+  response.status = 503;
+  response.body =
+      trouble_page(target.path == "/view" ? target.value("of") : "This comparison", error.message);
   return response;
 }
 

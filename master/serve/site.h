@@ -71,6 +71,8 @@ class Site {
   Result<Standing> standing(const Target& target) const;
   Result<std::string> made(const Target& target) const;
   HttpResponse shown(const Target& target, const std::string& known);
+  static HttpResponse as_asked(const Kept& page, const std::string& known);
+  HttpResponse trouble(const Target& target, const Error& error) const;
   Result<std::string> view(const Target& target) const;
   Result<std::string> compare(const Target& target) const;
   // The kept page at `target`, if it is still good.

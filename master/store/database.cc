@@ -2,6 +2,7 @@
 
 #include <sqlite3.h>
 
+#include <atomic>
 #include <cerrno>
 #include <cmath>
 #include <cstring>
@@ -10,7 +11,7 @@ namespace gapfarm {
 namespace {
 
 // `gapfarm status` holds the file for milliseconds, but somebody may look around in it by hand.
-constexpr int kBusyTimeout_ms = 60000;
+std::atomic<int> busy_timeout_ms = 60000;
 
 const char* remedy(int code) {
   switch (code & 0xff) {
@@ -53,6 +54,8 @@ Error sql_error(const std::string& file, const std::string& operation, int code,
 }
 
 }  // namespace
+
+void set_database_patience_ms(int patience_ms) { busy_timeout_ms = patience_ms; }
 
 SqlStatement::SqlStatement(sqlite3_stmt* statement, std::string file, std::string operation)
     : statement_(statement), file_(std::move(file)), operation_(std::move(operation)) {}
@@ -155,7 +158,7 @@ Result<Database> Database::open(const std::filesystem::path& file, Mode mode) {
                      handle ? sqlite3_errmsg(handle) : sqlite3_errstr(code), handle);
   }
   sqlite3_extended_result_codes(handle, 1);
-  sqlite3_busy_timeout(handle, kBusyTimeout_ms);
+  sqlite3_busy_timeout(handle, busy_timeout_ms);
   if (mode == Mode::kQueryOnly) {
     if (Status s = database.exec("PRAGMA query_only = ON", "open the run store"); !s) {
       return s.error();

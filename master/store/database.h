@@ -50,6 +50,10 @@ class SqlStatement {
   int bind_result_ = 0;
 };
 
+// For how long connections that this process opens from now on wait for a file that another holds;
+// a minute unless told otherwise.  For who would keep others waiting meanwhile.
+void set_database_patience_ms(int patience_ms);
+
 class Database {
  public:
   enum class Mode {

@@ -51,13 +51,22 @@ function startLive() {
     redraws.forEach((draw) => draw());
   }
 
+  // Why, from a page that tells it or in plain words; what stands here is kept.
+  function refused(answer, text) {
+    const isPage = (answer.headers.get("Content-Type") || "").startsWith("text/html");
+    const why = isPage ? new DOMParser().parseFromString(text, "text/html").getElementById("why")?.textContent || "" : text;
+    const shown = document.getElementById("why");
+    if (shown) shown.textContent = why;
+    else say(`The server says: ${why.slice(0, 300).trim()}`);
+  }
+
   async function look() {
     try {
       const answer = await fetch(location.href.split("#")[0], {
         cache: "no-store", headers: etag ? { "If-None-Match": etag } : {}, signal: AbortSignal.timeout(20000),
       });
       if (answer.status === 304) return say("");
-      if (!answer.ok) return say(`The server says: ${(await answer.text()).slice(0, 200).trim()}`);
+      if (!answer.ok) return refused(answer, await answer.text());
       update(await answer.text());
       etag = answer.headers.get("ETag") || "";
       say("");

@@ -4,7 +4,10 @@
 #include <gmock/gmock.h>
 
 #include <fstream>
+#include <nlohmann/json.hpp>
 
+#include "master/store/answer_store.h"
+#include "master/store/command_record.h"
 #include "tests/unit/store/store_fixture.h"
 
 namespace gapfarm {
@@ -25,6 +28,7 @@ class SiteTest : public StoreTest {
     sources.read_run = [this](const RunQuestion& question) -> Result<RunReport> {
       ++made_;
       cpu_s_ += cost_s_;
+      if (!trouble_.empty()) return Error{trouble_};
       RunReport report;
       report.headline = "made " + std::to_string(made_);
       report.name = question.run.string();
@@ -52,6 +56,7 @@ class SiteTest : public StoreTest {
 
   double now_s_ = 1e9, cpu_s_ = 0, cost_s_ = 0;
   int made_ = 0;
+  std::string trouble_;  // of reading a run
   Site site_;
 };
 
@@ -131,6 +136,74 @@ TEST_F(SiteTest, WhatAFolderIsTakenForCountsToo) {
   const WorkEntry as_diagnosis = entries.now({found}).front();
   EXPECT_EQ(as_diagnosis.told, "One motor is slower.");
   EXPECT_NE(as_diagnosis.stamp, as_command);
+}
+
+TEST_F(SiteTest, ADiagnosisAtWorkTellsWhatItHasFound) {
+  const std::filesystem::path d = folder_ / "d";
+  std::filesystem::create_directories(d);
+  auto answers = AnswerStore::open(answer_file(d), "build");
+  ASSERT_TRUE(answers.ok()) << answers.error().message;
+  CommandRecord record;
+  record.command = "diagnose";
+  record.state = "stopped";
+  record.stage = "screen";
+  record.stage_number = 2, record.stages = 3;
+  record.plan = {{"tune", 1e9 - 40}, {"screen", 1e9 - 30}, {"refit", 0}};
+  record.heartbeat_unix_s = 1e9 - 5;
+  record.findings = {
+      {"tune", {"the noise", "1.5 nats a trial <b>", {"noise", "size"}, {{"k", "2 mm"}}}}};
+  ASSERT_TRUE(answers->set_command(to_json(record).dump()).ok());
+  const std::string page = get(view("d")).body;
+  EXPECT_THAT(page, HasSubstr("tune <small>done in 10 s"));
+  EXPECT_THAT(page, HasSubstr("screen <small>stopped after 25 s"));
+  EXPECT_THAT(page, HasSubstr("refit <small>not reached"));
+  EXPECT_THAT(page,
+              HasSubstr(R"(1.5 <a class="term" href="#term-nat">nats a trial</a> &lt;b&gt;)"));
+  EXPECT_THAT(page, HasSubstr(R"(<th scope="row">k</th>)"));
+  // What is found next is new.
+  const std::string known = get(view("d")).etag;
+  record.findings.push_back({"screen", {"the catalogue", "A seam.", {}, {}}});
+  ASSERT_TRUE(answers->set_command(to_json(record).dump()).ok());
+  wait();
+  EXPECT_THAT(get(view("d"), known).body, HasSubstr("A seam."));
+}
+
+TEST_F(SiteTest, SaysWhatCannotBeRead) {
+  const RunStore sound = make("sound");
+  make("foreign");
+  make("damaged");
+  { std::ofstream(folder_ / "foreign/run.sqlite", std::ios::binary) << std::string(9000, 'x'); }
+  {
+    std::fstream file(folder_ / "damaged/run.sqlite",
+                      std::ios::binary | std::ios::in | std::ios::out);
+    file.seekp(4096);
+    file << std::string(40000, 'x');
+  }
+  make("held");
+  auto holder = Database::open(folder_ / "held/run.sqlite", Database::Mode::kWrite);
+  ASSERT_TRUE(holder.ok());
+  ASSERT_TRUE(holder->exec("BEGIN EXCLUSIVE", "hold").ok());
+  set_database_patience_ms(20);
+  const std::string list = get("/").body;
+  EXPECT_THAT(list, HasSubstr("/sound</a>"));
+  EXPECT_THAT(list, HasSubstr("not a SQLite file"));
+  EXPECT_THAT(list, HasSubstr("restore a copy"));
+  EXPECT_THAT(list, HasSubstr("another program holds the file"));
+  ASSERT_TRUE(holder->exec("COMMIT", "hold").ok());
+  wait();
+  EXPECT_THAT(get("/").body, testing::Not(HasSubstr("another program holds the file")));
+  set_database_patience_ms(60000);
+}
+
+TEST_F(SiteTest, APageThatCannotBeMadeSaysWhyAndLooksAgain) {
+  const RunStore store = make("run");
+  trouble_ = "run.sqlite: another program holds the file <b>";
+  const HttpResponse page = get(view("run"));
+  EXPECT_EQ(page.status, 503u);
+  EXPECT_THAT(page.body, HasSubstr("another program holds the file &lt;b&gt;"));
+  EXPECT_THAT(page.body, HasSubstr(R"(<a href="/">)"));
+  trouble_.clear();
+  EXPECT_EQ(get(view("run"), page.etag).status, 200u);
 }
 
 TEST_F(SiteTest, FindsNothingOutsideOfItsFolders) {
