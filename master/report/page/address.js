@@ -3,8 +3,8 @@
 
 const address = {
   get: (key) => (PAGE.served ? new URLSearchParams(location.search).get(key) || "" : ""),
-  // What is empty goes.
-  set(values) {
+  // What is empty goes.  A choice is a step that back takes back; typing is none.
+  set(values, step = true) {
     if (!PAGE.served) return;
     const query = new URLSearchParams(location.search);
     for (const [key, value] of Object.entries(values)) {
@@ -12,9 +12,25 @@ const address = {
       else query.delete(key);
     }
     const text = query.toString().replaceAll("%2F", "/");
-    history.replaceState(null, "", `${location.pathname}${text ? `?${text}` : ""}${location.hash}`);
+    const next = `${location.pathname}${text ? `?${text}` : ""}`;
+    if (next === location.pathname + location.search) return;
+    history[step ? "pushState" : "replaceState"](null, "", next + location.hash);
+    this.shown = location.search;
   },
+  // Who chooses again when the address changes by back or forward.
+  followers: [],
+  follow(chooseAgain) {
+    this.followers.push(chooseAgain);
+  },
+  shown: location.search,
 };
+
+addEventListener("popstate", () => {
+  // The way to a place on the page is none to another view.
+  if (!PAGE.served || location.search === address.shown) return;
+  address.shown = location.search;
+  address.followers.forEach((chooseAgain) => chooseAgain());
+});
 
 // The list's filter, while it is typed: the server looks.
 function startFilter() {
@@ -25,10 +41,15 @@ function startFilter() {
   const changed = () => {
     clearTimeout(wait);
     wait = setTimeout(() => {
-      address.set({ q: form.q.value.trim(), state: form.elements.state.value });
+      address.set({ q: form.q.value.trim(), state: form.elements.state.value }, false);
       lookNow();
     }, 150);
   };
+  address.follow(() => {
+    form.q.value = address.get("q");
+    form.elements.state.value = address.get("state");
+    lookNow();
+  });
   form.addEventListener("input", changed);
   form.addEventListener("submit", (event) => { event.preventDefault(); changed(); });
 }

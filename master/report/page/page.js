@@ -26,6 +26,14 @@ function radios(parent, title, options, changed, place) {
     });
     return labelled(set, input, label);
   });
+  if (place) {
+    address.follow(() => {
+      const again = inputs.find((input) => input.value === address.get(place)) || inputs[0];
+      if (again.checked) return;
+      again.checked = true;
+      changed();
+    });
+  }
   return () => inputs.find((input) => input.checked).value;
 }
 
@@ -48,6 +56,15 @@ function choice(parent, title, options, changed, place) {
     if (place) address.set({ [place]: select.value === options[0][0] ? "" : select.value });
     changed();
   });
+  if (place) {
+    address.follow(() => {
+      const known = options.map(([value]) => value);
+      const again = known.includes(address.get(place)) ? address.get(place) : known[0];
+      if (select.value === again) return;
+      select.value = again;
+      changed();
+    });
+  }
   label.append(`${title} `, select);
   const read = () => select.value;
   read.set = (value) => { select.value = value; };

@@ -19,6 +19,7 @@ function startProgress() {
   const canLog = all.length && all.every((v) => v > 0);
   const scale = canLog
     ? radios(controls, "Scale", [{ key: "linear", label: "linear" }, { key: "log", label: "log" }], draw, "scale") : () => "linear";
+  if (!canLog) element(controls, "span", { className: "quiet" }, "No logarithmic scale: some values are not above 0.");
 
   function draw() {
     const { of, label } = AGAINST.find((a) => a.key === against());
