@@ -102,9 +102,11 @@ std::string toml_value(const ParameterRow& row) {
   return fmt::format("{:.6g}", row.after);
 }
 
-std::string toml_comment(const ParameterRow& row) {
+// Where a population lay is no interval of anything: there what `gapfarm determine` said stands.
+std::string toml_comment(const ParameterRow& row, bool intervals) {
   std::string text = row.unit == "-" ? "" : row.unit;
-  if (row.lo && row.hi) {
+  if (!intervals && !row.note.empty()) text += (text.empty() ? "" : "; ") + row.note;
+  if (intervals && row.lo && row.hi) {
     text += (text.empty() ? "" : ", ") + fmt::format("90 % {:.4g} to {:.4g}", *row.lo, *row.hi);
   }
   return text.empty() ? "" : "  # " + text;
@@ -112,17 +114,17 @@ std::string toml_comment(const ParameterRow& row) {
 
 }  // namespace
 
-std::string config_snippet(const std::vector<ParameterRow>& rows) {
+std::string config_snippet(const std::vector<ParameterRow>& rows, bool intervals) {
   std::string base, effects, section;
   for (const ParameterRow& row : rows) {
     if (row.effect.empty()) {
-      base += row.key + " = " + toml_value(row) + toml_comment(row) + "\n";
+      base += row.key + " = " + toml_value(row) + toml_comment(row, intervals) + "\n";
       continue;
     }
     if (row.effect != section) effects += "\n[effects." + row.effect + "]\n";
     section = row.effect;
-    effects +=
-        row.key.substr(row.key.find('.') + 1) + " = " + toml_value(row) + toml_comment(row) + "\n";
+    effects += row.key.substr(row.key.find('.') + 1) + " = " + toml_value(row) +
+               toml_comment(row, intervals) + "\n";
   }
   const std::string text = (base.empty() ? "" : "[parameters]\n" + base) + effects;
   return text.empty() || text[0] != '\n' ? text : text.substr(1);
@@ -150,7 +152,8 @@ std::string parameters_section(const std::vector<ParameterRow>& rows,
          R"(<code>gapfarm check</code> reads it. What each effect does, for other simulators, is in docs/effects.md.</p>)"
          R"(<div class="snippet"><button type="button" class="copy" data-of="snippet" hidden>Copy</button>)"
          R"(<pre id="snippet" tabindex="0">)" +
-         html_escaped(config_snippet(rows)) + "</pre></div></section>\n";
+         html_escaped(config_snippet(rows, columns.interval.term == "interval")) +
+         "</pre></div></section>\n";
 }
 
 }  // namespace gapfarm

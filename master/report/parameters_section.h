@@ -23,7 +23,8 @@ std::string parameters_section(const std::vector<ParameterRow>& rows,
                                const std::vector<ParameterCorrelation>& correlations,
                                const ParameterColumns& columns);
 
-// [parameters] and [effects.NAME] as a config takes them (docs/configuration.md).
-std::string config_snippet(const std::vector<ParameterRow>& rows);
+// [parameters] and [effects.NAME] as a config takes them (docs/configuration.md).  `intervals`: the
+// rows' lo and hi are intervals of the values and stand beside them; else the rows' notes do.
+std::string config_snippet(const std::vector<ParameterRow>& rows, bool intervals);
 
 }  // namespace gapfarm

@@ -133,6 +133,11 @@ TEST_F(RunPage, ShowsWhatDetermineLeft) {
   EXPECT_THAT(after.parameters[0].note, HasSubstr("0.15 to 0.45"));
   EXPECT_THAT(after.parameters[0].note, HasSubstr("do not determine it"));
   EXPECT_THAT(after.parameters[1].note, HasSubstr("another value"));
+  // Where the population lay is no interval, and is not pasted as one.
+  const std::string page = run_html(after);
+  EXPECT_THAT(page, HasSubstr("# 95 % by gapfarm determine: 0.15 to 0.45"));
+  EXPECT_THAT(page, testing::Not(HasSubstr("# 90 %")));
+  EXPECT_THAT(page, testing::Not(HasSubstr(", 90 % ")));
 }
 
 }  // namespace

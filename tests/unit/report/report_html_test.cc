@@ -167,8 +167,8 @@ TEST(Parameters, TheSnippetIsReadAsAConfig) {
   rows.push_back({"camera_seam.axis", "-", "camera_seam", "", {}, 1, {}, {}, 0, 1, "y", ""});
   rows.push_back(
       {"camera_seam.position", "m", "camera_seam", "", {}, 1.3351234, 1.2, 1.4, -10, 10, "", ""});
-  const auto config = parse_config(config_snippet(rows), "snippet.toml");
-  ASSERT_TRUE(config.ok()) << config.error().message << config_snippet(rows);
+  const auto config = parse_config(config_snippet(rows, true), "snippet.toml");
+  ASSERT_TRUE(config.ok()) << config.error().message << config_snippet(rows, true);
   const Problem& problem = config->problem;
   for (const ParameterRow& row : rows) {
     const double value = problem.values[problem.table().row(row.key)];
