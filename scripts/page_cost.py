@@ -1,14 +1,20 @@
 #!/usr/bin/env python3
-"""page_cost.py CONFIG [--pairs N] [--generations G] [--workers W]
+"""page_cost.py CONFIG [--pairs N] [--generations G] [--workers W] [--bench BENCH_FARM]
 
 What an open page costs: runs in pairs, one of them with `gapfarm serve` and a page open on it, which
 listens to the server's events and fetches what is new, as live.js does; the browser's own drawing is
 not in it.  Prints evaluations a second and the master's own CPU time an evaluation, pair by pair, and
-the server's share of a core.  GAPFARM: the program, build/release/bin/gapfarm unless told otherwise.
+the server's share of a core.
+
+With --bench, `bench_farm` runs beside each run instead, and what its master costs is printed: CPU time
+of its thread a task, and tasks a second.
+
+GAPFARM: the program, build/release/bin/gapfarm unless told otherwise.
 """
 
 import argparse
 import http.client
+import json
 import os
 import re
 import shutil
@@ -20,6 +26,7 @@ import threading
 import time
 from pathlib import Path
 
+TASKS_OF_A_BATCH = 20000  # of bench_farm's throughput
 HERE = Path(__file__).resolve().parent.parent
 GAPFARM = os.environ.get("GAPFARM", str(HERE / "build/release/bin/gapfarm"))
 
@@ -57,20 +64,79 @@ class Page(threading.Thread):
             etag = page.getheader("ETag") or ""
 
 
+def serve(folder):
+    """The server, and its port."""
+    server = subprocess.Popen(
+        [GAPFARM, "serve", folder, "--port", "0"], stdout=subprocess.PIPE, text=True
+    )
+    return server, int(re.search(r"127\.0\.0\.1:(\d+)", server.stdout.readline())[1])
+
+
+def begin_run(options, run, generations):
+    words = [GAPFARM, "evolve", options.config, "--out", run, "--workers", str(options.workers)]
+    words += ["--generations", str(generations), "--log-level", "error"]
+    return subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+
+
+def one_bench(options, with_page):
+    """(tasks a second, us of CPU a task of bench_farm's master): beside a run that goes on, with or
+    without a page open on it."""
+    folder = tempfile.mkdtemp(prefix="page-cost-")
+    run = f"{folder}/run"
+    master, server = begin_run(options, run, 10**6), None
+    while not Path(f"{run}/run.sqlite").exists() and master.poll() is None:
+        time.sleep(0.05)
+    if with_page:
+        server, port = serve(folder)
+        Page(port, run).start()
+    time.sleep(3)
+    words = [options.bench, "--benchmark_filter=throughput/link:0/workers:1$"]
+    words += ["--benchmark_format=json", "--benchmark_min_time=2"]
+    said = subprocess.run(words, check=True, capture_output=True, text=True).stdout
+    result = json.loads(said[said.index("{") :])["benchmarks"][0]
+    for process in (master, server):
+        if process:
+            process.terminate()
+            process.wait()
+    shutil.rmtree(folder, ignore_errors=True)
+    us = {"ns": 1e-3, "us": 1, "ms": 1e3, "s": 1e6}[result["time_unit"]]
+    return result["items_per_second"], us * result["cpu_time"] / TASKS_OF_A_BATCH
+
+
+def change(values):
+    """"+1.2 % (standard error 0.8, median +1.0)" """
+    error = 100 * statistics.stdev(values) / len(values) ** 0.5 if len(values) > 1 else 0
+    return (
+        f"{100 * statistics.mean(values):+.1f} % (standard error {error:.1f}, median "
+        f"{100 * statistics.median(values):+.1f})"
+    )
+
+
+def bench_in_pairs(options):
+    rates, costs = [], []
+    for pair in range(options.pairs):
+        order = (False, True) if pair % 2 == 0 else (True, False)
+        results = {with_page: one_bench(options, with_page) for with_page in order}
+        (rate0, us0), (rate1, us1) = results[False], results[True]
+        rates.append(rate1 / rate0 - 1)
+        costs.append(us1 / us0 - 1)
+        print(
+            f"pair {pair + 1}: {rate0:.0f} and {rate1:.0f} tasks/s, {us0:.2f} and {us1:.2f} us of "
+            "the master's CPU a task",
+            flush=True,
+        )
+    print(f"bench_farm with a page open: rate {change(rates)}, CPU {change(costs)}")
+
+
 def one_run(options, with_page):
     """(evaluations a second, master's ms an evaluation, server's share of a core, page)"""
     folder = tempfile.mkdtemp(prefix="page-cost-")
     run = f"{folder}/run"
     server = page = None
     if with_page:
-        server = subprocess.Popen(
-            [GAPFARM, "serve", folder, "--port", "0"], stdout=subprocess.PIPE, text=True
-        )
-        port = int(re.search(r"127\.0\.0\.1:(\d+)", server.stdout.readline())[1])
-    words = [GAPFARM, "evolve", options.config, "--out", run, "--workers", str(options.workers)]
-    words += ["--generations", str(options.generations), "--log-level", "error"]
+        server, port = serve(folder)
     began = time.monotonic()
-    master = subprocess.Popen(words, stdout=subprocess.DEVNULL)
+    master = begin_run(options, run, options.generations)
     of_master, of_server, served_from = 0.0, 0.0, None
     while master.poll() is None:
         time.sleep(0.05)
@@ -99,7 +165,10 @@ def main():
     parser.add_argument("--pairs", type=int, default=5)
     parser.add_argument("--generations", type=int, default=100)
     parser.add_argument("--workers", type=int, default=1)
+    parser.add_argument("--bench", help="bench_farm, to be run beside each run")
     options = parser.parse_args()
+    if options.bench:
+        return bench_in_pairs(options)
     rates, costs, shares = [], [], []
     for pair in range(options.pairs):
         order = (False, True) if pair % 2 == 0 else (True, False)
@@ -114,10 +183,8 @@ def main():
             f"{page.fetched} times in {wall:.0f} s, {page.bytes / 1e6:.1f} MB",
             flush=True,
         )
-    spread = [100 * statistics.stdev(v) / len(v) ** 0.5 if len(v) > 1 else 0 for v in (rates, costs)]
     print(
-        f"with a page: rate {100 * statistics.mean(rates):+.1f} % (standard error {spread[0]:.1f}), "
-        f"master's CPU {100 * statistics.mean(costs):+.1f} % ({spread[1]:.1f}), "
+        f"with a page: rate {change(rates)}, master's CPU {change(costs)}, "
         f"server {100 * statistics.mean(shares):.2f} % of a core, at most {100 * max(shares):.2f}"
     )
 
