@@ -90,7 +90,7 @@ def one_bench(options, with_page):
         server, port = serve(folder)
         Page(port, run).start()
     time.sleep(3)
-    words = [options.bench, "--benchmark_filter=throughput/link:0/workers:1$"]
+    words = [options.bench, "--benchmark_filter=throughput/link:0/workers:1/"]
     words += ["--benchmark_format=json", "--benchmark_min_time=2"]
     said = subprocess.run(words, check=True, capture_output=True, text=True).stdout
     result = json.loads(said[said.index("{") :])["benchmarks"][0]

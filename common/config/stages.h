@@ -17,8 +17,9 @@ struct Stage {
 };
 
 struct StagePlan {
-  std::vector<Stage> stages;                  // empty: all genes at once
-  std::vector<std::string> validation_files;  // relative to the config's folder made absolute
+  std::vector<Stage> stages;  // empty: all genes at once
+  // Relative to the config's folder made absolute; where trials are windows of runs: folders.
+  std::vector<std::string> validation_files;
 };
 
 //   [[stages]]
@@ -27,7 +28,7 @@ struct StagePlan {
 //   [[stages]]
 //   genes = ["drive_noise_common", "full_speed"]
 //   [validation]
-//   trials = ["held_out.csv"]
+//   trials = ["held_out.csv"]     # of scenario ground: folders = ["tuesday"]
 //
 // Read from the config's own text.  Errors, with places: a name that is no gene, a gene in no
 // stage, a stage before the last without evaluations.

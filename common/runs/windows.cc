@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/runs/session.h"
+
 namespace gapfarm {
 namespace {
 
@@ -86,7 +88,7 @@ class Cutter {
   void add(std::size_t index, std::size_t from, std::size_t end) {
     const LoggedRun& run = log_.runs[index];
     Trial trial;
-    trial.session = run.session.empty() ? run.run : run.session + "/" + run.run;
+    trial.session = session_of(run);
     trial.trial = static_cast<std::int64_t>(to_.log.trials.size());
     trial.command = kWindowCommand;
     trial.run = static_cast<std::uint32_t>(index);

@@ -38,7 +38,7 @@ Result<std::unique_ptr<Optimiser>> optimiser_at(const std::optional<Checkpoint>&
 
 // How the run's results do on the trials that were kept apart; added to the text and the JSON, too.
 Result<std::vector<Validated>> add_validation(RunStore& store, const EvolutionRun& run,
-                                              const TrialLog& log, Farm& farm, const Genome& best,
+                                              const Problem& apart, Farm& farm, const Genome& best,
                                               std::string& text, Json& json) {
   const auto checkpoint = store.checkpoint();
   if (!checkpoint) return checkpoint.error();
@@ -46,10 +46,10 @@ Result<std::vector<Validated>> add_validation(RunStore& store, const EvolutionRu
   if (*checkpoint) {
     stages = stage_results((*checkpoint)->optimiser_state, run.problem.genes.size());
   }
-  auto rows = validate(farm, run.problem, log, stages, best);
+  auto rows = validate(farm, apart, stages, best);
   if (!rows) return rows.error();
-  text += fmt::format("validation on {} trials kept apart, {}:\n", log.trials.size(),
-                      fitness_name(run.problem.fitness.kind));
+  text += fmt::format("validation on {} {} kept apart, {}:\n", apart.log.trials.size(),
+                      apart.ground ? "windows" : "trials", fitness_name(run.problem.fitness.kind));
   for (const Validated& row : *rows) {
     text += fmt::format("  {:<24} {}\n", row.name,
                         row.fitness ? fmt::format("{:.6g}", *row.fitness) : "does not end well");
@@ -121,11 +121,11 @@ Result<std::unique_ptr<SocketFarm>> start_farm_of(const RunStore& store, const E
 
 // What a finished run is for: its model, held against trials kept apart and against no simulation.
 Status leave_model(RunStore& store, const EvolutionRun& run,
-                   const std::optional<TrialLog>& kept_apart, const EvolveSummary& summary,
+                   const std::optional<Problem>& kept_apart, const EvolveSummary& summary,
                    Farm& farm, CliContext& context, std::string& text, Json& json) {
   std::vector<Validated> validated;
   if (kept_apart) {
-    show_notes(*kept_apart, context.console);
+    show_notes(kept_apart->log, context.console);
     auto added = add_validation(store, run, *kept_apart, farm, summary.best->genome, text, json);
     if (!added) return added.error();
     validated = std::move(*added);

@@ -9,6 +9,7 @@
 #include <limits>
 #include <sstream>
 
+#include "common/config/config.h"
 #include "common/config/stages.h"
 #include "common/score/motion_model.h"
 #include "common/score/statistics.h"
@@ -172,11 +173,17 @@ RunOutcome run_outcome(const Problem& problem, const PredictionOfLog* before,
   return outcome;
 }
 
-Result<std::optional<TrialLog>> trials_kept_apart(const RunInfo& info, const Problem& problem) {
+Result<std::optional<Problem>> kept_apart_of(const RunInfo& info, const Problem& problem) {
   Config config;
   config.path = info.config_path;
   config.text = info.config_text;
   config.problem = problem;
+  if (problem.ground) {
+    const auto read = parse_config(info.config_text, info.config_path, start_no_program);
+    if (!read) return read.error();
+    config.windows = read->windows;
+    config.trial_files = read->trial_files;
+  }
   const auto plan = read_stages(config);
   if (!plan) return plan.error();
   return read_validation(*plan, config);
@@ -221,8 +228,9 @@ Result<RunReport> read_run_report(const RunQuestion& question) {
   if (Status s = add_history(*reader, *problem, *generations, question, &report); !s) {
     return s.error();
   }
-  const auto apart = trials_kept_apart(info, *problem);
-  if (apart && *apart) report.kept_apart = (*apart)->trials.size();
+  const auto apart = kept_apart_of(info, *problem);
+  if (apart && *apart) report.kept_apart = (*apart)->log.trials.size();
+  report.windows = problem->ground != nullptr;
   report.headline = headline(report);
   report.action = action(report, info);
   report.provenance = {

@@ -26,9 +26,9 @@ inline constexpr const char* kOutcomeDocument = "outcome";
 // problem that cannot be read.
 Result<RunReport> read_run_report(const RunQuestion& question);
 
-// The trials that the run's config keeps apart; none when it names none.  Errors: of reading them,
-// which may have gone since.
-Result<std::optional<TrialLog>> trials_kept_apart(const RunInfo& info, const Problem& problem);
+// The problem on what the run's config keeps apart; none when it names nothing.  Errors: of reading
+// that, which may have gone since.
+Result<std::optional<Problem>> kept_apart_of(const RunInfo& info, const Problem& problem);
 
 // Beside a run: what `gapfarm determine --out` wrote of it.
 inline constexpr const char* kDeterminedFile = "determined.csv";

@@ -6,12 +6,16 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "common/config/config.h"
+#include "common/config/stages.h"
 #include "common/json/json.h"
+#include "common/problem/run_files.h"
 #include "common/score/motion_model.h"
 #include "master/cli/inputs.h"
 #include "master/cli/run_model.h"
 #include "master/cli/run_page.h"
 #include "master/experiment/plan.h"
+#include "master/ground/paths.h"
 #include "master/store/run_reader.h"
 
 namespace gapfarm {
@@ -21,7 +25,9 @@ using Json = nlohmann::ordered_json;
 
 constexpr double kPlayedInterval_s = 0.02;
 constexpr std::size_t kMostPlayed = 400;  // samples of a path
-constexpr std::size_t kMostKept = 200;    // answers
+constexpr double kWindowInterval_s = 0.04;
+constexpr double kMostOfWindow = 150;   // samples, each a question of its own
+constexpr std::size_t kMostKept = 200;  // answers
 
 // More digits than a screen can show would only be sent.
 double micro(double value) { return std::round(1e6 * value) / 1e6; }
@@ -56,7 +62,8 @@ std::vector<v1::Override> muted(const Problem& problem, ParameterValues values) 
   };
   for (std::size_t row = 0; row < table.size(); ++row) {
     const std::string& key = table[row].key;
-    const bool noise = key.starts_with("drive_noise_") || key.starts_with("pose_noise_");
+    const bool noise = key.starts_with("drive_noise_") || key.starts_with("push_noise_") ||
+                       key.starts_with("pose_noise_");
     const double value = noise ? table[row].lower : values[row];
     if (value != problem.values[row]) set(row, value);
   }
@@ -69,6 +76,73 @@ v1::Task drive_task(const Problem& problem, const Trial& trial, const ParameterV
   planned.mutable_trial()->clear_path();
   planned.set_moved(true);
   return simulate_tasks({{planned}}, muted(problem, values), 1, kPlayedInterval_s)[0];
+}
+
+// What is shown of one drive, and whose simulation did not end well.
+struct Watched {
+  Json json;
+  std::string failed;
+
+  void put(const char* name, const std::vector<PathSample>& path, const Pose& X_WS,
+           const std::string& outcome) {
+    if (path.empty()) {
+      failed += fmt::format(" {} ends with {}.", name, outcome);
+    } else {
+      json[name] = path_json(path, X_WS);
+    }
+  }
+};
+
+constexpr const char* kSimulated[] = {"before", "best"};
+
+// What was pushed, by whom: outline in the piece's frame, and the finger's way from its start.
+void add_push(const Piece& piece, const Trial& trial, Json* json) {
+  for (const Eigen::Vector2d& corner : piece.corners) {
+    (*json)["outline"].push_back({micro(corner.x()), micro(corner.y())});
+  }
+  const Pose X_SW = inverse(trial.X_WS);
+  for (const TipSample& tip : trial.tip) {
+    const Eigen::Vector2d p_ST = transform(X_SW, {tip.x, tip.y});
+    (*json)["finger"].push_back({tip.t_s, micro(p_ST.x()), micro(p_ST.y()), 0});
+  }
+}
+
+Result<Watched> watch_trial(Farm& farm, const Problem& problem, const Trial& trial,
+                            const Genome& best) {
+  const auto results = farm.run(farm.add_problem(to_proto(problem)),
+                                {drive_task(problem, trial, problem.values),
+                                 drive_task(problem, trial, problem.values_of(best))});
+  if (!results) return results.error();
+  const bool pushed = !problem.pieces.empty();
+  const double duration_s = pushed ? trial.tip.empty() ? 0 : trial.tip.back().t_s
+                                   : resolved_command(trial, problem.commands).duration_s;
+  Watched watched;
+  watched.json = {{"duration_s", duration_s}, {"measured", measured_json(trial, duration_s)}};
+  if (pushed) add_push(problem.piece(trial.command), trial, &watched.json);
+  for (std::size_t k = 0; k < results->size(); ++k) {
+    const v1::TaskResult& result = (*results)[k];
+    Trial simulated;
+    if (result.outcome() == v1::OK) simulated = from_proto(result.simulate().trials(0));
+    watched.put(kSimulated[k], simulated.path, simulated.X_WS, v1::Outcome_Name(result.outcome()));
+  }
+  return watched;
+}
+
+Result<Watched> watch_window(Farm& farm, const Problem& problem, const Trial& window,
+                             const Genome& best, std::vector<PathSample> measured) {
+  const auto samples = static_cast<std::size_t>(
+      std::clamp(*window.duration_s / kWindowInterval_s, 10.0, kMostOfWindow));
+  const auto simulated = simulate_window(farm, problem, window, {{}, best}, samples);
+  if (!simulated) return simulated.error();
+  Trial trial = window;
+  trial.path = std::move(measured);
+  Watched watched;
+  watched.json = {{"duration_s", *window.duration_s},
+                  {"measured", measured_json(trial, *window.duration_s)}};
+  for (std::size_t k = 0; k < simulated->size(); ++k) {
+    watched.put(kSimulated[k], (*simulated)[k].path, window.X_WS, (*simulated)[k].failed);
+  }
+  return watched;
 }
 
 struct BestOf {
@@ -92,17 +166,29 @@ Result<BestOf> best_of(const RunReader& reader, std::optional<std::uint64_t> gen
   return BestOf{individuals->front(), *generation};
 }
 
-// Those that were evolved on, then those that were kept apart, where they can still be read.
-std::vector<Trial> all_trials(const RunInfo& info, const Problem& problem) {
-  std::vector<Trial> all = problem.log.trials;
-  const auto apart = trials_kept_apart(info, problem);
-  if (apart && *apart) all.insert(all.end(), (*apart)->trials.begin(), (*apart)->trials.end());
-  return all;
-}
-
-std::string title_of(const Trial& trial, std::size_t number) {
+std::string title_of(const Trial& trial, std::size_t number, bool window) {
+  if (window) {
+    return fmt::format("Window {} ({}, from {:.2f} s on)", number, trial.session, *trial.t_s);
+  }
   return fmt::format("Trial {} ({}, {} of session {})", number, trial.command, trial.trial,
                      trial.session);
+}
+
+// The poses between a window's ends, from the log that the run was evolved on or kept apart.
+std::vector<PathSample> logged_window(const RunInfo& info, const Problem& problem,
+                                      const Trial& window, bool apart) {
+  Config config;
+  if (auto read = parse_config(info.config_text, info.config_path, start_no_program)) {
+    config = *std::move(read);
+  }
+  std::vector<std::string> folders = config.trial_files;
+  if (apart) {
+    const auto plan = read_stages(config);
+    if (!plan) return {};
+    folders = plan->validation_files;
+  }
+  const auto log = read_run_folders(folders, problem.ground->robot().channels);
+  return log ? measured_window(*log, window) : std::vector<PathSample>();
 }
 
 }  // namespace
@@ -112,15 +198,17 @@ Result<std::string> DriveShower::show(const DriveQuestion& question) {
   if (!reader) return reader.error();
   const auto problem = stored_problem(*reader);
   if (!problem) return problem.error();
-  if (!problem->pieces.empty()) return Error{"pushes of pieces have no drive to show"};
-  const auto trials = all_trials(reader->info(), *problem);
-  if (question.trial >= trials.size()) {
-    return Error{
-        fmt::format("the run has {} trials, those that it kept apart included, and no "
-                    "trial {}",
-                    trials.size(), question.trial + 1)};
+  // Those that were evolved on, then those that were kept apart, where they can still be read.
+  const std::size_t logged = problem->log.trials.size();
+  const auto apart = question.trial < logged ? Result<std::optional<Problem>>(std::nullopt)
+                                             : kept_apart_of(reader->info(), *problem);
+  const bool beyond = question.trial >= logged;
+  const std::size_t extra = apart && *apart ? (*apart)->log.trials.size() : 0;
+  if (beyond && question.trial - logged >= extra) {
+    return Error{fmt::format("the run has {} {}, those that it kept apart included, and no {}",
+                             logged + extra, problem->ground ? "windows" : "trials",
+                             question.trial + 1)};
   }
-  const bool apart = question.trial >= problem->log.trials.size();
   const auto best = best_of(*reader, question.generation);
   if (!best) return best.error();
   const std::string key =
@@ -134,37 +222,30 @@ Result<std::string> DriveShower::show(const DriveQuestion& question) {
     if (!farm) return farm.error();
     farm_ = *std::move(farm);
   }
-  const Trial& trial = trials[question.trial];
-  const auto results =
-      farm_->run(farm_->add_problem(to_proto(*problem)),
-                 {drive_task(*problem, trial, problem->values),
-                  drive_task(*problem, trial, problem->values_of(best->individual.genome))});
-  if (!results) return results.error();
-  const double duration_s = resolved_command(trial, problem->commands).duration_s;
-  Json json = {{"title", title_of(trial, question.trial + 1) + (apart ? ", kept apart" : "")},
-               {"kept_apart", apart},
-               {"duration_s", duration_s},
-               {"measured", measured_json(trial, duration_s)}};
-  std::string failed;
-  const char* const names[] = {"before", "best"};
-  for (std::size_t k = 0; k < results->size(); ++k) {
-    const v1::TaskResult& result = (*results)[k];
-    if (result.outcome() != v1::OK) {
-      failed += fmt::format(" {} ends with {}.", names[k], v1::Outcome_Name(result.outcome()));
-      continue;
-    }
-    const Trial simulated = from_proto(result.simulate().trials(0));
-    json[names[k]] = path_json(simulated.path, simulated.X_WS);
-  }
+  const Problem& of = beyond ? **apart : *problem;
+  const Trial& trial = of.log.trials[beyond ? question.trial - logged : question.trial];
+  auto drive = of.ground ? watch_window(*farm_, of, trial, best->individual.genome,
+                                        logged_window(reader->info(), of, trial, beyond))
+                         : watch_trial(*farm_, *problem, trial, best->individual.genome);
+  if (!drive) return drive.error();
+  Json json = {{"title", title_of(trial, question.trial + 1, of.ground != nullptr) +
+                             (beyond ? ", kept apart" : "")},
+               {"kept_apart", beyond}};
+  json.update(drive->json);
   json["said"] = fmt::format(
       "Best: genome {} of generation {}, {} {}.{}", best->individual.birth_id, best->generation,
       reader->info().fitness,
       best->individual.fitness ? fmt::format("{:.6g}", *best->individual.fitness) : "unknown",
-      failed);
-  json["note"] = std::string(apart ? "▲ Kept apart: evolution never saw this trial. " : "") +
-                 (trial.path.size() > 1 ? ""
-                                        : "Faint: no path was measured, an arc joins the start to "
-                                          "the measured end.");
+      drive->failed);
+  json["note"] = fmt::format(
+      "{}{}",
+      beyond ? fmt::format("▲ Kept apart: evolution never saw this {}. ",
+                           of.ground ? "window" : "trial")
+             : "",
+      json["measured"].size() > 1 ? ""
+      : of.ground ? "Faint: the log of the runs cannot be read (any more), an arc joins the "
+                    "start to the measured end."
+                  : "Faint: no path was measured, an arc joins the start to the measured end.");
   if (shown_.size() >= kMostKept) shown_.clear();
   return shown_[key] = json_text(json);
 }

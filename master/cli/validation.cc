@@ -4,19 +4,15 @@
 #include <filesystem>
 
 #include "common/config/config.h"
+#include "common/problem/run_files.h"
 #include "common/trials/read.h"
 #include "master/cli/inputs.h"
 #include "master/evolve/evaluation.h"
 
 namespace gapfarm {
 
-Result<std::optional<TrialLog>> read_validation(const StagePlan& plan, const Config& config) {
-  if (plan.validation_files.empty()) return std::optional<TrialLog>();
-  if (config.problem.ground) {
-    return Error{
-        "[validation] is for trials; predict runs that were kept apart by `gapfarm horizons "
-        "RUN --trials FOLDER`"};
-  }
+Result<std::optional<Problem>> read_validation(const StagePlan& plan, const Config& config) {
+  if (plan.validation_files.empty()) return std::optional<Problem>();
   for (const std::string& file : plan.validation_files) {
     const auto same = [&](const std::string& other) {
       std::error_code code;
@@ -26,9 +22,16 @@ Result<std::optional<TrialLog>> read_validation(const StagePlan& plan, const Con
       return Error{file + " is both evolved on and kept apart; a validation takes other trials"};
     }
   }
+  Problem apart = config.problem;
+  if (apart.ground) {
+    const Status read = read_problem_runs(plan.validation_files, config.windows, &apart);
+    if (!read) return read.error();
+    return std::optional<Problem>(std::move(apart));
+  }
   auto log = read_trial_files(plan.validation_files, command_names(config.problem.commands));
   if (!log) return log.error();
-  return std::optional<TrialLog>(*std::move(log));
+  apart.log = *std::move(log);
+  return std::optional<Problem>(std::move(apart));
 }
 
 Status check_runnable(const Config& config) {
@@ -39,10 +42,8 @@ Status check_runnable(const Config& config) {
   return log ? Status() : Status(log.error());
 }
 
-Result<std::vector<Validated>> validate(Farm& farm, const Problem& problem, const TrialLog& log,
+Result<std::vector<Validated>> validate(Farm& farm, const Problem& apart,
                                         const std::vector<Genome>& stages, const Genome& best) {
-  Problem apart = problem;
-  apart.log = log;
   std::vector<Validated> rows = {{"the config's own values", {}}};
   std::vector<Genome> genomes = {{}};
   for (std::size_t i = 0; i < stages.size(); ++i) {

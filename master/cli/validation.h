@@ -16,16 +16,16 @@ struct Validated {
   std::optional<double> fitness;
 };
 
-// The trials that [validation] keeps apart; none when it names none.  Errors: of reading, a file
-// that is among the trials evolved on.
-Result<std::optional<TrialLog>> read_validation(const StagePlan& plan, const Config& config);
+// The problem with what [validation] keeps apart in place of its trials; none when it names none.
+// Errors: of reading, a file or folder that is among those evolved on.
+Result<std::optional<Problem>> read_validation(const StagePlan& plan, const Config& config);
 
 // What a run needs of its config.  Errors of check_evolvable(), read_stages() and
 // read_validation().
 Status check_runnable(const Config& config);
 
-// Fitness on `log` of the problem's own values, each stage's result and the best.
-Result<std::vector<Validated>> validate(Farm& farm, const Problem& problem, const TrialLog& log,
+// Fitness on what was kept apart of the problem's own values, each stage's result and the best.
+Result<std::vector<Validated>> validate(Farm& farm, const Problem& apart,
                                         const std::vector<Genome>& stages, const Genome& best);
 
 }  // namespace gapfarm

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/runs/session.h"
 #include "common/runs/windows.h"
 #include "master/report/svg.h"
 
@@ -141,6 +142,67 @@ Result<DrivenPaths> drive_paths(Farm& farm, const Problem& fitted, const Paramet
   paths.before_m = middle_of(off_before);
   paths.after_m = middle_of(off_after);
   return paths;
+}
+
+Result<std::vector<SimulatedWindow>> simulate_window(Farm& farm, const Problem& problem,
+                                                     const Trial& window,
+                                                     const std::vector<Genome>& genomes,
+                                                     std::size_t samples) {
+  Problem asked = problem;
+  asked.fitness.kind = FitnessKind::kLogScore;
+  asked.runs = {problem.runs[*window.run]};
+  asked.log = {};
+  const auto time = [&](std::size_t k) {
+    return *window.duration_s * static_cast<double>(k) / static_cast<double>(samples);
+  };
+  for (std::size_t k = 1; k <= samples; ++k) {
+    Trial stretch = window;
+    stretch.run = 0;
+    stretch.trial = static_cast<std::int64_t>(k);
+    stretch.duration_s = time(k);
+    asked.log.trials.push_back(std::move(stretch));
+  }
+  std::vector<v1::Task> tasks(genomes.size());
+  for (std::size_t g = 0; g < genomes.size(); ++g) {
+    v1::PredictTask& predict = *tasks[g].mutable_predict();
+    predict.set_means_only(true);
+    predict.mutable_point()->mutable_genome()->Add(genomes[g].begin(), genomes[g].end());
+  }
+  const auto results = farm.run(farm.add_problem(to_proto(asked)), tasks);
+  if (!results) return results.error();
+  std::vector<SimulatedWindow> windows;
+  for (const v1::TaskResult& result : *results) {
+    SimulatedWindow& to = windows.emplace_back();
+    if (result.outcome() != v1::OK) {
+      to.failed = v1::Outcome_Name(result.outcome());
+      continue;
+    }
+    to.path.push_back({0, window.X_WS});
+    for (const v1::Predicted& p : result.predict().predictions()) {
+      to.path.push_back({time(to.path.size()), from_proto(p.end())});
+    }
+  }
+  return windows;
+}
+
+std::vector<PathSample> measured_window(const RunLog& log, const Trial& window) {
+  const auto run = std::find_if(log.runs.begin(), log.runs.end(), [&](const LoggedRun& r) {
+    return session_of(r) == window.session;
+  });
+  std::vector<PathSample> path;
+  if (run == log.runs.end()) return path;
+  const double end_s = *window.t_s + *window.duration_s;
+  constexpr double kSame = 1e-6;  // of a time or a pose that was written and read again
+  for (const PoseRow& pose : run->poses) {
+    if (pose.t_s < *window.t_s - kSame || pose.t_s > end_s + kSame) continue;
+    path.push_back({pose.t_s - *window.t_s, pose.X_WM});
+  }
+  const auto same = [](const Pose& a, const Pose& b) {
+    return std::hypot(a.x - b.x, a.y - b.y) < kSame;
+  };
+  const bool of_it = path.size() > 1 && same(path.front().pose, window.X_WS) &&
+                     same(path.back().pose, window.X_WE);
+  return of_it ? path : std::vector<PathSample>();
 }
 
 std::string draw_paths(const DrivenPaths& paths, std::size_t most) {

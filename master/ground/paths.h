@@ -28,6 +28,21 @@ struct DrivenPaths {
 Result<DrivenPaths> drive_paths(Farm& farm, const Problem& fitted, const ParameterValues& values,
                                 const RunLog& runs);
 
+// One window of `problem` as a simulation drives it, from its measured start.
+struct SimulatedWindow {
+  std::string failed;            // what its simulation ended with; empty: well
+  std::vector<PathSample> path;  // of the marker, t from the window's start; empty unless well
+};
+// One for each of `genomes` (empty: the problem's own values), `samples` poses each and the start.
+// Errors: the farm's.
+Result<std::vector<SimulatedWindow>> simulate_window(Farm& farm, const Problem& problem,
+                                                     const Trial& window,
+                                                     const std::vector<Genome>& genomes,
+                                                     std::size_t samples);
+// What was measured of it, from its start to its end; empty where `log` is not the one that the
+// window was cut from.
+std::vector<PathSample> measured_window(const RunLog& log, const Trial& window);
+
 // A panel a run, at most `most` of them.
 std::string draw_paths(const DrivenPaths& paths, std::size_t most = 6);
 

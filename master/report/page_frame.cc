@@ -117,9 +117,14 @@ std::string drives_section(std::string_view tuned, std::string_view final_) {
          kNoScript + "</section>\n";
 }
 
-std::string watch_section() {
-  return R"(<section id="watch"><h2>Watch a drive</h2>
-<p>Any trial of the log, seen from above: as it was measured, and as the config's values and the best of a generation drive it without chance. The server simulates what is asked for.</p>)" +
+std::string watch_section(std::string_view what) {
+  const char* any = what == "window" ? "Any window of the logged runs, from its measured start on"
+                    : what == "push" ? "Any push of the log"
+                                     : "Any trial of the log";
+  return fmt::format(
+             R"(<section id="watch"><h2>Watch a {}</h2>
+<p>{}, seen from above: as it was measured, and as the config's values and the best of a generation have it without chance. The server simulates what is asked for.</p>)",
+             what, any) +
          plot_key(measured_key() + model_keys("before", "best")) +
          R"(<div class="controls" id="watch-controls"></div><p class="quiet" id="watch-said" role="status"></p><div id="watch-plot"></div>)" +
          kNoScript + "</section>\n";

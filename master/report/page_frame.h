@@ -34,7 +34,7 @@ extern const char* const kNoScript;
 // The sections that only hold plots of trials.
 std::string floor_section();
 std::string drives_section(std::string_view tuned, std::string_view final_);
-// Any trial's drive, played; of pages that a server shows.
-std::string watch_section();
+// Any trial, played; of pages that a server shows.  `what`: "drive", "push" or "window".
+std::string watch_section(std::string_view what);
 
 }  // namespace gapfarm

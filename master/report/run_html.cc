@@ -163,6 +163,7 @@ Json page_json(const RunReport& report) {
                {"timeline", timeline_json(report.farm)},
                {"served", report.served},
                {"run", report.name},
+               {"windows", report.windows},
                {"logged_trials", report.trials},
                {"kept_apart", report.served ? report.kept_apart : 0},
                {"parameters", parameters_json(report.parameters)},
@@ -204,7 +205,7 @@ std::string run_html(const RunReport& report) {
     frame.places.emplace_back("residuals", "Residuals");
   }
   const bool farmed = !report.farm.state.empty();
-  const bool watched = report.served && !report.pieces && !report.genomes.empty();
+  const bool watched = report.served && !report.genomes.empty();
   if (watched) frame.places.emplace_back("watch", "Watch");
   if (!report.genomes.empty()) frame.places.emplace_back("genomes", "Genomes");
   if (farmed) frame.places.emplace_back("farm", "Farm");
@@ -218,7 +219,7 @@ std::string run_html(const RunReport& report) {
          densities_section(report) + elite_section(report) + scores(report);
   if (driven) body += floor_section() + drives_section("before", "after");
   if (poses) body += pose_sections();
-  if (watched) body += watch_section();
+  if (watched) body += watch_section(report.windows ? "window" : report.pieces ? "push" : "drive");
   body += genomes_section(report);
   if (farmed) body += farm_section(report.farm);
   body += provenance(report) + glossary_section(run_terms());

@@ -43,7 +43,12 @@ std::string state_line(const RunFarm& farm) {
 }
 
 std::string operators_section(const RunReport& report) {
-  if (report.operators.empty()) return "";
+  if (report.operators.empty() && report.generations.empty()) return "";
+  if (report.operators.empty()) {
+    return R"(<section id="operators"><h2>How often each operator is drawn</h2><p>Nothing to show: this run's optimiser has no )" +
+           term("operator", "operators") +
+           ", which only the genetic algorithm draws.</p></section>\n";
+  }
   return R"(<section id="operators"><h2>How often each operator is drawn</h2><p>The )" +
          term("operator", "operators") +
          R"( that made better offspring are drawn more often: the probabilities by generation.</p>)"

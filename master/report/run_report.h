@@ -143,6 +143,7 @@ struct RunReport {
   RunElite elite;
   RunFarm farm;
   std::size_t trials = 0;      // of the log
+  bool windows = false;        // trials are windows of runs
   std::size_t kept_apart = 0;  // trials of [validation] that a server can play
   bool served = false;         // by `gapfarm serve`: the page looks again while it is open
   std::vector<std::pair<std::string, std::string>> provenance;

@@ -1,8 +1,8 @@
 // node serve_page.mjs CHROMIUM BIN SOURCE FOLDER: evolves, serves and looks, as a person would.
 // A run from its first generation to its end, another whose worker and then master are killed with -9
 // and which is resumed under the open page, a diagnosis from its first stage to its report, two runs
-// compared, addresses opened again, a drive played, keys only, a phone, dark, without events, without
-// scripts, and a server that goes away.
+// compared, addresses opened again, a drive, windows of a ground robot's runs and pushes played, keys only,
+// a phone, dark, without events, without scripts, and a server that goes away.
 import { spawn } from "node:child_process";
 import { mkdirSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
@@ -54,6 +54,21 @@ pose_noise_heading = 0.008
 sessions = 2
 levels = [0.5, 1.0]
 durations = [0.5, 1.0]
+`;
+const PUSHED = `scenario = "push"
+[parameters]
+step_rate = 120
+[genes]
+shape_factor = [0.2, 1.0]
+ground_friction = [0.1, 1.0]
+[simulate]
+sessions = 1
+[[pieces]]
+name = "square"
+corners = [[0, 0], [0.1, 0], [0.1, 0.1], [0, 0.1]]
+origin = "centroid"
+thickness = 0.01
+mass = 0.08
 `;
 const may = (url) => url.startsWith("http://127.0.0.1:");
 
@@ -114,12 +129,100 @@ async function diagnosed(view) {
   const page = await open(view("d"), { may });
   const stage = `document.querySelector("#tiles")?.innerText || ""`;
   await until(page, `/[1-9] of 6/.test(${stage}) || (document.querySelector("#tiles") || location.reload(), false)`, "a diagnosis is seen at work");
+  // What was found is there before the report is, stage by stage.
+  const told = (about) => `[...document.querySelectorAll("#found-list h4")].some((h) => h.textContent === "${about}")`;
+  await until(page, told("the base model"), "what the first stage found is told");
+  await until(page, told("what the catalogue offers"), "what the catalogue offers is told");
   await page.picture("serve-diagnosis-live");
   await until(page, `document.getElementById("shrinkage") || document.getElementById("screening")`, "the diagnosis becomes its report", 400_000);
   check((await diagnosis.ended) === 0, `the diagnosis did not end well: ${diagnosis.said}`);
   for (const complaint of page.complaints) check(/404/.test(complaint), `diagnosis: ${complaint}`);
   await page.picture("serve-diagnosis");
   await page.close();
+}
+
+// Windows of runs: a ground robot's, those that were kept apart, too.
+async function windows(view) {
+  const rover = (name) => join(source, "configs/rover", name);
+  for (const day of ["monday", "tuesday"]) {
+    const made = start("import", "runs", rover(`${day}_cmd_vel.csv`), rover(`${day}_tracker.csv`), "--out", day);
+    check((await made.ended) === 0, `runs were not imported: ${made.said}`);
+  }
+  const robot = start("robot", rover("rover.urdf"), "--controllers", rover("control.yaml"), "--out", "robot.toml");
+  check((await robot.ended) === 0, `no robot: ${robot.said}`);
+  writeFileSync(join(folder, "rover.toml"), `scenario = "ground"
+[robot]
+file = "robot.toml"
+[runs]
+folders = ["monday"]
+[validation]
+folders = ["tuesday"]
+[genes]
+delay = "table"
+lag = "table"
+wheels.left.radius = "table"
+`);
+  const run = start("evolve", "rover.toml", "--out", "rover", "--generations", "1", "--population", "4", "--workers", "1");
+  check((await run.ended) === 0, `the rover's run did not end well: ${run.said}`);
+  const page = await open(`${view("rover")}&trial=3`, { may });
+  const title = `document.querySelector("#watch-plot h4")?.textContent`;
+  await until(page, `/^Window 3 .*, at 2.0. s of 2/.test(${title})`, "a window is shown");
+  const measured = `Math.max(...[...document.querySelectorAll("#watch-plot path.measured")].map((p) => p.getAttribute("d").split("L").length))`;
+  check((await page.run(measured)) > 15, "the poses that were measured on the way are not drawn");
+  await page.run(`document.getElementById("watch").scrollIntoView()`);
+  await page.picture("serve-window");
+  const kept = await page.run(`PAGE.logged_trials + 2`);
+  const apart = await open(`${view("rover")}&trial=${kept}`, { may });
+  await until(apart, `/^Window ${kept} .*kept apart/.test(${title})`, "a window that was kept apart is shown");
+  check(/never saw this window/.test(await apart.run(`document.getElementById("watch-plot").innerText`)), "it is not marked");
+  for (const complaint of [...page.complaints, ...apart.complaints]) check(false, `windows: ${complaint}`);
+  await page.close();
+  await apart.close();
+}
+
+// Pushes: the piece's outline as measured and as simulated, and the finger's way.
+async function pushes(view) {
+  writeFileSync(join(folder, "push.toml"), PUSHED);
+  const made = start("simulate", "push.toml", "--trials", "8", "--out", "pushes.csv", "--workers", "1");
+  check((await made.ended) === 0, `nothing was pushed: ${made.said}`);
+  const run = start("evolve", "push.toml", "--trials", "pushes.csv", "--out", "push", "--generations", "1", "--population", "4", "--workers", "1");
+  check((await run.ended) === 0, `the pushes' run did not end well: ${run.said}`);
+  const page = await open(`${view("push")}&trial=2`, { may });
+  await until(page, `/^Trial 2 /.test(document.querySelector("#watch-plot h4")?.textContent)`, "a push is shown");
+  const closed = `[...document.querySelectorAll("#watch-plot path")].filter((p) => p.getAttribute("d").split("L").length === 5).length`;
+  check((await page.run(closed)) >= 3, "three outlines of the piece are not drawn");
+  for (const complaint of page.complaints) check(false, `pushes: ${complaint}`);
+  await page.run(`document.getElementById("watch").scrollIntoView()`);
+  await page.picture("serve-push");
+  await page.close();
+}
+
+// Choices are steps that back takes back and forward does again; what cannot be read says why.
+async function backAndBroken(address, view) {
+  const page = await open(view("short"), { may });
+  const choose = (value) => page.run(`(() => { const s = document.querySelector("#progress-controls select"); s.value = "${value}"; s.dispatchEvent(new Event("change")); })()`);
+  const chosen = (value) => `document.querySelector("#progress-controls select").value === "${value}"`;
+  await choose("evaluations");
+  await choose("minutes");
+  await page.run("history.back()");
+  await until(page, `${chosen("evaluations")} && location.search.includes("against=evaluations")`, "back takes a choice back");
+  await page.run("history.back()");
+  await until(page, `${chosen("generation")} && !location.search.includes("against")`, "back takes the first choice back");
+  await page.run("history.forward()");
+  await until(page, chosen("evaluations"), "forward chooses again");
+  for (const complaint of page.complaints) check(false, `back: ${complaint}`);
+  await page.close();
+  mkdirSync(join(folder, "broken"));
+  writeFileSync(join(folder, "broken/run.sqlite"), "no store");
+  const broken = await open(address, { may });
+  await until(broken, `/not a SQLite file/.test(document.getElementById("entries").innerText)`, "a store that is none is told of");
+  await broken.close();
+  const why = await open(view("broken"), { may });
+  check(/not a SQLite file/.test(await why.run(`document.getElementById("why")?.textContent`)), "its page does not say why");
+  check((await why.run(OVERFLOW)) <= 0, "a page that says why is wider than the window");
+  await why.picture("serve-broken");
+  await why.close();
+  rmSync(join(folder, "broken"), { recursive: true });
 }
 
 try {
@@ -212,6 +315,9 @@ try {
   await byKeys(address);
   await withoutEvents(view("live"), () => start("resume", "live", "--workers", "1"));
   await diagnosed(view);
+  await windows(view);
+  await pushes(view);
+  await backAndBroken(address, view);
 
   for (const [name, url, options] of [
     ["serve-phone", view("short"), { width: 390, height: 844, dark: true }],

@@ -26,17 +26,33 @@ function watchedPaths(drive) {
   });
 }
 
-function watchSpec(lines, t) {
+// A piece's corners where it is now, closed.
+const outlineAt = (outline, [, x, y, theta]) => [...outline, outline[0]].map(([a, b]) => [
+  0, x + a * Math.cos(theta) - b * Math.sin(theta), y + a * Math.sin(theta) + b * Math.cos(theta)]);
+
+function watchSpec(lines, t, { outline, finger }) {
+  const far = Math.max(0.02, ...lines.flatMap(({ path }) => path.map(([, x, y]) => Math.hypot(x, y))));
+  const [unit, each] = far < 2 ? ["mm", 1000] : ["m", 1];
+  const place = ([, x, y]) => [each * x, each * y];
   const layers = lines.map(({ key, style, dashed, known, path }) => (
-    { kind: "line", style, dashed: dashed || !known, width: 2, faint: known ? 0.8 : 0.4, name: `${key} path`, points: path.map(([, x, y]) => [1000 * x, 1000 * y]) }));
-  const spec = framed(layers, ["ahead of the start, mm", "left of the start, mm"]);
-  const reach = Math.max(20, ...lines.flatMap(({ path }) => path.map(([, x, y]) => 1000 * Math.hypot(x, y))));
-  for (const { key, style, shape, path } of lines) {
-    const [, x, y, theta] = placeAt(path, t);
-    layers.push({ kind: "arrows", style, width: 2.5, name: `${key} heading`, arrows: [tick({ x, y, theta }, 0.1 * reach)] });
-    layers.push({ kind: "points", style, shape, name: `${key} now`, points: [[1000 * x, 1000 * y]] });
+    { kind: "line", style, dashed: dashed || !known, width: 2, faint: known ? 0.8 : 0.4, name: `${key} path`, points: path.map(place) }));
+  const outlines = (at) => (outline ? lines : []).map(({ key, style, dashed, path }) => (
+    { kind: "line", style, dashed, width: 1.5, name: `${key} outline`, points: outlineAt(outline, placeAt(path, at)).map(place) }));
+  if (finger) {
+    layers.push({ kind: "line", style: "quiet", dashed: true, width: 1, name: "finger's way", points: finger.map(place) });
+    layers.push({ kind: "points", style: "quiet", shape: "dot", name: "finger now", points: [place(placeAt(finger, t))] });
   }
-  return { ...spec, equal: true };
+  // What is seen at any time has room: the frame stands still.
+  const spec = framed([...layers, ...outlines(0), ...outlines(Infinity)], [`ahead of the start, ${unit}`, `left of the start, ${unit}`]);
+  layers.push(...outlines(t));
+  for (const { key, style, shape, path } of lines) {
+    const now = placeAt(path, t);
+    const [x, y] = place(now);
+    const length = 0.1 * each * far;
+    layers.push({ kind: "arrows", style, width: 2.5, name: `${key} heading`, arrows: [[x, y, x + length * Math.cos(now[3]), y + length * Math.sin(now[3])]] });
+    layers.push({ kind: "points", style, shape, name: `${key} now`, points: [[x, y]] });
+  }
+  return { ...spec, layers, equal: true };
 }
 
 function element(parent, name, properties, text) {
@@ -53,7 +69,8 @@ function startWatch() {
     const label = element(controls, "label", {}, `${title} `);
     return element(label, "input", { type: "number", min: 1, max: most, step: 1, name: title });
   };
-  const trial = number("Trial", PAGE.logged_trials + PAGE.kept_apart);
+  const what = PAGE.windows ? "Window" : "Trial";
+  const trial = number(what, PAGE.logged_trials + PAGE.kept_apart);
   if (PAGE.kept_apart) {
     element(controls, "span", { className: "quiet" }, `${PAGE.logged_trials + 1} to ${PAGE.logged_trials + PAGE.kept_apart}: kept apart`);
   }
@@ -73,7 +90,7 @@ function startWatch() {
   const draw = () => {
     scrub.setAttribute("aria-valuetext", `${words(time())} s of ${words(end)} s`);
     chart.figure.classList.toggle("apart", drive.kept_apart);
-    chart.show(watchSpec(lines, time()), `${drive.title}, at ${time().toFixed(2)} s of ${words(end)} s`, drive.note, true);
+    chart.show(watchSpec(lines, time(), drive), `${drive.title}, at ${time().toFixed(2)} s of ${words(end)} s`, drive.note, true);
   };
   const stop = () => {
     cancelAnimationFrame(frame);
@@ -93,7 +110,8 @@ function startWatch() {
     frame = requestAnimationFrame(step);
   }
 
-  async function load() {
+  // `step`: a person asked for it.
+  async function load(step) {
     stop();
     said.textContent = "Asked for it; a simulation takes about a second.";
     const wanted = new URLSearchParams({ of: PAGE.run, trial: trial.value || "1" });
@@ -109,16 +127,22 @@ function startWatch() {
       said.textContent = drive.said;
       chart.zoom = null;
       draw();
-      address.set({ trial: wanted.get("trial"), generation: wanted.get("generation") });
+      address.set({ trial: wanted.get("trial"), generation: wanted.get("generation") }, step);
     } catch (error) {
       said.textContent = `It cannot be shown: ${error.message}`;
     }
     parent.dataset.shown = said.textContent;
   }
 
-  show.addEventListener("click", load);
-  for (const input of [trial, generation]) input.addEventListener("keydown", (event) => event.key === "Enter" && load());
+  show.addEventListener("click", () => load(true));
+  for (const input of [trial, generation]) input.addEventListener("keydown", (event) => event.key === "Enter" && load(true));
+  address.follow(() => {
+    const [last, of] = [address.get("trial") || "1", address.get("generation")];
+    if (trial.value === last && generation.value === of) return;
+    [trial.value, generation.value] = [last, of];
+    load(false);
+  });
   play.addEventListener("click", () => (frame ? stop() : start()));
   scrub.addEventListener("input", () => { stop(); draw(); });
-  load();
+  load(false);
 }
