@@ -1,6 +1,7 @@
 // A run's farm on its page: who worked, who came and went, what it coped with.
 #include <spdlog/fmt/fmt.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "master/report/html.h"
@@ -49,6 +50,27 @@ std::string log_html(const std::vector<std::string>& lines) {
   return R"(<div class="snippet log"><pre tabindex="0">)" + text + "</pre></div>";
 }
 
+constexpr const char* kTellsLittle =
+    "<p>Nothing that this store tells of: an older program wrote it, and the oldest kept no "
+    "account "
+    "of such things.</p>";
+
+// Zeros of a store that has no place for other numbers are none.
+bool tells_little(const RunFarm& farm) {
+  return farm.timeline.counts.empty() &&
+         std::all_of(farm.tally.begin(), farm.tally.end(),
+                     [](const auto& entry) { return entry.second == "0"; });
+}
+
+std::string tally_html(const RunFarm& farm) {
+  if (tells_little(farm)) return kTellsLittle;
+  std::string html = R"(<dl class="provenance">)";
+  for (const auto& [label, value] : farm.tally) {
+    html += "<div><dt>" + html_escaped(label) + "</dt><dd>" + html_escaped(value) + "</dd></div>";
+  }
+  return html + "</dl>";
+}
+
 // The plots are kept outside of what is put in its place: they draw themselves again.
 std::string timeline_html(const RunTimeline& timeline) {
   std::string html = "<h3>Who was there</h3>";
@@ -66,14 +88,12 @@ std::string farm_section(const RunFarm& farm) {
                      R"(<div id="farm-past" data-live><h3>Workers that failed</h3>)";
   html += farm.failures.empty() ? std::string("<p>None that this store tells of.</p>")
                                 : list_of(farm.failures, "cautions");
-  html += R"(<h3>What it coped with</h3><dl class="provenance">)";
-  for (const auto& [label, value] : farm.tally) {
-    html += "<div><dt>" + html_escaped(label) + "</dt><dd>" + html_escaped(value) + "</dd></div>";
-  }
-  html += "</dl><h3>What somebody should look at</h3>";
-  html += farm.incidents.empty()
-              ? std::string("<p>Nothing: no task was given up, and no two answers differed.</p>")
-              : list_of(farm.incidents, "cautions");
+  html += "<h3>What it coped with</h3>" + tally_html(farm);
+  html += "<h3>What somebody should look at</h3>";
+  html += !farm.incidents.empty() ? list_of(farm.incidents, "cautions")
+          : tells_little(farm)
+              ? std::string(kTellsLittle)
+              : std::string("<p>Nothing: no task was given up, and no two answers differed.</p>");
   return html + "<h3>The end of its log</h3>" + log_html(farm.log) + "</div></section>\n";
 }
 

@@ -84,11 +84,13 @@ function startWatch() {
   const said = document.getElementById("watch-said");
   const chart = new Chart(parent, 0.7);
   chart.figure.classList.add("large");
+  chart.figure.hidden = true;  // until there is a drive
   let [drive, lines, end, frame] = [null, [], 1, 0];
 
   const time = () => (scrub.valueAsNumber / 1000) * end;
   const draw = () => {
     scrub.setAttribute("aria-valuetext", `${words(time())} s of ${words(end)} s`);
+    chart.figure.hidden = false;
     chart.figure.classList.toggle("apart", drive.kept_apart);
     chart.show(watchSpec(lines, time(), drive), `${drive.title}, at ${time().toFixed(2)} s of ${words(end)} s`, drive.note, true);
   };

@@ -120,6 +120,15 @@ TEST_F(RunPage, CountsTrialsKeptApartWhileTheirFileIsThere) {
   EXPECT_EQ(read().kept_apart, 0u);
 }
 
+// A store without a place for what a farm copes with does not say that it was nothing.
+TEST_F(RunPage, TellsNoZerosThatNobodyCounted) {
+  make(1);
+  const std::string page = run_html(read());
+  EXPECT_THAT(page, HasSubstr("kept no account"));
+  EXPECT_THAT(page, testing::Not(HasSubstr("no task was given up")));
+  EXPECT_THAT(page, testing::Not(HasSubstr("retries: jobs given out again")));
+}
+
 TEST_F(RunPage, ShowsWhatDetermineLeft) {
   make(1);
   const RunReport before = read();
