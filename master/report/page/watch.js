@@ -36,8 +36,9 @@ function watchSpec(lines, t, { outline, finger }) {
   const place = ([, x, y]) => [each * x, each * y];
   const layers = lines.map(({ key, style, dashed, known, path }) => (
     { kind: "line", style, dashed: dashed || !known, width: 2, faint: known ? 0.8 : 0.4, name: `${key} path`, points: path.map(place) }));
-  const outlines = (at) => (outline ? lines : []).map(({ key, style, dashed, path }) => (
-    { kind: "line", style, dashed, width: 1.5, name: `${key} outline`, points: outlineAt(outline, placeAt(path, at)).map(place) }));
+  // Nobody knows when a piece moved of which only the end was measured.
+  const outlines = (at) => (outline ? lines : []).map(({ key, style, dashed, known, path }) => (
+    { kind: "line", style, dashed, width: 1.5, name: `${key} outline`, points: outlineAt(outline, placeAt(path, known ? at : Infinity)).map(place) }));
   if (finger) {
     layers.push({ kind: "line", style: "quiet", dashed: true, width: 1, name: "finger's way", points: finger.map(place) });
     layers.push({ kind: "points", style: "quiet", shape: "dot", name: "finger now", points: [place(placeAt(finger, t))] });
