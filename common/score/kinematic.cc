@@ -184,6 +184,7 @@ class Body {
       robot_.steering.understeer_s2_m2 = 0;  // is what tyres that slip look like
     }
     if (name == "slip_angle") slip_angle_rad_ = value;
+    if (name == "grip_shape") grip_shape_ = std::exp(value);
     if (name == "pose_scale") scale_ = value;
     if (name == "aspect") aspect_ = value;
     if (name == "steering_offset") robot_.steering.offset_rad += value;
@@ -206,7 +207,7 @@ class Body {
   Twist on_floor(double v, double curvature) const {
     if (!grip_m_s2_) return {v, 0, v * curvature};
     const double asked = v * v * curvature / *grip_m_s2_;
-    const double held = 1 / std::sqrt(1 + asked * asked);
+    const double held = std::pow(1 + std::pow(std::abs(asked), grip_shape_), -1 / grip_shape_);
     return {v, -slip_angle_rad_ * v * asked * held, v * curvature * held};
   }
 
@@ -230,6 +231,7 @@ class Body {
   double sag_ = 0, drift_ = 0, scale_ = 1, aspect_ = 1;
   std::optional<double> grip_m_s2_;  // none: no speed slips
   double slip_angle_rad_ = 0;
+  double grip_shape_ = 2;
   Eigen::MatrixXd inverse_;
 };
 

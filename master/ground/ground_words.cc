@@ -119,6 +119,7 @@ std::string words_of_change(const GroundRobot& robot, const GroundHypothesis& h,
                             const NamedEffect& effect) {
   std::string text = h.thing + " ";
   for (std::size_t k = 0; k < h.freed.size() && k < effect.parameters.size(); ++k) {
+    if (h.freed[k].name == "grip_shape") continue;  // a word for it is nobody's
     const bool several = h.freed.size() > 1;
     const std::string which = several ? spoken(h.freed[k]) : "";
     text += (k > 0 ? "; " : "") + which + (which.empty() ? "" : " ") +

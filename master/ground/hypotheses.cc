@@ -248,7 +248,7 @@ void Catalogue::tracker() {
 void Catalogue::floors() {
   if (is_steered(robot_)) {
     value("friction", {"friction_anisotropy"}, "friction across the wheels",
-          {row("grip"), row("slip_angle")});
+          {row("grip"), row("slip_angle"), row("grip_shape")});
   } else if (skids(robot_)) {
     value("friction_across", {"wheel_separation", "icr_track", "friction_anisotropy"},
           "how hard the floor makes it to turn (the separation of the sides, as they roll)",

@@ -2,17 +2,47 @@
 
 #include <algorithm>
 
+#include "common/random/stream.h"
+
 namespace gapfarm {
 namespace {
 
 // How far off a file may be of which nothing is asked, in what a robot changes by by itself.
 constexpr double kFarOff = 20;
 
+// A grip that was never reached has no upper end that shows, and none below that does not: half of
+// how far it may fall, in its logarithm, before the log would be two nats less likely.
+constexpr double kTellsGrip = 2;  // nats
+constexpr double kMostUnsureGrip = 2, kGripStep = 0.1;
+constexpr double kSharpGrip = 1.8;  // of its shape
+
+double unsure_grip(const WindowFitter& fitter, const WindowFit& fit, std::size_t grip) {
+  for (double fall = kGripStep; fall < kMostUnsureGrip; fall += kGripStep) {
+    Eigen::VectorXd values = fit.values;
+    values[static_cast<Eigen::Index>(grip)] -= fall;
+    double best = fitter.hold(fit.rows, values).objective;
+    for (std::size_t k = 0; k < fit.rows.size(); ++k) {
+      if (fit.rows[k].row.name == "grip_shape") values[static_cast<Eigen::Index>(k)] = kSharpGrip;
+    }
+    best = std::max(best, fitter.hold(fit.rows, values).objective);
+    if (fit.objective - best > kTellsGrip) return fall / 2;
+  }
+  return kMostUnsureGrip / 2;
+}
+
 GroundReference reference_of(const WindowFitter& fitter, const WindowFit& fit, std::uint64_t seed) {
   GroundReference reference;
   for (const FitRow& row : fit.rows) reference.names.push_back(row.row.name);
   reference.values = fit.values;
   reference.draws = fitter.draws(fit, seed).colwise() - fit.values;
+  for (std::size_t k = 0; k < fit.rows.size(); ++k) {
+    if (fit.rows[k].row.name != "grip") continue;
+    const double unsure = unsure_grip(fitter, fit, k);
+    Stream stream({seed, Purpose::kStatistics, 2, 0, 0});
+    for (double& off : reference.draws.row(static_cast<Eigen::Index>(k))) {
+      off += unsure * stream.normal();
+    }
+  }
   reference.covariance =
       reference.draws * reference.draws.transpose() / static_cast<double>(reference.draws.cols());
   return reference;

@@ -84,6 +84,7 @@ std::vector<KinematicRow> change_rows(const GroundRobot& robot) {
   const double held_m_s2 = robot.friction * robot.friction_ratio * kGravity_m_s2;
   rows.push_back({"grip", std::log(held_m_s2), kGripShare, "log", "-"});
   rows.push_back({"slip_angle", kSlipAngle_rad, kKeptSlipAngle_rad, "angle", "rad"});
+  rows.push_back({"grip_shape", std::log(2.0), kKeptGripShape, "shape", "-"});
   return rows;
 }
 

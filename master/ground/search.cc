@@ -22,6 +22,9 @@ constexpr int kFolds = 5;
 constexpr double kLeastSureFirst = 1;
 constexpr double kLeastSureNext = 2;
 constexpr double kShareOfFirst = 0.5;
+// Where to begin with another floor: changes of a grip's logarithm, and logarithms of its shape.
+constexpr double kGripChanges[] = {0, -0.3, -0.7, -1.1, -1.6, -2.2, 0.5};
+constexpr double kGripShapes[] = {0.7, 1.8};
 constexpr double kNear_s = 1, kMiddle_s = 3, kFar_s = 10;  // either way of the file's delay
 
 Eigen::VectorXd nominals(const std::vector<FitRow>& rows) {
@@ -48,6 +51,27 @@ Eigen::Index row_index(const std::vector<FitRow>& rows, const std::string& name)
   return found == rows.end() ? -1 : found - rows.begin();
 }
 
+// Values whose grip is the best of those far and near: past the limit of a tyre no slope leads
+// back.
+Eigen::VectorXd scan_grip(const WindowFitter& fitter, const std::vector<FitRow>& rows,
+                          const Eigen::VectorXd& values) {
+  const Eigen::Index grip = row_index(rows, "grip"), shape = row_index(rows, "grip_shape");
+  Eigen::VectorXd best = values;
+  double most = fitter.hold(rows, values).objective;
+  for (const double change : kGripChanges) {
+    for (const double sharp : kGripShapes) {
+      Eigen::VectorXd moved = values;
+      moved[grip] += change;
+      moved[shape] = sharp;
+      const double objective = fitter.hold(rows, moved).objective;
+      if (objective <= most) continue;
+      most = objective;
+      best = moved;
+    }
+  }
+  return best;
+}
+
 // `slopes`: of the search's fit.
 Offer try_one(const WindowFitter& fitter, const GroundSearch& search,
               const std::vector<Eigen::MatrixXd>& slopes, std::size_t index, WindowFit* fit) {
@@ -57,6 +81,7 @@ Offer try_one(const WindowFitter& fitter, const GroundSearch& search,
   if (hypothesis.freed.size() == 1 && hypothesis.freed[0].name == "delay") {
     values = scan_delay(fitter, rows, values);
   }
+  if (hypothesis.name == "friction") values = scan_grip(fitter, rows, values);
   const bool afar = values.head(search.fit.values.size()) != search.fit.values;
   if (!afar) {
     const double promised = fitter.promise(search.fit, slopes, rows, values);

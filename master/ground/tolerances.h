@@ -33,6 +33,8 @@ inline constexpr double kGripShare = 0.05;
 // Rear tyres of cars where they hold no more, and how well that is known.
 inline constexpr double kSlipAngle_rad = 0.17;
 inline constexpr double kKeptSlipAngle_rad = 0.02;
+// How gradually tyres give way (a logarithm) is the tyres' to say: the reference tells it.
+inline constexpr double kKeptGripShape = 0.05;
 inline constexpr double kGravity_m_s2 = 9.81;
 
 inline bool is_steered(const GroundRobot& robot) {

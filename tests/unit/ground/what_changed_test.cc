@@ -65,6 +65,20 @@ TEST(WhatChanged, TellsAnotherFloorFromOtherSteering) {
   EXPECT_NEAR(bent.diagnosis.effects.front().parameters.at(0).value, 0.03, 0.003);
 }
 
+// Tyres that hold up to their limit and then let go at once: on a floor where they never slipped
+// nobody knows that, and on the next one it is not to be taken for steering.
+TEST(WhatChanged, LeavesHowTyresLetGoToTheTyres) {
+  const GroundRobot car = robot_of(kCar);
+  const auto sharp = [](double grip_m_s2) {
+    return off_by({"grip", "slip_angle", "grip_shape", "steering_gain"},
+                  {std::log(grip_m_s2), 0.1, std::log(8.0), 1.1});
+  };
+  const GroundDiagnosis floor = changed(car, driven(car, sharp(12)), driven(car, sharp(4), 5));
+  ASSERT_EQ(floor.diagnosis.effects.size(), 1u) << floor.diagnosis.headline;
+  EXPECT_EQ(floor.diagnosis.effects.front().name, "friction");
+  EXPECT_NEAR(floor.corrected.friction, 4 / 9.81, 0.03);
+}
+
 TEST(WhatChanged, GivesASkidSteersMultiplierBeforeAndAfter) {
   const GroundRobot skid = robot_of(kSkid);
   const GroundDiagnosis found =
