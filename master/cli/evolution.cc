@@ -15,6 +15,7 @@
 #include "master/evolve/evolve.h"
 #include "master/evolve/optimisers.h"
 #include "master/evolve/staged.h"
+#include "master/ground/simulated_start.h"
 
 namespace gapfarm {
 namespace {
@@ -27,13 +28,36 @@ class SteadyClock : public EvolveClock {
 };
 
 Result<std::unique_ptr<Optimiser>> optimiser_at(const std::optional<Checkpoint>& checkpoint,
-                                                const EvolutionRun& run, const StagePlan& plan) {
-  const OptimiserSetup setup = optimiser_setup(run.config.evolution, run.problem, run.config.seed);
+                                                const EvolutionRun& run, const StagePlan& plan,
+                                                const std::optional<SimulatedStart>& start) {
+  OptimiserSetup setup = optimiser_setup(run.config.evolution, run.problem, run.config.seed);
+  if (start) {
+    setup.nominal = start->genome;
+    setup.spread = start->spread;
+  }
   if (!plan.stages.empty()) {
     return checkpoint ? restore_staged(setup, plan.stages, checkpoint->optimiser_state)
                       : make_staged(setup, plan.stages);
   }
   return checkpoint ? restore_optimiser(setup, checkpoint->optimiser_state) : make_optimiser(setup);
+}
+
+// Where the search of a ground robot's values begins; nothing where the config has the say, and
+// where there is no beginning.
+Result<std::optional<SimulatedStart>> start_of(const std::optional<Checkpoint>& checkpoint,
+                                               const EvolutionRun& run, const StagePlan& plan,
+                                               Farm& farm, Console& console) {
+  const bool own = !run.config.evolution.seed_nominal || !plan.stages.empty();
+  if (checkpoint || own || !run.problem.ground || run.problem.log.trials.empty()) {
+    return std::optional<SimulatedStart>();
+  }
+  auto start = fit_by_simulation(farm, run.problem, run.config.evolution.optimiser.sigma);
+  if (!start) return start.error();
+  console.note(fmt::format(
+      "begins at least squares through the simulation: {} simulations, ends {:.2f} times as near "
+      "as with the values of the robot's own kinematics",
+      start->simulations, start->shrinks));
+  return std::optional(*std::move(start));
 }
 
 // How the run's results do on the trials that were kept apart; added to the text and the JSON, too.
@@ -215,14 +239,16 @@ int run_evolution(RunStore& store, const EvolutionRun& run, CliContext& context)
   if (!plan) return failed(plan.error(), context);
   const auto kept_apart = read_validation(*plan, run.config);
   if (!kept_apart) return failed(kept_apart.error(), context);
-  auto optimiser = optimiser_at(*checkpoint, run, *plan);
-  if (!optimiser) return failed(optimiser.error(), context);
-
   const auto page = open_page(run.page, store.run(), context);
   if (!page) return failed(page.error(), context);
   FarmEventKeeper events(store, context.console);
   auto farm = start_farm_of(store, run, events, context);
   if (!farm) return failed(farm.error(), context);
+
+  const auto start = start_of(*checkpoint, run, *plan, **farm, context.console);
+  if (!start) return failed(start.error(), context);
+  auto optimiser = optimiser_at(*checkpoint, run, *plan, *start);
+  if (!optimiser) return failed(optimiser.error(), context);
 
   const SteadyClock clock;
   FarmProgressWriter progress(store, **farm, run.config.evolution, *checkpoint, clock,

@@ -38,6 +38,8 @@ Genome to_genome(const Eigen::VectorXd& vector) { return {vector.begin(), vector
 CmaEs::CmaEs(const MethodSetup& setup) : setup_(setup) {
   const auto n = static_cast<Eigen::Index>(setup.space.size());
   begin(setup.start.empty() ? Eigen::VectorXd::Constant(n, 0.5) : to_vector(setup.start));
+  if (setup.start.empty() || setup.spread.empty()) return;
+  covariance_ = Eigen::Map<const Eigen::MatrixXd>(setup.spread.data(), n, n) / (sigma_ * sigma_);
 }
 
 void CmaEs::begin(Eigen::VectorXd mean) {

@@ -20,10 +20,14 @@ Result<std::unique_ptr<SearchOptimiser>> wrapped(const OptimiserSetup& setup, au
     return Error{"the nominal genome has " + std::to_string(setup.nominal.size()) +
                  " genes instead of " + std::to_string(setup.genes.size())};
   }
+  if (!setup.spread.empty() && setup.spread.size() != setup.genes.size() * setup.genes.size()) {
+    return Error{"the spread of the first genome is not one of its genes"};
+  }
   const EvolutionSettings& settings = setup.settings;
   const MethodSetup method{settings.optimiser, settings.population,
                            GeneSpace(*setup.table, setup.genes),
-                           settings.seed_nominal ? setup.nominal : Genome{}};
+                           settings.seed_nominal ? setup.nominal : Genome{},
+                           settings.seed_nominal ? setup.spread : std::vector<double>{}};
   const auto row = static_cast<std::size_t>(settings.optimiser.kind);
   return std::make_unique<SearchOptimiser>(optimisers()[row].name, setup, make_method(method));
 }

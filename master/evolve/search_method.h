@@ -20,7 +20,8 @@ struct MethodSetup {
   OptimiserSettings settings;
   unsigned population = 40;  // when the settings leave it to the evolution
   GeneSpace space;
-  Genome start;  // where to begin; empty: anywhere
+  Genome start;                // where to begin; empty: anywhere
+  std::vector<double> spread;  // of the start, a covariance row by row; empty: unknown
 };
 
 // The stream of a generation's k-th proposal.

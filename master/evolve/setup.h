@@ -13,6 +13,8 @@ struct OptimiserSetup {
   const ParameterTable* table = nullptr;  // outlives the optimiser
   std::vector<Gene> genes;
   Genome nominal;  // of the config's own values; empty: unknown
+  // How unsure that genome is: a covariance in gene units, row by row; empty: unknown.
+  std::vector<double> spread;
   std::uint64_t run_seed = 0;
   bool noisy = false;  // scores differ between replicates (SpreadKind::kSampled)
 };

@@ -122,6 +122,7 @@ class StagedOptimiser final : public Optimiser {
     OptimiserSetup setup = setup_;
     setup.genes.clear();
     setup.nominal.clear();
+    setup.spread.clear();
     for (const std::size_t gene : stages_[stage_].genes) {
       setup.genes.push_back(setup_.genes[gene]);
       setup.nominal.push_back(base()[gene]);
@@ -190,6 +191,7 @@ Status check_stages(const OptimiserSetup& setup, const std::vector<Stage>& stage
     OptimiserSetup part = setup;
     part.genes.clear();
     part.nominal.clear();
+    part.spread.clear();
     for (const std::size_t gene : stage.genes) {
       part.genes.push_back(setup.genes[gene]);
       part.nominal.push_back(setup.nominal[gene]);

@@ -86,6 +86,25 @@ TEST(CmaEs, MinimaOnTheBoundsAreReached) {
   }
 }
 
+TEST(CmaEs, BeginsAsWideAsItsStartIsUnsure) {
+  Toy toy;
+  toy.rows.assign(2, toy_row(ParameterKind::kReal, 0, 1));
+  OptimiserSetup setup = ToyRun(toy, settings_for(OptimiserKind::kCmaEs), 1).setup();
+  setup.nominal = {0.4, 0.6};
+  setup.spread = {1e-10, 0, 0, 1e-4};
+  const auto optimiser = make_optimiser(setup);
+  ASSERT_TRUE(optimiser.ok()) << optimiser.error().message;
+  double widest = 0;
+  for (const Candidate& candidate : (*optimiser)->ask()) {
+    EXPECT_NEAR(candidate.genome[0], 0.4, 1e-4);
+    widest = std::max(widest, std::abs(candidate.genome[1] - 0.6));
+  }
+  EXPECT_GT(widest, 1e-3);
+  EXPECT_LT(widest, 0.1);
+  setup.spread.pop_back();
+  EXPECT_FALSE(make_optimiser(setup).ok());
+}
+
 TEST(LocalSearch, EveryAlgorithmConvergesOnASmoothFunction) {
   for (const auto kind : {LocalSearchKind::kNelderMead, LocalSearchKind::kSubplex,
                           LocalSearchKind::kBobyqa, LocalSearchKind::kCobyla}) {

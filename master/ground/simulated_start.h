@@ -1,0 +1,31 @@
+// Where a search of a ground robot's values begins: least squares through the simulation itself.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "common/base/result.h"
+#include "common/problem/problem.h"
+#include "master/farm/farm.h"
+
+namespace gapfarm {
+
+struct SimulatedStart {
+  Genome genome;  // of all genes; those that move no end stand as they did
+  // How unsure the windows leave the genes: a covariance in gene units, row by row.
+  std::vector<double> spread;
+  std::size_t simulations = 0;
+  double shrinks =
+      1;  // what residuals shrank by from the kinematics' values, in the geometric mean
+};
+
+// Gauss and Newton's steps from the values of the robot's own kinematics (kinematic_start()) to the
+// most likely ends of the problem's windows.  Residuals have Student's density, with scales of
+// their own for windows of each length, and each length counts alike; genes that no end depends on
+// stay within `widest` (a standard deviation in gene units) of where they are.  Where a simulation
+// does not end well nothing moves.  Errors: those of the farm.
+// REQUIRES: a problem with a ground robot and windows.
+Result<SimulatedStart> fit_by_simulation(Farm& farm, const Problem& problem, double widest);
+
+}  // namespace gapfarm

@@ -1,0 +1,69 @@
+#include "master/ground/simulated_start.h"
+
+#include <gtest/gtest.h>
+
+#include "common/parameters/genome.h"
+#include "common/score/kinematic_start.h"
+#include "tests/unit/blind/worker_farm.h"
+#include "tests/unit/worker/ground_problem.h"
+
+namespace gapfarm {
+namespace {
+
+void search_for(Problem* problem, const std::string& key) {
+  const std::size_t row = problem->table().row(key);
+  const Parameter& p = problem->table()[row];
+  problem->genes.push_back({row, p.lower, p.upper, p.scale});
+}
+
+double found_value(const Problem& problem, const SimulatedStart& start, const std::string& key) {
+  ParameterValues values = problem.values;
+  decode(problem.table(), problem.genes, start.genome, values);
+  return values[problem.table().row(key)];
+}
+
+TEST(SimulatedStart, FindsWhatKinematicsHaveNoWordFor) {
+  Problem problem = tests::ground_problem();
+  ParameterValues truth = problem.values;
+  const auto put = [&](const char* key, double value) {
+    truth[problem.table().row(key)] = value;
+    search_for(&problem, key);
+  };
+  put("wheels.left.radius", 0.096);
+  put("friction_ratio", 1.25);
+  put("lag", 0.18);
+  put("marker.x", 0.08);
+  search_for(&problem, kGroundTurnNoise);
+  tests::take_runs(problem,
+                   {tests::driven_run(problem, truth, 12), tests::driven_run(problem, truth, 9)},
+                   {{0.5, 2}, 0.5});
+  tests::WorkerFarm farm;
+  const auto start = fit_by_simulation(farm, problem, 0.1);
+  ASSERT_TRUE(start.ok()) << start.error().message;
+  EXPECT_GT(start->shrinks, 5);
+  EXPECT_NEAR(found_value(problem, *start, "wheels.left.radius"), 0.096, 2e-4);
+  EXPECT_NEAR(found_value(problem, *start, "friction_ratio"), 1.25, 0.02);
+  EXPECT_NEAR(found_value(problem, *start, "lag"), 0.18, 0.004);
+  EXPECT_NEAR(found_value(problem, *start, "marker.x"), 0.08, 1e-3);
+  // What moves no end stands, as unsure as before.
+  const std::size_t n = problem.genes.size();
+  ASSERT_EQ(start->spread.size(), n * n);
+  EXPECT_NEAR(start->spread.back(), 0.01, 1e-9);
+  EXPECT_LT(start->spread.front(), 1e-4);
+  EXPECT_NEAR(found_value(problem, *start, kGroundTurnNoise),
+              problem.values[problem.table().row(kGroundTurnNoise)], 1e-9);
+}
+
+TEST(SimulatedStart, StandsWhereNothingMovesAnEnd) {
+  Problem problem = tests::ground_problem();
+  search_for(&problem, kGroundTurnNoise);
+  tests::take_runs(problem, {tests::driven_run(problem, problem.values, 5)});
+  tests::WorkerFarm farm;
+  const auto start = fit_by_simulation(farm, problem, 0.1);
+  ASSERT_TRUE(start.ok()) << start.error().message;
+  EXPECT_EQ(start->simulations, 1u);
+  EXPECT_EQ(start->shrinks, 1);
+}
+
+}  // namespace
+}  // namespace gapfarm
