@@ -3,16 +3,18 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/score/kinematic.h"
-
 namespace gapfarm {
 
 ParameterValues kinematic_start(const Problem& problem) {
-  ParameterValues values = problem.values;
-  if (!problem.ground || problem.log.trials.empty()) return values;
+  if (!problem.ground || problem.log.trials.empty()) return problem.values;
   const auto fitted = fit_kinematics(problem);
-  if (!fitted || !fitted->values.allFinite()) return values;
-  const GroundRobot robot = robot_with(problem.ground->robot(), *fitted);
+  return fitted ? kinematic_start(problem, *fitted) : problem.values;
+}
+
+ParameterValues kinematic_start(const Problem& problem, const Kinematics& fitted) {
+  ParameterValues values = problem.values;
+  if (!fitted.values.allFinite()) return values;
+  const GroundRobot robot = robot_with(problem.ground->robot(), fitted);
   if (!check_robot(robot)) return values;
   const GroundTable there(robot), here(problem.ground->robot());
   for (const Gene& gene : problem.genes) {

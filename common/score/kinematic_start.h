@@ -2,6 +2,7 @@
 #pragma once
 
 #include "common/problem/problem.h"
+#include "common/score/kinematic.h"
 
 namespace gapfarm {
 
@@ -9,5 +10,7 @@ namespace gapfarm {
 // clock, lag, marker, steering), fitted to its windows by least squares and kept within the genes'
 // ranges.  The problem's own where it has no ground robot or no windows.
 ParameterValues kinematic_start(const Problem& problem);
+// The same of kinematics that were fitted before.
+ParameterValues kinematic_start(const Problem& problem, const Kinematics& fitted);
 
 }  // namespace gapfarm

@@ -54,9 +54,9 @@ Result<std::optional<SimulatedStart>> start_of(const std::optional<Checkpoint>& 
   auto start = fit_by_simulation(farm, run.problem, run.config.evolution.optimiser.sigma);
   if (!start) return start.error();
   console.note(fmt::format(
-      "begins at least squares through the simulation: {} simulations, ends {:.2f} times as near "
-      "as with the values of the robot's own kinematics",
-      start->simulations, start->shrinks));
+      "begins at least squares through the simulation: {} simulations, {:.2f} nats a window more "
+      "than with the values of the robot's own kinematics",
+      start->simulations, start->gain));
   return std::optional(*std::move(start));
 }
 

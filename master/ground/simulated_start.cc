@@ -28,8 +28,7 @@ using Ends = std::vector<Eigen::Vector3d>;  // residuals, m, m, rad
 struct At {
   Genome genome;
   Ends residuals;
-  std::vector<std::array<double, 2>> scales;  // of each length: m, rad
-  double nats = 0;                            // a window of each length, and what was moved
+  double nats = 0;  // a window of each length, and what was moved
 };
 
 class SimulationFit {
@@ -54,6 +53,7 @@ class SimulationFit {
 
  private:
   Result<std::vector<std::optional<At>>> look_at(const std::vector<Genome>& genomes);
+  void take_scales(const Ends& residuals);
   void weigh(At* at) const;
   // Equations of one step: H and the gradient, over the genes that are told.
   Result<bool> slopes(const At& at, Eigen::MatrixXd* H, Eigen::VectorXd* g);
@@ -66,7 +66,10 @@ class SimulationFit {
   std::string hash_;
   std::vector<std::size_t> length_;  // of each window: which
   std::vector<double> count_;        // of windows of each length
-  std::vector<std::size_t> told_;    // genes that move ends
+  // Of each length, m and rad: those of the kinematics' own residuals, so that no length and
+  // neither position nor heading is given up for another.
+  std::vector<std::array<double, 2>> scales_;
+  std::vector<std::size_t> told_;  // genes that move ends
   Genome start_;
   Eigen::MatrixXd information_;  // at the last step
   std::size_t simulations_ = 0;
@@ -88,15 +91,14 @@ double nats_of(double size, double s, int part) {
          (kWindowTail + kParts[part]) / 2 * std::log1p(z * z / kWindowTail);
 }
 
-// Scales of the density by its iteration, and the density with them.
-void SimulationFit::weigh(At* at) const {
-  at->scales.assign(count_.size(), {1, 1});
-  at->nats = 0;
+// Scales of the density of some residuals, by its iteration.
+void SimulationFit::take_scales(const Ends& residuals) {
+  scales_.assign(count_.size(), {1, 1});
   for (std::size_t length = 0; length < count_.size(); ++length) {
     for (int part = 0; part < 2; ++part) {
       std::vector<double> sizes;
       for (std::size_t i = 0; i < length_.size(); ++i) {
-        if (length_[i] == length) sizes.push_back(size_of(at->residuals[i], part));
+        if (length_[i] == length) sizes.push_back(size_of(residuals[i], part));
       }
       const auto middle = sizes.begin() + static_cast<long>(sizes.size() / 2);
       std::nth_element(sizes.begin(), middle, sizes.end());
@@ -106,8 +108,17 @@ void SimulationFit::weigh(At* at) const {
         for (const double size : sizes) sum += weight_of(size, s, part) * s * s * size * size;
         s = std::max(std::sqrt(sum / count_[length] / kParts[part]), kLeastScale);
       }
-      at->scales[length][part] = s;
-      for (const double size : sizes) at->nats += nats_of(size, s, part) / count_[length];
+      scales_[length][part] = s;
+    }
+  }
+}
+
+void SimulationFit::weigh(At* at) const {
+  at->nats = 0;
+  for (std::size_t i = 0; i < length_.size(); ++i) {
+    for (int part = 0; part < 2; ++part) {
+      const double s = scales_[length_[i]][part];
+      at->nats += use(i) * nats_of(size_of(at->residuals[i], part), s, part);
     }
   }
   const double windows = static_cast<double>(length_.size());
@@ -132,7 +143,7 @@ Result<std::vector<std::optional<At>>> SimulationFit::look_at(const std::vector<
     const v1::TaskResult& result = (*results)[k];
     all.emplace_back();
     if (result.outcome() != v1::OK) continue;
-    At at{genomes[k], {}, {}, 0};
+    At at{genomes[k], {}, 0};
     int next = 0;
     for (const Trial& trial : problem_.log.trials) {
       const Pose end = from_proto(result.predict().predictions(next++).end());
@@ -169,7 +180,7 @@ Result<bool> SimulationFit::slopes(const At& at, Eigen::MatrixXd* H, Eigen::Vect
       const double r = at.residuals[i][c];
       const int part = c < 2 ? 0 : 1;
       const double size = size_of(at.residuals[i], part);
-      const double w = windows * use(i) * weight_of(size, at.scales[length_[i]][part], part);
+      const double w = windows * use(i) * weight_of(size, scales_[length_[i]][part], part);
       *H += w * J.row(c).transpose() * J.row(c);
       *g += w * r * J.row(c).transpose();
     }
@@ -211,13 +222,21 @@ Result<bool> SimulationFit::step(At* at) {
 }
 
 Result<SimulatedStart> SimulationFit::run(double widest) {
-  const ParameterValues values = kinematic_start(problem_);
+  const auto kinematics = fit_kinematics(problem_);
+  if (!kinematics) return kinematics.error();
+  Ends residuals;
+  const std::vector<Pose> ends = kinematic_ends(problem_, *kinematics);
+  for (std::size_t i = 0; i < ends.size(); ++i) {
+    residuals.push_back(local_difference(ends[i], problem_.log.trials[i].X_WE));
+  }
+  take_scales(residuals);
+  const ParameterValues values = kinematic_start(problem_, *kinematics);
   for (const Gene& gene : problem_.genes) {
     start_.push_back(encode_gene(problem_.table(), gene, values[gene.row]));
   }
   const auto first = look_at({start_});
   if (!first) return first.error();
-  SimulatedStart found{start_, {}, simulations_, 1};
+  SimulatedStart found{start_, {}, simulations_, 0};
   if (!first->front() || told_.empty()) return found;
   At at = *first->front();
   for (int k = 0; k < kMostRounds; ++k) {
@@ -227,7 +246,7 @@ Result<SimulatedStart> SimulationFit::run(double widest) {
   }
   found.genome = at.genome;
   found.simulations = simulations_;
-  found.shrinks = std::exp((at.nats - first->front()->nats) / sum_of_uses() / 3);
+  found.gain = (at.nats - first->front()->nats) / sum_of_uses();
   if (information_.size() == 0) return found;
   const auto n = static_cast<Eigen::Index>(start_.size());
   Eigen::MatrixXd precision = Eigen::MatrixXd::Identity(n, n) / (widest * widest);

@@ -16,15 +16,14 @@ struct SimulatedStart {
   // How unsure the windows leave the genes: a covariance in gene units, row by row.
   std::vector<double> spread;
   std::size_t simulations = 0;
-  double shrinks =
-      1;  // what residuals shrank by from the kinematics' values, in the geometric mean
+  double gain = 0;  // nats a window, over the kinematics' values in the simulation
 };
 
 // Gauss and Newton's steps from the values of the robot's own kinematics (kinematic_start()) to the
-// most likely ends of the problem's windows.  Residuals have Student's density, with scales of
-// their own for windows of each length, and each length counts alike; genes that no end depends on
-// stay within `widest` (a standard deviation in gene units) of where they are.  Where a simulation
-// does not end well nothing moves.  Errors: those of the farm.
+// most likely ends of the problem's windows.  Residuals have Student's density; its scales are
+// those of what the kinematics themselves leave, for windows of each length, and each length counts
+// alike.  The spread is at most `widest` (a standard deviation in gene units) where the windows do
+// not tell.  Where a simulation does not end well nothing moves.  Errors: those of the farm.
 // REQUIRES: a problem with a ground robot and windows.
 Result<SimulatedStart> fit_by_simulation(Farm& farm, const Problem& problem, double widest);
 
