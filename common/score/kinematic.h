@@ -34,8 +34,8 @@ std::vector<Pose> kinematic_ends(const Problem& problem, const Kinematics& kinem
 // a minute), "drift" (s that the command's clock loses a second), "grip" (of cars: logarithm of the
 // acceleration to the side that the floor holds, m/s^2) with "slip_angle" (rad, of the rear axle
 // there; in place of the file's understeer) and "grip_shape" (logarithm of the power p in
-// 1 / (1 + share^p)^(1/p), how sharply curvature falls where the grip ends), "pose_scale" and "aspect" (of the tracker: all that it
-// reports, its y over its x).
+// 1 / (1 + share^p)^(1/p), how sharply curvature falls where the grip ends), "pose_scale" and
+// "aspect" (of the tracker: all that it reports, its y over its x).
 std::vector<Pose> kinematic_ends(const GroundRobot& robot, std::span<const CommandedRun> runs,
                                  std::span<const Trial> trials, const Kinematics& kinematics);
 
