@@ -1,58 +1,65 @@
 #!/usr/bin/env bash
-# Fits the robots of practice cases to their own logs and says how far off each is on the runs that
-# were not fitted, beside its own kinematics and constant velocity.
-#   scripts/measure_ground.sh CASES OUT [CASE...]
-# CASES holds folders with robot.toml, fit/ and test/ (commands.csv and poses.csv in each); the
-# tables of docs/ground.md are what it prints.  BIN: where the programs are (build/release/bin).
+# Fits robots to their own logs and says how far off each is on the runs that were not fitted, beside
+# its own kinematics and constant velocity.
+#   scripts/measure_ground.sh SETS OUT [SET...]
+# SETS holds folders with robot.toml, fit/ and test/ (commands.csv and poses.csv in each), such as
+# scripts/ground_sets.py makes of public logs; the tables of docs/ground.md are what this prints.
+# BIN: where the programs are (build/release/bin).
 set -euo pipefail
-cases=$1
+sets=$1
 out=$2
 shift 2
 bin=${BIN:-build/release/bin}
 mkdir -p "$out"
 if [[ $# -eq 0 ]]; then
-  for folder in "$cases"/*/; do
+  for folder in "$sets"/*/; do
     if [[ -e "$folder/robot.toml" ]]; then set -- "$@" "$(basename "$folder")"; fi
   done
 fi
 
 genes_of() {
   case $1 in
-    ackermann) echo 'steering.offset steering.gain understeer lag delay throttle.gain throttle.drag
-                     marker.x marker.y friction' ;;
-    skid) echo 'wheels.left.radius wheels.right.radius wheelbase friction creep delay lag
-                marker.x marker.y' ;;
-    *) echo 'wheels.left.radius wheels.right.radius wheel_separation lag delay marker.x marker.y
-             marker.yaw' ;;
+    ackermann) echo 'steering.offset steering.gain understeer friction throttle.gain throttle.zero
+                     throttle.back_emf throttle.drag throttle.coulomb throttle.cornering' ;;
+    tricycle) echo 'wheels.front.radius steering.offset steering.gain wheelbase friction' ;;
+    skid) echo 'wheels.left.radius wheels.right.radius wheelbase friction creep' ;;
+    omni) echo 'wheels.w1.radius wheels.w2.radius wheels.w3.radius robot_radius roller_drag friction
+                creep' ;;
+    mecanum) echo 'wheels.front_left.radius wheels.front_right.radius wheels.rear_left.radius
+                   wheels.rear_right.radius wheel_separation roller_drag friction creep' ;;
+    *) echo 'wheels.left.radius wheels.right.radius wheel_separation friction creep' ;;
   esac
 }
 
-for name in "$@"; do
-  robot=$(realpath "$cases/$name/robot.toml")
+config_of() {  # SET
+  local robot drive
+  robot=$(realpath "$sets/$1/robot.toml")
   drive=$(sed -n 's/^drive = "\(.*\)".*/\1/p' "$robot")
-  config="$out/$name.toml"
-  {
-    echo 'scenario = "ground"'
-    echo '[robot]'
-    echo "file = \"$robot\""
-    echo '[runs]'
-    echo "folders = [\"$(realpath "$cases/$name/fit")\"]"
-    echo '[parameters]'
-    echo "step_rate = ${STEP_RATE:-120}"
-    echo '[genes]'
-    for gene in $(genes_of "$drive") drive_noise_travel drive_noise_turn pose_noise_position \
-                pose_noise_heading; do
-      echo "$gene = \"table\""
-    done
-    echo '[optimiser]'
-    echo 'kind = "cma_es"'
-    echo 'sigma = 0.1'
-    echo '[evolution]'
-    echo "stop = { evaluations = ${EVALUATIONS:-600} }"
-  } > "$config"
+  printf 'scenario = "ground"\n[robot]\nfile = "%s"\n[runs]\nfolders = ["%s"]\n' \
+         "$robot" "$(realpath "$sets/$1/fit")"
+  printf 'horizons = [0.5, 2, 5]\n[parameters]\nstep_rate = %s\n[genes]\n' "${STEP_RATE:-120}"
+  for gene in $(genes_of "$drive") delay lag marker.x marker.y marker.yaw drive_noise_travel \
+              drive_noise_turn pose_noise_position pose_noise_heading; do
+    echo "$gene = \"table\""
+  done
+  printf '[optimiser]\nkind = "cma_es"\nsigma = 0.1\n[evolution]\nstop = { evaluations = %s }\n' \
+         "${EVALUATIONS:-60}"
+}
+
+echo '| set | s | windows | way m | gapfarm mm, mrad | kinematics mm, mrad | constant velocity mm, mrad |'
+echo '|---|---|---|---|---|---|---|'
+for name in "$@"; do
+  config_of "$name" > "$out/$name.toml"
   rm -rf "${out:?}/$name"
-  start=$SECONDS
-  "$bin/gapfarm" evolve "$config" --out "$out/$name" 2> "$out/$name.log"
-  echo "== $name: $drive, fitted in $((SECONDS - start)) s; runs that were not fitted:"
-  "$bin/gapfarm" horizons "$out/$name" --trials "$cases/$name/test" 2>> "$out/$name.log"
+  if ! "$bin/gapfarm" evolve "$out/$name.toml" --out "$out/$name" > "$out/$name.log" 2>&1; then
+    echo "| $name | $(tail -n 1 "$out/$name.log") |"
+    continue
+  fi
+  "$bin/gapfarm" horizons "$out/$name" --trials "$sets/$name/test" > "$out/$name.txt" \
+    2>> "$out/$name.log"
+  awk -v name="$name" '
+    /^ *([0-9.]+|whole) / {
+      gsub(/\|/, " ")
+      print "| " name " | " $1 " | " $2 " | " $3 " | " $4 ", " $5 " | " $8 ", " $9 " | " $12 ", " $13 " |"
+    }' "$out/$name.txt"
 done
