@@ -13,7 +13,8 @@ constexpr std::size_t kMostFaults = 2;
 constexpr std::size_t kMostSteps = 3;
 constexpr double kFaultShrinks = 1.4;  // residuals must, for a log to be called the wrong way round
 constexpr double kFaultGain = 10;      // nats
-constexpr double kNotToldApart = 2;    // nats
+constexpr double kChangeShrinks = 1.02;  // residuals must, for a change to be named
+constexpr double kNotToldApart = 2;      // nats
 // Nats to second order below which nothing is fitted: a third of what a name takes.
 constexpr double kLeastPromise = kLeastGroundGain / 3;
 constexpr int kFolds = 5;
@@ -123,8 +124,13 @@ bool confirm_step(const WindowFitter& fitter, GroundSearch* search) {
 // Nats that the next name must tell.  What changed is modelled with a form that is wrong by some
 // share, and the more it changed, the more is left over for others to explain.
 double least_gain(const GroundSearch& search) {
-  if (!search.reference || search.steps.empty()) return kLeastGroundGain;
-  return std::max(kLeastGroundGain, kShareOfFirst * search.steps.front().gain);
+  if (!search.reference) return kLeastGroundGain;
+  // A long log is sure of the smallest of differences, which no model has right.
+  const double stretches = static_cast<double>(search.windows.trials.size()) /
+                           static_cast<double>(search.windows.horizons);
+  double least = std::max(kLeastGroundGain, 3 * stretches * std::log(kChangeShrinks));
+  if (!search.steps.empty()) least = std::max(least, kShareOfFirst * search.steps.front().gain);
+  return least;
 }
 
 // The best of the catalogue, when it is worth its name.

@@ -27,6 +27,18 @@ GroundDiagnosis changed(const GroundRobot& robot, const RunLog& before, const Ru
   return *std::move(result);
 }
 
+// Poses of a worse tracker.
+RunLog shaken(RunLog log, double noise_m) {
+  Stream stream({11, Purpose::kTest, 0, 0, 0});
+  for (LoggedRun& run : log.runs) {
+    for (PoseRow& pose : run.poses) {
+      pose.X_WM.x += noise_m * stream.normal();
+      pose.X_WM.y += noise_m * stream.normal();
+    }
+  }
+  return log;
+}
+
 // A file that is off in several things: of what changed it says nothing.
 Kinematics cars_own(double grip_m_s2, double steering_offset_rad = 0.02) {
   return off_by({"grip", "slip_angle", "steering_gain", "steering_offset", "delay"},
@@ -77,6 +89,15 @@ TEST(WhatChanged, LeavesHowTyresLetGoToTheTyres) {
   ASSERT_EQ(floor.diagnosis.effects.size(), 1u) << floor.diagnosis.headline;
   EXPECT_EQ(floor.diagnosis.effects.front().name, "friction");
   EXPECT_NEAR(floor.corrected.friction, 4 / 9.81, 0.03);
+}
+
+// A long log is sure of a difference that next to nothing depends on.
+TEST(WhatChanged, SaysNothingOfWhatMovesNoEnd) {
+  const GroundRobot skid = robot_of(kSkid);
+  const auto with_lag = [](double lag_s) { return off_by({"lag"}, {lag_s}); };
+  const RunLog noisy = shaken(driven(skid, with_lag(0.1)), 0.03);
+  const GroundDiagnosis same = changed(skid, noisy, shaken(driven(skid, with_lag(0.16), 5), 0.03));
+  EXPECT_TRUE(same.diagnosis.effects.empty()) << same.diagnosis.headline;
 }
 
 TEST(WhatChanged, GivesASkidSteersMultiplierBeforeAndAfter) {
