@@ -13,7 +13,7 @@ constexpr std::size_t kMostFaults = 2;
 constexpr std::size_t kMostSteps = 3;
 constexpr double kFaultShrinks = 1.4;  // residuals must, for a log to be called the wrong way round
 constexpr double kFaultGain = 10;      // nats
-constexpr double kChangeShrinks = 1.02;  // residuals must, for a change to be named
+constexpr double kChangeShrinks = 1.01;  // residuals must, for a change to be named
 constexpr double kNotToldApart = 2;      // nats
 // Nats to second order below which nothing is fitted: a third of what a name takes.
 constexpr double kLeastPromise = kLeastGroundGain / 3;
