@@ -36,25 +36,57 @@ bool at_bound(const Parameter& row, double value) {
 }  // namespace
 
 // Tuning that ends on a bound would have gone on: another robot, or another log than the config's.
-bool DiagnosisRun::doubts_base() {
-  if (study_.on_bounds.empty()) return false;
+SanityFinding DiagnosisRun::on_bounds() const {
   std::vector<std::string> where;
-  for (std::size_t row : study_.on_bounds) {
+  for (std::size_t row : tuned_->on_bounds) {
     const Parameter& p = problem_.table()[row];
     where.push_back(p.key + " " +
-                    problem_.table().format(row, rounded_to_digits(study_.base.at(row), 3)) +
+                    problem_.table().format(row, rounded_to_digits(tuned_->base.at(row), 3)) +
                     " (from " + problem_.table().format(row, p.lower) + " to " +
                     problem_.table().format(row, p.upper) + ")");
   }
-  doubt({"base_on_bounds",
-         "Tuning the base ended on the edge of what scenario " + problem_.scenario +
-             " can be: " + listed(where) +
-             ". A robot that needs such values is probably not one of this kind, so whatever the "
-             "catalogue explained would be its being another one.",
-         "Check what the config says of the robot and of duties and durations that the log leaves "
-         "empty, or use a scenario that can be this robot.",
-         Severity::kDoubt});
-  return true;
+  return {"base_on_bounds",
+          "Tuning the base ended on the edge of what scenario " + problem_.scenario +
+              " can be: " + listed(where) +
+              ". A robot that needs such values is probably not one of this kind, so whatever the "
+              "catalogue explained would be its being another one.",
+          "Check what the config says of the robot and of duties and durations that the log leaves "
+          "empty, or use a scenario that can be this robot.",
+          Severity::kDoubt};
+}
+
+// A strong effect draws a base to its bounds, too; beside it the base comes back.  If not, nothing
+// stays chosen.
+Status DiagnosisRun::free_base() {
+  std::vector<EffectCandidate> effects;
+  for (const ChosenEffect& c : chosen_) effects.push_back(c.candidate);
+  if (effects.empty()) return {};
+  const Eigen::MatrixXd none(static_cast<Eigen::Index>(3 * study_.size()), 0);
+  auto fit =
+      fit_jointly(predictor_, study_, effects, estimates_ ? estimates_->at : start_of(effects),
+                  BaseParameters::kFitted, none, kMostRounds);
+  if (!fit) return fit.error();
+  if (!base_on_bounds(study_, fit->at).empty()) chosen_.clear();
+  estimates_ = std::move(*fit);
+  return {};
+}
+
+// Nor is anything left to explain beside it; of a robot of another kind there is.
+bool DiagnosisRun::explains_bounds() const {
+  return result_.diagnosis.verdict == Verdict::kEffect && !chosen_.empty() &&
+         base_on_bounds(study_, nested_.back().at).empty();
+}
+
+// As if nothing had been looked for.
+Status DiagnosisRun::doubt_base() {
+  as_logged_.reset();
+  tuned_alone_.clear();
+  result_.diagnosis.screening.clear();
+  const SanityFinding finding = on_bounds();
+  study_ = std::move(*tuned_);
+  tuned_.reset();
+  doubt(finding);
+  return rebuild_nuisances();
 }
 
 void DiagnosisRun::doubt(SanityFinding finding) {

@@ -11,11 +11,7 @@
 #include "master/diagnose/verdict.h"
 
 namespace gapfarm {
-namespace {
-
-constexpr int kMostRounds = 6;  // of a fit that does not settle; most need two
-
-}  // namespace
+namespace {}  // namespace
 
 bool clearly_better(const std::vector<double>& scores, const std::vector<double>& others) {
   const auto n = static_cast<double>(scores.size());
@@ -133,19 +129,22 @@ Status DiagnosisRun::refit() {
     drop_effect(worthless->first, worthless->second);
   }
   doubt_misses();
-  if (misses_) return name_none_for_misses(folds);
+  if (misses_ || (tuned_ && !explains_bounds())) return name_none(folds);
   return fit_final();
 }
 
 // The base alone is what is left to tell of.
-Status DiagnosisRun::name_none_for_misses(const std::vector<std::size_t>& folds) {
+Status DiagnosisRun::name_none(const std::vector<std::size_t>& folds) {
   chosen_.clear();
   estimates_.reset();
   nested_.clear();
   nested_studies_.clear();
   nested_scores_.clear();
   result_.fits.clear();
-  doubt(*misses_);
+  if (misses_) doubt(*misses_);
+  if (tuned_) {
+    if (Status s = doubt_base(); !s) return s;
+  }
   if (Status s = refit_nested(); !s) return s;
   score_nested(folds);
   set_floor(folds);

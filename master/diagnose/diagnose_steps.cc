@@ -118,12 +118,21 @@ Status DiagnosisRun::search_catalogue() {
 }
 
 Status DiagnosisRun::screen() {
-  if (doubts_base()) return {};
+  if (!study_.on_bounds.empty()) tuned_ = study_;
+  if (Status s = look_for_all(); !s) return s;
+  return tuned_ && chosen_.empty() ? doubt_base() : Status{};
+}
+
+Status DiagnosisRun::look_for_all() {
   if (Status s = look_for_latency(); !s) return s;
   if (Status s = look_for_lag(); !s) return s;
   look_for_spreads();
   if (Status s = search_catalogue(); !s) return s;
-  if (subject_.base_moves && estimates_) {
+  if (tuned_) {
+    if (Status s = free_base(); !s) return s;
+    if (chosen_.empty()) return {};
+  }
+  if ((subject_.base_moves || tuned_) && estimates_) {
     if (Status s = search_again(); !s) return s;
   }
   const Regression explained = this->explained();
@@ -143,14 +152,15 @@ Status DiagnosisRun::select() {
 
 // The effects fitted together, base and nuisances beside them to first order.
 Result<JointFit> DiagnosisRun::estimate(const std::vector<EffectCandidate>& effects, int rounds) {
+  const bool moves = subject_.base_moves || tuned_;
   Overrides start = start_of(effects);
   for (const EffectCandidate& effect : effects) {
     for (const auto& [row, value] : estimates_ ? estimates_->at : Overrides{}) {
       const std::string& of = problem_.table()[row].effect;
-      if (of == effect.signature.effect || (of.empty() && subject_.base_moves)) start[row] = value;
+      if (of == effect.signature.effect || (of.empty() && moves)) start[row] = value;
     }
   }
-  const BaseParameters base = subject_.base_moves ? BaseParameters::kFitted : BaseParameters::kHeld;
+  const BaseParameters base = moves ? BaseParameters::kFitted : BaseParameters::kHeld;
   auto fit = fit_jointly(predictor_, study_, effects, start, base, nuisances_, rounds);
   if (!fit) return fit;
   const auto moved = move_seams(predictor_, study_, nuisances_, &*fit);
@@ -368,7 +378,11 @@ Status DiagnosisRun::judge() {
   const bool named = !first_.empty() || !chosen_.empty() || slip_.gain > 0 || !spreads_.empty() ||
                      lag_.gain > 0 || rounded;
   Verdict& verdict = result_.diagnosis.verdict;
-  verdict = judge_verdict(named, nats, leftovers_, subject_.unknown_log10_p);
+  const bool two = std::any_of(chosen_.begin(), chosen_.end(), [](const ChosenEffect& c) {
+    return kind_of(c.candidate.signature.effect) != c.candidate.signature.effect;
+  });
+  verdict = judge_verdict(named, nats, leftovers_, subject_.unknown_log10_p,
+                          two ? kWrongShareOfTwo : kWrongShare);
   if (on_grid && !rounded) {
     odd_readings_ =
         "The logged positions lie on a grid, which nothing that was looked for explains.";

@@ -26,6 +26,8 @@ namespace gapfarm {
 // By paired scores: not by chance, but for one case in twenty.
 bool clearly_better(const std::vector<double>& scores, const std::vector<double>& others);
 
+inline constexpr int kMostRounds = 6;  // of a fit that does not settle; most need two
+
 class DiagnosisRun {
  public:
   // REQUIRES: a scenario that has a diagnosis_subject().
@@ -70,7 +72,10 @@ class DiagnosisRun {
   void tell_of_choice() const;
   void tell_of_verdict() const;
   void tell_of_gaps() const;
-  bool doubts_base();
+  SanityFinding on_bounds() const;
+  Status free_base();
+  bool explains_bounds() const;
+  Status doubt_base();
   void doubt(SanityFinding finding);
   void doubt_misses();
   // `perfect`: what a prediction scores that misses nothing.
@@ -82,7 +87,7 @@ class DiagnosisRun {
   double frame_of(const std::string& key, const Overrides& at) const;
   Status fit_final();
   double within_table(std::size_t row, double value);
-  Status name_none_for_misses(const std::vector<std::size_t>& folds);
+  Status name_none(const std::vector<std::size_t>& folds);
   void complete_screening();
   std::string why_not_screened(const std::string& name, Screened* row) const;
   double pose_grid_gain() const;
@@ -94,6 +99,7 @@ class DiagnosisRun {
   bool looks_for(const std::string& effect, Looks look) const;
   void compare_with_repeats();
   Status search_catalogue();
+  Status look_for_all();
   Status search_again();
   Status rebuild_nuisances();
   Status look_for_latency();
@@ -165,6 +171,7 @@ class DiagnosisRun {
   Predictor predictor_;
   Study study_;
   std::optional<Study> as_logged_;  // where late readings were put right: before that
+  std::optional<Study> tuned_;      // where tuning ended on bounds: before anything was looked for
   Overrides tuned_alone_;           // the base without any effect, where study_.base is not it
   Eigen::MatrixXd nuisances_;
   std::vector<CovariateBlock> blocks_;

@@ -75,6 +75,9 @@ Result<Study> make_study(const Problem& problem, std::span<const Gene> genes);
 // problem, and fills in predictions, residuals and gain derivatives.
 Status tune_base(Predictor& predictor, bool keep, Study* study);
 
+// Rows of the base's parameters whose value in `at` lies where tuning has to stop.
+std::vector<std::size_t> base_on_bounds(const Study& study, const Overrides& at);
+
 // Predictions with `extra` on top of the tuned base, as differences from the base's in the axes of
 // the base's ends, divided by `scale`.
 std::vector<Eigen::Vector3d> differences(const Study& study, const std::vector<Pose>& ends,

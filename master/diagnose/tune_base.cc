@@ -242,21 +242,6 @@ Result<std::vector<Pose>> predict_base(Predictor& predictor, const Overrides& si
   }
 }
 
-// Where the tuned values ended on what tuning_step() clamps them to.
-std::vector<std::size_t> parameters_on_bounds(const Problem& problem,
-                                              const std::vector<BaseParameter>& parameters,
-                                              const Study& study) {
-  std::vector<std::size_t> rows;
-  for (const BaseParameter& p : parameters) {
-    const auto [lower, upper] = tunable(problem.table()[p.row]);
-    const double value = study.base.at(p.row);
-    if (value <= lower * 1.001 || value >= upper * 0.999) {
-      rows.push_back(p.row);
-    }
-  }
-  return rows;
-}
-
 // Change of every end for both sides' gain, from what lesser duties would do: no duty may be more
 // than full.  The parabola through three points, at its end.
 Result<Slope> slope_of_duties(Predictor& predictor, const Overrides& at,
@@ -350,6 +335,16 @@ Status settle(Predictor& predictor, const std::vector<Pose>& ends, Study* study)
 
 }  // namespace
 
+std::vector<std::size_t> base_on_bounds(const Study& study, const Overrides& at) {
+  std::vector<std::size_t> rows;
+  for (const BaseParameter& p : study.drive.tuned) {
+    const auto [lower, upper] = tunable((*study.table)[p.row]);
+    const double value = at.at(p.row);
+    if (value <= lower * 1.001 || value >= upper * 0.999) rows.push_back(p.row);
+  }
+  return rows;
+}
+
 Status tune_base(Predictor& predictor, bool keep, Study* study) {
   const Problem& problem = predictor.problem();
   const std::vector<BaseParameter>& parameters = study->drive.tuned;
@@ -378,7 +373,7 @@ Status tune_base(Predictor& predictor, bool keep, Study* study) {
   }
   const auto ends = predict_base(predictor, simulated, study);
   if (!ends) return ends.error();
-  if (!keep) study->on_bounds = parameters_on_bounds(problem, parameters, *study);
+  if (!keep) study->on_bounds = base_on_bounds(*study, study->base);
   return settle(predictor, *ends, study);
 }
 

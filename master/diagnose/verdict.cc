@@ -34,10 +34,10 @@ std::vector<Leftover> leftovers(const Regression& explained,
 }
 
 Verdict judge_verdict(bool named, double explained_nats, const std::vector<Leftover>& left,
-                      double unknown_log10_p) {
+                      double unknown_log10_p, double wrong_share) {
   const bool unknown = !left.empty() && left.front().log10_p < unknown_log10_p;
   if (!unknown) return named ? Verdict::kEffect : Verdict::kNone;
-  if (!named || left.front().excess > kWrongShare * std::max(explained_nats, 1.0)) {
+  if (!named || left.front().excess > wrong_share * std::max(explained_nats, 1.0)) {
     return Verdict::kUnknown;
   }
   return Verdict::kEffectAndUnknown;

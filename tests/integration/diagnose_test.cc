@@ -265,6 +265,17 @@ TEST_F(Diagnose, ABaseAtTheEdgeOfItsBoundsIsNoReasonToStop) {
   EXPECT_TRUE(diagnose().contains("verdict"));
 }
 
+// Alone the base makes up for the lost travel with all that it has, and beside it comes back.
+TEST_F(Diagnose, AnEffectThatDrawsTheBaseToItsBoundsIsFound) {
+  simulate(120, {"backlash.travel=0.03"});
+  const Json d = diagnose();
+  EXPECT_EQ(d["verdict"], "effect") << d["headline"];
+  ASSERT_EQ(d["effects"].size(), 1u);
+  EXPECT_EQ(d["effects"][0]["name"], "backlash");
+  EXPECT_LT(d["effects"][0]["parameters"]["travel"]["lo"], 0.03);
+  EXPECT_GT(d["effects"][0]["parameters"]["travel"]["hi"], 0.03);
+}
+
 // Another robot, with two wheels and a caster, where its log is at hand.
 TEST_F(Diagnose, ARobotThatIsNoTrackedOneIsNotExplained) {
   const auto data = shared_data("ground/neato");

@@ -65,6 +65,9 @@ TEST(Verdict, FollowsWhatIsNamedAndWhatIsLeft) {
   EXPECT_EQ(judge_verdict(true, 100, clean, kLeast), Verdict::kEffect);
   EXPECT_EQ(judge_verdict(true, 100, little, kLeast), Verdict::kEffectAndUnknown);
   EXPECT_EQ(judge_verdict(true, 100, much, kLeast), Verdict::kUnknown);
+  const std::vector<Leftover> twelfth = {{"place", -10, 12}};
+  EXPECT_EQ(judge_verdict(true, 100, twelfth, kLeast), Verdict::kEffectAndUnknown);
+  EXPECT_EQ(judge_verdict(true, 100, twelfth, kLeast, kWrongShareOfTwo), Verdict::kUnknown);
 }
 
 }  // namespace
