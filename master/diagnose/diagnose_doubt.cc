@@ -113,22 +113,29 @@ void DiagnosisRun::doubt_misses() {
 }
 
 // The chosen effect that is to be dropped and why: trials that no fit saw are predicted no better
-// with it, or its best size is none or more than there can be.
+// with it, or its best size is none or more than there can be.  The worst goes first: of two that
+// are alike, the one after it may look worthless because of it.
 // What closes next to nothing has to do so without doubt: beside a large gap a few nats are to be
-// had by anything.
+// had by anything.  How much it closes is known only by the noise's own tails.
 std::optional<std::pair<std::size_t, std::string>> DiagnosisRun::effect_to_drop(
-    double perfect) const {
+    std::optional<double> perfect) const {
   const std::size_t before = as_logged_ ? 1 : 0;
-  const double gap = std::max(perfect, mean(nested_scores_.back())) - mean(nested_scores_.front());
+  const double gap =
+      perfect ? std::max(*perfect, mean(nested_scores_.back())) - mean(nested_scores_.front()) : 0;
+  std::optional<std::size_t> worst;
+  double least = INFINITY;
   for (std::size_t k = chosen_.size(); k-- > 0;) {
     const std::vector<double>&with = nested_scores_[before + k + 1],
           &without = nested_scores_[before + k];
     const double gain = mean(with) - mean(without);
     if (gain > 0 && (gain > kLittleClosed * gap || clearly_better(with, without))) continue;
-    return std::pair{k, std::string(" seemed to explain some of it, too, but trials that the fit "
-                                    "did not see are predicted no better with it.")};
+    if (gain < least) worst = k;
+    least = std::min(least, gain);
   }
-  return std::nullopt;
+  if (!worst) return std::nullopt;
+  return std::pair{*worst,
+                   std::string(" seemed to explain some of it, too, but trials that the fit "
+                               "did not see are predicted no better with it.")};
 }
 
 std::optional<std::pair<std::size_t, std::string>> DiagnosisRun::effect_at_bound() const {

@@ -113,8 +113,7 @@ Status DiagnosisRun::refit() {
     if (Status s = refit_nested(); !s) return s;
     score_nested(folds);
     tell_of_gaps();
-    auto worthless =
-        effect_to_drop(floor_score(nested_studies_.back(), problem_.fitness.outlier_share));
+    auto worthless = effect_to_drop(std::nullopt);
     if (!worthless) {
       if (Status s = estimate_beside_base(); !s) return s;
       worthless = effect_at_bound();
@@ -123,7 +122,7 @@ Status DiagnosisRun::refit() {
       if (chosen_.size() < found) judge_again();
       if (Status s = fit_correction(); !s) return s;
       set_floor(folds);
-      worthless = effect_to_drop(floor_);  // by the noise's own tails, if it has any
+      worthless = effect_to_drop(floor_);
     }
     if (!worthless) break;
     drop_effect(worthless->first, worthless->second);

@@ -78,8 +78,9 @@ class DiagnosisRun {
   Status doubt_base();
   void doubt(SanityFinding finding);
   void doubt_misses();
-  // `perfect`: what a prediction scores that misses nothing.
-  std::optional<std::pair<std::size_t, std::string>> effect_to_drop(double perfect) const;
+  // `perfect`: what a prediction scores that misses nothing, once that is known.
+  std::optional<std::pair<std::size_t, std::string>> effect_to_drop(
+      std::optional<double> perfect) const;
   std::optional<std::pair<std::size_t, std::string>> effect_at_bound() const;
   void drop_effect(std::size_t k, const std::string& why);
   void say_what_was_left_out();
