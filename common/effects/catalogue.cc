@@ -82,6 +82,8 @@ std::vector<Effect> build_catalogue() {
 
 // Of which there may be two: an arena under four cameras has a seam across each axis.
 constexpr const char* kMayRepeat[] = {"camera_seam"};
+// Rows are stored by their number: what came to the catalogue after seconds comes after them.
+constexpr const char* kFirstAfterSeconds = "unsettled_start";
 
 std::vector<Effect> with_seconds(std::vector<Effect> effects) {
   for (const char* kind : kMayRepeat) {
@@ -91,7 +93,10 @@ std::vector<Effect> with_seconds(std::vector<Effect> effects) {
     second.repeats = first->name;
     second.name += "_2";
     second.summary += "; a second one";
-    effects.push_back(std::move(second));
+    const auto after = std::find_if(effects.begin(), effects.end(), [](const Effect& effect) {
+      return effect.name == kFirstAfterSeconds;
+    });
+    effects.insert(after, std::move(second));
   }
   return effects;
 }

@@ -62,9 +62,9 @@ Status check_score(const FitnessSettings& fitness, const SpreadSettings& spread)
   return {};
 }
 
-// Rows that a message must have: those of a second one of a kind, which come last, are left out
-// where they do nothing, so that problems without one are, to the byte, what they were before there
-// could be two.
+// Rows that a message must have: those from a second one of a kind on, which are younger, are left
+// out where they do nothing, so that problems without them are, to the byte, what they were before
+// there were any.
 std::size_t least_rows(const ParameterTable& table) {
   for (std::size_t e = 0; e < table.effects().size(); ++e) {
     if (!table.effects()[e].repeats.empty()) return table.effect_row(e);

@@ -205,18 +205,20 @@ Result<Config> figure_config(const EffectsOptions& options) {
   return config;
 }
 
-// A second one of a kind, which stand last, does what the first does.
-std::span<const Effect> pictured(const ParameterTable& table) {
-  std::size_t count = 0;
-  while (count < table.effects().size() && table.effects()[count].repeats.empty()) ++count;
-  return table.effects().first(count);
+// Their places in the table; a second one of a kind does what the first does.
+std::vector<std::size_t> pictured(const ParameterTable& table) {
+  std::vector<std::size_t> firsts;
+  for (std::size_t e = 0; e < table.effects().size(); ++e) {
+    if (table.effects()[e].repeats.empty()) firsts.push_back(e);
+  }
+  return firsts;
 }
 
 // Pairs of tasks: every effect's drives without it and with it.
 std::vector<v1::Task> figure_tasks(const Problem& problem) {
   const ParameterTable& table = problem.table();
   std::vector<v1::Task> tasks;
-  for (std::size_t e = 0; e < pictured(table).size(); ++e) {
+  for (const std::size_t e : pictured(table)) {
     const Effect& effect = table.effects()[e];
     std::vector<v1::Override> off, on;
     const std::vector<double> values = figure_values(effect);
@@ -234,9 +236,8 @@ int draw_figures(EffectsOptions& options, CliContext& context) {
   Result<Config> config = figure_config(options);
   std::vector<std::string> names;
   if (config) {
-    for (const Effect& effect : pictured(config->problem.table())) {
-      names.push_back(effect.name + ".svg");
-    }
+    const ParameterTable& table = config->problem.table();
+    for (const std::size_t e : pictured(table)) names.push_back(table.effects()[e].name + ".svg");
     if (!options.config.empty()) options.outputs.reads(options.config);
     if (Status s = options.outputs.plan_in(options.figures, names); !s) config = s.error();
   }
@@ -255,19 +256,19 @@ int draw_figures(EffectsOptions& options, CliContext& context) {
   const std::string hash = (*farm)->add_problem(to_proto(problem));
   const auto results = (*farm)->run(hash, figure_tasks(problem));
   if (!results) return failed(results.error(), context);
-  const std::span<const Effect> effects = pictured(problem.table());
-  for (std::size_t e = 0; e < effects.size(); ++e) {
-    for (const v1::TaskResult& result : {(*results)[2 * e], (*results)[2 * e + 1]}) {
+  const std::vector<std::size_t> effects = pictured(problem.table());
+  for (std::size_t k = 0; k < effects.size(); ++k) {
+    const Effect& effect = problem.table().effects()[effects[k]];
+    for (const v1::TaskResult& result : {(*results)[2 * k], (*results)[2 * k + 1]}) {
       if (result.outcome() == v1::OK) continue;
-      return failed(Error{effects[e].name + ": the simulation ended with " +
+      return failed(Error{effect.name + ": the simulation ended with " +
                           v1::Outcome_Name(result.outcome()) + " (" + result.message() + ")"},
                     context);
     }
     const auto drives =
-        drives_of(problem, (*results)[2 * e].simulate(), (*results)[2 * e + 1].simulate());
-    const std::string picture =
-        effect_figure(effects[e], figure_values(effects[e]), kFigureStart, drives);
-    const std::string path = (std::filesystem::path(options.figures) / names[e]).string();
+        drives_of(problem, (*results)[2 * k].simulate(), (*results)[2 * k + 1].simulate());
+    const std::string picture = effect_figure(effect, figure_values(effect), kFigureStart, drives);
+    const std::string path = (std::filesystem::path(options.figures) / names[k]).string();
     if (Status s = options.outputs.write(path, picture); !s) return failed(s.error(), context);
   }
   context.console.result(options.figures + ": " + std::to_string(effects.size()) + " pictures\n",

@@ -5,8 +5,10 @@
 
 #include <filesystem>
 #include <fstream>
+#include <sstream>
 
 #include "master/cli/inputs.h"
+#include "master/store/database.h"
 #include "master/store/run_store.h"
 
 namespace gapfarm {
@@ -122,7 +124,14 @@ TEST_F(RunPage, CountsTrialsKeptApartWhileTheirFileIsThere) {
 
 // A store without a place for what a farm copes with does not say that it was nothing.
 TEST_F(RunPage, TellsNoZerosThatNobodyCounted) {
-  make(1);
+  fs::create_directory(run());
+  {
+    auto database = Database::open((run() / "run.sqlite").string(), Database::Mode::kCreate);
+    ASSERT_TRUE(database.ok()) << database.error().message;
+    std::ostringstream sql;
+    sql << std::ifstream(GAPFARM_SOURCE_DIR "/tests/integration/run_of_0_1.sql").rdbuf();
+    ASSERT_TRUE(database->exec(sql.str(), "make it").ok());
+  }
   const std::string page = run_html(read());
   EXPECT_THAT(page, HasSubstr("kept no account"));
   EXPECT_THAT(page, testing::Not(HasSubstr("no task was given up")));
@@ -146,7 +155,7 @@ TEST_F(RunPage, ShowsWhatDetermineLeft) {
   const std::string page = run_html(after);
   EXPECT_THAT(page, HasSubstr("# 95 % by gapfarm determine: 0.15 to 0.45"));
   EXPECT_THAT(page, testing::Not(HasSubstr("# 90 %")));
-  EXPECT_THAT(page, testing::Not(HasSubstr(", 90 % ")));
+  EXPECT_THAT(page, testing::Not(testing::ContainsRegex(", 90 % [0-9]")));
 }
 
 }  // namespace

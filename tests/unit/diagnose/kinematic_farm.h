@@ -28,8 +28,7 @@ class KinematicFarm : public Farm {
       const std::string& hash, const std::vector<v1::Task>& tasks,
       const std::function<void(const FarmProgress&)>& = {}) override {
     std::vector<v1::TaskResult> results;
-    for (const v1::Task& task : tasks)
-      results.push_back(answer(problems_.at(hash), task.predict()));
+    for (const v1::Task& task : tasks) results.push_back(answer(problems_.at(hash), task));
     asked += tasks.size();
     return results;
   }
@@ -40,15 +39,27 @@ class KinematicFarm : public Farm {
   std::size_t asked = 0;
 
  private:
-  v1::TaskResult answer(const Problem& problem, const v1::PredictTask& task) const {
+  v1::TaskResult answer(const Problem& problem, const v1::Task& whole) const {
     v1::TaskResult result;
     ParameterValues values = problem.values;
-    for (const v1::Override& o : task.point().overrides()) values[o.parameter()] = o.value();
+    const v1::PredictTask& task = whole.predict();
+    const v1::Point& point = whole.has_trace()      ? whole.trace().point()
+                             : whole.has_simulate() ? whole.simulate().point()
+                                                    : task.point();
+    for (const v1::Override& o : point.overrides()) values[o.parameter()] = o.value();
     if (fails_ && fails_(values)) {
       result.set_outcome(v1::NEVER_RESTED);
       return result;
     }
     result.set_outcome(v1::OK);
+    if (whole.has_simulate()) {
+      simulate(problem, values, whole.simulate(), result.mutable_simulate());
+      return result;
+    }
+    if (whole.has_trace()) {
+      trace(values, whole.trace(), result.mutable_trace());
+      return result;
+    }
     result.mutable_predict();
     std::vector<std::uint32_t> wanted(task.trials().begin(), task.trials().end());
     for (std::uint32_t i = 0; wanted.empty() && i < problem.log.trials.size(); ++i) {
@@ -58,17 +69,42 @@ class KinematicFarm : public Farm {
     return result;
   }
 
+  // As the robot goes: at once, and at one speed.
+  static Twist way_of(const ParameterValues& values, double left, double right, double time_s) {
+    const double speed = values[row_of(Srv1::kFullSpeed)];
+    const double width = values[row_of(Srv1::kTrackGauge)] + values[row_of(Srv1::kContactLength)];
+    return {speed * (left + right) / 2 * time_s, 0, speed * (right - left) / width * time_s};
+  }
+
+  static void trace(const ParameterValues& values, const v1::TraceTask& task, v1::TraceResult* to) {
+    const v1::Command& c = task.command();
+    for (double t = 0; t <= c.duration() + 1e-9; t += task.interval()) {
+      v1::TraceSample* sample = to->add_samples();
+      sample->set_t(t);
+      *sample->mutable_pose() = to_proto(exp(way_of(values, c.left(), c.right(), t)));
+    }
+    to->set_rest_time(c.duration());
+  }
+
+  // The ends alone.
+  static void simulate(const Problem& problem, const ParameterValues& values,
+                       const v1::SimulateTask& task, v1::SimulateResult* to) {
+    for (const v1::PlannedTrial& planned : task.plan()) {
+      Trial trial = from_proto(planned.trial());
+      const CommandSpec c = resolved_command(trial, problem.commands);
+      trial.X_WE = trial.X_WS * exp(way_of(values, c.left, c.right, c.duration_s));
+      *to->add_trials() = to_proto(trial);
+    }
+  }
+
   static void add(const Problem& problem, const ParameterValues& values, std::uint32_t i,
                   v1::PredictResult* to) {
     const Trial& trial = problem.log.trials[i];
     const CommandSpec c = resolved_command(trial, problem.commands);
-    const double speed = values[row_of(Srv1::kFullSpeed)];
-    const double width = values[row_of(Srv1::kTrackGauge)] + values[row_of(Srv1::kContactLength)];
     v1::Predicted* predicted = to->add_predictions();
     predicted->set_trial(i);
-    const Twist way(speed * (c.left + c.right) / 2 * c.duration_s, 0,
-                    speed * (c.right - c.left) / width * c.duration_s);
-    *predicted->mutable_end() = to_proto(trial.X_WS * exp(way));
+    *predicted->mutable_end() =
+        to_proto(trial.X_WS * exp(way_of(values, c.left, c.right, c.duration_s)));
   }
 
   Fails fails_;
