@@ -33,6 +33,15 @@ async function until(page, expression, words, ms = 90_000) {
   return false;
 }
 
+// The server finds a new folder at its next look around.
+async function served(url) {
+  for (const from = performance.now(); performance.now() - from < 90_000;) {
+    if ((await fetch(url)).ok) break;
+    await new Promise((done) => { setTimeout(done, 100); });
+  }
+  return url;
+}
+
 const saidBy = (child, pattern) => new Promise((resolve) => {
   const look = () => pattern.exec(child.said);
   if (look()) return resolve(look());
@@ -126,7 +135,7 @@ async function diagnosed(view) {
   const made = start("simulate", "d.toml", "--trials", "60", "--seed", "3", "--set", "motor_lag.tau=0.06", "--out", "d.csv", "--workers", "1");
   check((await made.ended) === 0, `nothing to diagnose: ${made.said}`);
   const diagnosis = start("diagnose", "d.toml", "--trials", "d.csv", "--out", "d", "--workers", "1");
-  const page = await open(view("d"), { may });
+  const page = await open(await served(view("d")), { may });
   const stage = `document.querySelector("#tiles")?.innerText || ""`;
   await until(page, `/[1-9] of 6/.test(${stage}) || (document.querySelector("#tiles") || location.reload(), false)`, "a diagnosis is seen at work");
   // What was found is there before the report is, stage by stage.
@@ -164,7 +173,7 @@ wheels.left.radius = "table"
 `);
   const run = start("evolve", "rover.toml", "--out", "rover", "--generations", "1", "--population", "4", "--workers", "1");
   check((await run.ended) === 0, `the rover's run did not end well: ${run.said}`);
-  const page = await open(`${view("rover")}&trial=3`, { may });
+  const page = await open(await served(`${view("rover")}&trial=3`), { may });
   const title = `document.querySelector("#watch-plot h4")?.textContent`;
   await until(page, `/^Window 3 .*, at 2.0. s of 2/.test(${title})`, "a window is shown");
   const measured = `fetch("/drive?of=rover&trial=3").then((answer) => answer.json()).then((drive) => drive.measured.length)`;
@@ -187,7 +196,7 @@ async function pushes(view) {
   check((await made.ended) === 0, `nothing was pushed: ${made.said}`);
   const run = start("evolve", "push.toml", "--trials", "pushes.csv", "--out", "push", "--generations", "1", "--population", "4", "--workers", "1");
   check((await run.ended) === 0, `the pushes' run did not end well: ${run.said}`);
-  const page = await open(`${view("push")}&trial=2`, { may });
+  const page = await open(await served(`${view("push")}&trial=2`), { may });
   await until(page, `/^Trial 2 /.test(document.querySelector("#watch-plot h4")?.textContent)`, "a push is shown");
   const closed = `[...document.querySelectorAll("#watch-plot path")].filter((p) => p.getAttribute("d").split("L").length === 5).length`;
   check((await page.run(closed)) >= 3, "three outlines of the piece are not drawn");
@@ -199,7 +208,7 @@ async function pushes(view) {
 
 // Choices are steps that back takes back and forward does again; what cannot be read says why.
 async function backAndBroken(address, view) {
-  const page = await open(view("short"), { may });
+  const page = await open(await served(view("short")), { may });
   const choose = (value) => page.run(`(() => { const s = document.querySelector("#progress-controls select"); s.value = "${value}"; s.dispatchEvent(new Event("change")); })()`);
   const chosen = (value) => `document.querySelector("#progress-controls select").value === "${value}"`;
   await choose("evaluations");
@@ -241,7 +250,7 @@ try {
   // From before its first generation to its end.
   const whole = evolve("whole", "--generations", "8");
   await saidBy(whole, /evolving/);
-  const first = await open(view("whole"), { may });
+  const first = await open(await served(view("whole")), { may });
   await until(first, `document.getElementById("headline") !== null || (location.reload(), false)`, "a new run is found");
   await until(first, `${generation} >= 1`, "its first generation is shown");
   await until(first, `/^finished/.test(document.getElementById("state").textContent)`, "it is seen to end");
@@ -258,7 +267,7 @@ try {
   await until(list, `document.querySelectorAll("#entries tbody tr").length === 1 && location.search.includes("q=short")`, "the list is filtered and its address says so");
   await list.close();
 
-  const page = await open(view("live"), { may });
+  const page = await open(await served(view("live")), { may });
   await until(page, `${generation} >= 2`, "a live run goes on under the open page");
   await until(page, `document.querySelectorAll("#gene-plots .canvas rect").length > 10`, "genes are drawn");
   check(/busy|idle/.test(await page.run(`document.getElementById("farm-now").innerText`)), "no worker is told of");
