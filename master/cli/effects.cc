@@ -276,9 +276,28 @@ int draw_figures(EffectsOptions& options, CliContext& context) {
   return kExitDone;
 }
 
+// Of the config's scenario, or of tracked robots.
+Result<std::vector<Effect>> catalogue_of(const EffectsOptions& options) {
+  const std::span<const Effect> tracked = srv1_effects();
+  if (options.config.empty()) return std::vector<Effect>(tracked.begin(), tracked.end());
+  const Result<Config> config = read_config(options.config);
+  if (!config) return config.error();
+  const ParameterTable& table = config->problem.table();
+  std::vector<Effect> effects;
+  for (const std::size_t e : pictured(table)) effects.push_back(table.effects()[e]);
+  return effects;
+}
+
 int run_effects(EffectsOptions& options, CliContext& context) {
   if (!options.figures.empty()) return draw_figures(options, context);
-  context.console.result(listing(srv1_effects()), to_json(srv1_effects()));
+  const Result<std::vector<Effect>> effects = catalogue_of(options);
+  if (!effects) {
+    context.console.error(effects.error());
+    return kExitBadUsage;
+  }
+  const std::string none = "its scenario has no catalogue of effects\n";
+  context.console.result(effects->empty() ? options.config + ": " + none : listing(*effects),
+                         to_json(*effects));
   return kExitDone;
 }
 
@@ -286,7 +305,9 @@ int run_effects(EffectsOptions& options, CliContext& context) {
 
 SubcommandRun setup_effects(CLI::App& app) {
   auto options = std::make_shared<EffectsOptions>();
-  app.add_option("CONFIG", options->config, "Robot of the pictures; default: the nominal one");
+  app.add_option(
+      "CONFIG", options->config,
+      "Whose catalogue, and the robot of the pictures; default: tracked robots, a nominal one");
   app.add_option("--figures", options->figures,
                  "Draw what each effect does to the commands, as SVG, into this folder");
   options->outputs.declare(app);

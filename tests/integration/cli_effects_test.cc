@@ -29,6 +29,19 @@ TEST(CliEffects, ListsEveryRowWithItsParameters) {
   }
 }
 
+TEST(CliEffects, ListsTheCatalogueOfTheConfigsScenario) {
+  const Finished push = gapfarm_command({"effects", GAPFARM_SOURCE_DIR "/configs/push.toml"});
+  EXPECT_EQ(push.exit_code, 0) << push.err;
+  EXPECT_THAT(push.out, HasSubstr("friction_anisotropy ("));
+  EXPECT_THAT(push.out, testing::Not(HasSubstr("motor_asymmetry")));
+  const Finished ball =
+      gapfarm_command({"effects", GAPFARM_SOURCE_DIR "/configs/racquetball.toml"});
+  EXPECT_EQ(ball.exit_code, 0) << ball.err;
+  EXPECT_THAT(ball.out, HasSubstr("has no catalogue of effects"));
+  const Finished missing = gapfarm_command({"effects", "none.toml"});
+  EXPECT_EQ(missing.exit_code, 2);
+}
+
 TEST(CliEffects, DrawsAPictureOfEach) {
   const TemporaryFolder folder;
   const std::string pictures = folder / "pictures";
