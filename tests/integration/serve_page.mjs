@@ -132,16 +132,20 @@ async function withoutEvents(url, resume) {
 // From its first stage to its report.
 async function diagnosed(view) {
   writeFileSync(join(folder, "d.toml"), DIAGNOSED);
-  const made = start("simulate", "d.toml", "--trials", "60", "--seed", "3", "--set", "motor_lag.tau=0.06", "--out", "d.csv", "--workers", "1");
+  const made = start("simulate", "d.toml", "--trials", "120", "--seed", "3", "--set", "motor_lag.tau=0.06", "--out", "d.csv", "--workers", "1");
   check((await made.ended) === 0, `nothing to diagnose: ${made.said}`);
   const diagnosis = start("diagnose", "d.toml", "--trials", "d.csv", "--out", "d", "--workers", "1");
+  // Held up again and again, so that its stages are there to be seen however fast the machine is.
+  const hold = () => { diagnosis.kill("SIGSTOP"); setTimeout(() => diagnosis.kill("SIGCONT"), 540); };
+  const holding = setInterval(hold, 600);
   const page = await open(await served(view("d")), { may });
   const stage = `document.querySelector("#tiles")?.innerText || ""`;
-  await until(page, `/[1-9] of 6/.test(${stage}) || (document.querySelector("#tiles") || location.reload(), false)`, "a diagnosis is seen at work");
+  await until(page, `/[1-9] of 6/.test(${stage}) || (document.querySelector("#tiles") || location.reload(), false)`, "a diagnosis is seen at work", 200_000);
   // What was found is there before the report is, stage by stage.
   const told = (about) => `[...document.querySelectorAll("#found-list h4")].some((h) => h.textContent === "${about}")`;
-  await until(page, told("the base model"), "what the first stage found is told");
-  await until(page, told("what the catalogue offers"), "what the catalogue offers is told");
+  await until(page, told("the base model"), "what the first stage found is told", 200_000);
+  await until(page, told("what the catalogue offers"), "what the catalogue offers is told", 200_000);
+  clearInterval(holding);
   await page.picture("serve-diagnosis-live");
   await until(page, `document.getElementById("shrinkage") || document.getElementById("screening")`, "the diagnosis becomes its report", 400_000);
   check((await diagnosis.ended) === 0, `the diagnosis did not end well: ${diagnosis.said}`);
