@@ -71,6 +71,13 @@ std::vector<Effect> build_catalogue() {
       in_spread(camera("pose_quantisation", kStartHeading | kStartPlace,
                        "positions are rounded to this grid",
                        {real("step", "m", 0, 0, 0.1, "of the grid")})),
+  };
+}
+
+// Rows are stored by their number, so what came after the second ones of a kind stands after them.
+std::vector<Effect> build_younger() {
+  using namespace effect_rows;  // NOLINT: what follows is rows
+  return {
       by_chance(
           camera("unsettled_start", kUnrecordedMove,
                  "in a share of the trials after an unrecorded move the start was read "
@@ -82,34 +89,38 @@ std::vector<Effect> build_catalogue() {
 
 // Of which there may be two: an arena under four cameras has a seam across each axis.
 constexpr const char* kMayRepeat[] = {"camera_seam"};
-// Rows are stored by their number: what came to the catalogue after seconds comes after them.
-constexpr const char* kFirstAfterSeconds = "unsettled_start";
 
-std::vector<Effect> with_seconds(std::vector<Effect> effects) {
-  for (const char* kind : kMayRepeat) {
-    const auto first = std::find_if(effects.begin(), effects.end(),
-                                    [&](const Effect& effect) { return effect.name == kind; });
-    Effect second = *first;
-    second.repeats = first->name;
+std::vector<Effect> build_seconds() {
+  std::vector<Effect> seconds;
+  for (const Effect& first : build_catalogue()) {
+    if (std::find(std::begin(kMayRepeat), std::end(kMayRepeat), first.name) ==
+        std::end(kMayRepeat)) {
+      continue;
+    }
+    Effect& second = seconds.emplace_back(first);
+    second.repeats = first.name;
     second.name += "_2";
     second.summary += "; a second one";
-    const auto after = std::find_if(effects.begin(), effects.end(), [](const Effect& effect) {
-      return effect.name == kFirstAfterSeconds;
-    });
-    effects.insert(after, std::move(second));
   }
-  return effects;
+  return seconds;
+}
+
+std::vector<Effect> joined(std::initializer_list<std::vector<Effect>> parts) {
+  std::vector<Effect> all;
+  for (const std::vector<Effect>& part : parts) all.insert(all.end(), part.begin(), part.end());
+  return all;
 }
 
 }  // namespace
 
 std::span<const Effect> srv1_effects() {
-  static const std::vector<Effect> catalogue = build_catalogue();
+  static const std::vector<Effect> catalogue = joined({build_catalogue(), build_younger()});
   return catalogue;
 }
 
 std::span<const Effect> srv1_effects_and_seconds() {
-  static const std::vector<Effect> catalogue = with_seconds(build_catalogue());
+  static const std::vector<Effect> catalogue =
+      joined({build_catalogue(), build_seconds(), build_younger()});
   return catalogue;
 }
 
