@@ -11,8 +11,6 @@
 #include "master/diagnose/verdict.h"
 
 namespace gapfarm {
-namespace {}  // namespace
-
 bool clearly_better(const std::vector<double>& scores, const std::vector<double>& others) {
   const auto n = static_cast<double>(scores.size());
   double sum = 0, squares = 0;
