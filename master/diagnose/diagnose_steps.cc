@@ -95,8 +95,11 @@ Status DiagnosisRun::search_catalogue() {
 
 Status DiagnosisRun::screen() {
   if (!study_.on_bounds.empty()) tuned_ = study_;
-  if (Status s = look_for_all(); !s) return s;
-  return tuned_ && chosen_.empty() ? doubt_base() : Status{};
+  const Status looked = look_for_all();
+  // A base on its bounds may be one that cannot be simulated with much of the catalogue.
+  const bool fell = !looked && looked.error().code == ErrorCode::kSimulation;
+  if (!looked && !(tuned_ && fell)) return looked;
+  return tuned_ && (fell || chosen_.empty()) ? doubt_base() : Status{};
 }
 
 Status DiagnosisRun::look_for_all() {

@@ -120,6 +120,36 @@ TEST(Diagnose, ABaseThatCannotBeSimulatedEndsInAReport) {
   EXPECT_NE(result->diagnosis.sanity.front().text.find("NEVER_RESTED"), std::string::npos);
 }
 
+// Turns that no length of the treads explains: another robot.
+TEST(Diagnose, ABaseThatStaysOnItsBoundsIsDoubted) {
+  Problem problem = kinematic_log(120);
+  for (Trial& t : problem.log.trials) {
+    Twist way = log(between(t.X_WS, t.X_WE));
+    way[2] /= 2;
+    t.X_WE = t.X_WS * exp(way);
+  }
+  const std::size_t length = row_of(Srv1::kContactLength);
+  // Also where the robot falls over as soon as anything of the catalogue acts on such a base.
+  const double bound = 0.9 * problem.table()[length].upper;
+  const std::size_t effects = problem.table().effect_row(0);
+  for (const bool falls : {false, true}) {
+    KinematicFarm farm([&](const ParameterValues& values) {
+      bool acts = false;
+      for (std::size_t row = effects; row < values.size(); ++row) {
+        acts = acts || values[row] != problem.values[row];
+      }
+      return falls && acts && values[length] < bound;
+    });
+    const auto result = diagnose(farm, problem, {});
+    ASSERT_TRUE(result.ok()) << result.error().message;
+    EXPECT_EQ(result->diagnosis.verdict, Verdict::kUnknown);
+    EXPECT_TRUE(result->diagnosis.effects.empty());
+    ASSERT_FALSE(result->diagnosis.sanity.empty());
+    EXPECT_EQ(result->diagnosis.sanity.front().name, "base_on_bounds")
+        << result->diagnosis.sanity.front().text;
+  }
+}
+
 TEST(Diagnose, SaysTheSameWhoeverWatches) {
   Problem problem = kinematic_log(120);
   for (Trial& t : problem.log.trials) {
