@@ -5,7 +5,7 @@
 
 #include "common/json/json.h"
 #include "common/trials/files.h"
-#include "master/diagnose/aliases.h"
+#include "master/diagnose/effects/effect_diagnosis.h"
 
 namespace gapfarm {
 namespace {
@@ -32,7 +32,7 @@ std::vector<std::string> diagnose_command(const OpenCase& open, std::size_t numb
   if (!open.left_out.empty()) {
     // An effect that passes for another one is no stranger while the other one is there.
     words.insert(words.end(), {"--leave-out", open.left_out});
-    for (const std::string& alias : constant_aliases(open.left_out)) words.push_back(alias);
+    for (const char* alias : effect_diagnosis(open.left_out).aliases) words.emplace_back(alias);
   }
   return words;
 }

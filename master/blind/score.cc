@@ -6,6 +6,8 @@
 #include <numbers>
 #include <set>
 
+#include "master/diagnose/effects/effect_diagnosis.h"
+
 namespace gapfarm {
 namespace {
 
@@ -74,7 +76,8 @@ bool holds(double lo, double hi, double value, double turn) {
 
 // Effects without an arrow: half a turn changes nothing, and a quarter of one undoes them.
 bool has_no_arrow(const std::string& effect) {
-  return effect == "friction_anisotropy" || effect == "pressure_distribution";
+  const std::optional<Polar>& polar = effect_diagnosis(effect).polar;
+  return polar && polar->symmetry == 2;
 }
 
 // The same effect with its strength above neutral, as a diagnosis tells it.

@@ -6,9 +6,9 @@
 #include "common/score/statistics.h"
 #include "master/diagnose/diagnose_steps.h"
 #include "master/diagnose/digits.h"
+#include "master/diagnose/effects/patch_places.h"
 #include "master/diagnose/findings.h"
 #include "master/diagnose/headline.h"
-#include "master/diagnose/seam.h"
 #include "master/sanity/words.h"
 
 namespace gapfarm {
@@ -21,13 +21,8 @@ constexpr double kAtBound = 1e-3;
 constexpr double kMostMissed = 3;
 constexpr double kLittleClosed = 0.02;  // of the gap
 
-bool is_place(const std::string& key) {
-  return key == "camera_distortion.x" || key == "camera_distortion.y" ||
-         key == "friction_patch.x" || key == "friction_patch.y" || is_seam_position(key);
-}
-
-bool at_bound(const Parameter& row, double value) {
-  if (row.kind != ParameterKind::kReal || is_place(row.key)) return false;
+bool at_bound(const EffectDiagnoses& effects, const Parameter& row, double value) {
+  if (row.kind != ParameterKind::kReal || place_of(effects, row) != nullptr) return false;
   if (row.key.ends_with(".direction")) return false;
   const double near = kAtBound * (row.upper - row.lower);
   return value <= row.lower + near || value >= row.upper - near;
@@ -143,7 +138,7 @@ std::optional<std::pair<std::size_t, std::string>> DiagnosisRun::effect_at_bound
     for (const FittedParameter& fitted : estimates_->parameters) {
       const Parameter& row = problem_.table()[fitted.row];
       if (row.effect != chosen_[k].candidate.signature.effect) continue;
-      if (!at_bound(row, fitted.value)) continue;
+      if (!at_bound(*subject_.effects, row, fitted.value)) continue;
       return std::pair{
           k, " explains some of it only at the edge of what it can be (" + row.key + " = " +
                  problem_.table().format(fitted.row, rounded_to_digits(fitted.value, 4)) +
@@ -193,7 +188,7 @@ std::string DiagnosisRun::why_not_screened(const std::string& name, Screened* ro
     return note;
   };
   if (kind_of(name) != name) return "a second one, looked for beside the first";
-  if (name == "friction_patch") return "no disc of floor promises enough to be simulated";
+  if (name == kPatchEffect) return "no disc of floor promises enough to be simulated";
   if (name == "slip_events") {
     return told(slip_.gain, "probability", slip_.probability,
                 slip_.gain > 0 ? "by the tails of what is left"
@@ -206,7 +201,7 @@ std::string DiagnosisRun::why_not_screened(const std::string& name, Screened* ro
                 latency_.gain > 0 ? "by readings that fall behind the next ones"
                                   : "readings of one resting pose agree");
   }
-  if (const SpreadRow* look = spread_row(name)) {
+  if (const SpreadRow* look = subject_.effects->row(name).spread) {
     for (const FoundSpread& found : spreads_) {
       if (found.row != look) continue;
       const Estimate& first = found.fit.estimates.front();
@@ -242,7 +237,7 @@ DiagnosisResult DiagnosisRun::give_up(const std::string& stage, const Error& err
   d.drives.clear();
   d.parameters.clear();
   say_what_was_left_out();
-  tell(subject_.effect_words, &d);
+  tell(*subject_.effects, &d);
   result_.tuned = problem_.values;
   for (const auto& [row, value] : study_.base) result_.tuned[row] = value;
   result_.final_ = result_.tuned;

@@ -59,41 +59,39 @@ Status DiagnosisRun::plan_next() {
 
 // An arena may have more seams, a floor more patches, than a model holds or than were clear enough.
 Status DiagnosisRun::look_for_second_places() {
-  const std::pair<const char*, std::vector<const char*>> kPlaces[] = {
-      {"camera_seam", {"axis", "position"}}, {"friction_patch", {"x", "y", "radius"}}};
   const Regression explained = this->explained();
   const auto is_named = [&](const std::string& name) {
     return std::any_of(chosen_.begin(), chosen_.end(),
                        [&](const ChosenEffect& c) { return c.candidate.signature.effect == name; });
   };
   for (const ChosenEffect& effect : chosen_) {
-    for (const auto& [name, keys] : kPlaces) {
-      if (effect.candidate.signature.effect != name) continue;
-      const auto second = selector_->again(explained, name);
-      if (!second) return second.error();
-      if (second->gain < subject_.least_gain) continue;
-      std::string place;
-      for (const char* key : keys) {
-        const std::size_t row = problem_.table().row(std::string(name) + "." + key);
-        const std::string& full = problem_.table()[row].key;
-        Overrides at;
-        for (const auto& [k, v] : second->signature.fixed) at[problem_.table().row(k)] = v;
-        const double value = second->signature.fixed.at(full) + frame_of(full, at);
-        place += std::string(place.empty() ? "" : ", ") + key + " " +
-                 problem_.table().format(row, std::round(value * 1e3) / 1e3);
-      }
-      Regression with_it = explained;
-      with_it.add(second->signature.columns);
-      const std::vector<Leftover> left = leftovers(with_it, blocks_);
-      const bool all = left.empty() || left.front().log10_p >= subject_.unknown_log10_p;
-      const bool two = is_named(second_of(name)), room = !two && !second_of(name).empty();
-      result_.diagnosis.cautions.push_back(
-          std::string(two ? "A third " : "A second ") + name + " (" + place + ") would explain " +
-          std::to_string(std::lround(second->gain)) + " nats more of what is left" +
-          (all ? ", and nothing would remain" : "") +
-          (room ? "; that is too little, or too near the first, to name it."
-                : std::string("; a model holds ") + (two ? "two." : "one.")));
+    const std::string& name = effect.candidate.signature.effect;
+    const std::vector<const char*>& keys = subject_.effects->row(name).told_by;
+    if (keys.empty() || kind_of(name) != name) continue;
+    const auto second = selector_->again(explained, name);
+    if (!second) return second.error();
+    if (second->gain < subject_.least_gain) continue;
+    std::string place;
+    for (const char* key : keys) {
+      const std::size_t row = problem_.table().row(name + "." + key);
+      const std::string& full = problem_.table()[row].key;
+      Overrides at;
+      for (const auto& [k, v] : second->signature.fixed) at[problem_.table().row(k)] = v;
+      const double value = second->signature.fixed.at(full) + frame_of(full, at);
+      place += std::string(place.empty() ? "" : ", ") + key + " " +
+               problem_.table().format(row, std::round(value * 1e3) / 1e3);
     }
+    Regression with_it = explained;
+    with_it.add(second->signature.columns);
+    const std::vector<Leftover> left = leftovers(with_it, blocks_);
+    const bool all = left.empty() || left.front().log10_p >= subject_.unknown_log10_p;
+    const bool two = is_named(second_of(name)), room = !two && !second_of(name).empty();
+    result_.diagnosis.cautions.push_back(
+        std::string(two ? "A third " : "A second ") + name + " (" + place + ") would explain " +
+        std::to_string(std::lround(second->gain)) + " nats more of what is left" +
+        (all ? ", and nothing would remain" : "") +
+        (room ? "; that is too little, or too near the first, to name it."
+              : std::string("; a model holds ") + (two ? "two." : "one.")));
   }
   return {};
 }

@@ -149,11 +149,11 @@ NamedEffect DiagnosisRun::named(std::size_t k, const JointFit& estimates) const 
 }
 
 double DiagnosisRun::frame_of(const std::string& key, const Overrides& at) const {
-  if (key == "camera_distortion.x" || key == "friction_patch.x") return frame_m_.x();
-  if (key == "camera_distortion.y" || key == "friction_patch.y") return frame_m_.y();
-  if (!is_seam_position(key)) return 0;
-  const std::string seam = key.substr(0, key.find('.'));
-  const auto axis = at.find(problem_.table().row(seam + ".axis"));
+  const Parameter& p = problem_.table()[problem_.table().row(key)];
+  const WorldPlace* place = place_of(*subject_.effects, p);
+  if (place == nullptr) return 0;
+  if (place->axis >= 0) return frame_m_[place->axis];
+  const auto axis = at.find(problem_.table().row(p.effect + ".axis"));
   return axis != at.end() && axis->second != 0 ? frame_m_.y() : frame_m_.x();
 }
 
@@ -235,7 +235,7 @@ void DiagnosisRun::name_effects() {
     const double change = effect.gap_after - effect.gap_before;
     effect.gap_before = gap;
     effect.gap_after = gap += change;
-    effect.text = effect_sentence(effect, subject_.effect_words);
+    effect.text = effect_sentence(effect, *subject_.effects);
     result_.diagnosis.effects.push_back(std::move(effect));
   }
 }
@@ -335,7 +335,7 @@ Status DiagnosisRun::report() {
         " m (its [frame]), and a seam's shift is the one there.");
   }
   if (Status s = plan_next(); !s) return s;
-  tell(subject_.effect_words, &d);
+  tell(*subject_.effects, &d);
   return {};
 }
 

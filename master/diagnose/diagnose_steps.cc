@@ -9,6 +9,7 @@
 #include "common/score/statistics.h"
 #include "master/diagnose/digits.h"
 #include "master/diagnose/drive_noise.h"
+#include "master/diagnose/effects/patch_places.h"
 #include "master/diagnose/noise.h"
 
 namespace gapfarm {
@@ -80,7 +81,7 @@ Status DiagnosisRun::search_catalogue() {
   for (Signature& s : *catalogue) study_.drop_ignored(s.columns);
   selector_ = std::make_unique<Selector>(predictor_, study_, std::move(*catalogue), *base_);
   selector_->leave_out({options_.left_out.begin(), options_.left_out.end()});
-  if (!left_out("friction_patch")) {
+  if (!left_out(kPatchEffect)) {
     selector_->look_for_patches([this] { return subject_.patches(predictor_, study_); });
   }
   std::vector<const Signature*> first;
@@ -181,7 +182,9 @@ Result<Relinearised> DiagnosisRun::relinearise(const std::vector<EffectCandidate
     columns.col(0) = study_.whiten(contribution);
     columns.rightCols(columns.cols() - 1) = estimates_->jacobian(Eigen::all, own);
     at_estimate.data += columns.col(0);
-    if (depends_on_contact(effects[k].signature.effect)) columns = split_by_kind(study_, columns);
+    if (subject_.effects->row(effects[k].signature.effect).by_contact) {
+      columns = split_by_kind(study_, columns);
+    }
     study_.drop_ignored(columns);
     at_estimate.columns.push_back(std::move(columns));
   }

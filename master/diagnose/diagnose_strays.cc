@@ -3,10 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/pose/segment.h"
 #include "master/diagnose/diagnose_steps.h"
 #include "master/diagnose/noise.h"
-#include "master/diagnose/seam.h"
 #include "master/diagnose/slip_places.h"
 
 namespace gapfarm {
@@ -14,25 +12,6 @@ namespace {
 
 constexpr double kLeastSlipGain = 11;
 constexpr double kLeastSlipShare = 0.03;  // of what the effects on the means explain
-
-// Which camera saw a pose on the line of a seam is not known, and at the edge of a patch a small
-// error of its place is a large one of the motion.
-bool strays_by(const Signature& chosen, const ResidualTrial& trial) {
-  const Eigen::Vector2d from(trial.X_WS.x, trial.X_WS.y), to(trial.X_WP.x, trial.X_WP.y);
-  if (is_seam(chosen.effect)) {
-    const int axis = chosen.fixed.at(chosen.effect + ".axis") == 0 ? 0 : 1;
-    const double line = chosen.fixed.at(chosen.effect + ".position");
-    return std::abs(to[axis] - line) < 0.03 || std::abs(from[axis] - line) < 0.01;
-  }
-  if (chosen.effect == "friction_patch") {
-    constexpr double kEdge_m = 0.1;
-    const Eigen::Vector2d centre(chosen.fixed.at("friction_patch.x"),
-                                 chosen.fixed.at("friction_patch.y"));
-    return nearest_on_segment(centre, from, to).distance <
-           chosen.fixed.at("friction_patch.radius") + kEdge_m;
-  }
-  return false;
-}
 
 }  // namespace
 
@@ -43,8 +22,9 @@ void DiagnosisRun::look_for_spreads() {
   const double share = problem_.fitness.outlier_share;
   const std::vector<Eigen::Vector3d> left = study_.unwhiten(studentised(*base_, 0.2));
   const std::vector<double> without = scores_of(study_, left, share);
-  for (const SpreadRow* row : spread_rows()) {
-    if (left_out(row->effect)) continue;
+  for (const EffectDiagnosis* effect : *subject_.effects) {
+    const SpreadRow* row = effect->spread;
+    if (row == nullptr || left_out(row->effect)) continue;
     SpreadFit fit = row->fit(study_, left, share);
     if (fit.gain < row->least_gain) continue;
     const std::vector<double> with = row->scores(study_, left, fit, share);
@@ -91,7 +71,9 @@ std::vector<bool> DiagnosisRun::tells_of_slips() const {
       if (found.row->strays(trial)) tells[i] = false;
     }
     for (const ChosenEffect& effect : chosen_) {
-      if (strays_by(effect.candidate.signature, trial)) tells[i] = false;
+      const Signature& chosen = effect.candidate.signature;
+      const auto strays = subject_.effects->row(chosen.effect).strays;
+      if (strays != nullptr && strays(chosen, trial)) tells[i] = false;
     }
   }
   return tells;

@@ -22,28 +22,6 @@ constexpr double kMostOfRange = 0.3;  // of a parameter's range, that one step m
 constexpr double kLeastMove = 1e-4, kMostMove = 5, kGoodMove = 0.3;
 constexpr double kFarSquared = 16;  // squared distance beyond which a trial counts linearly
 
-// Effects with a strength and a direction, whose first two columns belong to its cosine and sine.
-struct Polar {
-  const char* effect;
-  const char* strength;
-  const char* direction;
-  double symmetry;  // looks the same after this share of a turn
-  bool ratio;       // the strength is the logarithm of a ratio
-};
-constexpr Polar kPolar[] = {
-    {"floor_tilt", "floor_tilt.angle", "floor_tilt.direction", 1, false},
-    {"table_tilt", "table_tilt.angle", "table_tilt.direction", 1, false},
-    {"friction_anisotropy", "friction_anisotropy.ratio", "friction_anisotropy.direction", 2, true},
-    {"pressure_distribution", "pressure_distribution.stretch", "pressure_distribution.direction", 2,
-     false},
-};
-
-const Polar* polar_of(const std::string& effect) {
-  const auto* found = std::find_if(std::begin(kPolar), std::end(kPolar),
-                                   [&](const Polar& p) { return effect == p.effect; });
-  return found == std::end(kPolar) ? nullptr : found;
-}
-
 // Step of a finite difference in a parameter: a hundredth of its value, but no less than what the
 // catalogue's bounds make a small change.
 double step_of(const Parameter& row, double value) {
@@ -245,33 +223,19 @@ std::map<std::string, double> start_values(const Study& study, const Regression&
   ridged.diagonal() *= 1 + 1e-6;
   const Eigen::VectorXd c = solve_symmetric(ridged, columns.transpose() * data);
   std::map<std::string, double> values = signature.fixed;
-  const std::string& e = signature.effect;
-  const Polar* polar = polar_of(e);
-  if (polar != nullptr) {
-    const double strength = std::hypot(c[0], c[1]);
-    values[polar->strength] = polar->ratio ? std::exp(strength) : strength;
-    values[polar->direction] = std::atan2(c[1], c[0]) / polar->symmetry;
-  } else if (e == "camera_distortion") {
-    const Eigen::Vector2d middle = middle_of(study);
-    const double k1 = std::abs(c[0]) > 1e-6 ? c[0] : 1e-6;
-    values["camera_distortion.k1"] = k1;
-    values["camera_distortion.x"] = middle.x() + std::clamp(c[1] / k1, -1.0, 1.0);
-    values["camera_distortion.y"] = middle.y() + std::clamp(c[2] / k1, -1.0, 1.0);
+  const EffectDiagnosis& effect = study.subject->effects->row(signature.effect);
+  const EffectStart at{study, others, signature, c};
+  const ParameterTable& table = *study.table;
+  if (effect.polar) {
+    start_polar(*effect.polar, at, &values);
+  } else if (effect.start != nullptr) {
+    effect.start(at, &values);
   } else {
     for (std::size_t k = 0; k < signature.parameters.size(); ++k) {
-      values[signature.parameters[k]] = c[static_cast<Eigen::Index>(k)];
+      const std::string& key = signature.parameters[k];
+      values[key] = table[table.row(key)].nominal + c[static_cast<Eigen::Index>(k)];
     }
   }
-  if (e == "camera_aspect") values["camera_aspect.ratio"] += 1;
-  if (is_seam(e)) {
-    // Slopes were about the middle; the catalogue's are about zero.
-    const Eigen::Vector2d middle = middle_of(study);
-    const double along = signature.fixed.at(e + ".axis") == 0 ? middle.y() : middle.x();
-    values[e + ".position"] = seam_position(study, others, signature, c.head<4>());
-    values[e + ".offset_x"] -= along * values[e + ".slope_x"];
-    values[e + ".offset_y"] -= along * values[e + ".slope_y"];
-  }
-  const ParameterTable& table = *study.table;
   for (auto& [key, value] : values) {
     const Parameter& row = table[table.row(key)];
     value = std::clamp(value, row.lower, row.upper);

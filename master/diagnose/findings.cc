@@ -9,61 +9,11 @@
 #include "common/score/statistics.h"
 #include "master/diagnose/free_commands.h"
 #include "master/diagnose/selection.h"
-#include "master/diagnose/spread_row.h"
 
 namespace gapfarm {
 namespace {
 
 constexpr double kFewInCell = 4;
-
-const EffectWordsByName& robot_effect_words() {
-  constexpr double kDegrees = 180 / std::numbers::pi;
-  static const EffectWordsByName words = {
-      {"motor_asymmetry",
-       {"The right side runs faster than the left by %1", {{"ratio", 100, " %"}}}},
-      {"motor_deadband", {"Duty below %1 moves nothing and is lost above it", {{"duty", 1, ""}}}},
-      {"motor_lag", {"The motors follow their duty with a lag of %1", {{"tau", 1000, " ms"}}}},
-      {"timing_offset", {"The motors run longer than told by %1", {{"offset", 1000, " ms"}}}},
-      {"battery_sag", {"The battery loses %1 of its speed a minute", {{"rate", 100, " %"}}}},
-      {"backlash",
-       {"A side that changes direction first loses %1 of travel", {{"travel", 1000, " mm"}}}},
-      {"slip_events",
-       {"In %1 of the trials a side slips and loses up to %2 of its speed",
-        {{"probability", 100, " %"}, {"loss", 100, " %"}}}},
-      {"floor_tilt",
-       {"The floor falls by %1 toward %2",
-        {{"angle", 1000, " mrad"}, {"direction", kDegrees, " degrees"}}}},
-      {"floor_nap",
-       {"The floor has a nap that drags with %1 of the weight against %2",
-        {{"strength", 100, " %"}, {"direction", kDegrees, " degrees"}}}},
-      {"friction_patch",
-       {"A patch of floor around x = %2, y = %3 of the world, of radius %4 has %1 times the "
-        "friction",
-        {{"ratio", 1, ""}, {"x", 1, " m"}, {"y", 1, " m"}, {"radius", 1000, " mm"}}}},
-      {"rolling_resistance", {"Rolling drags with %1 of the weight", {{"coefficient", 100, " %"}}}},
-      {"com_offset",
-       {"The centre of mass lies %1 ahead and %2 left of the treads' centre",
-        {{"x", 1000, " mm"}, {"y", 1000, " mm"}}}},
-      {"camera_aspect", {"The camera's y scale is %1 times its x scale", {{"ratio", 1, ""}}}},
-      {"camera_distortion",
-       {"The lens distorts radially with k1 = %1 about x = %2, y = %3 of the world",
-        {{"k1", 1, " 1/m^2"}, {"x", 1, " m"}, {"y", 1, " m"}}}},
-      {"camera_seam",
-       {"Beyond a seam at %a = %1 the poses are shifted by %2 in x and %3 in y",
-        {{"position", 1, " m"}, {"offset_x", 1000, " mm"}, {"offset_y", 1000, " mm"}}}},
-      {"camera_seam_2",
-       {"Beyond a second seam at %a = %1 the poses are shifted by %2 in x and %3 in y, too",
-        {{"position", 1, " m"}, {"offset_x", 1000, " mm"}, {"offset_y", 1000, " mm"}}}},
-      {"heading_offset",
-       {"The marker's heading is %1 to the left of the robot's", {{"angle", 1000, " mrad"}}}},
-      {"marker_offset",
-       {"The marker sits %1 ahead and %2 left of the turning centre",
-        {{"x", 1000, " mm"}, {"y", 1000, " mm"}}}},
-      {"pose_latency",
-       {"In %1 of the trials a pose is %2 old", {{"share", 100, " %"}, {"latency", 1000, " ms"}}}},
-      {"pose_quantisation", {"Positions are rounded to a grid of %1", {{"step", 1000, " mm"}}}}};
-  return words;
-}
 
 std::string told(const Estimate& e, double factor, const std::string& unit, bool intervals) {
   std::string text = plain_number(factor * e.value) + unit;
@@ -88,18 +38,9 @@ std::string plain_claim(const NamedEffect& effect, bool intervals) {
   return "The data show " + effect.name + (values.empty() ? "" : " with " + listed(values));
 }
 
-const EffectWords* words_in(const EffectWordsByName& table, const std::string& effect) {
-  const auto found = table.find(effect);
-  return found == table.end() ? nullptr : &found->second;
-}
-
-std::string claim(const NamedEffect& effect, const EffectWordsByName* own, bool intervals) {
-  const EffectWords* found = own != nullptr ? words_in(*own, effect.name) : nullptr;
-  if (found == nullptr) found = words_in(robot_effect_words(), effect.name);
-  const SpreadRow* row = found == nullptr ? spread_row(effect.name) : nullptr;
-  if (row != nullptr) found = &row->words;
-  if (found == nullptr) return plain_claim(effect, intervals);
-  const EffectWords& words = *found;
+std::string claim(const NamedEffect& effect, const EffectDiagnoses& effects, bool intervals) {
+  const EffectWords& words = effects.row(effect.name).words;
+  if (words.sentence == nullptr) return plain_claim(effect, intervals);
   std::string text;
   for (const char* c = words.sentence; *c != 0; ++c) {
     if (*c != '%') {
@@ -200,8 +141,8 @@ std::string change_words(const GapFigures& position_mm, const GapFigures& headin
          " to " + plain_number(heading_mrad.final_) + " mrad)";
 }
 
-std::string effect_sentence(const NamedEffect& effect, const EffectWordsByName* words) {
-  std::string text = claim(effect, words, true);
+std::string effect_sentence(const NamedEffect& effect, const EffectDiagnoses& effects) {
+  std::string text = claim(effect, effects, true);
   if (std::isfinite(effect.closed) && effect.closed > 0) {
     text += "; adding that closes " + percent(effect.closed) + " of the gap in log score";
     if (effect.position_mm_before && effect.position_mm_after && effect.heading_mrad_before &&
@@ -213,8 +154,8 @@ std::string effect_sentence(const NamedEffect& effect, const EffectWordsByName* 
   return text + ".";
 }
 
-std::string effect_claim(const NamedEffect& effect, const EffectWordsByName* words) {
-  return claim(effect, words, false);
+std::string effect_claim(const NamedEffect& effect, const EffectDiagnoses& effects) {
+  return claim(effect, effects, false);
 }
 
 std::vector<std::string> findings(const Diagnosis& diagnosis) {

@@ -2,8 +2,6 @@
 #pragma once
 
 #include <cstddef>
-#include <functional>
-#include <map>
 #include <span>
 #include <string>
 #include <string_view>
@@ -11,6 +9,7 @@
 
 #include "common/trials/trial.h"
 #include "master/diagnose/diagnosis.h"
+#include "master/diagnose/effects/effect_diagnosis.h"
 #include "master/diagnose/residuals.h"
 
 namespace gapfarm {
@@ -34,35 +33,13 @@ std::string component_words(int component);
 // along the motion "turn 0.9 mrad too little" or "turn 0.9 mrad less".
 std::string deviation_words(int component, double size, bool along_motion, bool trend);
 
-// How a parameter is told: the words around its value in a unit that people use.
-struct Telling {
-  const char* key;
-  double factor;
-  const char* unit;
-};
-struct EffectWords {
-  const char* sentence;  // %1, %2, ...: the tellings' values with their intervals
-  std::vector<Telling> parameters;
-};
-// On one line.  %: the size of the parameter; @: the choice of the effect that is no number ("y").
-struct ShortWords {
-  std::string_view effect;
-  const char* key;  // whose size is told
-  double factor;
-  const char* unit;
-  const char* cause;
-  const char* opposite;  // where the value is negative; null: the same
-  const char* remedy;
-};
-using EffectWordsByName = std::map<std::string, EffectWords, std::less<>>;
-
 // "The battery loses 0.35 % of its speed a minute (0.31 to 0.4); adding that closes 88 % of the
-// gap."  `words`: of a scenario that has its own for some effects; the others are told as of a
-// tracked robot.  Effects without words, or without their parameters, are named with what is there.
-std::string effect_sentence(const NamedEffect& effect, const EffectWordsByName* words = nullptr);
+// gap."  Effects without words, or without their parameters, are named with what is there.
+std::string effect_sentence(const NamedEffect& effect,
+                            const EffectDiagnoses& effects = drive_effect_diagnoses());
 
 // Its claim alone, without intervals and full stop.
-std::string effect_claim(const NamedEffect& effect, const EffectWordsByName* words = nullptr);
+std::string effect_claim(const NamedEffect& effect, const EffectDiagnoses& effects);
 
 // The verdict and its reasons, a sentence each.
 std::vector<std::string> findings(const Diagnosis& diagnosis);

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "common/effects/catalogue.h"
-#include "master/diagnose/aliases.h"
+#include "master/diagnose/effects/patch_places.h"
 #include "master/diagnose/seam.h"
 #include "master/diagnose/subject.h"
 
@@ -17,16 +17,6 @@ namespace {
 constexpr double kSecondAlias = 0.8;   // cosine beyond which a further effect is the first again,
 constexpr double kSecondShare = 0.25;  // unless it gains this share of all that is explained
 
-// Effects whose difference is small beside what one contact model and another make of them: of
-// these a second one must gain a good part of what the first did.
-struct Family {
-  std::set<std::string> effects;
-  double share;
-};
-const Family kFamilies[] = {
-    {{"motor_deadband", "rolling_resistance", "timing_offset", "motor_lag"}, 0.75},
-    {{"floor_tilt", "floor_nap"}, 0.15},
-};
 // A second one of a kind: an error of the first's place or bend looks like one.  nats, and of all
 // that is explained.
 constexpr double kLeastSecondOfAKind = 20;
@@ -108,7 +98,7 @@ Result<std::vector<EffectCandidate>> Selector::candidates(
     }
   };
   see_all();
-  if (!without.count("friction_patch")) {
+  if (!without.count(kPatchEffect)) {
     if (Status s = search_patches(explained, most); !s) return s.error();
     see_all();
   }
@@ -132,7 +122,7 @@ Result<std::vector<EffectCandidate>> Selector::candidates(
 Result<EffectCandidate> Selector::again(const Regression& explained, const std::string& effect) {
   std::set<std::string> others;
   for (const Signature& s : catalogue_) others.insert(s.effect);
-  others.insert("friction_patch");  // joins the catalogue when it is looked for
+  others.insert(kPatchEffect);  // joins the catalogue when it is looked for
   others.erase(effect);
   auto best = candidates(explained, others);
   if (!best) return best.error();
@@ -166,13 +156,14 @@ double Selector::alias_cosine(const std::vector<Signature>& first,
 bool Selector::is_new(const std::vector<Signature>& first,
                       const std::vector<EffectCandidate>& chosen,
                       const EffectCandidate& candidate) const {
-  for (const Family& family : kFamilies) {
-    if (!family.effects.count(candidate.signature.effect)) continue;
+  const EffectDiagnoses& effects = *study_.subject->effects;
+  const EffectFamily* family = effects.row(candidate.signature.effect).family;
+  if (family != nullptr) {
     double gained = 0;
     for (const EffectCandidate& c : chosen) {
-      if (family.effects.count(c.signature.effect)) gained += c.gain;
+      if (effects.row(c.signature.effect).family == family) gained += c.gain;
     }
-    if (candidate.gain < family.share * gained) return false;
+    if (candidate.gain < family->share * gained) return false;
   }
   if (candidate.gain > kSecondShare * (first_gain_ + total_gain(chosen))) return true;
   for (std::size_t i = 0; i < chosen.size(); ++i) {
@@ -241,7 +232,7 @@ Result<std::vector<Alias>> Selector::aliases_of(const std::vector<Signature>& fi
     const double parallel = cosine(own, r.explained(other.signature.columns));
     const bool as_good =
         chosen[i].gain - other.gain < 4 && other.gain > study_.subject->least_gain / 2;
-    const auto& constant = constant_aliases(chosen[i].signature.effect);
+    const auto& constant = study_.subject->effects->row(chosen[i].signature.effect).aliases;
     const bool always =
         std::find(constant.begin(), constant.end(), other.signature.effect) != constant.end();
     if (parallel > kAliasCosine || as_good || always)

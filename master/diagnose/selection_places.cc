@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "master/diagnose/effects/patch_places.h"
 #include "master/diagnose/seam.h"
 #include "master/diagnose/selection.h"
 
@@ -12,11 +13,6 @@ namespace {
 constexpr double kWorthSketched = 12.5;  // of patches; where there are none it reaches 11
 constexpr int kSeamSteps = 10;
 constexpr int kMostPatchSearches = 4;
-
-Patch patch_of(const Signature& s) {
-  return {s.fixed.at("friction_patch.x"), s.fixed.at("friction_patch.y"),
-          s.fixed.at("friction_patch.radius"), s.fixed.at("friction_patch.ratio")};
-}
 
 }  // namespace
 

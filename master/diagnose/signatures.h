@@ -18,7 +18,7 @@ struct Signature {
   std::string effect;
   Eigen::MatrixXd columns;              // whitened; the first ones belong to `parameters`
   std::vector<std::string> parameters;  // table keys whose values the fitted coefficients are, or
-                                        // empty: see start_values() in estimate.h
+                                        // empty: see EffectDiagnosis::start
   std::map<std::string, double> fixed;  // other parameters of the effect at this signature
   double penalty = 0.5;                 // nats that its best fit gains by luck
 };
@@ -28,9 +28,6 @@ struct Signature {
 Result<std::vector<Signature>> signatures(Predictor& predictor, const Study& study,
                                           const std::vector<std::string>& left_out);
 
-// Whether it is a force, whose share in straight, turning and wide drives another contact model
-// would make another one.
-bool depends_on_contact(const std::string& effect);
 // Each column in three, one a kind of drive; those of nothing but zeros left out.
 Eigen::MatrixXd split_by_kind(const Study& study, const Eigen::MatrixXd& columns);
 

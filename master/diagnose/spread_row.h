@@ -1,15 +1,13 @@
-// An effect that makes some trials stray rather than moves their mean, as a row: all that the
-// diagnosis knows of it.  It is looked for before the effects on the mean, which do without the
+// An effect that makes some trials stray rather than moves their mean, as a row: how it is
+// looked for.  It is looked for before the effects on the mean, which do without the
 // trials that it strikes, and named when trials that no fit saw are clearly foretold better with
 // it.
 #pragma once
 
 #include <Eigen/Core>
-#include <span>
-#include <string_view>
 #include <vector>
 
-#include "master/diagnose/findings.h"
+#include "master/diagnose/diagnosis.h"
 #include "master/diagnose/study.h"
 
 namespace gapfarm {
@@ -30,13 +28,7 @@ struct SpreadRow {
   bool (*strays)(const ResidualTrial& trial);  // whether it may be one that the effect strikes
   const char* found;                           // how screening says that it was seen, or not
   const char* missing;
-  EffectWords words;
-  ShortWords short_words;
 };
-
-std::span<const SpreadRow* const> spread_rows();
-// Null where the effect has no row.
-const SpreadRow* spread_row(std::string_view effect);
 
 struct FoundSpread {
   const SpreadRow* row;

@@ -8,6 +8,7 @@ namespace gapfarm {
 DiagnosisSubject push_subject() {
   DiagnosisSubject s;
   s.scenario = "push";
+  s.effects = &push_effect_diagnoses();
   s.looks = kLooksAtNothingElse;
   s.least_gain = 9;
   s.unknown_log10_p = -4.2;
@@ -31,7 +32,6 @@ DiagnosisSubject push_subject() {
   s.cautions = push_cautions;
   s.lacks = push_lacks;
   s.experiments = plan_pushes;
-  s.effect_words = &push_effect_words();
   s.view = push_view;
   s.shown = {{"arm_mm", "centroid left of the finger's line, mm", "contact offset"},
              {"direction", "push direction in the world, degrees", "push direction"},

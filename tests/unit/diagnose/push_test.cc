@@ -111,7 +111,7 @@ TEST(PushWords, TellOfEveryEffectOfTheCatalogue) {
     for (const EffectParameter& p : effect.parameters) {
       named.parameters.push_back({p.key, 0.1, 0.05, 0.2, p.unit});
     }
-    const std::string text = effect_sentence(named, &push_effect_words());
+    const std::string text = effect_sentence(named, push_effect_diagnoses());
     EXPECT_EQ(text.find('%' + std::string("1")), std::string::npos) << text;
     EXPECT_EQ(text.find("The data show"), std::string::npos) << text;
     EXPECT_EQ(text.find("tread"), std::string::npos) << text;

@@ -31,7 +31,7 @@ struct Turned {
   }
 
   SpreadFit fit() const { return row().fit(study, residuals, kOutliers); }
-  static const SpreadRow& row() { return *spread_row("unsettled_start"); }
+  static const SpreadRow& row() { return *effect_diagnosis("unsettled_start").spread; }
 
   Study study;
   std::vector<Eigen::Vector3d> residuals;

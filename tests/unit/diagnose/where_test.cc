@@ -263,10 +263,36 @@ TEST(Findings, TellEffectsInPlainUnits) {
 TEST(Findings, EveryEffectOnTheSpreadIsLookedFor) {
   const std::set<std::string> engine = {"slip_events", "pose_latency", "pose_quantisation"};
   for (const Effect& effect : srv1_effects()) {
-    const bool has_row = spread_row(effect.name) != nullptr;
+    const bool has_row = effect_diagnosis(effect.name).spread != nullptr;
     EXPECT_EQ(has_row, !effect.moves_means() && engine.count(effect.name) == 0) << effect.name;
   }
-  for (const SpreadRow* row : spread_rows()) EXPECT_EQ(row->short_words.effect, row->effect);
+  for (const EffectDiagnosis* row : drive_effect_diagnoses()) {
+    if (row->spread == nullptr) continue;
+    EXPECT_STREQ(row->spread->effect, row->effect);
+  }
+}
+
+TEST(Findings, EveryEffectOfACatalogueHasARow) {
+  const std::set<std::string> searched = {"friction_patch", "camera_seam_2"};  // not by a probe
+  for (const Effect& effect : srv1_effects_and_seconds()) {
+    const EffectDiagnosis* row = drive_effect_diagnoses().find(effect.name);
+    ASSERT_NE(row, nullptr) << effect.name << " has no row in master/diagnose/effects/rows.inc";
+    const bool shown = !row->steps.empty() || row->probes != nullptr || row->marks != nullptr;
+    EXPECT_EQ(shown, effect.moves_means() && searched.count(effect.name) == 0) << effect.name;
+    for (const ProbedStep& step : row->steps) {
+      EXPECT_TRUE(std::any_of(effect.parameters.begin(), effect.parameters.end(),
+                              [&](const EffectParameter& p) { return p.key == step.key; }))
+          << effect.name << "." << step.key;
+    }
+    for (const char* alias : row->aliases) {
+      const auto& back = drive_effect_diagnoses().row(alias).aliases;
+      EXPECT_NE(std::find(back.begin(), back.end(), std::string(effect.name)), back.end())
+          << alias << " does not know that it passes for " << effect.name;
+    }
+  }
+  for (const Effect& effect : push_effects()) {
+    EXPECT_NE(push_effect_diagnoses().find(effect.name), nullptr) << effect.name;
+  }
 }
 
 TEST(Findings, TellAtLengthWhatTheHeadlineIsOf) {

@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "common/effects/start_turns.h"
+#include "master/diagnose/effects/effect_diagnosis.h"
 #include "master/diagnose/estimate.h"
 #include "master/diagnose/intervals.h"
 #include "master/diagnose/spread_row.h"
@@ -99,19 +100,24 @@ std::vector<double> scores_with_unsettled(const Study& study,
   return scores;
 }
 
-}  // namespace
-
-extern const SpreadRow kUnsettledStart = {
+const SpreadRow kUnsettledSpread = {
     "unsettled_start",
     14,  // as of late readings, searched on a grid; null logs stay below 8
     fit_unsettled,
     scores_with_unsettled,
     follows_move,
     "by drives that are turned after an unrecorded move",
-    "drives after an unrecorded move stray no more than others",
-    {"%1 of the starts after unrecorded moves were read in the hand, turned by up to %2",
-     {{"share", 100, " %"}, {"angle", 180 / std::numbers::pi, " degrees"}}},
-    {"unsettled_start", "share", 100, " %", "% of the starts after moves were read too early",
-     nullptr, "Let go of the robot before its pose is read"}};
+    "drives after an unrecorded move stray no more than others"};
+
+}  // namespace
+
+extern const EffectDiagnosis kUnsettledStart = {
+    .effect = "unsettled_start",
+    .words = {"%1 of the starts after unrecorded moves were read in the hand, turned by up to %2",
+              {{"share", 100, " %"}, {"angle", 180 / std::numbers::pi, " degrees"}}},
+    .short_words = ShortWords{"share", 100, " %", "% of the starts after moves were read too early",
+                              nullptr, "Let go of the robot before its pose is read"},
+    .spread = &kUnsettledSpread,
+};
 
 }  // namespace gapfarm

@@ -1,0 +1,32 @@
+// How an effect is told.
+#pragma once
+
+#include <vector>
+
+namespace gapfarm {
+
+// How a parameter is told: the words around its value in a unit that people use.
+struct Telling {
+  const char* key;
+  double factor;
+  const char* unit;
+};
+
+struct EffectWords {
+  // %1, %2, ...: the tellings' values with their intervals; %a: a seam's axis.  Null: none.
+  const char* sentence = nullptr;
+  std::vector<Telling> parameters = {};
+};
+
+// On one line.  %: the size of the parameter; @: the choice of the effect that is no number ("y").
+struct ShortWords {
+  const char* key;  // whose size is told
+  double factor;
+  const char* unit;
+  const char* cause;
+  const char* opposite;  // where the value is negative; null: the same
+  const char* remedy;
+  const char* toward = nullptr;  // key of a direction that is told, too
+};
+
+}  // namespace gapfarm

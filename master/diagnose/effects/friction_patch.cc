@@ -1,0 +1,58 @@
+#include <algorithm>
+#include <cmath>
+
+#include "common/pose/segment.h"
+#include "master/diagnose/effects/effect_diagnosis.h"
+#include "master/diagnose/effects/patch_places.h"
+
+namespace gapfarm {
+namespace {
+
+// A patch's mark changes within a few cm and has several hills when it is weak: standard deviation
+// of its place and radius, and of its ratio's distance from 1 as a share, for a gain of half a nat.
+constexpr double kPatchPlace_m = 0.25;
+constexpr double kPatchRatio = 1;
+
+// At its edge a small error of the place is a large one of the motion.
+bool strays_at_edge(const Signature& chosen, const ResidualTrial& trial) {
+  constexpr double kEdge_m = 0.1;
+  const Eigen::Vector2d from(trial.X_WS.x, trial.X_WS.y), to(trial.X_WP.x, trial.X_WP.y);
+  const Patch patch = patch_of(chosen);
+  return nearest_on_segment({patch[0], patch[1]}, from, to).distance < patch[2] + kEdge_m;
+}
+
+}  // namespace
+
+Patch patch_of(const Signature& s) {
+  return {s.fixed.at("friction_patch.x"), s.fixed.at("friction_patch.y"),
+          s.fixed.at("friction_patch.radius"), s.fixed.at("friction_patch.ratio")};
+}
+
+std::map<std::string, double> patch_values(const Patch& patch) {
+  return {{"friction_patch.ratio", patch[3]},
+          {"friction_patch.x", patch[0]},
+          {"friction_patch.y", patch[1]},
+          {"friction_patch.radius", patch[2]}};
+}
+
+double patch_search_error(const Parameter& p, double value, double gain) {
+  const double weakness = 1 / std::sqrt(2 * std::max(gain, 1.0));
+  return p.key == "friction_patch.ratio" ? kPatchRatio * weakness * (value - p.nominal)
+                                         : kPatchPlace_m * weakness;
+}
+
+// Looked for by its place: what a sketch proposes is simulated (patch.h).
+extern const EffectDiagnosis kFrictionPatch = {
+    .effect = kPatchEffect,
+    .search_error = patch_search_error,
+    .places = {{"x", 0}, {"y", 1}},
+    .told_by = {"x", "y", "radius"},
+    .strays = strays_at_edge,
+    .words = {"A patch of floor around x = %2, y = %3 of the world, of radius %4 has %1 times the "
+              "friction",
+              {{"ratio", 1, ""}, {"x", 1, " m"}, {"y", 1, " m"}, {"radius", 1000, " mm"}}},
+    .short_words = ShortWords{"ratio", 1, "", "A patch of the floor has % times the friction",
+                              nullptr, "Look at the floor there"},
+};
+
+}  // namespace gapfarm

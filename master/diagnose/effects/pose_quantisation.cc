@@ -1,0 +1,13 @@
+#include "master/diagnose/effects/effect_diagnosis.h"
+
+namespace gapfarm {
+
+// Seen in the logged digits themselves.
+extern const EffectDiagnosis kPoseQuantisation = {
+    .effect = "pose_quantisation",
+    .words = {"Positions are rounded to a grid of %1", {{"step", 1000, " mm"}}},
+    .short_words =
+        ShortWords{"step", 1000, " mm", "Positions are rounded to %", nullptr, "Log more digits"},
+};
+
+}  // namespace gapfarm

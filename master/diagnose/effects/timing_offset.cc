@@ -1,0 +1,18 @@
+#include "master/diagnose/effects/effect_diagnosis.h"
+
+namespace gapfarm {
+
+extern const EffectDiagnosis kTimingOffset = {
+    .effect = "timing_offset",
+    .steps = {{"offset", 0.02, true}},
+    .changes_reach = true,
+    .family = &kReachFamily,
+    .aliases = {"motor_lag"},
+    .model_error = 0.06,
+    .words = {"The motors run longer than told by %1", {{"offset", 1000, " ms"}}},
+    .short_words =
+        ShortWords{"offset", 1000, " ms", "The motors run % longer than told",
+                   "The motors run % shorter than told", "Correct the commanded time by %"},
+};
+
+}  // namespace gapfarm
