@@ -25,7 +25,10 @@ ActiveEffects::ActiveEffects(const ParameterTable& table, const ParameterValues&
     const auto first = values.begin() + static_cast<std::ptrdiff_t>(table.effect_row(e));
     active_.push_back({behaviour_of(effect.kind()),
                        {first, first + static_cast<std::ptrdiff_t>(effect.parameters.size())}});
-    if (effect.stage != EffectStage::kCamera) motion_context_ |= effect.context;
+    if (effect.stage == EffectStage::kCamera) return;
+    // What lies at a place meets the robot's heading only there.
+    const bool at_place = effect.context & kStartPlace;
+    motion_context_ |= at_place ? effect.context & ~kStartHeading : effect.context;
   };
   // Their order is that of the way from duty to logged pose: a second one of a kind stands by the
   // first, although its rows come after all others'.

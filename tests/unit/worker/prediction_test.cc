@@ -115,6 +115,28 @@ TEST(Prediction, AFrictionPatchActsWhereItIs) {
   EXPECT_EQ(moved(1), 0);
 }
 
+// Headings matter only where the patch is: trials elsewhere share one motion whatever theirs are.
+TEST(Prediction, AFrictionPatchCostsTheTrialsThatCrossIt) {
+  Problem problem = empty_problem();
+  for (int i = 0; i < 20; ++i) {
+    Trial trial;
+    trial.session = "s";
+    trial.trial = i;
+    trial.command = "wide_ccw";
+    trial.X_WS = i == 0 ? Pose{0.5, 0.5, 0} : Pose{1.8, 1.8, 0.3 * i - 3};
+    trial.X_WE = trial.X_WS;
+    problem.log.trials.push_back(trial);
+  }
+  const double without_s = predict(problem, true).simulated();
+  value(problem, "friction_patch.ratio") = 0.2;
+  value(problem, "friction_patch.x") = 0.45;
+  value(problem, "friction_patch.y") = 0.6;
+  value(problem, "friction_patch.radius") = 0.12;
+  const double with_s = predict(problem, true).simulated();
+  EXPECT_GT(with_s, 1.5 * without_s);
+  EXPECT_LT(with_s, 3 * without_s) << "two motions and a little: all share one, one crosses it";
+}
+
 // A motion that jumps at some heading is simulated trial by trial.
 TEST(Prediction, ANapThatTakesTheGripIsSimulatedTrialByTrial) {
   Problem problem = small_problem(60);
