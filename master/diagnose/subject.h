@@ -15,6 +15,7 @@
 #include "common/base/result.h"
 #include "master/diagnose/covariates.h"
 #include "master/diagnose/diagnosis.h"
+#include "master/diagnose/effects/effect_diagnosis.h"
 #include "master/diagnose/findings.h"
 #include "master/diagnose/next_experiment.h"
 #include "master/diagnose/patch.h"
@@ -47,6 +48,7 @@ struct TrialView {
 
 struct DiagnosisSubject {
   const char* scenario;
+  const EffectDiagnoses* effects;
   unsigned looks;
   // Net log-likelihood (nats over all trials) that an effect must gain to be named, and log10 of
   // the p below which a leftover dependence is no chance: measured on logs without any effect
@@ -74,7 +76,7 @@ struct DiagnosisSubject {
   Result<std::vector<Signature>> (*signatures)(Predictor& predictor, const Study& study,
                                                const std::vector<std::string>& left_out);
   // Whether a disc can matter to a trial's end.
-  bool (*in_reach)(const ResidualTrial& trial, const Patch& patch);
+  bool (*in_reach)(const Study& study, const ResidualTrial& trial, const Patch& patch);
   PatchSearch (*patches)(Predictor& predictor, const Study& study);
   // The parts of the log that are predicted from the others, one number a trial.
   std::vector<std::size_t> (*folds)(const Study& study);
@@ -86,7 +88,6 @@ struct DiagnosisSubject {
   std::vector<std::string> (*lacks)(const Study& study, const TrialLog& log);
   // Trials that might part rival explanations.
   ExperimentPlan (*experiments)(const Problem& problem);
-  const EffectWordsByName* effect_words;  // its own, of effect_sentence(); null: none
   TrialView (*view)(const Study& study, std::size_t trial);
   std::vector<ShownCovariate> shown;  // in the pictures, beside what every log has
   PictureWords words;

@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "common/parameters/push.h"
+#include "common/pose/segment.h"
 #include "master/diagnose/drive_designs.h"
 #include "master/diagnose/estimate.h"
 #include "master/diagnose/findings.h"
@@ -28,10 +29,25 @@ PatchSearch sketched_patches(Predictor& predictor, const Study& study) {
   };
 }
 
+// Whether a robot's contacts may come over the disc: on its way from the logged start to the end
+// that is predicted without it, which bows out no farther than an ellipse through both.
+bool drives_over(const Study& study, const ResidualTrial& trial, const Patch& patch) {
+  constexpr double kContacts_m = 0.11;  // half the diagonal of the largest robot of the table
+  constexpr double kSpare_m = 0.03, kSpareWay = 1.1;
+  const CommandSpec& command = study.cells[trial.cell].command;
+  const Eigen::Vector2d from(trial.X_WS.x, trial.X_WS.y), to(trial.X_WP.x, trial.X_WP.y);
+  const double way =
+      kSpareWay * std::abs(command.left + command.right) / 2 * command.duration_s * study.speed_m_s;
+  const double bow = std::sqrt(std::max(0.0, way * way - (to - from).squaredNorm())) / 2;
+  return nearest_on_segment({patch[0], patch[1]}, from, to).distance <
+         patch[2] + bow + kContacts_m + kSpare_m;
+}
+
 // A robot on two sides drives commands: srv1's, or one that a program of the user's simulates.
 DiagnosisSubject drive_subject(const char* scenario, const ParameterTable& table) {
   DiagnosisSubject s;
   s.scenario = scenario;
+  s.effects = &drive_effect_diagnoses();
   s.looks = kLooksForLateReadings | kLooksForLag | kLooksForSlips | kLooksForRounding;
   // The best of the catalogue gained 4.4 at most in 90 of 100 null logs, 6.7 in 99, and the least
   // p of twelve blocks was 10^-3.8 (400 logs; docs/diagnosis.md).
@@ -54,9 +70,7 @@ DiagnosisSubject drive_subject(const char* scenario, const ParameterTable& table
   };
   s.blocks = covariate_blocks;
   s.signatures = signatures;
-  s.in_reach = [](const ResidualTrial& trial, const Patch& patch) {
-    return std::hypot(trial.X_WS.x - patch[0], trial.X_WS.y - patch[1]) < patch[2] + 0.5;
-  };
+  s.in_reach = drives_over;
   s.patches = sketched_patches;
   s.folds = folds_of;
   s.where = [](const Study& study, std::span<const Eigen::Vector3d> residuals,
@@ -70,7 +84,6 @@ DiagnosisSubject drive_subject(const char* scenario, const ParameterTable& table
     return lacking(log_variety(study.trials, study.cells, log));
   };
   s.experiments = plan_drives;
-  s.effect_words = nullptr;
   s.view = [](const Study& study, std::size_t trial) {
     return TrialView{study.trials[trial].X_WS, 0, {}};
   };

@@ -147,7 +147,7 @@ Result<std::vector<Signature>> push_signatures(Predictor& predictor, const Study
   return found;
 }
 
-bool piece_crosses(const ResidualTrial& trial, const Patch& patch) {
+bool piece_crosses(const Study&, const ResidualTrial& trial, const Patch& patch) {
   constexpr double kExtent = 2.4;  // gyration radii: the farthest corner of a slender triangle
   const OnSegment nearest =
       nearest_on_segment({patch[0], patch[1]}, transform(trial.X_WS, trial.push.p_RC),

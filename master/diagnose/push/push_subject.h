@@ -31,7 +31,7 @@ std::vector<CovariateBlock> push_blocks(const Study& study);
 Result<std::vector<Signature>> push_signatures(Predictor& predictor, const Study& study,
                                                const std::vector<std::string>& left_out);
 // Whether the piece, on its way as the base predicts it, comes upon the disc.
-bool piece_crosses(const ResidualTrial& trial, const Patch& patch);
+bool piece_crosses(const Study& study, const ResidualTrial& trial, const Patch& patch);
 // Discs simulated over a grid of the table that pieces cross.
 PatchSearch push_patches(Predictor& predictor, const Study& study);
 // Whole cells, dealt in turn.
@@ -40,7 +40,6 @@ std::vector<Where> push_where(const Study& study, std::span<const Eigen::Vector3
                               const Problem& problem);
 std::vector<std::string> push_cautions(const Study& study, const TrialLog& log);
 std::vector<std::string> push_lacks(const Study& study, const TrialLog& log);
-const EffectWordsByName& push_effect_words();
 TrialView push_view(const Study& study, std::size_t trial);
 
 // A shift along and across the push (across: to its left), in the axes of the predicted end.
