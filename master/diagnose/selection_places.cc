@@ -11,6 +11,8 @@ namespace gapfarm {
 namespace {
 
 constexpr double kWorthSketched = 12.5;  // of patches; where there are none it reaches 11
+// A disc that is off by half a step of the sketch shows a third of what the right one would.
+constexpr double kMostOfMoving = 3;
 constexpr int kSeamSteps = 10;
 constexpr int kMostPatchSearches = 4;
 
@@ -110,6 +112,7 @@ Status Selector::search_patches(const Regression& explained, double most_gain) {
       simulated->begin(), simulated->end(),
       [](const EffectCandidate& a, const EffectCandidate& b) { return a.gain < b.gain; });
   if (best.gain + best.signature.penalty < kWorthRefining) return {};
+  if (kMostOfMoving * best.gain < most_gain) return {};  // its turn comes when that is explained
   return refine_patch(explained, best);
 }
 
