@@ -77,9 +77,10 @@ OverallProgress::Passed OverallProgress::present(double now_s) const {
     return {share, share * fresh_part()};
   }
   // As the stages before had it; once this one takes longer than that, it is taken to be at its
-  // end.
+  // end.  Where none was in work there is no pace to go by.
+  if (behind_fresh_ <= 0) return {0, 0};
   const double in_stage = now_s - stage_s_, gone = now_s - first_s_;
-  const double before = behind_fresh_ > 0 ? (gone - in_stage) / behind_fresh_ : 0;
+  const double before = (gone - in_stage) / behind_fresh_;
   const double expected = std::max(before, gone / (behind_fresh_ + stage.share)) * stage.share;
   const double share = expected > 0 ? std::min(1.0, in_stage / expected) : 0;
   return {share, share * fresh_part()};

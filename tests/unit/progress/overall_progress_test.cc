@@ -63,6 +63,19 @@ TEST(OverallProgress, UncountedStagesGoByTheirUsualShares) {
   EXPECT_EQ(progress.at(160).number, 2u);
 }
 
+// What was done before it was stopped is behind, and nothing else is known before tasks are
+// counted.
+TEST(OverallProgress, BeginningInALaterStageIsNotNearTheEnd) {
+  OverallProgress progress({{"a", 1, 0}, {"b", 8, 0}, {"c", 1, 0}});
+  progress.begin("b", 100);
+  EXPECT_NEAR(progress.at(103).share, 0.1, 1e-9);
+  EXPECT_FALSE(progress.at(103).time_left_s);
+  progress.expect(50);
+  progress.answered(0, 25);
+  EXPECT_NEAR(progress.at(140).share, 0.5, 1e-9);
+  EXPECT_NEAR(*progress.at(140).time_left_s, 50, 1e-9);
+}
+
 TEST(OverallProgress, NeverGoesBack) {
   OverallProgress progress({{"a", 1, 10}, {"b", 1, 0}});
   progress.begin(0, 0);
