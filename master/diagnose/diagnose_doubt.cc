@@ -24,8 +24,11 @@ constexpr double kLittleClosed = 0.02;  // of the gap
 bool at_bound(const EffectDiagnoses& effects, const Parameter& row, double value) {
   if (row.kind != ParameterKind::kReal || place_of(effects, row) != nullptr) return false;
   if (row.key.ends_with(".direction")) return false;
-  const double near = kAtBound * (row.upper - row.lower);
-  return value <= row.lower + near || value >= row.upper - near;
+  // What cannot be negative counts by its logarithm: a twentieth of the friction is far from none.
+  const bool ratio = row.lower > 0;
+  const auto at = [&](double x) { return ratio ? std::log(x) : x; };
+  const double near = kAtBound * (at(row.upper) - at(row.lower));
+  return at(value) <= at(row.lower) + near || at(value) >= at(row.upper) - near;
 }
 
 }  // namespace
