@@ -72,6 +72,25 @@ Signature seam_signature(const Study& study, int axis, double position_m) {
   return seam;
 }
 
+Signature linear_view_signature(const Study& study) {
+  Signature view;
+  view.columns.resize(static_cast<Eigen::Index>(3 * study.size()), 4);
+  for (int shown = 0; shown < 2; ++shown) {
+    for (int seen = 0; seen < 2; ++seen) {
+      std::vector<Eigen::Vector3d> d;
+      for (const ResidualTrial& t : study.trials) {
+        const double moved = seen == 0 ? t.X_WP.x - t.X_WS.x : t.X_WP.y - t.X_WS.y;
+        const double c = std::cos(t.X_WP.theta), s = std::sin(t.X_WP.theta);
+        d.push_back(shown == 0 ? Eigen::Vector3d(c * moved, -s * moved, 0)
+                               : Eigen::Vector3d(s * moved, c * moved, 0));
+      }
+      view.columns.col(2 * shown + seen) = study.whiten(d);
+    }
+  }
+  view.penalty = 2;
+  return view;
+}
+
 double seam_position(const Study& study, const Regression& others, const Signature& seam,
                      const Eigen::Vector4d& coefficients) {
   constexpr double kStep_m = 0.0025;

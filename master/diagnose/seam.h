@@ -17,6 +17,9 @@ bool is_seam_position(const std::string& key);
 
 // Shift of the readings beyond a line: two offsets, then two slopes along it about `middle`.
 Signature seam_signature(const Study& study, int axis, double position_m);
+// All positions scaled, sheared and turned as a whole, about any place; headings as they are.  No
+// effect of the catalogue: where it does as well, no line on the floor is to be seen.
+Signature linear_view_signature(const Study& study);
 // The same as another effect of its kind: a second seam's.
 Signature renamed(Signature signature, const std::string& effect);
 

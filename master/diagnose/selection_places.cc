@@ -2,10 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <optional>
 
 #include "master/diagnose/effects/patch_places.h"
 #include "master/diagnose/seam.h"
 #include "master/diagnose/selection.h"
+#include "master/diagnose/subject.h"
 
 namespace gapfarm {
 namespace {
@@ -38,6 +41,22 @@ EffectCandidate Selector::refine_seam(const Regression& explained, EffectCandida
     if (gain > best.gain) best = {gain, std::move(s)};
   }
   return best;
+}
+
+// A line near the edge of where trials were bends all that lies beyond it.
+void Selector::drop_false_lines(const Regression& explained,
+                                std::map<std::string, EffectCandidate>* best) const {
+  std::optional<double> linear;
+  std::erase_if(*best, [&](const auto& entry) {
+    const auto& [effect, candidate] = entry;
+    if (!is_seam(effect) || candidate.gain < study_.subject->least_gain) return false;
+    if (!linear) {
+      Signature view = linear_view_signature(study_);
+      study_.drop_ignored(view.columns);
+      linear = net_gain(explained, view);
+    }
+    return *linear >= candidate.gain;
+  });
 }
 
 // Simulates discs, in their order; they join the catalogue.
