@@ -250,10 +250,17 @@ void DiagnosisRun::foresee_spreads(const std::vector<std::size_t>& folds) {
   const Study& study = nested_studies_.back();
   const std::vector<Eigen::Vector3d> residuals = held_out_residuals(study, nested_.back(), folds);
   for (FoundSpread& found : spreads_) {
+    // What else was named was not yet explained when it was found.
+    SpreadFit beside = found.row->fit(study, residuals, problem_.fitness.outlier_share);
+    if (beside.gain >= found.row->least_gain) found.fit = std::move(beside);
     found.scores = found.row->scores(study, residuals, found.fit, problem_.fitness.outlier_share);
   }
   std::string dropped;
   std::erase_if(spreads_, [&](const FoundSpread& found) {
+    // Where few trials are struck it is what each gains that tells, not how many do.
+    const double gained = (mean(found.scores) - mean(nested_scores_.back())) *
+                          static_cast<double>(found.scores.size());
+    if (gained >= found.row->least_gain) return false;
     if (clearly_better(found.scores, nested_scores_.back())) return false;
     dropped = found.row->effect;
     return true;

@@ -106,7 +106,7 @@ Status DiagnosisRun::screen() {
 Status DiagnosisRun::look_for_all() {
   if (Status s = look_for_latency(); !s) return s;
   if (Status s = look_for_lag(); !s) return s;
-  look_for_spreads();
+  look_for_spreads(*base_);
   if (Status s = search_catalogue(); !s) return s;
   if (tuned_) {
     if (Status s = free_base(); !s) return s;
@@ -115,6 +115,7 @@ Status DiagnosisRun::look_for_all() {
   if ((subject_.base_moves || tuned_) && estimates_) {
     if (Status s = search_again(); !s) return s;
   }
+  if (Status s = look_for_spreads_again(); !s) return s;
   const Regression explained = this->explained();
   look_for_slip(explained);
   return slip_.gain > 0 ? select_without_slips(explained) : Status{};

@@ -113,7 +113,8 @@ class DiagnosisRun {
   Regression explained() const;  // what is left once all that was chosen is explained
   double explained_nats(const Regression& explained) const;
   void look_for_slip(const Regression& explained);
-  void look_for_spreads();
+  void look_for_spreads(const Regression& explained);
+  Status look_for_spreads_again();
   void drop_ignored();
   std::vector<bool> tells_of_slips() const;
   Status select();

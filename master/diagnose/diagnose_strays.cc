@@ -17,10 +17,10 @@ constexpr double kLeastSlipShare = 0.03;  // of what the effects on the means ex
 
 // Before any effect on the mean: trials that stray would pass for a patch of floor or a seam. Those
 // that are foretold better once the effect is foreseen tell nothing of means.
-void DiagnosisRun::look_for_spreads() {
+void DiagnosisRun::look_for_spreads(const Regression& explained) {
   constexpr double kStruck_nats = 0.5;
   const double share = problem_.fitness.outlier_share;
-  const std::vector<Eigen::Vector3d> left = study_.unwhiten(studentised(*base_, 0.2));
+  const std::vector<Eigen::Vector3d> left = study_.unwhiten(studentised(explained, 0.2));
   const std::vector<double> without = scores_of(study_, left, share);
   for (const EffectDiagnosis* effect : *subject_.effects) {
     const SpreadRow* row = effect->spread;
@@ -37,16 +37,30 @@ void DiagnosisRun::look_for_spreads() {
   if (!spreads_.empty()) drop_ignored();
 }
 
+// Beside a strong effect on the mean nothing strays visibly; with it explained some may.
+Status DiagnosisRun::look_for_spreads_again() {
+  if (!spreads_.empty() || chosen_.empty()) return {};
+  look_for_spreads(explained());
+  if (spreads_.empty()) return {};
+  selector_->recount(*base_);
+  return select();
+}
+
 // Events that slow one side in some trials show as a tail along that side's derivative: a long one
 // when they are rare, a lopsided one when they are not.
 void DiagnosisRun::look_for_slip(const Regression& explained) {
-  if (!looks_for("slip_events", kLooksForSlips)) return;
+  if ((subject_.looks & kLooksForSlips) == 0) return;
   const Eigen::VectorXd z = studentised(explained, 0.2);
   const std::vector<Eigen::Vector3d> left = study_.unwhiten(z);
   const std::vector<bool> tells = tells_of_slips();
   slip_ = fit_slip(study_.trials, left, tells, study_.noise);
   if (slip_.gain < std::max(kLeastSlipGain, kLeastSlipShare * explained_nats(explained))) {
     slip_ = {};
+    return;
+  }
+  if (left_out("slip_events")) {
+    slip_ = {};
+    odd_drives_ = "Single drives stray: nothing that could explain them was looked for.";
     return;
   }
   std::vector<double> slipped;
