@@ -4,6 +4,7 @@
 
 #include "common/config/model.h"
 #include "common/config/sections.h"
+#include "common/config/toml_string.h"
 #include "common/trials/csv.h"
 #include "common/trials/files.h"
 
@@ -15,22 +16,6 @@ std::string toml_number(double value) {
   std::string text = format_double(value);
   if (std::isfinite(value) && text.find_first_of(".e") == text.npos) text += ".0";
   return text;
-}
-
-std::string toml_string(std::string_view text) {
-  constexpr char kHex[] = "0123456789abcdef";
-  std::string quoted = "\"";
-  for (const char c : text) {
-    const auto byte = static_cast<unsigned char>(c);
-    if (c == '"' || c == '\\') {
-      quoted += {'\\', c};
-    } else if (byte < 0x20 || byte == 0x7f) {
-      quoted += std::string("\\u00") + kHex[byte >> 4] + kHex[byte & 15];
-    } else {
-      quoted += c;
-    }
-  }
-  return quoted + '"';
 }
 
 // TOML integers end at 2^63 - 1; seeds do not.

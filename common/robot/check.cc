@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <utility>
 
 #include "common/robot/robot.h"
 
@@ -41,6 +42,38 @@ Status check_channels(const GroundRobot& robot) {
   return {};
 }
 
+// What a robot's file may say of its sizes; some of them follow from others.
+Status check_sizes(const GroundRobot& robot) {
+  const auto within = [](const std::string& what, double value, double lower, double upper,
+                         const char* unit) -> Status {
+    if (value >= lower && value <= upper) return {};
+    return Error{what + " is " + number(value) + " " + unit + ", expected " + number(lower) +
+                 " to " + number(upper) + " " + unit};
+  };
+  constexpr double kFar_m = 50;
+  for (const RobotWheel& w : robot.wheels) {
+    const std::string wheel = " of wheel \"" + w.name + "\"";
+    if (Status s = within("the radius" + wheel, w.radius_m.value_or(0), 1e-4, 10, "m"); !s)
+      return s;
+    if (Status s = within("x" + wheel, w.x_m.value_or(0), -kFar_m, kFar_m, "m"); !s) return s;
+    if (Status s = within("y" + wheel, w.y_m.value_or(0), -kFar_m, kFar_m, "m"); !s) return s;
+    const double length_m = w.contact_length_m.value_or(0);
+    if (Status s = within("the contact length" + wheel, length_m, 0, kFar_m, "m"); !s) return s;
+  }
+  const ControllerKinematics& k = robot.controller;
+  constexpr std::pair<const char*, std::optional<double> ControllerKinematics::*> kSizes[] = {
+      {"wheel_separation", &ControllerKinematics::wheel_separation_m},
+      {"wheelbase", &ControllerKinematics::wheelbase_m},
+      {"traction_track_width", &ControllerKinematics::traction_track_width_m}};
+  for (const auto& [what, size] : kSizes) {
+    if (!(k.*size)) continue;
+    if (Status s = within(what, *(k.*size), 1e-3, kFar_m, "m"); !s) return s;
+  }
+  const double inertia = robot.yaw_inertia_kg_m2.value_or(0);
+  if (Status s = within("yaw_inertia", inertia, 1e-8, 1e8, "kg m^2"); !s) return s;
+  return within("the height of the centre of mass", robot.com_z_m.value_or(0), 1e-4, kFar_m, "m");
+}
+
 }  // namespace
 
 Status check_robot(const GroundRobot& robot) {
@@ -48,18 +81,14 @@ Status check_robot(const GroundRobot& robot) {
     if (std::isfinite(value) && value > 0) return {};
     return Error{what + " is " + number(value) + ", expected more than 0"};
   };
-  for (const RobotWheel& w : robot.wheels) {
-    if (Status s = positive("the radius of wheel \"" + w.name + "\"", w.radius_m.value_or(0)); !s)
-      return s;
-  }
+  if (Status s = check_sizes(robot); !s) return s;
   if (!robot.com_x_m || !robot.com_y_m) return Error{"the centre of mass needs x and y in m"};
   if (Status s = positive("mass", robot.mass_kg.value_or(0)); !s) return s;
-  if (Status s = positive("yaw_inertia", robot.yaw_inertia_kg_m2.value_or(0)); !s) return s;
   if (Status s = positive("friction", robot.friction); !s) return s;
   if (Status s = positive("friction_ratio", robot.friction_ratio); !s) return s;
   if (Status s = check_channels(robot); !s) return s;
   if (!(robot.motors.lag_s >= 0)) return Error{"lag is below 0 s"};
-  return positive("the height of the centre of mass", robot.com_z_m.value_or(0));
+  return {};
 }
 
 }  // namespace gapfarm

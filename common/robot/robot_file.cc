@@ -2,6 +2,7 @@
 #include "common/robot/robot_file.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "common/config/toml_section.h"
 #include "common/trials/files.h"
@@ -104,7 +105,8 @@ void read_steering_table(TomlSection& top, RobotSteering& steering) {
     const auto command =
         pair != nullptr && pair->size() == 2 ? (*pair)[0].value<double>() : std::nullopt;
     const auto angle = command ? (*pair)[1].value<double>() : std::nullopt;
-    fine = angle && (steering.table.empty() || *command > steering.table.back().command);
+    fine = angle && std::isfinite(*command) && std::isfinite(*angle) &&
+           (steering.table.empty() || *command > steering.table.back().command);
     if (fine) steering.table.push_back({*command, *angle});
   }
   if (fine && steering.table.size() != 1) return;

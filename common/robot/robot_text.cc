@@ -1,4 +1,5 @@
 // Writing robot.toml.
+#include "common/config/toml_string.h"
 #include "common/robot/robot_file.h"
 #include "common/trials/csv.h"
 
@@ -9,7 +10,7 @@ namespace {
 class Lines {
  public:
   void word(const char* key, const std::string& value) {
-    text_ += std::string(key) + " = \"" + value + "\"\n";
+    text_ += std::string(key) + " = " + toml_string(value) + "\n";
   }
   void truth(const char* key, bool value) {
     text_ += std::string(key) + (value ? " = true\n" : " = false\n");
@@ -35,7 +36,7 @@ void write_top(const GroundRobot& robot, Lines& out) {
   out.word("drive", drive_words()[static_cast<std::size_t>(robot.drive)]);
   std::string channels;
   for (const std::string& c : robot.channels) {
-    channels += (channels.empty() ? "\"" : ", \"") + c + "\"";
+    channels += (channels.empty() ? "" : ", ") + toml_string(c);
   }
   out.raw("commands = [" + channels + "]\n");
   out.word("command_kind", command_words()[static_cast<std::size_t>(robot.command)]);
@@ -97,7 +98,7 @@ void write_steering(const GroundRobot& robot, Lines& out) {
 }
 
 void write_wheel(const RobotWheel& wheel, Lines& out) {
-  out.section("wheels.\"" + wheel.name + "\"");
+  out.section("wheels." + toml_string(wheel.name));
   out.word("kind", wheel_words()[static_cast<std::size_t>(wheel.kind)]);
   out.word("side", side_words()[static_cast<std::size_t>(wheel.side)]);
   out.number("x", wheel.x_m);

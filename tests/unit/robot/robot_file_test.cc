@@ -50,6 +50,36 @@ TEST(RobotFile, WhatIsWrittenReadsBackAsTheSameRobot) {
   EXPECT_EQ(*again->wheel("front_left")->x_m, *robot->wheel("front_left")->x_m);
 }
 
+TEST(RobotFile, NamesWithQuotesReadBackAsTheyWere) {
+  const std::string text =
+      "name = \"the \\\"big\\\" one\"\ndrive = \"differential\"\ncommands = [\"left\", \"right\"]\n"
+      "wheel_separation = 0.3\n[wheels.left]\nradius = 0.05\ngroup = 'a\"b'\n"
+      "[wheels.right]\nradius = 0.05\n[wheels.'c\"\\']\nkind = \"caster\"\nx = 0.1\ny = 0.0\n";
+  const auto robot = parse_robot(text, "robot.toml");
+  ASSERT_TRUE(robot.ok()) << robot.error().message;
+  const auto again = parse_robot(format_robot(*robot), "again.toml");
+  ASSERT_TRUE(again.ok()) << again.error().message;
+  EXPECT_EQ(again->name, "the \"big\" one");
+  EXPECT_EQ(again->wheel("left")->group, "a\"b");
+  EXPECT_NE(again->wheel("c\"\\"), nullptr);
+}
+
+TEST(RobotFile, RefusesSizesThatNoRobotHas) {
+  const std::string car =
+      "drive = \"ackermann\"\ncommands = [\"throttle\", \"steering\"]\nwheelbase = 0.3\n";
+  const auto endless =
+      parse_robot(car + "steering_table = [[-1.0, -inf], [1.0, 0.4]]\n", "robot.toml");
+  ASSERT_FALSE(endless.ok());
+  EXPECT_NE(endless.error().message.find("robot.toml:4:"), std::string::npos);
+  // A size that follows from others is in the bounds of one that is stated.
+  const auto tiny = parse_robot(
+      "drive = \"differential\"\ncommands = [\"left\", \"right\"]\nwheel_separation = 0.001\n"
+      "wheel_radius = 0.01\n",
+      "robot.toml");
+  ASSERT_FALSE(tiny.ok());
+  EXPECT_NE(tiny.error().message.find("caster_front"), std::string::npos) << tiny.error().message;
+}
+
 TEST(RobotFile, GuessesWhatCommandsAreFromTheirNames) {
   const auto twist = parse_robot(
       "drive = \"differential\"\ncommands = [\"v\", \"omega\"]\nwheel_separation = 0.3\n", "r");
