@@ -222,8 +222,12 @@ void Rows::steering() {
   add("steering.offset", "rad", s.offset_rad - 0.2, s.offset_rad + 0.2, s.offset_rad,
       "wheels point here when told straight",
       [](GroundRobot& robot, double v) { robot.steering.offset_rad = v; });
-  size("steering.gain", "-", s.gain, "turned over told",
-       [](GroundRobot& robot, double v) { robot.steering.gain = v; });
+  const Put put_gain = [](GroundRobot& robot, double v) { robot.steering.gain = v; };
+  if (s.gain > 0) {  // encoders are scaled by hand: more than a size may be off by
+    add("steering.gain", "-", s.gain / 10, s.gain * 10, s.gain, "turned over told", put_gain, kLog);
+  } else {
+    size("steering.gain", "-", s.gain, "turned over told", put_gain);
+  }
   add("understeer", "s^2/m^2", 0, std::max(0.2, 4 * s.understeer_s2_m2), s.understeer_s2_m2,
       "curvature / (1 + understeer v^2)",
       [](GroundRobot& robot, double v) { robot.steering.understeer_s2_m2 = v; });
