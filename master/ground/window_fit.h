@@ -23,6 +23,7 @@ struct WindowSet {
   std::vector<int> block;    // of each trial: what is left out or resampled together
   int horizons = 0;
   int blocks = 0;
+  std::vector<int> run_blocks;  // of each run: its first block; those of one run follow each other
 };
 
 // Blocks are runs, or stretches of them where there are fewer than ten.  Windows of robots with a
@@ -89,7 +90,8 @@ class WindowFitter {
   double promise(const WindowFit& fit, const std::vector<Eigen::MatrixXd>& fit_slopes,
                  const std::vector<FitRow>& rows, const Eigen::VectorXd& values) const;
 
-  // Values by blocks drawn with replacement, one Gauss-Newton step each, a column a draw.
+  // Values by runs drawn with replacement and blocks of them, one Gauss-Newton step each, a column
+  // a draw: what differs from run to run (a clock's offset) is no surer for a run that is long.
   Eigen::MatrixXd draws(const WindowFit& fit, std::uint64_t seed) const;
   // 90 % intervals of them; a row of (lo, hi) for each of the fit's.  With a reference: of how far
   // they are from it, which is not sure either, beside its values.

@@ -14,6 +14,38 @@ namespace {
 constexpr int kDraws = 400;       // of the bootstrap
 constexpr double kFreely = 1e-6;  // of a tolerance's precision: so wide that it only keeps the
                                   // equations sound
+
+// First block and count of every run that has windows.
+std::vector<std::pair<int, int>> blocks_of_runs(const WindowSet& windows) {
+  std::vector<std::pair<int, int>> runs;
+  for (std::size_t r = 0; r < windows.run_blocks.size(); ++r) {
+    const int first = windows.run_blocks[r];
+    const bool last = r + 1 == windows.run_blocks.size();
+    const int end = last ? windows.blocks : windows.run_blocks[r + 1];
+    const bool used = std::any_of(windows.block.begin(), windows.block.end(),
+                                  [&](int block) { return block >= first && block < end; });
+    if (used) runs.emplace_back(first, end - first);
+  }
+  return runs;
+}
+
+// How often each block counts in a draw.  Of n runs n - 1 are drawn, so that the scatter of few is
+// not taken for small, and of each run as many blocks as it has; together they count as n.
+std::vector<double> draw_blocks(const std::vector<std::pair<int, int>>& runs, std::size_t blocks,
+                                Stream* stream) {
+  std::vector<double> times(blocks, 0.0);
+  const std::size_t draws = std::max<std::size_t>(1, runs.size() - 1);
+  const double weight = static_cast<double>(runs.size()) / static_cast<double>(draws);
+  for (std::size_t d = 0; d < draws; ++d) {
+    const auto [first, count] = runs[static_cast<std::size_t>(stream->below(runs.size()))];
+    for (int k = 0; k < count; ++k) {
+      const auto pick = stream->below(static_cast<std::uint64_t>(count));
+      times[static_cast<std::size_t>(first) + static_cast<std::size_t>(pick)] += weight;
+    }
+  }
+  return times;
+}
+
 void add_pose(const Pose& X, Hasher* hasher) { hasher->add(X.x).add(X.y).add(X.theta); }
 
 }  // namespace
@@ -116,6 +148,7 @@ Eigen::MatrixXd WindowFitter::draws(const WindowFit& fit, std::uint64_t seed) co
   const Eigen::MatrixXd P = prior_precision(fit.rows);
   const Eigen::VectorXd away = from_middle(fit.rows, fit.values);
   Stream stream({seed, Purpose::kStatistics, 0, 0, 0});
+  const auto runs = blocks_of_runs(windows_);
   Eigen::MatrixXd drawn(n, kDraws);
   for (int d = 0; d < kDraws; ++d) {
     Eigen::VectorXd from = away;
@@ -125,10 +158,10 @@ Eigen::MatrixXd WindowFitter::draws(const WindowFit& fit, std::uint64_t seed) co
     }
     Eigen::MatrixXd A = P;
     Eigen::VectorXd b = P * from;
+    const std::vector<double> times = draw_blocks(runs, blocks, &stream);
     for (std::size_t k = 0; k < blocks; ++k) {
-      const auto pick = static_cast<std::size_t>(stream.below(blocks));
-      A += H[pick];
-      b += g[pick];
+      A += times[k] * H[k];
+      b += times[k] * g[k];
     }
     drawn.col(d) = fit.values - solve_symmetric(A, b);
   }

@@ -56,7 +56,8 @@ Result<WindowSet> window_set(const GroundRobot& robot, const RunLog& log,
     all += length[i];
   }
   // Stretches of one length, none over two runs.
-  std::vector<int> first(log.runs.size());
+  std::vector<int>& first = set.run_blocks;
+  first.resize(log.runs.size());
   const bool few = log.runs.size() < kLeastBlocks;
   for (std::size_t i = 0; i < log.runs.size(); ++i) {
     first[i] = set.blocks;
