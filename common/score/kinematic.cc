@@ -107,9 +107,12 @@ class Body {
   Pose unobserved(const Pose& X) const { return {X.x / scale_, X.y / scale_ / aspect_, X.theta}; }
 
   // The commands as this robot takes them: later by a clock that drifts, weaker by a battery that
-  // sags, both counted from `began_s`.
-  std::vector<CommandRow> taken(std::vector<CommandRow> rows, double began_s) const {
-    if (sag_ == 0 && drift_ == 0) return rows;
+  // sags, both counted from `began_s`.  In `changed` where they are not those of the log.
+  std::span<const CommandRow> taken(std::span<const CommandRow> logged, double began_s,
+                                    std::vector<CommandRow>* changed) const {
+    if (sag_ == 0 && drift_ == 0) return logged;
+    std::vector<CommandRow>& rows = *changed;
+    rows.assign(logged.begin(), logged.end());
     const bool throttled = robot_.command == CommandKind::kThrottleSteering;
     for (CommandRow& row : rows) {
       const double left = std::max(0.0, 1 - sag_ * (row.t_s - began_s) / 60);
@@ -179,10 +182,7 @@ class Body {
     }
     if (name == "sag") sag_ = value;
     if (name == "drift") drift_ = value;
-    if (name == "grip") {
-      grip_m_s2_ = std::exp(value);
-      robot_.steering.understeer_s2_m2 = 0;  // is what tyres that slip look like
-    }
+    if (name == "grip") grip_m_s2_ = std::exp(value);
     if (name == "slip_angle") slip_angle_rad_ = value;
     if (name == "grip_shape") grip_shape_ = std::exp(value);
     if (name == "pose_scale") scale_ = value;
@@ -239,8 +239,8 @@ class Body {
 std::map<double, Pose> way(const Body& body, const CommandedRun& run, double began_s,
                            const std::vector<double>& times) {
   std::map<double, Pose> poses;
-  const std::vector<CommandRow> commands = body.taken(run.commands, began_s);
-  RobotDrive drive(body.robot(), commands, run.speed_m_s);
+  std::vector<CommandRow> changed;
+  RobotDrive drive(body.robot(), body.taken(run.commands, began_s, &changed), run.speed_m_s);
   Pose X;
   double omega = run.turn_rad_s;
   std::size_t next = 0;

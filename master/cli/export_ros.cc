@@ -43,7 +43,6 @@ Result<SaidValues> values_of_run(const Problem& problem, const Model& model, Con
   const auto asked = ask_what_changed(said.given, *log, {{0.5, 2, 5}, 0.5}, 1, nullptr);
   if (!asked) return asked.error();
   const GroundReference& fit = *asked->reference;
-  const std::vector<KinematicRow> file = change_rows(said.given);
   for (std::size_t k = 0; k < fit.names.size(); ++k) {
     const auto i = static_cast<Eigen::Index>(k);
     std::vector<double> drawn;
@@ -54,8 +53,11 @@ Result<SaidValues> values_of_run(const Problem& problem, const Model& model, Con
     const auto at = [&](double share) {
       return drawn[static_cast<std::size_t>(share * static_cast<double>(drawn.size() - 1))];
     };
-    said.values.push_back(
-        {fit.names[k], file[k].nominal, fit.values[i], {at(kLow), at(kHigh)}, true});
+    said.values.push_back({fit.names[k],
+                           value_in_file(said.given, fit.names[k]),
+                           fit.values[i],
+                           {at(kLow), at(kHigh)},
+                           true});
   }
   return said;
 }

@@ -313,16 +313,13 @@ void GroundReport::name_headline() {
 }
 
 std::vector<SaidValue> GroundReport::said() const {
-  const std::vector<KinematicRow> file = change_rows(robot_);
   std::vector<SaidValue> values;
   for (std::size_t j = 0; j < search_.rows.size(); ++j) {
     const FitRow& row = search_.rows[j];
     const auto k = static_cast<Eigen::Index>(j);
-    const auto own = std::find_if(file.begin(), file.end(),
-                                  [&](const KinematicRow& r) { return r.name == row.row.name; });
     // Against a reference every value is the two logs' own.
     values.push_back({row.row.name,
-                      own == file.end() ? row.row.nominal : own->nominal,
+                      value_in_file(robot_, row.row.name),
                       search_.fit.values[k],
                       {intervals_(k, 0), intervals_(k, 1)},
                       row.free || search_.reference.has_value()});

@@ -300,4 +300,16 @@ std::vector<GroundHypothesis> ground_hypotheses(const GroundRobot& robot) {
   return std::move(catalogue.all);
 }
 
+double value_in_file(const GroundRobot& robot, const std::string& name) {
+  for (const KinematicRow& row : change_rows(robot)) {
+    if (row.name == name) return row.nominal;
+  }
+  for (const GroundHypothesis& h : ground_hypotheses(robot)) {
+    for (const KinematicRow& row : h.freed) {
+      if (row.name == name) return row.nominal;
+    }
+  }
+  return 0;
+}
+
 }  // namespace gapfarm

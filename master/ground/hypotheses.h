@@ -49,4 +49,7 @@ std::vector<KinematicRow> change_rows(const GroundRobot& robot);
 std::vector<GroundHypothesis> change_hypotheses(const GroundRobot& robot,
                                                 const std::vector<KinematicRow>& rows);
 
+// What the robot's file has of a row of either.
+double value_in_file(const GroundRobot& robot, const std::string& name);
+
 }  // namespace gapfarm

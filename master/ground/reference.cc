@@ -1,6 +1,8 @@
 #include "master/ground/reference.h"
 
 #include <algorithm>
+#include <optional>
+#include <utility>
 
 #include "common/random/stream.h"
 
@@ -16,6 +18,8 @@ constexpr double kTellsGrip = 2;  // nats
 constexpr double kMostUnsureGrip = 2, kGripStep = 0.1;
 constexpr double kSharpGrip = 1.8;  // of its shape
 
+constexpr int kMostTraits = 3;
+
 double unsure_grip(const WindowFitter& fitter, const WindowFit& fit, std::size_t grip) {
   for (double fall = kGripStep; fall < kMostUnsureGrip; fall += kGripStep) {
     Eigen::VectorXd values = fit.values;
@@ -28,6 +32,37 @@ double unsure_grip(const WindowFitter& fitter, const WindowFit& fit, std::size_t
     if (fit.objective - best > kTellsGrip) return fall / 2;
   }
   return kMostUnsureGrip / 2;
+}
+
+// What the robot's rows have no word for and the reference shows all the same (a battery that sags,
+// steering that is weaker to one side) is the robot's own: no change, where the other log has it
+// too. The best of the catalogue is taken into the fit as long as it is worth a name.
+WindowFit with_traits(const WindowFitter& fitter, const std::vector<GroundHypothesis>& catalogue,
+                      WindowFit fit) {
+  for (int found = 0; found < kMostTraits; ++found) {
+    const std::vector<Eigen::MatrixXd> slopes = fitter.slopes(fit);
+    WindowFit best = fit;
+    double most = kLeastGroundGain;
+    for (const GroundHypothesis& h : catalogue) {
+      Eigen::VectorXd values = fit.values;
+      std::vector<FitRow> rows = with_freed(fit.rows, h, &values);
+      if (rows.size() == fit.rows.size()) continue;
+      for (std::size_t k = 0; k < rows.size(); ++k) {
+        rows[k].free = false;
+        if (k >= fit.rows.size()) rows[k].row.tolerance *= kFarOff;
+      }
+      if (fitter.promise(fit, slopes, rows, values) < kLeastGroundGain / 3) continue;
+      WindowFit with = fitter.fit(rows, {}, values);
+      const double gain = with.objective - fit.objective - h.price;
+      const bool less = with.values[values.size() - 1] < rows.back().row.nominal;
+      if (gain < most || (h.only_more && less)) continue;
+      most = gain;
+      best = std::move(with);
+    }
+    if (best.rows.size() == fit.rows.size()) break;
+    fit = std::move(best);
+  }
+  return fit;
 }
 
 GroundReference reference_of(const WindowFitter& fitter, const WindowFit& fit, std::uint64_t seed) {
@@ -46,6 +81,12 @@ GroundReference reference_of(const WindowFitter& fitter, const WindowFit& fit, s
   reference.covariance =
       reference.draws * reference.draws.transpose() / static_cast<double>(reference.draws.cols());
   return reference;
+}
+
+std::optional<double> value_in(const GroundReference& reference, const std::string& name) {
+  const auto found = std::find(reference.names.begin(), reference.names.end(), name);
+  if (found == reference.names.end()) return {};
+  return reference.values[found - reference.names.begin()];
 }
 
 }  // namespace
@@ -70,17 +111,23 @@ Result<GroundQuestion> ask_what_changed(const GroundRobot& robot, const RunLog& 
   for (std::size_t k = 0; k < rows.size(); ++k) {
     rows[k].row.nominal = values[static_cast<Eigen::Index>(k)];
   }
-  const WindowFit fit = fitter.fit(rows, {}, values);
+  WindowFit fit = fitter.fit(rows, {}, values);
   if (const auto fault = find_ground_fault(robot, reference, question, settings);
       fault && fault->objective > fit.objective) {
     const GroundHypothesis& h = question.catalogue[fault->hypothesis];
     return Error{"the reference's log is wrong in " + h.thing + ". " + h.remedy};
   }
+  fit = with_traits(fitter, question.catalogue, std::move(fit));
   question.reference = reference_of(fitter, fit, seed);
   for (std::size_t k = 0; k < question.rows.size(); ++k) {
     question.rows[k].nominal = fit.values[static_cast<Eigen::Index>(k)];
   }
   question.catalogue = change_hypotheses(robot, question.rows);
+  for (GroundHypothesis& h : question.catalogue) {
+    for (KinematicRow& row : h.freed) {
+      row.nominal = value_in(*question.reference, row.name).value_or(row.nominal);
+    }
+  }
   return question;
 }
 

@@ -79,8 +79,6 @@ std::vector<KinematicRow> change_rows(const GroundRobot& robot) {
     if (row.name == "marker_yaw") row.tolerance = kMarkerYaw_rad;
   }
   if (!is_steered(robot)) return rows;
-  // A grip says what understeer says, and of every curvature.
-  std::erase_if(rows, [](const KinematicRow& row) { return row.name == "understeer"; });
   const double held_m_s2 = robot.friction * robot.friction_ratio * kGravity_m_s2;
   rows.push_back({"grip", std::log(held_m_s2), kGripShare, "log", "-"});
   rows.push_back({"slip_angle", kSlipAngle_rad, kKeptSlipAngle_rad, "angle", "rad"});

@@ -48,17 +48,19 @@ inline GroundRobot robot_of(const char* text) {
   return *robot;
 }
 
-inline CommandRow row_at(const GroundRobot& robot, int run, int second) {
+// `push`: how hard a car is driven.
+inline CommandRow row_at(const GroundRobot& robot, int run, int second, double push) {
   const double t = second;
   if (robot.command == CommandKind::kThrottleSteering) {
-    return {t, {0.3 + 0.1 * std::sin(0.8 * t + run), 0.8 * std::sin(1.9 * t + 2 * run)}};
+    return {t, {push * (0.3 + 0.1 * std::sin(0.8 * t + run)), 0.8 * std::sin(1.9 * t + 2 * run)}};
   }
   return {t, {5 + 4 * std::sin(1.7 * t + run), 5 + 4 * std::cos(2.3 * t + run)}};
 }
 
 // What a robot that is `truly` off its file logs: five runs on one clock, poses of 0.3 mm and
 // 1 mrad.  Runs of another `first` are told other things.
-inline RunLog driven(const GroundRobot& robot, const Kinematics& truly, int first = 0) {
+inline RunLog driven(const GroundRobot& robot, const Kinematics& truly, int first = 0,
+                     double push = 1) {
   Stream stream({7, Purpose::kTest, static_cast<std::uint64_t>(first), 0, 0});
   RunLog log;
   log.channels = robot.channels;
@@ -69,7 +71,7 @@ inline RunLog driven(const GroundRobot& robot, const Kinematics& truly, int firs
     CommandedRun commanded;
     commanded.start_s = began;
     for (int second = 0; second < 13; ++second) {
-      CommandRow row = row_at(robot, first + r, second);
+      CommandRow row = row_at(robot, first + r, second, push);
       row.t_s += began;
       run.commands.push_back(row);
     }

@@ -91,6 +91,36 @@ TEST(WhatChanged, LeavesHowTyresLetGoToTheTyres) {
   EXPECT_NEAR(floor.corrected.friction, 4 / 9.81, 0.03);
 }
 
+// Understeer that grows with speed whatever the curvature: a log of slow driving tells it, and a
+// fast one on the same floor is neither another floor nor other steering.
+TEST(WhatChanged, SaysNothingWhereOnlyTheSpeedIsAnother) {
+  const GroundRobot car = robot_of(kCar);
+  const Kinematics own = off_by({"understeer", "grip", "slip_angle"}, {0.1, std::log(60.0), 0.17});
+  const GroundDiagnosis same = changed(car, driven(car, own, 0, 0.7), driven(car, own, 5, 1.4));
+  EXPECT_TRUE(same.diagnosis.effects.empty()) << same.diagnosis.headline;
+  EXPECT_EQ(same.diagnosis.verdict, Verdict::kNone);
+}
+
+// What no row of the file says and both logs show is the robot's own.
+TEST(WhatChanged, SaysNothingOfWhatBothLogsShow) {
+  const GroundRobot car = robot_of(kCar);
+  const auto weaker = [](double to_the_left) {
+    return off_by({"grip", "slip_angle", "steering_left"}, {std::log(7.0), 0.17, to_the_left});
+  };
+  const RunLog before = driven(car, weaker(0.8));
+  const GroundDiagnosis same = changed(car, before, driven(car, weaker(0.8), 5));
+  EXPECT_TRUE(same.diagnosis.effects.empty()) << same.diagnosis.headline;
+  const GroundDiagnosis bent = changed(car, before, driven(car, weaker(0.6), 5));
+  ASSERT_FALSE(bent.diagnosis.effects.empty());
+  EXPECT_EQ(bent.diagnosis.effects.front().name, "steering_asymmetry") << bent.diagnosis.headline;
+  EXPECT_NEAR(bent.diagnosis.effects.front().parameters.at(0).value, -0.2, 0.03);
+  const GroundRobot differential = robot_of(kDifferential);
+  const Kinematics sagging = off_by({"sag"}, {0.05});
+  const GroundDiagnosis tired =
+      changed(differential, driven(differential, sagging), driven(differential, sagging, 5));
+  EXPECT_TRUE(tired.diagnosis.effects.empty()) << tired.diagnosis.headline;
+}
+
 // A long log is sure of a difference that next to nothing depends on.
 TEST(WhatChanged, SaysNothingOfWhatMovesNoEnd) {
   const GroundRobot skid = robot_of(kSkid);
