@@ -3,6 +3,7 @@
 #include <fcntl.h>
 #include <poll.h>
 #include <signal.h>
+#include <sys/resource.h>
 #include <sys/syscall.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -74,9 +75,15 @@ Result<Child> start_child(const ChildJob& job) {
   return child;
 }
 
-ChildEnd end_of(const Child& child, int status, const ChildrenOptions& options) {
+double seconds_of(const timeval& time) {
+  return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
+}
+
+ChildEnd end_of(const Child& child, int status, const rusage& used,
+                const ChildrenOptions& options) {
   ChildEnd end;
   end.wall_s = monotonic_seconds() - child.started_s;
+  end.cpu_s = seconds_of(used.ru_utime) + seconds_of(used.ru_stime);
   if (child.asked_s) {
     end.state = ChildState::kTimedOut;
     end.text = "did not end within " + std::to_string(std::lround(options.time_limit_s)) + " s";
@@ -129,7 +136,8 @@ class Crowd {
     std::size_t ended = 0;
     for (std::size_t i = 0; i < children_.size();) {
       int status = 0;
-      if (waitpid(children_[i].pid, &status, WNOHANG) != children_[i].pid) {
+      rusage used = {};
+      if (wait4(children_[i].pid, &status, WNOHANG, &used) != children_[i].pid) {
         ++i;
         continue;
       }
@@ -138,7 +146,7 @@ class Crowd {
       kill(-child.pid, SIGKILL);  // what it left behind
       close(child.pidfd);
       ++ended;
-      const ChildEnd end = end_of(child, status, options_);
+      const ChildEnd end = end_of(child, status, used, options_);
       if (options_.on_end) options_.on_end(*child.job, end);
     }
     return ended;

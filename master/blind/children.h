@@ -24,6 +24,7 @@ struct ChildEnd {
   int status = 0;  // exit status, or the signal of a crash
   double wall_s = 0;
   std::string text;  // "exited with status 3"; empty when done
+  double cpu_s = 0;  // of the child and of its own children that it waited for
 };
 
 struct ChildrenOptions {

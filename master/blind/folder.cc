@@ -41,6 +41,7 @@ Status write_outcome(const ChildEnd& end, const std::string& path) {
   const Json json = {{"outcome", child_state_name(end.state)},
                      {"status", end.status},
                      {"wall_s", end.wall_s},
+                     {"cpu_s", end.cpu_s},
                      {"text", end.text}};
   return write_file_atomically(path, json_text(json, 1) + "\n");
 }
@@ -141,6 +142,7 @@ ChildEnd read_outcome(const std::string& path) {
   }
   end.status = json.value("status", 0);
   end.wall_s = json.value("wall_s", 0.0);
+  end.cpu_s = json.value("cpu_s", 0.0);
   end.text = json.value("text", "");
   return end;
 }

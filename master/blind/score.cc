@@ -135,7 +135,8 @@ std::vector<Coverage> coverage_of(const Truth& truth, const Said& said) {
       const auto value = told.find(p.key);
       if (value == told.end() || !p.choices.empty()) continue;
       if (neutral && i >= entry->strengths) continue;
-      Coverage coverage{effect.name, p.key, value->second, kNone, kNone, false};
+      Coverage coverage{effect.name, p.key, value->second,       kNone,
+                        kNone,       false, i < entry->strengths};
       for (const SaidParameter& s : named->parameters) {
         if (s.key != p.key) continue;
         coverage.lo = s.lo;

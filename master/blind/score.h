@@ -32,6 +32,7 @@ struct Coverage {
   double lo = 0;  // NaN when the diagnosis gave no interval
   double hi = 0;
   bool covered = false;
+  bool is_strength = true;  // or a place, a direction, ... that means nothing without one
 };
 
 // One entry a parameter of every true effect that was named by its own name: an alias has other

@@ -44,6 +44,8 @@ std::vector<RateRow> rate_rows(const Tally& sum) {
   rows.push_back({"effects outside the catalogue called unknown", ">= 85 %", sum.outside_unknown});
   rows.push_back({"pairs right", ">= 80 %", sum.pairs_right});
   rows.push_back({"parameters within their 90 % interval", "85 to 95 %", sum.covered});
+  rows.push_back({"... of these, strengths", "", sum.strengths_covered});
+  rows.push_back({"... of these, places, directions and the like", "", sum.places_covered});
   rows.push_back({"promised shrinkage within 0.1 of realised", ">= 90 %", sum.promise_kept});
   rows.push_back({"diagnoses that failed", "0", sum.failed});
   return rows;
@@ -96,6 +98,7 @@ Json case_json(const ScoredCase& c) {
   Json json = {{"case", c.truth.id},
                {"outcome", child_state_name(c.end.state)},
                {"wall_s", c.end.wall_s},
+               {"cpu_s", c.end.cpu_s},
                {"said", c.said ? said_json(*c.said) : Json()}};
   if (!c.end.text.empty()) json["outcome_text"] = c.end.text;
   if (!c.has_truth) return json;
@@ -108,6 +111,7 @@ Json case_json(const ScoredCase& c) {
                         {"truth", p.truth},
                         {"lo", p.lo},
                         {"hi", p.hi},
+                        {"strength", p.is_strength},
                         {"covered", p.covered}});
   }
   json["coverage"] = coverage;
@@ -224,18 +228,19 @@ std::vector<Truth> by_effect(std::vector<Truth> cases, const ParameterTable& tab
 }
 
 std::string cases_markdown(const std::vector<ScoredCase>& cases) {
-  std::string text = table_head(
-      {"case", "kind", "level", "truth", "said", "right", "covered", "promised", "realised", "s"});
+  std::string text = table_head({"case", "kind", "level", "truth", "said", "right", "covered",
+                                 "promised", "realised", "s", "CPU s"});
   for (const ScoredCase& c : cases) {
     Rate covered;
     for (const Coverage& p : c.coverage) covered.add(p.covered);
-    text += row_of_cells({c.truth.id, c.has_truth ? case_kind_name(c.truth.kind) : "-",
-                          c.truth.level, c.has_truth ? effects_text(c.truth) : "-", said_text(c),
-                          !c.has_truth        ? "-"
-                          : c.judgement.right ? "yes"
-                                              : "NO",
-                          covered.total ? counts(covered) : "-", share(c.promised),
-                          share(c.realised), formatted("%.0f", c.end.wall_s)});
+    text +=
+        row_of_cells({c.truth.id, c.has_truth ? case_kind_name(c.truth.kind) : "-", c.truth.level,
+                      c.has_truth ? effects_text(c.truth) : "-", said_text(c),
+                      !c.has_truth        ? "-"
+                      : c.judgement.right ? "yes"
+                                          : "NO",
+                      covered.total ? counts(covered) : "-", share(c.promised), share(c.realised),
+                      formatted("%.0f", c.end.wall_s), formatted("%.0f", c.end.cpu_s)});
   }
   return text;
 }
@@ -262,6 +267,8 @@ std::string format_blind_json(const BlindReport& report) {
                       {"outside_unknown", rate_json(sum.outside_unknown)},
                       {"pairs_right", rate_json(sum.pairs_right)},
                       {"covered", rate_json(sum.covered)},
+                      {"strengths_covered", rate_json(sum.strengths_covered)},
+                      {"places_covered", rate_json(sum.places_covered)},
                       {"promise_kept", rate_json(sum.promise_kept)},
                       {"failed", rate_json(sum.failed)}};
   const Json json = {{"version", 1},

@@ -75,6 +75,7 @@ Tally tally(const std::vector<ScoredCase>& cases) {
     ++sum.confusion[truth_family(c.truth)][c.said ? first_said(*c.said) : "failed"];
     for (const Coverage& coverage : c.coverage) {
       sum.covered.add(coverage.covered);
+      (coverage.is_strength ? sum.strengths_covered : sum.places_covered).add(coverage.covered);
       sum.covered_by_parameter[coverage.effect + "." + coverage.key].add(coverage.covered);
     }
     if (c.promised && c.realised) {

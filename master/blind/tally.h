@@ -47,6 +47,7 @@ struct Tally {
   Rate outside_unknown;  // effects outside the catalogue called unknown, naming nothing
   Rate pairs_right;
   Rate covered;                               // true parameters within their interval
+  Rate strengths_covered, places_covered;     // of these: Coverage::is_strength, and the others
   Rate promise_kept;                          // |promised - realised| <= kPromiseTolerance
   std::map<std::string, Rate> singles_right;  // by level
   std::map<std::string, Rate> singles_first;  // by level; the true name itself came first

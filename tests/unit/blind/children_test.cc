@@ -41,6 +41,15 @@ TEST_F(Children, EveryWayToEndIsAnOutcome) {
   EXPECT_EQ(ends.at("crash").status, SIGSEGV);
 }
 
+TEST_F(Children, WhatTheirOwnChildrenTookIsCountedToo) {
+  std::map<std::string, ChildEnd> ends;
+  const std::string count = "i=0; while [ $i -lt 50000 ]; do i=$((i+1)); done";
+  ASSERT_TRUE(run_children({shell("busy", "(" + count + ") & wait"), shell("idle", "sleep 0.1")},
+                           options(ends))
+                  .ok());
+  EXPECT_GT(ends.at("busy").cpu_s, 2 * ends.at("idle").cpu_s);
+}
+
 TEST_F(Children, TooSlowIsATimeout) {
   std::map<std::string, ChildEnd> ends;
   ChildrenOptions with = options(ends);

@@ -172,6 +172,8 @@ TEST(Coverage, ComparesAnglesOnTheCircle) {
         truth, said_with("floor_tilt", {{"angle", 0.05, 0.04, 0.06}, {"direction", 0, lo, hi}}));
     EXPECT_EQ(all.size(), 2u);
     EXPECT_TRUE(all[0].covered);
+    EXPECT_TRUE(all[0].is_strength);
+    EXPECT_FALSE(all[1].is_strength);
     return all[1].covered;
   };
   EXPECT_TRUE(covered(-kPi, -kPi + 0.2));

@@ -59,6 +59,8 @@ TEST(Tally, CountsEveryCaseOnce) {
   EXPECT_EQ(sum.singles_first.at("clear").hits, 1u);
   EXPECT_EQ(sum.covered.hits, 1u);
   EXPECT_EQ(sum.covered.total, 1u);
+  EXPECT_EQ(sum.strengths_covered.total, 1u);
+  EXPECT_EQ(sum.places_covered.total, 0u);
   EXPECT_EQ(sum.promise_kept.hits, 1u);
   EXPECT_EQ(sum.promise_kept.total, 2u);
   EXPECT_EQ(sum.confusion.at("backlash").at("failed"), 1u);
