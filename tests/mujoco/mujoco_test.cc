@@ -1,0 +1,82 @@
+// The robot in MuJoCo against closed forms, and a log of its by the program's own check.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "tests/integration/run_program.h"
+#include "tests/mujoco/mujoco_engine.h"
+
+namespace gapfarm::truths {
+namespace {
+
+Drive drive_of(double left_m_s, double right_m_s, double on_s = 1) {
+  return {{left_m_s, 0}, {right_m_s, 0}, on_s, 0.012};
+}
+
+Pose end_of(const Scene& scene, const Drive& drive, const Pose& X_WS = {}) {
+  return mujoco_engine().make(scene)->drive(X_WS, drive).back().X_WR;
+}
+
+TEST(MujocoEngine, GoesStraightAsFarAsItsWheelsDo) {
+  for (const double speed : {0.1, 0.28, -0.2}) {
+    const Pose end = end_of({}, drive_of(speed, speed));
+    EXPECT_NEAR(end.x, speed, 2e-3) << speed;
+    EXPECT_NEAR(end.y, 0, 1e-4);
+    EXPECT_NEAR(end.theta, 0, 1e-3);
+  }
+}
+
+TEST(MujocoEngine, TurnsInPlaceAboutItsMiddleAndSlowerThanTwoWheelsWould) {
+  const Pose end = end_of({}, drive_of(-0.06, 0.06));
+  EXPECT_NEAR(end.x, 0, 1e-3);
+  EXPECT_NEAR(end.y, 0, 1e-3);
+  EXPECT_LT(end.theta, 2 * 0.06 / Scene().robot.gauge_m);
+  EXPECT_GT(end.theta, 0.4);
+}
+
+TEST(MujocoEngine, IsItsOwnMirrorImage) {
+  Scene scene, other;
+  scene.com_y_m = 0.006;
+  other.com_y_m = -0.006;
+  const Pose end = end_of(scene, drive_of(0.11, 0.28));
+  const Pose seen = mirrored(end_of(other, drive_of(0.28, 0.11)));
+  EXPECT_NEAR(end.x, seen.x, 1e-4);
+  EXPECT_NEAR(end.y, seen.y, 1e-4);
+  EXPECT_NEAR(end.theta, seen.theta, 1e-3);
+}
+
+TEST(MujocoEngine, ADriveAgainIsTheSameDrive) {
+  const auto engine = mujoco_engine().make({});
+  const Pose once = engine->drive({}, drive_of(0.11, 0.28)).back().X_WR;
+  engine->drive({}, drive_of(-0.28, -0.28));
+  EXPECT_EQ(engine->drive({}, drive_of(0.11, 0.28)).back().X_WR, once);
+}
+
+TEST(MujocoEngine, SlidesDownhillInTurnsAndStaysOtherwise) {
+  Scene scene;
+  scene.floor.tilt_rad = 0.1;
+  scene.floor.tilt_direction_rad = std::numbers::pi / 2;
+  EXPECT_GT(end_of(scene, drive_of(-0.06, 0.06)).y, 0.003);
+  const Pose still = end_of(scene, drive_of(0, 0));
+  EXPECT_LT(std::hypot(still.x, still.y), 2e-3);
+  // Downhill is a direction of the world.
+  const Pose turned = end_of(scene, drive_of(-0.06, 0.06), {0, 0, 2});
+  EXPECT_GT(turned.y, 0.003);
+}
+
+TEST(MujocoCases, ANullsLogPassesTheCheck) {
+  const TemporaryFolder folder;
+  const Finished made = run_program(
+      "mujoco_cases", {folder / "out", "--nulls", "1", "--trials", "16", "--seed", "5"});
+  ASSERT_EQ(made.exit_code, 0) << made.err;
+  const Finished checked =
+      gapfarm_command({"check", std::string(GAPFARM_SOURCE_DIR) + "/configs/srv1.toml", "--trials",
+                       folder / "out/cases/case001/trials.csv"});
+  EXPECT_EQ(checked.exit_code, 0) << checked.err;
+  EXPECT_THAT(checked.out + checked.err, testing::HasSubstr("48 in 3 sessions"));
+}
+
+}  // namespace
+}  // namespace gapfarm::truths
