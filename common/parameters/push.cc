@@ -12,6 +12,12 @@ Parameter own_shape_factor(int piece) {
                     "the same of the config's piece " + number + "; 0: shape_factor");
 }
 
+Parameter own_pressure(int piece) {
+  const std::string number = std::to_string(piece);
+  return rows::real("pressure_" + number, "-", 0, 10, 0,
+                    "the same of the config's piece " + number + "; 0: pressure");
+}
+
 std::vector<Parameter> push_rows() {
   using namespace rows;  // NOLINT: what follows is rows
 #define ROW(name, row) row,
@@ -26,6 +32,11 @@ std::vector<Parameter> push_rows() {
 const ParameterTable& push_table() {
   static const ParameterTable table(push_rows(), push_effects());
   return table;
+}
+
+bool rests_on_its_face(const ParameterValues& values) {
+  const std::size_t row = row_of(Push::kModel);
+  return push_table()[row].choices[static_cast<std::size_t>(values[row])] == "distributed";
 }
 
 }  // namespace gapfarm

@@ -33,6 +33,7 @@ constexpr Spread kSpreads[] = {
     {"pose_noise_position", 1.2, true},
     {"pose_noise_heading", 1.2, true},
     {"shape_factor", 1.15, false},
+    {"pressure", 1.3, false},
     {"ground_friction", 1.5, false},
     {"finger_friction", 1.3, false},
     {"push_noise_slide", 1.2, true},

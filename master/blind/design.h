@@ -55,7 +55,7 @@ using DesignProgress =
 // a config with genes those that are not stay as they are, noise excepted.
 //   mass 1.25, contact_length 1.1, track_gauge 1.08, friction 1.3, friction_ratio 1.15,
 //   full_speed 1.12, maximum_velocity 1.12, motor_torque 1.2, each noise parameter 1.2,
-//   shape_factor 1.15, ground_friction 1.5, finger_friction 1.3
+//   shape_factor 1.15, pressure 1.3, ground_friction 1.5, finger_friction 1.3
 std::map<std::string, double> draw_robot(const Problem& problem, Stream& stream);
 
 // Draws robots and effects, and searches every strength on the farm, all cases side by side, on

@@ -10,9 +10,10 @@ namespace {
 
 double at(const ParameterValues& values, Push row) { return values[row_of(row)]; }
 
-double shape_factor(std::size_t index, const ParameterValues& values) {
-  const double own = index < kOwnShapeFactors ? values[row_of(Push::kShapeFactor1) + index] : 0.0;
-  return own > 0 ? own : at(values, Push::kShapeFactor);
+// The piece's own value, if it has one, else that of all.
+double own_or(std::size_t index, Push first_own, Push of_all, const ParameterValues& values) {
+  const double own = index < kOwnShapeFactors ? values[row_of(first_own) + index] : 0.0;
+  return own > 0 ? own : at(values, of_all);
 }
 
 }  // namespace
@@ -35,7 +36,8 @@ PushSettings push_settings(const Piece& piece, std::size_t index, const Paramete
   s.mass_kg = piece.mass_kg * at(values, Push::kMassFactor);
   const Eigen::Vector3d moments = second_moments(piece);
   s.gyration_m2 = moments[0] + moments[1];
-  s.shape_factor = shape_factor(index, values);
+  s.shape_factor = own_or(index, Push::kShapeFactor1, Push::kShapeFactor, values);
+  s.pressure = own_or(index, Push::kPressure1, Push::kPressure, values);
   effects.push(s);
   return s;
 }

@@ -82,9 +82,23 @@ void PathRecorder::finish() {
   if (path_ != nullptr && !path_->empty() && path_->back().t_s < last_.t_s) path_->push_back(last_);
 }
 
-PushSimulator::PushSimulator(const PushSettings& settings)
-    : engine_(settings.model == PushModel::kBullet ? make_push_world(settings)
-                                                   : make_limit_surface(settings)) {}
+namespace {
+
+std::unique_ptr<PushSimulator::Engine> make_engine(const PushSettings& settings) {
+  switch (settings.model) {
+    case PushModel::kBullet:
+      return make_push_world(settings);
+    case PushModel::kLimitSurface:
+      return make_limit_surface(settings);
+    case PushModel::kDistributed:
+      return make_distributed_push(settings);
+  }
+  return nullptr;
+}
+
+}  // namespace
+
+PushSimulator::PushSimulator(const PushSettings& settings) : engine_(make_engine(settings)) {}
 PushSimulator::~PushSimulator() = default;
 const PushSettings& PushSimulator::settings() const { return engine_->settings(); }
 

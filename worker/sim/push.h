@@ -13,7 +13,7 @@
 
 namespace gapfarm {
 
-enum class PushModel { kBullet, kLimitSurface };
+enum class PushModel { kBullet, kLimitSurface, kDistributed };
 
 // Builds the world and the piece; changing any of it means a new simulator.
 struct PushSettings {
@@ -27,6 +27,9 @@ struct PushSettings {
   double shape_factor = 1;
   double stretch = 0;
   double stretch_direction_rad = 0;
+  // kDistributed instead: where on the whole face the weight is (face.h).
+  double pressure = 1;
+  int face_points = 100;
   double com_x_m = 0;  // centre of mass from the centroid
   double com_y_m = 0;
   double ground_friction = 0.5;

@@ -24,6 +24,7 @@ class PushSimulator::Engine {
 
 std::unique_ptr<PushSimulator::Engine> make_push_world(const PushSettings& settings);
 std::unique_ptr<PushSimulator::Engine> make_limit_surface(const PushSettings& settings);
+std::unique_ptr<PushSimulator::Engine> make_distributed_push(const PushSettings& settings);
 
 // The finger's way: straight between samples, standing still before and after.
 class FingerWay {

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <map>
 #include <set>
+#include <span>
 
 #include "common/parameters/push.h"
 #include "common/score/motion_model.h"
@@ -16,19 +17,31 @@ constexpr double kRetuningStep = 0.05;  // of the logarithm
 constexpr int kPushTuningRounds = 4;
 constexpr std::size_t kMostGridTrials = 120;
 constexpr double kGridFactors[] = {0.25, 0.4, 0.55, 0.7, 0.85, 1.0};
+constexpr double kGridPressures[] = {0.4, 0.7, 1.0, 1.6, 3.0, 6.0};
 constexpr double kGridFrictions[] = {0.1, 0.25, 0.45, 0.7};
 // What a coarse grid's points may miss ends by before they count less: of the distance slid, and
 // turned by on the way.
 constexpr double kCoarse_m = 3e-3, kCoarseShare = 0.05;
 constexpr double kCoarse_rad = 0.02, kCoarseTurn_rad_m = 1;
 
-bool is_factor(std::size_t row) {
-  return row >= row_of(Push::kShapeFactor) && row < row_of(Push::kShapeFactor1) + kOwnShapeFactors;
-}
+// What says how a piece is supported: the row of all pieces, followed by those of their own.
+struct SupportRows {
+  std::size_t of_all = row_of(Push::kShapeFactor);
+  std::span<const double> grid = kGridFactors;
 
-double own_factor(const Problem& problem, std::size_t piece) {
-  const double own = problem.values[row_of(Push::kShapeFactor1) + piece];
-  return own > 0 ? own : problem.values[row_of(Push::kShapeFactor)];
+  std::size_t own(std::size_t piece) const { return of_all + 1 + piece; }
+  bool holds(std::size_t row) const { return row >= of_all && row < own(kOwnShapeFactors); }
+  double value(const Problem& problem, std::size_t piece) const {
+    const double value = problem.values[own(piece)];
+    return value > 0 ? value : problem.values[of_all];
+  }
+};
+static_assert(row_of(Push::kShapeFactor1) == row_of(Push::kShapeFactor) + 1 &&
+              row_of(Push::kPressure1) == row_of(Push::kPressure) + 1);
+
+SupportRows support_rows(const Problem& problem) {
+  if (!rests_on_its_face(problem.values)) return {};
+  return {row_of(Push::kPressure), kGridPressures};
 }
 
 // The rows that tuning moves.
@@ -37,24 +50,24 @@ Result<std::vector<BaseParameter>> base_of(const Problem& problem, std::span<con
   constexpr double kFactorPrior = 1, kFingerPrior = 1;
   // Hardly seen in slow pushes: held close.
   constexpr double kGroundPrior = 0.3;
+  const SupportRows support = support_rows(problem);
   bool factor = genes.empty(), finger = genes.empty(), ground = false;
   for (const Gene& gene : genes) {
-    factor = factor || is_factor(gene.row);
+    factor = factor || support.holds(gene.row);
     finger = finger || gene.row == row_of(Push::kFingerFriction);
     ground = ground || gene.row == row_of(Push::kGroundFriction);
   }
   std::vector<BaseParameter> base;
   for (const std::size_t piece : pieces) {
     if (!factor) break;
-    const bool own = pieces.size() > 1 || problem.values[row_of(Push::kShapeFactor1) + piece] > 0;
+    const bool own = pieces.size() > 1 || problem.values[support.own(piece)] > 0;
     if (own && piece >= kOwnShapeFactors) {
       return Error{"piece " + problem.pieces[piece].name + " is number " +
                    std::to_string(piece + 1) + " of the config, and only the first " +
                    std::to_string(kOwnShapeFactors) +
-                   " can have a shape factor of their own; list it earlier"};
+                   " can have a shape factor or a pressure of their own; list it earlier"};
     }
-    base.push_back(
-        {own ? row_of(Push::kShapeFactor1) + piece : row_of(Push::kShapeFactor), kFactorPrior});
+    base.push_back({own ? support.own(piece) : support.of_all, kFactorPrior});
   }
   if (finger) base.push_back({row_of(Push::kFingerFriction), kFingerPrior});
   if (ground) base.push_back({row_of(Push::kGroundFriction), kGroundPrior});
@@ -179,18 +192,19 @@ Status start_from_grid(Predictor& predictor, Study* study) {
   if (tuned(row_of(Push::kFingerFriction))) {
     frictions.insert(frictions.end(), std::begin(kGridFrictions), std::end(kGridFrictions));
   }
-  const bool factors_tuned = std::any_of(study->base.begin(), study->base.end(),
-                                         [](const auto& entry) { return is_factor(entry.first); });
+  const SupportRows support = support_rows(predictor.problem());
+  const bool factors_tuned =
+      std::any_of(study->base.begin(), study->base.end(),
+                  [&](const auto& entry) { return support.holds(entry.first); });
   std::vector<double> factors = {0};  // the config's
-  if (factors_tuned)
-    factors.insert(factors.end(), std::begin(kGridFactors), std::end(kGridFactors));
+  if (factors_tuned) factors.insert(factors.end(), support.grid.begin(), support.grid.end());
   if (frictions.size() * factors.size() == 1) return {};
   std::vector<PredictionRequest> requests;
   for (double friction : frictions) {
     for (double factor : factors) {
       some.at = study->base;
       for (auto& [row, value] : some.at) {
-        if (is_factor(row) && factor > 0) value = factor;
+        if (support.holds(row) && factor > 0) value = factor;
       }
       if (tuned(row_of(Push::kFingerFriction))) some.at[row_of(Push::kFingerFriction)] = friction;
       requests.push_back(some);
@@ -216,8 +230,7 @@ Status start_from_grid(Predictor& predictor, Study* study) {
       const auto best =
           static_cast<std::size_t>(std::min_element(own.begin(), own.end()) - own.begin());
       sum += own[best];
-      const std::size_t row = row_of(Push::kShapeFactor1) + piece;
-      const std::size_t to = at.count(row) ? row : row_of(Push::kShapeFactor);
+      const std::size_t to = at.count(support.own(piece)) ? support.own(piece) : support.of_all;
       if (factors[best] > 0 && at.count(to)) at[to] = factors[best];
     }
     if (sum < least) {
@@ -283,10 +296,11 @@ Result<Study> make_push_study(const Problem& problem, std::span<const Gene> gene
   const auto base = base_of(problem, genes, pieces);
   if (!base) return base.error();
   study.base_parameters = *base;
+  const SupportRows support = support_rows(problem);
   for (const BaseParameter& p : *base) {
-    const bool own = p.row >= row_of(Push::kShapeFactor1) && is_factor(p.row);
+    const bool own = p.row > support.of_all && support.holds(p.row);
     study.base[p.row] =
-        own ? own_factor(problem, p.row - row_of(Push::kShapeFactor1)) : problem.values[p.row];
+        own ? support.value(problem, p.row - support.own(0)) : problem.values[p.row];
   }
   // To begin with; logs of pushes hold no two readings of one pose.
   study.reading_noise_known = false;

@@ -21,9 +21,29 @@ PushSettings fine_square() {
   return settings;
 }
 
+// What holds on a support plate and on a whole face.
+class PushEffects : public ::testing::TestWithParam<PushModel> {
+ protected:
+  static PushSettings square() {
+    PushSettings settings = square_piece();
+    settings.model = GetParam();
+    return settings;
+  }
+  static PushSettings fine() {
+    PushSettings settings = square();
+    settings.step_rate_hz = 960;
+    return settings;
+  }
+};
+INSTANTIATE_TEST_SUITE_P(Models, PushEffects,
+                         ::testing::Values(PushModel::kBullet, PushModel::kDistributed),
+                         [](const auto& model) {
+                           return model.param == PushModel::kBullet ? "Plate" : "Face";
+                         });
+
 // dv/dt = -mu g (1 + k v) stops after (v - ln(1 + k v) / k) / (mu g k).
-TEST(FrictionSpeed, SlowsAFastPieceByTheClosedForm) {
-  const PushSettings settings = fine_square();
+TEST_P(PushEffects, FrictionSpeedSlowsAFastPieceByTheClosedForm) {
+  const PushSettings settings = fine();
   const double k = 3, v = 0.8;
   Floor table;
   table.speed_slope_s_m = k;
@@ -32,8 +52,8 @@ TEST(FrictionSpeed, SlowsAFastPieceByTheClosedForm) {
 }
 
 // Along the grain friction is mu / sqrt(ratio), across it mu sqrt(ratio).
-TEST(FrictionAnisotropy, StopsSoonerAcrossTheGrain) {
-  const PushSettings settings = fine_square();
+TEST_P(PushEffects, FrictionAnisotropyStopsSoonerAcrossTheGrain) {
+  const PushSettings settings = fine();
   Floor table;
   table.grain_ratio = 2;
   const double v = 0.6;
@@ -44,8 +64,8 @@ TEST(FrictionAnisotropy, StopsSoonerAcrossTheGrain) {
   EXPECT_NEAR(slide_distance(settings, {0, v}, table), plain * std::sqrt(2.0), 1e-3);
 }
 
-TEST(FrictionPatch, ASlideWithinItFeelsItsFriction) {
-  const PushSettings settings = fine_square();
+TEST_P(PushEffects, FrictionPatchASlideWithinItFeelsItsFriction) {
+  const PushSettings settings = fine();
   Floor table;
   table.patch_radius_m = 2;
   table.patch_ratio = 2;
@@ -55,8 +75,8 @@ TEST(FrictionPatch, ASlideWithinItFeelsItsFriction) {
 }
 
 // It slides down where tan(angle) > mu, and stays where it is less.
-TEST(TableTilt, SlidesAboveTheAngleOfFriction) {
-  const PushSettings settings = square_piece();
+TEST_P(PushEffects, TableTiltSlidesAboveTheAngleOfFriction) {
+  const PushSettings settings = square();
   const auto nothing = straight(5, 5, 6, 1);
   Floor table;
   table.tilt_rad = std::atan(0.95 * settings.ground_friction);
@@ -70,8 +90,8 @@ TEST(TableTilt, SlidesAboveTheAngleOfFriction) {
 }
 
 // On a slope along the slide it stops after v^2 / (2 g (mu cos a - sin a)).
-TEST(TableTilt, LengthensADownhillSlideByTheClosedForm) {
-  const PushSettings settings = fine_square();
+TEST_P(PushEffects, TableTiltLengthensADownhillSlideByTheClosedForm) {
+  const PushSettings settings = fine();
   Floor table;
   table.tilt_rad = 0.05;
   const double v = 0.5;
@@ -79,8 +99,8 @@ TEST(TableTilt, LengthensADownhillSlideByTheClosedForm) {
   EXPECT_NEAR(slide_distance(settings, {v, 0}, table), v * v / (2 * slowing), 2e-3);
 }
 
-TEST(ComOffset, APushThroughTheMovedCentreDoesNotTurn) {
-  PushSettings settings = square_piece();
+TEST_P(PushEffects, ComOffsetAPushThroughTheMovedCentreDoesNotTurn) {
+  PushSettings settings = square();
   settings.com_x_m = 0.01;
   PushSimulator simulator(settings);
   EXPECT_NEAR(simulator.run(straight(0.01, -0.1, 0.02, 0.05), {}).X_SE.theta, 0, 2e-3);
@@ -115,8 +135,8 @@ TEST(PressureDistribution, StopsASpinByTheClosedForm) {
 
 // A steady push needs mu m g, so the finger, and the piece with it, stays behind by that over the
 // stiffness.
-TEST(FingerCompliance, APieceStaysBehindByForceTimesCompliance) {
-  PushSettings settings = square_piece();
+TEST_P(PushEffects, FingerComplianceAPieceStaysBehindByForceTimesCompliance) {
+  PushSettings settings = square();
   // Slowly: with its mass on the spring it overshoots by v sqrt(m C).
   const auto finger = straight(0, -0.07, -0.04, 0.002);
   const double stiff = PushSimulator(settings).run(finger, {}).X_SE.y;
