@@ -8,10 +8,16 @@ here=$(dirname "$0")/..
 gapfarm=${GAPFARM:-$here/build/release/bin/gapfarm}
 log=$1
 shift
-fit() { "$gapfarm" crossfit "$here/configs/push.toml" --trials "$log" --repeats object start "$@"; }
+fit() {
+  "$gapfarm" crossfit "$here/configs/push.toml" --trials "$log" --repeats object start \
+    --set model=bullet "$@"
+}
+# The source's three parameters.
+own="shape_factor=0.2,1 ground_friction=0.1,1 finger_friction=0.02,1"
 
 echo "== each shape tuned on its own"
-fit --by object --train start=0.11,0.15,0.21 --test start=0.13,0.18 \
+# shellcheck disable=SC2086
+fit --by object --train start=0.11,0.15,0.21 --test start=0.13,0.18 --genes $own \
   --sweep shape_factor ground_friction finger_friction "$@"
 echo
 echo "== frictions shared, a shape factor each"
@@ -20,4 +26,5 @@ fit --per object --train start=0.11,0.15,0.21 --test start=0.13,0.18 \
   ground_friction=0.1,1 finger_friction=0.02,1 --evaluations 1500 "$@"
 echo
 echo "== the large triangle beyond the starts that it was tuned on"
-fit --only object=triangle_l --train start=0.11,0.13,0.15 --test start=0.18,0.21 "$@"
+# shellcheck disable=SC2086
+fit --only object=triangle_l --train start=0.11,0.13,0.15 --test start=0.18,0.21 --genes $own "$@"
