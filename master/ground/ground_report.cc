@@ -8,6 +8,7 @@
 
 #include "common/random/stream.h"
 #include "master/ground/ground_words.h"
+#include "master/ground/run_clocks.h"
 
 namespace gapfarm {
 namespace {
@@ -34,6 +35,7 @@ class GroundReport {
 
  private:
   void left_out();
+  void clocks();
   void faults();
   void values();
   void figures();
@@ -216,6 +218,20 @@ void GroundReport::figures() {
   }
 }
 
+void GroundReport::clocks() {
+  const auto apart = clocks_apart(fitter_, search_.fit);
+  if (!apart) return;
+  std::string runs;
+  for (const RunClock& clock : *apart) {
+    runs += fmt::format("{}{:+.2f} s in run {}", runs.empty() ? "" : ", ", clock.delay_s,
+                        search_.log.runs[clock.run].run);
+  }
+  d_.cautions.push_back(
+      "The runs' clocks are apart: from command to pose it takes " + runs +
+      ". Each log's commands and poses need one clock; how late they are on the whole is no surer "
+      "than that.");
+}
+
 void GroundReport::screening() {
   if (search_.offers.empty()) return;
   for (const Offer& offer : search_.offers.front()) {
@@ -332,6 +348,7 @@ Diagnosis GroundReport::write() {
   faults();
   values();
   figures();
+  clocks();
   screening();
   trials();
   name_headline();

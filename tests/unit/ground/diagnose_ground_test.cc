@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "tests/unit/ground/driven_log.h"
@@ -31,6 +32,9 @@ TEST(DiagnoseGround, NamesNothingWhereTheFileIsRight) {
   const GroundDiagnosis found = diagnosis_of(robot, driven(robot, {}));
   EXPECT_TRUE(found.diagnosis.effects.empty()) << found.diagnosis.headline;
   EXPECT_EQ(found.diagnosis.verdict, Verdict::kNone);
+  for (const std::string& caution : found.diagnosis.cautions) {
+    EXPECT_EQ(caution.find("clocks"), std::string::npos) << caution;
+  }
 }
 
 TEST(DiagnoseGround, FindsTheWheelThatIsSmallerThanItsFileSays) {
@@ -120,6 +124,14 @@ TEST(DiagnoseGround, IsNoSurerOfAClockThanItsRunsAgree) {
   EXPECT_LT(delay.lo, 0.31);
   EXPECT_GT(delay.hi, 0.31);
   EXPECT_GT(delay.hi - delay.lo, 0.05);  // 3.3 standard errors of these five are 0.082
+  const auto& cautions = found.diagnosis.cautions;
+  const auto apart = std::find_if(cautions.begin(), cautions.end(), [](const std::string& text) {
+    return text.find("clocks are apart") != text.npos;
+  });
+  ASSERT_NE(apart, cautions.end());
+  const std::size_t second = apart->find(" s in run 2");
+  ASSERT_NE(second, std::string::npos) << *apart;
+  EXPECT_NEAR(std::stod(apart->substr(second - 5, 5)), 0.23, 0.04) << *apart;
 }
 
 TEST(DiagnoseGround, FindsWhatIsTheWrongWayRoundBeforeAnyFit) {
