@@ -17,6 +17,7 @@ import sys
 
 REST_S = 10  # between two runs on the session's clock
 POSES_HZ = 25
+SPEED_S = 0.2  # of wheel speeds whose stamps jitter
 
 
 def numbers(path, skip=0):
@@ -174,14 +175,20 @@ def tricycle(data, out, _):
     begin, length = rows[0][0], rows[-1][0] - rows[0][0]
     commands = [[], []]
     poses = [[], []]
-    for a, b in zip(rows, rows[1:]):
-        part = int(3 * (a[0] - begin) >= 2 * length)
-        ticks = (b[2] - a[2] + 2**31) % 2**32 - 2**31
-        steering = (a[1] + 4096) % 8192 - 4096
+    # Stamps are of receipt and jitter by half a cycle, so speeds are of a fifth of a second.
+    told = [rows[0]]
+    for row in rows:
+        part = int(3 * (row[0] - begin) >= 2 * length)
+        poses[part].append([row[0] - begin, *row[3:]])
+        if row[0] - told[0][0] < SPEED_S and row is not rows[-1]:
+            told.append(row)
+            continue
+        ticks = (row[2] - told[0][2] + 2**31) % 2**32 - 2**31
+        turned = [(r[1] + 4096) % 8192 - 4096 for r in told]
         metres = traction_gain * ticks / 5000
-        commands[part].append([a[0] - begin, metres / 0.1 / (b[0] - a[0]),
-                               steer_gain * 2 * math.pi * steering / 8192])
-        poses[part].append([a[0] - begin, *a[3:]])
+        commands[part].append([told[0][0] - begin, metres / 0.1 / (row[0] - told[0][0]),
+                               steer_gain * 2 * math.pi * sum(turned) / len(turned) / 8192])
+        told = [row]
     for part in range(2):
         parts[part].add(commands[part], poses[part])
     write(out, 'drive = "tricycle"\ncommands = ["speed", "steering"]\nmeasured = true\n'
