@@ -228,7 +228,8 @@ void Rows::steering() {
   } else {
     size("steering.gain", "-", s.gain, "turned over told", put_gain);
   }
-  add("understeer", "s^2/m^2", 0, std::max(0.2, 4 * s.understeer_s2_m2), s.understeer_s2_m2,
+  // A model car on a slippery floor has come to 0.43.
+  add("understeer", "s^2/m^2", 0, std::max(1.0, 4 * s.understeer_s2_m2), s.understeer_s2_m2,
       "curvature / (1 + understeer v^2)",
       [](GroundRobot& robot, double v) { robot.steering.understeer_s2_m2 = v; });
 }
