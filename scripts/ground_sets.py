@@ -17,7 +17,7 @@ import sys
 
 REST_S = 10  # between two runs on the session's clock
 POSES_HZ = 25
-SPEED_S = 0.2  # of wheel speeds whose stamps jitter
+SPEED_S = 0.2  # over which speeds are taken where polls come late or miss a cycle
 
 
 def numbers(path, skip=0):
@@ -124,11 +124,14 @@ def optiodom(data, out, kind):
     for path in sorted(glob.glob(f"{data}/optiodom/{kind}/*/*/*run-0[12].csv")):
         rows = numbers(path)
         commands = []
-        for before, row in zip(rows, rows[1:]):  # ticks of the cycle that ends here
-            values = [s * tick / cycle * v for s, v in zip(signs, row[4:])]
+        together = round(SPEED_S / cycle) if kind == "tricyc" else 1
+        for k in range(1, len(rows), together):  # ticks of the cycles that end here
+            cycles = rows[k:k + together]
+            means = [sum(column) / len(cycles) for column in zip(*(row[4:] for row in cycles))]
+            values = [s * tick / cycle * v for s, v in zip(signs, means)]
             if kind == "tricyc":
-                values = [row[4] * tick / cycle, row[5]]
-            commands.append([before[0], *values])
+                values[1] = means[1]
+            commands.append([rows[k - 1][0], *values])
         number = int(path[-6:-4])
         parts[1 - number % 2].add(commands, [[r[0], r[1], r[2], r[3]] for r in rows])
     names = ", ".join(f'"{c}"' for c in channels)

@@ -21,13 +21,13 @@ genes_of() {
   case $1 in
     ackermann) echo 'steering.offset steering.gain understeer friction throttle.gain throttle.zero
                      throttle.back_emf throttle.drag throttle.coulomb throttle.cornering' ;;
-    tricycle) echo 'wheels.front.radius steering.offset steering.gain wheelbase friction' ;;
+    tricycle) echo 'wheels.front.radius steering.offset steering.gain understeer wheelbase friction' ;;
     skid) echo 'wheels.left.radius wheels.right.radius wheelbase friction creep' ;;
     omni) echo 'wheels.w1.radius wheels.w2.radius wheels.w3.radius robot_radius roller_drag friction
                 creep' ;;
     mecanum) echo 'wheels.front_left.radius wheels.front_right.radius wheels.rear_left.radius
                    wheels.rear_right.radius wheel_separation roller_drag friction creep' ;;
-    *) echo 'wheels.left.radius wheels.right.radius wheel_separation friction creep' ;;
+    *) echo 'wheels.left.radius wheels.right.radius wheel_separation friction' ;;
   esac
 }
 
