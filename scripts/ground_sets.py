@@ -198,6 +198,34 @@ def tricycle(data, out, _):
           'wheelbase = 1.4\nwheel_radius = 0.1\n[marker]\nx = 1.5\n', *parts)
 
 
+def rutgers(data, out, fold):
+    """A mecanum robot at constant duties; every third command, from this one on, is kept apart.
+
+    Wheels are where the motion says they are: [80, -80, 80, -80] drives along the camera's y, each
+    wheel turns the robot to the left, and 3 and 4 push against 1 and 2 along x. Sizes are guesses.
+    """
+    folder = f"{data}/rutgers_mecanum"
+    order = ["front_left", "front_right", "rear_left", "rear_right"]
+    parts = [Folder(order), Folder(order)]
+    with open(f"{folder}/takes.csv", newline="", encoding="utf-8") as file:
+        takes = list(csv.DictReader(file))
+    words = [tuple(take[f"w{i}"] for i in (1, 2, 3, 4)) for take in takes]
+    apart = list(dict.fromkeys(words))[fold::3]
+    for take, word in zip(takes, words):
+        poses = numbers(f"{folder}/take{int(take['take']):02d}_poses.csv", 1)
+        # The clocks are not one: the robot starts where its way begins, back from 20 and 60 mm.
+        far = [next(p[0] for p in poses if math.hypot(p[1], p[2]) > r) for r in (0.02, 0.06)]
+        start = far[0] - (far[1] - far[0]) / 2
+        w1, w2, w3, w4 = (int(w) / 128 for w in word)
+        commands = [[start - 0.5, 0, 0, 0, 0], [start, -w4, w3, -w2, w1],
+                    [start + float(take["command_seconds"]), 0, 0, 0, 0]]
+        parts[word in apart].add(commands, [p for p in poses if p[0] >= start - 0.5])
+    names = ", ".join(f'"{name}"' for name in order)
+    write(out, f'drive = "mecanum"\ncommands = [{names}]\ncommand_kind = "duties"\n'
+          'full_speed = 8.0\nwheel_radius = 0.05\nwheelbase = 0.15\nwheel_separation = 0.15\n'
+          f'mass = 3.0\n[marker]\nyaw = {-math.pi / 2:.6f}\n', *parts)
+
+
 SETS = {
     "drive_asphalt": (drive, "asphalt_a"), "drive_gravel": (drive, "gravel"),
     "drive_sand": (drive, "sand_a"), "dart_rubber": (dart, "rubber"),
@@ -205,6 +233,7 @@ SETS = {
     "opti_omni3": (optiodom, "omni3"), "opti_omni4": (optiodom, "omni4"),
     "opti_tricycle": (optiodom, "tricyc"), "neato": (neato, None), "mrclam_1": (mrclam, 1),
     "mrclam_2": (mrclam, 2), "mrclam_3": (mrclam, 3), "tricycle_calib": (tricycle, None),
+    "rutgers_1": (rutgers, 0), "rutgers_2": (rutgers, 1), "rutgers_3": (rutgers, 2),
 }
 
 

@@ -26,7 +26,8 @@ genes_of() {
     omni) echo 'wheels.w1.radius wheels.w2.radius wheels.w3.radius robot_radius roller_drag friction
                 creep' ;;
     mecanum) echo 'wheels.front_left.radius wheels.front_right.radius wheels.rear_left.radius
-                   wheels.rear_right.radius wheel_separation roller_drag friction creep' ;;
+                   wheels.rear_right.radius wheel_separation roller_drag friction creep_speed
+                   cross_load centre_of_mass.x' ;;
     *) echo 'wheels.left.radius wheels.right.radius wheel_separation friction' ;;
   esac
 }

@@ -98,6 +98,11 @@ class Rows {
     }
     return farthest;
   }
+  // Four wheels of a stiff frame: a diagonal may carry more than the other.
+  bool crossed() const {
+    const bool skids = robot_.drive == DriveKind::kSkid || robot_.drive == DriveKind::kMecanum;
+    return skids && robot_.wheels.size() == 4;
+  }
   bool steered() const {
     return robot_.drive == DriveKind::kAckermann || robot_.drive == DriveKind::kTricycle;
   }
@@ -167,11 +172,16 @@ void Rows::floor() {
     add("roller_drag", "-", 0, 0.5, robot_.roller_drag, "of the rollers, over friction",
         [](GroundRobot& robot, double v) { robot.roller_drag = v; });
   }
+  if (crossed()) {
+    add("cross_load", "-", -0.9, 0.9, 0, "of front left and rear right over their even share", {});
+  }
   if (has(WheelKind::kCaster)) {
     add("caster_drag", "-", 0, 1, robot_.caster_drag, "of casters, over friction of a wheel",
         [](GroundRobot& robot, double v) { robot.caster_drag = v; });
   }
   add(kGroundCreep, "-", 0, 0.5, 0, "slip over wheel speed at 0.7 of full traction", {});
+  add("creep_speed", "m/s", 0, 0.5, 0,
+      "slip at 0.7 of full traction at any speed, as of motors that give way", {});
 }
 
 void Rows::body() {

@@ -15,8 +15,8 @@ namespace gapfarm {
 namespace {
 
 constexpr double kGeneStep = 0.01;  // to find slopes; contacts are noisy below
-constexpr int kMostRounds = 8;
-constexpr double kEnoughNats = 0.02;
+constexpr int kMostRounds = 24;
+constexpr double kEnoughNats = 0.1;
 constexpr double kLeastScale = 1e-5;
 constexpr std::array<double, 4> kDampings = {0, 0.1, 1, 10};
 constexpr double kParts[] = {2, 1};   // dimensions of position and heading

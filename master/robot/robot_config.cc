@@ -28,7 +28,8 @@ std::vector<std::string> told_by_driving(const GroundRobot& robot) {
       keys.insert(keys.end(), {"robot_radius", "roller_drag"});
       break;
     case DriveKind::kMecanum:
-      keys.insert(keys.end(), {"wheel_separation", "roller_drag"});
+      keys.insert(keys.end(),
+                  {"wheel_separation", "roller_drag", "friction", "creep_speed", "cross_load"});
       break;
     case DriveKind::kDifferential:
       keys.insert(keys.end(), {"wheel_separation"});

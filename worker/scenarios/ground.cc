@@ -104,9 +104,13 @@ Prediction GroundModel::predict(const ParameterValues& values,
   Prediction prediction;
   prediction.facts.resize(problem_.commands.size());
   const GroundRobot robot = problem_.ground->robot_at(values);
-  const GroundWorld world{at(values, kGroundGravity), at(values, kGroundStepRate),
+  const auto cross_load = problem_.table().find("cross_load");  // of four wheels only
+  const GroundWorld world{at(values, kGroundGravity),
+                          at(values, kGroundStepRate),
                           static_cast<int>(at(values, kGroundSolverIterations)),
-                          at(values, kGroundCreep)};
+                          at(values, kGroundCreep),
+                          at(values, "creep_speed"),
+                          cross_load ? values[*cross_load] : 0};
   GroundSimulator simulator(robot, world, options.steps);
   std::vector<std::uint32_t> wanted(options.trials.begin(), options.trials.end());
   if (wanted.empty()) {

@@ -16,6 +16,12 @@ constexpr double kStillFor_s = 0.1;
 constexpr double kStillSpeed_m_s = 1e-4;
 constexpr double kStillTurn_rad_s = 1e-3;
 
+// Of a wheel's even share of the weight.
+double share_of_load(const GroundWorld& world, const RobotWheel& wheel) {
+  if (world.cross_load == 0 || wheel.kind == WheelKind::kCaster) return 1;
+  return 1 + world.cross_load * std::copysign(1.0, *wheel.x_m * *wheel.y_m);
+}
+
 double share(double drag) { return std::max(drag, kLeastRatio); }
 
 Patch patch_of(const GroundRobot& robot, const RobotWheel& wheel) {
@@ -48,6 +54,7 @@ PatchSettings compile_patches(const GroundRobot& robot, const GroundWorld& world
   PatchSettings s;
   for (const RobotWheel& wheel : robot.wheels) {
     Patch patch = patch_of(robot, wheel);
+    patch.friction *= share_of_load(world, wheel);
     if (wheel.kind != WheelKind::kTread) {
       s.patches.push_back(patch);
       continue;
@@ -66,6 +73,7 @@ PatchSettings compile_patches(const GroundRobot& robot, const GroundWorld& world
   s.com_z_m = *robot.com_z_m;
   s.yaw_inertia_kg_m2 = *robot.yaw_inertia_kg_m2;
   s.creep = world.creep;
+  s.creep_speed_m_s = world.creep_speed_m_s;
   s.gravity_m_s2 = world.gravity_m_s2;
   s.step_rate_hz = world.step_rate_hz;
   s.solver_iterations = world.solver_iterations;
@@ -80,6 +88,9 @@ void compile_motions(const GroundRobot& robot, std::span<const WheelMotion> whee
     PatchMotion motion{wheels[i].heading_rad, wheels[i].speed_m_s};
     if (wheel.kind == WheelKind::kMecanum) {
       motion.e1_rad += wheel.roller_angle_rad;
+      // A roller turns by what the floor moves past its wheel, not past the robot: straight ahead
+      // it does not turn at all.
+      motion.across_m_s = -motion.speed_m_s * std::sin(wheel.roller_angle_rad);
       motion.speed_m_s *= std::cos(wheel.roller_angle_rad);
     } else if (wheel.kind == WheelKind::kPlain && !wheel.driven) {
       motion.e1_rad += pi / 2;

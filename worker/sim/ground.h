@@ -17,7 +17,11 @@ struct GroundWorld {
   double gravity_m_s2 = 9.81;
   double step_rate_hz = 240;
   int solver_iterations = 10;
-  double creep = 0;  // PatchSettings::creep
+  double creep = 0;            // PatchSettings::creep
+  double creep_speed_m_s = 0;  // PatchSettings::creep_speed_m_s
+  // Four wheels on a stiff frame, on a floor that is not quite flat: how much more than their even
+  // share of the weight front left and rear right carry, as a share; the others carry as much less.
+  double cross_load = 0;
 };
 
 // One patch a wheel, two a tread.  Idle wheels hold across and roll along; omni and mecanum wheels

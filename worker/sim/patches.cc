@@ -132,12 +132,17 @@ void PatchRobot::Impl::prepare_contacts() {
       point.m_lateralFrictionDir1 = c * ahead + s * left;
       point.m_lateralFrictionDir2 = c * left - s * ahead;
       point.m_contactMotion1 = floor_is_second ? motion.speed_m_s : -motion.speed_m_s;
+      point.m_contactMotion2 = 0;
+      if (motion.across_m_s != 0) {
+        point.m_contactMotion2 = floor_is_second ? motion.across_m_s : -motion.across_m_s;
+      }
       point.m_contactCFM = softness;
       point.m_contactERP = getSolverInfo().m_erp2;
       point.m_contactPointFlags |=
           BT_CONTACT_FLAG_LATERAL_FRICTION_INITIALIZED | BT_CONTACT_FLAG_HAS_CONTACT_CFM;
       point.m_combinedFriction = settings_.patches[index].friction;
-      point.m_frictionCFM = settings_.creep * (std::abs(motion.speed_m_s) + kCreepAtRest_m_s);
+      point.m_frictionCFM = settings_.creep * (std::abs(motion.speed_m_s) + kCreepAtRest_m_s) +
+                            settings_.creep_speed_m_s;
       point.m_userPersistentData = &grips_[index];
     }
   }

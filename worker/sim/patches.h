@@ -27,7 +27,8 @@ struct PatchSettings {
   double mass_kg = 10;
   double com_x_m = 0, com_y_m = 0, com_z_m = 0.1;  // centre of mass, R
   double yaw_inertia_kg_m2 = 1;                    // about it
-  double creep = 0;  // slip over surface speed at 0.7 of full traction
+  double creep = 0;            // slip over surface speed at 0.7 of full traction
+  double creep_speed_m_s = 0;  // slip there at any speed
   double gravity_m_s2 = 9.81;
   double step_rate_hz = 240;
   int solver_iterations = 10;
@@ -35,8 +36,9 @@ struct PatchSettings {
 
 // Of one patch over one step.
 struct PatchMotion {
-  double e1_rad = 0;     // in R
-  double speed_m_s = 0;  // of the surface along e1, positive when it drives the robot that way
+  double e1_rad = 0;      // in R
+  double speed_m_s = 0;   // of the surface along e1, positive when it drives the robot that way
+  double across_m_s = 0;  // of the surface across e1, positive to the left of it
 };
 
 // Velocity of R's origin in R's axes.

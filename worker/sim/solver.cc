@@ -215,7 +215,11 @@ double EllipseFrictionSolver::solve_friction() {
     const double a2 = 1 / rows[1].m_jacDiagABInv;
     const double ratio = rows[1].m_friction;
     const double radius = rows[0].m_friction * normal.m_appliedImpulse;
-    if (ratio < 0) {
+    if (ratio < 0 && rows[0].m_cfm > 0) {
+      double none = 0;
+      creep_within_ellipse(a1, a1, 1, radius, rows[0].m_cfm, p1, none);
+      creep_within_ellipse(a2, a2, 1, -ratio * radius, rows[0].m_cfm, p2, none);
+    } else if (ratio < 0) {
       p1 = std::clamp(p1, -radius, radius);
       p2 = std::clamp(p2, ratio * radius, -ratio * radius);
     } else if (rows[0].m_cfm > 0) {

@@ -117,6 +117,39 @@ TEST(Ground, MecanumWheelsDriveInThreeDirections) {
   EXPECT_NEAR(slanted.y, -0.4, 0.004);
 }
 
+// A roller turns by what the floor moves past its wheel: not at all straight ahead; aside by twice
+// what its wheel turns, and its drag r then costs a grip that creeps the slip q r / sqrt(1 - r^2).
+TEST(Ground, RollersOfAMecanumDriveDragAsideAndNotAhead) {
+  GroundRobot robot = ground_robot(DriveKind::kMecanum);
+  robot.roller_drag = 0.3;
+  robot = twisted(robot);
+  GroundWorld world;
+  world.creep_speed_m_s = 0.05;
+  const Pose ahead = driven(robot, {kV, 0, 0}, 2, world, {kV, 0, 0});
+  EXPECT_NEAR(ahead.x, 2 * kV, 1e-3);
+  const Pose left = driven(robot, {0, 0, kV}, 2, world, {0, kV, 0});
+  const double slip = 0.05 * 0.3 / std::sqrt(1 - 0.3 * 0.3);
+  EXPECT_NEAR(left.y, 2 * (kV - std::numbers::sqrt2 * slip), 3e-3);
+}
+
+// The diagonals contend for the turn where grips creep far below their limit: each has a say by
+// the load on it.
+TEST(Ground, TheDiagonalWithMoreOfTheLoadHasMoreOfASay) {
+  GroundRobot robot =
+      ground_robot(DriveKind::kMecanum, {"front_left", "front_right", "rear_left", "rear_right"});
+  robot.roller_drag = 0;
+  robot = completed(robot);
+  for (const double cross : {-0.5, 0.0, 0.5}) {
+    GroundWorld world;
+    world.creep_speed_m_s = 0.5;
+    world.cross_load = cross;
+    const std::vector<double> told = {-0.4, 0, 0, 0.4};  // 0.04 m/s of one diagonal's wheels
+    const double turned = driven(robot, told, 2, world).theta - driven(robot, told, 1, world).theta;
+    const double expected = (1 + cross) / 2 * 0.04 / (0.15 + 0.2);
+    EXPECT_NEAR(turned, expected, 0.01 * expected) << cross;
+  }
+}
+
 TEST(Ground, OmniWheelsDriveInThreeDirections) {
   for (const int wheels : {3, 4}) {
     GroundRobot robot = ground_robot(DriveKind::kOmni);
