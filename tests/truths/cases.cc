@@ -111,7 +111,7 @@ void draw_robot(std::uint64_t seed, Case& made) {
   Stream stream({seed, Purpose::kTest, ~1ull});
   Robot& r = made.robot;
   r.mass_kg = around(0.35, 1.25, stream);
-  r.length_m = around(0.07, 1.1, stream);
+  r.length_m = around(0.1, 1.1, stream);
   r.gauge_m = around(0.085, 1.08, stream);
   r.friction = around(0.6, 1.3, stream);
   r.friction_ratio = around(1, 1.15, stream);

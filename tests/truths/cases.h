@@ -32,7 +32,9 @@ struct Case {
   std::uint64_t seed = 0;
 };
 
-// A robot of its own, and the noise of its drives and readings.
+// A robot of its own, and the noise of its drives and readings.  Treads that carry the load all
+// along turn as easily as points of contact half as far apart: these are longer than scenario
+// srv1's.
 void draw_robot(std::uint64_t seed, Case& made);
 
 // Effects, size, level, robot, seed and the answer that a diagnosis should give.

@@ -16,7 +16,7 @@ namespace gapfarm::truths {
 struct Robot {
   double mass_kg = 0.35;
   double gauge_m = 0.085;     // tread to tread
-  double length_m = 0.07;     // of a tread on the floor
+  double length_m = 0.1;      // of a tread on the floor
   double friction = 0.6;      // along the treads
   double friction_ratio = 1;  // across over along
   double full_speed_m_s = 0.28;
