@@ -20,6 +20,7 @@ constexpr double kEnoughNats = 0.1;
 constexpr double kLeastScale = 1e-5;
 constexpr std::array<double, 4> kDampings = {0, 0.1, 1, 10};
 constexpr double kParts[] = {2, 1};   // dimensions of position and heading
+constexpr double kStrayShare = 0.25;  // of what windows of the commonest length cover
 constexpr double kFreelyMoves = 0.3;  // of a gene's range, where the windows do not tell
 
 using Ends = std::vector<Eigen::Vector3d>;  // residuals, m, m, rad
@@ -35,13 +36,13 @@ class SimulationFit {
  public:
   SimulationFit(Farm& farm, const Problem& problem) : farm_(farm), problem_(problem) {
     hash_ = farm.add_problem(to_proto(problem));
-    std::map<long, std::size_t> lengths;
-    for (const Trial& trial : problem.log.trials) {
-      const long length = std::lround(2 * std::log2(std::max(*trial.duration_s, 1e-3)));
-      length_.push_back(lengths.try_emplace(length, lengths.size()).first->second);
+    std::vector<double> durations_s;
+    for (const Trial& trial : problem.log.trials) durations_s.push_back(*trial.duration_s);
+    length_ = window_lengths(durations_s);
+    for (const std::size_t length : length_) {
+      if (length >= count_.size()) count_.resize(length + 1, 0);
+      count_[length] += 1;
     }
-    count_.assign(lengths.size(), 0);
-    for (const std::size_t length : length_) count_[length] += 1;
     for (std::size_t g = 0; g < problem.genes.size(); ++g) {
       const Parameter& row = problem.table()[problem.genes[g].row];
       const bool noise = row.key.find("_noise_") != std::string::npos;
@@ -262,6 +263,28 @@ Result<SimulatedStart> SimulationFit::run(double widest) {
 }
 
 }  // namespace
+
+std::vector<std::size_t> window_lengths(std::span<const double> durations_s) {
+  const auto octave = [](double s) { return std::lround(std::log2(std::max(s, 1e-3))); };
+  std::map<long, double> covered_s;
+  for (const double s : durations_s) covered_s[octave(s)] += s;
+  double most_s = 0;
+  for (const auto& [key, s] : covered_s) most_s = std::max(most_s, s);
+  std::map<long, std::size_t> kept;
+  for (const auto& [key, s] : covered_s) {
+    if (s >= kStrayShare * most_s) kept.try_emplace(key, kept.size());
+  }
+  std::vector<std::size_t> lengths;
+  for (const double s : durations_s) {
+    const long own = octave(s);
+    const auto nearest =
+        std::min_element(kept.begin(), kept.end(), [own](const auto& a, const auto& b) {
+          return std::abs(a.first - own) < std::abs(b.first - own);
+        });
+    lengths.push_back(nearest->second);
+  }
+  return lengths;
+}
 
 Result<SimulatedStart> fit_by_simulation(Farm& farm, const Problem& problem, double widest) {
   return SimulationFit(farm, problem).run(widest);

@@ -1,7 +1,7 @@
 // Where a search of a ground robot's values begins: least squares through the simulation itself.
 #pragma once
 
-#include <functional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -18,6 +18,11 @@ struct SimulatedStart {
   std::size_t simulations = 0;
   double gain = 0;  // nats a window, over the kinematics' values in the simulation
 };
+
+// Of each window its length among lengths that count alike, 0 on.  Lengths are octaves; a few
+// windows of a length between two horizons (poses are not even) count with the nearest one, or they
+// would weigh as much as hundreds.
+std::vector<std::size_t> window_lengths(std::span<const double> durations_s);
 
 // Gauss and Newton's steps from the values of the robot's own kinematics (kinematic_start()) to the
 // most likely ends of the problem's windows.  Residuals have Student's density; its scales are

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <set>
+
 #include "common/parameters/genome.h"
 #include "common/score/kinematic_start.h"
 #include "tests/unit/blind/worker_farm.h"
@@ -52,6 +54,23 @@ TEST(SimulatedStart, FindsWhatKinematicsHaveNoWordFor) {
   EXPECT_LT(start->spread.front(), 1e-4);
   EXPECT_NEAR(found_value(problem, *start, kGroundTurnNoise),
               problem.values[problem.table().row(kGroundTurnNoise)], 1e-9);
+}
+
+// A Warthog's poses came every 0.15 to 0.2 s: two windows of 5 s were 4.6 s long and weighed as
+// much as all of 0.5 s together.
+TEST(SimulatedStart, AFewWindowsOfAnOddLengthWeighNoMoreThanOthers) {
+  std::vector<double> durations_s(400, 0.5);
+  durations_s.insert(durations_s.end(), 140, 0.61);
+  durations_s.insert(durations_s.end(), 100, 2.0);
+  durations_s.insert(durations_s.end(), 40, 5.0);
+  durations_s.insert(durations_s.end(), {4.6, 0.8, 2.9});
+  const std::vector<std::size_t> lengths = window_lengths(durations_s);
+  ASSERT_EQ(lengths.size(), 683u);
+  const std::set<std::size_t> different(lengths.begin(), lengths.end());
+  EXPECT_EQ(different.size(), 3u);
+  EXPECT_EQ(lengths[680], lengths[679]);
+  EXPECT_EQ(lengths[681], lengths[0]);
+  EXPECT_EQ(lengths[400], lengths[0]);
 }
 
 TEST(SimulatedStart, StandsWhereNothingMovesAnEnd) {
