@@ -8,6 +8,7 @@
 
 #include "common/base/hash.h"
 #include "common/score/fitness.h"
+#include "common/score/logged_motions.h"
 #include "worker/fitness.h"
 #include "worker/scenarios/scenario.h"
 
@@ -17,11 +18,25 @@ namespace {
 class Prepared : public PreparedProblem {
  public:
   Prepared(Problem problem, const Scenario& scenario)
-      : scenario_(scenario), problem_(std::move(problem)), model_(scenario.prepare(problem_)) {}
+      : scenario_(scenario), problem_(std::move(problem)), model_(scenario.prepare(problem_)) {
+    if (!problem_.residual.empty()) facts_ = logged_motions(problem_);
+  }
 
   const Problem& problem() const override { return problem_; }
   const Scenario& scenario() const { return scenario_; }
   const ScenarioModel& model() const { return *model_; }
+  // The model's, with the problem's correction.
+  Prediction predict(const ParameterValues& values, const PredictOptions& options) const {
+    Prediction prediction = model_->predict(values, options);
+    if (problem_.residual.empty()) return prediction;
+    for (std::size_t k = 0; k < prediction.trials.size(); ++k) {
+      const LoggedMotion& facts = facts_[options.trials.empty() ? k : options.trials[k]];
+      for (Alternative& way : prediction.trials[k].alternatives) {
+        way.X_WM = corrected_end(problem_.residual, facts, way.X_WM);
+      }
+    }
+    return prediction;
+  }
   const FitnessReference& reference() const { return reference_; }
   void set_reference(FitnessReference reference) { reference_ = std::move(reference); }
 
@@ -29,6 +44,7 @@ class Prepared : public PreparedProblem {
   const Scenario& scenario_;
   Problem problem_;
   std::unique_ptr<ScenarioModel> model_;
+  std::vector<LoggedMotion> facts_;  // one a trial, where there is a correction
   FitnessReference reference_;
 };
 
@@ -70,7 +86,7 @@ v1::TaskResult run(const Prepared& p, const ParameterValues& values, const v1::E
   options.stream = task.stream();
   options.steps = steps;
   options.means_only = compares_means(p.problem().fitness.kind);
-  const Prediction prediction = p.model().predict(values, options);
+  const Prediction prediction = p.predict(values, options);
   if (prediction.outcome != v1::OK) return failed(prediction.outcome, prediction.message);
   auto fitness = fitness_of(p.problem(), p.reference(), prediction);
   if (!fitness) return failed(v1::DIVERGED, fitness.error().message);
@@ -98,7 +114,7 @@ v1::TaskResult run(const Prepared& p, const ParameterValues& values, const v1::P
   options.means_only = task.means_only();
   options.stream = task.stream();
   options.steps = steps;
-  const Prediction prediction = p.model().predict(values, options);
+  const Prediction prediction = p.predict(values, options);
   if (prediction.outcome != v1::OK) return failed(prediction.outcome, prediction.message);
   v1::TaskResult result;
   result.set_outcome(v1::OK);
@@ -155,6 +171,11 @@ v1::TaskResult run(const Prepared& p, const ParameterValues& values, const v1::T
     return invalid(
         "a trace needs duties in [-1, 1], a duration in [0, 60] s and an interval of at least "
         "0.0001 s");
+  }
+  if (!p.problem().residual.empty()) {
+    return invalid(
+        "a traced command has no place, heading or time, which the problem's residual looks at; "
+        "trace without it");
   }
   return p.model().trace(values, task, steps);
 }

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "common/base/build_info.h"
+#include "common/config/residual_section.h"
 #include "common/config/sections.h"
 #include "common/trials/csv.h"
 #include "common/trials/files.h"
@@ -181,6 +182,7 @@ Problem problem_of(const Model& model) {
   problem.robot_file = model.robot_file;
   problem.ground = model.ground;
   problem.external = model.external;
+  problem.residual = model.residual;
   problem.fitness = model.fitness;
   problem.spread = model.spread;
   return problem;
@@ -236,6 +238,7 @@ Result<Model> parse_model(std::string_view text, const std::string& path) {
   read_model_fitness(top, model);
   read_spread(top, model.spread);
   read_frame(top, model);
+  read_residual(top, model);
   read_origin(top, model);
   top.finish();
   if (!errors.empty()) return errors.error();

@@ -44,6 +44,8 @@ struct Model {
   std::optional<double> score;  // fitness value on the data
   // World position that the effects' places count from, m: simulate a log less this.
   double frame_x_m = 0, frame_y_m = 0;
+  // Where the scenario's form takes one: what no cause explains, places from the same origin.
+  ResidualField residual;
   ModelData data;
   ModelOrigin origin;
 
@@ -70,7 +72,7 @@ bool is_model(std::string_view text);
 // effects that differ from neutral, provenance.  Every double reads back as the same bits.
 // REQUIRES: values that the table accepts.
 std::string format_model(const Model& model);
-// Error: values that the table does not accept.
+// Error: values that the table does not accept, a residual that cannot be used.
 Status check_model(const Model& model);
 // Errors beside the file system's: of check_model().
 Status write_model(const Model& model, const std::string& path);

@@ -3,6 +3,7 @@
 #include <limits>
 
 #include "common/config/model.h"
+#include "common/config/residual_section.h"
 #include "common/config/sections.h"
 #include "common/config/toml_string.h"
 #include "common/trials/csv.h"
@@ -173,7 +174,8 @@ std::string format_model(const Model& model) {
          toml_string(model.scenario) + "\nkind = " + toml_string(model.kind) + "\n" +
          robot_text(model) + program_section(model) + base_section(model, "parameters", false) +
          base_section(model, "noise", true) + effect_sections(model) + frame_section(model) +
-         command_sections(model) + score_sections(model) + origin_sections(model);
+         residual_section(model) + command_sections(model) + score_sections(model) +
+         origin_sections(model);
 }
 
 Status check_model(const Model& model) {
@@ -187,7 +189,7 @@ Status check_model(const Model& model) {
     const Status accepted = table.check(row, model.values[row]);
     if (!accepted.ok()) return accepted;
   }
-  return {};
+  return check_residual_of(model);
 }
 
 Status write_model(const Model& model, const std::string& path) {

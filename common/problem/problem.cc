@@ -20,7 +20,7 @@ std::vector<CommandSpec> racquetball_commands() { return {{"serve", 1, 1, 5}}; }
 // Windows bring their own durations and commands.
 std::vector<CommandSpec> ground_commands() { return {{kWindowCommand, 0, 0, 0}}; }
 
-constexpr ScenarioForm kForms[] = {{"srv1", srv1_commands},
+constexpr ScenarioForm kForms[] = {{"srv1", srv1_commands, false, false, false, true},
                                    {"push", no_commands, true},
                                    {"racquetball", racquetball_commands},
                                    {"ground", ground_commands, false, true},

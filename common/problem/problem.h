@@ -12,6 +12,7 @@
 #include "common/parameters/ground.h"
 #include "common/parameters/table.h"
 #include "common/problem/piece.h"
+#include "common/residual/field.h"
 #include "common/runs/windows.h"
 #include "common/trials/trial.h"
 #include "gapfarm/v1/problem.pb.h"
@@ -73,6 +74,8 @@ struct Problem {
   std::vector<CommandedRun> runs;
   // Scenario `external` only: the program that simulates.
   std::shared_ptr<const ExternalProgram> external;
+  // Where the scenario's form has drives alone: a correction of where they end.
+  ResidualField residual;
 
   // Of the robot or the program where there is one, else of the scenario.  REQUIRES: a known
   // scenario.
@@ -98,6 +101,8 @@ struct ScenarioForm {
   bool robot = false;
   // A program of the user's simulates.
   bool program = false;
+  // Drives that may be corrected by a ResidualField.
+  bool residual = false;
 };
 // REQUIRES: a scenario that has a parameter table.
 const ScenarioForm& scenario_form(std::string_view scenario);

@@ -10,6 +10,7 @@
 #include "common/base/hash.h"
 #include "common/base/suggest.h"
 #include "common/problem/external_problem.h"
+#include "common/problem/residual_problem.h"
 
 namespace gapfarm {
 namespace {
@@ -342,6 +343,7 @@ v1::Problem to_proto(const Problem& problem) {
   for (const Piece& piece : problem.pieces) *message.add_pieces() = to_proto(piece);
   for (const Trial& trial : problem.log.trials) *message.add_trials() = to_proto(trial);
   write_external(problem, &message);
+  write_residual(problem, &message);
   if (!problem.robot_file.empty()) message.set_robot(problem.robot_file);
   for (const CommandedRun& run : problem.runs) {
     v1::Run* to = message.add_runs();
@@ -378,6 +380,7 @@ Result<Problem> from_proto(const v1::Problem& message) {
                     message.spread().replicates()};
   if (Status s = check_score(problem.fitness, problem.spread); !s) return s.error();
   if (Status s = read_trials(message, &problem); !s) return s.error();
+  if (Status s = read_residual(message, &problem); !s) return s.error();
   return problem;
 }
 

@@ -97,6 +97,7 @@ Result<Problem> open_problem(DetermineCommand& command, const std::optional<Conf
                              Console& console) {
   const Result<Model> model = read_model_of(command.model, console);
   if (!model) return model.error();
+  if (Status s = check_no_residual(*model, command.model, "determine"); !s) return s.error();
   command.outputs.reads(config->problem.log);
   command.outputs.reads(command.config);
   command.outputs.reads(command.model);

@@ -273,6 +273,10 @@ int run_drive(DriveCommand& command, CliContext& context) {
     context.console.error(model.error());
     return kExitBadUsage;
   }
+  if (Status s = check_no_residual(*model, command.model, "drive"); !s) {
+    context.console.error(s.error());
+    return kExitBadUsage;
+  }
   auto task = read_task(command, *model);
   if (task) {
     if (Status s = plan_outputs(command); !s) task = s.error();

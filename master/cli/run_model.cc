@@ -55,6 +55,14 @@ Result<Model> best_so_far(const RunReader& run) {
   return model;
 }
 
+Status check_no_residual(const Model& model, const std::string& path, const std::string& user) {
+  if (model.residual.empty()) return {};
+  return Error{path +
+               ": the model has a [residual], a correction of trials' ends by their places, "
+               "headings and times, which " +
+               user + " does not take along; leave that section out of a copy, or give tuned.toml"};
+}
+
 Result<Model> read_model_of(const std::string& run_or_model, Console& console) {
   namespace fs = std::filesystem;
   const fs::path path(run_or_model);

@@ -21,4 +21,7 @@ Result<Model> best_so_far(const RunReader& run);
 // has gone further than that says or left none, its best so far, of which a note tells.
 Result<Model> read_model_of(const std::string& run_or_model, Console& console);
 
+// An error where the model has a [residual], which `user` ("drive") cannot take along.
+Status check_no_residual(const Model& model, const std::string& path, const std::string& user);
+
 }  // namespace gapfarm

@@ -72,7 +72,8 @@ class Session {
     if (motion.outcome != MotionOutcome::kOk) return to_outcome(motion.outcome);
 
     const Pose X_WS = situation_.X_WR;
-    const Pose X_SE = stale ? pose_before_end(path, reading_.stale_age_s) : motion.X_SE;
+    const Pose X_SR = corrected(motion.X_SE, trial, command, moved, &path);
+    const Pose X_SE = stale ? pose_before_end(path, reading_.stale_age_s) : X_SR;
     trial.X_WS = measured(X_WS);
     const double turn_rad = robot_.effects().draw_start_turn(moved, stream_);
     if (turn_rad != 0) trial.X_WS.theta = wrap_angle(trial.X_WS.theta + turn_rad);
@@ -82,10 +83,32 @@ class Session {
     }
     *logged = to_proto(trial);
 
-    situation_.X_WR = X_WS * motion.X_SE;
+    situation_.X_WR = X_WS * X_SR;
     if (command.left != 0) situation_.last_left = sign(command.left);
     if (command.right != 0) situation_.last_right = sign(command.right);
     return v1::OK;
+  }
+
+  // The end with the problem's correction, into which the path grows with time.
+  Pose corrected(const Pose& X_SE, const Trial& trial, const CommandSpec& command, bool moved,
+                 std::vector<MotionSample>* path) const {
+    if (problem_.residual.empty()) return X_SE;
+    const Pose& X_WS = situation_.X_WR;
+    const LoggedMotion facts{trial.command,
+                             X_WS,
+                             command.left,
+                             command.right,
+                             command.duration_s,
+                             situation_.session_time_s,
+                             situation_.last_left,
+                             situation_.last_right,
+                             moved};
+    const Eigen::Vector3d shift = residual_shift(problem_.residual, facts, X_WS * X_SE);
+    for (MotionSample& s : *path) {
+      const double share = path->back().t_s > 0 ? s.t_s / path->back().t_s : 0;
+      s.X_SB = s.X_SB * Pose{share * shift[0], share * shift[1], share * shift[2]};
+    }
+    return X_SE * Pose{shift[0], shift[1], shift[2]};
   }
 
   Pose measured(const Pose& X_WR) {

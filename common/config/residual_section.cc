@@ -1,0 +1,157 @@
+#include "common/config/residual_section.h"
+
+#include <cmath>
+#include <optional>
+
+#include "common/trials/csv.h"
+
+namespace gapfarm {
+namespace {
+
+constexpr const char* kAll = "all";
+
+std::vector<std::string> covariate_names() {
+  std::vector<std::string> names;
+  for (const ResidualCovariate& c : residual_covariates()) names.emplace_back(c.name);
+  return names;
+}
+
+// Rows of equally many finite numbers.
+std::optional<Eigen::MatrixXd> read_rows(TomlSection& section, const std::string& key,
+                                         Eigen::Index columns) {
+  const toml::node* node = section.find(key);
+  if (node == nullptr) return std::nullopt;
+  const std::string expected =
+      key + " are rows of " + std::to_string(columns) + " finite numbers: [[0, ...], ...]";
+  const toml::array* list = node->as_array();
+  if (list == nullptr || list->empty()) {
+    section.fail(key, expected);
+    return std::nullopt;
+  }
+  Eigen::MatrixXd rows(static_cast<Eigen::Index>(list->size()), columns);
+  for (std::size_t k = 0; k < list->size(); ++k) {
+    const toml::array* row = (*list)[k].as_array();
+    bool sound = row != nullptr && static_cast<Eigen::Index>(row->size()) == columns;
+    for (Eigen::Index j = 0; sound && j < columns; ++j) {
+      const auto value = (*row)[static_cast<std::size_t>(j)].value<double>();
+      sound = value && std::isfinite(*value);
+      if (sound) rows(static_cast<Eigen::Index>(k), j) = *value;
+    }
+    if (!sound) {
+      section.errors().add((*list)[k], expected);
+      return std::nullopt;
+    }
+  }
+  return rows;
+}
+
+void read_weights(TomlSection& section, const Model& model, ResidualTerm* term) {
+  auto weights = section.section("weights");
+  if (!weights) return;
+  const auto read = [&](const std::string& key, const std::string& command) {
+    auto rows = read_rows(*weights, key, 3);
+    if (rows) term->weights.push_back({command, std::move(*rows)});
+  };
+  read(kAll, "");
+  for (const CommandSpec& c : model.commands) read(c.name, c.name);
+  weights->finish();
+}
+
+ResidualTerm read_term(TomlSection& section, const Model& model) {
+  ResidualTerm term;
+  term.frame =
+      static_cast<ResidualFrame>(section.choice("frame", residual_frame_words()).value_or(0));
+  section.read("by_drive", term.by_drive);
+  const std::vector<std::string> names = covariate_names();
+  term.covariates = section.choices("covariates", names).value_or(std::vector<std::size_t>());
+  term.lengths = section.numbers("lengths", 1e-9, 1e9).value_or(std::vector<double>());
+  if (!term.covariates.empty()) {
+    auto rows = read_rows(section, "centres", static_cast<Eigen::Index>(term.covariates.size()));
+    if (rows) term.centres = std::move(*rows);
+  }
+  read_weights(section, model, &term);
+  section.finish();
+  return term;
+}
+
+std::string rows_text(const Eigen::MatrixXd& rows) {
+  std::string text;
+  for (Eigen::Index k = 0; k < rows.rows(); ++k) {
+    text += k == 0 ? "[" : ",\n  ";
+    for (Eigen::Index j = 0; j < rows.cols(); ++j) {
+      text += (j == 0 ? "[" : ", ") + format_double(rows(k, j));
+    }
+    text += "]";
+  }
+  return text + "]";
+}
+
+std::string term_text(const ResidualTerm& term) {
+  const auto known = residual_covariates();
+  std::string names, lengths;
+  for (std::size_t j = 0; j < term.covariates.size(); ++j) {
+    const char* separator = j == 0 ? "" : ", ";
+    names += std::string(separator) + '"' + known[term.covariates[j]].name + '"';
+    lengths += separator + format_double(term.lengths[j]);
+  }
+  std::string text = "\n[[residual.terms]]\nframe = \"" +
+                     residual_frame_words()[static_cast<std::size_t>(term.frame)] +
+                     "\"\nby_drive = " + (term.by_drive ? "true" : "false") + "\ncovariates = [" +
+                     names + "]\nlengths = [" + lengths +
+                     "]\ncentres = " + rows_text(term.centres) + "\n[residual.terms.weights]\n";
+  for (const ResidualWeights& w : term.weights) {
+    text += (w.command.empty() ? kAll : w.command) + " = " + rows_text(w.shifts) + "\n";
+  }
+  return text;
+}
+
+}  // namespace
+
+Status check_residual_of(const Model& model) {
+  if (model.residual.empty()) return {};
+  if (!scenario_form(model.scenario).residual) {
+    return Error{"scenario " + model.scenario +
+                 " takes no [residual]; leave the section out of this model"};
+  }
+  std::vector<std::string> commands;
+  for (const CommandSpec& c : model.commands) commands.push_back(c.name);
+  return check_residual(model.residual, commands);
+}
+
+void read_residual(TomlSection& top, Model& model) {
+  auto section = top.section("residual");
+  if (!section) return;
+  const toml::node* node = section->find("terms");
+  const toml::array* list = node == nullptr ? nullptr : node->as_array();
+  if (list == nullptr || list->empty()) {
+    top.errors().add(node == nullptr ? section->table().source().begin : node->source().begin,
+                     "[residual] has no terms, expected sections [[residual.terms]] with frame, "
+                     "covariates, lengths, centres and weights; or leave [residual] out");
+    return;
+  }
+  for (const toml::node& entry : *list) {
+    const toml::table* table = entry.as_table();
+    if (table == nullptr) {
+      top.errors().add(
+          entry, "residual.terms holds " + toml_type_name(entry) + ", expected [[residual.terms]]");
+      continue;
+    }
+    TomlSection term(*table, "[[residual.terms]]", top.errors());
+    model.residual.push_back(read_term(term, model));
+  }
+  section->finish();
+  if (!top.errors().empty()) return;
+  if (Status s = check_residual_of(model); !s) top.errors().add(*node, s.error().message);
+}
+
+std::string residual_section(const Model& model) {
+  if (model.residual.empty()) return "";
+  std::string text =
+      "\n# What nothing in the catalogue explains, as a smooth correction of where drives end; it "
+      "is no cause.\n# Each term: sum of weights (m, m, rad) times exp(-|(z - centre) / length|^2 "
+      "/ 2) over its covariates z.\n[residual]\n";
+  for (const ResidualTerm& term : model.residual) text += term_text(term);
+  return text;
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,64 @@
+// One term's regression: Gaussian processes on inducing points, all that is needed to fit it to any
+// of a log's folds.
+//
+// The shifts at the centres c have the prior covariance a^2 k(c, c), k being the term's bumps; what
+// a shift is elsewhere follows from these (subset of regressors; Quinonero-Candela and Rasmussen
+// 2005).
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <vector>
+
+#include "master/residual/fit.h"
+#include "master/residual/shapes.h"
+
+namespace gapfarm {
+
+class ResidualBasis {
+ public:
+  // Centres lie among the trials that are `seen`.  `lengths`: some of the shape's.
+  ResidualBasis(const ResidualData& data, const std::vector<bool>& seen, const ResidualShape& shape,
+                const std::vector<double>& lengths);
+
+  // Whether anything varies that the shifts could depend on.
+  bool useful() const { return useful_; }
+
+  // A term fitted to the residuals (m, m, rad) of the trials with learn[i], prior standard
+  // deviation of the shifts `amplitude` times the noise's.
+  ResidualTerm fit(const std::vector<Eigen::Vector3d>& residuals, const std::vector<bool>& learn,
+                   double amplitude) const;
+  // The same, of which only the shifts (one a trial, in the predicted ends' axes) are wanted; those
+  // for several amplitudes cost little more than for one.
+  std::vector<std::vector<Eigen::Vector3d>> shifts(const std::vector<Eigen::Vector3d>& residuals,
+                                                   const std::vector<bool>& learn,
+                                                   const std::vector<double>& amplitudes,
+                                                   const std::vector<bool>& wanted) const;
+  // Of every trial, by a fitted term of this basis.
+  std::vector<Eigen::Vector3d> shifts_of(const ResidualTerm& term) const;
+
+ private:
+  struct Normal {
+    Eigen::MatrixXd matrix;
+    Eigen::VectorXd right;
+  };
+  void place_centres(const std::vector<bool>& seen, const std::vector<double>& lengths);
+  Normal normal_of(std::size_t group, const std::vector<Eigen::Vector3d>& residuals,
+                   const std::vector<bool>& learn) const;
+  Eigen::MatrixXd solve(const Normal& normal, double amplitude) const;
+  Eigen::Vector3d shift(std::size_t trial, const Eigen::MatrixXd& weights) const;
+  Eigen::Index components() const { return term_.frame == ResidualFrame::kReadings ? 2 : 3; }
+
+  const ResidualData& data_;
+  bool useful_ = true;
+  ResidualTerm term_;                               // without weights
+  std::vector<std::string> groups_;                 // commands, or one of all
+  std::vector<std::vector<std::size_t>> of_group_;  // trials
+  std::vector<Eigen::VectorXd> features_;           // of every trial
+  std::vector<Eigen::Matrix3d> axes_;               // whitened, of every trial
+  std::vector<Eigen::Matrix3d> turned_;             // residual_axes() of every trial
+  Eigen::MatrixXd kernel_;                          // k(c, c)
+  Eigen::Vector3d unit_;                            // noise of each component, by drive
+};
+
+}  // namespace gapfarm

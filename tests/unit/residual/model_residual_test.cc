@@ -1,0 +1,99 @@
+// [residual] of model.toml, and of a problem's message.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "common/config/model.h"
+#include "tests/unit/residual/fields.h"
+
+namespace gapfarm {
+namespace {
+
+using testing::HasSubstr;
+
+Model model_with_residual() {
+  Model model = *nominal_model("srv1");
+  model.residual = {tests::heading_term(), tests::place_term(ResidualFrame::kReadings)};
+  model.residual[0].weights[0].shifts(0, 0) = 0.1 + 0.2;
+  return model;
+}
+
+void expect_equal(const ResidualField& a, const ResidualField& b) {
+  ASSERT_EQ(a.size(), b.size());
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    EXPECT_EQ(a[i].frame, b[i].frame);
+    EXPECT_EQ(a[i].by_drive, b[i].by_drive);
+    EXPECT_EQ(a[i].covariates, b[i].covariates);
+    EXPECT_EQ(a[i].lengths, b[i].lengths);
+    EXPECT_EQ(a[i].centres, b[i].centres);
+    ASSERT_EQ(a[i].weights.size(), b[i].weights.size());
+    for (std::size_t k = 0; k < a[i].weights.size(); ++k) {
+      EXPECT_EQ(a[i].weights[k].command, b[i].weights[k].command);
+      EXPECT_EQ(a[i].weights[k].shifts, b[i].weights[k].shifts);
+    }
+  }
+}
+
+TEST(ModelResidual, ReadsBackToTheBit) {
+  const Model model = model_with_residual();
+  const auto again = parse_model(format_model(model), "m.toml");
+  ASSERT_TRUE(again.ok()) << again.error().message;
+  expect_equal(again->residual, model.residual);
+  EXPECT_EQ(format_model(*again), format_model(model));
+}
+
+TEST(ModelResidual, CrossesTheWire) {
+  const Problem problem = problem_of(model_with_residual());
+  const auto again = from_proto(to_proto(problem));
+  ASSERT_TRUE(again.ok()) << again.error().message;
+  expect_equal(again->residual, problem.residual);
+}
+
+// Problems without one keep their hashes, and with them their stored answers.
+TEST(ModelResidual, WithoutOneTheBytesAreWhatTheyWere) {
+  const Problem plain = problem_of(*nominal_model("srv1"));
+  EXPECT_EQ(to_proto(plain).residual_size(), 0);
+  EXPECT_NE(problem_hash(to_proto(plain)),
+            problem_hash(to_proto(problem_of(model_with_residual()))));
+  EXPECT_EQ(format_model(*nominal_model("srv1")).find("residual"), std::string::npos);
+}
+
+TEST(ModelResidual, MistakesAreNamedWithTheirPlace) {
+  const std::string sound = format_model(model_with_residual());
+  const auto message = [&](const std::string& from, const std::string& to) {
+    std::string text = sound;
+    const auto at = text.find(from);
+    EXPECT_NE(at, text.npos) << from;
+    text.replace(at, from.size(), to);
+    const auto model = parse_model(text, "m.toml");
+    return model.ok() ? std::string() : model.error().message;
+  };
+  EXPECT_THAT(message("frame = \"robot\"", "frame = \"robt\""),
+              testing::AllOf(HasSubstr("m.toml:"), HasSubstr("robt"), HasSubstr("robot")));
+  EXPECT_THAT(message("covariates = [\"heading\"]", "covariates = [\"headin\"]"),
+              HasSubstr("heading"));
+  EXPECT_THAT(message("lengths = [0.7]", "lengths = [-0.7]"), HasSubstr("-0.7"));
+  EXPECT_THAT(message("centres = [[-2]", "centres = [[-2, 1]"),
+              HasSubstr("centres are rows of 1 finite numbers"));
+  EXPECT_THAT(message("centres = [[-2]", "centres = [[nan]"),
+              HasSubstr("centres are rows of 1 finite numbers"));
+  EXPECT_THAT(message("turn_cw = [", "turn_up = ["), HasSubstr("turn_up"));
+  EXPECT_THAT(message("by_drive = true", "by_drve = true"), HasSubstr("by_drve"));
+  EXPECT_THAT(message("scenario = \"srv1\"", "scenario = \"racquetball\""), HasSubstr("residual"));
+}
+
+TEST(ModelResidual, EmptyAndForeignOnesAreRefused) {
+  const auto empty = parse_model("model = 1\n[residual]\n", "m.toml");
+  ASSERT_FALSE(empty.ok());
+  EXPECT_THAT(empty.error().message, HasSubstr("[residual] has no terms"));
+  v1::Problem message = to_proto(problem_of(*nominal_model("racquetball")));
+  *message.mutable_residual() = to_proto(problem_of(model_with_residual())).residual();
+  const auto foreign = from_proto(message);
+  ASSERT_FALSE(foreign.ok());
+  EXPECT_THAT(foreign.error().message, HasSubstr("takes no residual"));
+  message = to_proto(problem_of(model_with_residual()));
+  message.mutable_residual(0)->mutable_centres()->RemoveLast();
+  EXPECT_FALSE(from_proto(message).ok());
+}
+
+}  // namespace
+}  // namespace gapfarm
