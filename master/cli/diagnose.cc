@@ -114,6 +114,7 @@ Status write_all(const Config& config, const DiagnoseCommand& command,
                  const DiagnosisResult& result) {
   const std::filesystem::path out(command.out);
   Model model = model_of(config, result, result.final_, "diagnosed");
+  model.residual = result.residual;
   model.intervals.resize(model.values.size());
   for (std::size_t i = 0; i < result.intervals.size(); ++i) {
     const auto& [lo, hi] = result.intervals[i];
@@ -182,6 +183,9 @@ Status apply_options(const DiagnoseCommand& command, Config& config, std::vector
   if (!command.model.empty()) {
     const Result<Model> model = read_model_of(command.model, console);
     if (!model) return model.error();
+    if (Status s = check_no_residual(*model, command.model, "a base to diagnose"); !s) {
+      return s.error();
+    }
     config.problem.values = model->values;
     frame = {model->frame_x_m, model->frame_y_m};
   }

@@ -80,6 +80,7 @@ Status DiagnosisRun::doubt_base() {
   as_logged_.reset();
   tuned_alone_.clear();
   result_.diagnosis.screening.clear();
+  result_.diagnosis.nearest.clear();
   const SanityFinding finding = on_bounds();
   study_ = std::move(*tuned_);
   tuned_.reset();
@@ -152,7 +153,10 @@ std::optional<std::pair<std::size_t, std::string>> DiagnosisRun::effect_at_bound
 }
 
 void DiagnosisRun::drop_effect(std::size_t k, const std::string& why) {
-  result_.diagnosis.cautions.push_back(chosen_[k].candidate.signature.effect + why);
+  const EffectCandidate& dropped = chosen_[k].candidate;
+  result_.diagnosis.cautions.push_back(dropped.signature.effect + why);
+  result_.diagnosis.nearest.push_back(
+      {{dropped.signature.effect}, dropped.gain, 0, "", dropped.signature.effect + why});
   chosen_.erase(chosen_.begin() + static_cast<std::ptrdiff_t>(k));
   nested_.clear();
   nested_studies_.clear();
@@ -239,6 +243,7 @@ DiagnosisResult DiagnosisRun::give_up(const std::string& stage, const Error& err
   d.trials.clear();
   d.drives.clear();
   d.parameters.clear();
+  d.residual.reset();
   say_what_was_left_out();
   tell(*subject_.effects, &d);
   result_.tuned = problem_.values;

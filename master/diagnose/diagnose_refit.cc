@@ -11,6 +11,7 @@
 #include "master/diagnose/verdict.h"
 
 namespace gapfarm {
+
 bool clearly_better(const std::vector<double>& scores, const std::vector<double>& others) {
   const auto n = static_cast<double>(scores.size());
   double sum = 0, squares = 0;
@@ -138,6 +139,8 @@ Status DiagnosisRun::name_none(const std::vector<std::size_t>& folds) {
   nested_studies_.clear();
   nested_scores_.clear();
   result_.fits.clear();
+  std::erase(result_.diagnosis.cautions, correction_);
+  correction_.clear();
   if (misses_) doubt(*misses_);
   if (tuned_) {
     if (Status s = doubt_base(); !s) return s;
@@ -155,7 +158,7 @@ Status DiagnosisRun::fit_final() {
   auto fit = fit_jointly(predictor_, nested_studies_.back(), {}, estimates_->at,
                          BaseParameters::kFitted, none, options_.keep_base ? 0 : 2);
   if (!fit && fit.error().code != ErrorCode::kSimulation) return fit.error();
-  final_at_ = fit ? fit->at : estimates_->at;
+  final_fit_ = fit ? std::move(*fit) : *estimates_;
   return {};
 }
 

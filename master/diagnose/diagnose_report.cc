@@ -299,6 +299,7 @@ void DiagnosisRun::fill_trials() {
 }
 
 Status DiagnosisRun::report() {
+  if (Status s = fit_residual(); !s) return s;
   name_effects();
   fill_gap();
   fill_trials();

@@ -91,6 +91,7 @@ Status DiagnosisRun::search_catalogue() {
   result_.diagnosis.screening.clear();
   fill_screening(*all);
   tell_of_candidates(*all);
+  candidates_ = std::move(*all);
   return select();
 }
 
@@ -319,6 +320,9 @@ Status DiagnosisRun::judge() {
                   ? Verdict::kEffectAndUnknown
                   : Verdict::kUnknown;
     result_.diagnosis.cautions.push_back(odd_drives_);
+  }
+  if (verdict == Verdict::kUnknown || verdict == Verdict::kEffectAndUnknown) {
+    note_nearest(explained);
   }
   if (verdict == Verdict::kUnknown) {
     unnamed_ = chosen_;

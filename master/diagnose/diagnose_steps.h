@@ -133,6 +133,19 @@ class DiagnosisRun {
   void foresee_spreads(const std::vector<std::size_t>& folds);
   std::optional<double> fit_tails();
   Status fit_correction();
+  Status fit_residual();
+  // A smooth correction beside one of the nested fits, with scores on trials that it did not see.
+  struct TriedResidual {
+    std::size_t nested = 0;
+    ResidualField field;  // empty: none helps
+    std::vector<double> without, with;
+    NoiseEstimate noise;  // of predictions beside it
+  };
+  TriedResidual try_residual(std::size_t k) const;
+  void drop_correction();
+  void note_nearest(const Regression& explained);
+  NearMiss near_miss(std::vector<std::string> effects, double gain,
+                     const std::vector<Leftover>& left) const;
   Status compare_with_baselines();
   Study study_beside(const JointFit& fit) const;
   void keep_nested(JointFit fit, const Study& fitted_in, Study scored_in);
@@ -197,11 +210,14 @@ class DiagnosisRun {
   // What explains something, but too little of what is there to be named: as a correction it may
   // still help.
   std::vector<ChosenEffect> unnamed_;
-  double scale_ = 1;  // leftover variance over the noise's
+  std::string correction_;                   // what is said of that; empty: there is none
+  std::vector<EffectCandidate> candidates_;  // of the last search, before anything was chosen
+  double scale_ = 1;                         // leftover variance over the noise's
   double floor_ = 0;
-  bool doubted_ = false;                 // nothing is to be named
-  std::optional<SanityFinding> misses_;  // why, where that shows after the refit
-  std::optional<Overrides> final_at_;    // base and effects as they are told
+  bool doubted_ = false;                         // nothing is to be named
+  std::optional<SanityFinding> misses_;          // why, where that shows after the refit
+  std::optional<JointFit> final_fit_;            // base and effects as they are told
+  std::optional<NoiseEstimate> residual_noise_;  // of predictions beside a correction
   DiagnosisResult result_;
   std::string stage_;
   std::chrono::steady_clock::time_point began_;

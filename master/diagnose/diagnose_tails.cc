@@ -86,10 +86,11 @@ Status DiagnosisRun::fit_correction() {
     return {};
   }
   result_.fits.emplace_back("the tuned base, corrected by " + name, task);
-  result_.diagnosis.cautions.push_back(
+  correction_ =
       "model.toml holds " + name +
       " as a correction: trials left out are predicted better so, but too much is left to call it "
-      "the cause.");
+      "the cause.";
+  result_.diagnosis.cautions.push_back(correction_);
   return {};
 }
 

@@ -31,7 +31,8 @@ double DiagnosisRun::mean_loss_of_slips() const {
 
 void DiagnosisRun::spread_effects(Overrides* at) const {
   const auto set = [&](const char* key, double value) { (*at)[problem_.table().row(key)] = value; };
-  NoiseEstimate noise = nested_studies_.back().predictive_noise();
+  NoiseEstimate noise =
+      residual_noise_ ? *residual_noise_ : nested_studies_.back().predictive_noise();
   if (study_.quantum_m > 0) {
     // The readings' noise was measured with the rounding in it.
     const double rounding2 = study_.quantum_m * study_.quantum_m / 12;
@@ -89,7 +90,7 @@ void DiagnosisRun::fill_values() {
     return values;
   };
   result_.tuned = values_at(nested_.front().at, false);
-  result_.final_ = values_at(final_at_ ? *final_at_ : nested_.back().at, true);
+  result_.final_ = values_at(final_fit_ ? final_fit_->at : nested_.back().at, true);
   result_.intervals.assign(problem_.values.size(), {1, 0});
   for (const NamedEffect& effect : result_.diagnosis.effects) {
     for (const Estimate& e : effect.parameters) {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "common/pose/pose.h"
+#include "common/residual/field.h"
 #include "common/trials/trial.h"
 #include "master/diagnose/parameter_row.h"
 #include "master/sanity/finding.h"
@@ -91,6 +92,25 @@ struct SelectionRecord {
   std::vector<std::pair<std::string, double>> offered;
 };
 
+// A smooth correction of what is left when nothing of the catalogue explains it; nobody's cause.
+struct FoundResidual {
+  ResidualField field;  // places are the world's; empty: none surely helps
+  // On trials that neither its choice nor its fit saw, nats a trial, with a 90 % interval.
+  double gained = 0, gained_lo = 0, gained_hi = 0;
+  double gap_before = 0, gap_after = 0;             // mean log score lost against the floor
+  double closed = 0, closed_lo = 0, closed_hi = 0;  // share of the explainable gap
+  std::string text;                                 // a sentence for a person
+};
+
+// What of the catalogue comes nearest where it explains too little.
+struct NearMiss {
+  std::vector<std::string> effects;  // one, or several together
+  double gain = 0;                   // nats over all trials that they explain
+  double left = 0;                   // nats that they leave of a dependence on ...
+  std::string left_on;               // ... this
+  std::string text;                  // why they are not named
+};
+
 struct NextExperiment {
   std::string text;
   std::vector<std::string> separates;
@@ -152,7 +172,9 @@ struct Diagnosis {
   std::vector<Where> unexplained;  // of the final model
   std::vector<Screened> screening;
   std::vector<SelectionRecord> steps;
-  std::vector<ResidualCheck> checks;  // most significant first
+  std::vector<ResidualCheck> checks;      // most significant first
+  std::optional<FoundResidual> residual;  // where something is unexplained
+  std::vector<NearMiss> nearest;          // nearest first
   std::vector<NextExperiment> next;
   std::vector<std::string> cautions;               // thin data and the like, one sentence each
   std::vector<ParameterRow> parameters;            // what was tuned, and of the named effects

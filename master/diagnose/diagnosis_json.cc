@@ -293,6 +293,8 @@ Json summary_json(const Diagnosis& diagnosis) {
                   {"cautions", diagnosis.cautions},
                   {"provenance", std::move(provenance)},
                   {"timing", std::move(timing)}};
+  if (diagnosis.residual) summary["residual"] = residual_json(*diagnosis.residual);
+  if (!diagnosis.nearest.empty()) summary["nearest"] = nearest_json(diagnosis.nearest);
   if (!diagnosis.drives.empty()) summary["drives"] = drives_json(diagnosis.drives);
   if (!diagnosis.shown.empty()) summary["pictures"] = pictures_json(diagnosis);
   return summary;
@@ -348,7 +350,11 @@ Result<Diagnosis> parse_diagnosis(std::string_view text) {
   read_remainder(root, diagnosis);
   read_parameters(root, &diagnosis.parameters);
   read_correlations(root, &diagnosis.correlations);
+  read_nearest(root, &diagnosis.nearest);
   if (!error.empty()) return Error{error};
+  if (json.contains("residual")) {
+    if (Status s = read_residual(json["residual"], &diagnosis.residual); !s) return s.error();
+  }
   if (json.contains("drives")) {
     if (Status s = read_drives(json["drives"], &diagnosis.drives); !s) return s.error();
   }

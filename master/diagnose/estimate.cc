@@ -188,6 +188,25 @@ void step(const Problem& problem, const Study& study, const Eigen::MatrixXd& nui
   }
 }
 
+// To the parameters that fit without fold `f`, to first order.
+Eigen::VectorXd step_without(const Study& study, const JointFit& fit,
+                             const std::vector<std::size_t>& fold_of, std::size_t f) {
+  const Eigen::VectorXd z = study.whiten(fit.residuals);
+  const bool only = *std::max_element(fold_of.begin(), fold_of.end()) == 0;
+  const Eigen::Index p = fit.jacobian.cols();
+  Normal normal{Eigen::MatrixXd::Zero(p, p), Eigen::VectorXd::Zero(p)};
+  for (std::size_t i = 0; i < study.size(); ++i) {
+    if (fold_of[i] == f && !only) continue;
+    const auto at = static_cast<Eigen::Index>(3 * i);
+    const double weight = weight_of(study, at / 3, z);
+    const auto rows = fit.jacobian.middleRows(at, 3);
+    normal.matrix += weight * rows.transpose() * rows;
+    normal.right += weight * rows.transpose() * z.segment<3>(at);
+  }
+  add_prior(study, fit, &normal);
+  return solve_symmetric(normal.matrix, normal.right);
+}
+
 }  // namespace
 
 double misfit_of(const Study& study, const JointFit& fit, const Eigen::MatrixXd& nuisances) {
@@ -258,8 +277,7 @@ Result<JointFit> fit_jointly(Predictor& predictor, const Study& study,
     step(predictor.problem(), study, nuisances, &next);
     const std::vector<FittedParameter> whole = next.parameters;
     double now = 0;
-    // A step may lead to where the robot falls over, or would with a little more of a parameter, or
-    // past the optimum: half of it, then.
+    // A step may lead past the optimum, or to where the robot nearly falls over: half of it, then.
     for (int half = 0;; ++half) {
       Status moved = predict(predictor, study, &next);
       if (moved) now = misfit_of(study, next, nuisances);
@@ -294,22 +312,10 @@ Result<JointFit> fit_jointly(Predictor& predictor, const Study& study,
 std::vector<Eigen::Vector3d> held_out_residuals(const Study& study, const JointFit& fit,
                                                 const std::vector<std::size_t>& fold_of) {
   if (fit.jacobian.cols() == 0) return fit.residuals;
-  const Eigen::VectorXd z = study.whiten(fit.residuals);
   const std::size_t folds = 1 + *std::max_element(fold_of.begin(), fold_of.end());
-  Eigen::VectorXd left = z;
+  Eigen::VectorXd left = study.whiten(fit.residuals);
   for (std::size_t f = 0; f < folds; ++f) {
-    Normal normal{Eigen::MatrixXd::Zero(fit.jacobian.cols(), fit.jacobian.cols()),
-                  Eigen::VectorXd::Zero(fit.jacobian.cols())};
-    for (std::size_t i = 0; i < study.size(); ++i) {
-      if (fold_of[i] == f && folds > 1) continue;
-      const auto at = static_cast<Eigen::Index>(3 * i);
-      const double weight = weight_of(study, at / 3, z);
-      const auto rows = fit.jacobian.middleRows(at, 3);
-      normal.matrix += weight * rows.transpose() * rows;
-      normal.right += weight * rows.transpose() * z.segment<3>(at);
-    }
-    add_prior(study, fit, &normal);
-    const Eigen::VectorXd delta = solve_symmetric(normal.matrix, normal.right);
+    const Eigen::VectorXd delta = step_without(study, fit, fold_of, f);
     for (std::size_t i = 0; i < study.size(); ++i) {
       if (fold_of[i] != f) continue;
       const auto at = static_cast<Eigen::Index>(3 * i);
@@ -317,6 +323,13 @@ std::vector<Eigen::Vector3d> held_out_residuals(const Study& study, const JointF
     }
   }
   return study.unwhiten(left);
+}
+
+std::vector<Eigen::Vector3d> left_without(const Study& study, const JointFit& fit,
+                                          const std::vector<std::size_t>& fold_of, std::size_t f) {
+  if (fit.jacobian.cols() == 0) return fit.residuals;
+  const Eigen::VectorXd step = fit.jacobian * step_without(study, fit, fold_of, f);
+  return study.unwhiten(study.whiten(fit.residuals) - step);
 }
 
 std::vector<double> scores_of(const Study& study, const std::vector<Eigen::Vector3d>& residuals,

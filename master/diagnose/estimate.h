@@ -61,6 +61,10 @@ std::vector<double> held_out_scores(const Study& study, const JointFit& fit,
 std::vector<Eigen::Vector3d> held_out_residuals(const Study& study, const JointFit& fit,
                                                 const std::vector<std::size_t>& fold_of);
 
+// Of every trial, seen or not, under the one that did not see fold `f`.
+std::vector<Eigen::Vector3d> left_without(const Study& study, const JointFit& fit,
+                                          const std::vector<std::size_t>& fold_of, std::size_t f);
+
 // Sessions when there are several, else five contiguous blocks.
 std::vector<std::size_t> folds_of(const Study& study);
 

@@ -62,6 +62,25 @@ std::string unexplained_section(const Diagnosis& diagnosis) {
          "</section>\n";
 }
 
+std::string shape_section(const Diagnosis& diagnosis) {
+  if (!diagnosis.residual && diagnosis.nearest.empty()) return "";
+  std::string html = R"(<section id="shape"><h2>The shape of what nothing explains</h2>)";
+  if (diagnosis.residual) html += "<p>" + html_escaped(diagnosis.residual->text) + "</p>";
+  if (diagnosis.residual && !diagnosis.residual->field.empty()) {
+    html +=
+        R"(<div class="controls" id="shape-controls"></div><div class="grid" id="shape-plots"></div>)";
+    html += kNoScript;
+  }
+  if (!diagnosis.nearest.empty()) {
+    html += "<h3>What comes nearest, and why it is not the cause</h3><ul>";
+    for (const NearMiss& miss : diagnosis.nearest) {
+      html += "<li>" + html_escaped(miss.text) + "</li>";
+    }
+    html += "</ul>";
+  }
+  return html + "</section>\n";
+}
+
 }  // namespace
 
 std::string report_html(const Diagnosis& diagnosis, bool served) {
@@ -108,6 +127,9 @@ std::string report_html(const Diagnosis& diagnosis, bool served) {
   body += screening_section(diagnosis);
   body += shrinkage_section(diagnosis);
   body += unexplained_section(diagnosis);
+  const std::string shape = shape_section(diagnosis);
+  if (!shape.empty()) frame.places.insert(frame.places.end() - 3, {"shape", "Shape"});
+  body += shape;
   body += next_section(diagnosis);
   body += cautions_section(diagnosis);
   body += provenance_section(diagnosis);

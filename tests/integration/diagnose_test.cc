@@ -200,6 +200,8 @@ TEST_F(Diagnose, SaysNoneWhenNothingIsMissing) {
   const Json d = diagnose();
   EXPECT_EQ(d["verdict"], "none") << d["headline"];
   EXPECT_TRUE(d["effects"].empty());
+  EXPECT_FALSE(d.contains("residual"));
+  EXPECT_EQ(text_of(folder_ / "d/model.toml").find("[residual]"), std::string::npos);
 }
 
 TEST_F(Diagnose, WithoutTheEffectInTheCatalogueItIsNotGivenAnotherName) {
@@ -210,6 +212,24 @@ TEST_F(Diagnose, WithoutTheEffectInTheCatalogueItIsNotGivenAnotherName) {
   const Json without = diagnose({"--leave-out", "battery_sag"});
   EXPECT_EQ(without["verdict"], "unknown") << without["headline"];
   EXPECT_TRUE(without["effects"].empty());
+  // What has no name has a shape: it predicts trials that it did not see, another log's, too.
+  ASSERT_TRUE(without["residual"]["kept"]) << without["residual"];
+  EXPECT_GT(without["residual"]["gained_lo"], 0);
+  EXPECT_GT(without["residual"]["closed"], 0.5);
+  ASSERT_FALSE(without["nearest"].empty());
+  const Finished refused = gapfarm_command(
+      {"drive", folder_ / "d/model.toml", "--commands", "forward", "--out", folder_ / "driven"});
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_NE(refused.err.find("[residual]"), std::string::npos) << refused.err;
+  simulate(60, {"battery_sag.rate=0.03"}, "4");
+  const auto nats = [&](const char* model) {
+    const Finished said =
+        gapfarm_command({"predict", folder_ / model, "--trials", folder_ / "trials.csv", "--out",
+                         folder_ / "p.csv", "--force", "--json"});
+    EXPECT_EQ(said.exit_code, 0) << said.err;
+    return Json::parse(said.out)["log_score"].get<double>();
+  };
+  EXPECT_GT(nats("d/model.toml"), nats("d/tuned.toml") + 0.1);
 }
 
 // Both make single drives stray: slips anywhere, a patch where it lies.

@@ -106,6 +106,7 @@ startTimeline();
 startCompared();
 startFilter();
 startWatch();
+startShape();
 const pageTrials = readTrials();
 if (pageTrials.length) {
   startDrives(pageTrials);

@@ -97,6 +97,36 @@ TEST(DiagnosisJson, SaysWhatIsWrong) {
   EXPECT_FALSE(parse_diagnosis("").ok());
 }
 
+ResidualTerm shape_over_the_floor() {
+  ResidualTerm term;
+  term.frame = ResidualFrame::kMotion;
+  term.covariates = {0, 1};
+  term.lengths = {0.5, 0.25};
+  term.centres = Eigen::MatrixXd::Constant(2, 2, 1.0 / 3);
+  term.weights = {{"forward", Eigen::MatrixXd::Constant(2, 3, 0.1)},
+                  {"turn_cw", Eigen::MatrixXd::Constant(2, 3, -0.2)}};
+  return term;
+}
+
+TEST(DiagnosisJson, KeepsTheShapeOfWhatHasNoName) {
+  Diagnosis d;
+  d.residual =
+      FoundResidual{{shape_over_the_floor()}, 0.4, 0.3, 0.5, 0.7, 0.3, 0.6, 0.5, 0.7, "so"};
+  d.nearest = {{{"camera_seam", "floor_tilt"}, 120, 44, "start place", "why"}};
+  const auto back = parse_diagnosis(to_json(d));
+  ASSERT_TRUE(back.ok()) << back.error().message;
+  EXPECT_EQ(to_json(*back), to_json(d));
+  ASSERT_TRUE(back->residual);
+  EXPECT_EQ(back->residual->field.at(0).frame, ResidualFrame::kMotion);
+  EXPECT_EQ(back->residual->field.at(0).weights.at(1).shifts(1, 2), -0.2);
+  EXPECT_EQ(back->nearest.at(0).effects.at(1), "floor_tilt");
+  Json json = Json::parse(to_json(d));
+  json["residual"]["terms"][0]["centres"][1] = "x";
+  EXPECT_THAT(parse_diagnosis(json.dump()).error().message, HasSubstr("residual.terms[0]"));
+  json["residual"] = 3;
+  EXPECT_THAT(parse_diagnosis(json.dump()).error().message, HasSubstr("residual"));
+}
+
 // A file cut off anywhere, or with any byte gone wrong, is refused or read; it never crashes.
 TEST(DiagnosisJson, SurvivesDamage) {
   Diagnosis d = example_diagnosis();

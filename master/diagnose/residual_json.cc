@@ -1,0 +1,161 @@
+// The correction without a cause, and what came nearest, as a part of diagnosis.json.
+
+#include <nlohmann/json.hpp>
+
+#include "common/json/json.h"
+#include "master/diagnose/diagnosis_json.h"
+#include "master/diagnose/json_fields.h"
+
+namespace gapfarm {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json rows_json(const Eigen::MatrixXd& matrix) {
+  Json rows = Json::array();
+  for (Eigen::Index k = 0; k < matrix.rows(); ++k) {
+    Json row = Json::array();
+    for (Eigen::Index j = 0; j < matrix.cols(); ++j) row.push_back(matrix(k, j));
+    rows.push_back(std::move(row));
+  }
+  return rows;
+}
+
+Json term_json(const ResidualTerm& term) {
+  Json covariates = Json::array(), lengths = Json::array(), weights = Json::object();
+  for (const std::size_t row : term.covariates) {
+    covariates.push_back(residual_covariates()[row].name);
+  }
+  for (const double length : term.lengths) lengths.push_back(length);
+  for (const ResidualWeights& w : term.weights) {
+    weights[w.command.empty() ? "all" : w.command] = rows_json(w.shifts);
+  }
+  return {{"frame", residual_frame_words()[static_cast<std::size_t>(term.frame)]},
+          {"by_drive", term.by_drive},
+          {"covariates", std::move(covariates)},
+          {"lengths", std::move(lengths)},
+          {"centres", rows_json(term.centres)},
+          {"weights", std::move(weights)}};
+}
+
+bool read_rows(const Json& json, Eigen::MatrixXd* rows) {
+  if (!json.is_array() || json.empty() || !json.front().is_array()) return false;
+  const std::size_t columns = json.front().size();
+  rows->resize(static_cast<Eigen::Index>(json.size()), static_cast<Eigen::Index>(columns));
+  for (std::size_t k = 0; k < json.size(); ++k) {
+    if (!json[k].is_array() || json[k].size() != columns) return false;
+    for (std::size_t j = 0; j < columns; ++j) {
+      if (!json[k][j].is_number()) return false;
+      (*rows)(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(j)) = json[k][j];
+    }
+  }
+  return true;
+}
+
+// Whatever a model would refuse is refused here, too; its commands are those that have weights.
+Status read_term(const Json& json, const std::string& path, ResidualTerm* term) {
+  std::string error, frame;
+  std::vector<std::string> covariates;
+  Fields fields(json, path, error);
+  fields.read("frame", frame);
+  fields.read("covariates", covariates);
+  if (!error.empty()) return Error{error};
+  const Error wrong{"diagnosis.json: " + path +
+                    " is no term of a residual; was this written by gapfarm diagnose?"};
+  const std::vector<std::string>& words = residual_frame_words();
+  const auto at = std::find(words.begin(), words.end(), frame);
+  const bool whole = json.contains("centres") && json.contains("lengths") &&
+                     json["lengths"].is_array() && json.contains("weights") &&
+                     json["weights"].is_object() && json.contains("by_drive") &&
+                     json["by_drive"].is_boolean();
+  if (at == words.end() || !whole || !read_rows(json["centres"], &term->centres)) return wrong;
+  term->frame = static_cast<ResidualFrame>(at - words.begin());
+  term->by_drive = json["by_drive"];
+  for (const Json& length : json["lengths"]) {
+    if (!length.is_number()) return wrong;
+    term->lengths.push_back(length);
+  }
+  const auto known = residual_covariates();
+  for (const std::string& name : covariates) {
+    const auto row = std::find_if(known.begin(), known.end(),
+                                  [&](const ResidualCovariate& c) { return c.name == name; });
+    if (row == known.end()) return wrong;
+    term->covariates.push_back(static_cast<std::size_t>(row - known.begin()));
+  }
+  for (const auto& [command, rows] : json["weights"].items()) {
+    ResidualWeights& w = term->weights.emplace_back();
+    if (command != "all") w.command = command;
+    if (!read_rows(rows, &w.shifts)) return wrong;
+  }
+  return {};
+}
+
+}  // namespace
+
+Json residual_json(const FoundResidual& residual) {
+  Json terms = Json::array();
+  for (const ResidualTerm& term : residual.field) terms.push_back(term_json(term));
+  return {{"kept", !residual.field.empty()}, {"text", residual.text},
+          {"gained", residual.gained},       {"gained_lo", residual.gained_lo},
+          {"gained_hi", residual.gained_hi}, {"gap_before", residual.gap_before},
+          {"gap_after", residual.gap_after}, {"closed", residual.closed},
+          {"closed_lo", residual.closed_lo}, {"closed_hi", residual.closed_hi},
+          {"terms", std::move(terms)}};
+}
+
+Status read_residual(const Json& json, std::optional<FoundResidual>* residual) {
+  std::string error;
+  FoundResidual found;
+  Fields fields(json, "residual", error);
+  fields.read("text", found.text);
+  fields.read("gained", found.gained);
+  fields.read("gained_lo", found.gained_lo);
+  fields.read("gained_hi", found.gained_hi);
+  fields.read("gap_before", found.gap_before);
+  fields.read("gap_after", found.gap_after);
+  fields.read("closed", found.closed);
+  fields.read("closed_lo", found.closed_lo);
+  fields.read("closed_hi", found.closed_hi);
+  std::vector<std::string> commands;
+  Status sound;
+  fields.for_each("terms", [&](const Json& item, const std::string& path, const auto&) {
+    ResidualTerm& term = found.field.emplace_back();
+    if (sound) sound = read_term(item, path, &term);
+    for (const ResidualWeights& w : term.weights) {
+      if (!w.command.empty()) commands.push_back(w.command);
+    }
+  });
+  if (!error.empty()) return Error{error};
+  if (!sound) return sound;
+  if (Status s = check_residual(found.field, commands); !s) {
+    return Error{"diagnosis.json: " + s.error().message};
+  }
+  *residual = std::move(found);
+  return {};
+}
+
+Json nearest_json(const std::vector<NearMiss>& nearest) {
+  Json list = Json::array();
+  for (const NearMiss& miss : nearest) {
+    list.push_back({{"effects", miss.effects},
+                    {"gain", miss.gain},
+                    {"left", miss.left},
+                    {"left_on", miss.left_on},
+                    {"text", miss.text}});
+  }
+  return list;
+}
+
+void read_nearest(Fields& root, std::vector<NearMiss>* nearest) {
+  root.for_each("nearest", [&](const Json& item, const std::string& path, const auto&) {
+    NearMiss& miss = nearest->emplace_back();
+    Fields fields(item, path, root.error());
+    fields.read("effects", miss.effects);
+    fields.read("gain", miss.gain);
+    fields.read("left", miss.left);
+    fields.read("left_on", miss.left_on);
+    fields.read("text", miss.text);
+  });
+}
+
+}  // namespace gapfarm
