@@ -20,26 +20,27 @@ ResidualField leftward() {
   return {term};
 }
 
-v1::TaskResult answer(const Problem& problem, const v1::Task& task) {
+v1::TaskResult answer_of(const Problem& problem, const v1::Task& task) {
   const auto prepared = prepare(to_proto(problem));
   EXPECT_TRUE(prepared.ok());
   return evaluate(prepared->get(), task);
 }
 
-v1::PredictResult predicted(const Problem& problem, const std::vector<std::uint32_t>& trials = {}) {
+v1::PredictResult predictions_of(const Problem& problem,
+                                 const std::vector<std::uint32_t>& trials = {}) {
   v1::Task task;
   for (const std::uint32_t i : trials) task.mutable_predict()->add_trials(i);
   if (trials.empty()) task.mutable_predict();
-  const v1::TaskResult result = answer(problem, task);
+  const v1::TaskResult result = answer_of(problem, task);
   EXPECT_EQ(result.outcome(), v1::OK) << result.message();
   return result.predict();
 }
 
 TEST(ResidualOfAWorker, ShiftsPredictedEndsAndKeepsTheirSpread) {
   Problem problem = small_problem(12);
-  const v1::PredictResult plain = predicted(problem);
+  const v1::PredictResult plain = predictions_of(problem);
   problem.residual = leftward();
-  const v1::PredictResult with = predicted(problem);
+  const v1::PredictResult with = predictions_of(problem);
   const std::vector<LoggedMotion> facts = logged_motions(problem);
   for (int i = 0; i < plain.predictions_size(); ++i) {
     const Pose before = from_proto(plain.predictions(i).end());
@@ -56,7 +57,7 @@ TEST(ResidualOfAWorker, ShiftsPredictedEndsAndKeepsTheirSpread) {
 // The density moves with the end: what was measured there scores what it scored.
 TEST(ResidualOfAWorker, ScoresAreOfTheShiftedEnd) {
   Problem problem = small_problem(12);
-  const v1::PredictResult plain = predicted(problem);
+  const v1::PredictResult plain = predictions_of(problem);
   problem.residual = leftward();
   const std::vector<LoggedMotion> facts = logged_motions(problem);
   for (std::size_t i = 0; i < 12; ++i) {
@@ -64,7 +65,7 @@ TEST(ResidualOfAWorker, ScoresAreOfTheShiftedEnd) {
     Trial& trial = problem.log.trials[i];
     trial.X_WE = corrected_end(problem.residual, facts[i], end) * between(end, trial.X_WE);
   }
-  const v1::PredictResult with = predicted(problem);
+  const v1::PredictResult with = predictions_of(problem);
   for (int i = 0; i < 12; ++i) {
     EXPECT_NEAR(plain.predictions(i).log_score(), with.predictions(i).log_score(), 1e-6);
   }
@@ -73,7 +74,7 @@ TEST(ResidualOfAWorker, ScoresAreOfTheShiftedEnd) {
 TEST(ResidualOfAWorker, SomeTrialsAreAnsweredAsAllAre) {
   Problem problem = small_problem(12);
   problem.residual = leftward();
-  const v1::PredictResult all = predicted(problem), some = predicted(problem, {3, 7});
+  const v1::PredictResult all = predictions_of(problem), some = predictions_of(problem, {3, 7});
   EXPECT_EQ(all.predictions(3).SerializeAsString(), some.predictions(0).SerializeAsString());
   EXPECT_EQ(all.predictions(7).SerializeAsString(), some.predictions(1).SerializeAsString());
 }
@@ -93,9 +94,9 @@ TEST(ResidualOfAWorker, SimulatedSessionsHaveIt) {
     planned->mutable_trial()->mutable_start()->set_x(0.5);
     planned->set_moved(i == 0);
   }
-  const v1::SimulateResult plain = answer(problem, task).simulate();
+  const v1::SimulateResult plain = answer_of(problem, task).simulate();
   problem.residual = leftward();
-  const v1::SimulateResult with = answer(problem, task).simulate();
+  const v1::SimulateResult with = answer_of(problem, task).simulate();
   ASSERT_EQ(with.trials_size(), 2);
   const Pose before = from_proto(plain.trials(0).end()), after = from_proto(with.trials(0).end());
   const double bump = std::exp(-0.5 * 0.25);
@@ -114,7 +115,7 @@ TEST(ResidualOfAWorker, ATraceHasNoPlaceToLookAt) {
   v1::Task task;
   task.mutable_trace()->set_interval(0.1);
   task.mutable_trace()->mutable_command()->set_duration(0.2);
-  const v1::TaskResult result = answer(problem, task);
+  const v1::TaskResult result = answer_of(problem, task);
   EXPECT_EQ(result.outcome(), v1::INVALID_REQUEST);
   EXPECT_NE(result.message().find("residual"), std::string::npos) << result.message();
 }
