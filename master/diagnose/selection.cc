@@ -107,7 +107,7 @@ Result<std::vector<EffectCandidate>> Selector::candidates(
     if (candidate.gain < kWorthRefiningShare * most) continue;
     if (is_seam(effect)) candidate = refine_seam(explained, candidate);
   }
-  drop_false_lines(explained, &best);
+  drop_linear_views(explained, &best);
   for (auto& [effect, candidate] : best) {
     if (candidate.signature.effect != effect)
       candidate.signature = renamed(std::move(candidate.signature), effect);

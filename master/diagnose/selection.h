@@ -102,8 +102,8 @@ class Selector {
   Result<std::vector<EffectCandidate>> simulate_patches(const Regression& explained,
                                                         const std::vector<Patch>& patches);
   Status refine_patch(const Regression& explained, EffectCandidate best);
-  void drop_false_lines(const Regression& explained,
-                        std::map<std::string, EffectCandidate>* best) const;
+  void drop_linear_views(const Regression& explained,
+                         std::map<std::string, EffectCandidate>* best) const;
   EffectCandidate refine_seam(const Regression& explained, EffectCandidate best) const;
   Regression without(const std::vector<Signature>& first,
                      const std::vector<EffectCandidate>& chosen, std::size_t leave_out) const;

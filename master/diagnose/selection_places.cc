@@ -43,13 +43,15 @@ EffectCandidate Selector::refine_seam(const Regression& explained, EffectCandida
   return best;
 }
 
-// A line near the edge of where trials were bends all that lies beyond it.
-void Selector::drop_false_lines(const Regression& explained,
-                                std::map<std::string, EffectCandidate>* best) const {
+// A line near the edge of where trials were bends all that lies beyond it, a lens whose middle is
+// far away all that it sees.
+void Selector::drop_linear_views(const Regression& explained,
+                                 std::map<std::string, EffectCandidate>* best) const {
   std::optional<double> linear;
   std::erase_if(*best, [&](const auto& entry) {
     const auto& [effect, candidate] = entry;
-    if (!is_seam(effect) || candidate.gain < study_.subject->least_gain) return false;
+    if (!study_.subject->effects->row(effect).bends_view) return false;
+    if (candidate.gain < study_.subject->least_gain) return false;
     if (!linear) {
       Signature view = linear_view_signature(study_);
       study_.drop_ignored(view.columns);

@@ -21,6 +21,7 @@ void start_lens(const EffectStart& at, std::map<std::string, double>* values) {
 extern const EffectDiagnosis kCameraDistortion = {
     .effect = "camera_distortion",
     .probes = [](const Study& study) { return lens_probes(middle_of(study)); },
+    .bends_view = true,
     .start = start_lens,
     .model_error = 0.03,
     .places = {{"x", 0}, {"y", 1}},

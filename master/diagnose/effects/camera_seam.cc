@@ -65,6 +65,7 @@ EffectDiagnosis first_seam() {
   return {
       .effect = "camera_seam",
       .marks = lines,
+      .bends_view = true,
       .start = start_seam,
       .model_error = 0.05,
       .search_error = seam_search_error,

@@ -77,6 +77,10 @@ struct EffectDiagnosis {
   // another one.
   bool by_contact = false;
 
+  // A camera that sees one place otherwise than another: not offered where one linear map of all
+  // positions explains as much.
+  bool bends_view = false;
+
   // Rivals, whatever the log.
   const EffectFamily* family = nullptr;
   std::vector<const char*> aliases = {};
