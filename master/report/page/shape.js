@@ -80,7 +80,7 @@ function floorShape(term, weights) {
   return [{
     spec: { x: { ...room(x), label: SHAPE_LABEL.x }, y: { ...room(y), label: SHAPE_LABEL.y }, equal: true, layers },
     title: "Shift over the floor",
-    note: `Up to ${words(tellingOf(term) * longest, 2)} ${unitOf(term, "x")} ${shapePer(term)}, drawn ${words(times, 2)} times as long; ${shapeFrame(term)}.${colours}`,
+    note: `Up to ${words(tellingOf(term) * longest, 2)} ${unitOf(term, "x")} ${shapePer(term)}, drawn ${times === 1 ? "to scale" : `${words(times, 2)} times as long`}; ${shapeFrame(term)}.${colours}`,
   }];
 }
 
