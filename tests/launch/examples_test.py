@@ -142,7 +142,9 @@ def run_until_stopped(words):
         said = process.stdout.readline()
         process.send_signal(signal.SIGINT)
         said += process.communicate(timeout=60)[0]
-        stopped = said and process.returncode in (0, 128 + signal.SIGINT)
+        # A watched run that has ended ends the command, too, maybe just before it is stopped.
+        ends = (0, 128 + signal.SIGINT) + ((-signal.SIGINT,) if "--watch" in words else ())
+        stopped = said and process.returncode in ends
         return 0 if stopped else process.returncode or 1, said
 
 
