@@ -42,7 +42,7 @@ def diagnosed(args, case, name, leave_out):
         command = [program, "diagnose", args.config, "--workers", args.workers, "--out", str(out),
                    "--trials", str(args.folder / "cases" / case / "trials.csv")]
         if leave_out:
-            command += ["--leave-out", leave_out]
+            command += ["--leave-out", *leave_out]
         done = subprocess.run(command, capture_output=True, text=True, check=False)
         if done.returncode != 0:
             sys.exit(f"{' '.join(command)}\n{done.stderr}")
@@ -51,11 +51,13 @@ def diagnosed(args, case, name, leave_out):
 
 def left_out_row(args, case, effect):
     """Nats that the truth closes, that [residual] does, that model.toml does."""
-    without = diagnosed(args, case, "left_out", effect)
+    asked = args.folder / "diagnoses" / case / "question.json"  # with what always passes for it
+    options = json.loads(asked.read_text(encoding="utf-8"))["options"]
+    without = diagnosed(args, case, "left_out", options["leave-out"])
     if args.quick:
         truth = without["gap"]["tuned"]
     else:
-        whole = diagnosed(args, case, "whole", "")
+        whole = diagnosed(args, case, "whole", [])
         truth = whole["gap"]["tuned"] - whole["gap"]["final"]
     residual = without.get("residual") or {"kept": False}
     gained = residual["gained"] if residual["kept"] else 0.0
@@ -90,7 +92,7 @@ def main():
     print(f"\n[residual] closes at least half of what the true effect closes: {sum(halves)} of {len(halves)}")
     kept = 0
     for case in nulls[:args.nulls]:
-        found = diagnosed(args, case, "null", "")
+        found = diagnosed(args, case, "null", [])
         kept += bool((found.get("residual") or {}).get("kept"))
     tried = len(nulls[:args.nulls])
     print(f"nothing kept of nulls: {tried - kept} of {tried}")
