@@ -10,7 +10,7 @@ here=$(dirname "$0")/..
 bin=${2:-$here/build/release/bin}
 config=${3:-$here/configs/push.toml}
 jobs=${4:-2}
-mkdir -p "$out/truth" "$out/cases"
+mkdir -p "$out"
 c++ -std=c++20 -O2 "$here/tests/planar_push/make_log.cc" -o "$out/make_log"
 
 # An effect a line, with values that show clearly in 95 pushes.
@@ -35,36 +35,8 @@ camera_distortion k1=0.15 x=0.5 y=0.5
 camera_distortion k1=-0.12 x=0.3 y=0.4
 marker_offset x=0.005 y=-0.004'
 
-# make_case ID SEED [EFFECT KEY=VALUE...]
-make_case() {
-  id=$1 seed=$2
-  shift 2
-  answer=none values='' arguments=''
-  if [ $# -gt 0 ]; then
-    answer=effect name=$1
-    shift
-    for value in "$@"; do
-      arguments="$arguments $name.$value"
-      values="$values${values:+, }\"${value%%=*}\": ${value#*=}"
-    done
-    values="\"$name\": {$values}"
-  fi
-  mkdir -p "$out/cases/$id"
-  # shellcheck disable=SC2086
-  "$out/make_log" "$out/cases/$id" "$seed" $arguments
-  printf '{"effects": {%s}, "level": "clear", "answer": "%s"}\n' "$values" "$answer" \
-    >"$out/truth/$id.json"
-}
+make_log() { "$out/make_log" "$@"; }
 
-seed=100
-while [ $seed -lt 120 ]; do
-  make_case "null$seed" $seed
-  seed=$((seed + 1))
-done
-echo "$effects" | while read -r line; do
-  # shellcheck disable=SC2086
-  make_case "effect$seed" $seed $line
-  seed=$((seed + 1))
-done
-"$bin/gapfarm" blind-check "$config" --foreign "$out/cases" --truth "$out/truth" \
-  --out "$out/check" --jobs "$jobs" --workers 1
+# shellcheck source=scripts/labelled_cases.sh
+. "$here/scripts/labelled_cases.sh"
+judge_labelled_cases

@@ -8,7 +8,7 @@ out=${1:?usage: scripts/free_commands.sh OUT [BIN] [CONFIG] [JOBS]}
 bin=${2:-build/release/bin}
 config=${3:-configs/srv1_free.toml}
 jobs=${4:-2}
-mkdir -p "$out/truth"
+mkdir -p "$out"
 
 # An effect a line, with values that show clearly in 150 free trials.
 effects='motor_asymmetry ratio=0.05
@@ -32,42 +32,20 @@ marker_offset x=0.015 y=-0.01
 pose_latency share=0.2 latency=0.25
 pose_quantisation step=0.01'
 
-# make_case ID SEED [EFFECT KEY=VALUE...]
-make_case() {
-  id=$1 seed=$2
+make_log() {
+  folder=$1 robot_seed=$2
   shift 2
-  robot=$(awk -v seed="$seed" 'BEGIN { srand(seed)
+  robot=$(awk -v seed="$robot_seed" 'BEGIN { srand(seed)
     printf "contact_length=%.4f track_gauge=%.4f friction_ratio=%.3f full_speed=%.3f friction=%.3f",
       0.07 * 1.1 ^ (2 * rand() - 1), 0.085 * 1.08 ^ (2 * rand() - 1), 1.15 ^ (2 * rand() - 1),
       0.28 * 1.12 ^ (2 * rand() - 1), 0.6 * 1.3 ^ (2 * rand() - 1) }')
-  mkdir -p "$out/cases/$id"
-  answer=none values='' arguments=''
-  for value in $robot; do arguments="$arguments --set $value"; done
-  if [ $# -gt 0 ]; then
-    answer=effect name=$1
-    shift
-    for value in "$@"; do
-      arguments="$arguments --set $name.$value"
-      values="$values${values:+, }\"${value%%=*}\": ${value#*=}"
-    done
-    values="\"$name\": {$values}"
-  fi
+  set_all=''
+  for value in $robot "$@"; do set_all="$set_all --set $value"; done
   # shellcheck disable=SC2086
-  "$bin/gapfarm" simulate "$config" --seed "$seed" --workers 1 $arguments \
-    --out "$out/cases/$id/trials.csv" 2>"$out/simulate.log" || { cat "$out/simulate.log"; exit 1; }
-  printf '{"effects": {%s}, "level": "clear", "answer": "%s"}\n' "$values" "$answer" \
-    >"$out/truth/$id.json"
+  "$bin/gapfarm" simulate "$config" --seed "$robot_seed" --workers 1 $set_all \
+    --out "$folder/trials.csv" 2>"$out/simulate.log" || { cat "$out/simulate.log"; exit 1; }
 }
 
-seed=100
-while [ $seed -lt 120 ]; do
-  make_case "null$seed" $seed
-  seed=$((seed + 1))
-done
-echo "$effects" | while read -r line; do
-  # shellcheck disable=SC2086
-  make_case "effect$seed" $seed $line
-  seed=$((seed + 1))
-done
-"$bin/gapfarm" blind-check "$config" --foreign "$out/cases" --truth "$out/truth" \
-  --out "$out/check" --jobs "$jobs" --workers 1
+# shellcheck source=scripts/labelled_cases.sh
+. "$(dirname "$0")/labelled_cases.sh"
+judge_labelled_cases
