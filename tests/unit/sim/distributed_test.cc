@@ -276,21 +276,7 @@ TEST(DistributedPush, AFingerThatMissesMovesNothing) {
 
 // Bits, whatever was simulated before, and however it ended.
 TEST(DistributedPush, AnswersAsANewSimulatorWould) {
-  const auto finger = straight(0.021, -0.1, 0.04, 0.1);
-  Floor rough;
-  rough.grain_ratio = 1.7;
-  rough.speed_slope_s_m = 2;
-  const Motion fresh = on_face_pushed(on_face(triangle_piece()), finger, rough);
-  PushSimulator used(on_face(triangle_piece()));
-  Floor steep;
-  steep.tilt_rad = 1.2;
-  used.run(finger, steep);
-  used.slide({1, 2}, 30, {});
-  used.slide({INFINITY, 0}, 0, {});
-  used.run(straight(-0.05, -0.1, 0.1, 0.4), {});
-  const Motion again = used.run(finger, rough);
-  EXPECT_EQ(again.X_SE, fresh.X_SE);
-  EXPECT_EQ(again.duration_s, fresh.duration_s);
+  expect_answers_of_a_new_one(on_face(triangle_piece()));
 }
 
 // In another frame the same push is the same.

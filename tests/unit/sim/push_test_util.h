@@ -1,6 +1,8 @@
 // Pieces and pushes for tests.
 #pragma once
 
+#include <gtest/gtest.h>
+
 #include <cmath>
 #include <vector>
 
@@ -37,6 +39,25 @@ inline PushSettings triangle_piece() {
 // Straight up along y at x, from `begin_y` to `end_y` at this speed.
 inline std::vector<FingerSample> straight(double x, double begin_y, double end_y, double speed) {
   return {{0, {x, begin_y}}, {(end_y - begin_y) / speed, {x, end_y}}};
+}
+
+// A simulator that has been through slopes, slides and worse answers as a new one does, to the bit.
+inline void expect_answers_of_a_new_one(const PushSettings& settings) {
+  const auto finger = straight(0.021, -0.1, 0.04, 0.1);
+  Floor rough;
+  rough.grain_ratio = 1.7;
+  rough.speed_slope_s_m = 2;
+  const Motion fresh = PushSimulator(settings).run(finger, rough);
+  PushSimulator used(settings);
+  Floor steep;
+  steep.tilt_rad = 1.2;
+  used.run(finger, steep);
+  used.slide({1, 2}, 30, {});
+  used.slide({INFINITY, 0}, 0, {});
+  used.run(straight(-0.05, -0.1, 0.1, 0.4), {});
+  const Motion again = used.run(finger, rough);
+  EXPECT_EQ(again.X_SE, fresh.X_SE);
+  EXPECT_EQ(again.duration_s, fresh.duration_s);
 }
 
 }  // namespace gapfarm

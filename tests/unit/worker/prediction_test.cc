@@ -88,23 +88,33 @@ TEST(Prediction, FewTrialsOfAConditionAreSimulatedAtTheirHeadings) {
   }
 }
 
-// A patch changes the trials that cross it and no others.
-TEST(Prediction, AFrictionPatchActsWhereItIs) {
+// The first one from (0.5, 0.5), where lay_patch() lays its disc, all others from far off.
+Problem wide_turns(int count) {
   Problem problem = empty_problem();
-  for (int i = 0; i < 2; ++i) {
+  for (int i = 0; i < count; ++i) {
     Trial trial;
     trial.session = "s";
     trial.trial = i;
     trial.command = "wide_ccw";
-    trial.X_WS = i == 0 ? Pose{0.5, 0.5, 0} : Pose{1.8, 1.8, 0};
+    trial.X_WS = i == 0 ? Pose{0.5, 0.5, 0} : Pose{1.8, 1.8, 0.3 * i - 3};
     trial.X_WE = trial.X_WS;
     problem.log.trials.push_back(trial);
   }
-  const v1::TaskResult without = predict(problem, true);
+  return problem;
+}
+
+void lay_patch(Problem& problem) {
   value(problem, "friction_patch.ratio") = 0.2;
   value(problem, "friction_patch.x") = 0.45;
   value(problem, "friction_patch.y") = 0.6;
   value(problem, "friction_patch.radius") = 0.12;
+}
+
+// A patch changes the trials that cross it and no others.
+TEST(Prediction, AFrictionPatchActsWhereItIs) {
+  Problem problem = wide_turns(2);
+  const v1::TaskResult without = predict(problem, true);
+  lay_patch(problem);
   const v1::TaskResult with = predict(problem, true);
   const auto moved = [&](int i) {
     return local_difference(from_proto(without.predict().predictions(i).end()),
@@ -117,21 +127,9 @@ TEST(Prediction, AFrictionPatchActsWhereItIs) {
 
 // Headings matter only where the patch is: trials elsewhere share one motion whatever theirs are.
 TEST(Prediction, AFrictionPatchCostsTheTrialsThatCrossIt) {
-  Problem problem = empty_problem();
-  for (int i = 0; i < 20; ++i) {
-    Trial trial;
-    trial.session = "s";
-    trial.trial = i;
-    trial.command = "wide_ccw";
-    trial.X_WS = i == 0 ? Pose{0.5, 0.5, 0} : Pose{1.8, 1.8, 0.3 * i - 3};
-    trial.X_WE = trial.X_WS;
-    problem.log.trials.push_back(trial);
-  }
+  Problem problem = wide_turns(20);
   const double without_s = predict(problem, true).simulated();
-  value(problem, "friction_patch.ratio") = 0.2;
-  value(problem, "friction_patch.x") = 0.45;
-  value(problem, "friction_patch.y") = 0.6;
-  value(problem, "friction_patch.radius") = 0.12;
+  lay_patch(problem);
   const double with_s = predict(problem, true).simulated();
   EXPECT_GT(with_s, 1.5 * without_s);
   EXPECT_LT(with_s, 3 * without_s) << "two motions and a little: all share one, one crosses it";
