@@ -1,11 +1,15 @@
 #include "master/diagnose/diagnose.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 
 #include "common/base/suggest.h"
-#include "master/diagnose/diagnose_steps.h"
+#include "master/diagnose/headline.h"
 #include "master/diagnose/prepare.h"
+#include "master/diagnose/report_parts.h"
+#include "master/diagnose/steps.h"
+#include "master/diagnose/watch.h"
 
 namespace gapfarm {
 namespace {
@@ -21,12 +25,81 @@ Status check_left_out(const Problem& problem, const std::vector<std::string>& le
   return {};
 }
 
-}  // namespace
+// Says which of kDiagnosisStages is on, and how long each took.
+class Stages {
+ public:
+  explicit Stages(const DiagnoseOptions& options) : options_(options) {}
+
+  void begin(std::size_t stage) {
+    end();
+    present_ = kDiagnosisStages[stage].name;
+    began_ = Clock::now();
+    if (options_.on_stage) options_.on_stage(present_);
+  }
+  void end() {
+    if (present_.empty()) return;
+    took_s_.emplace_back(present_, std::chrono::duration<double>(Clock::now() - began_).count());
+    present_.clear();
+  }
+  const std::string& present() const { return present_; }
+  const std::vector<std::pair<std::string, double>>& took_s() const { return took_s_; }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  const DiagnoseOptions& options_;
+  std::string present_;  // empty: none
+  Clock::time_point began_;
+  std::vector<std::pair<std::string, double>> took_s_;
+};
 
 // The steps in the order of docs/diagnosis.md.
+Result<DiagnosisResult> take_steps(const steps::Inquiry& of, Stages* stages) {
+  steps::KnownSoFar known;
+  const auto end_with = [&](const Error& error) -> Result<DiagnosisResult> {
+    // What cannot be simulated is no reason to be without a report.
+    if (error.code != ErrorCode::kSimulation) return error;
+    return give_up(of, known, stages->present(), error);
+  };
+  stages->begin(0);
+  const Result<Study> tuned = steps::tune(of);
+  if (!tuned) return end_with(tuned.error());
+  known.tuned = &*tuned;
+  tell_of_base(of, *tuned);
+
+  stages->begin(1);
+  const Result<steps::Evidence> measured = steps::measure(of, *tuned);
+  if (!measured) return end_with(measured.error());
+  tell_of_noise(of, measured->study);
+
+  stages->begin(2);
+  const Result<steps::Screening> screening = steps::screen(of, *measured);
+  if (!screening) return end_with(screening.error());
+  known.screening = &*screening;
+  tell_of_readings(of, screening->found);
+  tell_of_choice(of, screening->found, screening->doubt.has_value());
+
+  stages->begin(3);
+  const Result<steps::Judgement> judgement = steps::judge(of, *screening);
+  if (!judgement) return end_with(judgement.error());
+  known.judged = &*judgement;
+  tell_of_verdict(of, *judgement);
+
+  stages->begin(4);
+  const Result<steps::Refit> refit = steps::refit(of, *measured, *screening, *judgement);
+  if (!refit) return end_with(refit.error());
+  known.judged = &refit->judged;
+
+  stages->begin(5);
+  auto result = steps::report(of, *screening, steps::add_shape(of, *refit));
+  return result ? std::move(result) : end_with(result.error());
+}
+
+}  // namespace
+
 Result<DiagnosisResult> diagnose(Farm& farm, const Problem& problem,
                                  const DiagnoseOptions& options) {
-  if (diagnosis_subject(problem) == nullptr) {
+  const std::shared_ptr<const DiagnosisSubject> subject = diagnosis_subject(problem);
+  if (subject == nullptr) {
     return Error{"scenario " + problem.scenario +
                  " cannot be diagnosed: it has no catalogue of effects; `gapfarm influence` says "
                  "what its parameters do"};
@@ -34,24 +107,18 @@ Result<DiagnosisResult> diagnose(Farm& farm, const Problem& problem,
   if (Status s = check_left_out(problem, options.left_out); !s) return s.error();
   const PreparedLog log = prepare_log(problem, options.frame_m);
   if (any_unusable(log.sanity)) return unusable_result(log);
-  DiagnosisRun run(farm, log, options);
-  const std::array<std::function<Status()>, kDiagnosisStages.size()> steps = {
-      [&] { return run.tune(); },   [&] { return run.measure_noise(); },
-      [&] { return run.screen(); }, [&] { return run.judge(); },
-      [&] { return run.refit(); },  [&] { return run.report(); }};
-  for (std::size_t k = 0; k < steps.size(); ++k) {
-    run.stage(kDiagnosisStages[k].name);
-    const Status s = steps[k]();
-    if (s) {
-      run.tell_of_stage(k);
-      continue;
-    }
-    if (s.error().code != ErrorCode::kSimulation) return s.error();
-    run.stage("");
-    return run.give_up(kDiagnosisStages[k].name, s.error());
-  }
-  run.stage("");
-  return run.take();
+  Predictor predictor(farm, log.problem);
+  Stages stages(options);
+  auto result = take_steps({farm, predictor, log.problem, *subject, options,
+                            Eigen::Vector2d(log.frame_x_m, log.frame_y_m)},
+                           &stages);
+  if (!result) return result;
+  stages.end();
+  Diagnosis& d = result->diagnosis;
+  d.timing_s = stages.took_s();
+  d.sanity.insert(d.sanity.end(), log.sanity.begin(), log.sanity.end());
+  tell(*subject->effects, &d);
+  return result;
 }
 
 }  // namespace gapfarm

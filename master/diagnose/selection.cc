@@ -157,7 +157,7 @@ double Selector::alias_cosine(const std::vector<Signature>& first,
 bool Selector::is_new(const std::vector<Signature>& first,
                       const std::vector<EffectCandidate>& chosen,
                       const EffectCandidate& candidate) const {
-  const EffectDiagnoses& effects = *study_.subject->effects;
+  const EffectDiagnoses& effects = *study_->subject->effects;
   const EffectFamily* family = effects.row(candidate.signature.effect).family;
   if (family != nullptr) {
     double gained = 0;
@@ -176,7 +176,7 @@ bool Selector::is_new(const std::vector<Signature>& first,
 void Selector::drop_weak(std::vector<EffectCandidate>* chosen) const {
   const double explained = first_gain_ + total_gain(*chosen);
   std::erase_if(*chosen, [&](const EffectCandidate& c) {
-    return c.gain <= least_gain_of(c, study_, explained);
+    return c.gain <= least_gain_of(c, *study_, explained);
   });
   promote_seconds(chosen);
 }
@@ -232,8 +232,8 @@ Result<std::vector<Alias>> Selector::aliases_of(const std::vector<Signature>& fi
   for (const EffectCandidate& other : *others) {
     const double parallel = cosine(own, r.explained(other.signature.columns));
     const bool as_good =
-        chosen[i].gain - other.gain < 4 && other.gain > study_.subject->least_gain / 2;
-    const auto& constant = study_.subject->effects->row(chosen[i].signature.effect).aliases;
+        chosen[i].gain - other.gain < 4 && other.gain > study_->subject->least_gain / 2;
+    const auto& constant = study_->subject->effects->row(chosen[i].signature.effect).aliases;
     const bool always =
         std::find(constant.begin(), constant.end(), other.signature.effect) != constant.end();
     if (parallel > kAliasCosine || as_good || always)
@@ -243,10 +243,11 @@ Result<std::vector<Alias>> Selector::aliases_of(const std::vector<Signature>& fi
   return aliases;
 }
 
-void Selector::recount(const Regression& nuisances) {
+void Selector::recount(const Study& study, const Regression& nuisances) {
+  study_ = &study;
   base_ = nuisances;
-  if (make_patch_search_) patch_search_ = make_patch_search_();
-  for (Signature& s : catalogue_) study_.drop_ignored(s.columns);
+  if (patch_search_) look_for_patches();
+  for (Signature& s : catalogue_) study_->drop_ignored(s.columns);
 }
 
 Result<std::vector<ChosenEffect>> Selector::select(const std::vector<Signature>& first,
@@ -276,7 +277,7 @@ Result<std::vector<ChosenEffect>> Selector::select(const std::vector<Signature>&
     steps_.push_back(std::move(step));
     const double explained = first_gain + total_gain(chosen);
     std::erase_if(*next, [&](const EffectCandidate& c) {
-      return c.gain < least_gain_of(c, study_, explained) || rejected.count(c.signature.effect) ||
+      return c.gain < least_gain_of(c, *study_, explained) || rejected.count(c.signature.effect) ||
              !is_new(first, chosen, c);
     });
     if (next->empty()) break;

@@ -60,12 +60,16 @@ struct ChosenEffect {
 
 class Selector {
  public:
+  // REQUIRES: both outlive it, `study` until the next recount().
   Selector(Predictor& predictor, const Study& study, std::vector<Signature> catalogue,
            const Regression& nuisances)
-      : predictor_(predictor), study_(study), catalogue_(std::move(catalogue)), base_(nuisances) {}
+      : predictor_(&predictor),
+        study_(&study),
+        catalogue_(std::move(catalogue)),
+        base_(nuisances) {}
 
-  // From now on candidates() looks for friction patches, too; recount() calls `make` again.
-  void look_for_patches(std::function<PatchSearch()> make);
+  // From now on candidates() looks for friction patches, too.
+  void look_for_patches();
 
   // These are never offered, whatever the catalogue holds.
   void leave_out(std::set<std::string> effects) { left_out_ = std::move(effects); }
@@ -84,8 +88,9 @@ class Selector {
   Result<std::vector<ChosenEffect>> select(const std::vector<Signature>& first, double first_gain,
                                            const Relinearise& relinearise);
 
-  // From now on, only trials that the study does not ignore count; `nuisances` without them.
-  void recount(const Regression& nuisances);
+  // From now on, only trials that this study of the same does not ignore count; `nuisances` without
+  // them.
+  void recount(const Study& study, const Regression& nuisances);
 
   // Only the nuisances are explained.
   const Regression& nothing_explained() const { return base_; }
@@ -120,13 +125,12 @@ class Selector {
   Result<std::vector<Alias>> aliases_of(const std::vector<Signature>& first,
                                         const std::vector<EffectCandidate>& chosen, std::size_t i);
 
-  Predictor& predictor_;
-  const Study& study_;
+  Predictor* predictor_;
+  const Study* study_;
   std::vector<Signature> catalogue_;
   Regression base_;
   std::set<std::string> left_out_;
-  std::function<PatchSearch()> make_patch_search_;
-  PatchSearch patch_search_;
+  PatchSearch patch_search_;  // empty: none
   std::vector<SelectionStep> steps_;
   double first_gain_ = 0;
   int patch_searches_ = 0;

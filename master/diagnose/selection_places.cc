@@ -25,9 +25,8 @@ double net_gain(const Regression& explained, const Signature& s) {
   return explained.gain(s.columns).squares / 2 - s.penalty;
 }
 
-void Selector::look_for_patches(std::function<PatchSearch()> make) {
-  make_patch_search_ = std::move(make);
-  patch_search_ = make_patch_search_();
+void Selector::look_for_patches() {
+  patch_search_ = study_->subject->patches(*predictor_, *study_);
 }
 
 EffectCandidate Selector::refine_seam(const Regression& explained, EffectCandidate best) const {
@@ -35,8 +34,8 @@ EffectCandidate Selector::refine_seam(const Regression& explained, EffectCandida
   const int axis = static_cast<int>(best.signature.fixed.at("camera_seam.axis"));
   const double coarse = best.signature.fixed.at("camera_seam.position");
   for (int k = -kSeamSteps; k <= kSeamSteps; ++k) {
-    Signature s = seam_signature(study_, axis, coarse + k * kSeamStep_m);
-    study_.drop_ignored(s.columns);
+    Signature s = seam_signature(*study_, axis, coarse + k * kSeamStep_m);
+    study_->drop_ignored(s.columns);
     const double gain = net_gain(explained, s);
     if (gain > best.gain) best = {gain, std::move(s)};
   }
@@ -50,11 +49,11 @@ void Selector::drop_linear_views(const Regression& explained,
   std::optional<double> linear;
   std::erase_if(*best, [&](const auto& entry) {
     const auto& [effect, candidate] = entry;
-    if (!study_.subject->effects->row(effect).bends_view) return false;
-    if (candidate.gain < study_.subject->least_gain) return false;
+    if (!study_->subject->effects->row(effect).bends_view) return false;
+    if (candidate.gain < study_->subject->least_gain) return false;
     if (!linear) {
-      Signature view = linear_view_signature(study_);
-      study_.drop_ignored(view.columns);
+      Signature view = linear_view_signature(*study_);
+      study_->drop_ignored(view.columns);
       linear = net_gain(explained, view);
     }
     return *linear >= candidate.gain;
@@ -64,11 +63,11 @@ void Selector::drop_linear_views(const Regression& explained,
 // Simulates discs, in their order; they join the catalogue.
 Result<std::vector<EffectCandidate>> Selector::simulate_patches(const Regression& explained,
                                                                 const std::vector<Patch>& patches) {
-  auto found = patch_signatures(predictor_, study_, patches);
+  auto found = patch_signatures(*predictor_, *study_, patches);
   if (!found) return found.error();
   std::vector<EffectCandidate> simulated;
   for (Signature& s : *found) {
-    study_.drop_ignored(s.columns);
+    study_->drop_ignored(s.columns);
     simulated.push_back({net_gain(explained, s), s});
     catalogue_.push_back(std::move(s));
   }

@@ -1,15 +1,15 @@
-// Parameters and single drives, as the report shows them.
+// Trials, parameters and single drives, as the report shows them.
 
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <set>
 
-#include "master/diagnose/diagnose_steps.h"
 #include "master/diagnose/intervals.h"
+#include "master/diagnose/report_parts.h"
 #include "master/experiment/plan.h"
 
-namespace gapfarm {
+namespace gapfarm::steps {
 namespace {
 
 constexpr double kHardlyMoved = 0.8;  // of the prior's spread: the data add next to nothing
@@ -109,29 +109,106 @@ std::vector<ShownDrive> drives_to_show(const std::vector<DiagnosedTrial>& trials
   return drives;
 }
 
-}  // namespace
+// Residuals, ends and their covariances, seen from axes turned by `angle_rad`.
+void turn(double angle_rad, DiagnosedTrial* trial) {
+  const auto turned = [&](const Eigen::Vector3d& v) {
+    const Pose seen = Pose{0, 0, -angle_rad} * Pose{v[0], v[1], 0};
+    return Eigen::Vector3d(seen.x, seen.y, v[2]);
+  };
+  trial->tuned_residual = turned(trial->tuned_residual);
+  trial->final_residual = turned(trial->final_residual);
+  trial->tuned_cov = rotate_covariance(trial->tuned_cov, -angle_rad);
+  trial->final_cov = rotate_covariance(trial->final_cov, -angle_rad);
+  for (Pose* end : {&trial->measured, &trial->tuned, &trial->final_}) {
+    end->theta = wrap_angle(end->theta + angle_rad);
+  }
+}
 
-void DiagnosisRun::fill_parameters() {
-  const ParameterTable& table = problem_.table();
-  const JointFit& fit = nested_.back();
-  const Study& study = nested_studies_.back();
+// The values without anything random, as differences from the problem's.
+std::vector<v1::Override> without_chance(const Inquiry& of, ParameterValues values) {
+  const ParameterTable& table = of.table();
+  for (const NoiseRow& noise : {of.subject.drive_common, of.subject.drive_side,
+                                of.subject.pose_position, of.subject.pose_heading}) {
+    values[noise.row] = table[noise.row].lower;
+  }
+  table.without_chance(&values);
+  std::vector<v1::Override> overrides;
+  for (std::size_t row = 0; row < values.size(); ++row) {
+    if (values[row] == of.problem.values[row]) continue;
+    v1::Override& to = overrides.emplace_back();
+    to.set_parameter(static_cast<std::uint32_t>(row));
+    to.set_value(values[row]);
+  }
+  return overrides;
+}
+
+// Rows of the table that are told of: noise, base, and named effects.
+std::set<std::size_t> told_rows(const Inquiry& of, const JointFit& fit,
+                                const std::vector<NamedEffect>& effects) {
   std::set<std::size_t> told;
-  for (const NoiseRow& noise : {subject_.drive_common, subject_.drive_side, subject_.pose_position,
-                                subject_.pose_heading}) {
+  for (const NoiseRow& noise : {of.subject.drive_common, of.subject.drive_side,
+                                of.subject.pose_position, of.subject.pose_heading}) {
     told.insert(noise.row);
   }
   for (std::size_t k = 0; k < fit.base_parameters; ++k) told.insert(fit.parameters[k].row);
-  for (const NamedEffect& effect : result_.diagnosis.effects) {
-    for (std::size_t row = 0; row < table.size(); ++row) {
-      if (table[row].effect == effect.name) told.insert(row);
+  for (const NamedEffect& effect : effects) {
+    for (std::size_t row = 0; row < of.table().size(); ++row) {
+      if (of.table()[row].effect == effect.name) told.insert(row);
     }
   }
-  Diagnosis& d = result_.diagnosis;
-  for (const std::size_t at : told) {
-    ParameterRow row = row_of(table[at], result_.tuned[at], result_.final_[at]);
-    const auto& [lo, hi] = result_.intervals[at];
+  return told;
+}
+
+}  // namespace
+
+std::vector<DiagnosedTrial> diagnosed_trials(const Inquiry& of, const Refit& refit) {
+  const Study& study = refit.judged.named.study();
+  const NestedFit &tuned = refit.nested.front(), &last = refit.nested.back();
+  const std::vector<Eigen::Matrix3d> tuned_cov = tuned.study.covariances();
+  const std::vector<Eigen::Matrix3d> last_cov = last.study.covariances();
+  std::vector<DiagnosedTrial> trials;
+  for (std::size_t i = 0; i < study.size(); ++i) {
+    const ResidualTrial& t = study.trials[i];
+    const Cell& cell = study.cells[t.cell];
+    DiagnosedTrial to;
+    to.session = of.problem.log.trials[i].session;
+    to.trial = of.problem.log.trials[i].trial;
+    to.command = cell.command.name;
+    to.session_time_s = t.context.session_time_s;
+    to.duration_s = cell.command.duration_s;
+    to.level = cell.level;
+    to.place_in_run = t.context.place_in_run;
+    to.held_out = true;  // every trial's scores come from the other folds
+    to.X_WS = t.X_WS;
+    to.X_WS.x += of.frame_m.x();
+    to.X_WS.y += of.frame_m.y();
+    TrialView view = of.subject.view(study, i);
+    to.measured = between(view.X_WV, t.X_WE);
+    to.tuned = between(view.X_WV, tuned.fit.ends[i]);
+    to.final_ = between(view.X_WV, last.fit.ends[i]);
+    to.tuned_cov = tuned_cov[i];
+    to.final_cov = last_cov[i];
+    to.tuned_residual = tuned.fit.residuals[i];
+    to.final_residual = last.fit.residuals[i];
+    if (view.turn_rad != 0) turn(view.turn_rad, &to);
+    to.covariates = std::move(view.covariates);
+    to.tuned_score = tuned.scores[i];
+    to.final_score = last.scores[i];
+    trials.push_back(std::move(to));
+  }
+  return trials;
+}
+
+void fill_parameters(const Inquiry& of, const Refit& refit, DiagnosisResult* result) {
+  const ParameterTable& table = of.table();
+  const JointFit& fit = refit.nested.back().fit;
+  const Study& study = refit.nested.back().study;
+  Diagnosis& d = result->diagnosis;
+  for (const std::size_t at : told_rows(of, fit, d.effects)) {
+    ParameterRow row = row_of(table[at], result->tuned[at], result->final_[at]);
+    const auto& [lo, hi] = result->intervals[at];
     if (lo < hi) row.lo = lo, row.hi = hi;
-    to_world(frame_of(row.key, nested_.back().at), &row);
+    to_world(of.frame_of(row.key, fit.at), &row);
     d.parameters.push_back(std::move(row));
   }
   // Of the base, which only this fit knows the spread of.
@@ -139,7 +216,7 @@ void DiagnosisRun::fill_parameters() {
     const FittedParameter& p = fit.parameters[k];
     const auto row = std::find_if(d.parameters.begin(), d.parameters.end(),
                                   [&](const ParameterRow& r) { return r.key == table[p.row].key; });
-    const double half = kNormal90 * p.standard_error * std::sqrt(scale_);
+    const double half = kNormal90 * p.standard_error * std::sqrt(refit.judged.scale);
     if (half > 0) {
       row->lo = std::max(row->after - half, row->lower);
       row->hi = std::min(row->after + half, row->upper);
@@ -152,54 +229,34 @@ void DiagnosisRun::fill_parameters() {
   if (cov.size() > 0) d.correlations = strong_correlations(table, fit, cov);
 }
 
-// The values without anything random, as differences from the problem's.
-std::vector<v1::Override> DiagnosisRun::without_chance(ParameterValues values) const {
-  const ParameterTable& table = problem_.table();
-  for (const NoiseRow& noise : {subject_.drive_common, subject_.drive_side, subject_.pose_position,
-                                subject_.pose_heading}) {
-    values[noise.row] = table[noise.row].lower;
-  }
-  table.without_chance(&values);
-  std::vector<v1::Override> overrides;
-  for (std::size_t row = 0; row < values.size(); ++row) {
-    if (values[row] == problem_.values[row]) continue;
-    v1::Override& to = overrides.emplace_back();
-    to.set_parameter(static_cast<std::uint32_t>(row));
-    to.set_value(values[row]);
-  }
-  return overrides;
-}
-
-// Some drives once more from where they began, by both models.  One that does not end well is left
-// out: the picture can do without.
-Status DiagnosisRun::show_drives() {
-  Diagnosis& d = result_.diagnosis;
-  if (!subject_.words.ends.empty()) return {};  // another scenario's, whose paths say nothing
-  if (!has_paths()) return {};
-  d.drives = drives_to_show(d.trials);
-  if (d.drives.empty()) return {};
+Result<std::vector<ShownDrive>> shown_drives(const Inquiry& of, const DiagnosisResult& result) {
+  std::vector<ShownDrive> drives;
+  if (!of.subject.words.ends.empty()) return drives;  // of a scenario whose paths say nothing
+  if (!of.has_paths()) return drives;
+  drives = drives_to_show(result.diagnosis.trials);
+  if (drives.empty()) return drives;
   std::vector<v1::Task> tasks;
-  for (const ParameterValues* values : {&result_.tuned, &result_.final_}) {
-    const std::vector<v1::Override> overrides = without_chance(*values);
-    for (const ShownDrive& drive : d.drives) {
+  for (const ParameterValues* values : {&result.tuned, &result.final_}) {
+    const std::vector<v1::Override> overrides = without_chance(of, *values);
+    for (const ShownDrive& drive : drives) {
       v1::PlannedTrial planned;
-      *planned.mutable_trial() = to_proto(problem_.log.trials[drive.trial]);
+      *planned.mutable_trial() = to_proto(of.problem.log.trials[drive.trial]);
       planned.mutable_trial()->clear_path();
       planned.set_moved(true);
-      tasks.push_back(simulate_tasks({{planned}}, overrides, options_.seed, kShownInterval_s)[0]);
+      tasks.push_back(simulate_tasks({{planned}}, overrides, of.options.seed, kShownInterval_s)[0]);
     }
   }
-  const auto results = farm_.run(farm_.add_problem(to_proto(problem_)), tasks);
+  const auto results = of.farm.run(of.farm.add_problem(to_proto(of.problem)), tasks);
   if (!results) return results.error();
   for (std::size_t k = 0; k < results->size(); ++k) {
-    ShownDrive& drive = d.drives[k % d.drives.size()];
-    const Trial& logged = problem_.log.trials[drive.trial];
+    ShownDrive& drive = drives[k % drives.size()];
+    const Trial& logged = of.problem.log.trials[drive.trial];
     drive.measured = shown_path(logged.path, logged.X_WS);
     if ((*results)[k].outcome() != v1::OK) continue;
     const Trial simulated = from_proto((*results)[k].simulate().trials(0));
-    (k < d.drives.size() ? drive.tuned : drive.final_) = shown_path(simulated.path, simulated.X_WS);
+    (k < drives.size() ? drive.tuned : drive.final_) = shown_path(simulated.path, simulated.X_WS);
   }
-  return {};
+  return drives;
 }
 
-}  // namespace gapfarm
+}  // namespace gapfarm::steps

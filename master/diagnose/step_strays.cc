@@ -1,0 +1,86 @@
+// Looking for what makes single trials stray.
+
+#include <algorithm>
+#include <cmath>
+
+#include "master/diagnose/noise.h"
+#include "master/diagnose/slip_places.h"
+#include "master/diagnose/step_parts.h"
+
+namespace gapfarm::steps {
+namespace {
+
+constexpr double kLeastSlipGain = 11;
+constexpr double kLeastSlipShare = 0.03;  // of what the effects on the means explain
+
+// False where something else that was chosen makes single trials stray.
+std::vector<bool> tells_of_slips(const Inquiry& of, const Explanation& so_far) {
+  const Study& study = so_far.study();
+  std::vector<bool> tells(study.size(), true);
+  for (std::size_t i = 0; i < study.size(); ++i) {
+    const ResidualTrial& trial = study.trials[i];
+    if (!so_far.first.empty() && trial.context.moved) tells[i] = false;
+    for (const FoundSpread& found : so_far.spreads) {
+      if (found.row->strays(trial)) tells[i] = false;
+    }
+    for (const ChosenEffect& effect : so_far.chosen) {
+      const Signature& chosen = effect.candidate.signature;
+      const auto strays = of.subject.effects->row(chosen.effect).strays;
+      if (strays != nullptr && strays(chosen, trial)) tells[i] = false;
+    }
+  }
+  return tells;
+}
+
+}  // namespace
+
+Explanation look_for_spreads(const Inquiry& of, Explanation so_far, const Regression& explained) {
+  constexpr double kStruck_nats = 0.5;
+  const double share = of.outlier_share();
+  Study study = so_far.study();
+  const std::vector<Eigen::Vector3d> left = study.unwhiten(studentised(explained, 0.2));
+  const std::vector<double> without_it = scores_of(study, left, share);
+  for (const EffectDiagnosis* effect : *of.subject.effects) {
+    const SpreadRow* row = effect->spread;
+    if (row == nullptr || of.left_out(row->effect)) continue;
+    SpreadFit fit = row->fit(study, left, share);
+    if (fit.gain < row->least_gain) continue;
+    const std::vector<double> with = row->scores(study, left, fit, share);
+    study.ignored.resize(study.size(), false);
+    for (std::size_t i = 0; i < study.size(); ++i) {
+      if (with[i] > without_it[i] + kStruck_nats) study.ignored[i] = true;
+    }
+    so_far.spreads.push_back({row, std::move(fit), {}});
+  }
+  return so_far.spreads.empty() ? so_far : without(so_far, study.ignored);
+}
+
+Explanation look_for_slips(const Inquiry& of, Explanation so_far, const Selector& catalogue,
+                           const Regression& explained) {
+  if ((of.subject.looks & kLooksForSlips) == 0) return so_far;
+  const Study& study = so_far.study();
+  const std::vector<Eigen::Vector3d> left = study.unwhiten(studentised(explained, 0.2));
+  const std::vector<bool> tells = tells_of_slips(of, so_far);
+  const SlipFit slip = fit_slip(study.trials, left, tells, study.noise);
+  if (slip.gain < std::max(kLeastSlipGain, kLeastSlipShare * explained_nats(catalogue, explained)))
+    return so_far;
+  if (of.left_out("slip_events")) {
+    so_far.odd_drives = "Single drives stray: nothing that could explain them was looked for.";
+    return so_far;
+  }
+  std::vector<double> slipped;
+  for (const SlipTrial& t :
+       trials_with_slips(study.trials, left, slip, slip.probability * slip.loss / 2, 0)) {
+    slipped.push_back(t.slipped);
+  }
+  const Gathering gathering = gathering_of_slips(study, slipped, tells);
+  if (gathering.gain < kLeastGathering) {
+    so_far.slip = slip;
+  } else {
+    so_far.odd_drives = "Single drives stray, most of them " + gathering.where +
+                        ": something lies there that nothing explains which was looked for.";
+  }
+  return so_far;
+}
+
+}  // namespace gapfarm::steps
