@@ -33,12 +33,17 @@ genes_of() {
 }
 
 config_of() {  # SET
-  local robot drive
+  local robot drive whole=
   robot=$(realpath "$sets/$1/robot.toml")
+  # Whole runs too where there are enough of them to be no luck.
+  if [[ $(tail -n +2 "$sets/$1/fit/poses.csv" | cut -d, -f1 | uniq | wc -l) -ge 12 ]]; then
+    whole=', 0'
+  fi
   drive=$(sed -n 's/^drive = "\(.*\)".*/\1/p' "$robot")
   printf 'scenario = "ground"\n[robot]\nfile = "%s"\n[runs]\nfolders = ["%s"]\n' \
          "$robot" "$(realpath "$sets/$1/fit")"
-  printf 'horizons = [0.5, 2, 5]\n[parameters]\nstep_rate = %s\n[genes]\n' "${STEP_RATE:-120}"
+  printf 'horizons = [0.5, 2, 5%s]\n[parameters]\nstep_rate = %s\n[genes]\n' "$whole" \
+         "${STEP_RATE:-120}"
   for gene in $(genes_of "$drive") delay lag marker.x marker.y marker.yaw drive_noise_travel \
               drive_noise_turn pose_noise_position pose_noise_heading; do
     echo "$gene = \"table\""

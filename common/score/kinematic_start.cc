@@ -30,4 +30,20 @@ ParameterValues kinematic_start(const Problem& problem, const Kinematics& fitted
   return values;
 }
 
+std::vector<bool> told_by_kinematics(const Problem& problem) {
+  Kinematics moved = nominal_kinematics(problem.ground->robot());
+  for (double& value : moved.values) value += 1e-3 * (1 + std::abs(value));
+  const GroundTable there(robot_with(problem.ground->robot(), moved));
+  const GroundTable here(problem.ground->robot());
+  std::vector<bool> told;
+  for (const Gene& gene : problem.genes) {
+    const std::string& key = problem.table()[gene.row].key;
+    const auto now = there.table().find(key), before = here.table().find(key);
+    const bool noise = key.find("_noise_") != std::string::npos;
+    told.push_back(now && before && !noise &&
+                   there.table()[*now].nominal != here.table()[*before].nominal);
+  }
+  return told;
+}
+
 }  // namespace gapfarm

@@ -1,6 +1,8 @@
 // Where a search of a ground robot's values begins.
 #pragma once
 
+#include <vector>
+
 #include "common/problem/problem.h"
 #include "common/score/kinematic.h"
 
@@ -12,5 +14,8 @@ namespace gapfarm {
 ParameterValues kinematic_start(const Problem& problem);
 // The same of kinematics that were fitted before.
 ParameterValues kinematic_start(const Problem& problem, const Kinematics& fitted);
+
+// Whether the kinematics have a word for each of the problem's genes.  REQUIRES: a ground robot.
+std::vector<bool> told_by_kinematics(const Problem& problem);
 
 }  // namespace gapfarm

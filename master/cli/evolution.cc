@@ -3,6 +3,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <chrono>
+#include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
 
@@ -54,9 +55,14 @@ Result<std::optional<SimulatedStart>> start_of(const std::optional<Checkpoint>& 
   auto start = fit_by_simulation(farm, run.problem, run.config.evolution.optimiser.sigma);
   if (!start) return start.error();
   console.note(fmt::format(
-      "begins at least squares through the simulation: {} simulations, {:.2f} nats a window more "
-      "than with the values of the robot's own kinematics",
-      start->simulations, start->gain));
+      "begins at least squares through the simulation: {} simulations from {} start{}, {:.2f} nats "
+      "a window more than with the values of the robot's own kinematics",
+      start->simulations, start->starts, start->starts == 1 ? "" : "s", start->gain));
+  console.note(fmt::format(
+      "on stretches left out of the fit the simulation foretells {:.2f} nats a window {} than the "
+      "kinematics{}",
+      std::abs(start->left_out_gain), start->left_out_gain < 0 ? "less" : "more",
+      start->kinematic ? ", so that the kinematics' values are kept" : ""));
   return std::optional(*std::move(start));
 }
 

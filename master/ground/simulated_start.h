@@ -2,7 +2,6 @@
 #pragma once
 
 #include <span>
-#include <string>
 #include <vector>
 
 #include "common/base/result.h"
@@ -13,22 +12,31 @@ namespace gapfarm {
 
 struct SimulatedStart {
   Genome genome;  // of all genes; those that move no end stand as they did
-  // How unsure the windows leave the genes: a covariance in gene units, row by row.
+  // How wide a search begins, a covariance in gene units, row by row: of what moves ends a tenth of
+  // what the windows leave unsure.
   std::vector<double> spread;
   std::size_t simulations = 0;
-  double gain = 0;  // nats a window, over the kinematics' values in the simulation
+  std::size_t starts = 1;  // from which least squares went on
+  double gain = 0;         // nats a window, over the kinematics' values in the simulation
+  // On stretches that were left out of the fits, nats a window over the robot's own kinematics.
+  double left_out_gain = 0;
+  // The kinematics predicted those better, and the values are theirs.
+  bool kinematic = false;
 };
 
-// Of each window its length among lengths that count alike, 0 on.  Lengths are octaves; a few
-// windows of a length between two horizons (poses are not even) count with the nearest one, or they
-// would weigh as much as hundreds.
-std::vector<std::size_t> window_lengths(std::span<const double> durations_s);
+// `count` genomes that differ from `middle` in the genes of `free`, spread evenly (a Kronecker
+// sequence) within about a third of each gene's range; always the same.
+std::vector<Genome> spread_starts(const Genome& middle, std::span<const std::size_t> free,
+                                  std::size_t count);
 
-// Gauss and Newton's steps from the values of the robot's own kinematics (kinematic_start()) to the
-// most likely ends of the problem's windows.  Residuals have Student's density; its scales are
-// those of what the kinematics themselves leave, for windows of each length, and each length counts
-// alike.  The spread is at most `widest` (a standard deviation in gene units) where the windows do
-// not tell.  Where a simulation does not end well nothing moves.  Errors: those of the farm.
+// Gauss and Newton's steps to the most likely ends of the problem's windows (RobustErrors, scaled
+// by what the kinematics leave), from the values of the robot's own kinematics (kinematic_start())
+// and from some others in what kinematics have no word for, such as friction and creep, where a
+// way from the first ends on a hill beside the highest.  The few best after a look go on, the best
+// two of these to the end, and what predicts stretches that were left out best is taken: one of
+// them, or the kinematics' own values, with the search held near these.  The spread is at most
+// `widest` (a standard deviation in gene units) where the windows do not tell.  Where a simulation
+// does not end well nothing moves.  Errors: those of the farm.
 // REQUIRES: a problem with a ground robot and windows.
 Result<SimulatedStart> fit_by_simulation(Farm& farm, const Problem& problem, double widest);
 

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include <set>
+#include <algorithm>
 
 #include "common/parameters/genome.h"
 #include "common/score/kinematic_start.h"
@@ -43,6 +43,8 @@ TEST(SimulatedStart, FindsWhatKinematicsHaveNoWordFor) {
   const auto start = fit_by_simulation(farm, problem, 0.1);
   ASSERT_TRUE(start.ok()) << start.error().message;
   EXPECT_GT(start->gain, 1);
+  EXPECT_GT(start->left_out_gain, 1);
+  EXPECT_FALSE(start->kinematic);
   EXPECT_NEAR(found_value(problem, *start, "wheels.left.radius"), 0.096, 2e-4);
   EXPECT_NEAR(found_value(problem, *start, "friction_ratio"), 1.25, 0.02);
   EXPECT_NEAR(found_value(problem, *start, "lag"), 0.18, 0.004);
@@ -56,21 +58,35 @@ TEST(SimulatedStart, FindsWhatKinematicsHaveNoWordFor) {
               problem.values[problem.table().row(kGroundTurnNoise)], 1e-9);
 }
 
-// A Warthog's poses came every 0.15 to 0.2 s: two windows of 5 s were 4.6 s long and weighed as
-// much as all of 0.5 s together.
-TEST(SimulatedStart, AFewWindowsOfAnOddLengthWeighNoMoreThanOthers) {
-  std::vector<double> durations_s(400, 0.5);
-  durations_s.insert(durations_s.end(), 140, 0.61);
-  durations_s.insert(durations_s.end(), 100, 2.0);
-  durations_s.insert(durations_s.end(), 40, 5.0);
-  durations_s.insert(durations_s.end(), {4.6, 0.8, 2.9});
-  const std::vector<std::size_t> lengths = window_lengths(durations_s);
-  ASSERT_EQ(lengths.size(), 683u);
-  const std::set<std::size_t> different(lengths.begin(), lengths.end());
-  EXPECT_EQ(different.size(), 3u);
-  EXPECT_EQ(lengths[680], lengths[679]);
-  EXPECT_EQ(lengths[681], lengths[0]);
-  EXPECT_EQ(lengths[400], lengths[0]);
+TEST(SimulatedStart, KinematicsHaveNoWordForFriction) {
+  Problem problem = tests::ground_problem();
+  for (const char* key : {"wheels.left.radius", "friction_ratio", "delay", "creep", "marker.yaw",
+                          kGroundPositionNoise}) {
+    search_for(&problem, key);
+  }
+  EXPECT_EQ(told_by_kinematics(problem),
+            (std::vector<bool>{true, false, true, false, true, false}));
+}
+
+TEST(SimulatedStart, OtherStartsAreSpreadOverWhatIsFree) {
+  const Genome middle = {0.5, 0.0, 0.9, 0.4};
+  const std::vector<std::size_t> free = {1, 2, 3};
+  const std::vector<Genome> starts = spread_starts(middle, free, 9);
+  ASSERT_EQ(starts.size(), 9u);
+  EXPECT_EQ(starts, spread_starts(middle, free, 9));
+  std::vector<double> least = {1, 1, 1, 1}, most = {0, 0, 0, 0};
+  for (const Genome& start : starts) {
+    EXPECT_EQ(start[0], middle[0]);
+    for (std::size_t g = 0; g < 4; ++g) {
+      EXPECT_GE(start[g], 0);
+      EXPECT_LE(start[g], 1);
+      least[g] = std::min(least[g], start[g]);
+      most[g] = std::max(most[g], start[g]);
+    }
+  }
+  EXPECT_GT(most[1] - least[1], 0.2);
+  EXPECT_GT(most[2] - least[2], 0.2);
+  EXPECT_GT(most[3] - least[3], 0.45);
 }
 
 TEST(SimulatedStart, StandsWhereNothingMovesAnEnd) {

@@ -1,0 +1,219 @@
+#include "master/ground/robust_errors.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "common/score/algebra.h"
+#include "master/ground/window_prior.h"
+
+namespace gapfarm {
+namespace {
+
+constexpr double kLeastScale = 1e-5;
+constexpr double kDimensions[] = {2, 1};  // of position and heading
+constexpr double kStrayShare = 0.25;      // of what windows of the commonest length cover
+constexpr double kEnoughWindows = 10;     // for a length to count in full
+constexpr double kLeastPrecision = 1e-9;  // of a value that no window tells
+
+double part_of(const Eigen::Vector3d& end, int part) {
+  return part == 0 ? end.head<2>().norm() : std::abs(end[2]);
+}
+
+// Student's density in one or two dimensions.
+double part_weight(double size, double scale, int part) {
+  const double z = size / scale;
+  return (kWindowTail + kDimensions[part]) / (kWindowTail + z * z) / (scale * scale);
+}
+double part_nats(double size, double scale, int part) {
+  const double z = size / scale;
+  return -kDimensions[part] * std::log(scale) -
+         (kWindowTail + kDimensions[part]) / 2 * std::log1p(z * z / kWindowTail);
+}
+
+// The likeliest scale of such a density, by its iteration.
+double scale_of_part(std::vector<double> sizes, int part) {
+  const auto middle = sizes.begin() + static_cast<long>(sizes.size() / 2);
+  std::nth_element(sizes.begin(), middle, sizes.end());
+  double scale = std::max(1.3 * *middle / std::sqrt(kDimensions[part]), kLeastScale);
+  const double count = static_cast<double>(sizes.size()) * kDimensions[part];
+  for (int round = 0; round < 20; ++round) {
+    double sum = 0;
+    for (const double size : sizes) {
+      sum += part_weight(size, scale, part) * scale * scale * size * size;
+    }
+    scale = std::max(std::sqrt(sum / count), kLeastScale);
+  }
+  return scale;
+}
+
+}  // namespace
+
+std::vector<std::size_t> window_lengths(std::span<const double> durations_s) {
+  const auto octave = [](double s) { return std::lround(std::log2(std::max(s, 1e-3))); };
+  std::map<long, double> covered_s;
+  for (const double s : durations_s) covered_s[octave(s)] += s;
+  double most_s = 0;
+  for (const auto& [key, s] : covered_s) most_s = std::max(most_s, s);
+  std::map<long, std::size_t> kept;
+  for (const auto& [key, s] : covered_s) {
+    if (s >= kStrayShare * most_s) kept.try_emplace(key, kept.size());
+  }
+  std::vector<std::size_t> lengths;
+  for (const double s : durations_s) {
+    const long own = octave(s);
+    const auto nearest =
+        std::min_element(kept.begin(), kept.end(), [own](const auto& a, const auto& b) {
+          return std::abs(a.first - own) < std::abs(b.first - own);
+        });
+    lengths.push_back(nearest->second);
+  }
+  return lengths;
+}
+
+std::vector<std::size_t> left_out_stretches(std::span<const Trial> windows, std::size_t count) {
+  std::map<std::size_t, std::array<double, 2>> span_s;  // of each run
+  for (const Trial& w : windows) {
+    const double end = *w.t_s + *w.duration_s;
+    const auto [run, fresh] = span_s.try_emplace(*w.run, std::array{*w.t_s, end});
+    run->second = {std::min(run->second[0], *w.t_s), std::max(run->second[1], end)};
+  }
+  const bool whole_runs = span_s.size() >= count;
+  std::map<std::size_t, double> before;  // runs or seconds
+  double all = 0;
+  for (const auto& [run, span] : span_s) {
+    before[run] = all;
+    all += whole_runs ? 1 : span[1] - span[0];
+  }
+  std::vector<std::size_t> stretches;
+  for (const Trial& w : windows) {
+    double place = before[*w.run];
+    if (!whole_runs) place += *w.t_s + *w.duration_s / 2 - span_s[*w.run][0];
+    const auto stretch = static_cast<std::size_t>(static_cast<double>(count) * place / all);
+    stretches.push_back(std::min(stretch, count - 1));
+  }
+  return stretches;
+}
+
+RobustErrors::RobustErrors(std::span<const double> durations_s, const WindowEnds& reference)
+    : length_(window_lengths(durations_s)) {
+  std::vector<std::array<std::vector<double>, 2>> sizes;
+  for (std::size_t i = 0; i < length_.size(); ++i) {
+    if (length_[i] >= sizes.size()) sizes.resize(length_[i] + 1);
+    for (int part = 0; part < 2; ++part) {
+      sizes[length_[i]][static_cast<std::size_t>(part)].push_back(part_of(reference[i], part));
+    }
+  }
+  double shares = 0;
+  for (const auto& [position, heading] : sizes) {
+    scales_.push_back({scale_of_part(position, 0), scale_of_part(heading, 1)});
+    const double share = std::min(1.0, static_cast<double>(position.size()) / kEnoughWindows);
+    use_.push_back(share / static_cast<double>(position.size()));
+    shares += share;
+  }
+  for (double& use : use_) use *= static_cast<double>(length_.size()) / shares;
+}
+
+double RobustErrors::nats_of(std::size_t window, const Eigen::Vector3d& end) const {
+  const std::size_t length = length_[window];
+  return use_[length] * (part_nats(part_of(end, 0), scales_[length][0], 0) +
+                         part_nats(part_of(end, 1), scales_[length][1], 1));
+}
+
+double RobustErrors::nats(const WindowEnds& ends) const {
+  double sum = 0;
+  for (std::size_t i = 0; i < ends.size(); ++i) sum += nats_of(i, ends[i]);
+  return sum;
+}
+
+Eigen::Vector3d RobustErrors::weights(std::size_t window, const Eigen::Vector3d& end) const {
+  const std::size_t length = length_[window];
+  const double position = part_weight(part_of(end, 0), scales_[length][0], 0);
+  const double heading = part_weight(part_of(end, 1), scales_[length][1], 1);
+  return use_[length] * Eigen::Vector3d(position, position, heading);
+}
+
+namespace {
+
+void add_window(const RobustErrors& errors, std::size_t window, const Eigen::Vector3d& end,
+                const Eigen::MatrixXd& slope, NormalEquations* to) {
+  const Eigen::Vector3d weights = errors.weights(window, end);
+  to->H += slope.transpose() * weights.asDiagonal() * slope;
+  to->g += slope.transpose() * weights.cwiseProduct(end);
+}
+
+NormalEquations no_equations(Eigen::Index values) {
+  return {Eigen::MatrixXd::Zero(values, values), Eigen::VectorXd::Zero(values)};
+}
+
+}  // namespace
+
+NormalEquations normal_equations(const RobustErrors& errors, const WindowEnds& ends,
+                                 const WindowSlopes& slopes) {
+  NormalEquations sum = no_equations(slopes.front().cols());
+  for (std::size_t i = 0; i < ends.size(); ++i) add_window(errors, i, ends[i], slopes[i], &sum);
+  return sum;
+}
+
+Eigen::VectorXd step_within_bounds(const NormalEquations& equations, const Eigen::VectorXd& at) {
+  const Eigen::Index n = at.size();
+  std::vector<Eigen::Index> moving;
+  for (Eigen::Index k = 0; k < n; ++k) moving.push_back(k);
+  Eigen::VectorXd to = at;
+  // Each round puts one value more on a bound, or is the last.
+  while (!moving.empty()) {
+    const auto m = static_cast<Eigen::Index>(moving.size());
+    Eigen::MatrixXd H(m, m);
+    Eigen::VectorXd g(m);
+    for (Eigen::Index a = 0; a < m; ++a) {
+      g[a] = equations.g[moving[static_cast<std::size_t>(a)]];
+      for (Eigen::Index b = 0; b < m; ++b) {
+        H(a, b) =
+            equations.H(moving[static_cast<std::size_t>(a)], moving[static_cast<std::size_t>(b)]);
+      }
+      for (Eigen::Index k = 0; k < n; ++k) {  // those on their bounds have gone there
+        if (std::find(moving.begin(), moving.end(), k) == moving.end()) {
+          g[a] += equations.H(moving[static_cast<std::size_t>(a)], k) * (to[k] - at[k]);
+        }
+      }
+      H(a, a) += kLeastPrecision;
+    }
+    const Eigen::VectorXd move = solve_symmetric(H, g);
+    std::vector<Eigen::Index> inside;
+    for (Eigen::Index a = 0; a < m; ++a) {
+      const Eigen::Index k = moving[static_cast<std::size_t>(a)];
+      to[k] = std::clamp(at[k] - move[a], 0.0, 1.0);
+      if (to[k] == at[k] - move[a]) inside.push_back(k);
+    }
+    if (inside.size() == moving.size()) break;
+    moving = std::move(inside);
+  }
+  return to;
+}
+
+double left_out_nats(const RobustErrors& errors, const WindowEnds& ends, const WindowSlopes& slopes,
+                     const NormalEquations& prior, std::span<const std::size_t> stretches) {
+  const std::size_t count = 1 + *std::max_element(stretches.begin(), stretches.end());
+  NormalEquations all = prior;
+  std::vector<NormalEquations> own(count, no_equations(prior.g.size()));
+  for (std::size_t i = 0; i < ends.size(); ++i) {
+    add_window(errors, i, ends[i], slopes[i], &own[stretches[i]]);
+  }
+  for (const NormalEquations& one : own) {
+    all.H += one.H;
+    all.g += one.g;
+  }
+  std::vector<Eigen::VectorXd> moves;
+  for (const NormalEquations& one : own) {
+    Eigen::MatrixXd H = all.H - one.H;
+    H.diagonal().array() += kLeastPrecision;
+    moves.push_back(solve_symmetric(H, all.g - one.g));
+  }
+  double sum = 0;
+  for (std::size_t i = 0; i < ends.size(); ++i) {
+    sum += errors.nats_of(i, ends[i] - slopes[i] * moves[stretches[i]]);
+  }
+  return sum;
+}
+
+}  // namespace gapfarm

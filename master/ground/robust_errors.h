@@ -1,0 +1,64 @@
+// How well the ends of windows are met, robustly, and what a step of least squares makes of that.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <span>
+#include <vector>
+
+#include "common/trials/trial.h"
+
+namespace gapfarm {
+
+using WindowEnds = std::vector<Eigen::Vector3d>;    // measured less predicted: m, m, rad
+using WindowSlopes = std::vector<Eigen::MatrixXd>;  // of each end: 3 rows, a column a value
+
+// Of each window its length among lengths that count alike, 0 on.  Lengths are octaves; a few
+// windows of a length between two horizons (poses are not even) count with the nearest one, or they
+// would weigh as much as hundreds.
+std::vector<std::size_t> window_lengths(std::span<const double> durations_s);
+
+// Of each window one of `count` stretches of the log that are left out in turn: runs in a row where
+// there are enough of them, else the log's time in equal parts.  Neighbours are alike (repeats of a
+// command, a floor), so they are left out together.  REQUIRES: trials that are windows.
+std::vector<std::size_t> left_out_stretches(std::span<const Trial> windows, std::size_t count);
+
+// Student's density of position and heading, with a scale of its own for windows of each length, so
+// that no length and neither position nor heading is given up for another.  Each length counts
+// alike, one with a handful of windows as much less as these are fewer.  Weights add up to the
+// number of windows.
+class RobustErrors {
+ public:
+  // Scales are those of the density of `reference`.  REQUIRES: a reference end a window.
+  RobustErrors(std::span<const double> durations_s, const WindowEnds& reference);
+
+  std::size_t windows() const { return length_.size(); }
+  double nats(const WindowEnds& ends) const;
+  double nats_of(std::size_t window, const Eigen::Vector3d& end) const;
+  // Of the squares of an end's three residuals, in least squares that approach nats().
+  Eigen::Vector3d weights(std::size_t window, const Eigen::Vector3d& end) const;
+
+ private:
+  std::vector<std::size_t> length_;            // of each window: which
+  std::vector<double> use_;                    // of a window of each length
+  std::vector<std::array<double, 2>> scales_;  // of each length: m, rad
+};
+
+// H move = g: Gauss and Newton's step away from where the ends are `ends`.
+struct NormalEquations {
+  Eigen::MatrixXd H;
+  Eigen::VectorXd g;
+};
+NormalEquations normal_equations(const RobustErrors& errors, const WindowEnds& ends,
+                                 const WindowSlopes& slopes);
+
+// Where H move = g leads from `at` within [0, 1]: a value that would leave stays on its bound, and
+// the others move as is best then.
+Eigen::VectorXd step_within_bounds(const NormalEquations& equations, const Eigen::VectorXd& at);
+
+// Nats of ends that were not fitted to: each stretch is predicted by values that one step of least
+// squares makes of the other stretches.  `prior` adds to the equations of every step.
+double left_out_nats(const RobustErrors& errors, const WindowEnds& ends, const WindowSlopes& slopes,
+                     const NormalEquations& prior, std::span<const std::size_t> stretches);
+
+}  // namespace gapfarm

@@ -1,0 +1,118 @@
+#include "master/ground/robust_errors.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <set>
+
+#include "common/random/stream.h"
+
+namespace gapfarm {
+namespace {
+
+// A Warthog's poses came every 0.15 to 0.2 s: two windows of 5 s were 4.6 s long and weighed as
+// much as all of 0.5 s together.
+TEST(RobustErrors, AFewWindowsOfAnOddLengthWeighNoMoreThanOthers) {
+  std::vector<double> durations_s(400, 0.5);
+  durations_s.insert(durations_s.end(), 140, 0.61);
+  durations_s.insert(durations_s.end(), 100, 2.0);
+  durations_s.insert(durations_s.end(), 40, 5.0);
+  durations_s.insert(durations_s.end(), {4.6, 0.8, 2.9});
+  const std::vector<std::size_t> lengths = window_lengths(durations_s);
+  ASSERT_EQ(lengths.size(), 683u);
+  const std::set<std::size_t> different(lengths.begin(), lengths.end());
+  EXPECT_EQ(different.size(), 3u);
+  EXPECT_EQ(lengths[680], lengths[679]);
+  EXPECT_EQ(lengths[681], lengths[0]);
+  EXPECT_EQ(lengths[400], lengths[0]);
+}
+
+WindowEnds some_ends(std::size_t count, double size, std::uint64_t seed = 1) {
+  Stream stream({3, Purpose::kTest, seed, 0, 0});
+  WindowEnds ends;
+  for (std::size_t i = 0; i < count; ++i) {
+    ends.emplace_back(size * stream.normal(), size * stream.normal(), size * stream.normal());
+  }
+  return ends;
+}
+
+TEST(RobustErrors, LengthsCountAlikeUnlessThereIsAHandful) {
+  std::vector<double> durations_s(100, 0.5);
+  durations_s.insert(durations_s.end(), 20, 2.0);
+  durations_s.push_back(60);
+  const RobustErrors errors(durations_s, some_ends(121, 0.01));
+  const Eigen::Vector3d none = Eigen::Vector3d::Zero();
+  // Beside the scales, which are about the same: at an end that is met.
+  const double many = 100 * errors.weights(0, none)[2];
+  const double some = 20 * errors.weights(100, none)[2];
+  const double one = errors.weights(120, none)[2];
+  EXPECT_NEAR(std::log(some / many), 0, 1);
+  EXPECT_LT(one * 0.01 * 0.01, 0.5 * many * 0.01 * 0.01 / 2);
+  EXPECT_GT(errors.nats(WindowEnds(121, none)), errors.nats(some_ends(121, 0.01)));
+}
+
+// H = [[2, 1], [1, 2]]; freely the first value would go to 0.1 - 0.7.
+TEST(StepWithinBounds, WhatStaysOnABoundIsMadeUpForByTheOthers) {
+  NormalEquations equations{Eigen::MatrixXd(2, 2), Eigen::VectorXd(2)};
+  equations.H << 2, 1, 1, 2;
+  equations.g = equations.H * Eigen::Vector2d(0.7, -0.1);
+  Eigen::VectorXd at(2);
+  at << 0.9, 0.5;
+  const Eigen::VectorXd inside = step_within_bounds(equations, at);
+  EXPECT_NEAR(inside[0], 0.2, 1e-6);
+  EXPECT_NEAR(inside[1], 0.6, 1e-6);
+  at << 0.1, 0.5;
+  const Eigen::VectorXd bounded = step_within_bounds(equations, at);
+  EXPECT_EQ(bounded[0], 0);
+  // g2 - H12 * 0.1 = 0.5 - 0.1 over 2: it goes the other way.
+  EXPECT_NEAR(bounded[1], 0.5 - (0.5 - 0.1) / 2, 1e-6);
+}
+
+TEST(LeftOut, ValuesThatTellOnlyTheirOwnStretchAreSeenThrough) {
+  const std::size_t n = 240, count = 6;
+  const std::vector<double> durations_s(n, 1.0);
+  const WindowEnds measured = some_ends(n, 0.01);
+  const RobustErrors errors(durations_s, measured);
+  std::vector<std::size_t> stretches;
+  for (std::size_t i = 0; i < n; ++i) stretches.push_back(i * count / n);
+  // A value a stretch, which has taken up that stretch's own mean.
+  WindowSlopes own(n, Eigen::MatrixXd::Zero(3, count)), shared(n, Eigen::MatrixXd::Zero(3, 1));
+  WindowEnds fitted = measured;
+  for (std::size_t s = 0; s < count; ++s) {
+    double mean = 0;
+    for (std::size_t i = 0; i < n; ++i) mean += stretches[i] == s ? measured[i][0] / 40 : 0;
+    for (std::size_t i = 0; i < n; ++i) {
+      if (stretches[i] != s) continue;
+      fitted[i][0] += 0.02 - mean;  // they are all off, and their values take it up
+      own[i](0, static_cast<Eigen::Index>(s)) = -1;
+      shared[i](0, 0) = -1;
+    }
+  }
+  const NormalEquations one{Eigen::MatrixXd::Zero(1, 1), Eigen::VectorXd::Zero(1)};
+  const NormalEquations six{Eigen::MatrixXd::Zero(count, count), Eigen::VectorXd::Zero(count)};
+  const double alone = left_out_nats(errors, fitted, own, six, stretches);
+  const double together = left_out_nats(errors, fitted, shared, one, stretches);
+  EXPECT_NEAR(alone, errors.nats(fitted), 1e-3);  // what was left out tells nothing of itself
+  EXPECT_GT(together, alone + 50);
+}
+
+Trial window(std::uint32_t run, double t_s) {
+  Trial trial;
+  trial.run = run;
+  trial.t_s = t_s;
+  trial.duration_s = 1;
+  return trial;
+}
+
+TEST(LeftOut, StretchesAreRunsInARowOrEqualTimes) {
+  std::vector<Trial> repeats, one;
+  for (std::uint32_t k = 0; k < 12; ++k) repeats.push_back(window(k, 5));
+  const std::vector<std::size_t> pairs = left_out_stretches(repeats, 6);
+  for (std::size_t k = 0; k < 12; ++k) EXPECT_EQ(pairs[k], k / 2);
+  for (int k = 0; k < 30; ++k) one.push_back(window(0, 100 + k));
+  const std::vector<std::size_t> times = left_out_stretches(one, 3);
+  for (std::size_t k = 0; k < 30; ++k) EXPECT_EQ(times[k], k / 10);
+}
+
+}  // namespace
+}  // namespace gapfarm
