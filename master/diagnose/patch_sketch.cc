@@ -11,9 +11,11 @@
 namespace gapfarm {
 namespace {
 
-constexpr int kMoments = 16;  // of a way
-// A fitted share of the mark scales it, so one smaller and one larger friction stand for all.
-constexpr std::array<double, 2> kRatios = {0.4, 2.5};
+constexpr int kSteps = 16;  // of a way
+// A fitted share of the mark scales it, so few stand for all; but where a robot can no longer turn
+// its way out of a patch, that is so from some ratio on.
+constexpr std::array<double, 8> kRatios = {0.1, 0.14, 0.2, 0.3, 0.45, 0.67, 1.6, 2.5};
+constexpr std::array<std::size_t, 3> kGridRatios = {2, 4, 7};  // of these
 constexpr std::array<double, 6> kPatchRadii_m = {0.14, 0.20, 0.28, 0.38, 0.50, 0.65};
 constexpr double kPatchStep_m = 0.1;
 constexpr double kApart_m = 0.08;  // discs nearer than this, in all of x, y and radius, are one
@@ -57,14 +59,17 @@ Footprint footprint_of(const Problem& problem, const Study& study) {
           value_of(problem, study, "friction_ratio"), value_of(problem, study, "tread_creep")};
 }
 
-// Shift of the end, in its axes, for a twist in the body axes of a moment from which X leads there.
-Eigen::Matrix3d moved_to_end(const Pose& X) {
-  const double c = std::cos(X.theta), s = std::sin(X.theta);
-  Eigen::Matrix3d m;
-  // A turn about the moment's origin moves the end by (-y, x) of the way there.
-  m << c, s, -c * X.y + s * X.x, -s, c, s * X.y + c * X.x, 0, 0, 1;
-  return m;
+// Which contacts lie in the patch, a bit each.
+unsigned inside(const std::array<Eigen::Vector2d, 4>& contacts, const Patch& patch) {
+  const Eigen::Vector2d centre(patch[0], patch[1]);
+  unsigned set = 0;
+  for (unsigned c = 0; c < 4; ++c) {
+    set |= (contacts[c] - centre).squaredNorm() < patch[2] * patch[2] ? 1U << c : 0U;
+  }
+  return set;
 }
+
+constexpr unsigned kAllInside = 15;
 
 bool near(const Patch& a, const Patch& b) {
   return std::abs(a[0] - b[0]) < kApart_m && std::abs(a[1] - b[1]) < kApart_m &&
@@ -83,20 +88,14 @@ PatchSketch::PatchSketch(const Problem& problem, const Study& study) : study_(st
   speed_m_s_ = study.speed_m_s;
   for (std::size_t i = 0; i < study.size(); ++i) {
     const ResidualTrial& trial = study.trials[i];
-    const double duration = study.cells[trial.cell].command.duration_s;
-    const Twist way = way_of(study, i);
-    std::vector<Moment>& moments = moments_.emplace_back(kMoments);
-    for (int k = 0; k < kMoments; ++k) {
-      const double share = (k + 0.5) / kMoments;
-      const Pose X_SB = exp(Twist(way * share));
-      const Pose X_WB = trial.X_WS * X_SB;
-      for (int c = 0; c < 4; ++c) {
-        const Pose at = X_WB * Pose{contacts_[c].x(), contacts_[c].y(), 0};
-        moments[k].contacts[c] = {at.x, at.y};
-      }
-      moments[k].to_end = study.whitener[i] *
-                          moved_to_end(between(X_SB, between(trial.X_WS, trial.X_WP))) *
-                          (duration / kMoments);
+    Way& way = ways_.emplace_back();
+    const Twist whole = way_of(study, i);
+    way.step_s = study.cells[trial.cell].command.duration_s / kSteps;
+    way.step = whole / kSteps;
+    way.X_WE = trial.X_WS * exp(whole);
+    for (int k = 0; k < kSteps; ++k) {
+      way.X_WB.push_back(trial.X_WS * exp(Twist(whole * k / kSteps)));
+      way.contacts.push_back(contacts_at(trial.X_WS * exp(Twist(whole * (k + 0.5) / kSteps))));
     }
   }
   for (double ratio : kRatios) shifts_.push_back(shifts(ratio));
@@ -111,7 +110,7 @@ void PatchSketch::lay_grid() {
   }
   const double step = std::max(kPatchStep_m, (high - low).maxCoeff() / kMostSteps);
   std::vector<Eigen::VectorXd> marks;
-  for (std::size_t r = 0; r < kRatios.size(); ++r) {
+  for (const std::size_t r : kGridRatios) {
     for (double radius : kPatchRadii_m) {
       for (double x = low.x(); x <= high.x(); x += step) {
         for (double y = low.y(); y <= high.y(); y += step) {
@@ -173,31 +172,52 @@ std::vector<PatchSketch::Shifts> PatchSketch::shifts(double ratio) const {
     const double left = cell.command.left * speed_m_s_, right = cell.command.right * speed_m_s_;
     const Eigen::Vector3d even = twist(left, right, Eigen::Vector4d::Ones());
     Shifts& shifts = all.emplace_back();
-    for (std::size_t inside = 0; inside < shifts.size(); ++inside) {
+    for (std::size_t set = 0; set < shifts.size(); ++set) {
       Eigen::Vector4d friction = Eigen::Vector4d::Ones();
       for (std::size_t c = 0; c < 4; ++c) {
-        if ((inside >> c & 1) != 0) friction[static_cast<Eigen::Index>(c)] = ratio;
+        if ((set >> c & 1) != 0) friction[static_cast<Eigen::Index>(c)] = ratio;
       }
-      shifts[inside] = twist(left, right, friction) - even;
+      shifts[set] = twist(left, right, friction) - even;
     }
   }
   return all;
 }
 
+PatchSketch::Contacts PatchSketch::contacts_at(const Pose& X_WB) const {
+  Contacts contacts;
+  for (std::size_t c = 0; c < 4; ++c) {
+    const Pose at = X_WB * Pose{contacts_[c].x(), contacts_[c].y(), 0};
+    contacts[c] = {at.x, at.y};
+  }
+  return contacts;
+}
+
+// Of the end, in the predicted end's axes.
+Eigen::Vector3d PatchSketch::shift_of(const Way& way, const Patch& patch,
+                                      const Shifts& shifts) const {
+  std::size_t k = 0;
+  while (k < kSteps) {
+    const unsigned set = inside(way.contacts[k], patch);
+    if (set != 0 && set != kAllInside) break;
+    ++k;
+  }
+  if (k == kSteps) return Eigen::Vector3d::Zero();
+  Pose X_WB = way.X_WB[k];
+  for (; k < kSteps; ++k) {
+    const unsigned set = inside(contacts_at(X_WB * exp(Twist(way.step / 2))), patch);
+    const Twist more = shifts[set] * way.step_s;
+    X_WB = X_WB * exp(Twist(way.step + more));
+  }
+  const Pose shift = between(way.X_WE, X_WB);
+  return {shift.x, shift.y, shift.theta};
+}
+
 Eigen::VectorXd PatchSketch::column(const Patch& patch, const std::vector<Shifts>& shifts) const {
   Eigen::VectorXd column = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(3 * study_.size()));
-  const Eigen::Vector2d centre(patch[0], patch[1]);
-  const double within = patch[2] * patch[2];
   for (std::size_t i = 0; i < study_.size(); ++i) {
-    const Shifts& shift = shifts[study_.trials[i].cell];
-    for (const Moment& moment : moments_[i]) {
-      unsigned inside = 0;
-      for (unsigned c = 0; c < 4; ++c) {
-        inside |= (moment.contacts[c] - centre).squaredNorm() < within ? 1U << c : 0U;
-      }
-      if (inside == 0 || inside == 15) continue;
-      column.segment<3>(static_cast<Eigen::Index>(3 * i)) += moment.to_end * shift[inside];
-    }
+    const Eigen::Vector3d shift = shift_of(ways_[i], patch, shifts[study_.trials[i].cell]);
+    if (shift.isZero(0)) continue;
+    column.segment<3>(static_cast<Eigen::Index>(3 * i)) = study_.whitener[i] * shift;
   }
   study_.drop_ignored(column);
   return column;
@@ -207,17 +227,25 @@ Eigen::VectorXd PatchSketch::column(const Patch& patch) const {
   return column(patch, shifts(patch[3]));
 }
 
-// Up the nearest hill, in ever smaller steps.
+// Up the nearest hill, in ever smaller steps of place and radius and from ratio to ratio.
 void PatchSketch::climb(const Regression& explained, Place* place) const {
-  const std::vector<Shifts>& shifts = shifts_[place->patch[3] == kRatios[0] ? 0 : 1];
   for (double step_m : {0.05, 0.025, 0.012}) {
     for (bool better = true; better;) {
       better = false;
-      for (int k = 0; k < 6; ++k) {
+      for (int k = 0; k < 8; ++k) {
         Place next = *place;
-        next.patch[static_cast<std::size_t>(k / 2)] += k % 2 == 0 ? step_m : -step_m;
+        const std::size_t at =
+            std::find(kRatios.begin(), kRatios.end(), next.patch[3]) - kRatios.begin();
+        std::size_t to = at;
+        if (k < 6) {
+          next.patch[static_cast<std::size_t>(k / 2)] += k % 2 == 0 ? step_m : -step_m;
+        } else {
+          to = k == 6 ? at + 1 : at - 1;  // below 0 it is large
+          if (to >= kRatios.size()) continue;
+          next.patch[3] = kRatios[to];
+        }
         if (next.patch[2] < 0.08) continue;
-        next.squares = explained.each_gain(column(next.patch, shifts))[0];
+        next.squares = explained.each_gain(column(next.patch, shifts_[to]))[0];
         if (next.squares <= place->squares * (1 + 1e-9)) continue;
         *place = next;
         better = true;

@@ -6,6 +6,7 @@
 #include <array>
 #include <vector>
 
+#include "common/pose/pose.h"
 #include "master/diagnose/patch.h"
 #include "master/diagnose/regression.h"
 #include "master/diagnose/study.h"
@@ -15,8 +16,8 @@ namespace gapfarm {
 // Quasi-static: four contacts whose friction outweighs all else.  On a floor of one friction the
 // motion does not depend on it; while some contacts are inside the disc, the body moves with the
 // twist that makes the least of sum mu_i sqrt(s_i^2 + creep^2) over the contacts' sliding speeds
-// s_i.  How that differs from the twist on an even floor, along the way that the base predicts, is
-// the disc's mark on the end pose.
+// s_i.  The base's motion with what that differs by from the twist on an even floor is followed to
+// its end, for a strong patch leads elsewhere; how that end differs is the disc's mark.
 class PatchSketch {
  public:
   PatchSketch(const Problem& problem, const Study& study);
@@ -37,11 +38,17 @@ class PatchSketch {
   std::vector<Place> search(const Regression& explained, std::size_t most, double least) const;
 
  private:
-  struct Moment {                             // of a trial
-    std::array<Eigen::Vector2d, 4> contacts;  // world, m
-    Eigen::Matrix3d to_end;                   // twist in body axes -> whitened shift of the end
+  using Contacts = std::array<Eigen::Vector2d, 4>;  // world, m
+  struct Way {                                      // that the base predicts of a trial
+    double step_s = 0;
+    Twist step = Twist::Zero();
+    Pose X_WE;
+    std::vector<Pose> X_WB;          // where each step begins
+    std::vector<Contacts> contacts;  // in its middle
   };
   using Shifts = std::array<Eigen::Vector3d, 16>;  // of the twist, by the set of contacts inside
+  Contacts contacts_at(const Pose& X_WB) const;
+  Eigen::Vector3d shift_of(const Way& way, const Patch& patch, const Shifts& shifts) const;
   std::vector<Shifts> shifts(double ratio) const;  // by cell
   Eigen::VectorXd column(const Patch& patch, const std::vector<Shifts>& shifts) const;
   void lay_grid();
@@ -53,8 +60,8 @@ class PatchSketch {
   double lateral_ = 1;                       // over longitudinal friction
   double creep_ = 0;
   double speed_m_s_ = 0;
-  std::vector<std::vector<Moment>> moments_;  // by trial
-  std::vector<std::vector<Shifts>> shifts_;   // of kRatios
+  std::vector<Way> ways_;                    // by trial
+  std::vector<std::vector<Shifts>> shifts_;  // of kRatios
   std::vector<Patch> grid_;
   Eigen::MatrixXd marks_;  // of the grid's discs
 };
