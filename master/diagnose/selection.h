@@ -106,7 +106,7 @@ class Selector {
   Status search_patches(const Regression& explained, double most_gain);
   Result<std::vector<EffectCandidate>> simulate_patches(const Regression& explained,
                                                         const std::vector<Patch>& patches);
-  Status refine_patch(const Regression& explained, EffectCandidate best);
+  Status refine_patch(const Regression& explained, std::vector<EffectCandidate> discs);
   void drop_linear_views(const Regression& explained,
                          std::map<std::string, EffectCandidate>* best) const;
   EffectCandidate refine_seam(const Regression& explained, EffectCandidate best) const;

@@ -1,10 +1,14 @@
 // What has a place and is searched rather than sloped: patches of floor and seams.
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdint>
+#include <iterator>
 #include <map>
 #include <optional>
 
+#include "common/random/stream.h"
 #include "master/diagnose/effects/patch_places.h"
 #include "master/diagnose/seam.h"
 #include "master/diagnose/selection.h"
@@ -18,6 +22,16 @@ constexpr double kWorthSketched = 12.5;  // of patches; where there are none it 
 constexpr double kMostOfMoving = 3;
 constexpr int kSeamSteps = 10;
 constexpr int kMostPatchSearches = 4;
+// The ratio is what the sketch is least sure of.
+constexpr std::array<double, 3> kRatioPowers = {0.5, 1, 2};
+constexpr double kLeastRatio = 0.06, kMostRatio = 2.9;
+// Moves of discs: standard deviations at first, and how they go on.
+constexpr double kMove_m = 0.05, kMoveRatio = 0.4, kMovesShrink = 0.75, kLeastRadius_m = 0.05;
+constexpr int kMoves = 8;
+constexpr std::size_t kMostParents = 3, kOffspring = 15;
+constexpr std::uint64_t kMovesSeed = 4;
+
+bool better(const EffectCandidate& a, const EffectCandidate& b) { return a.gain > b.gain; }
 
 }  // namespace
 
@@ -60,7 +74,7 @@ void Selector::drop_linear_views(const Regression& explained,
   });
 }
 
-// Simulates discs, in their order; they join the catalogue.
+// In their order.
 Result<std::vector<EffectCandidate>> Selector::simulate_patches(const Regression& explained,
                                                                 const std::vector<Patch>& patches) {
   auto found = patch_signatures(*predictor_, *study_, patches);
@@ -68,41 +82,37 @@ Result<std::vector<EffectCandidate>> Selector::simulate_patches(const Regression
   std::vector<EffectCandidate> simulated;
   for (Signature& s : *found) {
     study_->drop_ignored(s.columns);
-    simulated.push_back({net_gain(explained, s), s});
-    catalogue_.push_back(std::move(s));
+    const double gain = net_gain(explained, s);
+    simulated.push_back({gain, std::move(s)});
   }
   return simulated;
 }
 
-// A disc that the sketch proposes, moved to where the simulation explains most: every step tries
-// both ways along x, y, radius and ratio, then all that helped at once.
-Status Selector::refine_patch(const Regression& explained, EffectCandidate best) {
-  for (double step : {0.04, 0.02, 0.01}) {
-    const Patch from = patch_of(best.signature);
-    std::vector<Patch> moves;
-    for (std::size_t k = 0; k < 8; ++k) {
-      const double sign = k % 2 == 0 ? 1 : -1;
-      Patch& to = moves.emplace_back(from);
-      double& moved = to[k / 2];
-      moved = k < 6 ? moved + sign * step : moved * std::pow(1 + 6 * step, sign);
-      to[2] = std::max(to[2], 0.05);
-      to[3] = std::clamp(to[3], 0.06, 2.9);
+// Discs that the sketch proposes, the best first, moved to where the simulation explains most. What
+// a rim does to each drive that crosses it makes many hills, so the best few are moved at random,
+// in ever smaller steps.
+Status Selector::refine_patch(const Regression& explained, std::vector<EffectCandidate> discs) {
+  Stream stream({kMovesSeed, Purpose::kStatistics, 0, 0, 0});
+  double scale = 1;
+  for (int k = 0; k < kMoves; ++k, scale *= kMovesShrink) {
+    discs.resize(std::min(discs.size(), kMostParents));
+    std::vector<Patch> moved;
+    for (std::size_t i = 0; i < kOffspring; ++i) {
+      Patch& to = moved.emplace_back(patch_of(discs[i % discs.size()].signature));
+      for (std::size_t c = 0; c < 3; ++c) to[c] += scale * kMove_m * stream.normal();
+      to[2] = std::max(to[2], kLeastRadius_m);
+      to[3] = std::clamp(to[3] * std::exp(scale * kMoveRatio * stream.normal()), kLeastRatio,
+                         kMostRatio);
     }
-    auto tried = simulate_patches(explained, moves);
+    auto tried = simulate_patches(explained, moved);
     if (!tried) return tried.error();
-    const double before = best.gain;
-    Patch together = from;
-    for (std::size_t k = 0; k < 8; k += 2) {
-      const EffectCandidate& better =
-          (*tried)[k].gain > (*tried)[k + 1].gain ? (*tried)[k] : (*tried)[k + 1];
-      if (better.gain > before) together[k / 2] = patch_of(better.signature)[k / 2];
-      if (better.gain > best.gain) best = better;
-    }
-    auto all = simulate_patches(explained, {together});
-    if (!all) return all.error();
-    if (all->front().gain > best.gain) best = all->front();
+    discs.insert(discs.end(), std::make_move_iterator(tried->begin()),
+                 std::make_move_iterator(tried->end()));
+    std::stable_sort(discs.begin(), discs.end(), better);
   }
-  refined_patches_.push_back(patch_of(best.signature));
+  refined_patches_.push_back(patch_of(discs.front().signature));
+  discs.resize(std::min(discs.size(), kMostParents));
+  for (EffectCandidate& disc : discs) catalogue_.push_back(std::move(disc.signature));
   return {};
 }
 
@@ -120,20 +130,21 @@ Status Selector::search_patches(const Regression& explained, double most_gain) {
           return std::hypot(p[0] - place[0], p[1] - place[1], p[2] - place[2]) < 0.15;
         });
     if (known) continue;
-    starts.push_back(place);
-    starts.push_back(place);
-    starts.back()[3] = std::sqrt(place[3]);
+    for (const double power : kRatioPowers) {
+      starts.push_back(place);
+      starts.back()[3] = std::clamp(std::pow(place[3], power), kLeastRatio, kMostRatio);
+    }
   }
   if (starts.empty()) return {};
   ++patch_searches_;
   auto simulated = simulate_patches(explained, starts);
   if (!simulated) return simulated.error();
-  const EffectCandidate& best = *std::max_element(
-      simulated->begin(), simulated->end(),
-      [](const EffectCandidate& a, const EffectCandidate& b) { return a.gain < b.gain; });
+  std::stable_sort(simulated->begin(), simulated->end(), better);
+  for (const EffectCandidate& disc : *simulated) catalogue_.push_back(disc.signature);
+  const EffectCandidate& best = simulated->front();
   if (best.gain + best.signature.penalty < kWorthRefining) return {};
   if (kMostOfMoving * best.gain < most_gain) return {};  // its turn comes when that is explained
-  return refine_patch(explained, best);
+  return refine_patch(explained, std::move(*simulated));
 }
 
 }  // namespace gapfarm
