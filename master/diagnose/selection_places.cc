@@ -26,9 +26,9 @@ constexpr int kMostPatchSearches = 4;
 constexpr std::array<double, 3> kRatioPowers = {0.5, 1, 2};
 constexpr double kLeastRatio = 0.06, kMostRatio = 2.9;
 // Moves of discs: standard deviations at first, and how they go on.
-constexpr double kMove_m = 0.05, kMoveRatio = 0.4, kMovesShrink = 0.75, kLeastRadius_m = 0.05;
-constexpr int kMoves = 8;
-constexpr std::size_t kMostParents = 3, kOffspring = 15;
+constexpr double kMove_m = 0.05, kMoveRatio = 0.4, kMovesShrink = 0.7, kLeastRadius_m = 0.05;
+constexpr int kMoves = 6;
+constexpr std::size_t kMostParents = 3, kOffspring = 12;
 constexpr std::uint64_t kMovesSeed = 4;
 
 bool better(const EffectCandidate& a, const EffectCandidate& b) { return a.gain > b.gain; }

@@ -119,8 +119,10 @@ Gathering gathering_of_slips(const Study& study, std::span<const double> slipped
   Gathering best;
   for (const Place& place : places(ways)) {
     double here = 0, expected_here = 0;
+    std::vector<bool> passed(study.size());
     for (std::size_t i = 0; i < study.size(); ++i) {
-      if (!tells[i] || !place.passed(ways[i])) continue;
+      passed[i] = place.passed(ways[i]);
+      if (!tells[i] || !passed[i]) continue;
       here += slipped[i];
       expected_here += chance[i];
     }
@@ -128,7 +130,7 @@ Gathering gathering_of_slips(const Study& study, std::span<const double> slipped
     if (here < kFewestSlips || here <= expected_here || expected_here <= 0) continue;
     const double gain = here * std::log(here / expected_here) +
                         (rest > 0 ? rest * std::log(rest / expected_rest) : 0);
-    if (gain > best.gain) best = {gain, place.words};
+    if (gain > best.gain) best = {gain, place.words, std::move(passed)};
   }
   return best;
 }

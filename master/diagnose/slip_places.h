@@ -3,14 +3,16 @@
 
 #include <span>
 #include <string>
+#include <vector>
 
 #include "master/diagnose/study.h"
 
 namespace gapfarm {
 
 struct Gathering {
-  double gain = 0;    // nats, of the best place over slips that fall anywhere
-  std::string where;  // in words: a disc, or a line that the drives cross
+  double gain = 0;           // nats, of the best place over slips that fall anywhere
+  std::string where;         // in words: a disc, or a line that the drives cross
+  std::vector<bool> passed;  // whether each trial's drive went there
 };
 
 // A gain that slips which fall anywhere reach in less than one of 500 logs: the best of about 500

@@ -1,10 +1,12 @@
 // What several steps of a diagnosis are made of.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "master/diagnose/slip_places.h"
 #include "master/diagnose/steps.h"
 
 namespace gapfarm::steps {
@@ -30,6 +32,11 @@ Explanation look_for_spreads(const Inquiry& of, Explanation so_far, const Regres
 // when they are rare, a lopsided one when they are not.
 Explanation look_for_slips(const Inquiry& of, Explanation so_far, const Selector& catalogue,
                            const Regression& explained);
+
+// Where slips gather beside what acts everywhere, when what acted in a place `before` is gone from
+// the `rest`.  `catalogue` as it was before.
+std::optional<Gathering> gathering_beside(const Inquiry& of, const Explanation& before,
+                                          const Selector& catalogue, const Explanation& rest);
 
 // What is left once all that was chosen is explained, and the nats that it took.
 Regression explained_by(const Selector& catalogue, const Explanation& explanation);

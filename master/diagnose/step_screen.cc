@@ -194,20 +194,41 @@ Result<Screening> look_for_spreads_again(const Inquiry& of, Screening screening)
   return choose_among_the_rest(of, std::move(screening));
 }
 
-// Trials in which a side slipped pull on every mean: the effects are looked for again without them.
+// Trials in which a side slipped pull on every mean: the effects are looked for again without them,
+// but for those that are kept (none: empty).
 Result<Screening> choose_without_slips(const Inquiry& of, Screening screening,
-                                       const Regression& explained) {
+                                       const Regression& explained, const std::vector<bool>& kept) {
   Explanation& found = screening.found;
   const Eigen::VectorXd z = studentised(explained, 0.2);
   std::vector<bool> ignored = found.study().ignored;
   ignored.resize(found.study().size(), false);
   for (std::size_t i = 0; i < ignored.size(); ++i) {
-    if (z.segment<3>(static_cast<Eigen::Index>(3 * i)).squaredNorm() > kSlippedSquared) {
-      ignored[i] = true;
-    }
+    const bool slipped =
+        z.segment<3>(static_cast<Eigen::Index>(3 * i)).squaredNorm() > kSlippedSquared;
+    if (slipped && (kept.empty() || !kept[i])) ignored[i] = true;
   }
   found = without(found, ignored);
   return choose_among_the_rest(of, std::move(screening));
+}
+
+Result<Screening> look_for_slips_and_choose(const Inquiry& of, Screening screening) {
+  const Regression explained = explained_by(*screening.catalogue, screening.found);
+  screening.found = look_for_slips(of, std::move(screening.found), *screening.catalogue, explained);
+  if (!(screening.found.slip.gain > 0)) return screening;
+  const Explanation before = screening.found;
+  const Selector all = *screening.catalogue;
+  auto rest = choose_without_slips(of, std::move(screening), explained, {});
+  if (!rest) return rest;
+  // A patch of floor moves single drives, too: it may have been left out with them.
+  const auto gathering = gathering_beside(of, before, all, rest->found);
+  if (!gathering) return rest;
+  *rest->catalogue = all;
+  rest->found = before;
+  rest = choose_without_slips(of, std::move(*rest), explained, gathering->passed);
+  if (!rest) return rest;
+  rest->found.slip = {};
+  rest->found = look_for_slips(of, rest->found, all, explained_by(all, rest->found));
+  return rest;
 }
 
 Result<Screening> look_for_all(const Inquiry& of, Explanation so_far) {
@@ -225,11 +246,7 @@ Result<Screening> look_for_all(const Inquiry& of, Explanation so_far) {
   }
   if (screening) screening = look_for_spreads_again(of, std::move(*screening));
   if (!screening) return screening;
-  const Regression explained = explained_by(*screening->catalogue, screening->found);
-  screening->found =
-      look_for_slips(of, std::move(screening->found), *screening->catalogue, explained);
-  if (!(screening->found.slip.gain > 0)) return screening;
-  return choose_without_slips(of, std::move(*screening), explained);
+  return look_for_slips_and_choose(of, std::move(*screening));
 }
 
 }  // namespace

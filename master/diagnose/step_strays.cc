@@ -32,6 +32,16 @@ std::vector<bool> tells_of_slips(const Inquiry& of, const Explanation& so_far) {
   return tells;
 }
 
+std::vector<double> slipped_by(const SlipFit& slip, const Study& study,
+                               const std::vector<Eigen::Vector3d>& left) {
+  std::vector<double> slipped;
+  for (const SlipTrial& t :
+       trials_with_slips(study.trials, left, slip, slip.probability * slip.loss / 2, 0)) {
+    slipped.push_back(t.slipped);
+  }
+  return slipped;
+}
+
 }  // namespace
 
 Explanation look_for_spreads(const Inquiry& of, Explanation so_far, const Regression& explained) {
@@ -68,12 +78,7 @@ Explanation look_for_slips(const Inquiry& of, Explanation so_far, const Selector
     so_far.odd_drives = "Single drives stray: nothing that could explain them was looked for.";
     return so_far;
   }
-  std::vector<double> slipped;
-  for (const SlipTrial& t :
-       trials_with_slips(study.trials, left, slip, slip.probability * slip.loss / 2, 0)) {
-    slipped.push_back(t.slipped);
-  }
-  const Gathering gathering = gathering_of_slips(study, slipped, tells);
+  const Gathering gathering = gathering_of_slips(study, slipped_by(slip, study, left), tells);
   if (gathering.gain < kLeastGathering) {
     so_far.slip = slip;
   } else {
@@ -81,6 +86,25 @@ Explanation look_for_slips(const Inquiry& of, Explanation so_far, const Selector
                         ": something lies there that nothing explains which was looked for.";
   }
   return so_far;
+}
+
+std::optional<Gathering> gathering_beside(const Inquiry& of, const Explanation& before,
+                                          const Selector& catalogue, const Explanation& rest) {
+  const auto has_place = [&](const ChosenEffect& c) {
+    return of.subject.effects->row(c.candidate.signature.effect).strays != nullptr;
+  };
+  if (std::none_of(before.chosen.begin(), before.chosen.end(), has_place)) return {};
+  if (std::any_of(rest.chosen.begin(), rest.chosen.end(), has_place)) return {};
+  Explanation everywhere = before;
+  std::erase_if(everywhere.chosen, has_place);
+  const Study& study = before.study();
+  const std::vector<Eigen::Vector3d> left =
+      study.unwhiten(studentised(explained_by(catalogue, everywhere), 0.2));
+  const std::vector<bool> tells = tells_of_slips(of, everywhere);
+  const SlipFit slip = fit_slip(study.trials, left, tells, study.noise);
+  Gathering found = gathering_of_slips(study, slipped_by(slip, study, left), tells);
+  if (found.gain < kLeastGathering) return {};
+  return found;
 }
 
 }  // namespace gapfarm::steps
