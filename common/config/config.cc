@@ -33,7 +33,9 @@ void read_top(TomlSection& top, Config& config) {
 
 // [robot] and [runs].  False when there is no robot to go on with.
 bool read_robot_section(TomlSection& top, Config& config) {
+  const ScenarioForm& form = scenario_form(config.problem.scenario);
   auto section = top.section("robot");
+  if (!section && !form.robot) return true;
   if (!section) {
     top.errors().add(top.table().source().begin,
                      "scenario ground needs a robot:\n  [robot]\n  file = \"robot.toml\"");
@@ -49,6 +51,7 @@ bool read_robot_section(TomlSection& top, Config& config) {
     top.errors().add(section->table().source().begin, known.error().message);
     return false;
   }
+  if (!form.robot) return true;
   auto runs = top.section("runs");
   if (!runs) return true;
   for (const std::string& folder : runs->strings("folders").value_or(std::vector<std::string>())) {
@@ -89,20 +92,17 @@ Result<Config> parse_config(std::string_view text, const std::string& path,
   TomlSection top(*parsed, "", errors);
   read_top(top, config);
   Problem& problem = config.problem;
-  if (scenario_form(problem.scenario).robot && !read_robot_section(top, config)) {
-    return errors.error();
-  }
-  if (scenario_form(problem.scenario).program &&
-      !read_external_section(top, config.path, start, problem)) {
+  const ScenarioForm& form = scenario_form(problem.scenario);
+  if ((form.robot || form.other_robot) && !read_robot_section(top, config)) return errors.error();
+  if (form.program && !read_external_section(top, config.path, start, problem)) {
     return errors.error();
   }
   const ParameterTable& table = problem.table();
-  problem.values = table.nominal();
+  problem.values = problem.tracked ? problem.tracked->values() : table.nominal();
   problem.commands = default_commands(problem.scenario);
   read_parameters(top, table, problem.values);
   read_effects(top, table, problem.values);
   read_genes(top, table, problem.genes);
-  const ScenarioForm& form = scenario_form(problem.scenario);
   read_pieces(top, form, problem.pieces, problem.commands);
   if (!form.pieces) read_commands(top, problem.commands);
   read_fitness(top, problem.fitness);

@@ -158,7 +158,8 @@ Status read_model_program(TomlSection& top, Model& model) {
 
 const ParameterTable& Model::table() const {
   if (external) return external->table.table();
-  return ground ? ground->table() : *parameter_table(scenario).value();
+  if (ground) return ground->table();
+  return tracked ? tracked->table() : *parameter_table(scenario).value();
 }
 
 Result<Model> nominal_model(std::string_view scenario) {
@@ -173,6 +174,23 @@ Result<Model> nominal_model(std::string_view scenario) {
   return model;
 }
 
+Model model_of_problem(const Problem& problem, ParameterValues values) {
+  Model model;
+  model.scenario = problem.scenario;
+  model.version = build_info().version;
+  model.fingerprint = build_info().fingerprint;
+  model.values = std::move(values);
+  model.commands = problem.commands;
+  model.pieces = problem.pieces;
+  model.robot_file = problem.robot_file;
+  model.tracked = problem.tracked;
+  model.ground = problem.ground;
+  model.external = problem.external;
+  model.fitness = problem.fitness;
+  model.spread = problem.spread;
+  return model;
+}
+
 Problem problem_of(const Model& model) {
   Problem problem;
   problem.scenario = model.scenario;
@@ -180,6 +198,7 @@ Problem problem_of(const Model& model) {
   problem.commands = model.commands;
   problem.pieces = model.pieces;
   problem.robot_file = model.robot_file;
+  problem.tracked = model.tracked;
   problem.ground = model.ground;
   problem.external = model.external;
   problem.residual = model.residual;
@@ -217,22 +236,23 @@ Result<Model> parse_model(std::string_view text, const std::string& path) {
   model.version.clear();
   model.fingerprint.clear();
   top.read("kind", model.kind);
-  if (scenario_form(scenario).robot) {
+  const ScenarioForm& form = scenario_form(scenario);
+  if (form.robot || (form.other_robot && top.find("robot") != nullptr)) {
     Problem problem = problem_of(model);
     const std::string robot = top.string("robot").value_or("");
     if (Status s = problem.set_robot(robot, path + ": robot"); !s) return s.error();
     model.robot_file = problem.robot_file;
+    model.tracked = problem.tracked;
     model.ground = problem.ground;
-    model.values = problem.values;
+    model.values = model.table().nominal();  // effects that the file leaves out are neutral
   }
-  if (scenario_form(scenario).program) {
+  if (form.program) {
     if (Status s = read_model_program(top, model); !s)
       return Error{path + ": " + s.error().message};
   }
   read_base(top, "parameters", model);
   read_base(top, "noise", model);
   read_model_effects(top, model);
-  const ScenarioForm& form = scenario_form(model.scenario);
   read_pieces(top, form, model.pieces, model.commands);
   if (!form.pieces) read_commands(top, model.commands);
   read_model_fitness(top, model);

@@ -49,8 +49,9 @@ struct Model {
   ModelData data;
   ModelOrigin origin;
 
-  // Where the scenario has a robot: its file, and what it says.
+  // Where there is a robot: its file, and what it says.
   std::string robot_file;
+  std::shared_ptr<const TrackedTable> tracked;
   std::shared_ptr<const GroundTable> ground;
   // Where a program of the user's simulates.
   std::shared_ptr<const ExternalProgram> external;
@@ -61,6 +62,9 @@ struct Model {
 // A model with the scenario's nominal values and commands, of this build.  Errors: unknown
 // scenario.
 Result<Model> nominal_model(std::string_view scenario);
+
+// A model of the problem at these values, of this build; of no data and no run.
+Model model_of_problem(const Problem& problem, ParameterValues values);
 
 // The model's problem without a log and without genes.
 Problem problem_of(const Model& model);

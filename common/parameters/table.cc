@@ -9,7 +9,6 @@
 #include "common/parameters/ground.h"
 #include "common/parameters/push.h"
 #include "common/parameters/racquetball.h"
-#include "common/parameters/rows.h"
 
 namespace gapfarm {
 namespace {
@@ -22,15 +21,6 @@ std::string number(double value) {
 
 using enum ParameterKind;
 using enum ParameterScale;
-
-std::vector<Parameter> srv1_rows() {
-  using namespace rows;  // NOLINT: what follows is rows
-#define ROW(name, row) row,
-#define SETTING(name, member, row) row,
-  return {
-#include "common/parameters/srv1_rows.inc"
-  };
-}
 
 struct ScenarioTable {
   const char* scenario;
@@ -116,11 +106,6 @@ std::string ParameterTable::format(std::size_t row, double value) const {
   const auto index = static_cast<std::size_t>(value);
   if (p.kind == kChoice && value >= 0 && index < p.choices.size()) return p.choices[index];
   return number(value) + (p.unit == "-" ? "" : " " + p.unit);
-}
-
-const ParameterTable& srv1_table() {
-  static const ParameterTable table(srv1_rows(), srv1_effects_and_seconds());
-  return table;
 }
 
 std::span<const std::string> scenario_names() {

@@ -78,6 +78,7 @@ constexpr std::size_t row_of(Srv1 p) { return static_cast<std::size_t>(p); }
 std::span<const std::string> scenario_names();
 // The table of a scenario; an error names the known scenarios.
 Result<const ParameterTable*> parameter_table(std::string_view scenario);
+// Of the SRV-1 (common/parameters/tracked.h).
 const ParameterTable& srv1_table();
 
 }  // namespace gapfarm

@@ -20,7 +20,7 @@ std::vector<CommandSpec> racquetball_commands() { return {{"serve", 1, 1, 5}}; }
 // Windows bring their own durations and commands.
 std::vector<CommandSpec> ground_commands() { return {{kWindowCommand, 0, 0, 0}}; }
 
-constexpr ScenarioForm kForms[] = {{"srv1", srv1_commands, false, false, false, true},
+constexpr ScenarioForm kForms[] = {{"srv1", srv1_commands, false, false, false, true, true},
                                    {"push", no_commands, true},
                                    {"racquetball", racquetball_commands},
                                    {"ground", ground_commands, false, true},
@@ -63,15 +63,27 @@ const char* fitness_unit(FitnessKind kind) {
 
 const ParameterTable& Problem::table() const {
   if (external) return external->table.table();
-  return ground ? ground->table() : *parameter_table(scenario).value();
+  if (ground) return ground->table();
+  return tracked ? tracked->table() : *parameter_table(scenario).value();
 }
 
 Status Problem::set_robot(const std::string& text, const std::string& path) {
+  if (text.find_first_not_of(" \t\r\n\xEF\xBB\xBF") == text.find('<')) {
+    return Error{path + ": found XML, expected a robot file; make one of a URDF: gapfarm robot " +
+                 path + " --out robot.toml"};
+  }
   const auto robot = parse_robot(text, path);
   if (!robot) return robot.error();
+  if (scenario_form(scenario).robot) {
+    ground = std::make_shared<const GroundTable>(*robot);
+    values = table().nominal();
+  } else {
+    auto table = make_tracked_table(*robot);
+    if (!table) return Error{path + ": " + table.error().message};
+    tracked = *std::move(table);
+    values = tracked->values();
+  }
   robot_file = text;
-  ground = std::make_shared<const GroundTable>(*robot);
-  values = table().nominal();
   return {};
 }
 

@@ -11,6 +11,7 @@
 #include "common/parameters/genome.h"
 #include "common/parameters/ground.h"
 #include "common/parameters/table.h"
+#include "common/parameters/tracked.h"
 #include "common/problem/piece.h"
 #include "common/residual/field.h"
 #include "common/runs/windows.h"
@@ -68,9 +69,11 @@ struct Problem {
   FitnessSettings fitness;
   SpreadSettings spread;
   TrialLog log;
-  // Scenario `ground` only: the robot's file, what it says, and the runs of which `log` is windows.
+  // Where there is one: the robot's file, and what it says to scenario `srv1` or `ground`.
   std::string robot_file;
+  std::shared_ptr<const TrackedTable> tracked;
   std::shared_ptr<const GroundTable> ground;
+  // Scenario `ground` only: the runs of which `log` is windows.
   std::vector<CommandedRun> runs;
   // Scenario `external` only: the program that simulates.
   std::shared_ptr<const ExternalProgram> external;
@@ -80,7 +83,10 @@ struct Problem {
   // Of the robot or the program where there is one, else of the scenario.  REQUIRES: a known
   // scenario.
   const ParameterTable& table() const;
-  // Takes the robot; `values` become its own.  Errors: parse_robot()'s, `path` naming the file.
+  // What treads are simulated: of the robot where there is one, else the SRV-1's.
+  const TrackedTable& treads() const { return tracked ? *tracked : srv1_robot(); }
+  // Takes the robot; `values` become its own.  Errors: parse_robot()'s, a robot that the scenario
+  // cannot simulate; `path` names the file.
   Status set_robot(const std::string& text, const std::string& path);
   // The problem's values with the genes of `genome` put in; an empty genome changes nothing.
   ParameterValues values_of(const Genome& genome) const;
@@ -103,6 +109,8 @@ struct ScenarioForm {
   bool program = false;
   // Drives that may be corrected by a ResidualField.
   bool residual = false;
+  // There may be a robot's file, of another robot than the scenario's own.
+  bool other_robot = false;
 };
 // REQUIRES: a scenario that has a parameter table.
 const ScenarioForm& scenario_form(std::string_view scenario);

@@ -1,5 +1,4 @@
 // Problems to protobuf and back.
-
 #include <google/protobuf/io/coded_stream.h>
 #include <google/protobuf/io/zero_copy_stream_impl_lite.h>
 
@@ -111,10 +110,9 @@ Status read_values(const v1::Problem& message, Problem* problem) {
 
 Status read_pieces(const v1::Problem& message, Problem* problem) {
   const bool wanted = scenario_form(problem->scenario).pieces;
-  if (wanted != (message.pieces_size() > 0)) {
-    return invalid("scenario '" + problem->scenario + "' " + (wanted ? "needs" : "has no") +
-                   " pieces");
-  }
+  const std::string asked = wanted ? "' needs pieces" : "' has no pieces";
+  if (wanted != (message.pieces_size() > 0))
+    return invalid("scenario '" + problem->scenario + asked);
   for (const v1::Piece& p : message.pieces()) {
     Piece piece = from_proto(p);
     if (p.x_size() != p.y_size()) return invalid("piece '" + p.name() + "' has half a corner");
@@ -151,14 +149,16 @@ Status check_tip(const Trial& trial, bool wanted, const std::string& where) {
 
 // A robot and what it was told, where the scenario has them.
 Status read_runs(const v1::Problem& message, Problem* problem) {
-  if (!scenario_form(problem->scenario).robot) {
-    if (message.robot().empty() && message.runs_size() == 0) return {};
+  const ScenarioForm& form = scenario_form(problem->scenario);
+  if (!form.robot && (message.runs_size() > 0 || (!message.robot().empty() && !form.other_robot))) {
     return invalid("scenario '" + problem->scenario + "' has neither robot nor runs");
   }
-  if (message.robot().empty()) return invalid("scenario 'ground' needs a robot");
-  if (Status s = problem->set_robot(message.robot(), "robot"); !s)
-    return invalid(s.error().message);
+  if (form.robot && message.robot().empty()) return invalid("scenario 'ground' needs a robot");
+  if (message.robot().empty()) return {};
+  const Status known = problem->set_robot(message.robot(), "robot");
+  if (!known) return invalid(known.error().message);
   problem->values.clear();
+  if (!form.robot) return {};
   const std::size_t channels = problem->ground->robot().channels.size();
   for (const v1::Run& run : message.runs()) {
     CommandedRun to{run.start(), run.speed(), run.turn(), {}};

@@ -31,6 +31,7 @@ class Completion {
   Status run() {
     if (Status s = wheels(); !s) return s;
     if (Status s = sizes(); !s) return s;
+    if (Status s = full_speed(); !s) return s;
     return check_robot(r_);
   }
 
@@ -358,11 +359,28 @@ class Completion {
       r_.com_z_m = kHeightPerGauge * across;
       assume("the centre of mass " + digits4(*r_.com_z_m) + " m over the floor");
     }
+    if (!r_.yaw_inertia_kg_m2 && r_.body_length_m && r_.body_width_m) {
+      r_.yaw_inertia_kg_m2 = box_yaw_inertia(*r_.mass_kg, *r_.body_length_m, *r_.body_width_m);
+    }
     if (!r_.yaw_inertia_kg_m2) {
       // A plate of the wheels' circle, of even mass.
       r_.yaw_inertia_kg_m2 = *r_.mass_kg * reach() * reach() / 2;
       assume("a yaw inertia of " + digits4(*r_.yaw_inertia_kg_m2) + " kg m^2");
     }
+    return {};
+  }
+
+  Status full_speed() {
+    RobotMotors& m = r_.motors;
+    if (!m.full_surface_speed_m_s) return {};
+    if (m.full_speed_rad_s) {
+      return Error{"full_speed (rad/s) and full_surface_speed (m/s) say the same; state one"};
+    }
+    for (const RobotWheel& w : r_.wheels) {
+      if (!w.driven || m.full_speed_rad_s) continue;
+      m.full_speed_rad_s = *m.full_surface_speed_m_s / *w.radius_m;
+    }
+    m.full_surface_speed_m_s.reset();
     return {};
   }
 

@@ -83,6 +83,7 @@ struct RobotMotors {
   double dead_band = 0;                           // in the command's own unit
   std::optional<double> command_timeout_s;        // without a new row the wheels stop
   std::optional<double> full_speed_rad_s;         // of a wheel at duty 1
+  std::optional<double> full_surface_speed_m_s;   // of its rim: complete_robot() makes it the above
 };
 
 // acceleration = max(throttle - zero, 0) (gain - back_emf v) - drag v - coulomb sign(v)
@@ -117,11 +118,12 @@ struct GroundRobot {
   std::optional<double> mass_kg;
   std::optional<double> com_x_m, com_y_m, com_z_m;  // centre of mass, z over the floor
   std::optional<double> yaw_inertia_kg_m2;          // about the centre of mass
-  double friction = 0.7;                            // of the floor along the wheels
-  double friction_ratio = 1;                        // across over along
-  double rolling_resistance = 0;                    // share of weight
-  double roller_drag = 0.02;                        // omni, mecanum: friction across over along
-  double caster_drag = 0;                           // friction of a caster over that of a wheel
+  std::optional<double> body_length_m, body_width_m, body_height_m;  // a box of even mass
+  double friction = 0.7;          // of the floor along the wheels
+  double friction_ratio = 1;      // across over along
+  double rolling_resistance = 0;  // share of weight
+  double roller_drag = 0.02;      // omni, mecanum: friction across over along
+  double caster_drag = 0;         // friction of a caster over that of a wheel
   ControllerKinematics controller;
   RobotMotors motors;
   RobotThrottle throttle;
@@ -140,6 +142,11 @@ struct GroundRobot {
   // Null when there is none.
   const RobotWheel* wheel(std::string_view wanted) const;
 };
+
+// Of a box of even mass about the vertical, kg m^2.
+inline double box_yaw_inertia(double mass_kg, double length_m, double width_m) {
+  return mass_kg * (length_m * length_m + width_m * width_m) / 12;
+}
 
 // Fills what follows from the drive and the sizes that are there: wheels at +-wheel_separation / 2
 // where only radii are stated; front and rear ones of a skid-steer so far apart that four-point

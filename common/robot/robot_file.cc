@@ -72,6 +72,7 @@ void read_motors(TomlSection& top, RobotMotors& m) {
   top.read("dead_band", m.dead_band, 0, 1e4);
   top.read("cmd_vel_timeout", m.command_timeout_s, 1e-3, 1e4, "s");
   top.read("full_speed", m.full_speed_rad_s, 1e-3, 1e5, "rad/s");
+  top.read("full_surface_speed", m.full_surface_speed_m_s, 1e-4, 100, "m/s");
 }
 
 void read_body(TomlSection& top, GroundRobot& robot) {
@@ -81,6 +82,12 @@ void read_body(TomlSection& top, GroundRobot& robot) {
     own->read("x", robot.com_x_m, -50, 50, "m");
     own->read("y", robot.com_y_m, -50, 50, "m");
     own->read("z", robot.com_z_m, 1e-4, 50, "m");
+    own->finish();
+  }
+  if (auto own = top.section("body")) {
+    own->read("length", robot.body_length_m, 1e-3, 50, "m");
+    own->read("width", robot.body_width_m, 1e-3, 50, "m");
+    own->read("height", robot.body_height_m, 1e-3, 50, "m");
     own->finish();
   }
   top.read("friction", robot.friction, 1e-3, 10);

@@ -124,6 +124,12 @@ std::string format_robot(const GroundRobot& robot) {
   out.number("x", robot.com_x_m);
   out.number("y", robot.com_y_m);
   out.number("z", robot.com_z_m);
+  if (robot.body_length_m || robot.body_width_m || robot.body_height_m) {
+    out.section("body");
+    out.number("length", robot.body_length_m);
+    out.number("width", robot.body_width_m);
+    out.number("height", robot.body_height_m);
+  }
   out.section("marker");
   out.number("x", robot.X_RM.x);
   out.number("y", robot.X_RM.y);

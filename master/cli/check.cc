@@ -181,6 +181,11 @@ std::string standing(const std::vector<SanityFinding>& findings) {
   return "fine";
 }
 
+std::string robot_name(const Problem& problem) {
+  const std::string& name = problem.tracked->name();
+  return name.empty() ? "the file of [robot]" : name;
+}
+
 std::string describe(const Config& config, const Summary& summary, unsigned workers) {
   const Problem& problem = config.problem;
   std::string text = config.path + ": " + standing(summary.sanity) + "\n";
@@ -193,7 +198,9 @@ std::string describe(const Config& config, const Summary& summary, unsigned work
   if (problem.ground) {
     text += drive_words()[static_cast<std::size_t>(problem.ground->robot().drive)] + "\n";
   } else {
-    text += problem.table()[0].key + " " + problem.table().format(0, problem.values[0]) + "\n";
+    text += problem.table()[0].key + " " + problem.table().format(0, problem.values[0]);
+    if (problem.tracked) text += ", sizes of " + robot_name(problem);
+    text += "\n";
   }
   text += "trials       " + std::to_string(summary.trials) + " in " +
           std::to_string(summary.sessions) + " sessions:";

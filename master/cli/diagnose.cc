@@ -87,17 +87,8 @@ constexpr const char* kAnswers = "simulations.sqlite";
 
 Model model_of(const Config& config, const DiagnosisResult& result, const ParameterValues& values,
                const std::string& kind) {
-  Model model;
-  model.scenario = config.problem.scenario;
+  Model model = model_of_problem(config.problem, values);
   model.kind = kind;
-  model.version = build_info().version;
-  model.fingerprint = build_info().fingerprint;
-  model.values = values;
-  model.commands = config.problem.commands;
-  model.pieces = config.problem.pieces;
-  model.external = config.problem.external;
-  model.fitness = config.problem.fitness;
-  model.spread = config.problem.spread;
   model.frame_x_m = result.frame_x_m;
   model.frame_y_m = result.frame_y_m;
   model.data = {problem_hash(to_proto(config.problem)), config.problem.log.trials.size(),
@@ -185,6 +176,11 @@ Status apply_options(const DiagnoseCommand& command, Config& config, std::vector
     if (!model) return model.error();
     if (Status s = check_no_residual(*model, command.model, "a base to diagnose"); !s) {
       return s.error();
+    }
+    if (model->scenario != config.problem.scenario ||
+        model->robot_file != config.problem.robot_file) {
+      return Error{command.model + ": is a model of another scenario or robot than " +
+                   command.config + "; give the config that it was made with"};
     }
     config.problem.values = model->values;
     frame = {model->frame_x_m, model->frame_y_m};

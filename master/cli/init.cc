@@ -68,8 +68,38 @@ LogFigures figures_of(const TrialLog& log, const std::vector<CommandSpec>& known
   return figures;
 }
 
+// Faster or slower than an SRV-1 may be.
+bool is_another_robot(const LogFigures& figures) {
+  const Parameter& row = srv1_table()[row_of(Srv1::kFullSpeed)];
+  return figures.speed_m_s && !(*figures.speed_m_s >= row.lower && *figures.speed_m_s <= row.upper);
+}
+
+// What is to be measured: of an SRV-1 here, of another robot in a file of its own.
+std::string robot_text(const LogFigures& figures) {
+  if (is_another_robot(figures)) {
+    return fmt::format(
+        "# QUESTION: what robot is this?  None of the SRV-1's size makes {:.3g} m/s.  Copy\n"
+        "# configs/robots/srv1.toml, measure, and name the copy here (docs/formats.md):\n"
+        "[robot]\nfile = \"robot.toml\"\n\n[parameters]\n"
+        "robot = \"treads\"      # QUESTION: treads, or wheels (four)?\n",
+        *figures.speed_m_s);
+  }
+  const auto nominal = [](Srv1 row) { return srv1_table()[row_of(row)].nominal; };
+  return fmt::format(
+      "[parameters]\n"
+      "robot = \"treads\"      # QUESTION: treads, or wheels (four)?\n"
+      "mass = {:g}           # kg.  QUESTION: what does it weigh?\n"
+      "track_gauge = {:g}   # m.  QUESTION: how far apart are its two sides?\n"
+      "mass_height = {:g}    # m.  QUESTION: how high over the floor is its centre of mass?\n",
+      nominal(Srv1::kMass), nominal(Srv1::kTrackGauge), nominal(Srv1::kMassHeight));
+}
+
 std::string speed_gene(const LogFigures& figures) {
   const Parameter& row = srv1_table()[row_of(Srv1::kFullSpeed)];
+  if (is_another_robot(figures)) {
+    return fmt::format("full_speed = \"table\"             # m/s; straight drives made {:.3g}\n",
+                       *figures.speed_m_s);
+  }
   if (!figures.speed_m_s) {
     return "# QUESTION: how fast is it at full duty?  No command of the log drives straight.\n"
            "full_speed = \"table\"             # m/s\n";
@@ -111,13 +141,7 @@ std::string config_of_log(const LogFigures& figures, const TrialLog& log,
          "scenario = \"srv1\"     # a robot on two sides that stands still before and after a "
          "command\n"
          "seed = 1\ntrials = [" +
-         files +
-         "]\n\n[parameters]\n"
-         "robot = \"treads\"      # QUESTION: treads, or wheels (four)?\n"
-         "mass = 0.35           # kg.  QUESTION: what does it weigh?\n"
-         "track_gauge = 0.085   # m.  QUESTION: how far apart are its two sides?\n"
-         "mass_height = 0.03    # m.  QUESTION: how high over the floor is its centre of mass?\n"
-         "\n# What evolution searches.\n[genes]\n" +
+         files + "]\n\n" + robot_text(figures) + "\n# What evolution searches.\n[genes]\n" +
          speed_gene(figures) +
          "# QUESTION: how long is the contact with the floor?  Half to twice that serves.\n"
          "contact_length = \"table\"         # m\n"

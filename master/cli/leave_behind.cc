@@ -17,18 +17,7 @@ namespace {
 
 Model model_of(const RunStore& store, const Problem& problem, const Config& config,
                const EvolveSummary& summary) {
-  Model model;
-  model.scenario = problem.scenario;
-  model.version = build_info().version;
-  model.fingerprint = build_info().fingerprint;
-  model.values = problem.values_of(summary.best->genome);
-  model.commands = problem.commands;
-  model.pieces = problem.pieces;
-  model.robot_file = problem.robot_file;
-  model.ground = problem.ground;
-  model.external = problem.external;
-  model.fitness = problem.fitness;
-  model.spread = problem.spread;
+  Model model = model_of_problem(problem, problem.values_of(summary.best->genome));
   model.score = fitness_of_cost(problem.fitness.kind, summary.best->cost);
   model.data = {store.info().problem_hash, problem.log.trials.size(), config.trial_files};
   model.origin = {store.run().string(), config.seed, summary.generations, summary.evaluations};

@@ -36,15 +36,7 @@ Result<Model> best_so_far(const RunReader& run) {
   const Result<Problem> problem = stored_problem(run);
   if (!problem) return problem.error();
   const StoredIndividual& best = members->front();
-  Model model;
-  model.scenario = problem->scenario;
-  model.version = build_info().version;
-  model.fingerprint = build_info().fingerprint;
-  model.values = problem->values_of(best.genome);
-  model.commands = problem->commands;
-  model.pieces = problem->pieces;
-  model.fitness = problem->fitness;
-  model.spread = problem->spread;
+  Model model = model_of_problem(*problem, problem->values_of(best.genome));
   model.score = best.fitness;
   model.data = {run.info().problem_hash, problem->log.trials.size(), {}};
   if (const auto config =

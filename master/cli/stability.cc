@@ -48,16 +48,8 @@ Status write_all(const StabilityCommand& command, const Config& config,
   const Status tried =
       command.outputs.write((out / "stability.csv").string(), tried_csv(report, config.problem));
   if (!tried) return tried;
-  Model model;
-  model.scenario = config.problem.scenario;
+  Model model = model_of_problem(config.problem, report.best.values);
   model.kind = "stable";
-  model.version = build_info().version;
-  model.fingerprint = build_info().fingerprint;
-  model.values = report.best.values;
-  model.commands = config.problem.commands;
-  model.pieces = config.problem.pieces;
-  model.fitness = config.problem.fitness;
-  model.spread = config.problem.spread;
   const std::string path = (out / "model.toml").string();
   if (Status s = check_model(model); !s) return Error{path + ": " + s.error().message};
   return command.outputs.write(path, format_model(model));

@@ -16,6 +16,7 @@ constexpr int kSteps = 16;  // of a way
 // its way out of a patch, that is so from some ratio on.
 constexpr std::array<double, 8> kRatios = {0.1, 0.14, 0.2, 0.3, 0.45, 0.67, 1.6, 2.5};
 constexpr std::array<std::size_t, 3> kGridRatios = {2, 4, 7};  // of these
+// Lengths for an SRV-1; a larger robot tells discs as much larger apart.
 constexpr std::array<double, 6> kPatchRadii_m = {0.14, 0.20, 0.28, 0.38, 0.50, 0.65};
 constexpr double kPatchStep_m = 0.1;
 constexpr double kApart_m = 0.08;  // discs nearer than this, in all of x, y and radius, are one
@@ -71,14 +72,15 @@ unsigned inside(const std::array<Eigen::Vector2d, 4>& contacts, const Patch& pat
 
 constexpr unsigned kAllInside = 15;
 
-bool near(const Patch& a, const Patch& b) {
-  return std::abs(a[0] - b[0]) < kApart_m && std::abs(a[1] - b[1]) < kApart_m &&
-         std::abs(a[2] - b[2]) < kApart_m;
+bool near(const Patch& a, const Patch& b, double apart_m) {
+  return std::abs(a[0] - b[0]) < apart_m && std::abs(a[1] - b[1]) < apart_m &&
+         std::abs(a[2] - b[2]) < apart_m;
 }
 
 }  // namespace
 
-PatchSketch::PatchSketch(const Problem& problem, const Study& study) : study_(study) {
+PatchSketch::PatchSketch(const Problem& problem, const Study& study)
+    : study_(study), scale_(problem.treads().scale()) {
   const Footprint footprint = footprint_of(problem, study);
   const double front = footprint.length_m / 2, side = footprint.gauge_m / 2;
   contacts_ = {Eigen::Vector2d(front, side), Eigen::Vector2d(-front, side),
@@ -108,10 +110,11 @@ void PatchSketch::lay_grid() {
     low = low.cwiseMin(Eigen::Vector2d(t.X_WS.x, t.X_WS.y));
     high = high.cwiseMax(Eigen::Vector2d(t.X_WS.x, t.X_WS.y));
   }
-  const double step = std::max(kPatchStep_m, (high - low).maxCoeff() / kMostSteps);
+  const double step = std::max(kPatchStep_m * scale_, (high - low).maxCoeff() / kMostSteps);
   std::vector<Eigen::VectorXd> marks;
   for (const std::size_t r : kGridRatios) {
-    for (double radius : kPatchRadii_m) {
+    for (double radius_m : kPatchRadii_m) {
+      const double radius = radius_m * scale_;
       for (double x = low.x(); x <= high.x(); x += step) {
         for (double y = low.y(); y <= high.y(); y += step) {
           const Patch patch = {x, y, radius, kRatios[r]};
@@ -229,7 +232,8 @@ Eigen::VectorXd PatchSketch::column(const Patch& patch) const {
 
 // Up the nearest hill, in ever smaller steps of place and radius and from ratio to ratio.
 void PatchSketch::climb(const Regression& explained, Place* place) const {
-  for (double step_m : {0.05, 0.025, 0.012}) {
+  for (double step : {0.05, 0.025, 0.012}) {
+    const double step_m = step * scale_;
     for (bool better = true; better;) {
       better = false;
       for (int k = 0; k < 8; ++k) {
@@ -244,7 +248,7 @@ void PatchSketch::climb(const Regression& explained, Place* place) const {
           if (to >= kRatios.size()) continue;
           next.patch[3] = kRatios[to];
         }
-        if (next.patch[2] < 0.08) continue;
+        if (next.patch[2] < 0.08 * scale_) continue;
         next.squares = explained.each_gain(column(next.patch, shifts_[to]))[0];
         if (next.squares <= place->squares * (1 + 1e-9)) continue;
         *place = next;
@@ -272,9 +276,10 @@ std::vector<PatchSketch::Place> PatchSketch::search(const Regression& explained,
   const auto best_first = [](const Place& a, const Place& b) { return a.squares > b.squares; };
   std::stable_sort(places.begin(), places.end(), best_first);
   std::vector<Place> apart;
-  const auto add = [](const Place& place, std::vector<Place>* to) {
-    const bool known = std::any_of(
-        to->begin(), to->end(), [&](const Place& other) { return near(place.patch, other.patch); });
+  const auto add = [&](const Place& place, std::vector<Place>* to) {
+    const bool known = std::any_of(to->begin(), to->end(), [&](const Place& other) {
+      return near(place.patch, other.patch, kApart_m * scale_);
+    });
     if (!known) to->push_back(place);
   };
   for (const Place& place : places) {

@@ -56,6 +56,7 @@ class PatchSketch {
   double fitted_ratio(const Regression& explained, const Patch& patch) const;
 
   const Study& study_;
+  double scale_ = 1;                         // TrackedTable::scale()
   std::array<Eigen::Vector2d, 4> contacts_;  // body axes, m
   double lateral_ = 1;                       // over longitudinal friction
   double creep_ = 0;

@@ -19,12 +19,14 @@ std::vector<Probe> probes_of(const EffectDiagnosis& row, const Study& study) {
   std::vector<Probe> all;
   for (const ProbedStep& step : row.steps) {
     const std::string key = std::string(row.effect) + "." + step.key;
-    const double neutral = (*study.table)[study.table->row(key)].nominal;
+    const Parameter& parameter = (*study.table)[study.table->row(key)];
+    const double neutral = parameter.nominal;
+    const double size = step.size * (parameter.unit == "m" ? study.scale : 1);
     Probe& probe = all.emplace_back();
     probe.effect = row.effect;
-    probe.plus = {{key, neutral + step.size}};
-    if (step.both_ways) probe.minus = {{key, neutral - step.size}};
-    probe.scale = (step.both_ways ? 2 : 1) * step.size;
+    probe.plus = {{key, neutral + size}};
+    if (step.both_ways) probe.minus = {{key, neutral - size}};
+    probe.scale = (step.both_ways ? 2 : 1) * size;
   }
   return all;
 }

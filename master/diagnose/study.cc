@@ -103,6 +103,7 @@ Result<Study> make_study(const Problem& problem, std::span<const Gene> genes) {
   study.subject = diagnosis_subject(problem);
   study.table = &problem.table();
   study.drive = drive_base(problem, genes);
+  study.scale = problem.treads().scale();
   study.base_parameters = study.drive.tuned;
   std::vector<DrivenCommand> driven;
   for (const Trial& trial : problem.log.trials) {

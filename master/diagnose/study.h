@@ -42,6 +42,7 @@ struct Study {
   bool reading_noise_known = true;     // from gaps between readings, rather than the config's
   Overrides base;                      // tuned values
   double speed_m_s = 0;                // tuned full speed
+  double scale = 1;                    // of lengths of the robot (TrackedTable::scale())
   std::vector<std::size_t> on_bounds;  // rows of the base that tuning left on their bounds
   Eigen::Index misfit_columns = 0;     // last nuisances: what repeats of a trial have in common
   // Of push logs: what a relative change of each of these parameters moves the base's ends by.

@@ -32,15 +32,15 @@ PatchSearch sketched_patches(Predictor& predictor, const Study& study) {
 // Whether a robot's contacts may come over the disc: on its way from the logged start to the end
 // that is predicted without it, which bows out no farther than an ellipse through both.
 bool drives_over(const Study& study, const ResidualTrial& trial, const Patch& patch) {
-  constexpr double kContacts_m = 0.11;  // half the diagonal of the largest robot of the table
-  constexpr double kSpare_m = 0.03, kSpareWay = 1.1;
+  // Half the diagonal of the largest robot of the SRV-1's table.
+  constexpr double kContacts_m = 0.11, kSpare_m = 0.03, kSpareWay = 1.1;
   const CommandSpec& command = study.cells[trial.cell].command;
   const Eigen::Vector2d from(trial.X_WS.x, trial.X_WS.y), to(trial.X_WP.x, trial.X_WP.y);
   const double way =
       kSpareWay * std::abs(command.left + command.right) / 2 * command.duration_s * study.speed_m_s;
   const double bow = std::sqrt(std::max(0.0, way * way - (to - from).squaredNorm())) / 2;
   return nearest_on_segment({patch[0], patch[1]}, from, to).distance <
-         patch[2] + bow + kContacts_m + kSpare_m;
+         patch[2] + bow + (kContacts_m + kSpare_m) * study.scale;
 }
 
 // A robot on two sides drives commands: srv1's, or one that a program of the user's simulates.

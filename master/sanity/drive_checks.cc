@@ -74,8 +74,8 @@ bool doubt_speed(const std::vector<DriveSample>& samples, const DriveLimits& lim
                          "Multiply x0, y0, x1 and y1 by " + few_digits(unit->metres) + "."});
   } else {
     findings->push_back({"robot_out_of_bounds", seen,
-                         "Check duties and durations: empty ones are the config's. Another kind of "
-                         "robot needs another scenario."});
+                         "Check duties and durations: empty ones are the config's. A robot of "
+                         "another size needs a file of its own, [robot] file = \"robot.toml\"."});
   }
   return true;
 }

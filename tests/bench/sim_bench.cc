@@ -3,6 +3,7 @@
 
 #include <array>
 
+#include "worker/scenarios/srv1_robot.h"
 #include "worker/sim/simulator.h"
 
 namespace gapfarm {
@@ -11,6 +12,11 @@ namespace {
 constexpr double kFullSpeed_m_s = 0.28;
 constexpr std::array<std::array<double, 2>, 6> kDuties{
     {{1, 1}, {-1, -1}, {-0.3, 0.3}, {0.3, -0.3}, {0.4, 1}, {1, 0.4}}};
+
+SimSettings srv1_settings() {
+  const ParameterValues values = srv1_table().nominal();
+  return sim_settings(srv1_robot().size(), values, ActiveEffects(srv1_table(), values));
+}
 
 DriveInput drive_of(const std::array<double, 2>& duty) {
   DriveInput drive;
@@ -35,7 +41,7 @@ void run_commands(benchmark::State& state, const SimSettings& settings, const Fl
 }
 
 void BM_TreadsSixCommands(benchmark::State& state) {
-  SimSettings settings;
+  SimSettings settings = srv1_settings();
   settings.step_rate_hz = static_cast<double>(state.range(0));
   run_commands(state, settings);
 }
@@ -53,12 +59,12 @@ void BM_TreadsSixCommandsEveryFloorEffect(benchmark::State& state) {
   floor.rolling_resistance = 0.05;
   floor.patch_radius_m = 0.1;
   floor.patch_ratio = 0.7;
-  run_commands(state, {}, floor);
+  run_commands(state, srv1_settings(), floor);
 }
 BENCHMARK(BM_TreadsSixCommandsEveryFloorEffect)->Unit(benchmark::kMillisecond);
 
 void BM_WheelsSixCommands(benchmark::State& state) {
-  SimSettings settings;
+  SimSettings settings = srv1_settings();
   settings.robot = RobotModel::kWheels;
   settings.wheel_shape = static_cast<WheelShape>(state.range(0));
   run_commands(state, settings);
@@ -66,7 +72,7 @@ void BM_WheelsSixCommands(benchmark::State& state) {
 BENCHMARK(BM_WheelsSixCommands)->DenseRange(0, 3)->Unit(benchmark::kMillisecond);
 
 void BM_Construct(benchmark::State& state) {
-  SimSettings settings;
+  SimSettings settings = srv1_settings();
   settings.robot = static_cast<RobotModel>(state.range(0));
   for (auto _ : state) {
     Simulator simulator(settings);
@@ -77,7 +83,7 @@ BENCHMARK(BM_Construct)->DenseRange(0, 1)->Unit(benchmark::kMicrosecond);
 
 // A run of no duration: reset and the 50 ms that count as rest.
 void BM_ResetAndRest(benchmark::State& state) {
-  SimSettings settings;
+  SimSettings settings = srv1_settings();
   settings.robot = static_cast<RobotModel>(state.range(0));
   Simulator simulator(settings);
   DriveInput drive;

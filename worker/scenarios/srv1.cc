@@ -69,15 +69,15 @@ void forget_over_moves(const std::vector<DrivenCommand>& driven,
 }
 
 // Whether a disc of floor can matter to a motion that ends at X_SE.
-bool patch_in_reach(const Floor& floor, const GroupMotion& motion, const Pose& X_SE) {
+bool patch_in_reach(const Floor& floor, const GroupMotion& motion, const Pose& X_SE, double scale) {
   if (floor.patch_ratio == 1) return false;
-  // The farthest contact that the parameter table allows (107 mm), half the way between two samples
-  // of the way at the greatest speed, and half the patch's rim.
+  // The farthest contact that the SRV-1's parameter table allows (107 mm), half the way between two
+  // samples of the way at the greatest speed, and half the patch's rim.
   constexpr double kRobotReach_m = 0.12;
   const Pose& end = motion.reference();
   const double astray = std::hypot(X_SE.x - end.x, X_SE.y - end.y);
   return motion.distance_from_way({floor.patch_x_m, floor.patch_y_m}) <
-         floor.patch_radius_m + kRobotReach_m + astray;
+         floor.patch_radius_m + kRobotReach_m * scale + astray;
 }
 
 // Where the robot may truly have been at the start of a trial that was read there.
@@ -94,7 +94,7 @@ std::vector<View> untwisted(std::vector<View> starts, const std::vector<StartTur
 
 // Whether what trials share says too little of one of them.
 bool simulate_alone(const Srv1Robot& robot, const ConditionGroup& group, const GroupMotion& motion,
-                    const Situation& situation, const Pose& X_SE) {
+                    const Situation& situation, const Pose& X_SE, double scale) {
   if (motion.jumps_over_heading()) return true;
   // A lone trial's reference starts at its own heading.
   const bool by_heading = robot.effects().motion_context() & kStartHeading;
@@ -102,7 +102,7 @@ bool simulate_alone(const Srv1Robot& robot, const ConditionGroup& group, const G
   if (!(robot.effects().motion_context() & kStartPlace)) return false;
   Floor floor;
   robot.effects().floor(situation, floor);
-  return patch_in_reach(floor, motion, X_SE);
+  return patch_in_reach(floor, motion, X_SE, scale);
 }
 
 class Srv1Model : public ScenarioModel {
@@ -248,7 +248,7 @@ Prediction Srv1Model::predict(const ParameterValues& values, const PredictOption
     Situation situation = reference_situation(group);
     situation.X_WR = X_WR;
     situation.session_time_s = trial.context.session_time_s;
-    if (simulate_alone(robot, group, motion, situation, X_SE)) {
+    if (simulate_alone(robot, group, motion, situation, X_SE, problem_.treads().scale())) {
       const Motion direct = robot.run(group.drive, situation, {});
       if (direct.outcome != MotionOutcome::kOk) return give_up(to_outcome(direct.outcome), group);
       X_SE = motion.spread_end(direct.X_SE);

@@ -43,8 +43,10 @@ class BulletVehicle final : public Vehicle {
 
 }  // namespace
 
-SimSettings sim_settings(const ParameterValues& values, const ActiveEffects& effects) {
+SimSettings sim_settings(const RobotSize& size, const ParameterValues& values,
+                         const ActiveEffects& effects) {
   SimSettings s;
+  s.size = size;
 #define ROW(name, row)
 #define SETTING(name, member, row) put(at(values, Srv1::name), s.member);
 #include "common/parameters/srv1_rows.inc"
@@ -78,7 +80,8 @@ Gains draw_gains(const NoiseSettings& noise, Stream& stream) {
 std::unique_ptr<Vehicle> make_vehicle(const Problem& problem, const ParameterValues& values,
                                       const ActiveEffects& effects, StepCounter* steps) {
   if (problem.external) return make_external_vehicle(problem, values, steps);
-  return std::make_unique<BulletVehicle>(sim_settings(values, effects), steps);
+  return std::make_unique<BulletVehicle>(sim_settings(problem.treads().size(), values, effects),
+                                         steps);
 }
 
 Srv1Robot::Srv1Robot(const ParameterValues& values, StepCounter* steps)

@@ -61,7 +61,8 @@ class Srv1Robot {
   unsigned runs_ = 0;
 };
 
-SimSettings sim_settings(const ParameterValues& values, const ActiveEffects& effects);
+SimSettings sim_settings(const RobotSize& size, const ParameterValues& values,
+                         const ActiveEffects& effects);
 
 // Pose `age_s` before the end of a path sampled from the start to rest, by interpolation; before
 // the first sample the robot stood at the first.

@@ -8,22 +8,24 @@
 #include <vector>
 
 #include "common/pose/pose.h"
+#include "common/robot/robot_size.h"
 
 namespace gapfarm {
 
 enum class RobotModel { kTreads, kWheels };
 enum class WheelShape { kSphere, kCylinder, kBox, kHull };
 
-// Builds the world and the robot; changing any of it means a new simulator.
+// Builds the world and the robot; changing any of it means a new simulator.  What is 0 here has to
+// be said: it is of the robot.
 struct SimSettings {
   RobotModel robot = RobotModel::kTreads;
-  double mass_kg = 0.35;
-  double contact_length_m = 0.07;  // front to rear contact, centre to centre
-  double track_gauge_m = 0.085;    // left to right contact
-  double friction = 0.6;           // along the treads
-  double friction_ratio = 1;       // lateral over longitudinal
-  double tread_creep = 0;          // slip over tread speed at 0.7 of full traction (treads)
-  double mass_height_m = 0.03;     // centre of mass over the floor
+  double mass_kg = 0;
+  double contact_length_m = 0;  // front to rear contact, centre to centre
+  double track_gauge_m = 0;     // left to right contact
+  double friction = 0;          // along the treads
+  double friction_ratio = 1;    // lateral over longitudinal
+  double tread_creep = 0;       // slip over tread speed at 0.7 of full traction (treads)
+  double mass_height_m = 0;     // centre of mass over the floor
   double gravity_m_s2 = 9.81;
   double step_rate_hz = 240;
   int sub_steps = 1;           // physics steps a step of 1/step_rate
@@ -33,6 +35,7 @@ struct SimSettings {
   double angular_damping = 0;
   double com_x_m = 0;  // centre of mass ahead of the tread centre
   double com_y_m = 0;  // and to its left
+  RobotSize size;
   // wheels only
   WheelShape wheel_shape = WheelShape::kSphere;
   double maximum_velocity_rad_s = 40;  // of a wheel at full duty

@@ -4,7 +4,6 @@
 #include <memory>
 #include <optional>
 
-#include "worker/sim/robot_size.h"
 #include "worker/sim/world.h"
 
 namespace gapfarm {
@@ -13,11 +12,11 @@ namespace {
 class Treads final : public Robot {
  public:
   explicit Treads(const SimSettings& settings)
-      : settings_(settings), sphere_(kContactRadius_m), compound_(false, 4) {
+      : settings_(settings), sphere_(settings.size.contact_radius_m), compound_(false, 4) {
     for (const double x : {0.5, -0.5}) {
       for (const double y : {0.5, -0.5}) {
         const btVector3 contact(x * settings.contact_length_m, y * settings.track_gauge_m,
-                                kContactRadius_m);
+                                settings.size.contact_radius_m);
         compound_.addChildShape(btTransform(btMatrix3x3::getIdentity(), contact + turning_centre()),
                                 &sphere_);
       }
@@ -26,9 +25,10 @@ class Treads final : public Robot {
 
   void enter(btDiscreteDynamicsWorld& world) override {
     const double share = settings_.mass_kg / 12;
-    const double l2 = kBodyLength_m * kBodyLength_m;
-    const double w2 = kBodyWidth_m * kBodyWidth_m;
-    const double h2 = kBodyHeight_m * kBodyHeight_m;
+    const RobotSize& size = settings_.size;
+    const double l2 = size.body_length_m * size.body_length_m;
+    const double w2 = size.body_width_m * size.body_width_m;
+    const double h2 = size.body_height_m * size.body_height_m;
     btRigidBody::btRigidBodyConstructionInfo info(settings_.mass_kg, nullptr, &compound_,
                                                   share * btVector3(w2 + h2, l2 + h2, l2 + w2));
     info.m_startWorldTransform.setOrigin(-turning_centre());

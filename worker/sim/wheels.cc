@@ -6,7 +6,6 @@
 #include <numbers>
 #include <optional>
 
-#include "worker/sim/robot_size.h"
 #include "worker/sim/world.h"
 
 namespace gapfarm {
@@ -14,35 +13,39 @@ namespace {
 
 // Collision margin of box, cylinder and hull wheels.  Bullet's default of 40 mm would be larger
 // than the wheel; shapes below keep their outer size whatever the margin is.
-constexpr double kMargin_m = 0.001;
+constexpr double kMargin_m = 0.001, kMarginShare = 0.25;  // of half the width, at most
 constexpr int kHullCorners = 16;
 constexpr int kWheels = 4;
+// Share of the mass in each wheel: 40 g of 350 g.  A share keeps the joints equally well
+// conditioned over the whole range of masses.
+constexpr double kWheelMassShare = 4.0 / 35.0;
 
-std::unique_ptr<btConvexShape> make_wheel_shape(WheelShape shape) {
-  const btVector3 half(kWheelRadius_m, kWheelHalfWidth_m, kWheelRadius_m);
+std::unique_ptr<btConvexShape> make_wheel_shape(WheelShape shape, const RobotSize& size) {
+  const btVector3 half(size.wheel_radius_m, size.wheel_half_width_m, size.wheel_radius_m);
+  const double margin = std::min(kMargin_m, kMarginShare * size.wheel_half_width_m);
   switch (shape) {
     case WheelShape::kSphere:
-      return std::make_unique<btSphereShape>(kWheelRadius_m);
+      return std::make_unique<btSphereShape>(size.wheel_radius_m);
     case WheelShape::kCylinder: {
       auto cylinder = std::make_unique<btCylinderShape>(half);
-      cylinder->setMargin(kMargin_m);
+      cylinder->setMargin(margin);
       return cylinder;
     }
     case WheelShape::kBox: {
       auto box = std::make_unique<btBoxShape>(half);
-      box->setMargin(kMargin_m);
+      box->setMargin(margin);
       return box;
     }
     case WheelShape::kHull:
       break;
   }
   auto hull = std::make_unique<btConvexHullShape>();
-  hull->setMargin(kMargin_m);  // a hull grows by its margin, so its corners lie that much inside
+  hull->setMargin(margin);  // a hull grows by its margin, so its corners lie that much inside
   for (int i = 0; i < kHullCorners; ++i) {
     const double angle = 2 * std::numbers::pi * (i + 0.5) / kHullCorners;
-    const double radius = kWheelRadius_m - kMargin_m;
+    const double radius = size.wheel_radius_m - margin;
     for (const double side : {-1.0, 1.0}) {
-      hull->addPoint(btVector3(radius * std::sin(angle), side * (kWheelHalfWidth_m - kMargin_m),
+      hull->addPoint(btVector3(radius * std::sin(angle), side * (size.wheel_half_width_m - margin),
                                -radius * std::cos(angle)),
                      false);
     }
@@ -55,8 +58,9 @@ class Wheels final : public Robot {
  public:
   explicit Wheels(const SimSettings& settings)
       : settings_(settings),
-        wheel_shape_(make_wheel_shape(settings.wheel_shape)),
-        chassis_shape_(btVector3(kBodyLength_m / 2, kBodyWidth_m / 2, kBodyHeight_m / 2)) {}
+        wheel_shape_(make_wheel_shape(settings.wheel_shape, settings.size)),
+        chassis_shape_(btVector3(settings.size.body_length_m / 2, settings.size.body_width_m / 2,
+                                 settings.size.body_height_m / 2)) {}
 
   void enter(btDiscreteDynamicsWorld& world) override {
     const double wheel_mass = kWheelMassShare * settings_.mass_kg;
@@ -68,7 +72,8 @@ class Wheels final : public Robot {
       const bool front = i < 2;
       const bool is_left = i % 2 == 0;
       const btVector3 hub((front ? 0.5 : -0.5) * settings_.contact_length_m,
-                          (is_left ? 0.5 : -0.5) * settings_.track_gauge_m, kWheelRadius_m);
+                          (is_left ? 0.5 : -0.5) * settings_.track_gauge_m,
+                          settings_.size.wheel_radius_m);
       wheels_[i].emplace(construction(wheel_mass, *wheel_shape_, hub));
       add(world, *wheels_[i], kContactGroup, kFloorGroup);
     }
@@ -91,7 +96,8 @@ class Wheels final : public Robot {
 
   void drive(const SideSpeeds& speeds, double dt_s) override {
     for (int i = 0; i < kWheels; ++i) {
-      const double speed = (i % 2 == 0 ? speeds.left : speeds.right) / kWheelRadius_m;
+      const double speed =
+          (i % 2 == 0 ? speeds.left : speeds.right) / settings_.size.wheel_radius_m;
       const double limit = settings_.maximum_velocity_rad_s;
       // Bullet's hinge turns its first body, the chassis, about the axle against the wheel.
       hinges_[i]->enableAngularMotor(true, -std::clamp(speed, -limit, limit),

@@ -7,8 +7,6 @@
 namespace gapfarm {
 namespace {
 
-// Contacts give a little: load sharing among four supports has one answer instead of many.
-constexpr double kContactSoftness = 1e-3;
 // Velocity change, squared, (m/s)^2, below which the solver stops iterating early.
 constexpr double kConverged = 1e-20;
 
@@ -145,7 +143,7 @@ void RobotWorld::prepare_contacts() {
       point.m_lateralFrictionDir2 = left;
       // Wanted velocity of the first body over the second where they touch.
       point.m_contactMotion1 = floor_is_second ? speed : -speed;
-      point.m_contactCFM = kContactSoftness;
+      point.m_contactCFM = settings_.size.contact_softness;
       point.m_contactERP = getSolverInfo().m_erp2;
       point.m_contactPointFlags |=
           BT_CONTACT_FLAG_LATERAL_FRICTION_INITIALIZED | BT_CONTACT_FLAG_HAS_CONTACT_CFM;

@@ -8,7 +8,9 @@ namespace gapfarm {
 namespace {
 
 constexpr double kProbedTilt_rad = 0.05;
-constexpr double kLowMass_m = 0.002;  // hardly over the floor
+
+// Hardly over the floor: twice what the table allows.
+double low_mass_m(const Study& study) { return 2 * (*study.table)[*study.drive.mass_height].lower; }
 
 // A tilt also shifts the load, the more the higher the mass lies, which no flat floor shows.  A
 // program's mass lies where it lies.
@@ -28,7 +30,7 @@ std::vector<Probe> tilt_probes(const Study& study) {
     add({});
     return all;
   }
-  for (double height : {study.base.at(*study.drive.mass_height), kLowMass_m}) {
+  for (double height : {study.base.at(*study.drive.mass_height), low_mass_m(study)}) {
     add({{"mass_height", height}});
   }
   return all;
@@ -59,7 +61,7 @@ std::vector<Signature> tilt_signatures(const Study& study, ProbedSlopes slopes) 
   std::vector<Signature> all = {tilt_signature(study, slopes[0], slopes[1])};
   if (slopes.size() < 4) return all;
   all.push_back(tilt_signature(study, slopes[2], slopes[3]));
-  all.back().fixed = {{"mass_height", kLowMass_m}};
+  all.back().fixed = {{"mass_height", low_mass_m(study)}};
   return all;
 }
 

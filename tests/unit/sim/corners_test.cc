@@ -16,7 +16,7 @@ SimSettings corner_settings(RobotModel robot, unsigned corner) {
   const auto pick = [&](double low, double high) {
     return (corner >> bit++ & 1) != 0 ? high : low;
   };
-  SimSettings settings;
+  SimSettings settings = srv1_settings();
   settings.robot = robot;
   settings.mass_kg = pick(0.2, 0.6);
   settings.contact_length_m = pick(0.03, 0.11);

@@ -29,7 +29,7 @@ class Draw {
 };
 
 SimSettings draw_settings(Draw& draw, RobotModel robot) {
-  SimSettings settings;
+  SimSettings settings = srv1_settings();
   settings.robot = robot;
   settings.contact_length_m = draw.uniform(0.03, 0.11);
   settings.track_gauge_m = draw.uniform(0.05, 0.12);

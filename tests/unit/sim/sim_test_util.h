@@ -6,6 +6,7 @@
 #include <numbers>
 #include <vector>
 
+#include "worker/scenarios/srv1_robot.h"
 #include "worker/sim/simulator.h"
 
 namespace gapfarm {
@@ -40,6 +41,11 @@ inline DriveInput drive_of(const Command& command, double duration_s = 1) {
 inline DriveInput mirrored(DriveInput drive) {
   std::swap(drive.left, drive.right);
   return drive;
+}
+
+inline SimSettings srv1_settings() {
+  const ParameterValues values = srv1_table().nominal();
+  return sim_settings(srv1_robot().size(), values, ActiveEffects(srv1_table(), values));
 }
 
 inline double degrees(double rad) { return rad * 180 / std::numbers::pi; }

@@ -12,7 +12,7 @@ namespace gapfarm {
 namespace {
 
 struct Point {
-  SimSettings settings;
+  SimSettings settings = srv1_settings();
   DriveInput drive;
   Floor floor;
 };

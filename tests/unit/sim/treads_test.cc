@@ -13,7 +13,7 @@ TEST(Treads, StraightDistanceIsSpeedTimesDuration) {
   // lost at the start comes back at the end.
   for (const double speed : {0.28, -0.28, 0.1}) {
     for (const double duration : {0.5, 1.0, 1.5, 0.8765}) {
-      const Motion motion = run_once({}, drive_at(speed, speed, duration));
+      const Motion motion = run_once(srv1_settings(), drive_at(speed, speed, duration));
       ASSERT_EQ(motion.outcome, MotionOutcome::kOk);
       EXPECT_NEAR(motion.X_SE.x, speed * duration, 1e-3);
       EXPECT_NEAR(motion.X_SE.y, 0, 1e-5);
@@ -24,19 +24,19 @@ TEST(Treads, StraightDistanceIsSpeedTimesDuration) {
 
 TEST(Treads, LagDelaysButKeepsTheDistance) {
   DriveInput drive = drive_at(0.28, 0.28);
-  const double without = run_once({}, drive).rest_time_s;
+  const double without = run_once(srv1_settings(), drive).rest_time_s;
   drive.left.lag_s = drive.right.lag_s = 0.1;
-  const Motion motion = run_once({}, drive);
+  const Motion motion = run_once(srv1_settings(), drive);
   EXPECT_NEAR(motion.X_SE.x, 0.28, 1e-3);
   EXPECT_GT(motion.rest_time_s, without + 0.3);
 }
 
 TEST(Treads, DeadTravelShortensTheDriveByItself) {
   DriveInput drive = drive_at(0.28, 0.28);
-  const double without = run_once({}, drive).X_SE.x;
+  const double without = run_once(srv1_settings(), drive).X_SE.x;
   for (const double dead : {0.002, 0.01}) {
     drive.left.dead_travel_m = drive.right.dead_travel_m = dead;
-    EXPECT_NEAR(without - run_once({}, drive).X_SE.x, dead, 1e-4);
+    EXPECT_NEAR(without - run_once(srv1_settings(), drive).X_SE.x, dead, 1e-4);
   }
 }
 
@@ -63,7 +63,7 @@ TEST(Treads, TurnsInPlaceAtTheRateOfCoulombFriction) {
   for (const double length : {0.04, 0.07, 0.09, 0.11}) {
     for (const double gauge : {0.06, 0.085, 0.12}) {
       for (const double ratio : {0.5, 1.0, 1.5}) {
-        SimSettings settings;
+        SimSettings settings = srv1_settings();
         settings.contact_length_m = length;
         settings.track_gauge_m = gauge;
         settings.friction_ratio = ratio;
@@ -78,7 +78,7 @@ TEST(Treads, TurnsInPlaceAtTheRateOfCoulombFriction) {
 TEST(Treads, SteadyTurnRateIgnoresFrictionMassAndGravity) {
   const double expected = coulomb_turn_rate({}, 0.1);
   for (const double factor : {0.5, 2.0}) {
-    SimSettings settings;
+    SimSettings settings = srv1_settings();
     settings.friction *= factor;
     settings.mass_kg *= factor;
     settings.gravity_m_s2 *= factor;
@@ -88,7 +88,7 @@ TEST(Treads, SteadyTurnRateIgnoresFrictionMassAndGravity) {
 
 TEST(Treads, TurnAngleHardlyDependsOnTheStep) {
   // 45 mm half-length and full speed, the case in which stock Bullet does not turn at all.
-  SimSettings settings;
+  SimSettings settings = srv1_settings();
   settings.contact_length_m = 0.09;
   const DriveInput drive = drive_at(-0.28, 0.28, 0.8);
   settings.step_rate_hz = 960;
@@ -103,7 +103,7 @@ TEST(Treads, TurnAngleHardlyDependsOnTheStep) {
 TEST(Treads, LongerContactTurnsLess) {
   double last = 1e9;
   for (double length = 0.03; length < 0.115; length += 0.01) {
-    SimSettings settings;
+    SimSettings settings = srv1_settings();
     settings.contact_length_m = length;
     const double angle = run_once(settings, drive_of(kCommands[2])).X_SE.theta;
     EXPECT_LT(angle, last);
@@ -113,7 +113,7 @@ TEST(Treads, LongerContactTurnsLess) {
 
 TEST(Treads, MirrorImagesOfCommandsGiveMirrorImagesOfMotion) {
   for (const double rate : {120.0, 240.0}) {
-    SimSettings settings;
+    SimSettings settings = srv1_settings();
     settings.step_rate_hz = rate;
     Simulator simulator(settings);
     for (const Command& command : kCommands) {
@@ -127,7 +127,7 @@ TEST(Treads, MirrorImagesOfCommandsGiveMirrorImagesOfMotion) {
 
 TEST(Treads, RestsOnSlopesBelowTheAngleOfFrictionAndSlidesAbove) {
   for (const double friction : {0.2, 0.6}) {
-    SimSettings settings;
+    SimSettings settings = srv1_settings();
     settings.friction = friction;
     for (const double direction : {0.0, 1.0, 2.5}) {
       Floor floor;
@@ -151,7 +151,7 @@ TEST(Treads, RestsOnSlopesBelowTheAngleOfFrictionAndSlidesAbove) {
 
 TEST(Treads, CoastsBySpeedSquaredOverTwiceTheFrictionWhenTheTreadsLock) {
   for (const double friction : {0.1, 0.3, 0.6}) {
-    SimSettings settings;
+    SimSettings settings = srv1_settings();
     settings.friction = friction;
     settings.step_rate_hz = 960;
     std::vector<MotionSample> path;
@@ -167,7 +167,7 @@ TEST(Treads, CoastsBySpeedSquaredOverTwiceTheFrictionWhenTheTreadsLock) {
 TEST(Treads, EnergyNeverGrowsWithoutDrive) {
   for (const double restitution : {0.0, 0.5}) {
     for (const double tilt : {0.0, 0.4, 0.7}) {
-      SimSettings settings;
+      SimSettings settings = srv1_settings();
       settings.restitution = restitution;
       Floor floor;
       floor.tilt_rad = tilt;
@@ -193,7 +193,7 @@ TEST(Treads, EnergyNeverGrowsWithoutDrive) {
 
 TEST(Treads, DragLengthensTheStartAndShortensTheStop) {
   // With drag k g the start accelerates at (mu - k) g and the stop brakes at (mu + k) g.
-  SimSettings settings;
+  SimSettings settings = srv1_settings();
   settings.step_rate_hz = 960;
   const double without = run_once(settings, drive_at(0.28, 0.28)).X_SE.x;
   const double k = 0.1;
@@ -217,7 +217,7 @@ TEST(Treads, DragLengthensTheStartAndShortensTheStop) {
 TEST(Treads, DragAtTheFloorDoesNotDependOnTheHeightOfTheMass) {
   Floor floor;
   floor.rolling_resistance = 0.1;
-  SimSettings settings;
+  SimSettings settings = srv1_settings();
   settings.tread_creep = 0.05;
   settings.contact_length_m = 0.04;
   const auto lost = [&](double height_m) {
@@ -230,7 +230,7 @@ TEST(Treads, DragAtTheFloorDoesNotDependOnTheHeightOfTheMass) {
 
 TEST(Treads, CreepsByItsShareOfTheTractionThatItNeeds) {
   // Traction share q slips at creep v q / sqrt(1 - q^2): drag coefficient over friction is q.
-  SimSettings settings;
+  SimSettings settings = srv1_settings();
   settings.tread_creep = 0.05;
   Floor floor;
   const double v = 0.28;
@@ -248,26 +248,28 @@ TEST(Treads, CreepsByItsShareOfTheTractionThatItNeeds) {
 }
 
 TEST(Treads, WithLittleCreepSlidesAsWithNone) {
-  SimSettings creeping;
+  SimSettings creeping = srv1_settings();
   creeping.tread_creep = 1e-4;
   for (const Command& command : kCommands) {
     const Pose with = run_once(creeping, drive_of(command)).X_SE;
-    const Pose without = run_once({}, drive_of(command)).X_SE;
+    const Pose without = run_once(srv1_settings(), drive_of(command)).X_SE;
     EXPECT_LT(distance_m(with, without), 5e-4) << command.name;
     EXPECT_NEAR(with.theta, without.theta, 3e-3) << command.name;
   }
 }
 
 TEST(Treads, PatchEverywhereIsAnotherFriction) {
-  SimSettings slippery;
+  SimSettings slippery = srv1_settings();
   slippery.friction *= 0.5;
   Floor floor;
   floor.patch_radius_m = 10;
   floor.patch_ratio = 0.5;
   const DriveInput drive = drive_of(kCommands[4]);
-  EXPECT_LT(distance_m(run_once({}, drive, floor).X_SE, run_once(slippery, drive).X_SE), 1e-9);
+  EXPECT_LT(
+      distance_m(run_once(srv1_settings(), drive, floor).X_SE, run_once(slippery, drive).X_SE),
+      1e-9);
   floor.patch_ratio = 1;
-  EXPECT_TRUE(same(run_once({}, drive, floor), run_once({}, drive)));
+  EXPECT_TRUE(same(run_once(srv1_settings(), drive, floor), run_once(srv1_settings(), drive)));
 }
 
 TEST(Treads, SlipperyPatchUnderOneSideTurnsTheStartTowardIt) {
@@ -275,13 +277,14 @@ TEST(Treads, SlipperyPatchUnderOneSideTurnsTheStartTowardIt) {
   floor.patch_y_m = 0.085 / 2;
   floor.patch_radius_m = 0.06;
   floor.patch_ratio = 0.2;
-  EXPECT_GT(run_once({}, drive_at(0.28, 0.28), floor).X_SE.theta, radians(1));
+  EXPECT_GT(run_once(srv1_settings(), drive_at(0.28, 0.28), floor).X_SE.theta, radians(1));
   floor.patch_x_m = 5;
-  EXPECT_TRUE(same(run_once({}, drive_at(0.28, 0.28), floor), run_once({}, drive_at(0.28, 0.28))));
+  EXPECT_TRUE(same(run_once(srv1_settings(), drive_at(0.28, 0.28), floor),
+                   run_once(srv1_settings(), drive_at(0.28, 0.28))));
 }
 
 TEST(Treads, MassAheadSwingsTheTurningCentre) {
-  SimSettings ahead;
+  SimSettings ahead = srv1_settings();
   ahead.com_x_m = 0.01;
   const DriveInput turn = drive_of(kCommands[2], 1.4);
   const Pose pose = run_once(ahead, turn).X_SE;
@@ -293,9 +296,9 @@ TEST(Treads, MassAheadSwingsTheTurningCentre) {
 }
 
 TEST(Treads, MassToTheLeftMirrorsMassToTheRight) {
-  SimSettings left;
+  SimSettings left = srv1_settings();
   left.com_y_m = 0.008;
-  SimSettings right;
+  SimSettings right = srv1_settings();
   right.com_y_m = -0.008;
   for (const Command& command : kCommands) {
     const Pose ours = run_once(left, drive_of(command)).X_SE;
@@ -307,7 +310,7 @@ TEST(Treads, MassToTheLeftMirrorsMassToTheRight) {
 TEST(Treads, TopplesOnASlopeWhereTheMassPassesTheLowerContacts) {
   // The centre of mass passes the lower contacts at atan(15 / 30) = 27 degrees; friction holds to
   // 56.
-  SimSettings settings;
+  SimSettings settings = srv1_settings();
   settings.contact_length_m = 0.03;
   settings.friction = 1.5;
   Floor floor;
@@ -321,12 +324,13 @@ TEST(Treads, TopplesOnASlopeWhereTheMassPassesTheLowerContacts) {
 
 TEST(Treads, NonsenseSpeedsAreDiverged) {
   const double infinity = std::numeric_limits<double>::infinity();
-  EXPECT_EQ(run_once({}, drive_at(infinity, 0.1)).outcome, MotionOutcome::kDiverged);
+  EXPECT_EQ(run_once(srv1_settings(), drive_at(infinity, 0.1)).outcome, MotionOutcome::kDiverged);
 }
 
 TEST(Treads, PathStartsAtTheOriginAndEndsAtRest) {
   std::vector<MotionSample> path;
-  const Motion motion = Simulator({}).run(drive_of(kCommands[4], 0.6), {}, &path, 0.05);
+  const Motion motion =
+      Simulator(srv1_settings()).run(drive_of(kCommands[4], 0.6), {}, &path, 0.05);
   EXPECT_EQ(path.front().t_s, 0);
   EXPECT_EQ(path.front().X_SB, Pose{});
   for (std::size_t i = 0; i + 1 < path.size(); ++i) {
@@ -334,7 +338,7 @@ TEST(Treads, PathStartsAtTheOriginAndEndsAtRest) {
   }
   EXPECT_EQ(path.back().X_SB, motion.X_SE);
   EXPECT_EQ(path.back().t_s, motion.duration_s);
-  EXPECT_TRUE(same(motion, Simulator({}).run(drive_of(kCommands[4], 0.6), {})))
+  EXPECT_TRUE(same(motion, Simulator(srv1_settings()).run(drive_of(kCommands[4], 0.6), {})))
       << "looking does not change the motion";
 }
 

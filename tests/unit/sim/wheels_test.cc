@@ -8,7 +8,7 @@ namespace gapfarm {
 namespace {
 
 SimSettings wheels(WheelShape shape = WheelShape::kSphere) {
-  SimSettings settings;
+  SimSettings settings = srv1_settings();
   settings.robot = RobotModel::kWheels;
   settings.wheel_shape = shape;
   return settings;

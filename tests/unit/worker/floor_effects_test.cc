@@ -7,7 +7,6 @@
 
 #include "tests/unit/worker/effect_util.h"
 #include "worker/scenarios/srv1_motions.h"
-#include "worker/sim/robot_size.h"
 
 namespace gapfarm {
 namespace {

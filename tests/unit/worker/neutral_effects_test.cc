@@ -10,9 +10,18 @@
 namespace gapfarm {
 namespace {
 
-TEST(Settings, AtNominalParametersAreTheDefaults) {
+TEST(Settings, AtNominalParametersAreTheRobotsOwn) {
   const ParameterValues nominal = srv1_table().nominal();
-  EXPECT_EQ(sim_settings(nominal, ActiveEffects(srv1_table(), nominal)), SimSettings{});
+  const RobotSize& size = srv1_robot().size();
+  const SimSettings own = sim_settings(size, nominal, ActiveEffects(srv1_table(), nominal));
+  SimSettings expected;
+  expected.size = size;
+  expected.mass_kg = 0.35;
+  expected.contact_length_m = 0.07;
+  expected.track_gauge_m = 0.085;
+  expected.friction = 0.6;
+  expected.mass_height_m = 0.03;
+  EXPECT_EQ(own, expected);
 }
 
 using tests::small_problem;
