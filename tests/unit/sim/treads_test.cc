@@ -76,7 +76,7 @@ TEST(Treads, TurnsInPlaceAtTheRateOfCoulombFriction) {
 }
 
 TEST(Treads, SteadyTurnRateIgnoresFrictionMassAndGravity) {
-  const double expected = coulomb_turn_rate({}, 0.1);
+  const double expected = coulomb_turn_rate(srv1_settings(), 0.1);
   for (const double factor : {0.5, 2.0}) {
     SimSettings settings = srv1_settings();
     settings.friction *= factor;
