@@ -25,7 +25,7 @@ constexpr int kMostPatchSearches = 4;
 // The ratio is what the sketch is least sure of.
 constexpr std::array<double, 3> kRatioPowers = {0.5, 1, 2};
 constexpr double kLeastRatio = 0.06, kMostRatio = 2.9;
-// Moves of discs: standard deviations at first, and how they go on.
+// Moves of discs: standard deviations at first, for an SRV-1, and how they go on.
 constexpr double kMove_m = 0.05, kMoveRatio = 0.4, kMovesShrink = 0.7, kLeastRadius_m = 0.05;
 constexpr int kMoves = 6;
 constexpr std::size_t kMostParents = 3, kOffspring = 12;
@@ -99,8 +99,9 @@ Status Selector::refine_patch(const Regression& explained, std::vector<EffectCan
     std::vector<Patch> moved;
     for (std::size_t i = 0; i < kOffspring; ++i) {
       Patch& to = moved.emplace_back(patch_of(discs[i % discs.size()].signature));
-      for (std::size_t c = 0; c < 3; ++c) to[c] += scale * kMove_m * stream.normal();
-      to[2] = std::max(to[2], kLeastRadius_m);
+      for (std::size_t c = 0; c < 3; ++c)
+        to[c] += scale * kMove_m * study_->scale * stream.normal();
+      to[2] = std::max(to[2], kLeastRadius_m * study_->scale);
       to[3] = std::clamp(to[3] * std::exp(scale * kMoveRatio * stream.normal()), kLeastRatio,
                          kMostRatio);
     }
@@ -127,7 +128,8 @@ Status Selector::search_patches(const Regression& explained, double most_gain) {
   for (const Patch& place : *places) {
     const bool known =
         std::any_of(refined_patches_.begin(), refined_patches_.end(), [&](const Patch& p) {
-          return std::hypot(p[0] - place[0], p[1] - place[1], p[2] - place[2]) < 0.15;
+          return std::hypot(p[0] - place[0], p[1] - place[1], p[2] - place[2]) <
+                 0.15 * study_->scale;
         });
     if (known) continue;
     for (const double power : kRatioPowers) {
