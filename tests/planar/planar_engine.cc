@@ -72,7 +72,6 @@ class PlanarEngine : public Engine {
     const Eigen::Vector2d g = downhill();
     const double cx = scene_.com_x_m + lever * (g.x() - pull_.x());
     const double cy = scene_.com_y_m + lever * (g.y() - pull_.y());
-    const double weight = r.mass_kg * kGravity_m_s2 * std::cos(scene_.floor.tilt_rad);
     const double to_left = std::clamp(0.5 + cy / r.gauge_m, 0.0, 1.0);
     std::array<double, kStrips> shape;
     double sum = 0;
@@ -82,8 +81,8 @@ class PlanarEngine : public Engine {
     }
     Loads all;
     for (std::size_t i = 0; i < kStrips; ++i) {
-      all[0][i] = weight * to_left * shape[i] / sum;
-      all[1][i] = weight * (1 - to_left) * shape[i] / sum;
+      all[0][i] = weight() * to_left * shape[i] / sum;
+      all[1][i] = weight() * (1 - to_left) * shape[i] / sum;
     }
     return all;
   }
@@ -96,21 +95,22 @@ class PlanarEngine : public Engine {
     return scene_.robot.friction * (inside ? f.patch_ratio : 1);
   }
 
-  // Force over velocity of what drags a point that carries `load` and moves at (u, w) in the
-  // robot's frame, N s/m, along the body and across.
-  Eigen::Vector2d drag(double load, double u, double w) const {
+  double weight() const {
+    return scene_.robot.mass_kg * kGravity_m_s2 * std::cos(scene_.floor.tilt_rad);
+  }
+
+  // Force over velocity of what drags a tread that carries `load` and rolls at `u`, N s/m.
+  double rolling_drag(double load, double u) const {
+    return scene_.floor.rolling_resistance * load / std::hypot(u, kDragRate_m_s);
+  }
+
+  // The same of the nap, which drags the robot by where it travels, however it turns.
+  double nap_drag() const {
     const Floor& f = scene_.floor;
-    Eigen::Vector2d c(0, 0);
-    if (f.rolling_resistance != 0) {
-      c.x() += f.rolling_resistance * load / std::hypot(u, kDragRate_m_s);
-    }
-    if (f.nap_strength != 0) {
-      const double angle = f.nap_direction_rad - X_WR_.theta;
-      const double speed = std::hypot(u, w, kDragRate_m_s);
-      const double against = (1 - (u * std::cos(angle) + w * std::sin(angle)) / speed) / 2;
-      c.array() += f.nap_strength * load * against / speed;
-    }
-    return c;
+    const double angle = f.nap_direction_rad - X_WR_.theta;
+    const double speed = std::hypot(velocity_[0], velocity_[1], kDragRate_m_s);
+    const double along = velocity_[0] * std::cos(angle) + velocity_[1] * std::sin(angle);
+    return f.nap_strength * weight() * (1 - along / speed) / 2 / speed;
   }
 
   // Force over slip of a strip, along and across; `told` says which of its ends is the front.
@@ -133,6 +133,7 @@ class PlanarEngine : public Engine {
     Eigen::Matrix3d a = (inertia / kStep_s).asDiagonal();
     Eigen::Vector3d b = (inertia / kStep_s).cwiseProduct(velocity_);
     b.head<2>() += r.mass_kg * downhill();
+    a.diagonal().head<2>().array() += nap_drag();
     const Loads load = loads();
     for (std::size_t side = 0; side < 2; ++side) {
       for (std::size_t i = 0; i < kStrips; ++i) {
@@ -141,7 +142,7 @@ class PlanarEngine : public Engine {
         const double u = velocity_[0] - ry * velocity_[2], w = velocity_[1] + rx * velocity_[2];
         const double tread = treads[side];
         const Eigen::Vector2d c = grip(x, y, load[side][i], u - tread, w, tread, told[side]);
-        const Eigen::Vector2d d = c + drag(load[side][i], u, w);
+        const Eigen::Vector2d d(c.x() + rolling_drag(load[side][i], u), c.y());
         a(0, 0) += d.x();
         a(0, 2) -= d.x() * ry;
         a(1, 1) += d.y();

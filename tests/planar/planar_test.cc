@@ -108,6 +108,16 @@ TEST(PlanarEngine, DragStopsItSoonerThanItStartsIt) {
   EXPECT_NEAR(end_of(nap, drive_of(-0.28, -0.28)).x, -free, 5e-4);
 }
 
+TEST(PlanarEngine, NapDragsByWhereTheRobotTravels) {
+  Scene nap;
+  nap.floor.nap_strength = 0.3;
+  // It goes nowhere, so nothing drags it, though its treads slide both ways.
+  const Pose turned = end_of(nap, drive_of(-0.06, 0.06)), free = end_of({}, drive_of(-0.06, 0.06));
+  EXPECT_NEAR(turned.x, 0, 1e-6);
+  EXPECT_NEAR(turned.y, 0, 1e-6);
+  EXPECT_NEAR(turned.theta, free.theta, 1e-6);
+}
+
 TEST(PlanarEngine, ATreadThatGripsTakesTheRobotAlongWhenTheOtherIsOnIce) {
   Scene left, right;
   left.floor = {.patch_ratio = 0.1, .patch_x_m = 0, .patch_y_m = 1, .patch_radius_m = 0.99};
