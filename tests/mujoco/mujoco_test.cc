@@ -54,6 +54,19 @@ TEST(MujocoEngine, ADriveAgainIsTheSameDrive) {
   EXPECT_EQ(engine->drive({}, drive_of(0.11, 0.28)).back().X_WR, once);
 }
 
+// A robot that hops from wheel to wheel does not.
+TEST(MujocoEngine, TurnsAlmostAlikeWhenDrivenAlmostAlike) {
+  for (const double friction : {0.46, 0.6, 0.78}) {
+    Scene scene;
+    scene.robot.friction = friction;
+    const double turn = end_of(scene, drive_of(0.084, 0.21)).theta;
+    for (const double factor : {0.997, 0.999, 1.001, 1.003}) {
+      const double other = end_of(scene, drive_of(0.084 * factor, 0.21 * factor)).theta;
+      EXPECT_NEAR(other, factor * turn, 0.008 * turn) << friction << " " << factor;
+    }
+  }
+}
+
 TEST(MujocoEngine, SlidesDownhillInTurnsAndStaysOtherwise) {
   Scene scene;
   scene.floor.tilt_rad = 0.1;
