@@ -38,6 +38,51 @@ Model random_model(std::uint64_t seed) {
   return model;
 }
 
+// A tracked robot that is no SRV-1, with a lag of its own.
+constexpr const char* kOwnRobot = R"(name = "tank"
+drive = "tracked"
+commands = ["left", "right"]
+wheel_separation = 0.4
+full_surface_speed = 0.6
+mass = 12.0
+lag = 0.1
+[wheels.left]
+contact_length = 0.35
+radius = 0.1
+[wheels.right]
+contact_length = 0.35
+radius = 0.1
+)";
+
+TEST(Model, KeepsARobotOfTrialsFromRest) {
+  TemporaryFolder folder;
+  folder.write("tank.toml", kOwnRobot);
+  const auto config = parse_config(
+      "scenario = \"srv1\"\n[robot]\nfile = \"tank.toml\"\n[parameters]\nmass = 20.0\n"
+      "[genes]\ncontact_length = \"table\"\n",
+      folder.path("config.toml"));
+  ASSERT_TRUE(config.ok()) << config.error().message;
+  const Problem& problem = config->problem;
+  const std::size_t lag = problem.table().row("motor_lag.tau");
+  EXPECT_EQ(problem.values[row_of(Srv1::kMass)], 20);
+  EXPECT_EQ(problem.values[row_of(Srv1::kTrackGauge)], 0.4);
+  EXPECT_EQ(problem.values[lag], 0.1);
+  EXPECT_EQ(problem.genes[0].upper, 0.7);
+  // With the file's lag, and as another base that has none.
+  for (const double tau : {0.1, 0.0}) {
+    ParameterValues values = problem.values;
+    values[lag] = tau;
+    const Model model = model_of_problem(problem, values);
+    ASSERT_TRUE(write_model(model, folder.path("model.toml")).ok());
+    const auto again = read_model(folder.path("model.toml"));
+    ASSERT_TRUE(again.ok()) << again.error().message;
+    EXPECT_EQ(again->values, values);
+    EXPECT_EQ(again->robot_file, kOwnRobot);
+    EXPECT_EQ(problem_hash(to_proto(problem_of(*again))),
+              problem_hash(to_proto(problem_of(model))));
+  }
+}
+
 TEST(Model, ReadsBackToTheBit) {
   TemporaryFolder folder;
   for (std::uint64_t seed = 0; seed < 20; ++seed) {

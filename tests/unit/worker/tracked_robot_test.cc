@@ -7,6 +7,7 @@
 #include <string>
 
 #include "common/parameters/srv1_robot_file.h"
+#include "common/robot/robot_file.h"
 #include "common/trials/files.h"
 #include "tests/unit/worker/problems.h"
 #include "worker/evaluate.h"
@@ -80,6 +81,17 @@ TEST(TrackedRobot, TheSrv1sFileGivesTheSrv1sTable) {
   EXPECT_EQ(problem.tracked->values(), srv1_table().nominal());
   EXPECT_EQ(problem.treads().size(), srv1_robot().size());
   EXPECT_EQ(problem.treads().scale(), 1);
+}
+
+TEST(TrackedRobot, AFileAsGapfarmWritesItIsTheSameRobot) {
+  for (const char* text : {kSrv1RobotFile, kBigRobot}) {
+    const auto robot = parse_robot(text, "robot.toml");
+    ASSERT_TRUE(robot.ok()) << robot.error().message;
+    const Problem read = with_robot(tests::empty_problem(), text);
+    const Problem again = with_robot(tests::empty_problem(), format_robot(*robot));
+    EXPECT_EQ(again.values, read.values);
+    EXPECT_EQ(again.treads().size(), read.treads().size());
+  }
 }
 
 // What documents and stored results are about.
