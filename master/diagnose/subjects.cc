@@ -40,7 +40,7 @@ bool drives_over(const Study& study, const ResidualTrial& trial, const Patch& pa
       kSpareWay * std::abs(command.left + command.right) / 2 * command.duration_s * study.speed_m_s;
   const double bow = std::sqrt(std::max(0.0, way * way - (to - from).squaredNorm())) / 2;
   return nearest_on_segment({patch[0], patch[1]}, from, to).distance <
-         patch[2] + bow + (kContacts_m + kSpare_m) * study.scale;
+         patch[2] + bow + kContacts_m * study.scale + kSpare_m * study.scale;
 }
 
 // A robot on two sides drives commands: srv1's, or one that a program of the user's simulates.
