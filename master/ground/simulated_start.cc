@@ -1,11 +1,13 @@
 #include "master/ground/simulated_start.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
 
 #include "common/score/algebra.h"
 #include "common/score/kinematic_start.h"
+#include "master/ground/kinematic_rival.h"
 #include "master/ground/robust_errors.h"
 
 namespace gapfarm {
@@ -15,6 +17,9 @@ constexpr double kGeneStep = 0.01;  // to find slopes; contacts are noisy below
 constexpr int kMostRounds = 24;
 constexpr int kRaceRounds = 3;  // of every start, before the best go on
 constexpr double kEnoughNats = 0.1;
+// What windows of one run tell is less than their number says: how much more than one of them a
+// value's start counts is tried on stretches that were left out.
+constexpr std::array<double, 6> kHolds = {1, 3, 10, 30, 100, 300};
 constexpr double kFreelyMoves = 0.3;  // of a gene's range, where the windows do not tell
 constexpr std::size_t kStretches = 6;
 constexpr std::size_t kLooks = 3;  // starts a gene that kinematics do not tell
@@ -22,7 +27,6 @@ constexpr std::size_t kLooks = 3;  // starts a gene that kinematics do not tell
 // trades ends for the noise's likelihood.
 constexpr double kFoundSpread = 0.1;  // of what the windows leave unsure
 constexpr double kHeldSpread = 1e-3;
-constexpr double kKinematicsFreely = 1;  // of gains, m, s, rad: far more than windows leave
 
 // Everything at one genome.
 struct At {
@@ -31,9 +35,16 @@ struct At {
   double nats = 0;  // of the windows, and of what was moved
 };
 
+// What values are held to, and how firmly.
+struct Hold {
+  Genome start;
+  double strength = 1;
+};
+
 // One way uphill.
 struct Climb {
   At at;
+  Hold hold;
   WindowSlopes slopes;  // there, or one step before
   NormalEquations equations;
   bool over = false;
@@ -45,15 +56,20 @@ class SimulationFit {
   Result<SimulatedStart> run(double widest);
 
  private:
-  Result<std::vector<std::optional<At>>> look_at(const std::vector<Genome>& genomes);
+  Result<std::vector<std::optional<At>>> look_at(const std::vector<Genome>& genomes,
+                                                 const std::vector<Hold>& holds);
   Status look_round(Climb* climb);  // slopes and equations
   Status step(Climb* climb);
   Status climb_on(Climb* climb, int rounds);
   Result<std::vector<Climb>> other_climbs(const Climb& first);
-  Status settle(std::vector<std::optional<At>>* looks, const Climb& first);
+  Status settle(std::vector<std::optional<At>>* looks, const std::vector<Hold>& holds,
+                const Climb& first);
   Genome moved(const At& at, const NormalEquations& equations) const;
-  NormalEquations prior_at(const Genome& genome) const;
-  double left_out(const Climb& climb) const;
+  double cost_of(const Genome& genome, const Hold& hold) const;
+  NormalEquations prior_at(const Genome& genome, const Hold& hold) const;
+  double left_out(const Climb& climb, double strength) const;
+  Result<Climb> best_of(std::vector<Climb> climbs);
+  void judge(const Climb& best, const At& begin, SimulatedStart* found) const;
   void take_spread(const Climb& climb, double widest, SimulatedStart* found) const;
 
   Farm& farm_;
@@ -67,31 +83,6 @@ class SimulationFit {
   Genome start_;
   std::size_t simulations_ = 0;
 };
-
-WindowEnds ends_of(const Problem& problem, const std::vector<Pose>& predicted) {
-  WindowEnds ends;
-  for (std::size_t i = 0; i < predicted.size(); ++i) {
-    ends.push_back(local_difference(predicted[i], problem.log.trials[i].X_WE));
-  }
-  return ends;
-}
-
-WindowEnds kinematic_errors(const Problem& problem, const Kinematics& at) {
-  return ends_of(problem, kinematic_ends(problem, at));
-}
-
-WindowSlopes kinematic_slopes(const Problem& problem, const Kinematics& at,
-                              const WindowEnds& ends) {
-  WindowSlopes slopes(ends.size(), Eigen::MatrixXd(3, at.values.size()));
-  for (Eigen::Index k = 0; k < at.values.size(); ++k) {
-    Kinematics moved = at;
-    const double step = 1e-4 * std::max(1.0, std::abs(at.values[k]));
-    moved.values[k] += step;
-    const WindowEnds there = kinematic_errors(problem, moved);
-    for (std::size_t i = 0; i < ends.size(); ++i) slopes[i].col(k) = (there[i] - ends[i]) / step;
-  }
-  return slopes;
-}
 
 SimulationFit::SimulationFit(Farm& farm, const Problem& problem)
     : farm_(farm),
@@ -108,7 +99,8 @@ SimulationFit::SimulationFit(Farm& farm, const Problem& problem)
   }
 }
 
-Result<std::vector<std::optional<At>>> SimulationFit::look_at(const std::vector<Genome>& genomes) {
+Result<std::vector<std::optional<At>>> SimulationFit::look_at(const std::vector<Genome>& genomes,
+                                                              const std::vector<Hold>& holds) {
   std::vector<v1::Task> tasks;
   for (const Genome& genome : genomes) {
     v1::PredictTask* predict = tasks.emplace_back().mutable_predict();
@@ -127,24 +119,29 @@ Result<std::vector<std::optional<At>>> SimulationFit::look_at(const std::vector<
     for (const v1::Predicted& p : result.predict().predictions()) {
       ends.push_back(from_proto(p.end()));
     }
-    At at{genomes[k], ends_of(problem_, ends), 0};
+    At at{genomes[k], window_errors(problem_, ends), 0};
     at.nats = errors_->nats(at.ends);
-    for (const std::size_t g : told_) {
-      const double moved = (at.genome[g] - start_[g]) / kFreelyMoves;
-      at.nats -= moved * moved / 2;
-    }
+    at.nats -= cost_of(at.genome, holds[holds.size() == 1 ? 0 : k]);
     all.back() = std::move(at);
   }
   return all;
 }
 
-NormalEquations SimulationFit::prior_at(const Genome& genome) const {
+double SimulationFit::cost_of(const Genome& genome, const Hold& hold) const {
+  double sum = 0;
+  for (const std::size_t g : told_) {
+    const double moved = (genome[g] - hold.start[g]) / kFreelyMoves;
+    sum += hold.strength * moved * moved / 2;
+  }
+  return sum;
+}
+
+NormalEquations SimulationFit::prior_at(const Genome& genome, const Hold& hold) const {
   const auto n = static_cast<Eigen::Index>(told_.size());
-  NormalEquations prior{Eigen::MatrixXd::Identity(n, n) / (kFreelyMoves * kFreelyMoves),
-                        Eigen::VectorXd(n)};
+  const double precision = hold.strength / (kFreelyMoves * kFreelyMoves);
+  NormalEquations prior{precision * Eigen::MatrixXd::Identity(n, n), Eigen::VectorXd(n)};
   for (std::size_t k = 0; k < told_.size(); ++k) {
-    prior.g[static_cast<Eigen::Index>(k)] =
-        (genome[told_[k]] - start_[told_[k]]) / (kFreelyMoves * kFreelyMoves);
+    prior.g[static_cast<Eigen::Index>(k)] = precision * (genome[told_[k]] - hold.start[told_[k]]);
   }
   return prior;
 }
@@ -170,7 +167,7 @@ Status SimulationFit::look_round(Climb* climb) {
     double& value = genomes.back()[gene];
     value += value + kGeneStep > 1 ? -kGeneStep : kGeneStep;
   }
-  const auto beside = look_at(genomes);
+  const auto beside = look_at(genomes, {climb->hold});
   if (!beside) return beside.error();
   climb->over = std::any_of(beside->begin(), beside->end(), [](const auto& b) { return !b; });
   if (climb->over) return {};
@@ -183,7 +180,7 @@ Status SimulationFit::look_round(Climb* climb) {
     }
   }
   climb->equations = normal_equations(*errors_, at.ends, climb->slopes);
-  const NormalEquations prior = prior_at(at.genome);
+  const NormalEquations prior = prior_at(at.genome, climb->hold);
   climb->equations.H += prior.H;
   climb->equations.g += prior.g;
   return {};
@@ -201,7 +198,7 @@ Status SimulationFit::step(Climb* climb) {
       damped.H.diagonal() *= 1 + damping;
       genomes.push_back(moved(climb->at, damped));
     }
-    auto tried = look_at(genomes);
+    auto tried = look_at(genomes, {climb->hold});
     if (!tried) return tried.error();
     for (std::optional<At>& there : *tried) {
       if (there && there->nats > climb->at.nats) climb->at = std::move(*there);
@@ -220,14 +217,16 @@ Status SimulationFit::climb_on(Climb* climb, int rounds) {
 }
 
 // What kinematics tell is moved to suit the rest, by the slopes of the first climb.
-Status SimulationFit::settle(std::vector<std::optional<At>>* looks, const Climb& first) {
+Status SimulationFit::settle(std::vector<std::optional<At>>* looks, const std::vector<Hold>& holds,
+                             const Climb& first) {
   std::vector<Genome> genomes;
   std::vector<std::size_t> whose;
+  std::vector<Hold> held;
   for (std::size_t k = 0; k < looks->size(); ++k) {
     const std::optional<At>& look = (*looks)[k];
     if (!look) continue;
     NormalEquations equations = normal_equations(*errors_, look->ends, first.slopes);
-    const NormalEquations prior = prior_at(look->genome);
+    const NormalEquations prior = prior_at(look->genome, holds[k]);
     equations.H += prior.H;
     equations.g += prior.g;
     for (std::size_t j = 0; j < told_.size(); ++j) {
@@ -240,8 +239,9 @@ Status SimulationFit::settle(std::vector<std::optional<At>>* looks, const Climb&
     }
     genomes.push_back(moved(*look, equations));
     whose.push_back(k);
+    held.push_back(holds[k]);
   }
-  auto settled = look_at(genomes);
+  auto settled = look_at(genomes, held);
   if (!settled) return settled.error();
   for (std::size_t j = 0; j < whose.size(); ++j) {
     std::optional<At>& look = (*looks)[whose[j]];
@@ -253,13 +253,17 @@ Status SimulationFit::settle(std::vector<std::optional<At>>* looks, const Climb&
 Result<std::vector<Climb>> SimulationFit::other_climbs(const Climb& first) {
   std::vector<Climb> climbs;
   if (untold_.size() < 2 || first.slopes.empty()) return climbs;
-  auto looks = look_at(spread_starts(start_, untold_, kLooks * untold_.size()));
+  const auto starts = spread_starts(start_, untold_, kLooks * untold_.size());
+  std::vector<Hold> holds;
+  for (const Genome& start : starts) holds.push_back({start, 1});
+  auto looks = look_at(starts, holds);
   if (!looks) return looks.error();
   for (int round = 0; round < 2; ++round) {
-    if (Status s = settle(&*looks, first); !s) return s.error();
+    if (Status s = settle(&*looks, holds, first); !s) return s.error();
   }
-  for (std::optional<At>& look : *looks) {
-    if (look) climbs.push_back({std::move(*look), {}, {}, false});
+  for (std::size_t k = 0; k < looks->size(); ++k) {
+    std::optional<At>& look = (*looks)[k];
+    if (look) climbs.push_back({std::move(*look), holds[k], {}, {}, false});
   }
   std::stable_sort(climbs.begin(), climbs.end(),
                    [](const Climb& a, const Climb& b) { return a.at.nats > b.at.nats; });
@@ -267,9 +271,56 @@ Result<std::vector<Climb>> SimulationFit::other_climbs(const Climb& first) {
   return climbs;
 }
 
-double SimulationFit::left_out(const Climb& climb) const {
-  return left_out_nats(*errors_, climb.at.ends, climb.slopes, prior_at(climb.at.genome),
+double SimulationFit::left_out(const Climb& climb, double strength) const {
+  const Hold hold{climb.hold.start, strength};
+  return left_out_nats(*errors_, climb.at.ends, climb.slopes, prior_at(climb.at.genome, hold),
                        stretches_);
+}
+
+// What foretells stretches that were left out best, held as firmly as is best for these.
+Result<Climb> SimulationFit::best_of(std::vector<Climb> climbs) {
+  const auto by_nats = [](const Climb& a, const Climb& b) { return a.at.nats > b.at.nats; };
+  for (Climb& climb : climbs) {
+    if (Status s = climb_on(&climb, kRaceRounds); !s) return s.error();
+  }
+  std::stable_sort(climbs.begin(), climbs.end(), by_nats);
+  if (climbs.size() > 2) climbs.resize(2);
+  std::size_t best = 0;
+  double strength = 1, most = 0;
+  for (std::size_t k = 0; k < climbs.size(); ++k) {
+    if (Status s = climb_on(&climbs[k], kMostRounds); !s) return s.error();
+    if (climbs[k].slopes.empty()) continue;
+    for (const double held : kHolds) {
+      const double nats = left_out(climbs[k], held);
+      if (most != 0 && nats <= most) continue;
+      best = k;
+      strength = held;
+      most = nats;
+    }
+  }
+  Climb& chosen = climbs[best];
+  if (strength > 1) {
+    chosen.hold.strength = strength;
+    chosen.at.nats = errors_->nats(chosen.at.ends) - cost_of(chosen.at.genome, chosen.hold);
+    chosen.over = false;
+    if (Status s = climb_on(&chosen, kMostRounds); !s) return s.error();
+  }
+  return std::move(chosen);
+}
+
+// Against the kinematics, whose values in the simulation are `begin`.
+void SimulationFit::judge(const Climb& best, const At& begin, SimulatedStart* found) const {
+  const double windows = static_cast<double>(errors_->windows());
+  const WindowEnds ends = window_errors(problem_, kinematic_ends(problem_, kinematics_));
+  const double rival = kinematic_left_out(problem_, kinematics_, *errors_, stretches_);
+  const double own = left_out(best, best.hold.strength);
+  found->left_out_gain = (own - rival) / windows;
+  // What the simulation makes of the kinematics' values is nearly what they make of them.
+  const double in_simulation = errors_->nats(begin.ends) - errors_->nats(ends);
+  found->kinematic = rival + in_simulation > own;
+  if (found->kinematic) return;
+  found->genome = best.at.genome;
+  found->gain = (errors_->nats(best.at.ends) - errors_->nats(begin.ends)) / windows;
 }
 
 void SimulationFit::take_spread(const Climb& climb, double widest, SimulatedStart* found) const {
@@ -292,86 +343,39 @@ void SimulationFit::take_spread(const Climb& climb, double widest, SimulatedStar
 Result<SimulatedStart> SimulationFit::run(double widest) {
   const auto kinematics = fit_kinematics(problem_);
   if (!kinematics) return kinematics.error();
-  const WindowEnds kinematic = kinematic_errors(problem_, *kinematics);
+  kinematics_ = *kinematics;
   std::vector<double> durations_s;
   for (const Trial& trial : problem_.log.trials) durations_s.push_back(*trial.duration_s);
-  errors_.emplace(durations_s, kinematic);
-  const ParameterValues values = kinematic_start(problem_, *kinematics);
+  errors_.emplace(durations_s, window_errors(problem_, kinematic_ends(problem_, kinematics_)));
+  const ParameterValues values = kinematic_start(problem_, kinematics_);
   for (const Gene& gene : problem_.genes) {
     start_.push_back(encode_gene(problem_.table(), gene, values[gene.row]));
   }
-  auto first = look_at({start_});
+  const Hold hold{start_, 1};
+  auto first = look_at({start_}, {hold});
   if (!first) return first.error();
   SimulatedStart found;
   found.genome = start_;
   found.simulations = simulations_;
   if (!first->front() || told_.empty()) return found;
   const At begin = *first->front();
-  std::vector<Climb> climbs = {{begin, {}, {}, false}};
+  std::vector<Climb> climbs = {{begin, hold, {}, {}, false}};
   if (Status s = step(&climbs.front()); !s) return s.error();
   found.simulations = simulations_;
   if (climbs.front().slopes.empty()) return found;
   auto others = other_climbs(climbs.front());
   if (!others) return others.error();
   for (Climb& climb : *others) climbs.push_back(std::move(climb));
-  for (Climb& climb : climbs) {
-    if (Status s = climb_on(&climb, kRaceRounds); !s) return s.error();
-  }
-  std::stable_sort(climbs.begin(), climbs.end(),
-                   [](const Climb& a, const Climb& b) { return a.at.nats > b.at.nats; });
   found.starts = climbs.size();
-  if (climbs.size() > 2) climbs.resize(2);
-  for (Climb& climb : climbs) {
-    if (Status s = climb_on(&climb, kMostRounds); !s) return s.error();
-  }
-  const Climb* best = nullptr;
-  double most = 0;
-  for (const Climb& climb : climbs) {
-    if (climb.slopes.empty()) continue;
-    const double nats = left_out(climb);
-    if (best == nullptr || nats > most) most = nats;
-    if (most == nats) best = &climb;
-  }
-  const double windows = static_cast<double>(errors_->windows());
+  const auto best = best_of(std::move(climbs));
+  if (!best) return best.error();
   found.simulations = simulations_;
-  if (best == nullptr) return found;
-  const auto n = kinematics->values.size();
-  const NormalEquations freely{
-      Eigen::MatrixXd::Identity(n, n) / (kKinematicsFreely * kKinematicsFreely),
-      Eigen::VectorXd::Zero(n)};
-  const double rival = left_out_nats(
-      *errors_, kinematic, kinematic_slopes(problem_, *kinematics, kinematic), freely, stretches_);
-  found.left_out_gain = (most - rival) / windows;
-  // What the simulation makes of the kinematics' values is nearly what they make of them.
-  found.kinematic = rival + begin.nats - errors_->nats(kinematic) > most;
-  found.genome = found.kinematic ? start_ : best->at.genome;
-  found.gain = found.kinematic ? 0 : (best->at.nats - begin.nats) / windows;
+  judge(*best, begin, &found);
   take_spread(*best, widest, &found);
   return found;
 }
 
 }  // namespace
-
-std::vector<Genome> spread_starts(const Genome& middle, std::span<const std::size_t> free,
-                                  std::size_t count) {
-  // The root of x^(d+1) = x + 1: its powers fill d dimensions most evenly (Roberts 2018).
-  double root = 1.5;
-  for (int k = 0; k < 60; ++k) {
-    root = std::pow(1 + root, 1 / (static_cast<double>(free.size()) + 1));
-  }
-  std::vector<Genome> starts(count, middle);
-  for (std::size_t k = 0; k < count; ++k) {
-    for (std::size_t d = 0; d < free.size(); ++d) {
-      const double turn =
-          0.5 + static_cast<double>(k + 1) * std::pow(root, -static_cast<double>(d + 1));
-      const double away = kFreelyMoves * (2 * (turn - std::floor(turn)) - 1);
-      double& value = starts[k][free[d]];
-      value = std::abs(value + away);  // a bound reflects
-      if (value > 1) value = 2 - value;
-    }
-  }
-  return starts;
-}
 
 Result<SimulatedStart> fit_by_simulation(Farm& farm, const Problem& problem, double widest) {
   return SimulationFit(farm, problem).run(widest);
