@@ -13,6 +13,7 @@ namespace gapfarm {
 struct CovariateBlock {
   std::string name;         // "start heading", "session time", ...
   Eigen::MatrixXd columns;  // whitened
+  double expected = 0;      // standard deviation of coefficients that are nothing to speak of
 };
 
 std::vector<CovariateBlock> covariate_blocks(const Study& study);

@@ -55,6 +55,22 @@ Gain Regression::gain(const Eigen::MatrixXd& columns) const {
   return gain;
 }
 
+Gain Regression::gain_beyond(const Eigen::MatrixXd& columns, double expected) const {
+  Eigen::MatrixXd c = Eigen::MatrixXd::Zero(basis_.rows(), columns.cols());
+  c.topRows(rows_) = columns;
+  c -= basis_ * (basis_.transpose() * c);
+  const SymmetricAxes eigen = axes_of_symmetric(c.transpose() * c);
+  const Eigen::VectorXd b = eigen.vectors.transpose() * (c.transpose() * left_);
+  const double least = kAbsorbed * columns.colwise().squaredNorm().mean();
+  Gain gain;
+  for (Eigen::Index i = 0; i < b.size(); ++i) {
+    if (eigen.values[i] <= least) continue;
+    gain.squares += b[i] * b[i] / eigen.values[i] / (1 + expected * expected * eigen.values[i]);
+    ++gain.dimensions;
+  }
+  return gain;
+}
+
 Eigen::VectorXd Regression::each_gain(const Eigen::MatrixXd& columns) const {
   // The data have nothing of the basis left in them, so neither has their product with a column.
   const Eigen::VectorXd product = columns.transpose() * left_.head(rows_);

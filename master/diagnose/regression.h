@@ -23,6 +23,9 @@ class Regression {
   // What `columns` would explain beyond the basis.  Directions that the basis absorbs but for a
   // share of 1e-4 of their squares do not count.
   Gain gain(const Eigen::MatrixXd& columns) const;
+  // The same where coefficients of standard deviation `expected` are nothing to speak of: what the
+  // columns explain in units of what they and the noise would make of these.
+  Gain gain_beyond(const Eigen::MatrixXd& columns, double expected) const;
   // Squares that each column would explain beyond the basis were it alone.
   Eigen::VectorXd each_gain(const Eigen::MatrixXd& columns) const;
   // What a column's squares have beyond the basis.

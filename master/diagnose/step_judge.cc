@@ -77,14 +77,15 @@ std::vector<Leftover> all_leftovers(const Explanation& explanation, const Regres
   std::vector<Leftover> left = leftovers(explained, evidence.blocks);
   if (study.misfit_columns == 0) return left;
   // What repeats of a trial have in common was kept from the effects as another physics' misfit,
-  // but a simulation that misses it is not whole.
+  // but a simulation that misses more than a sound one may is not whole.
   const Eigen::MatrixXd& nuisances = evidence.nuisances;
   Regression without_it(nuisances.leftCols(nuisances.cols() - study.misfit_columns),
                         explanation.estimates ? study.whiten(explanation.estimates->residuals)
                                               : study.whitened_residuals());
   for (const ChosenEffect& c : explanation.chosen) without_it.add(c.candidate.signature.columns);
-  const std::vector<Leftover> common = leftovers(
-      without_it, {{"what its repeats have in common", nuisances.rightCols(study.misfit_columns)}});
+  const std::vector<Leftover> common =
+      leftovers(without_it, {{"what its repeats have in common",
+                              nuisances.rightCols(study.misfit_columns), study.misfit_expected}});
   left.insert(left.end(), common.begin(), common.end());
   std::stable_sort(left.begin(), left.end(),
                    [](const Leftover& a, const Leftover& b) { return a.log10_p < b.log10_p; });

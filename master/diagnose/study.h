@@ -45,6 +45,7 @@ struct Study {
   double scale = 1;                    // of lengths of the robot (TrackedTable::scale())
   std::vector<std::size_t> on_bounds;  // rows of the base that tuning left on their bounds
   Eigen::Index misfit_columns = 0;     // last nuisances: what repeats of a trial have in common
+  double misfit_expected = 0;          // of their priors: what a sound simulation may miss
   // Of push logs: what a relative change of each of these parameters moves the base's ends by.
   std::vector<RetunedPush> retuned;
   std::vector<Eigen::Matrix3d> whitener;  // L^-1 of each trial's covariance L L'

@@ -22,7 +22,8 @@ std::vector<Leftover> leftovers(const Regression& explained,
   const double scale = leftover_scale(explained);
   std::vector<Leftover> all;
   for (const CovariateBlock& block : blocks) {
-    const Gain gain = explained.gain(block.columns);
+    const Gain gain = block.expected > 0 ? explained.gain_beyond(block.columns, block.expected)
+                                         : explained.gain(block.columns);
     if (gain.dimensions == 0) continue;
     const double p = chi_squared_above(gain.dimensions, gain.squares / scale);
     all.push_back({block.name, std::log10(std::max(p, 1e-300)),
