@@ -19,9 +19,9 @@ constexpr double kOutline_m = 3e-4;
 // a simulator with friction all over the face (docs/pushing.md).
 constexpr double kMisfit = 0.01;
 constexpr double kConditionMisfit[] = {0.02, 0.01, 0.01};
-// What two simulations with friction all over the face differ by in one push, of these: with it,
-// and not with a fourth more or less, forty logs by another simulator (scripts/foreign_pushes.sh)
-// leave nothing significant in common to repeats where nothing is missing.
+// Of these, what two simulations with friction all over the face differ by in one push: with it
+// what repeats have in common of three logs by another simulator (scripts/foreign_pushes.sh, 57
+// degrees of freedom) has squares of 53, 57 and 64, and of 99 to 191 where nothing may be missed.
 constexpr double kSoundMisfit = 0.3;
 constexpr std::size_t kRepeats = 3;  // that a condition needs to be told from noise
 constexpr double kFarArm = 2;        // gyration radii: beyond, the finger slips off
