@@ -1,9 +1,7 @@
 #include "master/diagnose/diagnosis_json.h"
 
 #include <array>
-#include <limits>
 #include <nlohmann/json.hpp>
-#include <type_traits>
 
 #include "common/json/json.h"
 #include "master/diagnose/json_fields.h"
@@ -22,230 +20,144 @@ constexpr std::array<std::pair<Verdict, const char*>, 5> kVerdicts = {
      {Verdict::kEffectAndUnknown, "effect+unknown"},
      {Verdict::kUnusable, "unusable"}}};
 
-Json effect_json(const NamedEffect& effect) {
-  Json parameters = Json::object();
-  for (const Estimate& e : effect.parameters) {
-    parameters[e.key] = {{"value", e.value}, {"lo", e.lo}, {"hi", e.hi}, {"unit", e.unit}};
-  }
-  Json json = {{"name", effect.name},
-               {"aliases", effect.aliases},
-               {"alias_reason", effect.alias_reason},
-               {"confidence", effect.confidence},
-               {"parameters", std::move(parameters)},
-               {"gap_before", effect.gap_before},
-               {"gap_after", effect.gap_after}};
-  if (!effect.axis.empty()) json["axis"] = effect.axis;
-  if (effect.position_mm_before) json["position_mm_before"] = *effect.position_mm_before;
-  if (effect.heading_mrad_before) json["heading_mrad_before"] = *effect.heading_mrad_before;
-  if (effect.position_mm_after) json["position_mm_after"] = *effect.position_mm_after;
-  if (effect.heading_mrad_after) json["heading_mrad_after"] = *effect.heading_mrad_after;
-  json["closed"] = effect.closed;
-  json["closed_lo"] = effect.closed_lo;
-  json["closed_hi"] = effect.closed_hi;
-  json["text"] = effect.text;
-  return json;
+const char* bound_name(BoundHit hit) {
+  return hit == BoundHit::kNone ? "" : hit == BoundHit::kLower ? "lower" : "upper";
 }
 
-Json figures_json(const GapFigures& figures) {
-  return {{"tuned", figures.tuned}, {"final", figures.final_}, {"floor", figures.floor}};
-}
+constexpr Severity kSeverities[] = {Severity::kNote, Severity::kDoubt, Severity::kUnusable};
 
-Json where_json(const std::vector<Where>& findings) {
-  Json list = Json::array();
-  for (const Where& w : findings) {
-    list.push_back({{"command", w.command},
-                    {"component", w.component},
-                    {"kind", w.kind},
-                    {"covariate", w.covariate},
-                    {"size", w.size},
-                    {"share", w.share},
-                    {"p", w.p},
-                    {"text", w.text}});
-  }
-  return list;
-}
-
-Json screening_json(const std::vector<Screened>& screening) {
-  Json list = Json::array();
-  for (const Screened& s : screening) {
-    Json row = {{"effect", s.effect},
-                {"gain", s.gain},
-                {"p", s.p},
-                {"estimate", s.estimate},
-                {"alias_set", s.alias_set}};
-    if (s.held_out) row["held_out"] = *s.held_out;
-    if (s.held_out_se) row["held_out_se"] = *s.held_out_se;
-    row["note"] = s.note;
-    list.push_back(std::move(row));
-  }
-  return list;
-}
-
-Json steps_json(const std::vector<SelectionRecord>& steps) {
-  Json list = Json::array();
-  for (const SelectionRecord& step : steps) {
-    Json offered = Json::object();
-    for (const auto& [effect, gain] : step.offered) offered[effect] = gain;
-    list.push_back({{"explained", step.explained}, {"offered", std::move(offered)}});
-  }
-  return list;
-}
-
-Json checks_json(const std::vector<ResidualCheck>& checks) {
-  Json list = Json::array();
-  for (const ResidualCheck& c : checks) {
-    list.push_back({{"covariate", c.covariate}, {"log10_p", c.log10_p}, {"excess", c.excess}});
-  }
-  return list;
-}
-
-NamedEffect read_effect(const Json& json, const std::string& path, std::string& error) {
-  NamedEffect effect;
-  Fields fields(json, path, error);
-  fields.read("name", effect.name);
-  fields.read("aliases", effect.aliases);
-  fields.read_if_there("alias_reason", effect.alias_reason);
-  fields.read("confidence", effect.confidence);
-  fields.for_each("parameters", [&](const Json& item, const std::string& where, const auto& key) {
-    Estimate& estimate = effect.parameters.emplace_back();
-    estimate.key = key;
-    Fields parameter(item, where, error);
-    parameter.read("value", estimate.value);
-    parameter.read("lo", estimate.lo);
-    parameter.read("hi", estimate.hi);
-    parameter.read("unit", estimate.unit);
-  });
-  fields.read("gap_before", effect.gap_before);
-  fields.read("gap_after", effect.gap_after);
-  fields.read_if_there("axis", effect.axis);
-  fields.read_if_there("position_mm_before", effect.position_mm_before);
-  fields.read_if_there("heading_mrad_before", effect.heading_mrad_before);
-  fields.read_if_there("position_mm_after", effect.position_mm_after);
-  fields.read_if_there("heading_mrad_after", effect.heading_mrad_after);
-  fields.read("closed", effect.closed);
-  fields.read("closed_lo", effect.closed_lo);
-  fields.read("closed_hi", effect.closed_hi);
-  fields.read_if_there("text", effect.text);
-  return effect;
-}
-
-GapFigures read_figures(const Json& json, const std::string& path, std::string& error) {
-  GapFigures figures;
-  Fields fields(json, path, error);
-  fields.read("tuned", figures.tuned);
-  fields.read("final", figures.final_);
-  fields.read("floor", figures.floor);
-  return figures;
-}
-
-void read_findings(Fields& root, const char* key, std::vector<Where>& findings) {
-  root.for_each(key, [&](const Json& item, const std::string& path, const auto&) {
-    Where& w = findings.emplace_back();
-    Fields fields(item, path, root.error());
-    fields.read("command", w.command);
-    fields.read("component", w.component);
-    fields.read("kind", w.kind);
-    fields.read("covariate", w.covariate);
-    fields.read_if_there("size", w.size);
-    fields.read("share", w.share);
-    fields.read("p", w.p);
-    fields.read("text", w.text);
-  });
-}
-
-void read_screening(Fields& root, Diagnosis& diagnosis) {
-  root.for_each("screening", [&](const Json& item, const std::string& path, const auto&) {
-    Screened& s = diagnosis.screening.emplace_back();
-    Fields fields(item, path, root.error());
-    fields.read("effect", s.effect);
-    fields.read("gain", s.gain);
-    fields.read("p", s.p);
-    fields.read_if_there("estimate", s.estimate);
-    fields.read_if_there("alias_set", s.alias_set);
-    fields.read_if_there("held_out", s.held_out);
-    fields.read_if_there("held_out_se", s.held_out_se);
-    fields.read_if_there("note", s.note);
-  });
-}
+// Every row of the file, in the order of its fields.
+constexpr auto kEstimate = [](auto& v, auto& e) {
+  v.field("value", e.value);
+  v.field("lo", e.lo);
+  v.field("hi", e.hi);
+  v.field("unit", e.unit);
+};
+constexpr auto kEffect = [](auto& v, auto& e) {
+  v.field("name", e.name);
+  v.field("aliases", e.aliases);
+  v.later("alias_reason", e.alias_reason);
+  v.field("confidence", e.confidence);
+  v.by_key("parameters", e.parameters, &Estimate::key, kEstimate);
+  v.field("gap_before", e.gap_before);
+  v.field("gap_after", e.gap_after);
+  v.if_any("axis", e.axis);
+  v.if_any("position_mm_before", e.position_mm_before);
+  v.if_any("heading_mrad_before", e.heading_mrad_before);
+  v.if_any("position_mm_after", e.position_mm_after);
+  v.if_any("heading_mrad_after", e.heading_mrad_after);
+  v.field("closed", e.closed);
+  v.field("closed_lo", e.closed_lo);
+  v.field("closed_hi", e.closed_hi);
+  v.later("text", e.text);
+};
+constexpr auto kFigures = [](auto& v, auto& figures) {
+  v.field("tuned", figures.tuned);
+  v.field("final", figures.final_);
+  v.field("floor", figures.floor);
+};
+constexpr auto kWhere = [](auto& v, auto& w) {
+  v.field("command", w.command);
+  v.field("component", w.component);
+  v.field("kind", w.kind);
+  v.field("covariate", w.covariate);
+  v.later("size", w.size);
+  v.field("share", w.share);
+  v.field("p", w.p);
+  v.field("text", w.text);
+};
+constexpr auto kScreened = [](auto& v, auto& s) {
+  v.field("effect", s.effect);
+  v.field("gain", s.gain);
+  v.field("p", s.p);
+  v.later("estimate", s.estimate);
+  v.later("alias_set", s.alias_set);
+  v.if_any("held_out", s.held_out);
+  v.if_any("held_out_se", s.held_out_se);
+  v.later("note", s.note);
+};
+constexpr auto kStep = [](auto& v, auto& step) {
+  v.field("explained", step.explained);
+  v.by_key("offered", step.offered);
+};
+constexpr auto kCheck = [](auto& v, auto& check) {
+  v.field("covariate", check.covariate);
+  v.field("log10_p", check.log10_p);
+  v.field("excess", check.excess);
+};
+constexpr auto kNearMiss = [](auto& v, auto& miss) {
+  v.field("effects", miss.effects);
+  v.field("gain", miss.gain);
+  v.field("left", miss.left);
+  v.field("left_on", miss.left_on);
+  v.field("text", miss.text);
+};
+constexpr auto kNext = [](auto& v, auto& next) {
+  v.field("text", next.text);
+  v.field("separates", next.separates);
+  v.later("trials", next.trials);
+};
+constexpr auto kSanity = [](auto& v, auto& f) {
+  v.field("name", f.name);
+  v.choice("severity", f.severity, kSeverities, severity_name);
+  v.field("text", f.text);
+  v.field("remedy", f.remedy);
+};
+constexpr auto kProvenance = [](auto& v, auto& line) {
+  v.field("label", line.first);
+  v.field("value", line.second);
+};
+constexpr auto kTiming = [](auto& v, auto& stage) {
+  v.field("stage", stage.first);
+  v.field("seconds", stage.second);
+};
+constexpr auto kCorrelation = [](auto& v, auto& c) {
+  v.field("a", c.a);
+  v.field("b", c.b);
+  v.field("r", c.r);
+};
+constexpr auto kParameter = [](auto& v, auto& row) {
+  v.field("key", row.key);
+  v.field("unit", row.unit);
+  v.if_any("effect", row.effect);
+  v.later("summary", row.summary);
+  v.if_any("tuned", row.before);
+  v.field("final", row.after);
+  v.if_any("lo", row.lo);
+  v.if_any("hi", row.hi);
+  v.field("lower", row.lower);
+  v.field("upper", row.upper);
+  v.if_any("choice", row.choice);
+  std::string hit = bound_name(bound_hit(row));  // for others: it follows from the rest
+  v.if_any("at_bound", hit);
+  v.if_any("note", row.note);
+};
 
 void read_gap(const Json& json, Fields& root, Diagnosis& diagnosis) {
   if (!json.contains("gap")) return root.complain("gap", Json(), "an object");
   const Json& gap = json["gap"];
-  diagnosis.gap = read_figures(gap, "gap", root.error());
-  if (!gap.is_object()) return;
-  const auto figures = [&](const char* key, GapFigures& into) {
-    if (gap.contains(key)) into = read_figures(gap[key], std::string("gap.") + key, root.error());
+  const auto read = [&](const Json& from, const std::string& path, GapFigures& into) {
+    Fields fields(from, path, root.error());
+    kFigures(fields, into);
   };
-  figures("position_mm", diagnosis.position_mm);
-  figures("heading_mrad", diagnosis.heading_mrad);
-}
-
-void read_sanity(Fields& root, Diagnosis& diagnosis) {
-  root.for_each("sanity", [&](const Json& item, const std::string& path, const auto&) {
-    SanityFinding& f = diagnosis.sanity.emplace_back();
-    std::string severity = "unusable";
-    Fields fields(item, path, root.error());
-    fields.read("name", f.name);
-    fields.read("text", f.text);
-    fields.read("remedy", f.remedy);
-    fields.read_if_there("severity", severity);
-    for (Severity s : {Severity::kNote, Severity::kDoubt, Severity::kUnusable}) {
-      if (severity == severity_name(s)) f.severity = s;
-    }
-  });
-}
-
-// The lists that FORMATS leaves to us.
-void read_remainder(Fields& root, Diagnosis& diagnosis) {
-  root.for_each("next_experiment", [&](const Json& item, const std::string& path, const auto&) {
-    NextExperiment& next = diagnosis.next.emplace_back();
-    Fields fields(item, path, root.error());
-    fields.read("text", next.text);
-    fields.read("separates", next.separates);
-    fields.read_if_there("trials", next.trials);
-  });
-  root.for_each("steps", [&](const Json& item, const std::string& path, const auto&) {
-    SelectionRecord& step = diagnosis.steps.emplace_back();
-    Fields fields(item, path, root.error());
-    fields.read("explained", step.explained);
-    fields.for_each("offered", [&](const Json&, const std::string&, const auto& effect) {
-      Fields gains(item["offered"], path + ".offered", root.error());
-      gains.read(effect.c_str(), step.offered.emplace_back(effect, 0).second);
-    });
-  });
-  root.for_each("checks", [&](const Json& item, const std::string& path, const auto&) {
-    ResidualCheck& check = diagnosis.checks.emplace_back();
-    Fields fields(item, path, root.error());
-    fields.read("covariate", check.covariate);
-    fields.read("log10_p", check.log10_p);
-    fields.read("excess", check.excess);
-  });
-  root.read_if_there("cautions", diagnosis.cautions);
-  root.for_each("provenance", [&](const Json& item, const std::string& path, const auto&) {
-    auto& [label, value] = diagnosis.provenance.emplace_back();
-    Fields fields(item, path, root.error());
-    fields.read("label", label);
-    fields.read("value", value);
-  });
-  root.for_each("timing", [&](const Json& item, const std::string& path, const auto&) {
-    auto& [stage, seconds] = diagnosis.timing_s.emplace_back();
-    Fields fields(item, path, root.error());
-    fields.read("stage", stage);
-    fields.read("seconds", seconds);
-  });
+  read(gap, "gap", diagnosis.gap);
+  if (!gap.is_object()) return;
+  if (gap.contains("position_mm")) {
+    read(gap["position_mm"], "gap.position_mm", diagnosis.position_mm);
+  }
+  if (gap.contains("heading_mrad")) {
+    read(gap["heading_mrad"], "gap.heading_mrad", diagnosis.heading_mrad);
+  }
 }
 
 }  // namespace
 
 Json sanity_json(const std::vector<SanityFinding>& findings) {
-  Json list = Json::array();
-  for (const SanityFinding& f : findings) {
-    list.push_back({{"name", f.name},
-                    {"severity", severity_name(f.severity)},
-                    {"text", f.text},
-                    {"remedy", f.remedy}});
-  }
-  return list;
+  return FieldWriter::list(findings, kSanity);
+}
+
+Json parameters_json(const std::vector<ParameterRow>& rows) {
+  return FieldWriter::list(rows, kParameter);
 }
 
 const char* verdict_name(Verdict verdict) {
@@ -256,45 +168,33 @@ const char* verdict_name(Verdict verdict) {
 }
 
 Json summary_json(const Diagnosis& diagnosis) {
-  Json effects = Json::array();
-  for (const NamedEffect& effect : diagnosis.effects) effects.push_back(effect_json(effect));
   Json gap = {{"unit", "nats/trial"}};
-  gap.update(figures_json(diagnosis.gap));
-  gap["position_mm"] = figures_json(diagnosis.position_mm);
-  gap["heading_mrad"] = figures_json(diagnosis.heading_mrad);
-  Json next = Json::array();
-  for (const NextExperiment& n : diagnosis.next) {
-    next.push_back({{"text", n.text}, {"separates", n.separates}, {"trials", n.trials}});
-  }
-  Json provenance = Json::array();
-  for (const auto& [label, value] : diagnosis.provenance) {
-    provenance.push_back({{"label", label}, {"value", value}});
-  }
-  Json timing = Json::array();
-  for (const auto& [stage, seconds] : diagnosis.timing_s) {
-    timing.push_back({{"stage", stage}, {"seconds", seconds}});
-  }
+  gap.update(FieldWriter::written(diagnosis.gap, kFigures));
+  gap["position_mm"] = FieldWriter::written(diagnosis.position_mm, kFigures);
+  gap["heading_mrad"] = FieldWriter::written(diagnosis.heading_mrad, kFigures);
   Json summary = {{"version", kVersion},
                   {"verdict", verdict_name(diagnosis.verdict)},
                   {"headline", diagnosis.headline},
                   {"action", diagnosis.action},
                   {"findings", diagnosis.findings},
                   {"sanity", sanity_json(diagnosis.sanity)},
-                  {"effects", std::move(effects)},
+                  {"effects", FieldWriter::list(diagnosis.effects, kEffect)},
                   {"gap", std::move(gap)},
                   {"parameters", parameters_json(diagnosis.parameters)},
-                  {"correlations", correlations_json(diagnosis.correlations)},
-                  {"where", where_json(diagnosis.where)},
-                  {"unexplained", where_json(diagnosis.unexplained)},
-                  {"screening", screening_json(diagnosis.screening)},
-                  {"steps", steps_json(diagnosis.steps)},
-                  {"checks", checks_json(diagnosis.checks)},
-                  {"next_experiment", std::move(next)},
+                  {"correlations", FieldWriter::list(diagnosis.correlations, kCorrelation)},
+                  {"where", FieldWriter::list(diagnosis.where, kWhere)},
+                  {"unexplained", FieldWriter::list(diagnosis.unexplained, kWhere)},
+                  {"screening", FieldWriter::list(diagnosis.screening, kScreened)},
+                  {"steps", FieldWriter::list(diagnosis.steps, kStep)},
+                  {"checks", FieldWriter::list(diagnosis.checks, kCheck)},
+                  {"next_experiment", FieldWriter::list(diagnosis.next, kNext)},
                   {"cautions", diagnosis.cautions},
-                  {"provenance", std::move(provenance)},
-                  {"timing", std::move(timing)}};
+                  {"provenance", FieldWriter::list(diagnosis.provenance, kProvenance)},
+                  {"timing", FieldWriter::list(diagnosis.timing_s, kTiming)}};
   if (diagnosis.residual) summary["residual"] = residual_json(*diagnosis.residual);
-  if (!diagnosis.nearest.empty()) summary["nearest"] = nearest_json(diagnosis.nearest);
+  if (!diagnosis.nearest.empty()) {
+    summary["nearest"] = FieldWriter::list(diagnosis.nearest, kNearMiss);
+  }
   if (!diagnosis.drives.empty()) summary["drives"] = drives_json(diagnosis.drives);
   if (!diagnosis.shown.empty()) summary["pictures"] = pictures_json(diagnosis);
   return summary;
@@ -320,14 +220,14 @@ Result<Diagnosis> parse_diagnosis(std::string_view text) {
   std::string error;
   Fields root(json, "", error);
   double version = 0;
-  root.read("version", version);
+  root.field("version", version);
   if (error.empty() && version != kVersion) {
     return Error{"diagnosis.json: version is " + json_text(json["version"]) +
                  ", this program reads version " + std::to_string(kVersion)};
   }
   Diagnosis diagnosis;
   std::string verdict;
-  root.read("verdict", verdict);
+  root.field("verdict", verdict);
   bool known = false;
   for (const auto& [value, name] : kVerdicts) {
     if (verdict == name) diagnosis.verdict = value, known = true;
@@ -336,21 +236,24 @@ Result<Diagnosis> parse_diagnosis(std::string_view text) {
     root.complain("verdict", json["verdict"], "effect, none, unknown, effect+unknown or unusable");
   }
   if (!error.empty()) return Error{error};
-  root.read_if_there("headline", diagnosis.headline);
-  root.read_if_there("action", diagnosis.action);
-  root.read_if_there("findings", diagnosis.findings);
-  root.for_each("effects", [&](const Json& item, const std::string& path, const auto&) {
-    diagnosis.effects.push_back(read_effect(item, path, error));
-  });
+  root.later("headline", diagnosis.headline);
+  root.later("action", diagnosis.action);
+  root.later("findings", diagnosis.findings);
+  root.list("effects", diagnosis.effects, kEffect);
   read_gap(json, root, diagnosis);
-  read_sanity(root, diagnosis);
-  read_findings(root, "where", diagnosis.where);
-  read_findings(root, "unexplained", diagnosis.unexplained);
-  read_screening(root, diagnosis);
-  read_remainder(root, diagnosis);
-  read_parameters(root, &diagnosis.parameters);
-  read_correlations(root, &diagnosis.correlations);
-  read_nearest(root, &diagnosis.nearest);
+  root.list("sanity", diagnosis.sanity, kSanity);
+  root.list("where", diagnosis.where, kWhere);
+  root.list("unexplained", diagnosis.unexplained, kWhere);
+  root.list("screening", diagnosis.screening, kScreened);
+  root.list("next_experiment", diagnosis.next, kNext);
+  root.list("steps", diagnosis.steps, kStep);
+  root.list("checks", diagnosis.checks, kCheck);
+  root.later("cautions", diagnosis.cautions);
+  root.list("provenance", diagnosis.provenance, kProvenance);
+  root.list("timing", diagnosis.timing_s, kTiming);
+  root.list("parameters", diagnosis.parameters, kParameter);
+  root.list("correlations", diagnosis.correlations, kCorrelation);
+  root.list("nearest", diagnosis.nearest, kNearMiss);
   if (!error.empty()) return Error{error};
   if (json.contains("residual")) {
     if (Status s = read_residual(json["residual"], &diagnosis.residual); !s) return s.error();

@@ -37,19 +37,13 @@ Result<std::vector<DiagnosedTrial>> parse_trials(const nlohmann::ordered_json& t
 nlohmann::ordered_json pictures_json(const Diagnosis& diagnosis);
 Status read_pictures(const nlohmann::ordered_json& pictures, Diagnosis* diagnosis);
 
-// The correction without a cause, and what of the catalogue came nearest; and back.
-class Fields;
+// The correction without a cause; and back.
 nlohmann::ordered_json residual_json(const FoundResidual& residual);
 Status read_residual(const nlohmann::ordered_json& json, std::optional<FoundResidual>* residual);
-nlohmann::ordered_json nearest_json(const std::vector<NearMiss>& nearest);
-void read_nearest(Fields& root, std::vector<NearMiss>* nearest);
 
-// Parameters, what makes up for what, and drives beside their simulations (paths as
-// [t s, x m, y m, heading rad] from the start); and back.
 nlohmann::ordered_json parameters_json(const std::vector<ParameterRow>& rows);
-void read_parameters(Fields& root, std::vector<ParameterRow>* rows);
-nlohmann::ordered_json correlations_json(const std::vector<ParameterCorrelation>& correlations);
-void read_correlations(Fields& root, std::vector<ParameterCorrelation>* correlations);
+
+// Drives beside their simulations (paths as [t s, x m, y m, heading rad] from the start); and back.
 nlohmann::ordered_json drives_json(const std::vector<ShownDrive>& drives);
 Status read_drives(const nlohmann::ordered_json& json, std::vector<ShownDrive>* drives);
 

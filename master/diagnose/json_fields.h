@@ -1,4 +1,9 @@
-// Reading JSON field by field, with an error that names the place.
+// JSON field by field.  A row is described once, as a function of a visitor and the row:
+//
+//   constexpr auto kCheck = [](auto& v, auto& row) { v.field("p", row.p); v.later("note",
+//   row.note); };
+//
+// FieldWriter writes it, Fields reads it back, with an error that names the place.
 #pragma once
 
 #include <cstdint>
@@ -6,6 +11,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "common/json/json.h"
@@ -21,7 +27,7 @@ class Fields {
   }
 
   template <class T>
-  void read(const char* key, T& field) {
+  void field(const char* key, T& field) {
     if (!json_.is_object() || !json_.contains(key)) {
       return fail(name(key) + " is missing; was this written by gapfarm diagnose?");
     }
@@ -30,8 +36,46 @@ class Fields {
 
   // A field that an earlier version, or another program, may leave out.
   template <class T>
-  void read_if_there(const char* key, T& field) {
+  void later(const char* key, T& field) {
     if (json_.is_object() && json_.contains(key)) convert(key, json_[key], field);
+  }
+  // One that is written only where there is something in it.
+  template <class T>
+  void if_any(const char* key, T& field) {
+    later(key, field);
+  }
+  // A value that is told by one of these names.
+  template <class T, std::size_t n, class Name>
+  void choice(const char* key, T& field, const T (&values)[n], const Name& name_of) {
+    std::string found;
+    later(key, found);
+    for (const T& value : values) {
+      if (found == name_of(value)) field = value;
+    }
+  }
+  // Rows in an object, each under its own key, which `key_of` is.
+  template <class Row, class Key, class Describe>
+  void by_key(const char* key, std::vector<Row>& rows, Key Row::*key_of, const Describe& describe) {
+    for_each(key, [&](const auto& item, const std::string& path, const std::string& item_key) {
+      Row& row = rows.emplace_back();
+      row.*key_of = item_key;
+      Fields fields(item, path, error_);
+      describe(fields, row);
+    });
+  }
+  void by_key(const char* key, std::vector<std::pair<std::string, double>>& numbers) {
+    for_each(key, [&](const auto& item, const std::string&, const std::string& item_key) {
+      convert((std::string(key) + "." + item_key).c_str(), item,
+              numbers.emplace_back(item_key, 0).second);
+    });
+  }
+  // Rows in a list, where there is one.
+  template <class Row, class Describe>
+  void list(const char* key, std::vector<Row>& rows, const Describe& describe) {
+    for_each(key, [&](const auto& item, const std::string& path, const std::string&) {
+      Fields fields(item, path, error_);
+      describe(fields, rows.emplace_back());
+    });
   }
 
   // Calls each(item, path) for the list under `key`, when there is one.
@@ -88,6 +132,56 @@ class Fields {
   const nlohmann::ordered_json& json_;
   std::string path_;
   std::string& error_;
+};
+
+class FieldWriter {
+ public:
+  using Json = nlohmann::ordered_json;
+
+  template <class T>
+  void field(const char* key, const T& value) {
+    json_[key] = value;
+  }
+  template <class T>
+  void later(const char* key, const T& value) {
+    field(key, value);
+  }
+  void if_any(const char* key, const std::string& text) {
+    if (!text.empty()) field(key, text);
+  }
+  void if_any(const char* key, const std::optional<double>& number) {
+    if (number) field(key, *number);
+  }
+  template <class T, std::size_t n, class Name>
+  void choice(const char* key, const T& value, const T (&)[n], const Name& name_of) {
+    field(key, name_of(value));
+  }
+  template <class Row, class Key, class Describe>
+  void by_key(const char* key, const std::vector<Row>& rows, Key Row::*key_of,
+              const Describe& describe) {
+    Json& object = json_[key] = Json::object();
+    for (const Row& row : rows) object[row.*key_of] = written(row, describe);
+  }
+  void by_key(const char* key, const std::vector<std::pair<std::string, double>>& numbers) {
+    Json& object = json_[key] = Json::object();
+    for (const auto& [name, number] : numbers) object[name] = number;
+  }
+
+  template <class Row, class Describe>
+  static Json written(const Row& row, const Describe& describe) {
+    FieldWriter writer;
+    describe(writer, row);
+    return std::move(writer.json_);
+  }
+  template <class Row, class Describe>
+  static Json list(const std::vector<Row>& rows, const Describe& describe) {
+    Json list = Json::array();
+    for (const Row& row : rows) list.push_back(written(row, describe));
+    return list;
+  }
+
+ private:
+  Json json_ = Json::object();
 };
 
 }  // namespace gapfarm

@@ -1,4 +1,4 @@
-// The correction without a cause, and what came nearest, as a part of diagnosis.json.
+// The correction without a cause, as a part of diagnosis.json.
 
 #include <nlohmann/json.hpp>
 
@@ -57,8 +57,8 @@ Status read_term(const Json& json, const std::string& path, ResidualTerm* term) 
   std::string error, frame;
   std::vector<std::string> covariates;
   Fields fields(json, path, error);
-  fields.read("frame", frame);
-  fields.read("covariates", covariates);
+  fields.field("frame", frame);
+  fields.field("covariates", covariates);
   if (!error.empty()) return Error{error};
   const Error wrong{"diagnosis.json: " + path +
                     " is no term of a residual; was this written by gapfarm diagnose?"};
@@ -90,32 +90,33 @@ Status read_term(const Json& json, const std::string& path, ResidualTerm* term) 
   return {};
 }
 
+constexpr auto kFound = [](auto& v, auto& found) {
+  v.field("text", found.text);
+  v.field("gained", found.gained);
+  v.field("gained_lo", found.gained_lo);
+  v.field("gained_hi", found.gained_hi);
+  v.field("gap_before", found.gap_before);
+  v.field("gap_after", found.gap_after);
+  v.field("closed", found.closed);
+  v.field("closed_lo", found.closed_lo);
+  v.field("closed_hi", found.closed_hi);
+};
+
 }  // namespace
 
 Json residual_json(const FoundResidual& residual) {
-  Json terms = Json::array();
-  for (const ResidualTerm& term : residual.field) terms.push_back(term_json(term));
-  return {{"kept", !residual.field.empty()}, {"text", residual.text},
-          {"gained", residual.gained},       {"gained_lo", residual.gained_lo},
-          {"gained_hi", residual.gained_hi}, {"gap_before", residual.gap_before},
-          {"gap_after", residual.gap_after}, {"closed", residual.closed},
-          {"closed_lo", residual.closed_lo}, {"closed_hi", residual.closed_hi},
-          {"terms", std::move(terms)}};
+  Json json = {{"kept", !residual.field.empty()}};
+  json.update(FieldWriter::written(residual, kFound));
+  json["terms"] = Json::array();
+  for (const ResidualTerm& term : residual.field) json["terms"].push_back(term_json(term));
+  return json;
 }
 
 Status read_residual(const Json& json, std::optional<FoundResidual>* residual) {
   std::string error;
   FoundResidual found;
   Fields fields(json, "residual", error);
-  fields.read("text", found.text);
-  fields.read("gained", found.gained);
-  fields.read("gained_lo", found.gained_lo);
-  fields.read("gained_hi", found.gained_hi);
-  fields.read("gap_before", found.gap_before);
-  fields.read("gap_after", found.gap_after);
-  fields.read("closed", found.closed);
-  fields.read("closed_lo", found.closed_lo);
-  fields.read("closed_hi", found.closed_hi);
+  kFound(fields, found);
   std::vector<std::string> commands;
   Status sound;
   fields.for_each("terms", [&](const Json& item, const std::string& path, const auto&) {
@@ -132,30 +133,6 @@ Status read_residual(const Json& json, std::optional<FoundResidual>* residual) {
   }
   *residual = std::move(found);
   return {};
-}
-
-Json nearest_json(const std::vector<NearMiss>& nearest) {
-  Json list = Json::array();
-  for (const NearMiss& miss : nearest) {
-    list.push_back({{"effects", miss.effects},
-                    {"gain", miss.gain},
-                    {"left", miss.left},
-                    {"left_on", miss.left_on},
-                    {"text", miss.text}});
-  }
-  return list;
-}
-
-void read_nearest(Fields& root, std::vector<NearMiss>* nearest) {
-  root.for_each("nearest", [&](const Json& item, const std::string& path, const auto&) {
-    NearMiss& miss = nearest->emplace_back();
-    Fields fields(item, path, root.error());
-    fields.read("effects", miss.effects);
-    fields.read("gain", miss.gain);
-    fields.read("left", miss.left);
-    fields.read("left_on", miss.left_on);
-    fields.read("text", miss.text);
-  });
 }
 
 }  // namespace gapfarm

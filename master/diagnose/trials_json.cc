@@ -1,3 +1,5 @@
+// Trials as a table, drives with their paths, and how the pictures tell of both.
+
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -7,6 +9,7 @@
 
 #include "common/json/json.h"
 #include "master/diagnose/diagnosis_json.h"
+#include "master/diagnose/json_fields.h"
 
 namespace gapfarm {
 namespace {
@@ -88,6 +91,37 @@ bool read_cell(const Json& json, Field& field) {
   return true;
 }
 
+Json path_json(const std::vector<PathSample>& path) {
+  Json list = Json::array();
+  for (const PathSample& s : path) list.push_back({s.t_s, s.pose.x, s.pose.y, s.pose.theta});
+  return list;
+}
+
+bool read_path(const Json& json, std::vector<PathSample>* path) {
+  if (!json.is_array()) return false;
+  for (const Json& sample : json) {
+    if (!sample.is_array() || sample.size() != 4) return false;
+    for (const Json& v : sample) {
+      if (!v.is_number()) return false;
+    }
+    path->push_back({sample[0].get<double>(),
+                     {sample[1].get<double>(), sample[2].get<double>(), sample[3].get<double>()}});
+  }
+  return true;
+}
+
+constexpr auto kShown = [](auto& v, auto& shown) {
+  v.field("key", shown.key);
+  v.field("label", shown.label);
+  v.field("matches", shown.matches);
+};
+constexpr auto kWords = [](auto& v, auto& words) {
+  v.field("ends", words.ends);
+  v.field("residuals", words.residuals);
+  v.field("x", words.x);
+  v.field("y", words.y);
+};
+
 }  // namespace
 
 Json trials_json(const Diagnosis& diagnosis, int digits) {
@@ -153,47 +187,52 @@ Result<std::vector<DiagnosedTrial>> parse_trials(const Json& table,
   return trials;
 }
 
-Json pictures_json(const Diagnosis& diagnosis) {
-  Json shown = Json::array();
-  for (const ShownCovariate& s : diagnosis.shown) {
-    shown.push_back({{"key", s.key}, {"label", s.label}, {"matches", s.matches}});
+Json drives_json(const std::vector<ShownDrive>& drives) {
+  Json list = Json::array();
+  for (const ShownDrive& drive : drives) {
+    Json json = {{"trial", drive.trial}, {"why", drive.why}};
+    if (!drive.measured.empty()) json["measured"] = path_json(drive.measured);
+    if (!drive.tuned.empty()) json["tuned"] = path_json(drive.tuned);
+    if (!drive.final_.empty()) json["final"] = path_json(drive.final_);
+    list.push_back(std::move(json));
   }
-  const PictureWords& words = diagnosis.words;
-  return {{"ends", words.ends},
-          {"residuals", words.residuals},
-          {"x", words.x},
-          {"y", words.y},
-          {"shown", std::move(shown)}};
+  return list;
+}
+
+Status read_drives(const Json& json, std::vector<ShownDrive>* drives) {
+  const Error damaged{
+      "diagnosis.json: drives: expected a list of {trial, why, paths}; was this "
+      "written by gapfarm diagnose?"};
+  if (!json.is_array()) return damaged;
+  for (const Json& item : json) {
+    if (!item.is_object() || !item.contains("trial") || !item["trial"].is_number_unsigned() ||
+        !item.contains("why") || !item["why"].is_string()) {
+      return damaged;
+    }
+    ShownDrive& drive = drives->emplace_back();
+    drive.trial = item["trial"].get<std::size_t>();
+    drive.why = item["why"].get<std::string>();
+    for (const auto& [key, path] : {std::pair{"measured", &drive.measured},
+                                    {"tuned", &drive.tuned},
+                                    {"final", &drive.final_}}) {
+      if (item.contains(key) && !read_path(item[key], path)) return damaged;
+    }
+  }
+  return {};
+}
+
+Json pictures_json(const Diagnosis& diagnosis) {
+  Json json = FieldWriter::written(diagnosis.words, kWords);
+  json["shown"] = FieldWriter::list(diagnosis.shown, kShown);
+  return json;
 }
 
 Status read_pictures(const Json& pictures, Diagnosis* diagnosis) {
-  const auto text = [](const Json& from, const char* key, std::string* to) -> Status {
-    if (from.is_object() && from.contains(key) && from[key].is_string()) {
-      *to = from[key].get<std::string>();
-      return {};
-    }
-    return Error{std::string("diagnosis.json: pictures: expected a text under \"") + key +
-                 "\"; was this written by gapfarm diagnose?"};
-  };
-  PictureWords& words = diagnosis->words;
-  for (const auto& [key, to] : {std::pair{"ends", &words.ends},
-                                {"residuals", &words.residuals},
-                                {"x", &words.x},
-                                {"y", &words.y}}) {
-    if (Status s = text(pictures, key, to); !s) return s;
-  }
-  if (!pictures.contains("shown") || !pictures["shown"].is_array()) {
-    return Error{"diagnosis.json: pictures: expected a list under \"shown\""};
-  }
-  for (const Json& entry : pictures["shown"]) {
-    ShownCovariate shown;
-    for (const auto& [key, to] :
-         {std::pair{"key", &shown.key}, {"label", &shown.label}, {"matches", &shown.matches}}) {
-      if (Status s = text(entry, key, to); !s) return s;
-    }
-    diagnosis->shown.push_back(std::move(shown));
-  }
-  return {};
+  std::string error;
+  Fields fields(pictures, "pictures", error);
+  kWords(fields, diagnosis->words);
+  fields.list("shown", diagnosis->shown, kShown);
+  return error.empty() ? Status{} : Error{error};
 }
 
 }  // namespace gapfarm
