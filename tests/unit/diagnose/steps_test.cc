@@ -9,6 +9,7 @@
 #include "master/diagnose/nuisance.h"
 #include "master/diagnose/selection.h"
 #include "master/diagnose/signatures.h"
+#include "master/diagnose/step_parts.h"
 #include "master/diagnose/subject.h"
 #include "tests/unit/diagnose/kinematic_farm.h"
 
@@ -268,6 +269,80 @@ TEST(Nuisances, RespectSymmetry) {
   EXPECT_EQ(misfit_sd(straight, 0.28).tail<2>().norm(), 0);
   EXPECT_GT(misfit_sd(turn, 0.28)[2], 0);
   EXPECT_EQ(misfit_sd(turn, 0.28).head<2>().norm(), 0);
+}
+
+// A log as the steps see it once its noise is known.
+struct Measured : Driven {
+  Measured() : Driven(1.02), subject(diagnosis_subject(problem)) {
+    found.evidence = std::make_shared<const steps::Evidence>(evidence_of(of, study).value());
+    found.chosen.push_back({{30, signature_of("backlash", column(60, even))}, {}});
+  }
+
+  std::shared_ptr<const DiagnosisSubject> subject;
+  DiagnoseOptions options;
+  steps::Inquiry of{farm, predictor, problem, *subject, options, {0, 0}};
+  steps::Explanation found;
+};
+
+TEST(Steps, TrialsAreLeftOutOfACopy) {
+  const Measured m;
+  std::vector<bool> ignored(m.study.size(), false);
+  ignored[0] = true;
+  const steps::Explanation rest = without(m.found, ignored);
+  EXPECT_EQ(rest.evidence->nuisances.topRows(3).norm(), 0);
+  EXPECT_EQ(rest.evidence->blocks[0].columns.topRows(3).norm(), 0);
+  EXPECT_LT(rest.evidence->base.left().head(3).norm(), 1e-12);
+  EXPECT_EQ(rest.chosen.size(), 1u);
+  EXPECT_FALSE(m.found.study().ignores(0));
+  EXPECT_GT(m.found.evidence->nuisances.topRows(3).norm(), 0);
+}
+
+TEST(Steps, WhereNothingIsNamedReadingsAreAsLogged) {
+  Measured m;
+  m.found.as_logged = m.found.study();
+  m.found.as_logged->trials[0].residual.x() += 0.5;
+  m.found.lag.gain = 20;
+  const steps::Explanation nothing = naming_nothing(m.found);
+  EXPECT_FALSE(nothing.names_anything());
+  EXPECT_EQ(nothing.study().trials[0].residual, m.found.as_logged->trials[0].residual);
+  EXPECT_TRUE(m.found.names_anything());
+  EXPECT_NE(m.found.study().trials[0].residual, m.found.as_logged->trials[0].residual);
+}
+
+TEST(Steps, ABaseInDoubtHasNothingNamed) {
+  Measured m;
+  steps::Screening screening;
+  screening.found = m.found;
+  screening.doubt = SanityFinding{"base_on_bounds", "", "", Severity::kDoubt};
+  const auto judged = judge(m.of, screening);
+  ASSERT_TRUE(judged.ok());
+  EXPECT_EQ(judged->verdict, Verdict::kUnknown);
+  EXPECT_TRUE(judged->named.chosen.empty());
+  EXPECT_EQ(judged->doubts.size(), 1u);
+  EXPECT_EQ(screening.found.chosen.size(), 1u);
+}
+
+TEST(Steps, WhatHelpsNoUnseenTrialIsDropped) {
+  Measured m;
+  m.found.chosen.push_back({{20, signature_of("timing_offset", column(60, odd))}, {}});
+  steps::Judgement judged;
+  judged.named = m.found;
+  std::vector<steps::NestedFit> nested(3);
+  const auto scores = [](double all, double even_too) {
+    return std::vector<double>{all + even_too, all, all + even_too, all};
+  };
+  nested[0].scores = scores(0, 0);
+  nested[1].scores = scores(-0.5, 0.5);  // worse on the whole
+  nested[2].scores = scores(1, 0.5);
+  const auto worthless = of_no_use(judged, nested, std::nullopt);
+  ASSERT_TRUE(worthless);
+  EXPECT_EQ(worthless->effect, 0u);
+  const steps::Judgement rest = dropped(judged, *worthless);
+  ASSERT_EQ(rest.named.chosen.size(), 1u);
+  EXPECT_EQ(rest.named.chosen[0].candidate.signature.effect, "timing_offset");
+  EXPECT_EQ(rest.nearest.size(), 1u);
+  nested[1].scores = scores(0.5, 0);
+  EXPECT_FALSE(of_no_use(judged, nested, std::nullopt));
 }
 
 }  // namespace
