@@ -22,7 +22,6 @@ constexpr double kDigits_m = 1.2e-5;  // a log prints 1e-5 m: half of that at ea
 constexpr double kLeastOnGrid = 0.95;
 constexpr double kLeastDistinctOnGrid = 0.8;
 constexpr std::size_t kTriedSteps = 8;
-constexpr std::size_t kLeastGaps = 20;
 constexpr double kFarGap_m = 0.05;  // farther is no rounding
 // A Gaussian has 3; the sampling error with 450 gaps is 0.16 for the positions (two a gap) and 0.23
 // for the headings, and these are four of them.
@@ -146,7 +145,7 @@ double quantisation_step(std::span<const Trial> trials) {
 }
 
 PoseNoise reading_noise(std::span<const ReadingGap> gaps, double quantum_m) {
-  if (gaps.size() < kLeastGaps) return {0, 0};
+  if (gaps.size() < kFewestGaps) return {0, 0};
   std::vector<double> position, heading, clipped;
   std::size_t shared = 0;
   for (const ReadingGap& g : gaps) {

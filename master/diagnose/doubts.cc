@@ -6,9 +6,8 @@
 #include "common/score/statistics.h"
 #include "master/diagnose/digits.h"
 #include "master/diagnose/findings.h"
-#include "master/diagnose/intervals.h"
 #include "master/diagnose/step_parts.h"
-#include "master/sanity/words.h"
+#include "master/residual/fit.h"
 
 namespace gapfarm::steps {
 namespace {
@@ -33,15 +32,9 @@ bool at_bound(const EffectDiagnoses& effects, const Parameter& row, double value
 }  // namespace
 
 bool clearly_better(const std::vector<double>& scores, const std::vector<double>& others) {
-  const auto n = static_cast<double>(scores.size());
-  double sum = 0, squares = 0;
-  for (std::size_t i = 0; i < scores.size(); ++i) {
-    const double gain = scores[i] - others[i];
-    sum += gain;
-    squares += gain * gain;
-  }
-  const double variance = std::max(0.0, squares / n - (sum / n) * (sum / n));
-  return sum / n > kNormal90 * std::sqrt(variance / n);
+  std::vector<double> gains = scores;
+  for (std::size_t i = 0; i < gains.size(); ++i) gains[i] -= others[i];
+  return surely_gains(gains);
 }
 
 Explanation naming_nothing(Explanation explanation) {

@@ -6,6 +6,7 @@
 #include <functional>
 #include <numbers>
 
+#include "master/diagnose/nuisance.h"
 #include "master/diagnose/probes.h"
 
 namespace gapfarm {
@@ -14,8 +15,6 @@ namespace {
 constexpr std::size_t kFreedRepeats = 4;  // trials of a cell that make its mean worth something
 constexpr double kFreeShare = 1.0 / 3.0;  // of the trials
 constexpr double kWayTrust = 1e-3;        // of the duties' word on the way, beside the ends'
-// Speed at which the misfits of starting and stopping were measured, m/s.
-constexpr double kFreedSpeed = 0.28;
 
 // A command seen along and across: both sides together, and against each other.
 struct Duties {
@@ -181,7 +180,7 @@ std::vector<Eigen::VectorXd> smooth_misfits(const Study& study) {
       },
       factors);
   for (const auto& carry : {at_start, at_end}) {
-    const double scale = speed / kFreedSpeed;
+    const double scale = speed / kMeasuredSpeed_m_s;
     const auto ahead = [&](std::size_t, const Duties& d) { return 0.0015 * scale * d.drive; };
     const auto aside = [&](std::size_t, const Duties& d) {
       return 0.006 * scale * d.drive * d.turn;

@@ -1,7 +1,6 @@
 #include "master/diagnose/headline.h"
 
 #include <cmath>
-#include <numbers>
 #include <optional>
 
 #include "master/sanity/words.h"
@@ -10,7 +9,6 @@ namespace gapfarm {
 namespace {
 
 constexpr std::size_t kLine = 100;  // characters, about what fits on one line in large print
-constexpr double kDegreesEach = 180 / std::numbers::pi;
 
 const Estimate* size_of(const NamedEffect& effect, const ShortWords& words) {
   for (const Estimate& e : effect.parameters) {
@@ -42,7 +40,7 @@ std::string cause_of(const NamedEffect& effect, const EffectDiagnoses& effects) 
   std::string line = filled(opposite ? words->opposite : words->cause, effect, *words, size->value);
   for (const Estimate& e : effect.parameters) {
     if (words->toward != nullptr && e.key == words->toward) {
-      line += " toward " + plain_number(std::round(kDegreesEach * e.value)) + " degrees";
+      line += " toward " + plain_number(std::round(kDegrees * e.value)) + " degrees";
     }
   }
   return line;

@@ -3,11 +3,10 @@
 
 #include <cstddef>
 
+#include "common/score/normal.h"
 #include "master/diagnose/study.h"
 
 namespace gapfarm {
-
-inline constexpr double kNormal90 = 1.645;  // half a 90 % interval, in standard deviations
 
 // Standard deviation, in the unit of table row `row`, of what the fit's linearisation cannot see:
 // that another simulation of the same effect gives it another size, and that places are searched.

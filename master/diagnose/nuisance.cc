@@ -10,9 +10,6 @@
 namespace gapfarm {
 namespace {
 
-// Speed at which the misfits below were measured, m/s.
-constexpr double kMeasuredSpeed = 0.28;
-
 struct Misfit {
   MotionKind kind;
   int component;   // 0 x, 1 y, 2 heading
@@ -27,7 +24,7 @@ constexpr Misfit kMisfits[] = {
 };
 
 double misfit_size(const Misfit& misfit, double path, double speed_m_s) {
-  return (misfit.fixed + misfit.growing * path) * speed_m_s / kMeasuredSpeed;
+  return (misfit.fixed + misfit.growing * path) * speed_m_s / kMeasuredSpeed_m_s;
 }
 
 void add_column(const Study& study, const std::vector<Eigen::Vector3d>& values, double prior,

@@ -9,6 +9,9 @@
 
 namespace gapfarm {
 
+// Speed at which the misfits of starting and stopping were measured.
+inline constexpr double kMeasuredSpeed_m_s = 0.28;
+
 // Standard deviation (m, m, rad) of what a simulation of other physics gets wrong of a cell's mean
 // motion, in ways that are alike for its mirror image; 0 where symmetry forbids it.
 Eigen::Vector3d misfit_sd(const Cell& cell, double speed_m_s);

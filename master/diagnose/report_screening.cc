@@ -4,6 +4,7 @@
 
 #include "common/effects/catalogue.h"
 #include "master/diagnose/digits.h"
+#include "master/diagnose/distribution.h"
 #include "master/diagnose/effects/patch_places.h"
 #include "master/diagnose/report_parts.h"
 
@@ -39,7 +40,8 @@ Told told_of(const Inquiry& of, const std::string& name, const Explanation& name
                                 : "single drives do not stray as slips would make them"};
   }
   if (name == "pose_latency") {
-    if (named.study().gaps.size() < 20) return note("too few resting poses were read twice");
+    if (named.study().gaps.size() < kFewestGaps)
+      return note("too few resting poses were read twice");
     return {named.latency.gain, "latency",
             named.latency_from_rest_s > 0 ? named.latency_from_rest_s : named.latency.latency_s,
             named.latency.gain > 0 ? "by readings that fall behind the next ones"

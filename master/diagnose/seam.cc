@@ -93,7 +93,6 @@ Signature linear_view_signature(const Study& study) {
 
 double seam_position(const Study& study, const Regression& others, const Signature& seam,
                      const Eigen::Vector4d& coefficients) {
-  constexpr double kStep_m = 0.0025;
   const bool across_x = value_in(seam, "axis") == 0;
   const Eigen::Vector2d middle = middle_of(study);
   const auto shift = [&](const Pose& X, double line) {
@@ -103,9 +102,9 @@ double seam_position(const Study& study, const Regression& others, const Signatu
                 coefficients[1] + coefficients[3] * along, 0};
   };
   const double about = value_in(seam, "position");
-  const double reach = std::abs(coefficients[across_x ? 0 : 1]) + 4 * kStep_m;
+  const double reach = std::abs(coefficients[across_x ? 0 : 1]) + 4 * kFineSeamStep_m;
   double best = about, least = INFINITY;
-  for (double line = about - reach; line <= about + reach; line += kStep_m) {
+  for (double line = about - reach; line <= about + reach; line += kFineSeamStep_m) {
     std::vector<Eigen::Vector3d> d;
     for (const ResidualTrial& t : study.trials) {
       Pose start = t.X_WS;

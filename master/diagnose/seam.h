@@ -8,7 +8,8 @@
 
 namespace gapfarm {
 
-constexpr double kSeamStep_m = 0.005;  // to which a seam's position is searched
+inline constexpr double kSeamStep_m = 0.005;       // to which a seam's position is searched
+inline constexpr double kFineSeamStep_m = 0.0025;  // the same of one that was chosen
 
 // Whether it is a seam, the first or a second one.
 bool is_seam(const std::string& effect);

@@ -9,7 +9,7 @@ namespace gapfarm {
 namespace {
 
 // A first search as wide as two readings leave a line, then a finer one.
-constexpr double kWideStep_m = 0.01, kFineStep_m = 0.0025;
+constexpr double kWideStep_m = 0.01;
 constexpr int kWideSteps = 8, kFineSteps = 3;
 // Of the misfit (twice nats), for a move: trials change sides one by one.
 constexpr double kWorthMoving = 2;
@@ -59,7 +59,7 @@ Result<bool> move_seams(Predictor& predictor, const Study& study, const Eigen::M
                         JointFit* fit) {
   const Overrides before = fit->at;
   for (const auto& [step_m, steps] :
-       {std::pair(kWideStep_m, kWideSteps), std::pair(kFineStep_m, kFineSteps)}) {
+       {std::pair(kWideStep_m, kWideSteps), std::pair(kFineSeamStep_m, kFineSteps)}) {
     for (std::size_t row : seam_rows(predictor.problem().table(), fit->at)) {
       auto misfit = search_line(predictor, study, nuisances, row, step_m, steps, fit);
       if (!misfit) return misfit.error();

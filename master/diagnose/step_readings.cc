@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "common/score/statistics.h"
+#include "master/diagnose/distribution.h"
 #include "master/diagnose/step_parts.h"
 
 namespace gapfarm::steps {
@@ -89,7 +90,8 @@ Result<Explanation> put_late_readings_right(const Inquiry& of, Explanation so_fa
 // A late camera reads a pose before the motion has ended; the next reading shows it.
 Result<Explanation> look_for_late_readings(const Inquiry& of, Explanation so_far) {
   const Study& study = so_far.study();
-  if ((of.subject.looks & kLooksForLateReadings) == 0 || study.gaps.size() < 20) return so_far;
+  if ((of.subject.looks & kLooksForLateReadings) == 0 || study.gaps.size() < kFewestGaps)
+    return so_far;
   const auto velocity = end_velocities(of, study);
   if (!velocity) return velocity.error();
   if (velocity->empty()) return so_far;

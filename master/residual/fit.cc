@@ -4,6 +4,7 @@
 #include <cmath>
 #include <optional>
 
+#include "common/score/normal.h"
 #include "common/score/statistics.h"
 #include "master/residual/basis.h"
 
@@ -13,7 +14,6 @@ namespace {
 constexpr std::size_t kMostFittedTerms = 3;
 // Prior standard deviations of shifts, in units of the noise's.
 const std::vector<double> kAmplitudes = {0.5, 2, 8, 32};
-constexpr double kHalf90 = 1.645;  // half a 90 % interval, in standard deviations
 // A trial in fifty may stray five times as far as the noise.
 constexpr double kStraying = 0.02, kStrayScale = 5;
 
@@ -23,18 +23,6 @@ double nats_of(const Eigen::Vector3d& z) {
   const double wide = kStraying / (kStrayScale * kStrayScale * kStrayScale);
   return std::log((1 - kStraying) * std::exp(-q / 2) +
                   wide * std::exp(-q / (2 * kStrayScale * kStrayScale)) + 1e-300);
-}
-
-// By paired scores: the 90 % interval of the gain lies above zero.
-bool surely_gains(const std::vector<double>& gains) {
-  double sum = 0, squares = 0;
-  for (const double g : gains) {
-    sum += g;
-    squares += g * g;
-  }
-  const auto n = static_cast<double>(gains.size());
-  const double variance = std::max(0.0, squares / n - (sum / n) * (sum / n));
-  return sum / n > kHalf90 * std::sqrt(variance / n);
 }
 
 // The procedure on some of a log's trials.
@@ -125,6 +113,17 @@ class FieldSearch {
 };
 
 }  // namespace
+
+bool surely_gains(const std::vector<double>& gains) {
+  double sum = 0, squares = 0;
+  for (const double g : gains) {
+    sum += g;
+    squares += g * g;
+  }
+  const auto n = static_cast<double>(gains.size());
+  const double variance = std::max(0.0, squares / n - (sum / n) * (sum / n));
+  return sum / n > kNormal90 * std::sqrt(variance / n);
+}
 
 std::size_t ResidualData::folds() const {
   return fold.empty() ? 0 : 1 + *std::max_element(fold.begin(), fold.end());

@@ -36,6 +36,9 @@ struct ResidualFit {
   Residuals unseen;
 };
 
+// By paired scores: a mean gain that is not by chance, but for one case in twenty.
+bool surely_gains(const std::vector<double>& gains);
+
 // Chosen and fitted by the trials that are `seen`.
 ResidualField fit_field(const ResidualData& data, const Residuals& residuals,
                         const std::vector<bool>& seen);

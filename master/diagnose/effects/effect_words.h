@@ -1,9 +1,12 @@
 // How an effect is told.
 #pragma once
 
+#include <numbers>
 #include <vector>
 
 namespace gapfarm {
+
+inline constexpr double kDegrees = 180 / std::numbers::pi;  // of a radian
 
 // How a parameter is told: the words around its value in a unit that people use.
 struct Telling {

@@ -77,7 +77,7 @@ extern const EffectDiagnosis kFloorTilt = {
     .model_error = 0.3,
     .direction_error_rad = 0.02,
     .words = {"The floor falls by %1 toward %2",
-              {{"angle", 1000, " mrad"}, {"direction", 180 / std::numbers::pi, " degrees"}}},
+              {{"angle", 1000, " mrad"}, {"direction", kDegrees, " degrees"}}},
     .short_words = ShortWords{"angle", 1000, " mrad", "The floor slopes by %", nullptr,
                               "Level the floor", "direction"},
 };

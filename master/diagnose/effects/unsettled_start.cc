@@ -114,7 +114,7 @@ const SpreadRow kUnsettledSpread = {
 extern const EffectDiagnosis kUnsettledStart = {
     .effect = "unsettled_start",
     .words = {"%1 of the starts after unrecorded moves were read in the hand, turned by up to %2",
-              {{"share", 100, " %"}, {"angle", 180 / std::numbers::pi, " degrees"}}},
+              {{"share", 100, " %"}, {"angle", kDegrees, " degrees"}}},
     .short_words = ShortWords{"share", 100, " %", "% of the starts after moves were read too early",
                               nullptr, "Let go of the robot before its pose is read"},
     .spread = &kUnsettledSpread,

@@ -1,12 +1,8 @@
-#include <numbers>
-
 #include "master/diagnose/effects/effect_diagnosis.h"
 #include "master/diagnose/effects/patch_places.h"
 
 namespace gapfarm {
 namespace {
-
-constexpr double kDegreesOfRadian = 180 / std::numbers::pi;
 
 // What a camera does is told, and is as unsure, whatever it looks at.
 std::vector<EffectDiagnosis> pushed_rows() {
@@ -17,7 +13,7 @@ std::vector<EffectDiagnosis> pushed_rows() {
        .polar = Polar{"friction_anisotropy.ratio", "friction_anisotropy.direction", 2, true},
        .words = {"Friction across the table's grain is %1 times that along it, and the grain runs "
                  "at %2",
-                 {{"ratio", 1, ""}, {"direction", kDegreesOfRadian, " degrees"}}}},
+                 {{"ratio", 1, ""}, {"direction", kDegrees, " degrees"}}}},
       {.effect = "friction_speed",
        .words = {"Friction with the table grows by %1 of itself with every m/s",
                  {{"slope", 100, " %"}}}},
@@ -30,7 +26,7 @@ std::vector<EffectDiagnosis> pushed_rows() {
       {.effect = "table_tilt",
        .polar = Polar{"table_tilt.angle", "table_tilt.direction", 1, false},
        .words = {"The table falls by %1 toward %2",
-                 {{"angle", 1000, " mrad"}, {"direction", kDegreesOfRadian, " degrees"}}}},
+                 {{"angle", 1000, " mrad"}, {"direction", kDegrees, " degrees"}}}},
       {.effect = "com_offset",
        .aliases = {"marker_offset"},
        .model_error = 0.15,
@@ -40,7 +36,7 @@ std::vector<EffectDiagnosis> pushed_rows() {
        .polar = Polar{"pressure_distribution.stretch", "pressure_distribution.direction", 2, false},
        .words = {"The support under the piece is drawn out by %1 (logarithm of its length over its "
                  "width) at %2 in the piece",
-                 {{"stretch", 1, ""}, {"direction", kDegreesOfRadian, " degrees"}}}},
+                 {{"stretch", 1, ""}, {"direction", kDegrees, " degrees"}}}},
       {.effect = "finger_compliance",
        .words = {"The finger gives way by %1 to every newton", {{"compliance", 1000, " mm"}}}},
       {.effect = "placement_bias",

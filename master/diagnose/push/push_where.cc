@@ -13,7 +13,6 @@
 namespace gapfarm {
 namespace {
 
-constexpr double kDegrees = 180 / std::numbers::pi;
 constexpr double kFewInPlace = 3;
 
 std::string pushes_of(const std::string& piece) {
