@@ -78,7 +78,26 @@ TEST_F(PatchSketchTest, OnlyDrivesOverTheRimAreMarked) {
     }
   }
   EXPECT_GT(mark.norm(), 5);
-  EXPECT_EQ(sketch_.column({1, 1, 0.3, 1}).norm(), 0) << "no other friction";
+  EXPECT_LT(sketch_.column({1, 1, 0.3, 1}).norm(), 1e-9) << "no other friction";
+}
+
+// One tread nearly stands and is held by the floor outside: the other cannot turn the robot into
+// the disc, so it stays where it cannot turn.  A mark along the way of the even floor says nothing.
+TEST(PatchSketch, FollowsARobotThatCannotTurn) {
+  const Problem problem = tests::empty_problem();
+  Study study;
+  study.speed_m_s = kSpeed_m_s;
+  CommandSpec command = problem.command("forward");
+  command.left = 0.0747;
+  command.right = 0.5526;
+  command.duration_s = 1.984;
+  study.cells = {{command, MotionKind::kTurn, 1, 1, 1, 1}};
+  ResidualTrial t;
+  t.X_WS = {0.858, 0.719, 2.671};
+  t.X_WP = t.X_WS * exp(Twist(0.158, -0.004, 1.88));
+  study.trials = {t};
+  study.whitener = {Eigen::Matrix3d::Identity()};
+  EXPECT_LT(PatchSketch(problem, study).column({1, 1, 0.35, 0.3})[2], -0.5);
 }
 
 TEST_F(PatchSketchTest, FindsADiscAndNoneInNoise) {
@@ -93,7 +112,7 @@ TEST_F(PatchSketchTest, FindsADiscAndNoneInNoise) {
   EXPECT_NEAR(found[0].patch[0], truth[0], 0.03);
   EXPECT_NEAR(found[0].patch[1], truth[1], 0.03);
   EXPECT_NEAR(found[0].patch[2], truth[2], 0.03);
-  EXPECT_NEAR(std::log(found[0].patch[3]), std::log(truth[3]), 0.2);
+  EXPECT_NEAR(std::log(found[0].patch[3]), std::log(truth[3]), 0.25) << "climbed in such steps";
   for (const auto& place : sketch_.search(Regression(none, noise), 3, 0)) {
     EXPECT_LT(place.squares, 30) << "what a disc must gain to be named";
   }
