@@ -13,13 +13,21 @@ constexpr double kScanStep_s = 0.05;
 constexpr double kHuber = 2;     // robust standard deviations
 constexpr int kRounds = 3;       // of weights
 constexpr int kIterations = 12;  // of least squares a round
+constexpr double kShort = 4;     // times the shortest window
 
-// Residuals of every trial in the predicted end's axes.
-std::vector<Eigen::Vector3d> residuals(const Problem& problem, const Kinematics& at) {
-  const std::vector<Pose> ends = kinematic_ends(problem, at);
+// What is fitted to.
+struct Windows {
+  const Problem& problem;
+  std::vector<Trial> trials;
+};
+
+// Residuals of every window in the predicted end's axes.
+std::vector<Eigen::Vector3d> residuals(const Windows& windows, const Kinematics& at) {
+  const std::vector<Pose> ends =
+      kinematic_ends(windows.problem.ground->robot(), windows.problem.runs, windows.trials, at);
   std::vector<Eigen::Vector3d> r;
   for (std::size_t i = 0; i < ends.size(); ++i) {
-    r.push_back(local_difference(ends[i], problem.log.trials[i].X_WE));
+    r.push_back(local_difference(ends[i], windows.trials[i].X_WE));
   }
   return r;
 }
@@ -59,9 +67,9 @@ Eigen::VectorXd weights_of(const std::vector<Eigen::Vector3d>& r) {
   return weights;
 }
 
-void descend(const Problem& problem, const Eigen::VectorXd& weights, Kinematics* at) {
+void descend(const Windows& windows, const Eigen::VectorXd& weights, Kinematics* at) {
   const auto cost_at = [&](const Kinematics& k) {
-    return weighted(residuals(problem, k), weights);
+    return weighted(residuals(windows, k), weights);
   };
   Eigen::VectorXd r = cost_at(*at);
   double damping = 1e-3;
@@ -98,6 +106,35 @@ void descend(const Problem& problem, const Eigen::VectorXd& weights, Kinematics*
   }
 }
 
+// Over long windows a robot turns so far with a file's wrong values that headings are told wrong by
+// whole turns: what the short ones say is where the fit to all begins.
+Windows short_windows(const Problem& problem) {
+  double shortest_s = INFINITY;
+  for (const Trial& t : problem.log.trials) {
+    shortest_s = std::min(shortest_s, t.duration_s.value_or(0));
+  }
+  Windows some{problem, {}};
+  for (const Trial& t : problem.log.trials) {
+    if (t.duration_s.value_or(0) <= kShort * shortest_s) some.trials.push_back(t);
+  }
+  return some;
+}
+
+void find_delay(const Windows& windows, Kinematics* at) {
+  const auto delay = std::find(at->names.begin(), at->names.end(), "delay") - at->names.begin();
+  const double own = at->values[delay];
+  double least = 0;
+  for (double shift = -kScan_s; shift <= kScan_s + 1e-9; shift += kScanStep_s) {
+    Kinematics moved = *at;
+    moved.values[delay] = own + shift;
+    const double scale = robust_scale(residuals(windows, moved), 0, 3);
+    if (least == 0 || scale < least) {
+      least = scale;
+      at->values[delay] = own + shift;
+    }
+  }
+}
+
 }  // namespace
 
 Result<Kinematics> fit_kinematics(const Problem& problem) {
@@ -105,22 +142,14 @@ Result<Kinematics> fit_kinematics(const Problem& problem) {
     return Error{"kinematics need windows of logged runs, but there are none"};
   }
   Kinematics best = nominal_kinematics(problem.ground->robot());
-  const auto delay = std::find(best.names.begin(), best.names.end(), "delay") - best.names.begin();
-  const double own = best.values[delay];
-  double least = 0;
-  for (double shift = -kScan_s; shift <= kScan_s + 1e-9; shift += kScanStep_s) {
-    Kinematics moved = best;
-    moved.values[delay] = own + shift;
-    const double scale = robust_scale(residuals(problem, moved), 0, 3);
-    if (least == 0 || scale < least) {
-      least = scale;
-      best.values[delay] = own + shift;
-    }
-  }
+  const Windows some = short_windows(problem);
+  find_delay(some, &best);
+  descend(some, weights_of(residuals(some, best)), &best);
+  const Windows all{problem, problem.log.trials};
   for (int round = 0; round < kRounds; ++round) {
-    descend(problem, weights_of(residuals(problem, best)), &best);
+    descend(all, weights_of(residuals(all, best)), &best);
   }
-  const std::vector<Eigen::Vector3d> r = residuals(problem, best);
+  const std::vector<Eigen::Vector3d> r = residuals(all, best);
   for (const Eigen::Vector3d& d : r) {
     best.rms_m += d.head<2>().squaredNorm() / static_cast<double>(r.size());
     best.rms_rad += d[2] * d[2] / static_cast<double>(r.size());

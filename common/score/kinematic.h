@@ -44,7 +44,8 @@ std::vector<Pose> kinematic_ends(const GroundRobot& robot, std::span<const Comma
 GroundRobot robot_with(const GroundRobot& robot, const Kinematics& kinematics);
 
 // Levenberg's and Marquardt's least squares on the problem's windows, Huber's weights beyond two
-// robust standard deviations.  The delay is found first, by a scan of +-1 s round the file's.
+// robust standard deviations: of the short windows, then of all.  The delay is found first, by a
+// scan of +-1 s round the file's.
 // Errors: no windows.
 Result<Kinematics> fit_kinematics(const Problem& problem);
 
