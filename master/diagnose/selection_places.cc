@@ -24,7 +24,7 @@ constexpr int kSeamSteps = 10;
 constexpr int kMostPatchSearches = 4;
 // The ratio is what the sketch is least sure of.
 constexpr std::array<double, 3> kRatioPowers = {0.5, 1, 2};
-constexpr double kLeastRatio = 0.06, kMostRatio = 2.9;
+constexpr double kLeastMovedRatio = 0.06, kMostMovedRatio = 2.9;
 // Moves of discs: standard deviations at first, for an SRV-1, and how they go on.
 constexpr double kMove_m = 0.05, kMoveRatio = 0.4, kMovesShrink = 0.7, kLeastRadius_m = 0.05;
 constexpr int kMoves = 6;
@@ -102,8 +102,8 @@ Status Selector::refine_patch(const Regression& explained, std::vector<EffectCan
       for (std::size_t c = 0; c < 3; ++c)
         to[c] += scale * kMove_m * study_->scale * stream.normal();
       to[2] = std::max(to[2], kLeastRadius_m * study_->scale);
-      to[3] = std::clamp(to[3] * std::exp(scale * kMoveRatio * stream.normal()), kLeastRatio,
-                         kMostRatio);
+      to[3] = std::clamp(to[3] * std::exp(scale * kMoveRatio * stream.normal()), kLeastMovedRatio,
+                         kMostMovedRatio);
     }
     auto tried = simulate_patches(explained, moved);
     if (!tried) return tried.error();
@@ -134,7 +134,7 @@ Status Selector::search_patches(const Regression& explained, double most_gain) {
     if (known) continue;
     for (const double power : kRatioPowers) {
       starts.push_back(place);
-      starts.back()[3] = std::clamp(std::pow(place[3], power), kLeastRatio, kMostRatio);
+      starts.back()[3] = std::clamp(std::pow(place[3], power), kLeastMovedRatio, kMostMovedRatio);
     }
   }
   if (starts.empty()) return {};
