@@ -22,6 +22,8 @@ constexpr double kLittleClosed = 0.02;  // of the gap
 bool at_bound(const EffectDiagnoses& effects, const Parameter& row, double value) {
   if (row.kind != ParameterKind::kReal || place_of(effects, row) != nullptr) return false;
   if (row.key.ends_with(".direction")) return false;
+  const char* saturating = effects.row(row.effect).saturates;
+  if (saturating != nullptr && row.key == row.effect + "." + saturating) return false;
   // What cannot be negative counts by its logarithm: a twentieth of the friction is far from none.
   const bool ratio = row.lower > 0;
   const auto at = [&](double x) { return ratio ? std::log(x) : x; };

@@ -101,6 +101,8 @@ struct EffectDiagnosis {
   // Places in the world, and the keys that tell where a second one would be.
   std::vector<WorldPlace> places = {};
   std::vector<const char*> told_by = {};
+  // The key of a strength that may end on its bound: beyond it the motion hardly changes any more.
+  const char* saturates = nullptr;
   // Whether it makes single trials stray, as slips would.
   bool (*strays)(const Signature& chosen, const ResidualTrial& trial) = nullptr;
 

@@ -47,6 +47,7 @@ extern const EffectDiagnosis kFrictionPatch = {
     .search_error = patch_search_error,
     .places = {{"x", 0}, {"y", 1}},
     .told_by = {"x", "y", "radius"},
+    .saturates = "ratio",
     .strays = strays_at_edge,
     .words = {"A patch of floor around x = %2, y = %3 of the world, of radius %4 has %1 times the "
               "friction",

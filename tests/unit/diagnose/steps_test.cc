@@ -345,5 +345,22 @@ TEST(Steps, WhatHelpsNoUnseenTrialIsDropped) {
   EXPECT_FALSE(of_no_use(judged, nested, std::nullopt));
 }
 
+// More of a saturating strength would change nothing; seed 93's patch of 2.85 ended on 3.
+TEST(Steps, OnlyWhatCouldGrowIsDoubtedOnItsBound) {
+  Measured m;
+  const auto dropped_at = [&](const char* effect, const char* key, double value) {
+    m.found.chosen.front().candidate.signature.effect = effect;
+    const std::size_t row = *m.of.table().find(std::string(effect) + "." + key);
+    m.found.estimates.emplace();
+    m.found.estimates->parameters = {{.row = row, .value = value}};
+    return at_its_bound(m.of, m.found).has_value();
+  };
+  EXPECT_FALSE(dropped_at("friction_patch", "ratio", 3));
+  EXPECT_FALSE(dropped_at("friction_patch", "ratio", 0.05));
+  EXPECT_TRUE(dropped_at("friction_patch", "radius", 5));
+  EXPECT_TRUE(dropped_at("com_offset", "x", 0.03));
+  EXPECT_FALSE(dropped_at("com_offset", "x", 0.02));
+}
+
 }  // namespace
 }  // namespace gapfarm
