@@ -74,7 +74,7 @@ std::vector<Effect> build_catalogue() {
   };
 }
 
-// Rows are stored by their number, so what came after the second ones of a kind stands after them.
+// Rows are stored by their number, so what came after second seams stands after them.
 std::vector<Effect> build_younger() {
   using namespace effect_rows;  // NOLINT: what follows is rows
   return {
@@ -87,22 +87,15 @@ std::vector<Effect> build_younger() {
   };
 }
 
-// Of which there may be two: an arena under four cameras has a seam across each axis.
-constexpr const char* kMayRepeat[] = {"camera_seam"};
-
-std::vector<Effect> build_seconds() {
-  std::vector<Effect> seconds;
-  for (const Effect& first : build_catalogue()) {
-    if (std::find(std::begin(kMayRepeat), std::end(kMayRepeat), first.name) ==
-        std::end(kMayRepeat)) {
-      continue;
-    }
-    Effect& second = seconds.emplace_back(first);
-    second.repeats = first.name;
-    second.name += "_2";
-    second.summary += "; a second one";
-  }
-  return seconds;
+// Of an effect of which there may be two.
+Effect second_one(const std::string& first) {
+  const std::vector<Effect> catalogue = build_catalogue();
+  Effect second = *std::find_if(catalogue.begin(), catalogue.end(),
+                                [&](const Effect& effect) { return effect.name == first; });
+  second.repeats = first;
+  second.name += "_2";
+  second.summary += "; a second one";
+  return second;
 }
 
 std::vector<Effect> joined(std::initializer_list<std::vector<Effect>> parts) {
@@ -120,7 +113,11 @@ std::span<const Effect> srv1_effects() {
 
 std::span<const Effect> srv1_effects_and_seconds() {
   static const std::vector<Effect> catalogue =
-      joined({build_catalogue(), build_seconds(), build_younger()});
+      // An arena under four cameras has a seam across each axis; a floor may be mended twice.
+      joined({build_catalogue(),
+              {second_one("camera_seam")},
+              build_younger(),
+              {second_one("friction_patch")}});
   return catalogue;
 }
 

@@ -23,6 +23,8 @@ constexpr EffectNeed kEffectNeeds[] = {
     {"pose_latency", kExternalPath},
 };
 constexpr const char* kOfTheBuild[] = {"com_offset"};
+// What a request has no place for: a program is told one patch.
+constexpr const char* kNotTold[] = {"friction_patch_2"};
 
 std::vector<Parameter> noise_rows() {
   std::vector<Parameter> rows;
@@ -33,6 +35,9 @@ std::vector<Parameter> noise_rows() {
 bool can_be_applied(const Effect& effect, unsigned inputs) {
   for (const char* name : kOfTheBuild) {
     if (effect.kind() == name) return false;
+  }
+  for (const char* name : kNotTold) {
+    if (effect.name == name) return false;
   }
   for (const EffectNeed& need : kEffectNeeds) {
     if (effect.kind() == need.effect) return (inputs & need.inputs) == need.inputs;

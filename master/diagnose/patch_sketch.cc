@@ -266,11 +266,15 @@ double PatchSketch::fitted_ratio(const Regression& explained, const Patch& patch
   return std::clamp(std::pow(patch[3], share), kLeastRatio, kMostRatio);
 }
 
-std::vector<PatchSketch::Place> PatchSketch::search(const Regression& explained, std::size_t most,
-                                                    double least) const {
+std::vector<PatchSketch::Place> PatchSketch::search(const Regression& explained,
+                                                    const PatchWish& wish) const {
   const Eigen::VectorXd squares = explained.each_gain(marks_);
   std::vector<Place> places;
+  const auto is_wanted = [&](const Patch& patch) {
+    return !wish.beside || are_two_patches(*wish.beside, patch);
+  };
   for (std::size_t k = 0; k < grid_.size(); ++k) {
+    if (!is_wanted(grid_[k])) continue;
     places.push_back({grid_[k], squares[static_cast<Eigen::Index>(k)]});
   }
   const auto best_first = [](const Place& a, const Place& b) { return a.squares > b.squares; };
@@ -284,13 +288,14 @@ std::vector<PatchSketch::Place> PatchSketch::search(const Regression& explained,
   };
   for (const Place& place : places) {
     // A disc of the grid that is off by half a step shows a third of what the right one would.
-    if (apart.size() < kClimbs && 3 * place.squares > least) add(place, &apart);
+    if (apart.size() < kClimbs && 3 * place.squares > wish.least) add(place, &apart);
   }
   for (Place& place : apart) climb(explained, &place);
   std::stable_sort(apart.begin(), apart.end(), best_first);
   std::vector<Place> found;
   for (const Place& place : apart) {
-    if (found.size() < most && place.squares >= least) add(place, &found);
+    if (found.size() == wish.most || place.squares < wish.least) break;
+    if (is_wanted(place.patch)) add(place, &found);  // it may have climbed too near
   }
   for (Place& place : found) place.patch[3] = fitted_ratio(explained, place.patch);
   return found;

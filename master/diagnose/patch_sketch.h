@@ -33,9 +33,9 @@ class PatchSketch {
     Patch patch;
     double squares = 0;  // that its mark explains beyond the regression's
   };
-  // Up to `most` discs that explain `least` squares or more, the best first, none near another,
-  // with the ratio that fits best.  Start places bound the search.
-  std::vector<Place> search(const Regression& explained, std::size_t most, double least) const;
+  // The best first, none near another, with the ratio that fits best.  Start places bound the
+  // search.
+  std::vector<Place> search(const Regression& explained, const PatchWish& wish) const;
 
  private:
   using Contacts = std::array<Eigen::Vector2d, 4>;  // world, m

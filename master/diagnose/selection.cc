@@ -17,9 +17,8 @@ namespace {
 constexpr double kSecondAlias = 0.8;   // cosine beyond which a further effect is the first again,
 constexpr double kSecondShare = 0.25;  // unless it gains this share of all that is explained
 
-// A second one of a kind: an error of the first's place or bend looks like one.  nats, and of all
-// that is explained.
-constexpr double kLeastSecondOfAKind = 20;
+// A second one of a kind, for an error of the first's place or bend looks like one: of all that is
+// explained.
 constexpr double kSecondOfAKindShare = 0.05;
 constexpr double kWorthRelinearising = 40;  // nats: curvature of weaker effects is below the noise
 constexpr int kMostRelinearised = 4;
@@ -34,6 +33,11 @@ double total_gain(const std::vector<EffectCandidate>& chosen) {
   double sum = 0;
   for (const EffectCandidate& c : chosen) sum += c.gain;
   return sum;
+}
+
+// Whether two signatures of one kind are of two such things.
+bool are_two(const Signature& a, const Signature& b) {
+  return is_seam(a.effect) ? are_two_seams(a, b) : are_two_patches(patch_of(a), patch_of(b));
 }
 
 bool is_second(const EffectCandidate& c) {
@@ -68,16 +72,34 @@ std::set<std::string> names_of(const std::vector<EffectCandidate>& chosen,
 
 }  // namespace
 
+// Whether there may be one in the table, and it is none that is there or left out.
+bool Selector::may_be_second(const std::string& second,
+                             const std::set<std::string>& without) const {
+  const std::span<const Effect> known = study_->table->effects();
+  return !without.count(second) && !left_out_.count(second) &&
+         std::any_of(known.begin(), known.end(), [&](const Effect& e) { return e.name == second; });
+}
+
 // Empty: not at all.
 std::string Selector::offered_as(const Signature& s, const std::set<std::string>& without,
                                  const std::vector<EffectCandidate>& beside) const {
   if (!without.count(s.effect)) return s.effect;
   const std::string second = second_of(s.effect);
-  if (second.empty() || without.count(second) || left_out_.count(second)) return "";
+  if (second.empty() || !may_be_second(second, without)) return "";
   for (const EffectCandidate& first : beside) {
-    if (first.signature.effect == s.effect && are_two_seams(first.signature, s)) return second;
+    if (first.signature.effect == s.effect && are_two(first.signature, s)) return second;
   }
   return "";
+}
+
+// Beside which a second one is to be looked for; none: it is not.
+std::optional<Patch> Selector::first_patch(const std::set<std::string>& without,
+                                           const std::vector<EffectCandidate>& beside) const {
+  if (!without.count(kPatchEffect) || !may_be_second(second_of(kPatchEffect), without)) return {};
+  for (const EffectCandidate& first : beside) {
+    if (first.signature.effect == kPatchEffect) return patch_of(first.signature);
+  }
+  return {};
 }
 
 Result<std::vector<EffectCandidate>> Selector::candidates(
@@ -98,8 +120,9 @@ Result<std::vector<EffectCandidate>> Selector::candidates(
     }
   };
   see_all();
-  if (!without.count(kPatchEffect)) {
-    if (Status s = search_patches(explained, most); !s) return s.error();
+  const std::optional<Patch> first = first_patch(without, beside);
+  if (first || !without.count(kPatchEffect)) {
+    if (Status s = search_patches(explained, most, first); !s) return s.error();
     see_all();
   }
   for (auto& [effect, candidate] : best) {

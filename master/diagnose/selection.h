@@ -3,6 +3,7 @@
 
 #include <functional>
 #include <map>
+#include <optional>
 #include <set>
 #include <string>
 #include <utility>
@@ -18,6 +19,7 @@ namespace gapfarm {
 // A further effect must also gain this share of what the others did: small systematic errors of
 // a strong effect's model look like weaker effects.
 inline constexpr double kLeastShare = 0.02;
+inline constexpr double kLeastSecondOfAKind = 20;  // nats
 inline constexpr double kAliasCosine = 0.9;
 inline constexpr std::size_t kMostEffects = 4;
 
@@ -68,7 +70,7 @@ class Selector {
         catalogue_(std::move(catalogue)),
         base_(nuisances) {}
 
-  // From now on candidates() looks for friction patches, too.
+  // From now on candidates() looks for friction patches, too, and for a second one beside a first.
   void look_for_patches();
 
   // These are never offered, whatever the catalogue holds.
@@ -101,9 +103,13 @@ class Selector {
   Regression with(const std::vector<const Signature*>& signatures) const;
 
  private:
+  bool may_be_second(const std::string& second, const std::set<std::string>& without) const;
   std::string offered_as(const Signature& s, const std::set<std::string>& without,
                          const std::vector<EffectCandidate>& beside) const;
-  Status search_patches(const Regression& explained, double most_gain);
+  std::optional<Patch> first_patch(const std::set<std::string>& without,
+                                   const std::vector<EffectCandidate>& beside) const;
+  Status search_patches(const Regression& explained, double most_gain,
+                        const std::optional<Patch>& beside);
   Result<std::vector<EffectCandidate>> simulate_patches(const Regression& explained,
                                                         const std::vector<Patch>& patches);
   Status refine_patch(const Regression& explained, std::vector<EffectCandidate> discs);
@@ -133,7 +139,7 @@ class Selector {
   PatchSearch patch_search_;  // empty: none
   std::vector<SelectionStep> steps_;
   double first_gain_ = 0;
-  int patch_searches_ = 0;
+  int patch_searches_ = 0, second_patch_searches_ = 0;
   int relinearised_ = 0;
   std::vector<Patch> refined_patches_;
 };

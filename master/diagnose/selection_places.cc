@@ -21,7 +21,7 @@ constexpr double kWorthSketched = 12.5;  // of patches; where there are none it 
 // A disc that is off by half a step of the sketch shows a third of what the right one would.
 constexpr double kMostOfMoving = 3;
 constexpr int kSeamSteps = 10;
-constexpr int kMostPatchSearches = 4;
+constexpr int kMostPatchSearches = 4, kMostSecondPatchSearches = 2;
 // The ratio is what the sketch is least sure of.
 constexpr std::array<double, 3> kRatioPowers = {0.5, 1, 2};
 constexpr double kLeastMovedRatio = 0.06, kMostMovedRatio = 2.9;
@@ -118,12 +118,17 @@ Status Selector::refine_patch(const Regression& explained, std::vector<EffectCan
 }
 
 // Adds to the catalogue what the sketch finds in the data that are left, where a search has not
-// been yet.
-Status Selector::search_patches(const Regression& explained, double most_gain) {
-  if (!patch_search_ || patch_searches_ >= kMostPatchSearches) return {};
-  const double worth = std::max(kWorthSketched, kWorthRefiningShare * most_gain);
+// been yet; `beside`: another one than this.
+Status Selector::search_patches(const Regression& explained, double most_gain,
+                                const std::optional<Patch>& beside) {
+  int& searches = beside ? second_patch_searches_ : patch_searches_;
+  if (!patch_search_ || searches >= (beside ? kMostSecondPatchSearches : kMostPatchSearches)) {
+    return {};
+  }
+  const double worth =
+      std::max(beside ? kLeastSecondOfAKind : kWorthSketched, kWorthRefiningShare * most_gain);
   std::vector<Patch> starts;
-  const auto places = patch_search_(explained, 3, 2 * worth);
+  const auto places = patch_search_(explained, {3, 2 * worth, beside});
   if (!places) return places.error();
   for (const Patch& place : *places) {
     const bool known =
@@ -138,7 +143,7 @@ Status Selector::search_patches(const Regression& explained, double most_gain) {
     }
   }
   if (starts.empty()) return {};
-  ++patch_searches_;
+  ++searches;
   auto simulated = simulate_patches(explained, starts);
   if (!simulated) return simulated.error();
   std::stable_sort(simulated->begin(), simulated->end(), better);

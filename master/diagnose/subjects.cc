@@ -19,14 +19,14 @@ namespace {
 
 PatchSearch sketched_patches(Predictor& predictor, const Study& study) {
   const auto sketch = std::make_shared<const PatchSketch>(predictor.problem(), study);
-  return [sketch](const Regression& explained, std::size_t most,
-                  double least) -> Result<std::vector<Patch>> {
-    std::vector<Patch> patches;
-    for (const PatchSketch::Place& place : sketch->search(explained, most, least)) {
-      patches.push_back(place.patch);
-    }
-    return patches;
-  };
+  return
+      [sketch](const Regression& explained, const PatchWish& wish) -> Result<std::vector<Patch>> {
+        std::vector<Patch> patches;
+        for (const PatchSketch::Place& place : sketch->search(explained, wish)) {
+          patches.push_back(place.patch);
+        }
+        return patches;
+      };
 }
 
 // Whether a robot's contacts may come over the disc: on its way from the logged start to the end

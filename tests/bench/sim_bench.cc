@@ -57,8 +57,8 @@ void BM_TreadsSixCommandsEveryFloorEffect(benchmark::State& state) {
   floor.tilt_rad = 0.02;
   floor.nap_strength = 0.05;
   floor.rolling_resistance = 0.05;
-  floor.patch_radius_m = 0.1;
-  floor.patch_ratio = 0.7;
+  floor.patches[0].radius_m = 0.1;
+  floor.patches[0].ratio = 0.7;
   run_commands(state, srv1_settings(), floor);
 }
 BENCHMARK(BM_TreadsSixCommandsEveryFloorEffect)->Unit(benchmark::kMillisecond);

@@ -8,10 +8,12 @@ enum Value : std::size_t { kRatio, kX, kY, kRadius };
 
 void floor(EffectValues p, const Situation& situation, Floor& floor) {
   const Pose centre_S = between(situation.X_WR, {p[kX], p[kY], 0});
-  floor.patch_x_m = centre_S.x;
-  floor.patch_y_m = centre_S.y;
-  floor.patch_radius_m = p[kRadius];
-  floor.patch_ratio = p[kRatio];
+  // Of a first and a second patch each takes the next disc that does nothing yet.
+  for (FrictionDisc& disc : floor.patches) {
+    if (disc.ratio != 1) continue;
+    disc = {centre_S.x, centre_S.y, p[kRadius], p[kRatio]};
+    return;
+  }
 }
 
 }  // namespace friction_patch_hooks

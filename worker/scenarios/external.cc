@@ -57,9 +57,16 @@ class ExternalVehicle final : public Vehicle {
     request_.right = external_side(drive.right);
     request_.duration_s = drive.duration_s;
     request_.interval_s = path == nullptr ? 0 : interval_s;
-    request_.floor = {floor.tilt_rad,          floor.tilt_direction_rad, floor.nap_strength,
-                      floor.nap_direction_rad, floor.rolling_resistance, floor.patch_x_m,
-                      floor.patch_y_m,         floor.patch_radius_m,     floor.patch_ratio};
+    const FrictionDisc& patch = floor.patches.front();
+    request_.floor = {floor.tilt_rad,
+                      floor.tilt_direction_rad,
+                      floor.nap_strength,
+                      floor.nap_direction_rad,
+                      floor.rolling_resistance,
+                      patch.x_m,
+                      patch.y_m,
+                      patch.radius_m,
+                      patch.ratio};
     if (path != nullptr && !(request_.declaration->inputs & kExternalPath)) {
       throw ExternalFailure("external program '" + request_.declaration->name +
                             "' does not declare the input \"path\": there are only end poses");

@@ -70,14 +70,15 @@ void forget_over_moves(const std::vector<DrivenCommand>& driven,
 
 // Whether a disc of floor can matter to a motion that ends at X_SE.
 bool patch_in_reach(const Floor& floor, const GroupMotion& motion, const Pose& X_SE, double scale) {
-  if (floor.patch_ratio == 1) return false;
   // The farthest contact that the SRV-1's parameter table allows (107 mm), half the way between two
   // samples of the way at the greatest speed, and half the patch's rim.
   constexpr double kRobotReach_m = 0.12;
   const Pose& end = motion.reference();
   const double astray = std::hypot(X_SE.x - end.x, X_SE.y - end.y);
-  return motion.distance_from_way({floor.patch_x_m, floor.patch_y_m}) <
-         floor.patch_radius_m + kRobotReach_m * scale + astray;
+  return std::any_of(floor.patches.begin(), floor.patches.end(), [&](const FrictionDisc& disc) {
+    return disc.ratio != 1 && motion.distance_from_way({disc.x_m, disc.y_m}) <
+                                  disc.radius_m + kRobotReach_m * scale + astray;
+  });
 }
 
 // Where the robot may truly have been at the start of a trial that was read there.

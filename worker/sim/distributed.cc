@@ -106,7 +106,9 @@ void DistributedPush::place_points(const Pose& X_SM, double dt) {
   const double angle = X_SM.theta - table_.grain_direction_rad;
   const double c = std::cos(angle), s = std::sin(angle);
   const double whole = settings_.ground_friction * load_n_ * dt;
-  const bool varies = table_.speed_slope_s_m != 0 || table_.patch_ratio != 1;
+  const bool varies = table_.speed_slope_s_m != 0 ||
+                      std::any_of(table_.patches.begin(), table_.patches.end(),
+                                  [](const FrictionDisc& disc) { return disc.ratio != 1; });
   for (std::size_t i = 0; i < face_.size(); ++i) {
     const Eigen::Vector2d r = face_[i].p - centre_;
     points_.x[i] = c * r[0] - s * r[1];

@@ -12,11 +12,14 @@ Eigen::Vector3d gravity_in_start_frame(const Floor& floor, double gravity_m_s2) 
 }
 
 double patch_factor(const Floor& floor, double x_m, double y_m) {
-  if (floor.patch_radius_m <= 0 || floor.patch_ratio == 1) return 1;
-  const double distance = std::hypot(x_m - floor.patch_x_m, y_m - floor.patch_y_m);
-  const double inside =
-      std::clamp((floor.patch_radius_m - distance) / kPatchEdge_m + 0.5, 0.0, 1.0);
-  return 1 + (floor.patch_ratio - 1) * inside * inside * (3 - 2 * inside);
+  double factor = 1;
+  for (const FrictionDisc& disc : floor.patches) {
+    if (disc.radius_m <= 0 || disc.ratio == 1) continue;
+    const double distance = std::hypot(x_m - disc.x_m, y_m - disc.y_m);
+    const double inside = std::clamp((disc.radius_m - distance) / kPatchEdge_m + 0.5, 0.0, 1.0);
+    factor *= 1 + (disc.ratio - 1) * inside * inside * (3 - 2 * inside);
+  }
+  return factor;
 }
 
 Eigen::Vector2d drag_acceleration(const Floor& floor, double gravity_m_s2,

@@ -10,8 +10,9 @@ namespace gapfarm {
 // Gravity in S over a floor whose normal is S's z axis, m/s^2.
 Eigen::Vector3d gravity_in_start_frame(const Floor& floor, double gravity_m_s2);
 
-// Friction at (x, y) over friction outside the patch: patch_ratio inside, 1 outside, and a
-// smoothstep over kPatchEdge_m across the rim, so that end poses have derivatives.
+// Friction at (x, y) over friction outside all patches: the product of what each disc does, which
+// is its ratio inside, 1 outside, and a smoothstep over kPatchEdge_m across the rim, so that end
+// poses have derivatives.
 double patch_factor(const Floor& floor, double x_m, double y_m);
 inline constexpr double kPatchEdge_m = 0.008;
 

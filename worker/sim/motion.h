@@ -4,6 +4,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <string>
 #include <vector>
 
@@ -56,6 +57,12 @@ struct DriveInput {
   double duration_s = 1;  // the motors run this long, then are told zero speed
 };
 
+// A disc of floor with another friction; one that is like the rest does nothing.
+struct FrictionDisc {
+  double x_m = 0, y_m = 0, radius_m = 0;
+  double ratio = 1;  // friction inside over friction outside
+};
+
 // What the floor does, seen from S.
 struct Floor {
   double tilt_rad = 0;  // the floor falls away toward tilt_direction_rad
@@ -63,8 +70,7 @@ struct Floor {
   double nap_strength = 0;        // drag as a share of weight times (1 - cos(angle between the
   double nap_direction_rad = 0;   //  velocity and the nap)) / 2
   double rolling_resistance = 0;  // drag opposing motion along the body's x, share of weight
-  double patch_x_m = 0, patch_y_m = 0, patch_radius_m = 0;
-  double patch_ratio = 1;  // friction inside the disc over friction outside
+  std::array<FrictionDisc, 2> patches;  // where they overlap their ratios multiply
   // pieces only
   double grain_ratio = 1;  // friction across over along the grain; their geometric mean stays
   double grain_direction_rad = 0;

@@ -24,8 +24,8 @@ bool strays_at_edge(const Signature& chosen, const ResidualTrial& trial) {
 }  // namespace
 
 Patch patch_of(const Signature& s) {
-  return {s.fixed.at("friction_patch.x"), s.fixed.at("friction_patch.y"),
-          s.fixed.at("friction_patch.radius"), s.fixed.at("friction_patch.ratio")};
+  const auto value = [&](const char* key) { return s.fixed.at(s.effect + "." + key); };
+  return {value("x"), value("y"), value("radius"), value("ratio")};
 }
 
 std::map<std::string, double> patch_values(const Patch& patch) {
@@ -37,23 +37,43 @@ std::map<std::string, double> patch_values(const Patch& patch) {
 
 double patch_search_error(const Parameter& p, double value, double gain) {
   const double weakness = 1 / std::sqrt(2 * std::max(gain, 1.0));
-  return p.key == "friction_patch.ratio" ? kPatchRatio * weakness * (value - p.nominal)
-                                         : kPatchPlace_m * weakness;
+  return p.key == p.effect + ".ratio" ? kPatchRatio * weakness * (value - p.nominal)
+                                      : kPatchPlace_m * weakness;
 }
 
+namespace {
+
 // Looked for by its place: what a sketch proposes is simulated (patch.h).
-extern const EffectDiagnosis kFrictionPatch = {
-    .effect = kPatchEffect,
-    .search_error = patch_search_error,
-    .places = {{"x", 0}, {"y", 1}},
-    .told_by = {"x", "y", "radius"},
-    .saturates = "ratio",
-    .strays = strays_at_edge,
-    .words = {"A patch of floor around x = %2, y = %3 of the world, of radius %4 has %1 times the "
-              "friction",
-              {{"ratio", 1, ""}, {"x", 1, " m"}, {"y", 1, " m"}, {"radius", 1000, " mm"}}},
-    .short_words = ShortWords{"ratio", 1, "", "A patch of the floor has % times the friction",
-                              nullptr, "Look at the floor there"},
-};
+EffectDiagnosis first_patch() {
+  return {
+      .effect = kPatchEffect,
+      .search_error = patch_search_error,
+      .places = {{"x", 0}, {"y", 1}},
+      .told_by = {"x", "y", "radius"},
+      .saturates = "ratio",
+      .strays = strays_at_edge,
+      .words = {"A patch of floor around x = %2, y = %3 of the world, of radius %4 has %1 times "
+                "the friction",
+                {{"ratio", 1, ""}, {"x", 1, " m"}, {"y", 1, " m"}, {"radius", 1000, " mm"}}},
+      .short_words = ShortWords{"ratio", 1, "", "A patch of the floor has % times the friction",
+                                nullptr, "Look at the floor there"},
+  };
+}
+
+// The search offers discs away from the first as this one.
+EffectDiagnosis second_patch() {
+  EffectDiagnosis row = first_patch();
+  row.effect = "friction_patch_2";
+  row.words.sentence =
+      "A second patch of floor around x = %2, y = %3 of the world, of radius %4 has %1 times the "
+      "friction";
+  row.short_words.reset();
+  return row;
+}
+
+}  // namespace
+
+extern const EffectDiagnosis kFrictionPatch = first_patch();
+extern const EffectDiagnosis kFrictionPatch2 = second_patch();
 
 }  // namespace gapfarm

@@ -158,8 +158,8 @@ bool piece_crosses(const Study&, const ResidualTrial& trial, const Patch& patch)
 PatchSearch push_patches(Predictor& predictor, const Study& study) {
   // Simulated when first asked for; what is explained changes, the marks do not.
   const auto grid = std::make_shared<std::vector<Signature>>();
-  return [&predictor, &study, grid](const Regression& explained, std::size_t most,
-                                    double least) -> Result<std::vector<Patch>> {
+  return [&predictor, &study, grid](const Regression& explained,
+                                    const PatchWish& wish) -> Result<std::vector<Patch>> {
     const std::vector<Patch> places = patch_grid(study);
     if (grid->empty()) {
       auto marks = patch_signatures(predictor, study, places);
@@ -175,8 +175,9 @@ PatchSearch push_patches(Predictor& predictor, const Study& study) {
     std::sort(order.begin(), order.end());
     std::vector<Patch> best;
     for (const auto& [squares, k] : order) {
-      if (-squares < least || best.size() == most) break;
+      if (-squares < wish.least || best.size() == wish.most) break;
       const Patch& place = places[k];
+      if (wish.beside && !are_two_patches(*wish.beside, place)) continue;
       const bool near = std::any_of(best.begin(), best.end(), [&](const Patch& p) {
         return std::hypot(p[0] - place[0], p[1] - place[1]) < p[2];
       });

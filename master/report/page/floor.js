@@ -84,8 +84,8 @@ function lensLayers(frame) {
 function placeLayers(frame) {
   const layers = [];
   const named = new Set((PAGE.effects || []).map((e) => e.name));
-  if (named.has("friction_patch")) {
-    const [x, y, r, ratio] = ["x", "y", "radius", "ratio"].map((k) => valueOf(`friction_patch.${k}`));
+  for (const name of ["friction_patch", "friction_patch_2"].filter((n) => named.has(n))) {
+    const [x, y, r, ratio] = ["x", "y", "radius", "ratio"].map((k) => valueOf(`${name}.${k}`));
     layers.push({ kind: "area", style: "place", points: circle(x, y, r), name: "patch" });
     layers.push({ kind: "text", style: "place", text: `patch: ${words(ratio, 2)} × the friction`, points: [[x, y]], anchor: "middle" });
   }

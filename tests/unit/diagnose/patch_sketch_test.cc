@@ -107,15 +107,36 @@ TEST_F(PatchSketchTest, FindsADiscAndNoneInNoise) {
   const Eigen::MatrixXd none(noise.size(), 0);
   const Patch truth = {0.83, 1.12, 0.33, 0.4};
   const Regression marked(none, noise + sketch_.column(truth));
-  const auto found = sketch_.search(marked, 3, 16);
+  const auto found = sketch_.search(marked, {3, 16});
   ASSERT_FALSE(found.empty());
   EXPECT_NEAR(found[0].patch[0], truth[0], 0.03);
   EXPECT_NEAR(found[0].patch[1], truth[1], 0.03);
   EXPECT_NEAR(found[0].patch[2], truth[2], 0.03);
   EXPECT_NEAR(std::log(found[0].patch[3]), std::log(truth[3]), 0.25) << "climbed in such steps";
-  for (const auto& place : sketch_.search(Regression(none, noise), 3, 0)) {
+  for (const auto& place : sketch_.search(Regression(none, noise), {3, 0})) {
     EXPECT_LT(place.squares, 30) << "what a disc must gain to be named";
   }
+}
+
+TEST_F(PatchSketchTest, FindsASecondDiscApartFromAFirst) {
+  const Patch first = {0.6, 0.6, 0.3, 0.4}, second = {1.35, 1.3, 0.28, 0.45};
+  const Eigen::VectorXd data = sketch_.column(first) + sketch_.column(second);
+  const Eigen::MatrixXd none(data.size(), 0);
+  Regression explained(none, data);
+  // A first disc that is a little off leaves marks at its own rim.
+  explained.add(sketch_.column({0.63, 0.6, 0.33, 0.4}));
+  const auto found = sketch_.search(explained, {3, 16, first});
+  ASSERT_FALSE(found.empty());
+  EXPECT_NEAR(found[0].patch[0], second[0], 0.05);
+  EXPECT_NEAR(found[0].patch[1], second[1], 0.05);
+  for (const auto& place : found) EXPECT_TRUE(are_two_patches(first, place.patch));
+}
+
+TEST(Patches, OneOnTheRimOfAnotherIsNotASecond) {
+  const Patch first = {1, 1, 0.3, 0.4};
+  EXPECT_FALSE(are_two_patches(first, {1.05, 1, 0.25, 0.5}));
+  EXPECT_FALSE(are_two_patches(first, {1.3, 1, 0.14, 2}));
+  EXPECT_TRUE(are_two_patches(first, {1.3, 1.4, 0.3, 0.5}));
 }
 
 }  // namespace

@@ -64,8 +64,10 @@ TEST(ExternalTable, HasTheProgramsRowsThenNoiseThenEffectsThatCanBeApplied) {
       parse_declaration(declaration_with(kMass, R"(["lag", "dead_travel", "floor", "path"])"))
           .value());
   EXPECT_TRUE(rich.table().find("motor_lag.tau"));
-  // All of srv1's but one on the robot's build.
-  EXPECT_EQ(rich.table().effects().size() + 1, srv1_effects_and_seconds().size());
+  // All of srv1's but one on the robot's build and a second patch, of which a request tells
+  // nothing.
+  EXPECT_FALSE(rich.table().find("friction_patch_2.ratio"));
+  EXPECT_EQ(rich.table().effects().size() + 2, srv1_effects_and_seconds().size());
 }
 
 TEST(ExternalRequest, HoldsWhatTheProgramDeclaredAndNothingElse) {

@@ -73,10 +73,10 @@ TEST(Floor, DragTakesEnergyAtEverySpeedAndNeverTurnsMotionRound) {
 
 TEST(Floor, PatchChangesFrictionSmoothlyAcrossItsRim) {
   Floor floor;
-  floor.patch_x_m = 0.2;
-  floor.patch_y_m = -0.1;
-  floor.patch_radius_m = 0.05;
-  floor.patch_ratio = 0.4;
+  floor.patches[0].x_m = 0.2;
+  floor.patches[0].y_m = -0.1;
+  floor.patches[0].radius_m = 0.05;
+  floor.patches[0].ratio = 0.4;
   EXPECT_EQ(patch_factor(floor, 0.2, -0.1), 0.4);
   EXPECT_EQ(patch_factor(floor, 0.2, -0.1 + 0.05 + kPatchEdge_m), 1);
   EXPECT_NEAR(patch_factor(floor, 0.25, -0.1), 0.7, 1e-12) << "half-way on the rim itself";
@@ -87,8 +87,17 @@ TEST(Floor, PatchChangesFrictionSmoothlyAcrossItsRim) {
     EXPECT_LT(factor - last, 0.02);
     last = factor;
   }
-  floor.patch_ratio = 1;
+  floor.patches[0].ratio = 1;
   EXPECT_EQ(patch_factor(floor, 0.2, -0.1), 1);
+}
+
+TEST(Floor, RatiosOfPatchesThatOverlapMultiply) {
+  Floor floor;
+  floor.patches = {FrictionDisc{0, 0, 0.2, 0.5}, FrictionDisc{0.3, 0, 0.2, 1.6}};
+  EXPECT_EQ(patch_factor(floor, 0, 0), 0.5);
+  EXPECT_EQ(patch_factor(floor, 0.3, 0), 1.6);
+  EXPECT_DOUBLE_EQ(patch_factor(floor, 0.15, 0), 0.8);
+  EXPECT_EQ(patch_factor(floor, 0.15, 0.3), 1);
 }
 
 }  // namespace

@@ -67,8 +67,8 @@ TEST_P(PushEffects, FrictionAnisotropyStopsSoonerAcrossTheGrain) {
 TEST_P(PushEffects, FrictionPatchASlideWithinItFeelsItsFriction) {
   const PushSettings settings = fine();
   Floor table;
-  table.patch_radius_m = 2;
-  table.patch_ratio = 2;
+  table.patches[0].radius_m = 2;
+  table.patches[0].ratio = 2;
   const double v = 0.6;
   EXPECT_NEAR(slide_distance(settings, {v, 0}, table),
               v * v / (4 * settings.ground_friction * kGravity), 1e-3);

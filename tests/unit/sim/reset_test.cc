@@ -53,7 +53,7 @@ Task draw_task(Draw& draw) {
   if (draw.chance(0.3)) task.floor.tilt_rad = draw.uniform(0, 1.2);  // some slide and topple
   if (draw.chance(0.3)) task.floor.nap_strength = 0.1;
   if (draw.chance(0.3)) task.floor.rolling_resistance = 0.1;
-  if (draw.chance(0.3)) task.floor.patch_radius_m = 0.05, task.floor.patch_ratio = 0.3;
+  if (draw.chance(0.3)) task.floor.patches[0].radius_m = 0.05, task.floor.patches[0].ratio = 0.3;
   if (draw.chance(0.1)) task.drive.left.speed_m_s = std::numeric_limits<double>::infinity();
   return task;
 }

@@ -47,10 +47,10 @@ std::vector<Axis> axes() {
       {"rolling", [](Point& p, double u) { p.floor.rolling_resistance = 0.05 + 0.02 * u; }},
       {"patch_x",
        [](Point& p, double u) {
-         p.floor.patch_x_m = 0.05 + 0.01 * u;
-         p.floor.patch_y_m = 0.03;
-         p.floor.patch_radius_m = 0.05;
-         p.floor.patch_ratio = 0.5;
+         p.floor.patches[0].x_m = 0.05 + 0.01 * u;
+         p.floor.patches[0].y_m = 0.03;
+         p.floor.patches[0].radius_m = 0.05;
+         p.floor.patches[0].ratio = 0.5;
        }},
   };
 }

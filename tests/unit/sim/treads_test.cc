@@ -262,23 +262,23 @@ TEST(Treads, PatchEverywhereIsAnotherFriction) {
   SimSettings slippery = srv1_settings();
   slippery.friction *= 0.5;
   Floor floor;
-  floor.patch_radius_m = 10;
-  floor.patch_ratio = 0.5;
+  floor.patches[0].radius_m = 10;
+  floor.patches[0].ratio = 0.5;
   const DriveInput drive = drive_of(kCommands[4]);
   EXPECT_LT(
       distance_m(run_once(srv1_settings(), drive, floor).X_SE, run_once(slippery, drive).X_SE),
       1e-9);
-  floor.patch_ratio = 1;
+  floor.patches[0].ratio = 1;
   EXPECT_TRUE(same(run_once(srv1_settings(), drive, floor), run_once(srv1_settings(), drive)));
 }
 
 TEST(Treads, SlipperyPatchUnderOneSideTurnsTheStartTowardIt) {
   Floor floor;  // under the left tread at the start: the right one pulls harder and turns left
-  floor.patch_y_m = 0.085 / 2;
-  floor.patch_radius_m = 0.06;
-  floor.patch_ratio = 0.2;
+  floor.patches[0].y_m = 0.085 / 2;
+  floor.patches[0].radius_m = 0.06;
+  floor.patches[0].ratio = 0.2;
   EXPECT_GT(run_once(srv1_settings(), drive_at(0.28, 0.28), floor).X_SE.theta, radians(1));
-  floor.patch_x_m = 5;
+  floor.patches[0].x_m = 5;
   EXPECT_TRUE(same(run_once(srv1_settings(), drive_at(0.28, 0.28), floor),
                    run_once(srv1_settings(), drive_at(0.28, 0.28))));
 }

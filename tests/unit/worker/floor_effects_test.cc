@@ -157,6 +157,27 @@ TEST(EffectSignature, FrictionPatchStaysInItsPlace) {
   EXPECT_EQ(end_of(moved, driven("forward")), end_of({}, driven("forward"))) << "it is elsewhere";
 }
 
+TEST(EffectSignature, ASecondFrictionPatchAloneIsTheFirst) {
+  Changes first = {{"friction_patch.ratio", 0.2},
+                   {"friction_patch.x", 0},
+                   {"friction_patch.y", 0.0425},
+                   {"friction_patch.radius", 0.06}};
+  Changes second = first;
+  for (auto& [key, value] : second) key.replace(0, key.find('.'), "friction_patch_2");
+  const Pose end = end_of(first, driven("forward"));
+  EXPECT_EQ(end, end_of(second, driven("forward")));
+  // Both under the same side are one of the product of their ratios.
+  Changes both = first;
+  both.insert(both.end(), second.begin(), second.end());
+  both[0].second = both[4].second = 0.5;
+  first[0].second = 0.25;
+  EXPECT_EQ(end_of(first, driven("forward")), end_of(both, driven("forward")));
+  // One under each side: neither side pulls round.
+  both[6].second = -both[2].second;
+  EXPECT_NEAR(end_of(both, driven("forward")).theta, 0, 1e-4);
+  EXPECT_GT(std::abs(end_of(first, driven("forward")).theta), 0.01);
+}
+
 // As for the nap, in both directions of driving and at every heading; turning in place nothing
 // moves forward, so nothing is lost.
 TEST(EffectSignature, RollingResistanceShortensDrivesBothWays) {
