@@ -126,14 +126,14 @@ TriedShape try_shape(const Inquiry& of, const Refit& refit, std::size_t k) {
   return tried;
 }
 
-// Of a correction by effects that are no cause, the smooth one takes the place where it predicts
-// better without.
+// Of a correction by effects that are no cause, the smooth one takes the place unless both together
+// predict clearly better.
 TriedShape best_shape(const Inquiry& of, const Refit& refit) {
   TriedShape tried = try_shape(of, refit, refit.nested.size() - 1);
   if (refit.correction.empty()) return tried;
   TriedShape alone = try_shape(of, refit, refit.nested.size() - 2);
-  const bool better =
-      !alone.field.empty() && (tried.field.empty() || mean(alone.with_it) > mean(tried.with_it));
+  const bool better = !alone.field.empty() &&
+                      (tried.field.empty() || !clearly_better(tried.with_it, alone.with_it));
   return better ? alone : tried;
 }
 

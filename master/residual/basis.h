@@ -3,7 +3,7 @@
 //
 // The shifts at the centres c have the prior covariance a^2 k(c, c), k being the term's bumps; what
 // a shift is elsewhere follows from these (subset of regressors; Quinonero-Candela and Rasmussen
-// 2005).
+// 2005).  An edge is a row of bumps from there to where the log's readings end, all of one height.
 #pragma once
 
 #include <Eigen/Core>
@@ -17,35 +17,51 @@ namespace gapfarm {
 
 class ResidualBasis {
  public:
-  // Centres lie among the trials that are `seen`.  `lengths`: some of the shape's.
-  ResidualBasis(const ResidualData& data, const std::vector<bool>& seen, const ResidualShape& shape,
-                const std::vector<double>& lengths);
+  // Centres lie among the trials that are `seen`; an edge where it explains most of their
+  // `residuals`.  `lengths`: some of the shape's.
+  ResidualBasis(const ResidualData& data, const Residuals& residuals, const std::vector<bool>& seen,
+                const ResidualShape& shape, const std::vector<double>& lengths);
 
   // Whether anything varies that the shifts could depend on.
   bool useful() const { return useful_; }
 
-  // A term fitted to the residuals (m, m, rad) of the trials with learn[i], prior standard
-  // deviation of the shifts `amplitude` times the noise's.
-  ResidualTerm fit(const std::vector<Eigen::Vector3d>& residuals, const std::vector<bool>& learn,
+  // A term fitted to the residuals of the trials with learn[i], prior standard deviation of the
+  // shifts `amplitude` times the noise's.
+  ResidualTerm fit(const Residuals& residuals, const std::vector<bool>& learn,
                    double amplitude) const;
   // The same, of which only the shifts (one a trial, in the predicted ends' axes) are wanted; those
   // for several amplitudes cost little more than for one.
-  std::vector<std::vector<Eigen::Vector3d>> shifts(const std::vector<Eigen::Vector3d>& residuals,
-                                                   const std::vector<bool>& learn,
-                                                   const std::vector<double>& amplitudes,
-                                                   const std::vector<bool>& wanted) const;
+  std::vector<Residuals> shifts(const Residuals& residuals, const std::vector<bool>& learn,
+                                const std::vector<double>& amplitudes,
+                                const std::vector<bool>& wanted) const;
   // Of every trial, by a fitted term of this basis.
-  std::vector<Eigen::Vector3d> shifts_of(const ResidualTerm& term) const;
+  Residuals shifts_of(const ResidualTerm& term) const;
 
  private:
-  struct Normal {
-    Eigen::MatrixXd matrix;
-    Eigen::VectorXd right;
+  // Where a covariate may be looked at.
+  struct Place {
+    std::size_t trial = 0;
+    Pose X_WR;
   };
-  void place_centres(const std::vector<bool>& seen, const std::vector<double>& lengths);
-  Normal normal_of(std::size_t group, const std::vector<Eigen::Vector3d>& residuals,
+  // The trials that one group's shifts are learned from.
+  struct Lesson {
+    std::vector<std::size_t> trials;
+    Residuals whitened;
+    Eigen::MatrixXd matrix;
+    bool strays = false;  // some pull no harder than the farthest
+  };
+  std::vector<Place> places(const std::vector<bool>& seen) const;
+  void place_lengths(const std::vector<Place>& among, const std::vector<double>& shares);
+  void place_centres(const std::vector<Place>& among);
+  void place_edge(const std::vector<Place>& among, const Residuals& residuals,
+                  const std::vector<bool>& seen);
+  void set_units();
+  void set_features();
+  double value(std::size_t covariate, const Place& place) const;
+  Lesson lesson_of(std::size_t group, const Residuals& residuals,
                    const std::vector<bool>& learn) const;
-  Eigen::MatrixXd solve(const Normal& normal, double amplitude) const;
+  Eigen::VectorXd pull_of(const Lesson& lesson, const Eigen::MatrixXd& weights) const;
+  Eigen::MatrixXd solve(const Lesson& lesson, double amplitude) const;
   Eigen::Vector3d shift(std::size_t trial, const Eigen::MatrixXd& weights) const;
   Eigen::Index components() const { return term_.frame == ResidualFrame::kReadings ? 2 : 3; }
 
@@ -58,6 +74,7 @@ class ResidualBasis {
   std::vector<Eigen::Matrix3d> axes_;               // whitened, of every trial
   std::vector<Eigen::Matrix3d> turned_;             // residual_axes() of every trial
   Eigen::MatrixXd kernel_;                          // k(c, c)
+  bool tied_ = false;                               // all centres have one and the same shift
   Eigen::Vector3d unit_;                            // noise of each component, by drive
 };
 

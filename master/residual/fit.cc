@@ -7,6 +7,7 @@
 #include "common/score/normal.h"
 #include "common/score/statistics.h"
 #include "master/residual/basis.h"
+#include "master/residual/edge.h"
 
 namespace gapfarm {
 namespace {
@@ -14,28 +15,12 @@ namespace {
 constexpr std::size_t kMostFittedTerms = 3;
 // Prior standard deviations of shifts, in units of the noise's.
 const std::vector<double> kAmplitudes = {0.5, 2, 8, 32};
-// A trial in fifty may stray five times as far as the noise.
-constexpr double kStraying = 0.02, kStrayScale = 5;
-
-// Nats of a whitened residual but for a constant.
-double nats_of(const Eigen::Vector3d& z) {
-  const double q = z.squaredNorm();
-  const double wide = kStraying / (kStrayScale * kStrayScale * kStrayScale);
-  return std::log((1 - kStraying) * std::exp(-q / 2) +
-                  wide * std::exp(-q / (2 * kStrayScale * kStrayScale)) + 1e-300);
-}
 
 // The procedure on some of a log's trials.
 class FieldSearch {
  public:
   FieldSearch(const ResidualData& data, const Residuals& residuals, const std::vector<bool>& seen)
       : data_(data), seen_(seen), left_(residuals) {
-    for (const ResidualShape& shape : residual_shapes(data.free_commands)) {
-      for (const std::vector<double>& lengths : shape.lengths) {
-        ResidualBasis basis(data, seen, shape, lengths);
-        if (basis.useful()) bases_.push_back(std::move(basis));
-      }
-    }
     learn_ = seen;
     for (std::size_t i = 0; i < data.size(); ++i) learn_[i] = seen[i] && data.learn[i];
     for (std::size_t f = 0; f < data.folds(); ++f) {
@@ -54,6 +39,7 @@ class FieldSearch {
   ResidualField run() {
     ResidualField field;
     while (folds_.size() > 1 && field.size() < kMostFittedTerms) {
+      set_bases();
       const auto best = best_next();
       if (!best) break;
       const auto [basis, amplitude] = *best;
@@ -73,6 +59,17 @@ class FieldSearch {
     Residuals left;  // after the terms so far, fitted without it
   };
 
+  // Of all that may come next.
+  void set_bases() {
+    bases_.clear();
+    for (const ResidualShape& shape : residual_shapes(data_.free_commands)) {
+      for (const std::vector<double>& lengths : shape.lengths) {
+        ResidualBasis basis(data_, left_, learn_, shape, lengths);
+        if (basis.useful()) bases_.push_back(std::move(basis));
+      }
+    }
+  }
+
   static void take(const Residuals& shifts, Residuals* left) {
     for (std::size_t i = 0; i < left->size(); ++i) (*left)[i] -= shifts[i];
   }
@@ -87,9 +84,9 @@ class FieldSearch {
         const auto shifts = bases_[b].shifts(fold.left, fold.learn, kAmplitudes, fold.own);
         for (std::size_t i = 0; i < data_.size(); ++i) {
           if (!fold.own[i]) continue;
-          const double before = nats_of(data_.whiteners[i] * fold.left[i]);
+          const double before = straying_nats(data_.whiteners[i] * fold.left[i]);
           for (std::size_t a = 0; a < kAmplitudes.size(); ++a) {
-            const double after = nats_of(data_.whiteners[i] * (fold.left[i] - shifts[a][i]));
+            const double after = straying_nats(data_.whiteners[i] * (fold.left[i] - shifts[a][i]));
             gains[a].push_back(after - before);
           }
         }

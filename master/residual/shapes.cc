@@ -41,7 +41,9 @@ std::vector<ResidualShape> residual_shapes(bool free_commands) {
       for (const std::size_t duty : rows_of_covariates({"left", "right"})) rows.push_back(duty);
       for (std::vector<double>& length : lengths) length.resize(rows.size(), length.back());
     }
-    shapes.push_back({frame, by_drive, own && !free_commands, std::move(rows), std::move(lengths)});
+    shapes.push_back(
+        {frame, by_drive, own && !free_commands, false, std::move(rows), std::move(lengths)});
+    return &shapes.back();
   };
   add(F::kRobot, true, {"duration", "level"}, alike(2, {0.35, 1}));
   add(F::kWorld, true, {"duration", "level"}, alike(2, {0.35, 1}));
@@ -56,6 +58,9 @@ std::vector<ResidualShape> residual_shapes(bool free_commands) {
   add(F::kReadings, false, {"y"}, alike(1, {0.1, 0.35, 1}));
   add(F::kReadings, false, {"x", "y"}, alike(2, {0.35, 1}));
   add(F::kReadings, false, {"heading"}, alike(1, {0.6, 1.2}));
+  for (const Names axis : {Names{"x"}, Names{"y"}}) {
+    add(F::kReadings, false, axis, alike(1, {0.003}))->edge = true;
+  }
   return shapes;
 }
 

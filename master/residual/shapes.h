@@ -14,6 +14,7 @@ struct ResidualShape {
   ResidualFrame frame = ResidualFrame::kRobot;
   bool by_drive = true;
   bool by_command = true;  // shifts of its own for each command
+  bool edge = false;       // nothing, and one shift for all beyond an edge, wherever that lies
   std::vector<std::size_t> covariates;
   // Length scales to choose from: of what has a range in the log a share of it; of headings and of
   // what is or is not so, as they are.

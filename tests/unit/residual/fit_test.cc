@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "master/residual/edge.h"
 #include "tests/unit/residual/fields.h"
 
 namespace gapfarm {
@@ -43,9 +44,20 @@ Eigen::Vector3d tired(const LoggedMotion& f, const Pose&) {
   return drive_s(f) * 2e-5 * f.session_time_s * Eigen::Vector3d(-1, 0, f.left < f.right ? -1 : 1);
 }
 
+// Two cameras that disagree where their pictures meet.
+Eigen::Vector3d jumps(const LoggedMotion& f, const Pose& X_WE) {
+  const double beyond = (X_WE.y > 1.31 ? 1.0 : 0.0) - (f.X_WS.y > 1.31 ? 1.0 : 0.0);
+  return residual_axes(ResidualFrame::kReadings, f.X_WS, X_WE) * Eigen::Vector3d(0.05, -0.02, 0) *
+         beyond;
+}
+
 TEST(ResidualFit, KnownFieldsAreRecoveredOnTrialsThatItDidNotSee) {
   const std::pair<const char*, Eigen::Vector3d (*)(const LoggedMotion&, const Pose&)> fields[] = {
-      {"pulled", pulled}, {"slippery", slippery}, {"bent", bent}, {"tired", tired}};
+      {"pulled", pulled},
+      {"slippery", slippery},
+      {"bent", bent},
+      {"tired", tired},
+      {"jumps", jumps}};
   for (const auto& [name, field] : fields) {
     const DrawnLog log = draw_log(5, 500, field);
     const ResidualFit fit = fit_log(log);
@@ -63,6 +75,8 @@ TEST(ResidualFit, TheFrameAndCovariatesThatCountAreChosen) {
   EXPECT_EQ(floor.frame, ResidualFrame::kRobot);
   EXPECT_EQ(floor.covariates, (std::vector{tests::covariate("x"), tests::covariate("y")}));
   EXPECT_EQ(first(tired).covariates, std::vector{tests::covariate("time")});
+  EXPECT_EQ(first(jumps).frame, ResidualFrame::kReadings);
+  EXPECT_EQ(first(jumps).covariates, std::vector{tests::covariate("y")});
 }
 
 TEST(ResidualFit, NoiseLeavesNothing) {
@@ -71,6 +85,30 @@ TEST(ResidualFit, NoiseLeavesNothing) {
     kept += !fit_log(draw_log(seed, 300, nothing)).field.empty();
   }
   EXPECT_LE(kept, 2);
+}
+
+// Readings on either side of the line are told from each other a few millimetres from it.
+TEST(ResidualFit, AnEdgeIsAsSharpAsItsReadings) {
+  const DrawnLog log = draw_log(5, 500, jumps);
+  const ResidualField field = fit_log(log).field;
+  LoggedMotion across;
+  across.X_WS = {1, 1.27, 0};
+  const auto shift = [&](double y) {
+    const Pose end{1, y, 0};
+    return residual_shift(field, across, end).head<2>().norm();
+  };
+  EXPECT_LT(shift(1.29), 0.01);
+  for (const double y : {1.34, 1.6, 1.99}) EXPECT_NEAR(shift(y), std::hypot(0.05, 0.02), 0.008);
+}
+
+TEST(ResidualFit, ThereIsNoEdgeInNoise) {
+  for (std::uint64_t seed = 20; seed < 40; ++seed) {
+    const DrawnLog log = draw_log(seed, 300, nothing);
+    const std::vector<bool> all(log.data.size(), true);
+    for (const char* along : {"x", "y"}) {
+      EXPECT_EQ(best_edge(log.data, log.residuals, all, tests::covariate(along)), std::nullopt);
+    }
+  }
 }
 
 // Trials that were seen do not say what they are worth: a field fitted to noise helps them.
