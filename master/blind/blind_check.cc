@@ -161,14 +161,15 @@ Status open_truths(const InHand& hand, const BlindCheckSettings& settings,
   return {};
 }
 
-// Promised against realised, for the cases in which an effect was named.
+// Promised against realised, for the cases in which an effect was named; and what is closed of
+// effects that could not be.
 Status add_realised(const Config& config, const BlindCheckSettings& settings,
                     const BlindCheckHooks& hooks, const CheckPaths& paths,
                     std::vector<ScoredCase>& cases) {
   std::vector<DiagnosedCase> diagnosed;
   std::vector<std::size_t> owner;
   for (std::size_t i = 0; i < cases.size(); ++i) {
-    if (!cases[i].promised) continue;
+    if (!cases[i].promised && cases[i].truth.left_out.empty()) continue;
     auto models = read_diagnosed_case(cases[i].truth, paths.diagnosis(cases[i].truth.id));
     if (!models) continue;
     diagnosed.push_back(std::move(*models));
@@ -182,7 +183,7 @@ Status add_realised(const Config& config, const BlindCheckSettings& settings,
   for (std::size_t i = 0; i < owner.size(); ++i) {
     if (!(*fresh)[i]) continue;
     cases[owner[i]].fresh = (*fresh)[i];
-    cases[owner[i]].realised = realised_shrinkage(*(*fresh)[i]);
+    if (cases[owner[i]].promised) cases[owner[i]].realised = realised_shrinkage(*(*fresh)[i]);
   }
   return {};
 }

@@ -31,7 +31,7 @@ std::optional<DiagnosedCase> read_diagnosed_case(const Truth& truth, const std::
   const Result<Model> tuned = read_model(folder + "/tuned.toml");
   const Result<Model> final_model = read_model(folder + "/model.toml");
   if (!tuned || !final_model || tuned->scenario != final_model->scenario) return std::nullopt;
-  return DiagnosedCase{truth, tuned->values, final_model->values};
+  return DiagnosedCase{truth, tuned->values, final_model->values, final_model->residual};
 }
 
 Result<std::vector<std::optional<FreshScores>>> score_fresh_logs(
@@ -61,7 +61,17 @@ Result<std::vector<std::optional<FreshScores>>> score_fresh_logs(
     const auto final_score = mean_log_score((*results)[1]);
     const auto truth = mean_log_score((*results)[2]);
     scores.emplace_back();
-    if (tuned && final_score && truth) scores.back() = FreshScores{*tuned, *final_score, *truth};
+    if (tuned && final_score && truth) {
+      scores.back() = FreshScores{*tuned, *final_score, *truth, std::nullopt};
+    }
+    if (scores.back() && !cases[i].residual.empty()) {
+      Problem corrected = problem;
+      corrected.residual = cases[i].residual;
+      const auto result = farm.run(farm.add_problem(to_proto(corrected)),
+                                   {predict_with(problem.values, cases[i].final_)});
+      if (!result) return result.error();
+      scores.back()->corrected = mean_log_score(result->front());
+    }
     if (progress) progress("fresh logs predicted", i + 1, cases.size());
   }
   return scores;

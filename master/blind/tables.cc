@@ -42,6 +42,8 @@ std::vector<RateRow> rate_rows(const Tally& sum) {
   rows.push_back({"nulls called none", ">= 95 %", sum.null_none});
   rows.push_back({"nulls with an effect named (false alarms)", "", sum.false_alarms});
   rows.push_back({"effects outside the catalogue called unknown", ">= 85 %", sum.outside_unknown});
+  rows.push_back(
+      {"... of these, model.toml closes half of the truth's", ">= 79 %", sum.outside_closed});
   rows.push_back({"pairs right", ">= 80 %", sum.pairs_right});
   rows.push_back({"parameters within their 90 % interval", "85 to 95 %", sum.covered});
   rows.push_back({"... of these, strengths", "", sum.strengths_covered});
@@ -122,6 +124,7 @@ Json case_json(const ScoredCase& c) {
                             {"tuned", c.fresh->tuned},
                             {"final", c.fresh->final_},
                             {"truth", c.fresh->truth}};
+    if (c.fresh->corrected) json["fresh_scores"]["corrected"] = *c.fresh->corrected;
   }
   return json;
 }
@@ -265,6 +268,7 @@ std::string format_blind_json(const BlindReport& report) {
                       {"null_none", rate_json(sum.null_none)},
                       {"false_alarms", rate_json(sum.false_alarms)},
                       {"outside_unknown", rate_json(sum.outside_unknown)},
+                      {"outside_closed", rate_json(sum.outside_closed)},
                       {"pairs_right", rate_json(sum.pairs_right)},
                       {"covered", rate_json(sum.covered)},
                       {"strengths_covered", rate_json(sum.strengths_covered)},

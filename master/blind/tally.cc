@@ -28,6 +28,9 @@ void add_kind(const ScoredCase& c, Tally& sum) {
       return;
     case CaseKind::kOutside:
       sum.outside_unknown.add(right);
+      if (const auto half = c.fresh ? closes_half(*c.fresh) : std::nullopt) {
+        sum.outside_closed.add(*half);
+      }
       return;
     case CaseKind::kPair:
       sum.pairs_right.add(right);
@@ -47,6 +50,12 @@ std::optional<double> realised_shrinkage(const FreshScores& scores, double least
   const double gap = scores.truth - scores.tuned;
   if (!(gap >= least_gap)) return std::nullopt;
   return (scores.final_ - scores.tuned) / gap;
+}
+
+std::optional<bool> closes_half(const FreshScores& scores, double least_gap) {
+  const double gap = scores.truth - scores.tuned;
+  if (!(gap >= least_gap)) return std::nullopt;
+  return scores.corrected.value_or(scores.final_) - scores.tuned >= gap / 2;
 }
 
 ScoredCase score_case(const Truth& truth, const ChildEnd& end, std::optional<Said> said) {

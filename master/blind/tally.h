@@ -11,16 +11,21 @@
 
 namespace gapfarm {
 
-// Gap of a fresh log (nats a trial) under three models.
+// Mean log score of a fresh log (nats a trial) under three models.
 struct FreshScores {
   double tuned = 0;
-  double final_ = 0;
+  double final_ = 0;  // without the [residual], of which no promise knows
   double truth = 0;
+  std::optional<double> corrected;  // with it, where there is one
 };
 
 // (final - tuned) / (truth - tuned): the share of the explainable gap that really went.  None where
 // there is too little to explain (below `least_gap`, nats a trial) for the share to mean anything.
 std::optional<double> realised_shrinkage(const FreshScores& scores, double least_gap = 0.02);
+
+// Whether model.toml, its [residual] included, closes half of what the truth does.  None where
+// there is too little to close.
+std::optional<bool> closes_half(const FreshScores& scores, double least_gap = 0.02);
 
 struct ScoredCase {
   Truth truth;  // foreign cases without a truth: the id alone
@@ -45,6 +50,7 @@ struct Tally {
   Rate null_none;        // nulls called none
   Rate false_alarms;     // nulls in which an effect was named
   Rate outside_unknown;  // effects outside the catalogue called unknown, naming nothing
+  Rate outside_closed;   // of these, models that close half of what the truth does
   Rate pairs_right;
   Rate covered;                               // true parameters within their interval
   Rate strengths_covered, places_covered;     // of these: Coverage::is_strength, and the others

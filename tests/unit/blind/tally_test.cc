@@ -68,10 +68,26 @@ TEST(Tally, CountsEveryCaseOnce) {
   EXPECT_EQ(sum.confusion.at("outside").at("unknown"), 1u);
 }
 
+TEST(Tally, HalfIsClosedByTheModelAsItIsUsed) {
+  EXPECT_TRUE(*closes_half({1.0, 1.6, 2.0, std::nullopt}));
+  EXPECT_FALSE(*closes_half({1.0, 1.4, 2.0, std::nullopt}));
+  EXPECT_TRUE(*closes_half({1.0, 1.0, 2.0, 1.7}));
+  EXPECT_FALSE(*closes_half({1.0, 1.7, 2.0, 1.2}));
+  EXPECT_FALSE(closes_half({1.0, 1.0, 1.001, std::nullopt}).has_value());
+
+  Truth truth = truth_of("case001", CaseKind::kOutside, {"backlash"});
+  truth.left_out = "backlash";
+  ScoredCase c = score_case(truth, {}, Said{"unknown", {}});
+  EXPECT_EQ(tally({c}).outside_closed.total, 0u);
+  c.fresh = FreshScores{1.0, 1.0, 2.0, 1.7};
+  EXPECT_EQ(tally({c}).outside_closed.hits, 1u);
+  EXPECT_EQ(tally({c}).outside_closed.total, 1u);
+}
+
 TEST(Tally, ShrinkageNeedsAGap) {
-  EXPECT_NEAR(*realised_shrinkage({1.0, 1.8, 2.0}), 0.8, 1e-12);
-  EXPECT_FALSE(realised_shrinkage({1.0, 1.0, 1.001}).has_value());
-  EXPECT_FALSE(realised_shrinkage({1.0, 0.5, 0.9}).has_value());
+  EXPECT_NEAR(*realised_shrinkage({1.0, 1.8, 2.0, {}}), 0.8, 1e-12);
+  EXPECT_FALSE(realised_shrinkage({1.0, 1.0, 1.001, {}}).has_value());
+  EXPECT_FALSE(realised_shrinkage({1.0, 0.5, 0.9, {}}).has_value());
 }
 
 TEST(Tables, HoldRatesAndCases) {
