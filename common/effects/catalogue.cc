@@ -87,6 +87,14 @@ std::vector<Effect> build_younger() {
   };
 }
 
+std::vector<Effect> build_youngest() {
+  using namespace effect_rows;  // NOLINT: what follows is rows
+  return {
+      in_spread(drive("session_gain", kNoContext, "each session drives faster or slower as a whole",
+                      {real("spread", "-", 0, 0, 0.3, "standard deviation of a session's gain")})),
+  };
+}
+
 // Of an effect of which there may be two.
 Effect second_one(const std::string& first) {
   const std::vector<Effect> catalogue = build_catalogue();
@@ -107,7 +115,8 @@ std::vector<Effect> joined(std::initializer_list<std::vector<Effect>> parts) {
 }  // namespace
 
 std::span<const Effect> srv1_effects() {
-  static const std::vector<Effect> catalogue = joined({build_catalogue(), build_younger()});
+  static const std::vector<Effect> catalogue =
+      joined({build_catalogue(), build_younger(), build_youngest()});
   return catalogue;
 }
 
@@ -117,7 +126,8 @@ std::span<const Effect> srv1_effects_and_seconds() {
       joined({build_catalogue(),
               {second_one("camera_seam")},
               build_younger(),
-              {second_one("friction_patch")}});
+              {second_one("friction_patch")},
+              build_youngest()});
   return catalogue;
 }
 

@@ -92,7 +92,10 @@ Judgement base_doubted(const Inquiry& of, const Evidence& measured, Judgement ju
 
 std::optional<SanityFinding> missing_too_much(const Refit& refit) {
   const Judgement& judged = refit.judged;
-  const double gap = refit.floor - mean(refit.nested.back().scores);
+  // Means alone foretell no session's gain.
+  const bool by_session = judged.named.names_session_gains() && !judged.named.spreads.empty();
+  const double gap = refit.floor - mean(by_session ? judged.named.spreads.back().scores
+                                                   : refit.nested.back().scores);
   if (!judged.doubts.empty() || !(gap > kMostMissed)) return std::nullopt;
   if (!judged.named.names_anything() && judged.verdict != Verdict::kNone) return std::nullopt;
   return SanityFinding{

@@ -106,6 +106,7 @@ struct SpreadEffect {
   double gain = 0;
   std::vector<Estimate> estimates;
   std::vector<double> gained;  // of each trial, where that is known
+  std::vector<SessionGain> sessions = {};
 };
 
 // Effects that widen the distribution rather than move it: their gain is that of the mixture.
@@ -137,7 +138,7 @@ std::vector<SpreadEffect> spread_effects(const Refit& refit) {
   }
   for (const FoundSpread& spread : named.spreads) {
     found.push_back({spread.row->effect, spread.fit.gain, spread.fit.estimates,
-                     difference(spread.scores, last)});
+                     difference(spread.scores, last), spread.fit.sessions});
   }
   if (named.grid_m > 0) {
     const double q = named.grid_m;
@@ -149,11 +150,29 @@ std::vector<SpreadEffect> spread_effects(const Refit& refit) {
   return found;
 }
 
+// " How much faster than on average each session drove: a 3.1 % [2.6, 3.6], b -2 % [-2.4, -1.6]."
+std::string sessions_words(const Inquiry& of, const Study& study,
+                           const std::vector<SessionGain>& gains) {
+  if (gains.empty()) return "";
+  std::vector<std::string> names(gains.size());
+  for (std::size_t i = 0; i < study.size(); ++i) {
+    names[study.trials[i].session] = of.problem.log.trials[i].session;
+  }
+  const auto percent = [](double share) { return plain_number(100 * share); };
+  std::string text = " How much faster than on average each session drove:";
+  for (std::size_t s = 0; s < gains.size(); ++s) {
+    text += (s == 0 ? " " : ", ") + names[s] + " " + percent(gains[s].gain) + " % [" +
+            percent(gains[s].lo) + ", " + percent(gains[s].hi) + "]";
+  }
+  return text + ".";
+}
+
 NamedEffect named_spread(const Inquiry& of, const Refit& refit, const SpreadEffect& found) {
   NamedEffect effect;
   effect.name = found.name;
   effect.confidence = confidence_of(found.gain, of.subject.least_gain);
   effect.parameters = found.estimates;
+  effect.text = sessions_words(of, refit.judged.named.study(), found.sessions);
   std::vector<double> gained = found.gained;
   if (gained.empty()) {
     // The gain is over all that the readings tell; of the gap it can close what the means left.
@@ -229,7 +248,7 @@ std::vector<NamedEffect> named_effects(const Inquiry& of, const Refit& refit) {
     const double change = effect.gap_after - effect.gap_before;
     effect.gap_before = gap;
     effect.gap_after = gap += change;
-    effect.text = effect_sentence(effect, *of.subject.effects);
+    effect.text = effect_sentence(effect, *of.subject.effects) + effect.text;
     effects.push_back(std::move(effect));
   }
   return effects;

@@ -1,7 +1,6 @@
-// An effect that makes some trials stray rather than moves their mean, as a row: how it is
-// looked for.  It is looked for before the effects on the mean, which do without the
-// trials that it strikes, and named when trials that no fit saw are clearly foretold better with
-// it.
+// An effect that widens the distribution of trials rather than moves its mean, as a row: how it is
+// looked for.  It is looked for before the effects on the mean, which do without what it does to
+// trials, and named when trials that no fit saw are clearly foretold better with it.
 #pragma once
 
 #include <Eigen/Core>
@@ -12,9 +11,17 @@
 
 namespace gapfarm {
 
+// How much faster one session drives than the base, as a share.
+struct SessionGain {
+  double gain = 0;
+  double lo = 0;  // 90 % interval
+  double hi = 0;
+};
+
 struct SpreadFit {
   double gain = 0;                  // nats over all trials
   std::vector<Estimate> estimates;  // of the effect's parameters, the first the one that is told
+  std::vector<SessionGain> sessions = {};  // of all sessions, of an effect that has one in each
 };
 
 struct SpreadRow {
@@ -28,6 +35,9 @@ struct SpreadRow {
   bool (*strays)(const ResidualTrial& trial);  // whether it may be one that the effect strikes
   const char* found;                           // how screening says that it was seen, or not
   const char* missing;
+  // Each session has a gain of its own, of which nothing that is told of means may know, rather
+  // than trials that tell nothing of means.
+  bool by_session = false;
 };
 
 struct FoundSpread {

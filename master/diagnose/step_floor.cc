@@ -31,6 +31,8 @@ struct Tails {
 std::optional<Tails> tails_of(const Inquiry& of, const Evidence& evidence,
                               const std::vector<NestedFit>& nested) {
   if (!of.subject.drive_tail || !of.subject.pose_tail) return std::nullopt;
+  // Sessions' own gains would pass for tails.
+  if (evidence.study.session_spread > 0) return std::nullopt;
   const NestedFit& last = nested.back();
   if (residual_kurtosis(last.study.whiten(last.fit.residuals)) < kTailsWorthFitting)
     return std::nullopt;
@@ -77,10 +79,11 @@ std::vector<double> scores_with_slips(const Inquiry& of, const Explanation& name
   return scores;
 }
 
-Judgement straying_otherwise(Judgement judged, const std::string& effect) {
+Judgement straying_otherwise(Judgement judged, const std::string& effect,
+                             const char* what = "Single drives stray") {
   const bool named = judged.named.names_anything() || judged.named.grid_m > 0;
   judged.verdict = named ? Verdict::kEffectAndUnknown : Verdict::kUnknown;
-  judged.cautions.push_back("Single drives stray, but not as " + effect +
+  judged.cautions.push_back(std::string(what) + ", but not as " + effect +
                             " would make them: nothing that was looked for explains them.");
   return judged;
 }
@@ -100,21 +103,26 @@ Judgement with_spreads_foreseen(const Inquiry& of, Judgement judged, const Neste
   const std::vector<Eigen::Vector3d> residuals = held_out_residuals(last.study, last.fit, folds);
   for (FoundSpread& found : spreads) {
     // What else was named was not yet explained when it was found.
-    SpreadFit beside = found.row->fit(last.study, residuals, share);
+    // Held out, a session tells of the others' mean as well.
+    SpreadFit beside =
+        found.row->fit(last.study, found.row->by_session ? last.fit.residuals : residuals, share);
     if (beside.gain >= found.row->least_gain) found.fit = std::move(beside);
     found.scores = found.row->scores(last.study, residuals, found.fit, share);
   }
-  std::string worthless;
+  const SpreadRow* worthless = nullptr;
   std::erase_if(spreads, [&](const FoundSpread& found) {
     // Where few trials are struck it is what each gains that tells, not how many do.
     const double gained =
         (mean(found.scores) - mean(last.scores)) * static_cast<double>(found.scores.size());
     if (gained >= found.row->least_gain) return false;
     if (clearly_better(found.scores, last.scores)) return false;
-    worthless = found.row->effect;
+    worthless = found.row;
     return true;
   });
-  return worthless.empty() ? judged : straying_otherwise(std::move(judged), worthless);
+  if (worthless == nullptr) return judged;
+  return straying_otherwise(
+      std::move(judged), worthless->effect,
+      worthless->by_session ? "Sessions drive at other speeds" : "Single drives stray");
 }
 
 // Not worse than what was reached on trials that the fit did not see, and there is more to be had

@@ -1,6 +1,7 @@
 // The base, the noise and the evidence that later steps look at.
 
 #include "master/diagnose/noise.h"
+#include "master/diagnose/session_gains.h"
 #include "master/diagnose/step_parts.h"
 
 namespace gapfarm::steps {
@@ -16,9 +17,17 @@ Result<Study> tune(const Inquiry& of) {
 Result<Evidence> evidence_of(const Inquiry& of, Study study) {
   auto nuisances = of.subject.nuisances(of.predictor, study);
   if (!nuisances) return nuisances.error();
+  if (study.session_spread > 0) *nuisances = beside_sessions(study, *nuisances);
   std::vector<CovariateBlock> blocks = of.subject.blocks(study);
   Regression base(*nuisances, study.whitened_residuals());
   return Evidence{std::move(study), std::move(*nuisances), std::move(blocks), std::move(base)};
+}
+
+Eigen::MatrixXd beside_sessions(const Study& study, const Eigen::MatrixXd& nuisances) {
+  const Eigen::MatrixXd own = session_columns(study, study.session_spread);
+  Eigen::MatrixXd both(own.rows(), own.cols() + nuisances.cols());
+  both << own, nuisances;
+  return both;
 }
 
 Result<Evidence> measure(const Inquiry& of, const Study& tuned) {

@@ -18,6 +18,8 @@ bool clearly_better(const std::vector<double>& scores, const std::vector<double>
 
 // The study's nuisances and covariates by its present noise.
 Result<Evidence> evidence_of(const Inquiry& of, Study study);
+// Nuisances, and before them what the gains of the study's sessions do.
+Eigen::MatrixXd beside_sessions(const Study& study, const Eigen::MatrixXd& nuisances);
 // The same without what these trials say.
 Explanation without(const Explanation& all, const std::vector<bool>& ignored);
 
@@ -28,6 +30,10 @@ Result<Explanation> look_for_lag(const Inquiry& of, Explanation so_far);
 // Before any effect on the mean: trials that stray would pass for a patch of floor or a seam. Those
 // that are foretold better once the effect is foreseen tell nothing of means.
 Explanation look_for_spreads(const Inquiry& of, Explanation so_far, const Regression& explained);
+// Whether each session has a gain of its own, of a spread that is clear from what is left of every
+// trial (m, m, rad); nothing that is told of means knows of them then.
+Explanation look_for_session_gains(const Inquiry& of, Explanation so_far,
+                                   const std::vector<Eigen::Vector3d>& left);
 // Events that slow one side in some trials show as a tail along that side's derivative: a long one
 // when they are rare, a lopsided one when they are not.
 Explanation look_for_slips(const Inquiry& of, Explanation so_far, const Selector& catalogue,

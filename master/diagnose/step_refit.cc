@@ -157,7 +157,7 @@ Result<Refit> with_final_fit(const Inquiry& of, Refit refit) {
 
 Study study_beside(const Explanation& named, const JointFit& fit) {
   Study study = named.study();
-  if (named.names_a_spread()) return study;
+  if (named.names_strays()) return study;
   for (std::size_t i = 0; i < study.size(); ++i) study.trials[i].residual = fit.residuals[i];
   estimate_noise(Regression(named.evidence->nuisances, study.whitened_residuals()),
                  named.evidence->blocks, &study);

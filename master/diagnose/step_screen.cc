@@ -188,9 +188,9 @@ Result<Screening> choose_among_the_rest(const Inquiry& of, Screening screening) 
 // Beside a strong effect on the mean nothing strays visibly; with it explained some may.
 Result<Screening> look_for_spreads_again(const Inquiry& of, Screening screening) {
   Explanation& found = screening.found;
-  if (!found.spreads.empty() || found.chosen.empty()) return screening;
+  if (found.names_strays() || found.chosen.empty()) return screening;
   found = look_for_spreads(of, found, explained_by(*screening.catalogue, found));
-  if (found.spreads.empty()) return screening;
+  if (!found.names_strays()) return screening;
   return choose_among_the_rest(of, std::move(screening));
 }
 
@@ -231,22 +231,74 @@ Result<Screening> look_for_slips_and_choose(const Inquiry& of, Screening screeni
   return rest;
 }
 
-Result<Screening> look_for_all(const Inquiry& of, Explanation so_far) {
-  auto found = look_for_late_readings(of, std::move(so_far));
-  if (found) found = look_for_lag(of, std::move(*found));
-  if (!found) return found.error();
-  auto screening = search_catalogue(of, look_for_spreads(of, *found, found->evidence->base));
-  if (screening && found->on_bounds) {
+// What the chosen effects leave of every trial, sessions' gains left in.
+std::vector<Eigen::Vector3d> left_with_sessions(const Explanation& found) {
+  if (found.estimates) return found.estimates->residuals;
+  const Study& study = found.study();
+  const Eigen::MatrixXd& all = found.evidence->nuisances;
+  const auto sessions =
+      found.names_session_gains() ? static_cast<Eigen::Index>(study.sessions) : Eigen::Index{0};
+  Eigen::VectorXd residuals = study.whitened_residuals();
+  study.drop_ignored(residuals);
+  Regression explained(all.rightCols(all.cols() - sessions), residuals);
+  for (const ChosenEffect& c : found.chosen) explained.add(c.candidate.signature.columns);
+  return study.unwhiten(explained.left());
+}
+
+// Beside a strong effect on the mean sessions may seem alike; with it explained they may not be.
+Result<Screening> look_for_session_gains_again(const Inquiry& of, Screening screening) {
+  Explanation& found = screening.found;
+  if (found.names_session_gains() || found.chosen.empty()) return screening;
+  found = look_for_session_gains(of, found, left_with_sessions(found));
+  if (!found.names_session_gains()) return screening;
+  return choose_among_the_rest(of, std::move(screening));
+}
+
+Result<Screening> look_beside_readings(const Inquiry& of, const Explanation& found) {
+  auto screening = search_catalogue(of, look_for_spreads(of, found, found.evidence->base));
+  if (screening && found.on_bounds) {
     screening = free_base(of, std::move(*screening));
     if (screening && screening->found.chosen.empty()) return screening;
   }
   if (!screening) return screening;
-  if ((of.subject.base_moves || found->on_bounds) && screening->found.estimates) {
+  if ((of.subject.base_moves || found.on_bounds) && screening->found.estimates) {
     screening = search_again(of, screening->found);
   }
   if (screening) screening = look_for_spreads_again(of, std::move(*screening));
+  if (screening) screening = look_for_session_gains_again(of, std::move(*screening));
   if (!screening) return screening;
   return look_for_slips_and_choose(of, std::move(*screening));
+}
+
+// Whether sessions differ beside what was chosen, too, as clearly as it takes to name that.
+bool sessions_still_differ(const Inquiry& of, const Explanation& found) {
+  for (const FoundSpread& spread : found.spreads) {
+    if (!spread.row->by_session) continue;
+    return found.chosen.empty() ||
+           spread.row->fit(found.study(), left_with_sessions(found), of.outlier_share()).gain >=
+               spread.row->least_gain;
+  }
+  return false;
+}
+
+// Sessions that seem to differ are measured again with what they have of their own taken out; they
+// may do so because of something else that the catalogue holds.
+Result<Screening> look_for_all(const Inquiry& of, Explanation so_far) {
+  auto found = look_for_late_readings(of, std::move(so_far));
+  if (found) found = look_for_lag(of, std::move(*found));
+  if (!found) return found.error();
+  const Study& study = found->study();
+  Explanation differ =
+      look_for_session_gains(of, *found, study.unwhiten(study.whitened_residuals()));
+  if (!differ.names_session_gains()) return look_beside_readings(of, *found);
+  auto measured = measure(of, differ.study());
+  if (!measured) return measured.error();
+  differ.evidence = std::make_shared<const Evidence>(std::move(*measured));
+  auto screening = look_beside_readings(of, differ);
+  if (screening && !sessions_still_differ(of, screening->found)) {
+    return look_beside_readings(of, *found);
+  }
+  return screening;
 }
 
 }  // namespace

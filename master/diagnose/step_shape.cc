@@ -112,7 +112,7 @@ TriedShape try_shape(const Inquiry& of, const Refit& refit, std::size_t k) {
     after[i] -= fit.unseen[i];
     beside.trials[i].residual = after[i];
   }
-  if (!named.names_a_spread()) {
+  if (!named.names_strays()) {
     estimate_noise(Regression(named.evidence->nuisances, beside.whitened_residuals()),
                    named.evidence->blocks, &beside);
   }

@@ -50,9 +50,10 @@ Explanation look_for_spreads(const Inquiry& of, Explanation so_far, const Regres
   Study study = so_far.study();
   const std::vector<Eigen::Vector3d> left = study.unwhiten(studentised(explained, 0.2));
   const std::vector<double> without_it = scores_of(study, left, share);
+  const std::size_t before = so_far.spreads.size();
   for (const EffectDiagnosis* effect : *of.subject.effects) {
     const SpreadRow* row = effect->spread;
-    if (row == nullptr || of.left_out(row->effect)) continue;
+    if (row == nullptr || row->by_session || of.left_out(row->effect)) continue;
     SpreadFit fit = row->fit(study, left, share);
     if (fit.gain < row->least_gain) continue;
     const std::vector<double> with = row->scores(study, left, fit, share);
@@ -62,7 +63,28 @@ Explanation look_for_spreads(const Inquiry& of, Explanation so_far, const Regres
     }
     so_far.spreads.push_back({row, std::move(fit), {}});
   }
-  return so_far.spreads.empty() ? so_far : without(so_far, study.ignored);
+  return so_far.spreads.size() == before ? so_far : without(so_far, study.ignored);
+}
+
+Explanation look_for_session_gains(const Inquiry& of, Explanation so_far,
+                                   const std::vector<Eigen::Vector3d>& left) {
+  for (const EffectDiagnosis* effect : *of.subject.effects) {
+    const SpreadRow* row = effect->spread;
+    if (row == nullptr || !row->by_session || of.left_out(row->effect)) continue;
+    if (so_far.names_session_gains()) continue;
+    SpreadFit fit = row->fit(so_far.study(), left, of.outlier_share());
+    if (fit.gain < row->least_gain) continue;
+    Evidence evidence = *so_far.evidence;
+    evidence.study.session_spread = fit.estimates.front().value;
+    evidence.nuisances = beside_sessions(evidence.study, evidence.nuisances);
+    evidence.study.drop_ignored(evidence.nuisances);
+    Eigen::VectorXd residuals = evidence.study.whitened_residuals();
+    evidence.study.drop_ignored(residuals);
+    evidence.base = Regression(evidence.nuisances, residuals);
+    so_far.evidence = std::make_shared<const Evidence>(std::move(evidence));
+    so_far.spreads.push_back({row, std::move(fit), {}});
+  }
+  return so_far;
 }
 
 Explanation look_for_slips(const Inquiry& of, Explanation so_far, const Selector& catalogue,

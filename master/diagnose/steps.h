@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <memory>
 #include <optional>
 #include <string>
@@ -51,6 +52,11 @@ struct Explanation {
 
   const Study& study() const { return evidence->study; }
   bool names_a_spread() const { return slip.gain > 0 || !spreads.empty(); }
+  bool names_session_gains() const { return study().session_spread > 0; }
+  bool names_strays() const {
+    return slip.gain > 0 || std::any_of(spreads.begin(), spreads.end(),
+                                        [](const FoundSpread& s) { return !s.row->by_session; });
+  }
   // But for the grid, which closes next to nothing.
   bool names_anything() const {
     return !first.empty() || !chosen.empty() || names_a_spread() || lag.gain > 0;

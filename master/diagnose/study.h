@@ -49,8 +49,9 @@ struct Study {
   // Of push logs: what a relative change of each of these parameters moves the base's ends by.
   std::vector<RetunedPush> retuned;
   std::vector<Eigen::Matrix3d> whitener;  // L^-1 of each trial's covariance L L'
-  std::vector<bool> ignored;              // trials that no fit may learn from; empty: none
-  std::vector<double> trust;              // factor of each trial's whitener, (0, 1]; empty: 1
+  double session_spread = 0;  // of gains that each session has of its own; 0: none is known
+  std::vector<bool> ignored;  // trials that no fit may learn from; empty: none
+  std::vector<double> trust;  // factor of each trial's whitener, (0, 1]; empty: 1
 
   std::size_t size() const { return trials.size(); }
   const NoiseEstimate& predictive_noise() const { return predictive ? *predictive : noise; }

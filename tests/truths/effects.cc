@@ -72,12 +72,6 @@ Values draw_unsettled(double strength, double, Stream stream) {
   return {{"share", strength}, {"angle", stream.uniform(0.3, 1.2)}};
 }
 
-Values draw_session_gain(double strength, double, Stream stream) {
-  Values values;
-  for (const char* session : {"s1", "s2", "s3"}) values[session] = 0.3 * strength * stream.normal();
-  return values;
-}
-
 Values draw_compass(double strength, double, Stream stream) {
   return {{"amplitude", 0.5 * strength}, {"phase", direction(stream)}};
 }
@@ -195,9 +189,10 @@ void memory(const Values& p, const Told& told, Stream&, DriveTold& drive) {
   drive.right.gain *= 1 + p.at("share") * std::abs(told.last_right);
 }
 
+// Charged fully, half, and not at all.
 void session_gain(const Values& p, const Told& told, Stream&, DriveTold& drive) {
-  const auto found = p.find("s" + std::to_string(told.session + 1));
-  const double gain = 1 + (found == p.end() ? 0 : found->second);
+  constexpr double kDeviations[] = {1, 0.1, -1.1};
+  const double gain = 1 + p.at("spread") * kDeviations[told.session % std::size(kDeviations)];
   drive.left.gain *= gain;
   drive.right.gain *= gain;
 }
@@ -222,7 +217,7 @@ void shear(const Values& p, Pose& X) { X.x += p.at("share") * X.y; }
 constexpr char kRatio[] = "ratio", kDuty[] = "duty", kTau[] = "tau", kOffset[] = "offset",
                kRate[] = "rate", kTravel[] = "travel", kAngle[] = "angle", kStrength[] = "strength",
                kCoefficient[] = "coefficient", kStep[] = "step", kBend[] = "bend",
-               kShare[] = "share";
+               kShare[] = "share", kSpread[] = "spread";
 
 const std::vector<EffectRow>& rows() {
   static const std::vector<EffectRow> all = {
@@ -246,6 +241,7 @@ const std::vector<EffectRow>& rows() {
       {.name = "pose_latency", .draw = draw_latency, .read = latency},
       {.name = "pose_quantisation", .draw = alone<kStep, 0.1, false>, .read = rounding},
       {.name = "unsettled_start", .draw = draw_unsettled, .read = unsettled},
+      {.name = "session_gain", .draw = alone<kSpread, 0.3, false>, .drive = session_gain},
       {.name = "bent_duty",
        .in_catalogue = false,
        .draw = alone<kBend, 1.0, true>,
@@ -254,10 +250,6 @@ const std::vector<EffectRow>& rows() {
        .in_catalogue = false,
        .draw = alone<kShare, 0.5, true>,
        .drive = memory},
-      {.name = "session_gain",
-       .in_catalogue = false,
-       .draw = draw_session_gain,
-       .drive = session_gain},
       {.name = "crosstalk",
        .in_catalogue = false,
        .draw = alone<kShare, 0.3, true>,

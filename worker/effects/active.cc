@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cassert>
+#include <cmath>
 
 #include "worker/effects/behaviour.h"
 
@@ -162,6 +163,16 @@ double ActiveEffects::draw_start_turn(bool moved, Stream& stream) const {
     }
   }
   return turn_rad;
+}
+
+double ActiveEffects::session_spread() const {
+  double spread = 0;
+  for (const Active& a : active_) {
+    if (a.behaviour->session_spread) {
+      spread = std::hypot(spread, a.behaviour->session_spread(a.values));
+    }
+  }
+  return spread;
 }
 
 Reading ActiveEffects::reading() const {

@@ -81,6 +81,8 @@ struct EffectBehaviour {
   // Random drive effects: all alternatives with their weights, and one drawn.
   std::vector<DriveBranch> (*branches)(EffectValues p) = nullptr;
   DriveBranch (*draw)(EffectValues p, Stream& stream) = nullptr;
+  // Standard deviation of the gain that all trials of a session share.
+  double (*session_spread)(EffectValues p) = nullptr;
   void (*reading)(EffectValues p, Reading& reading) = nullptr;
   // By how much the heading of a start may be misread: all alternatives, and one drawn.
   std::vector<StartTurn> (*start_turns)(EffectValues p, bool moved) = nullptr;
@@ -113,6 +115,7 @@ class ActiveEffects {
   Pose unplace(Pose X_WR) const;
   std::vector<DriveBranch> branches() const;  // at least the one in which nothing happens
   DriveBranch draw(Stream& stream) const;
+  double session_spread() const;
   Reading reading() const;
   std::vector<StartTurn> start_turns(bool moved) const;  // at least the one without a turn
   double draw_start_turn(bool moved, Stream& stream) const;

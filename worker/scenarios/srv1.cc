@@ -161,7 +161,7 @@ std::vector<Gains> Srv1Model::draws(const Srv1Robot& robot, const PredictOptions
   Stream stream({options.stream.run_seed(), Purpose::kEvaluation, options.stream.generation(),
                  options.stream.birth_id(),
                  options.stream.replicate() | static_cast<std::uint64_t>(group + 1) << 32});
-  NoiseSettings core = robot.noise();
+  NoiseSettings core = robot.foreseen_noise();
   core.tails = {};
   std::vector<Gains> gains;
   for (unsigned i = 0; i < problem_.spread.replicates; ++i) {

@@ -195,7 +195,8 @@ GroupResult simulate_group(Srv1Robot& robot, const ConditionGroup& group, bool m
   if (ok && (effects.motion_context() & kStartHeading) && !group.few()) ok = simulation.headings();
   if (ok && (effects.motion_context() & kSessionTime)) ok = simulation.times();
   if (ok && !means_only) {
-    const std::vector<Gains> gains = draws.empty() ? cubature_points(robot.noise()) : draws;
+    const std::vector<Gains> gains =
+        draws.empty() ? cubature_points(robot.foreseen_noise()) : draws;
     ok = simulation.spread(gains, !draws.empty()) && simulation.random_drives(effects.branches());
     if (ok) simulation.stale_readings(reading);
   }

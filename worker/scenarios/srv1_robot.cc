@@ -93,6 +93,18 @@ Srv1Robot::Srv1Robot(const Problem& problem, const ParameterValues& values, Step
       full_speed_m_s_(problem.external ? 1 : at(values, Srv1::kFullSpeed)),
       vehicle_(make_vehicle(problem, values, effects_, steps)) {}
 
+NoiseSettings Srv1Robot::foreseen_noise() const {
+  NoiseSettings noise = noise_;
+  const double spread = effects_.session_spread();
+  if (spread > 0) noise.drive_common = std::hypot(noise.drive_common, spread);
+  return noise;
+}
+
+double Srv1Robot::draw_session_gain(Stream& stream) const {
+  const double spread = effects_.session_spread();
+  return spread > 0 ? std::clamp(1 + spread * stream.normal(), 0.0, 2.0) : 1;
+}
+
 Motion Srv1Robot::run(const DrivenCommand& drive, const Situation& situation, const Gains& gains,
                       std::vector<MotionSample>* path, double interval_s) {
   DriveState state;

@@ -46,6 +46,10 @@ class Srv1Robot {
 
   const ActiveEffects& effects() const { return effects_; }
   const NoiseSettings& noise() const { return noise_; }
+  // Of a trial in a session of which nothing is known: how fast that drives is a part of it.
+  NoiseSettings foreseen_noise() const;
+  // The gain that a session has, drawn.
+  double draw_session_gain(Stream& stream) const;
 
   Motion run(const DrivenCommand& drive, const Situation& situation, const Gains& gains,
              std::vector<MotionSample>* path = nullptr, double interval_s = 0);

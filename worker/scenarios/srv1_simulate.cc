@@ -10,6 +10,8 @@ namespace {
 
 constexpr double kReadingInterval_s = 0.02;  // between the poses that a stale reading may find
 
+constexpr std::uint64_t kOfTheSession = ~std::uint64_t{0};  // a stream that is no trial's
+
 int sign(double duty) { return (duty > 0) - (duty < 0); }
 
 double rounded(double value, double quantum) {
@@ -24,7 +26,11 @@ class Session {
       : problem_(problem),
         task_(task),
         robot_(problem, values, steps),
-        reading_(robot_.effects().reading()) {}
+        reading_(robot_.effects().reading()) {
+    Stream stream({task.stream().run_seed(), Purpose::kSimulation, task.stream().generation(),
+                   task.stream().birth_id(), kOfTheSession});
+    gain_ = robot_.draw_session_gain(stream);
+  }
 
   v1::TaskResult drive() {
     v1::TaskResult result;
@@ -61,8 +67,8 @@ class Session {
 
     Gains gains = draw_gains(robot_.noise(), stream_);
     const DriveBranch event = robot_.effects().draw(stream_);
-    gains.left *= event.left_gain;
-    gains.right *= event.right_gain;
+    gains.left *= event.left_gain * gain_;
+    gains.right *= event.right_gain * gain_;
     const bool stale = stream_.bernoulli(reading_.stale_share);
     const bool sampled = task_.path_interval() > 0;
     std::vector<MotionSample> path;
@@ -127,6 +133,7 @@ class Session {
   const v1::SimulateTask& task_;
   Srv1Robot robot_;
   Reading reading_;
+  double gain_ = 1;
   Situation situation_;
   Stream stream_{StreamKey{}};
 };
@@ -148,7 +155,7 @@ v1::TaskResult trace_command(const Problem& problem, const ParameterValues& valu
   if (task.noisy()) {
     Stream stream({task.stream().run_seed(), Purpose::kSimulation, task.stream().generation(),
                    task.stream().birth_id(), task.stream().replicate()});
-    gains = draw_gains(robot.noise(), stream);
+    gains = draw_gains(robot.foreseen_noise(), stream);
   }
   const Motion motion =
       robot.run({c.left(), c.right(), c.duration()}, {}, gains, &path, task.interval());

@@ -133,10 +133,11 @@ TEST(EffectSignature, BacklashCostsItsTravelOnceASideReverses) {
 }
 
 // Straight drives of a robot that slips now and then.
-std::vector<Pose> simulated_drives(const Changes& changes, int count) {
+std::vector<Pose> simulated_drives(const Changes& changes, int count, std::uint64_t session = 0) {
   Problem problem = tests::empty_problem();
   problem.values = noiseless(changes);
   v1::Task task;
+  task.mutable_simulate()->mutable_stream()->set_birth_id(session);
   for (int i = 0; i < count; ++i) {
     v1::PlannedTrial* planned = task.mutable_simulate()->add_plan();
     planned->set_moved(true);
@@ -176,6 +177,32 @@ TEST(EffectSignature, SlipEventsShortenAndTurnTheirShareOfTrials) {
   const double share = 1 - (1 - p) * (1 - p);
   EXPECT_NEAR(events, n * share, 4 * std::sqrt(n * share * (1 - share)));
   EXPECT_NEAR(to_the_left, events / 2.0, 4 * std::sqrt(events) / 2);
+}
+
+TEST(EffectSignature, SessionGainIsOneForAllDrivesOfASession) {
+  constexpr double kSpread = 0.1;
+  constexpr int n = 60;
+  const double way = end_of({}, driven("forward", 0.5)).x;
+  double squares = 0;
+  for (int session = 0; session < n; ++session) {
+    const std::vector<Pose> ends = simulated_drives({{"session_gain.spread", kSpread}}, 3,
+                                                    static_cast<std::uint64_t>(session));
+    ASSERT_EQ(ends.size(), 3u);
+    for (const Pose& end : ends) EXPECT_NEAR(end.x, ends.front().x, 1e-4);
+    const double gain = ends.front().x / way - 1;
+    squares += gain * gain / n;
+  }
+  EXPECT_NEAR(std::sqrt(squares), kSpread, 0.3 * kSpread);
+}
+
+// Nothing is known of a session that is foretold: the same mean, and a wider spread.
+TEST(EffectSignature, SessionGainWidensWhatIsForetold) {
+  const NoiseSettings without = Srv1Robot(noiseless()).foreseen_noise();
+  const NoiseSettings with = Srv1Robot(noiseless({{"session_gain.spread", 0.1}})).foreseen_noise();
+  EXPECT_EQ(without.drive_common, 0);
+  EXPECT_EQ(with.drive_common, 0.1);
+  EXPECT_EQ(end_of({{"session_gain.spread", 0.1}}, driven("forward")),
+            end_of({}, driven("forward")));
 }
 
 }  // namespace

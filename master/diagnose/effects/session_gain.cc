@@ -1,0 +1,31 @@
+#include "master/diagnose/effects/effect_diagnosis.h"
+#include "master/diagnose/session_gains.h"
+
+namespace gapfarm {
+namespace {
+
+bool strays_with_session(const ResidualTrial&) { return false; }
+
+const SpreadRow kSessionSpread = {
+    .effect = "session_gain",
+    .least_gain = 20,  // as of a second one of a kind
+    .fit = fit_session_gains,
+    .scores = scores_with_session_gains,
+    .strays = strays_with_session,
+    .found = "by sessions that drive faster or slower as a whole",
+    .missing = "no session drives faster or slower as a whole than others",
+    .by_session = true,
+};
+
+}  // namespace
+
+extern const EffectDiagnosis kSessionGain = {
+    .effect = "session_gain",
+    .words = {"Each session drives at a speed of its own, which differ by %1",
+              {{"spread", 100, " %"}}},
+    .short_words = ShortWords{"spread", 100, " %", "The sessions' speeds differ by %", nullptr,
+                              "Begin every session alike: charged, and on a clean floor"},
+    .spread = &kSessionSpread,
+};
+
+}  // namespace gapfarm
