@@ -3,11 +3,13 @@
 
     scripts/diagnosis_times.py --out run/times [--config configs/srv1.toml]
                                [--gapfarm build/release/bin/gapfarm] LOG...
+    scripts/diagnosis_times.py --check run/a
 
 LOG is a trials.csv; each is diagnosed afresh, one after the other, with two workers, in a folder of
 OUT that is named after the log's folder.  A LOG may be followed by :NAME,... of effects that its
 diagnosis leaves out.  CPU seconds do not depend on what else the machine does, those of the stages
-do.  Standard library only.
+do.  With --check nothing is diagnosed: what the cases of a finished blind check cost is told by kind, the
+CPU seconds of a case shared among its stages as its wall seconds are.  Standard library only.
 """
 import argparse
 import json
@@ -36,28 +38,71 @@ def diagnose(args, log, left_out):
         return folder, cpu_s() - before, json.load(file)
 
 
+STAGES = ["tune", "measure", "screen", "refit"]
+
+
+def by_stage(diagnosis):
+    return {row["stage"].split()[0]: row["seconds"] for row in diagnosis["timing"]}
+
+
+def tell_check(folder):
+    """A table of kinds of case: CPU seconds in all, and the means of stages."""
+    with open(os.path.join(folder, "blind_check.json"), encoding="utf-8") as file:
+        cases = [c for c in json.load(file)["cases"] if c.get("truth") and c["outcome"] == "done"]
+    kinds = {"null": "nulls", "single": "single effects", "pair": "pairs", "outside": "left-out effects"}
+    print("| kind | cases | CPU s: median | most | above 60 | " + " | ".join(STAGES) + " | rest |")
+    print("|" + "---|" * (6 + len(STAGES)))
+    for kind, label in kinds.items():
+        spent, stages = [], []
+        for case in cases:
+            if case["truth"]["kind"] != kind:
+                continue
+            with open(os.path.join(folder, "diagnoses", case["case"], "diagnosis.json"),
+                      encoding="utf-8") as file:
+                took = by_stage(json.load(file))
+            whole = sum(took.values())
+            spent.append(case["cpu_s"])
+            stages.append([case["cpu_s"] * took.get(s, 0) / whole for s in STAGES])
+        if not spent:
+            continue
+        means = [statistics.mean(row[k] for row in stages) for k in range(len(STAGES))]
+        means.append(statistics.mean(spent) - sum(means))
+        print(f"| {label} | {len(spent)} | {statistics.median(spent):.1f} | {max(spent):.1f} | "
+              f"{sum(s > 60 for s in spent)} | " + " | ".join(f"{m:.1f}" for m in means) + " |")
+    all_spent = [case["cpu_s"] for case in cases]
+    slowest = sorted(cases, key=lambda case: -case["cpu_s"])[:5]
+    print(f"\n{len(all_spent)} cases: median {statistics.median(all_spent):.1f} CPU s; slowest: " + ", ".join(
+        f"{c['case']} ({c['truth'].get('left_out') or ' and '.join(c['truth']['effects']) or 'null'}"
+        f"{' left out' if c['truth'].get('left_out') else ''}) {c['cpu_s']:.0f}" for c in slowest))
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--out", required=True)
+    parser.add_argument("--out", help="where diagnoses go")
+    parser.add_argument("--check", metavar="FOLDER", help="of a finished blind check")
     parser.add_argument("--config", default="configs/srv1.toml")
     parser.add_argument("--gapfarm", default="build/release/bin/gapfarm")
-    parser.add_argument("logs", nargs="+", metavar="LOG")
+    parser.add_argument("logs", nargs="*", metavar="LOG")
     args = parser.parse_args()
-    stages = ["tune", "measure", "screen", "refit"]
-    print("| log | said | CPU s | " + " | ".join(f"{s}, s" for s in stages) + " |")
-    print("|" + "---|" * (3 + len(stages)))
+    if args.check:
+        tell_check(args.check)
+        return
+    if not args.out or not args.logs:
+        parser.error("give --out and logs, or --check FOLDER")
+    print("| log | said | CPU s | " + " | ".join(f"{s}, s" for s in STAGES) + " |")
+    print("|" + "---|" * (3 + len(STAGES)))
     spent = []
     for entry in args.logs:
         log, _, left_out = entry.partition(":")
         folder, cpu, said = diagnose(args, log, left_out)
         spent.append(cpu)
-        took = {row["stage"].split()[0]: row["seconds"] for row in said["timing"]}
+        took = by_stage(said)
         what = said["verdict"]
         if said["effects"]:
             what += ": " + ", ".join(effect["name"] for effect in said["effects"])
         print(f"| {os.path.basename(folder)} | {what} | {cpu:.1f} | " +
-              " | ".join(f"{took.get(s, 0):.1f}" for s in stages) + " |", flush=True)
+              " | ".join(f"{took.get(s, 0):.1f}" for s in STAGES) + " |", flush=True)
     print(f"\n{len(spent)} logs: median {statistics.median(spent):.1f} CPU s, "
           f"most {max(spent):.1f}")
 
