@@ -35,6 +35,7 @@ class BlindCheck : public ::testing::Test {
     hooks_.stop = &stop_;
     Model model = *nominal_model("srv1");
     model.commands = config_.problem.commands;
+    EXPECT_TRUE(write_model(model, folder_ / "tuned.toml").ok());
     EXPECT_TRUE(write_model(model, folder_ / "model.toml").ok());
   }
 
@@ -42,7 +43,7 @@ class BlindCheck : public ::testing::Test {
   void fake_diagnose(const std::string& answer, const std::string& before = "") {
     const std::string script =
         "#!/bin/sh\necho \"$5 $*\" >> " + (folder_ / "runs.txt") + "\n" + before + "\ncp " +
-        (folder_ / "model.toml") + " $5/model.toml\ncp " + (folder_ / "model.toml") +
+        (folder_ / "model.toml") + " $5/model.toml\ncp " + (folder_ / "tuned.toml") +
         " $5/tuned.toml\ncat > $5/diagnosis.json" + " <<'END'\n" + answer + "\nEND\n";
     ASSERT_TRUE(write_file_atomically(folder_ / "diagnose.sh", script).ok());
     settings_.diagnose.command = {"/bin/sh", folder_ / "diagnose.sh"};
@@ -102,6 +103,33 @@ TEST_F(BlindCheck, ScoresWhatTheDiagnosesSay) {
   const std::string told = *read_text_file(folder_ / "runs.txt");
   EXPECT_EQ(told.find("--leave-out"), told.rfind("--leave-out"));
   EXPECT_NE(told.find("--leave-out"), told.npos);
+}
+
+// What is promised is promised of named effects; what is used is the model with its [residual].
+TEST_F(BlindCheck, AnEffectThatWasLeftOutIsScoredWithItsResidual) {
+  Model model = *read_model(folder_ / "tuned.toml");
+  ResidualTerm ahead;
+  ahead.covariates = {4};  // duration
+  ahead.lengths = {10};
+  ahead.centres = Eigen::MatrixXd::Ones(1, 1);
+  ahead.weights = {{"", Eigen::RowVector3d(0.05, 0, 0)}};
+  model.residual = {ahead};
+  ASSERT_TRUE(write_model(model, folder_ / "model.toml").ok());
+  fake_diagnose(R"({"verdict": "unknown", "effects": []})");
+  settings_.design.effects = {"motor_asymmetry"};
+  settings_.design.nulls = settings_.design.pairs = 0;
+  const auto report = run();
+  ASSERT_TRUE(report.ok()) << report.error().message;
+  for (const ScoredCase& c : report->cases) {
+    EXPECT_FALSE(c.realised.has_value());
+    ASSERT_EQ(c.fresh.has_value(), c.truth.kind == CaseKind::kOutside);
+    if (!c.fresh) continue;
+    EXPECT_EQ(c.fresh->final_, c.fresh->tuned);
+    ASSERT_TRUE(c.fresh->corrected.has_value());
+    EXPECT_LT(*c.fresh->corrected, c.fresh->final_);  // no robot drives 5 cm farther
+  }
+  EXPECT_EQ(tally(report->cases).outside_closed.hits, 0u);
+  EXPECT_EQ(tally(report->cases).outside_closed.total, 1u);
 }
 
 TEST_F(BlindCheck, TruthsAreSealedWhileDiagnosesRun) {
