@@ -34,6 +34,11 @@ Result<Problem> problem_at(const Config& config, const Model& model) {
     return Error{"the model is one of scenario '" + model.scenario + "', the config of '" +
                  config.problem.scenario + "'"};
   }
+  if (model.robot_file != config.problem.robot_file) {
+    return Error{
+        "the model is one of another robot than the config's; give the config that it was "
+        "made with"};
+  }
   Problem problem = config.problem;
   problem.values = model.values;
   problem.log = shifted(std::move(problem.log), -model.frame_x_m, -model.frame_y_m);
