@@ -98,6 +98,12 @@ class Rows {
     }
     return farthest;
   }
+  // Of the first mecanum wheel, without its sign.
+  double roller_angle() const {
+    const auto first = std::find_if(robot_.wheels.begin(), robot_.wheels.end(),
+                                    [](const auto& w) { return w.kind == WheelKind::kMecanum; });
+    return std::abs(first->roller_angle_rad);
+  }
   // Four wheels of a stiff frame: a diagonal may carry more than the other.
   bool crossed() const {
     const bool skids = robot_.drive == DriveKind::kSkid || robot_.drive == DriveKind::kMecanum;
@@ -171,6 +177,16 @@ void Rows::floor() {
   if (has(WheelKind::kOmni) || has(WheelKind::kMecanum)) {
     add("roller_drag", "-", 0, 0.5, robot_.roller_drag, "of the rollers, over friction",
         [](GroundRobot& robot, double v) { robot.roller_drag = v; });
+  }
+  if (has(WheelKind::kMecanum)) {
+    const double own = roller_angle();
+    add("roller_angle", "rad", own / 2, std::min(2 * own, 1.4), own,
+        "of mecanum rollers' axles from the way a wheel rolls", [](GroundRobot& robot, double v) {
+          for (RobotWheel& w : robot.wheels) {
+            if (w.kind != WheelKind::kMecanum) continue;
+            w.roller_angle_rad = std::copysign(v, w.roller_angle_rad);
+          }
+        });
   }
   if (crossed()) {
     add("cross_load", "-", -0.9, 0.9, 0, "of front left and rear right over their even share", {});

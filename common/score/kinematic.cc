@@ -99,6 +99,7 @@ class Body {
                                                         : ahead_;
       *w.radius_m *= side;
     }
+    if (holonomic(robot)) correct_arms(&robot);
     return robot;
   }
 
@@ -209,6 +210,26 @@ class Body {
     const double asked = v * v * curvature / *grip_m_s2_;
     const double held = std::pow(1 + std::pow(std::abs(asked), grip_shape_), -1 / grip_shape_);
     return {v, -slip_angle_rad_ * v * asked * held, v * curvature * held};
+  }
+
+  // A wheel of radius r at x, y drives ahead by r, aside by r / tan(roller angle), and turns the
+  // robot by r / (y + x tan(roller angle)), or by r / robot_radius where wheels stand across.
+  void correct_arms(GroundRobot* robot) const {
+    for (RobotWheel& w : robot->wheels) {
+      if (w.kind == WheelKind::kCaster) continue;
+      if (w.kind != WheelKind::kMecanum) {
+        *w.x_m *= ahead_ / turn_;
+        *w.y_m *= ahead_ / turn_;
+        continue;
+      }
+      const double before = std::tan(std::abs(w.roller_angle_rad));
+      const double tangent = before * ahead_ / aside_;
+      const double arm = std::abs(*w.y_m) + std::abs(*w.x_m) * before;
+      const double aside = arm * ahead_ / turn_ - std::abs(*w.x_m) * tangent;
+      if (!(tangent > 0 && aside > 0)) return;  // no such wheel
+      w.roller_angle_rad = std::copysign(std::atan(tangent), w.roller_angle_rad);
+      *w.y_m = std::copysign(aside, *w.y_m);
+    }
   }
 
   // e1 (v + w x p) = s of every driven wheel, in the least-squares sense.

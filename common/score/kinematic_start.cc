@@ -2,8 +2,32 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <optional>
+#include <string>
 
 namespace gapfarm {
+
+namespace {
+
+// By four-point Coulomb theory a skid-steer turns as wheels do that stand
+// 1 + (friction_ratio wheelbase / wheel_separation)^2 as far apart: the wheelbase of which that is
+// what was fitted, wherever the axles are.
+std::optional<double> rolling_wheelbase(const GroundRobot& robot, const Kinematics& fitted) {
+  const auto name = std::find(fitted.names.begin(), fitted.names.end(), "separation");
+  if (robot.drive != DriveKind::kSkid || name == fitted.names.end()) return std::nullopt;
+  const double ratio = fitted.values[name - fitted.names.begin()];
+  double separation = 0;
+  for (const RobotWheel& w : robot.wheels) separation = std::max(separation, 2 * std::abs(*w.y_m));
+  const ControllerKinematics& k = robot.controller;
+  const double rolls =
+      ratio * k.wheel_separation_m.value_or(separation) * k.wheel_separation_multiplier;
+  return separation * std::sqrt(std::max(rolls / separation - 1, 1e-3)) / robot.friction_ratio;
+}
+
+bool is_noise(const std::string& key) { return key.find("_noise_") != std::string::npos; }
+
+}  // namespace
 
 ParameterValues kinematic_start(const Problem& problem) {
   if (!problem.ground || problem.log.trials.empty()) return problem.values;
@@ -17,15 +41,31 @@ ParameterValues kinematic_start(const Problem& problem, const Kinematics& fitted
   const GroundRobot robot = robot_with(problem.ground->robot(), fitted);
   if (!check_robot(robot)) return values;
   const GroundTable there(robot), here(problem.ground->robot());
+  const auto wheelbase = rolling_wheelbase(problem.ground->robot(), fitted);
   for (const Gene& gene : problem.genes) {
     const Parameter& row = problem.table()[gene.row];
     const auto now = there.table().find(row.key), before = here.table().find(row.key);
-    const bool noise = row.key.find("_noise_") != std::string::npos;  // in the robot's proportion
-    if (!now || !before || noise) continue;
+    if (row.key == "wheelbase" && wheelbase) {
+      values[gene.row] = std::clamp(*wheelbase, gene.lower, gene.upper);
+      continue;
+    }
+    // Noise is in the robot's proportion.
+    if (!now || !before || is_noise(row.key)) continue;
     const double wanted = there.table()[*now].nominal;
     // What kinematics have no word for stays as the config has it.
     if (wanted == here.table()[*before].nominal) continue;
     values[gene.row] = std::clamp(wanted, gene.lower, gene.upper);
+  }
+  return values;
+}
+
+ParameterValues without_slip(const Problem& problem, ParameterValues values) {
+  static const std::map<std::string, double, std::less<>> kFirm = {
+      {"friction", 1e3},  {"creep", 0},       {"creep_speed", 0},
+      {"roller_drag", 0}, {"caster_drag", 0}, {"cross_load", 0}};
+  for (const Gene& gene : problem.genes) {
+    const auto firm = kFirm.find(problem.table()[gene.row].key);
+    if (firm != kFirm.end()) values[gene.row] = std::clamp(firm->second, gene.lower, gene.upper);
   }
   return values;
 }
@@ -39,9 +79,9 @@ std::vector<bool> told_by_kinematics(const Problem& problem) {
   for (const Gene& gene : problem.genes) {
     const std::string& key = problem.table()[gene.row].key;
     const auto now = there.table().find(key), before = here.table().find(key);
-    const bool noise = key.find("_noise_") != std::string::npos;
-    told.push_back(now && before && !noise &&
-                   there.table()[*now].nominal != here.table()[*before].nominal);
+    const bool rolls = key == "wheelbase" && problem.ground->robot().drive == DriveKind::kSkid;
+    told.push_back(rolls || (now && before && !is_noise(key) &&
+                             there.table()[*now].nominal != here.table()[*before].nominal));
   }
   return told;
 }

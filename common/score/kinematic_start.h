@@ -15,6 +15,10 @@ ParameterValues kinematic_start(const Problem& problem);
 // The same of kinematics that were fitted before.
 ParameterValues kinematic_start(const Problem& problem, const Kinematics& fitted);
 
+// `values` with those of the problem's genes that let wheels slip (friction, creep, drag, loads)
+// as far as their ranges go towards what kinematics suppose: none.
+ParameterValues without_slip(const Problem& problem, ParameterValues values);
+
 // Whether the kinematics have a word for each of the problem's genes.  REQUIRES: a ground robot.
 std::vector<bool> told_by_kinematics(const Problem& problem);
 

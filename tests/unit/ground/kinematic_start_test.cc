@@ -1,0 +1,98 @@
+#include "common/score/kinematic_start.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "common/score/kinematic.h"
+#include "tests/unit/worker/ground_problem.h"
+#include "worker/sim/ground.h"
+
+namespace gapfarm {
+namespace {
+
+// A robot whose search may move all that tells how its wheels roll, and a run with a window.
+Problem rolling_problem(const std::string& file, const std::vector<std::string>& keys,
+                        const std::vector<CommandRow>& commands) {
+  Problem problem;
+  problem.scenario = "ground";
+  problem.commands = default_commands("ground");
+  EXPECT_TRUE(problem.set_robot(file, "robot.toml").ok());
+  for (const std::string& key : keys) {
+    const std::size_t row = problem.table().row(key);
+    const Parameter& p = problem.table()[row];
+    problem.genes.push_back({row, p.lower, p.upper, p.scale});
+  }
+  problem.runs.resize(1);
+  problem.runs.front().commands = commands;
+  Trial window;
+  window.run = 0;
+  window.t_s = 0.5;
+  window.duration_s = 4;
+  problem.log.trials = {window};
+  return problem;
+}
+
+// How far apart the window's end is by the kinematics and by the simulation at their values.
+Eigen::Vector3d apart(const Problem& problem, const Kinematics& kinematics) {
+  const ParameterValues values = without_slip(problem, kinematic_start(problem, kinematics));
+  const GroundRobot robot = problem.ground->robot_at(values);
+  GroundSimulator simulator(robot, {});
+  const std::vector<double> times = {0.5, 4.5};
+  const auto samples = simulator.run(problem.runs.front().commands, {}, times).samples;
+  EXPECT_EQ(samples.size(), 2u);
+  const Pose X_SE = between(samples[0].X_SR, samples[1].X_SR);
+  return local_difference(kinematic_ends(problem, kinematics).front(), X_SE);
+}
+
+Kinematics changed(const Problem& problem, const std::vector<double>& gains) {
+  Kinematics kinematics = nominal_kinematics(problem.ground->robot());
+  for (std::size_t k = 0; k < gains.size(); ++k) {
+    kinematics.values[static_cast<Eigen::Index>(k)] = gains[k];
+  }
+  return kinematics;
+}
+
+TEST(KinematicStart, ASkidSteerRollsInTheSimulationAsItsKinematicsSay) {
+  const Problem problem = rolling_problem(
+      "drive = \"skid\"\ncommands = [\"left\", \"right\"]\nwheel_separation = 1.08\n"
+      "wheel_radius = 0.3\nmass = 470.0\n",
+      {"wheels.left.radius", "wheels.right.radius", "wheelbase", "friction", "creep"},
+      {{0, {3, 4}}, {2, {4, 1}}});
+  const Eigen::Vector3d off = apart(problem, changed(problem, {0.9, 0.95, 1.7}));
+  EXPECT_LT(off.head<2>().norm(), 0.08);  // of a way of 4 m
+  EXPECT_LT(std::abs(off[2]), 0.03);      // of 0.8 rad
+}
+
+TEST(KinematicStart, MecanumWheelsRollInTheSimulationAsTheirKinematicsSay) {
+  const Problem problem = rolling_problem(
+      "drive = \"mecanum\"\nwheelbase = 0.2\nwheel_separation = 0.2\nwheel_radius = 0.03\n"
+      "commands = [\"front_left\", \"front_right\", \"rear_left\", \"rear_right\"]\n",
+      {"wheels.front_left.radius", "wheels.front_right.radius", "wheels.rear_left.radius",
+       "wheels.rear_right.radius", "wheel_separation", "roller_angle", "roller_drag", "friction"},
+      {{0, {5, 6, 6, 5}}, {1.5, {-4, 4, 5, -5}}, {3, {2, -3, 2, -3}}});
+  const Kinematics kinematics = changed(problem, {1.12, 1.05, 1.07});
+  const Eigen::Vector3d off = apart(problem, kinematics);
+  EXPECT_LT(off.head<2>().norm(), 0.008);  // of a way of 0.5 m
+  EXPECT_LT(std::abs(off[2]), 0.03);       // of about 1 rad
+  // As the file has it the ends are far from there.
+  Problem unmoved = problem;
+  unmoved.genes.clear();
+  EXPECT_GT(apart(unmoved, kinematics).head<2>().norm(), 0.015);
+}
+
+TEST(KinematicStart, NothingSlipsWithoutSlip) {
+  Problem problem = tests::ground_problem();
+  for (const char* key : {"friction", "creep", "friction_ratio"}) {
+    const std::size_t row = problem.table().row(key);
+    problem.genes.push_back({row, 0.1, 1.5, problem.table()[row].scale});
+  }
+  const ParameterValues values = without_slip(problem, problem.values);
+  EXPECT_EQ(values[problem.table().row("friction")], 1.5);
+  EXPECT_EQ(values[problem.table().row("creep")], 0.1);
+  EXPECT_EQ(values[problem.table().row("friction_ratio")],
+            problem.values[problem.table().row("friction_ratio")]);
+}
+
+}  // namespace
+}  // namespace gapfarm
