@@ -26,7 +26,7 @@ genes_of() {
     omni) echo 'wheels.w1.radius wheels.w2.radius wheels.w3.radius robot_radius roller_drag friction
                 creep' ;;
     mecanum) echo 'wheels.front_left.radius wheels.front_right.radius wheels.rear_left.radius
-                   wheels.rear_right.radius wheel_separation roller_drag friction creep_speed
+                   wheels.rear_right.radius wheel_separation roller_drag friction
                    cross_load centre_of_mass.x' ;;
     *) echo 'wheels.left.radius wheels.right.radius wheel_separation friction' ;;
   esac
@@ -44,7 +44,11 @@ config_of() {  # SET
          "$robot" "$(realpath "$sets/$1/fit")"
   printf 'horizons = [0.5, 2, 5%s]\n[parameters]\nstep_rate = %s\n[genes]\n' "$whole" \
          "${STEP_RATE:-120}"
-  for gene in $(genes_of "$drive") delay lag marker.x marker.y marker.yaw drive_noise_travel \
+  # Rollers slip; motors on open duties turn from a certain duty on and give way under load.
+  local slip=
+  if [[ $drive == mecanum ]]; then slip=creep; fi
+  if grep -q '^command_kind = "duties"' "$robot"; then slip='dead_band creep_speed'; fi
+  for gene in $(genes_of "$drive") $slip delay lag marker.x marker.y marker.yaw drive_noise_travel \
               drive_noise_turn pose_noise_position pose_noise_heading; do
     echo "$gene = \"table\""
   done
