@@ -60,9 +60,9 @@ Result<std::optional<SimulatedStart>> start_of(const std::optional<Checkpoint>& 
       start->simulations, start->starts, start->starts == 1 ? "" : "s", start->gain));
   console.note(fmt::format(
       "on stretches left out of the fit the simulation foretells {:.2f} nats a window {} than the "
-      "kinematics{}",
+      "kinematics{}; no median error there is more than {:.2f} times theirs",
       std::abs(start->left_out_gain), start->left_out_gain < 0 ? "less" : "more",
-      start->kinematic ? ", so that the kinematics' values are kept" : ""));
+      start->kinematic ? ", and the kinematics' values are kept" : "", start->worst_ratio));
   return std::optional(*std::move(start));
 }
 

@@ -30,14 +30,14 @@ WindowEnds window_errors(const Problem& problem, const std::vector<Pose>& predic
   return ends;
 }
 
-double kinematic_left_out(const Problem& problem, const Kinematics& fitted,
-                          const RobustErrors& errors, std::span<const std::size_t> stretches) {
+WindowEnds kinematic_left_out(const Problem& problem, const Kinematics& fitted,
+                              const RobustErrors& errors, std::span<const std::size_t> stretches) {
   const WindowEnds ends = window_errors(problem, kinematic_ends(problem, fitted));
   const auto n = fitted.values.size();
   const NormalEquations freely{
       Eigen::MatrixXd::Identity(n, n) / (kKinematicsFreely * kKinematicsFreely),
       Eigen::VectorXd::Zero(n)};
-  return left_out_nats(errors, ends, slopes_of(problem, fitted, ends), freely, stretches);
+  return left_out_ends(errors, ends, slopes_of(problem, fitted, ends), freely, stretches);
 }
 
 }  // namespace gapfarm

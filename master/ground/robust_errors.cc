@@ -20,6 +20,12 @@ double part_of(const Eigen::Vector3d& end, int part) {
   return part == 0 ? end.head<2>().norm() : std::abs(end[2]);
 }
 
+double median_of(std::vector<double> sizes) {
+  const auto middle = sizes.begin() + static_cast<long>(sizes.size() / 2);
+  std::nth_element(sizes.begin(), middle, sizes.end());
+  return *middle;
+}
+
 // Student's density in one or two dimensions.
 double part_weight(double size, double scale, int part) {
   const double z = size / scale;
@@ -33,9 +39,7 @@ double part_nats(double size, double scale, int part) {
 
 // The likeliest scale of such a density, by its iteration.
 double scale_of_part(std::vector<double> sizes, int part) {
-  const auto middle = sizes.begin() + static_cast<long>(sizes.size() / 2);
-  std::nth_element(sizes.begin(), middle, sizes.end());
-  double scale = std::max(1.3 * *middle / std::sqrt(kDimensions[part]), kLeastScale);
+  double scale = std::max(1.3 * median_of(sizes) / std::sqrt(kDimensions[part]), kLeastScale);
   const double count = static_cast<double>(sizes.size()) * kDimensions[part];
   for (int round = 0; round < 20; ++round) {
     double sum = 0;
@@ -108,16 +112,18 @@ RobustErrors::RobustErrors(std::span<const double> durations_s, const WindowEnds
   for (const auto& [position, heading] : sizes) {
     scales_.push_back({scale_of_part(position, 0), scale_of_part(heading, 1)});
     const double share = std::min(1.0, static_cast<double>(position.size()) / kEnoughWindows);
-    use_.push_back(share / static_cast<double>(position.size()));
+    const double use = share / static_cast<double>(position.size());
+    use_.push_back({use, use});
     shares += share;
   }
-  for (double& use : use_) use *= static_cast<double>(length_.size()) / shares;
+  const double all = static_cast<double>(length_.size()) / shares;
+  emphasise(std::vector<std::array<double, 2>>(use_.size(), {all, all}));
 }
 
 double RobustErrors::nats_of(std::size_t window, const Eigen::Vector3d& end) const {
   const std::size_t length = length_[window];
-  return use_[length] * (part_nats(part_of(end, 0), scales_[length][0], 0) +
-                         part_nats(part_of(end, 1), scales_[length][1], 1));
+  return use_[length][0] * part_nats(part_of(end, 0), scales_[length][0], 0) +
+         use_[length][1] * part_nats(part_of(end, 1), scales_[length][1], 1);
 }
 
 double RobustErrors::nats(const WindowEnds& ends) const {
@@ -126,11 +132,36 @@ double RobustErrors::nats(const WindowEnds& ends) const {
   return sum;
 }
 
+std::vector<std::array<double, 2>> RobustErrors::ratios(const WindowEnds& ends,
+                                                        const WindowEnds& rival) const {
+  std::vector<std::array<double, 2>> all(lengths(), {1, 1});
+  for (std::size_t length = 0; length < lengths(); ++length) {
+    for (int part = 0; part < 2; ++part) {
+      std::vector<double> own, others;
+      for (std::size_t i = 0; i < ends.size(); ++i) {
+        if (length_[i] != length) continue;
+        own.push_back(part_of(ends[i], part));
+        others.push_back(part_of(rival[i], part));
+      }
+      if (static_cast<double>(own.size()) < kEnoughWindows) continue;
+      const double least = std::max(median_of(std::move(others)), kLeastScale);
+      all[length][static_cast<std::size_t>(part)] = median_of(std::move(own)) / least;
+    }
+  }
+  return all;
+}
+
+void RobustErrors::emphasise(std::span<const std::array<double, 2>> factors) {
+  for (std::size_t length = 0; length < use_.size(); ++length) {
+    for (std::size_t part = 0; part < 2; ++part) use_[length][part] *= factors[length][part];
+  }
+}
+
 Eigen::Vector3d RobustErrors::weights(std::size_t window, const Eigen::Vector3d& end) const {
   const std::size_t length = length_[window];
   const double position = part_weight(part_of(end, 0), scales_[length][0], 0);
   const double heading = part_weight(part_of(end, 1), scales_[length][1], 1);
-  return use_[length] * Eigen::Vector3d(position, position, heading);
+  return {use_[length][0] * position, use_[length][0] * position, use_[length][1] * heading};
 }
 
 namespace {
@@ -191,8 +222,9 @@ Eigen::VectorXd step_within_bounds(const NormalEquations& equations, const Eigen
   return to;
 }
 
-double left_out_nats(const RobustErrors& errors, const WindowEnds& ends, const WindowSlopes& slopes,
-                     const NormalEquations& prior, std::span<const std::size_t> stretches) {
+WindowEnds left_out_ends(const RobustErrors& errors, const WindowEnds& ends,
+                         const WindowSlopes& slopes, const NormalEquations& prior,
+                         std::span<const std::size_t> stretches) {
   const std::size_t count = 1 + *std::max_element(stretches.begin(), stretches.end());
   NormalEquations all = prior;
   std::vector<NormalEquations> own(count, no_equations(prior.g.size()));
@@ -209,11 +241,11 @@ double left_out_nats(const RobustErrors& errors, const WindowEnds& ends, const W
     H.diagonal().array() += kLeastPrecision;
     moves.push_back(solve_symmetric(H, all.g - one.g));
   }
-  double sum = 0;
+  WindowEnds foretold;
   for (std::size_t i = 0; i < ends.size(); ++i) {
-    sum += errors.nats_of(i, ends[i] - slopes[i] * moves[stretches[i]]);
+    foretold.push_back(ends[i] - slopes[i] * moves[stretches[i]]);
   }
-  return sum;
+  return foretold;
 }
 
 }  // namespace gapfarm

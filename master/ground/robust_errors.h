@@ -35,12 +35,18 @@ class RobustErrors {
   std::size_t windows() const { return length_.size(); }
   double nats(const WindowEnds& ends) const;
   double nats_of(std::size_t window, const Eigen::Vector3d& end) const;
+  // Of each length: medians of position's and heading's errors over those of `rival`; 1 where a
+  // length has only a few windows.
+  std::vector<std::array<double, 2>> ratios(const WindowEnds& ends, const WindowEnds& rival) const;
+  // Position and heading of each length count that much more than now.
+  void emphasise(std::span<const std::array<double, 2>> factors);
+  std::size_t lengths() const { return scales_.size(); }
   // Of the squares of an end's three residuals, in least squares that approach nats().
   Eigen::Vector3d weights(std::size_t window, const Eigen::Vector3d& end) const;
 
  private:
   std::vector<std::size_t> length_;            // of each window: which
-  std::vector<double> use_;                    // of a window of each length
+  std::vector<std::array<double, 2>> use_;     // of a window of each length: position, heading
   std::vector<std::array<double, 2>> scales_;  // of each length: m, rad
 };
 
@@ -56,9 +62,10 @@ NormalEquations normal_equations(const RobustErrors& errors, const WindowEnds& e
 // the others move as is best then.
 Eigen::VectorXd step_within_bounds(const NormalEquations& equations, const Eigen::VectorXd& at);
 
-// Nats of ends that were not fitted to: each stretch is predicted by values that one step of least
-// squares makes of the other stretches.  `prior` adds to the equations of every step.
-double left_out_nats(const RobustErrors& errors, const WindowEnds& ends, const WindowSlopes& slopes,
-                     const NormalEquations& prior, std::span<const std::size_t> stretches);
+// Ends that were not fitted to: each stretch is predicted by values that one step of least squares
+// makes of the other stretches.  `prior` adds to the equations of every step.
+WindowEnds left_out_ends(const RobustErrors& errors, const WindowEnds& ends,
+                         const WindowSlopes& slopes, const NormalEquations& prior,
+                         std::span<const std::size_t> stretches);
 
 }  // namespace gapfarm

@@ -1,5 +1,3 @@
-#include "master/ground/simulated_start.h"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -8,213 +6,30 @@
 #include "common/score/algebra.h"
 #include "common/score/kinematic_start.h"
 #include "master/ground/kinematic_rival.h"
-#include "master/ground/robust_errors.h"
+#include "master/ground/simulation_fit.h"
 
 namespace gapfarm {
 namespace {
 
-constexpr double kGeneStep = 0.01;  // to find slopes; contacts are noisy below
 constexpr int kMostRounds = 24;
 constexpr int kRaceRounds = 3;  // of every start, before the best go on
-constexpr double kEnoughNats = 0.1;
 // What windows of one run tell is less than their number says: how much more than one of them a
 // value's start counts is tried on stretches that were left out.
 constexpr std::array<double, 6> kHolds = {1, 3, 10, 30, 100, 300};
-constexpr double kFreelyMoves = 0.3;  // of a gene's range, where the windows do not tell
-constexpr std::size_t kStretches = 6;
+constexpr double kFirmly = 1000;   // held where nothing slips
+constexpr double kWorseCosts = 1;  // nats a window for a median e times as far off
+// Position and heading count alike, and what is worse than the kinematics' more.
+constexpr double kHeadingCounts = 2;
+constexpr int kEmphases = 3;
+constexpr double kEmphasis = 4;  // power of the ratio
+constexpr double kMostRatio = 1.3;
 constexpr std::size_t kLooks = 3;  // starts a gene that kinematics do not tell
 // What is left to find is mostly the noise: a search that has the windows' whole spread to roam in
 // trades ends for the noise's likelihood.
 constexpr double kFoundSpread = 0.1;  // of what the windows leave unsure
 constexpr double kHeldSpread = 1e-3;
 
-// Everything at one genome.
-struct At {
-  Genome genome;
-  WindowEnds ends;
-  double nats = 0;  // of the windows, and of what was moved
-};
-
-// What values are held to, and how firmly.
-struct Hold {
-  Genome start;
-  double strength = 1;
-};
-
-// One way uphill.
-struct Climb {
-  At at;
-  Hold hold;
-  WindowSlopes slopes;  // there, or one step before
-  NormalEquations equations;
-  bool over = false;
-};
-
-class SimulationFit {
- public:
-  SimulationFit(Farm& farm, const Problem& problem);
-  Result<SimulatedStart> run(double widest);
-
- private:
-  Result<std::vector<std::optional<At>>> look_at(const std::vector<Genome>& genomes,
-                                                 const std::vector<Hold>& holds);
-  Status look_round(Climb* climb);  // slopes and equations
-  Status step(Climb* climb);
-  Status climb_on(Climb* climb, int rounds);
-  Result<std::vector<Climb>> other_climbs(const Climb& first);
-  Status settle(std::vector<std::optional<At>>* looks, const std::vector<Hold>& holds,
-                const Climb& first);
-  Genome moved(const At& at, const NormalEquations& equations) const;
-  double cost_of(const Genome& genome, const Hold& hold) const;
-  NormalEquations prior_at(const Genome& genome, const Hold& hold) const;
-  double left_out(const Climb& climb, double strength) const;
-  Result<Climb> best_of(std::vector<Climb> climbs);
-  void judge(const Climb& best, const At& begin, SimulatedStart* found) const;
-  void take_spread(const Climb& climb, double widest, SimulatedStart* found) const;
-
-  Farm& farm_;
-  const Problem& problem_;
-  std::string hash_;
-  Kinematics kinematics_;
-  std::optional<RobustErrors> errors_;
-  std::vector<std::size_t> told_;    // genes that move ends
-  std::vector<std::size_t> untold_;  // those of them that kinematics have no word for
-  std::vector<std::size_t> stretches_;
-  Genome start_;
-  std::size_t simulations_ = 0;
-};
-
-SimulationFit::SimulationFit(Farm& farm, const Problem& problem)
-    : farm_(farm),
-      problem_(problem),
-      hash_(farm.add_problem(to_proto(problem))),
-      stretches_(left_out_stretches(problem.log.trials, kStretches)) {
-  const std::vector<bool> kinematic = told_by_kinematics(problem);
-  for (std::size_t g = 0; g < problem.genes.size(); ++g) {
-    const Parameter& row = problem.table()[problem.genes[g].row];
-    const bool noise = row.key.find("_noise_") != std::string::npos;
-    if (noise || row.kind != ParameterKind::kReal) continue;
-    told_.push_back(g);
-    if (!kinematic[g]) untold_.push_back(g);
-  }
-}
-
-Result<std::vector<std::optional<At>>> SimulationFit::look_at(const std::vector<Genome>& genomes,
-                                                              const std::vector<Hold>& holds) {
-  std::vector<v1::Task> tasks;
-  for (const Genome& genome : genomes) {
-    v1::PredictTask* predict = tasks.emplace_back().mutable_predict();
-    predict->mutable_point()->mutable_genome()->Assign(genome.begin(), genome.end());
-    predict->set_means_only(true);
-  }
-  simulations_ += tasks.size();
-  const auto results = farm_.run(hash_, tasks);
-  if (!results) return results.error();
-  std::vector<std::optional<At>> all;
-  for (std::size_t k = 0; k < genomes.size(); ++k) {
-    const v1::TaskResult& result = (*results)[k];
-    all.emplace_back();
-    if (result.outcome() != v1::OK) continue;
-    std::vector<Pose> ends;
-    for (const v1::Predicted& p : result.predict().predictions()) {
-      ends.push_back(from_proto(p.end()));
-    }
-    At at{genomes[k], window_errors(problem_, ends), 0};
-    at.nats = errors_->nats(at.ends);
-    at.nats -= cost_of(at.genome, holds[holds.size() == 1 ? 0 : k]);
-    all.back() = std::move(at);
-  }
-  return all;
-}
-
-double SimulationFit::cost_of(const Genome& genome, const Hold& hold) const {
-  double sum = 0;
-  for (const std::size_t g : told_) {
-    const double moved = (genome[g] - hold.start[g]) / kFreelyMoves;
-    sum += hold.strength * moved * moved / 2;
-  }
-  return sum;
-}
-
-NormalEquations SimulationFit::prior_at(const Genome& genome, const Hold& hold) const {
-  const auto n = static_cast<Eigen::Index>(told_.size());
-  const double precision = hold.strength / (kFreelyMoves * kFreelyMoves);
-  NormalEquations prior{precision * Eigen::MatrixXd::Identity(n, n), Eigen::VectorXd(n)};
-  for (std::size_t k = 0; k < told_.size(); ++k) {
-    prior.g[static_cast<Eigen::Index>(k)] = precision * (genome[told_[k]] - hold.start[told_[k]]);
-  }
-  return prior;
-}
-
-Genome SimulationFit::moved(const At& at, const NormalEquations& equations) const {
-  Eigen::VectorXd from(static_cast<Eigen::Index>(told_.size()));
-  for (std::size_t k = 0; k < told_.size(); ++k) {
-    from[static_cast<Eigen::Index>(k)] = at.genome[told_[k]];
-  }
-  const Eigen::VectorXd to = step_within_bounds(equations, from);
-  Genome genome = at.genome;
-  for (std::size_t k = 0; k < told_.size(); ++k) {
-    genome[told_[k]] = to[static_cast<Eigen::Index>(k)];
-  }
-  return genome;
-}
-
-Status SimulationFit::look_round(Climb* climb) {
-  const At& at = climb->at;
-  std::vector<Genome> genomes;
-  for (const std::size_t gene : told_) {
-    genomes.push_back(at.genome);
-    double& value = genomes.back()[gene];
-    value += value + kGeneStep > 1 ? -kGeneStep : kGeneStep;
-  }
-  const auto beside = look_at(genomes, {climb->hold});
-  if (!beside) return beside.error();
-  climb->over = std::any_of(beside->begin(), beside->end(), [](const auto& b) { return !b; });
-  if (climb->over) return {};
-  climb->slopes.assign(at.ends.size(), Eigen::MatrixXd(3, static_cast<Eigen::Index>(told_.size())));
-  for (std::size_t k = 0; k < told_.size(); ++k) {
-    const At& there = *(*beside)[k];
-    const double step = there.genome[told_[k]] - at.genome[told_[k]];
-    for (std::size_t i = 0; i < at.ends.size(); ++i) {
-      climb->slopes[i].col(static_cast<Eigen::Index>(k)) = (there.ends[i] - at.ends[i]) / step;
-    }
-  }
-  climb->equations = normal_equations(*errors_, at.ends, climb->slopes);
-  const NormalEquations prior = prior_at(at.genome, climb->hold);
-  climb->equations.H += prior.H;
-  climb->equations.g += prior.g;
-  return {};
-}
-
-// The best of some dampings, of greater ones where none of the usual helps.
-Status SimulationFit::step(Climb* climb) {
-  if (Status s = look_round(climb); !s || climb->over) return s;
-  const double before = climb->at.nats;
-  for (const std::vector<double>& dampings :
-       {std::vector<double>{0, 0.1, 1, 10}, std::vector<double>{100, 1000, 10000}}) {
-    std::vector<Genome> genomes;
-    for (const double damping : dampings) {
-      NormalEquations damped = climb->equations;
-      damped.H.diagonal() *= 1 + damping;
-      genomes.push_back(moved(climb->at, damped));
-    }
-    auto tried = look_at(genomes, {climb->hold});
-    if (!tried) return tried.error();
-    for (std::optional<At>& there : *tried) {
-      if (there && there->nats > climb->at.nats) climb->at = std::move(*there);
-    }
-    if (climb->at.nats > before) break;
-  }
-  climb->over = climb->at.nats - before < kEnoughNats;
-  return {};
-}
-
-Status SimulationFit::climb_on(Climb* climb, int rounds) {
-  for (int k = 0; k < rounds && !climb->over; ++k) {
-    if (Status s = step(climb); !s) return s;
-  }
-  return {};
-}
+}  // namespace
 
 // What kinematics tell is moved to suit the rest, by the slopes of the first climb.
 Status SimulationFit::settle(std::vector<std::optional<At>>* looks, const std::vector<Hold>& holds,
@@ -271,10 +86,40 @@ Result<std::vector<Climb>> SimulationFit::other_climbs(const Climb& first) {
   return climbs;
 }
 
-double SimulationFit::left_out(const Climb& climb, double strength) const {
-  const Hold hold{climb.hold.start, strength};
-  return left_out_nats(*errors_, climb.at.ends, climb.slopes, prior_at(climb.at.genome, hold),
+WindowEnds SimulationFit::left_out(const Climb& climb, const Hold& hold) const {
+  return left_out_ends(*errors_, climb.at.ends, climb.slopes, prior_at(climb.at.genome, hold),
                        stretches_);
+}
+
+SimulationFit::Foretold SimulationFit::foretold(const WindowEnds& ends) const {
+  Foretold of{(plain_->nats(ends) - plain_->nats(rival_)) / static_cast<double>(ends.size()), 0, 0};
+  of.cost = -of.gain;
+  for (const auto& parts : plain_->ratios(ends, rival_)) {
+    for (const double ratio : parts) {
+      of.worst = std::max(of.worst, ratio);
+      of.cost += kWorseCosts * std::log(std::max(ratio, 1.0));
+    }
+  }
+  return of;
+}
+
+// From where the climb stands, with another hold or other errors.
+Status SimulationFit::climb_again(Climb* climb) {
+  climb->at.nats = errors_->nats(climb->at.ends) - cost_of(climb->at.genome, climb->hold);
+  climb->over = false;
+  return climb_on(climb, kMostRounds);
+}
+
+// What stands on the kinematics' values and hardly slips.
+Result<std::optional<Climb>> SimulationFit::firm_climb() {
+  if (firm_ == start_ && untold_.empty()) return std::optional<Climb>();
+  const Hold hold{firm_, 1, kFirmly};
+  auto look = look_at({firm_}, {hold});
+  if (!look) return look.error();
+  if (!look->front()) return std::optional<Climb>();
+  Climb climb{*std::move(look->front()), hold, {}, {}, false};
+  if (Status s = climb_on(&climb, kMostRounds); !s) return s.error();
+  return std::optional(std::move(climb));
 }
 
 // What foretells stretches that were left out best, held as firmly as is best for these.
@@ -283,44 +128,80 @@ Result<Climb> SimulationFit::best_of(std::vector<Climb> climbs) {
   for (Climb& climb : climbs) {
     if (Status s = climb_on(&climb, kRaceRounds); !s) return s.error();
   }
+  std::erase_if(climbs, [](const Climb& climb) { return climb.slopes.empty(); });
   std::stable_sort(climbs.begin(), climbs.end(), by_nats);
   if (climbs.size() > 2) climbs.resize(2);
+  for (Climb& climb : climbs) {
+    if (Status s = climb_on(&climb, kMostRounds); !s) return s.error();
+  }
+  auto firm = firm_climb();
+  if (!firm) return firm.error();
+  if (*firm) climbs.push_back(**std::move(firm));
   std::size_t best = 0;
-  double strength = 1, most = 0;
+  Hold held = climbs.front().hold;
+  double least = INFINITY;
   for (std::size_t k = 0; k < climbs.size(); ++k) {
-    if (Status s = climb_on(&climbs[k], kMostRounds); !s) return s.error();
     if (climbs[k].slopes.empty()) continue;
-    for (const double held : kHolds) {
-      const double nats = left_out(climbs[k], held);
-      if (most != 0 && nats <= most) continue;
+    for (const double strength : kHolds) {
+      const Hold hold{climbs[k].hold.start, strength, climbs[k].hold.untold};
+      const double cost = foretold(left_out(climbs[k], hold)).cost;
+      if (!(cost < least)) continue;
       best = k;
-      strength = held;
-      most = nats;
+      held = hold;
+      least = cost;
     }
   }
-  Climb& chosen = climbs[best];
-  if (strength > 1) {
-    chosen.hold.strength = strength;
-    chosen.at.nats = errors_->nats(chosen.at.ends) - cost_of(chosen.at.genome, chosen.hold);
-    chosen.over = false;
-    if (Status s = climb_on(&chosen, kMostRounds); !s) return s.error();
+  Climb chosen = std::move(climbs[best]);
+  if (held.strength != chosen.hold.strength) {
+    chosen.hold = held;
+    if (Status s = climb_again(&chosen); !s) return s.error();
   }
-  return std::move(chosen);
+  return weigh_worse(std::move(chosen));
 }
 
-// Against the kinematics, whose values in the simulation are `begin`.
-void SimulationFit::judge(const Climb& best, const At& begin, SimulatedStart* found) const {
-  const double windows = static_cast<double>(errors_->windows());
+// What is foretold worse than by the kinematics counts more, as long as that helps.
+Result<Climb> SimulationFit::weigh_worse(Climb best) {
+  for (int round = 0; round < kEmphases && !best.slopes.empty(); ++round) {
+    const WindowEnds ends = left_out(best, best.hold);
+    if (foretold(ends).worst <= 1) break;
+    auto factors = plain_->ratios(ends, rival_);
+    for (auto& parts : factors) {
+      for (double& ratio : parts) ratio = std::pow(std::clamp(ratio, 1.0, kMostRatio), kEmphasis);
+    }
+    errors_->emphasise(factors);
+    Climb next = best;
+    if (Status s = climb_again(&next); !s) return s.error();
+    if (foretold(left_out(next, next.hold)).cost >= foretold(ends).cost) break;
+    best = std::move(next);
+  }
+  return best;
+}
+
+// Against the kinematics, whose values in the simulation are `begin` or, without slip, stand firm.
+Status SimulationFit::judge(const Climb& best, const At& begin, SimulatedStart* found) {
+  const Foretold own = foretold(left_out(best, best.hold));
+  found->left_out_gain = own.gain;
+  found->worst_ratio = own.worst;
   const WindowEnds ends = window_errors(problem_, kinematic_ends(problem_, kinematics_));
-  const double rival = kinematic_left_out(problem_, kinematics_, *errors_, stretches_);
-  const double own = left_out(best, best.hold.strength);
-  found->left_out_gain = (own - rival) / windows;
-  // What the simulation makes of the kinematics' values is nearly what they make of them.
-  const double in_simulation = errors_->nats(begin.ends) - errors_->nats(ends);
-  found->kinematic = rival + in_simulation > own;
-  if (found->kinematic) return;
+  auto firm = look_at({firm_}, {Hold{firm_}});
+  if (!firm) return firm.error();
+  double least = own.cost;
+  for (const At& at : {begin, firm->front().value_or(begin)}) {
+    // What the simulation makes of the kinematics' values is nearly what they make of them.
+    WindowEnds foretells = rival_;
+    for (std::size_t i = 0; i < ends.size(); ++i) foretells[i] += at.ends[i] - ends[i];
+    const Foretold theirs = foretold(foretells);
+    if (theirs.cost >= least) continue;
+    least = theirs.cost;
+    found->kinematic = true;
+    found->genome = at.genome;
+    found->worst_ratio = theirs.worst;
+  }
+  if (found->kinematic) return {};
   found->genome = best.at.genome;
-  found->gain = (errors_->nats(best.at.ends) - errors_->nats(begin.ends)) / windows;
+  found->gain = (plain_->nats(best.at.ends) - plain_->nats(begin.ends)) /
+                static_cast<double>(plain_->windows());
+  return {};
 }
 
 void SimulationFit::take_spread(const Climb& climb, double widest, SimulatedStart* found) const {
@@ -346,10 +227,17 @@ Result<SimulatedStart> SimulationFit::run(double widest) {
   kinematics_ = *kinematics;
   std::vector<double> durations_s;
   for (const Trial& trial : problem_.log.trials) durations_s.push_back(*trial.duration_s);
-  errors_.emplace(durations_s, window_errors(problem_, kinematic_ends(problem_, kinematics_)));
+  plain_.emplace(durations_s, window_errors(problem_, kinematic_ends(problem_, kinematics_)));
+  errors_ = plain_;
+  errors_->emphasise(std::vector<std::array<double, 2>>(errors_->lengths(), {1, kHeadingCounts}));
+  rival_ = kinematic_left_out(problem_, kinematics_, *plain_, stretches_);
   const ParameterValues values = kinematic_start(problem_, kinematics_);
   for (const Gene& gene : problem_.genes) {
     start_.push_back(encode_gene(problem_.table(), gene, values[gene.row]));
+  }
+  const ParameterValues grip = without_slip(problem_, values);
+  for (const Gene& gene : problem_.genes) {
+    firm_.push_back(encode_gene(problem_.table(), gene, grip[gene.row]));
   }
   const Hold hold{start_, 1};
   auto first = look_at({start_}, {hold});
@@ -369,13 +257,11 @@ Result<SimulatedStart> SimulationFit::run(double widest) {
   found.starts = climbs.size();
   const auto best = best_of(std::move(climbs));
   if (!best) return best.error();
+  if (Status s = judge(*best, begin, &found); !s) return s.error();
   found.simulations = simulations_;
-  judge(*best, begin, &found);
   take_spread(*best, widest, &found);
   return found;
 }
-
-}  // namespace
 
 Result<SimulatedStart> fit_by_simulation(Farm& farm, const Problem& problem, double widest) {
   return SimulationFit(farm, problem).run(widest);

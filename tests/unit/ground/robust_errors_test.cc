@@ -90,8 +90,8 @@ TEST(LeftOut, ValuesThatTellOnlyTheirOwnStretchAreSeenThrough) {
   }
   const NormalEquations one{Eigen::MatrixXd::Zero(1, 1), Eigen::VectorXd::Zero(1)};
   const NormalEquations six{Eigen::MatrixXd::Zero(count, count), Eigen::VectorXd::Zero(count)};
-  const double alone = left_out_nats(errors, fitted, own, six, stretches);
-  const double together = left_out_nats(errors, fitted, shared, one, stretches);
+  const double alone = errors.nats(left_out_ends(errors, fitted, own, six, stretches));
+  const double together = errors.nats(left_out_ends(errors, fitted, shared, one, stretches));
   EXPECT_NEAR(alone, errors.nats(fitted), 1e-3);  // what was left out tells nothing of itself
   EXPECT_GT(together, alone + 50);
 }
