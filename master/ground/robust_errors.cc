@@ -14,6 +14,9 @@ constexpr double kLeastScale = 1e-5;
 constexpr double kDimensions[] = {2, 1};  // of position and heading
 constexpr double kStrayShare = 0.25;      // of what windows of the commonest length cover
 constexpr double kEnoughWindows = 10;     // for a length to count in full
+// What is a run's own (its floor, its way, how its clock stands) is in every part of it: runs are
+// not cut where these are left to fit to.
+constexpr std::size_t kEnoughRuns = 3;
 constexpr double kLeastPrecision = 1e-9;  // of a value that no window tells
 
 double part_of(const Eigen::Vector3d& end, int part) {
@@ -82,7 +85,8 @@ std::vector<std::size_t> left_out_stretches(std::span<const Trial> windows, std:
     const auto [run, fresh] = span_s.try_emplace(*w.run, std::array{*w.t_s, end});
     run->second = {std::min(run->second[0], *w.t_s), std::max(run->second[1], end)};
   }
-  const bool whole_runs = span_s.size() >= count;
+  const bool whole_runs = span_s.size() >= kEnoughRuns;
+  if (whole_runs) count = std::min(count, span_s.size());
   std::map<std::size_t, double> before;  // runs or seconds
   double all = 0;
   for (const auto& [run, span] : span_s) {

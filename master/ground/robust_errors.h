@@ -18,9 +18,10 @@ using WindowSlopes = std::vector<Eigen::MatrixXd>;  // of each end: 3 rows, a co
 // would weigh as much as hundreds.
 std::vector<std::size_t> window_lengths(std::span<const double> durations_s);
 
-// Of each window one of `count` stretches of the log that are left out in turn: runs in a row where
-// there are enough of them, else the log's time in equal parts.  Neighbours are alike (repeats of a
-// command, a floor), so they are left out together.  REQUIRES: trials that are windows.
+// Of each window one of at most `count` stretches of the log that are left out in turn: whole runs,
+// those in a row together, or of one or two runs the log's time in equal parts.  Neighbours are
+// alike (repeats of a command, a floor), so they are left out together.  REQUIRES: trials that are
+// windows.
 std::vector<std::size_t> left_out_stretches(std::span<const Trial> windows, std::size_t count);
 
 // Student's density of position and heading, with a scale of its own for windows of each length, so

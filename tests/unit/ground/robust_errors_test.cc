@@ -109,6 +109,11 @@ TEST(LeftOut, StretchesAreRunsInARowOrEqualTimes) {
   for (std::uint32_t k = 0; k < 12; ++k) repeats.push_back(window(k, 5));
   const std::vector<std::size_t> pairs = left_out_stretches(repeats, 6);
   for (std::size_t k = 0; k < 12; ++k) EXPECT_EQ(pairs[k], k / 2);
+  // Three runs are three stretches, however long.
+  std::vector<Trial> three;
+  for (int k = 0; k < 30; ++k) three.push_back(window(k < 20 ? 0 : k < 25 ? 1 : 2, 100 + k));
+  const std::vector<std::size_t> runs = left_out_stretches(three, 6);
+  for (std::size_t k = 0; k < 30; ++k) EXPECT_EQ(runs[k], k < 20 ? 0 : k < 25 ? 1 : 2);
   for (int k = 0; k < 30; ++k) one.push_back(window(0, 100 + k));
   const std::vector<std::size_t> times = left_out_stretches(one, 3);
   for (std::size_t k = 0; k < 30; ++k) EXPECT_EQ(times[k], k / 10);
