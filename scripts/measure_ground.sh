@@ -44,9 +44,9 @@ config_of() {  # SET
          "$robot" "$(realpath "$sets/$1/fit")"
   printf 'horizons = [0.5, 2, 5%s]\n[parameters]\nstep_rate = %s\n[genes]\n' "$whole" \
          "${STEP_RATE:-120}"
-  # Rollers slip; motors on open duties turn from a certain duty on and give way under load.
+  # Rollers slip and stand a little askew; motors on open duties turn from a certain duty on and give way under load.
   local slip=
-  if [[ $drive == mecanum ]]; then slip=creep; fi
+  if [[ $drive == mecanum ]]; then slip='creep roller_angle'; fi
   if grep -q '^command_kind = "duties"' "$robot"; then slip='dead_band creep_speed'; fi
   for gene in $(genes_of "$drive") $slip delay lag marker.x marker.y marker.yaw drive_noise_travel \
               drive_noise_turn pose_noise_position pose_noise_heading; do
