@@ -7,6 +7,12 @@
 
 namespace gapfarm {
 
+std::vector<std::string> command_names(const std::vector<CommandSpec>& commands) {
+  std::vector<std::string> names;
+  for (const CommandSpec& command : commands) names.push_back(command.name);
+  return names;
+}
+
 Result<RunLog> read_run_folders(std::span<const std::string> folders,
                                 std::span<const std::string> channels) {
   RunLog all;

@@ -1,13 +1,16 @@
-// The runs of a problem from their files.
+// What a problem's log is read by: its commands' names, and its runs from their files.
 #pragma once
 
 #include <span>
 #include <string>
+#include <vector>
 
 #include "common/problem/problem.h"
 #include "common/runs/run.h"
 
 namespace gapfarm {
+
+std::vector<std::string> command_names(const std::vector<CommandSpec>& commands);
 
 // Reads commands.csv and poses.csv of each folder, one after another.
 Result<RunLog> read_run_folders(std::span<const std::string> folders,

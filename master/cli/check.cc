@@ -10,10 +10,10 @@
 #include "common/trials/context.h"
 #include "master/cli/inputs.h"
 #include "master/cli/subcommand.h"
-#include "master/cli/validation.h"
 #include "master/diagnose/diagnosis_json.h"
 #include "master/evolve/evaluation.h"
 #include "master/ground/diagnose_ground.h"
+#include "master/run/validation.h"
 #include "master/sanity/sanity.h"
 #include "master/sanity/words.h"
 

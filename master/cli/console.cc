@@ -29,13 +29,6 @@ void write_whole(std::FILE* file, std::string_view text) {
   std::fflush(file);
 }
 
-template <class... Values>
-std::string formatted(const char* format, Values... values) {
-  char text[64];
-  std::snprintf(text, sizeof text, format, values...);
-  return text;
-}
-
 }  // namespace
 
 Console::Console(std::FILE* out, std::FILE* err, Clock clock)
@@ -130,21 +123,9 @@ std::string Console::styled(std::string_view text, const char* code) const {
   return "\x1b[" + std::string(code) + "m" + std::string(text) + "\x1b[0m";
 }
 
-std::string format_number(const std::optional<double>& value, int digits) {
-  return value ? formatted("%.*g", digits, *value) : "-";
-}
-
 double steady_now_s() {
   const auto now = std::chrono::steady_clock::now().time_since_epoch();
   return std::chrono::duration<double>(now).count();
-}
-
-std::string progress_text(std::string_view what, double rate_per_s,
-                          std::optional<double> time_left_s) {
-  std::string text(what);
-  text += ", " + formatted("%.3g", rate_per_s) + "/s";
-  if (time_left_s) text += ", about " + format_duration(*time_left_s) + " left";
-  return text;
 }
 
 std::string printable(std::string_view text) {

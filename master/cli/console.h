@@ -86,11 +86,6 @@ class Console {
   LineCadence lines_;
 };
 
-// Six significant digits, "-" for none.
-std::string format_number(const std::optional<double>& value, int digits = 6);
-// "generation 41 of 100, 210/s, about 12 s left": the text of a progress line.
-std::string progress_text(std::string_view what, double rate_per_s,
-                          std::optional<double> time_left_s);
 // `text` with control bytes as '?': what came from elsewhere cannot steer the terminal.
 std::string printable(std::string_view text);
 

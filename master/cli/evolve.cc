@@ -7,7 +7,8 @@
 #include "master/cli/evolution.h"
 #include "master/cli/long_command.h"
 #include "master/cli/outputs.h"
-#include "master/cli/validation.h"
+#include "master/run/stored_run.h"
+#include "master/run/validation.h"
 
 namespace gapfarm {
 namespace {
@@ -17,10 +18,7 @@ struct EvolveCommand {
   TrialOptions trials;
   std::string out;
   std::optional<std::uint64_t> seed;
-  std::optional<std::uint64_t> shuffle;
-  EvolutionOverrides overrides;
-  FarmOptions farm;
-  PageOption page;
+  EvolutionOptions options;
 };
 
 int say_plan(const EvolveCommand& command, const Config& config, CliContext& context) {
@@ -37,41 +35,26 @@ int say_plan(const EvolveCommand& command, const Config& config, CliContext& con
                       {"seed", config.seed},
                       {"population", config.evolution.population},
                       {"generations", config.evolution.generations}},
-                     command.farm, config.farm, context);
-}
-
-RunInfo run_info(const Config& config, const EvolutionOverrides& overrides) {
-  const v1::Problem problem = to_proto(config.problem);
-  const FitnessKind kind = config.problem.fitness.kind;
-  RunInfo info;
-  info.config_path = config.path;
-  info.config_text = config.text;
-  info.overrides = overrides.to_json();
-  info.problem = serialise(problem);
-  info.problem_hash = problem_hash(problem);
-  info.seed = config.seed;
-  info.fitness = fitness_name(kind);
-  info.fitness_unit = fitness_unit(kind);
-  info.higher_is_better = higher_is_better(kind);
-  return info;
+                     command.options.farm, config.farm, context);
 }
 
 int run_evolve(const EvolveCommand& command, CliContext& context) {
-  const std::unique_ptr<Log> log = command.farm.log.open();
+  const std::unique_ptr<Log> log = command.options.farm.log.open();
   const NotesGoTo notes(*log, context.console);
   const auto config =
       open_config(command.config, command.trials, context.console, [&](Config& read) {
-        command.overrides.apply(read.evolution);
+        command.options.overrides.apply(read.evolution);
         if (command.seed) read.seed = *command.seed;
         if (Status s = check_runnable(read); !s) return s;
-        if (Status s = check_farm(command.farm, read.farm); !s) return s;
+        if (Status s = check_farm(command.options.farm, read.farm); !s) return s;
         return check_folder(command.out, FolderKind::kRun);
       });
   if (!config) return kExitBadUsage;
   if (context.dry_run) return say_plan(command, *config, context);
   std::error_code ignored;
   const bool folder_was_there = std::filesystem::exists(command.out, ignored);
-  Result<RunStore> store = RunStore::create(command.out, run_info(*config, command.overrides));
+  Result<RunStore> store =
+      RunStore::create(command.out, run_info(*config, command.options.overrides));
   if (!store) {
     context.console.error(store.error());
     return kExitBadUsage;
@@ -79,9 +62,7 @@ int run_evolve(const EvolveCommand& command, CliContext& context) {
   context.console.note(command.out + ": evolving " + std::to_string(config->problem.genes.size()) +
                        " parameters on " + std::to_string(config->problem.log.trials.size()) +
                        " trials, seed " + std::to_string(config->seed));
-  const int code = run_evolution(
-      *store, {*config, config->problem, command.farm, *log, command.shuffle, command.page},
-      context);
+  const int code = run_evolution(*store, *config, command.options, *log, context);
   // What failed before its first generation is not to be in the way of the next attempt.
   const auto checkpoint = store->checkpoint();
   if (code == kExitFailed && checkpoint && !*checkpoint) {
@@ -100,12 +81,7 @@ SubcommandRun setup_evolve(CLI::App& app) {
   command->trials.declare(app);
   app.add_option("--out", command->out, "Run folder to make")->required();
   app.add_option("--seed", command->seed, "In place of the config's");
-  command->overrides.declare(app);
-  command->farm.declare(app, true);
-  command->page.declare(app);
-  declare_long_command(app);
-  app.add_option("--shuffle", command->shuffle,
-                 "Hand jobs out in an order shuffled by this seed; the results do not change");
+  command->options.declare(app);
   app.footer(
       "Examples:\n"
       "  gapfarm evolve configs/demo.toml --out run/demo\n"

@@ -13,12 +13,6 @@
 
 namespace gapfarm {
 
-std::vector<std::string> command_names(const std::vector<CommandSpec>& commands) {
-  std::vector<std::string> names;
-  for (const CommandSpec& command : commands) names.push_back(command.name);
-  return names;
-}
-
 Result<Config> read_config_and_trials(const std::string& config_path, const TrialOptions& trials) {
   Result<Config> config = read_config(config_path);
   if (!config) return config.error();

@@ -12,14 +12,13 @@
 #include "common/config/model.h"
 #include "common/config/settings.h"
 #include "common/net/keys.h"
+#include "common/problem/run_files.h"
 #include "master/cli/farm_log.h"
 #include "master/cli/subcommand.h"
 #include "master/cli/trial_options.h"
 #include "master/farm/socket_farm.h"
 
 namespace gapfarm {
-
-std::vector<std::string> command_names(const std::vector<CommandSpec>& commands);
 
 // A config with its trials read: those given, else the config's own.  Errors: neither names any
 // file, and whatever reading either finds.

@@ -14,12 +14,12 @@
 #include "common/score/motion_model.h"
 #include "common/trials/read.h"
 #include "common/trials/shifted.h"
-#include "master/cli/baseline_notes.h"
 #include "master/cli/inputs.h"
 #include "master/cli/long_command.h"
 #include "master/cli/outputs.h"
 #include "master/cli/run_model.h"
 #include "master/report/prediction_table.h"
+#include "master/run/baseline_notes.h"
 
 namespace gapfarm {
 namespace {

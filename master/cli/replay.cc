@@ -6,13 +6,13 @@
 
 #include "common/trials/csv.h"
 #include "common/trials/write.h"
-#include "master/cli/evolution_farm.h"
 #include "master/cli/inputs.h"
 #include "master/cli/outputs.h"
 #include "master/cli/run_model.h"
 #include "master/evolve/evaluation.h"
 #include "master/evolve/individual.h"
 #include "master/experiment/plan.h"
+#include "master/run/evolution_farm.h"
 #include "master/store/run_reader.h"
 
 namespace gapfarm {

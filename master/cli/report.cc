@@ -5,11 +5,11 @@
 
 #include "common/trials/files.h"
 #include "master/cli/outputs.h"
-#include "master/cli/run_page.h"
 #include "master/cli/subcommand.h"
 #include "master/diagnose/diagnosis_json.h"
 #include "master/report/report_html.h"
 #include "master/report/run_report.h"
+#include "master/run/run_page.h"
 
 namespace gapfarm {
 namespace {

@@ -3,9 +3,9 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "common/config/config.h"
 #include "master/cli/evolution.h"
 #include "master/cli/long_command.h"
+#include "master/run/stored_run.h"
 #include "master/store/run_reader.h"
 
 namespace gapfarm {
@@ -14,37 +14,17 @@ namespace {
 struct ResumeCommand {
   std::string run;
   std::optional<std::uint64_t> generation;
-  std::optional<std::uint64_t> shuffle;
-  EvolutionOverrides overrides;
-  FarmOptions farm;
-  PageOption page;
+  EvolutionOptions options;
 };
-
-// The run's config and problem as they were stored.
-Result<Config> stored_config(const RunInfo& info, const EvolutionOverrides& overrides) {
-  Result<Config> config = parse_config(info.config_text, info.config_path, start_program);
-  if (!config) return config.error();
-  v1::Problem message;
-  if (!message.ParseFromString(info.problem)) {
-    return Error{"the stored problem cannot be read; the run store is damaged"};
-  }
-  Result<Problem> problem = from_proto(message);
-  if (!problem) return problem.error();
-  config->problem = std::move(*problem);
-  config->seed = info.seed;
-  EvolutionOverrides all = EvolutionOverrides::from_json(info.overrides);
-  all.merge(overrides);
-  all.apply(config->evolution);
-  return config;
-}
 
 // By its reader: a store of an older version stays as it is.
 int say_resume(const ResumeCommand& command, CliContext& context) {
   const auto reader = RunReader::open(command.run);
   const auto generations =
       reader ? reader->generations() : Result<std::vector<StoredGeneration>>(reader.error());
-  const Result<Config> config = generations ? stored_config(reader->info(), command.overrides)
-                                            : Result<Config>(generations.error());
+  const Result<Config> config = generations
+                                    ? stored_config(reader->info(), command.options.overrides)
+                                    : Result<Config>(generations.error());
   if (!config) {
     context.console.error(config.error());
     return kExitBadUsage;
@@ -55,28 +35,26 @@ int say_resume(const ResumeCommand& command, CliContext& context) {
       "go on with " + command.run + " after generation " + std::to_string(from) + " to at most " +
           std::to_string(config->evolution.generations),
       {{"run", command.run}, {"generation", from}, {"generations", config->evolution.generations}},
-      command.farm, config->farm, context);
+      command.options.farm, config->farm, context);
 }
 
 int run_resume(const ResumeCommand& command, CliContext& context) {
   if (context.dry_run) return say_resume(command, context);
-  const std::unique_ptr<Log> log = command.farm.log.open();
+  const std::unique_ptr<Log> log = command.options.farm.log.open();
   const NotesGoTo notes(*log, context.console);
   Result<RunStore> store = RunStore::open(command.run);
   if (!store) {
     context.console.error(store.error());
     return kExitBadUsage;
   }
-  const Result<Config> config = stored_config(store->info(), command.overrides);
+  const Result<Config> config = stored_config(store->info(), command.options.overrides);
   if (!config) return failed(Error{command.run + ": " + config.error().message}, context);
   if (command.generation) {
     const auto kept = store->truncate_after(*command.generation);
     if (!kept) return failed(kept.error(), context);
     if (!kept->empty()) context.console.note("later generations are kept in " + kept->string());
   }
-  return run_evolution(
-      *store, {*config, config->problem, command.farm, *log, command.shuffle, command.page},
-      context);
+  return run_evolution(*store, *config, command.options, *log, context);
 }
 
 }  // namespace
@@ -86,12 +64,7 @@ SubcommandRun setup_resume(CLI::App& app) {
   app.add_option("RUN", command->run, "Folder of the run")->required();
   app.add_option("--generation", command->generation,
                  "Continue after this generation; later ones are moved to a file of their own");
-  command->overrides.declare(app);
-  command->farm.declare(app, true);
-  command->page.declare(app);
-  declare_long_command(app);
-  app.add_option("--shuffle", command->shuffle,
-                 "Hand jobs out in an order shuffled by this seed; the results do not change");
+  command->options.declare(app);
   app.footer(
       "Examples:\n"
       "  gapfarm resume run/demo\n"

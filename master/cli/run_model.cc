@@ -8,45 +8,6 @@
 
 namespace gapfarm {
 
-Result<Problem> stored_problem(const RunReader& run) {
-  v1::Problem message;
-  if (!message.ParseFromString(run.info().problem)) {
-    return Error{run.run().string() +
-                 ": the stored problem cannot be read; the run store is damaged"};
-  }
-  return from_proto(message);
-}
-
-Result<Model> best_so_far(const RunReader& run) {
-  const auto generations = run.generations();
-  if (!generations) return generations.error();
-  const std::string name = run.run().string();
-  if (generations->empty()) {
-    return Error{name +
-                 ": no generation is complete yet; wait for the first, see `gapfarm status " +
-                 name + "`"};
-  }
-  const StoredGeneration& last = generations->back();
-  // By number: another generation may be committed meanwhile.
-  const auto members = run.individuals(last.generation);
-  if (!members) return members.error();
-  if (members->empty() || !members->front().fitness) {
-    return Error{name + ": nothing has ended well yet; see `gapfarm status " + name + "`"};
-  }
-  const Result<Problem> problem = stored_problem(run);
-  if (!problem) return problem.error();
-  const StoredIndividual& best = members->front();
-  Model model = model_of_problem(*problem, problem->values_of(best.genome));
-  model.score = best.fitness;
-  model.data = {run.info().problem_hash, problem->log.trials.size(), {}};
-  if (const auto config =
-          parse_config(run.info().config_text, run.info().config_path, start_program)) {
-    model.data.files = config->trial_files;
-  }
-  model.origin = {name, run.info().seed, last.generation, last.evaluations};
-  return model;
-}
-
 Status check_no_residual(const Model& model, const std::string& path, const std::string& user) {
   if (model.residual.empty()) return {};
   return Error{path +

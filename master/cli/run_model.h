@@ -6,16 +6,9 @@
 #include "common/base/result.h"
 #include "common/config/model.h"
 #include "master/cli/console.h"
-#include "master/store/run_reader.h"
+#include "master/run/stored_run.h"
 
 namespace gapfarm {
-
-// The run's problem as it was stored.  Error: it cannot be read.
-Result<Problem> stored_problem(const RunReader& run);
-
-// The best of the last committed generation.  Errors: none was committed, or nothing of it ends
-// well.
-Result<Model> best_so_far(const RunReader& run);
 
 // A model file, or the model of a run's or a diagnosis's folder: its model.toml, or, where a run
 // has gone further than that says or left none, its best so far, of which a note tells.

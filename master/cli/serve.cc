@@ -7,9 +7,9 @@
 
 #include "common/base/host.h"
 #include "master/cli/page_along.h"
-#include "master/cli/run_page.h"
 #include "master/cli/serve_drive.h"
 #include "master/cli/subcommand.h"
+#include "master/run/run_page.h"
 #include "master/serve/http_server.h"
 #include "master/serve/site.h"
 #include "master/store/database.h"

@@ -13,9 +13,9 @@
 #include "common/score/motion_model.h"
 #include "master/cli/inputs.h"
 #include "master/cli/run_model.h"
-#include "master/cli/run_page.h"
 #include "master/experiment/plan.h"
 #include "master/ground/paths.h"
+#include "master/run/run_page.h"
 #include "master/store/run_reader.h"
 
 namespace gapfarm {

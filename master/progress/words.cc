@@ -32,4 +32,16 @@ std::string format_share(double share) {
   return formatted("%.0f %%", share < 1 ? std::min(99.0, std::round(percent)) : 100.0);
 }
 
+std::string format_number(const std::optional<double>& value, int digits) {
+  return value ? formatted("%.*g", digits, *value) : "-";
+}
+
+std::string progress_text(std::string_view what, double rate_per_s,
+                          std::optional<double> time_left_s) {
+  std::string text(what);
+  text += ", " + formatted("%.3g", rate_per_s) + "/s";
+  if (time_left_s) text += ", about " + format_duration(*time_left_s) + " left";
+  return text;
+}
+
 }  // namespace gapfarm

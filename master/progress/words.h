@@ -1,7 +1,9 @@
-// Times and shares in words.
+// Times, shares and numbers in words.
 #pragma once
 
+#include <optional>
 #include <string>
+#include <string_view>
 
 namespace gapfarm {
 
@@ -10,5 +12,11 @@ std::string format_duration(double seconds);
 
 // "0 %", "0.4 %", "37 %"; "100 %" only for all of it.
 std::string format_share(double share);
+
+// Six significant digits, "-" for none.
+std::string format_number(const std::optional<double>& value, int digits = 6);
+// "generation 41 of 100, 210/s, about 12 s left": the text of a progress line.
+std::string progress_text(std::string_view what, double rate_per_s,
+                          std::optional<double> time_left_s);
 
 }  // namespace gapfarm

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <filesystem>
 #include <optional>
 #include <string>
 #include <utility>
@@ -12,6 +13,13 @@
 #include "master/diagnose/diagnosis.h"
 
 namespace gapfarm {
+
+// What of a run is shown beside the last generation's best.
+struct RunQuestion {
+  std::filesystem::path run;
+  std::optional<std::uint64_t> genome;      // to look up
+  std::optional<std::uint64_t> generation;  // whose best are listed; none: the last
+};
 
 // One generation's fitness; none where no individual ended well.
 struct RunGeneration {

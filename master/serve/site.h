@@ -22,13 +22,6 @@ struct DriveQuestion {
   std::optional<std::uint64_t> generation;  // none: the last
 };
 
-// What of a run is shown beside the last generation's best.
-struct RunQuestion {
-  std::filesystem::path run;
-  std::optional<std::uint64_t> genome;      // to look up
-  std::optional<std::uint64_t> generation;  // whose best are listed; none: the last
-};
-
 struct SiteSources {
   std::vector<std::filesystem::path> folders;
   std::function<double()> unix_now_s;

@@ -12,6 +12,7 @@
 #include <memory>
 
 #include "common/config/config.h"
+#include "common/problem/run_files.h"
 #include "common/trials/read.h"
 #include "master/diagnose/diagnose.h"
 #include "worker/evaluate.h"
@@ -68,12 +69,6 @@ double makespan(const std::vector<std::vector<double>>& batches, unsigned worker
     total += *std::max_element(free.begin(), free.end()) + round_trip_s;
   }
   return total;
-}
-
-std::vector<std::string> command_names(const std::vector<CommandSpec>& commands) {
-  std::vector<std::string> names;
-  for (const CommandSpec& c : commands) names.push_back(c.name);
-  return names;
 }
 
 int run(const std::string& config_path, const std::vector<std::string>& logs, double round_trip) {

@@ -6,7 +6,7 @@
 #include <filesystem>
 
 #include "master/cli/inputs.h"
-#include "master/cli/run_page.h"
+#include "master/run/run_page.h"
 #include "master/serve/site.h"
 #include "master/store/run_lock.h"
 #include "master/store/run_store.h"

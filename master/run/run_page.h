@@ -6,10 +6,9 @@
 
 #include "common/base/result.h"
 #include "common/problem/problem.h"
-#include "master/cli/validation.h"
 #include "master/report/pose_panels.h"
 #include "master/report/run_report.h"
-#include "master/serve/site.h"
+#include "master/run/validation.h"
 #include "master/store/records.h"
 
 namespace gapfarm {

@@ -1,11 +1,11 @@
-#include "master/cli/run_history.h"
+#include "master/run/run_history.h"
 
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
 
-#include "master/cli/run_farm_history.h"
 #include "master/report/html.h"
+#include "master/run/run_farm_history.h"
 
 namespace gapfarm {
 namespace {

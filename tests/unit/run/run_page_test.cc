@@ -1,5 +1,5 @@
 // A run's page from a store that was made up, as large as a night's.
-#include "master/cli/run_page.h"
+#include "master/run/run_page.h"
 
 #include <gmock/gmock.h>
 
@@ -7,9 +7,10 @@
 #include <fstream>
 #include <sstream>
 
-#include "master/cli/inputs.h"
+#include "master/run/stored_run.h"
 #include "master/store/database.h"
 #include "master/store/run_store.h"
+#include "tests/unit/run/config_of_run.h"
 
 namespace gapfarm {
 namespace {
@@ -25,10 +26,6 @@ class RunPage : public testing::Test {
     std::string pattern = (fs::temp_directory_path() / "gapfarm-page-XXXXXX").string();
     folder_ = ::mkdtemp(pattern.data());
     fs::copy_file(GAPFARM_SOURCE_DIR "/configs/demo/trials.csv", folder_ / "apart.csv");
-    std::ofstream(folder_ / "c.toml") << "trials = [\"" GAPFARM_SOURCE_DIR
-                                         "/configs/demo/trials.csv\"]\n[genes]\n"
-                                         "friction = [0.1, 1.5]\nfull_speed = [0.1, 0.6]\n"
-                                         "[validation]\ntrials = [\"apart.csv\"]\n";
   }
   ~RunPage() override { fs::remove_all(folder_); }
 
@@ -59,20 +56,15 @@ class RunPage : public testing::Test {
   }
 
   void make(std::uint64_t generations) const {
-    const auto config = read_config_and_trials((folder_ / "c.toml").string(), TrialOptions{});
-    ASSERT_TRUE(config.ok()) << config.error().message;
-    const v1::Problem problem = to_proto(config->problem);
-    RunInfo info;
-    info.config_path = config->path;
-    info.config_text = config->text;
-    info.problem = serialise(problem);
-    info.problem_hash = problem_hash(problem);
-    info.fitness = "log_score";
-    info.fitness_unit = "nats/trial";
-    auto store = RunStore::create(run(), info);
+    const std::string text = "trials = [\"" GAPFARM_SOURCE_DIR
+                             "/configs/demo/trials.csv\"]\n[genes]\n"
+                             "friction = [0.1, 1.5]\nfull_speed = [0.1, 0.6]\n"
+                             "[validation]\ntrials = [\"apart.csv\"]\n";
+    const Config config = tests::config_of_run(text, (folder_ / "c.toml").string());
+    auto store = RunStore::create(run(), run_info(config, {}));
     ASSERT_TRUE(store.ok()) << store.error().message;
     for (std::uint64_t g = 1; g <= generations; ++g) {
-      ASSERT_TRUE(store->commit(generation(config->problem, g)).ok());
+      ASSERT_TRUE(store->commit(generation(config.problem, g)).ok());
     }
   }
 

@@ -1,8 +1,9 @@
-#include "master/cli/evolution_farm.h"
+#include "master/run/evolution_farm.h"
 
 #include <algorithm>
 
 #include "master/evolve/evaluation.h"
+#include "master/progress/words.h"
 
 namespace gapfarm {
 namespace {
@@ -59,20 +60,30 @@ const char* coming_or_going(FarmEvent::Kind kind) {
   }
 }
 
+class OverSockets : public FarmOfRun {
+ public:
+  explicit OverSockets(std::unique_ptr<SocketFarm> farm) : farm_(std::move(farm)) {}
+  Farm& farm() override { return *farm_; }
+  FarmTally tally() const override { return tally_of(*farm_); }
+  std::uint64_t given_up() const override { return farm_->counts().quarantined; }
+  std::string numeric_class() const override { return farm_->numeric_class(); }
+  std::vector<std::string> endpoints() const override { return farm_->endpoints(); }
+
+ private:
+  std::unique_ptr<SocketFarm> farm_;
+};
+
 }  // namespace
 
-void FarmEventKeeper::listen(SocketFarmOptions& options) {
-  options.on_event = [this, next = options.on_event](const FarmEvent& event) {
-    keep(event);
-    if (next) next(event);
-  };
+std::unique_ptr<FarmOfRun> farm_of_run(std::unique_ptr<SocketFarm> farm) {
+  return std::make_unique<OverSockets>(std::move(farm));
 }
 
 void FarmEventKeeper::keep(const FarmEvent& event) {
   const std::optional<IncidentKind> kind = incident_of(event.kind);
   if (kind && (*kind != IncidentKind::kAlarm || alarms_++ < kMostAlarms)) {
     // The run goes on when it cannot be written, as with the live row.
-    if (Status s = store_.add_incident(*kind, event.text); !s) console_.error(s.error());
+    if (Status s = store_.add_incident(*kind, event.text); !s) watcher_.error(s.error());
   }
   const char* name = coming_or_going(event.kind);
   // Whoever comes and is refused again and again is not to fill the disk.
@@ -89,19 +100,19 @@ void FarmEventKeeper::keep(const FarmEvent& event) {
 }
 
 void FarmEventKeeper::flush() {
-  if (Status s = store_.add_worker_events(waiting_); !s) console_.error(s.error());
+  if (Status s = store_.add_worker_events(waiting_); !s) watcher_.error(s.error());
   waiting_.clear();
 }
 
-FarmProgressWriter::FarmProgressWriter(RunStore& store, const SocketFarm& farm,
+FarmProgressWriter::FarmProgressWriter(RunStore& store, FarmOfRun& farm,
                                        const EvolutionSettings& settings,
                                        const std::optional<Checkpoint>& resumed,
-                                       const EvolveClock& clock, Console& console)
+                                       const EvolveClock& clock, RunWatcher& watcher)
     : store_(store),
       farm_(farm),
       settings_(settings),
       clock_(clock),
-      console_(console),
+      watcher_(watcher),
       began_s_(clock.now_s()),
       wait_(farm.endpoints()) {
   if (!resumed) return;
@@ -112,7 +123,7 @@ FarmProgressWriter::FarmProgressWriter(RunStore& store, const SocketFarm& farm,
 
 Progress FarmProgressWriter::now() const {
   Progress progress = last_;
-  progress.farm = tally_of(farm_);
+  progress.farm = farm_.tally();
   return progress;
 }
 
@@ -167,10 +178,10 @@ void FarmProgressWriter::refresh(double now_s) {
   pace.evaluations_here = done;
   pace.wall_here_s = spent_s;
   last_.time_left_s = time_left_s(settings_, pace);
-  const std::vector<WorkerStatus> workers = farm_.workers();
+  const std::vector<WorkerStatus> workers = farm_.farm().workers();
   const bool waited = !last_.waiting.empty();
   last_.waiting = wait_.words(workers.size(), now_s).value_or("");
-  console_.progress("evolve: " + (last_.waiting.empty() ? words(pace) : last_.waiting),
+  watcher_.progress("evolve: " + (last_.waiting.empty() ? words(pace) : last_.waiting),
                     waited == last_.waiting.empty());
   if (now_s - written_s_ < kWriteInterval_s) return;
   written_s_ = now_s;
@@ -179,13 +190,13 @@ void FarmProgressWriter::refresh(double now_s) {
   for (const WorkerStatus& w : workers) {
     last_.workers.push_back({w.name, w.host, w.state, w.jobs, w.finished, w.rate_per_s});
   }
-  last_.farm = tally_of(farm_);
+  last_.farm = farm_.tally();
   // The live row is a courtesy: a run goes on when it cannot be written, and a commit that cannot
   // be written stops it with the reason.
-  if (Status s = store_.set_progress(last_); !s) console_.error(s.error());
+  if (Status s = store_.set_progress(last_); !s) watcher_.error(s.error());
 }
 
-FarmBackend::FarmBackend(SocketFarm& farm, const Problem& problem, std::uint64_t seed,
+FarmBackend::FarmBackend(Farm& farm, const Problem& problem, std::uint64_t seed,
                          FarmProgressWriter& progress)
     : farm_(farm), fitness_(problem.fitness.kind), seed_(seed), progress_(progress) {
   problem_hash_ = farm.add_problem(to_proto(problem));
@@ -218,8 +229,8 @@ Status StoreSink::commit(const GenerationRecord& record) {
   }
   stored.evaluations = record.evaluations;
   stored.wall_s = record.wall_s;
-  stored.quarantined = static_cast<unsigned>(farm_.counts().quarantined - quarantined_);
-  quarantined_ = farm_.counts().quarantined;
+  stored.quarantined = static_cast<unsigned>(farm_.given_up() - quarantined_);
+  quarantined_ = farm_.given_up();
   stored.optimiser_state = record.optimiser_state;
   const FitnessKind kind = problem_.fitness.kind;
   for (const Member& member : record.members) {

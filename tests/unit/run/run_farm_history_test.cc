@@ -1,5 +1,5 @@
 // Who worked when, from what the store tells.
-#include "master/cli/run_farm_history.h"
+#include "master/run/run_farm_history.h"
 
 #include <gmock/gmock.h>
 

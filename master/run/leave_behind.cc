@@ -1,15 +1,15 @@
-#include "master/cli/leave_behind.h"
+#include "master/run/leave_behind.h"
 
 #include <spdlog/fmt/fmt.h>
 
 #include "common/base/build_info.h"
 #include "common/config/model.h"
 #include "common/trials/files.h"
-#include "master/cli/baseline_notes.h"
-#include "master/cli/run_page.h"
 #include "master/report/fitness_chart.h"
 #include "master/report/pose_panels.h"
 #include "master/report/pose_picture.h"
+#include "master/run/baseline_notes.h"
+#include "master/run/run_page.h"
 #include "master/store/run_reader.h"
 
 namespace gapfarm {

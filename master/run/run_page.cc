@@ -1,4 +1,4 @@
-#include "master/cli/run_page.h"
+#include "master/run/run_page.h"
 
 #include <spdlog/fmt/fmt.h>
 
@@ -15,9 +15,10 @@
 #include "common/score/statistics.h"
 #include "common/trials/context.h"
 #include "common/trials/files.h"
-#include "master/cli/run_history.h"
 #include "master/report/html.h"
 #include "master/report/prediction_table.h"
+#include "master/run/run_history.h"
+#include "master/run/stored_run.h"
 #include "master/store/run_reader.h"
 
 namespace gapfarm {
@@ -194,11 +195,7 @@ Result<RunReport> read_run_report(const RunQuestion& question) {
   const auto reader = RunReader::open(run);
   if (!reader) return reader.error();
   const RunInfo& info = reader->info();
-  v1::Problem message;
-  if (!message.ParseFromString(info.problem)) {
-    return Error{run.string() + ": the stored problem cannot be read; the run store is damaged"};
-  }
-  const Result<Problem> problem = from_proto(message);
+  const Result<Problem> problem = stored_problem(*reader);
   if (!problem) return problem.error();
   const auto generations = reader->generations();
   if (!generations) return generations.error();

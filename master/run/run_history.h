@@ -4,7 +4,6 @@
 #include "common/base/result.h"
 #include "common/problem/problem.h"
 #include "master/report/run_report.h"
-#include "master/serve/site.h"
 #include "master/store/run_reader.h"
 
 namespace gapfarm {

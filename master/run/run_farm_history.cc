@@ -1,4 +1,4 @@
-#include "master/cli/run_farm_history.h"
+#include "master/run/run_farm_history.h"
 
 #include <spdlog/fmt/fmt.h>
 

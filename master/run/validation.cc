@@ -1,4 +1,4 @@
-#include "master/cli/validation.h"
+#include "master/run/validation.h"
 
 #include <algorithm>
 #include <filesystem>
@@ -6,7 +6,6 @@
 #include "common/config/config.h"
 #include "common/problem/run_files.h"
 #include "common/trials/read.h"
-#include "master/cli/inputs.h"
 #include "master/evolve/evaluation.h"
 
 namespace gapfarm {

@@ -1,10 +1,10 @@
-#include "master/cli/baseline_notes.h"
+#include "master/run/baseline_notes.h"
 
 #include <algorithm>
 #include <filesystem>
 
+#include "common/problem/run_files.h"
 #include "common/trials/read.h"
-#include "master/cli/inputs.h"
 
 namespace gapfarm {
 namespace {

@@ -2,50 +2,63 @@
 #pragma once
 
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "common/log/log.h"
 #include "common/problem/problem.h"
-#include "master/cli/console.h"
 #include "master/evolve/evolve.h"
 #include "master/evolve/time_left.h"
 #include "master/farm/socket_farm.h"
 #include "master/progress/worker_wait.h"
+#include "master/run/run_watcher.h"
 #include "master/store/run_store.h"
 
 namespace gapfarm {
 
-// Keeps what a farm reports in the store, besides what `options` does with it: at once what was
-// lost or is contradictory (of the alarms only the first hundred: each costs a disk write, and a
-// machine that computes wrongly raises one after the other), at the next flush() who came and went.
-// `store` and `console` outlive it, and it the farm.
+// A farm with what a run keeps of it.
+class FarmOfRun {
+ public:
+  virtual ~FarmOfRun() = default;
+  virtual Farm& farm() = 0;
+  virtual FarmTally tally() const = 0;
+  virtual std::uint64_t given_up() const = 0;  // tasks
+  // See SocketFarm.
+  virtual std::string numeric_class() const = 0;
+  virtual std::vector<std::string> endpoints() const = 0;
+};
+
+std::unique_ptr<FarmOfRun> farm_of_run(std::unique_ptr<SocketFarm> farm);
+
+// Keeps what a farm reports in the store: at once what was lost or is contradictory (of the alarms
+// only the first hundred: each costs a disk write, and a machine that computes wrongly raises one
+// after the other), at the next flush() who came and went.  `store` and `watcher` outlive it, and
+// it the farm.
 class FarmEventKeeper {
  public:
-  FarmEventKeeper(RunStore& store, Console& console) : store_(store), console_(console) {}
+  FarmEventKeeper(RunStore& store, RunWatcher& watcher) : store_(store), watcher_(watcher) {}
 
-  void listen(SocketFarmOptions& options);
+  void keep(const FarmEvent& event);
   void flush();
 
  private:
-  void keep(const FarmEvent& event);
-
   RunStore& store_;
-  Console& console_;
+  RunWatcher& watcher_;
   unsigned alarms_ = 0;
   std::size_t kept_ = 0;                      // of who came and went
   std::map<std::string, std::string> hosts_;  // of workers that are there
   std::vector<StoredWorkerEvent> waiting_;
 };
 
-// Keeps the store's live row and the terminal's progress line fresh, about once a second.
+// Keeps the store's live row and the watcher's progress line fresh, about once a second.
 class FarmProgressWriter {
  public:
   // `resumed`: where the run goes on; none at its start.
-  FarmProgressWriter(RunStore& store, const SocketFarm& farm, const EvolutionSettings& settings,
+  FarmProgressWriter(RunStore& store, FarmOfRun& farm, const EvolutionSettings& settings,
                      const std::optional<Checkpoint>& resumed, const EvolveClock& clock,
-                     Console& console);
+                     RunWatcher& watcher);
 
   void on_progress(const FarmProgress& progress);
   void on_generation(const GenerationRecord& record, std::optional<double> best);
@@ -59,10 +72,10 @@ class FarmProgressWriter {
   std::string words(const Pace& pace) const;
 
   RunStore& store_;
-  const SocketFarm& farm_;
+  FarmOfRun& farm_;
   const EvolutionSettings& settings_;
   const EvolveClock& clock_;
-  Console& console_;
+  RunWatcher& watcher_;
   double began_s_;
   double written_s_ = -1e9;
   std::uint64_t evaluations_before_ = 0;     // of this life of the master, generations done
@@ -80,12 +93,11 @@ class FarmProgressWriter {
 // Candidates to EvaluateTasks and back.
 class FarmBackend : public EvaluationBackend {
  public:
-  FarmBackend(SocketFarm& farm, const Problem& problem, std::uint64_t seed,
-              FarmProgressWriter& progress);
+  FarmBackend(Farm& farm, const Problem& problem, std::uint64_t seed, FarmProgressWriter& progress);
   Result<std::vector<Score>> evaluate(std::span<const Candidate> candidates) override;
 
  private:
-  SocketFarm& farm_;
+  Farm& farm_;
   FitnessKind fitness_;
   std::uint64_t seed_;
   FarmProgressWriter& progress_;
@@ -94,7 +106,7 @@ class FarmBackend : public EvaluationBackend {
 
 class StoreSink : public GenerationSink {
  public:
-  StoreSink(RunStore& store, const Problem& problem, const SocketFarm& farm,
+  StoreSink(RunStore& store, const Problem& problem, const FarmOfRun& farm,
             FarmProgressWriter& progress)
       : store_(store), problem_(problem), farm_(farm), progress_(progress) {}
   Status commit(const GenerationRecord& record) override;
@@ -104,7 +116,7 @@ class StoreSink : public GenerationSink {
  private:
   RunStore& store_;
   const Problem& problem_;
-  const SocketFarm& farm_;
+  const FarmOfRun& farm_;
   FarmProgressWriter& progress_;
   std::uint64_t quarantined_ = 0;
 };

@@ -1,0 +1,168 @@
+#include "master/run/run.h"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <chrono>
+#include <cmath>
+
+#include "master/evolve/evaluation.h"
+#include "master/evolve/optimisers.h"
+#include "master/evolve/staged.h"
+#include "master/ground/simulated_start.h"
+#include "master/run/baseline_notes.h"
+#include "master/run/leave_behind.h"
+
+namespace gapfarm {
+namespace {
+
+class SteadyClock : public EvolveClock {
+ public:
+  double now_s() const override {
+    const auto now = std::chrono::steady_clock::now().time_since_epoch();
+    return std::chrono::duration<double>(now).count();
+  }
+};
+
+// What a run begins with, read before any farm is there.
+struct RunInputs {
+  std::optional<Checkpoint> checkpoint;
+  StagePlan plan;
+  std::optional<Problem> kept_apart;
+};
+
+Result<RunInputs> read_inputs(const RunStore& store, const Config& config) {
+  auto checkpoint = store.checkpoint();
+  if (!checkpoint) return checkpoint.error();
+  auto plan = read_stages(config);
+  if (!plan) return plan.error();
+  auto kept_apart = read_validation(*plan, config);
+  if (!kept_apart) return kept_apart.error();
+  return RunInputs{*std::move(checkpoint), *std::move(plan), *std::move(kept_apart)};
+}
+
+// Where the search of a ground robot's values begins; nothing where the config has the say, and
+// where there is no beginning.
+Result<std::optional<SimulatedStart>> start_of(const RunInputs& inputs, const RunRequest& run,
+                                               Farm& farm, RunWatcher& watcher) {
+  const bool own = !run.config.evolution.seed_nominal || !inputs.plan.stages.empty();
+  if (inputs.checkpoint || own || !run.problem.ground || run.problem.log.trials.empty()) {
+    return std::optional<SimulatedStart>();
+  }
+  auto start = fit_by_simulation(farm, run.problem, run.config.evolution.optimiser.sigma);
+  if (!start) return start.error();
+  watcher.note(fmt::format(
+      "begins at least squares through the simulation: {} simulations from {} start{}, {:.2f} nats "
+      "a window more than with the values of the robot's own kinematics",
+      start->simulations, start->starts, start->starts == 1 ? "" : "s", start->gain));
+  watcher.note(fmt::format(
+      "on stretches left out of the fit the simulation foretells {:.2f} nats a window {} than the "
+      "kinematics{}; no median error there is more than {:.2f} times theirs",
+      std::abs(start->left_out_gain), start->left_out_gain < 0 ? "less" : "more",
+      start->kinematic ? ", and the kinematics' values are kept" : "", start->worst_ratio));
+  return std::optional(*std::move(start));
+}
+
+Result<std::unique_ptr<Optimiser>> optimiser_of(const RunInputs& inputs, const RunRequest& run,
+                                                Farm& farm, RunWatcher& watcher) {
+  const auto start = start_of(inputs, run, farm, watcher);
+  if (!start) return start.error();
+  OptimiserSetup setup = optimiser_setup(run.config.evolution, run.problem, run.config.seed);
+  if (*start) {
+    setup.nominal = (*start)->genome;
+    setup.spread = (*start)->spread;
+  }
+  const std::vector<Stage>& stages = inputs.plan.stages;
+  if (!inputs.checkpoint) {
+    return stages.empty() ? make_optimiser(setup) : make_staged(setup, stages);
+  }
+  const std::string& state = inputs.checkpoint->optimiser_state;
+  return stages.empty() ? restore_optimiser(setup, state) : restore_staged(setup, stages, state);
+}
+
+Status write_end(RunStore& store, const FarmProgressWriter& writer, RunState state,
+                 const std::string& reason) {
+  Progress progress = writer.now();
+  progress.state = state;
+  progress.stop_reason = reason;
+  progress.rate_per_s = 0;
+  progress.time_left_s.reset();
+  return store.set_progress(progress);
+}
+
+// How the run's results do on what was kept apart.
+Result<std::vector<Validated>> validated_by(const RunStore& store, const Problem& apart, Farm& farm,
+                                            const Genome& best) {
+  const auto checkpoint = store.checkpoint();
+  if (!checkpoint) return checkpoint.error();
+  std::vector<Genome> stages;
+  if (*checkpoint) stages = stage_results((*checkpoint)->optimiser_state, apart.genes.size());
+  return validate(farm, apart, stages, best);
+}
+
+// What a finished run is for: its model, held against trials kept apart and against no simulation.
+Status leave_model(RunStore& store, const RunRequest& run, const RunInputs& inputs, Farm& farm,
+                   RunWatcher& watcher, RunSummary& summary) {
+  const Genome& best = summary.evolved.best->genome;
+  if (inputs.kept_apart) {
+    watcher.read(inputs.kept_apart->log);
+    auto validated = validated_by(store, *inputs.kept_apart, farm, best);
+    if (!validated) return validated.error();
+    summary.kept_apart = inputs.kept_apart->log.trials.size();
+    summary.validated = *std::move(validated);
+  }
+  const Status left =
+      leave_behind(store, run.problem, run.config, summary.evolved, farm, summary.validated);
+  if (!left) return left;
+  const auto beside = baseline_note_of_run(run.problem, best, farm);
+  if (!beside) return beside.error();
+  if (!beside->empty()) watcher.note(*beside);
+  for (const char* name : kLeftBehind) summary.files.push_back((store.run() / name).string());
+  return {};
+}
+
+}  // namespace
+
+Result<RunSummary> evolve_run(RunStore& store, const RunRequest& request, RunWatcher& watcher) {
+  const auto inputs = read_inputs(store, request.config);
+  if (!inputs) return inputs.error();
+  FarmEventKeeper events(store, watcher);
+  auto farm = request.open_farm([&](const FarmEvent& event) { events.keep(event); });
+  if (!farm) return farm.error();
+  auto optimiser = optimiser_of(*inputs, request, (*farm)->farm(), watcher);
+  if (!optimiser) return optimiser.error();
+
+  const SteadyClock clock;
+  FarmProgressWriter progress(store, **farm, request.config.evolution, inputs->checkpoint, clock,
+                              watcher);
+  progress.watch(&request.log, &events);
+  FarmBackend backend((*farm)->farm(), request.problem, request.config.seed, progress);
+  StoreSink sink(store, request.problem, **farm, progress);
+  EvolveOptions options;
+  options.settings = request.config.evolution;
+  options.fitness = request.problem.fitness.kind;
+  if (inputs->checkpoint) options.spent_s = inputs->checkpoint->wall_s;
+  auto evolved = evolve(**optimiser, backend, sink, clock, options, request.stop_requested);
+  watcher.progress("", false);
+  events.flush();
+  if (!evolved) {
+    // Where even that cannot be written, status finds the master gone, and the error is told.
+    static_cast<void>(write_end(store, progress, RunState::kStopped, evolved.error().message));
+    return evolved.error();
+  }
+  RunSummary summary;
+  summary.evolved = *std::move(evolved);
+  const RunState state = summary.stopped() ? RunState::kStopped : RunState::kFinished;
+  if (Status s = write_end(store, progress, state, summary.evolved.text); !s) return s.error();
+  if (summary.stopped()) return summary;
+  if (summary.evolved.best && summary.evolved.best->outcome == v1::OK) {
+    const Status left = leave_model(store, request, *inputs, (*farm)->farm(), watcher, summary);
+    if (!left) return left.error();
+  }
+  // Of earlier masters' generations too, and of what was done after the last one.
+  const auto given_up = store.quarantined();
+  if (!given_up) return given_up.error();
+  summary.given_up = *given_up + (*farm)->given_up() - sink.quarantined();
+  return summary;
+}
+
+}  // namespace gapfarm

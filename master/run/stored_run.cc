@@ -1,0 +1,83 @@
+#include "master/run/stored_run.h"
+
+#include "common/config/config.h"
+#include "common/problem/problem.h"
+
+namespace gapfarm {
+
+RunInfo run_info(const Config& config, const EvolutionOverrides& overrides) {
+  const v1::Problem problem = to_proto(config.problem);
+  const FitnessKind kind = config.problem.fitness.kind;
+  RunInfo info;
+  info.config_path = config.path;
+  info.config_text = config.text;
+  info.overrides = overrides.to_json();
+  info.problem = serialise(problem);
+  info.problem_hash = problem_hash(problem);
+  info.seed = config.seed;
+  info.fitness = fitness_name(kind);
+  info.fitness_unit = fitness_unit(kind);
+  info.higher_is_better = higher_is_better(kind);
+  return info;
+}
+
+Result<Problem> stored_problem(const RunInfo& info) {
+  v1::Problem message;
+  if (!message.ParseFromString(info.problem)) {
+    return Error{"the stored problem cannot be read; the run store is damaged"};
+  }
+  return from_proto(message);
+}
+
+Result<Problem> stored_problem(const RunReader& run) {
+  auto problem = stored_problem(run.info());
+  if (problem) return problem;
+  Error error = problem.error();
+  error.message = run.run().string() + ": " + error.message;
+  return error;
+}
+
+Result<Config> stored_config(const RunInfo& info, const EvolutionOverrides& overrides) {
+  Result<Config> config = parse_config(info.config_text, info.config_path, start_program);
+  if (!config) return config.error();
+  Result<Problem> problem = stored_problem(info);
+  if (!problem) return problem.error();
+  config->problem = std::move(*problem);
+  config->seed = info.seed;
+  EvolutionOverrides all = EvolutionOverrides::from_json(info.overrides);
+  all.merge(overrides);
+  all.apply(config->evolution);
+  return config;
+}
+
+Result<Model> best_so_far(const RunReader& run) {
+  const auto generations = run.generations();
+  if (!generations) return generations.error();
+  const std::string name = run.run().string();
+  if (generations->empty()) {
+    return Error{name +
+                 ": no generation is complete yet; wait for the first, see `gapfarm status " +
+                 name + "`"};
+  }
+  const StoredGeneration& last = generations->back();
+  // By number: another generation may be committed meanwhile.
+  const auto members = run.individuals(last.generation);
+  if (!members) return members.error();
+  if (members->empty() || !members->front().fitness) {
+    return Error{name + ": nothing has ended well yet; see `gapfarm status " + name + "`"};
+  }
+  const Result<Problem> problem = stored_problem(run);
+  if (!problem) return problem.error();
+  const StoredIndividual& best = members->front();
+  Model model = model_of_problem(*problem, problem->values_of(best.genome));
+  model.score = best.fitness;
+  model.data = {run.info().problem_hash, problem->log.trials.size(), {}};
+  if (const auto config =
+          parse_config(run.info().config_text, run.info().config_path, start_program)) {
+    model.data.files = config->trial_files;
+  }
+  model.origin = {name, run.info().seed, last.generation, last.evaluations};
+  return model;
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,28 @@
+// A run as its store has it: what it was asked, and what came of it so far.
+#pragma once
+
+#include <string>
+
+#include "common/base/result.h"
+#include "common/config/model.h"
+#include "common/config/settings.h"
+#include "master/run/overrides.h"
+#include "master/store/run_reader.h"
+
+namespace gapfarm {
+
+// What a new run of a config keeps, `overrides` applied to it.
+RunInfo run_info(const Config& config, const EvolutionOverrides& overrides);
+
+// Error: the problem cannot be read.
+Result<Problem> stored_problem(const RunInfo& info);
+Result<Problem> stored_problem(const RunReader& run);  // the error names the run
+
+// The run's config and problem, with its overrides and then these.
+Result<Config> stored_config(const RunInfo& info, const EvolutionOverrides& overrides);
+
+// The best of the last committed generation.  Errors: none was committed, or nothing of it ends
+// well.
+Result<Model> best_so_far(const RunReader& run);
+
+}  // namespace gapfarm

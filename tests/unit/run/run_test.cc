@@ -1,0 +1,216 @@
+// A run as a call: what it returns and what its store keeps, over a worker in this process.
+#include "master/run/run.h"
+
+#include <gmock/gmock.h>
+
+#include <filesystem>
+
+#include "master/run/stored_run.h"
+#include "tests/integration/demo_config.h"
+#include "tests/unit/blind/worker_farm.h"
+#include "tests/unit/run/config_of_run.h"
+
+namespace gapfarm {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::SizeIs;
+
+constexpr std::uint64_t kGenerations = 3;
+
+// A worker; what it is asked is counted, and something may go wrong at a batch of tasks.
+class ShakyFarm : public tests::WorkerFarm, public FarmOfRun {
+ public:
+  struct Faults {
+    std::size_t no_worker_at = 0;  // batch, from 1; 0: none
+    std::size_t gives_up_at = 0;   // same: its first task
+  };
+
+  ShakyFarm(const Faults& faults, std::size_t* batches) : faults_(faults), batches_(batches) {}
+
+  Result<std::vector<v1::TaskResult>> run(
+      const std::string& problem, const std::vector<v1::Task>& tasks,
+      const std::function<void(const FarmProgress&)>& on_progress) override {
+    if (++*batches_ == faults_.no_worker_at) return Error{"no worker can be had"};
+    auto results = WorkerFarm::run(problem, tasks, on_progress);
+    if (results && *batches_ == faults_.gives_up_at) {
+      results->front().Clear();
+      results->front().set_outcome(v1::WORKER_FAILED);
+      ++given_up_;
+    }
+    return results;
+  }
+
+  Farm& farm() override { return *this; }
+  FarmTally tally() const override { return {}; }
+  std::uint64_t given_up() const override { return given_up_; }
+  std::string numeric_class() const override { return "here"; }
+  std::vector<std::string> endpoints() const override { return {}; }
+
+ private:
+  Faults faults_;
+  std::size_t* batches_;
+  std::uint64_t given_up_ = 0;
+};
+
+class Listener : public RunWatcher {
+ public:
+  void error(const Error& error) override { errors.push_back(error.message); }
+  void read(const TrialLog& log) override { apart += log.trials.size(); }
+  std::vector<std::string> errors;
+  std::size_t apart = 0;
+};
+
+class RunTest : public testing::Test {
+ protected:
+  std::string path(const std::string& name = "run") const { return folder_ / name; }
+
+  Config config(const std::string& sections = "") const {
+    Config made = tests::config_of_run(
+        demo_config(
+            4, 0, "",
+            "[evolution.stop]\ngenerations = " + std::to_string(kGenerations) + "\n" + sections),
+        folder_ / "config.toml");
+    made.seed = 7;
+    made.problem.log.trials.resize(12);
+    return made;
+  }
+
+  RunStore begin(const Config& config, const std::string& name = "run") const {
+    auto store = RunStore::create(path(name), run_info(config, {}));
+    EXPECT_TRUE(store.ok()) << store.error().message;
+    return *std::move(store);
+  }
+
+  // Stops when so many generations were evaluated, if at all.
+  Result<RunSummary> go(RunStore& store, const Config& config, ShakyFarm::Faults faults = {},
+                        std::size_t stop_after = 1000) {
+    Log log(LogOptions{"test", LogFormat::kText, LogLevel::kOff, ""});
+    std::size_t batches = 0;
+    const auto open = [&](const auto&) -> Result<std::unique_ptr<FarmOfRun>> {
+      return std::unique_ptr<FarmOfRun>(std::make_unique<ShakyFarm>(faults, &batches));
+    };
+    return evolve_run(store,
+                      {config, config.problem, log, open, [&] { return batches >= stop_after; }},
+                      listener_);
+  }
+
+  // As `resume` does it.
+  Result<RunSummary> go_on(const std::string& name = "run") {
+    auto store = RunStore::open(path(name));
+    if (!store) return store.error();
+    const auto config = stored_config(store->info(), {});
+    if (!config) return config.error();
+    return go(*store, *config);
+  }
+
+  std::string digest(const std::string& name = "run") const {
+    return RunReader::open(path(name)).value().generations().value().back().digest;
+  }
+  Progress progress() const { return RunReader::open(path()).value().progress().value(); }
+
+  tests::Folder folder_;
+  Listener listener_;
+};
+
+TEST_F(RunTest, LeavesItsModelAndPicturesBehind) {
+  const Config asked = config();
+  RunStore store = begin(asked);
+  const RunSummary summary = go(store, asked).value();
+  EXPECT_FALSE(summary.stopped());
+  EXPECT_EQ(summary.evolved.generations, kGenerations);
+  EXPECT_EQ(summary.given_up, 0u);
+  EXPECT_THAT(summary.files, SizeIs(4));
+  for (const std::string& file : summary.files) EXPECT_TRUE(std::filesystem::exists(file)) << file;
+  EXPECT_EQ(progress().state, RunState::kFinished);
+  EXPECT_THAT(listener_.errors, IsEmpty());
+}
+
+TEST_F(RunTest, StoppedItLeavesNothingAndGoesOnToTheSameGenerations) {
+  const Config asked = config();
+  RunStore whole = begin(asked, "whole");
+  ASSERT_TRUE(go(whole, asked).ok());
+  {
+    RunStore store = begin(asked);
+    const RunSummary summary = go(store, asked, {}, 2).value();
+    EXPECT_TRUE(summary.stopped());
+    EXPECT_EQ(summary.evolved.generations, 2u);
+    EXPECT_THAT(summary.files, IsEmpty());
+  }
+  EXPECT_EQ(progress().state, RunState::kStopped);
+  EXPECT_FALSE(std::filesystem::exists(path() + "/model.toml"));
+
+  const RunSummary summary = go_on().value();
+  EXPECT_FALSE(summary.stopped());
+  EXPECT_EQ(summary.evolved.generations, kGenerations);
+  EXPECT_EQ(digest(), digest("whole"));
+}
+
+TEST_F(RunTest, SaysInItsStoreWhyItFailedAndGoesOn) {
+  const Config asked = config();
+  {
+    RunStore store = begin(asked);
+    const auto summary = go(store, asked, {.no_worker_at = 2});
+    ASSERT_FALSE(summary.ok());
+    EXPECT_EQ(summary.error().message, "no worker can be had");
+  }
+  EXPECT_EQ(progress().state, RunState::kStopped);
+  EXPECT_EQ(progress().stop_reason, "no worker can be had");
+  EXPECT_EQ(go_on().value().evolved.generations, kGenerations);
+}
+
+TEST_F(RunTest, CountsWhatItGaveUpBeforeItWasStopped) {
+  const Config asked = config();
+  {
+    RunStore store = begin(asked);
+    ASSERT_TRUE(go(store, asked, {.gives_up_at = 1}, 1).value().stopped());
+  }
+  EXPECT_EQ(go_on().value().given_up, 1u);
+}
+
+TEST_F(RunTest, OpensNoFarmForTrialsKeptApartThatAreNotThere) {
+  const Config asked = config("[validation]\ntrials = [\"gone.csv\"]\n");
+  RunStore store = begin(asked);
+  Log log(LogOptions{"test", LogFormat::kText, LogLevel::kOff, ""});
+  const auto open = [](const auto&) -> Result<std::unique_ptr<FarmOfRun>> {
+    ADD_FAILURE() << "a farm was opened";
+    return Error{"none"};
+  };
+  const auto summary = evolve_run(store, {asked, asked.problem, log, open, {}}, listener_);
+  ASSERT_FALSE(summary.ok());
+  EXPECT_THAT(summary.error().message, HasSubstr("gone.csv"));
+}
+
+TEST_F(RunTest, HoldsItsBestAgainstTrialsKeptApart) {
+  std::filesystem::copy_file(GAPFARM_SOURCE_DIR "/configs/demo/trials.csv", folder_ / "apart.csv");
+  const Config asked = config("[validation]\ntrials = [\"apart.csv\"]\n");
+  RunStore store = begin(asked);
+  const RunSummary summary = go(store, asked).value();
+  EXPECT_EQ(summary.kept_apart, listener_.apart);
+  std::vector<std::string> names;
+  for (const Validated& row : summary.validated) names.push_back(row.name);
+  EXPECT_THAT(names, ElementsAre("the config's own values", "the best"));
+}
+
+TEST(Overrides, OutrankWhatWasStoredAndComeBackFromJson) {
+  EvolutionOverrides first, later;
+  first.generations = 5;
+  first.time_s = 1.5;
+  later.generations = 9;
+  later.population = 12;
+  EvolutionOverrides both = EvolutionOverrides::from_json(first.to_json());
+  both.merge(EvolutionOverrides::from_json(later.to_json()));
+  EvolutionSettings settings;
+  both.apply(settings);
+  EXPECT_EQ(settings.generations, 9u);
+  EXPECT_EQ(settings.time_s, 1.5);
+  EXPECT_EQ(settings.population, 12u);
+  EXPECT_EQ(settings.optimiser.population, 12u);
+  EXPECT_EQ(settings.evaluations, std::nullopt);
+  EXPECT_EQ(EvolutionOverrides::from_json("[1]").generations, std::nullopt);
+}
+
+}  // namespace
+}  // namespace gapfarm
