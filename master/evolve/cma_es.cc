@@ -188,36 +188,34 @@ std::vector<NamedNumber> CmaEs::figures() const {
 }
 
 void CmaEs::save(v1::MethodState& message) const {
-  message.add_counts(generation_);
-  message.add_counts(restarts_);
-  message.add_counts(anywhere_ ? 1 : 0);
-  message.add_reals(sigma_);
-  message.mutable_reals()->Add(mean_.begin(), mean_.end());
-  message.mutable_reals()->Add(path_sigma_.begin(), path_sigma_.end());
-  message.mutable_reals()->Add(path_c_.begin(), path_c_.end());
-  for (const auto column : covariance_.colwise()) {
-    message.mutable_reals()->Add(column.begin(), column.end());
-  }
-  message.mutable_reals()->Add(bests_.begin(), bests_.end());
+  v1::CmaEsState& state = *message.mutable_cma_es();
+  state.set_generation(generation_);
+  state.set_restarts(restarts_);
+  state.set_anywhere(anywhere_);
+  state.set_sigma(sigma_);
+  state.mutable_mean()->Add(mean_.begin(), mean_.end());
+  state.mutable_path_sigma()->Add(path_sigma_.begin(), path_sigma_.end());
+  state.mutable_path_c()->Add(path_c_.begin(), path_c_.end());
+  state.mutable_covariance()->Add(covariance_.data(), covariance_.data() + covariance_.size());
+  state.mutable_bests()->Add(bests_.begin(), bests_.end());
 }
 
 Status CmaEs::restore(const v1::MethodState& message) {
+  const v1::CmaEsState& state = message.cma_es();
   const auto n = mean_.size();
-  if (message.counts_size() != 3 || message.reals_size() < 1 + 3 * n + n * n) {
+  if (state.mean_size() != n || state.path_sigma_size() != n || state.path_c_size() != n ||
+      state.covariance_size() != n * n) {
     return damaged_method_state("CMA-ES");
   }
-  generation_ = message.counts(0);
-  restarts_ = message.counts(1);
-  anywhere_ = message.counts(2) != 0;
-  auto next = message.reals().begin();
-  sigma_ = *next++;
-  for (Eigen::VectorXd* vector : {&mean_, &path_sigma_, &path_c_}) {
-    for (double& number : *vector) number = *next++;
-  }
-  for (auto column : covariance_.colwise()) {
-    for (double& number : column) number = *next++;
-  }
-  bests_.assign(next, message.reals().end());
+  generation_ = state.generation();
+  restarts_ = state.restarts();
+  anywhere_ = state.anywhere();
+  sigma_ = state.sigma();
+  std::copy(state.mean().begin(), state.mean().end(), mean_.begin());
+  std::copy(state.path_sigma().begin(), state.path_sigma().end(), path_sigma_.begin());
+  std::copy(state.path_c().begin(), state.path_c().end(), path_c_.begin());
+  std::copy(state.covariance().begin(), state.covariance().end(), covariance_.data());
+  bests_.assign(state.bests().begin(), state.bests().end());
   return {};
 }
 

@@ -41,20 +41,19 @@ std::vector<NamedNumber> DeSimplex::figures() const {
 }
 
 void DeSimplex::save(v1::MethodState& message) const {
-  message.add_counts(polishing_ ? 1 : 0);
-  message.add_counts(rounds_);
-  differential_.save(*message.add_parts());
-  simplex_.save(*message.add_parts());
+  v1::DeSimplexState& state = *message.mutable_de_simplex();
+  state.set_polishing(polishing_);
+  state.set_rounds(rounds_);
+  differential_.save(*state.mutable_differential());
+  simplex_.save(*state.mutable_simplex());
 }
 
 Status DeSimplex::restore(const v1::MethodState& message) {
-  if (message.counts_size() != 2 || message.parts_size() != 2) {
-    return damaged_method_state("de_simplex");
-  }
-  polishing_ = message.counts(0) != 0;
-  rounds_ = message.counts(1);
-  if (Status s = differential_.restore(message.parts(0)); !s) return s;
-  return simplex_.restore(message.parts(1));
+  const v1::DeSimplexState& state = message.de_simplex();
+  polishing_ = state.polishing();
+  rounds_ = state.rounds();
+  if (Status s = differential_.restore(state.differential()); !s) return s;
+  return simplex_.restore(state.simplex());
 }
 
 }  // namespace gapfarm

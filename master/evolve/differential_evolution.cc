@@ -93,28 +93,30 @@ const Individual& DifferentialEvolution::best() const {
 }
 
 void DifferentialEvolution::save(v1::MethodState& message) const {
-  message.add_counts(iterations_);
-  for (const Individual& individual : population_)
-    gapfarm::save(individual, *message.add_individuals());
-  message.mutable_reals()->Add(keep_.begin(), keep_.end());
+  v1::DifferentialEvolutionState& state = *message.mutable_differential_evolution();
+  state.set_iterations(iterations_);
+  for (const Individual& individual : population_) {
+    gapfarm::save(individual, *state.add_population());
+  }
+  state.mutable_keep()->Add(keep_.begin(), keep_.end());
 }
 
 Status DifferentialEvolution::restore(const v1::MethodState& message) {
-  const auto members = static_cast<std::size_t>(message.individuals_size());
-  if (message.counts_size() != 1 || (members != 0 && members != size_)) {
+  const v1::DifferentialEvolutionState& state = message.differential_evolution();
+  const auto members = static_cast<std::size_t>(state.population_size());
+  const auto kept = static_cast<std::size_t>(state.keep_size());
+  if (!message.has_differential_evolution() || (members != 0 && members != size_) ||
+      (kept != 0 && kept != setup_.space.size())) {
     return damaged_method_state("differential evolution");
   }
-  iterations_ = message.counts(0);
+  iterations_ = state.iterations();
   population_.clear();
-  for (const v1::Individual& saved : message.individuals()) {
+  for (const v1::Individual& saved : state.population()) {
     Result<Individual> individual = load(saved, setup_.space);
     if (!individual) return individual.error();
     population_.push_back(*std::move(individual));
   }
-  keep_.assign(message.reals().begin(), message.reals().end());
-  if (!keep_.empty() && keep_.size() != setup_.space.size()) {
-    return damaged_method_state("differential evolution");
-  }
+  keep_.assign(state.keep().begin(), state.keep().end());
   return {};
 }
 

@@ -131,36 +131,28 @@ std::vector<NamedNumber> LocalSearch::figures() const {
 }
 
 void LocalSearch::save(v1::MethodState& message) const {
-  for (const std::uint64_t count : {searches_, std::uint64_t{converged_},
-                                    std::uint64_t{start_.size()}, std::uint64_t{best_.size()}}) {
-    message.add_counts(count);
-  }
-  message.mutable_reals()->Add(start_.begin(), start_.end());
-  message.mutable_reals()->Add(best_.begin(), best_.end());
-  message.add_reals(best_cost_);
-  message.mutable_reals()->Add(costs_.begin(), costs_.end());
+  v1::LocalSearchState& state = *message.mutable_local_search();
+  state.set_searches(searches_);
+  state.set_converged(converged_);
+  state.mutable_start()->Add(start_.begin(), start_.end());
+  state.mutable_best()->Add(best_.begin(), best_.end());
+  state.set_best_cost(best_cost_);
+  state.mutable_costs()->Add(costs_.begin(), costs_.end());
 }
 
 Status LocalSearch::restore(const v1::MethodState& message) {
-  const std::size_t n = setup_.space.size();
-  const auto is_size = [&](std::uint64_t size) { return size == 0 || size == n; };
-  if (message.counts_size() != 4 || !is_size(message.counts(2)) || !is_size(message.counts(3)) ||
-      static_cast<std::uint64_t>(message.reals_size()) <
-          message.counts(2) + message.counts(3) + 1) {
+  const v1::LocalSearchState& state = message.local_search();
+  const int n = static_cast<int>(setup_.space.size());
+  const auto is_size = [&](int size) { return size == 0 || size == n; };
+  if (!message.has_local_search() || !is_size(state.start_size()) || !is_size(state.best_size())) {
     return damaged_method_state("local search");
   }
-  searches_ = message.counts(0);
-  converged_ = message.counts(1) != 0;
-  auto next = message.reals().begin();
-  const auto take = [&](std::uint64_t size) {
-    const auto begun = next;
-    next += static_cast<std::ptrdiff_t>(size);
-    return Genome(begun, next);
-  };
-  start_ = take(message.counts(2));
-  best_ = take(message.counts(3));
-  best_cost_ = *next++;
-  costs_.assign(next, message.reals().end());
+  searches_ = state.searches();
+  converged_ = state.converged();
+  start_.assign(state.start().begin(), state.start().end());
+  best_.assign(state.best().begin(), state.best().end());
+  best_cost_ = state.best_cost();
+  costs_.assign(state.costs().begin(), state.costs().end());
   return {};
 }
 

@@ -13,8 +13,8 @@ std::vector<Genome> RandomSearch::propose(const StreamOf& stream_of) const {
 }
 
 Status RandomSearch::restore(const v1::MethodState& message) {
-  if (message.counts_size() != 1) return damaged_method_state("random search");
-  begun_ = message.counts(0) != 0;
+  if (!message.has_random_search()) return damaged_method_state("random search");
+  begun_ = message.random_search().begun();
   return {};
 }
 

@@ -12,7 +12,9 @@ class RandomSearch final : public SearchMethod {
   std::vector<Genome> propose(const StreamOf& stream_of) const override;
   void learn(std::span<const Genome>, std::span<const Standing>) override { begun_ = true; }
   unsigned origin() const override { return kRandom; }
-  void save(v1::MethodState& message) const override { message.add_counts(begun_ ? 1 : 0); }
+  void save(v1::MethodState& message) const override {
+    message.mutable_random_search()->set_begun(begun_);
+  }
   Status restore(const v1::MethodState& message) override;
 
  private:

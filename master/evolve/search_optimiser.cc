@@ -174,6 +174,11 @@ Status SearchOptimiser::restore(std::string_view state) {
                  "\", but the config asks for \"" + kind_ +
                  "\"; resume with the config of the run"};
   }
+  if (message.method().of_case() == v1::MethodState::OF_NOT_SET) {
+    return Error{"the saved optimiser state of \"" + kind_ +
+                 "\" was written before gapfarm 0.3 and is not continued; `gapfarm report` and "
+                 "`determine` read the run as it is, `evolve` begins it again"};
+  }
   const v1::GeneticState& ledger = message.ledger();
   if (ledger.generation() > 0 && ledger.hall_size() == 0) {
     return Error{"the saved optimiser state is damaged: it has no best"};
