@@ -49,6 +49,8 @@ struct Effect {
   // parameters and implementation it shares.  Empty: the first, or the only one.
   std::string repeats = {};
   EffectShows shows = EffectShows::kMean;
+  // Its lengths are the robot's own, and shrink with a smaller robot; those of a floor do not.
+  bool of_the_robot = false;
 
   bool moves_means() const { return shows == EffectShows::kMean; }
   const std::string& kind() const { return repeats.empty() ? name : repeats; }

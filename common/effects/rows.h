@@ -47,6 +47,10 @@ inline Effect in_spread(Effect effect) {
   effect.shows = EffectShows::kSpread;
   return effect;
 }
+inline Effect of_the_robot(Effect effect) {
+  effect.of_the_robot = true;
+  return effect;
+}
 inline Effect by_chance(Effect effect) {
   effect.shows = EffectShows::kChance;
   return effect;

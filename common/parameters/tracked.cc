@@ -101,13 +101,10 @@ std::vector<Parameter> tracked_rows(const TreadNumbers& own) {
 
 // Lengths of the robot itself grow and shrink with it, those of its floor only grow.
 std::vector<Effect> tracked_effects(double scale) {
-  constexpr const char* kOfTheRobot[] = {"backlash", "com_offset", "marker_offset"};
   const auto catalogue = srv1_effects_and_seconds();
   std::vector<Effect> effects(catalogue.begin(), catalogue.end());
   for (Effect& effect : effects) {
-    const bool own = std::find(std::begin(kOfTheRobot), std::end(kOfTheRobot), effect.kind()) !=
-                     std::end(kOfTheRobot);
-    const double factor = own ? scale : std::max(1.0, scale);
+    const double factor = effect.of_the_robot ? scale : std::max(1.0, scale);
     for (EffectParameter& p : effect.parameters) {
       if (p.unit != "m") continue;
       p.lower = three_digits(p.lower * factor);
