@@ -5,6 +5,8 @@
 #include <numbers>
 #include <set>
 
+#include "common/base/constants.h"
+
 namespace gapfarm {
 namespace {
 
@@ -300,7 +302,7 @@ void Rows::noise() {
 }
 
 void Rows::world() {
-  add(kGroundGravity, "m/s^2", 1, 30, 9.81, "downward", {});
+  add(kGroundGravity, "m/s^2", 1, 30, kGravity_m_s2, "downward", {});
   add(kGroundStepRate, "Hz", 30, 2000, 240, "physics steps a second", {}, kLog, kInteger);
   add(kGroundSolverIterations, "-", 1, 100, 10, "of the contact solver", {}, kLinear, kInteger);
 }

@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "common/base/constants.h"
 #include "common/parameters/table.h"
 
 namespace gapfarm::rows {

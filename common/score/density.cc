@@ -9,10 +9,10 @@
 #include <numbers>
 #include <sstream>
 
+#include "common/score/normal.h"
+
 namespace gapfarm {
 namespace {
-
-constexpr double kLogTwoPi = 1.8378770664093454836;
 
 Eigen::Vector3d in_metres(const Eigen::Vector3d& residual) {
   return {residual[0], residual[1], kHeadingLength_m * residual[2]};

@@ -7,13 +7,13 @@
 #include <optional>
 #include <span>
 
+#include "common/base/constants.h"
 #include "common/robot/robot_drive.h"
 
 namespace gapfarm {
 namespace {
 
 constexpr double kStep_s = 0.04;
-constexpr double kGravity_m_s2 = 9.81;
 
 bool steered(const GroundRobot& robot) {
   return robot.drive == DriveKind::kAckermann || robot.drive == DriveKind::kTricycle;

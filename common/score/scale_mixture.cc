@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "common/score/density.h"
+#include "common/score/normal.h"
 
 namespace gapfarm {
 namespace {
@@ -16,7 +17,6 @@ constexpr std::size_t kScales = 9;
 constexpr double kNatsBelow = 4;
 constexpr double kNatsAbove = 7;
 constexpr double kMostScale = 1000;
-constexpr double kLog2Pi = 1.8378770664093454836;
 
 // Nats that the density of log a has lost at `log_a`; its mode is 0.
 double lost(double freedom, double log_a) { return freedom / 2 * (std::exp(-log_a) + log_a - 1); }
@@ -94,7 +94,7 @@ Result<double> TailedDensity::log_density(const Eigen::Vector3d& residual,
     }
   }
   const double mixture = log_sum_exp(std::span(logs.data(), count)) -
-                         0.5 * (3 * kLog2Pi + readings->log_determinant());
+                         0.5 * (3 * kLogTwoPi + readings->log_determinant());
   if (outlier_share == 0) return mixture;
   const std::array<double, 2> both = {std::log1p(-outlier_share) + mixture,
                                       std::log(outlier_share) + log_tail_density(residual, *whole)};

@@ -12,7 +12,6 @@ namespace gapfarm {
 namespace {
 
 constexpr double kLeastStrength = 1e-6;  // of the bound: nothing smaller is an effect
-constexpr double kFirstStrength = 0.1;
 constexpr unsigned kMostSteps = 40;
 
 double middle(double lower, double upper, Stream& stream) {

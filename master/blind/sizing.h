@@ -32,6 +32,8 @@ struct EffectDraw {
 EffectDraw draw_effect(const ParameterTable& table, std::size_t effect, const Arena& arena,
                        Stream& stream);
 
+inline constexpr double kFirstStrength = 0.1;  // that is tried
+
 // The effect's parameters in the catalogue's order at `strength` in [0, 1]: 0 is neutral, 1 the
 // bound.  Strengths go in proportion; where neutral is above a positive lower bound (a ratio), in
 // proportion of the logarithm.

@@ -9,7 +9,6 @@
 namespace gapfarm {
 namespace {
 
-constexpr double kLeast = 1e-4;  // keeps logarithms and covariances finite
 constexpr double kMost = 0.5;
 constexpr double kTailFromSquared = 14;  // chi-square with 3 degrees of freedom: one in 340
 
@@ -53,7 +52,7 @@ NoiseEstimate refit_drive_noise(std::span<const ResidualTrial> trials,
   const Likelihood likelihood{trials, residuals, start, fit_pose, covariance, tail};
   // An unknown value (0) begins at that of a small tracked robot under a good camera.
   const auto first = [](double value, double unknown) {
-    return std::log(std::clamp(value > 0 ? value : unknown, kLeast, kMost));
+    return std::log(std::clamp(value > 0 ? value : unknown, kLeastDeviation, kMost));
   };
   std::vector<double> x = {first(start.drive_common, 0.01), first(start.drive_side, 0.01)};
   if (fit_pose) {
@@ -67,7 +66,7 @@ NoiseEstimate refit_drive_noise(std::span<const ResidualTrial> trials,
         return l->negative(l->at(std::vector<double>(at, at + n)));
       },
       const_cast<Likelihood*>(&likelihood));
-  search.set_lower_bounds(std::vector<double>(x.size(), std::log(kLeast)));
+  search.set_lower_bounds(std::vector<double>(x.size(), std::log(kLeastDeviation)));
   search.set_upper_bounds(std::vector<double>(x.size(), std::log(kMost)));
   search.set_initial_step(0.3);
   search.set_xtol_abs(0.005);

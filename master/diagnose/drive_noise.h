@@ -8,6 +8,8 @@
 
 namespace gapfarm {
 
+// Of any noise that is fitted: keeps logarithms and covariances finite.
+inline constexpr double kLeastDeviation = 1e-4;
 // The tail among free commands: no cell's spread holds the noise there.
 inline constexpr double kFreeNoiseTail = 7;
 

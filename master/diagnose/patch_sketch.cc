@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/base/constants.h"
 #include "common/pose/pose.h"
 #include "common/score/statistics.h"
 #include "master/diagnose/free_commands.h"
@@ -25,7 +26,6 @@ constexpr double kMostSteps = 20;           // of the grid, along each axis
 constexpr std::size_t kClimbs = 12;
 constexpr double kLeastRatio = 0.08;
 constexpr double kMostRatio = 2.8;
-constexpr double kCreepAtRest_m_s = 1.5e-3;  // as the simulation has
 
 double value_of(const Problem& problem, const Study& study, const char* key) {
   const std::size_t row = problem.table().row(key);

@@ -8,12 +8,12 @@
 
 #include "common/score/scale_mixture.h"
 #include "common/score/statistics.h"
+#include "master/diagnose/drive_noise.h"
 #include "master/diagnose/subject.h"
 
 namespace gapfarm {
 namespace {
 
-constexpr double kLeastDeviation = 1e-4;  // keeps logarithms and covariances finite
 constexpr double kMostDeviation = 0.3;
 constexpr double kMostPosition_m = 0.1;
 // Half a degree of freedom more than the Cauchy's, which has no core worth the name.

@@ -19,9 +19,8 @@ constexpr double kRelativeStep = 0.02;
 constexpr double kLargestLogStep = 0.4;
 constexpr int kMostBaseHalvings = 4;
 constexpr double kGainStep = 0.02;
-constexpr double kSameSlope = 0.05;  // relative: a parameter that moves the ends as the gain does
-constexpr double kUnknownSpeed = 0.28;  // m/s, where no drive goes ahead
-constexpr double kLeastAhead = 0.05;    // mean duty of a drive that does
+constexpr double kSameSlope = 0.05;   // relative: a parameter that moves the ends as the gain does
+constexpr double kLeastAhead = 0.05;  // mean duty of a drive that does
 // How near to its bounds a parameter may be tuned.
 constexpr double kAboveLower = 1.1, kBelowUpper = 0.9;
 
@@ -268,7 +267,7 @@ double speed_by(const Study& study, const Slope& both) {
     const double ahead = (c.left + c.right) / 2;
     if (std::abs(ahead) > kLeastAhead) speeds.push_back(both[i].x() / (ahead * c.duration_s));
   }
-  return speeds.empty() ? kUnknownSpeed : std::max(median(speeds), 1e-3);
+  return speeds.empty() ? kMeasuredSpeed_m_s : std::max(median(speeds), 1e-3);
 }
 
 // A program's parameter that does what the gain of both sides does, if it has one.

@@ -1,6 +1,7 @@
 // What values of a ground robot may be off by, and which kinds of robots have them.
 #pragma once
 
+#include "common/base/constants.h"
 #include "common/robot/robot.h"
 
 namespace gapfarm {
@@ -35,7 +36,6 @@ inline constexpr double kSlipAngle_rad = 0.17;
 inline constexpr double kKeptSlipAngle_rad = 0.02;
 // How gradually tyres give way (a logarithm) is the tyres' to say: the reference tells it.
 inline constexpr double kKeptGripShape = 0.05;
-inline constexpr double kGravity_m_s2 = 9.81;
 
 inline bool is_steered(const GroundRobot& robot) {
   return robot.drive == DriveKind::kAckermann || robot.drive == DriveKind::kTricycle;

@@ -5,6 +5,7 @@
 #include <numbers>
 #include <tuple>
 
+#include "common/base/constants.h"
 #include "common/base/suggest.h"
 #include "common/config/toml_section.h"
 #include "common/trials/csv.h"
@@ -17,7 +18,6 @@ struct Unit {
   double factor;
 };
 
-constexpr double kDegree = std::numbers::pi / 180;
 constexpr Unit kUnits[] = {{"s", 1},
                            {"ms", 1e-3},
                            {"us", 1e-6},

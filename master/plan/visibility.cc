@@ -14,7 +14,6 @@ namespace gapfarm::plan {
 namespace {
 
 constexpr double kPower = 0.9;
-constexpr double kFirstStrength = 0.1;
 constexpr int kMostHalvings = 4;  // where the robot cannot be simulated at the first strength
 
 NoiseEstimate noise_of(const DiagnosisSubject& subject, const ParameterValues& values) {

@@ -1,18 +1,18 @@
 #include <Eigen/Dense>
 
+#include "common/base/constants.h"
 #include "master/robot/understand.h"
 
 namespace gapfarm {
 
 std::vector<double> standing_loads(const GroundRobot& robot) {
-  constexpr double kGravity = 9.81;
   if (!robot.mass_kg) return {};
   std::vector<Eigen::Vector2d> points;
   for (const RobotWheel& wheel : robot.wheels) {
     points.emplace_back(wheel.x_m.value_or(0), wheel.y_m.value_or(0));
   }
   const Eigen::Vector2d com(robot.com_x_m.value_or(0), robot.com_y_m.value_or(0));
-  return wheel_loads(points, com, kGravity * *robot.mass_kg);
+  return wheel_loads(points, com, kGravity_m_s2 * *robot.mass_kg);
 }
 
 std::vector<double> wheel_loads(const std::vector<Eigen::Vector2d>& points,

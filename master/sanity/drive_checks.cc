@@ -5,6 +5,7 @@
 #include <complex>
 #include <numbers>
 
+#include "common/base/constants.h"
 #include "common/score/statistics.h"
 #include "master/sanity/axes.h"
 #include "master/sanity/log_checks.h"
@@ -82,7 +83,7 @@ bool doubt_speed(const std::vector<DriveSample>& samples, const DriveLimits& lim
 
 bool doubt_heading_unit(const std::vector<DriveSample>& samples,
                         std::vector<SanityFinding>* findings) {
-  constexpr double kSmall_rad = 0.1, kRadiansADegree = std::numbers::pi / 180;
+  constexpr double kSmall_rad = 0.1;
   constexpr double kGood = 0.75, kBad = 0.6;
   std::vector<DriveSample> straight = straight_samples(samples);
   if (straight.size() < kFewestStraight) return false;
@@ -90,7 +91,7 @@ bool doubt_heading_unit(const std::vector<DriveSample>& samples,
   for (const DriveSample& s : straight) sizes.push_back(std::abs(s.X_WS.theta));
   if (quantile(sizes, 0.95) > kSmall_rad) return false;
   const double as_logged = concentration(straight, 1);
-  const double scaled = concentration(straight, 1 / kRadiansADegree);
+  const double scaled = concentration(straight, 1 / kDegree);
   if (as_logged > kBad || scaled < kGood) return false;
   findings->push_back(
       {"unit_error",

@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "common/base/constants.h"
 #include "common/robot/robot.h"
 #include "common/robot/robot_drive.h"
 #include "common/runs/run.h"
@@ -14,7 +15,7 @@ namespace gapfarm {
 
 // What is simulated beside the robot itself.
 struct GroundWorld {
-  double gravity_m_s2 = 9.81;
+  double gravity_m_s2 = kGravity_m_s2;
   double step_rate_hz = 240;
   int solver_iterations = 10;
   double creep = 0;            // PatchSettings::creep

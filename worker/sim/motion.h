@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "common/base/constants.h"
 #include "common/pose/pose.h"
 #include "common/robot/robot_size.h"
 
@@ -27,7 +28,7 @@ struct SimSettings {
   double friction_ratio = 1;    // lateral over longitudinal
   double tread_creep = 0;       // slip over tread speed at 0.7 of full traction (treads)
   double mass_height_m = 0;     // centre of mass over the floor
-  double gravity_m_s2 = 9.81;
+  double gravity_m_s2 = kGravity_m_s2;
   double step_rate_hz = 240;
   int sub_steps = 1;           // physics steps a step of 1/step_rate
   int solver_iterations = 10;  // sweeps a physics step; the wheel model makes three times as many

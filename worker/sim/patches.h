@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "common/base/constants.h"
 #include "common/pose/pose.h"
 #include "worker/sim/step_counter.h"
 
@@ -29,7 +30,7 @@ struct PatchSettings {
   double yaw_inertia_kg_m2 = 1;                    // about it
   double creep = 0;            // slip over surface speed at 0.7 of full traction
   double creep_speed_m_s = 0;  // slip there at any speed
-  double gravity_m_s2 = 9.81;
+  double gravity_m_s2 = kGravity_m_s2;
   double step_rate_hz = 240;
   int solver_iterations = 10;
 };

@@ -9,6 +9,7 @@
 #include <span>
 #include <vector>
 
+#include "common/base/constants.h"
 #include "worker/sim/motion.h"
 
 namespace gapfarm {
@@ -38,7 +39,7 @@ struct PushSettings {
   double finger_height = 0.5;  // where it touches, over the thickness
   double finger_compliance_m_n = 0;
   double contact_margin_m = 0;  // by which the outline grows against the finger
-  double gravity_m_s2 = 9.81;
+  double gravity_m_s2 = kGravity_m_s2;
   double length_scale = 1;  // engine units a metre
   double step_rate_hz = 240;
   int sub_steps = 1;

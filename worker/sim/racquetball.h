@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "common/base/constants.h"
 #include "worker/sim/step_counter.h"
 
 namespace gapfarm {
@@ -16,7 +17,7 @@ namespace gapfarm {
 enum class BallShape { kSphere, kBox, kHull };
 
 struct RacquetballSettings {
-  double gravity_m_s2 = 9.81;
+  double gravity_m_s2 = kGravity_m_s2;
   double step_rate_hz = 240;
   int sub_steps = 1;
   int solver_iterations = 10;

@@ -9,8 +9,6 @@
 
 namespace gapfarm {
 
-// Speed that a contact's creep has at rest: what stands holds, but not like rock.
-inline constexpr double kCreepAtRest_m_s = 1.5e-3;
 // Share of a joint's or contact's position error that a step of full length repairs; a shorter one
 // repairs less, or it would have to move fast.
 inline constexpr double kRepairedShare = 0.2;

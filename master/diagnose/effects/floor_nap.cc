@@ -8,12 +8,11 @@
 namespace gapfarm {
 namespace {
 
-constexpr double kNapPi = std::numbers::pi;
 constexpr double kProbedNap = 0.15;
 
 std::vector<Probe> nap_probes(const Study&) {
   std::vector<Probe> all;
-  for (double direction : {0.0, 2 * kNapPi / 3, -2 * kNapPi / 3}) {
+  for (double direction : {0.0, 2 * std::numbers::pi / 3, -2 * std::numbers::pi / 3}) {
     all.push_back({"floor_nap",
                    {{"floor_nap.strength", kProbedNap}, {"floor_nap.direction", direction}},
                    {},
@@ -29,7 +28,7 @@ std::vector<Eigen::Vector3d> nap_creep(const Study& study, double direction) {
     if (!is_straight(study, i)) continue;
     const ResidualTrial& t = study.trials[i];
     const Cell& cell = study.cells[t.cell];
-    const double travel = t.X_WP.theta + (cell.mirror < 0 ? kNapPi : 0);
+    const double travel = t.X_WP.theta + (cell.mirror < 0 ? std::numbers::pi : 0);
     const double against = (1 - std::cos(travel - direction)) / 2;
     d[i].x() = -cell.mirror * against * cell.path * study.speed_m_s;
   }
@@ -52,7 +51,7 @@ std::vector<Signature> nap_signatures(const Study& study, ProbedSlopes probe) {
   }
   std::vector<Signature> all;
   for (int k = 0; k < 24; ++k) {
-    const double direction = wrap_angle(k * kNapPi / 12);
+    const double direction = wrap_angle(k * std::numbers::pi / 12);
     Signature s;
     s.effect = "floor_nap";
     s.columns =
@@ -77,7 +76,7 @@ extern const EffectDiagnosis kFloorNap = {
     .model_error = 0.2,
     .direction_error_rad = 0.02,
     .words = {"The floor has a nap that drags with %1 of the weight against %2",
-              {{"strength", 100, " %"}, {"direction", 180 / kNapPi, " degrees"}}},
+              {{"strength", 100, " %"}, {"direction", 180 / std::numbers::pi, " degrees"}}},
     .short_words =
         ShortWords{"strength", 100, " %", "The floor has a nap that drags with % of the weight",
                    nullptr, "Drive on a floor without pile"},

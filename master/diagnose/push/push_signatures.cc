@@ -11,7 +11,6 @@
 namespace gapfarm {
 namespace {
 
-constexpr double kHalfTurn = std::numbers::pi;
 constexpr double kPatchSpacing = 0.75;  // of the radius: a disc anywhere is overlapped by half
 constexpr double kPatchRadius_m = 0.12;
 constexpr double kProbedRatio = 0.4;
@@ -42,7 +41,7 @@ std::vector<Probe> push_probes(const Study& study) {
   both("marker_offset", "y", 0.003);
   // A strength and a direction: linear in the strength's cosine and sine.
   constexpr double kLogRatio = 0.2, kStretch = 0.1, kTilt = 0.03;
-  for (double direction : {0.0, kHalfTurn / 4}) {
+  for (double direction : {0.0, std::numbers::pi / 4}) {
     const auto grain = [&](double log_ratio) {
       return std::map<std::string, double>{{"friction_anisotropy.ratio", std::exp(log_ratio)},
                                            {"friction_anisotropy.direction", direction}};
@@ -54,13 +53,13 @@ std::vector<Probe> push_probes(const Study& study) {
     };
     all.push_back({"pressure_distribution", plate(kStretch), plate(-kStretch), 2 * kStretch});
   }
-  for (double direction : {0.0, kHalfTurn / 2}) {
+  for (double direction : {0.0, std::numbers::pi / 2}) {
     const auto tilt = [&](double toward) {
       return std::map<std::string, double>{{"table_tilt.angle", kTilt},
                                            {"table_tilt.direction", toward}};
     };
     all.push_back(
-        {"table_tilt", tilt(direction), tilt(wrap_angle(direction + kHalfTurn)), 2 * kTilt});
+        {"table_tilt", tilt(direction), tilt(wrap_angle(direction + std::numbers::pi)), 2 * kTilt});
   }
   for (Probe& probe : lens_probes(middle_of(study))) all.push_back(std::move(probe));
   return all;
