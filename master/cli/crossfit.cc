@@ -11,7 +11,6 @@
 
 #include "common/config/config.h"
 #include "common/trials/select.h"
-#include "master/cli/effect_ranking.h"
 #include "master/cli/inputs.h"
 #include "master/cli/long_command.h"
 #include "master/cli/parameter_options.h"
@@ -26,9 +25,7 @@ struct CrossfitOptions {
   std::string config;
   TrialOptions trials;
   std::vector<std::string> only, train, tests, repeats, sweeps, set, genes;
-  std::vector<std::string> effects, ranges;
   std::string by, per;
-  unsigned folds = 5;
   std::optional<std::uint64_t> evaluations, seed;
   FarmOptions farm;
   KeepOption keep;
@@ -41,12 +38,6 @@ std::vector<std::string> words_of(const std::string& text) {
   return words;
 }
 
-TuningSettings tuning_of(const CrossfitOptions& options, const Config& config) {
-  TuningSettings tuning{config.evolution, options.seed.value_or(config.seed)};
-  if (options.evaluations) tuning.evolution.evaluations = *options.evaluations;
-  return tuning;
-}
-
 CrossfitPlan plan_of(const CrossfitOptions& options, const Config& config) {
   CrossfitPlan plan;
   plan.train = options.train;
@@ -55,26 +46,17 @@ CrossfitPlan plan_of(const CrossfitOptions& options, const Config& config) {
   plan.per = options.per;
   plan.repeats = options.repeats;
   plan.sweeps = options.sweeps;
-  plan.tuning = tuning_of(options, config);
+  plan.tuning = {config.evolution, options.seed.value_or(config.seed)};
+  if (options.evaluations) plan.tuning.evolution.evaluations = *options.evaluations;
   return plan;
 }
 
-Result<EffectRankingPlan> ranking_plan_of(const CrossfitOptions& options, const Config& config) {
-  EffectRankingPlan plan;
-  if (options.effects != std::vector<std::string>{"all"}) plan.effects = options.effects;
-  plan.together = options.repeats;
-  plan.folds = options.folds;
-  plan.tuning = tuning_of(options, config);
-  Problem ranged = config.problem;
-  if (Status s = apply_genes(options.ranges, ranged, "--range"); !s) return s.error();
-  for (const Gene& gene : ranged.genes) {
-    const Parameter& row = ranged.table()[gene.row];
-    if (row.effect.empty()) {
-      return Error{"--range " + row.key + ": is no effect's parameter; base genes are --genes"};
-    }
-  }
-  plan.ranges = ranged.genes;
-  return plan;
+Json errors_json(const EndErrors& e) {
+  return {{"trials", e.trials},
+          {"mean_mm", 1e3 * e.mean_m},
+          {"median_mm", 1e3 * e.median_m},
+          {"median_position_mm", 1e3 * e.median_position_m},
+          {"median_heading_deg", e.median_heading_rad * 180 / M_PI}};
 }
 
 Json to_json(const Problem& problem, const CrossfitGroup& group) {
@@ -156,46 +138,21 @@ Status apply(const CrossfitOptions& options, Config& config) {
   return check_evolvable(config);
 }
 
-void begin(const CrossfitOptions& options, CliContext& context) {
-  LongCommand::begin_if_possible("crossfit", options.keep.place("crossfit", ""), {{"fit"}},
-                                 context);
-}
-
 int say_fits(const CrossfitOptions& options, const Config& config, CliContext& context) {
   const std::size_t genes = config.problem.genes.size(), trials = config.problem.log.trials.size();
-  std::string would =
+  const std::string would =
       fmt::format("tune {} parameters on parts of {} trials and try them on others", genes, trials);
-  if (!options.effects.empty()) would += fmt::format(", with {}", fmt::join(options.effects, ", "));
   return say_dry_run(would, {{"genes", genes}, {"trials", trials}}, options.farm, config.farm,
                      context);
-}
-
-int run_ranking(const CrossfitOptions& options, const Config& config, CliContext& context) {
-  auto plan = ranking_plan_of(options, config);
-  if (!plan) {
-    context.console.error(plan.error());
-    return kExitBadUsage;
-  }
-  if (context.dry_run) return say_fits(options, config, context);
-  begin(options, context);
-  plan->hooks = context.work->hooks();
-  auto farm = start_farm(options.farm, config.farm, context);
-  if (!farm) return failed(farm.error(), context);
-  const auto asked = context.work->over(**farm);
-  const auto ranking = rank_effects(config.problem, *plan, *asked);
-  if (!ranking) return failed(ranking.error(), context);
-  context.console.result(ranking_text(config.problem, *ranking, *plan),
-                         ranking_json(config.problem, *ranking));
-  return kExitDone;
 }
 
 int run_crossfit(const CrossfitOptions& options, CliContext& context) {
   const auto config = open_config(options.config, options.trials, context.console,
                                   [&](Config& read) { return apply(options, read); });
   if (!config) return kExitBadUsage;
-  if (!options.effects.empty()) return run_ranking(options, *config, context);
   if (context.dry_run) return say_fits(options, *config, context);
-  begin(options, context);
+  LongCommand::begin_if_possible("crossfit", options.keep.place("crossfit", ""), {{"fit"}},
+                                 context);
   CrossfitPlan plan = plan_of(options, *config);
   plan.hooks = context.work->hooks();
   auto farm = start_farm(options.farm, config->farm, context);
@@ -224,34 +181,15 @@ SubcommandRun setup_crossfit(CLI::App& app) {
   app.add_option("--set", options->set, "PARAMETER=VALUE, effects included; may repeat");
   app.add_option("--genes", options->genes,
                  "KEY or KEY=LOWER,UPPER in place of the config's genes; may repeat");
-  CLI::Option* train =
-      app.add_option("--train", options->train,
-                     "COLUMN=VALUE[,VALUE...] of the trials to tune on; may repeat, all must hold");
-  CLI::Option* test =
-      app.add_option("--test", options->tests,
-                     "A set of trials to try it on: such filters between blanks; may repeat");
-  CLI::Option* by =
-      app.add_option("--by", options->by, "Tune for each value of this column on its own");
-  CLI::Option* per =
-      app.add_option("--per", options->per, "Show errors by the values of this column");
+  app.add_option("--train", options->train,
+                 "COLUMN=VALUE[,VALUE...] of the trials to tune on; may repeat, all must hold");
+  app.add_option("--test", options->tests,
+                 "A set of trials to try it on: such filters between blanks; may repeat");
+  app.add_option("--by", options->by, "Tune for each value of this column on its own");
+  app.add_option("--per", options->per, "Show errors by the values of this column");
   app.add_option("--repeats", options->repeats,
                  "Columns that make a condition: trials alike in them repeat one another");
-  CLI::Option* sweep = app.add_option("--sweep", options->sweeps,
-                                      "Vary these parameters alone around what was tuned");
-  CLI::Option* effects = app.add_option(
-      "--effects", options->effects,
-      "Names, or 'all': refit the base with each effect in turn and rank them by what they gain on "
-      "trials left out (conditions as a whole)");
-  effects->excludes(train)->excludes(test)->excludes(by)->excludes(per)->excludes(sweep);
-  app.add_option("--folds", options->folds, "Parts that the trials are left out in, with --effects")
-      ->needs(effects)
-      ->check(CLI::Range(2, 1000))
-      ->capture_default_str();
-  app.add_option(
-         "--range", options->ranges,
-         "KEY=LOWER,UPPER of an effect's parameter in place of the catalogue's bounds, with "
-         "--effects; may repeat")
-      ->needs(effects);
+  app.add_option("--sweep", options->sweeps, "Vary these parameters alone around what was tuned");
   app.add_option("--evaluations", options->evaluations,
                  "Stop each fit after the generation in which so many are reached, in place of the "
                  "config's");
@@ -264,9 +202,7 @@ SubcommandRun setup_crossfit(CLI::App& app) {
       "  gapfarm crossfit configs/push.toml --trials pushes.csv --by object \\\n"
       "      --train start=0.11,0.15,0.21 --test start=0.13,0.18 --repeats object start\n"
       "  gapfarm crossfit configs/srv1.toml --trials a.csv b.csv --train session=a \\\n"
-      "      --test session=b --per command\n"
-      "  gapfarm crossfit configs/push_triangle.toml --trials pushes.csv --only session=wood \\\n"
-      "      --effects all --range friction_patch.x=0.3,0.8 friction_patch.y=0,0.4");
+      "      --test session=b --per command");
   return [options](CliContext& context) { return run_crossfit(*options, context); };
 }
 

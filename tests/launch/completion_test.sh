@@ -53,7 +53,6 @@ for shell in bash zsh fish; do
   expect "$shell" 'gapfarm evolve configs/de' configs/demo.toml
   expect "$shell" 'gapfarm status run/' run/first
   expect "$shell" 'gapfarm report run/' run/first
-  expect "$shell" 'gapfarm crossfit configs/demo.toml --effects motor_as' motor_asymmetry
   expect "$shell" 'gapfarm simulate configs/demo.toml --set full_sp' full_speed=
   expect "$shell" 'gapfarm plan configs/demo.toml --effects floor_tilt,motor_as' floor_tilt,motor_asymmetry
   expect "$shell" 'gapfarm completion z' zsh
