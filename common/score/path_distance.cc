@@ -53,21 +53,4 @@ double frechet_distance(std::span<const PathPoint> a, std::span<const PathPoint>
   return leash.back();
 }
 
-double greedy_frechet_bound(std::span<const PathPoint> a, std::span<const PathPoint> b) {
-  assert(!a.empty() && !b.empty());
-  std::size_t i = 0, j = 0;
-  double leash = (a[0] - b[0]).norm();
-  while (i + 1 < a.size() || j + 1 < b.size()) {
-    const auto length = [&](std::size_t di, std::size_t dj) {
-      return i + di < a.size() && j + dj < b.size() ? (a[i + di] - b[j + dj]).norm() : INFINITY;
-    };
-    const double both = length(1, 1), first = length(1, 0), second = length(0, 1);
-    const bool step_both = both <= first && both <= second;
-    if (step_both || first <= second) ++i;
-    if (step_both || second < first) ++j;
-    leash = std::max(leash, std::min({both, first, second}));
-  }
-  return leash;
-}
-
 }  // namespace gapfarm

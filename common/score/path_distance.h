@@ -21,8 +21,4 @@ double hausdorff_distance(std::span<const PathPoint> a, std::span<const PathPoin
 // without a step back, by dynamic programming (Eiter and Mannila 1994).
 double frechet_distance(std::span<const PathPoint> a, std::span<const PathPoint> b);
 
-// The leash of the walk that always takes the step after which it is shortest: an upper bound of
-// frechet_distance(), and what the published "Frechet" figures are.
-double greedy_frechet_bound(std::span<const PathPoint> a, std::span<const PathPoint> b);
-
 }  // namespace gapfarm

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cassert>
 #include <charconv>
 #include <cmath>
 #include <vector>
@@ -21,6 +22,25 @@ Points line(int count, double y, double step = 1) {
   Points points;
   for (int i = 0; i < count; ++i) points.emplace_back(step * i, y, 0);
   return points;
+}
+
+// The leash of the walk that always takes the step after which it is shortest: an upper bound of
+// frechet_distance(), and what the published "Frechet" figures are.
+double greedy_frechet_bound(std::span<const PathPoint> a, std::span<const PathPoint> b) {
+  assert(!a.empty() && !b.empty());
+  std::size_t i = 0, j = 0;
+  double leash = (a[0] - b[0]).norm();
+  while (i + 1 < a.size() || j + 1 < b.size()) {
+    const auto length = [&](std::size_t di, std::size_t dj) {
+      return i + di < a.size() && j + dj < b.size() ? (a[i + di] - b[j + dj]).norm() : INFINITY;
+    };
+    const double both = length(1, 1), first = length(1, 0), second = length(0, 1);
+    const bool step_both = both <= first && both <= second;
+    if (step_both || first <= second) ++i;
+    if (step_both || second < first) ++j;
+    leash = std::max(leash, std::min({both, first, second}));
+  }
+  return leash;
 }
 
 TEST(PathDistance, ParallelLinesAreTheirGapApart) {
