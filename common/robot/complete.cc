@@ -262,16 +262,21 @@ class Completion {
     return {};
   }
 
+  // Of the driven axle: stated, or assumed from the wheelbase, which is.
+  double said_track() {
+    auto& k = r_.controller;
+    if (!k.traction_track_width_m) k.traction_track_width_m = k.wheel_separation_m;
+    if (!k.traction_track_width_m) {
+      k.traction_track_width_m = kTrackPerBase * *k.wheelbase_m;
+      assume("a track of " + digits4(*k.traction_track_width_m) + " m");
+    }
+    return *k.traction_track_width_m;
+  }
+
   Status ackermann() {
     auto& k = r_.controller;
     if (!k.wheelbase_m) return missing("wheelbase in m");
-    const double track = k.traction_track_width_m ? *k.traction_track_width_m
-                         : k.wheel_separation_m   ? *k.wheel_separation_m
-                                                  : kTrackPerBase * *k.wheelbase_m;
-    if (!k.traction_track_width_m && !k.wheel_separation_m) {
-      assume("a track of " + digits4(track) + " m");
-    }
-    k.traction_track_width_m = track;
+    const double track = said_track();
     const double front = k.steering_track_width_m.value_or(track);
     for (const char* name : {"front_left", "front_right", "rear_left", "rear_right"}) {
       const bool made = find(name) == nullptr;
@@ -289,13 +294,7 @@ class Completion {
   Status tricycle() {
     auto& k = r_.controller;
     if (!k.wheelbase_m) return missing("wheelbase in m");
-    const double track = k.traction_track_width_m ? *k.traction_track_width_m
-                         : k.wheel_separation_m   ? *k.wheel_separation_m
-                                                  : kTrackPerBase * *k.wheelbase_m;
-    if (!k.traction_track_width_m && !k.wheel_separation_m) {
-      assume("a track of " + digits4(track) + " m");
-    }
-    k.traction_track_width_m = track;
+    const double track = said_track();
     const bool made = find("front") == nullptr;
     RobotWheel& front = ensure("front");
     place(front, *k.wheelbase_m, 0);

@@ -6,6 +6,7 @@
 #include "common/json/json.h"
 #include "master/store/answer_store.h"
 #include "master/store/run_lock.h"
+#include "master/store/run_status.h"
 
 namespace gapfarm {
 namespace {
@@ -84,15 +85,6 @@ std::filesystem::path answer_file(const std::filesystem::path& folder) {
 }
 
 Json to_json(const CommandRecord& record) {
-  Json workers = Json::array();
-  for (const StoredWorker& worker : record.workers) {
-    workers.push_back({{"name", worker.name},
-                       {"state", worker.state},
-                       {"jobs", worker.jobs},
-                       {"host", worker.host},
-                       {"finished", worker.finished},
-                       {"rate_per_s", worker.rate_per_s}});
-  }
   Json json;
   json["command"] = record.command;
   json["state"] = record.state;
@@ -113,7 +105,7 @@ Json to_json(const CommandRecord& record) {
   json["remembered"] = record.remembered;
   json["simulated"] = record.simulated;
   json["waiting"] = record.waiting;
-  json["workers"] = std::move(workers);
+  json["workers"] = workers_json(record.workers);
   json["began"] = record.began_unix_s;
   json["heartbeat"] = record.heartbeat_unix_s;
   json["pid"] = record.pid;

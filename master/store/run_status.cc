@@ -94,16 +94,20 @@ Result<RunStatus> run_status(const RunReader& reader, double now_unix_s) {
   return status;
 }
 
-Json to_json(const RunStatus& status) {
-  Json workers = Json::array();
-  for (const StoredWorker& worker : status.progress.workers) {
-    workers.push_back({{"name", worker.name},
-                       {"state", worker.state},
-                       {"jobs", worker.jobs},
-                       {"host", worker.host},
-                       {"finished", worker.finished},
-                       {"rate_per_s", worker.rate_per_s}});
+Json workers_json(const std::vector<StoredWorker>& workers) {
+  Json json = Json::array();
+  for (const StoredWorker& worker : workers) {
+    json.push_back({{"name", worker.name},
+                    {"state", worker.state},
+                    {"jobs", worker.jobs},
+                    {"host", worker.host},
+                    {"finished", worker.finished},
+                    {"rate_per_s", worker.rate_per_s}});
   }
+  return json;
+}
+
+Json to_json(const RunStatus& status) {
   Json json;
   json["state"] = run_state_name(status.state);
   json["stop_reason"] = status.stop_reason;
@@ -116,7 +120,7 @@ Json to_json(const RunStatus& status) {
   json["rate_per_s"] = status.rate_per_s;
   json["time_left_s"] = number_or_null(status.time_left_s);
   json["digest"] = status.digest;
-  json["workers"] = std::move(workers);
+  json["workers"] = workers_json(status.progress.workers);
   json["quarantined"] = status.quarantined;
   Json& incidents = json["incidents"] = Json::array();
   for (const Incident& incident : status.incidents) incidents.push_back(to_json(incident));

@@ -37,6 +37,7 @@ struct RunStatus {
 Result<RunStatus> run_status(const RunReader& reader, double now_unix_s);
 
 // docs/formats.md, "Status".
+nlohmann::ordered_json workers_json(const std::vector<StoredWorker>& workers);
 nlohmann::ordered_json to_json(const RunStatus& status);
 
 }  // namespace gapfarm

@@ -12,6 +12,7 @@
 #include "common/base/build_info.h"
 #include "common/base/host.h"
 #include "common/json/json.h"
+#include "master/store/run_status.h"
 #include "master/store/schema.h"
 
 namespace gapfarm {
@@ -48,19 +49,6 @@ std::string operator_json(const StoredGeneration& generation) {
   Json json = Json::object();
   for (const auto& [name, probability] : generation.operator_probabilities) {
     json[name] = probability;
-  }
-  return json_text(json);
-}
-
-std::string workers_json(const std::vector<StoredWorker>& workers) {
-  Json json = Json::array();
-  for (const StoredWorker& worker : workers) {
-    json.push_back({{"name", worker.name},
-                    {"host", worker.host},
-                    {"state", worker.state},
-                    {"jobs", worker.jobs},
-                    {"finished", worker.finished},
-                    {"rate_per_s", worker.rate_per_s}});
   }
   return json_text(json);
 }
@@ -308,7 +296,7 @@ Status RunStore::set_progress(const Progress& progress) {
   update->bind(5, unix_now_s()).bind(6, progress.rate_per_s).bind(7, progress.time_left_s);
   update->bind(8, static_cast<std::int64_t>(progress.done));
   update->bind(9, static_cast<std::int64_t>(progress.total));
-  update->bind_text(10, workers_json(progress.workers));
+  update->bind_text(10, json_text(workers_json(progress.workers)));
   update->bind(11, static_cast<std::int64_t>(epoch_));
   FarmTally farm = farm_before_;
   farm += progress.farm;
