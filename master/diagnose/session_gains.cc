@@ -17,7 +17,6 @@ namespace {
 constexpr std::size_t kFewestTrials = 10;  // of a session that tells anything
 constexpr double kFarSquared = 11.5;       // squared distance with 3 degrees of freedom: one in 110
 constexpr double kLeastSpread = 0.004, kMostSpread = 0.3, kSpreadStep = 1.08;
-constexpr double kInterval_nats = 1.353;  // half of chi-squared's 90 % with one degree of freedom
 constexpr int kReweightings = 3;
 
 Eigen::Vector3d of_gain(const ResidualTrial& trial) { return trial.left + trial.right; }
@@ -169,20 +168,19 @@ SpreadCurve curve_of(const SessionSums& sums) {
   return curve;
 }
 
+// With the interval that holds nine tenths of the likelihood, equal steps of the logarithm alike:
+// for gains that are known it is chi-squared's.
 Estimate told_spread(const SpreadCurve& curve) {
-  Estimate e{"spread", curve.spread[curve.best], 0, kMostSpread, "-"};
-  const double least = curve.nats[curve.best] - kInterval_nats;
-  for (std::size_t k = curve.best; k-- > 0;) {
-    if (curve.nats[k] >= least) continue;
-    e.lo = curve.spread[k];
-    break;
+  std::vector<double> below;
+  double sum = 0;
+  for (const double nats : curve.nats) {
+    below.push_back(sum += std::exp(nats - curve.nats[curve.best]));
   }
-  for (std::size_t k = curve.best; k < curve.nats.size(); ++k) {
-    if (curve.nats[k] >= least) continue;
-    e.hi = curve.spread[k];
-    break;
-  }
-  return e;
+  const auto quantile_at = [&](double share) {
+    const auto found = std::lower_bound(below.begin(), below.end(), share * sum);
+    return curve.spread[static_cast<std::size_t>(found - below.begin())];
+  };
+  return {"spread", curve.spread[curve.best], quantile_at(0.05), quantile_at(0.95), "-"};
 }
 
 }  // namespace
