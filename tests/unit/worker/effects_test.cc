@@ -83,13 +83,15 @@ TEST(EffectTable, HooksBelongToTheEffectsStage) {
       const EffectBehaviour& b = *behaviour_of(effect.name);
       const bool camera = b.observe || b.reading || b.place || b.start_turns;
       EXPECT_EQ(camera, effect.stage == EffectStage::kCamera) << b.name;
-      if (b.drive || b.branches) {
+      if (b.drive || b.branches || b.session_spread) {
         EXPECT_EQ(effect.stage, EffectStage::kDrive) << b.name;
       }
       if (b.floor || b.settings) {
         EXPECT_EQ(effect.stage, EffectStage::kFloor) << b.name;
       }
-      EXPECT_TRUE(camera || b.drive || b.branches || b.floor || b.settings || b.push) << b.name;
+      EXPECT_TRUE(camera || b.drive || b.branches || b.floor || b.settings || b.push ||
+                  b.session_spread)
+          << b.name;
       EXPECT_EQ(b.observe != nullptr, b.recover != nullptr) << b.name;
       EXPECT_EQ(b.place != nullptr, b.unplace != nullptr) << b.name;
       EXPECT_EQ(b.branches != nullptr, b.draw != nullptr) << b.name;
