@@ -35,11 +35,6 @@ double total_gain(const std::vector<EffectCandidate>& chosen) {
   return sum;
 }
 
-// Whether two signatures of one kind are of two such things.
-bool are_two(const Signature& a, const Signature& b) {
-  return is_seam(a.effect) ? are_two_seams(a, b) : are_two_patches(patch_of(a), patch_of(b));
-}
-
 bool is_second(const EffectCandidate& c) {
   return kind_of(c.signature.effect) != c.signature.effect;
 }
@@ -85,7 +80,8 @@ std::string Selector::offered_as(const Signature& s, const std::set<std::string>
                                  const std::vector<EffectCandidate>& beside) const {
   if (!without.count(s.effect)) return s.effect;
   const std::string second = second_of(s.effect);
-  if (second.empty() || !may_be_second(second, without)) return "";
+  const auto are_two = study_->subject->effects->row(s.effect).are_two;
+  if (second.empty() || are_two == nullptr || !may_be_second(second, without)) return "";
   for (const EffectCandidate& first : beside) {
     if (first.signature.effect == s.effect && are_two(first.signature, s)) return second;
   }

@@ -72,6 +72,7 @@ EffectDiagnosis first_seam() {
       .ambiguity = seam_ambiguity,
       .places = {{"position", -1}},
       .told_by = {"axis", "position"},
+      .are_two = are_two_seams,
       .strays = strays_at_line,
       .words = {"Beyond a seam at %a = %1 the poses are shifted by %2 in x and %3 in y",
                 {{"position", 1, " m"}, {"offset_x", 1000, " mm"}, {"offset_y", 1000, " mm"}}},
@@ -81,20 +82,11 @@ EffectDiagnosis first_seam() {
   };
 }
 
-// Its marks are the first one's, which the search offers again.
-EffectDiagnosis second_seam() {
-  EffectDiagnosis row = first_seam();
-  row.effect = "camera_seam_2";
-  row.marks = nullptr;
-  row.words.sentence =
-      "Beyond a second seam at %a = %1 the poses are shifted by %2 in x and %3 in y, too";
-  row.short_words.reset();
-  return row;
-}
-
 }  // namespace
 
 extern const EffectDiagnosis kCameraSeam = first_seam();
-extern const EffectDiagnosis kCameraSeam2 = second_seam();
+extern const EffectDiagnosis kCameraSeam2 = second_of_a_kind(
+    first_seam(), "camera_seam_2",
+    "Beyond a second seam at %a = %1 the poses are shifted by %2 in x and %3 in y, too");
 
 }  // namespace gapfarm

@@ -45,6 +45,14 @@ const WorldPlace* place_of(const EffectDiagnoses& effects, const Parameter& p) {
   return found == places.end() ? nullptr : &*found;
 }
 
+EffectDiagnosis second_of_a_kind(EffectDiagnosis first, const char* effect, const char* sentence) {
+  first.effect = effect;
+  first.marks = nullptr;
+  first.words.sentence = sentence;
+  first.short_words.reset();
+  return first;
+}
+
 void start_polar(const Polar& polar, const EffectStart& at, std::map<std::string, double>* values) {
   const Eigen::VectorXd& c = at.coefficients;
   const double strength = std::hypot(c[0], c[1]);

@@ -101,6 +101,8 @@ struct EffectDiagnosis {
   // Places in the world, and the keys that tell where a second one would be.
   std::vector<WorldPlace> places = {};
   std::vector<const char*> told_by = {};
+  // Of an effect of which there may be two: whether two marks of it are of two such things.
+  bool (*are_two)(const Signature& a, const Signature& b) = nullptr;
   // The key of a strength that may end on its bound: beyond it the motion hardly changes any more.
   const char* saturates = nullptr;
   // Whether it makes single trials stray, as slips would.
@@ -134,6 +136,10 @@ const EffectDiagnosis& effect_diagnosis(std::string_view effect);
 
 // The place that a parameter of an effect is; null: none.
 const WorldPlace* place_of(const EffectDiagnoses& effects, const Parameter& p);
+
+// The row of a second one of a kind, whose marks are the first one's, which the search offers
+// again.
+EffectDiagnosis second_of_a_kind(EffectDiagnosis first, const char* effect, const char* sentence);
 
 // Strength and direction from the cosine's and sine's coefficients.
 void start_polar(const Polar& polar, const EffectStart& at, std::map<std::string, double>* values);

@@ -50,6 +50,8 @@ EffectDiagnosis first_patch() {
       .search_error = patch_search_error,
       .places = {{"x", 0}, {"y", 1}},
       .told_by = {"x", "y", "radius"},
+      .are_two = [](const Signature& a,
+                    const Signature& b) { return are_two_patches(patch_of(a), patch_of(b)); },
       .saturates = "ratio",
       .strays = strays_at_edge,
       .words = {"A patch of floor around x = %2, y = %3 of the world, of radius %4 has %1 times "
@@ -60,20 +62,12 @@ EffectDiagnosis first_patch() {
   };
 }
 
-// The search offers discs away from the first as this one.
-EffectDiagnosis second_patch() {
-  EffectDiagnosis row = first_patch();
-  row.effect = "friction_patch_2";
-  row.words.sentence =
-      "A second patch of floor around x = %2, y = %3 of the world, of radius %4 has %1 times the "
-      "friction";
-  row.short_words.reset();
-  return row;
-}
-
 }  // namespace
 
 extern const EffectDiagnosis kFrictionPatch = first_patch();
-extern const EffectDiagnosis kFrictionPatch2 = second_patch();
+extern const EffectDiagnosis kFrictionPatch2 = second_of_a_kind(
+    first_patch(), "friction_patch_2",
+    "A second patch of floor around x = %2, y = %3 of the world, of radius %4 has %1 times the "
+    "friction");
 
 }  // namespace gapfarm
