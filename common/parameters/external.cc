@@ -23,8 +23,6 @@ constexpr EffectNeed kEffectNeeds[] = {
     {"pose_latency", kExternalPath},
 };
 constexpr const char* kOfTheBuild[] = {"com_offset"};
-// What a request has no place for: a program is told one patch.
-constexpr const char* kNotTold[] = {"friction_patch_2"};
 
 std::vector<Parameter> noise_rows() {
   std::vector<Parameter> rows;
@@ -36,9 +34,8 @@ bool can_be_applied(const Effect& effect, unsigned inputs) {
   for (const char* name : kOfTheBuild) {
     if (effect.kind() == name) return false;
   }
-  for (const char* name : kNotTold) {
-    if (effect.name == name) return false;
-  }
+  // A request has a place for one of what is on the floor.
+  if (effect.stage == EffectStage::kFloor && !effect.repeats.empty()) return false;
   for (const EffectNeed& need : kEffectNeeds) {
     if (effect.kind() == need.effect) return (inputs & need.inputs) == need.inputs;
   }
