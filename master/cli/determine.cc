@@ -29,16 +29,7 @@ struct DetermineCommand {
 };
 
 // The problem at the model's values, scored by likelihood whatever it was tuned by.
-Result<Problem> problem_at(const Config& config, const Model& model) {
-  if (model.scenario != config.problem.scenario) {
-    return Error{"the model is one of scenario '" + model.scenario + "', the config of '" +
-                 config.problem.scenario + "'"};
-  }
-  if (model.robot_file != config.problem.robot_file) {
-    return Error{
-        "the model is one of another robot than the config's; give the config that it was "
-        "made with"};
-  }
+Problem problem_at(const Config& config, const Model& model) {
   Problem problem = config.problem;
   problem.values = model.values;
   problem.log = shifted(std::move(problem.log), -model.frame_x_m, -model.frame_y_m);
@@ -108,6 +99,9 @@ Result<Problem> open_problem(DetermineCommand& command, const std::optional<Conf
   command.outputs.reads(command.model);
   command.outputs.reads((std::filesystem::path(command.model) / "model.toml").string());
   if (Status s = command.outputs.plan(command.out); !s) return s.error();
+  if (Status s = check_same_robot(*model, command.model, *config, command.config); !s) {
+    return s.error();
+  }
   return problem_at(*config, *model);
 }
 

@@ -177,10 +177,8 @@ Status apply_options(const DiagnoseCommand& command, Config& config, std::vector
     if (Status s = check_no_residual(*model, command.model, "a base to diagnose"); !s) {
       return s.error();
     }
-    if (model->scenario != config.problem.scenario ||
-        model->robot_file != config.problem.robot_file) {
-      return Error{command.model + ": is a model of another scenario or robot than " +
-                   command.config + "; give the config that it was made with"};
+    if (Status s = check_same_robot(*model, command.model, config, command.config); !s) {
+      return s.error();
     }
     config.problem.values = model->values;
     frame = {model->frame_x_m, model->frame_y_m};

@@ -8,6 +8,15 @@
 
 namespace gapfarm {
 
+Status check_same_robot(const Model& model, const std::string& path, const Config& config,
+                        const std::string& config_path) {
+  if (model.scenario == config.problem.scenario && model.robot_file == config.problem.robot_file) {
+    return {};
+  }
+  return Error{path + ": is a model of another scenario or robot than " + config_path +
+               "; give the config that it was made with"};
+}
+
 Status check_no_residual(const Model& model, const std::string& path, const std::string& user) {
   if (model.residual.empty()) return {};
   return Error{path +

@@ -3,6 +3,7 @@
 
 #include "common/base/build_info.h"
 #include "common/trials/files.h"
+#include "tests/integration/demo_config.h"
 #include "tests/integration/run_program.h"
 
 namespace gapfarm {
@@ -131,6 +132,25 @@ TEST(CliUsage, ADryRunOfWhatGoesOnFromARunLeavesItAsItIs) {
     EXPECT_THAT(dry.out, HasSubstr(would));
     EXPECT_FALSE(std::filesystem::exists(out)) << words[0];
     EXPECT_EQ(text_of(run + "/run.sqlite"), store) << words[0];
+  }
+}
+
+TEST(CliUsage, AModelOfAnotherRobotIsNoPointToLookFrom) {
+  const TemporaryFolder folder;
+  const std::string run = folder / "run";
+  ASSERT_EQ(gapfarm_command({"evolve", GAPFARM_SOURCE_DIR "/configs/demo.toml", "--out", run,
+                             "--generations", "1", "--population", "4", "--workers", "1"})
+                .exit_code,
+            0);
+  folder.write("robot.toml", text_of(GAPFARM_SOURCE_DIR "/configs/robots/srv1.toml"));
+  const std::string other =
+      folder.write("other.toml", demo_config(4, 0, "", "[robot]\nfile = \"robot.toml\"\n"));
+  for (const char* command : {"determine", "diagnose"}) {
+    const Finished refused =
+        gapfarm_command({command, other, "--model", run + "/model.toml", "--out", folder / "out"});
+    EXPECT_EQ(refused.exit_code, 2) << command;
+    EXPECT_THAT(refused.err, HasSubstr("is a model of another scenario or robot than " + other));
+    EXPECT_FALSE(std::filesystem::exists(folder / "out")) << command;
   }
 }
 
