@@ -96,7 +96,7 @@ std::vector<View> untwisted(std::vector<View> starts, const std::vector<StartTur
 // Whether what trials share says too little of one of them.
 bool simulate_alone(const Srv1Robot& robot, const ConditionGroup& group, const GroupMotion& motion,
                     const Situation& situation, const Pose& X_SE, double scale) {
-  if (motion.jumps_over_heading()) return true;
+  if (motion.better_alone()) return true;
   // A lone trial's reference starts at its own heading.
   const bool by_heading = robot.effects().motion_context() & kStartHeading;
   if (by_heading && group.few() && group.trials > 1) return true;

@@ -42,7 +42,7 @@ Pose GroupMotion::end(double heading_rad, double session_time_s) const {
   return reference_ * Pose{d[0], d[1], d[2]};
 }
 
-bool GroupMotion::jumps_over_heading() const { return heading_error_ > kHeadingJump; }
+bool GroupMotion::better_alone() const { return better_alone_ || heading_error_ > kHeadingJump; }
 
 Pose GroupMotion::spread_end(const Pose& X_SE) const {
   return X_SE * Pose{drive_shift_[0], drive_shift_[1], drive_shift_[2]};
@@ -66,10 +66,13 @@ class GroupSimulation {
     return true;
   }
 
-  // Doubles the headings until every second one predicts the others.
+  // Doubles the headings until every second one predicts the others, or more would have to be
+  // simulated than there are trials.
   bool headings() {
     auto& values = result_.motion.by_heading_;
     for (std::size_t n = kFewestHeadings; n <= kMostHeadings; n *= 2) {
+      result_.motion.better_alone_ = !values.empty() && n / 2 > group_.trials;
+      if (result_.motion.better_alone_) break;
       std::vector<Eigen::Vector3d> finer(n);
       const std::vector<double> nodes = heading_nodes(n);
       for (std::size_t k = 0; k < n; ++k) {

@@ -48,9 +48,9 @@ class GroupMotion {
   // Greatest difference between half the heading nodes' interpolant and the other half, in m and
   // rad taken alike; the error of the whole set is far less where the motion is smooth.
   double heading_error() const { return heading_error_; }
-  // Whether it is not: end() is then off by as much as heading_error(), and a trial is better
-  // simulated by itself.
-  bool jumps_over_heading() const;
+  // Whether it is not, or would take more nodes than there are trials: end() is then off by as much
+  // as heading_error(), and a trial is better simulated by itself.
+  bool better_alone() const;
   // Mean end over the drive noise of a trial whose motion without noise ends at X_SE.
   Pose spread_end(const Pose& X_SE) const;
   // Distance (m) of a place in the start frame from where the turning centre goes.  Effects of
@@ -68,6 +68,7 @@ class GroupMotion {
   std::vector<Branch> branches_;
   MotionFacts facts_;
   double heading_error_ = 0;
+  bool better_alone_ = false;
   std::vector<Eigen::Vector2d> way_;  // with effects of place only
 };
 

@@ -236,7 +236,7 @@ TEST(HeadingGrid, AgreesWithDirectSimulationWithinItsCheckedError) {
       group.trials = 100;  // enough to share motions
       const GroupResult result = simulate_group(robot, group, true, {});
       ASSERT_EQ(result.outcome, v1::OK);
-      if (result.motion.jumps_over_heading()) continue;  // simulated trial by trial instead
+      if (result.motion.better_alone()) continue;  // simulated trial by trial instead
       EXPECT_LE(worst_off_the_nodes(robot, group, result.motion),
                 std::max(result.motion.heading_error(), 2e-4))
           << c.name << " " << changes[0].first << " " << changes[0].second;
@@ -253,8 +253,20 @@ TEST(HeadingGrid, SaysWhenNoInterpolationWillDo) {
   group.trials = 100;
   const GroupResult result = simulate_group(robot, group, true, {});
   ASSERT_EQ(result.outcome, v1::OK);
-  EXPECT_TRUE(result.motion.jumps_over_heading());
+  EXPECT_TRUE(result.motion.better_alone());
   EXPECT_GT(worst_off_the_nodes(robot, group, result.motion), 1e-2);
+}
+
+// Simulating each trial is exact, so more nodes than trials are only simulated where eight do not
+// do and cost no more.
+TEST(HeadingGrid, SimulatesNoMoreNodesThanTrials) {
+  Srv1Robot rough(noiseless(nap(0.5, 2.5)));
+  ConditionGroup group;
+  group.drive = driven("wide_ccw");
+  group.trials = 10;
+  EXPECT_TRUE(simulate_group(rough, group, true, {}).motion.better_alone());
+  Srv1Robot smooth(noiseless(tilt(0.01, 0.3)));
+  EXPECT_FALSE(simulate_group(smooth, group, true, {}).motion.better_alone());
 }
 
 }  // namespace
