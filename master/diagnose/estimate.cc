@@ -16,7 +16,9 @@ namespace gapfarm {
 namespace {
 
 constexpr int kMostHalvings = 4;
-constexpr double kSettled = 1;        // of the objective (twice nats): less is no progress
+// Of the objective (twice nats): less is no progress, where the noise is as large as it was taken
+// for.
+constexpr double kSettled = 1;
 constexpr double kMostOfRange = 0.3;  // of a parameter's range, that one step may go
 // Of a finite difference, root mean square in standard deviations a row.
 constexpr double kLeastMove = 1e-4, kMostMove = 5, kGoodMove = 0.3;
@@ -63,7 +65,7 @@ Status predict(Predictor& predictor, const Study& study, JointFit* fit) {
 
 // Steps that moved the ends by many standard deviations, or by next to nothing, are taken again so
 // that they move them by a part of one: what a small change is, the motion says, not the bounds.
-Status rescale(Predictor& predictor, const Study& study, const JointFit& fit,
+Status rescale(Predictor& predictor, const Study& study, const SlopePoint& from,
                const std::vector<SlopeRequest>& requests,
                std::vector<std::optional<Slope>>* slopes) {
   std::vector<SlopeRequest> again;
@@ -80,7 +82,7 @@ Status rescale(Predictor& predictor, const Study& study, const JointFit& fit,
     of.push_back(k);
   }
   if (again.empty()) return {};
-  auto better = slopes_at(predictor, fit.at, fit.ends, again);
+  auto better = slopes_at(predictor, from.at, from.ends, again);
   if (!better) return better.error();
   for (std::size_t j = 0; j < of.size(); ++j) {
     if ((*better)[j]) (*slopes)[of[j]] = std::move((*better)[j]);
@@ -96,9 +98,12 @@ Status differentiate(Predictor& predictor, const Study& study, JointFit* fit) {
   }
   fit->jacobian.setZero(static_cast<Eigen::Index>(3 * study.size()),
                         static_cast<Eigen::Index>(fit->parameters.size()));
-  auto slopes = slopes_at(predictor, fit->at, fit->ends, requests);
+  if (requests.empty()) return {};
+  const auto from = slope_point(predictor, study, fit->at, fit->ends);
+  if (!from) return from.error();
+  auto slopes = slopes_at(predictor, from->at, from->ends, requests);
   if (!slopes) return slopes.error();
-  if (Status s = rescale(predictor, study, *fit, requests, &*slopes); !s) return s;
+  if (Status s = rescale(predictor, study, *from, requests, &*slopes); !s) return s;
   for (std::size_t k = 0; k < slopes->size(); ++k) {
     if (!(*slopes)[k]) continue;
     fit->jacobian.col(static_cast<Eigen::Index>(k)) = study.whiten(*(*slopes)[k]);
@@ -188,6 +193,45 @@ void step(const Problem& problem, const Study& study, const Eigen::MatrixXd& nui
   }
 }
 
+// Residuals that are larger than their noise tell as much less.
+double settled_within(const Study& study, double misfit) {
+  return kSettled * std::max(1.0, misfit / static_cast<double>(3 * study.size()));
+}
+
+struct Moved {
+  JointFit fit;
+  double misfit = 0;
+};
+
+// One step downhill, with the derivatives of before; where there is none, the fit with the standard
+// errors found here.  A step may lead past the optimum, or to where the robot nearly falls over:
+// half of it, then.
+Result<Moved> moved_on(Predictor& predictor, const Study& study, const Eigen::MatrixXd& nuisances,
+                       double best, const JointFit& fit) {
+  Moved next{fit, 0};
+  step(predictor.problem(), study, nuisances, &next.fit);
+  const std::vector<FittedParameter> whole = next.fit.parameters;
+  for (int half = 0;; ++half) {
+    const Status moved = predict(predictor, study, &next.fit);
+    if (moved) next.misfit = misfit_of(study, next.fit, nuisances);
+    if (moved && next.misfit <= best) return next;
+    if (!moved && moved.error().code != ErrorCode::kSimulation) return moved.error();
+    const bool level = moved && next.misfit < best + settled_within(study, best);
+    if (level || half == kMostHalvings) break;
+    for (std::size_t k = 0; k < whole.size(); ++k) {
+      FittedParameter& p = next.fit.parameters[k];
+      const double last = fit.parameters[k].value;
+      const Parameter& row = predictor.problem().table()[p.row];
+      next.fit.at[p.row] = p.value = within(row, last + way_between(row, last, p.value) / 2);
+    }
+  }
+  next = {fit, best};
+  for (std::size_t k = 0; k < whole.size(); ++k) {
+    next.fit.parameters[k].standard_error = whole[k].standard_error;
+  }
+  return next;
+}
+
 // To the parameters that fit without fold `f`, to first order.
 Eigen::VectorXd step_without(const Study& study, const JointFit& fit,
                              const std::vector<std::size_t>& fold_of, std::size_t f) {
@@ -273,38 +317,14 @@ Result<JointFit> fit_jointly(Predictor& predictor, const Study& study,
   if (fit.parameters.empty()) return fit;
   double best = misfit_of(study, fit, nuisances);
   for (int round = 0; round < rounds; ++round) {
-    JointFit next = fit;
-    step(predictor.problem(), study, nuisances, &next);
-    const std::vector<FittedParameter> whole = next.parameters;
-    double now = 0;
-    // A step may lead past the optimum, or to where the robot nearly falls over: half of it, then.
-    for (int half = 0;; ++half) {
-      Status moved = predict(predictor, study, &next);
-      if (moved) now = misfit_of(study, next, nuisances);
-      if (moved && now <= best) {
-        moved = differentiate(predictor, study, &next);
-        if (moved) break;
-      }
-      if (!moved && moved.error().code != ErrorCode::kSimulation) return moved.error();
-      const bool level = moved && now < best + kSettled;
-      if (level || half == kMostHalvings) {
-        // No way on: the present values stay, with the standard errors found here.
-        for (std::size_t k = 0; k < whole.size(); ++k) {
-          fit.parameters[k].standard_error = whole[k].standard_error;
-        }
-        return fit;
-      }
-      for (std::size_t k = 0; k < next.parameters.size(); ++k) {
-        FittedParameter& p = next.parameters[k];
-        const double last = fit.parameters[k].value;
-        const Parameter& row = predictor.problem().table()[p.row];
-        next.at[p.row] = p.value = within(row, last + way_between(row, last, p.value) / 2);
-      }
-    }
-    const bool settled = now > best - kSettled;
-    best = now;
-    fit = std::move(next);
+    auto moved = moved_on(predictor, study, nuisances, best, fit);
+    if (!moved) return moved.error();
+    const bool settled = moved->misfit > best - settled_within(study, best);
+    best = moved->misfit;
+    fit = std::move(moved->fit);
+    // So near, the derivatives of before will do.
     if (settled) break;
+    if (Status s = differentiate(predictor, study, &fit); !s) return s.error();
   }
   return fit;
 }

@@ -1,5 +1,9 @@
 #include "master/diagnose/slopes.h"
 
+#include <utility>
+
+#include "master/diagnose/subject.h"
+
 namespace gapfarm {
 namespace {
 
@@ -15,6 +19,24 @@ Slope slope_between(const std::vector<Pose>& from, const std::vector<Pose>& to, 
 }
 
 }  // namespace
+
+Result<SlopePoint> slope_point(Predictor& predictor, const Study& study, const Overrides& at,
+                               const std::vector<Pose>& ends) {
+  const double rate = study.subject->slope_rate_hz;
+  if (rate == 0) return SlopePoint{at, ends};
+  const std::size_t row = study.table->row("step_rate");
+  const auto own = at.find(row);
+  if ((own != at.end() ? own->second : predictor.problem().values[row]) <= rate) {
+    return SlopePoint{at, ends};
+  }
+  SlopePoint coarse{at, {}};
+  coarse.at[row] = rate;
+  auto there = predictor.attempt({{coarse.at, {}}});
+  if (!there) return there.error();
+  if (!there->front()) return SlopePoint{at, ends};
+  coarse.ends = std::move(*there->front());
+  return coarse;
+}
 
 Result<std::vector<std::optional<Slope>>> slopes_at(Predictor& predictor, const Overrides& at,
                                                     const std::vector<Pose>& ends,

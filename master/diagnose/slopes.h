@@ -7,6 +7,7 @@
 
 #include "common/base/result.h"
 #include "master/diagnose/predictor.h"
+#include "master/diagnose/study.h"
 
 namespace gapfarm {
 
@@ -17,6 +18,18 @@ struct SlopeRequest {
 
 // Change of every trial's end a unit of the parameter.
 using Slope = std::vector<Eigen::Vector3d>;
+
+// Where changes of the motion are simulated, and the ends there.
+struct SlopePoint {
+  Overrides at;
+  std::vector<Pose> ends;
+};
+
+// `at`, whose ends are `ends`, with the subject's slope_rate_hz where that is coarser: steps of
+// twice the length move the robot a little differently, but alike from point to point.  Errors: the
+// farm's.
+Result<SlopePoint> slope_point(Predictor& predictor, const Study& study, const Overrides& at,
+                               const std::vector<Pose>& ends);
 
 // At `at`, whose ends are `ends`, in the axes of those.  One-sided: upward, or downward where the
 // bounds or the simulation end above, with a tenth of the step where neither can be simulated; none

@@ -58,6 +58,9 @@ struct DiagnosisSubject {
   // Standard deviations beyond which a trial that nothing smooth explains counts no more; 0: none.
   double farthest;
   double noise_tail;  // of refit_drive_noise()
+  // Steps a second that do for a fit's derivatives; 0: the problem's own.  Its residuals are always
+  // the problem's own.
+  double slope_rate_hz = 0;
   // Whether strong effects are fitted with the base beside them, and looked for again from the base
   // and the noise that they leave: where the base was tuned without them, both may be far off.
   bool base_moves;

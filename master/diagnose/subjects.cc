@@ -90,6 +90,12 @@ DiagnosisSubject drive_subject(const char* scenario, const ParameterTable& table
   return s;
 }
 
+DiagnosisSubject srv1_subject() {
+  DiagnosisSubject s = drive_subject("srv1", srv1_table());
+  s.slope_rate_hz = 60;
+  return s;
+}
+
 }  // namespace
 
 std::shared_ptr<const DiagnosisSubject> diagnosis_subject(const Problem& problem) {
@@ -98,7 +104,7 @@ std::shared_ptr<const DiagnosisSubject> diagnosis_subject(const Problem& problem
     return std::make_shared<const DiagnosisSubject>(drive_subject("external", problem.table()));
   }
   static const std::array<std::shared_ptr<const DiagnosisSubject>, 2> subjects = {
-      std::make_shared<const DiagnosisSubject>(drive_subject("srv1", srv1_table())),
+      std::make_shared<const DiagnosisSubject>(srv1_subject()),
       std::make_shared<const DiagnosisSubject>(push_subject())};
   const auto found = std::find_if(subjects.begin(), subjects.end(), [&](const auto& subject) {
     return problem.scenario == subject->scenario;

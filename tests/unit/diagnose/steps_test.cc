@@ -1,9 +1,12 @@
 // The steps of a diagnosis one by one, on data whose answer is known.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <Eigen/Core>
 #include <cmath>
 #include <functional>
+#include <set>
+#include <utility>
 
 #include "master/diagnose/estimate.h"
 #include "master/diagnose/nuisance.h"
@@ -22,7 +25,8 @@ Eigen::MatrixXd no_columns(const Study& study) {
 
 // A log that a robot this much faster than the config's has driven, beside the config's.
 struct Driven {
-  explicit Driven(double faster) : problem(kinematic_log(60)), predictor(farm, problem) {
+  explicit Driven(double faster, KinematicFarm::Fails fails = {})
+      : farm(std::move(fails)), problem(kinematic_log(60)), predictor(farm, problem) {
     const std::size_t speed = row_of(Srv1::kFullSpeed);
     for (Trial& t : problem.log.trials) {
       const Twist way = log(between(t.X_WS, t.X_WE));
@@ -73,6 +77,26 @@ TEST(FitJointly, NuisancesTakeWhatTheyMay) {
   ASSERT_TRUE(nuisances.ok()) << nuisances.error().message;
   EXPECT_LT(misfit_of(d.study, *fit, *nuisances),
             0.1 * misfit_of(d.study, *fit, no_columns(d.study)));
+}
+
+// Derivatives may be of coarser steps; what the fit ends with may not, and where coarser steps
+// cannot be simulated the log's own do.
+TEST(FitJointly, OnlyDerivativesAreOfCoarserSteps) {
+  for (const bool fails : {false, true}) {
+    const std::size_t rate = row_of(Srv1::kStepRate);
+    std::set<double> rates;
+    Driven d(1.08, [&](const ParameterValues& values) {
+      rates.insert(values[rate]);
+      return fails && values[rate] == 60;
+    });
+    EXPECT_THAT(rates, ::testing::ElementsAre(d.problem.values[rate]));
+    const auto fit = fit_jointly(d.predictor, d.study, {}, d.study.base, BaseParameters::kFitted,
+                                 no_columns(d.study), 6);
+    ASSERT_TRUE(fit.ok()) << fit.error().message;
+    EXPECT_NEAR(fit->at.at(row_of(Srv1::kFullSpeed)) / d.nominal_speed, 1.08, 2e-3);
+    EXPECT_EQ(fit->at.count(rate), 0U);
+    EXPECT_EQ(rates.count(60), 1U);
+  }
 }
 
 // Whitened rows of one column: x of each trial.
