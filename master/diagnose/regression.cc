@@ -1,6 +1,7 @@
 #include "master/diagnose/regression.h"
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <cmath>
 
 #include "common/score/algebra.h"
@@ -82,6 +83,13 @@ Eigen::VectorXd Regression::each_gain(const Eigen::MatrixXd& columns) const {
     if (own > kAbsorbed * whole) squares[j] = product[j] * product[j] / own;
   }
   return squares;
+}
+
+double Regression::gain_within(const Eigen::VectorXd& column, double least, double most) const {
+  const double own = own_squares(column), product = column.dot(left_.head(rows_));
+  if (!(own > kAbsorbed * column.squaredNorm())) return 0;
+  const double c = std::clamp(product / own, least, most);
+  return c * (2 * product - c * own);
 }
 
 double Regression::own_squares(const Eigen::VectorXd& column) const {

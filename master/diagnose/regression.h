@@ -26,6 +26,8 @@ class Regression {
   // The same where coefficients of standard deviation `expected` are nothing to speak of: what the
   // columns explain in units of what they and the noise would make of these.
   Gain gain_beyond(const Eigen::MatrixXd& columns, double expected) const;
+  // What a column would explain with a coefficient no farther than these.
+  double gain_within(const Eigen::VectorXd& column, double least, double most) const;
   // Squares that each column would explain beyond the basis were it alone.
   Eigen::VectorXd each_gain(const Eigen::MatrixXd& columns) const;
   // What a column's squares have beyond the basis.

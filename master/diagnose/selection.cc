@@ -271,7 +271,8 @@ void Selector::recount(const Study& study, const Regression& nuisances) {
 
 Result<std::vector<ChosenEffect>> Selector::select(const std::vector<Signature>& first,
                                                    double first_gain,
-                                                   const Relinearise& relinearise) {
+                                                   const Relinearise& relinearise,
+                                                   std::size_t most) {
   first_gain_ = first_gain;
   relinearised_ = 0;
   steps_.clear();
@@ -282,7 +283,7 @@ Result<std::vector<ChosenEffect>> Selector::select(const std::vector<Signature>&
   // not tried again.
   std::set<std::set<std::string>> seen;
   std::set<std::string> rejected;
-  while (chosen.size() < kMostEffects) {
+  while (chosen.size() < most) {
     seen.insert(names_of(chosen));
     std::set<std::string> used = names_of(chosen);
     used.insert(taken.begin(), taken.end());

@@ -86,9 +86,10 @@ class Selector {
   Result<EffectCandidate> again(const Regression& explained, const std::string& effect);
 
   // `first` are explained before anything else (a late camera, say) and gained `first_gain` nats.
-  // `relinearise` fits what was chosen so far.
+  // `relinearise` fits what was chosen so far; no more than `most` are chosen.
   Result<std::vector<ChosenEffect>> select(const std::vector<Signature>& first, double first_gain,
-                                           const Relinearise& relinearise);
+                                           const Relinearise& relinearise,
+                                           std::size_t most = kMostEffects);
 
   // From now on, only trials that this study of the same does not ignore count; `nuisances` without
   // them.
@@ -112,7 +113,8 @@ class Selector {
                         const std::optional<Patch>& beside);
   Result<std::vector<EffectCandidate>> simulate_patches(const Regression& explained,
                                                         const std::vector<Patch>& patches);
-  Status refine_patch(const Regression& explained, std::vector<EffectCandidate> discs);
+  Status refine_patch(const Regression& explained, std::vector<EffectCandidate> discs,
+                      int most_barren);
   void drop_linear_views(const Regression& explained,
                          std::map<std::string, EffectCandidate>* best) const;
   EffectCandidate refine_seam(const Regression& explained, EffectCandidate best) const;

@@ -20,6 +20,9 @@ namespace {
 constexpr double kWorthSketched = 12.5;  // of patches; where there are none it reaches 11
 // A disc that is off by half a step of the sketch shows a third of what the right one would.
 constexpr double kMostOfMoving = 3;
+// Times what a simulated disc does, or a part of it: where a fit would have more, or the opposite,
+// the data ask for no such disc.
+constexpr double kMostOfItself = 3;
 constexpr int kSeamSteps = 10;
 constexpr int kMostPatchSearches = 4, kMostSecondPatchSearches = 2;
 // The ratio is what the sketch is least sure of.
@@ -27,7 +30,9 @@ constexpr std::array<double, 3> kRatioPowers = {0.5, 1, 2};
 constexpr double kLeastMovedRatio = 0.06, kMostMovedRatio = 2.9;
 // Moves of discs: standard deviations at first, for an SRV-1, and how they go on.
 constexpr double kMove_m = 0.05, kMoveRatio = 0.4, kMovesShrink = 0.7, kLeastRadius_m = 0.05;
+constexpr double kClimbs = 1.03;  // times the gain of before
 constexpr int kMoves = 6;
+constexpr int kMostBarrenBehind = 1;  // in a row, behind what explains more
 constexpr std::size_t kMostParents = 3, kOffspring = 12;
 constexpr std::uint64_t kMovesSeed = 4;
 
@@ -36,7 +41,11 @@ bool better(const EffectCandidate& a, const EffectCandidate& b) { return a.gain 
 }  // namespace
 
 double net_gain(const Regression& explained, const Signature& s) {
-  return explained.gain(s.columns).squares / 2 - s.penalty;
+  const bool one = s.whole && s.columns.cols() == 1;
+  const double squares =
+      one ? explained.gain_within(s.columns.col(0), 1 / kMostOfItself, kMostOfItself)
+          : explained.gain(s.columns).squares;
+  return squares / 2 - s.penalty;
 }
 
 void Selector::look_for_patches() {
@@ -91,10 +100,13 @@ Result<std::vector<EffectCandidate>> Selector::simulate_patches(const Regression
 // Discs that the sketch proposes, the best first, moved to where the simulation explains most. What
 // a rim does to each drive that crosses it makes many hills, so the best few are moved at random,
 // in ever smaller steps.
-Status Selector::refine_patch(const Regression& explained, std::vector<EffectCandidate> discs) {
+Status Selector::refine_patch(const Regression& explained, std::vector<EffectCandidate> discs,
+                              int most_barren) {
   Stream stream({kMovesSeed, Purpose::kStatistics, 0, 0, 0});
   double scale = 1;
-  for (int k = 0; k < kMoves; ++k, scale *= kMovesShrink) {
+  int barren = 0;
+  for (int k = 0; k < kMoves && barren < most_barren; ++k, scale *= kMovesShrink) {
+    const double before = discs.front().gain;
     discs.resize(std::min(discs.size(), kMostParents));
     std::vector<Patch> moved;
     for (std::size_t i = 0; i < kOffspring; ++i) {
@@ -110,8 +122,10 @@ Status Selector::refine_patch(const Regression& explained, std::vector<EffectCan
     discs.insert(discs.end(), std::make_move_iterator(tried->begin()),
                  std::make_move_iterator(tried->end()));
     std::stable_sort(discs.begin(), discs.end(), better);
+    barren = discs.front().gain > kClimbs * before ? 0 : barren + 1;
   }
-  refined_patches_.push_back(patch_of(discs.front().signature));
+  // Where little was tried because something else explains more, there may be more to find later.
+  if (barren < most_barren) refined_patches_.push_back(patch_of(discs.front().signature));
   discs.resize(std::min(discs.size(), kMostParents));
   for (EffectCandidate& disc : discs) catalogue_.push_back(std::move(disc.signature));
   return {};
@@ -151,7 +165,8 @@ Status Selector::search_patches(const Regression& explained, double most_gain,
   const EffectCandidate& best = simulated->front();
   if (best.gain + best.signature.penalty < kWorthRefining) return {};
   if (kMostOfMoving * best.gain < most_gain) return {};  // its turn comes when that is explained
-  return refine_patch(explained, std::move(*simulated));
+  return refine_patch(explained, std::move(*simulated),
+                      best.gain < most_gain ? kMostBarrenBehind : kMoves + 1);
 }
 
 }  // namespace gapfarm

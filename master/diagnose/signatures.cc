@@ -8,6 +8,7 @@
 #include "master/diagnose/effects/effect_diagnosis.h"
 #include "master/diagnose/effects/patch_places.h"
 #include "master/diagnose/probes.h"
+#include "master/diagnose/slopes.h"
 #include "master/diagnose/subject.h"
 
 namespace gapfarm {
@@ -130,6 +131,10 @@ Result<std::vector<Signature>> signatures(Predictor& predictor, const Study& stu
 
 Result<std::vector<Signature>> patch_signatures(Predictor& predictor, const Study& study,
                                                 const std::vector<std::array<double, 4>>& places) {
+  std::vector<Pose> ends_without;
+  for (const ResidualTrial& trial : study.trials) ends_without.push_back(trial.X_WP);
+  const auto without = slope_point(predictor, study, study.base, ends_without);
+  if (!without) return without.error();
   std::vector<PredictionRequest> requests;
   std::vector<std::map<std::string, double>> values;
   for (const auto& [x, y, radius, ratio] : places) {
@@ -139,7 +144,8 @@ Result<std::vector<Signature>> patch_signatures(Predictor& predictor, const Stud
         request.trials.push_back(static_cast<std::uint32_t>(i));
     }
     values.push_back(patch_values({x, y, radius, ratio}));
-    request.at = base_with(predictor, study, values.back());
+    request.at = without->at;
+    for (const auto& [key, value] : values.back()) request.at[study.table->row(key)] = value;
     if (request.trials.empty()) request.trials.push_back(0);
     requests.push_back(std::move(request));
   }
@@ -151,13 +157,14 @@ Result<std::vector<Signature>> patch_signatures(Predictor& predictor, const Stud
     std::vector<Eigen::Vector3d> d(study.size(), Eigen::Vector3d::Zero());
     for (std::size_t j = 0; (*ends)[k] && j < requests[k].trials.size(); ++j) {
       const std::size_t i = requests[k].trials[j];
-      d[i] = local_difference(study.trials[i].X_WP, (*(*ends)[k])[j]);
+      d[i] = local_difference(without->ends[i], (*(*ends)[k])[j]);
     }
     Signature s;
     s.effect = kPatchEffect;
     s.columns = stack({study.whiten(d)});
     s.fixed = values[k];
     s.penalty = 6;
+    s.whole = true;
     all.push_back(std::move(s));
   }
   return all;

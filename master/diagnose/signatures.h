@@ -21,6 +21,7 @@ struct Signature {
                                         // empty: see EffectDiagnosis::start
   std::map<std::string, double> fixed;  // other parameters of the effect at this signature
   double penalty = 0.5;                 // nats that its best fit gains by luck
+  bool whole = false;  // the column is all that the effect does at `fixed`, and no slope
 };
 
 // All of the catalogue but `left_out` and what cannot be simulated: by finite differences of

@@ -55,6 +55,23 @@ TEST(Regression, ChanceGainsItsDimensions) {
   EXPECT_NEAR(sum, 4, 5 * std::sqrt(8.0 / kLogs));
 }
 
+// Where the fit would have a column many times over, or the other way round, no more is gained than
+// the column explains at the ends of what it may be.
+TEST(Regression, AColumnIsHeldToItsSize) {
+  Stream stream({4, Purpose::kTest, 0, 0, 0});
+  const Eigen::MatrixXd nuisances = random_matrix(stream, 90, 2) * 1e-9;
+  const Eigen::VectorXd column = random_matrix(stream, 90, 1);
+  const double squares = column.squaredNorm();
+  const auto within = [&](double size) {
+    return Regression(nuisances, size * column).gain_within(column, 0.5, 3);
+  };
+  EXPECT_NEAR(within(2), 4 * squares, 1e-6 * squares);
+  EXPECT_NEAR(within(3), Regression(nuisances, 3 * column).gain(column).squares, 1e-6 * squares);
+  EXPECT_NEAR(within(20), (400 - 17 * 17) * squares, 1e-6 * squares);
+  EXPECT_NEAR(within(-1), (1 - 1.5 * 1.5) * squares, 1e-6 * squares);
+  EXPECT_EQ(Regression(column * 1e6, column).gain_within(column, 0.5, 3), 0) << "absorbed";
+}
+
 TEST(Verdict, FollowsWhatIsNamedAndWhatIsLeft) {
   constexpr double kLeast = -4.2;
   const std::vector<Leftover> clean = {{"start heading", -2, 3}};
