@@ -158,17 +158,20 @@ std::vector<SlipTrial> trials_with_slips(std::span<const ResidualTrial> trials,
     const ResidualTrial& t = trials[i];
     const auto cov = Covariance3::factorise(trial_covariance(t, fit.noise));
     if (!cov) {
-      judged.push_back({-1e3, 0});
+      judged.push_back({-1e3, 0, 0, 0});
       continue;
     }
     const Eigen::Vector3d centred = residuals[i] - mean_loss * (t.left + t.right);
     std::vector<double> logs;
+    const double squared = cov->squared_distance(centred);
+    double nearest = squared;
     for (const Event& e : events) {
       const Eigen::Vector3d r = centred - e.left * t.left - e.right * t.right;
+      nearest = std::min(nearest, cov->squared_distance(r));
       logs.push_back(std::log(e.weight) + log_predictive_density(r, *cov, outlier_share));
     }
     const double score = log_sum_exp(logs);
-    judged.push_back({score, 1 - std::exp(logs.front() - score)});
+    judged.push_back({score, 1 - std::exp(logs.front() - score), squared, nearest});
   }
   return judged;
 }

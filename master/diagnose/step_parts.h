@@ -11,6 +11,8 @@
 
 namespace gapfarm::steps {
 
+// Squared distance beyond which a trial strays, with 3 degrees of freedom: one in 110.
+inline constexpr double kSlippedSquared = 11.5;
 inline constexpr int kMostRounds = 6;  // of a fit that does not settle; most need two
 
 // By paired scores: not by chance, but for one case in twenty.

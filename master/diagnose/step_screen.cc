@@ -13,8 +13,6 @@
 namespace gapfarm::steps {
 namespace {
 
-constexpr double kSlippedSquared = 11.5;  // squared distance with 3 degrees of freedom: one in 110
-
 // Rows of the screening table, a candidate each.
 std::vector<Screened> screened(const Inquiry& of, const Evidence& evidence,
                                const std::vector<EffectCandidate>& candidates) {

@@ -32,14 +32,25 @@ std::vector<bool> tells_of_slips(const Inquiry& of, const Explanation& so_far) {
   return tells;
 }
 
-std::vector<double> slipped_by(const SlipFit& slip, const Study& study,
-                               const std::vector<Eigen::Vector3d>& left) {
+std::vector<SlipTrial> judged_by(const SlipFit& slip, const Study& study,
+                                 const std::vector<Eigen::Vector3d>& left) {
+  return trials_with_slips(study.trials, left, slip, slip.probability * slip.loss / 2, 0);
+}
+
+std::vector<double> slipped_by(const std::vector<SlipTrial>& trials) {
   std::vector<double> slipped;
-  for (const SlipTrial& t :
-       trials_with_slips(study.trials, left, slip, slip.probability * slip.loss / 2, 0)) {
-    slipped.push_back(t.slipped);
-  }
+  for (const SlipTrial& t : trials) slipped.push_back(t.slipped);
   return slipped;
+}
+
+// Whether most trials that stray end nowhere near where a slip would have led them.
+bool stray_otherwise(const std::vector<SlipTrial>& trials, const std::vector<bool>& tells) {
+  std::size_t as_slips = 0, otherwise = 0;
+  for (std::size_t i = 0; i < trials.size(); ++i) {
+    if (!tells[i] || trials[i].squared < kSlippedSquared) continue;
+    ++(trials[i].nearest < kSlippedSquared ? as_slips : otherwise);
+  }
+  return otherwise > as_slips;
 }
 
 }  // namespace
@@ -100,8 +111,13 @@ Explanation look_for_slips(const Inquiry& of, Explanation so_far, const Selector
     so_far.odd_drives = "Single drives stray: nothing that could explain them was looked for.";
     return so_far;
   }
-  const Gathering gathering = gathering_of_slips(study, slipped_by(slip, study, left), tells);
-  if (gathering.gain < kLeastGathering) {
+  const std::vector<SlipTrial> judged = judged_by(slip, study, left);
+  const Gathering gathering = gathering_of_slips(study, slipped_by(judged), tells);
+  if (stray_otherwise(judged, tells)) {
+    so_far.odd_drives =
+        "Single drives stray, most of them to where no slip would have led: nothing explains them "
+        "that was looked for.";
+  } else if (gathering.gain < kLeastGathering) {
     so_far.slip = slip;
   } else {
     so_far.odd_drives = "Single drives stray, most of them " + gathering.where +
@@ -124,7 +140,7 @@ std::optional<Gathering> gathering_beside(const Inquiry& of, const Explanation& 
       study.unwhiten(studentised(explained_by(catalogue, everywhere), 0.2));
   const std::vector<bool> tells = tells_of_slips(of, everywhere);
   const SlipFit slip = fit_slip(study.trials, left, tells, study.noise);
-  Gathering found = gathering_of_slips(study, slipped_by(slip, study, left), tells);
+  Gathering found = gathering_of_slips(study, slipped_by(judged_by(slip, study, left)), tells);
   if (found.gain < kLeastGathering) return {};
   return found;
 }

@@ -108,6 +108,27 @@ TEST(TrialsWithSlips, WithoutEventsItIsTheDensityOfOutliers) {
   }
 }
 
+// A side that lost speed ends near where some event leads, a drive that was pushed aside does not.
+TEST(TrialsWithSlips, TellsSlipsFromOtherStrays) {
+  Drawn d = draw(2);
+  const SlipFit fit{.gain = 1, .probability = 0.05, .loss = 0.5, .noise = kTruth};
+  for (std::size_t i = 0; i < 60; ++i) {
+    if (i % 2 == 0) {
+      d.residuals[i] -= 0.4 * d.trials[i].left;
+    } else {
+      d.residuals[i] += Eigen::Vector3d(0, 0.2, -0.6);
+    }
+  }
+  const std::vector<SlipTrial> judged = trials_with_slips(d.trials, d.residuals, fit, 0, 0);
+  std::size_t slips = 0, others = 0;
+  for (std::size_t i = 0; i < 60; ++i) {
+    if (judged[i].squared < 11.5) continue;
+    (i % 2 == 0 ? slips : others) += (judged[i].nearest < 11.5) == (i % 2 == 0);
+  }
+  EXPECT_GE(slips, 25U);
+  EXPECT_GE(others, 25U);
+}
+
 TEST(TrialsWithSlips, ForeseenSlipsScoreHigher) {
   const Drawn d = draw(3, 0.1, 0.3);
   const SlipFit fit = fit_slip(d.trials, d.residuals, std::vector<bool>(600, true), kStart);
