@@ -13,6 +13,10 @@
 namespace gapfarm::steps {
 namespace {
 
+// What draws a base to its bounds is strong; beside it the base comes free, and all is looked for
+// again from there.
+constexpr std::size_t kMostToFreeBase = 2;
+
 // Rows of the screening table, a candidate each.
 std::vector<Screened> screened(const Inquiry& of, const Evidence& evidence,
                                const std::vector<EffectCandidate>& candidates) {
@@ -110,8 +114,9 @@ Result<Screening> choose(const Inquiry& of, Screening screening) {
     tell_of_fit(of, *found.estimates);
     return at_estimate;
   };
-  auto chosen =
-      catalogue.select(found.first, found.first.empty() ? 0 : found.latency.gain, relinearise);
+  const bool to_free_base = found.on_bounds && found.tuned_alone.empty();
+  auto chosen = catalogue.select(found.first, found.first.empty() ? 0 : found.latency.gain,
+                                 relinearise, to_free_base ? kMostToFreeBase : kMostEffects);
   if (!chosen) return chosen.error();
   found.chosen = std::move(*chosen);
   return screening;
