@@ -56,8 +56,8 @@ config_of() {  # SET
          "${EVALUATIONS:-60}"
 }
 
-echo '| set | s | windows | way m | gapfarm mm, mrad | kinematics mm, mrad | constant velocity mm, mrad |'
-echo '|---|---|---|---|---|---|---|'
+echo '| set | s | windows | way m | gapfarm mm, mrad | kinematics mm, mrad | constant velocity mm, mrad | over kinematics mm; mrad |'
+echo '|---|---|---|---|---|---|---|---|'
 for name in "$@"; do
   config_of "$name" > "$out/$name.toml"
   rm -rf "${out:?}/$name"
@@ -70,6 +70,7 @@ for name in "$@"; do
   awk -v name="$name" '
     /^ *([0-9.]+|whole) / {
       gsub(/\|/, " ")
-      print "| " name " | " $1 " | " $2 " | " $3 " | " $4 ", " $5 " | " $8 ", " $9 " | " $12 ", " $13 " |"
+      print "| " name " | " $1 " | " $2 " | " $3 " | " $4 ", " $5 " | " $8 ", " $9 " | " $12 ", " $13 \
+            " | " $17 " " $18 " " $19 "; " $20 " " $21 " " $22 " |"
     }' "$out/$name.txt"
 done

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include "common/runs/afresh.h"
 #include "common/score/fitness.h"
@@ -15,13 +14,6 @@ namespace {
 constexpr double kSpeedSpan_s = 0.5;  // of poses before a window, for constant velocity
 // Windows in which the robot hardly went anywhere have no error a metre.
 constexpr double kLeastWayShare = 0.1;  // of the median way
-
-double median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<long>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 // Windows of one horizon: trials of a problem, one after another.
 struct Tiles {
@@ -54,25 +46,59 @@ Pose constant_end(const LoggedRun& run, const Trial& trial) {
   return trial.X_WS * exp(Twist(factor * log(between(before->X_WM, here->X_WM))));
 }
 
-WindowErrors errors_of(const std::vector<Pose>& ends, const Problem& problem, const Tiles& tiles,
-                       const std::vector<double>& ways) {
-  std::vector<double> position, heading, position_m, heading_m;
-  const double least = kLeastWayShare * median(ways);
-  for (std::size_t k = 0; k < tiles.count; ++k) {
-    const std::size_t i = tiles.first + k;
+// Of the ends of one horizon's windows: m, rad.
+struct EndErrors {
+  std::vector<double> position, heading;
+};
+
+EndErrors end_errors(const std::vector<Pose>& ends, const Problem& problem, const Tiles& tiles) {
+  EndErrors errors;
+  for (std::size_t i = tiles.first; i < tiles.first + tiles.count; ++i) {
     const Eigen::Vector3d d = local_difference(ends[i], problem.log.trials[i].X_WE);
-    position.push_back(d.head<2>().norm());
-    heading.push_back(std::abs(d[2]));
-    if (!(ways[k] > least)) continue;
-    position_m.push_back(position.back() / ways[k]);
-    heading_m.push_back(heading.back() / ways[k]);
+    errors.position.push_back(d.head<2>().norm());
+    errors.heading.push_back(std::abs(d[2]));
   }
-  return {median(position), median(heading), median(position_m), median(heading_m)};
+  return errors;
+}
+
+WindowErrors medians_of(const EndErrors& errors, const std::vector<double>& ways) {
+  std::vector<double> position_m, heading_m;
+  const double least = kLeastWayShare * median_error(ways);
+  for (std::size_t k = 0; k < ways.size(); ++k) {
+    if (!(ways[k] > least)) continue;
+    position_m.push_back(errors.position[k] / ways[k]);
+    heading_m.push_back(errors.heading[k] / ways[k]);
+  }
+  return {median_error(errors.position), median_error(errors.heading),
+          median_error(std::move(position_m)), median_error(std::move(heading_m))};
 }
 
 std::string cells(const WindowErrors& e) {
   return fmt::format(" {:8.1f} {:8.1f} {:7.1f} {:7.1f} |", 1e3 * e.position_m, 1e3 * e.heading_rad,
                      1e3 * e.position_m_m, 1e3 * e.heading_rad_m);
+}
+
+std::string ratio_cell(const DrawnRatio& drawn) {
+  if (!drawn.interval) return fmt::format("{:.2f} [few windows]", drawn.ratio);
+  return fmt::format("{:.2f} [{:.2f}, {:.2f}]", drawn.ratio, (*drawn.interval)[0],
+                     (*drawn.interval)[1]);
+}
+
+std::string surely_apart(const Horizons& horizons) {
+  int below = 0, above = 0, untold = 0, all = 0;
+  for (const HorizonRow& row : horizons.rows) {
+    for (const DrawnRatio& drawn : {row.position, row.heading}) {
+      ++all;
+      untold += !drawn.interval;
+      if (!drawn.interval) continue;
+      below += (*drawn.interval)[1] < 1;
+      above += (*drawn.interval)[0] > 1;
+    }
+  }
+  return fmt::format(
+      "of {} medians {} surely below the kinematics', {} surely above (90 % intervals of their "
+      "ratio, by drawing runs again){}\n",
+      all, below, above, untold > 0 ? fmt::format("; {} of too few windows", untold) : "");
 }
 
 }  // namespace
@@ -133,10 +159,14 @@ Result<Horizons> measure_horizons(Farm& farm, const Problem& fitted, const Param
       ways.push_back(way_of(runs.runs[run_of[t.first + k]], asked.log.trials[t.first + k]));
       row.log_score += result.predict().predictions(i).log_score() / static_cast<double>(t.count);
     }
-    row.way_m = median(ways);
-    row.simulation = errors_of(simulated, asked, t, ways);
-    row.kinematics = errors_of(kinematic, asked, t, ways);
-    row.constant_velocity = errors_of(constant, asked, t, ways);
+    row.way_m = median_error(ways);
+    const EndErrors own = end_errors(simulated, asked, t), rival = end_errors(kinematic, asked, t);
+    row.simulation = medians_of(own, ways);
+    row.kinematics = medians_of(rival, ways);
+    row.constant_velocity = medians_of(end_errors(constant, asked, t), ways);
+    const std::span<const std::size_t> run(run_of.data() + t.first, t.count);
+    row.position = drawn_ratio(own.position, rival.position, run, 1);
+    row.heading = drawn_ratio(own.heading, rival.heading, run, 1);
     horizons.rows.push_back(row);
   }
   return horizons;
@@ -144,20 +174,22 @@ Result<Horizons> measure_horizons(Farm& farm, const Problem& fitted, const Param
 
 std::string format_horizons(const Horizons& horizons) {
   std::string text = "Medians over windows: mm, mrad, and of each a metre of way\n";
-  text += fmt::format("{:>7} {:>7} {:>6} |{:^34}|{:^34}|{:^34}| {:>9}\n", "horizon", "windows",
-                      "way m", "simulation", "fitted kinematics", "constant velocity", "nats");
+  text += fmt::format("{:>7} {:>7} {:>6} |{:^34}|{:^34}|{:^34}| {:>9} |{:^44}\n", "horizon",
+                      "windows", "way m", "simulation", "fitted kinematics", "constant velocity",
+                      "nats", "simulation over kinematics");
   text += fmt::format("{:>7} {:>7} {:>6} |", "s", "", "");
   for (int i = 0; i < 3; ++i) {
     text += fmt::format(" {:>8} {:>8} {:>7} {:>7} |", "mm", "mrad", "mm/m", "mrad/m");
   }
-  text += "\n";
+  text += fmt::format(" {:>9} | {:>20}  {:>20}\n", "", "mm", "mrad");
   for (const HorizonRow& row : horizons.rows) {
     const std::string name = row.horizon_s > 0 ? fmt::format("{:g}", row.horizon_s) : "whole";
     text += fmt::format("{:>7} {:>7} {:>6.2f} |", name, row.windows, row.way_m) +
             cells(row.simulation) + cells(row.kinematics) + cells(row.constant_velocity) +
-            fmt::format(" {:>9.3f}\n", row.log_score);
+            fmt::format(" {:>9.3f} | {:>20}  {:>20}\n", row.log_score, ratio_cell(row.position),
+                        ratio_cell(row.heading));
   }
-  text += "kinematics:";
+  text += surely_apart(horizons) + "kinematics:";
   for (std::size_t i = 0; i < horizons.kinematics.names.size(); ++i) {
     text += fmt::format(" {} {:.4g}", horizons.kinematics.names[i],
                         horizons.kinematics.values[static_cast<Eigen::Index>(i)]);

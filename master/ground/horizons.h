@@ -10,6 +10,7 @@
 #include "common/runs/run.h"
 #include "common/score/kinematic.h"
 #include "master/farm/farm.h"
+#include "master/ground/drawn_ratio.h"
 
 namespace gapfarm {
 
@@ -27,6 +28,7 @@ struct HorizonRow {
   double way_m = 0;      // median of the marker's way
   double log_score = 0;  // of the simulation, mean, nats a window
   WindowErrors simulation, kinematics, constant_velocity;
+  DrawnRatio position, heading;  // of the simulation's medians, over the kinematics'
 };
 
 struct Horizons {
@@ -40,6 +42,7 @@ struct Horizons {
 Result<Horizons> measure_horizons(Farm& farm, const Problem& fitted, const ParameterValues& values,
                                   const RunLog& runs, const WindowSettings& windows);
 
+// A table, and how many of its medians are surely below and above the kinematics'.
 std::string format_horizons(const Horizons& horizons);
 
 }  // namespace gapfarm

@@ -1,0 +1,79 @@
+#include "master/ground/drawn_ratio.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "common/random/stream.h"
+
+namespace gapfarm {
+namespace {
+
+constexpr std::size_t kRatioDraws = 1000;
+constexpr std::size_t kEnoughRunsToDraw = 10;
+constexpr std::size_t kLeastDrawn = 5;  // fewer do not span 90 % of where a median may be
+constexpr double kRatioTail = 0.05;
+constexpr double kNoError = 1e-12;
+
+double ratio_of(std::vector<double> own, std::vector<double> rival) {
+  return std::max(median_error(std::move(own)), kNoError) /
+         std::max(median_error(std::move(rival)), kNoError);
+}
+
+// Windows that are drawn together, by their places.
+std::vector<std::vector<std::size_t>> groups_of(std::span<const std::size_t> run) {
+  std::map<std::size_t, std::vector<std::size_t>> runs;
+  for (std::size_t i = 0; i < run.size(); ++i) runs[run[i]].push_back(i);
+  std::vector<std::vector<std::size_t>> groups;
+  for (const auto& [name, windows] : runs) {
+    std::size_t pieces = 1;
+    if (runs.size() < kEnoughRunsToDraw) {
+      pieces = (kEnoughRunsToDraw * windows.size() + run.size() - 1) / run.size();
+      pieces = std::min(pieces, windows.size());
+    }
+    const std::size_t first = groups.size();
+    groups.resize(first + pieces);
+    for (std::size_t k = 0; k < windows.size(); ++k) {
+      groups[first + k * pieces / windows.size()].push_back(windows[k]);
+    }
+  }
+  return groups;
+}
+
+}  // namespace
+
+double median_error(std::vector<double> errors) {
+  if (errors.empty()) return 0;
+  const auto middle = errors.begin() + static_cast<long>(errors.size() / 2);
+  std::nth_element(errors.begin(), middle, errors.end());
+  return *middle;
+}
+
+DrawnRatio drawn_ratio(std::span<const double> own, std::span<const double> rival,
+                       std::span<const std::size_t> run, std::uint64_t seed) {
+  DrawnRatio drawn;
+  drawn.ratio = ratio_of({own.begin(), own.end()}, {rival.begin(), rival.end()});
+  const auto groups = groups_of(run);
+  if (groups.size() < kLeastDrawn) return drawn;
+  Stream stream({seed, Purpose::kStatistics, 0, 0, 0});
+  std::vector<double> ratios;
+  for (std::size_t draw = 0; draw < kRatioDraws; ++draw) {
+    std::vector<double> of_own, of_rival;
+    for (std::size_t k = 0; k + 1 < groups.size(); ++k) {
+      for (const std::size_t i : groups[stream.below(groups.size())]) {
+        of_own.push_back(own[i]);
+        of_rival.push_back(rival[i]);
+      }
+    }
+    ratios.push_back(ratio_of(std::move(of_own), std::move(of_rival)));
+  }
+  std::sort(ratios.begin(), ratios.end());
+  const auto last = static_cast<double>(kRatioDraws - 1);
+  const auto at = [&](double share) {
+    return ratios[static_cast<std::size_t>(std::lround(share * last))];
+  };
+  drawn.interval = {at(kRatioTail), at(1 - kRatioTail)};
+  return drawn;
+}
+
+}  // namespace gapfarm
