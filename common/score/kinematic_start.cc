@@ -10,6 +10,10 @@ namespace gapfarm {
 
 namespace {
 
+// Creep at which wheels that differ by some percent share that as springs would, and the robot
+// still follows within milliseconds.
+constexpr double kEvenly = 0.3;
+
 // By four-point Coulomb theory a skid-steer turns as wheels do that stand
 // 1 + (friction_ratio wheelbase / wheel_separation)^2 as far apart: the wheelbase of which that is
 // what was fitted, wherever the axles are.
@@ -23,6 +27,15 @@ std::optional<double> rolling_wheelbase(const GroundRobot& robot, const Kinemati
   const double rolls =
       ratio * k.wheel_separation_m.value_or(separation) * k.wheel_separation_multiplier;
   return separation * std::sqrt(std::max(rolls / separation - 1, 1e-3)) / robot.friction_ratio;
+}
+
+// Wheels that say more than three motions can follow never agree quite.  Rigid ones leave it open
+// between which of them the robot moves, and it stays wherever it was; where slip grows with force
+// it moves as least squares of their speeds, which is what kinematics make of them.
+bool wheels_disagree(const GroundRobot& robot) {
+  if (robot.drive != DriveKind::kOmni && robot.drive != DriveKind::kMecanum) return false;
+  return std::count_if(robot.wheels.begin(), robot.wheels.end(),
+                       [](const RobotWheel& w) { return w.driven; }) > 3;
 }
 
 bool is_noise(const std::string& key) { return key.find("_noise_") != std::string::npos; }
@@ -63,9 +76,13 @@ ParameterValues without_slip(const Problem& problem, ParameterValues values) {
   static const std::map<std::string, double, std::less<>> kFirm = {
       {"friction", 1e3},  {"creep", 0},       {"creep_speed", 0},
       {"roller_drag", 0}, {"caster_drag", 0}, {"cross_load", 0}};
+  const bool disagree = wheels_disagree(problem.ground->robot());
   for (const Gene& gene : problem.genes) {
-    const auto firm = kFirm.find(problem.table()[gene.row].key);
-    if (firm != kFirm.end()) values[gene.row] = std::clamp(firm->second, gene.lower, gene.upper);
+    const std::string& key = problem.table()[gene.row].key;
+    const auto firm = kFirm.find(key);
+    if (firm == kFirm.end()) continue;
+    const double wanted = disagree && key == kGroundCreep ? kEvenly : firm->second;
+    values[gene.row] = std::clamp(wanted, gene.lower, gene.upper);
   }
   return values;
 }

@@ -16,7 +16,8 @@ ParameterValues kinematic_start(const Problem& problem);
 ParameterValues kinematic_start(const Problem& problem, const Kinematics& fitted);
 
 // `values` with those of the problem's genes that let wheels slip (friction, creep, drag, loads)
-// as far as their ranges go towards what kinematics suppose: none.
+// as far as their ranges go towards what kinematics suppose: none, but for the creep of four or
+// more wheels across that say more than three motions can follow.
 ParameterValues without_slip(const Problem& problem, ParameterValues values);
 
 // Whether the kinematics have a word for each of the problem's genes.  REQUIRES: a ground robot.

@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "common/random/stream.h"
 #include "common/score/kinematic.h"
 #include "tests/unit/worker/ground_problem.h"
 #include "worker/sim/ground.h"
@@ -37,7 +38,9 @@ Problem rolling_problem(const std::string& file, const std::vector<std::string>&
 Eigen::Vector3d apart(const Problem& problem, const Kinematics& kinematics) {
   const ParameterValues values = without_slip(problem, kinematic_start(problem, kinematics));
   const GroundRobot robot = problem.ground->robot_at(values);
-  GroundSimulator simulator(robot, {});
+  GroundWorld world;
+  world.creep = values[problem.table().row(kGroundCreep)];
+  GroundSimulator simulator(robot, world);
   const std::vector<double> times = {0.5, 4.5};
   const auto samples = simulator.run(problem.runs.front().commands, {}, times).samples;
   EXPECT_EQ(samples.size(), 2u);
@@ -79,6 +82,34 @@ TEST(KinematicStart, MecanumWheelsRollInTheSimulationAsTheirKinematicsSay) {
   Problem unmoved = problem;
   unmoved.genes.clear();
   EXPECT_GT(apart(unmoved, kinematics).head<2>().norm(), 0.015);
+}
+
+// Encoders of four wheels that count a few ticks a cycle: which three of them a rigid robot follows
+// is left open, and it keeps what it has.
+TEST(KinematicStart, FourWheelsThatDisagreeAreFollowedAsLeastSquaresDo) {
+  Stream stream({5, Purpose::kTest, 0, 0, 0});
+  std::vector<CommandRow> commands;
+  for (int k = 0; k < 120; ++k) {
+    const double turn = k < 60 ? 0.7 : -0.4;
+    std::vector<double> speeds = {3 - turn, 3 + turn, 3 - turn, 3 + turn};
+    for (double& speed : speeds) speed += 0.06 * std::round(2 * stream.normal());
+    commands.push_back({0.04 * k, speeds});
+  }
+  std::vector<std::string> keys = {"wheels.front_left.radius", "wheels.front_right.radius",
+                                   "wheels.rear_left.radius",  "wheels.rear_right.radius",
+                                   "wheel_separation",         "friction"};
+  const char* file =
+      "drive = \"mecanum\"\nwheelbase = 0.2\nwheel_separation = 0.2\nwheel_radius = 0.03\n"
+      "commands = [\"front_left\", \"front_right\", \"rear_left\", \"rear_right\"]\n";
+  const Problem rigid = rolling_problem(file, keys, commands);
+  keys.emplace_back(kGroundCreep);
+  const Problem creeping = rolling_problem(file, keys, commands);
+  const Kinematics kinematics = nominal_kinematics(rigid.ground->robot());
+  const Eigen::Vector3d of_rigid = apart(rigid, kinematics);
+  const Eigen::Vector3d of_creeping = apart(creeping, kinematics);
+  EXPECT_LT(of_creeping.head<2>().norm(), 0.003);  // of a way of 0.36 m
+  EXPECT_LT(std::abs(of_creeping[2]), 0.01);
+  EXPECT_GT(std::abs(of_rigid[2]), 2 * std::abs(of_creeping[2]));
 }
 
 TEST(KinematicStart, NothingSlipsWithoutSlip) {
