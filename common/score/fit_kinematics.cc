@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/score/algebra.h"
+#include "common/score/bounded_step.h"
 #include "common/score/kinematic.h"
 
 namespace gapfarm {
@@ -67,6 +67,15 @@ Eigen::VectorXd weights_of(const std::vector<Eigen::Vector3d>& r) {
   return weights;
 }
 
+// Below what no value may fall.
+Eigen::VectorXd least_values(const Kinematics& of) {
+  Eigen::VectorXd least = Eigen::VectorXd::Constant(of.values.size(), -INFINITY);
+  for (std::size_t i = 0; i < of.names.size(); ++i) {
+    if (is_magnitude(of.names[i])) least[static_cast<Eigen::Index>(i)] = 0;
+  }
+  return least;
+}
+
 void descend(const Windows& windows, const Eigen::VectorXd& weights, Kinematics* at) {
   const auto cost_at = [&](const Kinematics& k) {
     return weighted(residuals(windows, k), weights);
@@ -74,6 +83,8 @@ void descend(const Windows& windows, const Eigen::VectorXd& weights, Kinematics*
   Eigen::VectorXd r = cost_at(*at);
   double damping = 1e-3;
   const Eigen::Index n = at->values.size();
+  const Eigen::VectorXd least = least_values(*at);
+  const Eigen::VectorXd most = Eigen::VectorXd::Constant(n, INFINITY);
   for (int it = 0; it < kIterations; ++it) {
     Eigen::MatrixXd J(r.size(), n);
     for (Eigen::Index i = 0; i < n; ++i) {
@@ -89,7 +100,7 @@ void descend(const Windows& windows, const Eigen::VectorXd& weights, Kinematics*
       Eigen::MatrixXd damped = H;
       damped.diagonal() += damping * H.diagonal() + Eigen::VectorXd::Constant(n, 1e-9);
       Kinematics moved = *at;
-      moved.values -= solve_symmetric(damped, g);
+      moved.values = step_within(damped, g, at->values, least, most);
       const Eigen::VectorXd next = cost_at(moved);
       better = next.squaredNorm() < r.squaredNorm();
       if (better) {

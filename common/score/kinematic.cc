@@ -158,6 +158,7 @@ class Body {
  private:
   void put(const std::string& name, double value) {
     RobotThrottle& t = robot_.throttle;
+    if (is_magnitude(name)) value = std::abs(value);
     if (name == "left") left_ *= value;
     if (name == "right") right_ *= value;
     if (name == "travel") left_ *= value;
@@ -192,11 +193,11 @@ class Body {
     if (name == "understeer") robot_.steering.understeer_s2_m2 = value;
     if (name == "gain") t.gain = value;
     if (name == "zero") t.zero = value;
-    if (name == "back_emf") t.back_emf = std::abs(value);
-    if (name == "drag") t.drag = std::abs(value);
-    if (name == "coulomb") t.coulomb = std::abs(value);
-    if (name == "cornering") t.cornering = std::abs(value);
-    if (name == "lag") robot_.motors.lag_s = std::abs(value);
+    if (name == "back_emf") t.back_emf = value;
+    if (name == "drag") t.drag = value;
+    if (name == "coulomb") t.coulomb = value;
+    if (name == "cornering") t.cornering = value;
+    if (name == "lag") robot_.motors.lag_s = value;
     if (name == "delay") robot_.motors.delay_s = value;
     if (name == "marker_x") robot_.X_RM.x = value;
     if (name == "marker_y") robot_.X_RM.y = value;
@@ -279,6 +280,11 @@ std::map<double, Pose> way(const Body& body, const CommandedRun& run, double beg
 }
 
 }  // namespace
+
+bool is_magnitude(std::string_view name) {
+  return name == "lag" || name == "back_emf" || name == "drag" || name == "coulomb" ||
+         name == "cornering";
+}
 
 Kinematics nominal_kinematics(const GroundRobot& robot) {
   Kinematics k;

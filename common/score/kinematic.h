@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "common/base/result.h"
@@ -19,6 +20,10 @@ struct Kinematics {
   double rms_m = 0;  // of the windows that it was fitted to
   double rms_rad = 0;
 };
+
+// Whether a value slows down by its size, whatever its sign (lags and drags): fits keep it at 0 or
+// above.
+bool is_magnitude(std::string_view name);
 
 // As the robot's file has it: gains 1, its delay, lag and marker.
 Kinematics nominal_kinematics(const GroundRobot& robot);
@@ -45,7 +50,7 @@ GroundRobot robot_with(const GroundRobot& robot, const Kinematics& kinematics);
 
 // Levenberg's and Marquardt's least squares on the problem's windows, Huber's weights beyond two
 // robust standard deviations: of the short windows, then of all.  The delay is found first, by a
-// scan of +-1 s round the file's.
+// scan of +-1 s round the file's.  What is a magnitude stays at 0 or above.
 // Errors: no windows.
 Result<Kinematics> fit_kinematics(const Problem& problem);
 

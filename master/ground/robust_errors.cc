@@ -5,6 +5,7 @@
 #include <map>
 
 #include "common/score/algebra.h"
+#include "common/score/bounded_step.h"
 #include "master/ground/window_prior.h"
 
 namespace gapfarm {
@@ -191,39 +192,10 @@ NormalEquations normal_equations(const RobustErrors& errors, const WindowEnds& e
 }
 
 Eigen::VectorXd step_within_bounds(const NormalEquations& equations, const Eigen::VectorXd& at) {
-  const Eigen::Index n = at.size();
-  std::vector<Eigen::Index> moving;
-  for (Eigen::Index k = 0; k < n; ++k) moving.push_back(k);
-  Eigen::VectorXd to = at;
-  // Each round puts one value more on a bound, or is the last.
-  while (!moving.empty()) {
-    const auto m = static_cast<Eigen::Index>(moving.size());
-    Eigen::MatrixXd H(m, m);
-    Eigen::VectorXd g(m);
-    for (Eigen::Index a = 0; a < m; ++a) {
-      g[a] = equations.g[moving[static_cast<std::size_t>(a)]];
-      for (Eigen::Index b = 0; b < m; ++b) {
-        H(a, b) =
-            equations.H(moving[static_cast<std::size_t>(a)], moving[static_cast<std::size_t>(b)]);
-      }
-      for (Eigen::Index k = 0; k < n; ++k) {  // those on their bounds have gone there
-        if (std::find(moving.begin(), moving.end(), k) == moving.end()) {
-          g[a] += equations.H(moving[static_cast<std::size_t>(a)], k) * (to[k] - at[k]);
-        }
-      }
-      H(a, a) += kLeastPrecision;
-    }
-    const Eigen::VectorXd move = solve_symmetric(H, g);
-    std::vector<Eigen::Index> inside;
-    for (Eigen::Index a = 0; a < m; ++a) {
-      const Eigen::Index k = moving[static_cast<std::size_t>(a)];
-      to[k] = std::clamp(at[k] - move[a], 0.0, 1.0);
-      if (to[k] == at[k] - move[a]) inside.push_back(k);
-    }
-    if (inside.size() == moving.size()) break;
-    moving = std::move(inside);
-  }
-  return to;
+  Eigen::MatrixXd H = equations.H;
+  H.diagonal().array() += kLeastPrecision;
+  return step_within(H, equations.g, at, Eigen::VectorXd::Zero(at.size()),
+                     Eigen::VectorXd::Ones(at.size()));
 }
 
 WindowEnds left_out_ends(const RobustErrors& errors, const WindowEnds& ends,

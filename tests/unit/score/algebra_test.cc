@@ -2,6 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
+#include "common/score/bounded_step.h"
+
 namespace gapfarm {
 namespace {
 
@@ -29,6 +33,19 @@ TEST(Algebra, SolutionsSolve) {
 TEST(Algebra, LeastSquaresIsTheMeanOfRepeats) {
   const VectorXd b = (VectorXd(3) << 1, 2, 6).finished();
   EXPECT_NEAR(least_squares(MatrixXd::Ones(3, 1), b)[0], 3, 1e-12);
+}
+
+TEST(Algebra, AStepStopsAtABoundAndTheOthersMakeTheBestOfIt) {
+  const VectorXd g = (VectorXd(2) << 3, 0).finished(), at = (VectorXd(2) << 1, 0).finished();
+  const VectorXd none = VectorXd::Constant(2, INFINITY);
+  const VectorXd freely = step_within(kSymmetric, g, at, -none, none);
+  EXPECT_LT((freely - (VectorXd(2) << -1, 1).finished()).norm(), 1e-12);
+  const VectorXd bound = step_within(kSymmetric, g, at, VectorXd::Zero(2), none);
+  EXPECT_EQ(bound[0], 0);
+  EXPECT_NEAR(bound[1], 0.5, 1e-12);
+  const VectorXd both = step_within(kSymmetric, g, at, VectorXd::Zero(2), at);
+  EXPECT_EQ(both[0], 0);
+  EXPECT_EQ(both[1], 0);
 }
 
 TEST(Algebra, OrthonormalColumnsSpanTheirs) {

@@ -159,5 +159,24 @@ TEST(GroundScenario, KinematicsAreFittedToWindows) {
   EXPECT_LT(fit->rms_m, 2e-3);
 }
 
+// A lag slows down by its size: a negative one is none.
+TEST(GroundScenario, FittedKinematicsHaveNoNegativeLag) {
+  for (const double lag_s : {0.0, 0.01}) {
+    Problem problem = ground_problem();
+    ParameterValues truth = problem.values;
+    truth[problem.table().row("lag")] = lag_s;
+    for (const double earlier_s : {0.0, 0.03}) {
+      LoggedRun run = driven_run(problem, truth, 20);
+      for (PoseRow& pose : run.poses) pose.t_s -= earlier_s;
+      take_runs(problem, {run}, {{0.5, 2}, 0.5});
+      const auto fit = fit_kinematics(problem);
+      ASSERT_TRUE(fit.ok()) << fit.error().message;
+      const auto found = std::find(fit->names.begin(), fit->names.end(), "lag");
+      EXPECT_GE(fit->values[found - fit->names.begin()], 0) << lag_s << " " << earlier_s;
+      EXPECT_LT(fit->values[found - fit->names.begin()], 0.05) << lag_s << " " << earlier_s;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace gapfarm
