@@ -5,6 +5,7 @@
 
 #include "master/cli/evolution.h"
 #include "master/cli/long_command.h"
+#include "master/run/run.h"
 #include "master/run/stored_run.h"
 #include "master/store/run_reader.h"
 
@@ -48,10 +49,12 @@ int run_resume(const ResumeCommand& command, CliContext& context) {
     return kExitBadUsage;
   }
   const Result<Config> config = stored_config(store->info(), command.options.overrides);
-  if (!config) return failed(Error{command.run + ": " + config.error().message}, context);
+  if (!config) {
+    return failed(stopped_by(*store, {command.run + ": " + config.error().message}), context);
+  }
   if (command.generation) {
     const auto kept = store->truncate_after(*command.generation);
-    if (!kept) return failed(kept.error(), context);
+    if (!kept) return failed(stopped_by(*store, kept.error()), context);
     if (!kept->empty()) context.console.note("later generations are kept in " + kept->string());
   }
   return run_evolution(*store, *config, command.options, *log, context);

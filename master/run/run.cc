@@ -79,9 +79,7 @@ Result<std::unique_ptr<Optimiser>> optimiser_of(const RunInputs& inputs, const R
   return stages.empty() ? restore_optimiser(setup, state) : restore_staged(setup, stages, state);
 }
 
-Status write_end(RunStore& store, const FarmProgressWriter& writer, RunState state,
-                 const std::string& reason) {
-  Progress progress = writer.now();
+Status write_end(RunStore& store, Progress progress, RunState state, const std::string& reason) {
   progress.state = state;
   progress.stop_reason = reason;
   progress.rate_per_s = 0;
@@ -122,14 +120,25 @@ Status leave_model(RunStore& store, const RunRequest& run, const RunInputs& inpu
 
 }  // namespace
 
+Error stopped_by(RunStore& store, Error error, const Progress& last) {
+  // Where even that cannot be written, status finds the master gone, and the error is told.
+  static_cast<void>(write_end(store, last, RunState::kStopped, error.message));
+  return error;
+}
+
 Result<RunSummary> evolve_run(RunStore& store, const RunRequest& request, RunWatcher& watcher) {
   const auto inputs = read_inputs(store, request.config);
-  if (!inputs) return inputs.error();
+  if (!inputs) return stopped_by(store, inputs.error());
   FarmEventKeeper events(store, watcher);
   auto farm = request.open_farm([&](const FarmEvent& event) { events.keep(event); });
-  if (!farm) return farm.error();
+  if (!farm) return stopped_by(store, farm.error());
   auto optimiser = optimiser_of(*inputs, request, (*farm)->farm(), watcher);
-  if (!optimiser) return optimiser.error();
+  if (!optimiser) {
+    events.flush();
+    Progress last;
+    last.farm = (*farm)->tally();
+    return stopped_by(store, optimiser.error(), last);
+  }
 
   const SteadyClock clock;
   FarmProgressWriter progress(store, **farm, request.config.evolution, inputs->checkpoint, clock,
@@ -144,15 +153,12 @@ Result<RunSummary> evolve_run(RunStore& store, const RunRequest& request, RunWat
   auto evolved = evolve(**optimiser, backend, sink, clock, options, request.stop_requested);
   watcher.progress("", false);
   events.flush();
-  if (!evolved) {
-    // Where even that cannot be written, status finds the master gone, and the error is told.
-    static_cast<void>(write_end(store, progress, RunState::kStopped, evolved.error().message));
-    return evolved.error();
-  }
+  if (!evolved) return stopped_by(store, evolved.error(), progress.now());
   RunSummary summary;
   summary.evolved = *std::move(evolved);
   const RunState state = summary.stopped() ? RunState::kStopped : RunState::kFinished;
-  if (Status s = write_end(store, progress, state, summary.evolved.text); !s) return s.error();
+  if (Status s = write_end(store, progress.now(), state, summary.evolved.text); !s)
+    return s.error();
   if (summary.stopped()) return summary;
   if (summary.evolved.best && summary.evolved.best->outcome == v1::OK) {
     const Status left = leave_model(store, request, *inputs, (*farm)->farm(), watcher, summary);

@@ -44,4 +44,8 @@ struct RunSummary {
 // that the run stopped, and why.
 Result<RunSummary> evolve_run(RunStore& store, const RunRequest& request, RunWatcher& watcher);
 
+// Says in the store that the run stopped by this error, which it returns.  `last`: what else its
+// live row says.
+Error stopped_by(RunStore& store, Error error, const Progress& last = {});
+
 }  // namespace gapfarm

@@ -4,11 +4,13 @@
 #include <gmock/gmock.h>
 
 #include <filesystem>
+#include <fstream>
 
 #include "master/run/stored_run.h"
 #include "tests/integration/demo_config.h"
 #include "tests/unit/blind/worker_farm.h"
 #include "tests/unit/run/config_of_run.h"
+#include "tests/unit/worker/ground_problem.h"
 
 namespace gapfarm {
 namespace {
@@ -75,6 +77,18 @@ class RunTest : public testing::Test {
         folder_ / "config.toml");
     made.seed = 7;
     made.problem.log.trials.resize(12);
+    return made;
+  }
+
+  // A ground robot's search begins with simulations before its first generation.
+  Config ground_config() const {
+    std::ofstream(folder_ / "skid.toml") << tests::kSkidFile;
+    Config made =
+        parse_config(
+            "scenario = \"ground\"\n[robot]\nfile = \"skid.toml\"\n[genes]\nlag = \"table\"\n",
+            folder_ / "ground.toml")
+            .value();
+    tests::take_runs(made.problem, {tests::driven_run(made.problem, made.problem.values, 4)});
     return made;
   }
 
@@ -161,6 +175,30 @@ TEST_F(RunTest, SaysInItsStoreWhyItFailedAndGoesOn) {
   EXPECT_EQ(go_on().value().evolved.generations, kGenerations);
 }
 
+TEST_F(RunTest, SaysInItsStoreWhyItFailedBeforeItsFirstGeneration) {
+  const Config asked = ground_config();
+  RunStore store = begin(asked);
+  ASSERT_EQ(progress().state, RunState::kRunning);
+  const auto summary = go(store, asked, {.no_worker_at = 2});
+  ASSERT_FALSE(summary.ok());
+  EXPECT_EQ(summary.error().message, "no worker can be had");
+  EXPECT_TRUE(RunReader::open(path()).value().generations().value().empty());
+  EXPECT_EQ(progress().state, RunState::kStopped);
+  EXPECT_EQ(progress().stop_reason, "no worker can be had");
+}
+
+TEST_F(RunTest, SaysInItsStoreThatNoFarmCouldBeOpened) {
+  const Config asked = config();
+  RunStore store = begin(asked);
+  Log log(LogOptions{"test", LogFormat::kText, LogLevel::kOff, ""});
+  const auto open = [](const auto&) -> Result<std::unique_ptr<FarmOfRun>> {
+    return Error{"the port is taken"};
+  };
+  ASSERT_FALSE(evolve_run(store, {asked, asked.problem, log, open, {}}, listener_).ok());
+  EXPECT_EQ(progress().state, RunState::kStopped);
+  EXPECT_EQ(progress().stop_reason, "the port is taken");
+}
+
 TEST_F(RunTest, CountsWhatItGaveUpBeforeItWasStopped) {
   const Config asked = config();
   {
@@ -181,6 +219,8 @@ TEST_F(RunTest, OpensNoFarmForTrialsKeptApartThatAreNotThere) {
   const auto summary = evolve_run(store, {asked, asked.problem, log, open, {}}, listener_);
   ASSERT_FALSE(summary.ok());
   EXPECT_THAT(summary.error().message, HasSubstr("gone.csv"));
+  EXPECT_EQ(progress().state, RunState::kStopped);
+  EXPECT_THAT(progress().stop_reason, HasSubstr("gone.csv"));
 }
 
 TEST_F(RunTest, HoldsItsBestAgainstTrialsKeptApart) {
