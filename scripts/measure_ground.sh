@@ -65,8 +65,8 @@ for name in "$@"; do
     echo "| $name | $(tail -n 1 "$out/$name.log") |"
     continue
   fi
-  "$bin/gapfarm" horizons "$out/$name" --trials "$sets/$name/test" > "$out/$name.txt" \
-    2>> "$out/$name.log"
+  "$bin/gapfarm" horizons "$out/$name" --trials "$sets/$name/test" --force \
+    --out "$out/$name.csv" > "$out/$name.txt" 2>> "$out/$name.log"
   awk -v name="$name" '
     /^ *([0-9.]+|whole) / {
       gsub(/\|/, " ")

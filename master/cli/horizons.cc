@@ -20,6 +20,7 @@ struct HorizonsCommand {
   std::vector<std::string> runs;
   std::vector<double> horizons = {0.5, 2, 5, 0};
   std::string picture;
+  std::string out;
   Outputs outputs;
   FarmOptions farm;
 };
@@ -61,7 +62,7 @@ Status draw_runs(const HorizonsCommand& command, const Fitted& fitted, const Run
 
 int run_horizons(HorizonsCommand& command, CliContext& context) {
   Console& console = context.console;
-  if (Status s = command.outputs.plan(command.picture); !s) {
+  if (Status s = command.outputs.plan({command.picture, command.out}); !s) {
     console.error(s.error());
     return kExitBadUsage;
   }
@@ -94,6 +95,11 @@ int run_horizons(HorizonsCommand& command, CliContext& context) {
   if (Status s = draw_runs(command, *fitted, *runs, **farm, console); !s) {
     return failed(s.error(), context);
   }
+  if (!command.out.empty()) {
+    if (Status s = command.outputs.write(command.out, windows_csv(*horizons)); !s) {
+      return failed(s.error(), context);
+    }
+  }
   console.print(format_horizons(*horizons));
   return kExitDone;
 }
@@ -111,6 +117,7 @@ SubcommandRun setup_horizons(CLI::App& app) {
       ->capture_default_str();
   app.add_option("--picture", command->picture,
                  "Draw the runs: logged, as simulated before and after the fit (SVG)");
+  app.add_option("--out", command->out, "Every window with its errors, m and rad (CSV)");
   command->outputs.declare(app);
   command->farm.declare(app, false);
   declare_long_command(app);

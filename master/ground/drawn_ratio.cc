@@ -5,6 +5,7 @@
 #include <map>
 
 #include "common/random/stream.h"
+#include "common/score/statistics.h"
 
 namespace gapfarm {
 namespace {
@@ -15,9 +16,8 @@ constexpr std::size_t kLeastDrawn = 5;  // fewer do not span 90 % of where a med
 constexpr double kRatioTail = 0.05;
 constexpr double kNoError = 1e-12;
 
-double ratio_of(std::vector<double> own, std::vector<double> rival) {
-  return std::max(median_error(std::move(own)), kNoError) /
-         std::max(median_error(std::move(rival)), kNoError);
+double ratio_of(std::span<const double> own, std::span<const double> rival) {
+  return std::max(median(own), kNoError) / std::max(median(rival), kNoError);
 }
 
 // Windows that are drawn together, by their places.
@@ -42,17 +42,10 @@ std::vector<std::vector<std::size_t>> groups_of(std::span<const std::size_t> run
 
 }  // namespace
 
-double median_error(std::vector<double> errors) {
-  if (errors.empty()) return 0;
-  const auto middle = errors.begin() + static_cast<long>(errors.size() / 2);
-  std::nth_element(errors.begin(), middle, errors.end());
-  return *middle;
-}
-
 DrawnRatio drawn_ratio(std::span<const double> own, std::span<const double> rival,
                        std::span<const std::size_t> run, std::uint64_t seed) {
   DrawnRatio drawn;
-  drawn.ratio = ratio_of({own.begin(), own.end()}, {rival.begin(), rival.end()});
+  drawn.ratio = ratio_of(own, rival);
   const auto groups = groups_of(run);
   if (groups.size() < kLeastDrawn) return drawn;
   Stream stream({seed, Purpose::kStatistics, 0, 0, 0});
@@ -65,7 +58,7 @@ DrawnRatio drawn_ratio(std::span<const double> own, std::span<const double> riva
         of_rival.push_back(rival[i]);
       }
     }
-    ratios.push_back(ratio_of(std::move(of_own), std::move(of_rival)));
+    ratios.push_back(ratio_of(of_own, of_rival));
   }
   std::sort(ratios.begin(), ratios.end());
   const auto last = static_cast<double>(kRatioDraws - 1);

@@ -5,12 +5,8 @@
 #include <cstdint>
 #include <optional>
 #include <span>
-#include <vector>
 
 namespace gapfarm {
-
-// The upper one of an even number; 0 of none.
-double median_error(std::vector<double> errors);
 
 // Of two medians over the same windows.
 struct DrawnRatio {

@@ -4,9 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 
 #include "common/runs/afresh.h"
 #include "common/score/fitness.h"
+#include "common/trials/csv.h"
 
 namespace gapfarm {
 namespace {
@@ -46,31 +48,52 @@ Pose constant_end(const LoggedRun& run, const Trial& trial) {
   return trial.X_WS * exp(Twist(factor * log(between(before->X_WM, here->X_WM))));
 }
 
-// Of the ends of one horizon's windows: m, rad.
-struct EndErrors {
-  std::vector<double> position, heading;
-};
+WindowError error_of(const Pose& end, const Trial& trial) {
+  const Eigen::Vector3d d = local_difference(end, trial.X_WE);
+  return {d.head<2>().norm(), std::abs(d[2])};
+}
 
-EndErrors end_errors(const std::vector<Pose>& ends, const Problem& problem, const Tiles& tiles) {
-  EndErrors errors;
-  for (std::size_t i = tiles.first; i < tiles.first + tiles.count; ++i) {
-    const Eigen::Vector3d d = local_difference(ends[i], problem.log.trials[i].X_WE);
-    errors.position.push_back(d.head<2>().norm());
-    errors.heading.push_back(std::abs(d[2]));
+WindowErrors medians_of(std::span<const WindowRow> windows, WindowError WindowRow::*which,
+                        double way_m) {
+  std::vector<double> position, heading, position_m, heading_m;
+  for (const WindowRow& row : windows) {
+    const WindowError& error = row.*which;
+    position.push_back(error.position_m);
+    heading.push_back(error.heading_rad);
+    if (!(row.way_m > kLeastWayShare * way_m)) continue;
+    position_m.push_back(error.position_m / row.way_m);
+    heading_m.push_back(error.heading_rad / row.way_m);
   }
+  return {median(position), median(heading), median(position_m), median(heading_m)};
+}
+
+std::vector<double> each(std::span<const WindowRow> windows, WindowError WindowRow::*which,
+                         double WindowError::*of) {
+  std::vector<double> errors;
+  for (const WindowRow& row : windows) errors.push_back(row.*which.*of);
   return errors;
 }
 
-WindowErrors medians_of(const EndErrors& errors, const std::vector<double>& ways) {
-  std::vector<double> position_m, heading_m;
-  const double least = kLeastWayShare * median_error(ways);
-  for (std::size_t k = 0; k < ways.size(); ++k) {
-    if (!(ways[k] > least)) continue;
-    position_m.push_back(errors.position[k] / ways[k]);
-    heading_m.push_back(errors.heading[k] / ways[k]);
-  }
-  return {median_error(errors.position), median_error(errors.heading),
-          median_error(std::move(position_m)), median_error(std::move(heading_m))};
+DrawnRatio drawn_ratio_of(std::span<const WindowRow> windows, double WindowError::*of,
+                          std::span<const std::size_t> run) {
+  return drawn_ratio(each(windows, &WindowRow::simulation, of),
+                     each(windows, &WindowRow::kinematics, of), run, 1);
+}
+
+// `run` of each window.
+HorizonRow row_of(std::span<const WindowRow> windows, std::span<const std::size_t> run) {
+  HorizonRow row;
+  row.horizon_s = windows.front().horizon_s;
+  row.windows = windows.size();
+  std::vector<double> ways;
+  for (const WindowRow& window : windows) ways.push_back(window.way_m);
+  row.way_m = median(ways);
+  row.simulation = medians_of(windows, &WindowRow::simulation, row.way_m);
+  row.kinematics = medians_of(windows, &WindowRow::kinematics, row.way_m);
+  row.constant_velocity = medians_of(windows, &WindowRow::constant_velocity, row.way_m);
+  row.position = drawn_ratio_of(windows, &WindowError::position_m, run);
+  row.heading = drawn_ratio_of(windows, &WindowError::heading_rad, run);
+  return row;
 }
 
 std::string cells(const WindowErrors& e) {
@@ -141,33 +164,22 @@ Result<Horizons> measure_horizons(Farm& farm, const Problem& fitted, const Param
   if (!kinematics) return kinematics.error();
   Horizons horizons;
   horizons.kinematics = *kinematics;
-  std::vector<Pose> simulated, constant;
-  for (const v1::Predicted& p : result.predict().predictions()) {
-    simulated.push_back(from_proto(p.end()));
-  }
-  for (std::size_t i = 0; i < run_of.size(); ++i) {
-    constant.push_back(constant_end(runs.runs[run_of[i]], asked.log.trials[i]));
-  }
   const std::vector<Pose> kinematic = kinematic_ends(asked, *kinematics);
   for (const Tiles& t : tiles) {
-    HorizonRow row;
-    row.horizon_s = t.horizon_s;
-    row.windows = t.count;
-    std::vector<double> ways;
-    for (std::size_t k = 0; k < t.count; ++k) {
-      const auto i = static_cast<int>(t.first + k);
-      ways.push_back(way_of(runs.runs[run_of[t.first + k]], asked.log.trials[t.first + k]));
-      row.log_score += result.predict().predictions(i).log_score() / static_cast<double>(t.count);
+    double log_score = 0;
+    for (std::size_t i = t.first; i < t.first + t.count; ++i) {
+      const v1::Predicted& simulated = result.predict().predictions(static_cast<int>(i));
+      const Trial& trial = asked.log.trials[i];
+      const LoggedRun& run = runs.runs[run_of[i]];
+      horizons.windows.push_back({t.horizon_s, run.session, run.run, *trial.t_s, *trial.duration_s,
+                                  way_of(run, trial), error_of(from_proto(simulated.end()), trial),
+                                  error_of(kinematic[i], trial),
+                                  error_of(constant_end(run, trial), trial)});
+      log_score += simulated.log_score() / static_cast<double>(t.count);
     }
-    row.way_m = median_error(ways);
-    const EndErrors own = end_errors(simulated, asked, t), rival = end_errors(kinematic, asked, t);
-    row.simulation = medians_of(own, ways);
-    row.kinematics = medians_of(rival, ways);
-    row.constant_velocity = medians_of(end_errors(constant, asked, t), ways);
-    const std::span<const std::size_t> run(run_of.data() + t.first, t.count);
-    row.position = drawn_ratio(own.position, rival.position, run, 1);
-    row.heading = drawn_ratio(own.heading, rival.heading, run, 1);
-    horizons.rows.push_back(row);
+    horizons.rows.push_back(row_of(std::span(horizons.windows).subspan(t.first, t.count),
+                                   std::span(run_of).subspan(t.first, t.count)));
+    horizons.rows.back().log_score = log_score;
   }
   return horizons;
 }
@@ -195,6 +207,21 @@ std::string format_horizons(const Horizons& horizons) {
                         horizons.kinematics.values[static_cast<Eigen::Index>(i)]);
   }
   return text + "\n";
+}
+
+std::string windows_csv(const Horizons& horizons) {
+  std::string text =
+      "horizon,session,run,t,duration,way,position,heading,kinematics_position,kinematics_heading,"
+      "constant_position,constant_heading\n";
+  for (const WindowRow& w : horizons.windows) {
+    text += fmt::format("{:g},{},{},{:.4f},{:.4f},{:.4f}", w.horizon_s, csv_field(w.session),
+                        csv_field(w.run), w.start_s, w.duration_s, w.way_m);
+    for (const WindowError& e : {w.simulation, w.kinematics, w.constant_velocity}) {
+      text += fmt::format(",{:.6f},{:.6f}", e.position_m, e.heading_rad);
+    }
+    text += "\n";
+  }
+  return text;
 }
 
 }  // namespace gapfarm

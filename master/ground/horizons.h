@@ -22,6 +22,20 @@ struct WindowErrors {
   double heading_rad_m = 0;
 };
 
+// How far off the end of one window is.
+struct WindowError {
+  double position_m = 0;
+  double heading_rad = 0;
+};
+
+struct WindowRow {
+  double horizon_s = 0;  // 0: a whole run
+  std::string session, run;
+  double start_s = 0, duration_s = 0;
+  double way_m = 0;
+  WindowError simulation, kinematics, constant_velocity;
+};
+
 struct HorizonRow {
   double horizon_s = 0;  // 0: whole runs
   std::size_t windows = 0;
@@ -34,6 +48,7 @@ struct HorizonRow {
 struct Horizons {
   Kinematics kinematics;  // fitted to the fitted windows
   std::vector<HorizonRow> rows;
+  std::vector<WindowRow> windows;  // horizon by horizon, in driving order
 };
 
 // `fitted` holds the windows that were fitted to, `values` what the simulation is to be measured
@@ -44,5 +59,8 @@ Result<Horizons> measure_horizons(Farm& farm, const Problem& fitted, const Param
 
 // A table, and how many of its medians are surely below and above the kinematics'.
 std::string format_horizons(const Horizons& horizons);
+
+// Every window as a headed CSV table (docs/formats.md).
+std::string windows_csv(const Horizons& horizons);
 
 }  // namespace gapfarm

@@ -1,0 +1,48 @@
+#include "master/ground/horizons.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "tests/unit/blind/worker_farm.h"
+#include "tests/unit/worker/ground_problem.h"
+
+namespace gapfarm {
+namespace {
+
+TEST(Horizons, TellEveryWindowBesideTheMedians) {
+  Problem problem = tests::ground_problem();
+  const RunLog log{problem.ground->robot().channels,
+                   {},
+                   {tests::driven_run(problem, problem.values, 12, "a"),
+                    tests::driven_run(problem, problem.values, 9, "b")},
+                   {}};
+  tests::take_runs(problem, log.runs);
+  tests::WorkerFarm farm;
+  const auto horizons = measure_horizons(farm, problem, problem.values, log, {{2, 0}, 0.5});
+  ASSERT_TRUE(horizons.ok()) << horizons.error().message;
+  ASSERT_EQ(horizons->rows.size(), 2u);
+  const auto windows = horizons->rows[0].windows;
+  ASSERT_EQ(horizons->windows.size(), windows + 2);
+  const WindowRow& a = horizons->windows[windows];
+  const WindowRow& b = horizons->windows[windows + 1];
+  EXPECT_EQ(a.run, "a");
+  EXPECT_EQ(b.run, "b");
+  EXPECT_NEAR(a.duration_s, 11.45, 0.1);  // the run-in is left out
+  EXPECT_GT(a.way_m, b.way_m);
+  // The simulation drove them itself; a skid-steer's kinematics know no slip.
+  for (const WindowRow& w : {a, b}) {
+    EXPECT_LT(w.simulation.position_m, 0.01);
+    EXPECT_GT(w.constant_velocity.position_m, 0.1);
+  }
+  EXPECT_EQ(horizons->rows[1].kinematics.heading_rad,
+            std::max(a.kinematics.heading_rad, b.kinematics.heading_rad));
+  EXPECT_EQ(horizons->rows[1].way_m, a.way_m);
+
+  const std::string table = windows_csv(*horizons);
+  EXPECT_EQ(std::count(table.begin(), table.end(), '\n'), static_cast<long>(windows + 3));
+  EXPECT_NE(table.find("\n0,,b,"), std::string::npos) << table;
+}
+
+}  // namespace
+}  // namespace gapfarm
