@@ -3,7 +3,8 @@
 
     scripts/ground_sets.py DATA OUT [SET ...]
 
-DATA holds drive/, dart/, optiodom/, neato/, mrclam/ and tricycle_calib/ as their owners left them,
+DATA holds drive/, dart/, optiodom/, neato/, mrclam/, rutgers_mecanum/ and tricycle_calib/ as their
+owners left them,
 and the car's file in wrong_robot/case01. Makes OUT/SET/robot.toml with the maker's figures, OUT/SET/fit and OUT/SET/test
 with commands.csv and poses.csv each. Measured wheel speeds are the input where a log has them.
 Needs only the standard library.
@@ -198,8 +199,9 @@ def tricycle(data, out, _):
           'wheelbase = 1.4\nwheel_radius = 0.1\n[marker]\nx = 1.5\n', *parts)
 
 
-def rutgers(data, out, fold):
-    """A mecanum robot at constant duties; every third command, from this one on, is kept apart.
+def rutgers(data, out, apart):
+    """A mecanum robot at constant duties; this slice of its nine commands is kept apart, or none:
+    then all are fitted and predicted.
 
     Wheels are where the motion says they are: [80, -80, 80, -80] drives along the camera's y, each
     wheel turns the robot to the left, and 3 and 4 push against 1 and 2 along x. Sizes are guesses.
@@ -210,7 +212,7 @@ def rutgers(data, out, fold):
     with open(f"{folder}/takes.csv", newline="", encoding="utf-8") as file:
         takes = list(csv.DictReader(file))
     words = [tuple(take[f"w{i}"] for i in (1, 2, 3, 4)) for take in takes]
-    apart = list(dict.fromkeys(words))[fold::3]
+    apart = apart and list(dict.fromkeys(words))[apart]
     for take, word in zip(takes, words):
         poses = numbers(f"{folder}/take{int(take['take']):02d}_poses.csv", 1)
         # The clocks are not one: the robot starts where its way begins, back from 20 and 60 mm.
@@ -219,7 +221,11 @@ def rutgers(data, out, fold):
         w1, w2, w3, w4 = (int(w) / 128 for w in word)
         commands = [[start - 0.5, 0, 0, 0, 0], [start, -w4, w3, -w2, w1],
                     [start + float(take["command_seconds"]), 0, 0, 0, 0]]
-        parts[word in apart].add(commands, [p for p in poses if p[0] >= start - 0.5])
+        # Until then it stands, and its camera sees it now here, now 90 mrad aside: ends are counted
+        # from the first frame, as its owners do.
+        stood = [[start - 0.5, *poses[0][1:]]]
+        for part in parts if apart is None else [parts[word in apart]]:
+            part.add(commands, stood + [p for p in poses if p[0] > start - 0.5])
     names = ", ".join(f'"{name}"' for name in order)
     write(out, f'drive = "mecanum"\ncommands = [{names}]\ncommand_kind = "duties"\n'
           'full_speed = 8.0\nwheel_radius = 0.05\nwheelbase = 0.15\nwheel_separation = 0.15\n'
@@ -233,7 +239,9 @@ SETS = {
     "opti_omni3": (optiodom, "omni3"), "opti_omni4": (optiodom, "omni4"),
     "opti_tricycle": (optiodom, "tricyc"), "neato": (neato, None), "mrclam_1": (mrclam, 1),
     "mrclam_2": (mrclam, 2), "mrclam_3": (mrclam, 3), "tricycle_calib": (tricycle, None),
-    "rutgers_1": (rutgers, 0), "rutgers_2": (rutgers, 1), "rutgers_3": (rutgers, 2),
+    **{f"rutgers_{k + 1}": (rutgers, slice(k, None, 3)) for k in range(3)},
+    "rutgers_all": (rutgers, None),
+    **{f"rutgers_of_nine_{k + 1}": (rutgers, slice(k, k + 1)) for k in range(9)},
 }
 
 
