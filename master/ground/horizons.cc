@@ -53,6 +53,11 @@ WindowError error_of(const Pose& end, const Trial& trial) {
   return {d.head<2>().norm(), std::abs(d[2])};
 }
 
+// 0 where no window went anywhere.
+double median_a_metre(const std::vector<double>& errors) {
+  return errors.empty() ? 0 : median(errors);
+}
+
 WindowErrors medians_of(std::span<const WindowRow> windows, WindowError WindowRow::*which,
                         double way_m) {
   std::vector<double> position, heading, position_m, heading_m;
@@ -64,7 +69,7 @@ WindowErrors medians_of(std::span<const WindowRow> windows, WindowError WindowRo
     position_m.push_back(error.position_m / row.way_m);
     heading_m.push_back(error.heading_rad / row.way_m);
   }
-  return {median(position), median(heading), median(position_m), median(heading_m)};
+  return {median(position), median(heading), median_a_metre(position_m), median_a_metre(heading_m)};
 }
 
 std::vector<double> each(std::span<const WindowRow> windows, WindowError WindowRow::*which,
