@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <optional>
+#include <set>
 
 #include "common/score/algebra.h"
 #include "common/score/bounded_step.h"
@@ -28,6 +30,50 @@ double median_of(std::vector<double> sizes) {
   const auto middle = sizes.begin() + static_cast<long>(sizes.size() / 2);
   std::nth_element(sizes.begin(), middle, sizes.end());
   return *middle;
+}
+
+// Mean logarithm of the middle half.
+double log_middle(std::vector<double> sizes) {
+  std::sort(sizes.begin(), sizes.end());
+  const auto count = static_cast<double>(sizes.size());
+  double sum = 0;
+  for (std::size_t k = 0; k < sizes.size(); ++k) {
+    // How much of the k-th share of the sizes lies between their quartiles.
+    const double from = std::max(static_cast<double>(k), count / 4);
+    const double to = std::min(static_cast<double>(k) + 1, 3 * count / 4);
+    if (to > from) sum += (to - from) * std::log(std::max(sizes[k], kLeastScale));
+  }
+  return sum / (count / 2);
+}
+
+// Where the first and last window of each run begin and end.
+std::map<std::size_t, std::array<double, 2>> spans_of(std::span<const Trial> windows) {
+  std::map<std::size_t, std::array<double, 2>> span_s;
+  for (const Trial& w : windows) {
+    const double end = *w.t_s + *w.duration_s;
+    const auto [run, fresh] = span_s.try_emplace(*w.run, std::array{*w.t_s, end});
+    run->second = {std::min(run->second[0], *w.t_s), std::max(run->second[1], end)};
+  }
+  return span_s;
+}
+
+// Of each window one of `count` parts of the log's time, of equal length.
+std::vector<std::size_t> equal_parts(std::span<const Trial> windows, std::size_t count) {
+  const auto span_s = spans_of(windows);
+  std::map<std::size_t, double> before_s;
+  double all_s = 0;
+  for (const auto& [run, span] : span_s) {
+    before_s[run] = all_s;
+    all_s += span[1] - span[0];
+  }
+  std::vector<std::size_t> parts;
+  for (const Trial& w : windows) {
+    const double in_run_s = *w.t_s + *w.duration_s / 2 - span_s.at(*w.run)[0];
+    const double share = (before_s[*w.run] + in_run_s) / all_s;
+    const auto part = static_cast<std::size_t>(static_cast<double>(count) * share);
+    parts.push_back(std::min(part, count - 1));
+  }
+  return parts;
 }
 
 // Student's density in one or two dimensions.
@@ -80,29 +126,46 @@ std::vector<std::size_t> window_lengths(std::span<const double> durations_s) {
 }
 
 std::vector<std::size_t> left_out_stretches(std::span<const Trial> windows, std::size_t count) {
-  std::map<std::size_t, std::array<double, 2>> span_s;  // of each run
-  for (const Trial& w : windows) {
-    const double end = *w.t_s + *w.duration_s;
-    const auto [run, fresh] = span_s.try_emplace(*w.run, std::array{*w.t_s, end});
-    run->second = {std::min(run->second[0], *w.t_s), std::max(run->second[1], end)};
-  }
-  const bool whole_runs = span_s.size() >= kEnoughRuns;
-  if (whole_runs) count = std::min(count, span_s.size());
-  std::map<std::size_t, double> before;  // runs or seconds
-  double all = 0;
-  for (const auto& [run, span] : span_s) {
-    before[run] = all;
-    all += whole_runs ? 1 : span[1] - span[0];
-  }
+  const auto span_s = spans_of(windows);
+  if (span_s.size() < kEnoughRuns) return equal_parts(windows, count);
+  count = std::min(count, span_s.size());
+  std::map<std::size_t, std::size_t> place;
+  for (const auto& [run, span] : span_s) place.try_emplace(run, place.size());
   std::vector<std::size_t> stretches;
-  for (const Trial& w : windows) {
-    double place = before[*w.run];
-    if (!whole_runs) place += *w.t_s + *w.duration_s / 2 - span_s[*w.run][0];
-    const auto stretch = static_cast<std::size_t>(static_cast<double>(count) * place / all);
-    stretches.push_back(std::min(stretch, count - 1));
-  }
+  for (const Trial& w : windows) stretches.push_back(count * place[*w.run] / span_s.size());
   return stretches;
 }
+
+namespace {
+
+// Of some windows' errors of position or heading.
+Unsure log_ratio(const WindowEnds& ends, const WindowEnds& rival,
+                 std::span<const std::size_t> windows, std::span<const std::size_t> parts,
+                 int part) {
+  const auto without = [&](std::optional<std::size_t> left_out) {
+    std::vector<double> own, others;
+    for (const std::size_t i : windows) {
+      if (left_out && parts[i] == *left_out) continue;
+      own.push_back(part_of(ends[i], part));
+      others.push_back(part_of(rival[i], part));
+    }
+    return own.empty() ? 0 : log_middle(std::move(own)) - log_middle(std::move(others));
+  };
+  std::set<std::size_t> different;
+  for (const std::size_t i : windows) different.insert(parts[i]);
+  std::vector<double> jackknife;
+  double mean = 0;
+  const auto count = static_cast<double>(different.size());
+  for (const std::size_t one : different) {
+    jackknife.push_back(without(one));
+    mean += jackknife.back() / count;
+  }
+  double squares = 0;
+  for (const double ratio : jackknife) squares += (ratio - mean) * (ratio - mean);
+  return {without(std::nullopt), std::sqrt(squares * (count - 1) / count)};
+}
+
+}  // namespace
 
 RobustErrors::RobustErrors(std::span<const double> durations_s, const WindowEnds& reference)
     : length_(window_lengths(durations_s)) {
@@ -137,20 +200,34 @@ double RobustErrors::nats(const WindowEnds& ends) const {
   return sum;
 }
 
-std::vector<std::array<double, 2>> RobustErrors::ratios(const WindowEnds& ends,
-                                                        const WindowEnds& rival) const {
-  std::vector<std::array<double, 2>> all(lengths(), {1, 1});
+Unsure RobustErrors::gain(const WindowEnds& ends, const WindowEnds& rival,
+                          std::span<const std::size_t> parts) const {
+  std::map<std::size_t, double> gains;  // of each part
+  double sum = 0;
+  for (std::size_t i = 0; i < ends.size(); ++i) {
+    const double nats = nats_of(i, ends[i]) - nats_of(i, rival[i]);
+    gains[parts[i]] += nats;
+    sum += nats;
+  }
+  const auto count = static_cast<double>(gains.size());
+  const auto all = static_cast<double>(ends.size());
+  double squares = 0;
+  for (const auto& [part, nats] : gains) squares += std::pow(nats - sum / count, 2);
+  const double error = count > 1 ? std::sqrt(squares * count / (count - 1)) / all : 0;
+  return {sum / all, error};
+}
+
+std::vector<std::array<Unsure, 2>> RobustErrors::log_ratios(
+    const WindowEnds& ends, const WindowEnds& rival, std::span<const std::size_t> parts) const {
+  std::vector<std::array<Unsure, 2>> all(lengths());
   for (std::size_t length = 0; length < lengths(); ++length) {
+    std::vector<std::size_t> mine;
+    for (std::size_t i = 0; i < ends.size(); ++i) {
+      if (length_[i] == length) mine.push_back(i);
+    }
+    if (static_cast<double>(mine.size()) < kEnoughWindows) continue;
     for (int part = 0; part < 2; ++part) {
-      std::vector<double> own, others;
-      for (std::size_t i = 0; i < ends.size(); ++i) {
-        if (length_[i] != length) continue;
-        own.push_back(part_of(ends[i], part));
-        others.push_back(part_of(rival[i], part));
-      }
-      if (static_cast<double>(own.size()) < kEnoughWindows) continue;
-      const double least = std::max(median_of(std::move(others)), kLeastScale);
-      all[length][static_cast<std::size_t>(part)] = median_of(std::move(own)) / least;
+      all[length][static_cast<std::size_t>(part)] = log_ratio(ends, rival, mine, parts, part);
     }
   }
   return all;

@@ -24,6 +24,12 @@ std::vector<std::size_t> window_lengths(std::span<const double> durations_s);
 // windows.
 std::vector<std::size_t> left_out_stretches(std::span<const Trial> windows, std::size_t count);
 
+// A value, and its standard error by leaving out parts of the log in turn.
+struct Unsure {
+  double value = 0;
+  double error = 0;
+};
+
 // Student's density of position and heading, with a scale of its own for windows of each length, so
 // that no length and neither position nor heading is given up for another.  Each length counts
 // alike, one with a handful of windows as much less as these are fewer.  Weights add up to the
@@ -36,9 +42,15 @@ class RobustErrors {
   std::size_t windows() const { return length_.size(); }
   double nats(const WindowEnds& ends) const;
   double nats_of(std::size_t window, const Eigen::Vector3d& end) const;
-  // Of each length: medians of position's and heading's errors over those of `rival`; 1 where a
-  // length has only a few windows.
-  std::vector<std::array<double, 2>> ratios(const WindowEnds& ends, const WindowEnds& rival) const;
+  // Nats a window over those of `rival`.  `parts`: of each window, the part of the log that it is
+  // in (left_out_stretches()): what a run has of its own is in all of it.
+  Unsure gain(const WindowEnds& ends, const WindowEnds& rival,
+              std::span<const std::size_t> parts) const;
+  // Of each length: how large errors of position and heading are beside those of `rival`, the
+  // logarithm of the ratio of their middles; nothing where a length has only a few windows.  A
+  // middle is the mean logarithm of the middle half, which jumps less than a median.
+  std::vector<std::array<Unsure, 2>> log_ratios(const WindowEnds& ends, const WindowEnds& rival,
+                                                std::span<const std::size_t> parts) const;
   // Position and heading of each length count that much more than now.
   void emphasise(std::span<const std::array<double, 2>> factors);
   std::size_t lengths() const { return scales_.size(); }

@@ -17,17 +17,22 @@ constexpr int kRaceRounds = 3;  // of every start, before the best go on
 // value's start counts is tried on stretches that were left out.
 constexpr std::array<double, 6> kHolds = {1, 3, 10, 30, 100, 300};
 constexpr double kFirmly = 1000;   // held where nothing slips
-constexpr double kWorseCosts = 1;  // nats a window for a median e times as far off
+constexpr double kWorseCosts = 1;  // nats a window for errors e times as large
 // Position and heading count alike, and what is worse than the kinematics' more.
 constexpr double kHeadingCounts = 2;
 constexpr int kEmphases = 3;
 constexpr double kEmphasis = 4;  // power of the ratio
-constexpr double kMostRatio = 1.3;
+constexpr double kMostLogRatio = 0.26;
+constexpr double kAsGood = 1.02;   // a ratio that is not worth climbing for
 constexpr std::size_t kLooks = 3;  // starts a gene that kinematics do not tell
 // What is left to find is mostly the noise: a search that has the windows' whole spread to roam in
 // trades ends for the noise's likelihood.
 constexpr double kFoundSpread = 0.1;  // of what the windows leave unsure
 constexpr double kHeldSpread = 1e-3;
+
+double emphasis_of(const Unsure& log_ratio) {
+  return std::exp(kEmphasis * std::clamp(log_ratio.value, 0.0, kMostLogRatio));
+}
 
 }  // namespace
 
@@ -91,13 +96,14 @@ WindowEnds SimulationFit::left_out(const Climb& climb, const Hold& hold) const {
                        stretches_);
 }
 
+// What is better must be so surely: a standard error is taken off every gain.
 SimulationFit::Foretold SimulationFit::foretold(const WindowEnds& ends) const {
-  Foretold of{(plain_->nats(ends) - plain_->nats(rival_)) / static_cast<double>(ends.size()), 0, 0};
-  of.cost = -of.gain;
-  for (const auto& parts : plain_->ratios(ends, rival_)) {
-    for (const double ratio : parts) {
-      of.worst = std::max(of.worst, ratio);
-      of.cost += kWorseCosts * std::log(std::max(ratio, 1.0));
+  const Unsure gain = plain_->gain(ends, rival_, parts_);
+  Foretold of{gain.value, 0, gain.error - gain.value};
+  for (const auto& ratios : plain_->log_ratios(ends, rival_, parts_)) {
+    for (const Unsure& ratio : ratios) {
+      of.worst = std::max(of.worst, std::exp(ratio.value));
+      of.cost += kWorseCosts * std::max(ratio.value + ratio.error, 0.0);
     }
   }
   return of;
@@ -163,10 +169,10 @@ Result<Climb> SimulationFit::best_of(std::vector<Climb> climbs) {
 Result<Climb> SimulationFit::weigh_worse(Climb best) {
   for (int round = 0; round < kEmphases && !best.slopes.empty(); ++round) {
     const WindowEnds ends = left_out(best, best.hold);
-    if (foretold(ends).worst <= 1) break;
-    auto factors = plain_->ratios(ends, rival_);
-    for (auto& parts : factors) {
-      for (double& ratio : parts) ratio = std::pow(std::clamp(ratio, 1.0, kMostRatio), kEmphasis);
+    if (foretold(ends).worst <= kAsGood) break;
+    std::vector<std::array<double, 2>> factors;
+    for (const auto& [position, heading] : plain_->log_ratios(ends, rival_, parts_)) {
+      factors.push_back({emphasis_of(position), emphasis_of(heading)});
     }
     errors_->emphasise(factors);
     Climb next = best;

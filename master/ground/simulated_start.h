@@ -20,7 +20,7 @@ struct SimulatedStart {
   double gain = 0;         // nats a window, over the kinematics' values in the simulation
   // On stretches that were left out of the fits, nats a window over the robot's own kinematics.
   double left_out_gain = 0;
-  // The largest of the ratios of median errors there, of position and heading at each length.
+  // The largest of the ratios of errors' middles there, of position and heading at each length.
   double worst_ratio = 1;
   // The kinematics predicted those better, and the values are theirs.
   bool kinematic = false;
@@ -36,8 +36,8 @@ std::vector<Genome> spread_starts(const Genome& middle, std::span<const std::siz
 // own kinematics (kinematic_start()) and from some others in what kinematics have no word for, such
 // as friction and creep, where a way from the first ends on a hill beside the highest.  The few
 // best after a look go on, the best two of these to the end, and beside them one that hardly slips.
-// What foretells stretches that were left out best is taken, where a median error that is larger
-// than the kinematics' costs; what is larger then counts more, as long as that helps.  The
+// What foretells stretches that were left out best is taken, where errors that may be larger than
+// the kinematics' cost; what is larger then counts more, as long as that helps.  The
 // kinematics' own values are kept where they do better, with the search held near these.  The
 // spread is at most `widest` (a standard deviation in gene units) where the windows do not tell.
 // Where a simulation does not end well nothing moves.  Errors: those of the farm.

@@ -10,6 +10,7 @@ namespace {
 constexpr double kGeneStep = 0.01;  // to find slopes; contacts are noisy below
 constexpr double kEnoughNats = 0.1;
 constexpr std::size_t kStretches = 6;
+constexpr std::size_t kParts = 12;    // of the log, that tell how sure a gain is
 constexpr double kFreelyMoves = 0.3;  // of a gene's range, where the windows do not tell
 
 }  // namespace
@@ -18,7 +19,8 @@ SimulationFit::SimulationFit(Farm& farm, const Problem& problem)
     : farm_(farm),
       problem_(problem),
       hash_(farm.add_problem(to_proto(problem))),
-      stretches_(left_out_stretches(problem.log.trials, kStretches)) {
+      stretches_(left_out_stretches(problem.log.trials, kStretches)),
+      parts_(left_out_stretches(problem.log.trials, kParts)) {
   const std::vector<bool> kinematic = told_by_kinematics(problem);
   for (std::size_t g = 0; g < problem.genes.size(); ++g) {
     const Parameter& row = problem.table()[problem.genes[g].row];

@@ -46,8 +46,8 @@ class SimulationFit {
   // What is foretold of stretches that were left out, beside the kinematics.
   struct Foretold {
     double gain = 0;   // nats a window
-    double worst = 0;  // ratio of median errors, of position and heading at all lengths
-    double cost = 0;   // the gain's negative, more where a median is worse
+    double worst = 0;  // ratio of errors' middles, of position and heading at all lengths
+    double cost = 0;   // the gain's negative, more where errors may be larger
   };
 
   Result<std::vector<std::optional<At>>> look_at(const std::vector<Genome>& genomes,
@@ -79,7 +79,8 @@ class SimulationFit {
   WindowEnds rival_;                            // of the kinematics, left out
   std::vector<std::size_t> told_;               // genes that move ends
   std::vector<std::size_t> untold_;             // those of them that kinematics have no word for
-  std::vector<std::size_t> stretches_;
+  std::vector<std::size_t> stretches_;          // of each window, left out in turn
+  std::vector<std::size_t> parts_;              // of each window, finer
   Genome start_;
   Genome firm_;  // the same without slip
   std::size_t simulations_ = 0;

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <set>
 
@@ -49,6 +50,62 @@ TEST(RobustErrors, LengthsCountAlikeUnlessThereIsAHandful) {
   EXPECT_NEAR(std::log(some / many), 0, 1);
   EXPECT_LT(one * 0.01 * 0.01, 0.5 * many * 0.01 * 0.01 / 2);
   EXPECT_GT(errors.nats(WindowEnds(121, none)), errors.nats(some_ends(121, 0.01)));
+}
+
+double scatter(const std::vector<double>& values) {
+  double mean = 0, squares = 0;
+  for (const double v : values) mean += v / static_cast<double>(values.size());
+  for (const double v : values) squares += (v - mean) * (v - mean);
+  return std::sqrt(squares / static_cast<double>(values.size() - 1));
+}
+
+double log_median_heading(const WindowEnds& ends) {
+  std::vector<double> sizes;
+  for (const auto& end : ends) sizes.push_back(std::abs(end[2]));
+  std::nth_element(sizes.begin(), sizes.begin() + 20, sizes.end());
+  return std::log(sizes[20]);
+}
+
+// Of 40 windows a median jumps further than the middle that two predictions are compared by, and
+// the standard error says how far that jumps.
+TEST(RobustErrors, RatiosJumpLessThanMediansAndSayHowFar) {
+  const std::vector<double> durations_s(40, 5.0);
+  std::vector<std::size_t> parts;
+  for (std::size_t i = 0; i < 40; ++i) parts.push_back(i * 12 / 40);
+  std::vector<double> ratios, medians;
+  double errors_told = 0;
+  const int logs = 200;
+  for (int log = 0; log < logs; ++log) {
+    const auto seed = static_cast<std::uint64_t>(2 * log);
+    const WindowEnds own = some_ends(40, 0.02, 10 + seed), rival = some_ends(40, 0.01, 11 + seed);
+    const RobustErrors errors(durations_s, rival);
+    const Unsure heading = errors.log_ratios(own, rival, parts).front()[1];
+    ratios.push_back(heading.value);
+    errors_told += heading.error / logs;
+    medians.push_back(log_median_heading(own) - log_median_heading(rival));
+  }
+  double mean = 0;
+  for (const double ratio : ratios) mean += ratio / logs;
+  EXPECT_NEAR(mean, std::log(2.0), 0.05);
+  EXPECT_LT(scatter(ratios), 0.93 * scatter(medians));
+  EXPECT_NEAR(errors_told / scatter(ratios), 1, 0.25);
+}
+
+TEST(RobustErrors, GainsAreAsSureAsTheyDoNotDifferFromPartToPart) {
+  const std::vector<double> durations_s(60, 1.0);
+  std::vector<std::size_t> parts;
+  for (std::size_t i = 0; i < 60; ++i) parts.push_back(i / 5);
+  const WindowEnds rival = some_ends(60, 0.02, 1);
+  const RobustErrors errors(durations_s, rival);
+  WindowEnds nearer = rival, one_part = rival;
+  for (Eigen::Vector3d& end : nearer) end /= 2;
+  for (std::size_t i = 0; i < 5; ++i) one_part[i] /= 100;
+  const Unsure everywhere = errors.gain(nearer, rival, parts);
+  EXPECT_GT(everywhere.value, 3 * everywhere.error);
+  const Unsure there = errors.gain(one_part, rival, parts);
+  EXPECT_GT(there.value, 0);
+  EXPECT_NEAR(there.value, there.error, 0.1 * there.error);
+  EXPECT_EQ(errors.gain(rival, rival, parts).error, 0);
 }
 
 // H = [[2, 1], [1, 2]]; freely the first value would go to 0.1 - 0.7.
