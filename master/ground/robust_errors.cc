@@ -125,14 +125,44 @@ std::vector<std::size_t> window_lengths(std::span<const double> durations_s) {
   return lengths;
 }
 
-std::vector<std::size_t> left_out_stretches(std::span<const Trial> windows, std::size_t count) {
+namespace {
+
+bool told_alike(const CommandedRun& a, const CommandedRun& b) {
+  return std::ranges::equal(a.commands, b.commands, {}, &CommandRow::values, &CommandRow::values);
+}
+
+// Of each of these runs, where it is among what is left out: counted from 0 on, repeats alike.
+std::map<std::size_t, std::size_t> places_of(const std::map<std::size_t, std::array<double, 2>>& of,
+                                             std::span<const CommandedRun> runs, bool repeats) {
+  std::map<std::size_t, std::size_t> places;
+  std::size_t count = 0;
+  for (const auto& [run, span] : of) {
+    const auto like = std::ranges::find_if(places, [&](const auto& known) {
+      return repeats && told_alike(runs[known.first], runs[run]);
+    });
+    places[run] = like == places.end() ? count++ : like->second;
+  }
+  return places;
+}
+
+std::size_t count_of(const std::map<std::size_t, std::size_t>& places) {
+  std::size_t count = 0;
+  for (const auto& [run, place] : places) count = std::max(count, place + 1);
+  return count;
+}
+
+}  // namespace
+
+std::vector<std::size_t> left_out_stretches(std::span<const Trial> windows,
+                                            std::span<const CommandedRun> runs, std::size_t count) {
   const auto span_s = spans_of(windows);
-  if (span_s.size() < kEnoughRuns) return equal_parts(windows, count);
-  count = std::min(count, span_s.size());
-  std::map<std::size_t, std::size_t> place;
-  for (const auto& [run, span] : span_s) place.try_emplace(run, place.size());
+  std::map<std::size_t, std::size_t> places = places_of(span_s, runs, true);
+  if (count_of(places) < kEnoughRuns) places = places_of(span_s, runs, false);
+  const std::size_t units = count_of(places);
+  if (units < kEnoughRuns) return equal_parts(windows, count);
+  count = std::min(count, units);
   std::vector<std::size_t> stretches;
-  for (const Trial& w : windows) stretches.push_back(count * place[*w.run] / span_s.size());
+  for (const Trial& w : windows) stretches.push_back(count * places[*w.run] / units);
   return stretches;
 }
 

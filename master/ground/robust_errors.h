@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "common/runs/windows.h"
 #include "common/trials/trial.h"
 
 namespace gapfarm {
@@ -19,10 +20,11 @@ using WindowSlopes = std::vector<Eigen::MatrixXd>;  // of each end: 3 rows, a co
 std::vector<std::size_t> window_lengths(std::span<const double> durations_s);
 
 // Of each window one of at most `count` stretches of the log that are left out in turn: whole runs,
-// those in a row together, or of one or two runs the log's time in equal parts.  Neighbours are
-// alike (repeats of a command, a floor), so they are left out together.  REQUIRES: trials that are
-// windows.
-std::vector<std::size_t> left_out_stretches(std::span<const Trial> windows, std::size_t count);
+// those in a row together and those with the same commands wherever they are, or of one or two runs
+// the log's time in equal parts.  What is alike (repeats, a floor) is left out together, or it
+// would be foretold by itself.  REQUIRES: trials that are windows of `runs`.
+std::vector<std::size_t> left_out_stretches(std::span<const Trial> windows,
+                                            std::span<const CommandedRun> runs, std::size_t count);
 
 // A value, and its standard error by leaving out parts of the log in turn.
 struct Unsure {

@@ -19,8 +19,8 @@ SimulationFit::SimulationFit(Farm& farm, const Problem& problem)
     : farm_(farm),
       problem_(problem),
       hash_(farm.add_problem(to_proto(problem))),
-      stretches_(left_out_stretches(problem.log.trials, kStretches)),
-      parts_(left_out_stretches(problem.log.trials, kParts)) {
+      stretches_(left_out_stretches(problem.log.trials, problem.runs, kStretches)),
+      parts_(left_out_stretches(problem.log.trials, problem.runs, kParts)) {
   const std::vector<bool> kinematic = told_by_kinematics(problem);
   for (std::size_t g = 0; g < problem.genes.size(); ++g) {
     const Parameter& row = problem.table()[problem.genes[g].row];

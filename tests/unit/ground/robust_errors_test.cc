@@ -161,18 +161,42 @@ Trial window(std::uint32_t run, double t_s) {
   return trial;
 }
 
+// A run a command.
+std::vector<CommandedRun> told(std::initializer_list<double> commands) {
+  std::vector<CommandedRun> runs;
+  for (const double command : commands) {
+    runs.push_back({});
+    runs.back().commands = {{0, {command}}, {5, {0}}};
+  }
+  return runs;
+}
+
+TEST(LeftOut, RepeatsOfACommandAreLeftOutTogether) {
+  std::vector<Trial> windows;
+  for (std::uint32_t k = 0; k < 8; ++k) windows.push_back(window(k, 5));
+  EXPECT_EQ(left_out_stretches(windows, told({1, 1, 2, 2, 1, 3, 3, 4}), 6),
+            (std::vector<std::size_t>{0, 0, 1, 1, 0, 2, 2, 3}));
+  // More commands than stretches: some go together, none is cut.
+  EXPECT_EQ(left_out_stretches(windows, told({1, 1, 2, 2, 3, 3, 4, 4}), 3),
+            (std::vector<std::size_t>{0, 0, 0, 0, 1, 1, 2, 2}));
+  // One command all along: its runs are all that can be left out.
+  EXPECT_EQ(left_out_stretches(windows, told({1, 1, 1, 1, 1, 1, 1, 1}), 4),
+            (std::vector<std::size_t>{0, 0, 1, 1, 2, 2, 3, 3}));
+}
+
 TEST(LeftOut, StretchesAreRunsInARowOrEqualTimes) {
-  std::vector<Trial> repeats, one;
-  for (std::uint32_t k = 0; k < 12; ++k) repeats.push_back(window(k, 5));
-  const std::vector<std::size_t> pairs = left_out_stretches(repeats, 6);
+  std::vector<Trial> many, one;
+  for (std::uint32_t k = 0; k < 12; ++k) many.push_back(window(k, 5));
+  const std::vector<CommandedRun> differ = told({1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12});
+  const std::vector<std::size_t> pairs = left_out_stretches(many, differ, 6);
   for (std::size_t k = 0; k < 12; ++k) EXPECT_EQ(pairs[k], k / 2);
   // Three runs are three stretches, however long.
   std::vector<Trial> three;
   for (int k = 0; k < 30; ++k) three.push_back(window(k < 20 ? 0 : k < 25 ? 1 : 2, 100 + k));
-  const std::vector<std::size_t> runs = left_out_stretches(three, 6);
+  const std::vector<std::size_t> runs = left_out_stretches(three, told({1, 2, 3}), 6);
   for (std::size_t k = 0; k < 30; ++k) EXPECT_EQ(runs[k], k < 20 ? 0 : k < 25 ? 1 : 2);
   for (int k = 0; k < 30; ++k) one.push_back(window(0, 100 + k));
-  const std::vector<std::size_t> times = left_out_stretches(one, 3);
+  const std::vector<std::size_t> times = left_out_stretches(one, told({1}), 3);
   for (std::size_t k = 0; k < 30; ++k) EXPECT_EQ(times[k], k / 10);
 }
 
