@@ -17,6 +17,7 @@ constexpr double kLeastScale = 1e-5;
 constexpr double kDimensions[] = {2, 1};  // of position and heading
 constexpr double kStrayShare = 0.25;      // of what windows of the commonest length cover
 constexpr double kEnoughWindows = 10;     // for a length to count in full
+constexpr double kMuchSharper = 0.5;      // of a scale
 // What is a run's own (its floor, its way, how its clock stands) is in every part of it: runs are
 // not cut where these are left to fit to.
 constexpr std::size_t kEnoughRuns = 3;
@@ -199,15 +200,8 @@ Unsure log_ratio(const WindowEnds& ends, const WindowEnds& rival,
 
 RobustErrors::RobustErrors(std::span<const double> durations_s, const WindowEnds& reference)
     : length_(window_lengths(durations_s)) {
-  std::vector<std::array<std::vector<double>, 2>> sizes;
-  for (std::size_t i = 0; i < length_.size(); ++i) {
-    if (length_[i] >= sizes.size()) sizes.resize(length_[i] + 1);
-    for (int part = 0; part < 2; ++part) {
-      sizes[length_[i]][static_cast<std::size_t>(part)].push_back(part_of(reference[i], part));
-    }
-  }
   double shares = 0;
-  for (const auto& [position, heading] : sizes) {
+  for (const auto& [position, heading] : sizes_of(reference)) {
     scales_.push_back({scale_of_part(position, 0), scale_of_part(heading, 1)});
     const double share = std::min(1.0, static_cast<double>(position.size()) / kEnoughWindows);
     const double use = share / static_cast<double>(position.size());
@@ -216,6 +210,32 @@ RobustErrors::RobustErrors(std::span<const double> durations_s, const WindowEnds
   }
   const double all = static_cast<double>(length_.size()) / shares;
   emphasise(std::vector<std::array<double, 2>>(use_.size(), {all, all}));
+}
+
+std::vector<std::array<std::vector<double>, 2>> RobustErrors::sizes_of(
+    const WindowEnds& ends) const {
+  std::vector<std::array<std::vector<double>, 2>> sizes;
+  for (std::size_t i = 0; i < length_.size(); ++i) {
+    if (length_[i] >= sizes.size()) sizes.resize(length_[i] + 1);
+    for (int part = 0; part < 2; ++part) {
+      sizes[length_[i]][static_cast<std::size_t>(part)].push_back(part_of(ends[i], part));
+    }
+  }
+  return sizes;
+}
+
+bool RobustErrors::sharpen(const WindowEnds& ends) {
+  bool any = false;
+  const auto sizes = sizes_of(ends);
+  for (std::size_t length = 0; length < lengths(); ++length) {
+    for (std::size_t part = 0; part < 2; ++part) {
+      const double own = scale_of_part(sizes[length][part], static_cast<int>(part));
+      if (!(own < kMuchSharper * scales_[length][part])) continue;
+      scales_[length][part] = own;
+      any = true;
+    }
+  }
+  return any;
 }
 
 double RobustErrors::nats_of(std::size_t window, const Eigen::Vector3d& end) const {

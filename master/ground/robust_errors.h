@@ -53,6 +53,9 @@ class RobustErrors {
   // middle is the mean logarithm of the middle half, which jumps less than a median.
   std::vector<std::array<Unsure, 2>> log_ratios(const WindowEnds& ends, const WindowEnds& rival,
                                                 std::span<const std::size_t> parts) const;
+  // Where `ends` are met much more nearly than the scales say, these become those of `ends`: what
+  // strays shows only beside what does not.  Whether any did.
+  bool sharpen(const WindowEnds& ends);
   // Position and heading of each length count that much more than now.
   void emphasise(std::span<const std::array<double, 2>> factors);
   std::size_t lengths() const { return scales_.size(); }
@@ -60,6 +63,9 @@ class RobustErrors {
   Eigen::Vector3d weights(std::size_t window, const Eigen::Vector3d& end) const;
 
  private:
+  // Of each length: positions' and headings' errors.
+  std::vector<std::array<std::vector<double>, 2>> sizes_of(const WindowEnds& ends) const;
+
   std::vector<std::size_t> length_;            // of each window: which
   std::vector<std::array<double, 2>> use_;     // of a window of each length: position, heading
   std::vector<std::array<double, 2>> scales_;  // of each length: m, rad

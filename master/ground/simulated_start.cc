@@ -16,6 +16,7 @@ constexpr int kRaceRounds = 3;  // of every start, before the best go on
 // What windows of one run tell is less than their number says: how much more than one of them a
 // value's start counts is tried on stretches that were left out.
 constexpr std::array<double, 6> kHolds = {1, 3, 10, 30, 100, 300};
+constexpr int kSharpenings = 4;
 constexpr double kFirmly = 1000;   // held where nothing slips
 constexpr double kWorseCosts = 1;  // nats a window for errors e times as large
 // Position and heading count alike, and what is worse than the kinematics' more.
@@ -148,21 +149,53 @@ Result<Climb> SimulationFit::best_of(std::vector<Climb> climbs) {
   double least = INFINITY;
   for (std::size_t k = 0; k < climbs.size(); ++k) {
     if (climbs[k].slopes.empty()) continue;
-    for (const double strength : kHolds) {
-      const Hold hold{climbs[k].hold.start, strength, climbs[k].hold.untold};
-      const double cost = foretold(left_out(climbs[k], hold)).cost;
-      if (!(cost < least)) continue;
-      best = k;
-      held = hold;
-      least = cost;
-    }
+    double cost = INFINITY;
+    const Hold hold = best_hold(climbs[k], &cost);
+    if (!(cost < least)) continue;
+    best = k;
+    held = hold;
+    least = cost;
   }
   Climb chosen = std::move(climbs[best]);
   if (held.strength != chosen.hold.strength) {
     chosen.hold = held;
     if (Status s = climb_again(&chosen); !s) return s.error();
   }
-  return weigh_worse(std::move(chosen));
+  auto sharp = sharpen(std::move(chosen));
+  if (!sharp) return sharp.error();
+  return weigh_worse(*std::move(sharp));
+}
+
+// As firmly as foretells best what was left out; `cost` is that of it.
+Hold SimulationFit::best_hold(const Climb& climb, double* cost) const {
+  Hold best = climb.hold;
+  *cost = INFINITY;
+  for (const double strength : kHolds) {
+    const Hold hold{climb.hold.start, strength, climb.hold.untold};
+    const double own = foretold(left_out(climb, hold)).cost;
+    if (!(own < *cost)) continue;
+    best = hold;
+    *cost = own;
+  }
+  return best;
+}
+
+// Kinematics that leave much more than the simulation are no measure of which windows stray.
+Result<Climb> SimulationFit::sharpen(Climb best) {
+  for (int round = 0; round < kSharpenings && !best.slopes.empty(); ++round) {
+    const WindowEnds ends = left_out(best, best.hold);
+    if (!plain_->sharpen(ends)) break;
+    errors_->sharpen(ends);
+    Climb next = best;
+    if (Status s = climb_again(&next); !s) return s.error();
+    double cost = INFINITY;
+    next.hold = best_hold(next, &cost);
+    if (Status s = climb_again(&next); !s) return s.error();
+    const double before = foretold(left_out(best, best.hold)).cost;
+    if (!(foretold(left_out(next, next.hold)).cost < before)) break;
+    best = std::move(next);
+  }
+  return best;
 }
 
 // What is foretold worse than by the kinematics counts more, as long as that helps.

@@ -37,7 +37,9 @@ std::vector<Genome> spread_starts(const Genome& middle, std::span<const std::siz
 // as friction and creep, where a way from the first ends on a hill beside the highest.  The few
 // best after a look go on, the best two of these to the end, and beside them one that hardly slips.
 // What foretells stretches that were left out best is taken, where errors that may be larger than
-// the kinematics' cost; what is larger then counts more, as long as that helps.  The
+// the kinematics' cost; where much less is left than by the kinematics, windows are scaled by that
+// from then on, so that what strays counts little; what is larger than theirs then counts more, as
+// long as that helps.  The
 // kinematics' own values are kept where they do better, with the search held near these.  The
 // spread is at most `widest` (a standard deviation in gene units) where the windows do not tell.
 // Where a simulation does not end well nothing moves.  Errors: those of the farm.

@@ -67,6 +67,8 @@ class SimulationFit {
   Status climb_again(Climb* climb);
   Result<std::optional<Climb>> firm_climb();
   Result<Climb> best_of(std::vector<Climb> climbs);
+  Hold best_hold(const Climb& climb, double* cost) const;
+  Result<Climb> sharpen(Climb best);
   Result<Climb> weigh_worse(Climb best);
   Status judge(const Climb& best, const At& begin, SimulatedStart* found);
   void take_spread(const Climb& climb, double widest, SimulatedStart* found) const;

@@ -153,6 +153,22 @@ TEST(LeftOut, ValuesThatTellOnlyTheirOwnStretchAreSeenThrough) {
   EXPECT_GT(together, alone + 50);
 }
 
+// A rival that leaves a metre does not tell which of some centimetres stray.
+TEST(RobustErrors, SharpenedTheyTellWhatStrays) {
+  const std::vector<double> durations_s(40, 2.0);
+  const Eigen::Vector3d near(0.01, 0, 0.01), far(0.3, 0, 0.01);
+  RobustErrors errors(durations_s, WindowEnds(40, Eigen::Vector3d(1, 0, 1)));
+  WindowEnds ends(40, near);
+  ends[3] = ends[17] = ends[30] = far;
+  EXPECT_GT(errors.weights(3, far)[0], 0.8 * errors.weights(0, near)[0]);
+  EXPECT_TRUE(errors.sharpen(ends));
+  EXPECT_LT(errors.weights(3, far)[0], 0.05 * errors.weights(0, near)[0]);
+  EXPECT_FALSE(errors.sharpen(ends));
+  // What is left hardly less is no reason to.
+  RobustErrors alike(durations_s, WindowEnds(40, near));
+  EXPECT_FALSE(alike.sharpen(WindowEnds(40, 0.7 * near)));
+}
+
 Trial window(std::uint32_t run, double t_s) {
   Trial trial;
   trial.run = run;
