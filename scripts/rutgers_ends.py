@@ -4,9 +4,9 @@
     scripts/rutgers_ends.py DATA OUT
 
 DATA holds rutgers_mecanum/; OUT is where scripts/measure_ground.sh left the sets rutgers_of_nine_1 to
-rutgers_of_nine_9 (each command predicted by a fit to the eight others) and rutgers_all (all fitted).  The
-same for all: from the first frame to the last one of the recording, every take on its own.  Needs
-only the standard library.
+rutgers_of_nine_9 (each command predicted by a fit to the eight others) and rutgers_all (all fitted).
+What was not measured is left out.  The same for all: from the first frame to the last one of the
+recording, every take on its own.  Needs only the standard library.
 """
 import csv
 import math
@@ -28,7 +28,9 @@ def apart(a, b):
 
 
 def predicted(path):
-    """(mm, degrees) of every whole run, in driving order."""
+    """(mm, degrees) of every whole run, in driving order; none where it was not measured."""
+    if not os.path.exists(path):
+        return []
     with open(path, newline="", encoding="utf-8") as file:
         return [(1e3 * float(row["position"]), math.degrees(float(row["heading"])))
                 for row in csv.DictReader(file) if float(row["horizon"]) == 0]
@@ -39,6 +41,8 @@ def cell(errors):
 
 
 def line(name, errors):
+    if not errors:
+        return
     mm, degrees = zip(*errors)
     print(f"| {name} | {len(errors)} | {statistics.median(mm):.1f}, {statistics.median(degrees):.1f} "
           f"| {statistics.mean(mm):.1f}, {statistics.mean(degrees):.1f} |")
