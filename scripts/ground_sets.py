@@ -200,8 +200,8 @@ def tricycle(data, out, _):
 
 
 def rutgers(data, out, apart):
-    """A mecanum robot at constant duties; this slice of its nine commands is kept apart, or none:
-    then all are fitted and predicted.
+    """A mecanum robot at constant duties; this one of its nine commands is kept apart, or none: then
+    all are fitted and predicted.
 
     Wheels are where the motion says they are: [80, -80, 80, -80] drives along the camera's y, each
     wheel turns the robot to the left, and 3 and 4 push against 1 and 2 along x. Sizes are guesses.
@@ -212,7 +212,7 @@ def rutgers(data, out, apart):
     with open(f"{folder}/takes.csv", newline="", encoding="utf-8") as file:
         takes = list(csv.DictReader(file))
     words = [tuple(take[f"w{i}"] for i in (1, 2, 3, 4)) for take in takes]
-    apart = apart and list(dict.fromkeys(words))[apart]
+    apart = None if apart is None else list(dict.fromkeys(words))[apart]
     for take, word in zip(takes, words):
         poses = numbers(f"{folder}/take{int(take['take']):02d}_poses.csv", 1)
         # The clocks are not one: the robot starts where its way begins, back from 20 and 60 mm.
@@ -224,7 +224,7 @@ def rutgers(data, out, apart):
         # Until then it stands, and its camera sees it now here, now 90 mrad aside: ends are counted
         # from the first frame, as its owners do.
         stood = [[start - 0.5, *poses[0][1:]]]
-        for part in parts if apart is None else [parts[word in apart]]:
+        for part in parts if apart is None else [parts[word == apart]]:
             part.add(commands, stood + [p for p in poses if p[0] > start - 0.5])
     names = ", ".join(f'"{name}"' for name in order)
     write(out, f'drive = "mecanum"\ncommands = [{names}]\ncommand_kind = "duties"\n'
@@ -239,9 +239,8 @@ SETS = {
     "opti_omni3": (optiodom, "omni3"), "opti_omni4": (optiodom, "omni4"),
     "opti_tricycle": (optiodom, "tricyc"), "neato": (neato, None), "mrclam_1": (mrclam, 1),
     "mrclam_2": (mrclam, 2), "mrclam_3": (mrclam, 3), "tricycle_calib": (tricycle, None),
-    **{f"rutgers_{k + 1}": (rutgers, slice(k, None, 3)) for k in range(3)},
     "rutgers_all": (rutgers, None),
-    **{f"rutgers_of_nine_{k + 1}": (rutgers, slice(k, k + 1)) for k in range(9)},
+    **{f"rutgers_of_nine_{k + 1}": (rutgers, k) for k in range(9)},
 }
 
 

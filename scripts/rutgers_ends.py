@@ -27,6 +27,26 @@ def apart(a, b):
     return 1e3 * math.hypot(a[0] - b[0], a[1] - b[1]), math.degrees(abs(turn))
 
 
+def windows_table(out):
+    """Medians over the windows of all nine predictions, as `gapfarm horizons` has them of one."""
+    windows = {}
+    for k in range(9):
+        path = os.path.join(out, f"rutgers_of_nine_{k + 1}.csv")
+        if not os.path.exists(path):
+            continue
+        with open(path, newline="", encoding="utf-8") as file:
+            for row in csv.DictReader(file):
+                windows.setdefault(row["horizon"], []).append(row)
+    print("\n| s | windows | gapfarm mm, mrad | kinematics mm, mrad | constant velocity mm, mrad |")
+    print("|---|---|---|---|---|")
+    for horizon, rows in windows.items():
+        cells = [", ".join(f"{1e3 * statistics.median(float(row[kind + part]) for row in rows):.1f}"
+                           for part in ("position", "heading"))
+                 for kind in ("", "kinematics_", "constant_")]
+        name = "whole" if float(horizon) == 0 else horizon
+        print(f"| {name} | {len(rows)} | {' | '.join(cells)} |")
+
+
 def predicted(path):
     """(mm, degrees) of every whole run, in driving order; none where it was not measured."""
     if not os.path.exists(path):
@@ -86,6 +106,7 @@ def main():
     line("fitted, of the commands tuned by hand", beside_fitted)
     line("tuned by hand", theirs)
     line("repeats, one from the other", repeats)
+    windows_table(out)
 
 
 if __name__ == "__main__":
