@@ -80,8 +80,9 @@ def main():
                    for row in csv.DictReader(file)}
     everything = predicted(os.path.join(out, "rutgers_all.csv"))
     own, fitted, theirs, beside, beside_fitted, repeats = [], [], [], [], [], []
-    print("| command | held out mm, deg | fitted mm, deg | by hand mm, deg | repeats apart mm, deg |")
-    print("|---|---|---|---|---|")
+    columns = ["command", "held out mm, deg", *(["fitted mm, deg"] if everything else []),
+               "by hand mm, deg", "repeats apart mm, deg"]
+    print(f"| {' | '.join(columns)} |\n|{'---|' * len(columns)}")
     for k in range(len(takes) // 2):
         pair = takes[2 * k:2 * k + 2]
         ends = [last_pose(f"{folder}/take{int(take['take']):02d}_poses.csv") for take in pair]
@@ -97,7 +98,8 @@ def main():
             beside += held
             beside_fitted += known
         words = " ".join(pair[0][f"w{i}"] for i in (1, 2, 3, 4))
-        print(f"| {words} | {cell(held)} | {cell(known)} | {cell(hand)} | {cell(repeats[-1:])} |")
+        cells = [held, *([known] if everything else []), hand, repeats[-1:]]
+        print(f"| {words} | {' | '.join(cell(errors) for errors in cells)} |")
     print("\n| ends | takes | median mm, deg | mean mm, deg |")
     print("|---|---|---|---|")
     line("held out", own)
