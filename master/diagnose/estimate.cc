@@ -99,11 +99,7 @@ Status differentiate(Predictor& predictor, const Study& study, JointFit* fit) {
   fit->jacobian.setZero(static_cast<Eigen::Index>(3 * study.size()),
                         static_cast<Eigen::Index>(fit->parameters.size()));
   if (requests.empty()) return {};
-  // Effects beside a base that stays are what is named, and what they leave is judged: with coarser
-  // derivatives a fit stops short of where that is least.
-  const bool judged = fit->base_parameters == 0;
-  const Result<SlopePoint> from =
-      judged ? SlopePoint{fit->at, fit->ends} : slope_point(predictor, study, fit->at, fit->ends);
+  const auto from = slope_point(predictor, study, fit->at, fit->ends);
   if (!from) return from.error();
   auto slopes = slopes_at(predictor, from->at, from->ends, requests);
   if (!slopes) return slopes.error();
