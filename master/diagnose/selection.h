@@ -113,8 +113,7 @@ class Selector {
                         const std::optional<Patch>& beside);
   Result<std::vector<EffectCandidate>> simulate_patches(const Regression& explained,
                                                         const std::vector<Patch>& patches);
-  Status refine_patch(const Regression& explained, std::vector<EffectCandidate> discs,
-                      int most_barren);
+  Status refine_patch(const Regression& explained, std::vector<EffectCandidate> discs, bool behind);
   void drop_linear_views(const Regression& explained,
                          std::map<std::string, EffectCandidate>* best) const;
   EffectCandidate refine_seam(const Regression& explained, EffectCandidate best) const;

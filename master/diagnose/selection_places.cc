@@ -32,7 +32,6 @@ constexpr double kLeastMovedRatio = 0.06, kMostMovedRatio = 2.9;
 constexpr double kMove_m = 0.05, kMoveRatio = 0.4, kMovesShrink = 0.7, kLeastRadius_m = 0.05;
 constexpr double kClimbs = 1.03;  // times the gain of before
 constexpr int kMoves = 6;
-constexpr int kMostBarrenBehind = 1;  // in a row, behind what explains more
 constexpr std::size_t kMostParents = 3, kOffspring = 12;
 constexpr std::uint64_t kMovesSeed = 4;
 
@@ -99,13 +98,13 @@ Result<std::vector<EffectCandidate>> Selector::simulate_patches(const Regression
 
 // Discs that the sketch proposes, the best first, moved to where the simulation explains most. What
 // a rim does to each drive that crosses it makes many hills, so the best few are moved at random,
-// in ever smaller steps.
+// in ever smaller steps; `behind` what explains more only for as long as that gains.
 Status Selector::refine_patch(const Regression& explained, std::vector<EffectCandidate> discs,
-                              int most_barren) {
+                              bool behind) {
   Stream stream({kMovesSeed, Purpose::kStatistics, 0, 0, 0});
   double scale = 1;
-  int barren = 0;
-  for (int k = 0; k < kMoves && barren < most_barren; ++k, scale *= kMovesShrink) {
+  bool left = false;
+  for (int k = 0; k < kMoves && !left; ++k, scale *= kMovesShrink) {
     const double before = discs.front().gain;
     discs.resize(std::min(discs.size(), kMostParents));
     std::vector<Patch> moved;
@@ -122,10 +121,10 @@ Status Selector::refine_patch(const Regression& explained, std::vector<EffectCan
     discs.insert(discs.end(), std::make_move_iterator(tried->begin()),
                  std::make_move_iterator(tried->end()));
     std::stable_sort(discs.begin(), discs.end(), better);
-    barren = discs.front().gain > kClimbs * before ? 0 : barren + 1;
+    left = behind && !(discs.front().gain > kClimbs * before);
   }
-  // Where little was tried because something else explains more, there may be more to find later.
-  if (barren < most_barren) refined_patches_.push_back(patch_of(discs.front().signature));
+  // What was left because something else explains more may be looked at again.
+  if (!left) refined_patches_.push_back(patch_of(discs.front().signature));
   discs.resize(std::min(discs.size(), kMostParents));
   for (EffectCandidate& disc : discs) catalogue_.push_back(std::move(disc.signature));
   return {};
@@ -165,8 +164,8 @@ Status Selector::search_patches(const Regression& explained, double most_gain,
   const EffectCandidate& best = simulated->front();
   if (best.gain + best.signature.penalty < kWorthRefining) return {};
   if (kMostOfMoving * best.gain < most_gain) return {};  // its turn comes when that is explained
-  return refine_patch(explained, std::move(*simulated),
-                      best.gain < most_gain ? kMostBarrenBehind : kMoves + 1);
+  const bool behind = best.gain < most_gain;
+  return refine_patch(explained, std::move(*simulated), behind);
 }
 
 }  // namespace gapfarm
