@@ -1,7 +1,6 @@
 #include "master/ground/drawn_ratio.h"
 
 #include <algorithm>
-#include <cmath>
 #include <map>
 
 #include "common/random/stream.h"
@@ -60,12 +59,7 @@ DrawnRatio drawn_ratio(std::span<const double> own, std::span<const double> riva
     }
     ratios.push_back(ratio_of(of_own, of_rival));
   }
-  std::sort(ratios.begin(), ratios.end());
-  const auto last = static_cast<double>(kRatioDraws - 1);
-  const auto at = [&](double share) {
-    return ratios[static_cast<std::size_t>(std::lround(share * last))];
-  };
-  drawn.interval = {at(kRatioTail), at(1 - kRatioTail)};
+  drawn.interval = {quantile(ratios, kRatioTail), quantile(ratios, 1 - kRatioTail)};
   return drawn;
 }
 
