@@ -18,14 +18,18 @@ import argparse
 import concurrent.futures
 import json
 import os
-import resource
 import shutil
 import statistics
 import subprocess
 
 
-def cpu_s():
-    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+def cpu_s_of(command):
+    """Of a command that ends well, and of all that it starts."""
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    _, status, used = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    if process.returncode != 0:
+        raise SystemExit(f"{' '.join(command)}: ended with {process.returncode}")
     return used.ru_utime + used.ru_stime
 
 
@@ -36,10 +40,8 @@ def diagnose(args, log, left_out):
                "--workers", "2"]
     if left_out:
         command += ["--leave-out", *left_out.split(",")]
-    before = cpu_s()
-    subprocess.run(command, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    with open(os.path.join(folder, "diagnosis.json"), encoding="utf-8") as file:
-        return folder, cpu_s() - before, json.load(file)
+    cpu = cpu_s_of(command)
+    return folder, cpu, read(args.out, os.path.basename(folder))
 
 
 STAGES = ["tune", "measure", "screen", "refit"]
@@ -74,14 +76,10 @@ def diagnose_again(args, case):
     if options.get("leave-out"):
         command += ["--leave-out", *options["leave-out"]]
     shutil.rmtree(out, ignore_errors=True)
-    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    _, status, used = os.wait4(process.pid, 0)
-    process.returncode = os.waitstatus_to_exitcode(status)
-    if process.returncode != 0:
-        raise SystemExit(f"{case}: diagnose ended with {process.returncode}")
+    spent = cpu_s_of(command)
     with open(cost, "w", encoding="utf-8") as file:
-        file.write(f"{used.ru_utime + used.ru_stime}\n")
-    return used.ru_utime + used.ru_stime
+        file.write(f"{spent}\n")
+    return spent
 
 
 def tell_check(args):
