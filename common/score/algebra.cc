@@ -28,6 +28,14 @@ Eigen::VectorXd least_squares(const Eigen::MatrixXd& A, const Eigen::VectorXd& b
   return A.colPivHouseholderQr().solve(b);
 }
 
+Eigen::MatrixXd least_squares_of(const Eigen::MatrixXd& A, const Eigen::MatrixXd& columns) {
+  return A.colPivHouseholderQr().solve(columns);
+}
+
+Eigen::MatrixXd pseudo_inverse(const Eigen::MatrixXd& A) {
+  return A.completeOrthogonalDecomposition().pseudoInverse();
+}
+
 Eigen::MatrixXd orthonormal(const Eigen::MatrixXd& columns) {
   const Eigen::HouseholderQR<Eigen::MatrixXd> qr(columns);
   return qr.householderQ() * Eigen::MatrixXd::Identity(columns.rows(), columns.cols());

@@ -26,6 +26,12 @@ Eigen::VectorXd solve_square(const Eigen::MatrixXd& A, const Eigen::VectorXd& b)
 // x that makes |A x - b| least, by Q R with column pivoting.
 Eigen::VectorXd least_squares(const Eigen::MatrixXd& A, const Eigen::VectorXd& b);
 
+// Columns x of that kind, one for each of `columns`.
+Eigen::MatrixXd least_squares_of(const Eigen::MatrixXd& A, const Eigen::MatrixXd& columns);
+
+// A^+ by Moore and Penrose, of any rank: A^+ b is the shortest x that makes |A x - b| least.
+Eigen::MatrixXd pseudo_inverse(const Eigen::MatrixXd& A);
+
 // Orthonormal columns that span those of `columns`, REQUIRES: no more of them than rows.
 Eigen::MatrixXd orthonormal(const Eigen::MatrixXd& columns);
 

@@ -1,6 +1,6 @@
 #include "common/score/kinematic.h"
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -9,6 +9,7 @@
 
 #include "common/base/constants.h"
 #include "common/robot/robot_drive.h"
+#include "common/score/algebra.h"
 
 namespace gapfarm {
 namespace {
@@ -244,7 +245,7 @@ class Body {
     }
     Eigen::MatrixXd A(static_cast<Eigen::Index>(rows.size()), 3);
     for (std::size_t i = 0; i < rows.size(); ++i) A.row(static_cast<Eigen::Index>(i)) = rows[i];
-    inverse_ = A.completeOrthogonalDecomposition().pseudoInverse();
+    inverse_ = pseudo_inverse(A);
   }
 
   GroundRobot robot_;

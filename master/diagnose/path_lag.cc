@@ -1,9 +1,11 @@
 #include "master/diagnose/path_lag.h"
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <vector>
+
+#include "common/score/algebra.h"
 
 namespace gapfarm {
 namespace {
@@ -27,8 +29,7 @@ Pose at_time(const std::vector<PathSample>& path, double t_s) {
 
 // What is left of `columns` once a trial's own nuisances have taken their part.
 Eigen::MatrixXd cleaned(const Eigen::MatrixXd& nuisances, const Eigen::MatrixXd& columns) {
-  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(nuisances);
-  return columns - nuisances * qr.solve(columns);
+  return columns - nuisances * least_squares_of(nuisances, columns);
 }
 
 // Sums over trials of products of the lag's mark and of what was measured.

@@ -1,10 +1,11 @@
 // Trials, parameters and single drives, as the report shows them.
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <set>
 
+#include "common/score/algebra.h"
 #include "master/diagnose/intervals.h"
 #include "master/diagnose/report_parts.h"
 #include "master/experiment/plan.h"
@@ -31,7 +32,11 @@ Eigen::MatrixXd covariance_of(const Study& study, const JointFit& fit) {
     const auto i = static_cast<Eigen::Index>(k);
     if (sd > 0) normal(i, i) += 1 / (sd * sd);
   }
-  return normal.fullPivLu().isInvertible() ? normal.inverse() : Eigen::MatrixXd();
+  const Eigen::VectorXd curvatures = axes_of_symmetric(normal).values;
+  const double rounding = std::numeric_limits<double>::epsilon() *
+                          static_cast<double>(normal.rows()) * curvatures.maxCoeff();
+  if (!(curvatures.minCoeff() > rounding)) return {};
+  return inverse_of_symmetric(normal);
 }
 
 std::vector<ParameterCorrelation> strong_correlations(const ParameterTable& table,
