@@ -109,9 +109,14 @@ v1::TaskResult run(const Prepared& p, const ParameterValues& values, const v1::P
   for (std::uint32_t i : task.trials()) {
     if (i >= trials.size()) return invalid("there is no trial " + std::to_string(i));
   }
+  if (task.headings() % 2 != 0 || task.headings() > kMostHeadings) {
+    return invalid("motions are simulated at an even number of headings up to " +
+                   std::to_string(kMostHeadings) + ", not at " + std::to_string(task.headings()));
+  }
   PredictOptions options;
   options.trials = {task.trials().data(), static_cast<std::size_t>(task.trials_size())};
   options.means_only = task.means_only();
+  options.headings = task.headings();
   options.stream = task.stream();
   options.steps = steps;
   const Prediction prediction = p.predict(values, options);

@@ -82,7 +82,7 @@ Status rescale(Predictor& predictor, const Study& study, const SlopePoint& from,
     of.push_back(k);
   }
   if (again.empty()) return {};
-  auto better = slopes_at(predictor, from.at, from.ends, again);
+  auto better = slopes_at(predictor, from, again);
   if (!better) return better.error();
   for (std::size_t j = 0; j < of.size(); ++j) {
     if ((*better)[j]) (*slopes)[of[j]] = std::move((*better)[j]);
@@ -101,7 +101,7 @@ Status differentiate(Predictor& predictor, const Study& study, JointFit* fit) {
   if (requests.empty()) return {};
   const auto from = slope_point(predictor, study, fit->at, fit->ends);
   if (!from) return from.error();
-  auto slopes = slopes_at(predictor, from->at, from->ends, requests);
+  auto slopes = slopes_at(predictor, *from, requests);
   if (!slopes) return slopes.error();
   if (Status s = rescale(predictor, study, *from, requests, &*slopes); !s) return s;
   for (std::size_t k = 0; k < slopes->size(); ++k) {

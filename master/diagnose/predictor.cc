@@ -22,9 +22,11 @@ void fill(const Overrides& at, v1::Point* point) {
   }
 }
 
-v1::Task task_of(const Overrides& at, const std::vector<std::uint32_t>& trials, bool means_only) {
+v1::Task task_of(const Overrides& at, const std::vector<std::uint32_t>& trials, bool means_only,
+                 std::uint32_t headings = 0) {
   v1::Task task;
   task.mutable_predict()->set_means_only(means_only);
+  task.mutable_predict()->set_headings(headings);
   task.mutable_predict()->mutable_trials()->Add(trials.begin(), trials.end());
   fill(at, task.mutable_predict()->mutable_point());
   return task;
@@ -175,7 +177,7 @@ Result<std::vector<std::optional<std::vector<Pose>>>> Predictor::simulate(
     const std::size_t parts =
         std::clamp<std::size_t>(1 + (kTasks - 1) / requests.size(), 1, kMostParts);
     for (std::vector<std::uint32_t>& part : parts_of(requests[k], parts)) {
-      tasks.push_back(task_of(requests[k].at, part, true));
+      tasks.push_back(task_of(requests[k].at, part, true, requests[k].headings));
       asked.emplace_back(k, std::move(part));
     }
   }

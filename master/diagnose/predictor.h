@@ -21,6 +21,7 @@ using Overrides = std::map<std::size_t, double>;
 struct PredictionRequest {
   Overrides at;
   std::vector<std::uint32_t> trials;  // ascending; empty: all
+  std::uint32_t headings = 0;         // as in v1::PredictTask
 };
 
 class Predictor {

@@ -145,6 +145,7 @@ Result<std::vector<Signature>> patch_signatures(Predictor& predictor, const Stud
     }
     values.push_back(patch_values({x, y, radius, ratio}));
     request.at = without->at;
+    request.headings = without->headings;
     for (const auto& [key, value] : values.back()) request.at[study.table->row(key)] = value;
     if (request.trials.empty()) request.trials.push_back(0);
     requests.push_back(std::move(request));

@@ -23,6 +23,7 @@ using Slope = std::vector<Eigen::Vector3d>;
 struct SlopePoint {
   Overrides at;
   std::vector<Pose> ends;
+  std::uint32_t headings = 0;  // as in v1::PredictTask
 };
 
 // `at`, whose ends are `ends`, with the subject's slope_rate_hz where that is coarser: steps of
@@ -31,11 +32,10 @@ struct SlopePoint {
 Result<SlopePoint> slope_point(Predictor& predictor, const Study& study, const Overrides& at,
                                const std::vector<Pose>& ends);
 
-// At `at`, whose ends are `ends`, in the axes of those.  One-sided: upward, or downward where the
+// At `from`, in the axes of its ends.  One-sided: upward, or downward where the
 // bounds or the simulation end above, with a tenth of the step where neither can be simulated; none
 // where that cannot be either.  Errors: the farm's.
-Result<std::vector<std::optional<Slope>>> slopes_at(Predictor& predictor, const Overrides& at,
-                                                    const std::vector<Pose>& ends,
+Result<std::vector<std::optional<Slope>>> slopes_at(Predictor& predictor, const SlopePoint& from,
                                                     const std::vector<SlopeRequest>& requests);
 
 // Between `up` and `down`, which lie `step` on either side of the middle; one of them alone is held

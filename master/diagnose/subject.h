@@ -61,6 +61,9 @@ struct DiagnosisSubject {
   // Steps a second that do for a fit's derivatives; 0: the problem's own.  Its residuals are always
   // the problem's own.
   double slope_rate_hz = 0;
+  // Headings that do for them, where that rate is coarser than the problem's; 0: as many as it
+  // takes.
+  std::uint32_t slope_headings = 0;
   // Whether strong effects are fitted with the base beside them, and looked for again from the base
   // and the noise that they leave: where the base was tuned without them, both may be far off.
   bool base_moves;

@@ -93,6 +93,7 @@ DiagnosisSubject drive_subject(const char* scenario, const ParameterTable& table
 DiagnosisSubject srv1_subject() {
   DiagnosisSubject s = drive_subject("srv1", srv1_table());
   s.slope_rate_hz = 60;
+  s.slope_headings = 6;
   return s;
 }
 

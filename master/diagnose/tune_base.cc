@@ -212,7 +212,7 @@ Result<std::vector<Slope>> base_slopes(Predictor& predictor,
   for (const BaseParameter& p : parameters) {
     steps.push_back({p.row, kRelativeStep * study.base.at(p.row)});
   }
-  const auto found = slopes_at(predictor, study.base, ends, steps);
+  const auto found = slopes_at(predictor, {study.base, ends}, steps);
   if (!found) return found.error();
   std::vector<Slope> slopes;
   for (std::size_t k = 0; k < parameters.size(); ++k) {

@@ -47,9 +47,13 @@ struct Prediction {
   double simulated_s = 0;
 };
 
+// Of one motion that depends on them.
+inline constexpr std::size_t kMostHeadings = 32;
+
 struct PredictOptions {
   std::span<const std::uint32_t> trials;  // indices into the problem's log; empty: all
   bool means_only = false;                // one alternative a trial, no covariance
+  std::size_t headings = 0;               // of such a motion, even; 0: as many as it takes
   v1::StreamKey stream;                   // only SpreadKind::kSampled draws from it
   StepCounter* steps = nullptr;           // counts the simulation's steps
 };

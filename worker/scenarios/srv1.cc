@@ -95,11 +95,12 @@ std::vector<View> untwisted(std::vector<View> starts, const std::vector<StartTur
 
 // Whether what trials share says too little of one of them.
 bool simulate_alone(const Srv1Robot& robot, const ConditionGroup& group, const GroupMotion& motion,
-                    const Situation& situation, const Pose& X_SE, double scale) {
+                    const Situation& situation, const Pose& X_SE, double scale,
+                    std::size_t headings) {
   if (motion.better_alone()) return true;
   // A lone trial's reference starts at its own heading.
   const bool by_heading = robot.effects().motion_context() & kStartHeading;
-  if (by_heading && group.few() && group.trials > 1) return true;
+  if (by_heading && group.few(headings) && group.trials > 1) return true;
   if (!(robot.effects().motion_context() & kStartPlace)) return false;
   Floor floor;
   robot.effects().floor(situation, floor);
@@ -231,7 +232,7 @@ Prediction Srv1Model::predict(const ParameterValues& values, const PredictOption
     if (group.trials == 1 && (context & kStartHeading)) {
       group.heading_rad = robot.effects().recover(trials_[group.first_trial].X_WS).theta;
     }
-    GroupResult result = simulate_group(robot, group, options.means_only, draws(robot, options, g));
+    GroupResult result = simulate_group(robot, group, options, draws(robot, options, g));
     if (result.outcome != v1::OK) return give_up(result.outcome, grouping.groups[g]);
     const MotionFacts& f = result.motion.facts();
     MotionFacts& worst = prediction.facts[grouping.groups[g].command];
@@ -249,7 +250,8 @@ Prediction Srv1Model::predict(const ParameterValues& values, const PredictOption
     Situation situation = reference_situation(group);
     situation.X_WR = X_WR;
     situation.session_time_s = trial.context.session_time_s;
-    if (simulate_alone(robot, group, motion, situation, X_SE, problem_.treads().scale())) {
+    if (simulate_alone(robot, group, motion, situation, X_SE, problem_.treads().scale(),
+                       options.headings)) {
       const Motion direct = robot.run(group.drive, situation, {});
       if (direct.outcome != MotionOutcome::kOk) return give_up(to_outcome(direct.outcome), group);
       X_SE = motion.spread_end(direct.X_SE);

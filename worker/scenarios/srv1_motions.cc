@@ -11,7 +11,6 @@ namespace {
 // Effects on the floor turn the motion by a few mm and mrad, and their harmonics fall quickly:
 // eight headings settle almost all, and the check against every second one says when not.
 constexpr std::size_t kFewestHeadings = 8;
-constexpr std::size_t kMostHeadings = 32;
 // m and rad, of half the nodes; the whole set's is far less.
 constexpr double kHeadingTolerance = 4e-3;
 // Beyond this the motion jumps at some heading, which no interpolation follows: a drag that only
@@ -24,7 +23,9 @@ constexpr double kPathInterval_s = 0.02;
 
 }  // namespace
 
-bool ConditionGroup::few() const { return trials < kFewestHeadings; }
+bool ConditionGroup::few(std::size_t headings) const {
+  return trials < (headings > 0 ? headings : kFewestHeadings);
+}
 
 Situation reference_situation(const ConditionGroup& group) {
   Situation s;
@@ -66,9 +67,22 @@ class GroupSimulation {
     return true;
   }
 
+  bool headings(std::size_t asked) {
+    if (asked == 0) return as_many_headings_as_needed();
+    auto& values = result_.motion.by_heading_;
+    values.resize(asked);
+    const std::vector<double> nodes = heading_nodes(asked);
+    for (std::size_t k = 0; k < asked; ++k) {
+      Situation s = situation_;
+      s.X_WR.theta = wrap_angle(nodes[k]);
+      if (!offset(s, {}, values[k])) return false;
+    }
+    return true;
+  }
+
   // Doubles the headings until every second one predicts the others, or more would have to be
   // simulated than there are trials.
-  bool headings() {
+  bool as_many_headings_as_needed() {
     auto& values = result_.motion.by_heading_;
     for (std::size_t n = kFewestHeadings; n <= kMostHeadings; n *= 2) {
       result_.motion.better_alone_ = !values.empty() && n / 2 > group_.trials;
@@ -187,17 +201,19 @@ class GroupSimulation {
   std::vector<MotionSample> path_;
 };
 
-GroupResult simulate_group(Srv1Robot& robot, const ConditionGroup& group, bool means_only,
-                           const std::vector<Gains>& draws) {
+GroupResult simulate_group(Srv1Robot& robot, const ConditionGroup& group,
+                           const PredictOptions& options, const std::vector<Gains>& draws) {
   GroupSimulation simulation(robot, group);
   const ActiveEffects& effects = robot.effects();
   const Reading reading = effects.reading();
   const bool by_place = effects.motion_context() & kStartPlace;
   bool ok = simulation.reference(by_place || reading.stale_share != 0);
   if (ok && by_place) simulation.keep_way();
-  if (ok && (effects.motion_context() & kStartHeading) && !group.few()) ok = simulation.headings();
+  if (ok && (effects.motion_context() & kStartHeading) && !group.few(options.headings)) {
+    ok = simulation.headings(options.headings);
+  }
   if (ok && (effects.motion_context() & kSessionTime)) ok = simulation.times();
-  if (ok && !means_only) {
+  if (ok && !options.means_only) {
     const std::vector<Gains> gains =
         draws.empty() ? cubature_points(robot.foreseen_noise()) : draws;
     ok = simulation.spread(gains, !draws.empty()) && simulation.random_drives(effects.branches());

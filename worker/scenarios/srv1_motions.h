@@ -26,8 +26,9 @@ struct ConditionGroup {
   std::size_t trials = 0;       // of the log, that share it
   std::size_t first_trial = 0;  // of the log
   double heading_rad = 0;       // of the reference situation
-  // Whether trials differ in their headings by too few to interpolate between.
-  bool few() const;
+  // Whether trials are too few for their headings to be interpolated between so many; 0: by
+  // default.
+  bool few(std::size_t headings) const;
 };
 
 // The main motion's end, what it depends on, and what may happen instead.
@@ -77,9 +78,10 @@ struct GroupResult {
   GroupMotion motion;
 };
 
-// Simulates a group's motion.  `draws` empty: cubature; otherwise these gains' sample moments.
-GroupResult simulate_group(Srv1Robot& robot, const ConditionGroup& group, bool means_only,
-                           const std::vector<Gains>& draws);
+// Simulates a group's motion as `options` ask.  `draws` empty: cubature; otherwise these gains'
+// sample moments.
+GroupResult simulate_group(Srv1Robot& robot, const ConditionGroup& group,
+                           const PredictOptions& options, const std::vector<Gains>& draws);
 
 // A situation that no patch of floor reaches.
 Situation reference_situation(const ConditionGroup& group);

@@ -46,7 +46,7 @@ TEST(Slopes, StayWithinBoundsAndWhereTheRobotComesToRest) {
   const auto ends = predictor.ends({{at, {}}});
   ASSERT_TRUE(ends.ok());
   // Steps up leave the bounds, or the robot never rests.
-  const auto slopes = slopes_at(predictor, at, ends->front(), {{length, 0.002}, {gauge, 0.004}});
+  const auto slopes = slopes_at(predictor, {at, ends->front()}, {{length, 0.002}, {gauge, 0.004}});
   ASSERT_TRUE(slopes.ok());
   for (const auto& slope : *slopes) {
     ASSERT_TRUE(slope);
@@ -58,7 +58,7 @@ TEST(Slopes, StayWithinBoundsAndWhereTheRobotComesToRest) {
   }
   KinematicFarm nowhere([&](const ParameterValues& v) { return v[length] != 0.07; });
   Predictor stuck(nowhere, problem);
-  const auto none = slopes_at(stuck, at, ends->front(), {{length, 0.002}});
+  const auto none = slopes_at(stuck, {at, ends->front()}, {{length, 0.002}});
   ASSERT_TRUE(none.ok());
   EXPECT_FALSE((*none)[0]);
 }

@@ -73,6 +73,11 @@ TEST(Evaluate, MalformedTasksAreAnsweredNotCrashedOn) {
   v1::Task predict;
   predict.mutable_predict()->add_trials(99);
   EXPECT_EQ(evaluate(p.get(), predict).outcome(), v1::INVALID_REQUEST);
+  predict.mutable_predict()->clear_trials();
+  for (const std::uint32_t headings : {3U, 34U, 4000000000U}) {
+    predict.mutable_predict()->set_headings(headings);
+    EXPECT_EQ(evaluate(p.get(), predict).outcome(), v1::INVALID_REQUEST) << headings;
+  }
   v1::Task override = evaluate_task({});
   auto* o = override.mutable_evaluate()->mutable_point()->add_overrides();
   o->set_parameter(100000);

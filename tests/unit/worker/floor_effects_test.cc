@@ -213,6 +213,13 @@ TEST(EffectSignature, ComOffsetToTheLeftMirrorsOneToTheRight) {
   }
 }
 
+PredictOptions means_only(std::size_t headings = 0) {
+  PredictOptions options;
+  options.means_only = true;
+  options.headings = headings;
+  return options;
+}
+
 double worst_off_the_nodes(Srv1Robot& robot, const ConditionGroup& group,
                            const GroupMotion& motion) {
   double worst = 0;
@@ -234,13 +241,27 @@ TEST(HeadingGrid, AgreesWithDirectSimulationWithinItsCheckedError) {
       ConditionGroup group;
       group.drive = {c.left, c.right, 1};
       group.trials = 100;  // enough to share motions
-      const GroupResult result = simulate_group(robot, group, true, {});
+      const GroupResult result = simulate_group(robot, group, means_only(), {});
       ASSERT_EQ(result.outcome, v1::OK);
       if (result.motion.better_alone()) continue;  // simulated trial by trial instead
       EXPECT_LE(worst_off_the_nodes(robot, group, result.motion),
                 std::max(result.motion.heading_error(), 2e-4))
           << c.name << " " << changes[0].first << " " << changes[0].second;
     }
+  }
+}
+
+// Few headings that are asked for follow what goes round once with the heading, as a tilt's pull.
+TEST(HeadingGrid, FewHeadingsFollowASmallTilt) {
+  Srv1Robot robot(noiseless(tilt(0.02, 0.3)));
+  for (const CommandSpec& c : commands()) {
+    ConditionGroup group;
+    group.drive = {c.left, c.right, 1};
+    group.trials = 100;
+    const GroupResult result = simulate_group(robot, group, means_only(6), {});
+    ASSERT_EQ(result.outcome, v1::OK);
+    EXPECT_FALSE(result.motion.better_alone());
+    EXPECT_LE(worst_off_the_nodes(robot, group, result.motion), 1e-3) << c.name;
   }
 }
 
@@ -251,7 +272,7 @@ TEST(HeadingGrid, SaysWhenNoInterpolationWillDo) {
   ConditionGroup group;
   group.drive = driven("wide_ccw");
   group.trials = 100;
-  const GroupResult result = simulate_group(robot, group, true, {});
+  const GroupResult result = simulate_group(robot, group, means_only(), {});
   ASSERT_EQ(result.outcome, v1::OK);
   EXPECT_TRUE(result.motion.better_alone());
   EXPECT_GT(worst_off_the_nodes(robot, group, result.motion), 1e-2);
@@ -264,9 +285,9 @@ TEST(HeadingGrid, SimulatesNoMoreNodesThanTrials) {
   ConditionGroup group;
   group.drive = driven("wide_ccw");
   group.trials = 10;
-  EXPECT_TRUE(simulate_group(rough, group, true, {}).motion.better_alone());
+  EXPECT_TRUE(simulate_group(rough, group, means_only(), {}).motion.better_alone());
   Srv1Robot smooth(noiseless(tilt(0.01, 0.3)));
-  EXPECT_FALSE(simulate_group(smooth, group, true, {}).motion.better_alone());
+  EXPECT_FALSE(simulate_group(smooth, group, means_only(), {}).motion.better_alone());
 }
 
 }  // namespace
