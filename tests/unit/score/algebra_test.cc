@@ -33,6 +33,16 @@ TEST(Algebra, SolutionsSolve) {
 TEST(Algebra, LeastSquaresIsTheMeanOfRepeats) {
   const VectorXd b = (VectorXd(3) << 1, 2, 6).finished();
   EXPECT_NEAR(least_squares(MatrixXd::Ones(3, 1), b)[0], 3, 1e-12);
+  const MatrixXd columns = (MatrixXd(3, 2) << 1, 0, 2, 0, 6, 3).finished();
+  const MatrixXd means = least_squares_of(MatrixXd::Ones(3, 1), columns);
+  EXPECT_LT((means - (MatrixXd(1, 2) << 3, 1).finished()).norm(), 1e-12);
+}
+
+// Of a matrix that leaves a direction free, the shortest of all solutions.
+TEST(Algebra, PseudoInverseGivesTheShortestSolution) {
+  const VectorXd b = (VectorXd(2) << 4, 4).finished();
+  const VectorXd x = pseudo_inverse(MatrixXd::Ones(2, 2)) * b;
+  EXPECT_LT((x - (VectorXd(2) << 2, 2).finished()).norm(), 1e-12);
 }
 
 TEST(Algebra, AStepStopsAtABoundAndTheOthersMakeTheBestOfIt) {
