@@ -1,15 +1,10 @@
 #include <Eigen/Core>
-#include <Eigen/Eigenvalues>
 
 #include "common/base/constants.h"
+#include "common/score/algebra.h"
 #include "master/robot/understand.h"
 
 namespace gapfarm {
-namespace {
-
-constexpr double kRounding = 1e-12;  // of the greatest eigenvalue
-
-}  // namespace
 
 std::vector<double> standing_loads(const GroundRobot& robot) {
   if (!robot.mass_kg) return {};
@@ -37,13 +32,7 @@ std::vector<double> wheel_loads(const std::vector<Eigen::Vector2d>& points,
     }
     const Eigen::Vector3d sums(weight_n, 0, 0);
     // Points on a line leave a direction free; the least solution is the even one.
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(A);
-    Eigen::Vector3d plate = Eigen::Vector3d::Zero();
-    for (int i = 0; i < 3; ++i) {
-      if (!(axes.eigenvalues()[i] > kRounding * axes.eigenvalues()[2])) continue;
-      const Eigen::Vector3d axis = axes.eigenvectors().col(i);
-      plate += axis * (axis.dot(sums) / axes.eigenvalues()[i]);
-    }
+    const Eigen::Vector3d plate = pseudo_inverse(A) * sums;
     if ((A * plate - sums).norm() > 1e-6 * weight_n) return {};
     std::vector<double> loads(n, 0);
     std::size_t worst = n;
