@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/score/bounded_step.h"
+#include "common/score/bounded_minimum.h"
 #include "common/score/kinematic.h"
 
 namespace gapfarm {
@@ -100,7 +100,7 @@ void descend(const Windows& windows, const Eigen::VectorXd& weights, Kinematics*
       Eigen::MatrixXd damped = H;
       damped.diagonal() += damping * H.diagonal() + Eigen::VectorXd::Constant(n, 1e-9);
       Kinematics moved = *at;
-      moved.values = step_within(damped, g, at->values, least, most);
+      moved.values = at->values + bounded_minimum(damped, -g, least - at->values, most);
       const Eigen::VectorXd next = cost_at(moved);
       better = next.squaredNorm() < r.squaredNorm();
       if (better) {

@@ -7,7 +7,8 @@
 #include <set>
 
 #include "common/score/algebra.h"
-#include "common/score/bounded_step.h"
+#include "common/score/bounded_minimum.h"
+#include "common/score/statistics.h"
 #include "master/ground/window_prior.h"
 
 namespace gapfarm {
@@ -25,12 +26,6 @@ constexpr double kLeastPrecision = 1e-9;  // of a value that no window tells
 
 double part_of(const Eigen::Vector3d& end, int part) {
   return part == 0 ? end.head<2>().norm() : std::abs(end[2]);
-}
-
-double median_of(std::vector<double> sizes) {
-  const auto middle = sizes.begin() + static_cast<long>(sizes.size() / 2);
-  std::nth_element(sizes.begin(), middle, sizes.end());
-  return *middle;
 }
 
 // Mean logarithm of the middle half.
@@ -90,7 +85,7 @@ double part_nats(double size, double scale, int part) {
 
 // The likeliest scale of such a density, by its iteration.
 double scale_of_part(std::vector<double> sizes, int part) {
-  double scale = std::max(1.3 * median_of(sizes) / std::sqrt(kDimensions[part]), kLeastScale);
+  double scale = std::max(1.3 * median(sizes) / std::sqrt(kDimensions[part]), kLeastScale);
   const double count = static_cast<double>(sizes.size()) * kDimensions[part];
   for (int round = 0; round < 20; ++round) {
     double sum = 0;
@@ -321,8 +316,9 @@ NormalEquations normal_equations(const RobustErrors& errors, const WindowEnds& e
 Eigen::VectorXd step_within_bounds(const NormalEquations& equations, const Eigen::VectorXd& at) {
   Eigen::MatrixXd H = equations.H;
   H.diagonal().array() += kLeastPrecision;
-  return step_within(H, equations.g, at, Eigen::VectorXd::Zero(at.size()),
-                     Eigen::VectorXd::Ones(at.size()));
+  const Eigen::VectorXd to =
+      at + bounded_minimum(H, -equations.g, -at, Eigen::VectorXd::Ones(at.size()) - at);
+  return to.cwiseMax(0).cwiseMin(1);  // sums are rounded
 }
 
 WindowEnds left_out_ends(const RobustErrors& errors, const WindowEnds& ends,

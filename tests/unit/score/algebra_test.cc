@@ -4,8 +4,6 @@
 
 #include <cmath>
 
-#include "common/score/bounded_step.h"
-
 namespace gapfarm {
 namespace {
 
@@ -43,19 +41,6 @@ TEST(Algebra, PseudoInverseGivesTheShortestSolution) {
   const VectorXd b = (VectorXd(2) << 4, 4).finished();
   const VectorXd x = pseudo_inverse(MatrixXd::Ones(2, 2)) * b;
   EXPECT_LT((x - (VectorXd(2) << 2, 2).finished()).norm(), 1e-12);
-}
-
-TEST(Algebra, AStepStopsAtABoundAndTheOthersMakeTheBestOfIt) {
-  const VectorXd g = (VectorXd(2) << 3, 0).finished(), at = (VectorXd(2) << 1, 0).finished();
-  const VectorXd none = VectorXd::Constant(2, INFINITY);
-  const VectorXd freely = step_within(kSymmetric, g, at, -none, none);
-  EXPECT_LT((freely - (VectorXd(2) << -1, 1).finished()).norm(), 1e-12);
-  const VectorXd bound = step_within(kSymmetric, g, at, VectorXd::Zero(2), none);
-  EXPECT_EQ(bound[0], 0);
-  EXPECT_NEAR(bound[1], 0.5, 1e-12);
-  const VectorXd both = step_within(kSymmetric, g, at, VectorXd::Zero(2), at);
-  EXPECT_EQ(both[0], 0);
-  EXPECT_EQ(both[1], 0);
 }
 
 TEST(Algebra, OrthonormalColumnsSpanTheirs) {

@@ -1,4 +1,4 @@
-#include "master/diagnose/bounded_minimum.h"
+#include "common/score/bounded_minimum.h"
 
 #include <Eigen/Core>
 #include <vector>
