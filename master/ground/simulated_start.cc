@@ -84,7 +84,7 @@ Result<std::vector<Climb>> SimulationFit::other_climbs(const Climb& first) {
   }
   for (std::size_t k = 0; k < looks->size(); ++k) {
     std::optional<At>& look = (*looks)[k];
-    if (look) climbs.push_back({std::move(*look), holds[k], {}, {}, false});
+    if (look) climbs.push_back({std::move(*look), holds[k], {}, {}, {}, false});
   }
   std::stable_sort(climbs.begin(), climbs.end(),
                    [](const Climb& a, const Climb& b) { return a.at.nats > b.at.nats; });
@@ -124,7 +124,7 @@ Result<std::optional<Climb>> SimulationFit::firm_climb() {
   auto look = look_at({firm_}, {hold});
   if (!look) return look.error();
   if (!look->front()) return std::optional<Climb>();
-  Climb climb{*std::move(look->front()), hold, {}, {}, false};
+  Climb climb{*std::move(look->front()), hold, {}, {}, {}, false};
   if (Status s = climb_on(&climb, kMostRounds); !s) return s.error();
   return std::optional(std::move(climb));
 }
@@ -286,7 +286,7 @@ Result<SimulatedStart> SimulationFit::run(double widest) {
   found.simulations = simulations_;
   if (!first->front() || told_.empty()) return found;
   const At begin = *first->front();
-  std::vector<Climb> climbs = {{begin, hold, {}, {}, false}};
+  std::vector<Climb> climbs = {{begin, hold, {}, {}, {}, false}};
   if (Status s = step(&climbs.front()); !s) return s.error();
   found.simulations = simulations_;
   if (climbs.front().slopes.empty()) return found;

@@ -32,18 +32,18 @@ std::vector<Genome> spread_starts(const Genome& middle, std::span<const std::siz
                                   std::size_t count);
 
 // Gauss and Newton's steps to the most likely ends of the problem's windows (RobustErrors, scaled
-// by what the kinematics leave; heading counts as much as position), from the values of the robot's
-// own kinematics (kinematic_start()) and from some others in what kinematics have no word for, such
-// as friction and creep, where a way from the first ends on a hill beside the highest.  The few
-// best after a look go on, the best two of these to the end, and beside them one that hardly slips.
-// What foretells stretches that were left out best is taken, where errors that may be larger than
-// the kinematics' cost; where much less is left than by the kinematics, windows are scaled by that
-// from then on, so that what strays counts little; what is larger than theirs then counts more, as
-// long as that helps.  The
-// kinematics' own values are kept where they do better, with the search held near these.  The
-// spread is at most `widest` (a standard deviation in gene units) where the windows do not tell.
-// Where a simulation does not end well nothing moves.  Errors: those of the farm.
-// REQUIRES: a problem with a ground robot and windows.
+// by what the kinematics leave; heading counts as much as position), each with the slopes of the
+// one before, corrected by what that did (Broyden), for as long as these lead on; from the values
+// of the robot's own kinematics (kinematic_start()) and from some others in what kinematics have no
+// word for, such as friction and creep, where a way from the first ends on a hill beside the
+// highest.  The few best after a look go on, the best two of these to the end, and beside them one
+// that hardly slips. What foretells stretches that were left out best is taken, where errors that
+// may be larger than the kinematics' cost; where much less is left than by the kinematics, windows
+// are scaled by that from then on, so that what strays counts little; what is larger than theirs
+// then counts more, as long as that helps.  The kinematics' own values are kept where they do
+// better, with the search held near these.  The spread is at most `widest` (a standard deviation in
+// gene units) where the windows do not tell. Where a simulation does not end well nothing moves.
+// Errors: those of the farm. REQUIRES: a problem with a ground robot and windows.
 Result<SimulatedStart> fit_by_simulation(Farm& farm, const Problem& problem, double widest);
 
 }  // namespace gapfarm

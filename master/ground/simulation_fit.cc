@@ -1,14 +1,18 @@
 #include "master/ground/simulation_fit.h"
 
 #include <algorithm>
+#include <array>
 
 #include "master/ground/kinematic_rival.h"
 
 namespace gapfarm {
 namespace {
 
-constexpr double kGeneStep = 0.01;  // to find slopes; contacts are noisy below
-constexpr double kEnoughNats = 0.1;
+constexpr double kGeneStep = 0.01;     // to find slopes; contacts are noisy below
+constexpr double kEnoughNats = 1;      // less is within a standard error or so of the values
+constexpr double kLeastSecant = 3e-3;  // of a move from which slopes can be told
+constexpr std::array<double, 2> kDampings = {0, 1};
+constexpr std::array<double, 3> kGreatDampings = {10, 100, 1000};
 constexpr std::size_t kStretches = 6;
 constexpr std::size_t kParts = 12;    // of the log, that tell how sure a gain is
 constexpr double kFreelyMoves = 0.3;  // of a gene's range, where the windows do not tell
@@ -85,12 +89,16 @@ NormalEquations SimulationFit::prior_at(const Genome& genome, const Hold& hold) 
   return prior;
 }
 
-Genome SimulationFit::moved(const At& at, const NormalEquations& equations) const {
-  Eigen::VectorXd from(static_cast<Eigen::Index>(told_.size()));
+Eigen::VectorXd SimulationFit::told_of(const Genome& genome) const {
+  Eigen::VectorXd values(static_cast<Eigen::Index>(told_.size()));
   for (std::size_t k = 0; k < told_.size(); ++k) {
-    from[static_cast<Eigen::Index>(k)] = at.genome[told_[k]];
+    values[static_cast<Eigen::Index>(k)] = genome[told_[k]];
   }
-  const Eigen::VectorXd to = step_within_bounds(equations, from);
+  return values;
+}
+
+Genome SimulationFit::moved(const At& at, const NormalEquations& equations) const {
+  const Eigen::VectorXd to = step_within_bounds(equations, told_of(at.genome));
   Genome genome = at.genome;
   for (std::size_t k = 0; k < told_.size(); ++k) {
     genome[told_[k]] = to[static_cast<Eigen::Index>(k)];
@@ -98,8 +106,16 @@ Genome SimulationFit::moved(const At& at, const NormalEquations& equations) cons
   return genome;
 }
 
+void SimulationFit::make_equations(Climb* climb) const {
+  climb->equations = normal_equations(*errors_, climb->at.ends, climb->slopes);
+  const NormalEquations prior = prior_at(climb->at.genome, climb->hold);
+  climb->equations.H += prior.H;
+  climb->equations.g += prior.g;
+}
+
 Status SimulationFit::look_round(Climb* climb) {
   const At& at = climb->at;
+  if (climb->sloped == at.genome) return {};
   std::vector<Genome> genomes;
   for (const std::size_t gene : told_) {
     genomes.push_back(at.genome);
@@ -110,6 +126,7 @@ Status SimulationFit::look_round(Climb* climb) {
   if (!beside) return beside.error();
   climb->over = std::any_of(beside->begin(), beside->end(), [](const auto& b) { return !b; });
   if (climb->over) return {};
+  climb->sloped = at.genome;
   climb->slopes.assign(at.ends.size(), Eigen::MatrixXd(3, static_cast<Eigen::Index>(told_.size())));
   for (std::size_t k = 0; k < told_.size(); ++k) {
     const At& there = *(*beside)[k];
@@ -118,33 +135,59 @@ Status SimulationFit::look_round(Climb* climb) {
       climb->slopes[i].col(static_cast<Eigen::Index>(k)) = (there.ends[i] - at.ends[i]) / step;
     }
   }
-  climb->equations = normal_equations(*errors_, at.ends, climb->slopes);
-  const NormalEquations prior = prior_at(at.genome, climb->hold);
-  climb->equations.H += prior.H;
-  climb->equations.g += prior.g;
   return {};
 }
 
-// The best of some dampings, of greater ones where none of the usual helps.
-Status SimulationFit::step(Climb* climb) {
-  if (Status s = look_round(climb); !s || climb->over) return s;
-  const double before = climb->at.nats;
-  for (const std::vector<double>& dampings :
-       {std::vector<double>{0, 0.1, 1, 10}, std::vector<double>{100, 1000, 10000}}) {
-    std::vector<Genome> genomes;
-    for (const double damping : dampings) {
-      NormalEquations damped = climb->equations;
-      damped.H.diagonal() *= 1 + damping;
-      genomes.push_back(moved(climb->at, damped));
-    }
-    auto tried = look_at(genomes, {climb->hold});
-    if (!tried) return tried.error();
-    for (std::optional<At>& there : *tried) {
-      if (there && there->nats > climb->at.nats) climb->at = std::move(*there);
-    }
-    if (climb->at.nats > before) break;
+// Broyden's: so that they say what this move did.
+void SimulationFit::correct_slopes(const At& before, Climb* climb) const {
+  const Eigen::VectorXd move = told_of(climb->at.genome) - told_of(before.genome);
+  if (move.norm() < kLeastSecant) return;
+  for (std::size_t i = 0; i < climb->slopes.size(); ++i) {
+    Eigen::MatrixXd& slopes = climb->slopes[i];
+    const Eigen::Vector3d missed = climb->at.ends[i] - before.ends[i] - slopes * move;
+    slopes += missed * move.transpose() / move.squaredNorm();
   }
-  climb->over = climb->at.nats - before < kEnoughNats;
+}
+
+double SimulationFit::promised(const Climb& climb) const {
+  const Eigen::VectorXd move = told_of(moved(climb.at, climb.equations)) - told_of(climb.at.genome);
+  return -climb.equations.g.dot(move) - move.dot(climb.equations.H * move) / 2;
+}
+
+// The best of these, and the nats that it gains.
+Result<double> SimulationFit::try_steps(Climb* climb, std::span<const double> dampings) {
+  std::vector<Genome> genomes;
+  for (const double damping : dampings) {
+    NormalEquations damped = climb->equations;
+    damped.H.diagonal() *= 1 + damping;
+    genomes.push_back(moved(climb->at, damped));
+  }
+  auto tried = look_at(genomes, {climb->hold});
+  if (!tried) return tried.error();
+  const At before = climb->at;
+  for (std::optional<At>& there : *tried) {
+    if (there && there->nats > climb->at.nats) climb->at = std::move(*there);
+  }
+  correct_slopes(before, climb);
+  return climb->at.nats - before.nats;
+}
+
+// By the slopes that there are while these lead up, else by new ones, with greater dampings where
+// the usual do not help.
+Status SimulationFit::step(Climb* climb) {
+  if (!climb->slopes.empty() && climb->sloped != climb->at.genome) {
+    make_equations(climb);
+    const auto gained = try_steps(climb, kDampings);
+    if (!gained) return gained.error();
+    if (*gained >= kEnoughNats) return {};
+  }
+  if (Status s = look_round(climb); !s || climb->over) return s;
+  make_equations(climb);
+  const bool worth_more = promised(*climb) >= kEnoughNats;
+  auto gained = try_steps(climb, kDampings);
+  if (gained && *gained == 0 && worth_more) gained = try_steps(climb, kGreatDampings);
+  if (!gained) return gained.error();
+  climb->over = *gained < kEnoughNats;
   return {};
 }
 

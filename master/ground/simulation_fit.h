@@ -2,6 +2,7 @@
 #pragma once
 
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -32,7 +33,8 @@ struct Hold {
 struct Climb {
   At at;
   Hold hold;
-  WindowSlopes slopes;  // there, or one step before
+  WindowSlopes slopes;  // at `sloped`, where it stands or stood some steps before
+  Genome sloped;
   NormalEquations equations;
   bool over = false;
 };
@@ -52,12 +54,17 @@ class SimulationFit {
 
   Result<std::vector<std::optional<At>>> look_at(const std::vector<Genome>& genomes,
                                                  const std::vector<Hold>& holds);
-  Status look_round(Climb* climb);  // slopes and equations
+  Status look_round(Climb* climb);  // slopes where it stands, unless they are known
+  void correct_slopes(const At& before, Climb* climb) const;
+  void make_equations(Climb* climb) const;
+  double promised(const Climb& climb) const;  // nats, of a step
+  Result<double> try_steps(Climb* climb, std::span<const double> dampings);
   Status step(Climb* climb);
   Status climb_on(Climb* climb, int rounds);
   Result<std::vector<Climb>> other_climbs(const Climb& first);
   Status settle(std::vector<std::optional<At>>* looks, const std::vector<Hold>& holds,
                 const Climb& first);
+  Eigen::VectorXd told_of(const Genome& genome) const;  // of told_, its values
   Genome moved(const At& at, const NormalEquations& equations) const;
   double strength_of(const Hold& hold, std::size_t gene) const;
   double cost_of(const Genome& genome, const Hold& hold) const;
