@@ -153,6 +153,7 @@ class Srv1Model : public ScenarioModel {
   std::vector<PreparedTrial> trials_;
   Grouping by_drive_;
   Grouping by_drive_and_last_;
+  mutable MotionMemo memo_;
 };
 
 std::vector<Gains> Srv1Model::draws(const Srv1Robot& robot, const PredictOptions& options,
@@ -205,7 +206,8 @@ TrialPrediction Srv1Model::observe(const Srv1Robot& robot, const Views& views,
 Prediction Srv1Model::predict(const ParameterValues& values, const PredictOptions& options) const {
   Prediction prediction;
   prediction.facts.resize(problem_.commands.size());
-  Srv1Robot robot(problem_, values, options.steps);
+  // A search never comes back to a genome; means are asked for again where only the view differs.
+  Srv1Robot robot(problem_, values, options.steps, options.means_only ? &memo_ : nullptr);
   prediction.tails = robot.noise().tails;
   const Views views(robot.effects());
   const unsigned context = robot.effects().motion_context();

@@ -31,14 +31,21 @@ NoiseSettings noise_of(const Problem& problem, const ParameterValues& values) {
 
 class BulletVehicle final : public Vehicle {
  public:
-  BulletVehicle(const SimSettings& settings, StepCounter* steps) : simulator_(settings, steps) {}
+  BulletVehicle(const SimSettings& settings, StepCounter* steps, MotionMemo* memo)
+      : simulator_(settings, steps), memo_(memo) {}
   Motion run(const DriveInput& drive, const Floor& floor, std::vector<MotionSample>* path,
              double interval_s) override {
-    return simulator_.run(drive, floor, path, interval_s);
+    if (memo_ == nullptr || path != nullptr) return simulator_.run(drive, floor, path, interval_s);
+    const MotionKey key{simulator_.settings(), drive, floor};
+    if (const auto known = memo_->find(key)) return *known;
+    const Motion motion = simulator_.run(drive, floor);
+    memo_->keep(key, motion);
+    return motion;
   }
 
  private:
   Simulator simulator_;
+  MotionMemo* memo_;
 };
 
 }  // namespace
@@ -78,20 +85,22 @@ Gains draw_gains(const NoiseSettings& noise, Stream& stream) {
 }
 
 std::unique_ptr<Vehicle> make_vehicle(const Problem& problem, const ParameterValues& values,
-                                      const ActiveEffects& effects, StepCounter* steps) {
+                                      const ActiveEffects& effects, StepCounter* steps,
+                                      MotionMemo* memo) {
   if (problem.external) return make_external_vehicle(problem, values, steps);
   return std::make_unique<BulletVehicle>(sim_settings(problem.treads().size(), values, effects),
-                                         steps);
+                                         steps, memo);
 }
 
 Srv1Robot::Srv1Robot(const ParameterValues& values, StepCounter* steps)
-    : Srv1Robot(Problem{}, values, steps) {}
+    : Srv1Robot(Problem{}, values, steps, nullptr) {}
 
-Srv1Robot::Srv1Robot(const Problem& problem, const ParameterValues& values, StepCounter* steps)
+Srv1Robot::Srv1Robot(const Problem& problem, const ParameterValues& values, StepCounter* steps,
+                     MotionMemo* memo)
     : effects_(problem.table(), values),
       noise_(noise_of(problem, values)),
       full_speed_m_s_(problem.external ? 1 : at(values, Srv1::kFullSpeed)),
-      vehicle_(make_vehicle(problem, values, effects_, steps)) {}
+      vehicle_(make_vehicle(problem, values, effects_, steps, memo)) {}
 
 NoiseSettings Srv1Robot::foreseen_noise() const {
   NoiseSettings noise = noise_;

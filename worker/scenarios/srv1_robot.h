@@ -10,6 +10,7 @@
 #include "common/trials/context.h"
 #include "gapfarm/v1/task.pb.h"
 #include "worker/effects/behaviour.h"
+#include "worker/scenarios/motion_memo.h"
 #include "worker/scenarios/outcome.h"
 #include "worker/scenarios/vehicle.h"
 #include "worker/sim/simulator.h"
@@ -42,7 +43,8 @@ class Srv1Robot {
   // Of scenario srv1.
   explicit Srv1Robot(const ParameterValues& values, StepCounter* steps = nullptr);
   // Of the problem's scenario: srv1, or external, whose effects are a part of srv1's.
-  Srv1Robot(const Problem& problem, const ParameterValues& values, StepCounter* steps);
+  Srv1Robot(const Problem& problem, const ParameterValues& values, StepCounter* steps,
+            MotionMemo* memo = nullptr);
 
   const ActiveEffects& effects() const { return effects_; }
   const NoiseSettings& noise() const { return noise_; }
@@ -53,6 +55,7 @@ class Srv1Robot {
 
   Motion run(const DrivenCommand& drive, const Situation& situation, const Gains& gains,
              std::vector<MotionSample>* path = nullptr, double interval_s = 0);
+  // Motions that the memo had count like others.
   double simulated_s() const { return simulated_s_; }
   unsigned runs() const { return runs_; }
 

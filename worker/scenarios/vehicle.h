@@ -7,6 +7,7 @@
 #include "common/parameters/table.h"
 #include "common/problem/problem.h"
 #include "worker/effects/behaviour.h"
+#include "worker/scenarios/motion_memo.h"
 #include "worker/sim/motion.h"
 #include "worker/sim/step_counter.h"
 
@@ -21,8 +22,10 @@ class Vehicle {
                      double interval_s) = 0;
 };
 
-// The simulation of the problem's scenario at these values.
+// The simulation of the problem's scenario at these values.  `memo` (may be null) holds motions
+// that need not be simulated again; one that is asked for with its path is.
 std::unique_ptr<Vehicle> make_vehicle(const Problem& problem, const ParameterValues& values,
-                                      const ActiveEffects& effects, StepCounter* steps);
+                                      const ActiveEffects& effects, StepCounter* steps,
+                                      MotionMemo* memo);
 
 }  // namespace gapfarm

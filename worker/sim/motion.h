@@ -51,17 +51,23 @@ struct SideDrive {
   double speed_m_s = 0;      // surface speed that the side settles at while the motors run
   double lag_s = 0;          // time constant of the first-order response, also when stopping
   double dead_travel_m = 0;  // tread travel (absolute) swallowed before the surface moves
+
+  bool operator==(const SideDrive&) const = default;
 };
 
 struct DriveInput {
   SideDrive left, right;
   double duration_s = 1;  // the motors run this long, then are told zero speed
+
+  bool operator==(const DriveInput&) const = default;
 };
 
 // A disc of floor with another friction; one that is like the rest does nothing.
 struct FrictionDisc {
   double x_m = 0, y_m = 0, radius_m = 0;
   double ratio = 1;  // friction inside over friction outside
+
+  bool operator==(const FrictionDisc&) const = default;
 };
 
 // What the floor does, seen from S.
@@ -76,6 +82,8 @@ struct Floor {
   double grain_ratio = 1;  // friction across over along the grain; their geometric mean stays
   double grain_direction_rad = 0;
   double speed_slope_s_m = 0;  // share of friction gained a m/s of sliding speed
+
+  bool operator==(const Floor&) const = default;
 };
 
 enum class MotionOutcome { kOk, kDiverged, kFellOver, kNeverRested };

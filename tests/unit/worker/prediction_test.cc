@@ -8,6 +8,7 @@
 #include "common/score/motion_model.h"
 #include "tests/unit/worker/problems.h"
 #include "worker/evaluate.h"
+#include "worker/scenarios/motion_memo.h"
 #include "worker/scenarios/srv1_robot.h"
 
 namespace gapfarm {
@@ -70,6 +71,53 @@ TEST(Prediction, SharedConditionsMatchSimulatingEachTrial) {
 
   value(floor, "battery_sag.rate") = 0.02;
   EXPECT_LT(worst_sharing_error(floor), 4e-3);
+}
+
+// A motion that was simulated for another view of the camera is not simulated again, and what is
+// predicted is the same to the bit.
+TEST(Prediction, MotionsThatOnlyTheViewTellsApartAreSimulatedOnce) {
+  Problem problem = small_problem(12);
+  value(problem, "floor_nap.strength") = 0.2;  // every trial by itself
+  const auto seen_from = [&](const PreparedProblem* worker, double slope, StepCounter* steps) {
+    v1::Task task;
+    task.mutable_predict()->set_means_only(true);
+    v1::Override* seam = task.mutable_predict()->mutable_point()->add_overrides();
+    seam->set_parameter(static_cast<std::uint32_t>(srv1_table().row("camera_seam.slope_x")));
+    seam->set_value(slope);
+    return evaluate(worker, task, steps);
+  };
+  const auto worker = prepare(to_proto(problem)), fresh = prepare(to_proto(problem));
+  ASSERT_TRUE(worker.ok() && fresh.ok());
+  StepCounter steps = 0;
+  const v1::TaskResult near = seen_from(worker->get(), 0.01, &steps);
+  ASSERT_EQ(near.outcome(), v1::OK) << near.message();
+  const std::uint64_t simulated = steps;
+  EXPECT_GT(simulated, 0u);
+  const v1::TaskResult far = seen_from(worker->get(), 0.05, &steps);
+  EXPECT_EQ(steps, simulated);
+  EXPECT_EQ(far.SerializeAsString(), seen_from(fresh->get(), 0.05, nullptr).SerializeAsString());
+  EXPECT_NE(far.SerializeAsString(), near.SerializeAsString());
+}
+
+TEST(MotionMemo, GivesBackWhatItKeptAndKeepsTheLast) {
+  MotionMemo memo(3);
+  MotionKey key;
+  const auto motion_of = [](int k) {
+    Motion motion;
+    motion.duration_s = k;
+    return motion;
+  };
+  for (int k = 0; k < 9; ++k) {
+    key.floor.nap_direction_rad = k;
+    EXPECT_FALSE(memo.find(key));
+    memo.keep(key, motion_of(k));
+  }
+  ASSERT_TRUE(memo.find(key));
+  EXPECT_EQ(memo.find(key)->duration_s, 8);
+  key.settings.mass_kg = 1;  // hashed alike
+  EXPECT_FALSE(memo.find(key));
+  key = {};
+  EXPECT_FALSE(memo.find(key));  // long ago
 }
 
 // Fewer trials of a condition than interpolation has nodes are simulated at their own headings, and
