@@ -321,9 +321,10 @@ Eigen::VectorXd step_within_bounds(const NormalEquations& equations, const Eigen
   return to.cwiseMax(0).cwiseMin(1);  // sums are rounded
 }
 
-WindowEnds left_out_ends(const RobustErrors& errors, const WindowEnds& ends,
-                         const WindowSlopes& slopes, const NormalEquations& prior,
-                         std::span<const std::size_t> stretches) {
+std::vector<Eigen::VectorXd> left_out_steps(const RobustErrors& errors, const WindowEnds& ends,
+                                            const WindowSlopes& slopes,
+                                            const NormalEquations& prior,
+                                            std::span<const std::size_t> stretches) {
   const std::size_t count = 1 + *std::max_element(stretches.begin(), stretches.end());
   NormalEquations all = prior;
   std::vector<NormalEquations> own(count, no_equations(prior.g.size()));
@@ -334,15 +335,22 @@ WindowEnds left_out_ends(const RobustErrors& errors, const WindowEnds& ends,
     all.H += one.H;
     all.g += one.g;
   }
-  std::vector<Eigen::VectorXd> moves;
+  std::vector<Eigen::VectorXd> steps;
   for (const NormalEquations& one : own) {
     Eigen::MatrixXd H = all.H - one.H;
     H.diagonal().array() += kLeastPrecision;
-    moves.push_back(solve_symmetric(H, all.g - one.g));
+    steps.push_back(solve_symmetric(H, all.g - one.g));
   }
+  return steps;
+}
+
+WindowEnds left_out_ends(const RobustErrors& errors, const WindowEnds& ends,
+                         const WindowSlopes& slopes, const NormalEquations& prior,
+                         std::span<const std::size_t> stretches) {
+  const auto steps = left_out_steps(errors, ends, slopes, prior, stretches);
   WindowEnds foretold;
   for (std::size_t i = 0; i < ends.size(); ++i) {
-    foretold.push_back(ends[i] - slopes[i] * moves[stretches[i]]);
+    foretold.push_back(ends[i] - slopes[i] * steps[stretches[i]]);
   }
   return foretold;
 }

@@ -83,8 +83,15 @@ NormalEquations normal_equations(const RobustErrors& errors, const WindowEnds& e
 // the others move as is best then.
 Eigen::VectorXd step_within_bounds(const NormalEquations& equations, const Eigen::VectorXd& at);
 
-// Ends that were not fitted to: each stretch is predicted by values that one step of least squares
-// makes of the other stretches.  `prior` adds to the equations of every step.
+// Of each stretch the step, to be taken off the values, that least squares makes of the others.
+// `prior` adds to the equations of every step.
+std::vector<Eigen::VectorXd> left_out_steps(const RobustErrors& errors, const WindowEnds& ends,
+                                            const WindowSlopes& slopes,
+                                            const NormalEquations& prior,
+                                            std::span<const std::size_t> stretches);
+
+// Ends that were not fitted to: each stretch is predicted by values after that step, to first
+// order.
 WindowEnds left_out_ends(const RobustErrors& errors, const WindowEnds& ends,
                          const WindowSlopes& slopes, const NormalEquations& prior,
                          std::span<const std::size_t> stretches);

@@ -97,6 +97,25 @@ WindowEnds SimulationFit::left_out(const Climb& climb, const Hold& hold) const {
                        stretches_);
 }
 
+// The same by simulations at the values of every step: where contacts begin to slip the first order
+// promises what is not to be had.
+Result<WindowEnds> SimulationFit::simulated_left_out(const Climb& climb) {
+  const auto steps = left_out_steps(*errors_, climb.at.ends, climb.slopes,
+                                    prior_at(climb.at.genome, climb.hold), stretches_);
+  std::vector<Genome> genomes;
+  for (const Eigen::VectorXd& step : steps) {
+    genomes.push_back(told_at(climb.at.genome, told_of(climb.at.genome) - step));
+  }
+  const auto there = look_at(genomes, {climb.hold});
+  if (!there) return there.error();
+  WindowEnds ends = left_out(climb, climb.hold);
+  for (std::size_t i = 0; i < ends.size(); ++i) {
+    const std::optional<At>& at = (*there)[stretches_[i]];
+    if (at) ends[i] = at->ends[i];
+  }
+  return ends;
+}
+
 // What is better must be so surely: a standard error is taken off every gain.
 SimulationFit::Foretold SimulationFit::foretold(const WindowEnds& ends) const {
   const Unsure gain = plain_->gain(ends, rival_, parts_);
@@ -218,7 +237,9 @@ Result<Climb> SimulationFit::weigh_worse(Climb best) {
 
 // Against the kinematics, whose values in the simulation are `begin` or, without slip, stand firm.
 Status SimulationFit::judge(const Climb& best, const At& begin, SimulatedStart* found) {
-  const Foretold own = foretold(left_out(best, best.hold));
+  const auto met = simulated_left_out(best);
+  if (!met) return met.error();
+  const Foretold own = foretold(*met);
   found->left_out_gain = own.gain;
   found->worst_ratio = own.worst;
   const WindowEnds ends = window_errors(problem_, kinematic_ends(problem_, kinematics_));

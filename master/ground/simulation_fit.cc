@@ -98,12 +98,15 @@ Eigen::VectorXd SimulationFit::told_of(const Genome& genome) const {
 }
 
 Genome SimulationFit::moved(const At& at, const NormalEquations& equations) const {
-  const Eigen::VectorXd to = step_within_bounds(equations, told_of(at.genome));
-  Genome genome = at.genome;
+  return told_at(at.genome, step_within_bounds(equations, told_of(at.genome)));
+}
+
+Genome SimulationFit::told_at(const Genome& genome, const Eigen::VectorXd& values) const {
+  Genome to = genome;
   for (std::size_t k = 0; k < told_.size(); ++k) {
-    genome[told_[k]] = to[static_cast<Eigen::Index>(k)];
+    to[told_[k]] = std::clamp(values[static_cast<Eigen::Index>(k)], 0.0, 1.0);
   }
-  return genome;
+  return to;
 }
 
 void SimulationFit::make_equations(Climb* climb) const {

@@ -66,10 +66,12 @@ class SimulationFit {
                 const Climb& first);
   Eigen::VectorXd told_of(const Genome& genome) const;  // of told_, its values
   Genome moved(const At& at, const NormalEquations& equations) const;
+  Genome told_at(const Genome& genome, const Eigen::VectorXd& values) const;
   double strength_of(const Hold& hold, std::size_t gene) const;
   double cost_of(const Genome& genome, const Hold& hold) const;
   NormalEquations prior_at(const Genome& genome, const Hold& hold) const;
   WindowEnds left_out(const Climb& climb, const Hold& hold) const;
+  Result<WindowEnds> simulated_left_out(const Climb& climb);
   Foretold foretold(const WindowEnds& ends) const;
   Status climb_again(Climb* climb);
   Result<std::optional<Climb>> firm_climb();
