@@ -16,8 +16,9 @@ constexpr double kHeadingTolerance = 4e-3;
 // Beyond this the motion jumps at some heading, which no interpolation follows: a drag that only
 // just leaves the treads their grip.
 constexpr double kHeadingJump = 1e-2;
-// Motion is nearly linear in the speed that a time-dependent effect changes.
-constexpr std::size_t kTimes = 4;
+// Motion is nearly linear in the speed that a time-dependent effect changes; where few headings
+// will do, as for derivatives, so will few times.
+constexpr std::size_t kTimes = 4, kFewTimes = 2;
 constexpr double kFarAway = 1e6;  // m
 constexpr double kPathInterval_s = 0.02;
 
@@ -105,10 +106,10 @@ class GroupSimulation {
     return true;
   }
 
-  bool times() {
+  bool times(std::size_t count) {
     if (group_.last_time_s <= group_.first_time_s) return true;
     auto& motion = result_.motion;
-    motion.times_ = chebyshev_nodes(group_.first_time_s, group_.last_time_s, kTimes);
+    motion.times_ = chebyshev_nodes(group_.first_time_s, group_.last_time_s, count);
     for (double time : motion.times_) {
       Situation s = situation_;
       s.session_time_s = time;
@@ -212,7 +213,8 @@ GroupResult simulate_group(Srv1Robot& robot, const ConditionGroup& group,
   if (ok && (effects.motion_context() & kStartHeading) && !group.few(options.headings)) {
     ok = simulation.headings(options.headings);
   }
-  if (ok && (effects.motion_context() & kSessionTime)) ok = simulation.times();
+  if (ok && (effects.motion_context() & kSessionTime))
+    ok = simulation.times(options.headings > 0 ? kFewTimes : kTimes);
   if (ok && !options.means_only) {
     const std::vector<Gains> gains =
         draws.empty() ? cubature_points(robot.foreseen_noise()) : draws;
