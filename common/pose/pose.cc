@@ -7,6 +7,8 @@ namespace gapfarm {
 
 double wrap_angle(double angle) {
   constexpr double kTwoPi = 2 * std::numbers::pi;
+  // Almost all are within already, and a remainder is slow.
+  if (angle > -std::numbers::pi && angle <= std::numbers::pi) return angle;
   double wrapped = std::remainder(angle, kTwoPi);  // [-pi, pi]
   if (wrapped <= -std::numbers::pi) wrapped += kTwoPi;
   return wrapped;

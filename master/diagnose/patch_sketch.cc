@@ -94,6 +94,8 @@ PatchSketch::PatchSketch(const Problem& problem, const Study& study)
     const Twist whole = way_of(study, i);
     way.step_s = study.cells[trial.cell].command.duration_s / kSteps;
     way.step = whole / kSteps;
+    way.half = exp(Twist(way.step / 2));
+    way.whole = exp(way.step);
     way.X_WE = trial.X_WS * exp(whole);
     for (int k = 0; k < kSteps; ++k) {
       way.X_WB.push_back(trial.X_WS * exp(Twist(whole * k / kSteps)));
@@ -188,9 +190,10 @@ std::vector<PatchSketch::Shifts> PatchSketch::shifts(double ratio) const {
 
 PatchSketch::Contacts PatchSketch::contacts_at(const Pose& X_WB) const {
   Contacts contacts;
-  for (std::size_t c = 0; c < 4; ++c) {
-    const Pose at = X_WB * Pose{contacts_[c].x(), contacts_[c].y(), 0};
-    contacts[c] = {at.x, at.y};
+  const double c = std::cos(X_WB.theta), s = std::sin(X_WB.theta);
+  for (std::size_t k = 0; k < 4; ++k) {
+    const Eigen::Vector2d& at = contacts_[k];
+    contacts[k] = {X_WB.x + c * at.x() - s * at.y(), X_WB.y + s * at.x() + c * at.y()};
   }
   return contacts;
 }
@@ -207,9 +210,9 @@ Eigen::Vector3d PatchSketch::shift_of(const Way& way, const Patch& patch,
   if (k == kSteps) return Eigen::Vector3d::Zero();
   Pose X_WB = way.X_WB[k];
   for (; k < kSteps; ++k) {
-    const unsigned set = inside(contacts_at(X_WB * exp(Twist(way.step / 2))), patch);
+    const unsigned set = inside(contacts_at(X_WB * way.half), patch);
     const Twist more = shifts[set] * way.step_s;
-    X_WB = X_WB * exp(Twist(way.step + more));
+    X_WB = X_WB * (set == 0 ? way.whole : exp(Twist(way.step + more)));
   }
   const Pose shift = between(way.X_WE, X_WB);
   return {shift.x, shift.y, shift.theta};

@@ -42,6 +42,7 @@ class PatchSketch {
   struct Way {                                      // that the base predicts of a trial
     double step_s = 0;
     Twist step = Twist::Zero();
+    Pose half, whole;  // exp() of half of it, and of it
     Pose X_WE;
     std::vector<Pose> X_WB;          // where each step begins
     std::vector<Contacts> contacts;  // in its middle
