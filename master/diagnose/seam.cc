@@ -1,5 +1,6 @@
 #include "master/diagnose/seam.h"
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <vector>
@@ -102,24 +103,31 @@ double seam_position(const Study& study, const Regression& others, const Signatu
                 coefficients[1] + coefficients[3] * along, 0};
   };
   const double about = value_in(seam, "position");
-  const double reach = std::abs(coefficients[across_x ? 0 : 1]) + 4 * kFineSeamStep_m;
+  // Of signatures that are nearly alike a coefficient may be of any size; no shift is.
+  const Parameter& offset = (*study.table)[study.table->row(seam.effect + ".offset_x")];
+  const double shifted = std::min(std::abs(coefficients[across_x ? 0 : 1]), offset.upper);
+  const double reach = shifted + 4 * kFineSeamStep_m;
+  std::vector<Pose> ways;
+  for (const ResidualTrial& t : study.trials) ways.push_back(between(t.X_WS, t.X_WP));
+  const Eigen::VectorXd left = others.left();
   double best = about, least = INFINITY;
   for (double line = about - reach; line <= about + reach; line += kFineSeamStep_m) {
     std::vector<Eigen::Vector3d> d;
-    for (const ResidualTrial& t : study.trials) {
+    for (std::size_t i = 0; i < study.size(); ++i) {
+      const ResidualTrial& t = study.trials[i];
       Pose start = t.X_WS;
       for (int round = 0; round < 3; ++round) {  // as the simulated camera's readings are undone
         const Pose s = shift(start, line);
         start = {t.X_WS.x - s.x, t.X_WS.y - s.y, t.X_WS.theta};
       }
-      const Pose end = start * between(t.X_WS, t.X_WP);
+      const Pose end = start * ways[i];
       const Pose s = shift(end, line);
       d.push_back(local_difference(t.X_WP, {end.x + s.x, end.y + s.y, end.theta}));
     }
     Eigen::VectorXd mark = study.whiten(d);
     study.drop_ignored(mark);
     // What would be left with this mark taken out, less what is left without.
-    const double change = others.own_squares(mark) - 2 * mark.dot(others.left());
+    const double change = others.own_squares(mark) - 2 * mark.dot(left);
     if (change >= least) continue;
     least = change;
     best = line;
