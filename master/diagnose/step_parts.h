@@ -2,6 +2,7 @@
 #pragma once
 
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -78,10 +79,12 @@ struct Worthless {
   std::size_t effect = 0;
   std::string why;
 };
-// Trials that no fit saw are predicted no better with it.  `perfect`: what a prediction scores that
-// misses nothing, once that is known.
+// Trials that no fit saw are predicted no better with it than with what comes before it alone.
+// `perfect`: what a prediction scores that misses nothing, once that is known.  `put_last`: effects
+// that were of use beside all others; they are not asked again.
 std::optional<Worthless> of_no_use(const Judgement& judged, const std::vector<NestedFit>& nested,
-                                   std::optional<double> perfect);
+                                   std::optional<double> perfect,
+                                   const std::set<std::string>& put_last = {});
 // Its best size is none or more than there can be.
 std::optional<Worthless> at_its_bound(const Inquiry& of, const Explanation& named);
 Judgement dropped(Judgement judged, const Worthless& effect);

@@ -141,6 +141,14 @@ Result<Refit> naming_none(const Inquiry& of, const Evidence& measured, Refit ref
   return with_floor(of, std::move(refit), folds);
 }
 
+// Beside a gap of something else a prediction misses either way, and what explains the rest shows
+// only when that is explained: an effect has to be of no use beside all others.
+void put_last(std::size_t effect, std::vector<ChosenEffect>* chosen, std::set<std::string>* names) {
+  names->insert((*chosen)[effect].candidate.signature.effect);
+  const auto at = chosen->begin() + static_cast<std::ptrdiff_t>(effect);
+  std::rotate(at, at + 1, chosen->end());
+}
+
 // The values that are told, with the base that fits beside them: report and model say the same.
 Result<Refit> with_final_fit(const Inquiry& of, Refit refit) {
   const Explanation& named = refit.judged.named;
@@ -186,29 +194,35 @@ Result<Refit> refit(const Inquiry& of, const Evidence& measured, const Screening
     tell_of_fit(of, *named.estimates);
   }
   const std::vector<std::size_t> folds = of.subject.folds(named.study());
+  std::set<std::string> were_last;
   for (;;) {
     auto nested = nested_fits(of, named, folds);
     if (!nested) return nested.error();
     refit.nested = std::move(*nested);
     tell_of_gaps(of, refit.nested);
-    auto worthless = of_no_use(refit.judged, refit.nested, std::nullopt);
-    if (!worthless && !named.chosen.empty()) {
+    auto idle = of_no_use(refit.judged, refit.nested, std::nullopt, were_last);
+    std::optional<Worthless> worthless;
+    if (!idle && !named.chosen.empty()) {
       auto fit = estimate_beside(of, named, refit.nested.back());
       if (!fit) return fit.error();
       named.estimates = std::move(*fit);
       worthless = at_its_bound(of, named);
     }
-    if (!worthless) {
+    if (!idle && !worthless) {
       if (named.chosen.size() < found) {
         refit.judged = judge_again(of, *screening.catalogue, std::move(refit.judged));
       }
       auto corrected = with_correction(of, screening, std::move(refit), folds);
       if (!corrected) return corrected;
       refit = with_floor(of, std::move(*corrected), folds);
-      worthless = of_no_use(refit.judged, refit.nested, refit.floor);
+      idle = of_no_use(refit.judged, refit.nested, refit.floor, were_last);
     }
-    if (!worthless) break;
-    refit.judged = dropped(std::move(refit.judged), *worthless);
+    if (!idle && !worthless) break;
+    if (idle && idle->effect + 1 < named.chosen.size()) {
+      put_last(idle->effect, &named.chosen, &were_last);
+      continue;
+    }
+    refit.judged = dropped(std::move(refit.judged), idle ? *idle : *worthless);
   }
   const auto missing = missing_too_much(refit);
   if (missing || (named.on_bounds && !explains_bounds(refit))) {
