@@ -5,8 +5,8 @@
 #include <cmath>
 
 #include "common/score/algebra.h"
-#include "common/score/bounded_minimum.h"
 #include "common/score/density.h"
+#include "common/score/bounded_minimum.h"
 #include "master/diagnose/seam.h"
 #include "master/diagnose/slopes.h"
 #include "master/diagnose/subject.h"
@@ -19,7 +19,6 @@ constexpr int kMostHalvings = 4;
 // Of the objective (twice nats): less is no progress, where the noise is as large as it was taken
 // for.
 constexpr double kSettled = 1;
-constexpr double kNear = 0.97;  // of the objective: what a step leaves where derivatives stay alike
 constexpr double kMostOfRange = 0.3;  // of a parameter's range, that one step may go
 // Of a finite difference, root mean square in standard deviations a row.
 constexpr double kLeastMove = 1e-4, kMostMove = 5, kGoodMove = 0.3;
@@ -321,12 +320,10 @@ Result<JointFit> fit_jointly(Predictor& predictor, const Study& study,
     auto moved = moved_on(predictor, study, nuisances, best, fit);
     if (!moved) return moved.error();
     const bool settled = moved->misfit > best - settled_within(study, best);
-    const bool near = moved->misfit > kNear * best;
     best = moved->misfit;
     fit = std::move(moved->fit);
-    if (settled) break;
     // So near, the derivatives of before will do.
-    if (near) continue;
+    if (settled) break;
     if (Status s = differentiate(predictor, study, &fit); !s) return s.error();
   }
   return fit;
