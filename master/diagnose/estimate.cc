@@ -5,8 +5,8 @@
 #include <cmath>
 
 #include "common/score/algebra.h"
-#include "common/score/density.h"
 #include "common/score/bounded_minimum.h"
+#include "common/score/density.h"
 #include "master/diagnose/seam.h"
 #include "master/diagnose/slopes.h"
 #include "master/diagnose/subject.h"
