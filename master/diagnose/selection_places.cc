@@ -28,11 +28,10 @@ constexpr int kMostPatchSearches = 4, kMostSecondPatchSearches = 2;
 // The ratio is what the sketch is least sure of.
 constexpr std::array<double, 3> kRatioPowers = {0.5, 1, 2};
 constexpr double kLeastMovedRatio = 0.06, kMostMovedRatio = 2.9;
-// Moves of discs: standard deviations at first, for an SRV-1, how they go on after moves that
-// gained and after moves that did not, and the least share of the first.
-constexpr double kMove_m = 0.05, kMoveRatio = 0.4, kLeastRadius_m = 0.05;
-constexpr double kShrinkBehindGain = 0.7, kShrinkElse = 0.5, kLeastMoves = 0.16;
+// Moves of discs: standard deviations at first, for an SRV-1, and how they go on.
+constexpr double kMove_m = 0.05, kMoveRatio = 0.4, kMovesShrink = 0.7, kLeastRadius_m = 0.05;
 constexpr double kClimbs = 1.03;  // times the gain of before
+constexpr int kMoves = 6;
 constexpr std::size_t kMostParents = 3, kOffspring = 12;
 constexpr std::uint64_t kMovesSeed = 4;
 
@@ -105,7 +104,7 @@ Status Selector::refine_patch(const Regression& explained, std::vector<EffectCan
   Stream stream({kMovesSeed, Purpose::kStatistics, 0, 0, 0});
   double scale = 1;
   bool left = false;
-  while (scale > kLeastMoves && !left) {
+  for (int k = 0; k < kMoves && !left; ++k, scale *= kMovesShrink) {
     const double before = discs.front().gain;
     discs.resize(std::min(discs.size(), kMostParents));
     std::vector<Patch> moved;
@@ -123,7 +122,6 @@ Status Selector::refine_patch(const Regression& explained, std::vector<EffectCan
                  std::make_move_iterator(tried->end()));
     std::stable_sort(discs.begin(), discs.end(), better);
     left = behind && !(discs.front().gain > kClimbs * before);
-    scale *= discs.front().gain > before ? kShrinkBehindGain : kShrinkElse;
   }
   // What was left because something else explains more may be looked at again.
   if (!left) refined_patches_.push_back(patch_of(discs.front().signature));
