@@ -6,7 +6,7 @@
 
 #include "common/base/constants.h"
 #include "common/pose/pose.h"
-#include "common/score/statistics.h"
+#include "master/diagnose/footprint.h"
 #include "master/diagnose/free_commands.h"
 
 namespace gapfarm {
@@ -26,39 +26,6 @@ constexpr double kMostSteps = 20;           // of the grid, along each axis
 constexpr std::size_t kClimbs = 12;
 constexpr double kLeastRatio = 0.08;
 constexpr double kMostRatio = 2.8;
-
-double value_of(const Problem& problem, const Study& study, const char* key) {
-  const std::size_t row = problem.table().row(key);
-  const auto tuned = study.base.find(row);
-  return tuned != study.base.end() ? tuned->second : problem.values[row];
-}
-
-// What the sketch has to know of a robot.
-struct Footprint {
-  double length_m = 0, gauge_m = 0, friction_ratio = 1, creep = 0;
-};
-
-// Of a program's robot, whose parameters mean what its author wants: as wide as it turns, as long,
-// and with treads that give way like most.
-Footprint footprint_of_turns(const Study& study) {
-  constexpr double kUsualGauge_m = 0.15, kUsualCreep = 0.1, kLeastApart = 0.1;
-  std::vector<double> gauges;
-  for (std::size_t i = 0; i < study.size(); ++i) {
-    const ResidualTrial& trial = study.trials[i];
-    const CommandSpec& c = study.cells[trial.cell].command;
-    const double turned = std::abs((trial.left + trial.right)[2]);
-    const double apart = std::abs(c.right - c.left) * study.speed_m_s * c.duration_s;
-    if (std::abs(c.right - c.left) > kLeastApart && turned > 0) gauges.push_back(apart / turned);
-  }
-  const double gauge_m = gauges.empty() ? kUsualGauge_m : median(gauges);
-  return {gauge_m, gauge_m, 1, kUsualCreep};
-}
-
-Footprint footprint_of(const Problem& problem, const Study& study) {
-  if (problem.external) return footprint_of_turns(study);
-  return {value_of(problem, study, "contact_length"), value_of(problem, study, "track_gauge"),
-          value_of(problem, study, "friction_ratio"), value_of(problem, study, "tread_creep")};
-}
 
 // Which contacts lie in the patch, a bit each.
 unsigned inside(const std::array<Eigen::Vector2d, 4>& contacts, const Patch& patch) {
@@ -82,9 +49,7 @@ bool near(const Patch& a, const Patch& b, double apart_m) {
 PatchSketch::PatchSketch(const Problem& problem, const Study& study)
     : study_(study), scale_(problem.treads().scale()) {
   const Footprint footprint = footprint_of(problem, study);
-  const double front = footprint.length_m / 2, side = footprint.gauge_m / 2;
-  contacts_ = {Eigen::Vector2d(front, side), Eigen::Vector2d(-front, side),
-               Eigen::Vector2d(front, -side), Eigen::Vector2d(-front, -side)};
+  contacts_ = footprint.contacts();
   lateral_ = footprint.friction_ratio;
   creep_ = footprint.creep;
   speed_m_s_ = study.speed_m_s;

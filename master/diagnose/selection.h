@@ -111,9 +111,6 @@ class Selector {
                                    const std::vector<EffectCandidate>& beside) const;
   Status search_patches(const Regression& explained, double most_gain,
                         const std::optional<Patch>& beside);
-  Result<std::vector<EffectCandidate>> simulate_patches(const Regression& explained,
-                                                        const std::vector<Patch>& patches);
-  Status refine_patch(const Regression& explained, std::vector<EffectCandidate> discs, bool behind);
   void drop_linear_views(const Regression& explained,
                          std::map<std::string, EffectCandidate>* best) const;
   EffectCandidate refine_seam(const Regression& explained, EffectCandidate best) const;

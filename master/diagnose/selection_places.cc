@@ -3,13 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdint>
-#include <iterator>
 #include <map>
 #include <optional>
 
-#include "common/random/stream.h"
 #include "master/diagnose/effects/patch_places.h"
+#include "master/diagnose/patch_climb.h"
 #include "master/diagnose/seam.h"
 #include "master/diagnose/selection.h"
 #include "master/diagnose/subject.h"
@@ -28,12 +26,6 @@ constexpr int kMostPatchSearches = 4, kMostSecondPatchSearches = 2;
 // The ratio is what the sketch is least sure of.
 constexpr std::array<double, 3> kRatioPowers = {0.5, 1, 2};
 constexpr double kLeastMovedRatio = 0.06, kMostMovedRatio = 2.9;
-// Moves of discs: standard deviations at first, for an SRV-1, and how they go on.
-constexpr double kMove_m = 0.05, kMoveRatio = 0.4, kMovesShrink = 0.7, kLeastRadius_m = 0.05;
-constexpr double kClimbs = 1.03;  // times the gain of before
-constexpr int kMoves = 6;
-constexpr std::size_t kMostParents = 3, kOffspring = 12;
-constexpr std::uint64_t kMovesSeed = 4;
 
 bool better(const EffectCandidate& a, const EffectCandidate& b) { return a.gain > b.gain; }
 
@@ -82,54 +74,6 @@ void Selector::drop_linear_views(const Regression& explained,
   });
 }
 
-// In their order.
-Result<std::vector<EffectCandidate>> Selector::simulate_patches(const Regression& explained,
-                                                                const std::vector<Patch>& patches) {
-  auto found = patch_signatures(*predictor_, *study_, patches);
-  if (!found) return found.error();
-  std::vector<EffectCandidate> simulated;
-  for (Signature& s : *found) {
-    study_->drop_ignored(s.columns);
-    const double gain = net_gain(explained, s);
-    simulated.push_back({gain, std::move(s)});
-  }
-  return simulated;
-}
-
-// Discs that the sketch proposes, the best first, moved to where the simulation explains most. What
-// a rim does to each drive that crosses it makes many hills, so the best few are moved at random,
-// in ever smaller steps; `behind` what explains more only for as long as that gains.
-Status Selector::refine_patch(const Regression& explained, std::vector<EffectCandidate> discs,
-                              bool behind) {
-  Stream stream({kMovesSeed, Purpose::kStatistics, 0, 0, 0});
-  double scale = 1;
-  bool left = false;
-  for (int k = 0; k < kMoves && !left; ++k, scale *= kMovesShrink) {
-    const double before = discs.front().gain;
-    discs.resize(std::min(discs.size(), kMostParents));
-    std::vector<Patch> moved;
-    for (std::size_t i = 0; i < kOffspring; ++i) {
-      Patch& to = moved.emplace_back(patch_of(discs[i % discs.size()].signature));
-      for (std::size_t c = 0; c < 3; ++c)
-        to[c] += scale * kMove_m * study_->scale * stream.normal();
-      to[2] = std::max(to[2], kLeastRadius_m * study_->scale);
-      to[3] = std::clamp(to[3] * std::exp(scale * kMoveRatio * stream.normal()), kLeastMovedRatio,
-                         kMostMovedRatio);
-    }
-    auto tried = simulate_patches(explained, moved);
-    if (!tried) return tried.error();
-    discs.insert(discs.end(), std::make_move_iterator(tried->begin()),
-                 std::make_move_iterator(tried->end()));
-    std::stable_sort(discs.begin(), discs.end(), better);
-    left = behind && !(discs.front().gain > kClimbs * before);
-  }
-  // What was left because something else explains more may be looked at again.
-  if (!left) refined_patches_.push_back(patch_of(discs.front().signature));
-  discs.resize(std::min(discs.size(), kMostParents));
-  for (EffectCandidate& disc : discs) catalogue_.push_back(std::move(disc.signature));
-  return {};
-}
-
 // Adds to the catalogue what the sketch finds in the data that are left, where a search has not
 // been yet; `beside`: another one than this.
 Status Selector::search_patches(const Regression& explained, double most_gain,
@@ -157,7 +101,7 @@ Status Selector::search_patches(const Regression& explained, double most_gain,
   }
   if (starts.empty()) return {};
   ++searches;
-  auto simulated = simulate_patches(explained, starts);
+  auto simulated = simulated_discs(*predictor_, *study_, explained, starts);
   if (!simulated) return simulated.error();
   std::stable_sort(simulated->begin(), simulated->end(), better);
   for (const EffectCandidate& disc : *simulated) catalogue_.push_back(disc.signature);
@@ -165,7 +109,12 @@ Status Selector::search_patches(const Regression& explained, double most_gain,
   if (best.gain + best.signature.penalty < kWorthRefining) return {};
   if (kMostOfMoving * best.gain < most_gain) return {};  // its turn comes when that is explained
   const bool behind = best.gain < most_gain;
-  return refine_patch(explained, std::move(*simulated), behind);
+  auto climbed = PatchClimb(*predictor_, *study_, explained).run(std::move(*simulated), behind);
+  if (!climbed) return climbed.error();
+  // What was left because something else explains more may be looked at again.
+  if (!climbed->left) refined_patches_.push_back(patch_of(climbed->discs.front().signature));
+  for (EffectCandidate& disc : climbed->discs) catalogue_.push_back(std::move(disc.signature));
+  return {};
 }
 
 }  // namespace gapfarm

@@ -130,20 +130,21 @@ Result<std::vector<Signature>> signatures(Predictor& predictor, const Study& stu
 }
 
 Result<std::vector<Signature>> patch_signatures(Predictor& predictor, const Study& study,
-                                                const std::vector<std::array<double, 4>>& places) {
+                                                const std::vector<Patch>& places,
+                                                const PatchTrials& trials) {
   std::vector<Pose> ends_without;
   for (const ResidualTrial& trial : study.trials) ends_without.push_back(trial.X_WP);
   const auto without = slope_point(predictor, study, study.base, ends_without);
   if (!without) return without.error();
   std::vector<PredictionRequest> requests;
   std::vector<std::map<std::string, double>> values;
-  for (const auto& [x, y, radius, ratio] : places) {
+  for (const Patch& place : places) {
     PredictionRequest request;
+    const auto reach = study.subject->patch_reach(predictor.problem(), study, place);
     for (std::size_t i = 0; i < study.size(); ++i) {
-      if (study.subject->in_reach(study, study.trials[i], {x, y, radius, ratio}))
-        request.trials.push_back(static_cast<std::uint32_t>(i));
+      if (trials(i, reach[i])) request.trials.push_back(static_cast<std::uint32_t>(i));
     }
-    values.push_back(patch_values({x, y, radius, ratio}));
+    values.push_back(patch_values(place));
     request.at = without->at;
     request.headings = without->headings;
     for (const auto& [key, value] : values.back()) request.at[study.table->row(key)] = value;

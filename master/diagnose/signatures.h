@@ -2,12 +2,14 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
+#include <cstddef>
+#include <functional>
 #include <map>
 #include <string>
 #include <vector>
 
 #include "common/base/result.h"
+#include "master/diagnose/patch.h"
 #include "master/diagnose/study.h"
 
 namespace gapfarm {
@@ -32,10 +34,14 @@ Result<std::vector<Signature>> signatures(Predictor& predictor, const Study& stu
 // Each column in three, one a kind of drive; those of nothing but zeros left out.
 Eigen::MatrixXd split_by_kind(const Study& study, const Eigen::MatrixXd& columns);
 
-// Discs of floor {x, y, radius, ratio}; simulated trial by trial where they can matter.  One that
-// cannot be simulated explains nothing.
+// Which trials a disc is simulated in; it does nothing in the others.
+using PatchTrials = std::function<bool(std::size_t trial, PatchReach reach)>;
+inline bool touched_trials(std::size_t, PatchReach reach) { return reach != PatchReach::kNone; }
+
+// Discs of floor, simulated trial by trial.  One that cannot be simulated explains nothing.
 Result<std::vector<Signature>> patch_signatures(Predictor& predictor, const Study& study,
-                                                const std::vector<std::array<double, 4>>& places);
+                                                const std::vector<Patch>& places,
+                                                const PatchTrials& trials = touched_trials);
 
 // Middle of the start places along each axis.
 Eigen::Vector2d middle_of(const Study& study);

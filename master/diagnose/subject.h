@@ -81,8 +81,9 @@ struct DiagnosisSubject {
   std::vector<CovariateBlock> (*blocks)(const Study& study);
   Result<std::vector<Signature>> (*signatures)(Predictor& predictor, const Study& study,
                                                const std::vector<std::string>& left_out);
-  // Whether a disc can matter to a trial's end.
-  bool (*in_reach)(const Study& study, const ResidualTrial& trial, const Patch& patch);
+  // Of every trial, with the study's base.
+  std::vector<PatchReach> (*patch_reach)(const Problem& problem, const Study& study,
+                                         const Patch& patch);
   PatchSearch (*patches)(Predictor& predictor, const Study& study);
   // The parts of the log that are predicted from the others, one number a trial.
   std::vector<std::size_t> (*folds)(const Study& study);

@@ -1,13 +1,16 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <memory>
 
 #include "common/parameters/push.h"
-#include "common/pose/segment.h"
+#include "common/pose/pose.h"
 #include "master/diagnose/drive_designs.h"
 #include "master/diagnose/estimate.h"
 #include "master/diagnose/findings.h"
+#include "master/diagnose/footprint.h"
+#include "master/diagnose/free_commands.h"
 #include "master/diagnose/nuisance.h"
 #include "master/diagnose/patch_sketch.h"
 #include "master/diagnose/push/push_subject.h"
@@ -29,18 +32,41 @@ PatchSearch sketched_patches(Predictor& predictor, const Study& study) {
       };
 }
 
-// Whether a robot's contacts may come over the disc: on its way from the logged start to the end
-// that is predicted without it, which bows out no farther than an ellipse through both.
-bool drives_over(const Study& study, const ResidualTrial& trial, const Patch& patch) {
-  // Half the diagonal of the largest robot of the SRV-1's table.
-  constexpr double kContacts_m = 0.11, kSpare_m = 0.03, kSpareWay = 1.1;
-  const CommandSpec& command = study.cells[trial.cell].command;
-  const Eigen::Vector2d from(trial.X_WS.x, trial.X_WS.y), to(trial.X_WP.x, trial.X_WP.y);
-  const double way =
-      kSpareWay * std::abs(command.left + command.right) / 2 * command.duration_s * study.speed_m_s;
-  const double bow = std::sqrt(std::max(0.0, way * way - (to - from).squaredNorm())) / 2;
-  return nearest_on_segment({patch[0], patch[1]}, from, to).distance <
-         patch[2] + bow + kContacts_m * study.scale + kSpare_m * study.scale;
+// How near and how far the robot's contacts come to a disc's centre, on the way that the base
+// predicts.
+struct Span {
+  double nearest = std::numeric_limits<double>::infinity(), farthest = 0;
+};
+
+Span span_of(const Pose& X_WS, const Twist& way, const Footprint& footprint, const Patch& patch) {
+  constexpr int kLooks = 16;
+  const auto contacts = footprint.contacts();
+  Span span;
+  for (int k = 0; k <= kLooks; ++k) {
+    const Pose X_WB = X_WS * exp(Twist(way * k / kLooks));
+    for (const Eigen::Vector2d& contact : contacts) {
+      const Pose at = X_WB * Pose{contact.x(), contact.y(), 0};
+      const double distance = std::hypot(at.x - patch[0], at.y - patch[1]);
+      span.nearest = std::min(span.nearest, distance);
+      span.farthest = std::max(span.farthest, distance);
+    }
+  }
+  return span;
+}
+
+std::vector<PatchReach> drive_patch_reach(const Problem& problem, const Study& study,
+                                          const Patch& patch) {
+  constexpr double kSpare_m = 0.03;  // for a way that is none of one twist, and between its steps
+  const double spare = kSpare_m * study.scale;
+  const Footprint footprint = footprint_of(problem, study);
+  std::vector<PatchReach> reach;
+  for (std::size_t i = 0; i < study.size(); ++i) {
+    const Span span = span_of(study.trials[i].X_WS, way_of(study, i), footprint, patch);
+    const bool touched = span.nearest < patch[2] + spare;
+    const bool inside = span.farthest < patch[2] - spare;
+    reach.push_back(inside ? PatchReach::kInside : touched ? PatchReach::kRim : PatchReach::kNone);
+  }
+  return reach;
 }
 
 // A robot on two sides drives commands: srv1's, or one that a program of the user's simulates.
@@ -70,7 +96,7 @@ DiagnosisSubject drive_subject(const char* scenario, const ParameterTable& table
   };
   s.blocks = covariate_blocks;
   s.signatures = signatures;
-  s.in_reach = drives_over;
+  s.patch_reach = drive_patch_reach;
   s.patches = sketched_patches;
   s.folds = folds_of;
   s.where = [](const Study& study, std::span<const Eigen::Vector3d> residuals,

@@ -146,12 +146,20 @@ Result<std::vector<Signature>> push_signatures(Predictor& predictor, const Study
   return found;
 }
 
-bool piece_crosses(const Study&, const ResidualTrial& trial, const Patch& patch) {
+bool piece_crosses(const ResidualTrial& trial, const Patch& patch) {
   constexpr double kExtent = 2.4;  // gyration radii: the farthest corner of a slender triangle
   const OnSegment nearest =
       nearest_on_segment({patch[0], patch[1]}, transform(trial.X_WS, trial.push.p_RC),
                          transform(trial.X_WP, trial.push.p_RC));
   return nearest.distance < patch[2] + kExtent * trial.push.gyration_m;
+}
+
+std::vector<PatchReach> push_patch_reach(const Problem&, const Study& study, const Patch& patch) {
+  std::vector<PatchReach> reach;
+  for (const ResidualTrial& trial : study.trials) {
+    reach.push_back(piece_crosses(trial, patch) ? PatchReach::kRim : PatchReach::kNone);
+  }
+  return reach;
 }
 
 PatchSearch push_patches(Predictor& predictor, const Study& study) {

@@ -25,7 +25,7 @@ DiagnosisSubject push_subject() {
   s.nuisances = push_nuisances;
   s.blocks = push_blocks;
   s.signatures = push_signatures;
-  s.in_reach = piece_crosses;
+  s.patch_reach = push_patch_reach;
   s.patches = push_patches;
   s.folds = push_folds;
   s.where = push_where;

@@ -31,7 +31,9 @@ std::vector<CovariateBlock> push_blocks(const Study& study);
 Result<std::vector<Signature>> push_signatures(Predictor& predictor, const Study& study,
                                                const std::vector<std::string>& left_out);
 // Whether the piece, on its way as the base predicts it, comes upon the disc.
-bool piece_crosses(const Study& study, const ResidualTrial& trial, const Patch& patch);
+bool piece_crosses(const ResidualTrial& trial, const Patch& patch);
+std::vector<PatchReach> push_patch_reach(const Problem& problem, const Study& study,
+                                         const Patch& patch);
 // Discs simulated over a grid of the table that pieces cross.
 PatchSearch push_patches(Predictor& predictor, const Study& study);
 // Whole cells, dealt in turn.

@@ -2,10 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <vector>
 
 #include "common/random/stream.h"
+#include "master/diagnose/subject.h"
 #include "tests/unit/worker/problems.h"
 
 namespace gapfarm {
@@ -79,6 +82,36 @@ TEST_F(PatchSketchTest, OnlyDrivesOverTheRimAreMarked) {
   }
   EXPECT_GT(mark.norm(), 5);
   EXPECT_LT(sketch_.column({1, 1, 0.3, 1}).norm(), 1e-9) << "no other friction";
+}
+
+// What the sketch marks crosses the rim; where the robot is inside all along, or never, no contact
+// changes its friction.
+TEST_F(PatchSketchTest, TellsWhichDrivesCrossTheRim) {
+  Study study = study_;
+  study.subject = diagnosis_subject(problem_);
+  const Patch patch = {1, 1, 0.3, 0.4};
+  const std::vector<PatchReach> reach = study.subject->patch_reach(problem_, study, patch);
+  const Eigen::VectorXd mark = sketch_.column(patch);
+  std::size_t inside = 0, outside = 0;
+  for (std::size_t i = 0; i < study.size(); ++i) {
+    const bool marked = mark.segment<3>(static_cast<Eigen::Index>(3 * i)).norm() > 0;
+    if (marked) {
+      EXPECT_EQ(reach[i], PatchReach::kRim) << i;
+    }
+    const Pose &from = study.trials[i].X_WS, &to = study.trials[i].X_WP;
+    const double start_m = std::hypot(from.x - 1, from.y - 1),
+                 end_m = std::hypot(to.x - 1, to.y - 1);
+    if (std::max(start_m, end_m) < 0.15) {
+      EXPECT_EQ(reach[i], PatchReach::kInside) << i;
+      ++inside;
+    }
+    if (study.trials[i].cell == 1 && start_m > 0.45) {
+      EXPECT_EQ(reach[i], PatchReach::kNone) << i;
+      ++outside;
+    }
+  }
+  EXPECT_GT(inside, 3U);
+  EXPECT_GT(outside, 100U);
 }
 
 // One tread nearly stands and is held by the floor outside: the other cannot turn the robot into

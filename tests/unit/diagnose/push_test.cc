@@ -84,9 +84,9 @@ TEST(PushPatch, MattersWhereThePieceComesUponIt) {
   ResidualTrial t = slid_trial(0.3);
   t.push.gyration_m = 0.05;
   t.X_WP = {0.3, 0, 0};
-  EXPECT_TRUE(piece_crosses(Study{}, t, {0.15, 0.1, 0.05, 0.4}));
-  EXPECT_FALSE(piece_crosses(Study{}, t, {0.15, 0.3, 0.05, 0.4}));
-  EXPECT_FALSE(piece_crosses(Study{}, t, {0.6, 0, 0.05, 0.4}));
+  EXPECT_TRUE(piece_crosses(t, {0.15, 0.1, 0.05, 0.4}));
+  EXPECT_FALSE(piece_crosses(t, {0.15, 0.3, 0.05, 0.4}));
+  EXPECT_FALSE(piece_crosses(t, {0.6, 0, 0.05, 0.4}));
 }
 
 TEST(DiagnosisSubjects, AreThoseWithACatalogue) {
