@@ -84,7 +84,7 @@ Judgement base_doubted(const Inquiry& of, const Evidence& measured, Judgement ju
   judged.named.evidence = std::make_shared<const Evidence>(measured);
   judged.named.as_logged.reset();
   judged.named.tuned_alone.clear();
-  judged.named.on_bounds = false;
+  judged.named.frees_base = false;
   judged.nearest.clear();
   judged.base_in_doubt = true;
   return doubted(std::move(judged), on_bounds(of, measured.study));

@@ -132,7 +132,7 @@ Result<Refit> naming_none(const Inquiry& of, const Evidence& measured, Refit ref
   judged.named.estimates.reset();
   std::erase(judged.cautions, refit.correction);
   refit.correction.clear();
-  const bool on_bounds = judged.named.on_bounds;
+  const bool on_bounds = judged.named.frees_base;
   if (missing) judged = doubted(std::move(judged), std::move(*missing));
   if (on_bounds) judged = base_doubted(of, measured, std::move(judged));
   auto nested = nested_fits(of, judged.named, folds);
@@ -225,7 +225,7 @@ Result<Refit> refit(const Inquiry& of, const Evidence& measured, const Screening
     refit.judged = dropped(std::move(refit.judged), idle ? *idle : *worthless);
   }
   const auto missing = missing_too_much(refit);
-  if (missing || (named.on_bounds && !explains_bounds(refit))) {
+  if (missing || (named.frees_base && !explains_bounds(refit))) {
     return naming_none(of, measured, std::move(refit), missing, folds);
   }
   return with_final_fit(of, std::move(refit));

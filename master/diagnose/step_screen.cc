@@ -114,7 +114,7 @@ Result<Screening> choose(const Inquiry& of, Screening screening) {
     tell_of_fit(of, *found.estimates);
     return at_estimate;
   };
-  const bool to_free_base = found.on_bounds && found.tuned_alone.empty();
+  const bool to_free_base = found.frees_base && found.tuned_alone.empty();
   auto chosen = catalogue.select(found.first, found.first.empty() ? 0 : found.latency.gain,
                                  relinearise, to_free_base ? kMostToFreeBase : kMostEffects);
   if (!chosen) return chosen.error();
@@ -259,12 +259,12 @@ Result<Screening> look_for_session_gains_again(const Inquiry& of, Screening scre
 
 Result<Screening> look_beside_readings(const Inquiry& of, const Explanation& found) {
   auto screening = search_catalogue(of, look_for_spreads(of, found, found.evidence->base));
-  if (screening && found.on_bounds) {
+  if (screening && found.frees_base) {
     screening = free_base(of, std::move(*screening));
     if (screening && screening->found.chosen.empty()) return screening;
   }
   if (!screening) return screening;
-  if ((of.subject.base_moves || found.on_bounds) && screening->found.estimates) {
+  if ((of.subject.base_moves || found.frees_base) && screening->found.estimates) {
     screening = search_again(of, screening->found);
   }
   if (screening) screening = look_for_spreads_again(of, std::move(*screening));
@@ -342,7 +342,7 @@ Overrides start_of(const Inquiry& of, const Selector& catalogue, const Explanati
 
 Result<JointFit> estimate(const Inquiry& of, const Selector& catalogue, const Explanation& so_far,
                           const std::vector<EffectCandidate>& effects, int rounds) {
-  const bool moves = of.subject.base_moves || so_far.on_bounds;
+  const bool moves = of.subject.base_moves || so_far.frees_base;
   Overrides start = start_of(of, catalogue, so_far, effects);
   for (const EffectCandidate& effect : effects) {
     for (const auto& [row, value] : so_far.estimates ? so_far.estimates->at : Overrides{}) {
@@ -361,18 +361,18 @@ Result<JointFit> estimate(const Inquiry& of, const Selector& catalogue, const Ex
   return fit_jointly(of.predictor, study, effects, fit->at, base, nuisances, rounds);
 }
 
-Result<Screening> screen(const Inquiry& of, const Evidence& measured) {
+Result<Screening> screen(const Inquiry& of, const Evidence& measured, bool free_base) {
   Explanation nothing;
   nothing.evidence = std::make_shared<const Evidence>(measured);
-  nothing.on_bounds = !measured.study.on_bounds.empty();
+  nothing.frees_base = free_base || !measured.study.on_bounds.empty();
   auto screening = look_for_all(of, nothing);
-  if (!nothing.on_bounds) return screening;
+  if (!nothing.frees_base) return screening;
   // A base on its bounds may be one that cannot be simulated with much of the catalogue.
   const bool fell = !screening && screening.error().code == ErrorCode::kSimulation;
   if (fell || (screening && screening->found.chosen.empty())) {
     Screening none;
     none.found = std::move(nothing);
-    none.found.on_bounds = false;
+    none.found.frees_base = false;
     none.doubt = on_bounds(of, measured.study);
     return none;
   }

@@ -33,8 +33,10 @@ struct Evidence {
 // The evidence as it is read now, and what explains it so far.
 struct Explanation {
   std::shared_ptr<const Evidence> evidence;
-  bool on_bounds = false;  // tuning ended there, before anything was looked for
-  Overrides tuned_alone;   // the base without any effect, where the study's is not it
+  // What is strong may have drawn the base to itself: beside it the base is fitted once more, and
+  // all is looked for again from there.
+  bool frees_base = false;
+  Overrides tuned_alone;  // the base without any effect, where the study's is not it
 
   LatencyFit latency;              // also where too little speaks for it
   double latency_from_rest_s = 0;  // as the parameter has it
@@ -115,8 +117,9 @@ Result<Study> tune(const Inquiry& of);
 // The noise that no smooth function explains, and the log by it.
 Result<Evidence> measure(const Inquiry& of, const Study& tuned);
 
-// All that the catalogue offers, and what of it the log calls for.
-Result<Screening> screen(const Inquiry& of, const Evidence& measured);
+// All that the catalogue offers, and what of it the log calls for.  `free_base`: see Explanation; a
+// base on its bounds is freed in any case.
+Result<Screening> screen(const Inquiry& of, const Evidence& measured, bool free_base = false);
 
 // Whether that explains enough to be named.
 Result<Judgement> judge(const Inquiry& of, const Screening& screening);
@@ -125,6 +128,15 @@ Result<Judgement> judge(const Inquiry& of, const Screening& screening);
 // is dropped.
 Result<Refit> refit(const Inquiry& of, const Evidence& measured, const Screening& screening,
                     const Judgement& judgement);
+
+// Where what explains most was still too little to be named, looked for from the base that tuning
+// drew to it: the same with the base freed, where that explains everything; else nothing.
+struct Freed {
+  Screening screening;
+  Refit refit;
+};
+Result<std::optional<Freed>> look_from_free_base(const Inquiry& of, const Evidence& measured,
+                                                 const Judgement& judgement);
 
 // Where something is unexplained: a smooth correction of it, if one surely helps.
 Refit add_shape(const Inquiry& of, const Refit& refit);
