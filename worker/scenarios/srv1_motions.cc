@@ -213,8 +213,9 @@ GroupResult simulate_group(Srv1Robot& robot, const ConditionGroup& group,
   if (ok && (effects.motion_context() & kStartHeading) && !group.few(options.headings)) {
     ok = simulation.headings(options.headings);
   }
-  if (ok && (effects.motion_context() & kSessionTime))
+  if (ok && (effects.motion_context() & kSessionTime)) {
     ok = simulation.times(options.headings > 0 ? kFewTimes : kTimes);
+  }
   if (ok && !options.means_only) {
     const std::vector<Gains> gains =
         draws.empty() ? cubature_points(robot.foreseen_noise()) : draws;
