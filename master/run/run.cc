@@ -162,7 +162,8 @@ Result<RunSummary> evolve_run(RunStore& store, const RunRequest& request, RunWat
   if (summary.stopped()) return summary;
   if (summary.evolved.best && summary.evolved.best->outcome == v1::OK) {
     const Status left = leave_model(store, request, *inputs, (*farm)->farm(), watcher, summary);
-    if (!left) return left.error();
+    // Finished is what has its model; resumed, it only leaves that behind.
+    if (!left) return stopped_by(store, left.error(), progress.now());
   }
   // Of earlier masters' generations too, and of what was done after the last one.
   const auto given_up = store.quarantined();

@@ -175,6 +175,27 @@ TEST_F(RunTest, SaysInItsStoreWhyItFailedAndGoesOn) {
   EXPECT_EQ(go_on().value().evolved.generations, kGenerations);
 }
 
+// As where the disk is full: all generations are there, the model is not.
+TEST_F(RunTest, IsNotFinishedWithoutItsReportAndLeavesItWhenItGoesOn) {
+  const Config asked = config();
+  const std::string report = path() + "/report.html";
+  {
+    RunStore store = begin(asked);
+    std::filesystem::create_directories(report + "/in the way");
+    const auto summary = go(store, asked);
+    ASSERT_FALSE(summary.ok());
+    EXPECT_THAT(summary.error().message, HasSubstr(report));
+    EXPECT_EQ(progress().state, RunState::kStopped);
+    EXPECT_EQ(progress().stop_reason, summary.error().message);
+  }
+  std::filesystem::remove_all(report);
+  const RunSummary summary = go_on().value();
+  EXPECT_EQ(summary.evolved.generations, kGenerations);
+  EXPECT_THAT(summary.files, SizeIs(4));
+  EXPECT_EQ(progress().state, RunState::kFinished);
+  EXPECT_TRUE(std::filesystem::is_regular_file(report));
+}
+
 TEST_F(RunTest, SaysInItsStoreWhyItFailedBeforeItsFirstGeneration) {
   const Config asked = ground_config();
   RunStore store = begin(asked);
