@@ -29,6 +29,14 @@ struct Estimate {
 };
 
 // An effect that the data show, in the order in which they were found.
+// How much faster one session drives than the base, as a share.
+struct SessionGain {
+  double gain = 0;
+  double lo = 0;  // 90 % interval
+  double hi = 0;
+  std::string session = {};  // as the log calls it
+};
+
 struct NamedEffect {
   std::string name;
   std::vector<std::string> aliases;  // at most three effects that these data cannot tell from it
@@ -47,6 +55,7 @@ struct NamedEffect {
   double closed_hi = 0;
   std::string text;  // one sentence for a person
   std::string axis;  // "x" or "y": of camera_seam, which coordinate crosses the line
+  std::vector<SessionGain> sessions = {};  // of session_gain, in the log's order
 };
 
 struct GapFigures {

@@ -33,6 +33,12 @@ constexpr auto kEstimate = [](auto& v, auto& e) {
   v.field("hi", e.hi);
   v.field("unit", e.unit);
 };
+constexpr auto kSessionGainRow = [](auto& v, auto& s) {
+  v.field("session", s.session);
+  v.field("gain", s.gain);
+  v.field("lo", s.lo);
+  v.field("hi", s.hi);
+};
 constexpr auto kEffect = [](auto& v, auto& e) {
   v.field("name", e.name);
   v.field("aliases", e.aliases);
@@ -49,6 +55,7 @@ constexpr auto kEffect = [](auto& v, auto& e) {
   v.field("closed", e.closed);
   v.field("closed_lo", e.closed_lo);
   v.field("closed_hi", e.closed_hi);
+  v.list_if_any("sessions", e.sessions, kSessionGainRow);
   v.later("text", e.text);
 };
 constexpr auto kFigures = [](auto& v, auto& figures) {

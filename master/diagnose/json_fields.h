@@ -78,6 +78,11 @@ class Fields {
     });
   }
 
+  template <class Row, class Describe>
+  void list_if_any(const char* key, std::vector<Row>& rows, const Describe& describe) {
+    list(key, rows, describe);
+  }
+
   // Calls each(item, path) for the list under `key`, when there is one.
   template <class Each>
   void for_each(const char* key, const Each& each) {
@@ -165,6 +170,11 @@ class FieldWriter {
   void by_key(const char* key, const std::vector<std::pair<std::string, double>>& numbers) {
     Json& object = json_[key] = Json::object();
     for (const auto& [name, number] : numbers) object[name] = number;
+  }
+
+  template <class Row, class Describe>
+  void list_if_any(const char* key, const std::vector<Row>& rows, const Describe& describe) {
+    if (!rows.empty()) field(key, list(rows, describe));
   }
 
   template <class Row, class Describe>

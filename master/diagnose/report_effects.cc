@@ -150,21 +150,24 @@ std::vector<SpreadEffect> spread_effects(const Refit& refit) {
   return found;
 }
 
+// With the names that the log has for them.
+std::vector<SessionGain> named_sessions(const Inquiry& of, const Study& study,
+                                        std::vector<SessionGain> gains) {
+  for (std::size_t i = 0; i < study.size() && !gains.empty(); ++i) {
+    gains[study.trials[i].session].session = of.problem.log.trials[i].session;
+  }
+  return gains;
+}
+
 // " How much faster than on average each session drove: a 3.1 % [2.6, 3.6], b -2 % [-2.4, -1.6]."
-std::string sessions_words(const Inquiry& of, const Study& study,
-                           const std::vector<SessionGain>& gains) {
-  if (gains.empty()) return "";
-  std::vector<std::string> names(gains.size());
-  for (std::size_t i = 0; i < study.size(); ++i) {
-    names[study.trials[i].session] = of.problem.log.trials[i].session;
-  }
+std::string sessions_words(const std::vector<SessionGain>& gains) {
   const auto percent = [](double share) { return plain_number(100 * share); };
-  std::string text = " How much faster than on average each session drove:";
-  for (std::size_t s = 0; s < gains.size(); ++s) {
-    text += (s == 0 ? " " : ", ") + names[s] + " " + percent(gains[s].gain) + " % [" +
-            percent(gains[s].lo) + ", " + percent(gains[s].hi) + "]";
+  std::string text;
+  for (const SessionGain& s : gains) {
+    text += (text.empty() ? " How much faster than on average each session drove: " : ", ") +
+            s.session + " " + percent(s.gain) + " % [" + percent(s.lo) + ", " + percent(s.hi) + "]";
   }
-  return text + ".";
+  return text.empty() ? text : text + ".";
 }
 
 NamedEffect named_spread(const Inquiry& of, const Refit& refit, const SpreadEffect& found) {
@@ -172,7 +175,8 @@ NamedEffect named_spread(const Inquiry& of, const Refit& refit, const SpreadEffe
   effect.name = found.name;
   effect.confidence = confidence_of(found.gain, of.subject.least_gain);
   effect.parameters = found.estimates;
-  effect.text = sessions_words(of, refit.judged.named.study(), found.sessions);
+  effect.sessions = named_sessions(of, refit.judged.named.study(), found.sessions);
+  effect.text = sessions_words(effect.sessions);
   std::vector<double> gained = found.gained;
   if (gained.empty()) {
     // The gain is over all that the readings tell; of the gap it can close what the means left.

@@ -11,13 +11,6 @@
 
 namespace gapfarm {
 
-// How much faster one session drives than the base, as a share.
-struct SessionGain {
-  double gain = 0;
-  double lo = 0;  // 90 % interval
-  double hi = 0;
-};
-
 struct SpreadFit {
   double gain = 0;                  // nats over all trials
   std::vector<Estimate> estimates;  // of the effect's parameters, the first the one that is told

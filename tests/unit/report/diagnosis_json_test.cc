@@ -51,6 +51,19 @@ TEST(DiagnosisJson, HasTheDocumentedFields) {
   EXPECT_EQ(json["next_experiment"][0]["separates"], Json({"floor_tilt", "floor_nap"}));
 }
 
+TEST(DiagnosisJson, ListsSessionsWithTheirGains) {
+  Diagnosis d = example_diagnosis();
+  d.effects[0].name = "session_gain";
+  d.effects[0].sessions = {{0.031, 0.026, 0.036, "monday"}, {-0.02, -0.024, -0.016, "friday"}};
+  const std::string text = to_json(d);
+  const Json effects = Json::parse(text)["effects"];
+  ASSERT_EQ(effects[0]["sessions"].size(), 2u);
+  EXPECT_EQ(effects[0]["sessions"][1],
+            Json({{"session", "friday"}, {"gain", -0.02}, {"lo", -0.024}, {"hi", -0.016}}));
+  EXPECT_FALSE(effects[1].contains("sessions"));
+  EXPECT_EQ(to_json(parse_diagnosis(text).value()), text);
+}
+
 TEST(DiagnosisJson, KeepsWhatIsNotANumberOut) {
   Diagnosis d = null_diagnosis();
   d.gap.floor = std::numeric_limits<double>::quiet_NaN();
