@@ -31,6 +31,12 @@ std::vector<Patch> patches_of(const std::vector<EffectCandidate>& discs) {
 
 }  // namespace
 
+Patch bounded_patch(Patch patch, double scale) {
+  patch[2] = std::max(patch[2], kLeastRadius_m * scale);
+  patch[3] = std::clamp(patch[3], kLeastMovedRatio, kMostMovedRatio);
+  return patch;
+}
+
 Result<std::vector<EffectCandidate>> simulated_discs(Predictor& predictor, const Study& study,
                                                      const Regression& explained,
                                                      const std::vector<Patch>& patches,
@@ -60,12 +66,6 @@ PatchTrials PatchClimb::heat(bool first) const {
   };
 }
 
-Patch PatchClimb::bounded(Patch patch) const {
-  patch[2] = std::max(patch[2], kLeastRadius_m * study_->scale);
-  patch[3] = std::clamp(patch[3], kLeastMovedRatio, kMostMovedRatio);
-  return patch;
-}
-
 std::vector<Patch> PatchClimb::moved(const std::vector<EffectCandidate>& discs,
                                      const PatchStep& step) {
   std::vector<Patch> moved;
@@ -73,7 +73,7 @@ std::vector<Patch> PatchClimb::moved(const std::vector<EffectCandidate>& discs,
     Patch to = patch_of(discs[i % discs.size()].signature);
     for (std::size_t c = 0; c < 3; ++c) to[c] += step.length_m * stream_.normal();
     to[3] *= std::exp(step.log_ratio * stream_.normal());
-    moved.push_back(bounded(to));
+    moved.push_back(bounded_patch(to, study_->scale));
   }
   return moved;
 }
@@ -87,6 +87,7 @@ Eigen::VectorXd PatchClimb::in_first_heat(Eigen::VectorXd mark) const {
 
 void PatchClimb::remember(const std::vector<EffectCandidate>& discs) {
   for (const EffectCandidate& disc : discs) {
+    if (disc.signature.columns.isZero(0)) continue;  // it could not be simulated
     marked_.push_back({patch_of(disc.signature), in_first_heat(disc.signature.columns.col(0))});
   }
 }
@@ -120,7 +121,8 @@ Result<std::vector<EffectCandidate>> PatchClimb::follow(const EffectCandidate& l
   for (std::size_t c = 0; c < 3; ++c) half_way[c] = (from[c] + (*to)[c]) / 2;
   half_way[3] = std::sqrt(from[3] * (*to)[3]);
   auto led =
-      simulated_discs(*predictor_, *study_, *explained_, {bounded(*to), bounded(half_way)},
+      simulated_discs(*predictor_, *study_, *explained_,
+                      {bounded_patch(*to, study_->scale), bounded_patch(half_way, study_->scale)},
                       [](std::size_t, PatchReach reach) { return reach == PatchReach::kRim; });
   if (led) remember(*led);
   return led;

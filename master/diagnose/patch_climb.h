@@ -9,6 +9,9 @@
 
 namespace gapfarm {
 
+// One that can be simulated and told from none, for a robot `scale` times an SRV-1.
+Patch bounded_patch(Patch patch, double scale);
+
 // With what they gain, in their order.
 Result<std::vector<EffectCandidate>> simulated_discs(Predictor& predictor, const Study& study,
                                                      const Regression& explained,
@@ -34,7 +37,6 @@ class PatchClimb {
  private:
   PatchTrials heat(bool first) const;
   std::vector<Patch> moved(const std::vector<EffectCandidate>& discs, const PatchStep& step);
-  Patch bounded(Patch patch) const;
   Eigen::VectorXd in_first_heat(Eigen::VectorXd mark) const;
   void remember(const std::vector<EffectCandidate>& discs);
   Result<std::vector<EffectCandidate>> race(const std::vector<Patch>& patches);

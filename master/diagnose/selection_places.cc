@@ -25,7 +25,6 @@ constexpr int kSeamSteps = 10;
 constexpr int kMostPatchSearches = 4, kMostSecondPatchSearches = 2;
 // The ratio is what the sketch is least sure of.
 constexpr std::array<double, 3> kRatioPowers = {0.5, 1, 2};
-constexpr double kLeastMovedRatio = 0.06, kMostMovedRatio = 2.9;
 
 bool better(const EffectCandidate& a, const EffectCandidate& b) { return a.gain > b.gain; }
 
@@ -95,8 +94,8 @@ Status Selector::search_patches(const Regression& explained, double most_gain,
         });
     if (known) continue;
     for (const double power : kRatioPowers) {
-      starts.push_back(place);
-      starts.back()[3] = std::clamp(std::pow(place[3], power), kLeastMovedRatio, kMostMovedRatio);
+      const auto& [x, y, radius, ratio] = place;
+      starts.push_back(bounded_patch({x, y, radius, std::pow(ratio, power)}, study_->scale));
     }
   }
   if (starts.empty()) return {};
