@@ -5,10 +5,8 @@
 #include "master/diagnose/step_parts.h"
 
 namespace gapfarm::steps {
-namespace {
 
-// Effects act on all drives and explain more than they leave: of the right kind, or an alias from
-// where the base stands.  What acts in a place leaves the base where it is.
+// What acts in a place leaves the base where it is.
 bool draws_base(const Inquiry& of, const Judgement& judgement) {
   const std::vector<ChosenEffect>& chosen = judgement.unnamed;
   if (chosen.empty() || judgement.left.empty()) return false;
@@ -18,8 +16,6 @@ bool draws_base(const Inquiry& of, const Judgement& judgement) {
   for (const ChosenEffect& c : chosen) gained += c.candidate.gain;
   return gained > judgement.left.front().excess;
 }
-
-}  // namespace
 
 Result<std::optional<Freed>> look_from_free_base(const Inquiry& of, const Evidence& measured,
                                                  const Judgement& judgement) {

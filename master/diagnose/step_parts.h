@@ -79,6 +79,9 @@ struct Worthless {
   std::size_t effect = 0;
   std::string why;
 };
+// Whether what was chosen, and is too little to be named, acts on all drives and explains more than
+// it leaves: effects of the right kind, or aliases of the right ones from where the base stands.
+bool draws_base(const Inquiry& of, const Judgement& judgement);
 // Trials that no fit saw are predicted no better with it than with what comes before it alone.
 // `perfect`: what a prediction scores that misses nothing, once that is known.  `put_last`: effects
 // that were of use beside all others; they are not asked again.

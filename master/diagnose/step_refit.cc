@@ -132,9 +132,9 @@ Result<Refit> naming_none(const Inquiry& of, const Evidence& measured, Refit ref
   judged.named.estimates.reset();
   std::erase(judged.cautions, refit.correction);
   refit.correction.clear();
-  const bool on_bounds = judged.named.frees_base;
+  const bool freed = judged.named.frees_base;
   if (missing) judged = doubted(std::move(judged), std::move(*missing));
-  if (on_bounds) judged = base_doubted(of, measured, std::move(judged));
+  if (freed) judged = base_doubted(of, measured, std::move(judged));
   auto nested = nested_fits(of, judged.named, folds);
   if (!nested) return nested.error();
   refit.nested = std::move(*nested);
