@@ -21,8 +21,8 @@ void fill_gap(const Inquiry& of, const Refit& refit, Diagnosis* d) {
       d->effects.empty() ? refit.floor - mean(model.scores) : d->effects.back().gap_after;
   d->gap.floor = 0;
   const std::vector<std::size_t> folds = of.subject.folds(refit.judged.named.study());
-  const RootMeanSquare tuned = root_mean_square(held_out_residuals(base.study, base.fit, folds));
-  const RootMeanSquare last = root_mean_square(held_out_residuals(model.study, model.fit, folds));
+  const RootMeanSquare tuned = held_out_error(base, folds);
+  const RootMeanSquare last = held_out_error(model, folds);
   double position = 0, heading = 0;
   const auto n = static_cast<double>(model.study.size());
   for (const Eigen::Matrix3d& cov : model.study.covariances()) {

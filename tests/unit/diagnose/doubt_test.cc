@@ -5,10 +5,13 @@
 #include "master/diagnose/diagnose.h"
 #include "master/diagnose/diagnosis_json.h"
 #include "master/diagnose/digits.h"
+#include "master/diagnose/estimate.h"
 #include "master/diagnose/findings.h"
 #include "master/diagnose/prepare.h"
 #include "master/diagnose/probes.h"
+#include "master/diagnose/report_parts.h"
 #include "master/diagnose/slopes.h"
+#include "master/diagnose/subject.h"
 #include "tests/unit/diagnose/kinematic_farm.h"
 
 namespace gapfarm {
@@ -169,6 +172,27 @@ TEST(Diagnose, SaysTheSameWhoeverWatches) {
                             "what the catalogue offers: ", "how far the gap closes: "}) {
     EXPECT_NE(told.find(about), std::string::npos) << about << "is not among " << told;
   }
+}
+
+// A log of two cameras: trial 0 lies on their seam, so that its slope is that of a jump and a
+// fold's step along it led 2 m away; 363 real drives were said to be 152 mm off, which they are
+// not.
+TEST(HeldOutError, ATrialOnASeamStaysWhereItsFitHasIt) {
+  steps::NestedFit nested;
+  nested.study.subject = diagnosis_subject(Problem{});
+  nested.study.table = &srv1_table();
+  nested.study.trials.resize(4);
+  nested.study.whitener.assign(4, Eigen::Vector3d(100, 100, 50).asDiagonal());
+  nested.fit.residuals.assign(4, {0.01, 0, 0});
+  nested.fit.jacobian = Eigen::MatrixXd::Zero(12, 1);
+  for (const Eigen::Index row : {3, 6, 9}) nested.fit.jacobian(row, 0) = 1;
+  nested.fit.jacobian(0, 0) = 200;
+  const std::vector<std::size_t> each = {0, 1, 2, 3};
+  const auto left = held_out_residuals(nested.study, nested.fit, each);
+  EXPECT_LT(left[0].x(), -1.5);
+  EXPECT_LT(steps::held_out_error(nested, each).position_mm, 10.01);
+  nested.fit.jacobian(0, 0) = 2;  // a slope like others: its miss counts
+  EXPECT_NEAR(held_out_residuals(nested.study, nested.fit, each)[0].x(), -0.01, 1e-6);
 }
 
 TEST(Confidence, GrowsWithTheGainAndIsNeverSure) {
