@@ -85,24 +85,20 @@ Result<DiagnosisResult> take_steps(const steps::Inquiry& of, Stages* stages) {
   tell_of_verdict(of, *judgement);
 
   stages->begin(4);
-  const auto freed = steps::look_from_free_base(of, *measured, *judgement);
+  auto freed = steps::look_from_free_base(of, *measured, *judgement);
   if (!freed) return end_with(freed.error());
-  if (*freed) {
-    const auto& [again, explained] = **freed;
-    known.screening = &again;
-    known.judged = &explained.judged;
-    tell_of_choice(of, again.found, false);
-    tell_of_verdict(of, explained.judged);
-    stages->begin(5);
-    auto result = steps::report(of, again, steps::add_shape(of, explained));
-    return result ? std::move(result) : end_with(result.error());
-  }
-  const Result<steps::Refit> refit = steps::refit(of, *measured, *screening, *judgement);
+  const Result<steps::Refit> refit =
+      *freed ? std::move((*freed)->refit) : steps::refit(of, *measured, *screening, *judgement);
   if (!refit) return end_with(refit.error());
   known.judged = &refit->judged;
+  if (*freed) {
+    known.screening = &(*freed)->screening;
+    tell_of_choice(of, known.screening->found, false);
+    tell_of_verdict(of, *known.judged);
+  }
 
   stages->begin(5);
-  auto result = steps::report(of, *screening, steps::add_shape(of, *refit));
+  auto result = steps::report(of, *known.screening, steps::add_shape(of, *refit));
   return result ? std::move(result) : end_with(result.error());
 }
 
