@@ -85,14 +85,19 @@ Result<DiagnosisResult> take_steps(const steps::Inquiry& of, Stages* stages) {
   tell_of_verdict(of, *judgement);
 
   stages->begin(4);
-  auto freed = steps::look_from_free_base(of, *measured, *judgement);
-  if (!freed) return end_with(freed.error());
-  const Result<steps::Refit> refit =
-      *freed ? std::move((*freed)->refit) : steps::refit(of, *measured, *screening, *judgement);
+  auto again = steps::look_from_free_base(of, *measured, *judgement);
+  if (!again) return end_with(again.error());
+  Result<steps::Refit> refit =
+      *again ? std::move((*again)->refit) : steps::refit(of, *measured, *screening, *judgement);
   if (!refit) return end_with(refit.error());
   known.judged = &refit->judged;
-  if (*freed) {
-    known.screening = &(*freed)->screening;
+  if (!*again) {
+    again = steps::look_without_dropped(of, *measured, *screening, *refit);
+    if (!again) return end_with(again.error());
+    if (*again) *refit = std::move((*again)->refit);
+  }
+  if (*again) {
+    known.screening = &(*again)->screening;
     tell_of_choice(of, known.screening->found, false);
     tell_of_verdict(of, *known.judged);
   }

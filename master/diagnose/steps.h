@@ -129,14 +129,20 @@ Result<Judgement> judge(const Inquiry& of, const Screening& screening);
 Result<Refit> refit(const Inquiry& of, const Evidence& measured, const Screening& screening,
                     const Judgement& judgement);
 
-// Where what explains most was still too little to be named, looked for from the base that tuning
-// drew to it: the same with the base freed, where that explains everything; else nothing.
-struct Freed {
+// All that follows from looking once more where the first look ended with nothing.
+struct SecondLook {
   Screening screening;
   Refit refit;
 };
-Result<std::optional<Freed>> look_from_free_base(const Inquiry& of, const Evidence& measured,
-                                                 const Judgement& judgement);
+// Where what explains most was still too little to be named, looked for from the base that tuning
+// drew to it: the same with the base freed, where that explains everything; else nothing.
+Result<std::optional<SecondLook>> look_from_free_base(const Inquiry& of, const Evidence& measured,
+                                                      const Judgement& judgement);
+// Where all that was chosen was dropped again and something is left to explain: what the rest of
+// the catalogue explains, if that is everything; else nothing.
+Result<std::optional<SecondLook>> look_without_dropped(const Inquiry& of, const Evidence& measured,
+                                                       const Screening& screening,
+                                                       const Refit& refit);
 
 // Where something is unexplained: a smooth correction of it, if one surely helps.
 Refit add_shape(const Inquiry& of, const Refit& refit);

@@ -1,6 +1,7 @@
 // gapfarm diagnose on pushes as a user runs it, on logs whose truth is known.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "tests/integration/diagnose_program.h"
@@ -83,6 +84,23 @@ TEST_F(DiagnosePushes, SayNoneWhenNothingIsMissing) {
   const Json d = diagnose(80, {});
   EXPECT_EQ(d["verdict"], "none") << d["headline"];
   EXPECT_TRUE(d["effects"].empty());
+}
+
+// Seed 137 of scripts/foreign_pushes.sh: a disc of table seemed to explain more than the lens, but
+// foretold nothing.
+TEST_F(DiagnosePushes, WhatForetellsNothingKeepsNoOtherFromBeingFound) {
+  const Finished made =
+      run_program("planar_push_log", {folder_.path().string(), "137", "camera_distortion.k1=0.15",
+                                      "camera_distortion.x=0.5", "camera_distortion.y=0.5"});
+  ASSERT_EQ(made.exit_code, 0) << made.err;
+  const Json d =
+      diagnose_log(GAPFARM_SOURCE_DIR "/configs/push.toml", folder_ / "trials.csv", folder_ / "d");
+  EXPECT_EQ(d["verdict"], "effect") << d["headline"];
+  ASSERT_EQ(d["effects"].size(), 1u);
+  EXPECT_EQ(d["effects"][0]["name"], "camera_distortion");
+  // What was tried first stays in the table.
+  const auto of_patch = [](const Json& row) { return row["effect"] == "friction_patch"; };
+  EXPECT_TRUE(std::any_of(d["screening"].begin(), d["screening"].end(), of_patch));
 }
 
 TEST_F(DiagnosePushes, OfAFewPushesNothingIsSaid) {
