@@ -31,11 +31,25 @@ class Prepared : public PreparedProblem {
     if (problem_.residual.empty()) return prediction;
     for (std::size_t k = 0; k < prediction.trials.size(); ++k) {
       const LoggedMotion& facts = facts_[options.trials.empty() ? k : options.trials[k]];
-      for (Alternative& way : prediction.trials[k].alternatives) {
-        way.X_WM = corrected_end(problem_.residual, facts, way.X_WM);
-      }
+      correct(facts, &prediction.trials[k]);
     }
     return prediction;
+  }
+  // What strays does so about every way of the model's.
+  void correct(const LoggedMotion& facts, TrialPrediction* trial) const {
+    const Residual& residual = problem_.residual;
+    std::vector<Alternative> all;
+    for (Alternative& way : trial->alternatives) {
+      way.X_WM = corrected_end(residual.field, facts, way.X_WM);
+      if (!residual.strays) continue;
+      for (const StrayWay& stray : stray_ways(*residual.strays, facts, way.X_WM)) {
+        Alternative& added = all.emplace_back(way);
+        added.weight *= stray.weight;
+        added.X_WM = stray.X_WE;
+        added.cov += stray.spread * stray.spread.transpose();
+      }
+    }
+    if (residual.strays) trial->alternatives = std::move(all);
   }
   const FitnessReference& reference() const { return reference_; }
   void set_reference(FitnessReference reference) { reference_ = std::move(reference); }

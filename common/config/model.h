@@ -45,7 +45,7 @@ struct Model {
   // World position that the effects' places count from, m: simulate a log less this.
   double frame_x_m = 0, frame_y_m = 0;
   // Where the scenario's form takes one: what no cause explains, places from the same origin.
-  ResidualField residual;
+  Residual residual;
   ModelData data;
   ModelOrigin origin;
 

@@ -1,7 +1,9 @@
 #include "common/config/residual_section.h"
 
+#include <array>
 #include <cmath>
 #include <optional>
+#include <utility>
 
 #include "common/trials/csv.h"
 
@@ -9,6 +11,17 @@ namespace gapfarm {
 namespace {
 
 constexpr const char* kAll = "all";
+
+// What [residual.strays] has beside its kind; what is left out is 0.
+std::array<std::pair<const char*, double*>, 7> stray_keys(StrayDrives& s) {
+  return {{{"share", &s.share},
+           {"least", &s.least},
+           {"most", &s.most},
+           {"rest", &s.rest},
+           {"direction", &s.direction_rad},
+           {"speed", &s.speed_m_s},
+           {"gauge", &s.gauge_m}}};
+}
 
 std::vector<std::string> covariate_names() {
   std::vector<std::string> names;
@@ -74,6 +87,27 @@ ResidualTerm read_term(TomlSection& section, const Model& model) {
   return term;
 }
 
+void read_strays(TomlSection& section, Model& model) {
+  auto read = section.section("strays");
+  if (!read) return;
+  StrayDrives strays;
+  strays.kind = static_cast<StrayKind>(read->choice("kind", stray_kind_words()).value_or(0));
+  for (const auto& [key, value] : stray_keys(strays)) {
+    *value = read->number(key, -1e3, 1e3).value_or(*value);
+  }
+  read->finish();
+  model.residual.strays = strays;
+}
+
+std::string strays_text(StrayDrives strays) {
+  std::string text = "\n[residual.strays]\nkind = \"" +
+                     stray_kind_words()[static_cast<std::size_t>(strays.kind)] + "\"\n";
+  for (const auto& [key, value] : stray_keys(strays)) {
+    if (*value != 0) text += std::string(key) + " = " + format_double(*value) + "\n";
+  }
+  return text;
+}
+
 std::string rows_text(const Eigen::MatrixXd& rows) {
   std::string text;
   for (Eigen::Index k = 0; k < rows.rows(); ++k) {
@@ -115,13 +149,24 @@ Status check_residual_of(const Model& model) {
   }
   std::vector<std::string> commands;
   for (const CommandSpec& c : model.commands) commands.push_back(c.name);
-  return check_residual(model.residual, commands);
+  if (Status s = check_residual(model.residual.field, commands); !s) return s;
+  return model.residual.strays ? check_strays(*model.residual.strays) : Status();
 }
 
 void read_residual(TomlSection& top, Model& model) {
   auto section = top.section("residual");
   if (!section) return;
+  read_strays(*section, model);
   const toml::node* node = section->find("terms");
+  const auto check = [&](const toml::source_position& place) {
+    if (!top.errors().empty()) return;
+    if (Status s = check_residual_of(model); !s) top.errors().add(place, s.error().message);
+  };
+  if (node == nullptr && model.residual.strays) {
+    section->finish();
+    check(section->table().source().begin);
+    return;
+  }
   const toml::array* list = node == nullptr ? nullptr : node->as_array();
   if (list == nullptr || list->empty()) {
     top.errors().add(node == nullptr ? section->table().source().begin : node->source().begin,
@@ -137,20 +182,21 @@ void read_residual(TomlSection& top, Model& model) {
       continue;
     }
     TomlSection term(*table, "[[residual.terms]]", top.errors());
-    model.residual.push_back(read_term(term, model));
+    model.residual.field.push_back(read_term(term, model));
   }
   section->finish();
-  if (!top.errors().empty()) return;
-  if (Status s = check_residual_of(model); !s) top.errors().add(*node, s.error().message);
+  check(node->source().begin);
 }
 
 std::string residual_section(const Model& model) {
   if (model.residual.empty()) return "";
   std::string text =
-      "\n# What nothing in the catalogue explains, as a smooth correction of where drives end; it "
-      "is no cause.\n# Each term: sum of weights (m, m, rad) times exp(-|(z - centre) / length|^2 "
-      "/ 2) over its covariates z.\n[residual]\n";
-  for (const ResidualTerm& term : model.residual) text += term_text(term);
+      "\n# What nothing in the catalogue explains, as a correction of where drives end; it is no "
+      "cause.\n# Each term: sum of weights (m, m, rad) times exp(-|(z - centre) / length|^2 / 2) "
+      "over its covariates z.\n# Strays: a share of drives has an amount, uniform from least to "
+      "most, of what all others have `rest` of.\n[residual]\n";
+  for (const ResidualTerm& term : model.residual.field) text += term_text(term);
+  if (model.residual.strays) text += strays_text(*model.residual.strays);
   return text;
 }
 

@@ -13,7 +13,7 @@
 #include "common/parameters/table.h"
 #include "common/parameters/tracked.h"
 #include "common/problem/piece.h"
-#include "common/residual/field.h"
+#include "common/residual/strays.h"
 #include "common/runs/windows.h"
 #include "common/trials/trial.h"
 #include "gapfarm/v1/problem.pb.h"
@@ -78,7 +78,7 @@ struct Problem {
   // Scenario `external` only: the program that simulates.
   std::shared_ptr<const ExternalProgram> external;
   // Where the scenario's form has drives alone: a correction of where they end.
-  ResidualField residual;
+  Residual residual;
 
   // Of the robot or the program where there is one, else of the scenario.  REQUIRES: a known
   // scenario.
@@ -107,7 +107,7 @@ struct ScenarioForm {
   bool robot = false;
   // A program of the user's simulates.
   bool program = false;
-  // Drives that may be corrected by a ResidualField.
+  // Drives that may be corrected by a Residual.
   bool residual = false;
   // There may be a robot's file, of another robot than the scenario's own.
   bool other_robot = false;

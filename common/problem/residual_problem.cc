@@ -23,7 +23,18 @@ void write_rows(const Eigen::MatrixXd& rows, google::protobuf::RepeatedField<dou
 }  // namespace
 
 void write_residual(const Problem& problem, v1::Problem* message) {
-  for (const ResidualTerm& term : problem.residual) {
+  if (const auto& strays = problem.residual.strays) {
+    v1::StrayDrives* to = message->mutable_strays();
+    to->set_kind(static_cast<std::uint32_t>(strays->kind));
+    to->set_share(strays->share);
+    to->set_least(strays->least);
+    to->set_most(strays->most);
+    to->set_rest(strays->rest);
+    to->set_direction(strays->direction_rad);
+    to->set_speed(strays->speed_m_s);
+    to->set_gauge(strays->gauge_m);
+  }
+  for (const ResidualTerm& term : problem.residual.field) {
     v1::ResidualTerm* to = message->add_residual();
     to->set_frame(static_cast<std::uint32_t>(term.frame));
     to->set_by_drive(term.by_drive);
@@ -38,8 +49,32 @@ void write_residual(const Problem& problem, v1::Problem* message) {
   }
 }
 
+namespace {
+
+Status read_strays(const v1::Problem& message, Problem* problem) {
+  if (!message.has_strays()) return {};
+  const v1::StrayDrives& from = message.strays();
+  if (from.kind() >= stray_kind_words().size()) {
+    return Error{"problem: residual.strays of kind number " + std::to_string(from.kind()) +
+                 "; master and worker must be the same build"};
+  }
+  const StrayDrives strays{static_cast<StrayKind>(from.kind()),
+                           from.share(),
+                           from.least(),
+                           from.most(),
+                           from.rest(),
+                           from.direction(),
+                           from.speed(),
+                           from.gauge()};
+  if (Status s = check_strays(strays); !s) return Error{"problem: " + s.error().message};
+  problem->residual.strays = strays;
+  return {};
+}
+
+}  // namespace
+
 Status read_residual(const v1::Problem& message, Problem* problem) {
-  if (message.residual_size() == 0) return {};
+  if (message.residual_size() == 0 && !message.has_strays()) return {};
   if (!scenario_form(problem->scenario).residual) {
     return Error{"problem: scenario '" + problem->scenario +
                  "' takes no residual; leave [residual] out of its model"};
@@ -58,11 +93,12 @@ Status read_residual(const v1::Problem& message, Problem* problem) {
     for (const v1::ResidualTerm::Weights& w : from.weights()) {
       term.weights.push_back({w.command(), rows_of(w.shifts(), 3)});
     }
-    problem->residual.push_back(std::move(term));
+    problem->residual.field.push_back(std::move(term));
   }
+  if (Status s = read_strays(message, problem); !s) return s;
   std::vector<std::string> commands;
   for (const CommandSpec& c : problem->commands) commands.push_back(c.name);
-  if (Status s = check_residual(problem->residual, commands); !s) {
+  if (Status s = check_residual(problem->residual.field, commands); !s) {
     return Error{"problem: " + s.error().message};
   }
   return {};

@@ -18,7 +18,7 @@ struct DiagnosedCase {
   Truth truth;
   ParameterValues tuned;   // of the base alone
   ParameterValues final_;  // with the named effects
-  ResidualField residual;  // that its model.toml adds; may be empty
+  Residual residual;       // that its model.toml adds; may be empty
 };
 
 // tuned.toml and model.toml in `folder`; none when one is missing or of another scenario.

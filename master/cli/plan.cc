@@ -148,7 +148,7 @@ Result<plan::DesignedPlan> design(const PlanOptions& options, const Config& conf
 int run_plan(PlanOptions& options, CliContext& context) {
   Result<Source> source = read_source(options.source);
   // What a correction would shift is no part of what effects do: it takes none along.
-  if (source) source->config.problem.residual.clear();
+  if (source) source->config.problem.residual = {};
   if (source) {
     if (Status s = apply_options(options, source->config); !s) source = s.error();
   }

@@ -51,7 +51,7 @@ struct DiagnosisResult {
   double frame_x_m = 0, frame_y_m = 0;
   ParameterValues tuned;   // the base model, as tuned
   ParameterValues final_;  // with the named effects
-  ResidualField residual;  // beside final_: what they leave unexplained; may be empty
+  Residual residual;       // beside final_: what they leave unexplained; may be empty
   // 90 % intervals of `final_`; lo > hi where there is none.
   std::vector<std::pair<double, double>> intervals;
   // The fits behind the gaps ("the tuned base", "the tuned base, floor_tilt", ...) and the farm's

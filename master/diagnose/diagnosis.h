@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "common/pose/pose.h"
-#include "common/residual/field.h"
+#include "common/residual/strays.h"
 #include "common/trials/trial.h"
 #include "master/diagnose/parameter_row.h"
 #include "master/sanity/finding.h"
@@ -103,7 +103,7 @@ struct SelectionRecord {
 
 // A smooth correction of what is left when nothing of the catalogue explains it; nobody's cause.
 struct FoundResidual {
-  ResidualField field;  // places are the world's; empty: none surely helps
+  Residual correction;  // places are the world's; empty: none surely helps
   // On trials that neither its choice nor its fit saw, nats a trial, with a 90 % interval.
   double gained = 0, gained_lo = 0, gained_hi = 0;
   double gap_before = 0, gap_after = 0;             // mean log score lost against the floor

@@ -120,7 +120,7 @@ Result<DiagnosisResult> report(const Inquiry& of, const Screening& screening, co
   fill_steps(screening, &d);
   for (const NestedFit& n : refit.nested) result.fits.emplace_back(n.name, n.tasks);
   d.residual = refit.shape;
-  result.residual = refit.field;
+  result.residual = refit.residual;
   d.effects = named_effects(of, refit);
   fill_gap(of, refit, &d);
   d.shown = of.subject.shown;

@@ -90,6 +90,36 @@ Status read_term(const Json& json, const std::string& path, ResidualTerm* term) 
   return {};
 }
 
+constexpr auto kStrays = [](auto& v, auto& s) {
+  v.field("share", s.share);
+  v.field("least", s.least);
+  v.field("most", s.most);
+  v.field("rest", s.rest);
+  v.field("direction", s.direction_rad);
+  v.field("speed", s.speed_m_s);
+  v.field("gauge", s.gauge_m);
+};
+
+Json strays_json(const StrayDrives& strays) {
+  Json json = {{"kind", stray_kind_words()[static_cast<std::size_t>(strays.kind)]}};
+  json.update(FieldWriter::written(strays, kStrays));
+  return json;
+}
+
+Status read_strays(const Json& json, StrayDrives* strays) {
+  std::string error, kind;
+  Fields fields(json, "residual.strays", error);
+  fields.field("kind", kind);
+  kStrays(fields, *strays);
+  if (!error.empty()) return Error{error};
+  const std::vector<std::string>& words = stray_kind_words();
+  const auto at = std::find(words.begin(), words.end(), kind);
+  if (at == words.end()) return Error{"diagnosis.json: residual.strays.kind is \"" + kind + "\""};
+  strays->kind = static_cast<StrayKind>(at - words.begin());
+  if (Status s = check_strays(*strays); !s) return Error{"diagnosis.json: " + s.error().message};
+  return {};
+}
+
 constexpr auto kFound = [](auto& v, auto& found) {
   v.field("text", found.text);
   v.field("gained", found.gained);
@@ -105,10 +135,13 @@ constexpr auto kFound = [](auto& v, auto& found) {
 }  // namespace
 
 Json residual_json(const FoundResidual& residual) {
-  Json json = {{"kept", !residual.field.empty()}};
+  Json json = {{"kept", !residual.correction.empty()}};
   json.update(FieldWriter::written(residual, kFound));
   json["terms"] = Json::array();
-  for (const ResidualTerm& term : residual.field) json["terms"].push_back(term_json(term));
+  for (const ResidualTerm& term : residual.correction.field) {
+    json["terms"].push_back(term_json(term));
+  }
+  if (residual.correction.strays) json["strays"] = strays_json(*residual.correction.strays);
   return json;
 }
 
@@ -120,7 +153,7 @@ Status read_residual(const Json& json, std::optional<FoundResidual>* residual) {
   std::vector<std::string> commands;
   Status sound;
   fields.for_each("terms", [&](const Json& item, const std::string& path, const auto&) {
-    ResidualTerm& term = found.field.emplace_back();
+    ResidualTerm& term = found.correction.field.emplace_back();
     if (sound) sound = read_term(item, path, &term);
     for (const ResidualWeights& w : term.weights) {
       if (!w.command.empty()) commands.push_back(w.command);
@@ -128,8 +161,12 @@ Status read_residual(const Json& json, std::optional<FoundResidual>* residual) {
   });
   if (!error.empty()) return Error{error};
   if (!sound) return sound;
-  if (Status s = check_residual(found.field, commands); !s) {
+  if (Status s = check_residual(found.correction.field, commands); !s) {
     return Error{"diagnosis.json: " + s.error().message};
+  }
+  if (json.contains("strays")) {
+    StrayDrives& strays = found.correction.strays.emplace();
+    if (Status s = read_strays(json["strays"], &strays); !s) return s;
   }
   *residual = std::move(found);
   return {};

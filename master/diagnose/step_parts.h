@@ -9,6 +9,7 @@
 
 #include "master/diagnose/slip_places.h"
 #include "master/diagnose/steps.h"
+#include "master/residual/stray_fit.h"
 
 namespace gapfarm::steps {
 
@@ -100,6 +101,25 @@ void score(const Inquiry& of, const std::vector<std::size_t>& folds, NestedFit* 
 // What a perfect prediction would score, with what makes single trials stray foreseen; what does
 // not help with that is dropped.
 Refit with_floor(const Inquiry& of, Refit refit, const std::vector<std::size_t>& folds);
+
+// What is known of trials that may stray, one entry a trial.
+struct StrayLesson {
+  std::vector<Pose> ends;  // predicted
+  // Measured ends less these, in their axes, by a fit to all trials and by fits to the other folds.
+  Residuals residuals, unseen;
+  std::vector<std::size_t> folds;
+  std::vector<bool> learn;
+};
+struct ForetoldStrays {
+  StrayDrives strays;
+  NoiseEstimate noise;         // of all drives
+  std::vector<double> scores;  // of every trial, by what the other folds tell of strays
+};
+// Whether a share of the drives strays in a way that has no name; nothing where hardly any does.
+std::optional<ForetoldStrays> look_astray(const Inquiry& of, const Study& study,
+                                          const StrayLesson& lesson);
+// "7 % of drives end as if ..."
+std::string stray_words(const StrayDrives& strays);
 
 // Of a side's speed, over the trials that the fits learned from.
 double mean_loss_of_slips(const Explanation& named);

@@ -63,27 +63,59 @@ ResidualField in_world(ResidualField field, const Eigen::Vector2d& origin) {
 }
 
 std::string residual_sentence(const FoundResidual& found) {
-  if (found.field.empty()) {
-    return "A smooth correction of what is left was tried; none surely helps on trials that its "
+  if (found.correction.empty()) {
+    return "Corrections of what is left were tried, smooth ones and of single drives that stray; "
+           "none surely helps on trials that its "
            "fit did not see, so none is kept.";
   }
   std::vector<std::string> terms;
-  for (const ResidualTerm& term : found.field) terms.push_back(term_words(term));
+  for (const ResidualTerm& term : found.correction.field) terms.push_back(term_words(term));
+  if (found.correction.strays) terms.push_back(stray_words(*found.correction.strays));
   std::string text;
   for (const std::string& term : terms) text += (text.empty() ? "" : "; ") + term;
-  return "A smooth correction without a cause closes " + percent_words(found.closed) + " [" +
+  return "A correction without a cause closes " + percent_words(found.closed) + " [" +
          percent_words(found.closed_lo) + ", " + percent_words(found.closed_hi) +
          "] of the gap on trials that its fit did not see: " + text +
          ". model.toml has it as [residual].";
 }
 
-// A smooth correction beside one of the nested fits, with scores on trials that neither saw.
+// A correction beside one of the nested fits, with scores on trials that neither saw.
 struct TriedShape {
   std::size_t nested = 0;
-  ResidualField field;  // empty: none helps
+  Residual residual;  // empty: none helps
   std::vector<double> without_it, with_it;
   NoiseEstimate noise;  // of predictions beside it
 };
+
+// What a smooth correction makes of scores and noise.
+void predict_beside(const Inquiry& of, const Refit& refit, const Residuals& after, Study* beside,
+                    TriedShape* tried) {
+  const Explanation& named = refit.judged.named;
+  const double share = of.outlier_share();
+  if (!named.names_strays()) {
+    estimate_noise(Regression(named.evidence->nuisances, beside->whitened_residuals()),
+                   named.evidence->blocks, beside);
+  }
+  if (beside->predictive) {
+    beside->predictive =
+        fit_predictive_noise(beside->trials, after, beside->noise, of.subject, share, true).noise;
+  }
+  tried->with_it = scores_of(*beside, after, share);
+  tried->noise = beside->predictive_noise();
+}
+
+// The smooth part's ends and what they leave; strays are looked for about them.
+StrayLesson lesson_about(const ResidualData& data, const JointFit& told, const ResidualFit& smooth,
+                         Residuals unseen) {
+  StrayLesson lesson{data.ends, told.residuals, std::move(unseen), data.fold, data.learn};
+  if (smooth.field.empty()) return lesson;
+  for (std::size_t i = 0; i < data.size(); ++i) {
+    const Eigen::Vector3d& r = told.residuals[i];
+    lesson.ends[i] = corrected_end(smooth.field, data.facts[i], data.ends[i]);
+    lesson.residuals[i] = local_difference(lesson.ends[i], data.ends[i] * Pose{r[0], r[1], r[2]});
+  }
+  return lesson;
+}
 
 // Each model with the noise that it leaves.
 TriedShape try_shape(const Inquiry& of, const Refit& refit, std::size_t k) {
@@ -102,8 +134,7 @@ TriedShape try_shape(const Inquiry& of, const Refit& refit, std::size_t k) {
   const ResidualFit fit = fit_residual(data, told.residuals, [&](std::size_t fold) {
     return left_without(study, last, folds, fold);
   });
-  TriedShape tried{k, fit.field, {}, {}, {}};
-  if (fit.field.empty()) return tried;
+  TriedShape tried{k, {fit.field, {}}, {}, {}, {}};
   const double share = of.outlier_share();
   const std::vector<Eigen::Vector3d> before = held_out_residuals(study, last, folds);
   std::vector<Eigen::Vector3d> after = before;
@@ -112,17 +143,14 @@ TriedShape try_shape(const Inquiry& of, const Refit& refit, std::size_t k) {
     after[i] -= fit.unseen[i];
     beside.trials[i].residual = after[i];
   }
-  if (!named.names_strays()) {
-    estimate_noise(Regression(named.evidence->nuisances, beside.whitened_residuals()),
-                   named.evidence->blocks, &beside);
-  }
-  if (study.predictive) {
-    beside.predictive =
-        fit_predictive_noise(beside.trials, after, beside.noise, of.subject, share, true).noise;
-  }
-  tried.without_it = scores_of(study, before, share);
-  tried.with_it = scores_of(beside, after, share);
-  tried.noise = beside.predictive_noise();
+  tried.without_it = tried.with_it = scores_of(study, before, share);
+  if (!fit.field.empty()) predict_beside(of, refit, after, &beside, &tried);
+  if (named.names_strays() || named.as_logged) return tried;
+  const auto astray = look_astray(of, beside, lesson_about(data, told, fit, after));
+  if (!astray || !clearly_better(astray->scores, tried.with_it)) return tried;
+  tried.residual.strays = astray->strays;
+  tried.with_it = astray->scores;
+  tried.noise = astray->noise;
   return tried;
 }
 
@@ -132,8 +160,8 @@ TriedShape best_shape(const Inquiry& of, const Refit& refit) {
   TriedShape tried = try_shape(of, refit, refit.nested.size() - 1);
   if (refit.correction.empty()) return tried;
   TriedShape alone = try_shape(of, refit, refit.nested.size() - 2);
-  const bool better = !alone.field.empty() &&
-                      (tried.field.empty() || !clearly_better(tried.with_it, alone.with_it));
+  const bool better = !alone.residual.empty() &&
+                      (tried.residual.empty() || !clearly_better(tried.with_it, alone.with_it));
   return better ? alone : tried;
 }
 
@@ -150,7 +178,7 @@ Refit add_shape(const Inquiry& of, const Refit& refit) {
   FoundResidual& found = with.shape.emplace();
   found.text = residual_sentence(found);
   const TriedShape tried = best_shape(of, refit);
-  if (tried.field.empty() || !clearly_better(tried.with_it, refit.nested.back().scores))
+  if (tried.residual.empty() || !clearly_better(tried.with_it, refit.nested.back().scores))
     return with;
   const auto n = static_cast<double>(tried.with_it.size());
   std::vector<double> gains = tried.with_it;
@@ -159,25 +187,30 @@ Refit add_shape(const Inquiry& of, const Refit& refit) {
   double squares = 0;
   for (const double g : gains) squares += (g - gained) * (g - gained);
   const double half = kNormal90 * std::sqrt(squares) / n;
-  const ClosedShare closed = closed_share(of, refit, gains);
-  if (!(gained - half > 0 && closed.lo > 0)) return with;
+  // The noise that passed for the floor had the strays in it.
+  if (tried.residual.strays) with.floor = std::max(refit.floor, mean(tried.with_it));
+  const ClosedShare closed = closed_share(of, with, gains);
+  if (!(gained - half > 0 && closed.lo > 0)) {
+    with.floor = refit.floor;
+    return with;
+  }
   if (tried.nested + 1 < with.nested.size()) {
     with.nested.pop_back();
     std::erase(with.judged.cautions, with.correction);
     with.correction.clear();
   }
-  found = {in_world(tried.field, of.frame_m),
+  found = {{in_world(tried.residual.field, of.frame_m), tried.residual.strays},
            gained,
            gained - half,
            gained + half,
-           refit.floor - mean(tried.without_it),
-           std::max(0.0, refit.floor - mean(tried.with_it)),
+           with.floor - mean(tried.without_it),
+           std::max(0.0, with.floor - mean(tried.with_it)),
            std::min(1.0, closed.share),
            std::min(1.0, closed.lo),
            std::min(1.0, closed.hi),
            ""};
   found.text = residual_sentence(found);
-  with.field = tried.field;
+  with.residual = tried.residual;
   with.noise = tried.noise;
   return with;
 }

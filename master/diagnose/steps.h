@@ -107,7 +107,7 @@ struct Refit {
   std::string correction;              // what is said of that; empty: there is none
   std::optional<JointFit> final_fit;   // base and effects as they are told
   std::optional<FoundResidual> shape;  // a smooth correction of what is unexplained
-  ResidualField field;                 // its field in the log's frame; empty: none helps
+  Residual residual;                   // the same in the log's frame; empty: none helps
   std::optional<NoiseEstimate> noise;  // of predictions beside it
 };
 

@@ -66,7 +66,7 @@ std::string shape_section(const Diagnosis& diagnosis) {
   if (!diagnosis.residual && diagnosis.nearest.empty()) return "";
   std::string html = R"(<section id="shape"><h2>The shape of what nothing explains</h2>)";
   if (diagnosis.residual) html += "<p>" + html_escaped(diagnosis.residual->text) + "</p>";
-  if (diagnosis.residual && !diagnosis.residual->field.empty()) {
+  if (diagnosis.residual && !diagnosis.residual->correction.field.empty()) {
     html +=
         R"(<div class="controls" id="shape-controls"></div><div class="grid" id="shape-plots"></div>)";
     html += kNoScript;

@@ -40,6 +40,15 @@ class Diagnose : public ::testing::Test {
     return diagnose_log(config_, folder_ / "trials.csv", folder_ / "d", more);
   }
 
+  // What a model scores a trial of the log.
+  double nats_of(const char* model) {
+    const Finished said =
+        gapfarm_command({"predict", folder_ / model, "--trials", folder_ / "trials.csv", "--out",
+                         folder_ / "p.csv", "--force", "--json"});
+    EXPECT_EQ(said.exit_code, 0) << said.err;
+    return Json::parse(said.out)["log_score"].get<double>();
+  }
+
   // Writes the log moved along x and y, with y mirrored where asked for; returns its path.
   static std::string move_log(const std::string& log, const std::string& to, double dx, double dy,
                               bool mirrored = false) {
@@ -222,14 +231,19 @@ TEST_F(Diagnose, WithoutTheEffectInTheCatalogueItIsNotGivenAnotherName) {
   EXPECT_EQ(refused.exit_code, 2);
   EXPECT_NE(refused.err.find("[residual]"), std::string::npos) << refused.err;
   simulate(60, {"battery_sag.rate=0.03"}, "4");
-  const auto nats = [&](const char* model) {
-    const Finished said =
-        gapfarm_command({"predict", folder_ / model, "--trials", folder_ / "trials.csv", "--out",
-                         folder_ / "p.csv", "--force", "--json"});
-    EXPECT_EQ(said.exit_code, 0) << said.err;
-    return Json::parse(said.out)["log_score"].get<double>();
-  };
-  EXPECT_GT(nats("d/model.toml"), nats("d/tuned.toml") + 0.1);
+  EXPECT_GT(nats_of("d/model.toml"), nats_of("d/tuned.toml") + 0.1);
+}
+
+// No smooth shape tells which drives were read late, but how many and how late can be foretold.
+TEST_F(Diagnose, WhatStraysWithoutANameIsForetoldAllTheSame) {
+  simulate(150, {"pose_latency.share=0.3", "pose_latency.latency=0.25"});
+  const Json d = diagnose({"--leave-out", "pose_latency"});
+  EXPECT_EQ(d["verdict"], "unknown") << d["headline"];
+  ASSERT_TRUE(d["residual"].contains("strays")) << d["residual"];
+  EXPECT_EQ(d["residual"]["strays"]["kind"], "late");
+  EXPECT_NEAR(d["residual"]["strays"]["share"], 0.3, 0.12);
+  simulate(100, {"pose_latency.share=0.3", "pose_latency.latency=0.25"}, "4");
+  EXPECT_GT(nats_of("d/model.toml"), nats_of("d/tuned.toml") + 0.3);
 }
 
 // Both make single drives stray: slips anywhere, a patch where it lies.

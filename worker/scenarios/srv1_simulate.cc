@@ -78,10 +78,12 @@ class Session {
     if (motion.outcome != MotionOutcome::kOk) return to_outcome(motion.outcome);
 
     const Pose X_WS = situation_.X_WR;
-    const Pose X_SR = corrected(motion.X_SE, trial, command, moved, &path);
-    const Pose X_SE = stale ? pose_before_end(path, reading_.stale_age_s) : X_SR;
+    const LoggedMotion facts = facts_of(trial, command, moved);
+    const Stray stray = strayed(facts, corrected(motion.X_SE, facts, &path), &path);
+    const Pose X_SR = stray.X_SR;
+    const Pose X_SE = stale ? pose_before_end(path, reading_.stale_age_s) : stray.X_SE;
     trial.X_WS = measured(X_WS);
-    const double turn_rad = robot_.effects().draw_start_turn(moved, stream_);
+    const double turn_rad = robot_.effects().draw_start_turn(moved, stream_) + stray.start_turn_rad;
     if (turn_rad != 0) trial.X_WS.theta = wrap_angle(trial.X_WS.theta + turn_rad);
     trial.X_WE = measured(X_WS * X_SE);
     if (sampled) {
@@ -95,26 +97,55 @@ class Session {
     return v1::OK;
   }
 
-  // The end with the problem's correction, into which the path grows with time.
-  Pose corrected(const Pose& X_SE, const Trial& trial, const CommandSpec& command, bool moved,
-                 std::vector<MotionSample>* path) const {
-    if (problem_.residual.empty()) return X_SE;
-    const Pose& X_WS = situation_.X_WR;
-    const LoggedMotion facts{trial.command,
-                             X_WS,
-                             command.left,
-                             command.right,
-                             command.duration_s,
-                             situation_.session_time_s,
-                             situation_.last_left,
-                             situation_.last_right,
-                             moved};
-    const Eigen::Vector3d shift = residual_shift(problem_.residual, facts, X_WS * X_SE);
+  LoggedMotion facts_of(const Trial& trial, const CommandSpec& command, bool moved) const {
+    return {trial.command,        situation_.X_WR,       command.left,
+            command.right,        command.duration_s,    situation_.session_time_s,
+            situation_.last_left, situation_.last_right, moved};
+  }
+
+  // The shifted end; the path grows into it with time.
+  static Pose shifted(const Pose& X_SE, const Eigen::Vector3d& shift,
+                      std::vector<MotionSample>* path) {
     for (MotionSample& s : *path) {
       const double share = path->back().t_s > 0 ? s.t_s / path->back().t_s : 0;
       s.X_SB = s.X_SB * Pose{share * shift[0], share * shift[1], share * shift[2]};
     }
     return X_SE * Pose{shift[0], shift[1], shift[2]};
+  }
+
+  // The end with the problem's correction.
+  Pose corrected(const Pose& X_SE, const LoggedMotion& facts,
+                 std::vector<MotionSample>* path) const {
+    const ResidualField& field = problem_.residual.field;
+    if (field.empty()) return X_SE;
+    return shifted(X_SE, residual_shift(field, facts, facts.X_WS * X_SE), path);
+  }
+
+  // Where the robot is at the end and where it is read, and how far off its start's heading is.
+  struct Stray {
+    Pose X_SR, X_SE;
+    double start_turn_rad = 0;
+  };
+
+  Stray strayed(const LoggedMotion& facts, const Pose& X_SR, std::vector<MotionSample>* path) {
+    const auto& strays = problem_.residual.strays;
+    Stray drawn{X_SR, X_SR, 0};
+    if (!strays || !may_stray(*strays, facts)) return drawn;
+    const bool astray = stream_.bernoulli(strays->share);
+    const double amount = strays->least + (strays->most - strays->least) * stream_.uniform();
+    const bool first = stream_.bernoulli(0.5);
+    if (strays->kind == StrayKind::kTurned) {
+      drawn.start_turn_rad = astray ? -amount : 0;
+      return drawn;
+    }
+    const Pose X_WE = facts.X_WS * X_SR;
+    const Pose end =
+        astray ? stray_end(*strays, facts, X_WE, amount, first) : rest_end(*strays, facts, X_WE);
+    drawn.X_SE = between(facts.X_WS, end);
+    if (strays->kind == StrayKind::kSide) {
+      drawn.X_SR = shifted(X_SR, local_difference(X_SR, drawn.X_SE), path);
+    }
+    return drawn;
   }
 
   Pose measured(const Pose& X_WR) {

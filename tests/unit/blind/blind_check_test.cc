@@ -113,7 +113,7 @@ TEST_F(BlindCheck, AnEffectThatWasLeftOutIsScoredWithItsResidual) {
   ahead.lengths = {10};
   ahead.centres = Eigen::MatrixXd::Ones(1, 1);
   ahead.weights = {{"", Eigen::RowVector3d(0.05, 0, 0)}};
-  model.residual = {ahead};
+  model.residual.field = {ahead};
   ASSERT_TRUE(write_model(model, folder_ / "model.toml").ok());
   fake_diagnose(R"({"verdict": "unknown", "effects": []})");
   settings_.design.effects = {"motor_asymmetry"};

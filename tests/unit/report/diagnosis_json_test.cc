@@ -123,19 +123,32 @@ ResidualTerm shape_over_the_floor() {
 
 TEST(DiagnosisJson, KeepsTheShapeOfWhatHasNoName) {
   Diagnosis d;
-  d.residual =
-      FoundResidual{{shape_over_the_floor()}, 0.4, 0.3, 0.5, 0.7, 0.3, 0.6, 0.5, 0.7, "so"};
+  d.residual = FoundResidual{
+      {{shape_over_the_floor()}, StrayDrives{StrayKind::kShifted, 0.1, 0.02, 0.03, 0, 0.5, 0, 0}},
+      0.4,
+      0.3,
+      0.5,
+      0.7,
+      0.3,
+      0.6,
+      0.5,
+      0.7,
+      "so"};
   d.nearest = {{{"camera_seam", "floor_tilt"}, 120, 44, "start place", "why"}};
   const auto back = parse_diagnosis(to_json(d));
   ASSERT_TRUE(back.ok()) << back.error().message;
   EXPECT_EQ(to_json(*back), to_json(d));
   ASSERT_TRUE(back->residual);
-  EXPECT_EQ(back->residual->field.at(0).frame, ResidualFrame::kMotion);
-  EXPECT_EQ(back->residual->field.at(0).weights.at(1).shifts(1, 2), -0.2);
+  EXPECT_EQ(back->residual->correction.field.at(0).frame, ResidualFrame::kMotion);
+  EXPECT_EQ(back->residual->correction.field.at(0).weights.at(1).shifts(1, 2), -0.2);
+  EXPECT_EQ(back->residual->correction.strays, d.residual->correction.strays);
   EXPECT_EQ(back->nearest.at(0).effects.at(1), "floor_tilt");
   Json json = Json::parse(to_json(d));
   json["residual"]["terms"][0]["centres"][1] = "x";
   EXPECT_THAT(parse_diagnosis(json.dump()).error().message, HasSubstr("residual.terms[0]"));
+  json = Json::parse(to_json(d));
+  json["residual"]["strays"]["kind"] = "lost";
+  EXPECT_THAT(parse_diagnosis(json.dump()).error().message, HasSubstr("lost"));
   json["residual"] = 3;
   EXPECT_THAT(parse_diagnosis(json.dump()).error().message, HasSubstr("residual"));
 }

@@ -12,8 +12,9 @@ using testing::HasSubstr;
 
 Model model_with_residual() {
   Model model = *nominal_model("srv1");
-  model.residual = {tests::heading_term(), tests::place_term(ResidualFrame::kReadings)};
-  model.residual[0].weights[0].shifts(0, 0) = 0.1 + 0.2;
+  model.residual.field = {tests::heading_term(), tests::place_term(ResidualFrame::kReadings)};
+  model.residual.field[0].weights[0].shifts(0, 0) = 0.1 + 0.2;
+  model.residual.strays = {StrayKind::kSide, 0.1 + 0.2, -0.5, 0.125, 0.01, 0, 0.25, 0.15};
   return model;
 }
 
@@ -37,7 +38,8 @@ TEST(ModelResidual, ReadsBackToTheBit) {
   const Model model = model_with_residual();
   const auto again = parse_model(format_model(model), "m.toml");
   ASSERT_TRUE(again.ok()) << again.error().message;
-  expect_equal(again->residual, model.residual);
+  expect_equal(again->residual.field, model.residual.field);
+  EXPECT_EQ(again->residual.strays, model.residual.strays);
   EXPECT_EQ(format_model(*again), format_model(model));
 }
 
@@ -45,13 +47,15 @@ TEST(ModelResidual, CrossesTheWire) {
   const Problem problem = problem_of(model_with_residual());
   const auto again = from_proto(to_proto(problem));
   ASSERT_TRUE(again.ok()) << again.error().message;
-  expect_equal(again->residual, problem.residual);
+  expect_equal(again->residual.field, problem.residual.field);
+  EXPECT_EQ(again->residual.strays, problem.residual.strays);
 }
 
 // Problems without one keep their hashes, and with them their stored answers.
 TEST(ModelResidual, WithoutOneTheBytesAreWhatTheyWere) {
   const Problem plain = problem_of(*nominal_model("srv1"));
   EXPECT_EQ(to_proto(plain).residual_size(), 0);
+  EXPECT_FALSE(to_proto(plain).has_strays());
   EXPECT_NE(problem_hash(to_proto(plain)),
             problem_hash(to_proto(problem_of(model_with_residual()))));
   EXPECT_EQ(format_model(*nominal_model("srv1")).find("residual"), std::string::npos);
@@ -78,7 +82,30 @@ TEST(ModelResidual, MistakesAreNamedWithTheirPlace) {
               HasSubstr("centres are rows of 1 finite numbers"));
   EXPECT_THAT(message("turn_cw = [", "turn_up = ["), HasSubstr("turn_up"));
   EXPECT_THAT(message("by_drive = true", "by_drve = true"), HasSubstr("by_drve"));
+  EXPECT_THAT(message("kind = \"side\"", "kind = \"sideways\""), HasSubstr("sideways"));
+  EXPECT_THAT(message("least = -0.5", "least = 0.5"), HasSubstr("exchange them"));
+  EXPECT_THAT(message("gauge = 0.15", "guage = 0.15"), HasSubstr("guage"));
   EXPECT_THAT(message("scenario = \"srv1\"", "scenario = \"racquetball\""), HasSubstr("residual"));
+}
+
+TEST(ModelResidual, StraysStandAlone) {
+  Model model = *nominal_model("srv1");
+  model.residual.strays = {StrayKind::kLate, 0.25, 0.2, 0.22, -0.05, 0, 0, 0};
+  const std::string text = format_model(model);
+  const auto again = parse_model(text, "m.toml");
+  ASSERT_TRUE(again.ok()) << again.error().message;
+  EXPECT_EQ(again->residual.strays, model.residual.strays);
+  EXPECT_EQ(format_model(*again), text);
+  model.scenario = "racquetball";
+  v1::Problem foreign = to_proto(problem_of(*nominal_model("racquetball")));
+  *foreign.mutable_strays() = to_proto(problem_of(*again)).strays();
+  EXPECT_THAT(from_proto(foreign).error().message, HasSubstr("takes no residual"));
+  foreign = to_proto(problem_of(*again));
+  foreign.mutable_strays()->set_kind(17);
+  EXPECT_THAT(from_proto(foreign).error().message, HasSubstr("the same build"));
+  foreign.mutable_strays()->set_kind(1);
+  foreign.mutable_strays()->set_share(2);
+  EXPECT_THAT(from_proto(foreign).error().message, HasSubstr("share"));
 }
 
 TEST(ModelResidual, EmptyAndForeignOnesAreRefused) {

@@ -39,14 +39,14 @@ v1::PredictResult predictions_of(const Problem& problem,
 TEST(ResidualOfAWorker, ShiftsPredictedEndsAndKeepsTheirSpread) {
   Problem problem = small_problem(12);
   const v1::PredictResult plain = predictions_of(problem);
-  problem.residual = leftward();
+  problem.residual.field = leftward();
   const v1::PredictResult with = predictions_of(problem);
   const std::vector<LoggedMotion> facts = logged_motions(problem);
   for (int i = 0; i < plain.predictions_size(); ++i) {
     const Pose before = from_proto(plain.predictions(i).end());
     const Pose after = from_proto(with.predictions(i).end());
     const Pose expected =
-        corrected_end(problem.residual, facts[static_cast<std::size_t>(i)], before);
+        corrected_end(problem.residual.field, facts[static_cast<std::size_t>(i)], before);
     EXPECT_TRUE(local_difference(expected, after).isZero(1e-12)) << i;
     for (int k = 0; k < 6; ++k) {
       EXPECT_DOUBLE_EQ(plain.predictions(i).cov(k), with.predictions(i).cov(k));
@@ -58,12 +58,12 @@ TEST(ResidualOfAWorker, ShiftsPredictedEndsAndKeepsTheirSpread) {
 TEST(ResidualOfAWorker, ScoresAreOfTheShiftedEnd) {
   Problem problem = small_problem(12);
   const v1::PredictResult plain = predictions_of(problem);
-  problem.residual = leftward();
+  problem.residual.field = leftward();
   const std::vector<LoggedMotion> facts = logged_motions(problem);
   for (std::size_t i = 0; i < 12; ++i) {
     const Pose end = from_proto(plain.predictions(static_cast<int>(i)).end());
     Trial& trial = problem.log.trials[i];
-    trial.X_WE = corrected_end(problem.residual, facts[i], end) * between(end, trial.X_WE);
+    trial.X_WE = corrected_end(problem.residual.field, facts[i], end) * between(end, trial.X_WE);
   }
   const v1::PredictResult with = predictions_of(problem);
   for (int i = 0; i < 12; ++i) {
@@ -73,7 +73,7 @@ TEST(ResidualOfAWorker, ScoresAreOfTheShiftedEnd) {
 
 TEST(ResidualOfAWorker, SomeTrialsAreAnsweredAsAllAre) {
   Problem problem = small_problem(12);
-  problem.residual = leftward();
+  problem.residual.field = leftward();
   const v1::PredictResult all = predictions_of(problem), some = predictions_of(problem, {3, 7});
   EXPECT_EQ(all.predictions(3).SerializeAsString(), some.predictions(0).SerializeAsString());
   EXPECT_EQ(all.predictions(7).SerializeAsString(), some.predictions(1).SerializeAsString());
@@ -95,7 +95,7 @@ TEST(ResidualOfAWorker, SimulatedSessionsHaveIt) {
     planned->set_moved(i == 0);
   }
   const v1::SimulateResult plain = answer_of(problem, task).simulate();
-  problem.residual = leftward();
+  problem.residual.field = leftward();
   const v1::SimulateResult with = answer_of(problem, task).simulate();
   ASSERT_EQ(with.trials_size(), 2);
   const Pose before = from_proto(plain.trials(0).end()), after = from_proto(with.trials(0).end());
@@ -109,9 +109,65 @@ TEST(ResidualOfAWorker, SimulatedSessionsHaveIt) {
   EXPECT_NEAR(path[0].pose().y(), with.trials(0).start().y(), 1e-3);
 }
 
+// Each way is as wide as the drive that does not stray, and by its own spread wider.
+TEST(ResidualOfAWorker, StraysAreWaysOfTheirOwn) {
+  Problem problem = small_problem(12);
+  const v1::PredictResult plain = predictions_of(problem);
+  problem.residual.strays = {StrayKind::kLate, 0.3, 0.1, 0.3, 0, 0, 0, 0};
+  const v1::PredictResult with = predictions_of(problem);
+  const std::vector<LoggedMotion> facts = logged_motions(problem);
+  for (int i = 0; i < plain.predictions_size(); ++i) {
+    const v1::Predicted& before = plain.predictions(i);
+    const Pose end = from_proto(before.end()), after = from_proto(with.predictions(i).end());
+    Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+    for (const StrayWay& way :
+         stray_ways(*problem.residual.strays, facts[static_cast<std::size_t>(i)], end)) {
+      mean += way.weight * local_difference(end, way.X_WE);
+    }
+    EXPECT_LT((local_difference(end, after) - mean).norm(), 0.1 * mean.norm()) << i;
+    EXPECT_GT(with.predictions(i).cov(0) + with.predictions(i).cov(3),
+              before.cov(0) + before.cov(3));
+  }
+}
+
+// Of many simulated drives as many stray as are said to, and only what is read of them.
+TEST(ResidualOfAWorker, SimulatedSessionsStray) {
+  Problem problem = small_problem(0);
+  for (const char* key :
+       {"drive_noise_common", "drive_noise_side", "pose_noise_position", "pose_noise_heading"}) {
+    tests::value(problem, key) = srv1_table()[srv1_table().row(key)].lower;
+  }
+  v1::Task task;
+  constexpr int kDrives = 200;
+  for (int i = 0; i < kDrives; ++i) {
+    v1::PlannedTrial* planned = task.mutable_simulate()->add_plan();
+    planned->mutable_trial()->set_command("forward");
+    planned->mutable_trial()->set_trial(i);
+    planned->set_moved(i == 0);
+  }
+  const auto driven = [](const v1::Trial& trial) {
+    return between(from_proto(trial.start()), from_proto(trial.end())).x;
+  };
+  const double whole = driven(answer_of(problem, task).simulate().trials(0));
+  problem.residual.strays = {StrayKind::kLate, 0.3, 0.4, 0.4, 0, 0, 0, 0};
+  const v1::SimulateResult with = answer_of(problem, task).simulate();
+  ASSERT_EQ(with.trials_size(), kDrives);
+  int astray = 0;
+  for (int i = 0; i < kDrives; ++i) {
+    const bool strays = driven(with.trials(i)) < 0.8 * whole;
+    astray += strays;
+    if (!strays || i + 1 == kDrives) continue;
+    // The robot drove on, and the next start is read where it stopped.
+    const Pose end = from_proto(with.trials(i).end()),
+               next = from_proto(with.trials(i + 1).start());
+    EXPECT_NEAR(between(end, next).x, 0.4 * whole, 0.05 * whole) << i;
+  }
+  EXPECT_NEAR(astray, 0.3 * kDrives, 20);
+}
+
 TEST(ResidualOfAWorker, ATraceHasNoPlaceToLookAt) {
   Problem problem = small_problem(1);
-  problem.residual = leftward();
+  problem.residual.field = leftward();
   v1::Task task;
   task.mutable_trace()->set_interval(0.1);
   task.mutable_trace()->mutable_command()->set_duration(0.2);

@@ -1,0 +1,128 @@
+#include "master/residual/stray_fit.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/unit/residual/fields.h"
+
+namespace gapfarm {
+namespace {
+
+using tests::draw_log;
+using tests::DrawnLog;
+
+// As fast and as wide as draw_log()'s robot.
+constexpr double kSpeed_m_s = 0.25, kGauge_m = 0.125;
+constexpr StrayNoise kTrue = {0.01, 0.015, 0.002, 0.01};
+
+struct StrayLog {
+  StrayData data;
+  Residuals residuals;
+  std::vector<bool> learn;
+};
+
+Eigen::Vector3d of_side(const LoggedMotion& facts, const Pose& X_WE, bool left) {
+  const StrayDrives robot{StrayKind::kSide, 0.1, 0, 0, 0, 0, kSpeed_m_s, kGauge_m};
+  return local_difference(X_WE, stray_end(robot, facts, X_WE, 1e-4, left)) / 1e-4;
+}
+
+StrayLog draw_strays(std::uint64_t seed, std::size_t trials, const StrayDrives* strays) {
+  const DrawnLog drives = draw_log(
+      seed, trials, [](const auto&, const auto&) { return Eigen::Vector3d::Zero().eval(); });
+  Stream stream({.run_seed = seed, .purpose = Purpose::kTest, .birth_id = 1});
+  StrayLog log{
+      {drives.data.facts, drives.data.ends, {}, {}, {}, 0.02}, {}, std::vector<bool>(trials, true)};
+  for (std::size_t i = 0; i < trials; ++i) {
+    const LoggedMotion& facts = log.data.facts[i];
+    const Pose& end = log.data.ends[i];
+    const Eigen::Vector3d l = of_side(facts, end, true), r = of_side(facts, end, false);
+    log.data.left.push_back(l);
+    log.data.right.push_back(r);
+    const Eigen::Matrix3d position = Eigen::Vector3d(2, 2, 0).asDiagonal();
+    const Eigen::Matrix3d heading = Eigen::Vector3d(0, 0, 2).asDiagonal();
+    log.data.covariances.push_back(
+        {(l + r) * (l + r).transpose(), l * l.transpose() + r * r.transpose(), position, heading});
+    Pose went = end;
+    if (strays != nullptr) {
+      const double amount = stream.uniform(strays->least, strays->most);
+      const bool first = stream.bernoulli(0.5);
+      const bool astray = may_stray(*strays, facts) && stream.bernoulli(strays->share);
+      went = astray ? stray_end(*strays, facts, end, amount, first) : rest_end(*strays, facts, end);
+    }
+    const double both = kTrue[0] * stream.normal();
+    const double left = both + kTrue[1] * stream.normal();
+    const double right = both + kTrue[1] * stream.normal();
+    const Eigen::Vector3d reading(kTrue[2] * stream.normal(), kTrue[2] * stream.normal(),
+                                  kTrue[3] * stream.normal());
+    log.residuals.push_back(local_difference(end, went) + left * l + right * r +
+                            std::sqrt(2.0) * reading);
+  }
+  return log;
+}
+
+std::optional<StrayFit> fit(const StrayLog& log) {
+  return fit_strays(log.data, log.residuals, log.learn, {0.02, 0.02, 0.003, 0.02}, 11);
+}
+
+double mean_score(const StrayLog& log, const StrayFit& by) {
+  double sum = 0;
+  for (std::size_t i = 0; i < log.data.size(); ++i) {
+    sum += stray_score(log.data, i, log.residuals[i], by);
+  }
+  return sum / static_cast<double>(log.data.size());
+}
+
+// The kind, how often and how much; and what it scores on a log that it did not see is what the
+// truth scores there.
+TEST(StrayFit, FindsWhatStraysAndHowOften) {
+  const StrayDrives kinds[] = {{StrayKind::kSide, 0.12, -0.55, 0, 0.02, 0, kSpeed_m_s, kGauge_m},
+                               {StrayKind::kLate, 0.25, 0.2, 0.22, -0.05, 0, 0, 0},
+                               {StrayKind::kTurned, 0.15, -1, 1, 0, 0, 0, 0},
+                               {StrayKind::kShifted, 0.06, 0.05, 0.06, 0, 0.4, 0, 0}};
+  for (const StrayDrives& truth : kinds) {
+    const StrayLog log = draw_strays(11, 500, &truth), fresh = draw_strays(12, 500, &truth);
+    const auto found = fit(log);
+    ASSERT_TRUE(found) << static_cast<int>(truth.kind);
+    EXPECT_EQ(found->strays.kind, truth.kind);
+    EXPECT_NEAR(found->strays.share / truth.share, 1, 0.35);
+    EXPECT_NEAR(found->strays.least, truth.least, 0.15 + 0.1 * std::abs(truth.least));
+    EXPECT_NEAR(found->strays.most, truth.most, 0.15 + 0.1 * std::abs(truth.most));
+    EXPECT_NEAR(found->strays.rest, truth.rest, 0.02);
+    const StrayFit perfect{truth, kTrue, 0, 0};
+    const StrayNoise wide = {0.2, 0.05, 0.004, 0.03};
+    StrayFit none = perfect;
+    none.strays.share = 1e-9;
+    none.noise = wide;
+    const double to_gain = mean_score(fresh, perfect) - mean_score(fresh, none);
+    EXPECT_GT(mean_score(fresh, *found) - mean_score(fresh, none), 0.9 * to_gain)
+        << static_cast<int>(truth.kind);
+  }
+}
+
+TEST(StrayFit, MeasuresTheRobotThatTurns) {
+  const StrayDrives truth{StrayKind::kSide, 0.2, -0.4, 0, 0, 0, kSpeed_m_s, kGauge_m};
+  const auto found = fit(draw_strays(5, 300, &truth));
+  ASSERT_TRUE(found);
+  EXPECT_NEAR(found->strays.speed_m_s, kSpeed_m_s, 1e-3);
+  EXPECT_NEAR(found->strays.gauge_m, kGauge_m, 1e-3);
+}
+
+// Seeds 22 and 28 of the noise have two hills, and the lower one left room for strays.
+TEST(StrayFit, InNoiseNothingStrays) {
+  for (std::uint64_t seed = 20; seed < 29; ++seed) {
+    EXPECT_FALSE(fit(draw_strays(seed, 300, nullptr))) << seed;
+  }
+}
+
+TEST(StrayFit, TrialsThatNobodyMayLearnFromDoNotCount) {
+  StrayLog log = draw_strays(21, 300, nullptr);
+  for (std::size_t i = 0; i < log.data.size(); i += 10) {
+    log.residuals[i] = Eigen::Vector3d(-0.05, 0, 1);
+    log.learn[i] = false;
+  }
+  EXPECT_FALSE(fit(log));
+}
+
+}  // namespace
+}  // namespace gapfarm
