@@ -95,6 +95,11 @@ std::string table_text(const plan::DesignedPlan& plan) {
         fmt::format("{:<32} {:>14} {:>14}  {}\n", seen.parameter, size_words(seen),
                     size_words(plan.seen_at_random[k]), seen.likeness >= kAlike ? seen.like : "");
   }
+  if (const auto as_good = plan::trials_as_good(plan.power)) {
+    text +=
+        fmt::format("On average over effects {:.0f} of these trials name what {} random ones do.\n",
+                    *as_good, plan.power.back().trials);
+  }
   const auto list = [&](const std::vector<std::string>& names, const std::string& words) {
     for (std::size_t k = 0; k < names.size(); ++k) text += (k == 0 ? "" : ", ") + names[k];
     if (!names.empty()) text += words + "\n";

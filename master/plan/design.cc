@@ -240,6 +240,20 @@ void keep_common(std::vector<Visibility>* a, std::vector<Visibility>* b) {
 
 }  // namespace
 
+std::optional<double> trials_as_good(const std::vector<PowerPoint>& power) {
+  PowerPoint before;
+  for (const PowerPoint& p : power) {
+    const double wanted = power.back().random;
+    if (p.planned >= wanted) {
+      const double rise = p.planned - before.planned;
+      const double share = rise > 0 ? (wanted - before.planned) / rise : 1;
+      return std::lerp(static_cast<double>(before.trials), static_cast<double>(p.trials), share);
+    }
+    before = p;
+  }
+  return std::nullopt;
+}
+
 Result<DesignedPlan> design_plan(Farm& farm, const Config& config, const PlanSettings& settings,
                                  const PlanProgress& progress) {
   if (diagnosis_subject(config.problem) == nullptr) {

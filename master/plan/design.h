@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -29,6 +30,10 @@ struct PowerPoint {
   double planned = 0;
   double random = 0;
 };
+
+// After how many trials of the plan as many effects are named as after all random ones,
+// interpolated; nothing where never.
+std::optional<double> trials_as_good(const std::vector<PowerPoint>& power);
 
 struct DesignedPlan {
   TrialLog log;     // to be driven in this order; ends are where the model says the robot stops

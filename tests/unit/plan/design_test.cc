@@ -49,6 +49,13 @@ TEST_F(DesignTest, ShowsSmallerEffectsThanARandomLogOfAsManyTrials) {
   }
 }
 
+TEST(TrialsAsGood, AreThoseAtWhichThePlanNamesWhatAllRandomOnesDo) {
+  const std::vector<PowerPoint> power = {{30, 0.2, 0.1}, {60, 0.5, 0.3}, {90, 0.9, 0.7}};
+  EXPECT_NEAR(trials_as_good(power).value(), 75, 1e-9);
+  EXPECT_EQ(trials_as_good({{30, 0.1, 0.2}, {60, 0.3, 0.5}}), std::nullopt);
+  EXPECT_EQ(trials_as_good({}), std::nullopt);
+}
+
 TEST_F(DesignTest, IsALogThatCanBeDriven) {
   const Config c = config();
   const DesignedPlan plan = designed(settings());
