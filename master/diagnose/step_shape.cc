@@ -145,7 +145,7 @@ TriedShape try_shape(const Inquiry& of, const Refit& refit, std::size_t k) {
   }
   tried.without_it = tried.with_it = scores_of(study, before, share);
   if (!fit.field.empty()) predict_beside(of, refit, after, &beside, &tried);
-  if (named.names_strays() || named.as_logged) return tried;
+  if (named.names_strays()) return tried;
   const auto astray = look_astray(of, beside, lesson_about(data, told, fit, after));
   if (!astray || !clearly_better(astray->scores, tried.with_it)) return tried;
   tried.residual.strays = astray->strays;

@@ -40,7 +40,7 @@ double middle_of(const StrayDrives& s) { return (s.most + s.least) / 2; }
 Range half_range(StrayKind kind) {
   switch (kind) {
     case StrayKind::kSide:
-      return {0.01, 0.5};
+      return {0.01, 0.45};
     case StrayKind::kLate:
       return {0.002, 0.5};
     case StrayKind::kTurned:
@@ -232,8 +232,9 @@ void measure_robot(const StrayData& data, StrayDrives* strays) {
     }
   }
   const Eigen::Vector2d speeds = squares.ldlt().solve(product);
-  strays->speed_m_s = std::max(1e-3, speeds[0]);
-  strays->gauge_m = strays->speed_m_s / std::max(1e-3, speeds[1]);
+  const auto within = [](double value) { return std::min(100.0, std::max(1e-3, value)); };
+  strays->speed_m_s = within(speeds[0]);
+  strays->gauge_m = within(strays->speed_m_s / within(speeds[1]));
 }
 
 }  // namespace
