@@ -109,6 +109,7 @@ struct FoundResidual {
   double gap_before = 0, gap_after = 0;             // mean log score lost against the floor
   double closed = 0, closed_lo = 0, closed_hi = 0;  // share of the explainable gap
   std::string text;                                 // a sentence for a person
+  std::vector<double> chances;                      // of every trial to have strayed
 };
 
 // What of the catalogue comes nearest where it explains too little.

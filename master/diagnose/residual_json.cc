@@ -120,6 +120,15 @@ Status read_strays(const Json& json, StrayDrives* strays) {
   return {};
 }
 
+bool read_chances(const Json& strays, std::vector<double>* chances) {
+  if (!strays.contains("chances") || !strays["chances"].is_array()) return false;
+  for (const Json& chance : strays["chances"]) {
+    if (!chance.is_number() || !(chance >= 0 && chance <= 1)) return false;
+    chances->push_back(chance);
+  }
+  return true;
+}
+
 constexpr auto kFound = [](auto& v, auto& found) {
   v.field("text", found.text);
   v.field("gained", found.gained);
@@ -141,7 +150,10 @@ Json residual_json(const FoundResidual& residual) {
   for (const ResidualTerm& term : residual.correction.field) {
     json["terms"].push_back(term_json(term));
   }
-  if (residual.correction.strays) json["strays"] = strays_json(*residual.correction.strays);
+  if (residual.correction.strays) {
+    json["strays"] = strays_json(*residual.correction.strays);
+    json["strays"]["chances"] = residual.chances;
+  }
   return json;
 }
 
@@ -167,6 +179,9 @@ Status read_residual(const Json& json, std::optional<FoundResidual>* residual) {
   if (json.contains("strays")) {
     StrayDrives& strays = found.correction.strays.emplace();
     if (Status s = read_strays(json["strays"], &strays); !s) return s;
+    if (!read_chances(json["strays"], &found.chances)) {
+      return Error{"diagnosis.json: residual.strays.chances is no list of numbers in [0, 1]"};
+    }
   }
   *residual = std::move(found);
   return {};

@@ -70,7 +70,11 @@ std::optional<ForetoldStrays> look_astray(const Inquiry& of, const Study& study,
       {noise.drive_common, noise.drive_side, noise.pose.position_m, noise.pose.heading_rad},
       kLeastGain);
   if (!fit) return {};
-  ForetoldStrays found{fit->strays, {}, std::vector<double>(study.size(), 0.0)};
+  ForetoldStrays found{fit->strays, {}, std::vector<double>(study.size(), 0.0), {}};
+  for (std::size_t i = 0; i < study.size(); ++i) {
+    const double chance = stray_chance(data, i, lesson.residuals[i], *fit);
+    found.chances.push_back(std::round(1000 * chance) / 1000);
+  }
   found.noise.drive_common = fit->noise[0];
   found.noise.drive_side = fit->noise[1];
   found.noise.pose = {fit->noise[2], fit->noise[3]};

@@ -112,8 +112,9 @@ struct StrayLesson {
 };
 struct ForetoldStrays {
   StrayDrives strays;
-  NoiseEstimate noise;         // of all drives
-  std::vector<double> scores;  // of every trial, by what the other folds tell of strays
+  NoiseEstimate noise;          // of all drives
+  std::vector<double> scores;   // of every trial, by what the other folds tell of strays
+  std::vector<double> chances;  // that it strayed
 };
 // Whether a share of the drives strays in a way that has no name; nothing where hardly any does.
 std::optional<ForetoldStrays> look_astray(const Inquiry& of, const Study& study,

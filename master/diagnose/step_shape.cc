@@ -84,7 +84,8 @@ struct TriedShape {
   std::size_t nested = 0;
   Residual residual;  // empty: none helps
   std::vector<double> without_it, with_it;
-  NoiseEstimate noise;  // of predictions beside it
+  NoiseEstimate noise;          // of predictions beside it
+  std::vector<double> chances;  // of every trial to have strayed
 };
 
 // What a smooth correction makes of scores and noise.
@@ -134,7 +135,7 @@ TriedShape try_shape(const Inquiry& of, const Refit& refit, std::size_t k) {
   const ResidualFit fit = fit_residual(data, told.residuals, [&](std::size_t fold) {
     return left_without(study, last, folds, fold);
   });
-  TriedShape tried{k, {fit.field, {}}, {}, {}, {}};
+  TriedShape tried{k, {fit.field, {}}, {}, {}, {}, {}};
   const double share = of.outlier_share();
   const std::vector<Eigen::Vector3d> before = held_out_residuals(study, last, folds);
   std::vector<Eigen::Vector3d> after = before;
@@ -151,6 +152,7 @@ TriedShape try_shape(const Inquiry& of, const Refit& refit, std::size_t k) {
   tried.residual.strays = astray->strays;
   tried.with_it = astray->scores;
   tried.noise = astray->noise;
+  tried.chances = astray->chances;
   return tried;
 }
 
@@ -208,7 +210,8 @@ Refit add_shape(const Inquiry& of, const Refit& refit) {
            std::min(1.0, closed.share),
            std::min(1.0, closed.lo),
            std::min(1.0, closed.hi),
-           ""};
+           "",
+           tried.chances};
   found.text = residual_sentence(found);
   with.residual = tried.residual;
   with.noise = tried.noise;

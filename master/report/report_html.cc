@@ -71,6 +71,10 @@ std::string shape_section(const Diagnosis& diagnosis) {
         R"(<div class="controls" id="shape-controls"></div><div class="grid" id="shape-plots"></div>)";
     html += kNoScript;
   }
+  if (diagnosis.residual && diagnosis.residual->correction.strays) {
+    html += R"(<div class="grid" id="stray-plots"></div>)";
+    html += kNoScript;
+  }
   if (!diagnosis.nearest.empty()) {
     html += "<h3>What comes nearest, and why it is not the cause</h3><ul>";
     for (const NearMiss& miss : diagnosis.nearest) {

@@ -109,15 +109,17 @@ StrayDrives strays_at(const StrayDrives& like, const double* x) {
   return strays;
 }
 
-double score_of(const StrayData& data, std::size_t i, const Eigen::Vector3d& residual,
-                const StrayNoise& noise, const StrayDrives* strays) {
+// Log densities of the ways in which a trial may end, weights included, the first that of a drive
+// that does not stray; none where there is no density.
+std::vector<double> ways_of(const StrayData& data, std::size_t i, const Eigen::Vector3d& residual,
+                            const StrayNoise& noise, const StrayDrives* strays) {
   Eigen::Matrix3d core = Eigen::Matrix3d::Zero();
   for (std::size_t k = 0; k < noise.size(); ++k) {
     core += noise[k] * noise[k] * data.covariances[i][k];
   }
   const auto whole = Covariance3::factorise(core);
-  if (!whole) return kNoDensity;
-  if (strays == nullptr) return log_predictive_density(residual, *whole, data.outlier_share);
+  if (!whole) return {};
+  if (strays == nullptr) return {log_predictive_density(residual, *whole, data.outlier_share)};
   const Pose measured = data.ends[i] * Pose{residual[0], residual[1], residual[2]};
   std::vector<double> logs;
   for (const StrayWay& way : stray_ways(*strays, data.facts[i], data.ends[i])) {
@@ -125,10 +127,16 @@ double score_of(const StrayData& data, std::size_t i, const Eigen::Vector3d& res
     const auto wider = way.spread.isZero(0)
                            ? whole
                            : Covariance3::factorise(core + way.spread * way.spread.transpose());
-    if (!wider) return kNoDensity;
+    if (!wider) return {};
     logs.push_back(std::log(way.weight) + log_predictive_density(left, *wider, data.outlier_share));
   }
-  return log_sum_exp(logs);
+  return logs;
+}
+
+double score_of(const StrayData& data, std::size_t i, const Eigen::Vector3d& residual,
+                const StrayNoise& noise, const StrayDrives* strays) {
+  const std::vector<double> logs = ways_of(data, i, residual, noise, strays);
+  return logs.empty() ? kNoDensity : log_sum_exp(logs);
 }
 
 struct Likelihood {
@@ -242,6 +250,12 @@ void measure_robot(const StrayData& data, StrayDrives* strays) {
 double stray_score(const StrayData& data, std::size_t trial, const Eigen::Vector3d& residual,
                    const StrayFit& fit) {
   return score_of(data, trial, residual, fit.noise, &fit.strays);
+}
+
+double stray_chance(const StrayData& data, std::size_t trial, const Eigen::Vector3d& residual,
+                    const StrayFit& fit) {
+  const std::vector<double> logs = ways_of(data, trial, residual, fit.noise, &fit.strays);
+  return logs.size() < 2 ? 0 : std::clamp(1 - std::exp(logs.front() - log_sum_exp(logs)), 0.0, 1.0);
 }
 
 StrayFit refit_strays(const StrayData& data, const Residuals& residuals,

@@ -40,6 +40,10 @@ struct StrayFit {
 double stray_score(const StrayData& data, std::size_t trial, const Eigen::Vector3d& residual,
                    const StrayFit& fit);
 
+// The chance that it strayed, by its residual.
+double stray_chance(const StrayData& data, std::size_t trial, const Eigen::Vector3d& residual,
+                    const StrayFit& fit);
+
 // The kind that explains most of the residuals of the trials with learn[i]; none that explains
 // `least_gain` nats: nothing.
 std::optional<StrayFit> fit_strays(const StrayData& data, const Residuals& residuals,

@@ -111,10 +111,11 @@ const pageTrials = readTrials();
 if (pageTrials.length) {
   startDrives(pageTrials);
   startFloor(pageTrials);
+  startStrays(pageTrials);
   startPoses(pageTrials);
   startResiduals(pageTrials, PAGE.where || []);
 } else {
-  for (const id of ["floor-plot", "drive-plots", "pose-plots", "residual-plots"]) {
+  for (const id of ["floor-plot", "stray-plots", "drive-plots", "pose-plots", "residual-plots"]) {
     const place = document.getElementById(id);
     if (place) place.textContent = PAGE.without_trials;
   }

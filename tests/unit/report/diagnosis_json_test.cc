@@ -133,7 +133,8 @@ TEST(DiagnosisJson, KeepsTheShapeOfWhatHasNoName) {
       0.6,
       0.5,
       0.7,
-      "so"};
+      "so",
+      {0.25, 1}};
   d.nearest = {{{"camera_seam", "floor_tilt"}, 120, 44, "start place", "why"}};
   const auto back = parse_diagnosis(to_json(d));
   ASSERT_TRUE(back.ok()) << back.error().message;

@@ -100,6 +100,30 @@ TEST(StrayFit, FindsWhatStraysAndHowOften) {
   }
 }
 
+// Most of those that were read late look late, and hardly another.
+TEST(StrayFit, TellsWhichTheyWere) {
+  const StrayDrives truth{StrayKind::kLate, 0.25, 0.3, 0.32, 0, 0, 0, 0};
+  const StrayLog log = draw_strays(11, 400, &truth);
+  const StrayFit perfect{truth, kTrue, 0, 0};
+  double late = 0, told = 0, both = 0;
+  for (std::size_t i = 0; i < log.data.size(); ++i) {
+    const LoggedMotion& facts = log.data.facts[i];
+    const Pose went =
+        log.data.ends[i] * Pose{log.residuals[i][0], log.residuals[i][1], log.residuals[i][2]};
+    const Pose on_time = log.data.ends[i];
+    const Pose read_late = stray_end(truth, facts, on_time, 0.31, true);
+    const bool was_late =
+        local_difference(read_late, went).norm() < local_difference(on_time, went).norm();
+    const bool is_told = stray_chance(log.data, i, log.residuals[i], perfect) > 0.5;
+    late += was_late;
+    told += is_told;
+    both += was_late && is_told;
+  }
+  EXPECT_NEAR(told / 400, 0.25, 0.06);
+  EXPECT_GT(both, 0.9 * late);
+  EXPECT_GT(both, 0.9 * told);
+}
+
 TEST(StrayFit, MeasuresTheRobotThatTurns) {
   const StrayDrives truth{StrayKind::kSide, 0.2, -0.4, 0, 0, 0, kSpeed_m_s, kGauge_m};
   const auto found = fit(draw_strays(5, 300, &truth));
