@@ -65,8 +65,7 @@ ResidualField in_world(ResidualField field, const Eigen::Vector2d& origin) {
 std::string residual_sentence(const FoundResidual& found) {
   if (found.correction.empty()) {
     return "Corrections of what is left were tried, smooth ones and of single drives that stray; "
-           "none surely helps on trials that its "
-           "fit did not see, so none is kept.";
+           "none surely helps on trials that no fit saw, so none is kept.";
   }
   std::vector<std::string> terms;
   for (const ResidualTerm& term : found.correction.field) terms.push_back(term_words(term));
