@@ -1,10 +1,11 @@
 // A share of drives that stray for a reason that nobody knows, as a part of the correction.
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <numbers>
 
 #include "common/score/logged_motions.h"
-#include "common/score/statistics.h"
 #include "master/diagnose/digits.h"
 #include "master/diagnose/report_parts.h"
 #include "master/diagnose/step_parts.h"

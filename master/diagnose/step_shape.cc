@@ -83,7 +83,10 @@ struct TriedShape {
   std::size_t nested = 0;
   Residual residual;  // empty: none helps
   std::vector<double> without_it, with_it;
-  NoiseEstimate noise;          // of predictions beside it
+  NoiseEstimate noise;  // of predictions beside it
+  // What the smooth part leaves, and of that what may stray.
+  Study beside;
+  StrayLesson lesson;
   std::vector<double> chances;  // of every trial to have strayed
 };
 
@@ -119,7 +122,6 @@ StrayLesson lesson_about(const ResidualData& data, const JointFit& told, const R
 
 // Each model with the noise that it leaves.
 TriedShape try_shape(const Inquiry& of, const Refit& refit, std::size_t k) {
-  const Explanation& named = refit.judged.named;
   const JointFit& last = refit.nested[k].fit;
   const JointFit& told = refit.final_fit ? *refit.final_fit : last;
   const Study& study = refit.nested[k].study;
@@ -134,7 +136,9 @@ TriedShape try_shape(const Inquiry& of, const Refit& refit, std::size_t k) {
   const ResidualFit fit = fit_residual(data, told.residuals, [&](std::size_t fold) {
     return left_without(study, last, folds, fold);
   });
-  TriedShape tried{k, {fit.field, {}}, {}, {}, {}, {}};
+  TriedShape tried;
+  tried.nested = k;
+  tried.residual.field = fit.field;
   const double share = of.outlier_share();
   const std::vector<Eigen::Vector3d> before = held_out_residuals(study, last, folds);
   std::vector<Eigen::Vector3d> after = before;
@@ -145,13 +149,19 @@ TriedShape try_shape(const Inquiry& of, const Refit& refit, std::size_t k) {
   }
   tried.without_it = tried.with_it = scores_of(study, before, share);
   if (!fit.field.empty()) predict_beside(of, refit, after, &beside, &tried);
-  if (named.names_strays()) return tried;
-  const auto astray = look_astray(of, beside, lesson_about(data, told, fit, after));
+  tried.lesson = lesson_about(data, told, fit, after);
+  tried.beside = std::move(beside);
+  return tried;
+}
+
+TriedShape with_strays(const Inquiry& of, const Refit& refit, TriedShape tried) {
+  if (refit.judged.named.names_strays()) return tried;
+  auto astray = look_astray(of, tried.beside, tried.lesson);
   if (!astray || !clearly_better(astray->scores, tried.with_it)) return tried;
   tried.residual.strays = astray->strays;
-  tried.with_it = astray->scores;
+  tried.with_it = std::move(astray->scores);
   tried.noise = astray->noise;
-  tried.chances = astray->chances;
+  tried.chances = std::move(astray->chances);
   return tried;
 }
 
@@ -178,7 +188,7 @@ Refit add_shape(const Inquiry& of, const Refit& refit) {
   if (!unexplained || !possible) return with;
   FoundResidual& found = with.shape.emplace();
   found.text = residual_sentence(found);
-  const TriedShape tried = best_shape(of, refit);
+  const TriedShape tried = with_strays(of, refit, best_shape(of, refit));
   if (tried.residual.empty() || !clearly_better(tried.with_it, refit.nested.back().scores))
     return with;
   const auto n = static_cast<double>(tried.with_it.size());
