@@ -40,9 +40,10 @@ std::string stray_words(const StrayDrives& strays) {
   switch (strays.kind) {
     case StrayKind::kSide:
       return some + "one side's speed were changed by " + percent(strays.least) + " to " +
-             percent(strays.most);
+             percent(strays.most) + " (of all others both sides' by " + percent(strays.rest) + ")";
     case StrayKind::kLate:
-      return some + "the end had been read " + lo + " to " + hi + " s too early";
+      return some + "the end had been read " + lo + " to " + hi + " s too early (all others " +
+             digits(strays.rest) + " s)";
     case StrayKind::kTurned:
       return percent(strays.share) +
              " of drives after a move end as if the start's heading were off by up to " + hi +
