@@ -1,9 +1,7 @@
 #include "common/config/residual_section.h"
 
-#include <array>
 #include <cmath>
 #include <optional>
-#include <utility>
 
 #include "common/trials/csv.h"
 
@@ -11,17 +9,6 @@ namespace gapfarm {
 namespace {
 
 constexpr const char* kAll = "all";
-
-// What [residual.strays] has beside its kind; what is left out is 0.
-std::array<std::pair<const char*, double*>, 7> stray_keys(StrayDrives& s) {
-  return {{{"share", &s.share},
-           {"least", &s.least},
-           {"most", &s.most},
-           {"rest", &s.rest},
-           {"direction", &s.direction_rad},
-           {"speed", &s.speed_m_s},
-           {"gauge", &s.gauge_m}}};
-}
 
 std::vector<std::string> covariate_names() {
   std::vector<std::string> names;
@@ -87,12 +74,13 @@ ResidualTerm read_term(TomlSection& section, const Model& model) {
   return term;
 }
 
+// What is left out is 0.
 void read_strays(TomlSection& section, Model& model) {
   auto read = section.section("strays");
   if (!read) return;
   StrayDrives strays;
   strays.kind = static_cast<StrayKind>(read->choice("kind", stray_kind_words()).value_or(0));
-  for (const auto& [key, value] : stray_keys(strays)) {
+  for (const auto& [key, value] : stray_values(strays)) {
     *value = read->number(key, -1e3, 1e3).value_or(*value);
   }
   read->finish();
@@ -102,7 +90,7 @@ void read_strays(TomlSection& section, Model& model) {
 std::string strays_text(StrayDrives strays) {
   std::string text = "\n[residual.strays]\nkind = \"" +
                      stray_kind_words()[static_cast<std::size_t>(strays.kind)] + "\"\n";
-  for (const auto& [key, value] : stray_keys(strays)) {
+  for (const auto& [key, value] : stray_values(strays)) {
     if (*value != 0) text += std::string(key) + " = " + format_double(*value) + "\n";
   }
   return text;

@@ -55,6 +55,16 @@ const std::vector<std::string>& stray_kind_words() {
   return words;
 }
 
+std::array<std::pair<const char*, double*>, 7> stray_values(StrayDrives& strays) {
+  return {{{"share", &strays.share},
+           {"least", &strays.least},
+           {"most", &strays.most},
+           {"rest", &strays.rest},
+           {"direction", &strays.direction_rad},
+           {"speed", &strays.speed_m_s},
+           {"gauge", &strays.gauge_m}}};
+}
+
 bool may_stray(const StrayDrives& strays, const LoggedMotion& facts) {
   return strays.kind != StrayKind::kTurned || facts.moved;
 }

@@ -7,8 +7,10 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "common/pose/pose.h"
@@ -36,6 +38,9 @@ struct StrayDrives {
 
   bool operator==(const StrayDrives&) const = default;
 };
+
+// Every number of it, by the key that model.toml and diagnosis.json have for it.
+std::array<std::pair<const char*, double*>, 7> stray_values(StrayDrives& strays);
 
 // Where a drive that would end at `X_WE` may end.
 struct StrayWay {

@@ -90,19 +90,9 @@ Status read_term(const Json& json, const std::string& path, ResidualTerm* term) 
   return {};
 }
 
-constexpr auto kStrays = [](auto& v, auto& s) {
-  v.field("share", s.share);
-  v.field("least", s.least);
-  v.field("most", s.most);
-  v.field("rest", s.rest);
-  v.field("direction", s.direction_rad);
-  v.field("speed", s.speed_m_s);
-  v.field("gauge", s.gauge_m);
-};
-
-Json strays_json(const StrayDrives& strays) {
+Json strays_json(StrayDrives strays) {
   Json json = {{"kind", stray_kind_words()[static_cast<std::size_t>(strays.kind)]}};
-  json.update(FieldWriter::written(strays, kStrays));
+  for (const auto& [key, value] : stray_values(strays)) json[key] = *value;
   return json;
 }
 
@@ -110,7 +100,7 @@ Status read_strays(const Json& json, StrayDrives* strays) {
   std::string error, kind;
   Fields fields(json, "residual.strays", error);
   fields.field("kind", kind);
-  kStrays(fields, *strays);
+  for (const auto& [key, value] : stray_values(*strays)) fields.field(key, *value);
   if (!error.empty()) return Error{error};
   const std::vector<std::string>& words = stray_kind_words();
   const auto at = std::find(words.begin(), words.end(), kind);

@@ -37,33 +37,14 @@ struct Range {
 double half_of(const StrayDrives& s) { return (s.most - s.least) / 2; }
 double middle_of(const StrayDrives& s) { return (s.most + s.least) / 2; }
 
-Range half_range(StrayKind kind) {
-  switch (kind) {
-    case StrayKind::kSide:
-      return {0.01, 0.45};
-    case StrayKind::kLate:
-      return {0.002, 0.5};
-    case StrayKind::kTurned:
-      return {0.02, 3};
-    case StrayKind::kShifted:
-      return {5e-4, 0.3};
-  }
-  return {0, 0};
-}
-
-Range middle_range(StrayKind kind) {
-  switch (kind) {
-    case StrayKind::kSide:
-      return {-0.5, 0.5};
-    case StrayKind::kLate:
-      return {0, 1};
-    case StrayKind::kTurned:
-      return {0, 0};
-    case StrayKind::kShifted:
-      return {0.301, 1};
-  }
-  return {0, 0};
-}
+// In the order of the kinds.
+struct Reach {
+  Range half, middle;
+};
+constexpr Reach kReaches[] = {{{0.01, 0.45}, {-0.5, 0.5}},
+                              {{0.002, 0.5}, {0, 1}},
+                              {{0.02, 3}, {0, 0}},
+                              {{5e-4, 0.3}, {1e-3, 1}}};
 
 Search search_from(const StrayNoise& noise, const StrayDrives* strays) {
   Search search;
@@ -72,13 +53,13 @@ Search search_from(const StrayNoise& noise, const StrayDrives* strays) {
                std::log(kMostDeviation), 0.2);
   }
   if (strays == nullptr) return search;
-  const Range half = half_range(strays->kind), middle = middle_range(strays->kind);
+  const auto [half, middle] = kReaches[static_cast<std::size_t>(strays->kind)];
   search.add(std::log(strays->share / (1 - strays->share)), -6, 1, 0.5);
   search.add(std::log(std::max(half_of(*strays), half.least)), std::log(half.least),
              std::log(half.most), 0.4);
   if (strays->kind == StrayKind::kTurned) return search;
   if (strays->kind == StrayKind::kShifted) {
-    search.add(std::log(middle_of(*strays)), std::log(1e-3), std::log(1.0), 0.3);
+    search.add(std::log(middle_of(*strays)), std::log(middle.least), std::log(middle.most), 0.3);
     search.add(strays->direction_rad, -7, 7, 0.2);
     return search;
   }

@@ -20,6 +20,16 @@ ResidualField leftward() {
   return {term};
 }
 
+// As little noise as there may be.
+Problem quiet_problem() {
+  Problem problem = small_problem(0);
+  for (const char* key :
+       {"drive_noise_common", "drive_noise_side", "pose_noise_position", "pose_noise_heading"}) {
+    tests::value(problem, key) = srv1_table()[srv1_table().row(key)].lower;
+  }
+  return problem;
+}
+
 v1::TaskResult answer_of(const Problem& problem, const v1::Task& task) {
   const auto prepared = prepare(to_proto(problem));
   EXPECT_TRUE(prepared.ok());
@@ -80,11 +90,7 @@ TEST(ResidualOfAWorker, SomeTrialsAreAnsweredAsAllAre) {
 }
 
 TEST(ResidualOfAWorker, SimulatedSessionsHaveIt) {
-  Problem problem = small_problem(0);
-  for (const char* key :
-       {"drive_noise_common", "drive_noise_side", "pose_noise_position", "pose_noise_heading"}) {
-    tests::value(problem, key) = srv1_table()[srv1_table().row(key)].lower;
-  }
+  Problem problem = quiet_problem();
   v1::Task task;
   task.mutable_simulate()->set_path_interval(0.1);
   for (int i = 0; i < 2; ++i) {
@@ -132,11 +138,7 @@ TEST(ResidualOfAWorker, StraysAreWaysOfTheirOwn) {
 
 // Of many simulated drives as many stray as are said to, and only what is read of them.
 TEST(ResidualOfAWorker, SimulatedSessionsStray) {
-  Problem problem = small_problem(0);
-  for (const char* key :
-       {"drive_noise_common", "drive_noise_side", "pose_noise_position", "pose_noise_heading"}) {
-    tests::value(problem, key) = srv1_table()[srv1_table().row(key)].lower;
-  }
+  Problem problem = quiet_problem();
   v1::Task task;
   constexpr int kDrives = 200;
   for (int i = 0; i < kDrives; ++i) {
