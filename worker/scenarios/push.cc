@@ -97,7 +97,7 @@ Prediction PushModelOfLog::predict(const ParameterValues& values,
     const Piece& piece = problem_.piece(trial.command);
     const auto index = static_cast<std::size_t>(&piece - problem_.pieces.data());
     PushedPiece& pushed = pieces.try_emplace(index, piece, index, values).first->second;
-    const Pose X_WR = pushed.effects().place(pushed.effects().recover(trial.X_WS));
+    const Pose X_WR = pushed.start_of(trial.X_WS);
     std::vector<Pose> ends;
     double slid_m = 0;
     for (const Eigen::Vector3d& o : offsets(noise, options, i)) {
@@ -110,7 +110,7 @@ Prediction PushModelOfLog::predict(const ParameterValues& values,
         prediction.trials.clear();
         return prediction;
       }
-      ends.push_back(pushed.effects().observe(push.X_WE));
+      ends.push_back(pushed.observe(push.X_WE));
       slid_m += push.slid_m;
       MotionFacts& worst = prediction.facts[index];
       const Motion& m = push.motion;

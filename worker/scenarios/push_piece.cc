@@ -45,8 +45,19 @@ PushSettings push_settings(const Piece& piece, std::size_t index, const Paramete
 PushedPiece::PushedPiece(const Piece& piece, std::size_t index, const ParameterValues& values)
     : piece_(piece),
       effects_(push_table(), values),
+      camera_scale_(at(values, gapfarm::Push::kCameraScale)),
       X_RC_{centroid(piece)[0], centroid(piece)[1], 0},
       simulator_(push_settings(piece, index, values, effects_)) {}
+
+Pose PushedPiece::start_of(const Pose& X_WM) const {
+  return effects_.place(
+      effects_.recover({X_WM.x / camera_scale_, X_WM.y / camera_scale_, X_WM.theta}));
+}
+
+Pose PushedPiece::observe(const Pose& X_WR) const {
+  const Pose X_WM = effects_.observe(X_WR);
+  return {X_WM.x * camera_scale_, X_WM.y * camera_scale_, X_WM.theta};
+}
 
 PushedPiece::Push PushedPiece::push(const Pose& X_WR, std::span<const TipSample> tip,
                                     std::vector<PathSample>* path, double interval_s) {

@@ -32,7 +32,10 @@ class PushedPiece {
   PushedPiece(const Piece& piece, std::size_t index, const ParameterValues& values);
 
   const Piece& piece() const { return piece_; }
-  const ActiveEffects& effects() const { return effects_; }
+  // The true start of a piece logged there, what is logged of a true pose, and of a true start.
+  Pose start_of(const Pose& X_WM) const;
+  Pose observe(const Pose& X_WR) const;
+  Pose logged_start(const Pose& X_WR) const { return effects_.unplace(X_WR); }
 
   struct Push {
     v1::Outcome outcome = v1::OK;
@@ -50,6 +53,7 @@ class PushedPiece {
  private:
   const Piece& piece_;
   ActiveEffects effects_;
+  double camera_scale_;  // logged lengths over true ones
   Pose X_RC_;  // centroid in the log's frame
   PushSimulator simulator_;
   double simulated_s_ = 0;

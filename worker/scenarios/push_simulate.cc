@@ -64,17 +64,17 @@ class PushSession {
     const double dx = aside * stream.normal();
     const double dy = aside * stream.normal();
     push.X_WE = push.X_WE * Pose{dx, dy, turned * stream.normal()};
-    trial.X_WS = measured(piece.effects(), piece.effects().unplace(X_WR), stream);
-    trial.X_WE = measured(piece.effects(), push.X_WE, stream);
+    trial.X_WS = measured(piece, piece.logged_start(X_WR), stream);
+    trial.X_WE = measured(piece, push.X_WE, stream);
     for (const PathSample& s : path) {
-      trial.path.push_back({s.t_s, measured(piece.effects(), s.pose, stream)});
+      trial.path.push_back({s.t_s, measured(piece, s.pose, stream)});
     }
     *logged = to_proto(trial);
     return v1::OK;
   }
 
-  Pose measured(const ActiveEffects& effects, const Pose& X_WR, Stream& stream) const {
-    const Pose X_WM = effects.observe(X_WR);
+  Pose measured(const PushedPiece& piece, const Pose& X_WR, Stream& stream) const {
+    const Pose X_WM = piece.observe(X_WR);
     const double x = X_WM.x + noise_.pose.position_m * stream.normal();
     const double y = X_WM.y + noise_.pose.position_m * stream.normal();
     return {x, y, wrap_angle(X_WM.theta + noise_.pose.heading_rad * stream.normal())};
@@ -108,7 +108,7 @@ v1::TaskResult trace_push(const Problem& problem, const ParameterValues& values,
   const Trial& trial = problem.log.trials[task.trial()];
   const Piece& piece = problem.piece(trial.command);
   PushedPiece pushed(piece, static_cast<std::size_t>(&piece - problem.pieces.data()), values);
-  Pose X_WR = pushed.effects().place(pushed.effects().recover(trial.X_WS));
+  Pose X_WR = pushed.start_of(trial.X_WS);
   if (task.noisy()) {
     const PushNoise noise = push_noise(values);
     Stream stream({task.stream().run_seed(), Purpose::kSimulation, task.stream().generation(),
