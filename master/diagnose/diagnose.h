@@ -12,7 +12,7 @@
 #include "common/base/result.h"
 #include "common/problem/problem.h"
 #include "master/diagnose/diagnosis.h"
-#include "master/diagnose/predictor.h"
+#include "master/infer/predictor.h"
 #include "master/farm/farm.h"
 #include "master/progress/finding.h"
 

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "master/diagnose/diagnose.h"
-#include "master/diagnose/predictor.h"
+#include "master/infer/predictor.h"
 #include "master/diagnose/subject.h"
 
 namespace gapfarm::steps {

@@ -4,7 +4,7 @@
 #include <cstddef>
 
 #include "common/base/result.h"
-#include "master/diagnose/predictor.h"
+#include "master/infer/predictor.h"
 #include "master/diagnose/study.h"
 
 namespace gapfarm {

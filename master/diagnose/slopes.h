@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "common/base/result.h"
-#include "master/diagnose/predictor.h"
+#include "master/infer/predictor.h"
 #include "master/diagnose/study.h"
 
 namespace gapfarm {

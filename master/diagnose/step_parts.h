@@ -17,6 +17,9 @@ namespace gapfarm::steps {
 inline constexpr double kSlippedSquared = 11.5;
 inline constexpr int kMostRounds = 6;  // of a fit that does not settle; most need two
 
+// Base and hypotheses searched together, where the scenario has nothing else.
+Result<Screening> compete(const Inquiry& of, const Evidence& measured);
+
 // By paired scores: not by chance, but for one case in twenty.
 bool clearly_better(const std::vector<double>& scores, const std::vector<double>& others);
 

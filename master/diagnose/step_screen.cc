@@ -362,6 +362,7 @@ Result<JointFit> estimate(const Inquiry& of, const Selector& catalogue, const Ex
 }
 
 Result<Screening> screen(const Inquiry& of, const Evidence& measured, bool free_base) {
+  if (of.subject.signatures == nullptr) return compete(of, measured);
   Explanation nothing;
   nothing.evidence = std::make_shared<const Evidence>(measured);
   nothing.frees_base = free_base || !measured.study.on_bounds.empty();

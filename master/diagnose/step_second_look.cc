@@ -54,7 +54,7 @@ Result<std::optional<SecondLook>> look_without_dropped(const Inquiry& of, const 
                                                        const Refit& refit) {
   const Judgement& judged = refit.judged;
   const std::vector<ChosenEffect>& chosen = screening.found.chosen;
-  if (chosen.empty() || !judged.unnamed.empty() || judged.named.names_anything() ||
+  if (of.subject.signatures == nullptr || chosen.empty() || !judged.unnamed.empty() || judged.named.names_anything() ||
       !judged.doubts.empty() || judged.verdict != Verdict::kUnknown) {
     return std::optional<SecondLook>();
   }

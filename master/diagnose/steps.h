@@ -71,6 +71,7 @@ struct Screening {
   std::vector<EffectCandidate> alone;   // of every effect, before anything was chosen
   std::unique_ptr<Selector> catalogue;  // refers to the evidence
   std::optional<SanityFinding> doubt;   // why nothing is to be looked for
+  std::optional<double> explained;      // nats, held out, where hypotheses competed
 };
 
 // What is to be believed of that.

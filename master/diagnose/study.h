@@ -10,7 +10,7 @@
 
 #include "common/base/result.h"
 #include "master/diagnose/drive_base.h"
-#include "master/diagnose/predictor.h"
+#include "master/infer/predictor.h"
 #include "master/diagnose/residuals.h"
 
 namespace gapfarm {

@@ -47,9 +47,9 @@ struct TrialView {
 };
 
 struct DiagnosisSubject {
-  const char* scenario;
-  const EffectDiagnoses* effects;
-  unsigned looks;
+  const char* scenario = nullptr;
+  const EffectDiagnoses* effects = nullptr;
+  unsigned looks = 0;
   // Net log-likelihood (nats over all trials) that an effect must gain to be named, and log10 of
   // the p below which a leftover dependence is no chance: measured on logs without any effect
   // (docs/diagnosis.md).
@@ -79,12 +79,14 @@ struct DiagnosisSubject {
   // Whitened columns, scaled to a prior standard deviation of 1, of what no effect may claim.
   Result<Eigen::MatrixXd> (*nuisances)(Predictor& predictor, Study& study);
   std::vector<CovariateBlock> (*blocks)(const Study& study);
-  Result<std::vector<Signature>> (*signatures)(Predictor& predictor, const Study& study,
-                                               const std::vector<std::string>& left_out);
-  // Of every trial, with the study's base.
+  // Null where base and hypotheses are searched together instead: EffectDiagnosis::searched.
+  Result<std::vector<Signature>> (*signatures)(
+      Predictor& predictor, const Study& study,
+      const std::vector<std::string>& left_out) = nullptr;
+  // Of every trial, with the study's base; null as above, as is `patches`.
   std::vector<PatchReach> (*patch_reach)(const Problem& problem, const Study& study,
-                                         const Patch& patch);
-  PatchSearch (*patches)(Predictor& predictor, const Study& study);
+                                         const Patch& patch) = nullptr;
+  PatchSearch (*patches)(Predictor& predictor, const Study& study) = nullptr;
   // The parts of the log that are predicted from the others, one number a trial.
   std::vector<std::size_t> (*folds)(const Study& study);
 

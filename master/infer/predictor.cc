@@ -1,4 +1,4 @@
-#include "master/diagnose/predictor.h"
+#include "master/infer/predictor.h"
 
 #include <algorithm>
 #include <numeric>

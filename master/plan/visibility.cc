@@ -6,7 +6,7 @@
 
 #include "common/random/stream.h"
 #include "common/score/statistics.h"
-#include "master/diagnose/predictor.h"
+#include "master/infer/predictor.h"
 #include "master/diagnose/subject.h"
 #include "master/plan/selection.h"
 

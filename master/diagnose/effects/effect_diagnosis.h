@@ -14,6 +14,7 @@
 #include "master/diagnose/probes.h"
 #include "master/diagnose/regression.h"
 #include "master/diagnose/signatures.h"
+#include "master/infer/compete.h"
 
 namespace gapfarm {
 
@@ -60,8 +61,22 @@ struct EffectStart {
   const Eigen::VectorXd& coefficients;
 };
 
+// A parameter that a search moves, and the size of it that a careless laboratory has: of the
+// logarithm where only positive values have a meaning.
+struct SearchedSize {
+  const char* key;
+  double size;
+  bool logarithm = false;
+};
+
 struct EffectDiagnosis {
   const char* effect;
+
+  // What is moved where base and effect are searched together; with `polar`, its strength alone.
+  std::vector<SearchedSize> searched = {};
+  // Where such a search begins, beside what the sizes say; null: nowhere else.  Effects with a place
+  // do nothing at their neutral value, and no slope leads away from it.
+  std::vector<infer::Start> (*proposals)(const Study& study) = nullptr;
 
   // Its mark: by steps of parameters, or by probes of its own; without either it is looked for in
   // another way.

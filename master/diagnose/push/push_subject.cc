@@ -24,9 +24,6 @@ DiagnosisSubject push_subject() {
   s.tune = tune_push_base;
   s.nuisances = push_nuisances;
   s.blocks = push_blocks;
-  s.signatures = push_signatures;
-  s.patch_reach = push_patch_reach;
-  s.patches = push_patches;
   s.folds = push_folds;
   s.where = push_where;
   s.cautions = push_cautions;

@@ -28,14 +28,12 @@ Eigen::Matrix3d push_covariance(const ResidualTrial& trial, const NoiseEstimate&
 // what repeats of one push have in common.
 Result<Eigen::MatrixXd> push_nuisances(Predictor& predictor, Study& study);
 std::vector<CovariateBlock> push_blocks(const Study& study);
-Result<std::vector<Signature>> push_signatures(Predictor& predictor, const Study& study,
-                                               const std::vector<std::string>& left_out);
 // Whether the piece, on its way as the base predicts it, comes upon the disc.
 bool piece_crosses(const ResidualTrial& trial, const Patch& patch);
-std::vector<PatchReach> push_patch_reach(const Problem& problem, const Study& study,
-                                         const Patch& patch);
-// Discs simulated over a grid of the table that pieces cross.
-PatchSearch push_patches(Predictor& predictor, const Study& study);
+// Discs of two sizes and two frictions over all that pieces slide across.
+std::vector<infer::Start> push_patch_starts(const Study& study);
+// Lenses that bend either way about the middle of all pushes.
+std::vector<infer::Start> push_lens_starts(const Study& study);
 // Whole cells, dealt in turn.
 std::vector<std::size_t> push_folds(const Study& study);
 std::vector<Where> push_where(const Study& study, std::span<const Eigen::Vector3d> residuals,

@@ -1,0 +1,100 @@
+// A robust fit of some parameters to all observations, by damped Gauss-Newton steps on simulated
+// slopes.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include "common/base/result.h"
+#include "common/pose/pose.h"
+#include "master/infer/space.h"
+
+namespace gapfarm::infer {
+
+// What was measured: a pose an observation, what it varies by, and the part of the data that it is
+// held out with.
+struct Observations {
+  std::vector<Pose> measured;
+  std::vector<Eigen::Matrix3d>
+      whitener;                   // L^-1 of its covariance L L', in the predicted pose's axes
+  std::vector<std::size_t> fold;  // from 0
+
+  std::size_t size() const { return measured.size(); }
+};
+
+// Predicted poses of the observations asked for, at each point; none where a point cannot be
+// simulated.  Errors: the simulation's own, never a point's.
+using Forward = std::function<Result<std::vector<std::optional<std::vector<Pose>>>>(
+    const std::vector<PredictionRequest>& points)>;
+
+// Log density (nats, to a constant) of whitened residuals, three an observation, under Student's t
+// of that scale.
+double robust_score(const Eigen::VectorXd& z, double scale);
+// The scale that makes it greatest.
+double best_scale(const Eigen::VectorXd& z);
+
+struct Fit {
+  Eigen::VectorXd u;            // in the space's coordinates
+  Eigen::VectorXd z;            // whitened residuals
+  Eigen::MatrixXd slopes;       // of z; empty: not known
+  bool fresh = false;           // slopes are of this very point
+  Eigen::VectorXd differences;  // that slopes were taken over, and will be next
+  double scale = 1;             // of the noise, over what the whitener says
+  double score = -INFINITY;     // robust, less what the prior costs, nats
+  double damping = 0;
+  double trust = 1;  // realised over promised gain of the last step
+  bool settled = false;
+};
+
+class Fitter {
+ public:
+  // REQUIRES: all outlive it.  `fixed`: other parameters of every point.
+  Fitter(const Forward& forward, const Observations& observations, Space space, Overrides fixed);
+
+  const Space& space() const { return space_; }
+  // All parameters at a fit.
+  Overrides at(const Eigen::VectorXd& u) const;
+
+  // The score at a point; -infinity where it cannot be simulated.
+  Result<Fit> start(const Eigen::VectorXd& u) const;
+  // The same of several, as one batch.  Where `reach` (ascending) is not empty, only those
+  // observations are simulated, and the others left as in `elsewhere`, whitened residuals.
+  Result<std::vector<Fit>> starts(const std::vector<Eigen::VectorXd>& points,
+                                  const std::vector<std::vector<std::uint32_t>>& reach = {},
+                                  const Eigen::VectorXd& elsewhere = {}) const;
+  // What the next step promises to gain, nats.  REQUIRES: slopes.
+  double promise(const Fit& fit) const;
+  // Steps uphill, at most so many.
+  Status improve(Fit* fit, int steps) const;
+  // Slopes of this very point; the first `known` columns are there.
+  Status differentiate(Fit* fit, Eigen::Index known = 0) const;
+  // Log score of every observation from fits to the other folds, linear steps from this one.
+  // REQUIRES: slopes.
+  std::vector<double> held_out(const Fit& fit) const;
+  // Covariance of the coordinates, from the slopes.
+  Eigen::MatrixXd covariance(const Fit& fit) const;
+
+ private:
+  struct Normal {
+    Eigen::MatrixXd matrix;
+    Eigen::VectorXd right;
+  };
+  Normal normal(const Fit& fit, std::optional<std::size_t> without_fold) const;
+  Eigen::Vector3d residual(std::size_t observation, const Pose& end) const;
+  Eigen::VectorXd whitened(const std::vector<Pose>& ends) const;
+  void judge(Eigen::VectorXd z, Fit* fit) const;
+  // How far a step from there may go.
+  Eigen::VectorXd least_step(const Eigen::VectorXd& u) const;
+  Eigen::VectorXd most_step(const Eigen::VectorXd& u) const;
+  Status step(Fit* fit) const;
+
+  const Forward& forward_;
+  const Observations& observations_;
+  Space space_;
+  Overrides fixed_;
+};
+
+}  // namespace gapfarm::infer

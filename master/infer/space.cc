@@ -1,0 +1,112 @@
+#include "master/infer/space.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "master/infer/settings.h"
+
+namespace gapfarm::infer {
+namespace {
+
+using Kind = Coordinate::Kind;
+
+double least_positive(const Parameter& row) {
+  return row.lower > 0 ? row.lower : kLeastShareOfRange * row.upper;
+}
+
+}  // namespace
+
+Space::Space(const ParameterTable& table, std::vector<Coordinate> coordinates)
+    : table_(&table), coordinates_(std::move(coordinates)) {
+  for (const Coordinate& c : coordinates_) dimensions_ += c.dimensions();
+  lower_ = Eigen::VectorXd::Constant(dimensions_, -INFINITY);
+  upper_ = -lower_;
+  prior_ = Eigen::VectorXd::Zero(dimensions_);
+  Eigen::Index k = 0;
+  for (const Coordinate& c : coordinates_) {
+    const Parameter& row = table[c.row];
+    if (c.has_prior) prior_.segment(k, c.dimensions()).setConstant(1 / std::pow(kPriorSizes, 2));
+    if (c.kind == Kind::kLinear) {
+      lower_[k] = row.lower / c.size;
+      upper_[k] = row.upper / c.size;
+    } else if (c.kind == Kind::kLogarithm) {
+      lower_[k] = std::log(least_positive(row)) / c.size;
+      upper_[k] = std::log(row.upper) / c.size;
+    } else {
+      const double most = c.of_ratio ? std::log(row.upper) : row.upper;
+      lower_.segment<2>(k).setConstant(-most / c.size);
+      upper_.segment<2>(k).setConstant(most / c.size);
+    }
+    k += c.dimensions();
+  }
+}
+
+Eigen::VectorXd Space::from(const Overrides& values) const {
+  const auto value = [&](std::size_t row) {
+    const auto at = values.find(row);
+    return at == values.end() ? (*table_)[row].nominal : at->second;
+  };
+  Eigen::VectorXd u(dimensions_);
+  Eigen::Index k = 0;
+  for (const Coordinate& c : coordinates_) {
+    if (c.kind == Kind::kLinear) {
+      u[k] = value(c.row) / c.size;
+    } else if (c.kind == Kind::kLogarithm) {
+      u[k] = std::log(std::max(value(c.row), least_positive((*table_)[c.row]))) / c.size;
+    } else {
+      const double strength = c.of_ratio ? std::log(value(c.row)) : value(c.row);
+      const double angle = c.symmetry * value(c.direction_row);
+      u[k] = strength * std::cos(angle) / c.size;
+      u[k + 1] = strength * std::sin(angle) / c.size;
+    }
+    k += c.dimensions();
+  }
+  return u.cwiseMax(lower_).cwiseMin(upper_);
+}
+
+Overrides Space::values(const Eigen::VectorXd& u) const {
+  Overrides values;
+  const auto put = [&](std::size_t row, double value) {
+    values[row] = std::clamp(value, (*table_)[row].lower, (*table_)[row].upper);
+  };
+  Eigen::Index k = 0;
+  for (const Coordinate& c : coordinates_) {
+    if (c.kind == Kind::kLinear) {
+      put(c.row, u[k] * c.size);
+    } else if (c.kind == Kind::kLogarithm) {
+      put(c.row, std::exp(u[k] * c.size));
+    } else {
+      const double strength = std::hypot(u[k], u[k + 1]) * c.size;
+      put(c.row, c.of_ratio ? std::exp(strength) : strength);
+      put(c.direction_row, std::atan2(u[k + 1], u[k]) / c.symmetry);
+    }
+    k += c.dimensions();
+  }
+  return values;
+}
+
+Space Space::with(const std::vector<Coordinate>& more) const {
+  std::vector<Coordinate> all = coordinates_;
+  all.insert(all.end(), more.begin(), more.end());
+  return Space(*table_, std::move(all));
+}
+
+Space Space::without(std::size_t first, std::size_t count, Eigen::VectorXd* u) const {
+  std::vector<Coordinate> rest;
+  Eigen::VectorXd kept(u->size());
+  Eigen::Index from = 0, to = 0;
+  for (std::size_t k = 0; k < coordinates_.size(); ++k) {
+    const Eigen::Index dimensions = coordinates_[k].dimensions();
+    if (k < first || k >= first + count) {
+      rest.push_back(coordinates_[k]);
+      kept.segment(to, dimensions) = u->segment(from, dimensions);
+      to += dimensions;
+    }
+    from += dimensions;
+  }
+  *u = kept.head(to);
+  return Space(*table_, std::move(rest));
+}
+
+}  // namespace gapfarm::infer

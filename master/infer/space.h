@@ -1,0 +1,61 @@
+// The coordinates in which a hypothesis is searched: smooth, scaled and without a seam.
+//
+// A strength with a direction is searched as its cosine and sine, what must be positive as its
+// logarithm, and one unit of every coordinate is a size that a careless laboratory has.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <utility>
+#include <vector>
+
+#include "common/parameters/table.h"
+#include "master/infer/predictor.h"
+
+namespace gapfarm::infer {
+
+struct Coordinate {
+  enum class Kind { kLinear, kLogarithm, kPolar };
+  Kind kind = Kind::kLinear;
+  std::size_t row = 0;            // of the parameter table; kPolar: of the strength
+  std::size_t direction_row = 0;  // kPolar
+  double symmetry = 1;            // kPolar: how often the effect looks the same in a full turn
+  bool of_ratio = false;          // kPolar: the strength is the logarithm of a ratio
+  double size = 1;                // of the value, or of its logarithm
+  bool has_prior = false;         // whether values of many sizes are implausible
+
+  Eigen::Index dimensions() const { return kind == Kind::kPolar ? 2 : 1; }
+};
+
+class Space {
+ public:
+  // REQUIRES: the table outlives it.
+  Space(const ParameterTable& table, std::vector<Coordinate> coordinates);
+
+  Eigen::Index dimensions() const { return dimensions_; }
+  // Rows that `values` lacks are at their nominal value.
+  Eigen::VectorXd from(const Overrides& values) const;
+  // Clamped to the table's bounds.
+  Overrides values(const Eigen::VectorXd& u) const;
+  const Eigen::VectorXd& lower() const { return lower_; }
+  const Eigen::VectorXd& upper() const { return upper_; }
+  // Precision of the prior about the neutral value, a dimension.
+  const Eigen::VectorXd& prior() const { return prior_; }
+  // The same with more coordinates behind.
+  Space with(const std::vector<Coordinate>& more) const;
+  // The same without these of its coordinates; `u` loses their dimensions.
+  Space without(std::size_t first, std::size_t count, Eigen::VectorXd* u) const;
+  std::size_t coordinates() const { return coordinates_.size(); }
+  // These alone, of the same table.
+  Space only(std::vector<Coordinate> coordinates) const {
+    return Space(*table_, std::move(coordinates));
+  }
+
+ private:
+  const ParameterTable* table_;
+  std::vector<Coordinate> coordinates_;
+  Eigen::Index dimensions_ = 0;
+  Eigen::VectorXd lower_, upper_, prior_;
+};
+
+}  // namespace gapfarm::infer

@@ -1,0 +1,176 @@
+// Hypotheses compete on a world whose forward model is a formula: what is found is known.
+#include "master/infer/compete.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "common/parameters/push.h"
+#include "common/random/stream.h"
+
+namespace gapfarm::infer {
+namespace {
+
+constexpr std::size_t kObservations = 60;
+constexpr double kNoise = 0.01;
+constexpr double kOutlier = 1.5;  // m; one observation in twelve
+
+std::size_t row(const char* key) { return push_table().row(key); }
+
+double value(const Overrides& at, const char* key) {
+  const auto found = at.find(row(key));
+  return found == at.end() ? push_table()[row(key)].nominal : found->second;
+}
+
+// Ends of pieces that a table pulls along and its friction holds back; a camera that is a
+// saturating function of its offset, so that slopes taken far away point at something else.
+Pose end_of(std::size_t i, const Overrides& at) {
+  const double a = 0.37 * static_cast<double>(i);
+  const double friction = value(at, "finger_friction");
+  const double pull = value(at, "table_tilt.angle"), to = value(at, "table_tilt.direction");
+  const double shift = std::tanh(20 * value(at, "com_offset.x"));
+  return {std::cos(a) * friction + 3 * pull * std::cos(to) * (1 + 0.3 * std::sin(3 * a)),
+          std::sin(a) * friction + 3 * pull * std::sin(to) * (1 + 0.3 * std::sin(3 * a)),
+          shift * std::cos(2 * a)};
+}
+
+Forward forward() {
+  return [](const std::vector<PredictionRequest>& points)
+             -> Result<std::vector<std::optional<std::vector<Pose>>>> {
+    std::vector<std::optional<std::vector<Pose>>> all;
+    for (const PredictionRequest& point : points) {
+      std::vector<Pose> ends;
+      if (point.trials.empty()) {
+        for (std::size_t i = 0; i < kObservations; ++i) ends.push_back(end_of(i, point.at));
+      }
+      for (const std::uint32_t i : point.trials) ends.push_back(end_of(i, point.at));
+      all.push_back(std::move(ends));
+    }
+    return all;
+  };
+}
+
+Observations observed(const Overrides& truth, bool outliers = false) {
+  Observations o;
+  Stream stream({7, Purpose::kStatistics, 0, 0, 0});
+  for (std::size_t i = 0; i < kObservations; ++i) {
+    Pose end = end_of(i, truth);
+    end = end * Pose{kNoise * stream.normal(), kNoise * stream.normal(), kNoise * stream.normal()};
+    if (outliers && i % 12 == 5) end.x += kOutlier;
+    o.measured.push_back(end);
+    o.whitener.push_back(Eigen::Matrix3d::Identity() / kNoise);
+    o.fold.push_back(i % 5);
+  }
+  return o;
+}
+
+Coordinate friction() {
+  Coordinate c;
+  c.kind = Coordinate::Kind::kLogarithm;
+  c.row = row("finger_friction");
+  c.size = 0.5;
+  return c;
+}
+
+Hypothesis tilt() {
+  Coordinate c;
+  c.kind = Coordinate::Kind::kPolar;
+  c.row = row("table_tilt.angle");
+  c.direction_row = row("table_tilt.direction");
+  c.size = 0.03;
+  c.has_prior = true;
+  return {"table_tilt", {c}, {}, true};
+}
+
+Hypothesis offset() {
+  Coordinate c;
+  c.row = row("com_offset.x");
+  c.size = 0.003;
+  c.has_prior = true;
+  return {"com_offset", {c}, {}, true};
+}
+
+Model base_of(const Forward& f, const Observations& o) {
+  const Space space(push_table(), {friction()});
+  const Fitter fitter(f, o, space, {});
+  Fit fit = fitter.start(space.from({{row("finger_friction"), 0.2}})).value();
+  EXPECT_TRUE(fitter.improve(&fit, 20));
+  return model_of(f, o, space, std::move(fit)).value();
+}
+
+TEST(InferSpace, GoesThereAndBack) {
+  const Space space = Space(push_table(), {friction()}).with(tilt().coordinates);
+  const Overrides values = {{row("finger_friction"), 0.31},
+                            {row("table_tilt.angle"), 0.05},
+                            {row("table_tilt.direction"), -2.1}};
+  const Overrides back = space.values(space.from(values));
+  for (const auto& [r, v] : values) EXPECT_NEAR(back.at(r), v, 1e-12) << push_table()[r].key;
+}
+
+TEST(InferSpace, ADirectionHasNoSeam) {
+  const Space space(push_table(), tilt().coordinates);
+  const double pi = std::numbers::pi;
+  const auto at = [&](double direction) {
+    return space.from({{row("table_tilt.angle"), 0.05}, {row("table_tilt.direction"), direction}});
+  };
+  EXPECT_LT((at(pi - 1e-6) - at(-pi + 1e-6)).norm(), 1e-4);
+}
+
+TEST(InferFit, FindsTheValueDespiteOutliers) {
+  const Forward f = forward();
+  const Observations o = observed({{row("finger_friction"), 0.6}}, /*outliers=*/true);
+  const Model base = base_of(f, o);
+  EXPECT_NEAR(base.space.values(base.fit.u).at(row("finger_friction")), 0.6, 0.01);
+  EXPECT_LT(base.fit.scale, 2);
+}
+
+TEST(InferCompete, NamesWhatActsWithItsSize) {
+  const Forward f = forward();
+  const Observations o = observed({{row("finger_friction"), 0.6},
+                                   {row("table_tilt.angle"), 0.08},
+                                   {row("table_tilt.direction"), 2.9}},
+                                  /*outliers=*/true);
+  const std::vector<Hypothesis> both = {offset(), tilt()};
+  const auto contest = compete(f, o, base_of(f, o), both, {}, nullptr);
+  ASSERT_TRUE(contest) << contest.error().message;
+  ASSERT_FALSE(contest->contenders.empty());
+  const Contender& best = contest->contenders.front();
+  EXPECT_EQ(both[best.hypothesis].name, "table_tilt");
+  EXPECT_GT(best.gain, 10 * best.gain_se / 2);
+  const Overrides at = best.model.space.values(best.model.fit.u);
+  EXPECT_NEAR(at.at(row("table_tilt.angle")), 0.08, 0.004);
+  EXPECT_NEAR(at.at(row("table_tilt.direction")), 2.9, 0.05);
+}
+
+TEST(InferCompete, NothingIsGainedWhereNothingActs) {
+  const Forward f = forward();
+  const Observations o = observed({{row("finger_friction"), 0.6}});
+  const auto contest = compete(f, o, base_of(f, o), {offset(), tilt()}, {}, nullptr);
+  ASSERT_TRUE(contest) << contest.error().message;
+  for (const Contender& c : contest->contenders) EXPECT_LT(c.gain, kLeastPromise);
+}
+
+// What the world's frame is must not matter: a quarter turn of the cause turns the answer.
+TEST(InferCompete, TurnsWithTheCause) {
+  const Forward f = forward();
+  for (const double direction : {-1.5, 0.0, 1.5, 3.0}) {
+    const Observations o = observed({{row("finger_friction"), 0.6},
+                                     {row("table_tilt.angle"), 0.06},
+                                     {row("table_tilt.direction"), direction}});
+    const auto contest = compete(f, o, base_of(f, o), {tilt()}, {}, nullptr);
+    ASSERT_TRUE(contest) << contest.error().message;
+    ASSERT_EQ(contest->contenders.size(), 1u) << direction;
+    const Model& model = contest->contenders.front().model;
+    EXPECT_NEAR(model.space.values(model.fit.u).at(row("table_tilt.direction")), direction, 0.05);
+  }
+}
+
+TEST(InferCompete, PairedGainsKnowTheirError) {
+  const PairedGain gain = paired_gain({1, 2, 3, 2}, {0, 1, 2, 1});
+  EXPECT_DOUBLE_EQ(gain.sum, 4);
+  EXPECT_DOUBLE_EQ(gain.se, 0);
+}
+
+}  // namespace
+}  // namespace gapfarm::infer
