@@ -47,8 +47,8 @@ std::string command_tiles(const CommandRecord& r) {
       running ? "Time left" : "Took",
       running ? (r.time_left_s ? "about " + format_duration(*r.time_left_s) : "not known yet")
               : format_duration(r.heartbeat_unix_s - r.began_unix_s),
-      simulates ? fmt::format("{} simulated, {} at hand; {} simulations/s", r.simulated,
-                              r.remembered, number_text(r.rate_per_s))
+      simulates ? fmt::format("{} simulated, {} at hand{}", r.simulated, r.remembered,
+                              rate_text(r.rate_per_s))
                 : "nothing is simulated so far");
   return html + "</dl>";
 }
