@@ -29,14 +29,28 @@ EndCause cause_of(v1::ProcessEnd end) {
 }
 
 bool drop_holding(WorkerRecord& worker, std::uint64_t attempt) {
-  const auto at = std::find_if(worker.holds.begin(), worker.holds.end(),
-                               [&](const Holding& h) { return h.attempt == attempt; });
+auto find_holding(WorkerRecord& worker, std::uint64_t attempt) {
+  return std::find_if(worker.holds.begin(), worker.holds.end(),
+                      [&](const Holding& h) { return h.attempt == attempt; });
+}
+
+  const auto at = find_holding(worker, attempt);
   if (at == worker.holds.end()) return false;
   worker.holds.erase(at);
   return true;
 }
 
 }  // namespace
+// A task that the worker held has come back after `wall` s of work.
+void note_pace(WorkerRecord& worker, std::uint64_t attempt, double wall, double now) {
+  constexpr double kNewest = 0.1;  // weight
+  const auto at = find_holding(worker, attempt);
+  if (!std::isfinite(wall) || wall < 0 || at == worker.holds.end()) return;
+  worker.mean_wall =
+      worker.mean_wall < 0 ? wall : worker.mean_wall + kNewest * (wall - worker.mean_wall);
+  worker.turnaround += kNewest * (now - at->since - worker.turnaround);
+}
+
 
 Scheduler::Scheduler(SchedulerOptions options)
     : options_(std::move(options)),
@@ -122,11 +136,11 @@ void Scheduler::on_message(const std::string& peer, v1::Envelope* envelope, doub
       on_heartbeat(*worker, envelope->heartbeat(), now);
       break;
     case v1::Envelope::kResult:
-      on_result(*worker, envelope->mutable_result());
+      on_result(*worker, envelope->mutable_result(), now);
       break;
     case v1::Envelope::kResults:
       for (v1::JobResult& result : *envelope->mutable_results()->mutable_results()) {
-        if (!on_result(*worker, &result)) return;
+        if (!on_result(*worker, &result, now)) return;
       }
       on_dropped(*worker, envelope->results());
       break;
@@ -207,7 +221,7 @@ void Scheduler::on_heartbeat(WorkerRecord& worker, const v1::Heartbeat& heartbea
   keep_only(worker, heartbeat.attempts(), now - options_.silence_limit_s);
 }
 
-bool Scheduler::on_result(WorkerRecord& worker, v1::JobResult* result) {
+bool Scheduler::on_result(WorkerRecord& worker, v1::JobResult* result, double now) {
   if (result->epoch() != options_.epoch) {
     ++counts_.foreign;
     return true;
@@ -232,12 +246,10 @@ bool Scheduler::on_result(WorkerRecord& worker, v1::JobResult* result) {
   if (options_.on_job) {
     options_.on_job({true, result->job_id(), attempt, worker.name, worker.host});
   }
-  if (!std::isfinite(wall) || wall < 0) return true;
-  worker.mean_wall =
-      worker.mean_wall < 0 ? wall : worker.mean_wall + 0.1 * (wall - worker.mean_wall);
   return true;
 }
 
+  if (committed.kind != Commit::kForeign) note_pace(worker, attempt, wall, now);
 void Scheduler::on_committed(const Committed& committed) {
   if (committed.kind == Commit::kForeign) ++counts_.foreign;
   if (committed.kind == Commit::kLate) ++counts_.late;
