@@ -43,9 +43,10 @@ ProcessPoolOptions pool_options(const SupervisorOptions& options) {
     // One speaks for all: the first place's.
     if (name.rfind(prefix + "-1.", 0) == 0) all.push_back("--announce");
     if (replaced != nullptr) {
-      all.insert(all.end(), {"--replaces", replaced->name, "--replaced-end", word(replaced->cause),
-                             "--replaced-epoch", std::to_string(replaced->epoch),
-                             "--replaced-attempt", std::to_string(replaced->attempt)});
+      all.insert(all.end(),
+                 {"--replaces", replaced->name, "--replaced-end", word(replaced->cause),
+                  "--replaced-epoch", std::to_string(replaced->epoch), "--replaced-attempt",
+                  std::to_string(replaced->attempt), "--replaced-failure", replaced->failure});
     }
     if (std::isfinite(deadline)) {
       const double left = std::max(deadline - monotonic_seconds(), 0.001);

@@ -29,6 +29,12 @@ std::string shown_line(std::string text) {
   return "'" + text + (cut ? "...'" : "'");
 }
 
+std::string shell_quoted(const std::string& word) {
+  std::string text = "'";
+  for (const char c : word) text += c == '\'' ? "'\\''" : std::string(1, c);
+  return text + "'";
+}
+
 std::string in_seconds(double seconds) {
   char text[32];
   std::snprintf(text, sizeof text, "%g s", seconds);
@@ -67,6 +73,14 @@ LineProgram::~LineProgram() { kill(); }
 std::string LineProgram::name() const {
   std::string text;
   for (const std::string& word : words_) text += (text.empty() ? "" : " ") + word;
+  return text;
+}
+
+std::string LineProgram::by_hand(const std::vector<std::string>& lines) const {
+  std::string text = "cd " + shell_quoted(folder_.empty() ? "." : folder_) + " && printf '%s\\n'";
+  for (const std::string& line : lines) text += " " + shell_quoted(line);
+  text += " |";
+  for (const std::string& word : words_) text += " " + shell_quoted(word);
   return text;
 }
 

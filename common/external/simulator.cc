@@ -53,12 +53,16 @@ Result<ExternalAnswer> ExternalSimulator::simulate(ExternalRequest& request,
                  "and give every machine the same program"};
   }
   request.id = ++asked_;
-  const Result<std::string> line = program_.ask(request_line(request));
-  if (!line) return line.error();
+  const std::string question = request_line(request);
+  const auto failed = [&](const std::string& what) {
+    return Error{what + "\nby hand: " + program_.by_hand({hello_line(), question})};
+  };
+  const Result<std::string> line = program_.ask(question);
+  if (!line) return failed(line.error().message);
   Result<ExternalAnswer> answer = parse_answer(*line, request);
   if (answer) return answer;
   program_.kill();
-  return Error{"external program '" + program_.name() + "' " + answer.error().message};
+  return failed("external program '" + program_.name() + "' " + answer.error().message);
 }
 
 }  // namespace gapfarm

@@ -143,6 +143,8 @@ ProcessEnded ProcessPool::ended(Place& place, int status, double now) {
   end.text = text_of(place.name, place.pid, status);
   end.epoch = (*place.page)->epoch.load();
   end.attempt = (*place.page)->attempt.load();
+  end.failure = (*place.page)->reported_failure();
+  if (!end.failure.empty()) end.text += ": " + first_line(end.failure);
   if (place.verdict) {
     end.text += place.verdict == EndCause::kHung
                     ? " by its parent: its simulation made no step for too long"

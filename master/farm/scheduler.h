@@ -80,6 +80,7 @@ struct WorkerEnd {
   std::uint64_t epoch = 0;
   std::uint64_t attempt = 0;  // 0: nothing
   std::string text;
+  std::string failure = {};  // what it reported of why it ended (ProcessEnded)
 };
 
 struct Outgoing {
@@ -145,6 +146,7 @@ class Scheduler {
   // Gives back what the worker holds but `keeps`, if it holds it for longer than `grace`.
   template <class List>
   void keep_only(WorkerRecord& worker, const List& keeps, double held_since_before);
+  std::string values_of_task(const v1::Task& task) const;
   void dismiss(WorkerRecord& worker, FarmEvent::Kind kind, const std::string& text);
   void cancel_all();
   void cancel(const Losers& losers);

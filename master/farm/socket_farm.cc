@@ -123,7 +123,7 @@ void SocketFarm::Impl::reap(double now) {
   }
   if (!locals) return;
   for (const ProcessEnded& end : locals->pool().reap(now)) {
-    scheduler->on_process_end({end.name, end.cause, end.epoch, end.attempt, end.text});
+    scheduler->on_process_end({end.name, end.cause, end.epoch, end.attempt, end.text, end.failure});
     if (end.gave_up) {
       if (last_trouble.empty()) last_trouble = end.text;
       on_event({FarmEvent::kDied, end.name, end.text + "; it is not started again", ""});
