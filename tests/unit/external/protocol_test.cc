@@ -51,7 +51,7 @@ TEST(ExternalDeclaration, RefusesWhatCannotBeATable) {
               HasSubstr("searched evenly"));
   EXPECT_THAT(error_of(declaration_with(
                   R"({"key": "m", "lower": 1, "upper": 2, "nominal": 1, "intger": true})")),
-              HasSubstr("unknown key 'intger', did you mean 'integer'"));
+              HasSubstr("unknown key 'intger'; did you mean 'integer'?"));
   EXPECT_THAT(error_of(declaration_with(kMass, R"(["paths"])")), HasSubstr("did you mean 'path'"));
 }
 
