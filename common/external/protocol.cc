@@ -6,6 +6,7 @@
 #include <regex>
 
 #include "common/base/suggest.h"
+#include "common/base/try.h"
 #include "common/json/json.h"
 
 namespace gapfarm {
@@ -87,7 +88,7 @@ Status check_keys(const Json& json, const std::string& parameter) {
 Result<Parameter> read_parameter(const Json& json) {
   Parameter p;
   p.key = word_of(json, "key");
-  if (Status s = check_keys(json, p.key); !s) return s.error();
+  RETURN_IF_ERROR(check_keys(json, p.key));
   if (json.value("integer", Json(false)) == Json(true)) p.kind = ParameterKind::kInteger;
   p.unit = word_of(json, "unit");
   if (p.unit.empty()) p.unit = "-";
@@ -132,9 +133,9 @@ std::vector<double> numbers(const Json& json, std::size_t count) {
 std::string hello_line() { return json_text(Json{{"gapfarm", kExternalProtocol}}); }
 
 Result<ExternalDeclaration> parse_declaration(const std::string& line) {
-  const Result<Json> read = read_object(line, "does not introduce itself with a JSON object");
-  if (!read) return read.error();
-  const Json& json = *read;
+  ASSIGN_OR_RETURN(const Json read,
+                   read_object(line, "does not introduce itself with a JSON object"));
+  const Json& json = read;
   if (number_of(json, "gapfarm", 0) != kExternalProtocol) {
     return wrong("does not speak protocol " + std::to_string(kExternalProtocol) +
                      " (\"gapfarm\": 1 is missing)",
@@ -148,14 +149,12 @@ Result<ExternalDeclaration> parse_declaration(const std::string& line) {
     return wrong("declares parameters that are no list of objects", json_text(rows));
   }
   for (const Json& row : rows) {
-    const Result<Parameter> parameter = read_parameter(row);
-    if (!parameter) return parameter.error();
-    declaration.parameters.push_back(*parameter);
+    ASSIGN_OR_RETURN(const Parameter parameter, read_parameter(row));
+    declaration.parameters.push_back(parameter);
   }
-  if (Status s = check_declaration(declaration); !s) return s.error();
-  const auto inputs = read_inputs(json);
-  if (!inputs) return inputs.error();
-  declaration.inputs = *inputs;
+  RETURN_IF_ERROR(check_declaration(declaration));
+  ASSIGN_OR_RETURN(const auto inputs, read_inputs(json));
+  declaration.inputs = inputs;
   return declaration;
 }
 
@@ -189,9 +188,8 @@ std::string request_line(const ExternalRequest& request) {
 }
 
 Result<ExternalAnswer> parse_answer(const std::string& line, const ExternalRequest& request) {
-  const Result<Json> read = read_object(line, "did not answer with a JSON object");
-  if (!read) return read.error();
-  const Json& json = *read;
+  ASSIGN_OR_RETURN(const Json read, read_object(line, "did not answer with a JSON object"));
+  const Json& json = read;
   const auto id = json.find("id");
   if (id == json.end() || *id != Json(request.id)) {
     return wrong("answered another question than " + std::to_string(request.id), line);

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <atomic>
 
+#include "common/base/try.h"
+
 namespace gapfarm {
 namespace {
 
@@ -44,9 +46,8 @@ Result<std::string> ExternalSimulator::introduce() {
 
 Result<ExternalAnswer> ExternalSimulator::simulate(ExternalRequest& request,
                                                    const std::string& declared) {
-  const Result<std::string> introduction = introduce();
-  if (!introduction) return introduction.error();
-  if (*introduction != declared) {
+  ASSIGN_OR_RETURN(const std::string introduction, introduce());
+  if (introduction != declared) {
     program_.kill();
     return Error{"external program '" + program_.name() +
                  "' declares other things than when the problem was made; check the config again, "
