@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "common/base/try.h"
 #include "common/process/process_pool.h"
 
 namespace gapfarm {
@@ -67,7 +68,7 @@ void wait_for(const ProcessPool& pool, const StopSource& stop, double timeout_s)
 
 Status supervise(const SupervisorOptions& options, StopSource& stop) {
   ProcessPool pool(pool_options(options));
-  if (Status status = pool.start(monotonic_seconds()); !status) return status;
+  RETURN_IF_ERROR(pool.start(monotonic_seconds()));
   unsigned stops = 0;
   std::string last_end;
   while (!pool.exhausted()) {

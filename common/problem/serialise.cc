@@ -8,6 +8,7 @@
 
 #include "common/base/hash.h"
 #include "common/base/suggest.h"
+#include "common/base/try.h"
 #include "common/problem/external_problem.h"
 #include "common/problem/residual_problem.h"
 
@@ -91,14 +92,14 @@ Status read_values(const v1::Problem& message, Problem* problem) {
   }
   for (std::size_t i = 0; i < table.size(); ++i) {
     problem->values.push_back(i < count ? message.values(static_cast<int>(i)) : table[i].nominal);
-    if (Status s = table.check(i, problem->values.back()); !s) return s.error();
+    RETURN_IF_ERROR(table.check(i, problem->values.back()));
   }
   for (const v1::Gene& gene : message.genes()) {
     if (gene.parameter() >= table.size()) {
       return invalid("gene of parameter row " + std::to_string(gene.parameter()));
     }
-    if (Status s = table.check(gene.parameter(), gene.lower()); !s) return s.error();
-    if (Status s = table.check(gene.parameter(), gene.upper()); !s) return s.error();
+    RETURN_IF_ERROR(table.check(gene.parameter(), gene.lower()));
+    RETURN_IF_ERROR(table.check(gene.parameter(), gene.upper()));
     if (gene.lower() > gene.upper() || (gene.log_scale() && gene.lower() <= 0)) {
       return invalid("gene " + table[gene.parameter()].key + " has an empty range");
     }
@@ -231,8 +232,8 @@ Status read_trials(const v1::Problem& message, Problem* problem) {
     if (!bounded || !std::isfinite(trial.t_s.value_or(0))) {
       return invalid(where + ": needs duties in [-1, 1], a duration in [0, 60] s and a finite t");
     }
-    if (Status s = check_tip(trial, !problem->pieces.empty(), where); !s) return s;
-    if (Status s = check_window(trial, *problem, where); !s) return s;
+    RETURN_IF_ERROR(check_tip(trial, !problem->pieces.empty(), where));
+    RETURN_IF_ERROR(check_window(trial, *problem, where));
     problem->log.trials.push_back(std::move(trial));
   }
   return {};
@@ -362,11 +363,11 @@ Result<Problem> from_proto(const v1::Problem& message) {
   Problem problem;
   problem.scenario = message.scenario();
   if (auto table = parameter_table(problem.scenario); !table) return table.error();
-  if (Status s = read_runs(message, &problem); !s) return s.error();
-  if (Status s = read_external(message, &problem); !s) return s.error();
-  if (Status s = read_values(message, &problem); !s) return s.error();
-  if (Status s = read_commands(message, &problem); !s) return s.error();
-  if (Status s = read_pieces(message, &problem); !s) return s.error();
+  RETURN_IF_ERROR(read_runs(message, &problem));
+  RETURN_IF_ERROR(read_external(message, &problem));
+  RETURN_IF_ERROR(read_values(message, &problem));
+  RETURN_IF_ERROR(read_commands(message, &problem));
+  RETURN_IF_ERROR(read_pieces(message, &problem));
   if (!v1::Fitness::Kind_IsValid(message.fitness().kind()) ||
       !v1::Spread::Kind_IsValid(message.spread().kind())) {
     return invalid("unknown kind of fitness or spread; master and worker must be the same build");
@@ -378,9 +379,9 @@ Result<Problem> from_proto(const v1::Problem& message) {
   }
   problem.spread = {static_cast<SpreadKind>(message.spread().kind()),
                     message.spread().replicates()};
-  if (Status s = check_score(problem.fitness, problem.spread); !s) return s.error();
-  if (Status s = read_trials(message, &problem); !s) return s.error();
-  if (Status s = read_residual(message, &problem); !s) return s.error();
+  RETURN_IF_ERROR(check_score(problem.fitness, problem.spread));
+  RETURN_IF_ERROR(read_trials(message, &problem));
+  RETURN_IF_ERROR(read_residual(message, &problem));
   return problem;
 }
 
