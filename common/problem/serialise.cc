@@ -8,7 +8,6 @@
 
 #include "common/base/hash.h"
 #include "common/base/suggest.h"
-#include "common/base/try.h"
 #include "common/problem/external_problem.h"
 #include "common/problem/residual_problem.h"
 
@@ -92,14 +91,14 @@ Status read_values(const v1::Problem& message, Problem* problem) {
   }
   for (std::size_t i = 0; i < table.size(); ++i) {
     problem->values.push_back(i < count ? message.values(static_cast<int>(i)) : table[i].nominal);
-    RETURN_IF_ERROR(table.check(i, problem->values.back()));
+    if (Status s = table.check(i, problem->values.back()); !s) return s.error();
   }
   for (const v1::Gene& gene : message.genes()) {
     if (gene.parameter() >= table.size()) {
       return invalid("gene of parameter row " + std::to_string(gene.parameter()));
     }
-    RETURN_IF_ERROR(table.check(gene.parameter(), gene.lower()));
-    RETURN_IF_ERROR(table.check(gene.parameter(), gene.upper()));
+    if (Status s = table.check(gene.parameter(), gene.lower()); !s) return s.error();
+    if (Status s = table.check(gene.parameter(), gene.upper()); !s) return s.error();
     if (gene.lower() > gene.upper() || (gene.log_scale() && gene.lower() <= 0)) {
       return invalid("gene " + table[gene.parameter()].key + " has an empty range");
     }
@@ -232,8 +231,8 @@ Status read_trials(const v1::Problem& message, Problem* problem) {
     if (!bounded || !std::isfinite(trial.t_s.value_or(0))) {
       return invalid(where + ": needs duties in [-1, 1], a duration in [0, 60] s and a finite t");
     }
-    RETURN_IF_ERROR(check_tip(trial, !problem->pieces.empty(), where));
-    RETURN_IF_ERROR(check_window(trial, *problem, where));
+    if (Status s = check_tip(trial, !problem->pieces.empty(), where); !s) return s;
+    if (Status s = check_window(trial, *problem, where); !s) return s;
     problem->log.trials.push_back(std::move(trial));
   }
   return {};
@@ -363,11 +362,11 @@ Result<Problem> from_proto(const v1::Problem& message) {
   Problem problem;
   problem.scenario = message.scenario();
   if (auto table = parameter_table(problem.scenario); !table) return table.error();
-  RETURN_IF_ERROR(read_runs(message, &problem));
-  RETURN_IF_ERROR(read_external(message, &problem));
-  RETURN_IF_ERROR(read_values(message, &problem));
-  RETURN_IF_ERROR(read_commands(message, &problem));
-  RETURN_IF_ERROR(read_pieces(message, &problem));
+  if (Status s = read_runs(message, &problem); !s) return s.error();
+  if (Status s = read_external(message, &problem); !s) return s.error();
+  if (Status s = read_values(message, &problem); !s) return s.error();
+  if (Status s = read_commands(message, &problem); !s) return s.error();
+  if (Status s = read_pieces(message, &problem); !s) return s.error();
   if (!v1::Fitness::Kind_IsValid(message.fitness().kind()) ||
       !v1::Spread::Kind_IsValid(message.spread().kind())) {
     return invalid("unknown kind of fitness or spread; master and worker must be the same build");
@@ -379,9 +378,9 @@ Result<Problem> from_proto(const v1::Problem& message) {
   }
   problem.spread = {static_cast<SpreadKind>(message.spread().kind()),
                     message.spread().replicates()};
-  RETURN_IF_ERROR(check_score(problem.fitness, problem.spread));
-  RETURN_IF_ERROR(read_trials(message, &problem));
-  RETURN_IF_ERROR(read_residual(message, &problem));
+  if (Status s = check_score(problem.fitness, problem.spread); !s) return s.error();
+  if (Status s = read_trials(message, &problem); !s) return s.error();
+  if (Status s = read_residual(message, &problem); !s) return s.error();
   return problem;
 }
 

@@ -99,15 +99,6 @@ TEST(FitJointly, OnlyDerivativesAreOfCoarserSteps) {
   }
 }
 
-TEST(Report, WhatIsLeftIsOneCautionTheClearestFirst) {
-  EXPECT_THAT(steps::leftover_caution({{"the time", -2, 0}}, -4), ::testing::IsEmpty());
-  EXPECT_THAT(steps::leftover_caution({{"the time", -5, 0}}, -4),
-              ::testing::ElementsAre("What is left still depends on the time."));
-  EXPECT_THAT(
-      steps::leftover_caution({{"the time", -5, 0}, {"x", -3, 0}, {"y", -9, 0}}, -4),
-      ::testing::ElementsAre("What is left still depends on y and the time (the clearest first)."));
-}
-
 // Whitened rows of one column: x of each trial.
 Study plain_study(std::size_t trials) {
   Study study;
