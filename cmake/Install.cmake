@@ -26,10 +26,17 @@ foreach(page gapfarm gapfarm-worker)
     OUTPUT ${made}/${page}.1.gz
     COMMAND ${GZIP_PROGRAM} -9 -n -k -f ${made}/${page}.1 DEPENDS ${made}/${page}.1 VERBATIM)
 endforeach()
-# In scripts/package.sh and by hand; a build of the programs alone does without.
+# A build of the programs alone does without; installing makes what is missing.
 add_custom_target(install_files DEPENDS
   ${made}/gapfarm.1.gz ${made}/gapfarm-worker.1.gz ${made}/gapfarm.bash ${made}/_gapfarm
   ${made}/gapfarm.fish)
+install(CODE "
+  execute_process(COMMAND \"${CMAKE_COMMAND}\" --build \"${PROJECT_BINARY_DIR}\" --target install_files
+                  RESULT_VARIABLE status OUTPUT_VARIABLE output ERROR_VARIABLE output)
+  if(NOT status EQUAL 0)
+    message(FATAL_ERROR \"cannot make what is installed: build the target install_files in \"
+                        \"${PROJECT_BINARY_DIR}, as whom it belongs to:\\n\${output}\")
+  endif()" ALL_COMPONENTS)
 
 # The units name the folder that they are installed for, which is known when they are.
 install(CODE "

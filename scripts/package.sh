@@ -29,7 +29,7 @@ if [[ -e "$build/CMakeCache.txt" ]]; then
 else
   cmake --preset "$(basename "$build")" -DGAPFARM_PYTHON=ON >/dev/null
 fi
-cmake --build "$build" --target gapfarm gapfarm-worker install_files -- --quiet
+cmake --build "$build" --target gapfarm gapfarm-worker -- --quiet
 (cd "$build" && cpack -G DEB -B "$out" >"$out/cpack.log") || { cat "$out/cpack.log"; exit 1; }
 rm -rf "$out/_CPack_Packages" "$out/cpack.log"
 ls "$out"/*.deb

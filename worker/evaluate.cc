@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "common/base/hash.h"
+#include "common/base/try.h"
 #include "common/score/fitness.h"
 #include "common/score/logged_motions.h"
 #include "worker/fitness.h"
@@ -86,9 +87,7 @@ Result<ParameterValues> values_at(const Problem& problem, const v1::Point& point
       return Error{"an override of parameter row " + std::to_string(override.parameter()) +
                    ", but the table has " + std::to_string(values.size())};
     }
-    if (Status s = problem.table().check(override.parameter(), override.value()); !s) {
-      return s.error();
-    }
+    RETURN_IF_ERROR(problem.table().check(override.parameter(), override.value()));
     values[override.parameter()] = override.value();
   }
   return values;
@@ -260,19 +259,17 @@ std::string golden_simulation() {
 }  // namespace
 
 Result<std::unique_ptr<PreparedProblem>> prepare(const v1::Problem& message) {
-  auto problem = from_proto(message);
-  if (!problem) return problem.error();
+  ASSIGN_OR_RETURN(auto problem, from_proto(message));
   for (const Scenario& scenario : scenarios()) {
-    if (problem->scenario != scenario.name) continue;
-    auto prepared = std::make_unique<Prepared>(std::move(*problem), scenario);
+    if (problem.scenario != scenario.name) continue;
+    auto prepared = std::make_unique<Prepared>(std::move(problem), scenario);
     if (!prepared->problem().log.trials.empty()) {
-      auto reference = fitness_reference(prepared->problem());
-      if (!reference) return reference.error();
-      prepared->set_reference(std::move(*reference));
+      ASSIGN_OR_RETURN(auto reference, fitness_reference(prepared->problem()));
+      prepared->set_reference(std::move(reference));
     }
     return std::unique_ptr<PreparedProblem>(std::move(prepared));
   }
-  return Error{"scenario '" + problem->scenario + "' has no simulation in this build"};
+  return Error{"scenario '" + problem.scenario + "' has no simulation in this build"};
 }
 
 v1::TaskResult evaluate(const PreparedProblem* prepared, const v1::Task& task, StepCounter* steps) {

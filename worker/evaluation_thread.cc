@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cassert>
-#include <cstdio>
 #include <list>
 #include <string>
 #include <utility>
@@ -52,9 +51,10 @@ class PreparedProblems {
 
 // What this worker cannot do another may: it ends like one that crashed, with the attempt still in
 // work, so that the task goes elsewhere and is blamed when it fails there too.
-[[noreturn]] void end_as_failed(const std::string& message) {
+// Its parent reports why.
+[[noreturn]] void end_as_failed(const std::string& message, WorkerProgress& progress) {
   constexpr int kExitTaskFailed = 70;
-  std::fprintf(stderr, "gapfarm-worker: %s\n", message.c_str());
+  progress.report_failure(message);
   _exit(kExitTaskFailed);
 }
 
@@ -119,7 +119,9 @@ void EvaluationThread::run() {
     progress_.epoch.store(work.job.epoch());
     progress_.attempt.store(work.job.attempt_id());
     v1::JobResult result = work_on(work, problems, &progress_.steps);
-    if (result.result().outcome() == v1::WORKER_FAILED) end_as_failed(result.result().message());
+    if (result.result().outcome() == v1::WORKER_FAILED) {
+      end_as_failed(result.result().message(), progress_);
+    }
     progress_.attempt.store(0);
     lock.lock();
     begun_ = -1;

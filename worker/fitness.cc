@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/base/try.h"
 #include "common/score/density.h"
 #include "common/score/fitness.h"
 
@@ -30,10 +31,10 @@ Result<double> mean_log_score(const Problem& problem, const Prediction& predicti
   const TailedDensity density(prediction.tails);
   double sum = 0;
   for (std::size_t i = 0; i < prediction.trials.size(); ++i) {
-    const auto score = log_score_of(prediction.trials[i], density, problem.log.trials[i].X_WE,
-                                    problem.fitness.outlier_share);
-    if (!score) return score.error();
-    sum += *score;
+    ASSIGN_OR_RETURN(const auto score,
+                     log_score_of(prediction.trials[i], density, problem.log.trials[i].X_WE,
+                                  problem.fitness.outlier_share));
+    sum += score;
   }
   return sum / static_cast<double>(prediction.trials.size());
 }
@@ -73,9 +74,8 @@ Result<RobustFitness> robust_score(const Problem& problem, const FitnessReferenc
 Result<FitnessReference> fitness_reference(const Problem& problem) {
   FitnessReference reference;
   if (problem.fitness.kind != FitnessKind::kRobustMahalanobis) return reference;
-  auto model = MotionModel::mine(problem.log, problem.commands);
-  if (!model) return model.error();
-  for (const CommandMotion& motion : model->commands()) {
+  ASSIGN_OR_RETURN(auto model, MotionModel::mine(problem.log, problem.commands));
+  for (const CommandMotion& motion : model.commands()) {
     if (motion.trials < MotionModelSettings{}.least_trials) continue;
     reference.real.push_back({motion.command.name, motion.motion.mean, motion.motion.covariance});
     reference.members.emplace_back();
@@ -118,10 +118,9 @@ Result<double> log_score_of(const TrialPrediction& prediction, const TailedDensi
   std::vector<double> terms;
   for (const Alternative& a : prediction.alternatives) {
     if (a.weight <= 0) continue;
-    const auto term =
-        density.log_density(local_difference(a.X_WM, X_WM), a.cov, a.reading_cov, outlier_share);
-    if (!term) return term.error();
-    terms.push_back(std::log(a.weight) + *term);
+    ASSIGN_OR_RETURN(const auto term, density.log_density(local_difference(a.X_WM, X_WM), a.cov,
+                                                          a.reading_cov, outlier_share));
+    terms.push_back(std::log(a.weight) + term);
   }
   return log_sum_exp(terms);
 }
@@ -132,27 +131,24 @@ Result<v1::EvaluateResult> fitness_of(const Problem& problem, const FitnessRefer
   result.set_conditions(prediction.conditions);
   switch (problem.fitness.kind) {
     case FitnessKind::kLogScore: {
-      const auto score = mean_log_score(problem, prediction);
-      if (!score) return score.error();
-      result.set_fitness(*score);
-      result.set_log_score(*score);
+      ASSIGN_OR_RETURN(const auto score, mean_log_score(problem, prediction));
+      result.set_fitness(score);
+      result.set_log_score(score);
       break;
     }
     case FitnessKind::kEnergyScore: {
-      const auto score = mean_energy_score(problem, prediction);
-      if (!score) return score.error();
-      result.set_fitness(*score);
+      ASSIGN_OR_RETURN(const auto score, mean_energy_score(problem, prediction));
+      result.set_fitness(score);
       break;
     }
     case FitnessKind::kCornerDistance:
       result.set_fitness(mean_corner_distance(problem, prediction));
       break;
     case FitnessKind::kRobustMahalanobis: {
-      const auto score = robust_score(problem, reference, prediction);
-      if (!score) return score.error();
-      result.set_fitness(score->fitness);
-      result.set_robust_distance(score->distance);
-      result.set_penalty(score->penalty);
+      ASSIGN_OR_RETURN(const auto score, robust_score(problem, reference, prediction));
+      result.set_fitness(score.fitness);
+      result.set_robust_distance(score.distance);
+      result.set_penalty(score.penalty);
       break;
     }
   }

@@ -53,6 +53,7 @@ struct Arguments {
   std::string replaced_end = "left";
   std::uint64_t replaced_epoch = 0;
   std::uint64_t replaced_attempt = 0;
+  std::string replaced_failure;
 };
 
 void describe(CLI::App& app, Arguments* arguments) {
@@ -104,6 +105,7 @@ void describe(CLI::App& app, Arguments* arguments) {
       ->group("");
   app.add_option("--replaced-epoch", arguments->replaced_epoch)->group("");
   app.add_option("--replaced-attempt", arguments->replaced_attempt)->group("");
+  app.add_option("--replaced-failure", arguments->replaced_failure)->group("");
 }
 
 v1::ProcessEnd process_end(const std::string& word) {
@@ -148,6 +150,7 @@ int work(const Arguments& arguments) {
   options.session.replaced_end = process_end(arguments.replaced_end);
   options.session.replaced_epoch = arguments.replaced_epoch;
   options.session.replaced_attempt = arguments.replaced_attempt;
+  options.session.replaced_failure = arguments.replaced_failure;
   if (arguments.lifetime_s > 0) {
     options.session.deadline_s = monotonic_seconds() + arguments.lifetime_s;
   }

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "common/base/host.h"
+#include "common/base/try.h"
 #include "common/net/socket.h"
 #include "common/process/process_pool.h"
 #include "worker/master_wait.h"
@@ -138,9 +139,8 @@ Result<ServiceEnd> serve(const ServiceOptions& options, EvaluationThread& evalua
                          StopSource& stop) {
   SocketOptions settings;
   settings.security = options.security;
-  auto socket = DealerSocket::connect(options.endpoint, settings);
-  if (!socket) return socket.error();
-  return Service(options, **socket, evaluation, stop).run();
+  ASSIGN_OR_RETURN(auto socket, DealerSocket::connect(options.endpoint, settings));
+  return Service(options, *socket, evaluation, stop).run();
 }
 
 }  // namespace gapfarm

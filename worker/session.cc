@@ -235,6 +235,7 @@ void WorkerSession::greet(double now) {
   hello->set_replaced_end(options_.replaced_end);
   hello->set_replaced_epoch(options_.replaced_epoch);
   hello->set_replaced_attempt(options_.replaced_attempt);
+  hello->set_replaced_failure(options_.replaced_failure);
   hello->set_leaving(leaving_ != Leaving::kNo);
 }
 

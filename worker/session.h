@@ -27,6 +27,7 @@ struct SessionOptions {
   // What that process had in work; attempt 0: nothing.
   std::uint64_t replaced_epoch = 0;
   std::uint64_t replaced_attempt = 0;
+  std::string replaced_failure;  // what it reported of that, or empty
   // Between two hellos without an answer, doubled up to the maximum and stretched by up to a half
   // at random, so that the workers of a restarted master do not all come at once.
   double hello_min_s = 0.02;

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "common/base/try.h"
 #include "common/process/process_pool.h"
 
 namespace gapfarm {
@@ -43,9 +44,10 @@ ProcessPoolOptions pool_options(const SupervisorOptions& options) {
     // One speaks for all: the first place's.
     if (name.rfind(prefix + "-1.", 0) == 0) all.push_back("--announce");
     if (replaced != nullptr) {
-      all.insert(all.end(), {"--replaces", replaced->name, "--replaced-end", word(replaced->cause),
-                             "--replaced-epoch", std::to_string(replaced->epoch),
-                             "--replaced-attempt", std::to_string(replaced->attempt)});
+      all.insert(all.end(),
+                 {"--replaces", replaced->name, "--replaced-end", word(replaced->cause),
+                  "--replaced-epoch", std::to_string(replaced->epoch), "--replaced-attempt",
+                  std::to_string(replaced->attempt), "--replaced-failure", replaced->failure});
     }
     if (std::isfinite(deadline)) {
       const double left = std::max(deadline - monotonic_seconds(), 0.001);
@@ -66,7 +68,7 @@ void wait_for(const ProcessPool& pool, const StopSource& stop, double timeout_s)
 
 Status supervise(const SupervisorOptions& options, StopSource& stop) {
   ProcessPool pool(pool_options(options));
-  if (Status status = pool.start(monotonic_seconds()); !status) return status;
+  RETURN_IF_ERROR(pool.start(monotonic_seconds()));
   unsigned stops = 0;
   std::string last_end;
   while (!pool.exhausted()) {

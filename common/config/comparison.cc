@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <sstream>
 
+#include "common/base/try.h"
 #include "common/config/config.h"
 #include "common/config/toml_section.h"
 #include "common/trials/files.h"
@@ -55,12 +56,10 @@ bool is_comparison(std::string_view text) {
 }
 
 Result<Comparison> read_comparison(const std::string& path) {
-  const auto text = read_text_file(path);
-  if (!text) return text.error();
-  const auto parsed = parse_toml(*text, path);
-  if (!parsed) return parsed.error();
+  ASSIGN_OR_RETURN(const auto text, read_text_file(path));
+  ASSIGN_OR_RETURN(const auto parsed, parse_toml(text, path));
   TomlErrors errors(path);
-  TomlSection top(*parsed, "", errors);
+  TomlSection top(parsed, "", errors);
   Comparison comparison;
   std::string config;
   if (auto section = top.section("compare")) {
@@ -81,15 +80,12 @@ Result<Comparison> read_comparison(const std::string& path) {
   }
   const std::string base_path =
       (std::filesystem::path(path).parent_path() / config).lexically_normal().string();
-  const auto base_text = read_text_file(base_path);
-  if (!base_text) return base_text.error();
-  const auto base = parse_toml(*base_text, base_path);
-  if (!base) return base.error();
+  ASSIGN_OR_RETURN(const auto base_text, read_text_file(base_path));
+  ASSIGN_OR_RETURN(const auto base, parse_toml(base_text, base_path));
   for (const auto& [name, section] : in_file_order(variants->table())) {
     if (!section->is_table()) return Error{path + ": variant \"" + name + "\" is no section"};
-    auto variant = read_variant(name, *section->as_table(), *base, base_path, path);
-    if (!variant) return variant.error();
-    comparison.variants.push_back(*std::move(variant));
+    ASSIGN_OR_RETURN(auto variant, read_variant(name, *section->as_table(), base, base_path, path));
+    comparison.variants.push_back(std::move(variant));
   }
   return comparison;
 }

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "common/base/build_info.h"
+#include "common/base/try.h"
 #include "common/config/residual_section.h"
 #include "common/config/sections.h"
 #include "common/trials/csv.h"
@@ -147,9 +148,9 @@ Status read_model_program(TomlSection& top, Model& model) {
     section->read("introduction", introduction);
     section->finish();
   }
-  auto program = make_external_program(std::move(command), std::move(introduction));
-  if (!program) return program.error();
-  model.external = std::move(*program);
+  ASSIGN_OR_RETURN(auto program,
+                   make_external_program(std::move(command), std::move(introduction)));
+  model.external = std::move(program);
   model.values = model.table().nominal();
   return {};
 }
@@ -240,7 +241,7 @@ Result<Model> parse_model(std::string_view text, const std::string& path) {
   if (form.robot || (form.other_robot && top.find("robot") != nullptr)) {
     Problem problem = problem_of(model);
     const std::string robot = top.string("robot").value_or("");
-    if (Status s = problem.set_robot(robot, path + ": robot"); !s) return s.error();
+    RETURN_IF_ERROR(problem.set_robot(robot, path + ": robot"));
     model.robot_file = problem.robot_file;
     model.tracked = problem.tracked;
     model.ground = problem.ground;

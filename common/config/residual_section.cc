@@ -3,6 +3,7 @@
 #include <cmath>
 #include <optional>
 
+#include "common/base/try.h"
 #include "common/trials/csv.h"
 
 namespace gapfarm {
@@ -137,7 +138,7 @@ Status check_residual_of(const Model& model) {
   }
   std::vector<std::string> commands;
   for (const CommandSpec& c : model.commands) commands.push_back(c.name);
-  if (Status s = check_residual(model.residual.field, commands); !s) return s;
+  RETURN_IF_ERROR(check_residual(model.residual.field, commands));
   return model.residual.strays ? check_strays(*model.residual.strays) : Status();
 }
 

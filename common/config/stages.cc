@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "common/base/try.h"
 #include "common/config/toml_section.h"
 
 namespace gapfarm {
@@ -63,10 +64,9 @@ class StageReader {
 }  // namespace
 
 Result<StagePlan> read_stages(const Config& config) {
-  const auto parsed = parse_toml(config.text, config.path);
-  if (!parsed) return parsed.error();
+  ASSIGN_OR_RETURN(const auto parsed, parse_toml(config.text, config.path));
   TomlErrors errors(config.path);
-  TomlSection top(*parsed, "", errors);
+  TomlSection top(parsed, "", errors);
   StagePlan plan;
   if (const toml::node* node = top.find("stages")) {
     StageReader(config, errors).read(*node, plan.stages);

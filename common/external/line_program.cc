@@ -4,7 +4,6 @@
 #include <poll.h>
 #include <signal.h>
 #include <string.h>
-#include <sys/prctl.h>
 #include <sys/socket.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -13,6 +12,9 @@
 #include <cerrno>
 #include <cmath>
 #include <utility>
+
+#include "common/base/try.h"
+#include "common/process/child.h"
 
 namespace gapfarm {
 namespace {
@@ -29,26 +31,16 @@ std::string shown_line(std::string text) {
   return "'" + text + (cut ? "...'" : "'");
 }
 
+std::string shell_quoted(const std::string& word) {
+  std::string text = "'";
+  for (const char c : word) text += c == '\'' ? "'\\''" : std::string(1, c);
+  return text + "'";
+}
+
 std::string in_seconds(double seconds) {
   char text[32];
   std::snprintf(text, sizeof text, "%g s", seconds);
   return text;
-}
-
-// In the child, after fork: only what is safe there.
-[[noreturn]] void become(const std::vector<char*>& words, const char* folder, int in, int out,
-                         int told, pid_t parent) {
-  prctl(PR_SET_PDEATHSIG, SIGKILL);
-  if (getppid() != parent) _exit(0);
-  sigset_t none;
-  sigemptyset(&none);
-  sigprocmask(SIG_SETMASK, &none, nullptr);
-  dup2(in, STDIN_FILENO);
-  dup2(out, STDOUT_FILENO);
-  if (*folder == '\0' || chdir(folder) == 0) execvp(words[0], words.data());
-  const int error = errno;
-  [[maybe_unused]] const ssize_t n = write(told, &error, sizeof error);
-  _exit(127);
 }
 
 void close_fd(int* fd) {
@@ -67,6 +59,14 @@ LineProgram::~LineProgram() { kill(); }
 std::string LineProgram::name() const {
   std::string text;
   for (const std::string& word : words_) text += (text.empty() ? "" : " ") + word;
+  return text;
+}
+
+std::string LineProgram::by_hand(const std::vector<std::string>& lines) const {
+  std::string text = "cd " + shell_quoted(folder_.empty() ? "." : folder_) + " && printf '%s\\n'";
+  for (const std::string& line : lines) text += " " + shell_quoted(line);
+  text += " |";
+  for (const std::string& word : words_) text += " " + shell_quoted(word);
   return text;
 }
 
@@ -108,30 +108,25 @@ Error LineProgram::ended() {
 Status LineProgram::start() {
   if (words_.empty()) return failed("has no name");
   // A socket, since writing to one that is closed can be told to raise no signal.
-  int in[2], out[2], told[2];
+  int in[2], out[2];
   if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, in) != 0) {
     return failed(std::string("got no pipe: ") + strerror(errno));
   }
-  if (pipe2(out, O_CLOEXEC) != 0 || pipe2(told, O_CLOEXEC) != 0) {
-    return failed(std::string("got no pipe: ") + strerror(errno));
-  }
-  std::vector<char*> words;
-  for (std::string& word : words_) words.push_back(word.data());
-  words.push_back(nullptr);
-  const pid_t parent = getpid();
-  pid_ = fork();
-  if (pid_ == 0) become(words, folder_.c_str(), in[1], out[1], told[1], parent);
+  if (pipe2(out, O_CLOEXEC) != 0) return failed(std::string("got no pipe: ") + strerror(errno));
+  ChildSetup setup;
+  setup.words = words_;
+  setup.folder = folder_;
+  setup.in = in[1];
+  setup.out = out[1];
+  const Result<pid_t> pid = start_child(setup);
   close(in[1]);
   close(out[1]);
-  close(told[1]);
   to_ = in[0];
   from_ = out[0];
-  int error = pid_ < 0 ? errno : 0;
-  if (pid_ > 0 && read(told[0], &error, sizeof error) <= 0) error = 0;
-  close(told[0]);
   answered_ = false;
-  if (error == 0) return {};
-  return failed("cannot be started in '" + folder_ + "': " + strerror(error));
+  if (!pid) return failed("cannot be started in '" + folder_ + "': " + pid.error().message);
+  pid_ = *pid;
+  return {};
 }
 
 bool LineProgram::wait_for(int fd, short events, double until) const {
@@ -185,7 +180,7 @@ Result<std::string> LineProgram::receive(double until, double limit_s) {
 
 Result<std::string> LineProgram::ask(const std::string& line) {
   if (!running()) {
-    if (Status s = start(); !s) return s.error();
+    RETURN_IF_ERROR(start());
   }
   if (rest_.empty() && wait_for(from_, POLLIN, clock_())) {
     char bytes[kShownBytes];
@@ -199,7 +194,7 @@ Result<std::string> LineProgram::ask(const std::string& line) {
   }
   const double limit_s = answered_ ? limits_.answer_s : limits_.start_s;
   const double until = clock_() + limit_s;
-  if (Status s = send(line, until); !s) return s.error();
+  RETURN_IF_ERROR(send(line, until));
   Result<std::string> answer = receive(until, limit_s);
   if (answer) answered_ = true;
   return answer;

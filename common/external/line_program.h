@@ -36,6 +36,8 @@ class LineProgram {
 
   bool running() const { return pid_ > 0; }
   std::string name() const;  // its words, as typed
+  // What asks it these lines in a shell.
+  std::string by_hand(const std::vector<std::string>& lines) const;
   // Ends it with SIGKILL.
   void kill();
 

@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <regex>
 
 #include "common/base/suggest.h"
+#include "common/base/try.h"
 #include "common/json/json.h"
 
 namespace gapfarm {
@@ -20,6 +22,22 @@ Error wrong(const std::string& what, const std::string& line) {
     if (static_cast<unsigned char>(c) < ' ' || c == 127) c = '?';
   }
   return Error{what + ": '" + shown + (line.size() > kShown ? "...'" : "'")};
+}
+
+// Python's json and others print what JSON does not have.
+Result<Json> read_object(const std::string& line, const std::string& what) {
+  Json json = parse_json(line);
+  if (json.is_object()) return json;
+  static const std::regex kNotNumbers("-?\\b(NaN|Infinity|nan|inf)\\b");
+  std::smatch found;
+  if (std::regex_search(line, found, kNotNumbers) &&
+      parse_json(std::regex_replace(line, kNotNumbers, "null")).is_object()) {
+    return wrong("printed " + found.str() +
+                     ", which is no number in JSON: print null for a pose "
+                     "that a simulation does not have",
+                 line);
+  }
+  return wrong(what, line);
 }
 
 std::string word_of(const Json& json, const char* key) {
@@ -54,9 +72,24 @@ Result<unsigned> read_inputs(const Json& json) {
   return inputs;
 }
 
-Parameter read_parameter(const Json& json) {
+// A key that is not known would be ignored without a word.
+Status check_keys(const Json& json, const std::string& parameter) {
+  static const std::vector<std::string> kKeys = {"key",     "unit", "lower",   "upper",
+                                                 "nominal", "log",  "integer", "summary"};
+  for (const auto& [key, value] : json.items()) {
+    if (std::find(kKeys.begin(), kKeys.end(), key) != kKeys.end()) continue;
+    return Error{"declares parameter '" + parameter + "' with the unknown key '" + key + "'" +
+                 suggestion(key, kKeys) +
+                 "; known: key, unit, lower, upper, nominal, log, integer, summary"};
+  }
+  return {};
+}
+
+Result<Parameter> read_parameter(const Json& json) {
   Parameter p;
   p.key = word_of(json, "key");
+  RETURN_IF_ERROR(check_keys(json, p.key));
+  if (json.value("integer", Json(false)) == Json(true)) p.kind = ParameterKind::kInteger;
   p.unit = word_of(json, "unit");
   if (p.unit.empty()) p.unit = "-";
   p.summary = word_of(json, "summary");
@@ -100,8 +133,9 @@ std::vector<double> numbers(const Json& json, std::size_t count) {
 std::string hello_line() { return json_text(Json{{"gapfarm", kExternalProtocol}}); }
 
 Result<ExternalDeclaration> parse_declaration(const std::string& line) {
-  const Json json = parse_json(line);
-  if (!json.is_object()) return wrong("does not introduce itself with a JSON object", line);
+  ASSIGN_OR_RETURN(const Json read,
+                   read_object(line, "does not introduce itself with a JSON object"));
+  const Json& json = read;
   if (number_of(json, "gapfarm", 0) != kExternalProtocol) {
     return wrong("does not speak protocol " + std::to_string(kExternalProtocol) +
                      " (\"gapfarm\": 1 is missing)",
@@ -114,11 +148,13 @@ Result<ExternalDeclaration> parse_declaration(const std::string& line) {
       !std::all_of(rows.begin(), rows.end(), [](const Json& row) { return row.is_object(); })) {
     return wrong("declares parameters that are no list of objects", json_text(rows));
   }
-  for (const Json& row : rows) declaration.parameters.push_back(read_parameter(row));
-  if (Status s = check_declaration(declaration); !s) return s.error();
-  const auto inputs = read_inputs(json);
-  if (!inputs) return inputs.error();
-  declaration.inputs = *inputs;
+  for (const Json& row : rows) {
+    ASSIGN_OR_RETURN(const Parameter parameter, read_parameter(row));
+    declaration.parameters.push_back(parameter);
+  }
+  RETURN_IF_ERROR(check_declaration(declaration));
+  ASSIGN_OR_RETURN(const auto inputs, read_inputs(json));
+  declaration.inputs = inputs;
   return declaration;
 }
 
@@ -137,7 +173,9 @@ std::string request_line(const ExternalRequest& request) {
   const unsigned inputs = request.declaration->inputs;
   Json parameters = Json::object();
   for (std::size_t i = 0; i < request.values.size(); ++i) {
-    parameters[request.declaration->parameters[i].key] = request.values[i];
+    const Parameter& p = request.declaration->parameters[i];
+    Json& value = parameters[p.key] = request.values[i];
+    if (p.kind == ParameterKind::kInteger) value = std::llround(request.values[i]);
   }
   Json json = {{"id", request.id},
                {"parameters", std::move(parameters)},
@@ -150,8 +188,8 @@ std::string request_line(const ExternalRequest& request) {
 }
 
 Result<ExternalAnswer> parse_answer(const std::string& line, const ExternalRequest& request) {
-  const Json json = parse_json(line);
-  if (!json.is_object()) return wrong("did not answer with a JSON object", line);
+  ASSIGN_OR_RETURN(const Json read, read_object(line, "did not answer with a JSON object"));
+  const Json& json = read;
   const auto id = json.find("id");
   if (id == json.end() || *id != Json(request.id)) {
     return wrong("answered another question than " + std::to_string(request.id), line);
@@ -164,7 +202,14 @@ Result<ExternalAnswer> parse_answer(const std::string& line, const ExternalReque
     answer.message = word_of(json, "message");
     return answer;
   }
-  const std::vector<double> pose = numbers(json.value("pose", Json()), 3);
+  const Json given = json.value("pose", Json::array());
+  if (given.is_null() ||
+      std::any_of(given.begin(), given.end(), [](const Json& value) { return value.is_null(); })) {
+    answer.diverged = true;
+    answer.message = "it answered a pose of null";
+    return answer;
+  }
+  const std::vector<double> pose = numbers(given, 3);
   if (pose.empty())
     return wrong("did not answer with \"pose\": [x, y, theta] of finite numbers", line);
   answer.X_SE = {pose[0], pose[1], wrap_angle(pose[2])};

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <atomic>
 
+#include "common/base/try.h"
+
 namespace gapfarm {
 namespace {
 
@@ -44,21 +46,24 @@ Result<std::string> ExternalSimulator::introduce() {
 
 Result<ExternalAnswer> ExternalSimulator::simulate(ExternalRequest& request,
                                                    const std::string& declared) {
-  const Result<std::string> introduction = introduce();
-  if (!introduction) return introduction.error();
-  if (*introduction != declared) {
+  ASSIGN_OR_RETURN(const std::string introduction, introduce());
+  if (introduction != declared) {
     program_.kill();
     return Error{"external program '" + program_.name() +
                  "' declares other things than when the problem was made; check the config again, "
                  "and give every machine the same program"};
   }
   request.id = ++asked_;
-  const Result<std::string> line = program_.ask(request_line(request));
-  if (!line) return line.error();
+  const std::string question = request_line(request);
+  const auto failed = [&](const std::string& what) {
+    return Error{what + "\nby hand: " + program_.by_hand({hello_line(), question})};
+  };
+  const Result<std::string> line = program_.ask(question);
+  if (!line) return failed(line.error().message);
   Result<ExternalAnswer> answer = parse_answer(*line, request);
   if (answer) return answer;
   program_.kill();
-  return Error{"external program '" + program_.name() + "' " + answer.error().message};
+  return failed("external program '" + program_.name() + "' " + answer.error().message);
 }
 
 }  // namespace gapfarm

@@ -25,8 +25,8 @@ class ExternalSimulator {
   Result<std::string> introduce();
 
   // `declared`: the line that the problem was made with; a program that now declares something else
-  // is an error.  Sets the request's id.  Errors name program and question, and leave it dead: the
-  // next question starts it again.
+  // is an error.  Sets the request's id.  Errors name the program and what it did, then in a second
+  // line how to ask it the same by hand, and leave it dead: the next question starts it again.
   Result<ExternalAnswer> simulate(ExternalRequest& request, const std::string& declared);
 
  private:

@@ -12,6 +12,8 @@
 #include <sstream>
 #include <zmq.hpp>
 
+#include "common/base/try.h"
+
 namespace gapfarm {
 namespace {
 
@@ -100,31 +102,31 @@ KeyPair make_key_pair(const std::string& name) {
 }
 
 Result<PublicKey> read_public_key(const std::string& path) {
-  const Result<Fields> fields =
-      read_fields(path, 022, "can be changed by other users; chmod 644 it after a look into it");
-  if (!fields) return fields.error();
+  ASSIGN_OR_RETURN(
+      const Fields fields,
+      read_fields(path, 022, "can be changed by other users; chmod 644 it after a look into it"));
   PublicKey key;
-  if (const auto name = fields->find("name"); name != fields->end()) key.name = name->second;
-  if (const auto text = fields->find("public"); text != fields->end()) key.key = text->second;
+  if (const auto name = fields.find("name"); name != fields.end()) key.name = name->second;
+  if (const auto text = fields.find("public"); text != fields.end()) key.key = text->second;
   if (!is_key(key.key)) return Error{"key file '" + path + "' holds no public key"};
   return key;
 }
 
 Result<KeyPair> read_key_pair(const std::string& path) {
-  const Result<Fields> fields =
+  ASSIGN_OR_RETURN(
+      const Fields fields,
       read_fields(path, 077,
                   "is open to other users; chmod 600 it, and make a new key if somebody may have "
-                  "looked");
-  if (!fields) return fields.error();
+                  "looked"));
   KeyPair pair;
-  if (const auto name = fields->find("name"); name != fields->end()) pair.name = name->second;
-  if (const auto text = fields->find("secret"); text != fields->end()) {
+  if (const auto name = fields.find("name"); name != fields.end()) pair.name = name->second;
+  if (const auto text = fields.find("secret"); text != fields.end()) {
     pair.secret_key = text->second;
   }
   if (!is_key(pair.secret_key)) return Error{"key file '" + path + "' holds no secret key"};
   pair.public_key = public_of(pair.secret_key);
-  if (const auto text = fields->find("public");
-      text == fields->end() || text->second != pair.public_key) {
+  if (const auto text = fields.find("public");
+      text == fields.end() || text->second != pair.public_key) {
     return Error{"key file '" + path + "' is damaged: its public key is not its secret key's"};
   }
   return pair;

@@ -11,6 +11,7 @@
 #include <cstring>
 #include <filesystem>
 
+#include "common/base/try.h"
 #include "common/net/key_file.h"
 
 namespace gapfarm {
@@ -87,7 +88,7 @@ std::string KeyFolder::default_path() {
 }
 
 Result<KeyFolder> KeyFolder::open(const std::string& path) {
-  if (Status s = check_folder(path); !s) return s.error();
+  RETURN_IF_ERROR(check_folder(path));
   return KeyFolder(path);
 }
 
@@ -96,7 +97,7 @@ Result<KeyFolder> KeyFolder::open_or_make(const std::string& path) {
   std::error_code error;
   if (!parent.empty()) std::filesystem::create_directories(parent, error);
   if (error) return Error{"cannot make the folder '" + parent.string() + "': " + error.message()};
-  if (Status s = make_private_folder(path); !s) return s.error();
+  RETURN_IF_ERROR(make_private_folder(path));
   return open(path);
 }
 
@@ -109,7 +110,7 @@ Result<KeyPair> KeyFolder::pair(const std::string& role) const {
 }
 
 Status KeyFolder::add_pair(const std::string& role, const KeyPair& pair) const {
-  if (Status s = write_key_pair(path_ + "/" + role + ".key", pair); !s) return s;
+  RETURN_IF_ERROR(write_key_pair(path_ + "/" + role + ".key", pair));
   return write_public_key(path_ + "/" + role + ".pub", {pair.name, pair.public_key});
 }
 
@@ -130,7 +131,7 @@ Status KeyFolder::list(const PublicKey& key) const {
     return Error{"'" + key.name + "' names no key: use 1 to 64 of A-Z a-z 0-9 . _ -, beginning " +
                  "with a letter or digit"};
   }
-  if (Status s = make_private_folder(listed_path()); !s) return s;
+  RETURN_IF_ERROR(make_private_folder(listed_path()));
   return write_public_key(listed_path() + "/" + key.name + ".pub", key);
 }
 
@@ -142,26 +143,21 @@ Status KeyFolder::unlist(const std::string& name) const {
 }
 
 Result<LinkSecurity> master_security(const std::string& folder) {
-  const Result<KeyFolder> keys = KeyFolder::open(folder);
-  if (!keys) return keys.error();
-  Result<KeyPair> own = keys->pair("master");
-  if (!own) return own.error();
+  ASSIGN_OR_RETURN(const KeyFolder keys, KeyFolder::open(folder));
+  ASSIGN_OR_RETURN(KeyPair own, keys.pair("master"));
   LinkSecurity security;
-  security.own = std::move(*own);
-  security.listed = keys->listed_path();
+  security.own = std::move(own);
+  security.listed = keys.listed_path();
   return security;
 }
 
 Result<LinkSecurity> worker_security(const std::string& folder) {
-  const Result<KeyFolder> keys = KeyFolder::open(folder);
-  if (!keys) return keys.error();
-  Result<KeyPair> own = keys->pair("worker");
-  if (!own) return own.error();
-  const Result<PublicKey> master = keys->master_public();
-  if (!master) return master.error();
+  ASSIGN_OR_RETURN(const KeyFolder keys, KeyFolder::open(folder));
+  ASSIGN_OR_RETURN(KeyPair own, keys.pair("worker"));
+  ASSIGN_OR_RETURN(const PublicKey master, keys.master_public());
   LinkSecurity security;
-  security.own = std::move(*own);
-  security.master_key = master->key;
+  security.own = std::move(own);
+  security.master_key = master.key;
   return security;
 }
 

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <zmq.hpp>
 
+#include "common/base/try.h"
 #include "common/net/envelope.h"
 #include "common/net/handshake_watch.h"
 #include "common/net/link_guard.h"
@@ -135,7 +136,7 @@ Error needs_keys(const std::string& endpoint) {
 }  // namespace
 
 Status may_listen(const std::string& endpoint, const LinkSecurity& security) {
-  if (Status status = check_endpoint(endpoint); !status) return status;
+  RETURN_IF_ERROR(check_endpoint(endpoint));
   if (!is_tcp(endpoint) || security.open == OpenLinks::kAnywhere) return {};
   if (security.open == OpenLinks::kLoopback) {
     if (is_loopback(endpoint)) return {};
@@ -175,7 +176,7 @@ Result<std::unique_ptr<RouterSocket>> RouterSocket::create(const SocketOptions& 
 
 Result<std::string> RouterSocket::bind(const std::string& endpoint) {
   const LinkSecurity& security = impl_->security;
-  if (Status status = may_listen(endpoint, security); !status) return status.error();
+  RETURN_IF_ERROR(may_listen(endpoint, security));
   try {
     secure_server(impl_->socket, security, is_tcp(endpoint) && security.open == OpenLinks::kNever);
     const mode_t mask = umask(0077);  // nobody else may connect to a socket in the file system
@@ -233,7 +234,7 @@ DealerSocket::~DealerSocket() = default;
 
 Result<std::unique_ptr<DealerSocket>> DealerSocket::connect(const std::string& endpoint,
                                                             const SocketOptions& options) {
-  if (Status status = check_endpoint(endpoint); !status) return status.error();
+  RETURN_IF_ERROR(check_endpoint(endpoint));
   const LinkSecurity& security = options.security;
   const bool has_keys = security.own.has_value() && !security.master_key.empty();
   const bool open = security.open != OpenLinks::kNever;

@@ -74,6 +74,14 @@ Status check_row(const Parameter& p) {
   if (p.scale == ParameterScale::kLog && !(p.lower > 0)) {
     return wrong("has a log scale, so its lower bound must be more than 0");
   }
+  if (p.kind != ParameterKind::kInteger) return {};
+  if (p.lower != std::floor(p.lower) || p.upper != std::floor(p.upper) ||
+      p.nominal != std::floor(p.nominal)) {
+    return wrong("is an integer, so its bounds and its nominal value must be whole numbers");
+  }
+  if (p.scale == ParameterScale::kLog) {
+    return wrong("is an integer, whose values are searched evenly; leave out \"log\"");
+  }
   return {};
 }
 

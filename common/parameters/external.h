@@ -68,7 +68,8 @@ class ExternalTable {
 };
 
 // Errors name the parameter: no key, a key that is taken or no TOML bare key, bounds that are
-// empty, not finite or do not hold the nominal value, a log scale that reaches 0.
+// empty, not finite or do not hold the nominal value, a log scale that reaches 0, an integer with
+// bounds that are not whole or a log scale.
 Status check_declaration(const ExternalDeclaration& declaration);
 
 // What a problem without a program has: noise, and nothing that moves.

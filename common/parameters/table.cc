@@ -13,10 +13,20 @@
 namespace gapfarm {
 namespace {
 
+// The shortest text that reads back as `value`.
 std::string number(double value) {
   char text[32];
   const auto end = std::to_chars(text, text + sizeof text, value).ptr;
   return {text, end};
+}
+
+double rounded(double value) {
+  constexpr int kDigits = 4;  // more than any of these parameters is known to
+  char text[32];
+  const auto end =
+      std::to_chars(text, text + sizeof text, value, std::chars_format::scientific, kDigits - 1);
+  std::from_chars(text, end.ptr, value);
+  return value;
 }
 
 using enum ParameterKind;
@@ -96,16 +106,26 @@ Status ParameterTable::check(std::size_t row, double value) const {
   if (std::isfinite(value) && value >= p.lower && value <= p.upper && whole) return {};
   std::string text = p.key + " is " + number(value) + ", but it must be ";
   if (p.kind != kReal) text += "a whole number ";
-  text += "between " + format(row, p.lower) + " and " + format(row, p.upper);
+  // In full where a rounded bound would hold what the bound refuses.
+  const bool close = value >= rounded(p.lower) && value <= rounded(p.upper);
+  const auto bound = [&](double at) { return close ? text_of(row, at) : format(row, at); };
+  text += "between " + bound(p.lower) + " and " + bound(p.upper);
+  if (close && p.unit != "-") text += " " + p.unit;
   return Error{text};
 }
 
-std::string ParameterTable::format(std::size_t row, double value) const {
+std::string ParameterTable::text_of(std::size_t row, double value) const {
   const Parameter& p = rows_[row];
   if (p.kind == kBoolean) return value != 0 ? "true" : "false";
   const auto index = static_cast<std::size_t>(value);
   if (p.kind == kChoice && value >= 0 && index < p.choices.size()) return p.choices[index];
-  return number(value) + (p.unit == "-" ? "" : " " + p.unit);
+  return number(value);
+}
+
+std::string ParameterTable::format(std::size_t row, double value) const {
+  const Parameter& p = rows_[row];
+  const bool unit = (p.kind == kReal || p.kind == kInteger) && p.unit != "-";
+  return text_of(row, p.kind == kReal ? rounded(value) : value) + (unit ? " " + p.unit : "");
 }
 
 std::span<const std::string> scenario_names() {

@@ -56,8 +56,10 @@ class ParameterTable {
 
   // OK when `value` is one the row accepts; the error names key, value, unit and bounds.
   Status check(std::size_t row, double value) const;
-  // "0.35 kg", "sphere", "true".
+  // For people, to four digits: "0.35 kg", "sphere", "true".
   std::string format(std::size_t row, double value) const;
+  // The same without a unit and in full, as `--set` and configs read it.
+  std::string text_of(std::size_t row, double value) const;
 
  private:
   std::vector<Parameter> rows_;

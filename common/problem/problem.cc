@@ -3,6 +3,7 @@
 #include <cassert>
 #include <string>
 
+#include "common/base/try.h"
 #include "common/robot/robot_file.h"
 
 namespace gapfarm {
@@ -72,13 +73,12 @@ Status Problem::set_robot(const std::string& text, const std::string& path) {
     return Error{path + ": found XML, expected a robot file; make one of a URDF: gapfarm robot " +
                  path + " --out robot.toml"};
   }
-  const auto robot = parse_robot(text, path);
-  if (!robot) return robot.error();
+  ASSIGN_OR_RETURN(const auto robot, parse_robot(text, path));
   if (scenario_form(scenario).robot) {
-    ground = std::make_shared<const GroundTable>(*robot);
+    ground = std::make_shared<const GroundTable>(robot);
     values = table().nominal();
   } else {
-    auto table = make_tracked_table(*robot);
+    auto table = make_tracked_table(robot);
     if (!table) return Error{path + ": " + table.error().message};
     tracked = *std::move(table);
     values = tracked->values();

@@ -14,6 +14,13 @@ std::string of_birth(const char* what, const v1::StreamKey& stream) {
   return text;
 }
 
+const v1::Point* point_of(const v1::Task& task) {
+  if (task.has_evaluate()) return &task.evaluate().point();
+  if (task.has_predict()) return &task.predict().point();
+  if (task.has_simulate()) return &task.simulate().point();
+  return task.has_trace() ? &task.trace().point() : nullptr;
+}
+
 }  // namespace
 
 // Tasks have no map fields, so their serialisation is the same everywhere in one build.
@@ -36,6 +43,26 @@ std::string task_label(const v1::Task& task) {
     default:
       return "task";
   }
+}
+
+std::string point_settings(const Problem& problem, const v1::Task& task) {
+  const v1::Point* point = point_of(task);
+  if (point == nullptr) return {};
+  const Genome genome(point->genome().begin(), point->genome().end());
+  if (!genome.empty() && genome.size() != problem.genes.size()) return {};
+  std::string text;
+  const auto add = [&](std::size_t row, double value) {
+    text += std::string(text.empty() ? "" : " ") + "--set " + problem.table()[row].key + "=" +
+            problem.table().text_of(row, value);
+  };
+  const ParameterValues values = problem.values_of(genome);
+  for (std::size_t i = 0; i < genome.size(); ++i) {
+    add(problem.genes[i].row, values[problem.genes[i].row]);
+  }
+  for (const v1::Override& override : point->overrides()) {
+    if (override.parameter() < values.size()) add(override.parameter(), override.value());
+  }
+  return text;
 }
 
 }  // namespace gapfarm

@@ -1,5 +1,7 @@
 #include "common/problem/residual_problem.h"
 
+#include "common/base/try.h"
+
 namespace gapfarm {
 namespace {
 
@@ -95,7 +97,7 @@ Status read_residual(const v1::Problem& message, Problem* problem) {
     }
     problem->residual.field.push_back(std::move(term));
   }
-  if (Status s = read_strays(message, problem); !s) return s;
+  RETURN_IF_ERROR(read_strays(message, problem));
   std::vector<std::string> commands;
   for (const CommandSpec& c : problem->commands) commands.push_back(c.name);
   if (Status s = check_residual(problem->residual.field, commands); !s) {

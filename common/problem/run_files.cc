@@ -2,6 +2,7 @@
 
 #include <filesystem>
 
+#include "common/base/try.h"
 #include "common/runs/afresh.h"
 #include "common/runs/read.h"
 
@@ -18,30 +19,28 @@ Result<RunLog> read_run_folders(std::span<const std::string> folders,
   RunLog all;
   for (const std::string& folder : folders) {
     const std::filesystem::path path(folder);
-    auto log = read_runs((path / "commands.csv").string(), (path / "poses.csv").string(), channels);
-    if (!log) return log.error();
-    for (LoggedRun& run : log->runs) {
+    ASSIGN_OR_RETURN(auto log, read_runs((path / "commands.csv").string(),
+                                         (path / "poses.csv").string(), channels));
+    for (LoggedRun& run : log.runs) {
       // Runs of two folders may bear one name.
       if (folders.size() > 1 && run.session.empty()) run.session = path.filename().string();
       all.runs.push_back(std::move(run));
     }
-    all.notes.insert(all.notes.end(), log->notes.begin(), log->notes.end());
+    all.notes.insert(all.notes.end(), log.notes.begin(), log.notes.end());
   }
   return all;
 }
 
 Status read_problem_runs(std::span<const std::string> folders, const WindowSettings& windows,
                          Problem* problem) {
-  const auto all = read_run_folders(folders, problem->ground->robot().channels);
-  if (!all) return all.error();
-  auto cut = cut_windows(*all, windows);
-  if (!cut) return cut.error();
+  ASSIGN_OR_RETURN(const auto all, read_run_folders(folders, problem->ground->robot().channels));
+  ASSIGN_OR_RETURN(auto cut, cut_windows(all, windows));
   if (problem->ground->robot().command == CommandKind::kThrottleSteering) {
-    *cut = begin_afresh(*all, *std::move(cut), windows.run_in_s, kWindowMargin_s);
+    cut = begin_afresh(all, std::move(cut), windows.run_in_s, kWindowMargin_s);
   }
-  for (const std::string& note : problem->ground->robot().notes) cut->log.notes.push_back(note);
-  problem->runs = std::move(cut->runs);
-  problem->log = std::move(cut->log);
+  for (const std::string& note : problem->ground->robot().notes) cut.log.notes.push_back(note);
+  problem->runs = std::move(cut.runs);
+  problem->log = std::move(cut.log);
   const Result<Problem> sound = from_proto(to_proto(*problem));
   return sound ? Status() : Status(sound.error());
 }

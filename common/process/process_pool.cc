@@ -2,7 +2,6 @@
 
 #include <poll.h>
 #include <signal.h>
-#include <spawn.h>
 #include <string.h>
 #include <sys/prctl.h>
 #include <sys/syscall.h>
@@ -15,7 +14,7 @@
 #include <cmath>
 #include <limits>
 
-extern char** environ;
+#include "common/process/child.h"
 
 namespace gapfarm {
 namespace {
@@ -32,13 +31,6 @@ EndCause cause_of(int status) {
     default:
       return EndCause::kCrashed;
   }
-}
-
-std::string text_of(const std::string& name, pid_t pid, int status) {
-  const std::string who = name + " (pid " + std::to_string(pid) + ")";
-  if (WIFEXITED(status)) return who + " exited with status " + std::to_string(WEXITSTATUS(status));
-  const int signal = WTERMSIG(status);
-  return who + " was killed by signal " + std::to_string(signal) + " (" + strsignal(signal) + ")";
 }
 
 }  // namespace
@@ -84,49 +76,25 @@ Status ProcessPool::start(double now) {
 Status ProcessPool::start_place(Place& place, unsigned index) {
   place.name =
       options_.name_prefix + "-" + std::to_string(index + 1) + "." + std::to_string(++place.starts);
-  std::vector<std::string> words =
-      options_.arguments(place.name, place.replaced ? &*place.replaced : nullptr);
-  words.insert(words.begin(), options_.program);
-  std::vector<char*> argv;
-  for (std::string& word : words) argv.push_back(word.data());
-  argv.push_back(nullptr);
-
   auto page = ProgressPage::create();
   if (!page) {
     place.gave_up = true;
     return page.error();
   }
-  posix_spawn_file_actions_t files;
-  posix_spawn_file_actions_init(&files);
-  posix_spawn_file_actions_addopen(&files, STDIN_FILENO, "/dev/null", 0, 0);
-  // Standard output is the parent's answer to its user; children may only complain.
-  posix_spawn_file_actions_adddup2(&files, STDERR_FILENO, STDOUT_FILENO);
-  // To the same number it still takes close-on-exec off (POSIX.1-2024; glibc since 2.29).
-  posix_spawn_file_actions_adddup2(&files, page->fd(), ProgressPage::kInheritedFd);
-  posix_spawnattr_t attributes;
-  posix_spawnattr_init(&attributes);
-  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF);
-  sigset_t defaults;
-  sigemptyset(&defaults);
-  for (int signal : {SIGINT, SIGTERM, SIGHUP, SIGPIPE, SIGCHLD}) sigaddset(&defaults, signal);
-  posix_spawnattr_setsigdefault(&attributes, &defaults);
-  // Blocked until the child's own handlers stand (StopOnSignals unblocks).
-  sigset_t mask;
-  sigemptyset(&mask);
-  sigaddset(&mask, SIGINT);
-  posix_spawnattr_setsigmask(&attributes, &mask);
-  pid_t pid = 0;
-  const int failed =
-      posix_spawn(&pid, options_.program.c_str(), &files, &attributes, argv.data(), environ);
-  posix_spawn_file_actions_destroy(&files);
-  posix_spawnattr_destroy(&attributes);
-  if (failed != 0) {
+  ChildSetup setup;
+  setup.words = options_.arguments(place.name, place.replaced ? &*place.replaced : nullptr);
+  setup.words.insert(setup.words.begin(), options_.program);
+  setup.kept = page->fd();
+  setup.blocks_interrupt = true;
+  setup.death_signal = 0;  // die_with_parent() in the child
+  const Result<pid_t> pid = start_child(setup);
+  if (!pid) {
     place.gave_up = true;
-    return Error{"cannot start " + options_.program + ": " + strerror(failed)};
+    return Error{"cannot start " + options_.program + ": " + pid.error().message};
   }
-  place.pid = pid;
+  place.pid = *pid;
   // By number: glibc 2.36 declares pidfd_open without C linkage.
-  place.pidfd = static_cast<int>(syscall(SYS_pidfd_open, pid, 0));
+  place.pidfd = static_cast<int>(syscall(SYS_pidfd_open, *pid, 0));
   place.replaced.reset();
   place.page.emplace(std::move(*page));
   place.beats = place.steps = place.attempt = 0;
@@ -140,9 +108,11 @@ ProcessEnded ProcessPool::ended(Place& place, int status, double now) {
   end.name = place.name;
   end.pid = place.pid;
   end.cause = place.verdict.value_or(cause_of(status));
-  end.text = text_of(place.name, place.pid, status);
+  end.text = place.name + " (pid " + std::to_string(place.pid) + ") " + end_text(status);
   end.epoch = (*place.page)->epoch.load();
   end.attempt = (*place.page)->attempt.load();
+  end.failure = (*place.page)->reported_failure();
+  if (!end.failure.empty()) end.text += ": " + first_line(end.failure);
   if (place.verdict) {
     end.text += place.verdict == EndCause::kHung
                     ? " by its parent: its simulation made no step for too long"

@@ -27,6 +27,9 @@ enum class EndCause {
 inline constexpr int kExitUsage = 2;
 inline constexpr int kExitRefused = 78;
 
+// A reported failure without the line on how to repeat it.
+inline std::string first_line(const std::string& text) { return text.substr(0, text.find('\n')); }
+
 struct ProcessEnded {
   std::string name;
   pid_t pid = 0;
@@ -34,6 +37,8 @@ struct ProcessEnded {
   // What it had in work, by its progress page; 0: nothing.
   std::uint64_t epoch = 0;
   std::uint64_t attempt = 0;
+  // Of one that reported why it ended: a sentence, and perhaps a line on how to repeat it by hand.
+  std::string failure;
   bool gave_up = false;  // its place stays empty
   std::string text;      // "local-1 (pid 42) was killed by signal 11 (Segmentation fault)"
 };

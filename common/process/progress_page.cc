@@ -25,6 +25,14 @@ Error trouble(const char* what) {
 
 }  // namespace
 
+void WorkerProgress::report_failure(const std::string& why) {
+  why.copy(failure.data(), failure.size() - 1);
+}
+
+std::string WorkerProgress::reported_failure() const {
+  return {failure.data(), strnlen(failure.data(), failure.size())};
+}
+
 Result<ProgressPage> ProgressPage::map(int fd) {
   void* at = mmap(nullptr, kPageBytes, PROT_READ | PROT_WRITE, MAP_SHARED, fd, 0);
   if (at == MAP_FAILED) {

@@ -3,8 +3,10 @@
 // it also says what a worker that crashed had in work.
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <cstdint>
+#include <string>
 
 #include "common/base/result.h"
 
@@ -16,6 +18,12 @@ struct WorkerProgress {
   std::atomic<std::uint64_t> steps{0};    // of the simulation, since the process began
   std::atomic<std::uint64_t> epoch{0};    // of the master's life that gave out `attempt`
   std::atomic<std::uint64_t> attempt{0};  // in work; 0: none
+  // Why the worker ends, written by report_failure() before it does; else all zeros.
+  std::array<char, 3072> failure{};
+
+  void report_failure(const std::string& why);  // cut to the room that there is
+  // For the parent, once the worker has ended: "" where it said nothing.
+  std::string reported_failure() const;
 };
 static_assert(std::atomic<std::uint64_t>::is_always_lock_free);
 

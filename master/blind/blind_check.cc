@@ -4,6 +4,7 @@
 #include <filesystem>
 
 #include "common/base/hash.h"
+#include "common/base/try.h"
 #include "common/process/process_pool.h"
 #include "common/trials/files.h"
 #include "common/trials/write.h"
@@ -61,40 +62,34 @@ Status make_out(const std::string& out) {
 Status write_cases(const std::vector<Truth>& cases, const std::vector<TrialLog>& logs,
                    const CheckPaths& paths) {
   for (std::size_t i = 0; i < cases.size(); ++i) {
-    if (Status s = write_trials(logs[i], paths.trials(cases[i].id)); !s) return s;
+    RETURN_IF_ERROR(write_trials(logs[i], paths.trials(cases[i].id)));
   }
   return {};
 }
 
 Result<InHand> make_cases(const Config& config, const BlindCheckSettings& settings,
                           const BlindCheckHooks& hooks, const CheckPaths& paths) {
-  if (Status s = check_fresh(paths); !s) return s.error();
-  if (Status s = make_out(paths.out); !s) return s.error();
-  const auto farm = hooks.start_farm();
-  if (!farm) return farm.error();
+  RETURN_IF_ERROR(check_fresh(paths));
+  RETURN_IF_ERROR(make_out(paths.out));
+  ASSIGN_OR_RETURN(const auto farm, hooks.start_farm());
   const DesignProgress progress = timed(hooks);
-  const auto planned = planned_problem(config, settings.plan, settings.design.seed, **farm);
-  if (!planned) return planned.error();
-  const auto design = draw_design(*planned, settings.design, **farm, progress);
-  if (!design) return design.error();
-  if (design->cases.empty()) return Error{"the design holds no case; ask for effects or nulls"};
-  const auto logs = simulate_cases(config, design->cases, settings.plan, 0, **farm, progress);
-  if (!logs) return logs.error();
-  if (Status s = write_cases(design->cases, *logs, paths); !s) return s.error();
+  ASSIGN_OR_RETURN(const auto planned,
+                   planned_problem(config, settings.plan, settings.design.seed, *farm));
+  ASSIGN_OR_RETURN(const auto design, draw_design(planned, settings.design, *farm, progress));
+  if (design.cases.empty()) return Error{"the design holds no case; ask for effects or nulls"};
+  ASSIGN_OR_RETURN(const auto logs,
+                   simulate_cases(config, design.cases, settings.plan, 0, *farm, progress));
+  RETURN_IF_ERROR(write_cases(design.cases, logs, paths));
 
-  InHand hand{TruthKey::random(), {}, design->out_of_reach};
-  for (const Truth& truth : design->cases) {
+  InHand hand{TruthKey::random(), {}, design.out_of_reach};
+  for (const Truth& truth : design.cases) {
     hand.sealed.push_back({truth.id, random_salt(), format_truth(truth)});
   }
-  if (Status s = write_file_atomically(paths.seals(), format_seals(hand.sealed)); !s) {
-    return s.error();
-  }
-  if (Status s = write_private_file(paths.box(), hand.key.close_box(hand.sealed)); !s) {
-    return s.error();
-  }
+  RETURN_IF_ERROR(write_file_atomically(paths.seals(), format_seals(hand.sealed)));
+  RETURN_IF_ERROR(write_private_file(paths.box(), hand.key.close_box(hand.sealed)));
   // Last: from here on the check can be resumed.
-  const CheckState state{content_hash(config.text), design->out_of_reach, settings.asked};
-  if (Status s = write_check_state(state, paths.state()); !s) return s.error();
+  const CheckState state{content_hash(config.text), design.out_of_reach, settings.asked};
+  RETURN_IF_ERROR(write_check_state(state, paths.state()));
   return hand;
 }
 
@@ -113,49 +108,42 @@ Result<TruthKey> find_key(const BlindCheckSettings& settings, const CheckPaths& 
 
 Result<InHand> take_up(const Config& config, const BlindCheckSettings& settings,
                        const CheckPaths& paths) {
-  const Result<CheckState> state = read_check_state(paths.state());
-  if (!state) return state.error();
-  if (state->made_of != content_hash(config.text)) {
+  ASSIGN_OR_RETURN(const CheckState state, read_check_state(paths.state()));
+  if (state.made_of != content_hash(config.text)) {
     return Error{paths.out + ": was made from another config than " + config.path +
                  "; resume it with that one, or choose another --out"};
   }
-  Result<TruthKey> key = find_key(settings, paths);
-  if (!key) return key.error();
-  const auto box = read_text_file(paths.box());
-  if (!box) return box.error();
-  const auto sealed = key->open_box(*box, paths.box());
-  if (!sealed) return sealed.error();
-  const auto seals = read_text_file(paths.seals());
-  if (!seals) return seals.error();
-  if (Status s = verify_seals(*sealed, *seals, paths.seals()); !s) return s.error();
+  ASSIGN_OR_RETURN(TruthKey key, find_key(settings, paths));
+  ASSIGN_OR_RETURN(const auto box, read_text_file(paths.box()));
+  ASSIGN_OR_RETURN(const auto sealed, key.open_box(box, paths.box()));
+  ASSIGN_OR_RETURN(const auto seals, read_text_file(paths.seals()));
+  RETURN_IF_ERROR(verify_seals(sealed, seals, paths.seals()));
   // No key lies about while diagnoses run, unless the user wants one.
   std::error_code ignored;
   if (settings.key_path.empty()) fs::remove(key_path_of(settings), ignored);
-  return InHand{*key, *sealed, state->out_of_reach};
+  return InHand{key, sealed, state.out_of_reach};
 }
 
 Result<std::vector<Truth>> truths_of(const InHand& hand) {
   std::vector<Truth> truths;
   for (const SealedTruth& sealed : hand.sealed) {
-    Result<Truth> truth = parse_truth(sealed.truth, sealed.id, sealed.id);
-    if (!truth) return truth.error();
-    truths.push_back(std::move(*truth));
+    ASSIGN_OR_RETURN(Truth truth, parse_truth(sealed.truth, sealed.id, sealed.id));
+    truths.push_back(std::move(truth));
   }
   return truths;
 }
 
 Status open_truths(const InHand& hand, const BlindCheckSettings& settings,
                    const CheckPaths& paths) {
-  const auto seals = read_text_file(paths.seals());
-  if (!seals) return seals.error();
-  if (Status s = verify_seals(hand.sealed, *seals, paths.seals()); !s) return s;
+  ASSIGN_OR_RETURN(const auto seals, read_text_file(paths.seals()));
+  RETURN_IF_ERROR(verify_seals(hand.sealed, seals, paths.seals()));
   std::string salts;
   for (const SealedTruth& sealed : hand.sealed) {
-    if (Status s = write_file_atomically(paths.truth(sealed.id), sealed.truth); !s) return s;
+    RETURN_IF_ERROR(write_file_atomically(paths.truth(sealed.id), sealed.truth));
     salts += sealed.id + " " + sealed.salt + "\n";
   }
-  if (Status s = write_file_atomically(paths.salts(), salts); !s) return s;
-  if (Status s = write_file_atomically(paths.opened_key(), hand.key.text()); !s) return s;
+  RETURN_IF_ERROR(write_file_atomically(paths.salts(), salts));
+  RETURN_IF_ERROR(write_file_atomically(paths.opened_key(), hand.key.text()));
   std::error_code ignored;
   fs::remove(key_path_of(settings), ignored);
   return {};
@@ -176,14 +164,13 @@ Status add_realised(const Config& config, const BlindCheckSettings& settings,
     owner.push_back(i);
   }
   if (diagnosed.empty()) return {};
-  const auto farm = hooks.start_farm();
-  if (!farm) return farm.error();
-  const auto fresh = score_fresh_logs(config, diagnosed, settings.plan, **farm, timed(hooks));
-  if (!fresh) return fresh.error();
+  ASSIGN_OR_RETURN(const auto farm, hooks.start_farm());
+  ASSIGN_OR_RETURN(const auto fresh,
+                   score_fresh_logs(config, diagnosed, settings.plan, *farm, timed(hooks)));
   for (std::size_t i = 0; i < owner.size(); ++i) {
-    if (!(*fresh)[i]) continue;
-    cases[owner[i]].fresh = (*fresh)[i];
-    if (cases[owner[i]].promised) cases[owner[i]].realised = realised_shrinkage(*(*fresh)[i]);
+    if (!fresh[i]) continue;
+    cases[owner[i]].fresh = fresh[i];
+    if (cases[owner[i]].promised) cases[owner[i]].realised = realised_shrinkage(*fresh[i]);
   }
   return {};
 }
@@ -195,9 +182,7 @@ ScoredCase scored(const Truth& truth, const CheckPaths& paths) {
 }
 
 Status write_report(const BlindReport& report, const CheckPaths& paths) {
-  if (Status s = write_file_atomically(paths.result(), format_blind_json(report)); !s) {
-    return s;
-  }
+  RETURN_IF_ERROR(write_file_atomically(paths.result(), format_blind_json(report)));
   return write_file_atomically(paths.out + "/blind_check.md", format_blind_markdown(report));
 }
 
@@ -211,11 +196,11 @@ Status diagnose_blindly(const InHand& hand, const std::vector<Truth>& truths,
   const PrivateMemory unreadable;
   const std::string key_path = key_path_of(settings);
   if (!settings.key_path.empty()) {
-    if (Status s = write_private_file(key_path, hand.key.text()); !s) return s;
+    RETURN_IF_ERROR(write_private_file(key_path, hand.key.text()));
   }
   Status diagnosed = diagnose_cases(open, paths, settings.diagnose, hooks);
   if (diagnosed) return {};
-  if (Status s = write_private_file(key_path, hand.key.text()); !s) return s;
+  RETURN_IF_ERROR(write_private_file(key_path, hand.key.text()));
   if (hooks.note)
     hooks.note("stopped; the key of the truths is in " + key_path +
                ", and the same command goes on from here");
@@ -229,11 +214,10 @@ Result<Problem> planned_problem(const Config& config, const SessionPlans& plan, 
   Truth own;
   own.id = "the config's own robot";
   own.seed = seed;
-  auto logs = simulate_cases(config, {own}, plan, 0, farm);
-  if (!logs) return logs.error();
+  ASSIGN_OR_RETURN(auto logs, simulate_cases(config, {own}, plan, 0, farm));
   Problem problem = config.problem;
   problem.fitness.kind = FitnessKind::kLogScore;
-  problem.log = std::move(logs->front());
+  problem.log = std::move(logs.front());
   for (Trial& trial : problem.log.trials) trial.path.clear();
   if (problem.log.trials.empty()) return Error{"the planned experiment has no trial"};
   return problem;
@@ -242,24 +226,22 @@ Result<Problem> planned_problem(const Config& config, const SessionPlans& plan, 
 Result<BlindReport> run_blind_check(const Config& config, const BlindCheckSettings& settings,
                                     const BlindCheckHooks& hooks) {
   const CheckPaths paths{settings.out};
-  const Result<InHand> hand = settings.resume || goes_on(settings, paths)
-                                  ? take_up(config, settings, paths)
-                                  : make_cases(config, settings, hooks, paths);
-  if (!hand) return hand.error();
-  const auto truths = truths_of(*hand);
-  if (!truths) return truths.error();
+  ASSIGN_OR_RETURN(const InHand hand, settings.resume || goes_on(settings, paths)
+                                          ? take_up(config, settings, paths)
+                                          : make_cases(config, settings, hooks, paths));
+  ASSIGN_OR_RETURN(const auto truths, truths_of(hand));
   if (hooks.note) {
-    hooks.note(std::to_string(truths->size()) + " cases sealed, see " + paths.seals());
+    hooks.note(std::to_string(truths.size()) + " cases sealed, see " + paths.seals());
   }
   if (hooks.on_sealed) {
-    if (Status s = hooks.on_sealed(); !s) return s.error();
+    RETURN_IF_ERROR(hooks.on_sealed());
   }
-  if (Status s = diagnose_blindly(*hand, *truths, settings, hooks, paths); !s) return s.error();
-  if (Status s = open_truths(*hand, settings, paths); !s) return s.error();
-  BlindReport report{settings.provenance, {}, hand->out_of_reach};
-  for (const Truth& truth : *truths) report.cases.push_back(scored(truth, paths));
-  if (Status s = add_realised(config, settings, hooks, paths, report.cases); !s) return s.error();
-  if (Status s = write_report(report, paths); !s) return s.error();
+  RETURN_IF_ERROR(diagnose_blindly(hand, truths, settings, hooks, paths));
+  RETURN_IF_ERROR(open_truths(hand, settings, paths));
+  BlindReport report{settings.provenance, {}, hand.out_of_reach};
+  for (const Truth& truth : truths) report.cases.push_back(scored(truth, paths));
+  RETURN_IF_ERROR(add_realised(config, settings, hooks, paths, report.cases));
+  RETURN_IF_ERROR(write_report(report, paths));
   return report;
 }
 
@@ -280,17 +262,15 @@ Result<BlindReport> run_foreign_check(const std::string& cases, const std::strin
             [](const OpenCase& a, const OpenCase& b) { return a.id < b.id; });
   const std::string made_of = fs::weakly_canonical(cases, code).string();
   if (!settings.resume && !goes_on(settings, paths)) {
-    if (Status s = check_fresh(paths); !s) return s.error();
-    if (Status s = write_check_state({made_of, {}, settings.asked}, paths.state()); !s)
-      return s.error();
+    RETURN_IF_ERROR(check_fresh(paths));
+    RETURN_IF_ERROR(write_check_state({made_of, {}, settings.asked}, paths.state()));
   } else {
-    const Result<CheckState> state = read_check_state(paths.state());
-    if (!state) return state.error();
-    if (state->made_of != made_of) {
-      return Error{paths.out + ": is the check of " + state->made_of + ", not of " + made_of};
+    ASSIGN_OR_RETURN(const CheckState state, read_check_state(paths.state()));
+    if (state.made_of != made_of) {
+      return Error{paths.out + ": is the check of " + state.made_of + ", not of " + made_of};
     }
   }
-  if (Status s = diagnose_cases(open, paths, settings.diagnose, hooks); !s) return s.error();
+  RETURN_IF_ERROR(diagnose_cases(open, paths, settings.diagnose, hooks));
   BlindReport report{settings.provenance, {}, {}};
   for (const OpenCase& c : open) {
     const std::string file = truths + "/" + c.id + ".json";
@@ -298,16 +278,14 @@ Result<BlindReport> run_foreign_check(const std::string& cases, const std::strin
     truth.id = c.id;
     const bool has_truth = !truths.empty() && fs::exists(file);
     if (has_truth) {
-      const Result<std::string> text = read_text_file(file);
-      if (!text) return text.error();
-      Result<Truth> parsed = parse_truth(*text, file, c.id);
-      if (!parsed) return parsed.error();
-      truth = std::move(*parsed);
+      ASSIGN_OR_RETURN(const std::string text, read_text_file(file));
+      ASSIGN_OR_RETURN(Truth parsed, parse_truth(text, file, c.id));
+      truth = std::move(parsed);
     }
     report.cases.push_back(scored(truth, paths));
     report.cases.back().has_truth = has_truth;
   }
-  if (Status s = write_report(report, paths); !s) return s.error();
+  RETURN_IF_ERROR(write_report(report, paths));
   return report;
 }
 

@@ -14,6 +14,8 @@
 #include <cstring>
 #include <optional>
 
+#include "common/base/try.h"
+#include "common/process/child.h"
 #include "common/process/process_pool.h"
 #include "master/farm/farm.h"
 
@@ -31,46 +33,20 @@ struct Child {
   std::optional<double> asked_s;  // to end, beyond its limit
 };
 
-// Only calls that are safe between fork and exec.  Returns on failure.
-void become(char* const* argv, int log, pid_t parent) {
-  setpgid(0, 0);
-  if (!die_with_parent(parent)) return;
-  const int null = open("/dev/null", O_RDONLY);
-  dup2(null, STDIN_FILENO);
-  dup2(log, STDOUT_FILENO);
-  dup2(log, STDERR_FILENO);
-  syscall(SYS_close_range, 3u, ~0u, 0u);
-  for (int s : {SIGINT, SIGTERM, SIGHUP, SIGPIPE, SIGCHLD}) signal(s, SIG_DFL);
-  sigset_t none;
-  sigemptyset(&none);
-  sigprocmask(SIG_SETMASK, &none, nullptr);
-  execv(argv[0], argv);
-}
-
-Result<Child> start_child(const ChildJob& job) {
+Result<Child> start_job(const ChildJob& job) {
   const int log = open(job.log_path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
   if (log < 0) return Error{job.log_path + ": cannot be written: " + std::strerror(errno)};
-  std::vector<std::string> words = job.argv;
-  std::vector<char*> argv;
-  for (std::string& word : words) argv.push_back(word.data());
-  argv.push_back(nullptr);
-  if (access(argv[0], X_OK) != 0) {
-    close(log);
-    return Error{"cannot start " + job.argv[0] + ": " + std::strerror(errno)};
-  }
-  const pid_t parent = getpid();
-  const pid_t pid = fork();
-  if (pid == 0) {
-    become(argv.data(), log, parent);
-    _exit(127);
-  }
+  ChildSetup setup;
+  setup.words = job.argv;
+  setup.out = setup.err = log;
+  setup.leads_group = true;
+  const Result<pid_t> pid = start_child(setup);
   close(log);
-  if (pid < 0) return Error{std::string("cannot start a process: ") + std::strerror(errno)};
-  setpgid(pid, pid);  // whichever of the two comes first
+  if (!pid) return Error{"cannot start " + job.argv[0] + ": " + pid.error().message};
   Child child;
   child.job = &job;
-  child.pid = pid;
-  child.pidfd = static_cast<int>(syscall(SYS_pidfd_open, pid, 0));
+  child.pid = *pid;
+  child.pidfd = static_cast<int>(syscall(SYS_pidfd_open, *pid, 0));
   child.started_s = monotonic_seconds();
   return child;
 }
@@ -91,13 +67,12 @@ ChildEnd end_of(const Child& child, int status, const rusage& used,
     end.status = WEXITSTATUS(status);
     if (!options.done(end.status)) {
       end.state = ChildState::kFailed;
-      end.text = "exited with status " + std::to_string(end.status);
+      end.text = end_text(status);
     }
   } else {
     end.state = ChildState::kCrashed;
     end.status = WTERMSIG(status);
-    end.text = std::string("was killed by signal ") + std::to_string(end.status) + " (" +
-               strsignal(end.status) + ")";
+    end.text = end_text(status);
   }
   return end;
 }
@@ -184,9 +159,8 @@ Status run_children(const std::vector<ChildJob>& jobs, const ChildrenOptions& op
   while (ended < jobs.size()) {
     if (options.stop && options.stop->requested()) return stop_requested();
     while (started < jobs.size() && crowd.size() < std::max(1u, options.at_once)) {
-      const Result<Child> child = start_child(jobs[started]);
-      if (!child) return child.error();
-      crowd.add(*child);
+      ASSIGN_OR_RETURN(const Child child, start_job(jobs[started]));
+      crowd.add(child);
       ++started;
     }
     crowd.wait();

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "common/base/suggest.h"
+#include "common/base/try.h"
 #include "common/score/statistics.h"
 #include "common/trials/csv.h"
 
@@ -182,13 +183,11 @@ Status search_strengths(const Problem& planned, Drafts& drafts, Farm& farm,
   const std::string hash = farm.add_problem(to_proto(planned));
   std::vector<v1::Task> tasks;
   for (const Truth& truth : drafts.cases) tasks.push_back(predict_task(planned, truth));
-  const auto base = farm.run(hash, tasks);
-  if (!base) return base.error();
-  for (std::size_t i = 0; i < base->size(); ++i) {
-    if ((*base)[i].outcome() == v1::OK) continue;
-    return Error{"a robot near the config's ends with " + v1::Outcome_Name((*base)[i].outcome()) +
-                 " (" + (*base)[i].message() +
-                 "); the config's values do not make one that drives"};
+  ASSIGN_OR_RETURN(const auto base, farm.run(hash, tasks));
+  for (std::size_t i = 0; i < base.size(); ++i) {
+    if (base[i].outcome() == v1::OK) continue;
+    return Error{"a robot near the config's ends with " + v1::Outcome_Name(base[i].outcome()) +
+                 " (" + base[i].message() + "); the config's values do not make one that drives"};
   }
   for (;;) {
     std::vector<std::size_t> open;
@@ -207,11 +206,10 @@ Status search_strengths(const Problem& planned, Drafts& drafts, Farm& farm,
       progress("strengths", drafts.sizings.size() - open.size(), drafts.sizings.size());
     }
     if (open.empty()) return {};
-    const auto results = farm.run(hash, round);
-    if (!results) return results.error();
+    ASSIGN_OR_RETURN(const auto results, farm.run(hash, round));
     for (std::size_t i = 0; i < open.size(); ++i) {
       Sizing& sizing = drafts.sizings[open[i]];
-      tell(table, drafts.arena(), (*results)[i], (*base)[sizing.in_case].predict(), sizing);
+      tell(table, drafts.arena(), results[i], base[sizing.in_case].predict(), sizing);
     }
   }
 }
@@ -296,11 +294,11 @@ std::map<std::string, double> draw_robot(const Problem& problem, Stream& stream)
 Result<BlindDesign> draw_design(const Problem& planned, const DesignSettings& settings, Farm& farm,
                                 const DesignProgress& progress) {
   const ParameterTable& table = planned.table();
-  if (Status s = check_effects(table, settings.effects); !s) return s.error();
+  RETURN_IF_ERROR(check_effects(table, settings.effects));
   const std::vector<std::size_t> effects = chosen_effects(table, settings.effects);
   Drafts drafts(planned, settings);
   draft_cases(settings, effects, drafts);
-  if (Status s = search_strengths(planned, drafts, farm, progress); !s) return s.error();
+  RETURN_IF_ERROR(search_strengths(planned, drafts, farm, progress));
   return deal(table, settings, std::move(drafts));
 }
 

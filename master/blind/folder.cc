@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "common/base/try.h"
 #include "common/json/json.h"
 #include "common/trials/files.h"
 #include "master/diagnose/effects/effect_diagnosis.h"
@@ -74,9 +75,8 @@ Status write_check_state(const CheckState& state, const std::string& path) {
 }
 
 Result<CheckState> read_check_state(const std::string& path) {
-  const Result<std::string> text = read_text_file(path);
-  if (!text) return text.error();
-  const Json json = parse_json(*text);
+  ASSIGN_OR_RETURN(const std::string text, read_text_file(path));
+  const Json json = parse_json(text);
   if (!json.is_object() || !json.value("made_of", Json()).is_string()) {
     return Error{path + ": is not the state of a blind check; choose another --out"};
   }
@@ -99,7 +99,7 @@ Status diagnose_cases(const std::vector<OpenCase>& cases, const CheckPaths& path
   for (std::size_t i = 0; i < cases.size(); ++i) {
     const std::string& id = cases[i].id;
     if (std::filesystem::exists(paths.outcome(id))) continue;
-    if (Status s = make_empty(paths.diagnosis(id)); !s) return s;
+    RETURN_IF_ERROR(make_empty(paths.diagnosis(id)));
     jobs.push_back({id, diagnose_command(cases[i], i + 1, paths, settings),
                     paths.diagnosis(id) + "/output.txt"});
   }
@@ -122,7 +122,7 @@ Status diagnose_cases(const std::vector<OpenCase>& cases, const CheckPaths& path
   options.on_tick = [&](std::size_t ended, double elapsed_s) {
     if (hooks.progress) hooks.progress("cases diagnosed", ended, jobs.size(), elapsed_s);
   };
-  if (Status s = run_children(jobs, options); !s) return s;
+  RETURN_IF_ERROR(run_children(jobs, options));
   return written;
 }
 

@@ -1,5 +1,6 @@
 #include "master/blind/fresh.h"
 
+#include "common/base/try.h"
 #include "common/config/model.h"
 
 namespace gapfarm {
@@ -39,27 +40,25 @@ Result<std::vector<std::optional<FreshScores>>> score_fresh_logs(
     Farm& farm, const DesignProgress& progress) {
   std::vector<Truth> truths;
   for (const DiagnosedCase& c : cases) truths.push_back(c.truth);
-  Result<std::vector<TrialLog>> logs =
-      simulate_cases(config, truths, plan, /*seed_offset=*/1, farm, progress);
-  if (!logs) return logs.error();
+  ASSIGN_OR_RETURN(std::vector<TrialLog> logs,
+                   simulate_cases(config, truths, plan, /*seed_offset=*/1, farm, progress));
   std::vector<std::optional<FreshScores>> scores;
   for (std::size_t i = 0; i < cases.size(); ++i) {
     Problem problem = config.problem;
     problem.genes.clear();
     problem.fitness.kind = FitnessKind::kLogScore;
-    problem.log = std::move((*logs)[i]);
+    problem.log = std::move(logs[i]);
     for (Trial& trial : problem.log.trials) trial.path.clear();
     for (const v1::Override& o : overrides_of(problem.table(), truths[i])) {
       problem.values[o.parameter()] = o.value();
     }
-    const auto results = farm.run(farm.add_problem(to_proto(problem)),
-                                  {predict_with(problem.values, cases[i].tuned),
-                                   predict_with(problem.values, cases[i].final_),
-                                   predict_with(problem.values, problem.values)});
-    if (!results) return results.error();
-    const auto tuned = mean_log_score((*results)[0]);
-    const auto final_score = mean_log_score((*results)[1]);
-    const auto truth = mean_log_score((*results)[2]);
+    ASSIGN_OR_RETURN(const auto results, farm.run(farm.add_problem(to_proto(problem)),
+                                                  {predict_with(problem.values, cases[i].tuned),
+                                                   predict_with(problem.values, cases[i].final_),
+                                                   predict_with(problem.values, problem.values)}));
+    const auto tuned = mean_log_score(results[0]);
+    const auto final_score = mean_log_score(results[1]);
+    const auto truth = mean_log_score(results[2]);
     scores.emplace_back();
     if (tuned && final_score && truth) {
       scores.back() = FreshScores{*tuned, *final_score, *truth, std::nullopt};
@@ -67,10 +66,10 @@ Result<std::vector<std::optional<FreshScores>>> score_fresh_logs(
     if (scores.back() && !cases[i].residual.empty()) {
       Problem corrected = problem;
       corrected.residual = cases[i].residual;
-      const auto result = farm.run(farm.add_problem(to_proto(corrected)),
-                                   {predict_with(problem.values, cases[i].final_)});
-      if (!result) return result.error();
-      scores.back()->corrected = mean_log_score(result->front());
+      ASSIGN_OR_RETURN(const auto result,
+                       farm.run(farm.add_problem(to_proto(corrected)),
+                                {predict_with(problem.values, cases[i].final_)}));
+      scores.back()->corrected = mean_log_score(result.front());
     }
     if (progress) progress("fresh logs predicted", i + 1, cases.size());
   }

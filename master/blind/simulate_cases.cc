@@ -1,5 +1,6 @@
 #include <algorithm>
 
+#include "common/base/try.h"
 #include "master/blind/design.h"
 #include "master/experiment/plan.h"
 
@@ -22,14 +23,13 @@ Result<std::vector<TrialLog>> simulate_cases(const Config& config, const std::ve
     tasks.insert(tasks.end(), sessions.begin(), sessions.end());
     owner.insert(owner.end(), sessions.size(), i);
   }
-  const auto results =
-      farm.run(farm.add_problem(to_proto(problem)), tasks, [&](const FarmProgress& p) {
-        if (progress) progress("sessions simulated", p.done, p.total);
-      });
-  if (!results) return results.error();
+  ASSIGN_OR_RETURN(const auto results,
+                   farm.run(farm.add_problem(to_proto(problem)), tasks, [&](const FarmProgress& p) {
+                     if (progress) progress("sessions simulated", p.done, p.total);
+                   }));
   std::vector<TrialLog> logs(cases.size());
-  for (std::size_t i = 0; i < results->size(); ++i) {
-    const v1::TaskResult& result = (*results)[i];
+  for (std::size_t i = 0; i < results.size(); ++i) {
+    const v1::TaskResult& result = results[i];
     if (result.outcome() != v1::OK) {
       return Error{cases[owner[i]].id + ": the simulation ended with " +
                    v1::Outcome_Name(result.outcome()) + " (" + result.message() +

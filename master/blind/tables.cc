@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "common/json/fields.h"
 #include "common/json/json.h"
 #include "common/trials/csv.h"
 
@@ -86,8 +87,6 @@ Json rates_json(const std::map<std::string, Rate>& rates) {
   return json;
 }
 
-Json optional_json(const std::optional<double>& value) { return value ? Json(*value) : Json(); }
-
 Json said_json(const Said& said) {
   Json effects = Json::array();
   for (const SaidEffect& e : said.effects) {
@@ -117,8 +116,8 @@ Json case_json(const ScoredCase& c) {
                         {"covered", p.covered}});
   }
   json["coverage"] = coverage;
-  json["promised"] = optional_json(c.promised);
-  json["realised"] = optional_json(c.realised);
+  json["promised"] = number_or_null(c.promised);
+  json["realised"] = number_or_null(c.realised);
   if (c.fresh) {
     json["fresh_scores"] = {{"unit", "nats/trial"},
                             {"tuned", c.fresh->tuned},

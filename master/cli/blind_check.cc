@@ -8,6 +8,7 @@
 
 #include "common/base/build_info.h"
 #include "common/base/hash.h"
+#include "common/base/try.h"
 #include "common/config/config.h"
 #include "common/process/process_pool.h"
 #include "common/trials/files.h"
@@ -34,13 +35,12 @@ struct BlindCheckOptions {
 };
 
 Result<DesignSettings> design_of(const BlindCheckOptions& options, const Config& config) {
-  if (Status s = check_effects(config.problem.table(), options.effects); !s) return s.error();
+  RETURN_IF_ERROR(check_effects(config.problem.table(), options.effects));
   DesignSettings design;
   design.effects = options.effects;
   for (const std::string& word : options.sizes) {
-    const Result<SizeLevel> level = size_level(word);
-    if (!level) return level.error();
-    design.sizes.push_back(*level);
+    ASSIGN_OR_RETURN(const SizeLevel level, size_level(word));
+    design.sizes.push_back(level);
   }
   design.per_effect = options.per_effect;
   design.nulls = options.nulls;
@@ -60,10 +60,10 @@ Result<Config> config_of(const BlindCheckOptions& options, SessionPlans& plan, C
   }
   if (!options.like.empty()) {
     const std::vector<std::string> files = {options.like};
-    const auto log = read_trial_files(files, command_names(config->problem.commands));
-    if (!log) return log.error();
-    show_notes(*log, console);
-    plan = plan_of(config->problem, *log);
+    ASSIGN_OR_RETURN(const auto log,
+                     read_trial_files(files, command_names(config->problem.commands)));
+    show_notes(log, console);
+    plan = plan_of(config->problem, log);
   }
   return config;
 }
@@ -98,10 +98,9 @@ Result<std::unique_ptr<Farm>> start(const BlindCheckOptions& options, const Conf
   FarmOptions farm;
   const DiagnoseSettings diagnose = diagnose_of(options);
   farm.workers = static_cast<int>(diagnose.workers * diagnose.jobs);
-  auto started = start_farm(farm, config.farm, context);
-  if (!started) return started.error();
+  ASSIGN_OR_RETURN(auto started, start_farm(farm, config.farm, context));
   if (!context.work->begun()) context.work->stage(0);
-  return context.work->over(*std::move(started));
+  return context.work->over(std::move(started));
 }
 
 BlindCheckHooks hooks_of(const BlindCheckOptions& options, const Config& config,
@@ -124,25 +123,23 @@ BlindCheckHooks hooks_of(const BlindCheckOptions& options, const Config& config,
   return hooks;
 }
 
-int show_strengths(const BlindCheckOptions& options, const Config& config, const SessionPlans& plan,
-                   DesignSettings design, CliContext& context) {
+Result<int> show_strengths(const BlindCheckOptions& options, const Config& config,
+                           const SessionPlans& plan, DesignSettings design, CliContext& context) {
   LongCommand::begin_if_possible("blind-check", KeepOption{}.place("blind-check", ""),
                                  {{"find strengths"}}, context);
-  const auto farm = start(options, config, context);
-  if (!farm) return failed(farm.error(), context);
-  const auto planned = planned_problem(config, plan, config.seed, **farm);
-  if (!planned) return failed(planned.error(), context);
+  ASSIGN_OR_RETURN(const auto farm, start(options, config, context));
+  ASSIGN_OR_RETURN(const auto planned, planned_problem(config, plan, config.seed, *farm));
   // The rest is made of the same effects and robots.
   design.nulls = design.pairs = design.left_out = 0;
   const BlindCheckHooks hooks = hooks_of(options, config, context);
   const double begin = monotonic_seconds();
-  const auto drawn = draw_design(*planned, design, **farm,
-                                 [&](const std::string& what, std::size_t done, std::size_t total) {
-                                   hooks.progress(what, done, total, monotonic_seconds() - begin);
-                                 });
-  if (!drawn) return failed(drawn.error(), context);
-  const std::size_t trials = planned->log.trials.size();
-  const std::string table = format_design(*drawn, planned->table());
+  ASSIGN_OR_RETURN(const auto drawn,
+                   draw_design(planned, design, *farm,
+                               [&](const std::string& what, std::size_t done, std::size_t total) {
+                                 hooks.progress(what, done, total, monotonic_seconds() - begin);
+                               }));
+  const std::size_t trials = planned.log.trials.size();
+  const std::string table = format_design(drawn, planned.table());
   context.console.result(std::to_string(trials) +
                              " trials a case.  A case of every effect and size, with the strength "
                              "that this experiment takes:\n\n" +
@@ -158,7 +155,7 @@ int show_strengths(const BlindCheckOptions& options, const Config& config, const
   return kExitDone;
 }
 
-int say_check(const BlindCheckOptions& options, const Config& config, CliContext& context) {
+Result<int> say_check(const BlindCheckOptions& options, const Config& config, CliContext& context) {
   FarmOptions farm;
   const DiagnoseSettings diagnose = diagnose_of(options);
   farm.workers = static_cast<int>(diagnose.workers * diagnose.jobs);
@@ -169,15 +166,6 @@ int say_check(const BlindCheckOptions& options, const Config& config, CliContext
   return say_dry_run("diagnose " + cases + (options.out.empty() ? "" : " into " + options.out),
                      {{"out", options.out}, {"nulls", options.nulls}, {"pairs", options.pairs}},
                      farm, config.farm, context);
-}
-
-int finish(const Result<BlindReport>& report, const BlindCheckOptions& options,
-           CliContext& context) {
-  if (!report) return failed(report.error(), context);
-  context.console.print(context.console.json() ? format_blind_json(*report)
-                                               : format_blind_summary(*report));
-  context.console.note("tables: " + options.out + "/blind_check.md");
-  return kExitDone;
 }
 
 // All that makes the cases and what is asked of them; not how many workers do it.
@@ -199,27 +187,19 @@ std::string asked(const BlindCheckOptions& options, const std::string& config_te
   return content_hash(text);
 }
 
-int run_blind(const BlindCheckOptions& options, CliContext& context) {
+Result<int> run_blind(const BlindCheckOptions& options, CliContext& context) {
   BlindCheckSettings settings;
-  const Result<Config> config = config_of(options, settings.plan, context.console);
-  const auto design = config ? design_of(options, *config) : Result<DesignSettings>(config.error());
-  if (!design) {
-    context.console.error(design.error());
-    return kExitBadUsage;
-  }
-  if (context.dry_run) return say_check(options, *config, context);
+  ASSIGN_OR_RETURN(const Config config, config_of(options, settings.plan, context.console));
+  ASSIGN_OR_RETURN(const auto design, design_of(options, config));
+  if (context.dry_run) return say_check(options, config, context);
   if (options.strengths && options.foreign.empty()) {
-    return show_strengths(options, *config, settings.plan, *design, context);
+    return show_strengths(options, config, settings.plan, design, context);
   }
   if (options.out.empty()) {
-    context.console.error(Error{"--out DIR is missing: the folder for cases, seals and result"});
-    return kExitBadUsage;
+    return Error{"--out DIR is missing: the folder for cases, seals and result"};
   }
-  if (Status s = check_folder(options.out, FolderKind::kBlindCheck); !s) {
-    context.console.error(s.error());
-    return kExitBadUsage;
-  }
-  settings.design = *design;
+  RETURN_IF_ERROR(check_folder(options.out, FolderKind::kBlindCheck));
+  settings.design = design;
   settings.diagnose = diagnose_of(options);
   settings.out = options.out;
   settings.key_path = options.key;
@@ -227,17 +207,19 @@ int run_blind(const BlindCheckOptions& options, CliContext& context) {
   settings.provenance = {
       {"command", command_line()},
       {"program", "gapfarm " + build_info().version + ", build " + build_info().fingerprint},
-      {"seed", std::to_string(config->seed)}};
-  settings.asked = asked(options, config->text);
+      {"seed", std::to_string(config.seed)}};
+  settings.asked = asked(options, config.text);
   const KeepingPlace place{options.out, /*passing=*/false, /*forget=*/true};
-  if (Status s = LongCommand::begin("blind-check", place, blind_check_stages(), context); !s) {
-    return failed(s.error(), context);
-  }
-  const BlindCheckHooks hooks = hooks_of(options, *config, context);
-  return finish(options.foreign.empty()
-                    ? run_blind_check(*config, settings, hooks)
-                    : run_foreign_check(options.foreign, options.truth, settings, hooks),
-                options, context);
+  RETURN_IF_ERROR(LongCommand::begin("blind-check", place, blind_check_stages(), context));
+  const BlindCheckHooks hooks = hooks_of(options, config, context);
+  ASSIGN_OR_RETURN(const BlindReport report,
+                   options.foreign.empty()
+                       ? run_blind_check(config, settings, hooks)
+                       : run_foreign_check(options.foreign, options.truth, settings, hooks));
+  context.console.print(context.console.json() ? format_blind_json(report)
+                                               : format_blind_summary(report));
+  context.console.note("tables: " + options.out + "/blind_check.md");
+  return kExitDone;
 }
 
 void declare_cases(CLI::App& app, BlindCheckOptions& options) {

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "common/base/try.h"
 #include "common/config/config.h"
 #include "common/problem/run_files.h"
 #include "common/trials/context.h"
@@ -47,15 +48,14 @@ std::uint64_t most_evaluations(const Config& config) {
 Result<double> measure_evaluation(const Config& config, CliContext& context) {
   FarmOptions options;
   options.workers = 1;
-  auto farm = start_farm(options, {}, context);
-  if (!farm) return farm.error();
-  const std::string hash = (*farm)->add_problem(to_proto(config.problem));
+  ASSIGN_OR_RETURN(auto farm, start_farm(options, {}, context));
+  const std::string hash = farm->add_problem(to_proto(config.problem));
   double last_s = 0;
   // The first one brings the problem to the worker.
   for (unsigned replicate = 0; replicate < 2; ++replicate) {
     const double began_s = steady_now_s();
-    const auto results = (*farm)->run(hash, {evaluation_task({0, replicate, {}}, config.seed)});
-    if (!results) return results.error();
+    ASSIGN_OR_RETURN(const auto results,
+                     farm->run(hash, {evaluation_task({0, replicate, {}}, config.seed)}));
     last_s = steady_now_s() - began_s;
   }
   return last_s;
@@ -238,16 +238,15 @@ std::string describe(const Config& config, const Summary& summary, unsigned work
   return text;
 }
 
-int run_check(const CheckOptions& options, CliContext& context) {
+Result<int> run_check(const CheckOptions& options, CliContext& context) {
   Console& console = context.console;
-  const auto config = open_config(options.config, options.trials, console, check_runnable);
-  if (!config) return kExitBadUsage;
-  const unsigned workers = local_workers({}, config->farm);
-  Summary summary = summarise(*config);
-  const auto measured = measure_evaluation(*config, context);
-  if (!measured) return failed(measured.error(), context);
-  summary.evaluation_s = *measured;
-  console.result(describe(*config, summary, workers), to_json(*config, summary, workers));
+  ASSIGN_OR_RETURN(const auto config,
+                   open_config(options.config, options.trials, console, check_runnable));
+  const unsigned workers = local_workers({}, config.farm);
+  Summary summary = summarise(config);
+  ASSIGN_OR_RETURN(const auto measured, measure_evaluation(config, context));
+  summary.evaluation_s = measured;
+  console.result(describe(config, summary, workers), to_json(config, summary, workers));
   return kExitDone;
 }
 

@@ -10,7 +10,9 @@
 
 #include "common/base/build_info.h"
 #include "common/base/shipped.h"
+#include "common/base/try.h"
 #include "common/config/config.h"
+#include "common/json/fields.h"
 #include "common/score/constant_velocity.h"
 #include "common/trials/files.h"
 #include "common/trials/read.h"
@@ -48,19 +50,16 @@ Result<Inputs> read_inputs(const CompareCommand& command) {
   Inputs inputs;
   for (const std::string& named : command.files) {
     const std::string file = shipped_file(named);
-    const auto text = read_text_file(file);
-    if (!text) return text.error();
-    if (is_comparison(*text)) {
-      auto comparison = read_comparison(file);
-      if (!comparison) return comparison.error();
-      if (comparison->seeds) inputs.options.seeds = *comparison->seeds;
-      if (comparison->evaluations) inputs.options.evaluations = *comparison->evaluations;
-      if (comparison->target_fitness) inputs.target = comparison->target_fitness;
-      for (Variant& v : comparison->variants) inputs.variants.push_back(std::move(v));
+    ASSIGN_OR_RETURN(const auto text, read_text_file(file));
+    if (is_comparison(text)) {
+      ASSIGN_OR_RETURN(auto comparison, read_comparison(file));
+      if (comparison.seeds) inputs.options.seeds = *comparison.seeds;
+      if (comparison.evaluations) inputs.options.evaluations = *comparison.evaluations;
+      if (comparison.target_fitness) inputs.target = comparison.target_fitness;
+      for (Variant& v : comparison.variants) inputs.variants.push_back(std::move(v));
     } else {
-      auto config = read_config(file);
-      if (!config) return config.error();
-      inputs.variants.push_back({std::filesystem::path(file).stem().string(), *std::move(config)});
+      ASSIGN_OR_RETURN(auto config, read_config(file));
+      inputs.variants.push_back({std::filesystem::path(file).stem().string(), std::move(config)});
     }
   }
   inputs.options.seeds = command.seeds.value_or(inputs.options.seeds);
@@ -82,10 +81,10 @@ Status read_trials(const TrialOptions& given, std::vector<Variant>& variants, Co
     if (before != nullptr && before->config.trial_files == config.trial_files) {
       config.problem.log = before->config.problem.log;
     } else {
-      auto log =
-          read_trial_files(config.trial_files, command_names(config.problem.commands), given.read);
-      if (!log) return log.error();
-      config.problem.log = *std::move(log);
+      ASSIGN_OR_RETURN(
+          auto log,
+          read_trial_files(config.trial_files, command_names(config.problem.commands), given.read));
+      config.problem.log = std::move(log);
       show_notes(config.problem.log, console);
     }
     before = &variant;
@@ -105,7 +104,7 @@ Status check_alike(const std::vector<Variant>& variants) {
     if (problem.scenario != first.scenario) return refuse("scenario");
     if (problem.fitness.kind != first.fitness.kind) return refuse("fitness");
     if (variant.config.trial_files != variants.front().config.trial_files) return refuse("log");
-    if (Status s = check_evolvable(variant.config); !s) return s;
+    RETURN_IF_ERROR(check_evolvable(variant.config));
   }
   return {};
 }
@@ -124,11 +123,9 @@ void add_random_search(std::vector<Variant>& variants) {
 Result<Baseline> untuned(Farm& farm, const Problem& problem) {
   v1::Task task;
   task.mutable_evaluate();
-  const auto results = farm.run(farm.add_problem(to_proto(problem)), {task});
-  if (!results) return results.error();
+  ASSIGN_OR_RETURN(const auto results, farm.run(farm.add_problem(to_proto(problem)), {task}));
   Baseline baseline{"the config's own values", std::nullopt};
-  if (results->front().outcome() == v1::OK)
-    baseline.fitness = results->front().evaluate().fitness();
+  if (results.front().outcome() == v1::OK) baseline.fitness = results.front().evaluate().fitness();
   return baseline;
 }
 
@@ -147,41 +144,33 @@ std::vector<std::pair<std::string, std::string>> provenance(const CompareCommand
 
 Status write_all(const CompareCommand& command, const Inputs& inputs,
                  const ComparisonSummary& summary, const std::vector<ComparedRun>& runs) {
-  const std::filesystem::path out(command.out);
-  const std::pair<const char*, std::string> files[] = {
-      {kFiles[0], summary_csv(summary)},
-      {kFiles[1], runs_csv(summary, runs)},
-      {kFiles[2], convergence_csv(summary)},
-      {kFiles[3], comparison_page(summary, "Searches compared", provenance(command, inputs))},
-  };
-  for (const auto& [name, text] : files) {
-    if (Status s = command.outputs.write((out / name).string(), text); !s) return s;
-  }
-  return {};
+  return command.outputs.write_in(
+      command.out,
+      {{kFiles[0], summary_csv(summary)},
+       {kFiles[1], runs_csv(summary, runs)},
+       {kFiles[2], convergence_csv(summary)},
+       {kFiles[3], comparison_page(summary, "Searches compared", provenance(command, inputs))}});
 }
 
 nlohmann::ordered_json to_json(const ComparisonSummary& summary) {
-  const auto number = [](const std::optional<double>& v) {
-    return v && std::isfinite(*v) ? Json(*v) : Json();
-  };
   Json baselines = Json::array(), variants = Json::array();
   for (const Baseline& b : summary.baselines) {
-    baselines.push_back({{"name", b.name}, {"fitness", number(b.fitness)}});
+    baselines.push_back({{"name", b.name}, {"fitness", number_or_null(b.fitness)}});
   }
   for (const VariantSummary& v : summary.variants) {
     variants.push_back({{"name", v.name},
-                        {"median", number(v.median)},
-                        {"median_lo", number(v.median_95.lower)},
-                        {"median_hi", number(v.median_95.upper)},
-                        {"mean_rank", number(v.mean_rank)},
+                        {"median", v.median},
+                        {"median_lo", v.median_95.lower},
+                        {"median_hi", v.median_95.upper},
+                        {"mean_rank", v.mean_rank},
                         {"successes", v.successes},
-                        {"median_to_target", number(v.median_to_target)},
-                        {"expected_to_target", number(v.expected_to_target)},
+                        {"median_to_target", number_or_null(v.median_to_target)},
+                        {"expected_to_target", number_or_null(v.expected_to_target)},
                         {"final", v.final_fitness}});
   }
   return {{"fitness", summary.fitness},
           {"higher_is_better", summary.higher_is_better},
-          {"target", number(summary.target)},
+          {"target", number_or_null(summary.target)},
           {"evaluations", summary.evaluations},
           {"seeds", summary.seeds},
           {"baselines", baselines},
@@ -194,54 +183,43 @@ Status plan_outputs(CompareCommand& command, const Inputs& inputs) {
   return command.outputs.plan_in(command.out, {std::begin(kFiles), std::end(kFiles)});
 }
 
-int run_compare(CompareCommand& command, CliContext& context) {
-  Result<Inputs> inputs = read_inputs(command);
-  Status status = inputs ? read_trials(command.trials, inputs->variants, context.console)
-                         : Status(inputs.error());
-  if (status) status = check_alike(inputs->variants);
-  if (status) status = plan_outputs(command, *inputs);
-  if (!status) {
-    context.console.error(status.error());
-    return kExitBadUsage;
-  }
-  add_random_search(inputs->variants);
-  const Config& first = inputs->variants.front().config;
+Result<int> run_compare(CompareCommand& command, CliContext& context) {
+  ASSIGN_OR_RETURN(Inputs inputs, read_inputs(command));
+  RETURN_IF_ERROR(read_trials(command.trials, inputs.variants, context.console));
+  RETURN_IF_ERROR(check_alike(inputs.variants));
+  RETURN_IF_ERROR(plan_outputs(command, inputs));
+  add_random_search(inputs.variants);
+  const Config& first = inputs.variants.front().config;
   if (context.dry_run) {
-    const CompareOptions& options = inputs->options;
+    const CompareOptions& options = inputs.options;
     return say_dry_run(
         fmt::format("compare {} searches, {} runs of {} evaluations each, into {}",
-                    inputs->variants.size(), options.seeds, options.evaluations, command.out),
+                    inputs.variants.size(), options.seeds, options.evaluations, command.out),
         {{"out", command.out},
-         {"variants", inputs->variants.size()},
+         {"variants", inputs.variants.size()},
          {"seeds", options.seeds},
          {"evaluations", options.evaluations}},
         command.farm, first.farm, context);
   }
-  if (Status s = LongCommand::begin("compare", {command.out}, {{"evaluate"}}, context); !s) {
-    return failed(s.error(), context);
-  }
-  auto farm = start_farm(command.farm, first.farm, context);
-  if (!farm) return failed(farm.error(), context);
-  const auto asked = context.work->over(**farm);
+  RETURN_IF_ERROR(LongCommand::begin("compare", {command.out}, {{"evaluate"}}, context));
+  ASSIGN_OR_RETURN(const auto asked, start_recorded(command.farm, first.farm, context));
   context.work->stage(
-      0, 1 + inputs->options.evaluations * inputs->options.seeds * inputs->variants.size());
-  const auto as_written = untuned(*asked, first.problem);
-  if (!as_written) return failed(as_written.error(), context);
-  const auto runs =
-      compare(inputs->variants, inputs->options, farm_scorer(*asked, inputs->variants));
-  if (!runs) return failed(runs.error(), context);
+      0, 1 + inputs.options.evaluations * inputs.options.seeds * inputs.variants.size());
+  ASSIGN_OR_RETURN(const auto as_written, untuned(*asked, first.problem));
+  ASSIGN_OR_RETURN(const auto runs,
+                   compare(inputs.variants, inputs.options, farm_scorer(*asked, inputs.variants)));
   ComparisonSummary summary =
-      summarise_comparison(inputs->variants, *runs, inputs->options, inputs->target);
+      summarise_comparison(inputs.variants, runs, inputs.options, inputs.target);
   const auto constant = constant_velocity_fitness(first.problem);
   if (!constant) context.console.note("no constant-velocity baseline: " + constant.error().message);
   summary.baselines = {{"constant velocity", constant ? std::optional(*constant) : std::nullopt},
-                       *as_written};
-  if (Status s = write_all(command, *inputs, summary, *runs); !s) return failed(s.error(), context);
+                       as_written};
+  RETURN_IF_ERROR(write_all(command, inputs, summary, runs));
   context.console.result(comparison_text(summary), to_json(summary));
   context.console.note(
       "left behind: " + (std::filesystem::path(command.out) / "compare.html").string() +
       ", summary.csv, runs.csv, convergence.csv");
-  return (*farm)->counts().quarantined > 0 ? kExitQuarantined : kExitDone;
+  return asked.sockets->counts().quarantined > 0 ? kExitQuarantined : kExitDone;
 }
 
 }  // namespace

@@ -53,7 +53,7 @@ end
 complete -c gapfarm -f -a '(__gapfarm_words)'
 )";
 
-int print_words(const CompletionOptions& options, CliContext& context) {
+Result<int> print_words(const CompletionOptions& options, CliContext& context) {
   const std::unique_ptr<Program> program = make_program();
   std::string text;
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
@@ -65,7 +65,7 @@ int print_words(const CompletionOptions& options, CliContext& context) {
   return kExitDone;
 }
 
-int run_completion(const CompletionOptions& options, CliContext& context) {
+Result<int> run_completion(const CompletionOptions& options, CliContext& context) {
   if (options.shell == "words") return print_words(options, context);
   const char* script = options.shell == "bash" ? kBash : options.shell == "zsh" ? kZsh : kFish;
   context.console.result(script, {{"shell", options.shell}, {"script", script}});

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "common/base/try.h"
 #include "common/config/config.h"
 #include "common/trials/select.h"
 #include "master/cli/inputs.h"
@@ -77,9 +78,8 @@ Json to_json(const Problem& problem, const CrossfitGroup& group) {
   Json sweeps = Json::object();
   for (const Sweep& sweep : group.sweeps) {
     for (const SweepPoint& p : sweep.points) {
-      const auto number = [](double m) { return std::isfinite(m) ? Json(1e3 * m) : Json(); };
       sweeps[sweep.parameter].push_back(
-          {{"value", p.value}, {"train_mm", number(p.train_m)}, {"test_mm", number(p.test_m)}});
+          {{"value", p.value}, {"train_mm", 1e3 * p.train_m}, {"test_mm", 1e3 * p.test_m}});
     }
   }
   return {{"group", group.name},
@@ -127,18 +127,17 @@ std::string describe(const Problem& problem, const CrossfitGroup& group) {
 
 Status apply(const CrossfitOptions& options, Config& config) {
   for (const std::string& setting : options.set) {
-    if (Status s = apply_setting(setting, config.problem); !s) return s;
+    RETURN_IF_ERROR(apply_setting(setting, config.problem));
   }
   if (!options.genes.empty()) {
-    if (Status s = apply_genes(options.genes, config.problem); !s) return s;
+    RETURN_IF_ERROR(apply_genes(options.genes, config.problem));
   }
-  Result<TrialLog> log = select_trials(config.problem.log, options.only);
-  if (!log) return log.error();
-  config.problem.log = std::move(*log);
+  ASSIGN_OR_RETURN(TrialLog log, select_trials(config.problem.log, options.only));
+  config.problem.log = std::move(log);
   return check_evolvable(config);
 }
 
-int say_fits(const CrossfitOptions& options, const Config& config, CliContext& context) {
+Result<int> say_fits(const CrossfitOptions& options, const Config& config, CliContext& context) {
   const std::size_t genes = config.problem.genes.size(), trials = config.problem.log.trials.size();
   const std::string would =
       fmt::format("tune {} parameters on parts of {} trials and try them on others", genes, trials);
@@ -146,25 +145,22 @@ int say_fits(const CrossfitOptions& options, const Config& config, CliContext& c
                      context);
 }
 
-int run_crossfit(const CrossfitOptions& options, CliContext& context) {
-  const auto config = open_config(options.config, options.trials, context.console,
-                                  [&](Config& read) { return apply(options, read); });
-  if (!config) return kExitBadUsage;
-  if (context.dry_run) return say_fits(options, *config, context);
+Result<int> run_crossfit(const CrossfitOptions& options, CliContext& context) {
+  ASSIGN_OR_RETURN(const auto config,
+                   open_config(options.config, options.trials, context.console,
+                               [&](Config& read) { return apply(options, read); }));
+  if (context.dry_run) return say_fits(options, config, context);
   LongCommand::begin_if_possible("crossfit", options.keep.place("crossfit", ""), {{"fit"}},
                                  context);
-  CrossfitPlan plan = plan_of(options, *config);
+  CrossfitPlan plan = plan_of(options, config);
   plan.hooks = context.work->hooks();
-  auto farm = start_farm(options.farm, config->farm, context);
-  if (!farm) return failed(farm.error(), context);
-  const auto asked = context.work->over(**farm);
-  const auto groups = crossfit(config->problem, plan, *asked);
-  if (!groups) return failed(groups.error(), context);
+  ASSIGN_OR_RETURN(const auto asked, start_recorded(options.farm, config.farm, context));
+  ASSIGN_OR_RETURN(const auto groups, crossfit(config.problem, plan, *asked));
   Json all = Json::array();
   std::string text;
-  for (const CrossfitGroup& group : *groups) {
-    all.push_back(to_json(config->problem, group));
-    text += describe(config->problem, group);
+  for (const CrossfitGroup& group : groups) {
+    all.push_back(to_json(config.problem, group));
+    text += describe(config.problem, group);
   }
   context.console.result(text, all);
   return kExitDone;

@@ -8,6 +8,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "common/base/try.h"
 #include "common/config/config.h"
 #include "common/trials/shifted.h"
 #include "master/cli/inputs.h"
@@ -45,107 +46,88 @@ LikelihoodOf farm_likelihood(Farm& farm, const Problem& problem, std::uint64_t s
     for (std::size_t i = 0; i < genomes.size(); ++i) {
       tasks.push_back(evaluation_task({i, 0, genomes[i]}, seed));
     }
-    const auto results = farm.run(hash, tasks);
-    if (!results) return results.error();
+    ASSIGN_OR_RETURN(const auto results, farm.run(hash, tasks));
     std::vector<double> scores;
-    for (const v1::TaskResult& result : *results) {
-      const auto score = score_of(result, FitnessKind::kLogScore);
-      if (!score) return score.error();
-      scores.push_back(score->outcome == v1::OK ? -score->cost : NAN);
+    for (const v1::TaskResult& result : results) {
+      ASSIGN_OR_RETURN(const auto score, score_of(result, FitnessKind::kLogScore));
+      scores.push_back(score.outcome == v1::OK ? -score.cost : NAN);
     }
     return scores;
   };
 }
 
 nlohmann::ordered_json to_json(const DetermineReport& report, const ParameterTable& table) {
-  // JSON knows no infinity.
-  const auto number = [](double v) {
-    return std::isfinite(v) ? nlohmann::ordered_json(v) : nlohmann::ordered_json();
-  };
   nlohmann::ordered_json genes = nlohmann::ordered_json::array(), pairs = genes;
   for (const GeneDetermined& g : report.genes) {
     genes.push_back({{"parameter", table[g.gene.row].key},
                      {"value", g.value},
                      {"unit", table[g.gene.row].unit},
-                     {"lo", number(g.interval_95.lower)},
-                     {"hi", number(g.interval_95.upper)},
-                     {"deviation_share", number(g.deviation)},
+                     {"lo", g.interval_95.lower},
+                     {"hi", g.interval_95.upper},
+                     {"deviation_share", g.deviation},
                      {"determined", g.determined},
                      {"at_bound", g.at_bound}});
   }
   for (const Compensation& c : report.compensations) {
     pairs.push_back({{"a", table[report.genes[c.a].gene.row].key},
                      {"b", table[report.genes[c.b].gene.row].key},
-                     {"correlation", number(c.correlation)}});
+                     {"correlation", c.correlation}});
   }
   return {{"reliable", report.reliable},
           {"at_maximum", !report.outside},
           {"parameters", genes},
           {"compensations", pairs},
-          {"roughness", number(report.roughness)},
-          {"explained", number(report.explained)},
+          {"roughness", report.roughness},
+          {"explained", report.explained},
           {"evaluations", report.evaluations},
           {"failures", report.failures}};
 }
 
 // The problem, and that its table can be written.
-Result<Problem> open_problem(DetermineCommand& command, const std::optional<Config>& config,
-                             Console& console) {
-  const Result<Model> model = read_model_of(command.model, console);
-  if (!model) return model.error();
-  if (Status s = check_no_residual(*model, command.model, "determine"); !s) return s.error();
-  command.outputs.reads(config->problem.log);
+Result<Problem> open_problem(DetermineCommand& command, const Config& config, Console& console) {
+  ASSIGN_OR_RETURN(const Model model, read_model_of(command.model, console));
+  RETURN_IF_ERROR(check_no_residual(model, command.model, "determine"));
+  command.outputs.reads(config.problem.log);
   command.outputs.reads(command.config);
   command.outputs.reads(command.model);
   command.outputs.reads((std::filesystem::path(command.model) / "model.toml").string());
-  if (Status s = command.outputs.plan(command.out); !s) return s.error();
-  if (Status s = check_same_robot(*model, command.model, *config, command.config); !s) {
-    return s.error();
-  }
-  return problem_at(*config, *model);
+  RETURN_IF_ERROR(command.outputs.plan(command.out));
+  RETURN_IF_ERROR(check_same_robot(model, command.model, config, command.config));
+  return problem_at(config, model);
 }
 
-int run_determine(DetermineCommand& command, CliContext& context) {
-  const auto config = open_config(command.config, command.trials, context.console, check_evolvable);
-  if (!config) return kExitBadUsage;
-  const Result<Problem> problem = open_problem(command, config, context.console);
-  if (!problem) {
-    context.console.error(problem.error());
-    return kExitBadUsage;
-  }
+Result<int> run_determine(DetermineCommand& command, CliContext& context) {
+  ASSIGN_OR_RETURN(const auto config,
+                   open_config(command.config, command.trials, context.console, check_evolvable));
+  ASSIGN_OR_RETURN(const Problem problem, open_problem(command, config, context.console));
   Genome point;
-  for (const Gene& gene : problem->genes) {
-    point.push_back(encode_gene(problem->table(), gene, problem->values[gene.row]));
+  for (const Gene& gene : problem.genes) {
+    point.push_back(encode_gene(problem.table(), gene, problem.values[gene.row]));
   }
   DetermineSettings settings = command.settings;
-  settings.seed = config->seed;
+  settings.seed = config.seed;
   if (context.dry_run) {
-    const std::size_t genes = problem->genes.size(), trials = problem->log.trials.size();
+    const std::size_t genes = problem.genes.size(), trials = problem.log.trials.size();
     return say_dry_run(fmt::format("look at the likelihood of {} parameters about {} on {} trials",
                                    genes, command.model, trials),
                        {{"out", command.out}, {"genes", genes}, {"trials", trials}}, command.farm,
-                       config->farm, context);
+                       config.farm, context);
   }
   LongCommand::begin_if_possible("determine", command.keep.place("determine", command.out),
                                  {{"evaluate"}}, context);
-  auto farm = start_farm(command.farm, config->farm, context);
-  if (!farm) return failed(farm.error(), context);
-  const auto asked = context.work->over(**farm);
-  const auto report = determine(*problem, point, farm_likelihood(*asked, *problem, config->seed),
-                                settings, context.work->hooks());
-  if (!report) return failed(report.error(), context);
+  ASSIGN_OR_RETURN(const auto asked, start_recorded(command.farm, config.farm, context));
+  ASSIGN_OR_RETURN(const auto report,
+                   determine(problem, point, farm_likelihood(*asked, problem, config.seed),
+                             settings, context.work->hooks()));
   if (!command.out.empty()) {
-    const Status written =
-        command.outputs.write(command.out, determine_csv(*report, problem->table()));
-    if (!written) return failed(written.error(), context);
+    RETURN_IF_ERROR(command.outputs.write(command.out, determine_csv(report, problem.table())));
   }
-  context.console.result(determine_text(*report, problem->table()),
-                         to_json(*report, problem->table()));
+  context.console.result(determine_text(report, problem.table()), to_json(report, problem.table()));
   std::string loose;
-  for (const GeneDetermined& g : report->genes) {
-    if (!g.determined) loose += (loose.empty() ? "" : ", ") + problem->table()[g.gene.row].key;
+  for (const GeneDetermined& g : report.genes) {
+    if (!g.determined) loose += (loose.empty() ? "" : ", ") + problem.table()[g.gene.row].key;
   }
-  if (!report->reliable) {
+  if (!report.reliable) {
     context.console.note(
         "warning: the likelihood about this model is no hill whose width could be "
         "measured; is it the best of its run?");

@@ -9,6 +9,7 @@
 #include <set>
 
 #include "common/base/build_info.h"
+#include "common/base/try.h"
 #include "common/json/json.h"
 #include "common/problem/run_files.h"
 #include "common/robot/robot_file.h"
@@ -111,9 +112,9 @@ Status write_all(const Config& config, const DiagnoseCommand& command,
     const auto& [lo, hi] = result.intervals[i];
     if (lo < hi) model.intervals[i] = Interval{lo, hi};
   }
-  if (Status s = write_model(model, out / "model.toml", command.outputs); !s) return s;
+  RETURN_IF_ERROR(write_model(model, out / "model.toml", command.outputs));
   const Model tuned = model_of(config, result, result.tuned, "tuned");
-  if (Status s = write_model(tuned, out / "tuned.toml", command.outputs); !s) return s;
+  RETURN_IF_ERROR(write_model(tuned, out / "tuned.toml", command.outputs));
   const Status report =
       command.outputs.write((out / "report.html").string(), report_html(result.diagnosis));
   if (!report) return report;
@@ -143,19 +144,19 @@ QuestionStamp stamp_of(const Config& config, const DiagnoseCommand& command,
 // Makes sure that the folder takes this diagnosis, a new one or the same again.
 Status plan_outputs(DiagnoseCommand& command, const Config& config, const QuestionStamp& stamp) {
   Outputs& outputs = command.outputs;
-  if (Status s = check_folder(command.out, FolderKind::kDiagnosis); !s) return s;
+  RETURN_IF_ERROR(check_folder(command.out, FolderKind::kDiagnosis));
   outputs.reads(config.problem.log);
   outputs.reads(command.config);
   outputs.reads(command.model);
-  const auto state = compare_stamp(command.out, kDiagnosisFile, stamp, outputs.force());
-  if (!state) return state.error();
+  ASSIGN_OR_RETURN(const auto state,
+                   compare_stamp(command.out, kDiagnosisFile, stamp, outputs.force()));
   std::vector<const char*> names = {kStampFile, "model.toml", "tuned.toml", "report.html",
                                     kDiagnosisFile};
   if (config.problem.ground)
     names = {kStampFile, "robot.toml", "values.json", "report.html", kDiagnosisFile};
   for (const char* name : names) {
     const std::string path = (std::filesystem::path(command.out) / name).string();
-    const Status s = *state == FolderState::kNew ? outputs.plan(path) : outputs.plan_again(path);
+    const Status s = state == FolderState::kNew ? outputs.plan(path) : outputs.plan_again(path);
     if (!s) return s;
   }
   return {};
@@ -172,16 +173,11 @@ Status apply_options(const DiagnoseCommand& command, Config& config, std::vector
                      std::optional<Eigen::Vector2d>& frame, Console& console) {
   if (command.seed) config.seed = *command.seed;
   if (!command.model.empty()) {
-    const Result<Model> model = read_model_of(command.model, console);
-    if (!model) return model.error();
-    if (Status s = check_no_residual(*model, command.model, "a base to diagnose"); !s) {
-      return s.error();
-    }
-    if (Status s = check_same_robot(*model, command.model, config, command.config); !s) {
-      return s.error();
-    }
-    config.problem.values = model->values;
-    frame = {model->frame_x_m, model->frame_y_m};
+    ASSIGN_OR_RETURN(const Model model, read_model_of(command.model, console));
+    RETURN_IF_ERROR(check_no_residual(model, command.model, "a base to diagnose"));
+    RETURN_IF_ERROR(check_same_robot(model, command.model, config, command.config));
+    config.problem.values = model.values;
+    frame = {model.frame_x_m, model.frame_y_m};
   }
   searched = std::move(config.problem.genes);
   config.problem.genes.clear();
@@ -189,69 +185,55 @@ Status apply_options(const DiagnoseCommand& command, Config& config, std::vector
   return {};
 }
 
-int run_diagnose(DiagnoseCommand& command, CliContext& context) {
+Result<int> run_diagnose(DiagnoseCommand& command, CliContext& context) {
   DiagnoseOptions options;
-  const auto config =
-      open_config(command.config, command.trials, context.console, [&](Config& read) {
+  ASSIGN_OR_RETURN(
+      const auto config,
+      open_config(command.config, command.trials, context.console, [&](Config& read) -> Status {
         return apply_options(command, read, options.genes, options.frame_m, context.console);
-      });
-  if (!config) return kExitBadUsage;
-  if (Status s = read_reference(&command, *config, context.console); !s) {
-    context.console.error(s.error());
-    return kExitBadUsage;
-  }
-  const QuestionStamp stamp = stamp_of(*config, command, options.genes);
-  if (Status s = plan_outputs(command, *config, stamp); !s) {
-    context.console.error(s.error());
-    return kExitBadUsage;
-  }
+      }));
+  RETURN_IF_ERROR(read_reference(&command, config, context.console));
+  const QuestionStamp stamp = stamp_of(config, command, options.genes);
+  RETURN_IF_ERROR(plan_outputs(command, config, stamp));
   if (context.dry_run) {
-    const std::size_t trials = config->problem.log.trials.size();
+    const std::size_t trials = config.problem.log.trials.size();
     return say_dry_run(
         fmt::format("diagnose {} trials of {} into {}, {}", trials, command.config, command.out,
                     command.model.empty() ? "the base tuned on them" : "by " + command.model),
-        {{"out", command.out}, {"trials", trials}, {"seed", config->seed}}, command.farm,
-        config->farm, context);
+        {{"out", command.out}, {"trials", trials}, {"seed", config.seed}}, command.farm,
+        config.farm, context);
   }
-  if (config->problem.ground) {
-    return run_diagnose_ground(command, *config, format_stamp(stamp), context);
+  if (config.problem.ground) {
+    return run_diagnose_ground(command, config, format_stamp(stamp), context);
   }
   // Every simulation goes into the folder: what a figure rests on can be looked up.
-  if (Status s = LongCommand::begin("diagnose", {command.out}, diagnosis_stages(), context); !s) {
-    return failed(s.error(), context);
-  }
-  const auto page = open_page(command.page, command.out, context);
-  if (!page) return failed(page.error(), context);
-  auto farm = start_farm(command.farm, config->farm, context);
-  if (!farm) return failed(farm.error(), context);
+  RETURN_IF_ERROR(LongCommand::begin("diagnose", {command.out}, diagnosis_stages(), context));
+  ASSIGN_OR_RETURN(const auto page, open_page(command.page, command.out, context));
+  ASSIGN_OR_RETURN(const auto asked, start_recorded(command.farm, config.farm, context));
   options.keep_base = !command.model.empty();
   options.left_out = command.leave_out;
-  options.seed = config->seed;
+  options.seed = config.seed;
   const std::string stamp_file = (std::filesystem::path(command.out) / kStampFile).string();
-  if (Status s = command.outputs.write(stamp_file, format_stamp(stamp)); !s) {
-    return failed(s.error(), context);
-  }
+  RETURN_IF_ERROR(command.outputs.write(stamp_file, format_stamp(stamp)));
   LongCommand& work = *context.work;
-  const auto asked = work.over(**farm);
   options.on_stage = [&](const std::string& stage) { work.stage(stage); };
   options.on_finding = [&](Finding finding) { work.found(std::move(finding)); };
-  auto result = diagnose(*asked, config->problem, options);
-  if (!result) return failed(result.error(), context);
-  add_diagnosis_provenance(*config, command, &result->diagnosis);
-  for (const auto& [fit, tasks] : result->fits) {
+  ASSIGN_OR_RETURN(auto result, diagnose(*asked, config.problem, options));
+  add_diagnosis_provenance(config, command, &result.diagnosis);
+  for (const auto& [fit, tasks] : result.fits) {
     // A stop may have come between them: their numbers need not follow one another.
     std::string questions;
     for (const v1::Task& task : tasks) {
-      questions += (questions.empty() ? "" : ", ") + work.answers().key(result->problem, task);
+      questions += (questions.empty() ? "" : ", ") + work.answers().key(result.problem, task);
     }
-    result->diagnosis.provenance.emplace_back("predictions of " + fit,
-                                              fmt::format("{}, questions {}", kAnswers, questions));
+    result.diagnosis.provenance.emplace_back("predictions of " + fit,
+                                             fmt::format("{}, questions {}", kAnswers, questions));
   }
-  if (Status s = write_all(*config, command, *result); !s) return failed(s.error(), context);
-  context.console.result(diagnosis_summary(result->diagnosis),
-                         diagnosis_summary_json(result->diagnosis, command));
+  RETURN_IF_ERROR(write_all(config, command, result));
+  context.console.result(diagnosis_summary(result.diagnosis),
+                         diagnosis_summary_json(result.diagnosis, command));
   context.console.note("left behind: " + command.out + "/report.html, diagnosis.json, model.toml");
-  return (*farm)->counts().quarantined > 0 ? kExitQuarantined : kExitDone;
+  return asked.sockets->counts().quarantined > 0 ? kExitQuarantined : kExitDone;
 }
 
 }  // namespace

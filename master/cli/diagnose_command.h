@@ -45,7 +45,7 @@ std::string log_hash(const RunLog& log);
 
 // A ground robot: its file and its runs, by its kinematics.  Nothing is simulated.  `stamp`: the
 // text of question.json.
-int run_diagnose_ground(DiagnoseCommand& command, const Config& config, const std::string& stamp,
-                        CliContext& context);
+Result<int> run_diagnose_ground(DiagnoseCommand& command, const Config& config,
+                                const std::string& stamp, CliContext& context);
 
 }  // namespace gapfarm

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "common/base/suggest.h"
+#include "common/base/try.h"
 #include "common/trials/read.h"
 #include "common/trials/waypoint_log.h"
 #include "master/cli/inputs.h"
@@ -75,12 +76,12 @@ Result<CommandSpec> command_of(const std::string& text, const std::vector<Comman
     if (spec.name != name) continue;
     CommandSpec command = spec;
     if (colon != std::string::npos) {
-      const auto seconds = numbers(text.substr(colon + 1), 1, "the duration of " + name);
-      if (!seconds) return seconds.error();
-      if (!((*seconds)[0] > 0 && (*seconds)[0] <= 60)) {
+      ASSIGN_OR_RETURN(const auto seconds,
+                       numbers(text.substr(colon + 1), 1, "the duration of " + name));
+      if (!(seconds[0] > 0 && seconds[0] <= 60)) {
         return Error{"command '" + text + "' lasts outside (0, 60] s"};
       }
-      command.duration_s = (*seconds)[0];
+      command.duration_s = seconds[0];
     }
     return command;
   }
@@ -92,24 +93,20 @@ Result<Task> read_task(const DriveCommand& command, const Model& model) {
                     (command.log.empty() ? 0 : 1);
   if (kinds != 1) return Error{"give one of --commands, --waypoints and --log"};
   Task task;
-  const auto start = numbers(command.start, 3, "--start");
-  if (!start) return start.error();
-  task.start = {(*start)[0], (*start)[1], wrap_angle((*start)[2])};
+  ASSIGN_OR_RETURN(const auto start, numbers(command.start, 3, "--start"));
+  task.start = {start[0], start[1], wrap_angle(start[2])};
   for (const std::string& text : command.commands) {
-    const auto spec = command_of(text, model.commands);
-    if (!spec) return spec.error();
-    task.commands.push_back(*spec);
+    ASSIGN_OR_RETURN(const auto spec, command_of(text, model.commands));
+    task.commands.push_back(spec);
   }
   for (const std::string& text : command.waypoints) {
-    const auto xy = numbers(text, 2, "a way-point");
-    if (!xy) return xy.error();
-    task.targets.emplace_back((*xy)[0], (*xy)[1]);
+    ASSIGN_OR_RETURN(const auto xy, numbers(text, 2, "a way-point"));
+    task.targets.emplace_back(xy[0], xy[1]);
   }
   if (command.log.empty()) return task;
-  auto log = read_waypoint_log(command.log);
-  if (!log) return log.error();
-  task.start = log->path.front().pose;
-  task.targets = log->targets;
+  ASSIGN_OR_RETURN(auto log, read_waypoint_log(command.log));
+  task.start = log.path.front().pose;
+  task.targets = log.targets;
   if (command.targets > 0 && command.targets < task.targets.size()) {
     // The real path ends where it came closest to the last target that is kept, after the one
     // before.
@@ -119,9 +116,9 @@ Result<Task> read_task(const DriveCommand& command, const Model& model) {
       std::size_t nearest = from;
       double least = INFINITY;
       bool left = false;
-      for (std::size_t i = from; i < log->path.size() && !left; ++i) {
+      for (std::size_t i = from; i < log.path.size() && !left; ++i) {
         const double d =
-            std::hypot(log->path[i].pose.x - target.x(), log->path[i].pose.y - target.y());
+            std::hypot(log.path[i].pose.x - target.x(), log.path[i].pose.y - target.y());
         if (d < least) {
           least = d;
           nearest = i;
@@ -130,9 +127,9 @@ Result<Task> read_task(const DriveCommand& command, const Model& model) {
       }
       from = nearest;
     }
-    log->path.resize(from + 1);
+    log.path.resize(from + 1);
   }
-  task.real = floor_path(log->path, kSpacing_m);
+  task.real = floor_path(log.path, kSpacing_m);
   return task;
 }
 
@@ -147,27 +144,22 @@ class Driving {
   }
 
   Result<DriveReport> run() {
-    const auto nominal = nominal_velocities(farm_, problem_);
-    if (!nominal) return nominal.error();
-    if (Status s = simulate(*nominal); !s) return s.error();
-    auto constant = *nominal;
+    ASSIGN_OR_RETURN(const auto nominal, nominal_velocities(farm_, problem_));
+    RETURN_IF_ERROR(simulate(nominal));
+    auto constant = nominal;
     if (!command_.mined.empty()) {
-      const auto log =
-          read_trial_files(command_.mined, command_names(problem_.commands), command_.reading.read);
-      if (!log) return log.error();
-      show_notes(*log, console_);
-      const auto fitted = constant_velocities(*log, problem_.commands);
-      if (!fitted) return fitted.error();
-      constant = *fitted;
-      const auto mined = MotionModel::mine(*log, problem_.commands);
-      if (!mined) return mined.error();
-      const auto mover = mined_mover(*mined, command_.settings);
-      if (Status s = add("mined motion model", drive(*mover, constant, command_.runs), true); !s)
-        return s.error();
+      ASSIGN_OR_RETURN(const auto log,
+                       read_trial_files(command_.mined, command_names(problem_.commands),
+                                        command_.reading.read));
+      show_notes(log, console_);
+      ASSIGN_OR_RETURN(const auto fitted, constant_velocities(log, problem_.commands));
+      constant = fitted;
+      ASSIGN_OR_RETURN(const auto mined, MotionModel::mine(log, problem_.commands));
+      const auto mover = mined_mover(mined, command_.settings);
+      RETURN_IF_ERROR(add("mined motion model", drive(*mover, constant, command_.runs), true));
     }
     const auto mover = constant_velocity_mover(constant, command_.settings);
-    if (Status s = add("constant velocity", drive(*mover, constant, 2), false); !s)
-      return s.error();
+    RETURN_IF_ERROR(add("constant velocity", drive(*mover, constant, 2), false));
     compare_targets();
     return report_;
   }
@@ -189,9 +181,8 @@ class Driving {
                                        const std::vector<ConstantVelocity>& rates,
                                        unsigned runs) const {
     if (task_.targets.empty()) return drive_commands(mover, task_.start, task_.commands, runs);
-    const auto pilot = make_pilot(rates);
-    if (!pilot) return pilot.error();
-    return drive_waypoints(mover, *pilot, task_.start, task_.targets, runs);
+    ASSIGN_OR_RETURN(const auto pilot, make_pilot(rates));
+    return drive_waypoints(mover, pilot, task_.start, task_.targets, runs);
   }
 
   Status add(const std::string& name, Result<std::vector<DrivenRun>> runs, bool spread) {
@@ -267,29 +258,16 @@ Status plan_outputs(DriveCommand& command) {
   return command.outputs.plan_in(command.out, {kBand, kEnds, kPage});
 }
 
-int run_drive(DriveCommand& command, CliContext& context) {
-  const auto model = read_model_of(command.model, context.console);
-  if (!model) {
-    context.console.error(model.error());
-    return kExitBadUsage;
-  }
-  if (Status s = check_no_residual(*model, command.model, "drive"); !s) {
-    context.console.error(s.error());
-    return kExitBadUsage;
-  }
-  auto task = read_task(command, *model);
-  if (task) {
-    if (Status s = plan_outputs(command); !s) task = s.error();
-  }
-  if (!task) {
-    context.console.error(task.error());
-    return kExitBadUsage;
-  }
-  const Problem problem = problem_of(*model);
-  command.settings.frame_x_m = model->frame_x_m;
-  command.settings.frame_y_m = model->frame_y_m;
+Result<int> run_drive(DriveCommand& command, CliContext& context) {
+  ASSIGN_OR_RETURN(const auto model, read_model_of(command.model, context.console));
+  RETURN_IF_ERROR(check_no_residual(model, command.model, "drive"));
+  ASSIGN_OR_RETURN(const Task task, read_task(command, model));
+  RETURN_IF_ERROR(plan_outputs(command));
+  const Problem problem = problem_of(model);
+  command.settings.frame_x_m = model.frame_x_m;
+  command.settings.frame_y_m = model.frame_y_m;
   // The commands' nominal motions, then the runs; way-points are a turn and a way each.
-  const std::uint64_t legs = task->targets.empty() ? 1 : 2 * task->targets.size();
+  const std::uint64_t legs = task.targets.empty() ? 1 : 2 * task.targets.size();
   const std::uint64_t tasks = problem.commands.size() + legs * command.runs;
   if (context.dry_run) {
     return say_dry_run(fmt::format("drive {} times by {}, {} simulations, into {}", command.runs,
@@ -298,30 +276,21 @@ int run_drive(DriveCommand& command, CliContext& context) {
                        command.farm, {}, context);
   }
   const KeepingPlace place{command.out, /*passing=*/false, /*forget=*/true};
-  if (Status s = LongCommand::begin("drive", place, {{"drive", 1, tasks}}, context); !s) {
-    return failed(s.error(), context);
-  }
-  auto farm = start_farm(command.farm, {}, context);
-  if (!farm) return failed(farm.error(), context);
-  const auto asked = context.work->over(**farm);
+  RETURN_IF_ERROR(LongCommand::begin("drive", place, {{"drive", 1, tasks}}, context));
+  ASSIGN_OR_RETURN(const auto asked, start_recorded(command.farm, {}, context));
   context.work->stage(0);
-  const auto report = Driving(command, *task, problem, *asked, context.console).run();
-  if (!report) return failed(report.error(), context);
-  const std::filesystem::path out(command.out);
-  const std::pair<const char*, std::string> files[] = {
-      {kBand, band_csv(*report)},
-      {kEnds, ends_csv(*report)},
-      {kPage, drive_page(*report, "Driven " + std::to_string(command.runs) + " times")},
-  };
-  for (const auto& [name, text] : files) {
-    if (Status s = command.outputs.write((out / name).string(), text); !s) {
-      return failed(s.error(), context);
-    }
-  }
-  Json json = to_json(*report);
+  ASSIGN_OR_RETURN(const auto report,
+                   Driving(command, task, problem, *asked, context.console).run());
+  RETURN_IF_ERROR(command.outputs.write_in(
+      command.out,
+      {{kBand, band_csv(report)},
+       {kEnds, ends_csv(report)},
+       {kPage, drive_page(report, "Driven " + std::to_string(command.runs) + " times")}}));
+  Json json = to_json(report);
   json["out"] = command.out;
-  context.console.result(drive_text(*report), json);
-  context.console.note("left behind: " + (out / kPage).string() + ", band.csv, ends.csv");
+  context.console.result(drive_text(report), json);
+  context.console.note("left behind: " + (std::filesystem::path(command.out) / kPage).string() +
+                       ", band.csv, ends.csv");
   return kExitDone;
 }
 

@@ -7,6 +7,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "common/base/try.h"
 #include "common/config/config.h"
 #include "master/cli/inputs.h"
 #include "master/cli/long_command.h"
@@ -232,44 +233,35 @@ std::vector<v1::Task> figure_tasks(const Problem& problem) {
   return tasks;
 }
 
-int draw_figures(EffectsOptions& options, CliContext& context) {
-  Result<Config> config = figure_config(options);
+Result<int> draw_figures(EffectsOptions& options, CliContext& context) {
+  ASSIGN_OR_RETURN(const Config config, figure_config(options));
   std::vector<std::string> names;
-  if (config) {
-    const ParameterTable& table = config->problem.table();
-    for (const std::size_t e : pictured(table)) names.push_back(table.effects()[e].name + ".svg");
-    if (!options.config.empty()) options.outputs.reads(options.config);
-    if (Status s = options.outputs.plan_in(options.figures, names); !s) config = s.error();
-  }
-  if (!config) {
-    context.console.error(config.error());
-    return kExitBadUsage;
-  }
+  const ParameterTable& table = config.problem.table();
+  for (const std::size_t e : pictured(table)) names.push_back(table.effects()[e].name + ".svg");
+  if (!options.config.empty()) options.outputs.reads(options.config);
+  RETURN_IF_ERROR(options.outputs.plan_in(options.figures, names));
   if (context.dry_run) {
     return say_dry_run("draw " + std::to_string(names.size()) + " pictures into " + options.figures,
-                       {{"out", options.figures}, {"files", names}}, options.farm, config->farm,
+                       {{"out", options.figures}, {"files", names}}, options.farm, config.farm,
                        context);
   }
-  auto farm = start_farm(options.farm, config->farm, context);
-  if (!farm) return failed(farm.error(), context);
-  const Problem& problem = config->problem;
-  const std::string hash = (*farm)->add_problem(to_proto(problem));
-  const auto results = (*farm)->run(hash, figure_tasks(problem));
-  if (!results) return failed(results.error(), context);
+  ASSIGN_OR_RETURN(auto farm, start_farm(options.farm, config.farm, context));
+  const Problem& problem = config.problem;
+  const std::string hash = farm->add_problem(to_proto(problem));
+  ASSIGN_OR_RETURN(const auto results, farm->run(hash, figure_tasks(problem)));
   const std::vector<std::size_t> effects = pictured(problem.table());
   for (std::size_t k = 0; k < effects.size(); ++k) {
     const Effect& effect = problem.table().effects()[effects[k]];
-    for (const v1::TaskResult& result : {(*results)[2 * k], (*results)[2 * k + 1]}) {
+    for (const v1::TaskResult& result : {results[2 * k], results[2 * k + 1]}) {
       if (result.outcome() == v1::OK) continue;
-      return failed(Error{effect.name + ": the simulation ended with " +
-                          v1::Outcome_Name(result.outcome()) + " (" + result.message() + ")"},
-                    context);
+      return Error{effect.name + ": the simulation ended with " +
+                   v1::Outcome_Name(result.outcome()) + " (" + result.message() + ")"};
     }
     const auto drives =
-        drives_of(problem, (*results)[2 * k].simulate(), (*results)[2 * k + 1].simulate());
+        drives_of(problem, results[2 * k].simulate(), results[2 * k + 1].simulate());
     const std::string picture = effect_figure(effect, figure_values(effect), kFigureStart, drives);
     const std::string path = (std::filesystem::path(options.figures) / names[k]).string();
-    if (Status s = options.outputs.write(path, picture); !s) return failed(s.error(), context);
+    RETURN_IF_ERROR(options.outputs.write(path, picture));
   }
   context.console.result(options.figures + ": " + std::to_string(effects.size()) + " pictures\n",
                          {{"out", options.figures}, {"files", names}});
@@ -280,24 +272,19 @@ int draw_figures(EffectsOptions& options, CliContext& context) {
 Result<std::vector<Effect>> catalogue_of(const EffectsOptions& options) {
   const std::span<const Effect> tracked = srv1_effects();
   if (options.config.empty()) return std::vector<Effect>(tracked.begin(), tracked.end());
-  const Result<Config> config = read_config(options.config);
-  if (!config) return config.error();
-  const ParameterTable& table = config->problem.table();
+  ASSIGN_OR_RETURN(const Config config, read_config(options.config));
+  const ParameterTable& table = config.problem.table();
   std::vector<Effect> effects;
   for (const std::size_t e : pictured(table)) effects.push_back(table.effects()[e]);
   return effects;
 }
 
-int run_effects(EffectsOptions& options, CliContext& context) {
+Result<int> run_effects(EffectsOptions& options, CliContext& context) {
   if (!options.figures.empty()) return draw_figures(options, context);
-  const Result<std::vector<Effect>> effects = catalogue_of(options);
-  if (!effects) {
-    context.console.error(effects.error());
-    return kExitBadUsage;
-  }
+  ASSIGN_OR_RETURN(const std::vector<Effect> effects, catalogue_of(options));
   const std::string none = "its scenario has no catalogue of effects\n";
-  context.console.result(effects->empty() ? options.config + ": " + none : listing(*effects),
-                         to_json(*effects));
+  context.console.result(effects.empty() ? options.config + ": " + none : listing(effects),
+                         to_json(effects));
   return kExitDone;
 }
 

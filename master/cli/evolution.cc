@@ -5,6 +5,8 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "common/base/try.h"
+#include "common/json/fields.h"
 #include "master/cli/long_command.h"
 #include "master/run/run.h"
 
@@ -56,14 +58,13 @@ Result<std::unique_ptr<FarmOfRun>> open_farm(const RunStore& store, const Config
     keep(event);
     if (next) next(event);
   };
-  auto farm = start_farm(options.farm, config.farm, context, base);
-  if (!farm) return farm.error();
-  for (const std::string& endpoint : (*farm)->endpoints()) {
+  ASSIGN_OR_RETURN(auto farm, start_farm(options.farm, config.farm, context, base));
+  for (const std::string& endpoint : farm->endpoints()) {
     if (endpoint.rfind("ipc://", 0) != 0) {
       context.console.note("listening for workers: gapfarm-worker --connect " + endpoint);
     }
   }
-  return farm_of_run(*std::move(farm));
+  return farm_of_run(std::move(farm));
 }
 
 void add_validation(const RunSummary& summary, const Problem& problem, std::string& text,
@@ -74,8 +75,7 @@ void add_validation(const RunSummary& summary, const Problem& problem, std::stri
   for (const Validated& row : summary.validated) {
     text += fmt::format("  {:<24} {}\n", row.name,
                         row.fitness ? fmt::format("{:.6g}", *row.fitness) : "does not end well");
-    json["validation"].push_back(
-        {{"name", row.name}, {"fitness", row.fitness ? Json(*row.fitness) : Json()}});
+    json["validation"].push_back({{"name", row.name}, {"fitness", number_or_null(row.fitness)}});
   }
 }
 
@@ -128,9 +128,8 @@ int run_evolution(RunStore& store, const Config& config, const EvolutionOptions&
   OnConsole watcher(context.console);
   std::unique_ptr<PageAlong> page;
   const auto farm = [&](const auto& keep) -> Result<std::unique_ptr<FarmOfRun>> {
-    auto opened = open_page(options.page, store.run(), context);
-    if (!opened) return opened.error();
-    page = *std::move(opened);
+    ASSIGN_OR_RETURN(auto opened, open_page(options.page, store.run(), context));
+    page = std::move(opened);
     return open_farm(store, config, options, log, keep, context);
   };
   const auto summary = evolve_run(

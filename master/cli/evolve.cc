@@ -3,6 +3,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "common/base/try.h"
 #include "common/config/config.h"
 #include "master/cli/evolution.h"
 #include "master/cli/long_command.h"
@@ -21,7 +22,7 @@ struct EvolveCommand {
   EvolutionOptions options;
 };
 
-int say_plan(const EvolveCommand& command, const Config& config, CliContext& context) {
+Result<int> say_plan(const EvolveCommand& command, const Config& config, CliContext& context) {
   const std::size_t genes = config.problem.genes.size(), trials = config.problem.log.trials.size();
   const std::string would = "evolve " + std::to_string(genes) + " parameters on " +
                             std::to_string(trials) + " trials into " + command.out + ", seed " +
@@ -38,35 +39,31 @@ int say_plan(const EvolveCommand& command, const Config& config, CliContext& con
                      command.options.farm, config.farm, context);
 }
 
-int run_evolve(const EvolveCommand& command, CliContext& context) {
+Result<int> run_evolve(const EvolveCommand& command, CliContext& context) {
   const std::unique_ptr<Log> log = command.options.farm.log.open();
   const NotesGoTo notes(*log, context.console);
-  const auto config =
-      open_config(command.config, command.trials, context.console, [&](Config& read) {
+  ASSIGN_OR_RETURN(
+      const auto config,
+      open_config(command.config, command.trials, context.console, [&](Config& read) -> Status {
         command.options.overrides.apply(read.evolution);
         if (command.seed) read.seed = *command.seed;
-        if (Status s = check_runnable(read); !s) return s;
-        if (Status s = check_farm(command.options.farm, read.farm); !s) return s;
+        RETURN_IF_ERROR(check_runnable(read));
+        RETURN_IF_ERROR(check_farm(command.options.farm, read.farm));
         return check_folder(command.out, FolderKind::kRun);
-      });
-  if (!config) return kExitBadUsage;
-  if (context.dry_run) return say_plan(command, *config, context);
+      }));
+  if (context.dry_run) return say_plan(command, config, context);
   std::error_code ignored;
   const bool folder_was_there = std::filesystem::exists(command.out, ignored);
-  Result<RunStore> store =
-      RunStore::create(command.out, run_info(*config, command.options.overrides));
-  if (!store) {
-    context.console.error(store.error());
-    return kExitBadUsage;
-  }
-  context.console.note(command.out + ": evolving " + std::to_string(config->problem.genes.size()) +
-                       " parameters on " + std::to_string(config->problem.log.trials.size()) +
-                       " trials, seed " + std::to_string(config->seed));
-  const int code = run_evolution(*store, *config, command.options, *log, context);
+  ASSIGN_OR_RETURN(RunStore store,
+                   RunStore::create(command.out, run_info(config, command.options.overrides)));
+  context.console.note(command.out + ": evolving " + std::to_string(config.problem.genes.size()) +
+                       " parameters on " + std::to_string(config.problem.log.trials.size()) +
+                       " trials, seed " + std::to_string(config.seed));
+  const int code = run_evolution(store, config, command.options, *log, context);
   // What failed before its first generation is not to be in the way of the next attempt.
-  const auto checkpoint = store->checkpoint();
+  const auto checkpoint = store.checkpoint();
   if (code == kExitFailed && checkpoint && !*checkpoint) {
-    if (Status s = RunStore::discard(*std::move(store), !folder_was_there); !s) {
+    if (Status s = RunStore::discard(std::move(store), !folder_was_there); !s) {
       context.console.error(s.error());
     }
   }

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "common/base/try.h"
 #include "common/problem/run_files.h"
 #include "common/trials/files.h"
 #include "master/cli/inputs.h"
@@ -37,12 +38,11 @@ Result<SaidValues> values_of_run(const Problem& problem, const Model& model, Con
   SaidValues said;
   said.given = problem.ground->robot();
   said.logs = model.data.files;
-  const auto log = read_run_folders(said.logs, said.given.channels);
-  if (!log) return log.error();
+  ASSIGN_OR_RETURN(const auto log, read_run_folders(said.logs, said.given.channels));
   console.note("fitting the robot's kinematics to the log of the run, for intervals");
-  const auto asked = ask_what_changed(said.given, *log, {{0.5, 2, 5}, 0.5}, 1, nullptr);
-  if (!asked) return asked.error();
-  const GroundReference& fit = *asked->reference;
+  ASSIGN_OR_RETURN(const auto asked,
+                   ask_what_changed(said.given, log, {{0.5, 2, 5}, 0.5}, 1, nullptr));
+  const GroundReference& fit = *asked.reference;
   for (std::size_t k = 0; k < fit.names.size(); ++k) {
     const auto i = static_cast<Eigen::Index>(k);
     std::vector<double> drawn;
@@ -85,31 +85,26 @@ Result<Said> read_source_of_export(const std::string& source, Console& console) 
   const fs::path values = fs::path(source) / "values.json";
   std::error_code ignored;
   if (fs::exists(values, ignored)) {
-    const auto text = read_text_file(values.string());
-    if (!text) return text.error();
-    auto said = parse_values(*text, values.string());
-    if (!said) return said.error();
-    const RosFriction friction = ros_friction(*said);
-    return Said{*std::move(said), friction};
+    ASSIGN_OR_RETURN(const auto text, read_text_file(values.string()));
+    ASSIGN_OR_RETURN(auto said, parse_values(text, values.string()));
+    const RosFriction friction = ros_friction(said);
+    return Said{std::move(said), friction};
   }
   const auto reader = RunReader::open(source);
   if (!reader) {
     return Error{source + ": neither the diagnosis of a ground robot nor a run (" +
                  reader.error().message + ")"};
   }
-  const auto problem = stored_problem(*reader);
-  if (!problem) return problem.error();
-  if (!problem->ground) {
-    return Error{source + ": scenario " + problem->scenario +
+  ASSIGN_OR_RETURN(const auto problem, stored_problem(*reader));
+  if (!problem.ground) {
+    return Error{source + ": scenario " + problem.scenario +
                  " has no robot file whose values could go back; only ground robots have"};
   }
-  const auto model = read_model_of(source, console);
-  if (!model) return model.error();
-  auto said = values_of_run(*problem, *model, console);
-  if (!said) return said.error();
-  RosFriction friction = simulated_friction(*problem, *model);
-  if (!friction.across) friction = ros_friction(*said);
-  return Said{*std::move(said), friction};
+  ASSIGN_OR_RETURN(const auto model, read_model_of(source, console));
+  ASSIGN_OR_RETURN(auto said, values_of_run(problem, model, console));
+  RosFriction friction = simulated_friction(problem, model);
+  if (!friction.across) friction = ros_friction(said);
+  return Said{std::move(said), friction};
 }
 
 std::string usual_controller(DriveKind drive) {
@@ -134,15 +129,12 @@ Status name_wheels_of_export(const std::string& urdf, const GroundRobot& robot, 
     }
     return {};
   }
-  const auto text = read_text_file(urdf);
-  if (!text) return text.error();
-  const auto model = parse_urdf(*text, urdf);
-  if (!model) return model.error();
-  const auto reading = understand_robot(*model, {});
-  if (!reading) return reading.error();
-  for (std::size_t i = 0; i < reading->sources.size(); ++i) {
-    const WheelSource& source = reading->sources[i];
-    if (reading->robot.wheels[i].driven) {
+  ASSIGN_OR_RETURN(const auto text, read_text_file(urdf));
+  ASSIGN_OR_RETURN(const auto model, parse_urdf(text, urdf));
+  ASSIGN_OR_RETURN(const auto reading, understand_robot(model, {}));
+  for (std::size_t i = 0; i < reading.sources.size(); ++i) {
+    const WheelSource& source = reading.sources[i];
+    if (reading.robot.wheels[i].driven) {
       data->wheels.push_back({source.link, source.mu1, source.mu2});
     }
   }
@@ -150,25 +142,20 @@ Status name_wheels_of_export(const std::string& urdf, const GroundRobot& robot, 
 }
 
 Result<RosExport> export_of(const ExportCommand& command, Console& console) {
-  auto said = read_source_of_export(command.source, console);
-  if (!said) return said.error();
+  ASSIGN_OR_RETURN(auto said, read_source_of_export(command.source, console));
   RosExport data;
   data.source = command.source;
-  data.logs = said->values.logs;
-  data.controller = usual_controller(said->values.given.drive);
+  data.logs = said.values.logs;
+  data.controller = usual_controller(said.values.given.drive);
   if (!command.controllers.empty()) {
-    const auto text = read_text_file(command.controllers);
-    if (!text) return text.error();
-    const auto read = parse_controllers(*text, command.controllers);
-    if (!read) return read.error();
-    data.controller = read->drives.front().name;
+    ASSIGN_OR_RETURN(const auto text, read_text_file(command.controllers));
+    ASSIGN_OR_RETURN(const auto read, parse_controllers(text, command.controllers));
+    data.controller = read.drives.front().name;
   }
-  data.values = ros_values(said->values);
-  data.remarks = ros_remarks(said->values);
-  data.friction = said->friction;
-  if (Status s = name_wheels_of_export(command.urdf, said->values.given, &data); !s) {
-    return s.error();
-  }
+  data.values = ros_values(said.values);
+  data.remarks = ros_remarks(said.values);
+  data.friction = said.friction;
+  RETURN_IF_ERROR(name_wheels_of_export(command.urdf, said.values.given, &data));
   return data;
 }
 
@@ -188,35 +175,26 @@ nlohmann::ordered_json export_json(const RosExport& data) {
   return json;
 }
 
-int run_export(ExportCommand& command, CliContext& context) {
+Result<int> run_export(ExportCommand& command, CliContext& context) {
   Console& console = context.console;
   for (const std::string* path : {&command.controllers, &command.urdf}) {
     if (!path->empty()) command.outputs.reads(*path);
   }
-  Status planned;
   if (!command.out.empty()) {
-    planned = command.outputs.plan_in(command.out, {"controllers.yaml", "gazebo.xml"});
+    RETURN_IF_ERROR(command.outputs.plan_in(command.out, {"controllers.yaml", "gazebo.xml"}));
   }
-  auto data = planned ? export_of(command, console) : Result<RosExport>(planned.error());
-  if (!data) {
-    console.error(data.error());
-    return kExitBadUsage;
-  }
-  const std::string yaml = ros_yaml(*data), gazebo = ros_gazebo(*data);
-  std::string text = ros_table(*data);
+  ASSIGN_OR_RETURN(const auto data, export_of(command, console));
+  const std::string yaml = ros_yaml(data), gazebo = ros_gazebo(data);
+  std::string text = ros_table(data);
   if (command.out.empty()) {
     text += "\n" + yaml + (gazebo.empty() ? "" : "\n" + gazebo);
-    console.result(text, export_json(*data));
+    console.result(text, export_json(data));
     return kExitDone;
   }
-  const std::pair<const char*, const std::string*> files[] = {{"controllers.yaml", &yaml},
-                                                              {"gazebo.xml", &gazebo}};
-  for (const auto& [name, content] : files) {
-    if (content->empty()) continue;
-    const std::string path = (fs::path(command.out) / name).string();
-    if (Status s = command.outputs.write(path, *content); !s) return failed(s.error(), context);
-  }
-  console.result(text, export_json(*data));
+  context.begun = true;
+  RETURN_IF_ERROR(
+      command.outputs.write_in(command.out, {{"controllers.yaml", yaml}, {"gazebo.xml", gazebo}}));
+  console.result(text, export_json(data));
   console.note("left behind: " + command.out + "/controllers.yaml" +
                (gazebo.empty() ? "" : ", gazebo.xml"));
   return kExitDone;

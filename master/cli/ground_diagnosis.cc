@@ -2,6 +2,7 @@
 #include <nlohmann/json.hpp>
 
 #include "common/base/hash.h"
+#include "common/base/try.h"
 #include "common/problem/run_files.h"
 #include "common/robot/robot_file.h"
 #include "master/cli/diagnose_command.h"
@@ -61,9 +62,8 @@ Status read_reference(DiagnoseCommand* command, const Config& config, Console& c
     return Error{"--reference: asks what changed of a ground robot, but the scenario is " +
                  config.problem.scenario + "; diagnose both logs, or use crossfit"};
   }
-  const auto folders = reference_folders(command->reference, console);
-  if (!folders) return folders.error();
-  auto log = read_run_folders(*folders, config.problem.ground->robot().channels);
+  ASSIGN_OR_RETURN(const auto folders, reference_folders(command->reference, console));
+  auto log = read_run_folders(folders, config.problem.ground->robot().channels);
   if (!log) return Error{"--reference: " + log.error().message};
   for (const std::string& note : log->notes) console.note("reference: " + note);
   command->reference_log = std::move(*log);
@@ -85,20 +85,15 @@ std::string log_hash(const RunLog& log) {
   return hasher.finish();
 }
 
-int run_diagnose_ground(DiagnoseCommand& command, const Config& config, const std::string& stamp,
-                        CliContext& context) {
+Result<int> run_diagnose_ground(DiagnoseCommand& command, const Config& config,
+                                const std::string& stamp, CliContext& context) {
+  context.begun = true;
   const GroundRobot robot = config.problem.ground->robot_at(config.problem.values);
-  const auto runs = read_run_folders(config.trial_files, robot.channels);
-  if (!runs) return failed(runs.error(), context);
-  if (Status s = LongCommand::begin("diagnose", {command.out}, ground_stages(), context); !s) {
-    return failed(s.error(), context);
-  }
-  const auto page = open_page(command.page, command.out, context);
-  if (!page) return failed(page.error(), context);
+  ASSIGN_OR_RETURN(const auto runs, read_run_folders(config.trial_files, robot.channels));
+  RETURN_IF_ERROR(LongCommand::begin("diagnose", {command.out}, ground_stages(), context));
+  ASSIGN_OR_RETURN(const auto page, open_page(command.page, command.out, context));
   const fs::path out(command.out);
-  if (Status s = command.outputs.write((out / kStampFile).string(), stamp); !s) {
-    return failed(s.error(), context);
-  }
+  RETURN_IF_ERROR(command.outputs.write((out / kStampFile).string(), stamp));
   LongCommand& work = *context.work;
   FitFile fits(out / kFits);
   work.keeps_also("fitted", out / kFits);
@@ -112,25 +107,19 @@ int run_diagnose_ground(DiagnoseCommand& command, const Config& config, const st
   options.on_progress = [&](std::size_t done, std::size_t total) { work.advance(done, total); };
   options.stopped = [&] { return context.stop.requested(); };
   options.memo = &fits;
-  auto result = diagnose_ground(robot, *runs, options);
-  if (!result) return failed(result.error(), context);
-  add_diagnosis_provenance(config, command, &result->diagnosis);
+  ASSIGN_OR_RETURN(auto result, diagnose_ground(robot, runs, options));
+  add_diagnosis_provenance(config, command, &result.diagnosis);
   for (const std::string& name : command.reference) {
-    result->diagnosis.provenance.emplace_back("reference", name);
+    result.diagnosis.provenance.emplace_back("reference", name);
   }
-  const std::pair<const char*, std::string> files[] = {
-      {"robot.toml", format_robot(result->corrected)},
-      {"values.json", format_values({robot, config.trial_files, result->values})},
-      {"report.html", report_html(result->diagnosis)},
-      {kDiagnosisFile, to_json(result->diagnosis)}};
-  for (const auto& [name, text] : files) {
-    if (Status s = command.outputs.write((out / name).string(), text); !s) {
-      return failed(s.error(), context);
-    }
-  }
+  RETURN_IF_ERROR(command.outputs.write_in(
+      command.out, {{"robot.toml", format_robot(result.corrected)},
+                    {"values.json", format_values({robot, config.trial_files, result.values})},
+                    {"report.html", report_html(result.diagnosis)},
+                    {kDiagnosisFile, to_json(result.diagnosis)}}));
   fits.remove();
-  context.console.result(diagnosis_summary(result->diagnosis),
-                         diagnosis_summary_json(result->diagnosis, command));
+  context.console.result(diagnosis_summary(result.diagnosis),
+                         diagnosis_summary_json(result.diagnosis, command));
   context.console.note("left behind: " + command.out +
                        "/report.html, diagnosis.json, and robot.toml with what was named put in; "
                        "next: gapfarm export ros " +

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <memory>
 
+#include "common/base/try.h"
 #include "common/problem/run_files.h"
 #include "common/runs/read.h"
 #include "master/cli/inputs.h"
@@ -36,71 +37,51 @@ struct Fitted {
 Result<Fitted> open_fitted(const std::string& source, Console& console) {
   std::error_code ignored;
   if (!std::filesystem::is_directory(source, ignored)) {
-    auto config = read_config_and_trials(source, {});
-    if (!config) return config.error();
-    return Fitted{config->problem, config->problem.values, config->windows, config->trial_files};
+    ASSIGN_OR_RETURN(auto config, read_config_and_trials(source, {}));
+    return Fitted{config.problem, config.problem.values, config.windows, config.trial_files};
   }
-  const auto reader = RunReader::open(source);
-  if (!reader) return reader.error();
-  auto problem = stored_problem(*reader);
-  if (!problem) return problem.error();
-  const auto model = read_model_of(source, console);
-  if (!model) return model.error();
-  return Fitted{*problem, model->values, {}, model->data.files};
+  ASSIGN_OR_RETURN(const auto reader, RunReader::open(source));
+  ASSIGN_OR_RETURN(auto problem, stored_problem(reader));
+  ASSIGN_OR_RETURN(const auto model, read_model_of(source, console));
+  return Fitted{problem, model.values, {}, model.data.files};
 }
 
 // Whole runs, before and after, as a picture.
 Status draw_runs(const HorizonsCommand& command, const Fitted& fitted, const RunLog& runs,
                  Farm& farm, Console& console) {
   if (command.picture.empty()) return {};
-  const auto paths = drive_paths(farm, fitted.problem, fitted.values, runs);
-  if (!paths) return paths.error();
-  if (Status s = command.outputs.write(command.picture, draw_paths(*paths)); !s) return s;
+  ASSIGN_OR_RETURN(const auto paths, drive_paths(farm, fitted.problem, fitted.values, runs));
+  RETURN_IF_ERROR(command.outputs.write(command.picture, draw_paths(paths)));
   console.note("paths drawn in " + command.picture);
   return {};
 }
 
-int run_horizons(HorizonsCommand& command, CliContext& context) {
+Result<int> run_horizons(HorizonsCommand& command, CliContext& context) {
   Console& console = context.console;
-  if (Status s = command.outputs.plan({command.picture, command.out}); !s) {
-    console.error(s.error());
-    return kExitBadUsage;
+  RETURN_IF_ERROR(command.outputs.plan({command.picture, command.out}));
+  ASSIGN_OR_RETURN(const auto fitted, open_fitted(command.source, console));
+  if (!fitted.problem.ground) {
+    return Error{command.source + ": scenario " + fitted.problem.scenario +
+                 " has no runs to cut into windows; gapfarm predict compares its trials"};
   }
-  auto fitted = open_fitted(command.source, console);
-  if (fitted && !fitted->problem.ground) {
-    fitted = Error{command.source + ": scenario " + fitted->problem.scenario +
-                   " has no runs to cut into windows; gapfarm predict compares its trials"};
-  }
-  if (!fitted) {
-    console.error(fitted.error());
-    return kExitBadUsage;
-  }
-  const auto runs = read_run_folders(command.runs.empty() ? fitted->folders : command.runs,
-                                     fitted->problem.ground->robot().channels);
-  if (!runs) {
-    console.error(runs.error());
-    return kExitBadUsage;
-  }
-  for (const std::string& note : runs->notes) console.note(note);
+  ASSIGN_OR_RETURN(const auto runs,
+                   read_run_folders(command.runs.empty() ? fitted.folders : command.runs,
+                                    fitted.problem.ground->robot().channels));
+  for (const std::string& note : runs.notes) console.note(note);
   if (context.dry_run) {
     return say_dry_run("measure horizons of " + command.source,
                        {{"source", command.source}, {"horizons", command.horizons}}, command.farm,
                        {}, context);
   }
-  auto farm = start_farm(command.farm, {}, context);
-  if (!farm) return failed(farm.error(), context);
-  const auto horizons = measure_horizons(**farm, fitted->problem, fitted->values, *runs,
-                                         {command.horizons, fitted->windows.run_in_s});
-  if (!horizons) return failed(horizons.error(), context);
-  if (Status s = draw_runs(command, *fitted, *runs, **farm, console); !s) {
-    return failed(s.error(), context);
-  }
+  ASSIGN_OR_RETURN(auto farm, start_farm(command.farm, {}, context));
+  ASSIGN_OR_RETURN(const auto horizons,
+                   measure_horizons(*farm, fitted.problem, fitted.values, runs,
+                                    {command.horizons, fitted.windows.run_in_s}));
+  RETURN_IF_ERROR(draw_runs(command, fitted, runs, *farm, console));
   if (!command.out.empty()) {
-    if (Status s = command.outputs.write(command.out, windows_csv(*horizons)); !s) {
-      return failed(s.error(), context);
-    }
+    RETURN_IF_ERROR(command.outputs.write(command.out, windows_csv(horizons)));
   }
-  console.print(format_horizons(*horizons));
+  console.print(format_horizons(horizons));
   return kExitDone;
 }
 

@@ -4,6 +4,7 @@
 #include <set>
 
 #include "common/base/suggest.h"
+#include "common/base/try.h"
 #include "common/problem/problem.h"
 #include "common/trials/files.h"
 #include "common/trials/format.h"
@@ -48,9 +49,8 @@ const ImportFormat* find_format(const std::string& name) {
 // OK when every file is what the user says it is.
 Status check_formats(const ImportOptions& options, const ImportFormat& wanted) {
   for (const std::string& file : options.files) {
-    const Result<std::string> text = read_text_file(file);
-    if (!text) return text.error();
-    const TextFormat found = sniff_format(*text);
+    ASSIGN_OR_RETURN(const std::string text, read_text_file(file));
+    const TextFormat found = sniff_format(text);
     if (found != wanted.format) return wrong_format(file, found, format_name(wanted.format));
   }
   return {};
@@ -64,7 +64,7 @@ Result<TrialLog> read_logs(const ImportOptions& options) {
     known.emplace_back(kRuns);
     return Error{"unknown format '" + options.format + "'" + suggestion(options.format, known)};
   }
-  if (Status s = check_formats(options, *format); !s) return s.error();
+  RETURN_IF_ERROR(check_formats(options, *format));
   std::vector<std::string> commands;
   for (const CommandSpec& command : default_commands(format->scenario)) {
     commands.push_back(command.name);
@@ -72,54 +72,43 @@ Result<TrialLog> read_logs(const ImportOptions& options) {
   return read_trial_files(options.files, commands, options.reading.read);
 }
 
-int run_import(ImportOptions& options, CliContext& context) {
+Result<int> run_import(ImportOptions& options, CliContext& context) {
   Console& console = context.console;
   if (options.out.empty() && !options.print_map) {
-    console.error(Error{"--out is missing, expected where to write; --out trials.csv"});
-    return kExitBadUsage;
+    return Error{"--out is missing, expected where to write; --out trials.csv"};
   }
   if (options.format == kRuns) {
     return import_runs({options.files, options.out, options.map, options.print_map},
                        options.outputs, context);
   }
   const bool to_stdout = options.out == "-";
-  const Result<TrialLog> log = read_logs(options);
-  if (!log) {
-    console.error(log.error());
-    return kExitBadUsage;
-  }
-  show_notes(*log, console);
+  ASSIGN_OR_RETURN(const TrialLog log, read_logs(options));
+  show_notes(log, console);
   if (to_stdout && console.json()) {
-    console.error(Error{"--json and --out - both want standard output; name a file"});
-    return kExitBadUsage;
+    return Error{"--json and --out - both want standard output; name a file"};
   }
   if (to_stdout) {
-    console.print(format_trials(*log));
+    console.print(format_trials(log));
     return kExitDone;
   }
-  options.outputs.reads(*log);
-  const auto files = trial_files(*log, options.out);
-  if (!files) return failed(files.error(), context);
-  for (const TrialFile& file : *files) {
-    if (Status s = options.outputs.plan(file.path); !s) {
-      console.error(s.error());
-      return kExitBadUsage;
-    }
+  options.outputs.reads(log);
+  ASSIGN_OR_RETURN(const auto files, trial_files(log, options.out));
+  for (const TrialFile& file : files) {
+    RETURN_IF_ERROR(options.outputs.plan(file.path));
   }
-  for (const TrialFile& file : *files) {
-    if (Status s = options.outputs.write(file.path, file.text); !s) {
-      return failed(s.error(), context);
-    }
+  context.begun = true;
+  for (const TrialFile& file : files) {
+    RETURN_IF_ERROR(options.outputs.write(file.path, file.text));
   }
   std::set<std::string> sessions;
-  for (const Trial& trial : log->trials) sessions.insert(trial.session);
-  console.result(std::to_string(log->trials.size()) + " trials in " +
+  for (const Trial& trial : log.trials) sessions.insert(trial.session);
+  console.result(std::to_string(log.trials.size()) + " trials in " +
                      std::to_string(sessions.size()) + " sessions written to " + options.out + "\n",
                  {{"out", options.out},
-                  {"trials", log->trials.size()},
+                  {"trials", log.trials.size()},
                   {"sessions", sessions.size()},
-                  {"read", log->files},
-                  {"notes", log->notes}});
+                  {"read", log.files},
+                  {"notes", log.notes}});
   return kExitDone;
 }
 

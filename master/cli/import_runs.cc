@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "common/base/try.h"
 #include "common/trials/files.h"
 #include "master/input/bags.h"
 #include "master/input/to_runs.h"
@@ -15,18 +16,16 @@ namespace fs = std::filesystem;
 Result<std::vector<Recording>> read_all(const std::vector<std::string>& files) {
   std::vector<Recording> recordings;
   for (const std::string& file : files) {
-    Result<Recording> recording = read_recording(file);
-    if (!recording) return recording.error();
-    recordings.push_back(*std::move(recording));
+    ASSIGN_OR_RETURN(Recording recording, read_recording(file));
+    recordings.push_back(std::move(recording));
   }
   return recordings;
 }
 
 Result<LogMap> read_map(const std::string& path, const std::vector<Recording>& recordings) {
   if (path.empty()) return guess_map(recordings);
-  const Result<std::string> text = read_text_file(path);
-  if (!text) return text.error();
-  return parse_map(*text, path);
+  ASSIGN_OR_RETURN(const std::string text, read_text_file(path));
+  return parse_map(text, path);
 }
 
 // What there is, for somebody who has to write a map.
@@ -67,75 +66,55 @@ Status check_map(const LogMap& map, const std::vector<Recording>& recordings) {
                "--print-map > map.toml lists the columns, --map map.toml uses it"};
 }
 
-struct NamedText {
-  const char* name;
-  const std::string* text;
-};
-
 Status write_files(const std::string& out, const RunFiles& files, const std::string& map,
                    Outputs& outputs) {
-  const NamedText all[] = {{"commands.csv", &files.commands},
-                           {"poses.csv", &files.poses},
-                           {"wheels.csv", &files.wheels},
-                           {"map.toml", &map}};
+  const Outputs::NamedTexts all = {{"commands.csv", files.commands},
+                                   {"poses.csv", files.poses},
+                                   {"wheels.csv", files.wheels},
+                                   {"map.toml", map}};
   std::vector<std::string> names;
-  for (const NamedText& file : all) {
-    if (!file.text->empty()) names.emplace_back(file.name);
+  for (const auto& [name, text] : all) {
+    if (!text.empty()) names.push_back(name);
   }
-  if (Status s = outputs.plan_in(out, names); !s) return s;
-  for (const NamedText& file : all) {
-    if (file.text->empty()) continue;
-    if (Status s = outputs.write((fs::path(out) / file.name).string(), *file.text); !s) return s;
-  }
-  return {};
-}
-
-int bad_input(const Error& error, CliContext& context) {
-  context.console.error(error);
-  return kExitBadUsage;
+  RETURN_IF_ERROR(outputs.plan_in(out, names));
+  return outputs.write_in(out, all);
 }
 
 }  // namespace
 
-int import_runs(const ImportRunsOptions& options, Outputs& outputs, CliContext& context) {
+Result<int> import_runs(const ImportRunsOptions& options, Outputs& outputs, CliContext& context) {
   Console& console = context.console;
   for (const std::string& file : options.files) outputs.reads(file);
   if (!options.map.empty()) outputs.reads(options.map);
-  const Result<std::vector<Recording>> recordings = read_all(options.files);
-  if (!recordings) return bad_input(recordings.error(), context);
-  Result<LogMap> map = read_map(options.map, *recordings);
-  if (!map) return bad_input(map.error(), context);
-  if (options.map.empty()) drive_by_wheels(*map);
-  for (const std::string& note : map->notes) console.note(printable(note));
+  ASSIGN_OR_RETURN(const std::vector<Recording> recordings, read_all(options.files));
+  ASSIGN_OR_RETURN(LogMap map, read_map(options.map, recordings));
+  if (options.map.empty()) drive_by_wheels(map);
+  for (const std::string& note : map.notes) console.note(printable(note));
   const std::string map_text =
       (options.map.empty() ? "# Guessed from names and numbers; correct it and give it by --map.\n"
                            : "") +
-      format_map(*map);
+      format_map(map);
   if (options.print_map) {
-    console.result(columns_text(*recordings) + map_text, {{"map", map_text}});
+    console.result(columns_text(recordings) + map_text, {{"map", map_text}});
     return kExitDone;
   }
-  if (Status s = check_map(*map, *recordings); !s) return bad_input(s.error(), context);
-  const Result<ImportedRuns> runs = to_runs(*recordings, *map);
-  if (!runs) return bad_input(runs.error(), context);
-  for (const std::string& line : runs->report) console.note(printable(line));
-  if (runs->log.runs.empty()) {
-    return bad_input(Error{options.files.front() +
-                           ":1: found no run with both poses and commands, expected one; give the "
-                           "files of both, in the same order"},
-                     context);
+  RETURN_IF_ERROR(check_map(map, recordings));
+  ASSIGN_OR_RETURN(const ImportedRuns runs, to_runs(recordings, map));
+  for (const std::string& line : runs.report) console.note(printable(line));
+  if (runs.log.runs.empty()) {
+    return Error{options.files.front() +
+                 ":1: found no run with both poses and commands, expected one; give the "
+                 "files of both, in the same order"};
   }
-  if (Status s = write_files(options.out, format_runs(runs->log), map_text, outputs); !s) {
-    return bad_input(s.error(), context);
-  }
-  const std::string done = std::to_string(runs->log.runs.size()) + " runs written to " +
+  RETURN_IF_ERROR(write_files(options.out, format_runs(runs.log), map_text, outputs));
+  const std::string done = std::to_string(runs.log.runs.size()) + " runs written to " +
                            options.out + " (commands.csv, poses.csv, map.toml)\n";
   console.result((options.map.empty() ? map_text + "\n" : "") + done,
                  {{"out", options.out},
-                  {"runs", runs->log.runs.size()},
-                  {"channels", runs->log.channels},
-                  {"clock_start_s", runs->clock_start_s},
-                  {"report", runs->report},
+                  {"runs", runs.log.runs.size()},
+                  {"channels", runs.log.channels},
+                  {"clock_start_s", runs.clock_start_s},
+                  {"report", runs.report},
                   {"map", map_text}});
   return kExitDone;
 }

@@ -16,6 +16,6 @@ struct ImportRunsOptions {
   bool print_map = false;
 };
 
-int import_runs(const ImportRunsOptions& options, Outputs& outputs, CliContext& context);
+Result<int> import_runs(const ImportRunsOptions& options, Outputs& outputs, CliContext& context);
 
 }  // namespace gapfarm

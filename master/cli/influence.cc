@@ -8,6 +8,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "common/base/try.h"
 #include "common/config/config.h"
 #include "master/cli/inputs.h"
 #include "master/cli/long_command.h"
@@ -28,78 +29,58 @@ struct InfluenceCommand {
 };
 
 nlohmann::ordered_json to_json(const InfluenceReport& report, const ParameterTable& table) {
-  // JSON knows no infinity.
-  const auto number = [](double v) {
-    return std::isfinite(v) ? nlohmann::ordered_json(v) : nlohmann::ordered_json();
-  };
   nlohmann::ordered_json factors = nlohmann::ordered_json::array();
   for (const FactorInfluence& f : report.factors) {
     factors.push_back({{"parameter", table[f.gene.row].key},
-                       {"alone_m", number(f.alone.distance)},
-                       {"alone_at", number(f.alone.value)},
-                       {"alone_p", number(f.alone.p)},
+                       {"alone_m", f.alone.distance},
+                       {"alone_at", f.alone.value},
+                       {"alone_p", f.alone.p},
                        {"alone_influential", f.alone.influential},
-                       {"morris_m", number(f.morris.mean)},
-                       {"morris_p", number(f.morris.p)},
+                       {"morris_m", f.morris.mean},
+                       {"morris_p", f.morris.p},
                        {"morris_influential", f.morris.influential}});
   }
-  return {{"horizon_s", number(report.horizon_s)},
-          {"repeat_distance_m", number(report.repeat_distance)},
+  return {{"horizon_s", report.horizon_s},
+          {"repeat_distance_m", report.repeat_distance},
           {"factors", factors}};
 }
 
-int run_influence(InfluenceCommand command, CliContext& context) {
-  Result<Config> config = command.traced.open(command.config, &command.settings.trace);
-  if (config) {
-    command.outputs.reads(command.config);
-    command.outputs.reads(config->problem.log);
-    const Status planned =
-        command.outputs.plan_in(command.out, {"influence.csv", "influence.html", "genes.toml"});
-    if (!planned) config = planned.error();
-  }
-  if (!config) {
-    context.console.error(config.error());
-    return kExitBadUsage;
-  }
-  show_notes(config->problem.log, context.console);
+Result<int> run_influence(InfluenceCommand command, CliContext& context) {
+  ASSIGN_OR_RETURN(const Config config,
+                   command.traced.open(command.config, &command.settings.trace));
+  command.outputs.reads(command.config);
+  command.outputs.reads(config.problem.log);
+  RETURN_IF_ERROR(
+      command.outputs.plan_in(command.out, {"influence.csv", "influence.html", "genes.toml"}));
+  show_notes(config.problem.log, context.console);
   for (std::size_t i = 0; i < path_distances().size(); ++i) {
     if (command.distance == path_distances()[i].name) command.settings.distance = i;
   }
-  const ParameterTable& table = config->problem.table();
+  const ParameterTable& table = config.problem.table();
   const std::vector<Gene> genes =
-      config->problem.genes.empty() ? all_base_genes(table) : config->problem.genes;
+      config.problem.genes.empty() ? all_base_genes(table) : config.problem.genes;
   if (context.dry_run) {
     return say_dry_run(fmt::format("trace what {} parameters of {} do to paths, into {}",
                                    genes.size(), command.config, command.out),
                        {{"out", command.out}, {"parameters", genes.size()}}, command.farm,
-                       config->farm, context);
+                       config.farm, context);
   }
   // The paths are large, and no figure refers to them.
   const KeepingPlace place{command.out, /*passing=*/false, /*forget=*/true};
-  if (Status s = LongCommand::begin("influence", place, {{"trace paths"}}, context); !s) {
-    return failed(s.error(), context);
-  }
-  auto farm = start_farm(command.farm, config->farm, context);
-  if (!farm) return failed(farm.error(), context);
-  const auto asked = context.work->over(**farm);
-  const auto report =
-      find_influence(*asked, config->problem, genes, command.settings, context.work->hooks());
-  if (!report) return failed(report.error(), context);
-  const std::filesystem::path out(command.out);
-  const std::pair<const char*, std::string> files[] = {
-      {"influence.csv", influence_csv(*report, table)},
-      {"influence.html", influence_page(*report, table, command.settings,
-                                        "Influence of parameters: " + config->problem.scenario)},
-      {"genes.toml", influential_genes(*report, table)},
-  };
-  for (const auto& [name, text] : files) {
-    if (Status s = command.outputs.write((out / name).string(), text); !s) {
-      return failed(s.error(), context);
-    }
-  }
-  context.console.result(influence_text(*report, table), to_json(*report, table));
-  context.console.note("left behind: " + (out / "influence.html").string() +
-                       ", influence.csv, genes.toml");
+  RETURN_IF_ERROR(LongCommand::begin("influence", place, {{"trace paths"}}, context));
+  ASSIGN_OR_RETURN(const auto asked, start_recorded(command.farm, config.farm, context));
+  ASSIGN_OR_RETURN(const auto report, find_influence(*asked, config.problem, genes,
+                                                     command.settings, context.work->hooks()));
+  RETURN_IF_ERROR(command.outputs.write_in(
+      command.out,
+      {{"influence.csv", influence_csv(report, table)},
+       {"influence.html", influence_page(report, table, command.settings,
+                                         "Influence of parameters: " + config.problem.scenario)},
+       {"genes.toml", influential_genes(report, table)}}));
+  context.console.result(influence_text(report, table), to_json(report, table));
+  context.console.note(
+      "left behind: " + (std::filesystem::path(command.out) / "influence.html").string() +
+      ", influence.csv, genes.toml");
   return kExitDone;
 }
 

@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "common/base/try.h"
 #include "common/config/config.h"
 #include "common/score/motion_model.h"
 #include "common/score/statistics.h"
@@ -155,36 +156,30 @@ std::string config_of_log(const LogFigures& figures, const TrialLog& log,
          "generations = 60\nstagnation_generations = 20\n";
 }
 
-int run_init(InitOptions& options, CliContext& context) {
+Result<int> run_init(InitOptions& options, CliContext& context) {
   if (names_a_robot(options.trials.files)) {
     return run_init_robot(options.trials.files, options.out, options.outputs, context);
   }
   Console& console = context.console;
   const std::vector<CommandSpec> known = default_commands("srv1");
-  const Result<TrialLog> log =
-      read_trial_files(options.trials.files, command_names(known), options.trials.read);
-  Status ready = log ? Status() : Status(log.error());
-  if (ready && log->trials.empty()) ready = Error{"the logs hold no trial to make a config of"};
-  if (ready) {
-    show_notes(*log, console);
-    options.outputs.reads(*log);
-    ready = options.outputs.plan(options.out);
-  }
-  if (!ready) {
-    console.error(ready.error());
-    return kExitBadUsage;
-  }
-  const LogFigures figures = figures_of(*log, known);
-  const std::string text = config_of_log(figures, *log, known, options);
-  nlohmann::ordered_json json = {{"out", options.out}, {"trials", log->trials.size()}};
+  ASSIGN_OR_RETURN(const TrialLog log, read_trial_files(options.trials.files, command_names(known),
+                                                        options.trials.read));
+  if (log.trials.empty()) return Error{"the logs hold no trial to make a config of"};
+  show_notes(log, console);
+  options.outputs.reads(log);
+  RETURN_IF_ERROR(options.outputs.plan(options.out));
+  context.begun = true;
+  const LogFigures figures = figures_of(log, known);
+  const std::string text = config_of_log(figures, log, known, options);
+  nlohmann::ordered_json json = {{"out", options.out}, {"trials", log.trials.size()}};
   if (figures.speed_m_s) json["full_speed"] = *figures.speed_m_s;
   if (options.out == "-") {
     json["config"] = text;
     console.result(text, json);
     return kExitDone;
   }
-  if (Status s = options.outputs.write(options.out, text); !s) return failed(s.error(), context);
-  console.result(options.out + ": a config for " + std::to_string(log->trials.size()) +
+  RETURN_IF_ERROR(options.outputs.write(options.out, text));
+  console.result(options.out + ": a config for " + std::to_string(log.trials.size()) +
                      " trials; answer its QUESTIONs, then: gapfarm check " + options.out + "\n",
                  json);
   return kExitDone;

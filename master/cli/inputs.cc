@@ -5,6 +5,7 @@
 #include <thread>
 
 #include "common/base/shipped.h"
+#include "common/base/try.h"
 #include "common/config/config.h"
 #include "common/problem/run_files.h"
 #include "common/trials/files.h"
@@ -29,45 +30,35 @@ Result<Config> read_config_and_trials(const std::string& config_path, const Tria
     if (!read) return read.error();
     return config;
   }
-  Result<TrialLog> log =
-      read_trial_files(config->trial_files, command_names(config->problem.commands), trials.read);
-  if (!log) return log.error();
-  config->problem.log = std::move(*log);
+  ASSIGN_OR_RETURN(
+      TrialLog log,
+      read_trial_files(config->trial_files, command_names(config->problem.commands), trials.read));
+  config->problem.log = std::move(log);
   const v1::Problem message = to_proto(config->problem);
-  const Result<Problem> sound = from_proto(message);
-  if (!sound) return sound.error();
-  if (Status s = check_sendable(message); !s) return s.error();
+  ASSIGN_OR_RETURN(const Problem sound, from_proto(message));
+  RETURN_IF_ERROR(check_sendable(message));
   return config;
 }
 
 Result<Source> read_source(const std::string& named) {
   const std::string path = shipped_file(named);
-  const Result<std::string> text = read_text_file(path);
-  if (!text) return text.error();
-  if (!is_model(*text)) {
-    auto config = parse_config(*text, path, start_program);
-    if (!config) return config.error();
-    return Source{std::move(*config)};
+  ASSIGN_OR_RETURN(const std::string text, read_text_file(path));
+  if (!is_model(text)) {
+    ASSIGN_OR_RETURN(auto config, parse_config(text, path, start_program));
+    return Source{std::move(config)};
   }
-  const Result<Model> model = parse_model(*text, path);
-  if (!model) return model.error();
-  Source source{{}, model->frame_x_m, model->frame_y_m};
-  source.config.problem = problem_of(*model);
+  ASSIGN_OR_RETURN(const Model model, parse_model(text, path));
+  Source source{{}, model.frame_x_m, model.frame_y_m};
+  source.config.problem = problem_of(model);
   return source;
 }
 
-std::optional<Config> open_config(const std::string& config_path, const TrialOptions& trials,
-                                  Console& console, const std::function<Status(Config&)>& finish) {
-  Result<Config> config = read_config_and_trials(config_path, trials);
-  if (config) {
-    if (Status s = finish(*config); !s) config = s.error();
-  }
-  if (!config) {
-    console.error(config.error());
-    return std::nullopt;
-  }
-  show_notes(config->problem.log, console);
-  return std::move(*config);
+Result<Config> open_config(const std::string& config_path, const TrialOptions& trials,
+                           Console& console, const std::function<Status(Config&)>& finish) {
+  ASSIGN_OR_RETURN(Config config, read_config_and_trials(config_path, trials));
+  RETURN_IF_ERROR(finish(config));
+  show_notes(config.problem.log, console);
+  return config;
 }
 
 void FarmOptions::declare(CLI::App& app, bool remote) {
@@ -113,10 +104,9 @@ Status check_farm(const FarmOptions& options, const FarmSettings& settings) {
     return Error{
         "--workers 0 leaves nobody to work; name an endpoint for remote ones with --listen"};
   }
-  const Result<LinkSecurity> security = link_security(options, endpoints);
-  if (!security) return security.error();
+  ASSIGN_OR_RETURN(const LinkSecurity security, link_security(options, endpoints));
   for (const std::string& endpoint : endpoints) {
-    if (Status s = may_listen(endpoint, *security); !s) return s;
+    RETURN_IF_ERROR(may_listen(endpoint, security));
   }
   return {};
 }
@@ -129,11 +119,11 @@ unsigned local_workers(const FarmOptions& options, const FarmSettings& settings)
 Result<std::unique_ptr<SocketFarm>> start_farm(const FarmOptions& options,
                                                const FarmSettings& settings, CliContext& context,
                                                SocketFarmOptions base) {
+  context.begun = true;
   base.local_workers = local_workers(options, settings);
   base.listen = endpoints_of(options, settings);
-  Result<LinkSecurity> security = link_security(options, base.listen);
-  if (!security) return security.error();
-  base.security = std::move(*security);
+  ASSIGN_OR_RETURN(LinkSecurity security, link_security(options, base.listen));
+  base.security = std::move(security);
   if (base.security.open != OpenLinks::kNever) {
     context.console.note(
         "insecure: links are neither encrypted nor authenticated; whoever reaches this machine's "
@@ -152,12 +142,17 @@ Result<std::unique_ptr<SocketFarm>> start_farm(const FarmOptions& options,
   return SocketFarm::create(std::move(base));
 }
 
-int say_dry_run(const std::string& would, nlohmann::ordered_json facts, const FarmOptions& options,
-                const FarmSettings& settings, CliContext& context) {
-  if (Status s = check_farm(options, settings); !s) {
-    context.console.error(s.error());
-    return kExitBadUsage;
-  }
+Result<RecordedWork> start_recorded(const FarmOptions& options, const FarmSettings& settings,
+                                    CliContext& context) {
+  ASSIGN_OR_RETURN(auto farm, start_farm(options, settings, context));
+  auto recorded = context.work->over(*farm);
+  return RecordedWork{std::move(farm), std::move(recorded)};
+}
+
+Result<int> say_dry_run(const std::string& would, nlohmann::ordered_json facts,
+                        const FarmOptions& options, const FarmSettings& settings,
+                        CliContext& context) {
+  RETURN_IF_ERROR(check_farm(options, settings));
   const unsigned workers = local_workers(options, settings);
   const std::vector<std::string> endpoints = endpoints_of(options, settings);
   std::string text = "dry run: nothing was simulated, started or written\nwould " + would +
@@ -172,6 +167,10 @@ int say_dry_run(const std::string& would, nlohmann::ordered_json facts, const Fa
 
 int failed(const Error& error, CliContext& context) {
   context.console.clear_progress();
+  if (!context.begun) {
+    context.console.error(error);
+    return kExitBadUsage;
+  }
   if (context.stop.requested()) {
     if (context.work == nullptr || !context.work->keeps()) {
       return kExitSignalBase + context.stop.signal();

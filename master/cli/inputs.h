@@ -32,10 +32,9 @@ struct Source {
 Result<Source> read_source(const std::string& path);
 
 // The config that a command works on, with its trials and the log's notes shown.  `finish` puts in
-// what the command line changes and checks what the command needs.  Nothing when any of it went
-// wrong: that was shown, and the command is to end with kExitBadUsage.
-std::optional<Config> open_config(const std::string& config_path, const TrialOptions& trials,
-                                  Console& console, const std::function<Status(Config&)>& finish);
+// what the command line changes and checks what the command needs.
+Result<Config> open_config(const std::string& config_path, const TrialOptions& trials,
+                           Console& console, const std::function<Status(Config&)>& finish);
 
 // --workers, --listen and what goes with them.
 struct FarmOptions {
@@ -54,18 +53,31 @@ unsigned local_workers(const FarmOptions& options, const FarmSettings& settings)
 // What can be said before anything is made: keys that are missing, endpoints that would be open.
 Status check_farm(const FarmOptions& options, const FarmSettings& settings);
 
-// Starts the farm, or says why not.
+// Starts the farm: the work has begun.
 Result<std::unique_ptr<SocketFarm>> start_farm(const FarmOptions& options,
                                                const FarmSettings& settings, CliContext& context,
                                                SocketFarmOptions base = {});
 
 // Where --dry-run ends a command whose input is checked: says what `would` be done ("evolve 7
-// parameters ...") and by whom, with `facts` for --json.  Returns the exit code.
-int say_dry_run(const std::string& would, nlohmann::ordered_json facts, const FarmOptions& options,
-                const FarmSettings& settings, CliContext& context);
+// parameters ...") and by whom, with `facts` for --json.
+Result<int> say_dry_run(const std::string& would, nlohmann::ordered_json facts,
+                        const FarmOptions& options, const FarmSettings& settings,
+                        CliContext& context);
 
-// After a signal kExitResumable, with a sentence how to go on, where the command keeps what it
-// simulates (LongCommand), else 130 or 143; without one kExitFailed, and the error is shown.
+// A farm that is asked through the command's LongCommand.
+struct RecordedWork {
+  std::unique_ptr<SocketFarm> sockets;
+  std::unique_ptr<Farm> farm;
+
+  Farm& operator*() const { return *farm; }
+  Farm* operator->() const { return farm.get(); }
+};
+Result<RecordedWork> start_recorded(const FarmOptions& options, const FarmSettings& settings,
+                                    CliContext& context);
+
+// What a command exits with that ends with this error, which is shown: kExitBadUsage before its
+// work begins.  After a signal kExitResumable, with a sentence how to go on, where the command
+// keeps what it simulates (LongCommand), else 130 or 143; without one kExitFailed.
 int failed(const Error& error, CliContext& context);
 
 }  // namespace gapfarm

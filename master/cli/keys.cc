@@ -7,6 +7,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "common/base/try.h"
 #include "master/cli/subcommand.h"
 
 namespace gapfarm {
@@ -32,16 +33,11 @@ nlohmann::ordered_json key_json(const std::string& folder, const std::string& wo
   return {{"folder", folder}, {"worker", worker}, {"public", public_key}};
 }
 
-int failed_with(const Error& error, CliContext& context) {
-  context.console.error(error);
-  return kExitFailed;
-}
-
 // A worker's pair in `folder`: the one that is there, else a new one.
 Result<KeyPair> worker_pair(const KeyFolder& folder, const std::string& name) {
   if (folder.has_pair("worker")) return folder.pair("worker");
   const KeyPair pair = make_key_pair(name);
-  if (Status s = folder.add_pair("worker", pair); !s) return s.error();
+  RETURN_IF_ERROR(folder.add_pair("worker", pair));
   return pair;
 }
 
@@ -51,121 +47,109 @@ Status make_master(const KeyFolder& folder, Console& console) {
   } else if (Status s = folder.add_pair("master", make_key_pair("master")); !s) {
     return s;
   }
-  const Result<KeyPair> pair = folder.pair("master");
-  if (!pair) return pair.error();
-  return folder.add_master_public({"master", pair->public_key});
+  ASSIGN_OR_RETURN(const KeyPair pair, folder.pair("master"));
+  return folder.add_master_public({"master", pair.public_key});
 }
 
-int run_make(const KeysOptions& options, CliContext& context) {
+Result<int> run_make(const KeysOptions& options, CliContext& context) {
+  context.begun = true;
   Console& console = context.console;
-  const Result<KeyFolder> folder = KeyFolder::open_or_make(options.folder);
-  if (!folder) return failed_with(folder.error(), context);
-  if (folder->has_pair("worker")) console.note("worker.key is there already and stays");
-  const Result<KeyPair> worker =
-      worker_pair(*folder, options.name.empty() ? key_name_of_host() : options.name);
-  if (!worker) return failed_with(worker.error(), context);
+  ASSIGN_OR_RETURN(const KeyFolder folder, KeyFolder::open_or_make(options.folder));
+  if (folder.has_pair("worker")) console.note("worker.key is there already and stays");
+  ASSIGN_OR_RETURN(const KeyPair worker,
+                   worker_pair(folder, options.name.empty() ? key_name_of_host() : options.name));
   if (options.worker_only) {
-    console.result("made the key of worker '" + worker->name + "' in " + folder->path() +
+    console.result("made the key of worker '" + worker.name + "' in " + folder.path() +
                        "\nput master.pub of the master's key folder there, and list the worker on "
                        "the master with\n  gapfarm keys allow " +
-                       worker->name + " --key '" + worker->public_key + "'\n",
-                   key_json(folder->path(), worker->name, worker->public_key));
+                       worker.name + " --key '" + worker.public_key + "'\n",
+                   key_json(folder.path(), worker.name, worker.public_key));
     return kExitDone;
   }
-  if (Status s = make_master(*folder, console); !s) return failed_with(s.error(), context);
-  if (Status s = folder->list({worker->name, worker->public_key}); !s) {
-    return failed_with(s.error(), context);
-  }
-  console.result("keys of a master, and of the workers of this user on '" + worker->name +
-                     "' (and wherever this folder is shared), are in " + folder->path() +
+  RETURN_IF_ERROR(make_master(folder, console));
+  RETURN_IF_ERROR(folder.list({worker.name, worker.public_key}));
+  console.result("keys of a master, and of the workers of this user on '" + worker.name +
+                     "' (and wherever this folder is shared), are in " + folder.path() +
                      "\nfor another machine: gapfarm keys worker NAME --out FOLDER\n",
-                 key_json(folder->path(), worker->name, worker->public_key));
+                 key_json(folder.path(), worker.name, worker.public_key));
   return kExitDone;
 }
 
 // Key folder of a worker elsewhere, made here.
-int run_worker(const KeysOptions& options, CliContext& context) {
-  const Result<KeyFolder> folder = KeyFolder::open(options.folder);
-  if (!folder) return failed_with(folder.error(), context);
-  const Result<PublicKey> master = folder->master_public();
-  if (!master) return failed_with(master.error(), context);
-  const Result<KeyFolder> other = KeyFolder::open_or_make(options.out);
-  if (!other) return failed_with(other.error(), context);
-  const Result<KeyPair> worker = worker_pair(*other, options.name);
-  if (!worker) return failed_with(worker.error(), context);
-  if (Status s = other->add_master_public(*master); !s) return failed_with(s.error(), context);
-  if (Status s = folder->list({options.name, worker->public_key}); !s) {
-    return failed_with(s.error(), context);
-  }
+Result<int> run_worker(const KeysOptions& options, CliContext& context) {
+  context.begun = true;
+  ASSIGN_OR_RETURN(const KeyFolder folder, KeyFolder::open(options.folder));
+  ASSIGN_OR_RETURN(const PublicKey master, folder.master_public());
+  ASSIGN_OR_RETURN(const KeyFolder other, KeyFolder::open_or_make(options.out));
+  ASSIGN_OR_RETURN(const KeyPair worker, worker_pair(other, options.name));
+  RETURN_IF_ERROR(other.add_master_public(master));
+  RETURN_IF_ERROR(folder.list({options.name, worker.public_key}));
   context.console.result(
       "listed worker '" + options.name + "'; copy its folder over and remove it here:\n  scp -rp " +
           options.out + " HOST:.config/gapfarm/keys && rm -r " + options.out + "\n",
-      key_json(options.out, options.name, worker->public_key));
+      key_json(options.out, options.name, worker.public_key));
   return kExitDone;
 }
 
-int run_allow(const KeysOptions& options, CliContext& context) {
+Result<int> run_allow(const KeysOptions& options, CliContext& context) {
   if (options.file.empty() == options.key.empty()) {
-    context.console.error(Error{"give either the worker's public key file or --key KEY"});
-    return kExitBadUsage;
+    return Error{"give either the worker's public key file or --key KEY"};
   }
-  const Result<KeyFolder> folder = KeyFolder::open(options.folder);
-  if (!folder) return failed_with(folder.error(), context);
+  context.begun = true;
+  ASSIGN_OR_RETURN(const KeyFolder folder, KeyFolder::open(options.folder));
   PublicKey key{options.name, options.key};
   if (!options.file.empty()) {
-    const Result<PublicKey> read = read_public_key(options.file);
-    if (!read) return failed_with(read.error(), context);
-    key.key = read->key;
+    ASSIGN_OR_RETURN(const PublicKey read, read_public_key(options.file));
+    key.key = read.key;
   }
-  if (Status s = folder->list(key); !s) return failed_with(s.error(), context);
+  RETURN_IF_ERROR(folder.list(key));
   context.console.result("listed worker '" + options.name + "'\n",
-                         key_json(folder->path(), options.name, key.key));
+                         key_json(folder.path(), options.name, key.key));
   return kExitDone;
 }
 
-int run_revoke(const KeysOptions& options, CliContext& context) {
-  const Result<KeyFolder> folder = KeyFolder::open(options.folder);
-  if (!folder) return failed_with(folder.error(), context);
-  if (Status s = folder->unlist(options.name); !s) return failed_with(s.error(), context);
+Result<int> run_revoke(const KeysOptions& options, CliContext& context) {
+  context.begun = true;
+  ASSIGN_OR_RETURN(const KeyFolder folder, KeyFolder::open(options.folder));
+  RETURN_IF_ERROR(folder.unlist(options.name));
   context.console.result("worker '" + options.name +
                              "' is not listed any more; links that stand go on until they break or "
                              "the master restarts\n",
-                         {{"folder", folder->path()}, {"revoked", options.name}});
+                         {{"folder", folder.path()}, {"revoked", options.name}});
   return kExitDone;
 }
 
-int run_list(const KeysOptions& options, CliContext& context) {
-  const Result<KeyFolder> folder = KeyFolder::open(options.folder);
-  if (!folder) return failed_with(folder.error(), context);
+Result<int> run_list(const KeysOptions& options, CliContext& context) {
+  context.begun = true;
+  ASSIGN_OR_RETURN(const KeyFolder folder, KeyFolder::open(options.folder));
   nlohmann::ordered_json rows = nlohmann::ordered_json::array();
   std::vector<std::string> trouble;
   const auto row = [&](const char* role, const std::string& name, const std::string& key) {
     rows.push_back({{"role", role}, {"name", name}, {"public", key}});
   };
   for (const char* role : {"master", "worker"}) {
-    if (!folder->has_pair(role)) continue;
-    const Result<KeyPair> pair = folder->pair(role);
+    if (!folder.has_pair(role)) continue;
+    const Result<KeyPair> pair = folder.pair(role);
     if (pair) {
       row(role, pair->name, pair->public_key);
     } else {
       trouble.push_back(pair.error().message);
     }
   }
-  const auto listed = folder->listed(&trouble);
-  if (!listed) return failed_with(listed.error(), context);
-  for (const PublicKey& key : *listed) row("listed", key.name, key.key);
+  ASSIGN_OR_RETURN(const auto listed, folder.listed(&trouble));
+  for (const PublicKey& key : listed) row("listed", key.name, key.key);
   std::string lines;
   for (const auto& entry : rows) {
     const std::string role = entry["role"], name = entry["name"], public_key = entry["public"];
     lines += role + std::string(8 - role.size(), ' ') + public_key + "  " + printable(name) + "\n";
   }
   context.console.result(lines, rows);
-  if (rows.empty()) context.console.note("no keys in " + folder->path());
+  if (rows.empty()) context.console.note("no keys in " + folder.path());
   for (const std::string& text : trouble) context.console.error(Error{text});
   return trouble.empty() ? kExitDone : kExitFailed;
 }
 
-using KeysRun = int (*)(const KeysOptions&, CliContext&);
+using KeysRun = Result<int> (*)(const KeysOptions&, CliContext&);
 
 }  // namespace
 

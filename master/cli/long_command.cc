@@ -10,6 +10,7 @@
 #include "common/base/build_info.h"
 #include "common/base/hash.h"
 #include "common/base/host.h"
+#include "common/base/try.h"
 #include "common/json/json.h"
 #include "common/trials/files.h"
 #include "master/cli/subcommand.h"
@@ -104,22 +105,21 @@ class LongCommand::Asked : public RecordedFarm {
 
 Status LongCommand::begin(const std::string& command, const KeepingPlace& place,
                           std::vector<ProgressStage> stages, CliContext& context) {
+  context.begun = true;
   std::error_code code;
   fs::create_directories(place.folder, code);
   if (code) return Error{place.folder.string() + ": cannot make the folder: " + code.message()};
-  auto lock = RunLock::take(place.folder);
-  if (!lock) return lock.error();
-  auto answers = AnswerStore::open(answer_file(place.folder), build_info().fingerprint);
-  if (!answers) return answers.error();
-  const Result<std::int64_t> at_hand = answers->count();
-  if (!at_hand) return at_hand.error();
+  ASSIGN_OR_RETURN(auto lock, RunLock::take(place.folder));
+  ASSIGN_OR_RETURN(auto answers,
+                   AnswerStore::open(answer_file(place.folder), build_info().fingerprint));
+  ASSIGN_OR_RETURN(const std::int64_t at_hand, answers.count());
   auto work = std::make_shared<LongCommand>(command, std::move(stages), context.console);
   work->place_ = place;
-  work->lock_ = std::move(*lock);
-  work->answers_ = std::make_unique<AnswerStore>(std::move(*answers));
-  work->at_hand_ = *at_hand;
+  work->lock_ = std::move(lock);
+  work->answers_ = std::make_unique<AnswerStore>(std::move(answers));
+  work->at_hand_ = at_hand;
   if (!place.passing) {
-    if (Status s = context.console.keep((place.folder / "log.txt").string()); !s) return s;
+    RETURN_IF_ERROR(context.console.keep((place.folder / "log.txt").string()));
     context.console.kept()->write(LogLevel::kInfo, work->record_.arguments);
   }
   work->write_record();
@@ -129,6 +129,7 @@ Status LongCommand::begin(const std::string& command, const KeepingPlace& place,
 
 void LongCommand::begin_if_possible(const std::string& command, const Result<KeepingPlace>& place,
                                     std::vector<ProgressStage> stages, CliContext& context) {
+  context.begun = true;
   const Status begun = place ? begin(command, *place, stages, context) : Status(place.error());
   if (begun) return;
   context.console.note("a stop would lose what is simulated: " + begun.error().message);

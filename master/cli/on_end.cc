@@ -1,5 +1,4 @@
 // --on-end COMMAND: what a user wants run when a long command is over; --dry-run: nothing at all.
-#include <spawn.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -7,6 +6,7 @@
 #include <cstring>
 #include <filesystem>
 
+#include "common/process/child.h"
 #include "master/cli/long_command.h"
 #include "master/cli/subcommand.h"
 
@@ -35,27 +35,15 @@ const char* state_word(int exit_code) {
 
 // Its exit status, or what kept it from starting.
 Result<int> run_shell(const std::string& text, const std::vector<std::string>& variables) {
-  std::vector<std::string> words = {"sh", "-c", text};
-  std::vector<char*> argv, environment;
-  for (std::string& word : words) argv.push_back(word.data());
-  argv.push_back(nullptr);
-  // The first of a name counts.
-  std::vector<std::string> own = variables;
-  for (std::string& variable : own) environment.push_back(variable.data());
-  for (char** variable = environ; *variable != nullptr; ++variable) {
-    environment.push_back(*variable);
-  }
-  environment.push_back(nullptr);
-  // stdout is for this program's results.
-  posix_spawn_file_actions_t actions;
-  posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_adddup2(&actions, STDERR_FILENO, STDOUT_FILENO);
-  pid_t pid = 0;
-  const int code = posix_spawn(&pid, "/bin/sh", &actions, nullptr, argv.data(), environment.data());
-  posix_spawn_file_actions_destroy(&actions);
-  if (code != 0) return Error{std::string("cannot start it: ") + std::strerror(code)};
+  ChildSetup setup;
+  setup.words = {"/bin/sh", "-c", text};
+  setup.environment = variables;
+  setup.in = STDIN_FILENO;
+  setup.death_signal = 0;
+  const Result<pid_t> pid = start_child(setup);
+  if (!pid) return Error{"cannot start it: " + pid.error().message};
   int status = 0;
-  while (waitpid(pid, &status, 0) < 0) {
+  while (waitpid(*pid, &status, 0) < 0) {
     if (errno != EINTR) return Error{std::string("lost sight of it: ") + std::strerror(errno)};
   }
   return WIFEXITED(status) ? WEXITSTATUS(status) : kExitSignalBase + WTERMSIG(status);

@@ -8,6 +8,7 @@
 #include <cstring>
 #include <filesystem>
 
+#include "common/base/try.h"
 #include "common/trials/files.h"
 #include "master/store/command_record.h"
 
@@ -138,23 +139,23 @@ Status Outputs::plan(const std::string& path) {
       return Error{path + ": is to be written twice; give one of the outputs another name"};
     }
   }
-  if (Status s = check(path, force_); !s) return s;
+  RETURN_IF_ERROR(check(path, force_));
   planned_.push_back({path, force_});
   return {};
 }
 
 Status Outputs::plan(const std::vector<std::string>& paths) {
   for (const std::string& path : paths) {
-    if (Status s = plan(path); !s) return s;
+    RETURN_IF_ERROR(plan(path));
   }
   return {};
 }
 
 Status Outputs::plan_in(const std::string& folder, const std::vector<std::string>& names,
                         FolderKind kind) {
-  if (Status s = check_folder(folder, kind); !s) return s;
+  RETURN_IF_ERROR(check_folder(folder, kind));
   for (const std::string& name : names) {
-    if (Status s = plan((fs::path(folder) / name).string()); !s) return s;
+    RETURN_IF_ERROR(plan((fs::path(folder) / name).string()));
   }
   return {};
 }
@@ -169,6 +170,13 @@ Status Outputs::write(const std::string& path, std::string_view bytes) const {
                                     [&](const Planned& other) { return other.path == path; });
   const bool replace = planned != planned_.end() ? planned->replace : force_;
   return write_file_atomically(path, bytes, replace ? IfThere::kReplace : IfThere::kKeep);
+}
+
+Status Outputs::write_in(const std::string& folder, const NamedTexts& files) const {
+  for (const auto& [name, text] : files) {
+    if (!text.empty()) RETURN_IF_ERROR(write((fs::path(folder) / name).string(), text));
+  }
+  return {};
 }
 
 }  // namespace gapfarm

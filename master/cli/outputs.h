@@ -41,6 +41,9 @@ class Outputs {
   // Writes beside `path` and renames.  A file that has appeared since it was planned is kept, and
   // the new one lies beside it under another name, which the error tells.
   Status write(const std::string& path, std::string_view bytes) const;
+  // Texts under their names in a folder; those that are empty are left out.
+  using NamedTexts = std::vector<std::pair<std::string, std::string>>;
+  Status write_in(const std::string& folder, const NamedTexts& files) const;
 
   bool force() const { return force_; }
 

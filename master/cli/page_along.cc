@@ -3,7 +3,6 @@
 #include <fcntl.h>
 #include <poll.h>
 #include <signal.h>
-#include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -12,8 +11,8 @@
 #include <charconv>
 #include <cstring>
 #include <string_view>
-#include <vector>
 
+#include "common/process/child.h"
 #include "common/process/process_pool.h"
 #include "master/cli/subcommand.h"
 #include "master/serve/request.h"
@@ -26,25 +25,6 @@ constexpr int kEndLimit_ms = 3000;
 constexpr int kLower = 10;  // a page can wait, a simulation should not
 constexpr std::string_view kAddress = "serving http://127.0.0.1:";
 constexpr std::string_view kTunnel = "from another machine: ";
-
-// After fork(): only what may be done there.
-[[noreturn]] void become_server(char* const* argv, int out, pid_t parent) {
-  ::prctl(PR_SET_PDEATHSIG, SIGTERM);
-  if (::getppid() != parent) ::_exit(1);
-  ::setpgid(0, 0);  // Ctrl-C is for the command, which ends this when it is done
-  sigset_t none;
-  ::sigemptyset(&none);
-  ::sigprocmask(SIG_SETMASK, &none, nullptr);
-  if (::nice(kLower) < 0) errno = 0;
-  const int nowhere = ::open("/dev/null", O_RDONLY);
-  ::dup2(nowhere, STDIN_FILENO);
-  // Whoever listens stops at the address: what comes later is dropped and blocks nobody.
-  ::fcntl(out, F_SETFL, O_NONBLOCK);
-  ::dup2(out, STDOUT_FILENO);
-  ::dup2(out, STDERR_FILENO);
-  ::execv(argv[0], argv);
-  ::_exit(127);
-}
 
 std::string up_to(std::string_view text, std::string_view mark, std::string_view end) {
   const std::size_t at = text.find(mark);
@@ -74,24 +54,25 @@ void PageOption::declare(CLI::App& app) {
 
 Result<std::unique_ptr<PageAlong>> PageAlong::start(const std::filesystem::path& folder,
                                                     unsigned port) {
-  std::vector<std::string> words = {executable_path(),    "serve", "--port",
-                                    std::to_string(port), "--",    folder.string()};
-  std::vector<char*> argv;
-  for (std::string& word : words) argv.push_back(word.data());
-  argv.push_back(nullptr);
   std::array<int, 2> ends = {};
   if (::pipe2(ends.data(), O_CLOEXEC) != 0) {
     return Error{std::string("the page cannot be started: ") + std::strerror(errno)};
   }
-  const pid_t self = ::getpid();
-  const pid_t pid = ::fork();
-  if (pid == 0) become_server(argv.data(), ends[1], self);
+  // Whoever listens stops at the address: what comes later is dropped and blocks nobody.
+  ::fcntl(ends[1], F_SETFL, O_NONBLOCK);
+  ChildSetup setup;
+  setup.words = {executable_path(), "serve", "--port", std::to_string(port), "--", folder.string()};
+  setup.out = setup.err = ends[1];
+  setup.death_signal = SIGTERM;
+  setup.leads_group = true;  // Ctrl-C is for the command, which ends this when it is done
+  setup.niceness = kLower;
+  const Result<pid_t> pid = start_child(setup);
   ::close(ends[1]);
-  if (pid < 0) {
+  if (!pid) {
     ::close(ends[0]);
-    return Error{std::string("the page cannot be started: ") + std::strerror(errno)};
+    return Error{"the page cannot be started: " + pid.error().message};
   }
-  std::unique_ptr<PageAlong> page(new PageAlong(pid, ends[0]));
+  std::unique_ptr<PageAlong> page(new PageAlong(*pid, ends[0]));
   const std::string said = page->hear();
   const std::string digits = up_to(said, kAddress, "/");
   page->tunnel_ = up_to(said, kTunnel, ",");

@@ -5,6 +5,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "common/base/try.h"
 #include "common/trials/shifted.h"
 #include "common/trials/write.h"
 #include "master/cli/inputs.h"
@@ -55,9 +56,8 @@ Result<double> width_of_place(const std::string& text) {
 Status apply_options(PlanOptions& options, Config& config) {
   SimulateSettings& s = config.simulate;
   if (!options.place.empty()) {
-    const Result<double> width = width_of_place(options.place);
-    if (!width) return width.error();
-    s.arena_m = *width;
+    ASSIGN_OR_RETURN(const double width, width_of_place(options.place));
+    s.arena_m = width;
   }
   if (options.sessions) s.sessions = *options.sessions;
   if (options.chain) s.chain = *options.chain;
@@ -139,9 +139,7 @@ Result<plan::DesignedPlan> design(const PlanOptions& options, const Config& conf
                                   CliContext& context) {
   LongCommand::begin_if_possible("plan", options.keep.place("plan", options.out),
                                  {{"candidates", 10, 0}, {"what they show", 3, 0}}, context);
-  auto farm = start_farm(options.farm, config.farm, context);
-  if (!farm) return farm.error();
-  const auto asked = context.work->over(**farm);
+  ASSIGN_OR_RETURN(const auto asked, start_recorded(options.farm, config.farm, context));
   context.work->stage(0);
   bool first = true;
   return plan::design_plan(*asked, config, options.settings, [&](const std::string& /*what*/) {
@@ -150,44 +148,34 @@ Result<plan::DesignedPlan> design(const PlanOptions& options, const Config& conf
   });
 }
 
-int run_plan(PlanOptions& options, CliContext& context) {
-  Result<Source> source = read_source(options.source);
+Result<int> run_plan(PlanOptions& options, CliContext& context) {
+  ASSIGN_OR_RETURN(Source source, read_source(options.source));
   // What a correction would shift is no part of what effects do: it takes none along.
-  if (source) source->config.problem.residual = {};
-  if (source) {
-    if (Status s = apply_options(options, source->config); !s) source = s.error();
-  }
-  Status planned = source ? Status{} : Status(source.error());
+  source.config.problem.residual = {};
+  RETURN_IF_ERROR(apply_options(options, source.config));
   options.outputs.reads(options.source);
-  if (planned) planned = options.outputs.plan({options.out, options.picture});
-  if (!planned) {
-    context.console.error(planned.error());
-    return kExitBadUsage;
-  }
+  RETURN_IF_ERROR(options.outputs.plan({options.out, options.picture}));
   if (context.dry_run) {
     return say_dry_run(fmt::format("plan {} trials for {} into {}", options.settings.trials,
                                    options.source, options.out),
                        {{"out", options.out}, {"trials", options.settings.trials}}, options.farm,
-                       source->config.farm, context);
+                       source.config.farm, context);
   }
-  const auto plan = design(options, source->config, context);
-  if (!plan) return failed(plan.error(), context);
-  std::vector<std::pair<std::string, std::string>> files = {
-      {options.out, format_trials(shifted(plan->log, source->frame_x_m, source->frame_y_m))}};
+  ASSIGN_OR_RETURN(const auto plan, design(options, source.config, context));
+  RETURN_IF_ERROR(options.outputs.write(
+      options.out, format_trials(shifted(plan.log, source.frame_x_m, source.frame_y_m))));
   if (!options.picture.empty()) {
-    files.emplace_back(options.picture, plan::plan_picture(source->config.problem, *plan));
+    RETURN_IF_ERROR(
+        options.outputs.write(options.picture, plan::plan_picture(source.config.problem, plan)));
   }
-  for (const auto& [path, text] : files) {
-    if (Status s = options.outputs.write(path, text); !s) return failed(s.error(), context);
-  }
-  nlohmann::ordered_json json = table_json(*plan);
+  nlohmann::ordered_json json = table_json(plan);
   json["out"] = options.out;
-  json["trials"] = plan->log.trials.size();
+  json["trials"] = plan.log.trials.size();
   context.console.result(
-      table_text(*plan) +
+      table_text(plan) +
           fmt::format("{}: {} trials to drive, in this order; x1, y1, theta1 are where the model "
                       "says the robot stops\n",
-                      options.out, plan->log.trials.size()),
+                      options.out, plan.log.trials.size()),
       json);
   return kExitDone;
 }

@@ -10,6 +10,7 @@
 #include <numeric>
 #include <tuple>
 
+#include "common/base/try.h"
 #include "common/score/fitness.h"
 #include "common/score/motion_model.h"
 #include "common/trials/read.h"
@@ -66,14 +67,11 @@ Result<std::vector<PredictedTrial>> predict_by_model(const Model& model, const T
   const std::vector<v1::Task> tasks = predict_tasks(log);
   LongCommand::begin_if_possible("predict", options.keep.place("predict", options.out),
                                  {{"predict", 1, tasks.size()}}, context);
-  auto farm = start_farm(options.farm, {}, context);
-  if (!farm) return farm.error();
-  const auto asked = context.work->over(**farm);
+  ASSIGN_OR_RETURN(const auto asked, start_recorded(options.farm, {}, context));
   context.work->stage(0);
-  const auto results = asked->run(asked->add_problem(to_proto(problem)), tasks);
-  if (!results) return results.error();
+  ASSIGN_OR_RETURN(const auto results, asked->run(asked->add_problem(to_proto(problem)), tasks));
   v1::PredictResult whole;
-  for (const v1::TaskResult& result : *results) {
+  for (const v1::TaskResult& result : results) {
     if (result.outcome() != v1::OK) {
       return Error{options.model + ": the simulation ended with " +
                    v1::Outcome_Name(result.outcome()) + " (" + result.message() + ")"};
@@ -101,20 +99,16 @@ Result<std::vector<PredictedTrial>> predict_by_log(const TrialLog& log,
                                                    const PredictOptions& options,
                                                    Console& console) {
   const std::vector<CommandSpec> commands = default_commands("srv1");
-  const Result<TrialLog> mined =
-      read_trial_files(options.mined, command_names(commands), reading_of_mined(options));
-  if (!mined) return mined.error();
-  show_notes(*mined, console);
-  const Result<MotionModel> model = MotionModel::mine(*mined, commands);
-  if (!model) return model.error();
+  ASSIGN_OR_RETURN(const TrialLog mined, read_trial_files(options.mined, command_names(commands),
+                                                          reading_of_mined(options)));
+  show_notes(mined, console);
+  ASSIGN_OR_RETURN(const MotionModel model, MotionModel::mine(mined, commands));
   std::vector<PredictedTrial> predictions;
   for (const Trial& trial : log.trials) {
     const CommandSpec command = resolved_command(trial, commands);
-    const auto prediction = model->predict(trial.X_WS, command);
-    if (!prediction) return prediction.error();
-    const auto score = model->log_density(trial.X_WS, command, trial.X_WE);
-    if (!score) return score.error();
-    predictions.push_back({prediction->X_WE, prediction->covariance, *score});
+    ASSIGN_OR_RETURN(const auto prediction, model.predict(trial.X_WS, command));
+    ASSIGN_OR_RETURN(const auto score, model.log_density(trial.X_WS, command, trial.X_WE));
+    predictions.push_back({prediction.X_WE, prediction.covariance, score});
   }
   return predictions;
 }
@@ -149,57 +143,45 @@ void show_summary(const TrialLog& log, const std::vector<PredictedTrial>& predic
   console.result(text + "\n", json);
 }
 
-int run_predict(PredictOptions& options, CliContext& context) {
+Result<int> run_predict(PredictOptions& options, CliContext& context) {
   Console& console = context.console;
   if (options.model.empty() == options.mined.empty()) {
-    console.error(Error{"give either a run or model file, or --mined LOG"});
-    return kExitBadUsage;
+    return Error{"give either a run or model file, or --mined LOG"};
   }
-  Result<Model> model =
-      options.mined.empty() ? read_model_of(options.model, console) : nominal_model("srv1");
-  if (!model) {
-    console.error(model.error());
-    return kExitBadUsage;
-  }
-  const Result<TrialLog> log =
-      read_trial_files(options.trials.files, command_names(model->commands), options.trials.read);
-  if (!log) {
-    console.error(log.error());
-    return kExitBadUsage;
-  }
-  show_notes(*log, console);
-  options.outputs.reads(*log);
+  ASSIGN_OR_RETURN(const Model model, options.mined.empty() ? read_model_of(options.model, console)
+                                                            : nominal_model("srv1"));
+  ASSIGN_OR_RETURN(
+      const TrialLog log,
+      read_trial_files(options.trials.files, command_names(model.commands), options.trials.read));
+  show_notes(log, console);
+  options.outputs.reads(log);
   options.outputs.reads(options.model);
   options.outputs.reads((std::filesystem::path(options.model) / "model.toml").string());
   for (const std::string& file : options.mined) options.outputs.reads(file);
-  if (Status s = options.outputs.plan(options.out); !s) {
-    console.error(s.error());
-    return kExitBadUsage;
-  }
+  RETURN_IF_ERROR(options.outputs.plan(options.out));
   if (context.dry_run) {
     const std::string by = options.mined.empty() ? options.model : "the mined motion model";
-    return say_dry_run(fmt::format("predict {} trials by {}", log->trials.size(), by),
-                       {{"out", options.out}, {"trials", log->trials.size()}}, options.farm, {},
+    return say_dry_run(fmt::format("predict {} trials by {}", log.trials.size(), by),
+                       {{"out", options.out}, {"trials", log.trials.size()}}, options.farm, {},
                        context);
   }
-  const auto predictions = options.mined.empty() ? predict_by_model(*model, *log, options, context)
-                                                 : predict_by_log(*log, options, console);
-  if (!predictions) return failed(predictions.error(), context);
-  const std::string table = format_predictions(*log, *predictions);
+  context.begun = true;
+  ASSIGN_OR_RETURN(const auto predictions, options.mined.empty()
+                                               ? predict_by_model(model, log, options, context)
+                                               : predict_by_log(log, options, console));
+  const std::string table = format_predictions(log, predictions);
   if (options.out == "-") {
     if (!console.json()) console.print(table);
-  } else if (Status s = options.outputs.write(options.out, table); !s) {
-    return failed(s.error(), context);
+  } else {
+    RETURN_IF_ERROR(options.outputs.write(options.out, table));
   }
   std::string beside;
   if (options.mined.empty()) {
     std::vector<double> scores;
-    for (const PredictedTrial& p : *predictions) scores.push_back(p.log_score);
-    const auto note = baseline_note(*model, *log, scores);
-    if (!note) return failed(note.error(), context);
-    beside = *note;
+    for (const PredictedTrial& p : predictions) scores.push_back(p.log_score);
+    ASSIGN_OR_RETURN(beside, baseline_note(model, log, scores));
   }
-  show_summary(*log, *predictions, beside, options, console);
+  show_summary(log, predictions, beside, options, console);
   return kExitDone;
 }
 

@@ -2,6 +2,7 @@
 
 #include <filesystem>
 
+#include "common/base/try.h"
 #include "common/json/json.h"
 #include "common/trials/files.h"
 
@@ -16,9 +17,8 @@ std::string word(const Json& json, const char* key) {
 }
 
 Result<QuestionStamp> read_stamp(const std::string& file) {
-  const auto text = read_text_file(file);
-  if (!text) return text.error();
-  const Json json = parse_json(*text);
+  ASSIGN_OR_RETURN(const auto text, read_text_file(file));
+  const Json json = parse_json(text);
   if (!json.is_object() || word(json, "problem").empty()) {
     return Error{file + ": does not say what was asked; choose another --out"};
   }
@@ -69,21 +69,20 @@ Result<FolderState> compare_stamp(const std::string& folder, const std::string& 
     if (!finished) return FolderState::kNew;
     return Error{folder + ": holds results that do not say of what; choose another --out"};
   }
-  const auto there = read_stamp(file);
-  if (!there) return there.error();
+  ASSIGN_OR_RETURN(const auto there, read_stamp(file));
   const std::string of =
-      folder + ": holds what '" + there->command + "' found of " + in_words(there->about);
-  if (there->command != stamp.command || there->problem != stamp.problem) {
+      folder + ": holds what '" + there.command + "' found of " + in_words(there.about);
+  if (there.command != stamp.command || there.problem != stamp.problem) {
     return Error{of + ", and this is another question (" + in_words(stamp.about) +
                  "); choose another --out"};
   }
-  if (there->options != stamp.options) {
+  if (there.options != stamp.options) {
     // A mistake in the options found late leaves simulations, which are of use to any.
     if (force || !finished) return FolderState::kReplaced;
-    return Error{of + " with other " + differing(there->options, stamp.options) +
+    return Error{of + " with other " + differing(there.options, stamp.options) +
                  "; choose another --out, or --force to replace it"};
   }
-  if (finished && there->build != stamp.build && !force) {
+  if (finished && there.build != stamp.build && !force) {
     return Error{of +
                  " by another build of gapfarm; choose another --out, or --force to replace "
                  "it"};

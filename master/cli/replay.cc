@@ -4,6 +4,8 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "common/base/try.h"
+#include "common/json/fields.h"
 #include "common/trials/csv.h"
 #include "common/trials/write.h"
 #include "master/cli/inputs.h"
@@ -35,13 +37,11 @@ struct Found {
 // The individual as the latest generation up to `until` has it.
 Result<Found> find_individual(const RunReader& reader, std::uint64_t birth_id,
                               std::optional<std::uint64_t> until) {
-  const auto generations = reader.generations();
-  if (!generations) return generations.error();
-  for (auto g = generations->rbegin(); g != generations->rend(); ++g) {
+  ASSIGN_OR_RETURN(const auto generations, reader.generations());
+  for (auto g = generations.rbegin(); g != generations.rend(); ++g) {
     if (until && g->generation > *until) continue;
-    const auto individuals = reader.individuals(g->generation);
-    if (!individuals) return individuals.error();
-    for (const StoredIndividual& individual : *individuals) {
+    ASSIGN_OR_RETURN(const auto individuals, reader.individuals(g->generation));
+    for (const StoredIndividual& individual : individuals) {
       if (individual.birth_id == birth_id) return Found{individual, g->generation};
     }
   }
@@ -54,15 +54,13 @@ Result<Found> find_individual(const RunReader& reader, std::uint64_t birth_id,
 
 // The best of the latest generation up to `until`.
 Result<Found> find_best(const RunReader& reader, std::optional<std::uint64_t> until) {
-  const auto generations = reader.generations();
-  if (!generations) return generations.error();
-  for (auto g = generations->rbegin(); g != generations->rend(); ++g) {
+  ASSIGN_OR_RETURN(const auto generations, reader.generations());
+  for (auto g = generations.rbegin(); g != generations.rend(); ++g) {
     if (until && g->generation > *until) continue;
-    const auto individuals = reader.individuals(g->generation);
-    if (!individuals) return individuals.error();
+    ASSIGN_OR_RETURN(const auto individuals, reader.individuals(g->generation));
     const StoredIndividual* best = nullptr;
     const bool higher = reader.info().higher_is_better;
-    for (const StoredIndividual& other : *individuals) {
+    for (const StoredIndividual& other : individuals) {
       if (!other.fitness) continue;
       const bool better = best == nullptr || (higher ? *other.fitness > *best->fitness
                                                      : *other.fitness < *best->fitness);
@@ -85,14 +83,12 @@ Result<Found> find(const RunReader& reader, const ReplayOptions& options) {
 
 // A duplicate took its score from the first individual of that genome: who that is.
 Result<std::optional<std::uint64_t>> earlier_twin(const RunReader& reader, const Found& found) {
-  const auto generations = reader.generations();
-  if (!generations) return generations.error();
+  ASSIGN_OR_RETURN(const auto generations, reader.generations());
   std::optional<std::uint64_t> twin;
-  for (const StoredGeneration& g : *generations) {
+  for (const StoredGeneration& g : generations) {
     if (g.generation > found.generation) break;
-    const auto individuals = reader.individuals(g.generation);
-    if (!individuals) return individuals.error();
-    for (const StoredIndividual& other : *individuals) {
+    ASSIGN_OR_RETURN(const auto individuals, reader.individuals(g.generation));
+    for (const StoredIndividual& other : individuals) {
       const bool earlier = other.birth_id < twin.value_or(found.individual.birth_id);
       if (earlier && other.genome == found.individual.genome) twin = other.birth_id;
     }
@@ -111,13 +107,11 @@ class Replay {
     for (unsigned replicate = 0; replicate < std::max(1u, individual.scores); ++replicate) {
       tasks.push_back(evaluation_task({birth_id, replicate, individual.genome}, seed_));
     }
-    const auto results = farm_.run(hash_, tasks);
-    if (!results) return results.error();
+    ASSIGN_OR_RETURN(const auto results, farm_.run(hash_, tasks));
     Standing standing;
-    for (const v1::TaskResult& result : *results) {
-      const Result<Score> score = score_of(result, problem_.fitness.kind);
-      if (!score) return score.error();
-      standing.add(*score);
+    for (const v1::TaskResult& result : results) {
+      ASSIGN_OR_RETURN(const Score score, score_of(result, problem_.fitness.kind));
+      standing.add(score);
     }
     return standing;
   }
@@ -130,10 +124,9 @@ class Replay {
       task.mutable_simulate()->mutable_point()->mutable_genome()->Assign(individual.genome.begin(),
                                                                          individual.genome.end());
     }
-    const auto results = farm_.run(hash_, tasks);
-    if (!results) return results.error();
+    ASSIGN_OR_RETURN(const auto results, farm_.run(hash_, tasks));
     TrialLog log;
-    for (const v1::TaskResult& result : *results) {
+    for (const v1::TaskResult& result : results) {
       if (result.outcome() != v1::OK) {
         return Error{"the drive ended with " + v1::Outcome_Name(result.outcome()) + " (" +
                      result.message() + ")"};
@@ -179,72 +172,52 @@ Comparison compare(const Found& found, const Standing& again, const Problem& pro
                                   std::to_string(again.scores) + " scores, the same to the bit\n"
                             : who + "differs: stored " + in_full(stored.outcome, stored.fitness) +
                                   ", replayed " + in_full(outcome, fitness) + "\n";
-  const auto value = [](const std::optional<double>& v) {
-    return v ? nlohmann::ordered_json(*v) : nlohmann::ordered_json();
-  };
-  result.json = {{"genome", stored.birth_id},
-                 {"generation", found.generation},
-                 {"fitness", fitness_name(kind)},
-                 {"same", result.same},
-                 {"stored", {{"outcome", stored.outcome}, {"fitness", value(stored.fitness)}}},
-                 {"replayed", {{"outcome", outcome}, {"fitness", value(fitness)}}},
-                 {"scores", again.scores}};
+  result.json = {
+      {"genome", stored.birth_id},
+      {"generation", found.generation},
+      {"fitness", fitness_name(kind)},
+      {"same", result.same},
+      {"stored", {{"outcome", stored.outcome}, {"fitness", number_or_null(stored.fitness)}}},
+      {"replayed", {{"outcome", outcome}, {"fitness", number_or_null(fitness)}}},
+      {"scores", again.scores}};
   return result;
 }
 
-// `begun`: whether the work has, so that what is wrong is not the input.
-Result<bool> replay(ReplayOptions& options, CliContext& context, bool& begun) {
-  const Result<RunReader> reader = RunReader::open(options.run);
-  if (!reader) return reader.error();
-  const RunInfo& info = reader->info();
-  const Result<Problem> problem = stored_problem(*reader);
-  if (!problem) return problem.error();
-  const Result<Found> found = find(*reader, options);
-  if (!found) return found.error();
+Result<int> run_replay(ReplayOptions& options, CliContext& context) {
+  ASSIGN_OR_RETURN(const RunReader reader, RunReader::open(options.run));
+  const RunInfo& info = reader.info();
+  ASSIGN_OR_RETURN(const Problem problem, stored_problem(reader));
+  ASSIGN_OR_RETURN(const Found found, find(reader, options));
 
   options.outputs.reads((std::filesystem::path(options.run) / "run.sqlite").string());
-  if (Status s = options.outputs.plan(options.paths); !s) return s.error();
+  RETURN_IF_ERROR(options.outputs.plan(options.paths));
 
-  begun = true;
   FarmOptions local;
   local.workers = 1;
-  auto farm = start_farm(local, {}, context);
-  if (!farm) return farm.error();
-  Replay replay(**farm, *problem, info.seed);
-  Result<Standing> again = replay.standing(found->individual, found->individual.birth_id);
+  ASSIGN_OR_RETURN(auto farm, start_farm(local, {}, context));
+  Replay replay(*farm, problem, info.seed);
+  Result<Standing> again = replay.standing(found.individual, found.individual.birth_id);
   if (!again) return again.error();
-  if (const auto twin = earlier_twin(*reader, *found); twin && *twin) {
+  if (const auto twin = earlier_twin(reader, found); twin && *twin) {
     context.console.note("scored as its twin, genome " + std::to_string(**twin));
-    again = replay.standing(found->individual, **twin);
+    again = replay.standing(found.individual, **twin);
     if (!again) return again.error();
   }
-  Comparison comparison = compare(*found, *again, *problem);
-  if (!comparison.same && (*farm)->numeric_class() != info.numeric_class) {
+  Comparison comparison = compare(found, *again, problem);
+  if (!comparison.same && farm->numeric_class() != info.numeric_class) {
     context.console.note("this machine computes other last bits: numeric class " +
-                         (*farm)->numeric_class() + ", the run's " + info.numeric_class);
+                         farm->numeric_class() + ", the run's " + info.numeric_class);
   }
   if (!options.paths.empty()) {
-    const Result<TrialLog> log = replay.drive(found->individual, options.interval_s);
-    if (!log) return log.error();
+    ASSIGN_OR_RETURN(const TrialLog log, replay.drive(found.individual, options.interval_s));
     // Without a mark: they were not measured, so no log may read them by itself.
-    if (Status s = options.outputs.write(options.paths, format_paths(*log)); !s) return s.error();
+    RETURN_IF_ERROR(options.outputs.write(options.paths, format_paths(log)));
     comparison.text +=
-        options.paths + ": " + std::to_string(log->trials.size()) + " trials driven by it\n";
+        options.paths + ": " + std::to_string(log.trials.size()) + " trials driven by it\n";
     comparison.json["paths"] = options.paths;
   }
   context.console.result(comparison.text, comparison.json);
-  return comparison.same;
-}
-
-int run_replay(ReplayOptions& options, CliContext& context) {
-  bool begun = false;
-  const Result<bool> same = replay(options, context, begun);
-  if (!same && !begun) {
-    context.console.error(same.error());
-    return kExitBadUsage;
-  }
-  if (!same) return failed(same.error(), context);
-  return *same ? kExitDone : kExitFailed;
+  return comparison.same ? kExitDone : kExitFailed;
 }
 
 }  // namespace

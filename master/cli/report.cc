@@ -3,6 +3,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "common/base/try.h"
 #include "common/trials/files.h"
 #include "master/cli/outputs.h"
 #include "master/cli/subcommand.h"
@@ -27,17 +28,15 @@ struct Page {
 };
 
 Result<Page> page_of_diagnosis(const std::filesystem::path& from) {
-  const Result<std::string> text = read_text_file(from.string());
-  if (!text) return text.error();
-  const auto diagnosis = parse_diagnosis(*text);
+  ASSIGN_OR_RETURN(const std::string text, read_text_file(from.string()));
+  const auto diagnosis = parse_diagnosis(text);
   if (!diagnosis) return Error{from.string() + ": " + diagnosis.error().message};
   return Page{report_html(*diagnosis), from, from.parent_path() / "report.html"};
 }
 
 Result<Page> page_of_run(const std::filesystem::path& run) {
-  const auto report = read_run_report({run, {}, {}});
-  if (!report) return report.error();
-  return Page{run_html(*report), run / "run.sqlite", run / "report.html"};
+  ASSIGN_OR_RETURN(const auto report, read_run_report({run, {}, {}}));
+  return Page{run_html(report), run / "run.sqlite", run / "report.html"};
 }
 
 Result<Page> page_of(const std::filesystem::path& from) {
@@ -52,25 +51,15 @@ Result<Page> page_of(const std::filesystem::path& from) {
                "evolve wrote"};
 }
 
-int run_report(ReportCommand& command, CliContext& context) {
-  const Result<Page> page = page_of(command.from);
-  if (!page) {
-    context.console.error(page.error());
-    return kExitBadUsage;
-  }
-  const std::string out = command.out.empty() ? page->out.string() : command.out;
-  command.outputs.reads(page->from.string());
+Result<int> run_report(ReportCommand& command, CliContext& context) {
+  ASSIGN_OR_RETURN(const Page page, page_of(command.from));
+  const std::string out = command.out.empty() ? page.out.string() : command.out;
+  command.outputs.reads(page.from.string());
   // Its own page is what it is there to draw again.
-  Status planned =
-      command.out.empty() ? command.outputs.plan_again(out) : command.outputs.plan(out);
-  if (!planned) {
-    context.console.error(planned.error());
-    return kExitBadUsage;
-  }
-  if (Status s = command.outputs.write(out, page->html); !s) {
-    context.console.error(s.error());
-    return kExitFailed;
-  }
+  RETURN_IF_ERROR(command.out.empty() ? command.outputs.plan_again(out)
+                                      : command.outputs.plan(out));
+  context.begun = true;
+  RETURN_IF_ERROR(command.outputs.write(out, page.html));
   context.console.result(out + "\n", {{"report", out}});
   return kExitDone;
 }

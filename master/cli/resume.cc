@@ -3,6 +3,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "common/base/try.h"
 #include "master/cli/evolution.h"
 #include "master/cli/long_command.h"
 #include "master/run/run.h"
@@ -19,45 +20,33 @@ struct ResumeCommand {
 };
 
 // By its reader: a store of an older version stays as it is.
-int say_resume(const ResumeCommand& command, CliContext& context) {
-  const auto reader = RunReader::open(command.run);
-  const auto generations =
-      reader ? reader->generations() : Result<std::vector<StoredGeneration>>(reader.error());
-  const Result<Config> config = generations
-                                    ? stored_config(reader->info(), command.options.overrides)
-                                    : Result<Config>(generations.error());
-  if (!config) {
-    context.console.error(config.error());
-    return kExitBadUsage;
-  }
-  const std::uint64_t last = generations->empty() ? 0 : generations->back().generation;
+Result<int> say_resume(const ResumeCommand& command, CliContext& context) {
+  ASSIGN_OR_RETURN(const auto reader, RunReader::open(command.run));
+  ASSIGN_OR_RETURN(const auto generations, reader.generations());
+  ASSIGN_OR_RETURN(const Config config, stored_config(reader.info(), command.options.overrides));
+  const std::uint64_t last = generations.empty() ? 0 : generations.back().generation;
   const std::uint64_t from = std::min(command.generation.value_or(last), last);
   return say_dry_run(
       "go on with " + command.run + " after generation " + std::to_string(from) + " to at most " +
-          std::to_string(config->evolution.generations),
-      {{"run", command.run}, {"generation", from}, {"generations", config->evolution.generations}},
-      command.options.farm, config->farm, context);
+          std::to_string(config.evolution.generations),
+      {{"run", command.run}, {"generation", from}, {"generations", config.evolution.generations}},
+      command.options.farm, config.farm, context);
 }
 
-int run_resume(const ResumeCommand& command, CliContext& context) {
+Result<int> run_resume(const ResumeCommand& command, CliContext& context) {
   if (context.dry_run) return say_resume(command, context);
   const std::unique_ptr<Log> log = command.options.farm.log.open();
   const NotesGoTo notes(*log, context.console);
-  Result<RunStore> store = RunStore::open(command.run);
-  if (!store) {
-    context.console.error(store.error());
-    return kExitBadUsage;
-  }
-  const Result<Config> config = stored_config(store->info(), command.options.overrides);
-  if (!config) {
-    return failed(stopped_by(*store, {command.run + ": " + config.error().message}), context);
-  }
+  ASSIGN_OR_RETURN(RunStore store, RunStore::open(command.run));
+  context.begun = true;
+  const Result<Config> config = stored_config(store.info(), command.options.overrides);
+  if (!config) return stopped_by(store, {command.run + ": " + config.error().message});
   if (command.generation) {
-    const auto kept = store->truncate_after(*command.generation);
-    if (!kept) return failed(stopped_by(*store, kept.error()), context);
+    const auto kept = store.truncate_after(*command.generation);
+    if (!kept) return stopped_by(store, kept.error());
     if (!kept->empty()) context.console.note("later generations are kept in " + kept->string());
   }
-  return run_evolution(*store, *config, command.options, *log, context);
+  return run_evolution(store, *config, command.options, *log, context);
 }
 
 }  // namespace

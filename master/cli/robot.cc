@@ -34,32 +34,25 @@ std::string next_words_of(const RobotSetup& setup) {
          fs::path(setup.config).stem().string();
 }
 
-int run_robot(RobotOptions& options, CliContext& context) {
+Result<int> run_robot(RobotOptions& options, CliContext& context) {
   Console& console = context.console;
   const RobotSetup& setup = options.setup;
-  const Result<RobotTexts> texts = set_up_robot(setup, options.outputs);
-  Status ready = texts ? options.outputs.plan({setup.robot, setup.config, options.picture})
-                       : Status(texts.error());
-  if (!ready) {
-    console.error(ready.error());
-    return kExitBadUsage;
-  }
-  Status written = write_robot(setup, *texts, options.outputs);
-  if (written && !options.picture.empty()) {
-    written = options.outputs.write(options.picture, draw_robot(texts->reading, texts->completed));
-  }
-  if (!written) {
-    console.error(written.error());
-    return kExitFailed;
+  ASSIGN_OR_RETURN(const RobotTexts texts, set_up_robot(setup, options.outputs));
+  RETURN_IF_ERROR(options.outputs.plan({setup.robot, setup.config, options.picture}));
+  context.begun = true;
+  RETURN_IF_ERROR(write_robot(setup, texts, options.outputs));
+  if (!options.picture.empty()) {
+    RETURN_IF_ERROR(
+        options.outputs.write(options.picture, draw_robot(texts.reading, texts.completed)));
   }
   if (console.json()) {
-    console.print(describe_robot_json(texts->reading, texts->completed, texts->robot));
+    console.print(describe_robot_json(texts.reading, texts.completed, texts.robot));
     return kExitDone;
   }
-  console.print(plain_lines(describe_robot(texts->reading, texts->completed)));
+  console.print(plain_lines(describe_robot(texts.reading, texts.completed)));
   if (setup.robot.empty()) {
     console.print("\nrobot.toml, to paste and correct (--out robot.toml writes it):\n\n" +
-                  plain_lines(texts->robot));
+                  plain_lines(texts.robot));
   } else {
     console.note("robot written to " + setup.robot + "; next: " + next_words_of(setup));
   }

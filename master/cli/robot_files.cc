@@ -4,6 +4,7 @@
 #include <initializer_list>
 #include <optional>
 
+#include "common/base/try.h"
 #include "common/robot/robot_file.h"
 #include "common/trials/files.h"
 #include "master/robot/compare_facts.h"
@@ -22,10 +23,9 @@ bool ends_with(const std::string& file, std::initializer_list<const char*> endin
 
 // A robot.toml says everything itself.
 Result<RobotReading> read_toml(const std::string& file) {
-  Result<GroundRobot> robot = read_robot(file);
-  if (!robot) return robot.error();
+  ASSIGN_OR_RETURN(GroundRobot robot, read_robot(file));
   RobotReading reading;
-  reading.robot = *std::move(robot);
+  reading.robot = std::move(robot);
   reading.robot.notes.clear();
   reading.sources.resize(reading.robot.wheels.size());
   reading.evidence.push_back(file + " says so");
@@ -33,21 +33,17 @@ Result<RobotReading> read_toml(const std::string& file) {
 }
 
 Result<RobotReading> read_urdf(const std::string& file, const std::vector<DriveFacts>& facts) {
-  const Result<std::string> text = read_text_file(file);
-  if (!text) return text.error();
-  const Result<UrdfModel> model = parse_urdf(*text, file);
-  if (!model) return model.error();
-  return understand_robot(*model, facts);
+  ASSIGN_OR_RETURN(const std::string text, read_text_file(file));
+  ASSIGN_OR_RETURN(const UrdfModel model, parse_urdf(text, file));
+  return understand_robot(model, facts);
 }
 
 Result<std::vector<DriveFacts>> read_controllers(const std::vector<std::string>& files) {
   std::vector<DriveFacts> facts;
   for (const std::string& file : files) {
-    const Result<std::string> text = read_text_file(file);
-    if (!text) return text.error();
-    const Result<ControllerFile> read = parse_controllers(*text, file);
-    if (!read) return read.error();
-    facts.insert(facts.end(), read->drives.begin(), read->drives.end());
+    ASSIGN_OR_RETURN(const std::string text, read_text_file(file));
+    ASSIGN_OR_RETURN(const ControllerFile read, parse_controllers(text, file));
+    facts.insert(facts.end(), read.drives.begin(), read.drives.end());
   }
   return facts;
 }
@@ -60,19 +56,17 @@ Result<RobotReading> read_robot_files(const std::vector<std::string>& files,
   for (const std::string& file : files) {
     (ends_with(file, {".yaml", ".yml"}) ? controllers : robots).push_back(file);
   }
-  const Result<std::vector<DriveFacts>> facts = read_controllers(controllers);
-  if (!facts) return facts.error();
-  if (robots.empty()) return understand_controllers(*facts);
+  ASSIGN_OR_RETURN(const std::vector<DriveFacts> facts, read_controllers(controllers));
+  if (robots.empty()) return understand_controllers(facts);
   std::optional<RobotReading> first;
   for (const std::string& file : robots) {
-    Result<RobotReading> next =
-        ends_with(file, {".toml"}) ? read_toml(file) : read_urdf(file, *facts);
-    if (!next) return next.error();
+    ASSIGN_OR_RETURN(RobotReading next,
+                     ends_with(file, {".toml"}) ? read_toml(file) : read_urdf(file, facts));
     if (!first) {
-      first = *std::move(next);
+      first = std::move(next);
       continue;
     }
-    for (std::string& said : compare_readings(*first, robots[0], *next, file)) {
+    for (std::string& said : compare_readings(*first, robots[0], next, file)) {
       first->disagreements.push_back(std::move(said));
     }
   }

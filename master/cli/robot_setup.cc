@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "common/base/try.h"
 #include "common/robot/robot_file.h"
 #include "master/cli/robot_files.h"
 #include "master/robot/robot_config.h"
@@ -42,10 +43,9 @@ RobotSetup setup_of_words(const std::vector<std::string>& words, const std::stri
 }  // namespace
 
 Result<RobotTexts> set_up_robot(const RobotSetup& setup, Outputs& outputs) {
-  Result<RobotReading> reading = read_robot_files(setup.files, setup.controllers);
-  if (!reading) return reading.error();
+  ASSIGN_OR_RETURN(RobotReading reading, read_robot_files(setup.files, setup.controllers));
   RobotTexts texts;
-  texts.completed = reading->robot;
+  texts.completed = reading.robot;
   if (const Status s = complete_robot(&texts.completed); !s) {
     return Error{setup.files[0] + ": " + s.error().message +
                  "; state it in a robot.toml (docs/formats.md) and give that"};
@@ -59,14 +59,14 @@ Result<RobotTexts> set_up_robot(const RobotSetup& setup, Outputs& outputs) {
   };
   add(setup.files, words.made_of);
   add(setup.controllers, words.made_of);
-  add(reading->disagreements, words.questions);
-  add(reading->remarks, words.questions);
+  add(reading.disagreements, words.questions);
+  add(reading.remarks, words.questions);
   add(texts.completed.notes, words.questions);
   words.robot = file_seen_from(setup.config, setup.robot);
   for (const std::string& run : setup.runs) words.runs.push_back(file_seen_from(setup.config, run));
   texts.robot = format_robot(texts.completed);
   texts.config = config_of_robot(texts.completed, words);
-  texts.reading = *std::move(reading);
+  texts.reading = std::move(reading);
   return texts;
 }
 
@@ -75,7 +75,7 @@ Status write_robot(const RobotSetup& setup, const RobotTexts& texts, const Outpu
       {&setup.robot, &texts.robot}, {&setup.config, &texts.config}};
   for (const auto& [path, text] : files) {
     if (path->empty()) continue;
-    if (Status s = outputs.write(*path, *text); !s) return s;
+    RETURN_IF_ERROR(outputs.write(*path, *text));
   }
   return {};
 }
@@ -92,24 +92,20 @@ bool names_a_robot(const std::vector<std::string>& words) {
   return std::any_of(words.begin(), words.end(), is_robot_file);
 }
 
-int run_init_robot(const std::vector<std::string>& words, const std::string& out, Outputs& outputs,
-                   CliContext& context) {
+Result<int> run_init_robot(const std::vector<std::string>& words, const std::string& out,
+                           Outputs& outputs, CliContext& context) {
   Console& console = context.console;
   const RobotSetup setup = setup_of_words(words, out);
-  const Result<RobotTexts> texts = set_up_robot(setup, outputs);
-  Status ready = texts ? Status() : Status(texts.error());
-  if (ready && out != "-") ready = outputs.plan(std::vector<std::string>{setup.robot, out});
-  if (!ready) {
-    console.error(ready.error());
-    return kExitBadUsage;
-  }
+  ASSIGN_OR_RETURN(const RobotTexts texts, set_up_robot(setup, outputs));
+  if (out != "-") RETURN_IF_ERROR(outputs.plan(std::vector<std::string>{setup.robot, out}));
   nlohmann::ordered_json json = {{"out", out}, {"robot", setup.robot}, {"runs", setup.runs}};
   if (out == "-") {
-    json["config"] = texts->config;
-    console.result(texts->config, json);
+    json["config"] = texts.config;
+    console.result(texts.config, json);
     return kExitDone;
   }
-  if (Status s = write_robot(setup, *texts, outputs); !s) return failed(s.error(), context);
+  context.begun = true;
+  RETURN_IF_ERROR(write_robot(setup, texts, outputs));
   console.result(out + ": a config for the robot in " + setup.robot +
                      "; answer its QUESTIONs, then: gapfarm check " + out + "\n",
                  json);

@@ -38,7 +38,7 @@ bool names_a_robot(const std::vector<std::string>& words);
 
 // gapfarm init URDF...: `words` are the robot's files and, after them or between, folders of runs.
 // Leaves `out` and beside it the robot.toml that it names; "-" shows the config alone.
-int run_init_robot(const std::vector<std::string>& words, const std::string& out, Outputs& outputs,
-                   CliContext& context);
+Result<int> run_init_robot(const std::vector<std::string>& words, const std::string& out,
+                           Outputs& outputs, CliContext& context);
 
 }  // namespace gapfarm

@@ -3,6 +3,7 @@
 #include <filesystem>
 
 #include "common/base/build_info.h"
+#include "common/base/try.h"
 #include "common/config/config.h"
 #include "master/store/schema.h"
 
@@ -43,17 +44,15 @@ Result<Model> read_model_of(const std::string& run_or_model, Console& console) {
                  ": has neither a model.toml nor a run in it; give a model file or "
                  "the folder of a run or a diagnosis"};
   }
-  const Result<RunReader> run = RunReader::open(path);
-  if (!run) return run.error();
+  ASSIGN_OR_RETURN(const RunReader run, RunReader::open(path));
   // A finished run that was resumed has gone on from what it left.
-  const auto generations = run->generations();
-  if (!generations) return generations.error();
-  const std::uint64_t reached = generations->empty() ? 0 : generations->back().generation;
+  ASSIGN_OR_RETURN(const auto generations, run.generations());
+  const std::uint64_t reached = generations.empty() ? 0 : generations.back().generation;
   if (left && left->origin.generation >= reached) return *std::move(left);
-  Result<Model> model = best_so_far(*run);
+  Result<Model> model = best_so_far(run);
   if (!model) return model;
   console.note(run_or_model + ": this run is not finished; taking its best so far, " +
-               run->info().fitness + " " + format_number(model->score) + " of generation " +
+               run.info().fitness + " " + format_number(model->score) + " of generation " +
                std::to_string(model->origin.generation));
   return model;
 }

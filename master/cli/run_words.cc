@@ -6,6 +6,7 @@
 #include "common/base/suggest.h"
 #include "common/usage/usage.h"
 #include "master/cli/app.h"
+#include "master/cli/inputs.h"
 #include "master/cli/long_command.h"
 #include "master/cli/signals.h"
 
@@ -78,7 +79,8 @@ int run_words(const std::vector<std::string>& words) {
     const char* name = subcommands()[i].name;
     if (!program->app->got_subcommand(name)) continue;
     context.dry_run = is_dry_run(*program->app->get_subcommand(name));
-    const int exit_code = console.end(program->runs[i](context));
+    const Result<int> ended = program->runs[i](context);
+    const int exit_code = console.end(ended ? *ended : failed(ended.error(), context));
     conclude_command(*program->app->get_subcommand(name), exit_code, context);
     return exit_code;
   }

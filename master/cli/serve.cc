@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "common/base/host.h"
+#include "common/base/try.h"
 #include "master/cli/page_along.h"
 #include "master/cli/serve_drive.h"
 #include "master/cli/subcommand.h"
@@ -31,12 +32,11 @@ double thread_cpu_now_s() {
   return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
 }
 
-int run_serve(const ServeOptions& options, CliContext& context) {
+Result<int> run_serve(const ServeOptions& options, CliContext& context) {
   for (const std::string& folder : options.folders) {
     std::error_code ignored;
     if (std::filesystem::is_directory(folder, ignored)) continue;
-    context.console.error(Error{folder + ": no such folder; name one with runs or diagnoses"});
-    return kExitBadUsage;
+    return Error{folder + ": no such folder; name one with runs or diagnoses"};
   }
   // A master commits within milliseconds; who holds a store for longer is not waited for, since
   // everybody else would wait, too.
@@ -49,20 +49,17 @@ int run_serve(const ServeOptions& options, CliContext& context) {
   sources.read_run = read_run_report;
   sources.drive = [&](const DriveQuestion& question) { return shower.show(question); };
   Site site(std::move(sources));
-  auto server =
-      HttpServer::listen(static_cast<std::uint16_t>(options.port),
-                         [&](const HttpRequest& request) { return site.answer(request); });
-  if (!server) {
-    context.console.error(server.error());
-    return kExitBadUsage;
-  }
-  const std::string port = std::to_string((*server)->port());
+  ASSIGN_OR_RETURN(auto server, HttpServer::listen(static_cast<std::uint16_t>(options.port),
+                                                   [&](const HttpRequest& request) {
+                                                     return site.answer(request);
+                                                   }));
+  const std::string port = std::to_string(server->port());
   const std::string address = "http://127.0.0.1:" + port + "/";
   const std::string tunnel = "ssh -L " + port + ":127.0.0.1:" + port + " " + host_name();
   context.console.result(
       "serving " + address + "\nfrom another machine: " + tunnel + ", then open " + address + "\n",
       {{"address", address}, {"ssh", tunnel}});
-  (*server)->run(context.stop.fd());
+  server->run(context.stop.fd());
   return kExitSignalBase + context.stop.signal();
 }
 

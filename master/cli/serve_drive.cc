@@ -6,6 +6,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "common/base/try.h"
 #include "common/config/config.h"
 #include "common/config/stages.h"
 #include "common/json/json.h"
@@ -109,18 +110,18 @@ void add_push(const Piece& piece, const Trial& trial, Json* json) {
 
 Result<Watched> watch_trial(Farm& farm, const Problem& problem, const Trial& trial,
                             const Genome& best) {
-  const auto results = farm.run(farm.add_problem(to_proto(problem)),
-                                {drive_task(problem, trial, problem.values),
-                                 drive_task(problem, trial, problem.values_of(best))});
-  if (!results) return results.error();
+  ASSIGN_OR_RETURN(const auto results,
+                   farm.run(farm.add_problem(to_proto(problem)),
+                            {drive_task(problem, trial, problem.values),
+                             drive_task(problem, trial, problem.values_of(best))}));
   const bool pushed = !problem.pieces.empty();
   const double duration_s = pushed ? trial.tip.empty() ? 0 : trial.tip.back().t_s
                                    : resolved_command(trial, problem.commands).duration_s;
   Watched watched;
   watched.json = {{"duration_s", duration_s}, {"measured", measured_json(trial, duration_s)}};
   if (pushed) add_push(problem.piece(trial.command), trial, &watched.json);
-  for (std::size_t k = 0; k < results->size(); ++k) {
-    const v1::TaskResult& result = (*results)[k];
+  for (std::size_t k = 0; k < results.size(); ++k) {
+    const v1::TaskResult& result = results[k];
     Trial simulated;
     if (result.outcome() == v1::OK) simulated = from_proto(result.simulate().trials(0));
     watched.put(kSimulated[k], simulated.path, simulated.X_WS, v1::Outcome_Name(result.outcome()));
@@ -132,15 +133,15 @@ Result<Watched> watch_window(Farm& farm, const Problem& problem, const Trial& wi
                              const Genome& best, std::vector<PathSample> measured) {
   const auto samples = static_cast<std::size_t>(
       std::clamp(*window.duration_s / kWindowInterval_s, 10.0, kMostOfWindow));
-  const auto simulated = simulate_window(farm, problem, window, {{}, best}, samples);
-  if (!simulated) return simulated.error();
+  ASSIGN_OR_RETURN(const auto simulated,
+                   simulate_window(farm, problem, window, {{}, best}, samples));
   Trial trial = window;
   trial.path = std::move(measured);
   Watched watched;
   watched.json = {{"duration_s", *window.duration_s},
                   {"measured", measured_json(trial, *window.duration_s)}};
-  for (std::size_t k = 0; k < simulated->size(); ++k) {
-    watched.put(kSimulated[k], (*simulated)[k].path, window.X_WS, (*simulated)[k].failed);
+  for (std::size_t k = 0; k < simulated.size(); ++k) {
+    watched.put(kSimulated[k], simulated[k].path, window.X_WS, simulated[k].failed);
   }
   return watched;
 }
@@ -152,18 +153,16 @@ struct BestOf {
 
 Result<BestOf> best_of(const RunReader& reader, std::optional<std::uint64_t> generation) {
   if (!generation) {
-    const auto generations = reader.generations();
-    if (!generations) return generations.error();
-    if (generations->empty()) return Error{"no generation was completed yet; look again later"};
-    generation = generations->back().generation;
+    ASSIGN_OR_RETURN(const auto generations, reader.generations());
+    if (generations.empty()) return Error{"no generation was completed yet; look again later"};
+    generation = generations.back().generation;
   }
-  const auto individuals = reader.individuals(*generation);
-  if (!individuals) return individuals.error();
-  if (individuals->empty()) {
+  ASSIGN_OR_RETURN(const auto individuals, reader.individuals(*generation));
+  if (individuals.empty()) {
     return Error{"the run has no generation " + std::to_string(*generation)};
   }
-  if (individuals->front().outcome != "OK") return Error{"nothing of it ended well"};
-  return BestOf{individuals->front(), *generation};
+  if (individuals.front().outcome != "OK") return Error{"nothing of it ended well"};
+  return BestOf{individuals.front(), *generation};
 }
 
 std::string title_of(const Trial& trial, std::size_t number, bool window) {
@@ -194,49 +193,45 @@ std::vector<PathSample> logged_window(const RunInfo& info, const Problem& proble
 }  // namespace
 
 Result<std::string> DriveShower::show(const DriveQuestion& question) {
-  const auto reader = RunReader::open(question.run);
-  if (!reader) return reader.error();
-  const auto problem = stored_problem(*reader);
-  if (!problem) return problem.error();
+  ASSIGN_OR_RETURN(const auto reader, RunReader::open(question.run));
+  ASSIGN_OR_RETURN(const auto problem, stored_problem(reader));
   // Those that were evolved on, then those that were kept apart, where they can still be read.
-  const std::size_t logged = problem->log.trials.size();
+  const std::size_t logged = problem.log.trials.size();
   const auto apart = question.trial < logged ? Result<std::optional<Problem>>(std::nullopt)
-                                             : kept_apart_of(reader->info(), *problem);
+                                             : kept_apart_of(reader.info(), problem);
   const bool beyond = question.trial >= logged;
   const std::size_t extra = apart && *apart ? (*apart)->log.trials.size() : 0;
   if (beyond && question.trial - logged >= extra) {
     return Error{fmt::format("the run has {} {}, those that it kept apart included, and no {}",
-                             logged + extra, problem->ground ? "windows" : "trials",
+                             logged + extra, problem.ground ? "windows" : "trials",
                              question.trial + 1)};
   }
-  const auto best = best_of(*reader, question.generation);
-  if (!best) return best.error();
+  ASSIGN_OR_RETURN(const auto best, best_of(reader, question.generation));
   const std::string key =
-      fmt::format("{}|{}|{}|{}", question.run.string(), reader->info().problem_hash, question.trial,
-                  best->individual.birth_id);
+      fmt::format("{}|{}|{}|{}", question.run.string(), reader.info().problem_hash, question.trial,
+                  best.individual.birth_id);
   if (const auto known = shown_.find(key); known != shown_.end()) return known->second;
   if (!farm_) {
     FarmOptions local;
     local.workers = 1;
-    auto farm = start_farm(local, {}, context_);
-    if (!farm) return farm.error();
-    farm_ = *std::move(farm);
+    ASSIGN_OR_RETURN(auto farm, start_farm(local, {}, context_));
+    farm_ = std::move(farm);
   }
-  const Problem& of = beyond ? **apart : *problem;
+  const Problem& of = beyond ? **apart : problem;
   const Trial& trial = of.log.trials[beyond ? question.trial - logged : question.trial];
-  auto drive = of.ground ? watch_window(*farm_, of, trial, best->individual.genome,
-                                        logged_window(reader->info(), of, trial, beyond))
-                         : watch_trial(*farm_, *problem, trial, best->individual.genome);
-  if (!drive) return drive.error();
+  ASSIGN_OR_RETURN(auto drive, of.ground
+                                   ? watch_window(*farm_, of, trial, best.individual.genome,
+                                                  logged_window(reader.info(), of, trial, beyond))
+                                   : watch_trial(*farm_, problem, trial, best.individual.genome));
   Json json = {{"title", title_of(trial, question.trial + 1, of.ground != nullptr) +
                              (beyond ? ", kept apart" : "")},
                {"kept_apart", beyond}};
-  json.update(drive->json);
+  json.update(drive.json);
   json["said"] = fmt::format(
-      "Best: genome {} of generation {}, {} {}.{}", best->individual.birth_id, best->generation,
-      reader->info().fitness,
-      best->individual.fitness ? fmt::format("{:.6g}", *best->individual.fitness) : "unknown",
-      drive->failed);
+      "Best: genome {} of generation {}, {} {}.{}", best.individual.birth_id, best.generation,
+      reader.info().fitness,
+      best.individual.fitness ? fmt::format("{:.6g}", *best.individual.fitness) : "unknown",
+      drive.failed);
   json["note"] = fmt::format(
       "{}{}",
       beyond ? fmt::format("▲ Kept apart: evolution never saw this {}. ",

@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "common/base/suggest.h"
+#include "common/base/try.h"
 #include "common/config/config.h"
 #include "common/trials/files.h"
 #include "common/trials/read.h"
@@ -35,7 +36,7 @@ struct SimulateOptions {
 Status apply_options(const SimulateOptions& options, Config& config) {
   SimulateSettings& s = config.simulate;
   for (const std::string& setting : options.set) {
-    if (Status status = apply_setting(setting, config.problem); !status) return status;
+    RETURN_IF_ERROR(apply_setting(setting, config.problem));
   }
   if (options.seed) config.seed = *options.seed;
   if (options.sessions) s.sessions = *options.sessions;
@@ -70,12 +71,12 @@ Result<Plan> plan_and_outputs(SimulateOptions& options, const Source& source, Cl
     plan = draw_plan(config.problem, config.simulate, config.seed);
   } else {
     const std::vector<std::string> files = {options.like};
-    const Result<TrialLog> log = read_trial_files(files, command_names(config.problem.commands));
-    if (!log) return log.error();
-    show_notes(*log, context.console);
-    outputs.reads(*log);
-    tips = log->has_tips();
-    plan = plan_of(config.problem, shifted(*log, -source.frame_x_m, -source.frame_y_m));
+    ASSIGN_OR_RETURN(const TrialLog log,
+                     read_trial_files(files, command_names(config.problem.commands)));
+    show_notes(log, context.console);
+    outputs.reads(log);
+    tips = log.has_tips();
+    plan = plan_of(config.problem, shifted(log, -source.frame_x_m, -source.frame_y_m));
   }
   outputs.reads(options.source);
   if (options.out == "-") {
@@ -86,7 +87,7 @@ Result<Plan> plan_and_outputs(SimulateOptions& options, const Source& source, Cl
   }
   const bool paths = config.simulate.path_interval_s > 0;
   tips = tips || !config.problem.pieces.empty();
-  if (Status s = outputs.plan(trial_file_names(options.out, paths, tips)); !s) return s.error();
+  RETURN_IF_ERROR(outputs.plan(trial_file_names(options.out, paths, tips)));
   return plan;
 }
 
@@ -95,20 +96,18 @@ Result<TrialLog> simulate(const SimulateOptions& options, const Source& source, 
   const Config& config = source.config;
   LongCommand::begin_if_possible("simulate", options.keep.place("simulate", options.out),
                                  {{"drive sessions", 1, plan.size()}}, context);
-  auto farm = start_farm(options.farm, config.farm, context);
-  if (!farm) return farm.error();
-  const auto asked = context.work->over(**farm);
+  ASSIGN_OR_RETURN(const auto asked, start_recorded(options.farm, config.farm, context));
   context.work->stage(0);
   Problem problem = config.problem;
   problem.log = {};
   problem.genes.clear();
   problem.fitness.kind = FitnessKind::kLogScore;
   const std::string hash = asked->add_problem(to_proto(problem));
-  const auto results =
-      asked->run(hash, simulate_tasks(plan, {}, config.seed, config.simulate.path_interval_s));
-  if (!results) return results.error();
+  ASSIGN_OR_RETURN(
+      const auto results,
+      asked->run(hash, simulate_tasks(plan, {}, config.seed, config.simulate.path_interval_s)));
   TrialLog log;
-  for (const v1::TaskResult& result : *results) {
+  for (const v1::TaskResult& result : results) {
     if (result.outcome() != v1::OK) {
       return Error{"the simulation ended with " + v1::Outcome_Name(result.outcome()) + " (" +
                    result.message() + "); these parameters do not make a robot that drives"};
@@ -119,46 +118,34 @@ Result<TrialLog> simulate(const SimulateOptions& options, const Source& source, 
   return shifted(std::move(log), source.frame_x_m, source.frame_y_m);
 }
 
-int run_simulate(SimulateOptions& options, CliContext& context) {
-  Result<Source> source = read_source(options.source);
-  if (source) {
-    if (Status s = apply_options(options, source->config); !s) source = s.error();
-  }
-  const Result<Plan> plan =
-      source ? plan_and_outputs(options, *source, context) : Result<Plan>(source.error());
-  if (!plan) {
-    context.console.error(plan.error());
-    return kExitBadUsage;
-  }
+Result<int> run_simulate(SimulateOptions& options, CliContext& context) {
+  ASSIGN_OR_RETURN(Source source, read_source(options.source));
+  RETURN_IF_ERROR(apply_options(options, source.config));
+  ASSIGN_OR_RETURN(const Plan plan, plan_and_outputs(options, source, context));
   if (context.dry_run) {
     std::size_t trials = 0;
-    for (const auto& session : *plan) trials += session.size();
+    for (const auto& session : plan) trials += session.size();
     return say_dry_run("simulate " + std::to_string(trials) + " trials in " +
-                           std::to_string(plan->size()) + " sessions into " + options.out +
-                           ", seed " + std::to_string(source->config.seed),
-                       {{"out", options.out}, {"trials", trials}, {"seed", source->config.seed}},
-                       options.farm, source->config.farm, context);
+                           std::to_string(plan.size()) + " sessions into " + options.out +
+                           ", seed " + std::to_string(source.config.seed),
+                       {{"out", options.out}, {"trials", trials}, {"seed", source.config.seed}},
+                       options.farm, source.config.farm, context);
   }
-  const Result<TrialLog> log = simulate(options, *source, *plan, context);
-  if (!log) return failed(log.error(), context);
+  ASSIGN_OR_RETURN(const TrialLog log, simulate(options, source, plan, context));
   if (options.out == "-") {
-    context.console.print(format_trials(*log));
+    context.console.print(format_trials(log));
     return kExitDone;
   }
-  const auto files = trial_files(*log, options.out);
-  if (!files) return failed(files.error(), context);
-  for (const TrialFile& file : *files) {
-    if (Status s = options.outputs.write(file.path, file.text); !s) {
-      return failed(s.error(), context);
-    }
+  ASSIGN_OR_RETURN(const auto files, trial_files(log, options.out));
+  for (const TrialFile& file : files) {
+    RETURN_IF_ERROR(options.outputs.write(file.path, file.text));
   }
-  context.console.result(options.out + ": " + std::to_string(log->trials.size()) +
-                             " simulated trials, seed " + std::to_string(source->config.seed) +
-                             "\n",
+  context.console.result(options.out + ": " + std::to_string(log.trials.size()) +
+                             " simulated trials, seed " + std::to_string(source.config.seed) + "\n",
                          {{"out", options.out},
-                          {"trials", log->trials.size()},
-                          {"paths", log->has_paths()},
-                          {"seed", source->config.seed}});
+                          {"trials", log.trials.size()},
+                          {"paths", log.has_paths()},
+                          {"seed", source.config.seed}});
   return kExitDone;
 }
 

@@ -8,7 +8,9 @@
 #include <nlohmann/json.hpp>
 
 #include "common/base/build_info.h"
+#include "common/base/try.h"
 #include "common/config/config.h"
+#include "common/json/fields.h"
 #include "master/cli/inputs.h"
 #include "master/cli/long_command.h"
 #include "master/cli/outputs.h"
@@ -55,66 +57,50 @@ Status write_all(const StabilityCommand& command, const Config& config,
   return command.outputs.write(path, format_model(model));
 }
 
-int run_stability(StabilityCommand command, CliContext& context) {
-  Result<Config> config = command.traced.open(command.config, &command.settings.trace);
-  if (config) {
-    if (Status s = check_evolvable(*config); !s) config = s.error();
-  }
-  if (config) {
-    command.outputs.reads(command.config);
-    command.outputs.reads(config->problem.log);
-    const Status planned = command.outputs.plan_in(command.out, {"model.toml", "stability.csv"});
-    if (!planned) config = planned.error();
-  }
-  if (!config) {
-    context.console.error(config.error());
-    return kExitBadUsage;
-  }
-  show_notes(config->problem.log, context.console);
-  command.settings.evolution = config->evolution;
+Result<int> run_stability(StabilityCommand command, CliContext& context) {
+  ASSIGN_OR_RETURN(const Config config,
+                   command.traced.open(command.config, &command.settings.trace));
+  RETURN_IF_ERROR(check_evolvable(config));
+  command.outputs.reads(command.config);
+  command.outputs.reads(config.problem.log);
+  RETURN_IF_ERROR(command.outputs.plan_in(command.out, {"model.toml", "stability.csv"}));
+  show_notes(config.problem.log, context.console);
+  command.settings.evolution = config.evolution;
   if (context.dry_run) {
-    const std::size_t genes = config->problem.genes.size();
+    const std::size_t genes = config.problem.genes.size();
     return say_dry_run(
         fmt::format("search {} parameters of {} for the least spread over {} repeats, into {}",
                     genes, command.config, command.settings.repeats, command.out),
         {{"out", command.out}, {"genes", genes}, {"repeats", command.settings.repeats}},
-        command.farm, config->farm, context);
+        command.farm, config.farm, context);
   }
   // The paths are large, and no figure refers to them.
   const KeepingPlace place{command.out, /*passing=*/false, /*forget=*/true};
-  if (Status s = LongCommand::begin("stability", place, {{"trace paths"}}, context); !s) {
-    return failed(s.error(), context);
-  }
-  auto farm = start_farm(command.farm, config->farm, context);
-  if (!farm) return failed(farm.error(), context);
-  const auto asked = context.work->over(**farm);
-  const auto report =
-      find_stability(*asked, config->problem, command.settings, context.work->hooks());
-  if (!report) return failed(report.error(), context);
-  if (Status s = write_all(command, *config, *report); !s) return failed(s.error(), context);
-  const ParameterTable& table = config->problem.table();
+  RETURN_IF_ERROR(LongCommand::begin("stability", place, {{"trace paths"}}, context));
+  ASSIGN_OR_RETURN(const auto asked, start_recorded(command.farm, config.farm, context));
+  ASSIGN_OR_RETURN(const auto report,
+                   find_stability(*asked, config.problem, command.settings, context.work->hooks()));
+  RETURN_IF_ERROR(write_all(command, config, report));
+  const ParameterTable& table = config.problem.table();
   std::string text = fmt::format(
       "spread of the ends over {} repeats, {} points tried\n"
       "  the config's own values  {}, on fresh repeats {}\n"
       "  the most stable found    {}, on fresh repeats {}\n",
-      command.settings.repeats, report->evaluations, spread_text(report->standard_spread),
-      spread_text(report->standard_fresh), spread_text(report->best.spread),
-      spread_text(report->best_fresh));
+      command.settings.repeats, report.evaluations, spread_text(report.standard_spread),
+      spread_text(report.standard_fresh), spread_text(report.best.spread),
+      spread_text(report.best_fresh));
   nlohmann::ordered_json values = nlohmann::ordered_json::object();
-  for (const Gene& gene : config->problem.genes) {
-    values[table[gene.row].key] = report->best.values[gene.row];
+  for (const Gene& gene : config.problem.genes) {
+    values[table[gene.row].key] = report.best.values[gene.row];
     text += fmt::format("  {:<22} {}\n", table[gene.row].key,
-                        table.format(gene.row, report->best.values[gene.row]));
+                        table.format(gene.row, report.best.values[gene.row]));
   }
-  const auto metres = [](const std::optional<double>& v) {
-    return v ? nlohmann::ordered_json(*v) : nlohmann::ordered_json();
-  };
   context.console.result(text, {{"repeats", command.settings.repeats},
-                                {"evaluations", report->evaluations},
-                                {"config_spread_m", metres(report->standard_spread)},
-                                {"config_fresh_m", metres(report->standard_fresh)},
-                                {"best_spread_m", report->best.spread},
-                                {"best_fresh_m", metres(report->best_fresh)},
+                                {"evaluations", report.evaluations},
+                                {"config_spread_m", number_or_null(report.standard_spread)},
+                                {"config_fresh_m", number_or_null(report.standard_fresh)},
+                                {"best_spread_m", report.best.spread},
+                                {"best_fresh_m", number_or_null(report.best_fresh)},
                                 {"best", values}});
   context.console.note(
       "left behind: " + (std::filesystem::path(command.out) / "model.toml").string() +

@@ -5,6 +5,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "common/base/try.h"
 #include "common/json/json.h"
 #include "master/cli/long_command.h"
 #include "master/cli/status_view.h"
@@ -42,19 +43,16 @@ Result<Look> look(const std::string& run, const Console& console) {
   const double now_s = unix_now_s();
   std::error_code ignored;
   if (!std::filesystem::exists(run_store_file(run), ignored) || command_folder(run) != run) {
-    const auto record = command_status(command_folder(run), now_s);
-    if (!record) return record.error();
-    if (*record) {
-      return Look{to_json(**record), command_screen(**record, run, now_s, console),
-                  (*record)->state == "running"};
+    ASSIGN_OR_RETURN(const auto record, command_status(command_folder(run), now_s));
+    if (record) {
+      return Look{to_json(*record), command_screen(*record, run, now_s, console),
+                  record->state == "running"};
     }
   }
-  const Result<RunReader> reader = RunReader::open(run);
-  if (!reader) return reader.error();
-  const Result<RunStatus> status = run_status(*reader, now_s);
-  if (!status) return status.error();
-  return Look{to_json(*status), status_screen(*status, run, console),
-              status->state == RunState::kRunning};
+  ASSIGN_OR_RETURN(const RunReader reader, RunReader::open(run));
+  ASSIGN_OR_RETURN(const RunStatus status, run_status(reader, now_s));
+  return Look{to_json(status), status_screen(status, run, console),
+              status.state == RunState::kRunning};
 }
 
 void show(const Look& seen, const StatusOptions& options, Console& console) {
@@ -68,15 +66,11 @@ void show(const Look& seen, const StatusOptions& options, Console& console) {
   console.print(seen.screen);
 }
 
-int run_status_command(const StatusOptions& options, CliContext& context) {
+Result<int> run_status_command(const StatusOptions& options, CliContext& context) {
   for (;;) {
-    const Result<Look> seen = look(options.run, context.console);
-    if (!seen) {
-      context.console.error(seen.error());
-      return kExitBadUsage;
-    }
-    show(*seen, options, context.console);
-    if (!options.watch || !seen->running) return kExitDone;
+    ASSIGN_OR_RETURN(const Look seen, look(options.run, context.console));
+    show(seen, options, context.console);
+    if (!options.watch || !seen.running) return kExitDone;
     pollfd stop{context.stop.fd(), POLLIN, 0};
     ::poll(&stop, 1, kWatchInterval_ms);
     if (context.stop.requested()) return kExitSignalBase + context.stop.signal();

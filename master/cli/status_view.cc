@@ -56,8 +56,8 @@ std::string worker_lines(const std::vector<StoredWorker>& workers, const Console
     const StoredWorker& worker = workers[i];
     text += label(console, i == 0 ? "workers" : "") + printable(worker.name) + " on " +
             printable(worker.host) + ": " + printable(worker.state) + ", " +
-            std::to_string(worker.jobs) + " in hand, " + std::to_string(worker.finished) +
-            " done, " + format_number(worker.rate_per_s, 3) + "/s\n";
+            std::to_string(worker.jobs) + " in hand, " + std::to_string(worker.finished) + " done" +
+            rate_text(worker.rate_per_s) + "\n";
   }
   return text;
 }
@@ -154,8 +154,8 @@ std::string status_screen(const RunStatus& status, const std::string& run, const
     text += ", and " + std::to_string(status.progress.done) + " of " +
             std::to_string(status.progress.total) + " tasks of the next";
   }
-  text += "\n" + label(console, "evaluations") + std::to_string(status.evaluations) + ", " +
-          format_number(status.rate_per_s, 3) + "/s";
+  text += "\n" + label(console, "evaluations") + std::to_string(status.evaluations) +
+          rate_text(status.rate_per_s);
   if (status.state == RunState::kRunning && status.time_left_s) {
     text += ", " + format_duration(*status.time_left_s) + " left";
   }
@@ -202,7 +202,7 @@ std::string command_screen(const CommandRecord& record, const std::string& folde
     text += "\n";
   }
   text += label(console, "done") + format_share(over ? 1 : record.share);
-  if (record.state == "running") text += ", " + format_number(record.rate_per_s, 3) + "/s";
+  if (record.state == "running") text += rate_text(record.rate_per_s);
   if (!over && record.time_left_s) {
     text += ", about " + format_duration(*record.time_left_s) + " left";
   }

@@ -7,6 +7,7 @@
 #include <memory>
 #include <span>
 
+#include "common/base/result.h"
 #include "common/process/stop.h"
 #include "master/cli/console.h"
 
@@ -28,10 +29,12 @@ struct CliContext {
   StopSource& stop;  // requested by SIGINT and SIGTERM; a second one ends the program at once
   std::shared_ptr<LongCommand> work{};  // of a long command, once it has begun
   bool dry_run = false;                 // all is to be checked and said, and nothing done
+  // Set as soon as the input is found good: an error is then kExitFailed, before kExitBadUsage.
+  bool begun = false;
 };
 
-// Runs after the command line was parsed; returns an ExitCode.
-using SubcommandRun = std::function<int(CliContext&)>;
+// Runs after the command line was parsed; gives an ExitCode.  An error is shown by the caller.
+using SubcommandRun = std::function<Result<int>(CliContext&)>;
 
 struct Subcommand {
   const char* name;

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "common/base/suggest.h"
+#include "common/base/try.h"
 #include "common/config/config.h"
 #include "common/trials/select.h"
 #include "master/cli/inputs.h"
@@ -24,7 +25,7 @@ Result<Config> TracedCommands::open(const std::string& path, TraceSettings* to) 
   if (!config) return config.error();
   to->seed = config->seed;
   to->interval_s = interval_s;
-  if (Status s = choose(config->problem.commands, to); !s) return s.error();
+  RETURN_IF_ERROR(choose(config->problem.commands, to));
   if (config->problem.pieces.empty()) {
     if (trials.files.empty() && only.empty()) return config;
     return Error{path + ": scenario " + config->problem.scenario +
@@ -32,9 +33,8 @@ Result<Config> TracedCommands::open(const std::string& path, TraceSettings* to) 
   }
   config = read_config_and_trials(path, trials);
   if (!config) return config.error();
-  Result<TrialLog> log = select_trials(config->problem.log, only);
-  if (!log) return log.error();
-  config->problem.log = std::move(*log);
+  ASSIGN_OR_RETURN(TrialLog log, select_trials(config->problem.log, only));
+  config->problem.log = std::move(log);
   const std::vector<Trial>& pushes = config->problem.log.trials;
   for (std::uint32_t i = 0; i < pushes.size(); ++i) {
     const auto wanted = [&](const CommandSpec& c) { return c.name == pushes[i].command; };

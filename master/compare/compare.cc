@@ -3,6 +3,7 @@
 #include <map>
 #include <memory>
 
+#include "common/base/try.h"
 #include "master/evolve/evaluation.h"
 #include "master/evolve/optimisers.h"
 #include "master/evolve/staged.h"
@@ -19,10 +20,8 @@ class Lane {
                              std::uint64_t evaluations) {
     const OptimiserSetup setup =
         optimiser_setup(variant.config.evolution, variant.config.problem, seed);
-    const auto plan = read_stages(variant.config);
-    if (!plan) return plan.error();
-    auto optimiser =
-        plan->stages.empty() ? make_optimiser(setup) : make_staged(setup, plan->stages);
+    ASSIGN_OR_RETURN(const auto plan, read_stages(variant.config));
+    auto optimiser = plan.stages.empty() ? make_optimiser(setup) : make_staged(setup, plan.stages);
     if (!optimiser) return Error{"variant \"" + variant.name + "\": " + optimiser.error().message};
     Lane lane;
     lane.optimiser_ = *std::move(optimiser);
@@ -98,9 +97,9 @@ Result<std::vector<ComparedRun>> compare(std::span<const Variant> variants,
   std::vector<Lane> lanes;
   for (std::size_t v = 0; v < variants.size(); ++v) {
     for (unsigned s = 0; s < options.seeds; ++s) {
-      auto lane = Lane::create(variants[v], v, options.first_seed + s, options.evaluations);
-      if (!lane) return lane.error();
-      lanes.push_back(*std::move(lane));
+      ASSIGN_OR_RETURN(auto lane,
+                       Lane::create(variants[v], v, options.first_seed + s, options.evaluations));
+      lanes.push_back(std::move(lane));
     }
   }
   for (;;) {
@@ -118,13 +117,12 @@ Result<std::vector<ComparedRun>> compare(std::span<const Variant> variants,
     }
     if (on_round) on_round(done);
     if (requests.empty()) break;
-    const auto scores = scorer(requests);
-    if (!scores) return scores.error();
-    if (scores->size() != requests.size()) {
+    ASSIGN_OR_RETURN(const auto scores, scorer(requests));
+    if (scores.size() != requests.size()) {
       return Error{"asked for " + std::to_string(requests.size()) + " scores, but got " +
-                   std::to_string(scores->size())};
+                   std::to_string(scores.size())};
     }
-    std::span<const Score> rest = *scores;
+    std::span<const Score> rest = scores;
     for (const Asked& part : asked) {
       lanes[part.lane].tell(rest.first(part.count));
       rest = rest.subspan(part.count);
@@ -154,12 +152,11 @@ CompareScorer farm_scorer(Farm& farm, std::span<const Variant> variants) {
       for (const std::size_t i : members) {
         tasks.push_back(evaluation_task(requests[i].candidate, requests[i].seed));
       }
-      const auto results = farm.run(hash, tasks);
-      if (!results) return results.error();
+      ASSIGN_OR_RETURN(const auto results, farm.run(hash, tasks));
       for (std::size_t k = 0; k < members.size(); ++k) {
-        const auto score = score_of((*results)[k], kinds[requests[members[k]].variant]);
-        if (!score) return score.error();
-        scores[members[k]] = *score;
+        ASSIGN_OR_RETURN(const auto score,
+                         score_of(results[k], kinds[requests[members[k]].variant]));
+        scores[members[k]] = score;
       }
     }
     return scores;

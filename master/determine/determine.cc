@@ -7,6 +7,7 @@
 #include <cmath>
 #include <iterator>
 
+#include "common/base/try.h"
 #include "common/random/stream.h"
 #include "common/score/algebra.h"
 
@@ -141,7 +142,7 @@ class Study {
     hooks_.planned({{"find how far to look", real(probes), probes},
                     {"fit the likelihood", real(points), points}});
     hooks_.began(0);
-    if (Status s = find_widths(); !s) return s.error();
+    RETURN_IF_ERROR(find_widths());
     hooks_.began(1);
     Quadratic quadratic;
     for (std::uint64_t round = 0; round < kRounds && !report_.reliable; ++round) {
@@ -149,9 +150,8 @@ class Study {
         widths_ /= 2;
         hooks_.began(1, points);
       }
-      auto fitted = fit_box(round);
-      if (!fitted) return fitted.error();
-      quadratic = *std::move(fitted);
+      ASSIGN_OR_RETURN(auto fitted, fit_box(round));
+      quadratic = std::move(fitted);
       report_.reliable = quadratic.explained > kExplained || quadratic.roughness < kCalm_nats;
     }
     report_.roughness = quadratic.roughness;
@@ -190,18 +190,17 @@ class Study {
         }
       }
     }
-    const auto values = nats(genomes);
-    if (!values) return values.error();
-    if (!std::isfinite(values->front()))
+    ASSIGN_OR_RETURN(const auto values, nats(genomes));
+    if (!std::isfinite(values.front()))
       return Error{"the model itself does not end well on this log"};
     std::size_t at = 1;
     for (Eigen::Index k = 0; k < size(); ++k) {
       for (const double width : kProbes) {
         double change = 0;
         for (int side = 0; side < 2; ++side) {
-          const double value = (*values)[at++];
+          const double value = values[at++];
           // What does not end well is beyond any quadratic.
-          change = std::max(change, std::isfinite(value) ? std::abs(value - values->front()) : 1e6);
+          change = std::max(change, std::isfinite(value) ? std::abs(value - values.front()) : 1e6);
         }
         // Narrower ones follow: the last that changes enough decides.
         if (change >= kWanted_nats / 2) {
@@ -235,15 +234,14 @@ class Study {
 
   Result<Quadratic> fit_box(std::uint64_t round) {
     const Design design = draw(round);
-    const auto values = nats(design.points);
-    if (!values) return values.error();
+    ASSIGN_OR_RETURN(const auto values, nats(design.points));
     std::vector<Eigen::Index> usable;
-    for (std::size_t i = 0; i < values->size(); ++i) {
-      if (std::isfinite((*values)[i])) usable.push_back(static_cast<Eigen::Index>(i));
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      if (std::isfinite(values[i])) usable.push_back(static_cast<Eigen::Index>(i));
     }
     if (usable.size() < terms(moving_.size())) {
       return Error{"only " + std::to_string(usable.size()) + " of " +
-                   std::to_string(values->size()) +
+                   std::to_string(values.size()) +
                    " points about the model end well; the quadratic needs " +
                    std::to_string(terms(moving_.size()))};
     }
@@ -252,7 +250,7 @@ class Study {
     for (Eigen::Index i = 0; i < offsets.rows(); ++i) {
       const Eigen::Index from = usable[static_cast<std::size_t>(i)];
       offsets.row(i) = design.offsets.row(from);
-      told[i] = (*values)[static_cast<std::size_t>(from)];
+      told[i] = values[static_cast<std::size_t>(from)];
     }
     return fit(offsets, told, widths_);
   }

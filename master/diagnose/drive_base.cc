@@ -39,6 +39,10 @@ DriveBase program_base(const Problem& problem, std::span<const Gene> genes) {
   DriveBase base;
   for (std::size_t row = 0; row < declared.size(); ++row) {
     const Parameter& p = declared[row];
+    if (p.kind != ParameterKind::kReal) {  // nothing slopes along it: it stays as the config has it
+      base.kept.push_back(row);
+      continue;
+    }
     const bool moves = searched(row) || !any;
     if (!has_logarithm(p, problem.values[row])) {
       base.kept.push_back(row);

@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "common/json/fields.h"
 #include "common/json/json.h"
 
 namespace gapfarm {
@@ -137,61 +138,6 @@ class Fields {
   const nlohmann::ordered_json& json_;
   std::string path_;
   std::string& error_;
-};
-
-class FieldWriter {
- public:
-  using Json = nlohmann::ordered_json;
-
-  template <class T>
-  void field(const char* key, const T& value) {
-    json_[key] = value;
-  }
-  template <class T>
-  void later(const char* key, const T& value) {
-    field(key, value);
-  }
-  void if_any(const char* key, const std::string& text) {
-    if (!text.empty()) field(key, text);
-  }
-  void if_any(const char* key, const std::optional<double>& number) {
-    if (number) field(key, *number);
-  }
-  template <class T, std::size_t n, class Name>
-  void choice(const char* key, const T& value, const T (&)[n], const Name& name_of) {
-    field(key, name_of(value));
-  }
-  template <class Row, class Key, class Describe>
-  void by_key(const char* key, const std::vector<Row>& rows, Key Row::*key_of,
-              const Describe& describe) {
-    Json& object = json_[key] = Json::object();
-    for (const Row& row : rows) object[row.*key_of] = written(row, describe);
-  }
-  void by_key(const char* key, const std::vector<std::pair<std::string, double>>& numbers) {
-    Json& object = json_[key] = Json::object();
-    for (const auto& [name, number] : numbers) object[name] = number;
-  }
-
-  template <class Row, class Describe>
-  void list_if_any(const char* key, const std::vector<Row>& rows, const Describe& describe) {
-    if (!rows.empty()) field(key, list(rows, describe));
-  }
-
-  template <class Row, class Describe>
-  static Json written(const Row& row, const Describe& describe) {
-    FieldWriter writer;
-    describe(writer, row);
-    return std::move(writer.json_);
-  }
-  template <class Row, class Describe>
-  static Json list(const std::vector<Row>& rows, const Describe& describe) {
-    Json list = Json::array();
-    for (const Row& row : rows) list.push_back(written(row, describe));
-    return list;
-  }
-
- private:
-  Json json_ = Json::object();
 };
 
 }  // namespace gapfarm

@@ -42,13 +42,10 @@ void fill_where(const Inquiry& of, const Refit& refit, Diagnosis* d) {
   const bool unexplained =
       d->verdict == Verdict::kUnknown || d->verdict == Verdict::kEffectAndUnknown;
   if (unexplained) d->unexplained = look(refit.nested.back());
-  const std::vector<std::string> thin = of.subject.cautions(study, of.problem.log);
-  d->cautions.insert(d->cautions.end(), thin.begin(), thin.end());
-  for (const Leftover& l : refit.judged.left) {
-    if (l.log10_p < of.subject.unknown_log10_p) {
-      d->cautions.push_back("What is left still depends on " + l.covariate + ".");
-    }
-  }
+}
+
+void append(const std::vector<std::string>& more, Diagnosis* d) {
+  d->cautions.insert(d->cautions.end(), more.begin(), more.end());
 }
 
 void fill_judgement(const Judgement& judged, Diagnosis* d) {
@@ -75,6 +72,17 @@ DiagnosisResult begun(const Inquiry& of) {
 }
 
 }  // namespace
+
+std::vector<std::string> leftover_caution(std::vector<Leftover> left, double unknown_log10_p) {
+  std::erase_if(left, [&](const Leftover& l) { return !(l.log10_p < unknown_log10_p); });
+  std::stable_sort(left.begin(), left.end(),
+                   [](const Leftover& a, const Leftover& b) { return a.log10_p < b.log10_p; });
+  std::vector<std::string> covariates;
+  for (const Leftover& l : left) covariates.push_back(l.covariate);
+  if (covariates.empty()) return {};
+  return {"What is left still depends on " + listed(covariates) +
+          (covariates.size() > 1 ? " (the clearest first)." : ".")};
+}
 
 Status compare_with_baselines(const Inquiry& of, const Refit& refit, Diagnosis* d) {
   if (scenario_form(of.problem.scenario).pieces) return {};
@@ -126,6 +134,10 @@ Result<DiagnosisResult> report(const Inquiry& of, const Screening& screening, co
   d.shown = of.subject.shown;
   d.words = of.subject.words;
   d.trials = diagnosed_trials(of, refit);
+  // Cautions, the gravest first: what the simulation does not explain or model, then what the log
+  // does not show, then what is only to be known.
+  if (Status s = compare_with_baselines(of, refit, &d); !s) return s.error();
+  append(leftover_caution(refit.judged.left, of.subject.unknown_log10_p), &d);
   fill_values(of, refit, &result);
   fill_where(of, refit, &d);
   // What is simulated from here on joins a catalogue of its own.
@@ -134,16 +146,15 @@ Result<DiagnosisResult> report(const Inquiry& of, const Screening& screening, co
   if (d.verdict == Verdict::kEffectAndUnknown && catalogue) {
     const auto places = second_places(of, named, &*catalogue);
     if (!places) return places.error();
-    d.cautions.insert(d.cautions.end(), places->begin(), places->end());
+    append(*places, &d);
   }
-  if (Status s = compare_with_baselines(of, refit, &d); !s) return s.error();
+  append(of.subject.cautions(named.study(), of.problem.log), &d);
   fill_parameters(of, refit, &result);
   auto drives = shown_drives(of, result);
   if (!drives) return drives.error();
   d.drives = std::move(*drives);
   d.screening = complete_screening(of, screening, refit.judged);
-  const std::vector<std::string> omitted = not_looked_for(of);
-  d.cautions.insert(d.cautions.end(), omitted.begin(), omitted.end());
+  append(not_looked_for(of), &d);
   if (of.frame_m.x() != 0 || of.frame_m.y() != 0) {
     d.cautions.push_back(
         "The log lies far from the world's origin: model.toml counts places from x "
@@ -175,9 +186,7 @@ DiagnosisResult give_up(const Inquiry& of, const KnownSoFar& known, const std::s
                         : "Bring [parameters] nearer to the robot; --leave-out NAME goes on "
                           "without an effect.",
                    base ? Severity::kUnusable : Severity::kDoubt});
-  for (const auto& [what, why] : of.predictor.left_out()) {
-    d.cautions.push_back("Left out, since it cannot be simulated: " + what + " (" + why + ").");
-  }
+  append(not_simulated(of), &d);
   result.tuned = of.problem.values;
   if (!base) {
     for (const auto& [row, value] : known.tuned->base) result.tuned[row] = value;

@@ -60,8 +60,12 @@ Result<std::vector<std::string>> second_places(const Inquiry& of, const Explanat
 Status plan_next(const Inquiry& of, const Explanation& named, Selector* catalogue,
                  Diagnosis* diagnosis);
 
+// One sentence of all that what is left depends on, the clearest first; none where there is none.
+std::vector<std::string> leftover_caution(std::vector<Leftover> left, double unknown_log10_p);
 // What could not be looked for, a sentence each.
 std::vector<std::string> not_looked_for(const Inquiry& of);
+// What was left out of the simulation, a sentence a reason.
+std::vector<std::string> not_simulated(const Inquiry& of);
 
 // What is known so far, as a report, where a step could not go on.
 struct KnownSoFar {

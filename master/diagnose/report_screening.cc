@@ -1,11 +1,13 @@
 // The screening table's other rows, and what could not be looked for.
 
 #include <algorithm>
+#include <map>
 
 #include "common/effects/catalogue.h"
 #include "master/diagnose/digits.h"
 #include "master/diagnose/distribution.h"
 #include "master/diagnose/effects/patch_places.h"
+#include "master/diagnose/findings.h"
 #include "master/diagnose/report_parts.h"
 
 namespace gapfarm::steps {
@@ -103,8 +105,17 @@ std::vector<std::string> not_looked_for(const Inquiry& of) {
     said.push_back("Not looked for, since the program does not take what they need: " + lacking +
                    ". It may declare more inputs, or parameters of its own.");
   }
-  for (const auto& [what, why] : of.predictor.left_out()) {
-    said.push_back("Left out, since it cannot be simulated: " + what + " (" + why + ").");
+  for (std::string& sentence : not_simulated(of)) said.push_back(std::move(sentence));
+  return said;
+}
+
+std::vector<std::string> not_simulated(const Inquiry& of) {
+  std::map<std::string, std::vector<std::string>> by_reason;
+  for (const auto& [what, why] : of.predictor.left_out()) by_reason[why].push_back(what);
+  std::vector<std::string> said;
+  for (const auto& [why, what] : by_reason) {
+    said.push_back("Left out, since " + std::string(what.size() > 1 ? "they" : "it") +
+                   " cannot be simulated: " + listed(what) + " (" + why + ").");
   }
   return said;
 }

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/base/try.h"
+
 namespace gapfarm {
 namespace {
 
@@ -48,11 +50,10 @@ Status drive_leg(const Mover& mover, std::uint64_t leg, std::vector<Pose>& at,
                  std::vector<DrivenRun>& runs, const Choose& choose) {
   std::vector<Mover::Start> starts;
   for (std::size_t r = 0; r < runs.size(); ++r) starts.push_back({at[r], choose(at[r]), r, leg});
-  auto legs = mover.drive(starts);
-  if (!legs) return legs.error();
+  ASSIGN_OR_RETURN(auto legs, mover.drive(starts));
   for (std::size_t r = 0; r < runs.size(); ++r) {
-    at[r] = (*legs)[r].path.back().pose;
-    runs[r].push_back(std::move((*legs)[r]));
+    at[r] = legs[r].path.back().pose;
+    runs[r].push_back(std::move(legs[r]));
   }
   return {};
 }
@@ -78,11 +79,10 @@ Result<std::vector<ConstantVelocity>> nominal_velocities(Farm& farm, const Probl
     trace->set_interval(0.05);
     tasks.push_back(std::move(task));
   }
-  const auto results = farm.run(farm.add_problem(to_proto(problem)), tasks);
-  if (!results) return results.error();
+  ASSIGN_OR_RETURN(const auto results, farm.run(farm.add_problem(to_proto(problem)), tasks));
   std::vector<ConstantVelocity> models;
   for (std::size_t i = 0; i < tasks.size(); ++i) {
-    const v1::TaskResult& result = (*results)[i];
+    const v1::TaskResult& result = results[i];
     if (result.outcome() != v1::OK || result.trace().samples_size() == 0) {
       return Error{"command '" + problem.commands[i].name + "' ends with " +
                    v1::Outcome_Name(result.outcome()) + " in this model " + result.message()};
@@ -120,10 +120,9 @@ Result<std::vector<DrivenRun>> drive_commands(Farm& farm, const Problem& problem
     }
     tasks.push_back(std::move(task));
   }
-  const auto results = farm.run(farm.add_problem(to_proto(problem)), tasks);
-  if (!results) return results.error();
+  ASSIGN_OR_RETURN(const auto results, farm.run(farm.add_problem(to_proto(problem)), tasks));
   std::vector<DrivenRun> driven;
-  for (const v1::TaskResult& result : *results) {
+  for (const v1::TaskResult& result : results) {
     if (result.outcome() != v1::OK) {
       return Error{"a run ended with " + v1::Outcome_Name(result.outcome()) + " (" +
                    result.message() + ")"};
@@ -145,7 +144,7 @@ Result<std::vector<DrivenRun>> drive_commands(const Mover& mover, const Pose& X_
   std::vector<Pose> at(runs, X_WS);
   for (std::size_t c = 0; c < commands.size(); ++c) {
     const auto given = [&](const Pose&) { return commands[c]; };
-    if (Status s = drive_leg(mover, c, at, driven, given); !s) return s.error();
+    RETURN_IF_ERROR(drive_leg(mover, c, at, driven, given));
   }
   return driven;
 }
@@ -189,8 +188,8 @@ Result<std::vector<DrivenRun>> drive_waypoints(const Mover& mover, const Waypoin
   for (std::size_t i = 0; i < targets.size(); ++i) {
     const auto turn = [&](const Pose& X_WR) { return turn_toward(pilot, X_WR, targets[i]); };
     const auto go = [&](const Pose& X_WR) { return go_to(pilot, X_WR, targets[i]); };
-    if (Status s = drive_leg(mover, 2 * i, at, driven, turn); !s) return s.error();
-    if (Status s = drive_leg(mover, 2 * i + 1, at, driven, go); !s) return s.error();
+    RETURN_IF_ERROR(drive_leg(mover, 2 * i, at, driven, turn));
+    RETURN_IF_ERROR(drive_leg(mover, 2 * i + 1, at, driven, go));
   }
   return driven;
 }

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/base/try.h"
 #include "common/random/stream.h"
 #include "master/drive/drive.h"
 
@@ -124,11 +125,10 @@ class SimulatedMover final : public Mover {
       *planned->mutable_trial() = planned_trial(start);
       tasks.push_back(std::move(task));
     }
-    const auto results = farm_.run(hash_, tasks);
-    if (!results) return results.error();
+    ASSIGN_OR_RETURN(const auto results, farm_.run(hash_, tasks));
     std::vector<Leg> legs;
     for (std::size_t i = 0; i < starts.size(); ++i) {
-      const v1::TaskResult& result = (*results)[i];
+      const v1::TaskResult& result = results[i];
       if (result.outcome() != v1::OK || result.simulate().trials_size() != 1) {
         return Error{"command '" + starts[i].command.name + "' ended with " +
                      v1::Outcome_Name(result.outcome()) + " " + result.message()};

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "common/base/try.h"
+
 namespace gapfarm {
 
 const SearchMethod& DeSimplex::current() const {
@@ -52,7 +54,7 @@ Status DeSimplex::restore(const v1::MethodState& message) {
   const v1::DeSimplexState& state = message.de_simplex();
   polishing_ = state.polishing();
   rounds_ = state.rounds();
-  if (Status s = differential_.restore(state.differential()); !s) return s;
+  RETURN_IF_ERROR(differential_.restore(state.differential()));
   return simplex_.restore(state.simplex());
 }
 

@@ -5,6 +5,7 @@
 #include <cassert>
 #include <cmath>
 
+#include "common/base/try.h"
 #include "master/evolve/individual_state.h"
 
 namespace gapfarm {
@@ -112,9 +113,8 @@ Status DifferentialEvolution::restore(const v1::MethodState& message) {
   iterations_ = state.iterations();
   population_.clear();
   for (const v1::Individual& saved : state.population()) {
-    Result<Individual> individual = load(saved, setup_.space);
-    if (!individual) return individual.error();
-    population_.push_back(*std::move(individual));
+    ASSIGN_OR_RETURN(Individual individual, load(saved, setup_.space));
+    population_.push_back(std::move(individual));
   }
   keep_.assign(state.keep().begin(), state.keep().end());
   return {};

@@ -2,6 +2,7 @@
 #include <cassert>
 #include <cmath>
 
+#include "common/base/try.h"
 #include "master/evolve/genetic_algorithm.h"
 #include "master/evolve/individual_state.h"
 
@@ -70,14 +71,12 @@ Status GeneticAlgorithm::restore(const v1::GeneticState& message) {
                  " operators, but the config names others; resume with the config of the run"};
   }
   for (const v1::Individual& saved : message.population()) {
-    Result<Individual> individual = load(saved, breeder_.space());
-    if (!individual) return individual.error();
-    population_.push_back(*std::move(individual));
+    ASSIGN_OR_RETURN(Individual individual, load(saved, breeder_.space()));
+    population_.push_back(std::move(individual));
   }
   if (message.generation() > 0) {
-    Result<Individual> best = load(message.hall(0), breeder_.space());
-    if (!best) return best.error();
-    best_ = *std::move(best);
+    ASSIGN_OR_RETURN(Individual best, load(message.hall(0), breeder_.space()));
+    best_ = std::move(best);
     best_member_ = to_member(best_);
   }
   generation_ = message.generation();

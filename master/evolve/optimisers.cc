@@ -3,6 +3,7 @@
 #include <array>
 #include <cassert>
 
+#include "common/base/try.h"
 #include "master/evolve/cma_es.h"
 #include "master/evolve/de_simplex.h"
 #include "master/evolve/genetic.h"
@@ -34,17 +35,17 @@ Result<std::unique_ptr<SearchOptimiser>> wrapped(const OptimiserSetup& setup, au
 
 template <class Method>
 Result<std::unique_ptr<Optimiser>> make(const OptimiserSetup& setup) {
-  auto made = wrapped(setup, [](const MethodSetup& m) { return std::make_unique<Method>(m); });
-  if (!made) return made.error();
-  return std::unique_ptr<Optimiser>(*std::move(made));
+  ASSIGN_OR_RETURN(
+      auto made, wrapped(setup, [](const MethodSetup& m) { return std::make_unique<Method>(m); }));
+  return std::unique_ptr<Optimiser>(std::move(made));
 }
 
 template <class Method>
 Result<std::unique_ptr<Optimiser>> restore(const OptimiserSetup& setup, std::string_view state) {
-  auto made = wrapped(setup, [](const MethodSetup& m) { return std::make_unique<Method>(m); });
-  if (!made) return made.error();
-  if (Status s = (*made)->restore(state); !s) return s.error();
-  return std::unique_ptr<Optimiser>(*std::move(made));
+  ASSIGN_OR_RETURN(
+      auto made, wrapped(setup, [](const MethodSetup& m) { return std::make_unique<Method>(m); }));
+  RETURN_IF_ERROR(made->restore(state));
+  return std::unique_ptr<Optimiser>(std::move(made));
 }
 
 template <class Method>

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <unordered_set>
 
+#include "common/base/try.h"
 #include "master/evolve/individual_state.h"
 
 namespace gapfarm {
@@ -183,16 +184,14 @@ Status SearchOptimiser::restore(std::string_view state) {
   if (ledger.generation() > 0 && ledger.hall_size() == 0) {
     return Error{"the saved optimiser state is damaged: it has no best"};
   }
-  if (Status s = load_seen(ledger, seen_); !s) return s;
+  RETURN_IF_ERROR(load_seen(ledger, seen_));
   for (const v1::Individual& saved : ledger.population()) {
-    Result<Individual> individual = load(saved, space_);
-    if (!individual) return individual.error();
-    round_.push_back(*std::move(individual));
+    ASSIGN_OR_RETURN(Individual individual, load(saved, space_));
+    round_.push_back(std::move(individual));
   }
   if (ledger.generation() > 0) {
-    Result<Individual> best = load(ledger.hall(0), space_);
-    if (!best) return best.error();
-    best_ = *std::move(best);
+    ASSIGN_OR_RETURN(Individual best, load(ledger.hall(0), space_));
+    best_ = std::move(best);
     best_member_ = to_member(best_);
   }
   generation_ = ledger.generation();

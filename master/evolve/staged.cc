@@ -3,6 +3,7 @@
 #include <cassert>
 #include <cmath>
 
+#include "common/base/try.h"
 #include "gapfarm/v1/record.pb.h"
 #include "master/evolve/optimisers.h"
 
@@ -20,9 +21,8 @@ class StagedOptimiser final : public Optimiser {
       : setup_(setup), stages_(std::move(stages)) {}
 
   Status begin() {
-    auto made = make_optimiser(stage_setup());
-    if (!made) return made.error();
-    inner_ = *std::move(made);
+    ASSIGN_OR_RETURN(auto made, make_optimiser(stage_setup()));
+    inner_ = std::move(made);
     return {};
   }
 
@@ -42,9 +42,8 @@ class StagedOptimiser final : public Optimiser {
     evaluations_ = message.evaluations();
     births_ = message.births();
     last_improvement_ = message.last_improvement();
-    auto restored = restore_optimiser(stage_setup(), message.optimiser());
-    if (!restored) return restored.error();
-    inner_ = *std::move(restored);
+    ASSIGN_OR_RETURN(auto restored, restore_optimiser(stage_setup(), message.optimiser()));
+    inner_ = std::move(restored);
     if (stage_ > 0) {
       kept_best_.birth_id = message.best().birth_id();
       kept_best_.outcome = static_cast<v1::Outcome>(message.best().outcome());
@@ -205,18 +204,18 @@ Status check_stages(const OptimiserSetup& setup, const std::vector<Stage>& stage
 
 Result<std::unique_ptr<Optimiser>> make_staged(const OptimiserSetup& setup,
                                                const std::vector<Stage>& stages) {
-  if (Status s = check_stages(setup, stages); !s) return s.error();
+  RETURN_IF_ERROR(check_stages(setup, stages));
   auto optimiser = std::make_unique<StagedOptimiser>(setup, stages);
-  if (Status s = optimiser->begin(); !s) return s.error();
+  RETURN_IF_ERROR(optimiser->begin());
   return std::unique_ptr<Optimiser>(std::move(optimiser));
 }
 
 Result<std::unique_ptr<Optimiser>> restore_staged(const OptimiserSetup& setup,
                                                   const std::vector<Stage>& stages,
                                                   std::string_view state) {
-  if (Status s = check_stages(setup, stages); !s) return s.error();
+  RETURN_IF_ERROR(check_stages(setup, stages));
   auto optimiser = std::make_unique<StagedOptimiser>(setup, stages);
-  if (Status s = optimiser->restore(state); !s) return s.error();
+  RETURN_IF_ERROR(optimiser->restore(state));
   return std::unique_ptr<Optimiser>(std::move(optimiser));
 }
 

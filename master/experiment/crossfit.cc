@@ -5,6 +5,7 @@
 #include <limits>
 #include <map>
 
+#include "common/base/try.h"
 #include "common/score/statistics.h"
 #include "common/trials/select.h"
 
@@ -56,23 +57,19 @@ class Crossfit {
   Result<CrossfitGroup> group(const std::string& name, const TrialLog& log) {
     CrossfitGroup group;
     group.name = name;
-    const Result<TrialLog> train = select_trials(log, plan_.train);
-    if (!train) return train.error();
-    const auto tuned = tune(with(*train), farm_, plan_.tuning);
-    if (!tuned) return tuned.error();
-    group.tuned = *tuned;
-    if (Status s = add_set("train", *train, group); !s) return s.error();
+    ASSIGN_OR_RETURN(const TrialLog train, select_trials(log, plan_.train));
+    ASSIGN_OR_RETURN(const auto tuned, tune(with(train), farm_, plan_.tuning));
+    group.tuned = tuned;
+    RETURN_IF_ERROR(add_set("train", train, group));
     TrialLog tests;
     for (const std::vector<std::string>& filters : plan_.tests) {
-      const Result<TrialLog> test = select_trials(log, filters);
-      if (!test) return test.error();
-      if (Status s = add_set(joined(filters), *test, group); !s) return s.error();
-      tests.trials.insert(tests.trials.end(), test->trials.begin(), test->trials.end());
+      ASSIGN_OR_RETURN(const TrialLog test, select_trials(log, filters));
+      RETURN_IF_ERROR(add_set(joined(filters), test, group));
+      tests.trials.insert(tests.trials.end(), test.trials.begin(), test.trials.end());
     }
     for (const std::string& key : plan_.sweeps) {
-      auto swept = sweep(key, *train, tests, group.tuned.values);
-      if (!swept) return swept.error();
-      group.sweeps.push_back(std::move(*swept));
+      ASSIGN_OR_RETURN(auto swept, sweep(key, train, tests, group.tuned.values));
+      group.sweeps.push_back(std::move(swept));
     }
     return group;
   }
@@ -85,28 +82,26 @@ class Crossfit {
   }
 
   Status add_set(const std::string& name, const TrialLog& log, CrossfitGroup& group) {
-    const auto ends = predict_ends(with(log), {problem_.values, group.tuned.values}, farm_);
-    if (!ends) return ends.error();
+    ASSIGN_OR_RETURN(const auto ends,
+                     predict_ends(with(log), {problem_.values, group.tuned.values}, farm_));
     for (std::size_t k = 0; k < 2; ++k) {
-      if ((*ends)[k].failure.empty()) continue;
+      if (ends[k].failure.empty()) continue;
       return Error{"the simulation of " + name + " at the " + (k == 1 ? "tuned" : "config's own") +
-                   " parameters ended with " + (*ends)[k].failure};
+                   " parameters ended with " + ends[k].failure};
     }
     std::vector<Pose> starts, repeats;
     for (const Trial& trial : log.trials) starts.push_back(trial.X_WS);
     std::vector<TrialColumnReader> condition;
     for (const std::string& column : plan_.repeats) {
-      const auto reader = trial_column_reader(log, column);
-      if (!reader) return reader.error();
-      condition.push_back(*reader);
+      ASSIGN_OR_RETURN(const auto reader, trial_column_reader(log, column));
+      condition.push_back(reader);
     }
     if (!condition.empty()) repeats = mean_of_repeats(log, condition);
     std::vector<std::string> parts = {""};
     TrialColumnReader per;
     if (!plan_.per.empty()) {
-      const auto reader = trial_column_reader(log, plan_.per);
-      if (!reader) return reader.error();
-      per = *reader;
+      ASSIGN_OR_RETURN(const auto reader, trial_column_reader(log, plan_.per));
+      per = reader;
       const auto values = values_in(log, per);
       if (values.size() > 1) parts.insert(parts.end(), values.begin(), values.end());
     }
@@ -125,8 +120,8 @@ class Crossfit {
         }
         return end_errors(problem_, trials, chosen);
       };
-      group.sets.push_back({name, part, errors((*ends)[0].ends), errors((*ends)[1].ends),
-                            errors(starts), errors(repeats)});
+      group.sets.push_back({name, part, errors(ends[0].ends), errors(ends[1].ends), errors(starts),
+                            errors(repeats)});
     }
     return {};
   }
@@ -152,10 +147,9 @@ class Crossfit {
     for (const auto& [log, member] :
          {std::pair{&train, &SweepPoint::train_m}, std::pair{&test, &SweepPoint::test_m}}) {
       if (log->trials.empty()) continue;
-      const auto ends = predict_ends(with(*log), points, farm_);
-      if (!ends) return ends.error();
+      ASSIGN_OR_RETURN(const auto ends, predict_ends(with(*log), points, farm_));
       for (std::size_t i = 0; i < points.size(); ++i) {
-        const PredictedEnds& predicted = (*ends)[i];
+        const PredictedEnds& predicted = ends[i];
         sweep.points[i].*member = predicted.failure.empty()
                                       ? end_errors(problem_, log->trials, predicted.ends).mean_m
                                       : std::numeric_limits<double>::quiet_NaN();
@@ -216,21 +210,18 @@ Result<std::vector<CrossfitGroup>> crossfit(const Problem& problem, const Crossf
   if (plan.by.empty()) {
     plan.hooks.planned(stages_of({""}, plan));
     plan.hooks.began(0);
-    auto group = fit.group("", problem.log);
-    if (!group) return group.error();
-    groups.push_back(std::move(*group));
+    ASSIGN_OR_RETURN(auto group, fit.group("", problem.log));
+    groups.push_back(std::move(group));
     return groups;
   }
-  const auto by = trial_column_reader(problem.log, plan.by);
-  if (!by) return by.error();
-  const std::vector<std::string> values = values_in(problem.log, *by);
+  ASSIGN_OR_RETURN(const auto by, trial_column_reader(problem.log, plan.by));
+  const std::vector<std::string> values = values_in(problem.log, by);
   plan.hooks.planned(stages_of(values, plan));
   for (const std::string& value : values) {
     plan.hooks.began(groups.size());
     const std::string filter = plan.by + "=" + value;
-    const auto log = select_trials(problem.log, {&filter, 1});
-    if (!log) return log.error();
-    auto group = fit.group(value, *log);
+    ASSIGN_OR_RETURN(const auto log, select_trials(problem.log, {&filter, 1}));
+    auto group = fit.group(value, log);
     if (!group) return Error{filter + ": " + group.error().message};
     groups.push_back(std::move(*group));
   }

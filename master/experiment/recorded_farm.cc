@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "common/base/try.h"
 #include "common/problem/problem.h"
 #include "common/process/process_pool.h"
 
@@ -38,10 +39,9 @@ Result<RecordedFarm::Open> RecordedFarm::look_up(const std::string& problem_hash
   Open open;
   for (std::size_t i = 0; i < tasks.size(); ++i) {
     std::string key = store_.key(problem_hash, tasks[i]);
-    auto found = store_.find(key);
-    if (!found) return found.error();
-    if (*found) {
-      results[i] = std::move(**found);
+    ASSIGN_OR_RETURN(auto found, store_.find(key));
+    if (found) {
+      results[i] = std::move(*found);
       continue;
     }
     open.tasks.push_back(tasks[i]);
@@ -69,7 +69,7 @@ Status RecordedFarm::flush() {
   }
   flushed_s_ = clock_();
   if (answers.empty()) return {};
-  if (Status s = store_.add(problem_hash_, stage_, answers); !s) return s;
+  RETURN_IF_ERROR(store_.add(problem_hash_, stage_, answers));
   for (const auto& [k, result] : waiting_) open_.kept[k] = true;
   waiting_.clear();
   return {};
@@ -83,13 +83,12 @@ Result<std::vector<v1::TaskResult>> RecordedFarm::run(
     const std::string& problem_hash, const std::vector<v1::Task>& tasks,
     const std::function<void(const FarmProgress&)>& on_progress) {
   if (const auto fresh = unkept_.find(problem_hash); fresh != unkept_.end()) {
-    if (Status s = store_.add_problem(problem_hash, fresh->second); !s) return s.error();
+    RETURN_IF_ERROR(store_.add_problem(problem_hash, fresh->second));
     unkept_.erase(fresh);
   }
   std::vector<v1::TaskResult> results(tasks.size());
-  auto open = look_up(problem_hash, tasks, results);
-  if (!open) return open.error();
-  open_ = std::move(*open);
+  ASSIGN_OR_RETURN(auto open, look_up(problem_hash, tasks, results));
+  open_ = std::move(open);
   problem_hash_ = problem_hash;
   waiting_.clear();
   trouble_ = {};

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "common/base/try.h"
 #include "master/evolve/evolve.h"
 #include "master/evolve/optimisers.h"
 
@@ -28,10 +29,9 @@ class Backend : public EvaluationBackend {
     std::vector<v1::Task> tasks;
     for (const Candidate& c : candidates)
       tasks.push_back(evaluate_task(c.genome, seed_, c.birth_id));
-    const auto results = farm_.run(hash_, tasks);
-    if (!results) return results.error();
+    ASSIGN_OR_RETURN(const auto results, farm_.run(hash_, tasks));
     std::vector<Score> scores;
-    for (const v1::TaskResult& result : *results) {
+    for (const v1::TaskResult& result : results) {
       const bool ok = result.outcome() == v1::OK;
       scores.push_back(
           {result.outcome(), ok ? cost_of_fitness(kind_, result.evaluate().fitness()) : 0});
@@ -75,21 +75,19 @@ Result<Tuned> tune(const Problem& problem, Farm& farm, const TuningSettings& set
   for (const Gene& gene : problem.genes) {
     setup.nominal.push_back(encode_gene(problem.table(), gene, problem.values[gene.row]));
   }
-  auto optimiser = make_optimiser(setup);
-  if (!optimiser) return optimiser.error();
+  ASSIGN_OR_RETURN(auto optimiser, make_optimiser(setup));
   Backend backend(problem, farm, settings.seed);
   NoSink sink;
   const NoClock clock;
   EvolveOptions options;
   options.settings = settings.evolution;
   options.fitness = problem.fitness.kind;
-  const auto summary = evolve(**optimiser, backend, sink, clock, options);
-  if (!summary) return summary.error();
-  if (!summary->best || summary->best->outcome != v1::OK) {
+  ASSIGN_OR_RETURN(const auto summary, evolve(*optimiser, backend, sink, clock, options));
+  if (!summary.best || summary.best->outcome != v1::OK) {
     return Error{"every genome failed; widen or move the genes' ranges"};
   }
-  return Tuned{problem.values_of(summary->best->genome),
-               fitness_of_cost(problem.fitness.kind, summary->best->cost), summary->evaluations};
+  return Tuned{problem.values_of(summary.best->genome),
+               fitness_of_cost(problem.fitness.kind, summary.best->cost), summary.evaluations};
 }
 
 Result<std::vector<PredictedEnds>> predict_ends(const Problem& problem,
@@ -111,10 +109,9 @@ Result<std::vector<PredictedEnds>> predict_ends(const Problem& problem,
     }
     tasks.push_back(std::move(task));
   }
-  const auto results = farm.run(farm.add_problem(to_proto(plain)), tasks);
-  if (!results) return results.error();
+  ASSIGN_OR_RETURN(const auto results, farm.run(farm.add_problem(to_proto(plain)), tasks));
   std::vector<PredictedEnds> all;
-  for (const v1::TaskResult& result : *results) {
+  for (const v1::TaskResult& result : results) {
     PredictedEnds& predicted = all.emplace_back();
     if (result.outcome() != v1::OK) {
       predicted.failure = v1::Outcome_Name(result.outcome()) + " (" + result.message() + ")";

@@ -261,14 +261,20 @@ bool JobQueue::give_back(WorkerId worker, std::uint64_t attempt_id) {
 
 std::string JobQueue::reason(const Job& job, const std::vector<Fault>& faults) const {
   std::string text = task_label(job.task) + " was given up:";
+  std::string last, by_hand;
   for (const Fault& fault : faults) {
+    std::string what = first_line(fault.failure);
+    if (what != fault.failure) by_hand = "; " + fault.failure.substr(what.size() + 1);
+    what = what.empty() ? std::string(" ") + verb(fault.cause)
+                        : ": " + (what == last ? "the same" : last = what);
     text += (&fault == faults.data() ? " " : ", ") + fault.worker + " on " +
-            (fault.host.empty() ? "an unnamed host" : fault.host) + " " + verb(fault.cause);
+            (fault.host.empty() ? "an unnamed host" : fault.host) + what;
   }
-  return text;
+  return text + by_hand;
 }
 
-Blamed JobQueue::blame(const WorkerIdentity& worker, std::uint64_t attempt_id, EndCause cause) {
+Blamed JobQueue::blame(const WorkerIdentity& worker, std::uint64_t attempt_id, EndCause cause,
+                       const std::string& failure) {
   Blamed blamed;
   Attempt* attempt = find(worker.id, attempt_id);
   const bool innocent = cause == EndCause::kLeft || cause == EndCause::kStuck;
@@ -280,7 +286,7 @@ Blamed JobQueue::blame(const WorkerIdentity& worker, std::uint64_t attempt_id, E
   const bool waits = job.waiting;
   leave_line(index);
   std::vector<Fault>& faults = faults_[index];
-  faults.push_back({worker.name, worker.host, cause});
+  faults.push_back({worker.name, worker.host, cause, failure});
   const auto kills =
       static_cast<unsigned>(std::count_if(faults.begin(), faults.end(), [](const Fault& fault) {
         return fault.cause == EndCause::kKilled;
@@ -292,6 +298,7 @@ Blamed JobQueue::blame(const WorkerIdentity& worker, std::uint64_t attempt_id, E
   }
   blamed.quarantined = true;
   blamed.reason = reason(job, faults);
+  blamed.task = job.task;
   job.result.set_outcome(v1::WORKER_FAILED);
   job.result.set_message(blamed.reason);
   complete(job, &blamed.losers);

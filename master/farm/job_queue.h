@@ -54,7 +54,8 @@ struct Committed {
 
 struct Blamed {
   bool quarantined = false;  // the job is done, with WORKER_FAILED
-  std::string reason;        // what was given up, whom it ended, and how
+  std::string reason;        // what was given up, whom it ended, how, and how to repeat it by hand
+  v1::Task task;             // that
   Losers losers;
 };
 
@@ -74,6 +75,7 @@ class JobQueue {
   bool has_pending() const {
     return !pending_.empty() || !retries_.empty() || opinions_.has_audits();
   }
+  const std::string& problem_hash() const { return problem_hash_; }
   std::size_t total() const { return jobs_.size(); }
   std::size_t committed() const { return committed_; }
   std::size_t unfinished() const { return jobs_.size() - committed_; }
@@ -98,8 +100,9 @@ class JobQueue {
   // Whether an answer of `worker` to `attempt` is waited for.
   bool is_out(WorkerId worker, std::uint64_t attempt) const;
   // The worker's process ended while it worked on `attempt`; also when that comes out only after
-  // the attempt was given back.  An attempt is blamed once.
-  Blamed blame(const WorkerIdentity& worker, std::uint64_t attempt, EndCause cause);
+  // the attempt was given back.  An attempt is blamed once.  `failure`: ProcessEnded's.
+  Blamed blame(const WorkerIdentity& worker, std::uint64_t attempt, EndCause cause,
+               const std::string& failure = "");
 
   // The results in the order of the tasks.  REQUIRES: unfinished() == 0.  Ends the batch.
   std::vector<v1::TaskResult> finish();
@@ -135,6 +138,7 @@ class JobQueue {
     std::string worker;
     std::string host;
     EndCause cause;
+    std::string failure;
   };
   const Attempt* find(WorkerId worker, std::uint64_t attempt) const;
   Attempt* find(WorkerId worker, std::uint64_t attempt);

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "common/net/envelope.h"
+#include "common/problem/question.h"
 
 namespace gapfarm {
 namespace {
@@ -28,12 +29,26 @@ EndCause cause_of(v1::ProcessEnd end) {
   }
 }
 
+auto find_holding(WorkerRecord& worker, std::uint64_t attempt) {
+  return std::find_if(worker.holds.begin(), worker.holds.end(),
+                      [&](const Holding& h) { return h.attempt == attempt; });
+}
+
 bool drop_holding(WorkerRecord& worker, std::uint64_t attempt) {
-  const auto at = std::find_if(worker.holds.begin(), worker.holds.end(),
-                               [&](const Holding& h) { return h.attempt == attempt; });
+  const auto at = find_holding(worker, attempt);
   if (at == worker.holds.end()) return false;
   worker.holds.erase(at);
   return true;
+}
+
+// A task that the worker held has come back after `wall` s of work.
+void note_pace(WorkerRecord& worker, std::uint64_t attempt, double wall, double now) {
+  constexpr double kNewest = 0.1;  // weight
+  const auto at = find_holding(worker, attempt);
+  if (!std::isfinite(wall) || wall < 0 || at == worker.holds.end()) return;
+  worker.mean_wall =
+      worker.mean_wall < 0 ? wall : worker.mean_wall + kNewest * (wall - worker.mean_wall);
+  worker.turnaround += kNewest * (now - at->since - worker.turnaround);
 }
 
 }  // namespace
@@ -61,6 +76,16 @@ void Scheduler::start(const std::string& problem_hash, std::vector<v1::Task> tas
   queue_.start(problem_hash, std::move(tasks), options_.shuffle_seed);
   for (const auto& [id, worker] : registry_.all()) line_up(*worker);
   take_offers();
+}
+
+// What the batch's problem makes of the task's genome and overrides, in words.
+std::string Scheduler::values_of_task(const v1::Task& task) const {
+  const auto bytes = problems_.find(queue_.problem_hash());
+  v1::Problem message;
+  if (bytes == problems_.end() || !message.ParseFromString(bytes->second)) return {};
+  const auto problem = from_proto(message);
+  const std::string settings = problem ? point_settings(*problem, task) : "";
+  return settings.empty() ? "" : "; its values, for `gapfarm simulate CONFIG`: " + settings;
 }
 
 std::vector<v1::TaskResult> Scheduler::finish() {
@@ -122,11 +147,11 @@ void Scheduler::on_message(const std::string& peer, v1::Envelope* envelope, doub
       on_heartbeat(*worker, envelope->heartbeat(), now);
       break;
     case v1::Envelope::kResult:
-      on_result(*worker, envelope->mutable_result());
+      on_result(*worker, envelope->mutable_result(), now);
       break;
     case v1::Envelope::kResults:
       for (v1::JobResult& result : *envelope->mutable_results()->mutable_results()) {
-        if (!on_result(*worker, &result)) return;
+        if (!on_result(*worker, &result, now)) return;
       }
       on_dropped(*worker, envelope->results());
       break;
@@ -153,9 +178,12 @@ void Scheduler::on_hello(const std::string& peer, const v1::Hello& hello, double
   }
   WorkerRecord& worker = *admission.worker;
   if (!hello.replaces().empty() && hello.replaces() != worker.name) {
-    on_process_end({hello.replaces(), cause_of(hello.replaced_end()), hello.replaced_epoch(),
-                    hello.replaced_attempt(),
-                    "its process ended and was replaced by " + worker.name});
+    on_process_end(
+        {hello.replaces(), cause_of(hello.replaced_end()), hello.replaced_epoch(),
+         hello.replaced_attempt(),
+         "its process ended and was replaced by " + worker.name +
+             (hello.replaced_failure().empty() ? "" : ": " + first_line(hello.replaced_failure())),
+         hello.replaced_failure()});
   }
   if (admission.returning) {
     // Whatever else was under way to it, or its answers on the way here, may be lost.
@@ -207,7 +235,7 @@ void Scheduler::on_heartbeat(WorkerRecord& worker, const v1::Heartbeat& heartbea
   keep_only(worker, heartbeat.attempts(), now - options_.silence_limit_s);
 }
 
-bool Scheduler::on_result(WorkerRecord& worker, v1::JobResult* result) {
+bool Scheduler::on_result(WorkerRecord& worker, v1::JobResult* result, double now) {
   if (result->epoch() != options_.epoch) {
     ++counts_.foreign;
     return true;
@@ -224,6 +252,7 @@ bool Scheduler::on_result(WorkerRecord& worker, v1::JobResult* result) {
     return false;
   }
   // Nonsense about a job leaves it in the worker's hands, to be given back with the rest of them.
+  if (committed.kind != Commit::kForeign) note_pace(worker, attempt, wall, now);
   const bool held = committed.kind == Commit::kForeign && queue_.is_out(worker.id, attempt);
   if (!held && drop_holding(worker, attempt)) line_up(worker);
   on_committed(committed);
@@ -232,9 +261,6 @@ bool Scheduler::on_result(WorkerRecord& worker, v1::JobResult* result) {
   if (options_.on_job) {
     options_.on_job({true, result->job_id(), attempt, worker.name, worker.host});
   }
-  if (!std::isfinite(wall) || wall < 0) return true;
-  worker.mean_wall =
-      worker.mean_wall < 0 ? wall : worker.mean_wall + 0.1 * (wall - worker.mean_wall);
   return true;
 }
 
@@ -320,11 +346,12 @@ void Scheduler::on_process_end(const WorkerEnd& end) {
   const auto departed = departed_.find(end.name);
   if (departed == departed_.end()) return;
   if (end.epoch != options_.epoch || end.attempt == 0) return;
-  const Blamed blamed = queue_.blame(*departed->second, end.attempt, end.cause);
+  Blamed blamed = queue_.blame(*departed->second, end.attempt, end.cause, end.failure);
   departed_.erase(departed);
   if (end.cause == EndCause::kHung) ++counts_.hung;
   if (!blamed.quarantined) return;
   ++counts_.quarantined;
+  blamed.reason += values_of_task(blamed.task);
   if (quarantine_reasons_.size() >= kReasonsKept) quarantine_reasons_.pop_front();
   quarantine_reasons_.push_back(blamed.reason);
   report(FarmEvent::kQuarantined, end.name, blamed.reason);

@@ -50,7 +50,10 @@ struct SchedulerOptions {
   CopyOptions copies;
   unsigned window = 2;  // jobs in a worker's hand
   // Tasks shorter than a round trip need more in hand: as many as last so long, at most window_max.
+  // `window_s` is a round trip on an idle machine; what longer ones need is measured, worker by
+  // worker.
   double window_s = 0.004;
+  double window_most_s = 0.05;  // half of what makes a straggler (CopyOptions)
   unsigned window_max = 256;
   double heartbeat_interval_s = 1;
   double silence_limit_s = 10;
@@ -77,6 +80,7 @@ struct WorkerEnd {
   std::uint64_t epoch = 0;
   std::uint64_t attempt = 0;  // 0: nothing
   std::string text;
+  std::string failure = {};  // what it reported of why it ended (ProcessEnded)
 };
 
 struct Outgoing {
@@ -133,7 +137,7 @@ class Scheduler {
   void on_hello(const std::string& peer, const v1::Hello& hello, double now);
   void on_heartbeat(WorkerRecord& worker, const v1::Heartbeat& heartbeat, double now);
   // False: the worker is gone with it.
-  bool on_result(WorkerRecord& worker, v1::JobResult* result);
+  bool on_result(WorkerRecord& worker, v1::JobResult* result, double now);
   void on_dropped(WorkerRecord& worker, const v1::ResultBatch& batch);
   void on_offer(WorkerRecord& worker, v1::Offer* offer);
   void on_committed(const Committed& committed);
@@ -142,6 +146,7 @@ class Scheduler {
   // Gives back what the worker holds but `keeps`, if it holds it for longer than `grace`.
   template <class List>
   void keep_only(WorkerRecord& worker, const List& keeps, double held_since_before);
+  std::string values_of_task(const v1::Task& task) const;
   void dismiss(WorkerRecord& worker, FarmEvent::Kind kind, const std::string& text);
   void cancel_all();
   void cancel(const Losers& losers);

@@ -54,7 +54,13 @@ std::size_t Scheduler::credit(const WorkerRecord& worker) const {
                                ? std::min(worker.asked_window, options_.window_max)
                                : std::max(options_.window, 1u);
   if (worker.asked_window > 0 || worker.mean_wall < 0) return base;
-  const double lasting = std::ceil(options_.window_s / std::max(worker.mean_wall, 1e-9)) + 1;
+  // Of n tasks in hand, each out for t s, a worker is busy for the share n wall / t of the time, so
+  // `kBusy` t / wall of them are what it takes to be busy for that share; fewer where it is.
+  constexpr double kBusy = 0.95;
+  const double wall = std::max(worker.mean_wall, 1e-9);
+  const double lasting =
+      std::max(std::ceil(options_.window_s / wall) + 1,
+               std::ceil(std::min(kBusy * worker.turnaround, options_.window_most_s) / wall));
   const std::size_t wanted =
       static_cast<std::size_t>(std::min(lasting, static_cast<double>(options_.window_max)));
   // Towards the end of a batch nobody takes what others will have time for.

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "common/base/build_info.h"
+#include "common/base/try.h"
 #include "common/net/envelope.h"
 #include "common/net/socket.h"
 #include "common/problem/problem.h"
@@ -91,27 +92,23 @@ Status SocketFarm::Impl::open() {
   SocketOptions links;
   links.security = options.security;
   links.limits = options.limits;
-  auto made = RouterSocket::create(links);
-  if (!made) return made.error();
-  socket = std::move(made).value();
+  ASSIGN_OR_RETURN(auto made, RouterSocket::create(links));
+  socket = std::move(made);
   for (const std::string& endpoint : options.listen) {
-    auto bound = socket->bind(endpoint);
-    if (!bound) return bound.error();
-    endpoints.push_back(*bound);
+    ASSIGN_OR_RETURN(auto bound, socket->bind(endpoint));
+    endpoints.push_back(bound);
   }
   return options.local_workers > 0 ? open_local() : Status{};
 }
 
 Status SocketFarm::Impl::open_local() {
-  auto program = options.worker_program.empty() ? find_worker_program()
-                                                : Result<std::string>(options.worker_program);
-  if (!program) return program.error();
-  auto made = PrivateFolder::make();
-  if (!made) return made.error();
-  folder = std::move(made).value();
-  auto endpoint = socket->bind("ipc://" + folder->socket_path());
-  if (!endpoint) return endpoint.error();
-  locals = std::make_unique<LocalWorkers>(*program, options.local_workers, *endpoint,
+  ASSIGN_OR_RETURN(auto program, options.worker_program.empty()
+                                     ? find_worker_program()
+                                     : Result<std::string>(options.worker_program));
+  ASSIGN_OR_RETURN(auto made, PrivateFolder::make());
+  folder = std::move(made);
+  ASSIGN_OR_RETURN(auto endpoint, socket->bind("ipc://" + folder->socket_path()));
+  locals = std::make_unique<LocalWorkers>(program, options.local_workers, endpoint,
                                           options.local_limits);
   return locals->start();
 }
@@ -123,7 +120,7 @@ void SocketFarm::Impl::reap(double now) {
   }
   if (!locals) return;
   for (const ProcessEnded& end : locals->pool().reap(now)) {
-    scheduler->on_process_end({end.name, end.cause, end.epoch, end.attempt, end.text});
+    scheduler->on_process_end({end.name, end.cause, end.epoch, end.attempt, end.text, end.failure});
     if (end.gave_up) {
       if (last_trouble.empty()) last_trouble = end.text;
       on_event({FarmEvent::kDied, end.name, end.text + "; it is not started again", ""});
@@ -160,7 +157,7 @@ Status SocketFarm::Impl::loop(const std::function<void(const FarmProgress&)>& on
       on_progress(scheduler->progress());
       next_progress = now + kProgressInterval;
     }
-    if (Status status = workers_can_be_had(); !status) return status;
+    RETURN_IF_ERROR(workers_can_be_had());
     if (!busy) sleep(now);
   }
   if (on_progress) on_progress(scheduler->progress());
@@ -172,7 +169,7 @@ SocketFarm::SocketFarm(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 Result<std::unique_ptr<SocketFarm>> SocketFarm::create(SocketFarmOptions options) {
   auto impl = std::make_unique<Impl>();
   impl->options = std::move(options);
-  if (Status status = impl->open(); !status) return status.error();
+  RETURN_IF_ERROR(impl->open());
   return std::unique_ptr<SocketFarm>(new SocketFarm(std::move(impl)));
 }
 

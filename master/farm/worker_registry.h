@@ -33,6 +33,7 @@ struct WorkerRecord : WorkerIdentity, std::enable_shared_from_this<WorkerRecord>
   std::vector<Holding> holds;  // oldest first: a worker works in this order
   std::uint64_t finished = 0;
   double mean_wall = -1;  // s a task, lately; negative: unknown
+  double turnaround = 0;  // s between a task's dispatch and its answer, lately
   bool leaving = false;   // takes no more jobs
   double joined = 0;      // s
   bool in_line = false;   // the scheduler's: waits in line for jobs

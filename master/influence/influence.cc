@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/base/try.h"
 #include "common/random/stream.h"
 #include "common/score/rank_tests.h"
 
@@ -33,9 +34,9 @@ class Study {
   Result<InfluenceReport> run() {
     for (const Gene& gene : genes_) report_.factors.push_back({gene, {}, {}});
     plan();
-    if (Status s = standard(); !s) return s.error();
-    if (Status s = one_at_a_time(); !s) return s.error();
-    if (Status s = morris(); !s) return s.error();
+    RETURN_IF_ERROR(standard());
+    RETURN_IF_ERROR(one_at_a_time());
+    RETURN_IF_ERROR(morris());
     std::stable_sort(report_.factors.begin(), report_.factors.end(),
                      [](const FactorInfluence& a, const FactorInfluence& b) {
                        if (a.alone.influential != b.alone.influential) return a.alone.influential;
@@ -67,14 +68,13 @@ class Study {
     hooks_.began(0);
     std::vector<TraceRequest> requests = {{{}, std::nullopt}};
     for (unsigned r = 0; r < 2 * settings_.repeats; ++r) requests.push_back({{}, r});
-    auto sets = trace_paths(farm_, problem_, settings_.trace, requests);
-    if (!sets) return sets.error();
-    for (const PathSet& set : *sets) {
+    ASSIGN_OR_RETURN(auto sets, trace_paths(farm_, problem_, settings_.trace, requests));
+    for (const PathSet& set : sets) {
       if (!set.ok) return Error{"the standard itself does not end well; change its [parameters]"};
     }
-    nominal_ = sets->front();
-    repeats_.assign(sets->begin() + 1, sets->begin() + 1 + settings_.repeats);
-    others_.assign(sets->begin() + 1 + settings_.repeats, sets->end());
+    nominal_ = sets.front();
+    repeats_.assign(sets.begin() + 1, sets.begin() + 1 + settings_.repeats);
+    others_.assign(sets.begin() + 1 + settings_.repeats, sets.end());
     choose_horizon();
     for (unsigned r = 0; r < settings_.repeats; ++r)
       noise_.push_back(apart(repeats_[r], others_[r]));
@@ -148,9 +148,8 @@ class Study {
                               kLevelNoise + (f * 64 + l) * settings_.repeats + r});
         }
       }
-      const auto sets = trace_paths(farm_, problem_, settings_.trace, requests);
-      if (!sets) return sets.error();
-      p.push_back(judge_levels(levels, *sets, factor.alone));
+      ASSIGN_OR_RETURN(const auto sets, trace_paths(farm_, problem_, settings_.trace, requests));
+      p.push_back(judge_levels(levels, sets, factor.alone));
     }
     const std::vector<double> adjusted = holm(p);
     for (std::size_t f = 0; f < p.size(); ++f) {
@@ -226,9 +225,8 @@ class Study {
         requests.push_back({overrides_of(genome), std::nullopt});
       }
     }
-    const auto sets = trace_paths(farm_, problem_, settings_.trace, requests);
-    if (!sets) return sets.error();
-    judge_walks(*sets, orders);
+    ASSIGN_OR_RETURN(const auto sets, trace_paths(farm_, problem_, settings_.trace, requests));
+    judge_walks(sets, orders);
     return {};
   }
 

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 
+#include "common/base/try.h"
+
 namespace gapfarm {
 namespace {
 
@@ -67,11 +69,10 @@ Result<std::vector<PathSet>> trace_paths(Farm& farm, const Problem& problem,
       tasks.push_back(trace_task(request, traced[i], i, settings));
     }
   }
-  const auto results = farm.run(farm.add_problem(to_proto(problem)), tasks);
-  if (!results) return results.error();
+  ASSIGN_OR_RETURN(const auto results, farm.run(farm.add_problem(to_proto(problem)), tasks));
   std::vector<PathSet> sets(requests.size());
-  for (std::size_t i = 0; i < results->size(); ++i) {
-    const v1::TaskResult& result = (*results)[i];
+  for (std::size_t i = 0; i < results.size(); ++i) {
+    const v1::TaskResult& result = results[i];
     if (result.outcome() == v1::INVALID_REQUEST)
       return Error{"a worker refused: " + result.message()};
     PathSet& set = sets[i / traced.size()];

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "common/base/try.h"
 #include "master/evolve/evaluation.h"
 #include "master/evolve/optimisers.h"
 
@@ -36,12 +37,11 @@ class Search {
         requests.push_back({overrides_of(problem_, genome), first_repeat + r});
       }
     }
-    const auto sets = trace_paths(farm_, problem_, settings_.trace, requests);
-    if (!sets) return sets.error();
+    ASSIGN_OR_RETURN(const auto sets, trace_paths(farm_, problem_, settings_.trace, requests));
     std::vector<std::optional<double>> found;
     for (std::size_t i = 0; i < genomes.size(); ++i) {
       found.push_back(
-          end_spread(std::span(*sets).subspan(i * settings_.repeats, settings_.repeats)));
+          end_spread(std::span(sets).subspan(i * settings_.repeats, settings_.repeats)));
     }
     return found;
   }
@@ -83,8 +83,7 @@ Result<StabilityReport> find_stability(Farm& farm, const Problem& problem,
                                        const StabilitySettings& settings, const StageHooks& hooks) {
   OptimiserSetup setup = optimiser_setup(settings.evolution, problem, settings.trace.seed);
   setup.noisy = false;
-  auto optimiser = make_optimiser(setup);
-  if (!optimiser) return optimiser.error();
+  ASSIGN_OR_RETURN(auto optimiser, make_optimiser(setup));
   const Search search(farm, problem, settings);
   StabilityReport report;
   // The config's own values, then the points, then those two and the best on fresh repeats.
@@ -92,31 +91,28 @@ Result<StabilityReport> find_stability(Farm& farm, const Problem& problem,
       traces_of_a_set(problem, settings.trace) * settings.repeats * (settings.evaluations + 3);
   hooks.planned({{"try points", 1, tasks}});
   hooks.began(0);
-  auto standard = search.spreads({{}}, 0);
-  if (!standard) return standard.error();
-  report.standard_spread = standard->front();
+  ASSIGN_OR_RETURN(auto standard, search.spreads({{}}, 0));
+  report.standard_spread = standard.front();
   for (int idle = 0;
-       (*optimiser)->evaluations() < settings.evaluations && idle < kMostIdleGenerations;) {
+       optimiser->evaluations() < settings.evaluations && idle < kMostIdleGenerations;) {
     std::vector<Genome> genomes;
-    for (const Candidate& candidate : (*optimiser)->ask()) genomes.push_back(candidate.genome);
-    const auto spreads = search.spreads(genomes, 0);
-    if (!spreads) return spreads.error();
+    for (const Candidate& candidate : optimiser->ask()) genomes.push_back(candidate.genome);
+    ASSIGN_OR_RETURN(const auto spreads, search.spreads(genomes, 0));
     for (std::size_t i = 0; i < genomes.size(); ++i) {
-      if ((*spreads)[i]) report.tried.push_back({problem.values_of(genomes[i]), *(*spreads)[i]});
+      if (spreads[i]) report.tried.push_back({problem.values_of(genomes[i]), *spreads[i]});
     }
-    (*optimiser)->tell(scores_of(*spreads));
+    optimiser->tell(scores_of(spreads));
     idle = genomes.empty() ? idle + 1 : 0;
   }
-  report.evaluations = (*optimiser)->evaluations();
-  const Member& best = (*optimiser)->best();
+  report.evaluations = optimiser->evaluations();
+  const Member& best = optimiser->best();
   if (best.outcome != v1::OK) {
     return Error{"no point of the searched box ends well; narrow the genes' ranges"};
   }
   report.best = {problem.values_of(best.genome), best.cost};
-  const auto fresh = search.spreads({{}, best.genome}, kFreshNoise);
-  if (!fresh) return fresh.error();
-  report.standard_fresh = (*fresh)[0];
-  report.best_fresh = (*fresh)[1];
+  ASSIGN_OR_RETURN(const auto fresh, search.spreads({{}, best.genome}, kFreshNoise));
+  report.standard_fresh = fresh[0];
+  report.best_fresh = fresh[1];
   return report;
 }
 

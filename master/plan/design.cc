@@ -5,6 +5,7 @@
 #include <map>
 
 #include "common/base/suggest.h"
+#include "common/base/try.h"
 #include "master/diagnose/subject.h"
 #include "master/experiment/plan.h"
 #include "master/plan/selection.h"
@@ -123,12 +124,11 @@ Result<TrialLog> Designer::driven(const Sessions& plan) {
                                 subject_->pose_position, subject_->pose_heading}) {
     problem.values[noise.row] = problem.table()[noise.row].lower;
   }
-  const auto results =
-      farm_.run(farm_.add_problem(to_proto(problem)), simulate_tasks(plan, {}, settings_.seed, 0));
-  if (!results) return results.error();
+  ASSIGN_OR_RETURN(const auto results, farm_.run(farm_.add_problem(to_proto(problem)),
+                                                 simulate_tasks(plan, {}, settings_.seed, 0)));
   TrialLog log;
-  for (std::size_t s = 0; s < results->size(); ++s) {
-    const v1::TaskResult& result = (*results)[s];
+  for (std::size_t s = 0; s < results.size(); ++s) {
+    const v1::TaskResult& result = results[s];
     if (result.outcome() != v1::OK) {
       return Error{"the simulation ended with " + v1::Outcome_Name(result.outcome()) + " (" +
                        result.message() + "); these parameters do not make a robot that drives",
@@ -153,26 +153,24 @@ bool Designer::stays(const TrialLog& log, std::size_t first, std::size_t count) 
 
 Result<std::vector<Chain>> Designer::choose() {
   const Sessions pool = draw(settings_.pool, settings_.seed);
-  const auto log = driven(pool);
-  if (!log) return log.error();
-  auto told = signals_of(*log);
-  if (!told) return told.error();
-  const auto trials = static_cast<double>(log->trials.size());
+  ASSIGN_OR_RETURN(const auto log, driven(pool));
+  ASSIGN_OR_RETURN(auto told, signals_of(log));
+  const auto trials = static_cast<double>(log.trials.size());
   std::vector<const Shift*> shifts;
   std::vector<double> scales;
-  for (const Shift& shift : told->shifts) {
-    const double all = information(shift.rows, told->nuisances);
+  for (const Shift& shift : told.shifts) {
+    const double all = information(shift.rows, told.nuisances);
     if (all <= 0) continue;
     shifts.push_back(&shift);
     scales.push_back(std::sqrt(kInformation * trials / (settings_.trials * all)));
   }
-  const Eigen::Index nuisances = told->nuisances.cols();
+  const Eigen::Index nuisances = told.nuisances.cols();
   std::vector<Chain> chains;  // that stay on the floor
   std::vector<Rows> candidates;
   Eigen::Index first = 0;
   for (Chain& chain : chains_of(pool)) {
     const auto rows = static_cast<Eigen::Index>(3 * chain.size());
-    if (!stays(*log, static_cast<std::size_t>(first / 3), chain.size())) {
+    if (!stays(log, static_cast<std::size_t>(first / 3), chain.size())) {
       first += rows;
       continue;
     }
@@ -181,7 +179,7 @@ Result<std::vector<Chain>> Designer::choose() {
       candidate.col(static_cast<Eigen::Index>(k)) =
           scales[k] * shifts[k]->rows.segment(first, rows);
     }
-    candidate.rightCols(nuisances) = told->nuisances.middleRows(first, rows);
+    candidate.rightCols(nuisances) = told.nuisances.middleRows(first, rows);
     candidates.push_back(std::move(candidate));
     chains.push_back(std::move(chain));
     first += rows;
@@ -265,23 +263,18 @@ Result<DesignedPlan> design_plan(Farm& farm, const Config& config, const PlanSet
   };
   DesignedPlan plan;
   Designer designer(farm, config, settings);
-  if (Status s = designer.choose_effects(&plan); !s) return s.error();
+  RETURN_IF_ERROR(designer.choose_effects(&plan));
   say("candidates");
-  const auto chains = designer.choose();
-  if (!chains) return chains.error();
+  ASSIGN_OR_RETURN(const auto chains, designer.choose());
   say("what the plan shows");
   const SimulateSettings& simulate = config.simulate;
-  auto log = designer.driven(dealt(*chains, simulate.sessions, simulate.pause_s));
-  if (!log) return log.error();
-  const auto planned = designer.signals_of(*log);
-  if (!planned) return planned.error();
+  ASSIGN_OR_RETURN(auto log, designer.driven(dealt(chains, simulate.sessions, simulate.pause_s)));
+  ASSIGN_OR_RETURN(const auto planned, designer.signals_of(log));
   say("what a random one shows");
-  auto random = designer.driven(designer.draw(1, settings.seed + 1));
-  if (!random) return random.error();
-  const auto at_random = designer.signals_of(*random);
-  if (!at_random) return at_random.error();
-  plan.seen = visibility(config.problem, *planned);
-  plan.seen_at_random = visibility(config.problem, *at_random);
+  ASSIGN_OR_RETURN(auto random, designer.driven(designer.draw(1, settings.seed + 1)));
+  ASSIGN_OR_RETURN(const auto at_random, designer.signals_of(random));
+  plan.seen = visibility(config.problem, planned);
+  plan.seen_at_random = visibility(config.problem, at_random);
   keep_common(&plan.seen, &plan.seen_at_random);
   for (const std::size_t effect : designer.effects()) {
     const std::string& name = config.problem.table().effects()[effect].name;
@@ -290,9 +283,9 @@ Result<DesignedPlan> design_plan(Farm& farm, const Config& config, const PlanSet
       plan.without_shift.push_back(name);
     }
   }
-  plan.power = designer.power(*planned, *log, *at_random, *random, plan.seen_at_random);
-  plan.log = std::move(*log);
-  plan.random = std::move(*random);
+  plan.power = designer.power(planned, log, at_random, random, plan.seen_at_random);
+  plan.log = std::move(log);
+  plan.random = std::move(random);
   return plan;
 }
 

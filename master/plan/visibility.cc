@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 
+#include "common/base/try.h"
 #include "common/random/stream.h"
 #include "common/score/statistics.h"
 #include "master/infer/predictor.h"
@@ -53,13 +54,12 @@ Status simulate_shifts(Predictor& predictor, const Study& study, std::vector<Shi
     for (const std::size_t k : open) {
       requests.push_back({with_effect(study, (*shifts)[k].draw, (*shifts)[k].strength), {}});
     }
-    const auto ends = predictor.attempt(requests);
-    if (!ends) return ends.error();
+    ASSIGN_OR_RETURN(const auto ends, predictor.attempt(requests));
     std::vector<std::size_t> failed;
     for (std::size_t i = 0; i < open.size(); ++i) {
       Shift& shift = (*shifts)[open[i]];
-      if ((*ends)[i]) {
-        shift.rows = study.whiten(differences(study, *(*ends)[i], 1));
+      if (ends[i]) {
+        shift.rows = study.whiten(differences(study, *ends[i], 1));
       } else {
         shift.strength /= 2;
         failed.push_back(open[i]);
@@ -148,15 +148,13 @@ Result<Signals> signals(Farm& farm, const Problem& problem, const TrialLog& log,
   planned.log = log;
   planned.genes.clear();
   planned.fitness.kind = FitnessKind::kLogScore;
-  auto study = subject.make_study(planned, problem.genes);
-  if (!study) return study.error();
+  ASSIGN_OR_RETURN(auto study, subject.make_study(planned, problem.genes));
   Predictor predictor(farm, planned);
-  if (Status s = subject.tune(predictor, true, &*study); !s) return s.error();
-  study->use_noise(noise_of(subject, planned.values));
-  auto nuisances = subject.nuisances(predictor, *study);
-  if (!nuisances) return nuisances.error();
+  RETURN_IF_ERROR(subject.tune(predictor, true, &study));
+  study.use_noise(noise_of(subject, planned.values));
+  ASSIGN_OR_RETURN(auto nuisances, subject.nuisances(predictor, study));
   Signals found;
-  found.nuisances = std::move(*nuisances);
+  found.nuisances = std::move(nuisances);
   const Arena arena = arena_of(log);
   for (const std::size_t effect : settings.effects) {
     if (!planned.table().effects()[effect].moves_means()) continue;
@@ -166,7 +164,7 @@ Result<Signals> signals(Farm& farm, const Problem& problem, const TrialLog& log,
           {draw_effect(planned.table(), effect, arena, stream), kFirstStrength, {}});
     }
   }
-  if (Status s = simulate_shifts(predictor, *study, &found.shifts); !s) return s.error();
+  RETURN_IF_ERROR(simulate_shifts(predictor, study, &found.shifts));
   return found;
 }
 

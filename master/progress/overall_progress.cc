@@ -120,13 +120,7 @@ std::string progress_words(const ProgressView& view) {
   }
   text += format_share(view.share) + " done";
   if (view.stages > 1 && view.total > 0) text += " in all";
-  if (view.rate_per_s > 0) {
-    char rate[32];
-    std::snprintf(rate, sizeof rate, ", %.3g/s", view.rate_per_s);
-    text += rate;
-  }
-  if (view.time_left_s) text += ", about " + format_duration(*view.time_left_s) + " left";
-  return text;
+  return progress_text(text, view.rate_per_s, view.time_left_s);
 }
 
 }  // namespace gapfarm

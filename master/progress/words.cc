@@ -36,10 +36,13 @@ std::string format_number(const std::optional<double>& value, int digits) {
   return value ? formatted("%.*g", digits, *value) : "-";
 }
 
+std::string rate_text(double rate_per_s) {
+  return rate_per_s > 0 ? formatted(", %.3g/s", rate_per_s) : "";
+}
+
 std::string progress_text(std::string_view what, double rate_per_s,
                           std::optional<double> time_left_s) {
-  std::string text(what);
-  text += ", " + formatted("%.3g", rate_per_s) + "/s";
+  std::string text = std::string(what) + rate_text(rate_per_s);
   if (time_left_s) text += ", about " + format_duration(*time_left_s) + " left";
   return text;
 }

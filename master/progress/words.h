@@ -15,6 +15,8 @@ std::string format_share(double share);
 
 // Six significant digits, "-" for none.
 std::string format_number(const std::optional<double>& value, int digits = 6);
+// ", 210/s"; "" while there is none.
+std::string rate_text(double rate_per_s);
 // "generation 41 of 100, 210/s, about 12 s left": the text of a progress line.
 std::string progress_text(std::string_view what, double rate_per_s,
                           std::optional<double> time_left_s);

@@ -27,7 +27,7 @@ Json significant_all(const std::vector<double>& values) {
   return list;
 }
 
-Json number_or_null(const std::optional<double>& value) {
+Json significant_or_null(const std::optional<double>& value) {
   return value ? Json(significant(*value)) : Json(nullptr);
 }
 
@@ -156,9 +156,9 @@ Json generations_json(const RunReport& report) {
   const auto best = [](const RunGeneration& g) { return g.best.value_or(0); };
   for (const RunGeneration& g : decimated(report.generations, kMostPoints, best)) {
     list.push_back({{"generation", g.generation},
-                    {"best", number_or_null(g.best)},
-                    {"median", number_or_null(g.median)},
-                    {"worst", number_or_null(g.worst)},
+                    {"best", significant_or_null(g.best)},
+                    {"median", significant_or_null(g.median)},
+                    {"worst", significant_or_null(g.worst)},
                     {"evaluations", g.evaluations},
                     {"wall_s", significant(g.wall_s)}});
   }
@@ -187,7 +187,7 @@ Json elite_json(const RunReport& report) {
     Json shares = Json::array();
     for (const double share : line.shares) shares.push_back(significant(share));
     lines.push_back({{"id", line.birth_id},
-                     {"fitness", number_or_null(line.fitness)},
+                     {"fitness", significant_or_null(line.fitness)},
                      {"shares", std::move(shares)},
                      {"values", line.values}});
   }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "common/base/try.h"
 #include "common/problem/run_files.h"
 #include "common/trials/read.h"
 
@@ -66,12 +67,10 @@ Result<std::string> baseline_note_of_run(const Problem& problem, const Genome& g
   if (!has_baselines(problem.scenario) || problem.log.trials.empty()) return std::string();
   v1::Task task;
   task.mutable_predict()->mutable_point()->mutable_genome()->Assign(genome.begin(), genome.end());
-  const auto results = farm.run(farm.add_problem(to_proto(problem)), {task});
-  if (!results) return results.error();
-  if (results->front().outcome() != v1::OK) return std::string();
-  const auto beside = baselines_beside(problem, results->front().predict());
-  if (!beside) return beside.error();
-  const std::string sentence = baseline_sentence(*beside, "the model");
+  ASSIGN_OR_RETURN(const auto results, farm.run(farm.add_problem(to_proto(problem)), {task}));
+  if (results.front().outcome() != v1::OK) return std::string();
+  ASSIGN_OR_RETURN(const auto beside, baselines_beside(problem, results.front().predict()));
+  const std::string sentence = baseline_sentence(beside, "the model");
   return sentence.empty() ? sentence
                           : std::string("without a simulation, ") + kFromOthers + ": " + sentence;
 }
@@ -83,10 +82,9 @@ Result<std::vector<BaselineComparison>> baselines_beside(const Problem& problem,
   }
   std::vector<double> scores;
   for (const v1::Predicted& p : prediction.predictions()) scores.push_back(p.log_score());
-  const auto baselines =
-      crossfitted_baselines(problem.log, problem.commands, session_folds(problem.log));
-  if (!baselines) return baselines.error();
-  return compare_with_baselines(*baselines, scores);
+  ASSIGN_OR_RETURN(const auto baselines, crossfitted_baselines(problem.log, problem.commands,
+                                                               session_folds(problem.log)));
+  return compare_with_baselines(baselines, scores);
 }
 
 }  // namespace gapfarm

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "common/base/try.h"
 #include "master/evolve/evaluation.h"
 #include "master/progress/words.h"
 
@@ -207,20 +208,19 @@ Result<std::vector<Score>> FarmBackend::evaluate(std::span<const Candidate> cand
   for (const Candidate& candidate : candidates) {
     tasks.push_back(evaluation_task(candidate, seed_));
   }
-  const auto results =
-      farm_.run(problem_hash_, tasks, [&](const FarmProgress& p) { progress_.on_progress(p); });
-  if (!results) return results.error();
+  ASSIGN_OR_RETURN(const auto results, farm_.run(problem_hash_, tasks, [&](const FarmProgress& p) {
+    progress_.on_progress(p);
+  }));
   std::vector<Score> scores;
-  for (const v1::TaskResult& result : *results) {
-    const Result<Score> score = score_of(result, fitness_);
-    if (!score) return score.error();
-    scores.push_back(*score);
+  for (const v1::TaskResult& result : results) {
+    ASSIGN_OR_RETURN(const Score score, score_of(result, fitness_));
+    scores.push_back(score);
   }
   return scores;
 }
 
 Status StoreSink::commit(const GenerationRecord& record) {
-  if (Status s = store_.set_numeric_class(farm_.numeric_class()); !s) return s;
+  RETURN_IF_ERROR(store_.set_numeric_class(farm_.numeric_class()));
   StoredGeneration stored;
   stored.generation = record.generation;
   stored.diversity = record.diversity;
@@ -246,8 +246,7 @@ Status StoreSink::commit(const GenerationRecord& record) {
     stored.individuals.push_back(std::move(individual));
   }
   summarise_fitness(stored, higher_is_better(kind));
-  const Result<std::string> digest = store_.commit(stored);
-  if (!digest) return digest.error();
+  ASSIGN_OR_RETURN(const std::string digest, store_.commit(stored));
   progress_.on_generation(record, stored.best);
   return {};
 }

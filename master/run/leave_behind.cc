@@ -3,6 +3,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "common/base/build_info.h"
+#include "common/base/try.h"
 #include "common/config/model.h"
 #include "common/trials/files.h"
 #include "master/report/fitness_chart.h"
@@ -43,24 +44,23 @@ std::vector<ScoreRow> baseline_rows(const std::vector<BaselineComparison>& compa
 Status write_poses(RunStore& store, const Problem& problem, const EvolveSummary& summary,
                    Farm& farm, const std::vector<Validated>& validated) {
   // As the config had them, and as evolved.
-  const auto results = farm.run(farm.add_problem(to_proto(problem)),
-                                {predict_task({}), predict_task(summary.best->genome)});
-  if (!results) return results.error();
+  ASSIGN_OR_RETURN(const auto results,
+                   farm.run(farm.add_problem(to_proto(problem)),
+                            {predict_task({}), predict_task(summary.best->genome)}));
   std::vector<PredictionOfLog> predictions;
   const char* const labels[] = {"before", "after"};
   const PredictionOfLog* known[] = {nullptr, nullptr};
-  predictions.reserve(results->size());
-  for (std::size_t i = 0; i < results->size(); ++i) {
-    if ((*results)[i].outcome() != v1::OK) continue;  // a nominal robot may fall over
-    known[i] = &predictions.emplace_back(PredictionOfLog{labels[i], (*results)[i].predict()});
+  predictions.reserve(results.size());
+  for (std::size_t i = 0; i < results.size(); ++i) {
+    if (results[i].outcome() != v1::OK) continue;  // a nominal robot may fall over
+    known[i] = &predictions.emplace_back(PredictionOfLog{labels[i], results[i].predict()});
   }
   RunOutcome outcome = run_outcome(problem, known[0], known[1], validated);
   if (known[1] != nullptr) {
-    const auto beside = baselines_beside(problem, known[1]->prediction);
-    if (!beside) return beside.error();
-    outcome.baselines = baseline_rows(*beside);
+    ASSIGN_OR_RETURN(const auto beside, baselines_beside(problem, known[1]->prediction));
+    outcome.baselines = baseline_rows(beside);
   }
-  if (Status s = store.keep_document(kOutcomeDocument, to_json(outcome)); !s) return s;
+  RETURN_IF_ERROR(store.keep_document(kOutcomeDocument, to_json(outcome)));
   const std::string title =
       fmt::format("End poses of {} trials, measured and simulated", problem.log.trials.size());
   return write_file_atomically(
@@ -71,12 +71,10 @@ Status write_poses(RunStore& store, const Problem& problem, const EvolveSummary&
 }
 
 Status write_fitness(const RunStore& store) {
-  const auto reader = RunReader::open(store.run());
-  if (!reader) return reader.error();
-  const auto generations = reader->generations();
-  if (!generations) return generations.error();
+  ASSIGN_OR_RETURN(const auto reader, RunReader::open(store.run()));
+  ASSIGN_OR_RETURN(const auto generations, reader.generations());
   std::vector<FitnessPoint> points;
-  for (const StoredGeneration& g : *generations) {
+  for (const StoredGeneration& g : generations) {
     points.push_back({g.generation, g.best, g.median, g.worst});
   }
   const RunInfo& info = store.info();
@@ -86,9 +84,8 @@ Status write_fitness(const RunStore& store) {
 }
 
 Status write_page(const RunStore& store) {
-  const auto report = read_run_report({store.run(), {}, {}});
-  if (!report) return report.error();
-  return write_file_atomically((store.run() / "report.html").string(), run_html(*report));
+  ASSIGN_OR_RETURN(const auto report, read_run_report({store.run(), {}, {}}));
+  return write_file_atomically((store.run() / "report.html").string(), run_html(report));
 }
 
 }  // namespace
@@ -97,9 +94,9 @@ Status leave_behind(RunStore& store, const Problem& problem, const Config& confi
                     const EvolveSummary& summary, Farm& farm,
                     const std::vector<Validated>& validated) {
   const Model model = model_of(store, problem, config, summary);
-  if (Status s = write_model(model, (store.run() / "model.toml").string()); !s) return s;
-  if (Status s = write_poses(store, problem, summary, farm, validated); !s) return s;
-  if (Status s = write_fitness(store); !s) return s;
+  RETURN_IF_ERROR(write_model(model, (store.run() / "model.toml").string()));
+  RETURN_IF_ERROR(write_poses(store, problem, summary, farm, validated));
+  RETURN_IF_ERROR(write_fitness(store));
   return write_page(store);
 }
 

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cmath>
 
+#include "common/base/try.h"
 #include "master/evolve/evaluation.h"
 #include "master/evolve/optimisers.h"
 #include "master/evolve/staged.h"
@@ -31,13 +32,10 @@ struct RunInputs {
 };
 
 Result<RunInputs> read_inputs(const RunStore& store, const Config& config) {
-  auto checkpoint = store.checkpoint();
-  if (!checkpoint) return checkpoint.error();
-  auto plan = read_stages(config);
-  if (!plan) return plan.error();
-  auto kept_apart = read_validation(*plan, config);
-  if (!kept_apart) return kept_apart.error();
-  return RunInputs{*std::move(checkpoint), *std::move(plan), *std::move(kept_apart)};
+  ASSIGN_OR_RETURN(auto checkpoint, store.checkpoint());
+  ASSIGN_OR_RETURN(auto plan, read_stages(config));
+  ASSIGN_OR_RETURN(auto kept_apart, read_validation(plan, config));
+  return RunInputs{std::move(checkpoint), std::move(plan), std::move(kept_apart)};
 }
 
 // Where the search of a ground robot's values begins; nothing where the config has the say, and
@@ -48,28 +46,27 @@ Result<std::optional<SimulatedStart>> start_of(const RunInputs& inputs, const Ru
   if (inputs.checkpoint || own || !run.problem.ground || run.problem.log.trials.empty()) {
     return std::optional<SimulatedStart>();
   }
-  auto start = fit_by_simulation(farm, run.problem, run.config.evolution.optimiser.sigma);
-  if (!start) return start.error();
+  ASSIGN_OR_RETURN(auto start,
+                   fit_by_simulation(farm, run.problem, run.config.evolution.optimiser.sigma));
   watcher.note(fmt::format(
       "begins at least squares through the simulation: {} simulations from {} start{}, {:.2f} nats "
       "a window more than with the values of the robot's own kinematics",
-      start->simulations, start->starts, start->starts == 1 ? "" : "s", start->gain));
+      start.simulations, start.starts, start.starts == 1 ? "" : "s", start.gain));
   watcher.note(fmt::format(
       "on stretches left out of the fit the simulation foretells {:.2f} nats a window {} than the "
       "kinematics{}; no typical error there is more than {:.2f} times theirs",
-      std::abs(start->left_out_gain), start->left_out_gain < 0 ? "less" : "more",
-      start->kinematic ? ", too little to leave the kinematics' values" : "", start->worst_ratio));
-  return std::optional(*std::move(start));
+      std::abs(start.left_out_gain), start.left_out_gain < 0 ? "less" : "more",
+      start.kinematic ? ", too little to leave the kinematics' values" : "", start.worst_ratio));
+  return std::optional(std::move(start));
 }
 
 Result<std::unique_ptr<Optimiser>> optimiser_of(const RunInputs& inputs, const RunRequest& run,
                                                 Farm& farm, RunWatcher& watcher) {
-  const auto start = start_of(inputs, run, farm, watcher);
-  if (!start) return start.error();
+  ASSIGN_OR_RETURN(const auto start, start_of(inputs, run, farm, watcher));
   OptimiserSetup setup = optimiser_setup(run.config.evolution, run.problem, run.config.seed);
-  if (*start) {
-    setup.nominal = (*start)->genome;
-    setup.spread = (*start)->spread;
+  if (start) {
+    setup.nominal = start->genome;
+    setup.spread = start->spread;
   }
   const std::vector<Stage>& stages = inputs.plan.stages;
   if (!inputs.checkpoint) {
@@ -90,10 +87,9 @@ Status write_end(RunStore& store, Progress progress, RunState state, const std::
 // How the run's results do on what was kept apart.
 Result<std::vector<Validated>> validated_by(const RunStore& store, const Problem& apart, Farm& farm,
                                             const Genome& best) {
-  const auto checkpoint = store.checkpoint();
-  if (!checkpoint) return checkpoint.error();
+  ASSIGN_OR_RETURN(const auto checkpoint, store.checkpoint());
   std::vector<Genome> stages;
-  if (*checkpoint) stages = stage_results((*checkpoint)->optimiser_state, apart.genes.size());
+  if (checkpoint) stages = stage_results(checkpoint->optimiser_state, apart.genes.size());
   return validate(farm, apart, stages, best);
 }
 
@@ -103,17 +99,15 @@ Status leave_model(RunStore& store, const RunRequest& run, const RunInputs& inpu
   const Genome& best = summary.evolved.best->genome;
   if (inputs.kept_apart) {
     watcher.read(inputs.kept_apart->log);
-    auto validated = validated_by(store, *inputs.kept_apart, farm, best);
-    if (!validated) return validated.error();
+    ASSIGN_OR_RETURN(auto validated, validated_by(store, *inputs.kept_apart, farm, best));
     summary.kept_apart = inputs.kept_apart->log.trials.size();
-    summary.validated = *std::move(validated);
+    summary.validated = std::move(validated);
   }
   const Status left =
       leave_behind(store, run.problem, run.config, summary.evolved, farm, summary.validated);
   if (!left) return left;
-  const auto beside = baseline_note_of_run(run.problem, best, farm);
-  if (!beside) return beside.error();
-  if (!beside->empty()) watcher.note(*beside);
+  ASSIGN_OR_RETURN(const auto beside, baseline_note_of_run(run.problem, best, farm));
+  if (!beside.empty()) watcher.note(beside);
   for (const char* name : kLeftBehind) summary.files.push_back((store.run() / name).string());
   return {};
 }
@@ -157,8 +151,7 @@ Result<RunSummary> evolve_run(RunStore& store, const RunRequest& request, RunWat
   RunSummary summary;
   summary.evolved = *std::move(evolved);
   const RunState state = summary.stopped() ? RunState::kStopped : RunState::kFinished;
-  if (Status s = write_end(store, progress.now(), state, summary.evolved.text); !s)
-    return s.error();
+  RETURN_IF_ERROR(write_end(store, progress.now(), state, summary.evolved.text));
   if (summary.stopped()) return summary;
   if (summary.evolved.best && summary.evolved.best->outcome == v1::OK) {
     const Status left = leave_model(store, request, *inputs, (*farm)->farm(), watcher, summary);
@@ -166,9 +159,8 @@ Result<RunSummary> evolve_run(RunStore& store, const RunRequest& request, RunWat
     if (!left) return stopped_by(store, left.error(), progress.now());
   }
   // Of earlier masters' generations too, and of what was done after the last one.
-  const auto given_up = store.quarantined();
-  if (!given_up) return given_up.error();
-  summary.given_up = *given_up + (*farm)->given_up() - sink.quarantined();
+  ASSIGN_OR_RETURN(const auto given_up, store.quarantined());
+  summary.given_up = given_up + (*farm)->given_up() - sink.quarantined();
   return summary;
 }
 

@@ -10,6 +10,7 @@
 #include <map>
 #include <utility>
 
+#include "common/base/try.h"
 #include "master/progress/words.h"
 #include "master/store/run_lock.h"
 #include "master/store/run_status.h"
@@ -144,20 +145,18 @@ class Present {
 };
 
 Status add_workers(const RunReader& reader, bool running, RunFarm* farm) {
-  const auto progress = reader.progress();
-  if (!progress) return progress.error();
-  const auto events = reader.worker_events(kMostEvents);
-  if (!events) return events.error();
+  ASSIGN_OR_RETURN(const auto progress, reader.progress());
+  ASSIGN_OR_RETURN(const auto events, reader.worker_events(kMostEvents));
   std::map<std::string, std::string> failures;  // the last of each
-  for (const StoredWorkerEvent& event : *events) {
+  for (const StoredWorkerEvent& event : events) {
     if (!is_failure(event)) continue;
     failures[event.worker] = day_and_time(event.unix_s) + ": " + event.text;
   }
-  for (auto it = events->rbegin(); it != events->rend(); ++it) {
+  for (auto it = events.rbegin(); it != events.rend(); ++it) {
     if (farm->failures.size() == kMostFailures) break;
     if (is_failure(*it)) farm->failures.push_back(sentence_of(*it));
   }
-  for (const StoredWorker& w : progress->workers) {
+  for (const StoredWorker& w : progress.workers) {
     if (farm->workers.size() == kMostRows) break;
     const auto failure = failures.find(w.name);
     // Whoever is not watched any more is neither busy nor idle.
@@ -165,7 +164,7 @@ Status add_workers(const RunReader& reader, bool running, RunFarm* farm) {
         {w.name, w.host, running || w.state == "gone" ? w.state : "was " + w.state, w.jobs,
          w.finished, w.rate_per_s, failure == failures.end() ? "" : failure->second});
   }
-  farm->timeline = timeline_of(*events, progress->heartbeat_unix_s, running);
+  farm->timeline = timeline_of(events, progress.heartbeat_unix_s, running);
   return {};
 }
 
@@ -193,22 +192,20 @@ RunTimeline timeline_of(const std::vector<StoredWorkerEvent>& events, double hea
 }
 
 Status add_farm(const RunReader& reader, RunReport* report) {
-  const auto status = run_status(reader, unix_now_s());
-  if (!status) return status.error();
+  ASSIGN_OR_RETURN(const auto status, run_status(reader, unix_now_s()));
   RunFarm& farm = report->farm;
-  farm.state = run_state_name(status->state);
-  const bool running = status->state == RunState::kRunning;
-  farm.told = running ? status->progress.waiting : status->stop_reason;
-  add_facts(*status, &farm);
-  if (Status s = add_workers(reader, running, &farm); !s) return s;
-  for (auto it = status->incidents.rbegin(); it != status->incidents.rend(); ++it) {
+  farm.state = run_state_name(status.state);
+  const bool running = status.state == RunState::kRunning;
+  farm.told = running ? status.progress.waiting : status.stop_reason;
+  add_facts(status, &farm);
+  RETURN_IF_ERROR(add_workers(reader, running, &farm));
+  for (auto it = status.incidents.rbegin(); it != status.incidents.rend(); ++it) {
     if (farm.incidents.size() == kMostIncidents) break;
     farm.incidents.push_back(fmt::format("{}, generation {}, {}: {}", day_and_time(it->unix_s),
                                          it->generation, incident_name(it->kind), it->text));
   }
-  const auto lost = reader.given_up(kMostGivenUp);
-  if (!lost) return lost.error();
-  for (const RunReader::Member& member : *lost) {
+  ASSIGN_OR_RETURN(const auto lost, reader.given_up(kMostGivenUp));
+  for (const RunReader::Member& member : lost) {
     const StoredIndividual& one = member.individual;
     farm.given_up.push_back({one.birth_id,
                              member.generation,

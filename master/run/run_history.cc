@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "common/base/try.h"
 #include "master/report/html.h"
 #include "master/run/run_farm_history.h"
 
@@ -104,19 +105,17 @@ Status add_densities(const RunReader& reader, const Problem& problem,
                      const std::vector<StoredGeneration>& generations, RunReport* report) {
   std::vector<std::size_t> genes;
   report->densities = empty_densities(problem, &genes);
-  const auto last = reader.individuals(generations.back().generation);
-  if (!last) return last.error();
+  ASSIGN_OR_RETURN(const auto last, reader.individuals(generations.back().generation));
   const std::size_t columns = std::clamp<std::size_t>(
-      kMostMembers / std::max<std::size_t>(1, last->size()), 2, kMostColumns);
+      kMostMembers / std::max<std::size_t>(1, last.size()), 2, kMostColumns);
   for (const std::size_t i : some_of(generations.size(), columns)) {
-    const auto individuals = reader.individuals(generations[i].generation);
-    if (!individuals) return individuals.error();
+    ASSIGN_OR_RETURN(const auto individuals, reader.individuals(generations[i].generation));
     for (std::size_t d = 0; d < genes.size(); ++d) {
-      add_column(problem, generations[i].generation, *individuals, genes[d], &report->densities[d]);
+      add_column(problem, generations[i].generation, individuals, genes[d], &report->densities[d]);
     }
   }
   std::erase_if(report->densities, [](const GeneDensity& d) { return d.generations.empty(); });
-  add_elite(problem, *last, &report->elite);
+  add_elite(problem, last, &report->elite);
   return {};
 }
 
@@ -127,10 +126,9 @@ RunGenome genome_of_member(const RunReader::Member& member) {
 }
 
 Status add_genomes(const RunReader& reader, std::uint64_t generation, RunReport* report) {
-  const auto members = reader.individuals(generation);
-  if (!members) return members.error();
+  ASSIGN_OR_RETURN(const auto members, reader.individuals(generation));
   report->genomes_of = generation;
-  for (const StoredIndividual& one : *members) {
+  for (const StoredIndividual& one : members) {
     if (report->genomes.size() == kMostGenomes) break;
     report->genomes.push_back(genome_of_member({generation, one}));
   }
@@ -139,15 +137,14 @@ Status add_genomes(const RunReader& reader, std::uint64_t generation, RunReport*
 
 Status look_up(const RunReader& reader, const Problem& problem, std::uint64_t birth_id,
                RunReport* report) {
-  const auto member = reader.member(birth_id);
-  if (!member) return member.error();
-  if (!*member) {
+  ASSIGN_OR_RETURN(const auto member, reader.member(birth_id));
+  if (!member) {
     report->without_looked_up =
         fmt::format("No member of a committed generation is genome {}.", birth_id);
     return {};
   }
-  report->looked_up = genome_of_member(**member);
-  const std::vector<double>& genome = (*member)->individual.genome;
+  report->looked_up = genome_of_member(*member);
+  const std::vector<double>& genome = member->individual.genome;
   if (genome.size() != problem.genes.size()) return {};
   for (std::size_t g = 0; g < genome.size(); ++g) {
     const Parameter& p = problem.table()[problem.genes[g].row];
@@ -166,16 +163,14 @@ Status add_history(const RunReader& reader, const Problem& problem,
                    const std::vector<StoredGeneration>& generations, const RunQuestion& question,
                    RunReport* report) {
   report->trials = problem.log.trials.size();
-  if (Status s = add_farm(reader, report); !s) return s;
+  RETURN_IF_ERROR(add_farm(reader, report));
   if (question.genome) {
-    if (Status s = look_up(reader, problem, *question.genome, report); !s) return s;
+    RETURN_IF_ERROR(look_up(reader, problem, *question.genome, report));
   }
   if (generations.empty()) return {};
   const std::uint64_t last = generations.back().generation;
   const std::uint64_t asked = question.generation.value_or(last);
-  if (Status s = add_genomes(reader, asked >= 1 && asked <= last ? asked : last, report); !s) {
-    return s;
-  }
+  RETURN_IF_ERROR(add_genomes(reader, asked >= 1 && asked <= last ? asked : last, report));
   add_operators(generations, report);
   return add_densities(reader, problem, generations, report);
 }

@@ -9,6 +9,7 @@
 #include <limits>
 #include <sstream>
 
+#include "common/base/try.h"
 #include "common/config/config.h"
 #include "common/config/stages.h"
 #include "common/score/motion_model.h"
@@ -118,24 +119,22 @@ std::string headline(const RunReport& report) {
 
 Result<std::optional<RunOutcome>> stored_outcome(const RunReader& reader, std::uint64_t last,
                                                  RunReport* report) {
-  const auto document = reader.document(kOutcomeDocument);
-  if (!document) return document.error();
-  if (!*document) {
+  ASSIGN_OR_RETURN(const auto document, reader.document(kOutcomeDocument));
+  if (!document) {
     report->without_outcome =
         "How the best moves is worked out when a run ends, and this one has not; gapfarm resume "
         "goes on.";
     return std::optional<RunOutcome>();
   }
-  if ((*document)->generation != last) {
+  if (document->generation != last) {
     report->without_outcome = fmt::format(
         "How the best moves was last worked out for generation {}; gapfarm resume goes on and does "
         "it again at the end.",
-        (*document)->generation);
+        document->generation);
     return std::optional<RunOutcome>();
   }
-  auto outcome = parse_run_outcome((*document)->json);
-  if (!outcome) return outcome.error();
-  return std::optional<RunOutcome>(std::move(*outcome));
+  ASSIGN_OR_RETURN(auto outcome, parse_run_outcome(document->json));
+  return std::optional<RunOutcome>(std::move(outcome));
 }
 
 }  // namespace
@@ -180,68 +179,59 @@ Result<std::optional<Problem>> kept_apart_of(const RunInfo& info, const Problem&
   config.text = info.config_text;
   config.problem = problem;
   if (problem.ground) {
-    const auto read = parse_config(info.config_text, info.config_path, start_no_program);
-    if (!read) return read.error();
-    config.windows = read->windows;
-    config.trial_files = read->trial_files;
+    ASSIGN_OR_RETURN(const auto read,
+                     parse_config(info.config_text, info.config_path, start_no_program));
+    config.windows = read.windows;
+    config.trial_files = read.trial_files;
   }
-  const auto plan = read_stages(config);
-  if (!plan) return plan.error();
-  return read_validation(*plan, config);
+  ASSIGN_OR_RETURN(const auto plan, read_stages(config));
+  return read_validation(plan, config);
 }
 
 Result<RunReport> read_run_report(const RunQuestion& question) {
   const std::filesystem::path& run = question.run;
-  const auto reader = RunReader::open(run);
-  if (!reader) return reader.error();
-  const RunInfo& info = reader->info();
-  const Result<Problem> problem = stored_problem(*reader);
-  if (!problem) return problem.error();
-  const auto generations = reader->generations();
-  if (!generations) return generations.error();
+  ASSIGN_OR_RETURN(const auto reader, RunReader::open(run));
+  const RunInfo& info = reader.info();
+  ASSIGN_OR_RETURN(const Problem problem, stored_problem(reader));
+  ASSIGN_OR_RETURN(const auto generations, reader.generations());
   RunReport report;
   report.name = run.string();
   report.fitness = info.fitness;
   report.unit = info.fitness_unit;
   report.higher_is_better = info.higher_is_better;
-  report.pieces = !problem->pieces.empty();
+  report.pieces = !problem.pieces.empty();
   double wall_s = 0;
-  for (const StoredGeneration& g : *generations) {
+  for (const StoredGeneration& g : generations) {
     wall_s += g.wall_s;
     report.generations.push_back({g.generation, g.best, g.median, g.worst, g.evaluations, wall_s});
   }
-  const std::uint64_t last = generations->empty() ? 0 : generations->back().generation;
-  const auto best = reader->best();
-  if (!best) return best.error();
-  if (*best) {
-    const auto individuals = reader->individuals(last);
-    if (!individuals) return individuals.error();
-    report.parameters = parameter_rows(*problem, *individuals, **best);
+  const std::uint64_t last = generations.empty() ? 0 : generations.back().generation;
+  ASSIGN_OR_RETURN(const auto best, reader.best());
+  if (best) {
+    ASSIGN_OR_RETURN(const auto individuals, reader.individuals(last));
+    report.parameters = parameter_rows(problem, individuals, *best);
     add_determined(run / kDeterminedFile, &report.parameters);
   }
-  auto outcome = stored_outcome(*reader, last, &report);
-  if (!outcome) return outcome.error();
-  report.outcome = std::move(*outcome);
-  if (Status s = add_history(*reader, *problem, *generations, question, &report); !s) {
-    return s.error();
-  }
-  const auto apart = kept_apart_of(info, *problem);
+  ASSIGN_OR_RETURN(auto outcome, stored_outcome(reader, last, &report));
+  report.outcome = std::move(outcome);
+  RETURN_IF_ERROR(add_history(reader, problem, generations, question, &report));
+  const auto apart = kept_apart_of(info, problem);
   if (apart && *apart) report.kept_apart = (*apart)->log.trials.size();
-  report.windows = problem->ground != nullptr;
+  report.windows = problem.ground != nullptr;
   report.headline = headline(report);
   report.action = action(report, info);
   report.provenance = {
-      {"config", info.config_path},   {"trials", std::to_string(problem->log.trials.size())},
+      {"config", info.config_path},   {"trials", std::to_string(problem.log.trials.size())},
       {"problem", info.problem_hash}, {"seed", std::to_string(info.seed)},
       {"begun", info.created},        {"program", info.program_version + ", " + info.fingerprint}};
-  if (!generations->empty()) {
-    const StoredGeneration& g = generations->back();
+  if (!generations.empty()) {
+    const StoredGeneration& g = generations.back();
     report.provenance.emplace_back("digest", g.digest);
     report.provenance.emplace_back("evaluations", std::to_string(g.evaluations));
     report.provenance.emplace_back(
-        "best genome", *best ? fmt::format("{}; gapfarm replay {} --genome {}", (*best)->birth_id,
-                                           run.string(), (*best)->birth_id)
-                             : "none");
+        "best genome", best ? fmt::format("{}; gapfarm replay {} --genome {}", best->birth_id,
+                                          run.string(), best->birth_id)
+                            : "none");
   }
   return report;
 }

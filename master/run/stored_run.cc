@@ -1,5 +1,6 @@
 #include "master/run/stored_run.h"
 
+#include "common/base/try.h"
 #include "common/config/config.h"
 #include "common/problem/problem.h"
 
@@ -40,9 +41,8 @@ Result<Problem> stored_problem(const RunReader& run) {
 Result<Config> stored_config(const RunInfo& info, const EvolutionOverrides& overrides) {
   Result<Config> config = parse_config(info.config_text, info.config_path, start_program);
   if (!config) return config.error();
-  Result<Problem> problem = stored_problem(info);
-  if (!problem) return problem.error();
-  config->problem = std::move(*problem);
+  ASSIGN_OR_RETURN(Problem problem, stored_problem(info));
+  config->problem = std::move(problem);
   config->seed = info.seed;
   EvolutionOverrides all = EvolutionOverrides::from_json(info.overrides);
   all.merge(overrides);
@@ -51,27 +51,24 @@ Result<Config> stored_config(const RunInfo& info, const EvolutionOverrides& over
 }
 
 Result<Model> best_so_far(const RunReader& run) {
-  const auto generations = run.generations();
-  if (!generations) return generations.error();
+  ASSIGN_OR_RETURN(const auto generations, run.generations());
   const std::string name = run.run().string();
-  if (generations->empty()) {
+  if (generations.empty()) {
     return Error{name +
                  ": no generation is complete yet; wait for the first, see `gapfarm status " +
                  name + "`"};
   }
-  const StoredGeneration& last = generations->back();
+  const StoredGeneration& last = generations.back();
   // By number: another generation may be committed meanwhile.
-  const auto members = run.individuals(last.generation);
-  if (!members) return members.error();
-  if (members->empty() || !members->front().fitness) {
+  ASSIGN_OR_RETURN(const auto members, run.individuals(last.generation));
+  if (members.empty() || !members.front().fitness) {
     return Error{name + ": nothing has ended well yet; see `gapfarm status " + name + "`"};
   }
-  const Result<Problem> problem = stored_problem(run);
-  if (!problem) return problem.error();
-  const StoredIndividual& best = members->front();
-  Model model = model_of_problem(*problem, problem->values_of(best.genome));
+  ASSIGN_OR_RETURN(const Problem problem, stored_problem(run));
+  const StoredIndividual& best = members.front();
+  Model model = model_of_problem(problem, problem.values_of(best.genome));
   model.score = best.fitness;
-  model.data = {run.info().problem_hash, problem->log.trials.size(), {}};
+  model.data = {run.info().problem_hash, problem.log.trials.size(), {}};
   if (const auto config =
           parse_config(run.info().config_text, run.info().config_path, start_program)) {
     model.data.files = config->trial_files;

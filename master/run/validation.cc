@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "common/base/try.h"
 #include "common/config/config.h"
 #include "common/problem/run_files.h"
 #include "common/trials/read.h"
@@ -27,17 +28,16 @@ Result<std::optional<Problem>> read_validation(const StagePlan& plan, const Conf
     if (!read) return read.error();
     return std::optional<Problem>(std::move(apart));
   }
-  auto log = read_trial_files(plan.validation_files, command_names(config.problem.commands));
-  if (!log) return log.error();
-  apart.log = *std::move(log);
+  ASSIGN_OR_RETURN(auto log,
+                   read_trial_files(plan.validation_files, command_names(config.problem.commands)));
+  apart.log = std::move(log);
   return std::optional<Problem>(std::move(apart));
 }
 
 Status check_runnable(const Config& config) {
-  if (Status s = check_evolvable(config); !s) return s;
-  const auto plan = read_stages(config);
-  if (!plan) return plan.error();
-  const auto log = read_validation(*plan, config);
+  RETURN_IF_ERROR(check_evolvable(config));
+  ASSIGN_OR_RETURN(const auto plan, read_stages(config));
+  const auto log = read_validation(plan, config);
   return log ? Status() : Status(log.error());
 }
 
@@ -53,10 +53,9 @@ Result<std::vector<Validated>> validate(Farm& farm, const Problem& apart,
   genomes.push_back(best);
   std::vector<v1::Task> tasks;
   for (const Genome& genome : genomes) tasks.push_back(evaluation_task({0, 0, genome}, 0));
-  const auto results = farm.run(farm.add_problem(to_proto(apart)), tasks);
-  if (!results) return results.error();
+  ASSIGN_OR_RETURN(const auto results, farm.run(farm.add_problem(to_proto(apart)), tasks));
   for (std::size_t i = 0; i < rows.size(); ++i) {
-    if ((*results)[i].outcome() == v1::OK) rows[i].fitness = (*results)[i].evaluate().fitness();
+    if (results[i].outcome() == v1::OK) rows[i].fitness = results[i].evaluate().fitness();
   }
   return rows;
 }

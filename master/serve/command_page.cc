@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "common/base/try.h"
 #include "master/progress/words.h"
 #include "master/report/glossary.h"
 #include "master/report/html.h"
@@ -47,8 +48,8 @@ std::string command_tiles(const CommandRecord& r) {
       running ? "Time left" : "Took",
       running ? (r.time_left_s ? "about " + format_duration(*r.time_left_s) : "not known yet")
               : format_duration(r.heartbeat_unix_s - r.began_unix_s),
-      simulates ? fmt::format("{} simulated, {} at hand; {} simulations/s", r.simulated,
-                              r.remembered, number_text(r.rate_per_s))
+      simulates ? fmt::format("{} simulated, {} at hand{}", r.simulated, r.remembered,
+                              rate_text(r.rate_per_s))
                 : "nothing is simulated so far");
   return html + "</dl>";
 }
@@ -170,11 +171,9 @@ std::string trouble_page(const std::string& what, const std::string& why) {
 }
 
 Result<std::string> command_page(const FoundWork& found, double now_unix_s) {
-  const auto record = command_status(found.path, now_unix_s);
-  if (!record) return record.error();
-  const CommandRecord r = record->value_or(CommandRecord());
-  const auto stages = read_stages(answer_file(found.path));
-  if (!stages) return stages.error();
+  ASSIGN_OR_RETURN(const auto record, command_status(found.path, now_unix_s));
+  const CommandRecord r = record.value_or(CommandRecord());
+  ASSIGN_OR_RETURN(const auto stages, read_stages(answer_file(found.path)));
   const bool tells = r.command == "diagnose";
   PageFrame frame;
   frame.served = true;
@@ -191,7 +190,7 @@ Result<std::string> command_page(const FoundWork& found, double now_unix_s) {
       html_escaped(r.state.empty() ? "unknown" : r.state), html_escaped(r.command),
       html_escaped(told.empty() ? found.name : told), html_escaped(r.arguments), command_tiles(r));
   if (tells) frame.body += found_section(r);
-  frame.body += stages_section(r, *stages) + workers_section(r);
+  frame.body += stages_section(r, stages) + workers_section(r);
   if (tells) frame.body += glossary_section({"nat", "gap", "rms", "gain", "held-out", "alias"});
   return framed_page(frame, plain_page_json(), no_trials_json());
 }

@@ -16,6 +16,8 @@
 #include <sstream>
 #include <utility>
 
+#include "common/base/try.h"
+
 namespace gapfarm {
 namespace {
 
@@ -288,7 +290,7 @@ class BeastServer : public HttpServer {
 Result<std::unique_ptr<HttpServer>> HttpServer::listen(std::uint16_t port, HttpHandler handler,
                                                        const HttpLimits& limits) {
   auto server = std::make_unique<BeastServer>(std::move(handler), limits);
-  if (Status s = server->open(port); !s) return s.error();
+  RETURN_IF_ERROR(server->open(port));
   return std::unique_ptr<HttpServer>(std::move(server));
 }
 

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 
+#include "common/base/try.h"
+
 namespace gapfarm {
 namespace {
 
@@ -45,11 +47,9 @@ Status read_query(std::string_view query, Target* target) {
     if (item.empty()) continue;
     if (++count > kMostValues) return Error{"more than 32 values"};
     const std::size_t equals = std::min(item.find('='), item.size());
-    auto key = decoded(item.substr(0, equals), true);
-    if (!key) return key.error();
-    auto value = decoded(item.substr(std::min(item.size(), equals + 1)), true);
-    if (!value) return value.error();
-    target->query[*std::move(key)].push_back(*std::move(value));
+    ASSIGN_OR_RETURN(auto key, decoded(item.substr(0, equals), true));
+    ASSIGN_OR_RETURN(auto value, decoded(item.substr(std::min(item.size(), equals + 1)), true));
+    target->query[std::move(key)].push_back(std::move(value));
   }
   return {};
 }
@@ -75,11 +75,10 @@ Result<Target> parse_target(std::string_view target) {
   target = target.substr(0, target.find('#'));
   const std::size_t mark = std::min(target.find('?'), target.size());
   Target parsed;
-  auto path = decoded(target.substr(0, mark), false);
-  if (!path) return path.error();
-  parsed.path = *std::move(path);
+  ASSIGN_OR_RETURN(auto path, decoded(target.substr(0, mark), false));
+  parsed.path = std::move(path);
   if (mark < target.size()) {
-    if (Status s = read_query(target.substr(mark + 1), &parsed); !s) return s.error();
+    RETURN_IF_ERROR(read_query(target.substr(mark + 1), &parsed));
   }
   return parsed;
 }

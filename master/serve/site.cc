@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <charconv>
 
+#include "common/base/try.h"
 #include "common/trials/files.h"
 #include "master/diagnose/diagnosis_json.h"
 #include "master/report/html.h"
@@ -224,17 +225,16 @@ Result<std::string> Site::view(const Target& target) const {
   const FoundWork* found = find(target.value("of"));
   if (found == nullptr) return Error{no_such(target.value("of"))};
   if (found->kind == FoundWork::Kind::kRun) {
-    auto report = sources_.read_run(
-        {found->path, whole_number(target.value("genome")), whole_number(target.value("best_of"))});
-    if (!report) return report.error();
-    report->name = found->name;
-    report->served = true;
-    return run_html(*report);
+    ASSIGN_OR_RETURN(auto report,
+                     sources_.read_run({found->path, whole_number(target.value("genome")),
+                                        whole_number(target.value("best_of"))}));
+    report.name = found->name;
+    report.served = true;
+    return run_html(report);
   }
   if (found->kind == FoundWork::Kind::kDiagnosis && entry(*found).state != "running") {
-    const auto text = read_text_file((found->path / "diagnosis.json").string());
-    if (!text) return text.error();
-    const auto diagnosis = parse_diagnosis(*text);
+    ASSIGN_OR_RETURN(const auto text, read_text_file((found->path / "diagnosis.json").string()));
+    const auto diagnosis = parse_diagnosis(text);
     if (!diagnosis) return Error{found->name + ": " + diagnosis.error().message};
     return report_html(*diagnosis, true);
   }
@@ -249,10 +249,9 @@ Result<std::string> Site::compare(const Target& target) const {
     const FoundWork* found = find(name);
     if (found == nullptr) return Error{no_such(name)};
     if (found->kind != FoundWork::Kind::kRun) return Error{name + " is no run."};
-    auto report = sources_.read_run({found->path, {}, {}});
-    if (!report) return report.error();
-    report->name = found->name;
-    runs.push_back(*std::move(report));
+    ASSIGN_OR_RETURN(auto report, sources_.read_run({found->path, {}, {}}));
+    report.name = found->name;
+    runs.push_back(std::move(report));
   }
   return compare_page(runs);
 }

@@ -1,6 +1,7 @@
 #include "master/store/answer_store.h"
 
 #include "common/base/hash.h"
+#include "common/base/try.h"
 #include "common/problem/question.h"
 
 namespace gapfarm {
@@ -26,14 +27,19 @@ CREATE TABLE IF NOT EXISTS command (  -- one row: what the command last said abo
 ) STRICT;
 )sql";
 
+std::string first_blob(const SqlStatement& row) {
+  std::string bytes;
+  row.read_all(SqlBlob{bytes});
+  return bytes;
+}
+
 Status check_identity(const Database& database) {
-  const auto id = database.integer("PRAGMA application_id", "read the answers");
-  if (!id) return id.error();
-  const auto tables = database.integer("SELECT count(*) FROM sqlite_master", "read the answers");
-  if (!tables) return tables.error();
-  if (*id == kAnswerStoreApplicationId || (*id == 0 && *tables == 0)) return {};
+  ASSIGN_OR_RETURN(const auto id, database.integer("PRAGMA application_id", "read the answers"));
+  ASSIGN_OR_RETURN(const auto tables,
+                   database.integer("SELECT count(*) FROM sqlite_master", "read the answers"));
+  if (id == kAnswerStoreApplicationId || (id == 0 && tables == 0)) return {};
   return Error{database.file().string() + ": is a SQLite file of another kind (application id " +
-               std::to_string(*id) + "); take another folder, or move the file away"};
+               std::to_string(id) + "); take another folder, or move the file away"};
 }
 
 }  // namespace
@@ -42,20 +48,18 @@ Result<AnswerStore> AnswerStore::open(const std::filesystem::path& file,
                                       const std::string& fingerprint) {
   std::error_code code;
   const bool there = std::filesystem::exists(file, code);
-  auto database = Database::open(file, there ? Database::Mode::kWrite : Database::Mode::kCreate);
-  if (!database) return database.error();
-  if (Status s = check_identity(*database); !s) return s.error();
+  ASSIGN_OR_RETURN(auto database,
+                   Database::open(file, there ? Database::Mode::kWrite : Database::Mode::kCreate));
+  RETURN_IF_ERROR(check_identity(database));
   const std::string tables =
       kAnswerTables + ("PRAGMA application_id = " + std::to_string(kAnswerStoreApplicationId));
-  auto transaction = SqlTransaction::begin(*database);
-  if (!transaction) return transaction.error();
-  if (Status s = database->exec(tables, "keep answers"); !s) return s.error();
-  if (Status s = transaction->commit(); !s) return s.error();
-  const auto last =
-      database->integer("SELECT coalesce(max(number), 0) FROM answers", "read the answers");
-  if (!last) return last.error();
-  AnswerStore store(std::move(*database), fingerprint);
-  store.next_number_ = *last + 1;
+  ASSIGN_OR_RETURN(auto transaction, SqlTransaction::begin(database));
+  RETURN_IF_ERROR(database.exec(tables, "keep answers"));
+  RETURN_IF_ERROR(transaction.commit());
+  ASSIGN_OR_RETURN(const auto last, database.integer("SELECT coalesce(max(number), 0) FROM answers",
+                                                     "read the answers"));
+  AnswerStore store(std::move(database), fingerprint);
+  store.next_number_ = last + 1;
   return store;
 }
 
@@ -66,9 +70,8 @@ std::int64_t AnswerStore::reserve(std::size_t count) {
 }
 
 Status AnswerStore::add_problem(const std::string& hash, const std::string& bytes) {
-  auto insert = database_.prepare("INSERT OR IGNORE INTO problems VALUES (?, ?)", "keep a problem");
-  if (!insert) return insert.error();
-  return insert->bind_text(1, hash).bind_blob(2, bytes).run();
+  return database_.run("keep a problem", "INSERT OR IGNORE INTO problems VALUES (?, ?)", hash,
+                       SqlBlob{bytes});
 }
 
 std::string AnswerStore::key(const std::string& problem_hash, const v1::Task& task) const {
@@ -76,12 +79,11 @@ std::string AnswerStore::key(const std::string& problem_hash, const v1::Task& ta
 }
 
 Result<std::optional<v1::TaskResult>> AnswerStore::find(const std::string& key) const {
-  auto select = database_.prepare("SELECT result FROM answers WHERE question = ?", "read answers");
-  if (!select) return select.error();
-  const auto row = select->bind_text(1, key).step();
-  if (!row) return row.error();
+  ASSIGN_OR_RETURN(const auto bytes,
+                   database_.row("read answers", "SELECT result FROM answers WHERE question = ?",
+                                 first_blob, key));
   std::optional<v1::TaskResult> result;
-  if (*row && !result.emplace().ParseFromString(select->blob(0))) {
+  if (bytes && !result.emplace().ParseFromString(*bytes)) {
     return Error{database_.file().string() + ": the answer " + key +
                  " is damaged; delete the file and run the command again"};
   }
@@ -90,19 +92,18 @@ Result<std::optional<v1::TaskResult>> AnswerStore::find(const std::string& key) 
 
 Status AnswerStore::add(const std::string& problem_hash, const std::string& stage,
                         const std::vector<Answer>& answers) {
-  auto transaction = SqlTransaction::begin(database_);
-  if (!transaction) return transaction.error();
-  auto insert = database_.prepare("INSERT OR IGNORE INTO answers VALUES (?, ?, ?, ?, ?, ?, ?)",
-                                  "keep answers");
-  if (!insert) return insert.error();
+  ASSIGN_OR_RETURN(auto transaction, SqlTransaction::begin(database_));
+  ASSIGN_OR_RETURN(auto insert,
+                   database_.prepare("INSERT OR IGNORE INTO answers VALUES (?, ?, ?, ?, ?, ?, ?)",
+                                     "keep answers"));
   for (const Answer& answer : answers) {
-    insert->bind_text(1, answer.key).bind(2, answer.number).bind_text(3, problem_hash);
-    insert->bind_text(4, fingerprint_).bind_text(5, stage);
-    insert->bind_blob(6, answer.task->SerializeAsString());
-    insert->bind_blob(7, answer.result->SerializeAsString());
-    if (Status s = insert->run(); !s) return s;
+    const std::string task = answer.task->SerializeAsString();
+    const std::string result = answer.result->SerializeAsString();
+    insert.bind_all(answer.key, answer.number, problem_hash, fingerprint_, stage, SqlBlob{task},
+                    SqlBlob{result});
+    RETURN_IF_ERROR(insert.run());
   }
-  return transaction->commit();
+  return transaction.commit();
 }
 
 Result<std::int64_t> AnswerStore::count() const {
@@ -114,43 +115,28 @@ Status AnswerStore::forget() {
 }
 
 Status AnswerStore::set_command(const std::string& json) {
-  auto insert =
-      database_.prepare("INSERT OR REPLACE INTO command VALUES (1, ?)", "say how far it is");
-  if (!insert) return insert.error();
-  return insert->bind_text(1, json).run();
+  return database_.run("say how far it is", "INSERT OR REPLACE INTO command VALUES (1, ?)", json);
 }
 
 Result<std::optional<std::string>> read_command(const std::filesystem::path& file) {
-  auto database = Database::open(file, Database::Mode::kQueryOnly);
-  if (!database) return database.error();
-  if (Status s = check_identity(*database); !s) return s.error();
-  const auto there = database->integer("SELECT count(*) FROM sqlite_master WHERE name = 'command'",
-                                       "read the command");
-  if (!there) return there.error();
-  std::optional<std::string> json;
-  if (*there == 0) return json;  // of an older program
-  auto select = database->prepare("SELECT record FROM command", "read the command");
-  if (!select) return select.error();
-  const auto row = select->step();
-  if (!row) return row.error();
-  if (*row) json = select->text(0);
-  return json;
+  ASSIGN_OR_RETURN(auto database, Database::open(file, Database::Mode::kQueryOnly));
+  RETURN_IF_ERROR(check_identity(database));
+  ASSIGN_OR_RETURN(const auto there,
+                   database.integer("SELECT count(*) FROM sqlite_master WHERE name = 'command'",
+                                    "read the command"));
+  if (there == 0) return std::optional<std::string>();  // of an older program
+  return database.row("read the command", "SELECT record FROM command",
+                      [](const SqlStatement& row) { return row.text(0); });
 }
 
 Result<std::vector<AnsweredStage>> read_stages(const std::filesystem::path& file) {
-  auto database = Database::open(file, Database::Mode::kQueryOnly);
-  if (!database) return database.error();
-  if (Status s = check_identity(*database); !s) return s.error();
-  auto select = database->prepare(
-      "SELECT stage, count(*) FROM answers GROUP BY stage ORDER BY min(number)", "read the stages");
-  if (!select) return select.error();
-  std::vector<AnsweredStage> stages;
-  for (;;) {
-    const auto row = select->step();
-    if (!row) return row.error();
-    if (!*row) return stages;
-    stages.push_back({select->text(0), select->integer(1)});
-  }
+  ASSIGN_OR_RETURN(auto database, Database::open(file, Database::Mode::kQueryOnly));
+  RETURN_IF_ERROR(check_identity(database));
+  return database.rows("read the stages",
+                       "SELECT stage, count(*) FROM answers GROUP BY stage ORDER BY min(number)",
+                       [](const SqlStatement& row) {
+                         return AnsweredStage{row.text(0), row.integer(1)};
+                       });
 }
 
 }  // namespace gapfarm

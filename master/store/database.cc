@@ -7,6 +7,8 @@
 #include <cmath>
 #include <cstring>
 
+#include "common/base/try.h"
+
 namespace gapfarm {
 namespace {
 
@@ -88,7 +90,7 @@ SqlStatement& SqlStatement::bind(int index, std::optional<double> value) {
   return *this;
 }
 
-SqlStatement& SqlStatement::bind_text(int index, std::string_view value) {
+SqlStatement& SqlStatement::bind(int index, std::string_view value) {
   bind_result_ |= sqlite3_bind_text64(statement_, index, value.data() ? value.data() : "",
                                       value.size(), SQLITE_TRANSIENT, SQLITE_UTF8);
   return *this;
@@ -115,8 +117,7 @@ Result<bool> SqlStatement::step() {
 }
 
 Status SqlStatement::run() {
-  const Result<bool> stepped = step();
-  if (!stepped) return stepped.error();
+  RETURN_IF_ERROR(step());
   sqlite3_reset(statement_);
   sqlite3_clear_bindings(statement_);
   return {};
@@ -126,11 +127,13 @@ std::int64_t SqlStatement::integer(int column) const {
   return sqlite3_column_int64(statement_, column);
 }
 
-double SqlStatement::real(int column) const { return sqlite3_column_double(statement_, column); }
+void SqlStatement::read(int column, double& to) const {
+  to = sqlite3_column_double(statement_, column);
+}
 
-std::optional<double> SqlStatement::optional_real(int column) const {
-  if (sqlite3_column_type(statement_, column) == SQLITE_NULL) return std::nullopt;
-  return real(column);
+void SqlStatement::read(int column, std::optional<double>& to) const {
+  to.reset();
+  if (sqlite3_column_type(statement_, column) != SQLITE_NULL) read(column, to.emplace());
 }
 
 std::string SqlStatement::text(int column) const {
@@ -139,10 +142,10 @@ std::string SqlStatement::text(int column) const {
   return {bytes, static_cast<std::size_t>(sqlite3_column_bytes(statement_, column))};
 }
 
-std::string SqlStatement::blob(int column) const {
+void SqlStatement::read(int column, SqlBlob<std::string> to) const {
   const auto* bytes = static_cast<const char*>(sqlite3_column_blob(statement_, column));
-  if (!bytes) return {};
-  return {bytes, static_cast<std::size_t>(sqlite3_column_bytes(statement_, column))};
+  to.bytes.assign(bytes ? bytes : "",
+                  bytes ? static_cast<std::size_t>(sqlite3_column_bytes(statement_, column)) : 0);
 }
 
 Result<Database> Database::open(const std::filesystem::path& file, Mode mode) {
@@ -160,17 +163,12 @@ Result<Database> Database::open(const std::filesystem::path& file, Mode mode) {
   sqlite3_extended_result_codes(handle, 1);
   sqlite3_busy_timeout(handle, busy_timeout_ms);
   if (mode == Mode::kQueryOnly) {
-    if (Status s = database.exec("PRAGMA query_only = ON", "open the run store"); !s) {
-      return s.error();
-    }
+    RETURN_IF_ERROR(database.exec("PRAGMA query_only = ON", "open the run store"));
     return database;
   }
-  if (Status s = database.exec(
-          "PRAGMA journal_mode = DELETE; PRAGMA synchronous = FULL; PRAGMA foreign_keys = ON",
-          "open the run store");
-      !s) {
-    return s.error();
-  }
+  RETURN_IF_ERROR(database.exec(
+      "PRAGMA journal_mode = DELETE; PRAGMA synchronous = FULL; PRAGMA foreign_keys = ON",
+      "open the run store"));
   return database;
 }
 
@@ -202,20 +200,18 @@ Result<SqlStatement> Database::prepare(const std::string& sql, const std::string
 }
 
 Result<std::int64_t> Database::integer(const std::string& sql, const std::string& operation) const {
-  Result<SqlStatement> statement = prepare(sql, operation);
-  if (!statement) return statement.error();
-  const Result<bool> row = statement->step();
-  if (!row) return row.error();
-  return *row ? statement->integer(0) : 0;
+  ASSIGN_OR_RETURN(const auto found,
+                   row(operation, sql, [](const SqlStatement& row) { return row.integer(0); }));
+  return found.value_or(0);
 }
 
 Result<SqlTransaction> SqlTransaction::begin(Database& database) {
-  if (Status s = database.exec("BEGIN IMMEDIATE", "begin a transaction"); !s) return s.error();
+  RETURN_IF_ERROR(database.exec("BEGIN IMMEDIATE", "begin a transaction"));
   return SqlTransaction(database);
 }
 
 Status SqlTransaction::commit() {
-  if (Status s = database_->exec("COMMIT", "commit"); !s) return s;
+  RETURN_IF_ERROR(database_->exec("COMMIT", "commit"));
   database_ = nullptr;
   return {};
 }

@@ -8,6 +8,8 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <type_traits>
+#include <vector>
 
 #include "common/base/result.h"
 
@@ -15,6 +17,14 @@ struct sqlite3;
 struct sqlite3_stmt;
 
 namespace gapfarm {
+
+// Bytes that are no text: to be bound, or a place to read them into.
+template <class Bytes>
+struct SqlBlob {
+  Bytes& bytes;
+};
+template <class Bytes>
+SqlBlob(Bytes&) -> SqlBlob<Bytes>;
 
 // A prepared statement.  May not outlive its Database.  Parameters count from 1, columns from 0.
 class SqlStatement {
@@ -26,8 +36,30 @@ class SqlStatement {
   SqlStatement& bind(int index, std::int64_t value);
   SqlStatement& bind(int index, double value);  // NaN becomes NULL
   SqlStatement& bind(int index, std::optional<double> value);
-  SqlStatement& bind_text(int index, std::string_view value);
-  SqlStatement& bind_blob(int index, std::string_view value);
+  SqlStatement& bind(int index, std::string_view value);
+  template <class Bytes>
+  SqlStatement& bind(int index, SqlBlob<Bytes> value) {
+    return bind_blob(index, value.bytes);
+  }
+  template <class Whole>
+  requires std::is_integral_v<Whole> SqlStatement& bind(int index, Whole value) {
+    return bind(index, static_cast<std::int64_t>(value));
+  }
+  template <class Whole>
+  requires std::is_integral_v<Whole> SqlStatement& bind(int index, std::optional<Whole> value) {
+    return value ? bind(index, *value) : bind(index, std::optional<double>());
+  }
+  SqlStatement& bind(int index, const char* value) { return bind(index, std::string_view(value)); }
+  SqlStatement& bind(int index, const std::string& value) {
+    return bind(index, std::string_view(value));
+  }
+  // The parameters in their order.
+  template <class... Values>
+  SqlStatement& bind_all(const Values&... values) {
+    int index = 0;
+    (bind(++index, values), ...);
+    return *this;
+  }
 
   // True when a row is there to be read, false at the end.  Errors include those of bind().
   Result<bool> step();
@@ -35,12 +67,27 @@ class SqlStatement {
   Status run();
 
   std::int64_t integer(int column) const;
-  double real(int column) const;
-  std::optional<double> optional_real(int column) const;
   std::string text(int column) const;
-  std::string blob(int column) const;
+  // The row's columns in their order, from `first` on.
+  template <class... Targets>
+  void read_from(int first, Targets&&... to) const {
+    (read(first++, to), ...);
+  }
+  template <class... Targets>
+  void read_all(Targets&&... to) const {
+    read_from(0, to...);
+  }
 
  private:
+  SqlStatement& bind_blob(int index, std::string_view value);
+  void read(int column, double& to) const;
+  void read(int column, std::optional<double>& to) const;
+  void read(int column, std::string& to) const { to = text(column); }
+  void read(int column, SqlBlob<std::string> to) const;
+  template <class Whole>
+  requires std::is_integral_v<Whole>
+  void read(int column, Whole& to) const { to = static_cast<Whole>(integer(column)); }
+
   friend class Database;
   SqlStatement(sqlite3_stmt* statement, std::string file, std::string operation);
 
@@ -72,6 +119,40 @@ class Database {
   // Runs statements that give no rows.  `operation` completes "cannot ...".
   Status exec(const std::string& sql, const std::string& operation);
   Result<SqlStatement> prepare(const std::string& sql, const std::string& operation) const;
+  // Runs one statement that gives no rows, with these values.
+  template <class... Values>
+  Status run(const std::string& operation, const std::string& sql, const Values&... values) {
+    Result<SqlStatement> statement = prepare(sql, operation);
+    return statement ? statement->bind_all(values...).run() : Status(statement.error());
+  }
+  // What `read` makes of each row of a statement with these values.
+  template <class Read, class... Values>
+  auto rows(const std::string& operation, const std::string& sql, const Read& read,
+            const Values&... values) const
+      -> Result<std::vector<std::invoke_result_t<Read, const SqlStatement&>>> {
+    Result<SqlStatement> statement = prepare(sql, operation);
+    if (!statement) return statement.error();
+    statement->bind_all(values...);
+    std::vector<std::invoke_result_t<Read, const SqlStatement&>> all;
+    for (;;) {
+      const Result<bool> row = statement->step();
+      if (!row) return row.error();
+      if (!*row) return all;
+      all.push_back(read(*statement));
+    }
+  }
+  // The same of the first row, if there is one.
+  template <class Read, class... Values>
+  auto row(const std::string& operation, const std::string& sql, const Read& read,
+           const Values&... values) const
+      -> Result<std::optional<std::invoke_result_t<Read, const SqlStatement&>>> {
+    using Row = std::optional<std::invoke_result_t<Read, const SqlStatement&>>;
+    Result<SqlStatement> statement = prepare(sql, operation);
+    if (!statement) return statement.error();
+    const Result<bool> there = statement->bind_all(values...).step();
+    if (!there) return there.error();
+    return *there ? Row(read(*statement)) : Row();
+  }
   // The only value of a statement's only row.
   Result<std::int64_t> integer(const std::string& sql, const std::string& operation) const;
 

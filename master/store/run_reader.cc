@@ -3,7 +3,9 @@
 #include <cstring>
 #include <nlohmann/json.hpp>
 
+#include "common/base/try.h"
 #include "common/json/json.h"
+#include "master/store/run_status.h"
 #include "master/store/schema.h"
 
 namespace gapfarm {
@@ -34,36 +36,27 @@ RunState state_of(const std::string& name) {
 // Of kMemberColumns, the first being column `at`.
 StoredIndividual individual_of(const SqlStatement& row, int at) {
   StoredIndividual individual;
-  individual.birth_id = static_cast<std::uint64_t>(row.integer(at));
-  individual.genome = genome_of(row.blob(at + 1));
-  individual.values = row.text(at + 2);
-  individual.outcome = row.text(at + 3);
-  individual.fitness = row.optional_real(at + 4);
-  individual.scores = static_cast<unsigned>(row.integer(at + 5));
-  for (const Json& parent : parse_json(row.text(at + 6))) {
+  std::string genome, parents;
+  row.read_from(at, individual.birth_id, SqlBlob{genome}, individual.values, individual.outcome,
+                individual.fitness, individual.scores, parents, individual.operators);
+  individual.genome = genome_of(genome);
+  for (const Json& parent : parse_json(parents)) {
     if (parent.is_number_unsigned()) individual.parents.push_back(parent.get<std::uint64_t>());
   }
-  individual.operators = row.text(at + 7);
   return individual;
 }
 
-std::vector<StoredWorker> workers_of(const std::string& text) {
-  std::vector<StoredWorker> workers;
-  // What was written by hand or damaged reads as empty: status is no place to die over it.
-  const Json json = parse_json(text);
-  if (!json.is_array()) return workers;
-  for (const Json& entry : json) {
-    if (!entry.is_object()) continue;
-    StoredWorker worker;
-    worker.name = entry.value("name", "");
-    worker.host = entry.value("host", "");
-    worker.state = entry.value("state", "");
-    worker.jobs = entry.value("jobs", 0u);
-    worker.finished = entry.value("finished", std::uint64_t{0});
-    worker.rate_per_s = entry.value("rate_per_s", 0.0);
-    workers.push_back(std::move(worker));
+StoredGeneration generation_of(const SqlStatement& row) {
+  StoredGeneration g;
+  std::string operators;
+  row.read_all(g.generation, g.best, g.mean, g.median, g.worst, g.diversity, operators,
+               g.evaluations, g.wall_s, g.quarantined, g.digest);
+  const Json probabilities = parse_json(operators);
+  for (const auto& [name, probability] : probabilities.items()) {
+    if (!probability.is_number()) continue;
+    g.operator_probabilities.emplace_back(name, probability.get<double>());
   }
-  return workers;
+  return g;
 }
 
 }  // namespace
@@ -76,88 +69,48 @@ Result<RunReader> RunReader::open(const std::filesystem::path& run) {
                  ": holds no run and no other long command (there is neither a run.sqlite nor a "
                  "simulations.sqlite with one); give the folder that --out names"};
   }
-  Result<Database> database = Database::open(file, Database::Mode::kQueryOnly);
-  if (!database) return database.error();
-  if (Status s = check_run_store(*database); !s) return s.error();
-  Result<RunInfo> info = load_run_info(*database);
-  if (!info) return info.error();
-  const Result<std::int64_t> schema = run_store_schema(*database);
-  if (!schema) return schema.error();
-  RunReader reader(run, std::move(*database));
-  reader.schema_ = *schema;
-  reader.info_ = std::move(*info);
+  ASSIGN_OR_RETURN(Database database, Database::open(file, Database::Mode::kQueryOnly));
+  RETURN_IF_ERROR(check_run_store(database));
+  ASSIGN_OR_RETURN(RunInfo info, load_run_info(database));
+  ASSIGN_OR_RETURN(const std::int64_t schema, run_store_schema(database));
+  RunReader reader(run, std::move(database));
+  reader.schema_ = schema;
+  reader.info_ = std::move(info);
   return reader;
 }
 
 Result<std::vector<StoredGeneration>> RunReader::generations() const {
-  Result<SqlStatement> select = database_.prepare(
+  return database_.rows(
+      "read the generations",
       "SELECT generation, best, mean, median, worst, diversity, operator_probabilities, "
       "evaluations, wall_s, quarantined, digest FROM generations ORDER BY generation",
-      "read the generations");
-  if (!select) return select.error();
-  std::vector<StoredGeneration> generations;
-  for (;;) {
-    const Result<bool> row = select->step();
-    if (!row) return row.error();
-    if (!*row) return generations;
-    StoredGeneration& generation = generations.emplace_back();
-    generation.generation = static_cast<std::uint64_t>(select->integer(0));
-    generation.best = select->optional_real(1);
-    generation.mean = select->optional_real(2);
-    generation.median = select->optional_real(3);
-    generation.worst = select->optional_real(4);
-    generation.diversity = select->real(5);
-    const Json operators = parse_json(select->text(6));
-    for (const auto& [name, probability] : operators.items()) {
-      if (probability.is_number()) {
-        generation.operator_probabilities.emplace_back(name, probability.get<double>());
-      }
-    }
-    generation.evaluations = static_cast<std::uint64_t>(select->integer(7));
-    generation.wall_s = select->real(8);
-    generation.quarantined = static_cast<unsigned>(select->integer(9));
-    generation.digest = select->text(10);
-  }
+      generation_of);
 }
 
 Result<std::vector<StoredIndividual>> RunReader::individuals(std::uint64_t generation) const {
-  Result<SqlStatement> select =
-      database_.prepare(std::string("SELECT ") + kMemberColumns +
-                            " FROM individuals WHERE generation = ? ORDER BY rank",
-                        "read the individuals");
-  if (!select) return select.error();
-  select->bind(1, static_cast<std::int64_t>(generation));
-  std::vector<StoredIndividual> individuals;
-  for (;;) {
-    const Result<bool> row = select->step();
-    if (!row) return row.error();
-    if (!*row) return individuals;
-    individuals.push_back(individual_of(*select, 0));
-  }
+  return database_.rows(
+      "read the individuals",
+      std::string("SELECT ") + kMemberColumns +
+          " FROM individuals WHERE generation = ? ORDER BY rank",
+      [](const SqlStatement& row) { return individual_of(row, 0); }, generation);
 }
 
 Result<std::vector<RunReader::Member>> RunReader::members(const std::string& where,
                                                           std::int64_t bound) const {
-  Result<SqlStatement> select = database_.prepare(
+  return database_.rows(
+      "read the individuals",
       "SELECT generation, " + std::string(kMemberColumns) + " FROM individuals " + where,
-      "read the individuals");
-  if (!select) return select.error();
-  select->bind(1, bound);
-  std::vector<Member> members;
-  for (;;) {
-    const Result<bool> row = select->step();
-    if (!row) return row.error();
-    if (!*row) return members;
-    members.push_back({static_cast<std::uint64_t>(select->integer(0)), individual_of(*select, 1)});
-  }
+      [](const SqlStatement& row) {
+        return Member{static_cast<std::uint64_t>(row.integer(0)), individual_of(row, 1)};
+      },
+      bound);
 }
 
 Result<std::optional<RunReader::Member>> RunReader::member(std::uint64_t birth_id) const {
-  auto found = members("WHERE birth_id = ? ORDER BY generation LIMIT 1",
-                       static_cast<std::int64_t>(birth_id));
-  if (!found) return found.error();
-  if (found->empty()) return std::optional<Member>();
-  return std::optional<Member>(std::move(found->front()));
+  ASSIGN_OR_RETURN(auto found, members("WHERE birth_id = ? ORDER BY generation LIMIT 1",
+                                       static_cast<std::int64_t>(birth_id)));
+  if (found.empty()) return std::optional<Member>();
+  return std::optional<Member>(std::move(found.front()));
 }
 
 Result<std::vector<RunReader::Member>> RunReader::given_up(std::size_t most) const {
@@ -168,88 +121,76 @@ Result<std::vector<RunReader::Member>> RunReader::given_up(std::size_t most) con
 }
 
 Result<std::vector<StoredWorkerEvent>> RunReader::worker_events(std::size_t most) const {
-  std::vector<StoredWorkerEvent> events;
-  if (schema_ < kSchemaWithWorkerEvents) return events;
-  Result<SqlStatement> select = database_.prepare(
+  if (schema_ < kSchemaWithWorkerEvents) return std::vector<StoredWorkerEvent>();
+  return database_.rows(
+      "read who came and went",
       "SELECT time, kind, worker, host, text FROM (SELECT rowid AS place, * FROM worker_events "
       "ORDER BY rowid DESC LIMIT ?) ORDER BY place",
-      "read who came and went");
-  if (!select) return select.error();
-  select->bind(1, static_cast<std::int64_t>(most));
-  for (;;) {
-    const Result<bool> row = select->step();
-    if (!row) return row.error();
-    if (!*row) return events;
-    events.push_back(
-        {select->real(0), select->text(1), select->text(2), select->text(3), select->text(4)});
-  }
+      [](const SqlStatement& row) {
+        StoredWorkerEvent e;
+        row.read_all(e.unix_s, e.kind, e.worker, e.host, e.text);
+        return e;
+      },
+      most);
 }
 
 Result<std::optional<StoredIndividual>> RunReader::best() const {
-  const Result<std::int64_t> last =
-      database_.integer("SELECT max(generation) FROM generations", "read the generations");
-  if (!last) return last.error();
-  Result<std::vector<StoredIndividual>> all = individuals(static_cast<std::uint64_t>(*last));
-  if (!all) return all.error();
-  if (all->empty()) return std::optional<StoredIndividual>{};
-  return std::optional<StoredIndividual>(std::move(all->front()));
+  ASSIGN_OR_RETURN(
+      const std::int64_t last,
+      database_.integer("SELECT max(generation) FROM generations", "read the generations"));
+  ASSIGN_OR_RETURN(std::vector<StoredIndividual> all,
+                   individuals(static_cast<std::uint64_t>(last)));
+  if (all.empty()) return std::optional<StoredIndividual>{};
+  return std::optional<StoredIndividual>(std::move(all.front()));
 }
 
 Result<std::vector<Incident>> RunReader::incidents() const {
-  std::vector<Incident> incidents;
-  if (schema_ < kSchemaWithIncidents) return incidents;
-  Result<SqlStatement> select = database_.prepare(
-      "SELECT generation, kind, time, text FROM incidents ORDER BY rowid", "read the incidents");
-  if (!select) return select.error();
-  for (;;) {
-    const Result<bool> row = select->step();
-    if (!row) return row.error();
-    if (!*row) return incidents;
-    const bool alarm = select->text(1) == incident_name(IncidentKind::kAlarm);
-    incidents.push_back({alarm ? IncidentKind::kAlarm : IncidentKind::kQuarantine,
-                         static_cast<std::uint64_t>(select->integer(0)), select->real(2),
-                         select->text(3)});
-  }
+  if (schema_ < kSchemaWithIncidents) return std::vector<Incident>();
+  return database_.rows("read the incidents",
+                        "SELECT generation, kind, time, text FROM incidents ORDER BY rowid",
+                        [](const SqlStatement& row) {
+                          Incident incident;
+                          std::string kind;
+                          row.read_all(incident.generation, kind, incident.unix_s, incident.text);
+                          if (kind == incident_name(IncidentKind::kAlarm)) {
+                            incident.kind = IncidentKind::kAlarm;
+                          }
+                          return incident;
+                        });
 }
 
 Result<std::optional<StoredDocument>> RunReader::document(const std::string& name) const {
   if (schema_ < kSchemaWithDocuments) return std::optional<StoredDocument>();
-  Result<SqlStatement> select =
-      database_.prepare("SELECT generation, content FROM documents WHERE name = ?", "read " + name);
-  if (!select) return select.error();
-  select->bind_text(1, name);
-  const Result<bool> row = select->step();
-  if (!row) return row.error();
-  if (!*row) return std::optional<StoredDocument>();
-  return std::optional<StoredDocument>(
-      {static_cast<std::uint64_t>(select->integer(0)), select->text(1)});
+  return database_.row(
+      "read " + name, "SELECT generation, content FROM documents WHERE name = ?",
+      [](const SqlStatement& row) {
+        StoredDocument document;
+        row.read_all(document.generation, document.json);
+        return document;
+      },
+      name);
 }
 
 Result<Progress> RunReader::progress() const {
-  Result<SqlStatement> select = database_.prepare(
-      "SELECT state, stop_reason, pid, host, heartbeat, rate_per_s, time_left_s, done, total, "
-      "workers, epoch, " +
-          std::string(schema_ < kSchemaWithIncidents ? "'{}'" : "farm") + " FROM progress",
-      "read the progress");
-  if (!select) return select.error();
-  const Result<bool> row = select->step();
-  if (!row) return row.error();
-  Progress progress;
-  if (!*row) return progress;
-  progress.state = state_of(select->text(0));
-  const bool running = progress.state == RunState::kRunning;
-  (running ? progress.waiting : progress.stop_reason) = select->text(1);
-  progress.pid = select->integer(2);
-  progress.host = select->text(3);
-  progress.heartbeat_unix_s = select->real(4);
-  progress.rate_per_s = select->real(5);
-  progress.time_left_s = select->optional_real(6);
-  progress.done = static_cast<std::uint64_t>(select->integer(7));
-  progress.total = static_cast<std::uint64_t>(select->integer(8));
-  progress.workers = workers_of(select->text(9));
-  progress.epoch = static_cast<std::uint64_t>(select->integer(10));
-  progress.farm = FarmTally::from_json(select->text(11));
-  return progress;
+  ASSIGN_OR_RETURN(
+      const auto found,
+      database_.row(
+          "read the progress",
+          "SELECT state, stop_reason, pid, host, heartbeat, rate_per_s, time_left_s, done, total, "
+          "workers, epoch, " +
+              std::string(schema_ < kSchemaWithIncidents ? "'{}'" : "farm") + " FROM progress",
+          [](const SqlStatement& row) {
+            Progress p;
+            std::string state, reason, workers, farm;
+            row.read_all(state, reason, p.pid, p.host, p.heartbeat_unix_s, p.rate_per_s,
+                         p.time_left_s, p.done, p.total, workers, p.epoch, farm);
+            p.state = state_of(state);
+            (p.state == RunState::kRunning ? p.waiting : p.stop_reason) = reason;
+            p.workers = workers_of(parse_json(workers));
+            p.farm = FarmTally::from_json(farm);
+            return p;
+          }));
+  return found.value_or(Progress());
 }
 
 }  // namespace gapfarm

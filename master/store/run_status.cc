@@ -3,6 +3,8 @@
 #include <nlohmann/json.hpp>
 
 #include "common/base/host.h"
+#include "common/base/try.h"
+#include "common/json/fields.h"
 #include "common/json/json.h"
 #include "master/store/run_lock.h"
 
@@ -24,10 +26,6 @@ bool master_lives(const RunReader& reader, const Progress& progress, double hear
   return blind && heartbeat_age_s < kFreshHeartbeat_s;
 }
 
-Json number_or_null(const std::optional<double>& value) {
-  return value ? Json(*value) : Json(nullptr);
-}
-
 Json to_json(const Incident& incident) {
   return {{"kind", incident_name(incident.kind)},
           {"generation", incident.generation},
@@ -40,23 +38,20 @@ Json to_json(const Incident& incident) {
 Result<RunStatus> run_status(const RunReader& reader, double now_unix_s) {
   RunStatus status;
   status.info = reader.info();
-  Result<Progress> progress = reader.progress();
-  if (!progress) return progress.error();
-  status.progress = std::move(*progress);
+  ASSIGN_OR_RETURN(Progress progress, reader.progress());
+  status.progress = std::move(progress);
   status.heartbeat_age_s = now_unix_s - status.progress.heartbeat_unix_s;
 
-  const Result<std::vector<StoredGeneration>> generations = reader.generations();
-  if (!generations) return generations.error();
-  for (const StoredGeneration& generation : *generations) {
+  ASSIGN_OR_RETURN(const std::vector<StoredGeneration> generations, reader.generations());
+  for (const StoredGeneration& generation : generations) {
     status.best_by_generation.push_back(generation.best);
     status.wall_s += generation.wall_s;
     status.quarantined += generation.quarantined;
   }
-  Result<std::vector<Incident>> incidents = reader.incidents();
-  if (!incidents) return incidents.error();
-  status.incidents = std::move(*incidents);
-  if (!generations->empty()) {
-    const StoredGeneration& last = generations->back();
+  ASSIGN_OR_RETURN(std::vector<Incident> incidents, reader.incidents());
+  status.incidents = std::move(incidents);
+  if (!generations.empty()) {
+    const StoredGeneration& last = generations.back();
     status.generation = last.generation;
     status.evaluations = last.evaluations;
     status.best = last.best;
@@ -69,9 +64,9 @@ Result<RunStatus> run_status(const RunReader& reader, double now_unix_s) {
     status.quarantined += incident.kind == IncidentKind::kQuarantine && !counted ? 1 : 0;
   }
   // By number, not "the last": another generation may have been committed meanwhile.
-  const Result<std::vector<StoredIndividual>> members = reader.individuals(status.generation);
-  if (!members) return members.error();
-  if (!members->empty()) status.best_individual = members->front();
+  ASSIGN_OR_RETURN(const std::vector<StoredIndividual> members,
+                   reader.individuals(status.generation));
+  if (!members.empty()) status.best_individual = members.front();
 
   status.state = status.progress.state;
   status.stop_reason = status.progress.stop_reason;
@@ -92,19 +87,6 @@ Result<RunStatus> run_status(const RunReader& reader, double now_unix_s) {
     status.progress.workers.clear();
   }
   return status;
-}
-
-Json workers_json(const std::vector<StoredWorker>& workers) {
-  Json json = Json::array();
-  for (const StoredWorker& worker : workers) {
-    json.push_back({{"name", worker.name},
-                    {"state", worker.state},
-                    {"jobs", worker.jobs},
-                    {"host", worker.host},
-                    {"finished", worker.finished},
-                    {"rate_per_s", worker.rate_per_s}});
-  }
-  return json;
 }
 
 Json to_json(const RunStatus& status) {

@@ -11,6 +11,7 @@
 
 #include "common/base/build_info.h"
 #include "common/base/host.h"
+#include "common/base/try.h"
 #include "common/json/json.h"
 #include "master/store/run_status.h"
 #include "master/store/schema.h"
@@ -70,17 +71,14 @@ fs::path free_backup_path(const fs::path& run, std::uint64_t generation) {
 }
 
 Status create_tables(Database& database, const RunInfo& info) {
-  Result<SqlTransaction> transaction = SqlTransaction::begin(database);
-  if (!transaction) return transaction.error();
-  if (Status s = create_run_tables(database); !s) return s;
-  if (Status s = insert_run_info(database, info); !s) return s;
-  if (Status s = database.exec("INSERT INTO progress VALUES (1, 'stopped', '', 0, '', 0, 0, NULL, "
-                               "0, 0, '[]', 0, '{}')",
-                               "create the run store");
-      !s) {
-    return s;
-  }
-  return transaction->commit();
+  ASSIGN_OR_RETURN(SqlTransaction transaction, SqlTransaction::begin(database));
+  RETURN_IF_ERROR(create_run_tables(database));
+  RETURN_IF_ERROR(insert_run_info(database, info));
+  RETURN_IF_ERROR(
+      database.exec("INSERT INTO progress VALUES (1, 'stopped', '', 0, '', 0, 0, NULL, "
+                    "0, 0, '[]', 0, '{}')",
+                    "create the run store"));
+  return transaction.commit();
 }
 
 // Whether nothing is there, or what a creation leaves that was interrupted before its one
@@ -104,25 +102,23 @@ Result<RunStore> RunStore::create(const fs::path& run, const RunInfo& info) {
     return Error{run.string() + ": cannot make the run folder: " + code.message() +
                  "; choose another --out"};
   }
-  Result<RunLock> lock = RunLock::take(run);
-  if (!lock) return lock.error();
+  ASSIGN_OR_RETURN(RunLock lock, RunLock::take(run));
   const fs::path file = run / "run.sqlite";
   if (!is_unborn(file)) {
     return Error{run.string() + ": holds a run already; continue it with `gapfarm resume " +
                  run.string() + "`, or choose another --out"};
   }
-  Result<Database> database = Database::open(file, Database::Mode::kCreate);
-  if (!database) return database.error();
+  ASSIGN_OR_RETURN(Database database, Database::open(file, Database::Mode::kCreate));
   RunInfo complete = info;
   if (complete.program_version.empty()) complete.program_version = build_info().version;
   if (complete.fingerprint.empty()) complete.fingerprint = build_info().fingerprint;
   complete.created = utc_now();
-  if (Status s = create_tables(*database, complete); !s) return s.error();
-  if (Status s = sync_to_disk(run); !s) return s.error();
+  RETURN_IF_ERROR(create_tables(database, complete));
+  RETURN_IF_ERROR(sync_to_disk(run));
 
-  RunStore store(run, std::move(*lock), std::move(*database));
+  RunStore store(run, std::move(lock), std::move(database));
   store.info_ = std::move(complete);
-  if (Status s = store.begin_epoch(); !s) return s.error();
+  RETURN_IF_ERROR(store.begin_epoch());
   return store;
 }
 
@@ -154,77 +150,70 @@ Result<RunStore> RunStore::open(const fs::path& run) {
                  "`gapfarm evolve CONFIG --out " +
                  run.string() + "`"};
   }
-  Result<RunLock> lock = RunLock::take(run);
-  if (!lock) return lock.error();
+  ASSIGN_OR_RETURN(RunLock lock, RunLock::take(run));
   // Looked at before anything may be written to it: it could be another program's file.
   {
-    const Result<Database> look = Database::open(file, Database::Mode::kQueryOnly);
-    if (!look) return look.error();
-    if (Status s = check_run_store(*look); !s) return s.error();
+    ASSIGN_OR_RETURN(const Database look, Database::open(file, Database::Mode::kQueryOnly));
+    RETURN_IF_ERROR(check_run_store(look));
   }
-  Result<Database> database = Database::open(file, Database::Mode::kWrite);
-  if (!database) return database.error();
-  Result<SqlStatement> damage = database->prepare("PRAGMA quick_check(1)", "check the run store");
-  if (!damage) return damage.error();
-  const Result<bool> checked = damage->step();
-  if (!checked) return checked.error();
-  if (damage->text(0) != "ok") {
-    return Error{file.string() + ": the file is damaged (" + damage->text(0) +
+  ASSIGN_OR_RETURN(Database database, Database::open(file, Database::Mode::kWrite));
+  ASSIGN_OR_RETURN(const auto checked,
+                   database.row("check the run store", "PRAGMA quick_check(1)",
+                                [](const SqlStatement& row) { return row.text(0); }));
+  if (checked != "ok") {
+    return Error{file.string() + ": the file is damaged (" + checked.value_or("") +
                  "); restore a copy, or save what is left with `sqlite3 run.sqlite .recover`"};
   }
-  if (Status s = upgrade_run_store(*database); !s) return s.error();
-  Result<RunInfo> info = load_run_info(*database);
-  if (!info) return info.error();
+  RETURN_IF_ERROR(upgrade_run_store(database));
+  ASSIGN_OR_RETURN(RunInfo info, load_run_info(database));
 
-  RunStore store(run, std::move(*lock), std::move(*database));
-  store.info_ = std::move(*info);
-  const Result<std::optional<Checkpoint>> last = store.checkpoint();
-  if (!last) return last.error();
-  if (*last) {
-    store.last_generation_ = (*last)->generation;
-    store.digest_ = (*last)->digest;
+  RunStore store(run, std::move(lock), std::move(database));
+  store.info_ = std::move(info);
+  ASSIGN_OR_RETURN(const std::optional<Checkpoint> last, store.checkpoint());
+  if (last) {
+    store.last_generation_ = last->generation;
+    store.digest_ = last->digest;
   }
-  if (Status s = store.begin_epoch(); !s) return s.error();
+  RETURN_IF_ERROR(store.begin_epoch());
   return store;
 }
 
 Status RunStore::load_before() {
-  Result<SqlStatement> before =
-      database_.prepare("SELECT epoch, farm, heartbeat, host FROM progress", "read the run store");
-  if (!before) return before.error();
-  const Result<bool> row = before->step();
-  if (!row) return row.error();
-  if (!*row) {
+  end_before_ = {0, "end", "", "", "the last that was heard of a master"};
+  std::string farm;
+  ASSIGN_OR_RETURN(
+      const auto row,
+      database_.row("read the run store", "SELECT epoch, farm, heartbeat, host FROM progress",
+                    [&](const SqlStatement& before) {
+                      before.read_all(epoch_, farm, end_before_.unix_s, end_before_.host);
+                      return true;
+                    }));
+  if (!row) {
     return Error{database_.file().string() +
                  ": table progress is empty: the file was changed by hand; restore a copy"};
   }
-  epoch_ = static_cast<std::uint64_t>(before->integer(0)) + 1;
-  farm_before_ = FarmTally::from_json(before->text(1));
-  end_before_ = {before->real(2), "end", "", before->text(3),
-                 "the last that was heard of a master"};
+  ++epoch_;
+  farm_before_ = FarmTally::from_json(farm);
   return {};
 }
 
 Status RunStore::begin_epoch() {
-  if (Status s = load_before(); !s) return s;
+  RETURN_IF_ERROR(load_before());
   std::vector<StoredWorkerEvent> events = {
       {unix_now_s(), "master", "", host_name(), "master " + std::to_string(epoch_) + " begins"}};
   if (epoch_ > 1) events.insert(events.begin(), end_before_);
-  Result<SqlTransaction> transaction = SqlTransaction::begin(database_);
-  if (!transaction) return transaction.error();
-  if (Status s = database_.exec(forget_quarantines(next_generation()), "write the run store"); !s) {
-    return s;
-  }
-  if (Status s = insert_worker_events(events); !s) return s;
-  if (Status s = set_progress({}); !s) return s;
-  return transaction->commit();
+  ASSIGN_OR_RETURN(SqlTransaction transaction, SqlTransaction::begin(database_));
+  RETURN_IF_ERROR(database_.exec(forget_quarantines(next_generation()), "write the run store"));
+  RETURN_IF_ERROR(insert_worker_events(events));
+  RETURN_IF_ERROR(set_progress({}));
+  return transaction.commit();
 }
 
 Result<std::uint64_t> RunStore::quarantined() const {
-  const Result<std::int64_t> sum = database_.integer(
-      "SELECT coalesce(sum(quarantined), 0) FROM generations", "read the generations");
-  if (!sum) return sum.error();
-  return static_cast<std::uint64_t>(*sum);
+  ASSIGN_OR_RETURN(const std::int64_t sum,
+                   database_.integer("SELECT coalesce(sum(quarantined), 0) FROM generations",
+                                     "read the generations"));
+  return static_cast<std::uint64_t>(sum);
 }
 
 Result<std::string> RunStore::commit(const StoredGeneration& generation) {
@@ -234,132 +223,100 @@ Result<std::string> RunStore::commit(const StoredGeneration& generation) {
                  std::to_string(*last_generation_) + "; commit generations in order"};
   }
   const std::string digest = generation_digest(digest_, generation);
-  Result<SqlTransaction> transaction = SqlTransaction::begin(database_);
-  if (!transaction) return transaction.error();
-  Result<SqlStatement> insert = database_.prepare(
-      "INSERT INTO generations VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)", "commit a generation");
-  if (!insert) return insert.error();
-  insert->bind(1, static_cast<std::int64_t>(generation.generation));
-  insert->bind(2, generation.best).bind(3, generation.mean);
-  insert->bind(4, generation.median).bind(5, generation.worst);
-  insert->bind(6, generation.diversity).bind_text(7, operator_json(generation));
-  insert->bind(8, static_cast<std::int64_t>(generation.evaluations));
-  insert->bind(9, generation.wall_s).bind(10, std::int64_t{generation.quarantined});
-  insert->bind_blob(11, generation.optimiser_state).bind_text(12, digest);
-  if (Status s = insert->run(); !s) return s.error();
-  if (Status s = insert_individuals(generation); !s) return s.error();
-  if (Status s = transaction->commit(); !s) return s.error();
+  ASSIGN_OR_RETURN(SqlTransaction transaction, SqlTransaction::begin(database_));
+  RETURN_IF_ERROR(database_.run(
+      "commit a generation", "INSERT INTO generations VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+      generation.generation, generation.best, generation.mean, generation.median, generation.worst,
+      generation.diversity, operator_json(generation), generation.evaluations, generation.wall_s,
+      generation.quarantined, SqlBlob{generation.optimiser_state}, digest));
+  RETURN_IF_ERROR(insert_individuals(generation));
+  RETURN_IF_ERROR(transaction.commit());
   last_generation_ = generation.generation;
   digest_ = digest;
   return digest;
 }
 
 Status RunStore::insert_individuals(const StoredGeneration& generation) {
-  Result<SqlStatement> insert = database_.prepare(
-      "INSERT INTO individuals VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)", "commit a generation");
-  if (!insert) return insert.error();
+  ASSIGN_OR_RETURN(
+      SqlStatement insert,
+      database_.prepare("INSERT INTO individuals VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+                        "commit a generation"));
   std::int64_t rank = 0;
-  for (const StoredIndividual& individual : generation.individuals) {
-    insert->bind(1, static_cast<std::int64_t>(generation.generation)).bind(2, rank++);
-    insert->bind(3, static_cast<std::int64_t>(individual.birth_id));
-    insert->bind_blob(4, genome_bytes(individual.genome)).bind_text(5, individual.values);
-    insert->bind_text(6, individual.outcome).bind(7, individual.fitness);
-    insert->bind(8, std::int64_t{individual.scores});
-    insert->bind_text(9, json_text(Json(individual.parents))).bind_text(10, individual.operators);
-    if (Status s = insert->run(); !s) return s;
+  for (const StoredIndividual& i : generation.individuals) {
+    const std::string_view genome = genome_bytes(i.genome);
+    insert.bind_all(generation.generation, rank++, i.birth_id, SqlBlob{genome}, i.values, i.outcome,
+                    i.fitness, i.scores, json_text(Json(i.parents)), i.operators);
+    RETURN_IF_ERROR(insert.run());
   }
   return {};
 }
 
 Status RunStore::set_numeric_class(const std::string& numeric_class) {
   if (!info_.numeric_class.empty()) return {};
-  Result<SqlStatement> update = database_.prepare(
-      "UPDATE run SET numeric_class = ? WHERE numeric_class = ''", "keep the numeric class");
-  if (!update) return update.error();
-  update->bind_text(1, numeric_class);
-  if (Status s = update->run(); !s) return s;
+  RETURN_IF_ERROR(database_.run("keep the numeric class",
+                                "UPDATE run SET numeric_class = ? WHERE numeric_class = ''",
+                                numeric_class));
   info_.numeric_class = numeric_class;
   return {};
 }
 
 Status RunStore::set_progress(const Progress& progress) {
-  Result<SqlStatement> update = database_.prepare(
-      "UPDATE progress SET state = ?, stop_reason = ?, pid = ?, host = ?, heartbeat = ?, "
-      "rate_per_s = ?, time_left_s = ?, done = ?, total = ?, workers = ?, epoch = ?, farm = ?",
-      "write the progress");
-  if (!update) return update.error();
   // One column for both: a run that waits has not stopped.
   const bool running = progress.state == RunState::kRunning;
-  update->bind_text(1, run_state_name(progress.state));
-  update->bind_text(2, running ? progress.waiting : progress.stop_reason);
-  update->bind(3, std::int64_t{::getpid()}).bind_text(4, host_name());
-  update->bind(5, unix_now_s()).bind(6, progress.rate_per_s).bind(7, progress.time_left_s);
-  update->bind(8, static_cast<std::int64_t>(progress.done));
-  update->bind(9, static_cast<std::int64_t>(progress.total));
-  update->bind_text(10, json_text(workers_json(progress.workers)));
-  update->bind(11, static_cast<std::int64_t>(epoch_));
   FarmTally farm = farm_before_;
   farm += progress.farm;
-  update->bind_text(12, farm.to_json());
-  return update->run();
+  return database_.run(
+      "write the progress",
+      "UPDATE progress SET state = ?, stop_reason = ?, pid = ?, host = ?, heartbeat = ?, "
+      "rate_per_s = ?, time_left_s = ?, done = ?, total = ?, workers = ?, epoch = ?, farm = ?",
+      run_state_name(progress.state), running ? progress.waiting : progress.stop_reason, ::getpid(),
+      host_name(), unix_now_s(), progress.rate_per_s, progress.time_left_s, progress.done,
+      progress.total, json_text(workers_json(progress.workers)), epoch_, farm.to_json());
 }
 
 Result<std::optional<Checkpoint>> RunStore::checkpoint(
     std::optional<std::uint64_t> generation) const {
-  Result<SqlStatement> select = database_.prepare(
+  auto found = database_.row(
+      "read a checkpoint",
       "SELECT generation, evaluations, optimiser_state, digest, (SELECT sum(wall_s) FROM "
       "generations AS g WHERE g.generation <= generations.generation) FROM generations WHERE "
       "?1 IS NULL OR generation = ?1 ORDER BY generation DESC LIMIT 1",
-      "read a checkpoint");
-  if (!select) return select.error();
-  if (generation) select->bind(1, static_cast<std::int64_t>(*generation));
-  const Result<bool> row = select->step();
-  if (!row) return row.error();
-  if (!*row) {
-    if (!generation) return std::optional<Checkpoint>{};
+      [](const SqlStatement& row) {
+        Checkpoint c;
+        row.read_all(c.generation, c.evaluations, SqlBlob{c.optimiser_state}, c.digest, c.wall_s);
+        return c;
+      },
+      generation);
+  if (found && !*found && generation) {
     return Error{database_.file().string() + ": has no generation " + std::to_string(*generation) +
                  "; " +
                  (last_generation_ ? "the last one is " + std::to_string(*last_generation_)
                                    : std::string("none was committed yet"))};
   }
-  Checkpoint checkpoint;
-  checkpoint.generation = static_cast<std::uint64_t>(select->integer(0));
-  checkpoint.evaluations = static_cast<std::uint64_t>(select->integer(1));
-  checkpoint.optimiser_state = select->blob(2);
-  checkpoint.digest = select->text(3);
-  checkpoint.wall_s = select->real(4);
-  return std::optional<Checkpoint>(std::move(checkpoint));
+  return found;
 }
 
 Result<fs::path> RunStore::truncate_after(std::uint64_t generation) {
-  const Result<std::optional<Checkpoint>> kept = checkpoint(generation);
-  if (!kept) return kept.error();
+  ASSIGN_OR_RETURN(const std::optional<Checkpoint> kept, checkpoint(generation));
   if (last_generation_ == generation) return fs::path{};
 
   const fs::path backup = free_backup_path(run_, *last_generation_);
   const std::string operation =
       "keep the generations after " + std::to_string(generation) + " in " + backup.string();
-  Result<SqlStatement> copy = database_.prepare("VACUUM INTO ?", operation);
-  if (!copy) return copy.error();
-  copy->bind_text(1, backup.string());
-  if (Status s = copy->run(); !s) return s.error();
-  if (Status s = sync_to_disk(backup); !s) return s.error();
-  if (Status s = sync_to_disk(run_); !s) return s.error();
+  RETURN_IF_ERROR(database_.run(operation, "VACUUM INTO ?", backup.string()));
+  RETURN_IF_ERROR(sync_to_disk(backup));
+  RETURN_IF_ERROR(sync_to_disk(run_));
 
   // The individuals go with their generations.
-  Result<SqlTransaction> transaction = SqlTransaction::begin(database_);
-  if (!transaction) return transaction.error();
-  if (Status s = database_.exec(
-          "DELETE FROM generations WHERE generation > " + std::to_string(generation) +
-              "; DELETE FROM documents WHERE generation > " + std::to_string(generation) + "; " +
-              forget_quarantines(generation + 1),
-          "forget the generations after " + std::to_string(generation));
-      !s) {
-    return s.error();
-  }
-  if (Status s = transaction->commit(); !s) return s.error();
+  ASSIGN_OR_RETURN(SqlTransaction transaction, SqlTransaction::begin(database_));
+  RETURN_IF_ERROR(
+      database_.exec("DELETE FROM generations WHERE generation > " + std::to_string(generation) +
+                         "; DELETE FROM documents WHERE generation > " +
+                         std::to_string(generation) + "; " + forget_quarantines(generation + 1),
+                     "forget the generations after " + std::to_string(generation)));
+  RETURN_IF_ERROR(transaction.commit());
   last_generation_ = generation;
-  digest_ = (*kept)->digest;
+  digest_ = kept->digest;
   return backup;
 }
 

@@ -4,6 +4,8 @@
 #include <iterator>
 #include <system_error>
 
+#include "common/base/try.h"
+
 namespace gapfarm {
 namespace {
 
@@ -99,7 +101,7 @@ static_assert(std::size(kUpgrades) + 1 == kRunStoreSchema);
 
 Status upgrade_from(Database& database, std::int64_t schema, const std::string& operation) {
   for (std::int64_t from = schema; from < kRunStoreSchema; ++from) {
-    if (Status s = database.exec(kUpgrades[from - 1], operation); !s) return s;
+    RETURN_IF_ERROR(database.exec(kUpgrades[from - 1], operation));
   }
   return database.exec("PRAGMA user_version = " + std::to_string(kRunStoreSchema), operation);
 }
@@ -113,12 +115,9 @@ std::filesystem::path run_store_file(const std::filesystem::path& run) {
 
 Status create_run_tables(Database& database) {
   const std::string operation = "create the run store";
-  if (Status s = database.exec(kTables, operation); !s) return s;
-  if (Status s = database.exec("PRAGMA application_id = " + std::to_string(kRunStoreApplicationId),
-                               operation);
-      !s) {
-    return s;
-  }
+  RETURN_IF_ERROR(database.exec(kTables, operation));
+  RETURN_IF_ERROR(database.exec("PRAGMA application_id = " + std::to_string(kRunStoreApplicationId),
+                                operation));
   return upgrade_from(database, 1, operation);
 }
 
@@ -127,13 +126,11 @@ Result<std::int64_t> run_store_schema(const Database& database) {
 }
 
 Status upgrade_run_store(Database& database) {
-  const Result<std::int64_t> schema = run_store_schema(database);
-  if (!schema) return schema.error();
-  if (*schema >= kRunStoreSchema) return {};
-  Result<SqlTransaction> transaction = SqlTransaction::begin(database);
-  if (!transaction) return transaction.error();
-  if (Status s = upgrade_from(database, *schema, "upgrade the run store"); !s) return s;
-  return transaction->commit();
+  ASSIGN_OR_RETURN(const std::int64_t schema, run_store_schema(database));
+  if (schema >= kRunStoreSchema) return {};
+  ASSIGN_OR_RETURN(SqlTransaction transaction, SqlTransaction::begin(database));
+  RETURN_IF_ERROR(upgrade_from(database, schema, "upgrade the run store"));
+  return transaction.commit();
 }
 
 Status check_run_store(const Database& database) {
@@ -142,74 +139,57 @@ Status check_run_store(const Database& database) {
   if (std::filesystem::file_size(database.file(), ignored) == 0 && !ignored) {
     return Error{file + ": is empty: creating the run was interrupted; delete it and start again"};
   }
-  const Result<std::int64_t> tables =
-      database.integer("SELECT count(*) FROM sqlite_master", "read the run store");
-  if (!tables) return tables.error();
-  const Result<std::int64_t> id = database.integer("PRAGMA application_id", "read the run store");
-  if (!id) return id.error();
-  if (*id == 0 && *tables == 0) {
+  ASSIGN_OR_RETURN(const std::int64_t tables,
+                   database.integer("SELECT count(*) FROM sqlite_master", "read the run store"));
+  ASSIGN_OR_RETURN(const std::int64_t id,
+                   database.integer("PRAGMA application_id", "read the run store"));
+  if (id == 0 && tables == 0) {
     return Error{file + ": has no tables: creating the run was interrupted; start it again"};
   }
-  if (*id != kRunStoreApplicationId) {
+  if (id != kRunStoreApplicationId) {
     return Error{file + ": is a SQLite file of another program (application id " +
-                 std::to_string(*id) + ", a run store has " +
+                 std::to_string(id) + ", a run store has " +
                  std::to_string(kRunStoreApplicationId) + "); give the folder of a gapfarm run"};
   }
-  const Result<std::int64_t> schema = run_store_schema(database);
-  if (!schema) return schema.error();
-  if (*schema < 1) {
+  ASSIGN_OR_RETURN(const std::int64_t schema, run_store_schema(database));
+  if (schema < 1) {
     return Error{file + ": names no schema: the file was changed by hand; restore a copy"};
   }
-  if (*schema > kRunStoreSchema) {
-    return Error{file + ": was written by a newer gapfarm (schema " + std::to_string(*schema) +
+  if (schema > kRunStoreSchema) {
+    return Error{file + ": was written by a newer gapfarm (schema " + std::to_string(schema) +
                  "; this program knows up to " + std::to_string(kRunStoreSchema) +
                  "); use the newer program"};
   }
   return {};
 }
 
-Status insert_run_info(Database& database, const RunInfo& info) {
-  Result<SqlStatement> insert = database.prepare(
-      "INSERT INTO run VALUES (1, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)", "create the run store");
-  if (!insert) return insert.error();
-  insert->bind_text(1, info.program_version).bind_text(2, info.fingerprint);
-  insert->bind_text(3, info.created).bind_text(4, info.config_path);
-  insert->bind_text(5, info.config_text).bind_text(6, info.overrides);
-  insert->bind_blob(7, info.problem).bind_text(8, info.problem_hash);
-  insert->bind_text(9, std::to_string(info.seed)).bind_text(10, info.numeric_class);
-  insert->bind_text(11, info.fitness).bind_text(12, info.fitness_unit);
-  insert->bind(13, std::int64_t{info.higher_is_better});
-  return insert->run();
+Status insert_run_info(Database& database, const RunInfo& i) {
+  return database.run("create the run store",
+                      "INSERT INTO run VALUES (1, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+                      i.program_version, i.fingerprint, i.created, i.config_path, i.config_text,
+                      i.overrides, SqlBlob{i.problem}, i.problem_hash, std::to_string(i.seed),
+                      i.numeric_class, i.fitness, i.fitness_unit, i.higher_is_better);
 }
 
 Result<RunInfo> load_run_info(const Database& database) {
-  Result<SqlStatement> select = database.prepare(
-      "SELECT program_version, fingerprint, created, config_path, config, overrides, problem, "
-      "problem_hash, seed, numeric_class, fitness, fitness_unit, higher_is_better FROM run",
-      "read the run store");
-  if (!select) return select.error();
-  const Result<bool> row = select->step();
-  if (!row) return row.error();
-  if (!*row) {
-    return Error{database.file().string() +
-                 ": table run is empty: the file was changed by hand; restore a copy"};
-  }
-  RunInfo info;
-  info.program_version = select->text(0);
-  info.fingerprint = select->text(1);
-  info.created = select->text(2);
-  info.config_path = select->text(3);
-  info.config_text = select->text(4);
-  info.overrides = select->text(5);
-  info.problem = select->blob(6);
-  info.problem_hash = select->text(7);
-  const std::string seed = select->text(8);
-  std::from_chars(seed.data(), seed.data() + seed.size(), info.seed);
-  info.numeric_class = select->text(9);
-  info.fitness = select->text(10);
-  info.fitness_unit = select->text(11);
-  info.higher_is_better = select->integer(12) != 0;
-  return info;
+  ASSIGN_OR_RETURN(
+      auto info,
+      database.row(
+          "read the run store",
+          "SELECT program_version, fingerprint, created, config_path, config, overrides, problem, "
+          "problem_hash, seed, numeric_class, fitness, fitness_unit, higher_is_better FROM run",
+          [](const SqlStatement& row) {
+            RunInfo i;
+            std::string seed;
+            row.read_all(i.program_version, i.fingerprint, i.created, i.config_path, i.config_text,
+                         i.overrides, SqlBlob{i.problem}, i.problem_hash, seed, i.numeric_class,
+                         i.fitness, i.fitness_unit, i.higher_is_better);
+            std::from_chars(seed.data(), seed.data() + seed.size(), i.seed);
+            return i;
+          }));
+  if (info) return *std::move(info);
+  return Error{database.file().string() +
+               ": table run is empty: the file was changed by hand; restore a copy"};
 }
 
 }  // namespace gapfarm

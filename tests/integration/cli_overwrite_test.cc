@@ -1,9 +1,7 @@
 // Nothing measured or made is overwritten unasked, whichever command it is.
 #include <gmock/gmock.h>
 
-#include <fstream>
 #include <nlohmann/json.hpp>
-#include <sstream>
 
 #include "tests/integration/demo_config.h"
 #include "tests/integration/run_program.h"
@@ -15,23 +13,16 @@ using testing::HasSubstr;
 using testing::Not;
 using Json = nlohmann::json;
 
-std::string bytes_of(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::stringstream text;
-  text << file.rdbuf();
-  return text.str();
-}
-
 class Overwrite : public testing::Test {
  protected:
   // Ends with 2 before it does anything, names the file, and leaves it as it was.
   void refused(const std::vector<std::string>& words, const std::string& file,
                const std::string& sentence) const {
-    const std::string before = bytes_of(file);
+    const std::string before = text_of(file);
     const Finished tried = gapfarm_command(words);
     EXPECT_EQ(tried.exit_code, 2) << words[0] << ": " << tried.out << tried.err;
     EXPECT_THAT(tried.err, HasSubstr(sentence)) << words[0];
-    EXPECT_EQ(bytes_of(file), before) << words[0];
+    EXPECT_EQ(text_of(file), before) << words[0];
   }
   std::string row(const char* session, int trial) const {
     return std::string(session) + "," + std::to_string(trial) + ",,forward,,,,0,0,0,0.25,0.01,0\n";
@@ -75,7 +66,7 @@ TEST_F(Overwrite, NoCommandTakesAMeasuredFile) {
       gapfarm_command({"simulate", config_, "--out", folder_ / "new.csv", "--paths", "0.1",
                        "--trials", "2", "--force", "--workers", "1"});
   EXPECT_EQ(forced.exit_code, 0) << forced.err;
-  EXPECT_THAT(bytes_of(other), HasSubstr("# log: new.csv "));
+  EXPECT_THAT(text_of(other), HasSubstr("# log: new.csv "));
 }
 
 TEST_F(Overwrite, ARunAndADiagnosisDoNotShareAFolder) {
@@ -127,7 +118,7 @@ TEST_F(Overwrite, LogsSayWhatWasRead) {
 
 TEST_F(Overwrite, RowsWithMistakesAreListedAndLeftOutWhenAsked) {
   const std::string bad = folder_.write(
-      "bad.csv", bytes_of(log_) + "a,2,,forward,,,,0,0,0,nan,0,0\na,3,,foward,,,,0,0,0,0,0,0\n");
+      "bad.csv", text_of(log_) + "a,2,,forward,,,,0,0,0,nan,0,0\na,3,,foward,,,,0,0,0,0,0,0\n");
   const Finished strict = gapfarm_command({"check", config_, "--trials", bad, "--json"});
   EXPECT_EQ(strict.exit_code, 2);
   EXPECT_THAT(strict.err, HasSubstr("bad.csv:4:"));

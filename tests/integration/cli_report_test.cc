@@ -3,7 +3,6 @@
 
 #include <filesystem>
 #include <fstream>
-#include <sstream>
 
 #include "master/store/run_store.h"
 #include "tests/integration/demo_config.h"
@@ -25,13 +24,6 @@ class CliReport : public ::testing::Test {
 
   Finished report(const std::string& from) {
     return gapfarm_command({"report", from, "--out", folder_ / "page.html"});
-  }
-
-  static std::string text_of(const std::string& path) {
-    std::ifstream file(path);
-    std::stringstream text;
-    text << file.rdbuf();
-    return text.str();
   }
 
   const TemporaryFolder folder_;

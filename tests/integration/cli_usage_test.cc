@@ -12,12 +12,6 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
 
-std::string text_of(const std::string& file) {
-  const Result<std::string> text = read_text_file(file);
-  EXPECT_TRUE(text.ok()) << text.error().message;
-  return text ? *text : "";
-}
-
 TEST(CliUsage, SaysWhatItIs) {
   const Finished version = gapfarm_command({"--version"});
   EXPECT_EQ(version.exit_code, 0);

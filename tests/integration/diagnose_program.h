@@ -4,22 +4,13 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
-#include <fstream>
 #include <nlohmann/json.hpp>
-#include <sstream>
 #include <string>
 #include <vector>
 
 #include "tests/integration/run_program.h"
 
 namespace gapfarm {
-
-inline std::string text_of(const std::string& path) {
-  std::ifstream file(path);
-  std::stringstream text;
-  text << file.rdbuf();
-  return text.str();
-}
 
 // A log of so many trials with these effects ("effect.key=value").
 inline void simulate_log(const std::string& config, const std::string& log, int trials,

@@ -88,6 +88,11 @@ TEST_F(ExternalRuns, AProgramThatMisbehavesStopsNoRun) {
   } kinds[] = {
       {"hang", "    if speed > 0.7: sys.stdin.close(); os.read(os.pipe()[0], 1)\n",
        "did not answer within 1 s"},
+      {"nan",
+       "    if speed > 0.7:\n"
+       "        print(json.dumps({'id': task['id'], 'pose': [float('nan')] * 3}), flush=True)\n"
+       "        continue\n",
+       "NaN, which is no number"},
       {"garbage", "    if speed > 0.7: print('bang', flush=True)\n",
        "did not answer with a JSON object: 'bang'"},
       {"flood", "    if speed > 0.7: print('x' * 3000000, flush=True)\n",
@@ -105,6 +110,15 @@ TEST_F(ExternalRuns, AProgramThatMisbehavesStopsNoRun) {
     const json found = status(kind.name);
     EXPECT_EQ(found["generation"], 2) << kind.name;
     EXPECT_EQ(found["evaluations"], calm["evaluations"]) << kind.name << ": nothing is lost";
+    if (found["incidents"].empty()) continue;
+    // Also long after: what failed, at which values, and how to see it by hand.
+    const std::string screen = gapfarm_command({"status", folder_ / kind.name}).out;
+    const std::string log = text_of(folder_.path() / kind.name / "log.txt");
+    for (const std::string& kept : {screen, log}) {
+      EXPECT_THAT(kept, HasSubstr(kind.named)) << kind.name;
+      EXPECT_THAT(kept, HasSubstr("--set speed=0.")) << kind.name;
+      EXPECT_THAT(kept, HasSubstr("by hand: cd ")) << kind.name;
+    }
   }
 }
 

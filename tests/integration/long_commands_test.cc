@@ -4,10 +4,8 @@
 #include <poll.h>
 #include <signal.h>
 
-#include <fstream>
 #include <functional>
 #include <nlohmann/json.hpp>
-#include <sstream>
 
 #include "master/store/command_record.h"
 #include "tests/integration/demo_config.h"
@@ -30,13 +28,6 @@ bool wait_until(const std::function<bool()>& condition) {
     ::poll(nullptr, 0, 10);
   }
   return false;
-}
-
-std::string text_of(const std::string& path) {
-  std::ifstream file(path);
-  std::stringstream text;
-  text << file.rdbuf();
-  return text.str();
 }
 
 class LongCommands : public ::testing::Test {

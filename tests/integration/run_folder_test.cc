@@ -39,13 +39,6 @@ class RunFolder : public ::testing::Test {
     return json.is_object() ? json : nlohmann::json::object();
   }
 
-  static std::string bytes(const std::string& file) {
-    std::ifstream in(file, std::ios::binary);
-    std::ostringstream text;
-    text << in.rdbuf();
-    return text.str();
-  }
-
   // Runs a shell script with mounts of its own; $G is gapfarm, $C the config, $R a folder.
   Finished with_mounts(const std::string& script, const std::string& folder) const {
     return run_program("/usr/bin/unshare", {"-m", "sh", "-c", script},
@@ -115,7 +108,7 @@ TEST_F(RunFolder, OfVersion01IsReadAsItIsAndUpgradedByResume) {
     auto database = Database::open(file_, Database::Mode::kCreate);
     ASSERT_TRUE(database.ok()) << database.error().message;
     const Status made =
-        database->exec(bytes(GAPFARM_SOURCE_DIR "/tests/integration/run_of_0_1.sql"), "make it");
+        database->exec(text_of(GAPFARM_SOURCE_DIR "/tests/integration/run_of_0_1.sql"), "make it");
     ASSERT_TRUE(made.ok()) << made.error().message;
   }
   const auto schema = [this] {
@@ -151,11 +144,11 @@ TEST_F(RunFolder, DamageIsNoticedBeforeAnythingIsWritten) {
     damaged.seekp(static_cast<std::streamoff>(size / 2));
     damaged << std::string(size / 4, '\xff');
   }
-  const std::string before = bytes(file_);
+  const std::string before = text_of(file_);
   const Finished tried = resume(run_, "21");
   EXPECT_EQ(tried.exit_code, kRefused);
   EXPECT_THAT(tried.err, AllOf(HasSubstr(file_), HasSubstr("damaged"), HasSubstr(".recover")));
-  EXPECT_EQ(bytes(file_), before);
+  EXPECT_EQ(text_of(file_), before);
 }
 
 TEST_F(RunFolder, AnotherProgramsFileIsLeftAlone) {
@@ -167,7 +160,7 @@ TEST_F(RunFolder, AnotherProgramsFileIsLeftAlone) {
                            "make another program's file")
                     .ok());
   }
-  const std::string before = bytes(file_);
+  const std::string before = text_of(file_);
   for (const Finished& tried : {resume(run_, "2"), gapfarm_command({"status", run_})}) {
     EXPECT_EQ(tried.exit_code, kRefused);
     EXPECT_THAT(tried.err, AllOf(HasSubstr(file_), HasSubstr("another program"),
@@ -176,7 +169,7 @@ TEST_F(RunFolder, AnotherProgramsFileIsLeftAlone) {
   const Finished over = evolve(run_, "2");
   EXPECT_EQ(over.exit_code, kRefused);
   EXPECT_THAT(over.err, AllOf(HasSubstr(run_), HasSubstr("choose another --out")));
-  EXPECT_EQ(bytes(file_), before);
+  EXPECT_EQ(text_of(file_), before);
 }
 
 TEST_F(RunFolder, ASecondMasterIsRefusedAndTheFirstGoesOn) {

@@ -14,19 +14,19 @@
 namespace gapfarm {
 namespace {
 
-std::string content(const std::filesystem::path& path) {
-  std::ifstream in(path, std::ios::binary);
-  std::ostringstream text;
-  text << in.rdbuf();
-  return text.str();
-}
-
 std::filesystem::path fresh_folder() {
   std::string pattern = (std::filesystem::temp_directory_path() / "gapfarm-test-XXXXXX").string();
   return mkdtemp(pattern.data());
 }
 
 }  // namespace
+
+std::string text_of(const std::filesystem::path& path) {
+  std::ifstream in(path, std::ios::binary);
+  std::ostringstream text;
+  text << in.rdbuf();
+  return text.str();
+}
 
 RunningProgram::RunningProgram(const std::string& program,
                                const std::vector<std::string>& arguments,
@@ -62,9 +62,9 @@ RunningProgram::~RunningProgram() {
 
 void RunningProgram::send(int signal) const { ::kill(pid_, signal); }
 
-std::string RunningProgram::out() const { return content(folder_ / "out"); }
+std::string RunningProgram::out() const { return text_of(folder_ / "out"); }
 
-std::string RunningProgram::err() const { return content(folder_ / "err"); }
+std::string RunningProgram::err() const { return text_of(folder_ / "err"); }
 
 Finished RunningProgram::wait() {
   int status = 0;
@@ -74,8 +74,8 @@ Finished RunningProgram::wait() {
   Finished finished;
   finished.peak_memory_kB = usage.ru_maxrss;
   finished.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
-  finished.out = content(folder_ / "out");
-  finished.err = content(folder_ / "err");
+  finished.out = text_of(folder_ / "out");
+  finished.err = text_of(folder_ / "err");
   return finished;
 }
 

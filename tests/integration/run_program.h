@@ -47,6 +47,9 @@ inline Finished gapfarm_command(const std::vector<std::string>& arguments,
   return run_program("gapfarm", arguments, environment);
 }
 
+// The file's bytes; none where it cannot be read.
+std::string text_of(const std::filesystem::path& path);
+
 // A fresh folder that goes with its owner.
 class TemporaryFolder {
  public:

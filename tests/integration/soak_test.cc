@@ -49,12 +49,12 @@ std::vector<std::string> contents(const std::string& run, std::int64_t last) {
       "quote(fitness) || scores || parents || operators FROM individuals WHERE generation <= ? "
       "ORDER BY generation, rank"};
   for (const std::string& query : queries) {
-    auto select = database->prepare(query, "compare runs");
-    EXPECT_TRUE(select.ok()) << select.error().message;
-    select->bind(1, last);
-    for (auto row = select->step(); row && *row; row = select->step()) {
-      rows.push_back(std::to_string(select->integer(0)) + ": " + select->text(1));
-    }
+    const auto read = [](const SqlStatement& row) {
+      return std::to_string(row.integer(0)) + ": " + row.text(1);
+    };
+    const auto found = database->rows("compare runs", query, read, last);
+    EXPECT_TRUE(found.ok()) << found.error().message;
+    rows.insert(rows.end(), found->begin(), found->end());
   }
   return rows;
 }

@@ -1,8 +1,9 @@
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
 
 #include <numeric>
 
 #include "master/diagnose/estimate.h"
+#include "master/diagnose/report_parts.h"
 #include "master/diagnose/spread_row.h"
 #include "master/diagnose/subject.h"
 #include "tests/unit/diagnose/drawn_drives.h"
@@ -79,6 +80,15 @@ TEST(Unsettled, ForeseenTheyScoreBetterAndOtherTrialsTheSame) {
   EXPECT_NEAR(std::accumulate(with.begin(), with.end(), 0.0) -
                   std::accumulate(without.begin(), without.end(), 0.0),
               fit.gain, 1e-6);
+}
+
+TEST(Report, WhatIsLeftIsOneCautionTheClearestFirst) {
+  EXPECT_THAT(steps::leftover_caution({{"the time", -2, 0}}, -4), ::testing::IsEmpty());
+  EXPECT_THAT(steps::leftover_caution({{"the time", -5, 0}}, -4),
+              ::testing::ElementsAre("What is left still depends on the time."));
+  EXPECT_THAT(
+      steps::leftover_caution({{"the time", -5, 0}, {"x", -3, 0}, {"y", -9, 0}}, -4),
+      ::testing::ElementsAre("What is left still depends on y and the time (the clearest first)."));
 }
 
 }  // namespace

@@ -114,15 +114,47 @@ TEST(ExternalSimulator, NamesAnswersThatAreNone) {
   EXPECT_THAT(message(R"({"id": 2, "pose": [0, 0, 0]})"), HasSubstr("another question than 1"));
   EXPECT_THAT(message(R"({"id": 1, "pose": [0, 0]})"), HasSubstr("[x, y, theta]"));
   EXPECT_THAT(message(R"({"id": 1, "pose": [0, 1e999, 0]})"), HasSubstr("JSON object"));
-  EXPECT_THAT(message(R"({"id": 1, "pose": [0, null, 0]})"), HasSubstr("finite numbers"));
+  for (const char* number : {"NaN", "-Infinity"}) {  // as Python's json prints them
+    EXPECT_THAT(
+        message(R"({"id": 1, "pose": [0, )" + std::string(number) + ", 0]}"),
+        AllOf(HasSubstr(std::string(number) + ", which is no number"), HasSubstr("print null")));
+  }
   EXPECT_THAT(message(R"({"id": 1, "pose": [0, 0, 0]})", 0.1), HasSubstr("answered none"));
   EXPECT_THAT(message(R"({"id": 1, "outcome": "tired"})"), HasSubstr("other than ok or diverged"));
 }
 
 TEST(ExternalSimulator, ADivergedSimulationIsAnAnswer) {
-  const auto result = answered(R"({"id": 1, "outcome": "diverged", "message": "NaN"})");
-  ASSERT_TRUE(result.ok());
-  EXPECT_TRUE(result->diverged);
+  for (const char* answer : {R"({"id": 1, "outcome": "diverged", "message": "NaN"})",
+                             R"({"id": 1, "pose": null})", R"({"id": 1, "pose": [0, null, 0]})"}) {
+    const auto result = answered(answer);
+    ASSERT_TRUE(result.ok()) << answer;
+    EXPECT_TRUE(result->diverged) << answer;
+  }
+}
+
+// The second line of an error asks a new program the same, also where words need quoting.
+TEST(ExternalSimulator, AFailureCanBeRepeatedByHand) {
+  const std::string hello = R"({"gapfarm":1,"name":"it's me"})";
+  ExternalSimulator simulator(
+      {shell("read x; echo '{\"gapfarm\":1,\"name\":\"it'\\''s me\"}'; read x; echo \"bang $x\""),
+       "/", 60},
+      monotonic_seconds);
+  const auto declaration = parse_declaration(hello);
+  ASSERT_TRUE(declaration.ok());
+  ExternalRequest request;
+  request.declaration = &*declaration;
+  const auto result = simulator.simulate(request, hello);
+  ASSERT_FALSE(result.ok());
+  const std::string& message = result.error().message;
+  const std::string begin = "\nby hand: ";
+  ASSERT_THAT(message, HasSubstr(begin));
+  const std::string command = message.substr(message.find(begin) + begin.size());
+  FILE* pipe = popen(command.c_str(), "r");
+  ASSERT_NE(pipe, nullptr);
+  std::string output;
+  for (int c = 0; (c = std::fgetc(pipe)) != EOF;) output += static_cast<char>(c);
+  EXPECT_EQ(pclose(pipe), 0) << command;
+  EXPECT_EQ(output, hello + "\nbang " + request_line(request) + "\n");
 }
 
 TEST(ExternalSimulator, RefusesOneThatDeclaresSomethingElseThanBefore) {

@@ -3,7 +3,10 @@
 
 #include <gmock/gmock.h>
 
+#include <cmath>
 #include <nlohmann/json.hpp>
+
+#include "common/parameters/genome.h"
 
 namespace gapfarm {
 namespace {
@@ -39,6 +42,16 @@ TEST(ExternalDeclaration, RefusesWhatCannotBeATable) {
   EXPECT_THAT(error_of(declaration_with(
                   R"({"key": "m", "lower": 0, "upper": 2, "nominal": 1, "log": true})")),
               HasSubstr("log scale"));
+  EXPECT_THAT(error_of(declaration_with(
+                  R"({"key": "n", "lower": 1, "upper": 2.5, "nominal": 1, "integer": true})")),
+              HasSubstr("must be whole numbers"));
+  EXPECT_THAT(error_of(declaration_with(
+                  R"({"key": "n", "lower": 1, "upper": 9, "nominal": 1, "integer": true,
+                      "log": true})")),
+              HasSubstr("searched evenly"));
+  EXPECT_THAT(error_of(declaration_with(
+                  R"({"key": "m", "lower": 1, "upper": 2, "nominal": 1, "intger": true})")),
+              HasSubstr("unknown key 'intger'; did you mean 'integer'?"));
   EXPECT_THAT(error_of(declaration_with(kMass, R"(["paths"])")), HasSubstr("did you mean 'path'"));
 }
 
@@ -47,6 +60,40 @@ TEST(ExternalDeclaration, SaysEverythingInOneLine) {
       R"({"key": "m", "lower": 1, "upper": 2, "nominal": 1, "summary": "of\nall\n[genes]"})"));
   ASSERT_TRUE(declaration.ok());
   EXPECT_EQ(declaration->parameters[0].summary, "of all [genes]");
+}
+
+// Whole numbers are searched and asked for as such.
+TEST(ExternalDeclaration, AnIntegerIsOne) {
+  const auto declaration = parse_declaration(declaration_with(
+      R"({"key": "teeth", "lower": 8, "upper": 12, "nominal": 10, "integer": true})"));
+  ASSERT_TRUE(declaration.ok()) << declaration.error().message;
+  const ExternalTable table(*declaration);
+  EXPECT_FALSE(table.table().check(0, 9.5).ok());
+  EXPECT_TRUE(table.table().check(0, 9).ok());
+  const Gene gene{0, 8, 12, ParameterScale::kLinear};
+  for (const double g : {0.0, 0.13, 0.5, 0.77, 1.0}) {
+    const double value = decode_gene(table.table(), gene, g);
+    EXPECT_EQ(value, std::floor(value)) << g;
+  }
+  ExternalRequest request;
+  request.declaration = &table.declaration();
+  request.values = {9};
+  EXPECT_THAT(request_line(request), HasSubstr(R"("teeth":9})"));
+}
+
+// Four digits, but for a value that a rounded bound would let in.
+TEST(ExternalTable, NumbersForPeopleAreShort) {
+  const ExternalTable table(
+      parse_declaration(declaration_with(R"({"key": "m", "unit": "m", "nominal": 0.3,
+          "lower": 0.24413111231467408, "upper": 0.9}, {"key": "n", "nominal": 123456,
+          "lower": 0, "upper": 200000, "integer": true})"))
+          .value());
+  const ParameterTable& rows = table.table();
+  EXPECT_EQ(rows.format(0, 0.24413111231467408), "0.2441 m");
+  EXPECT_EQ(rows.format(1, 123456), "123456");
+  EXPECT_EQ(rows.check(0, 0.1).error().message,
+            "m is 0.1, but it must be between 0.2441 m and 0.9 m");
+  EXPECT_THAT(rows.check(0, 0.2441).error().message, HasSubstr("between 0.24413111231467408"));
 }
 
 TEST(ExternalTable, HasTheProgramsRowsThenNoiseThenEffectsThatCanBeApplied) {

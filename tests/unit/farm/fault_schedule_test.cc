@@ -100,6 +100,25 @@ TEST(FaultSchedules, TheUndisturbedOneRetriesNothing) {
   EXPECT_EQ(farm.scheduler().counts().foreign, 0u);
 }
 
+// Two workers, tasks of a millisecond, ten milliseconds there and back: whatever the way takes, it
+// is hidden behind work, and no task is done twice for it.
+TEST(FaultSchedules, TheWindowGrowsWithTheWayToTheMaster) {
+  FaultPlan slow;
+  slow.delay_s = 0.005;
+  slow.span_s = 0;
+  std::vector<v1::Task> tasks(8000);
+  for (std::size_t i = 0; i < tasks.size(); ++i) {
+    tasks[i].mutable_echo()->set_payload(std::to_string(i));
+    tasks[i].mutable_echo()->set_busy_us(1000);
+  }
+  SimulatedFarm farm(1, 2, slow);
+  ASSERT_EQ(farm.run({tasks.begin(), tasks.begin() + 200}).size(), 200u);  // all have come
+  const double began = farm.now();
+  ASSERT_EQ(farm.run(tasks).size(), tasks.size());
+  EXPECT_LT(farm.now() - began, 1.2 * 4.0) << "4 s is what two workers take that never wait";
+  EXPECT_LT(farm.scheduler().copied(), 80u) << "a hundredth";
+}
+
 TEST(FaultSchedules, AuditsFindTheMachineThatComputesWrongly) {
   FaultPlan audits;
   audits.audit_share = 1;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "common/net/envelope.h"
+#include "common/problem/problem.h"
 
 namespace gapfarm {
 namespace {
@@ -261,6 +262,33 @@ TEST(Scheduler, QuarantinesOnlyTheJobThatEndsItsWorkers) {
   EXPECT_EQ(results[0].outcome(), v1::OK);
   EXPECT_EQ(results[1].outcome(), v1::WORKER_FAILED);
   EXPECT_EQ(results[2].outcome(), v1::OK);
+}
+
+TEST(Scheduler, ReportsWhatFailedAtWhichValuesAndHowToRepeatIt) {
+  Problem problem;
+  problem.values = problem.table().nominal();
+  problem.commands = default_commands("srv1");
+  problem.genes = {{row_of(Srv1::kFriction), 0.2, 1.0, ParameterScale::kLinear}};
+  v1::Task task;
+  task.mutable_evaluate()->mutable_point()->add_genome(0.25);
+  task.mutable_evaluate()->mutable_stream()->set_birth_id(17);
+  Desk desk;
+  desk.scheduler.add_problem("p", serialise(to_proto(problem)));
+  desk.scheduler.start("p", {task});
+  for (const char* name : {"a", "b", "c"}) {
+    desk.join(name);
+    const auto jobs = desk.jobs_for(name);
+    ASSERT_EQ(jobs.size(), 1u) << name;
+    const bool first = std::string(name) == "a";
+    desk.scheduler.on_process_end({name, EndCause::kCrashed, 7, jobs[0].attempt_id(), "ended",
+                                   first ? "" : "it did not answer within 1 s\nby hand: ask it"});
+  }
+  const std::string text = desk.scheduler.quarantine_reasons().back();
+  EXPECT_EQ(desk.events.back().text, text);
+  EXPECT_EQ(text,
+            "evaluation of birth 17 was given up: a on an unnamed host crashed, b on an unnamed "
+            "host: it did not answer within 1 s, c on an unnamed host: the same; by hand: ask it; "
+            "its values, for `gapfarm simulate CONFIG`: --set friction=0.4");
 }
 
 TEST(Scheduler, NeverBlamesAJobForPoliteExits) {

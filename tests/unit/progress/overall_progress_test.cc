@@ -112,6 +112,7 @@ TEST(OverallProgress, SaysStageShareRateAndTimeLeft) {
   OverallProgress single({{"evaluate", 1, 10}});
   single.begin(0, 0);
   EXPECT_EQ(progress_words(single.at(0)), "evaluate: 0 of 10, 0 % done");
+  EXPECT_EQ(progress_text("generation 1 of 60", 0, {}), "generation 1 of 60") << "no rate yet";
 }
 
 TEST(LineCadence, OneAtOnceAndThenOneAMinute) {

@@ -26,17 +26,20 @@ TEST_F(DatabaseTest, ReturnsBytesAndNumbersAsTheyWere) {
   Result<SqlStatement> insert = database.prepare("INSERT INTO t VALUES (?, ?)", "insert");
   ASSERT_TRUE(insert.ok());
   const std::string bytes("\0a\xff", 3);
-  ASSERT_TRUE(insert->bind_blob(1, bytes).bind(2, 0.1).run().ok());
-  ASSERT_TRUE(insert->bind_text(1, "").bind(2, std::nan("")).run().ok());
+  ASSERT_TRUE(insert->bind(1, SqlBlob{bytes}).bind(2, 0.1).run().ok());
+  ASSERT_TRUE(insert->bind(1, "").bind(2, std::nan("")).run().ok());
 
-  Result<SqlStatement> select = database.prepare("SELECT a, b FROM t", "select");
-  ASSERT_TRUE(*select->step());
-  EXPECT_EQ(select->blob(0), bytes);
-  EXPECT_EQ(select->real(1), 0.1);
-  ASSERT_TRUE(*select->step());
-  EXPECT_EQ(select->text(0), "");
-  EXPECT_FALSE(select->optional_real(1).has_value());
-  EXPECT_FALSE(*select->step());
+  const auto rows = database.rows("select", "SELECT a, b FROM t", [](const SqlStatement& row) {
+    std::pair<std::string, std::optional<double>> read;
+    row.read_all(SqlBlob{read.first}, read.second);
+    return read;
+  });
+  ASSERT_TRUE(rows.ok());
+  ASSERT_EQ(rows->size(), 2u);
+  EXPECT_EQ(rows->front().first, bytes);
+  EXPECT_EQ(rows->front().second, 0.1);
+  EXPECT_EQ(rows->back().first, "");
+  EXPECT_FALSE(rows->back().second.has_value());
 }
 
 TEST_F(DatabaseTest, ForgetsATransactionThatWasNotCommitted) {

@@ -1,0 +1,101 @@
+#include "common/process/child.h"
+
+#include <fcntl.h>
+#include <linux/close_range.h>
+#include <string.h>
+#include <sys/prctl.h>
+#include <sys/syscall.h>
+#include <sys/wait.h>
+
+#include <cerrno>
+
+namespace gapfarm {
+namespace {
+
+constexpr int kKept = 3;
+
+// What the child needs, made before fork().
+struct Prepared {
+  std::vector<char*> words, environment;
+  int null = -1;
+  int told = -1;  // where it writes what keeps it from starting
+  pid_t parent = 0;
+};
+
+void pass(int fd, int null, int as) { dup2(fd < 0 ? null : fd, as); }
+
+// After fork(): only what is safe there.
+[[noreturn]] void become(const ChildSetup& setup, const Prepared& prepared) {
+  if (setup.death_signal != 0) {
+    prctl(PR_SET_PDEATHSIG, setup.death_signal);
+    // The parent may have died before the line above.
+    if (getppid() != prepared.parent) _exit(0);
+  }
+  if (setup.leads_group) setpgid(0, 0);
+  const int told = fcntl(prepared.told, F_DUPFD_CLOEXEC, kKept + 1);
+  pass(setup.in, prepared.null, STDIN_FILENO);
+  pass(setup.out, prepared.null, STDOUT_FILENO);
+  pass(setup.err, prepared.null, STDERR_FILENO);
+  if (setup.kept >= 0) dup2(setup.kept, kKept);
+  syscall(SYS_close_range, kKept, ~0u, CLOSE_RANGE_CLOEXEC);
+  if (setup.kept >= 0) fcntl(kKept, F_SETFD, 0);
+  for (const int s : {SIGINT, SIGTERM, SIGHUP, SIGPIPE, SIGCHLD}) signal(s, SIG_DFL);
+  sigset_t mask;
+  sigemptyset(&mask);
+  if (setup.blocks_interrupt) sigaddset(&mask, SIGINT);
+  sigprocmask(SIG_SETMASK, &mask, nullptr);
+  errno = 0;
+  if (setup.niceness != 0 && nice(setup.niceness) < 0) errno = 0;
+  if (setup.folder.empty() || chdir(setup.folder.c_str()) == 0) {
+    execvpe(prepared.words[0], prepared.words.data(), prepared.environment.data());
+  }
+  const int error = errno;
+  [[maybe_unused]] const ssize_t n = write(told, &error, sizeof error);
+  _exit(127);
+}
+
+std::vector<char*> pointers(const std::vector<std::string>& texts) {
+  std::vector<char*> all;
+  for (const std::string& text : texts) all.push_back(const_cast<char*>(text.c_str()));
+  return all;
+}
+
+}  // namespace
+
+Result<pid_t> start_child(const ChildSetup& setup) {
+  int told[2];
+  if (pipe2(told, O_CLOEXEC) != 0) return Error{strerror(errno)};
+  Prepared prepared{pointers(setup.words), pointers(setup.environment),
+                    open("/dev/null", O_RDWR | O_CLOEXEC), told[1], getpid()};
+  prepared.words.push_back(nullptr);
+  for (char** variable = environ; *variable != nullptr; ++variable) {
+    prepared.environment.push_back(*variable);
+  }
+  prepared.environment.push_back(nullptr);
+  // No handler of this process runs in the child.
+  sigset_t all, before;
+  sigfillset(&all);
+  pthread_sigmask(SIG_SETMASK, &all, &before);
+  const pid_t pid = fork();
+  if (pid == 0) become(setup, prepared);
+  int error = pid < 0 ? errno : 0;
+  pthread_sigmask(SIG_SETMASK, &before, nullptr);
+  close(told[1]);
+  close(prepared.null);
+  // Its end of the pipe closes when it has become the program.
+  ssize_t n = 0;
+  while (pid > 0 && (n = read(told[0], &error, sizeof error)) < 0 && errno == EINTR) {
+  }
+  close(told[0]);
+  if (n > 0) waitpid(pid, nullptr, 0);
+  if (pid < 0 || n > 0) return Error{strerror(error)};
+  return pid;
+}
+
+std::string end_text(int status) {
+  if (WIFEXITED(status)) return "exited with status " + std::to_string(WEXITSTATUS(status));
+  const int signal = WTERMSIG(status);
+  return "was killed by signal " + std::to_string(signal) + " (" + strsignal(signal) + ")";
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,36 @@
+// How child processes are started, whatever they are for.
+#pragma once
+
+#include <signal.h>
+#include <sys/types.h>
+#include <unistd.h>
+
+#include <string>
+#include <vector>
+
+#include "common/base/result.h"
+
+namespace gapfarm {
+
+struct ChildSetup {
+  std::vector<std::string> words;        // program and arguments; without a slash found by PATH
+  std::string folder;                    // where it is started; empty: here
+  std::vector<std::string> environment;  // "NAME=value", beside this process's and before it
+  int in = -1;                           // descriptors; -1: /dev/null
+  int out = STDERR_FILENO;               // standard output is often the parent's answer to its user
+  int err = STDERR_FILENO;
+  int kept = -1;                  // becomes descriptor 3 (ProgressPage::kInheritedFd); -1: none
+  int death_signal = SIGKILL;     // sent when the thread that starts it ends; 0: none
+  bool leads_group = false;       // a terminal's Ctrl-C does not reach it
+  bool blocks_interrupt = false;  // until its own handlers stand (StopOnSignals unblocks SIGINT)
+  int niceness = 0;
+};
+
+// It inherits no other descriptor, no handler and no blocked signal.  Error: what kept it from
+// starting, in the system's words ("No such file or directory").
+Result<pid_t> start_child(const ChildSetup& setup);
+
+// Of a status of waitpid(): "exited with status 3", "was killed by signal 9 (Killed)".
+std::string end_text(int status);
+
+}  // namespace gapfarm
