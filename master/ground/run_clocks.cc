@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "master/ground/search.h"
+#include "master/ground/tolerances.h"
 
 namespace gapfarm {
 namespace {
