@@ -140,10 +140,8 @@ std::vector<SpreadEffect> spread_effects(const Refit& refit) {
   }
   if (named.grid_m > 0) {
     const PoseGrid& grid = named.study().grid;
-    found.push_back({"pose_quantisation",
-                     grid.nats,
-                     {{"step", grid.step_m, grid.lo_m, grid.hi_m, "m"}},
-                     {}});
+    found.push_back(
+        {"pose_quantisation", grid.nats, {{"step", grid.step_m, grid.lo_m, grid.hi_m, "m"}}, {}});
   }
   return found;
 }

@@ -109,7 +109,7 @@ NamedEffect GroundReport::effect_of(const GroundStep& step, std::size_t place) {
   effect.position_mm_after = rms_mm(after);
   effect.heading_mrad_before = rms_mrad(before);
   effect.heading_mrad_after = rms_mrad(after);
-  const Gain closed =
+  const HeldOutGain closed =
       share_of_gap(search_.windows, after, before, search_.best, search_.chain[0], options_.seed);
   effect.closed = closed.mean;
   effect.closed_lo = closed.lo;

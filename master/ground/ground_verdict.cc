@@ -10,10 +10,10 @@
 
 namespace gapfarm {
 
-bool may_be_named(const Gain& gain) { return std::isfinite(gain.lo) && gain.lo > 0; }
+bool may_be_named(const HeldOutGain& gain) { return std::isfinite(gain.lo) && gain.lo > 0; }
 
 bool nothing_is_left(const GroundFigures& figures) {
-  const Gain& left = figures.closable;
+  const HeldOutGain& left = figures.closable;
   return std::isfinite(left.mean) && std::isfinite(left.hi) &&
          std::max(left.mean, left.hi) <= kToleratedGap;
 }
@@ -26,7 +26,7 @@ Verdict ground_verdict(const GroundFigures& figures) {
 }
 
 std::string verdict_reason(const GroundFigures& figures) {
-  const Gain& left = figures.closable;
+  const HeldOutGain& left = figures.closable;
   const std::string closes =
       fmt::format("{:.2g} [{:.2g}, {:.2g}] nats a window", left.mean, left.lo, left.hi);
   if (nothing_is_left(figures)) {

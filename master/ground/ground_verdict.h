@@ -12,15 +12,15 @@ namespace gapfarm {
 
 struct GroundFigures {
   int faults = 0;  // of the log, put right
-  std::vector<Gain>
+  std::vector<HeldOutGain>
       named;  // of each name of a value, held out, in the order in which they were added
   // What the best of everything that was tried (values that move within their tolerances, the best
   // of the catalogue, every value free) would still gain, held out.
-  Gain closable;
+  HeldOutGain closable;
 };
 
 // Whether a value may be named: its gain's interval lies above 0.
-bool may_be_named(const Gain& gain);
+bool may_be_named(const HeldOutGain& gain);
 
 // Whether what is left lies within kToleratedGap, all of its interval.
 bool nothing_is_left(const GroundFigures& figures);

@@ -54,7 +54,7 @@ double weighted(const std::vector<double>& values, const std::vector<double>& ti
   return sum;
 }
 
-Gain interval_of(double mean, std::vector<double> drawn) {
+HeldOutGain interval_of(double mean, std::vector<double> drawn) {
   std::sort(drawn.begin(), drawn.end());
   const std::size_t tail = drawn.size() / 20;
   return {mean, drawn[tail], drawn[drawn.size() - 1 - tail]};
@@ -101,8 +101,8 @@ std::vector<std::vector<double>> draw_blocks(const WindowSet& windows, std::uint
   return all;
 }
 
-Gain held_out_gain(const WindowSet& windows, const WindowFit& with, const WindowFit& without,
-                   std::uint64_t seed) {
+HeldOutGain held_out_gain(const WindowSet& windows, const WindowFit& with, const WindowFit& without,
+                          std::uint64_t seed) {
   const std::vector<double> gains = block_gains(windows, with, without);
   std::vector<double> counts(gains.size(), 0.0);
   for (const int block : windows.block) counts[static_cast<std::size_t>(block)] += 1;
@@ -115,8 +115,8 @@ Gain held_out_gain(const WindowSet& windows, const WindowFit& with, const Window
   return interval_of(sum / static_cast<double>(with.nats.size()), std::move(drawn));
 }
 
-Gain share_of_gap(const WindowSet& windows, const WindowFit& with, const WindowFit& without,
-                  const WindowFit& best, const WindowFit& worst, std::uint64_t seed) {
+HeldOutGain share_of_gap(const WindowSet& windows, const WindowFit& with, const WindowFit& without,
+                         const WindowFit& best, const WindowFit& worst, std::uint64_t seed) {
   const std::vector<double> gained = block_gains(windows, with, without);
   const std::vector<double> gap = block_gains(windows, best, worst);
   // What is gained is part of the gap, so that a share above 0 is a gain above 0.

@@ -21,16 +21,16 @@ std::vector<std::vector<double>> draw_blocks(const WindowSet& windows, std::uint
                                              std::size_t spared);
 
 // Nats a window, with a 90 % interval by runs and blocks drawn again.
-struct Gain {
+struct HeldOutGain {
   double mean = 0;
   double lo = 0;
   double hi = 0;
 };
 
-Gain held_out_gain(const WindowSet& windows, const WindowFit& with, const WindowFit& without,
-                   std::uint64_t seed);
+HeldOutGain held_out_gain(const WindowSet& windows, const WindowFit& with, const WindowFit& without,
+                          std::uint64_t seed);
 // Share that `with` gains over `without` of what `best` gains over `worst`, within [0, 1].
-Gain share_of_gap(const WindowSet& windows, const WindowFit& with, const WindowFit& without,
-                  const WindowFit& best, const WindowFit& worst, std::uint64_t seed);
+HeldOutGain share_of_gap(const WindowSet& windows, const WindowFit& with, const WindowFit& without,
+                         const WindowFit& best, const WindowFit& worst, std::uint64_t seed);
 
 }  // namespace gapfarm

@@ -43,7 +43,7 @@ WindowFit with_traits(const WindowFitter& fitter, const std::vector<GroundHypoth
   for (int found = 0; found < kMostTraits; ++found) {
     const std::vector<Eigen::MatrixXd> slopes = fitter.slopes(fit);
     WindowFit best = fit;
-    double most = kLeastGroundGain;
+    double most = kLeastChangeGain;
     for (const GroundHypothesis& h : catalogue) {
       Eigen::VectorXd values = fit.values;
       std::vector<FitRow> rows = with_freed(fit.rows, h, &values);

@@ -88,7 +88,7 @@ double least_gain(const GroundSearch& search) {
   // A long log is sure of the smallest of differences, which no model has right.
   const double stretches = static_cast<double>(search.windows.trials.size()) /
                            static_cast<double>(search.windows.horizons);
-  double least = std::max(kLeastGroundGain, 3 * stretches * std::log(kChangeShrinks));
+  double least = std::max(kLeastChangeGain, 3 * stretches * std::log(kChangeShrinks));
   if (!search.steps.empty()) least = std::max(least, kShareOfFirst * search.steps.front().gain);
   return least;
 }
@@ -100,7 +100,7 @@ struct Candidate {
   WindowFit fit;
   WindowFit held_out;
   WindowFit before;  // that it is compared with
-  Gain held_out_gain;
+  HeldOutGain held_out_gain;
 };
 
 Candidate predict_held_out(const WindowFitter& fitter, const GroundWork& work,
@@ -153,7 +153,7 @@ void name_candidate(const WindowSet& windows, const GroundWork& work,
     if (hypothesis != step.chosen && !there) alike.push_back(hypothesis);
   };
   for (const Candidate& other : candidates) {
-    const Gain over = held_out_gain(windows, chosen.held_out, other.held_out, work.seed);
+    const HeldOutGain over = held_out_gain(windows, chosen.held_out, other.held_out, work.seed);
     if (over.lo <= 0 && may_be_named(other.held_out_gain)) add(other.offer.hypothesis);
   }
   for (const Offer& offer : offers) {

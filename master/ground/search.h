@@ -33,8 +33,8 @@ struct Offer {
 
 struct GroundStep {
   std::size_t chosen = 0;
-  double gain = 0;  // nats over all windows
-  Gain held_out;    // over `before`
+  double gain = 0;       // nats over all windows
+  HeldOutGain held_out;  // over `before`
   // Held out: what it is compared with. What was named before, or that with all values moved within
   // their tolerances, where only then it shows.
   WindowFit before;
@@ -80,7 +80,7 @@ struct GroundSearch {
   // tolerances, the best of the catalogue that was not named, every value free.  `closable`: what
   // it gains over the chain's last; of a change, over values within what a robot changes by.
   WindowFit best;
-  Gain closable;
+  HeldOutGain closable;
 };
 
 // A fault of the log that, put right, explains it far better than the file does as it is; nothing
