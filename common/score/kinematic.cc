@@ -164,11 +164,13 @@ class Body {
     if (name == "right") right_ *= value;
     if (name == "travel") left_ *= value;
     if (name == "travel") right_ *= value;
-    if (name == "travel") ahead_ *= value;
+    if (name == "travel") {
+      for (double* gain : {&ahead_, &aside_, &turn_}) *gain *= value;
+    }
     if (name == "separation") separation_ = value;
     if (name == "ahead") ahead_ *= value;
-    if (name == "aside") aside_ = value;
-    if (name == "turn") turn_ = value;
+    if (name == "aside") aside_ *= value;
+    if (name == "turn") turn_ *= value;
     if (name == "steering_gain") robot_.steering.gain *= value;
     if (name == "steering_left" || name == "steering_right") {
       const double sign = name == "steering_left" ? 1 : -1;

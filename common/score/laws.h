@@ -1,8 +1,17 @@
 // Probability laws.  Boost.Math stands behind this header alone: what it is made into is compiled
 // once.
+//
+// Nothing throws.  Where an argument is not finite or a law does not know it (a negative
+// chi-squared), a probability is 1, so that a p value is no evidence, any other value is NaN, and
+// undefined_laws() counts it.
 #pragma once
 
+#include <cstdint>
+
 namespace gapfarm {
+
+// Calls of this process so far whose arguments had no law; a command that sees it grow warns.
+std::uint64_t undefined_laws();
 
 // Standard normal: P(Z > z), and z with P(Z <= z) = share in (0, 1).
 double normal_above(double z);

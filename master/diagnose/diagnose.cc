@@ -4,7 +4,9 @@
 #include <chrono>
 #include <cmath>
 
+#include "common/base/guarded.h"
 #include "common/base/suggest.h"
+#include "common/score/laws.h"
 #include "master/diagnose/headline.h"
 #include "master/diagnose/prepare.h"
 #include "master/diagnose/report_parts.h"
@@ -61,38 +63,39 @@ Result<DiagnosisResult> take_steps(const steps::Inquiry& of, Stages* stages) {
     return give_up(of, known, stages->present(), error);
   };
   stages->begin(0);
-  const Result<Study> tuned = steps::tune(of);
+  const Result<Study> tuned = guarded([&] { return steps::tune(of); });
   if (!tuned) return end_with(tuned.error());
   known.tuned = &*tuned;
   tell_of_base(of, *tuned);
 
   stages->begin(1);
-  const Result<steps::Evidence> measured = steps::measure(of, *tuned);
+  const Result<steps::Evidence> measured = guarded([&] { return steps::measure(of, *tuned); });
   if (!measured) return end_with(measured.error());
   tell_of_noise(of, measured->study);
 
   stages->begin(2);
-  const Result<steps::Screening> screening = steps::screen(of, *measured);
+  const Result<steps::Screening> screening = guarded([&] { return steps::screen(of, *measured); });
   if (!screening) return end_with(screening.error());
   known.screening = &*screening;
   tell_of_readings(of, screening->found);
   tell_of_choice(of, screening->found, screening->doubt.has_value());
 
   stages->begin(3);
-  const Result<steps::Judgement> judgement = steps::judge(of, *screening);
+  const Result<steps::Judgement> judgement = guarded([&] { return steps::judge(of, *screening); });
   if (!judgement) return end_with(judgement.error());
   known.judged = &*judgement;
   tell_of_verdict(of, *judgement);
 
   stages->begin(4);
-  auto again = steps::look_from_free_base(of, *measured, *judgement);
+  auto again = guarded([&] { return steps::look_from_free_base(of, *measured, *judgement); });
   if (!again) return end_with(again.error());
   Result<steps::Refit> refit =
-      *again ? std::move((*again)->refit) : steps::refit(of, *measured, *screening, *judgement);
+      *again ? std::move((*again)->refit)
+             : guarded([&] { return steps::refit(of, *measured, *screening, *judgement); });
   if (!refit) return end_with(refit.error());
   known.judged = &refit->judged;
   if (!*again) {
-    again = steps::look_without_dropped(of, *measured, *screening, *refit);
+    again = guarded([&] { return steps::look_without_dropped(of, *measured, *screening, *refit); });
     if (!again) return end_with(again.error());
     if (*again) *refit = std::move((*again)->refit);
   }
@@ -103,8 +106,18 @@ Result<DiagnosisResult> take_steps(const steps::Inquiry& of, Stages* stages) {
   }
 
   stages->begin(5);
-  auto result = steps::report(of, *known.screening, steps::add_shape(of, *refit));
+  auto result =
+      guarded([&] { return steps::report(of, *known.screening, steps::add_shape(of, *refit)); });
   return result ? std::move(result) : end_with(result.error());
+}
+
+// A test whose number is none is no evidence, neither of an effect nor of its absence.
+void doubt_undefined_tests(Diagnosis* d) {
+  d->cautions.push_back(
+      "Some tests met numbers that are not finite and count as no evidence (p = 1): look for "
+      "trials "
+      "far from all others, or bring [parameters] nearer to the robot.");
+  if (d->verdict == Verdict::kNone) d->verdict = Verdict::kUnknown;
 }
 
 }  // namespace
@@ -122,12 +135,14 @@ Result<DiagnosisResult> diagnose(Farm& farm, const Problem& problem,
   if (any_unusable(log.sanity)) return unusable_result(log);
   Predictor predictor(farm, log.problem);
   Stages stages(options);
+  const std::uint64_t undefined_before = undefined_laws();
   auto result = take_steps({farm, predictor, log.problem, *subject, options,
                             Eigen::Vector2d(log.frame_x_m, log.frame_y_m)},
                            &stages);
   if (!result) return result;
   stages.end();
   Diagnosis& d = result->diagnosis;
+  if (undefined_laws() != undefined_before) doubt_undefined_tests(&d);
   d.timing_s = stages.took_s();
   d.sanity.insert(d.sanity.end(), log.sanity.begin(), log.sanity.end());
   tell(*subject->effects, &d);

@@ -1,4 +1,4 @@
-// What the readings alone tell: their grid and their noise.
+// What the readings alone tell: their noise.  Their grid: common/score/pose_readings.h.
 #pragma once
 
 #include <Eigen/Core>
@@ -9,12 +9,6 @@
 #include "master/diagnose/residuals.h"
 
 namespace gapfarm {
-
-// Step (m) of the grid that logged positions lie on; 0 when they lie on none.  Steps below 0.2 mm
-// are the digits of the file, not a property of the camera.  The grid may begin anywhere, one
-// reading of twenty may lie off it, and both axes must show one; an axis with fewer than
-// seven distinct positions has no say.
-double quantisation_step(std::span<const Trial> trials);
 
 // Fewer readings of resting poses tell nothing of the readings.
 inline constexpr std::size_t kFewestGaps = 20;

@@ -139,11 +139,9 @@ std::vector<SpreadEffect> spread_effects(const Refit& refit) {
                      difference(spread.scores, last), spread.fit.sessions});
   }
   if (named.grid_m > 0) {
-    const double q = named.grid_m;
-    found.push_back({"pose_quantisation",
-                     pose_grid_gain(named.study()),
-                     {{"step", q, 0.99 * q, 1.01 * q, "m"}},
-                     {}});
+    const PoseGrid& grid = named.study().grid;
+    found.push_back(
+        {"pose_quantisation", grid.nats, {{"step", grid.step_m, grid.lo_m, grid.hi_m, "m"}}, {}});
   }
   return found;
 }
@@ -213,8 +211,6 @@ RootMeanSquare held_out_error(const NestedFit& nested, const std::vector<std::si
   }
   return root_mean_square(residuals);
 }
-
-double pose_grid_gain(const Study& study) { return 0.02 * static_cast<double>(study.size()) + 20; }
 
 ClosedShare closed_share(const Inquiry& of, const Refit& refit, const std::vector<double>& gained) {
   const Study& study = refit.judged.named.study();

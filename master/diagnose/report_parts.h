@@ -29,10 +29,6 @@ RootMeanSquare root_mean_square(const std::vector<Eigen::Vector3d>& residuals);
 // under the fit to all.
 RootMeanSquare held_out_error(const NestedFit& nested, const std::vector<std::size_t>& folds);
 
-// Log-likelihood by which a grid of the positions is put among the other effects: that it is there
-// is certain.
-double pose_grid_gain(const Study& study);
-
 // Rows of every effect of the catalogue, also those that no mean shows.
 std::vector<Screened> complete_screening(const Inquiry& of, const Screening& screening,
                                          const Judgement& judged);

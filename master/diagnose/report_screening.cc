@@ -52,7 +52,7 @@ Told told_of(const Inquiry& of, const std::string& name, const Explanation& name
   const SpreadRow* look = of.subject.effects->row(name).spread;
   if (look != nullptr) return told_of_spread(look, named);
   if (name == "pose_quantisation") {
-    return {named.grid_m > 0 ? pose_grid_gain(named.study()) : 0, "step", named.grid_m,
+    return {named.grid_m > 0 ? named.study().grid.nats : 0, "step", named.grid_m,
             named.grid_m > 0 ? "the positions lie on this grid" : "the positions lie on no grid"};
   }
   if (name == "motor_lag" && named.lag.trials > 0) {

@@ -139,8 +139,8 @@ Result<Judgement> judge(const Inquiry& of, const Screening& screening) {
   double nats = by_means + named.slip.gain + (named.as_logged ? named.latency.gain : 0);
   for (const FoundSpread& found : named.spreads) nats += found.fit.gain;
   const bool on_grid =
-      (of.subject.looks & kLooksForRounding) != 0 && named.study().quantum_m > kLeastQuantum_m;
-  if (on_grid && !of.left_out("pose_quantisation")) named.grid_m = named.study().quantum_m;
+      (of.subject.looks & kLooksForRounding) != 0 && named.study().grid.step_m > kLeastQuantum_m;
+  if (on_grid && !of.left_out("pose_quantisation")) named.grid_m = named.study().grid.step_m;
   const bool two = std::any_of(named.chosen.begin(), named.chosen.end(), [](const ChosenEffect& c) {
     return kind_of(c.candidate.signature.effect) != c.candidate.signature.effect;
   });

@@ -138,13 +138,13 @@ Result<Study> make_study(const Problem& problem, std::span<const Gene> genes) {
   }
   study.sessions = sessions.size();
   study.gaps = reading_gaps(problem.log, contexts);
-  study.quantum_m = quantisation_step(problem.log.trials);
-  study.noise.pose = reading_noise(study.gaps, study.quantum_m);
+  study.grid = pose_grid(problem.log.trials);
+  study.noise.pose = reading_noise(study.gaps, study.grid.step_m);
   // Logs whose trials share one reading say nothing of it.
   study.reading_noise_known = study.noise.pose.position_m > 0 && study.noise.pose.heading_rad > 0;
   if (study.noise.pose.position_m <= 0) {
     study.noise.pose.position_m = std::max(problem.values[study.subject->pose_position.row],
-                                           study.quantum_m / std::sqrt(12.0));
+                                           study.grid.step_m / std::sqrt(12.0));
   }
   if (study.noise.pose.heading_rad <= 0) {
     study.noise.pose.heading_rad = problem.values[study.subject->pose_heading.row];

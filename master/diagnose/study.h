@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "common/base/result.h"
+#include "common/score/pose_readings.h"
 #include "master/diagnose/drive_base.h"
 #include "master/infer/predictor.h"
 #include "master/diagnose/residuals.h"
@@ -34,7 +35,7 @@ struct Study {
   std::vector<ReadingGap> gaps;
   std::size_t sessions = 0;
   bool free_commands = false;  // hardly a command repeats: see free_commands.h
-  double quantum_m = 0;        // grid of the logged positions
+  PoseGrid grid;               // of the logged positions
   NoiseEstimate noise;         // by which rows are whitened and dependences judged
   // By which trials are scored and the models left behind predict, where that is another one:
   // drives or readings with heavy tails.

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 
+#include "common/base/guarded.h"
 #include "master/ground/ground_report.h"
 #include "master/ground/reference.h"
 
@@ -53,8 +54,10 @@ Status leave_out(const std::vector<std::string>& names, std::vector<GroundHypoth
 
 }  // namespace
 
-Result<GroundDiagnosis> diagnose_ground(const GroundRobot& robot, const RunLog& log,
-                                        const GroundDiagnoseOptions& options) {
+namespace {
+
+Result<GroundDiagnosis> take_stages(const GroundRobot& robot, const RunLog& log,
+                                    const GroundDiagnoseOptions& options) {
   StageClock clock(options.on_stage);
   GroundQuestion question = ask_what_is_wrong(robot);
   if (options.reference) {
@@ -66,16 +69,25 @@ Result<GroundDiagnosis> diagnose_ground(const GroundRobot& robot, const RunLog& 
   }
   if (Status s = leave_out(options.left_out, &question.catalogue); !s) return s.error();
   const GroundWork work = {[&](const std::string& stage) { clock.begin(stage); },
-                           options.on_progress, options.stopped, options.memo, options.on_finding};
+                           options.on_progress,
+                           options.stopped,
+                           options.memo,
+                           options.on_finding,
+                           options.seed};
   auto search = search_ground(robot, log, options.windows, question, work);
   if (!search) return search.error();
   clock.begin(std::end(kGroundStages)[-1].name);
-  GroundDiagnosis result;
-  result.diagnosis = report_ground(robot, *search, options, &result.values);
-  result.corrected = robot_with(robot, chosen_values(*search));
+  GroundDiagnosis result = report_ground(robot, *search, options);
   clock.begin("");
   result.diagnosis.timing_s = std::move(clock.timing_s);
   return result;
+}
+
+}  // namespace
+
+Result<GroundDiagnosis> diagnose_ground(const GroundRobot& robot, const RunLog& log,
+                                        const GroundDiagnoseOptions& options) {
+  return guarded([&] { return take_stages(robot, log, options); });
 }
 
 std::vector<SanityFinding> check_ground_log(const GroundRobot& robot, const RunLog& log) {

@@ -13,6 +13,7 @@
 #include "common/runs/run.h"
 #include "common/runs/windows.h"
 #include "master/diagnose/diagnosis.h"
+#include "master/ground/ground_verdict.h"
 #include "master/ground/search.h"
 #include "master/ground/values_file.h"
 
@@ -46,6 +47,7 @@ struct GroundDiagnosis {
   Diagnosis diagnosis;
   GroundRobot corrected;  // the robot with what was named put in
   std::vector<SaidValue> values;
+  GroundFigures figures;  // behind the verdict
 };
 
 // Errors: no window fits, a hypothesis to leave out that there is not, a reference whose log is the

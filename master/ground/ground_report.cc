@@ -6,16 +6,16 @@
 #include <cmath>
 #include <tuple>
 
-#include "common/random/stream.h"
+#include "master/ground/ground_verdict.h"
+#include "master/ground/ground_where.h"
 #include "master/ground/ground_words.h"
 #include "master/ground/run_clocks.h"
+#include "master/ground/tolerances.h"
 
 namespace gapfarm {
 namespace {
 
 constexpr std::size_t kMostAliases = 3;
-constexpr int kGroundDraws = 400;
-constexpr double kSureOfUnknown = 2;  // standard errors
 constexpr double kAlmostSure = 0.99;  // no log makes surer than this
 
 // What was found, with what is needed to put it into words and figures.
@@ -32,10 +32,11 @@ class GroundReport {
 
   Diagnosis write();
   std::vector<SaidValue> said() const;
+  const GroundFigures& figures_of() const { return figures_; }
 
  private:
-  void left_out();
   void clocks();
+  void readings();
   void faults();
   void values();
   void figures();
@@ -43,18 +44,17 @@ class GroundReport {
   void trials();
   NamedEffect effect_of(const GroundStep& step, std::size_t place);
   void name_headline();
-  bool tells_more_left_out() const;
+  void judge();
   double sum(const std::vector<double>& nats) const;
   double rms_mm(const WindowFit& fit) const;
   double rms_mrad(const WindowFit& fit) const;
-  std::pair<double, double> closed_interval(std::size_t place) const;
 
   const GroundRobot& robot_;
   const GroundSearch& search_;
   const GroundDiagnoseOptions& options_;
   WindowFitter fitter_;
   Eigen::MatrixX2d intervals_;
-  WindowFit floor_;  // predictions of what was left out with every row free
+  GroundFigures figures_;
   Diagnosis d_;
 };
 
@@ -75,52 +75,20 @@ void add_alias(const std::string& name, NamedEffect* effect) {
   if (std::find(have.begin(), have.end(), name) == have.end()) effect->aliases.push_back(name);
 }
 
-void GroundReport::left_out() {
-  std::vector<FitRow> all = search_.rows;
-  for (FitRow& row : all) row.free = true;
-  floor_ = fit_left_out(fitter_, all, search_.free_fit.values);
-}
-
 double GroundReport::sum(const std::vector<double>& nats) const {
   double sum = 0;
   for (const double n : nats) sum += n;
   return sum / static_cast<double>(nats.size());
 }
 
-// By blocks drawn with replacement.
-std::pair<double, double> GroundReport::closed_interval(std::size_t place) const {
-  const auto blocks = static_cast<std::size_t>(search_.windows.blocks);
-  const bool named_best = sum(search_.chain.back().nats) > sum(floor_.nats);
-  const WindowFit& best = named_best ? search_.chain.back() : floor_;
-  std::vector<double> gained(blocks, 0.0), explainable(blocks, 0.0);
-  for (std::size_t i = 0; i < floor_.nats.size(); ++i) {
-    const auto b = static_cast<std::size_t>(search_.windows.block[i]);
-    gained[b] += search_.chain[place + 1].nats[i] - search_.chain[place].nats[i];
-    explainable[b] += best.nats[i] - search_.chain[0].nats[i];
-  }
-  Stream stream({options_.seed, Purpose::kStatistics, 1, place, 0});
-  std::vector<double> shares;
-  for (int d = 0; d < kGroundDraws; ++d) {
-    double up = 0, all = 0;
-    for (std::size_t k = 0; k < blocks; ++k) {
-      const auto pick = static_cast<std::size_t>(stream.below(blocks));
-      up += gained[pick];
-      all += explainable[pick];
-    }
-    shares.push_back(all > 0 ? std::clamp(up / all, 0.0, 1.0) : 0.0);
-  }
-  std::sort(shares.begin(), shares.end());
-  return {shares[kGroundDraws / 20], shares[kGroundDraws - 1 - kGroundDraws / 20]};
-}
-
 NamedEffect GroundReport::effect_of(const GroundStep& step, std::size_t place) {
   const GroundHypothesis& h = search_.catalogue[step.chosen];
   NamedEffect effect;
   effect.name = h.name;
-  for (const std::string& alias : h.aliases) add_alias(alias, &effect);
   for (const std::size_t other : step.not_told_apart) {
     add_alias(search_.catalogue[other].name, &effect);
   }
+  for (const std::string& alias : h.aliases) add_alias(alias, &effect);
   if (!effect.aliases.empty()) {
     effect.alias_reason = "They move this robot alike on these runs.";
   }
@@ -132,17 +100,20 @@ NamedEffect GroundReport::effect_of(const GroundStep& step, std::size_t place) {
           estimate_of(row, search_.fit.values[k], intervals_(k, 0), intervals_(k, 1)));
     }
   }
-  const double floor = std::max(sum(floor_.nats), sum(search_.chain.back().nats));
-  effect.gap_before = floor - sum(search_.chain[place].nats);
-  effect.gap_after = floor - sum(search_.chain[place + 1].nats);
-  effect.position_mm_before = rms_mm(search_.chain[place]);
-  effect.position_mm_after = rms_mm(search_.chain[place + 1]);
-  effect.heading_mrad_before = rms_mrad(search_.chain[place]);
-  effect.heading_mrad_after = rms_mrad(search_.chain[place + 1]);
-  const double gap = floor - sum(search_.chain[0].nats);
-  const double gained = effect.gap_before - effect.gap_after;
-  effect.closed = gap > 0 ? std::clamp(gained / gap, 0.0, 1.0) : 0;
-  std::tie(effect.closed_lo, effect.closed_hi) = closed_interval(place);
+  const double floor = sum(search_.best.nats);
+  const WindowFit& before = step.before;
+  const WindowFit& after = search_.chain[place + 1];
+  effect.gap_before = floor - sum(before.nats);
+  effect.gap_after = floor - sum(after.nats);
+  effect.position_mm_before = rms_mm(before);
+  effect.position_mm_after = rms_mm(after);
+  effect.heading_mrad_before = rms_mrad(before);
+  effect.heading_mrad_after = rms_mrad(after);
+  const HeldOutGain closed =
+      share_of_gap(search_.windows, after, before, search_.best, search_.chain[0], options_.seed);
+  effect.closed = closed.mean;
+  effect.closed_lo = closed.lo;
+  effect.closed_hi = closed.hi;
   // What was gained over what would just have been worth a name.
   effect.confidence = std::min(kAlmostSure, 1 - 0.5 * std::exp((kLeastGroundGain - step.gain) / 2));
   effect.text = search_.reference ? words_of_change(robot_, h, effect) + "."
@@ -172,41 +143,55 @@ void GroundReport::faults() {
   }
 }
 
-void GroundReport::values() {
-  for (std::size_t k = 0; k < search_.steps.size(); ++k) {
-    d_.effects.push_back(effect_of(search_.steps[k], k));
+// What the poses show by themselves.
+void GroundReport::readings() {
+  const auto add = [&](const char* name, std::vector<std::string> aliases, Estimate estimate,
+                       std::string text, const char* remedy) {
+    NamedEffect effect;
+    effect.name = name;
+    effect.aliases = std::move(aliases);
+    effect.confidence = kAlmostSure;
+    effect.parameters = {std::move(estimate)};
+    effect.text = std::move(text);
+    d_.sanity.push_back({name, effect.text, remedy, Severity::kNote, true, effect.aliases});
+    d_.effects.push_back(std::move(effect));
+    ++figures_.faults;
+  };
+  if (names_stale_frames(search_)) {
+    const StaleFrames& s = search_.stale;
+    add("stale_frames", {"pose_latency"}, {"share", s.share, s.lo, s.hi, "-"},
+        fmt::format("{} of {} poses on the way, {:.1f} % [{:.1f}, {:.1f}], repeat the one before; "
+                    "they were left out.",
+                    s.repeats, s.frames, 100 * s.share, 100 * s.lo, 100 * s.hi),
+        "Log a pose once, with the time at which it was measured.");
+  }
+  if (names_rounding(search_)) {
+    const PoseGrid& g = search_.grid;
+    add("pose_quantisation", {}, {"step", g.step_m, g.lo_m, g.hi_m, "m"},
+        fmt::format("Positions are rounded to a grid of {:.4g} mm ({:.0f} nats).", 1e3 * g.step_m,
+                    g.nats),
+        "Log more digits.");
   }
 }
 
-// Whether everything free tells more of what was left out than small moves do: two logs that were
-// driven otherwise differ in what the model has wrong, which is no change of the robot.
-bool GroundReport::tells_more_left_out() const {
-  if (!search_.reference) return true;
-  const WindowFit moved = fit_left_out(fitter_, search_.rows, search_.fit.values);
-  return surely_better(search_.windows, floor_, moved) > kSureOfUnknown;
+void GroundReport::values() {
+  for (std::size_t k = 0; k < search_.steps.size(); ++k) {
+    d_.effects.push_back(effect_of(search_.steps[k], k));
+    figures_.named.push_back(search_.steps[k].held_out);
+  }
 }
 
 void GroundReport::figures() {
-  const double floor = std::max(sum(floor_.nats), sum(search_.chain.back().nats));
+  const double floor = sum(search_.best.nats);
   d_.gap = {floor - sum(search_.chain.front().nats), floor - sum(search_.chain.back().nats), 0};
-  d_.position_mm = {rms_mm(search_.chain.front()), rms_mm(search_.chain.back()), rms_mm(floor_)};
+  d_.position_mm = {rms_mm(search_.chain.front()), rms_mm(search_.chain.back()),
+                    rms_mm(search_.best)};
   d_.heading_mrad = {rms_mrad(search_.chain.front()), rms_mrad(search_.chain.back()),
-                     rms_mrad(floor_)};
-  const double left = search_.free_fit.objective - search_.fit.objective;
-  const bool unknown = left > kUnknownGroundGain && tells_more_left_out();
+                     rms_mrad(search_.best)};
   if (search_.reference) {
     d_.cautions.push_back(
         "Against the reference's log: sizes and intervals are of the change, what the reference "
         "leaves unsure is in them.");
-  }
-  const bool named = !d_.effects.empty();
-  d_.verdict = named ? (unknown ? Verdict::kEffectAndUnknown : Verdict::kEffect)
-                     : (unknown ? Verdict::kUnknown : Verdict::kNone);
-  if (unknown) {
-    d_.cautions.push_back(fmt::format(
-        "Freeing every value of the file at once gains another {:.0f} nats: several are a little "
-        "off, or something moves the robot that its kinematics do not have.",
-        left));
   }
   if (search_.windows.blocks < 8) {
     d_.cautions.push_back("Few runs: intervals are from runs drawn again, and these are few.");
@@ -215,6 +200,19 @@ void GroundReport::figures() {
     d_.cautions.push_back(
         "Wheel speeds were measured: what lies before them (dead time, ramps) "
         "cannot show.");
+  }
+}
+
+void GroundReport::judge() {
+  figures_.faults += static_cast<int>(search_.faults.size());
+  figures_.closable = search_.closable;
+  d_.verdict = ground_verdict(figures_);
+  d_.findings.push_back(verdict_reason(figures_));
+  if (nothing_is_left(figures_)) return;
+  d_.where = where_left(fitter_, search_, options_.windows.horizons_s);
+  const std::string moved = values_that_would_move(search_);
+  if (!moved.empty()) {
+    d_.findings.push_back("Were all values free, these would move most: " + moved + ".");
   }
 }
 
@@ -309,7 +307,10 @@ void GroundReport::name_headline() {
                              : "Something changed that nothing of the catalogue explains alone.")
         : nothing ? "Nothing of the robot's file or log is wrong by more than a well-kept file's "
                     "values are."
-                  : "Something is wrong that nothing of the catalogue explains alone.";
+        : figures_.closable.lo > 0
+            ? "Something is wrong that nothing of the catalogue explains alone."
+            : "Nothing is surely wrong, but these runs do not exclude it.";
+    if (!d_.findings.empty()) d_.headline += " " + d_.findings.front();
     return;
   }
   d_.headline = d_.effects.front().text;
@@ -344,10 +345,11 @@ std::vector<SaidValue> GroundReport::said() const {
 }
 
 Diagnosis GroundReport::write() {
-  left_out();
   faults();
+  readings();
   values();
   figures();
+  judge();
   clocks();
   screening();
   trials();
@@ -357,11 +359,15 @@ Diagnosis GroundReport::write() {
 
 }  // namespace
 
-Diagnosis report_ground(const GroundRobot& robot, const GroundSearch& search,
-                        const GroundDiagnoseOptions& options, std::vector<SaidValue>* values) {
+GroundDiagnosis report_ground(const GroundRobot& robot, const GroundSearch& search,
+                              const GroundDiagnoseOptions& options) {
   GroundReport report(robot, search, options);
-  *values = report.said();
-  return report.write();
+  GroundDiagnosis result;
+  result.values = report.said();
+  result.diagnosis = report.write();
+  result.figures = report.figures_of();
+  result.corrected = robot_with(robot, chosen_values(search));
+  return result;
 }
 
 Kinematics chosen_values(const GroundSearch& search) {

@@ -7,9 +7,8 @@
 
 namespace gapfarm {
 
-// `values`: every value of the robot's kinematics, as the log has it.
-Diagnosis report_ground(const GroundRobot& robot, const GroundSearch& search,
-                        const GroundDiagnoseOptions& options, std::vector<SaidValue>* values);
+GroundDiagnosis report_ground(const GroundRobot& robot, const GroundSearch& search,
+                              const GroundDiagnoseOptions& options);
 
 // What was chosen, as fitted.
 Kinematics chosen_values(const GroundSearch& search);

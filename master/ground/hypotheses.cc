@@ -202,9 +202,9 @@ void Catalogue::steering() {
   }
   if (!robot_.steering.table.empty()) {
     value("steering_asymmetry", {"steering_gain"}, "the steering's gain to the left",
-          {{"steering_left", 1, kGainShare, "ratio", "-"}});
+          {{"steering_left", 1, kSteeringGainShare, "ratio", "-"}});
     value("steering_asymmetry", {"steering_gain"}, "the steering's gain to the right",
-          {{"steering_right", 1, kGainShare, "ratio", "-"}});
+          {{"steering_right", 1, kSteeringGainShare, "ratio", "-"}});
   }
 }
 

@@ -32,9 +32,12 @@ struct GroundHypothesis {
   std::function<void(RunLog*)> put_right;
   double metres = 1;  // logged positions times this are metres
   std::string remedy;
-  bool only_more = false;  // less than the file's value has no meaning
+  bool only_more = false;  // less than 0 has no meaning
   double price = 0;        // nats that it must tell more, having more values than others
 };
+
+// Standard deviation of a value that is wrong (kPlausibleErrors).
+double plausible_error(const KinematicRow& row);
 
 // Rows that every fit moves a little, within their tolerances.
 std::vector<KinematicRow> kinematic_rows(const GroundRobot& robot);

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "common/random/stream.h"
+#include "master/ground/tolerances.h"
 
 namespace gapfarm {
 namespace {
@@ -42,7 +43,7 @@ WindowFit with_traits(const WindowFitter& fitter, const std::vector<GroundHypoth
   for (int found = 0; found < kMostTraits; ++found) {
     const std::vector<Eigen::MatrixXd> slopes = fitter.slopes(fit);
     WindowFit best = fit;
-    double most = kLeastGroundGain;
+    double most = kLeastChangeGain;
     for (const GroundHypothesis& h : catalogue) {
       Eigen::VectorXd values = fit.values;
       std::vector<FitRow> rows = with_freed(fit.rows, h, &values);
@@ -51,7 +52,7 @@ WindowFit with_traits(const WindowFitter& fitter, const std::vector<GroundHypoth
         rows[k].free = false;
         if (k >= fit.rows.size()) rows[k].row.tolerance *= kFarOff;
       }
-      if (fitter.promise(fit, slopes, rows, values) < kLeastGroundGain / 3) continue;
+      if (fitter.promise(fit, slopes, rows, values) < kLeastPromise) continue;
       WindowFit with = fitter.fit(rows, {}, values);
       const double gain = with.objective - fit.objective - h.price;
       const bool less = with.values[values.size() - 1] < rows.back().row.nominal;

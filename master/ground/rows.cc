@@ -18,6 +18,13 @@ double wheel_reach_m(const GroundRobot& robot) {
 
 }  // namespace
 
+double plausible_error(const KinematicRow& row) {
+  for (const PlausibleError& error : kPlausibleErrors) {
+    if (row.name == error.row) return std::max(error.deviation, row.tolerance);
+  }
+  return kPlausibleTolerances * row.tolerance;
+}
+
 std::vector<KinematicRow> kinematic_rows(const GroundRobot& robot) {
   std::vector<KinematicRow> rows;
   if (is_holonomic(robot)) {
@@ -27,7 +34,7 @@ std::vector<KinematicRow> kinematic_rows(const GroundRobot& robot) {
   } else if (is_steered(robot)) {
     const double slow = robot.steering.understeer_s2_m2;
     rows = {{"steering_offset", 0, kSteering_rad, "angle", "rad"},
-            {"steering_gain", 1, kGainShare, "ratio", "-"},
+            {"steering_gain", 1, kSteeringGainShare, "ratio", "-"},
             {"understeer", slow, 0.01 + 0.2 * slow, "understeer", "s^2/m^2"}};
     if (is_throttled(robot)) {
       const RobotThrottle& t = robot.throttle;

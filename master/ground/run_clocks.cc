@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "master/ground/search.h"
+#include "master/ground/tolerances.h"
 
 namespace gapfarm {
 namespace {
@@ -61,7 +62,7 @@ std::optional<std::vector<RunClock>> clocks_apart(const WindowFitter& fitter,
     clocks.push_back({r, at_s[r]});
     own += best[r];
   }
-  const double least = kLeastGroundGain * (static_cast<double>(clocks.size()) - 1);
+  const double least = kLeastChangeGain * (static_cast<double>(clocks.size()) - 1);
   if (clocks.size() < 2 || own - common < least) return {};
   return clocks;
 }

@@ -4,47 +4,17 @@
 #include <cmath>
 #include <utility>
 
+#include "master/ground/ground_verdict.h"
 #include "master/ground/so_far.h"
+#include "master/ground/tolerances.h"
 
 namespace gapfarm {
 namespace {
 
-constexpr std::size_t kMostFaults = 2;
-constexpr std::size_t kMostSteps = 3;
-constexpr double kFaultShrinks = 1.4;  // residuals must, for a log to be called the wrong way round
-constexpr double kFaultGain = 10;      // nats
-constexpr double kChangeShrinks = 1.01;  // residuals must, for a change to be named
-constexpr double kNotToldApart = 2;      // nats
-// Nats to second order below which nothing is fitted: a third of what a name takes.
-constexpr double kLeastPromise = kLeastGroundGain / 3;
-constexpr int kFolds = 5;
-// Standard errors by which what is named must be better on stretches that were left out: the first
-// name has its gain to speak for it, further ones are to be rare.
-constexpr double kLeastSureFirst = 1;
-constexpr double kLeastSureNext = 2;
-constexpr double kShareOfFirst = 0.5;
 // Where to begin with another floor: changes of a grip's logarithm, and logarithms of its shape.
 constexpr double kGripChanges[] = {0, -0.3, -0.7, -1.1, -1.6, -2.2, 0.5};
 constexpr double kGripShapes[] = {0.7, 1.8};
 constexpr double kNear_s = 1, kMiddle_s = 3, kFar_s = 10;  // either way of the file's delay
-
-Eigen::VectorXd nominals(const std::vector<FitRow>& rows) {
-  Eigen::VectorXd values(static_cast<Eigen::Index>(rows.size()));
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    values[static_cast<Eigen::Index>(i)] = rows[i].row.nominal;
-  }
-  return values;
-}
-
-std::vector<FitRow> held_rows(const GroundQuestion& question) {
-  std::vector<FitRow> rows;
-  for (const KinematicRow& row : question.rows) rows.push_back({row, false});
-  return rows;
-}
-
-const GroundReference* reference_of(const GroundQuestion& question) {
-  return question.reference ? &*question.reference : nullptr;
-}
 
 Eigen::Index row_index(const std::vector<FitRow>& rows, const std::string& name) {
   const auto found =
@@ -94,8 +64,10 @@ Offer try_one(const WindowFitter& fitter, const GroundSearch& search,
   for (std::size_t k = 0; k < hypothesis.freed.size(); ++k) {
     offer.values[static_cast<Eigen::Index>(k)] =
         fit->values[row_index(rows, hypothesis.freed[k].name)];
-    const bool less = offer.values[static_cast<Eigen::Index>(k)] < hypothesis.freed[k].nominal;
-    if (hypothesis.only_more && less) offer.gain = 0;
+    if (hypothesis.only_more && hypothesis.freed[k].nominal == 0 &&
+        offer.values[static_cast<Eigen::Index>(k)] < 0) {
+      offer.gain = 0;
+    }
   }
   return offer;
 }
@@ -109,18 +81,6 @@ bool chosen_before(const GroundSearch& search, std::size_t index) {
   return true;
 }
 
-// Takes the last step back unless it tells more of what was left out.
-bool confirm_step(const WindowFitter& fitter, GroundSearch* search) {
-  Eigen::VectorXd start;
-  const std::vector<FitRow> rows = only_chosen(*search, search->steps.size(), &start);
-  WindowFit with = fit_left_out(fitter, rows, start);
-  const double sure = surely_better(fitter.windows(), with, search->chain.back());
-  search->steps.back().sure = sure;
-  if (sure < (search->steps.size() == 1 ? kLeastSureFirst : kLeastSureNext)) return false;
-  search->chain.push_back(std::move(with));
-  return true;
-}
-
 // Nats that the next name must tell.  What changed is modelled with a form that is wrong by some
 // share, and the more it changed, the more is left over for others to explain.
 double least_gain(const GroundSearch& search) {
@@ -128,9 +88,84 @@ double least_gain(const GroundSearch& search) {
   // A long log is sure of the smallest of differences, which no model has right.
   const double stretches = static_cast<double>(search.windows.trials.size()) /
                            static_cast<double>(search.windows.horizons);
-  double least = std::max(kLeastGroundGain, 3 * stretches * std::log(kChangeShrinks));
+  double least = std::max(kLeastChangeGain, 3 * stretches * std::log(kChangeShrinks));
   if (!search.steps.empty()) least = std::max(least, kShareOfFirst * search.steps.front().gain);
   return least;
+}
+
+// An offer, and how well it predicts what was not fitted: the file with what is named and this put
+// right, and nothing else moved.
+struct Candidate {
+  Offer offer;
+  WindowFit fit;
+  WindowFit held_out;
+  WindowFit before;  // that it is compared with
+  HeldOutGain held_out_gain;
+};
+
+Candidate predict_held_out(const WindowFitter& fitter, const GroundWork& work,
+                           const GroundSearch& search, const Offer& offer, WindowFit fit) {
+  std::vector<std::size_t> hypotheses;
+  for (const GroundStep& step : search.steps) hypotheses.push_back(step.chosen);
+  hypotheses.push_back(offer.hypothesis);
+  std::vector<FitRow> rows;
+  Eigen::VectorXd start;
+  for (const std::size_t h : hypotheses) {
+    rows = with_freed(std::move(rows), search.catalogue[h], &start);
+  }
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const Eigen::Index j = row_index(fit.rows, rows[i].row.name);
+    if (j >= 0) start[static_cast<Eigen::Index>(i)] = fit.values[j];
+  }
+  Candidate candidate{
+      offer, std::move(fit), fit_left_out(fitter, rows, start), search.chain.back(), {}};
+  const WindowSet& windows = fitter.windows();
+  candidate.held_out_gain = held_out_gain(windows, candidate.held_out, candidate.before, work.seed);
+  const bool first = offer.hypothesis == search.offers.back().front().hypothesis;
+  if (!first || may_be_named(candidate.held_out_gain)) return candidate;
+  // What gains most may show only once the others have moved a little.
+  Candidate beside = candidate;
+  beside.before = fit_left_out(fitter, search.rows, search.fit.values);
+  beside.held_out = fit_left_out(fitter, beside.fit.rows, beside.fit.values);
+  beside.held_out_gain = held_out_gain(windows, beside.held_out, beside.before, work.seed);
+  return may_be_named(beside.held_out_gain) ? beside : candidate;
+}
+
+double mean_nats(const WindowFit& fit) {
+  double sum = 0;
+  for (const double nats : fit.nats) sum += nats;
+  return sum / static_cast<double>(fit.nats.size());
+}
+
+void keep_if_best(GroundSearch* search, WindowFit held_out) {
+  const bool first = search->best.nats.empty();
+  if (first || mean_nats(held_out) > mean_nats(search->best)) search->best = std::move(held_out);
+}
+
+void name_candidate(const WindowSet& windows, const GroundWork& work,
+                    const std::vector<Offer>& offers, const std::vector<Candidate>& candidates,
+                    const Candidate& chosen, GroundSearch* search) {
+  GroundStep step{
+      chosen.offer.hypothesis, chosen.offer.gain, chosen.held_out_gain, chosen.before, {}};
+  const auto add = [&](std::size_t hypothesis) {
+    auto& alike = step.not_told_apart;
+    const bool there = std::find(alike.begin(), alike.end(), hypothesis) != alike.end();
+    if (hypothesis != step.chosen && !there) alike.push_back(hypothesis);
+  };
+  for (const Candidate& other : candidates) {
+    const HeldOutGain over = held_out_gain(windows, chosen.held_out, other.held_out, work.seed);
+    if (over.lo <= 0 && may_be_named(other.held_out_gain)) add(other.offer.hypothesis);
+  }
+  for (const Offer& offer : offers) {
+    if (offer.values.size() > 0 && offer.gain > chosen.offer.gain - kNotToldApart &&
+        offer.gain > kNotToldApart) {
+      add(offer.hypothesis);
+    }
+  }
+  search->steps.push_back(std::move(step));
+  search->fit = chosen.fit;
+  search->rows = chosen.fit.rows;
+  search->chain.push_back(chosen.held_out);
 }
 
 // The best of the catalogue, when it is worth its name.
@@ -154,40 +189,38 @@ bool take_step(const WindowFitter& fitter, const GroundWork& work, GroundSearch*
   std::vector<Offer> offers;
   for (const auto& [offer, fit] : tried) offers.push_back(offer);
   search->offers.push_back(offers);
-  if (tried.empty() || tried.front().first.gain < least_gain(*search)) return false;
-  GroundStep step{offers[0].hypothesis, offers[0].gain, 0, {}};
-  for (std::size_t k = 1; k < offers.size(); ++k) {
-    if (offers[k].gain > offers[0].gain - kNotToldApart) {
-      step.not_told_apart.push_back(offers[k].hypothesis);
-    }
+  const double least = least_gain(*search);
+  while (!tried.empty() && (tried.back().first.gain < least || tried.size() > kMostCandidates)) {
+    tried.pop_back();
   }
-  WindowFit before = std::exchange(search->fit, std::move(tried.front().second));
-  search->steps.push_back(std::move(step));
-  search->rows = search->fit.rows;
-  if (confirm_step(fitter, search)) {
-    tell_of_steps(work, *search);
-    return true;
+  std::vector<Candidate> candidates;
+  for (auto& [offer, fit] : tried) {
+    candidates.push_back(predict_held_out(fitter, work, *search, offer, std::move(fit)));
   }
-  search->steps.pop_back();
-  search->fit = std::move(before);
-  search->rows = search->fit.rows;
-  return false;
+  // Held out, values that gain far less than others do with small moves of the rest do not compete.
+  double most = 0;
+  for (const Candidate& c : candidates) {
+    if (may_be_named(c.held_out_gain)) most = std::max(most, c.offer.gain);
+  }
+  std::stable_sort(candidates.begin(), candidates.end(), [](const auto& a, const auto& b) {
+    return a.held_out_gain.mean > b.held_out_gain.mean;
+  });
+  double named = 0;
+  for (const GroundStep& step : search->steps) named = std::max(named, step.held_out.mean);
+  const auto chosen = std::find_if(candidates.begin(), candidates.end(), [&](const Candidate& c) {
+    return may_be_named(c.held_out_gain) && c.offer.gain >= kShareOfBest * most &&
+           c.held_out_gain.mean >= kShareOfBestName * named;
+  });
+  if (chosen == candidates.end()) {
+    if (!candidates.empty()) keep_if_best(search, std::move(candidates.front().held_out));
+    return false;
+  }
+  name_candidate(fitter.windows(), work, offers, candidates, *chosen, search);
+  tell_of_steps(work, *search);
+  return true;
 }
 
 }  // namespace
-
-double surely_better(const WindowSet& windows, const WindowFit& with, const WindowFit& without) {
-  std::vector<double> gains(static_cast<std::size_t>(windows.blocks), 0.0);
-  double sum = 0;
-  for (std::size_t i = 0; i < with.nats.size(); ++i) {
-    gains[static_cast<std::size_t>(windows.block[i])] += with.nats[i] - without.nats[i];
-    sum += with.nats[i] - without.nats[i];
-  }
-  const double mean = sum / static_cast<double>(gains.size());
-  double squares = 0;
-  for (const double gain : gains) squares += (gain - mean) * (gain - mean);
-  return squares > 0 ? sum / std::sqrt(squares) : 0;
-}
 
 Eigen::VectorXd scan_delay(const WindowFitter& fitter, const std::vector<FitRow>& rows,
                            const Eigen::VectorXd& values) {
@@ -224,64 +257,22 @@ std::vector<FitRow> with_freed(std::vector<FitRow> rows, const GroundHypothesis&
   return rows;
 }
 
-std::optional<GroundFault> find_ground_fault(const GroundRobot& robot, const RunLog& log,
-                                             const GroundQuestion& question,
-                                             const WindowSettings& settings) {
-  const std::vector<GroundHypothesis>& catalogue = question.catalogue;
-  const GroundReference* reference = reference_of(question);
-  const std::vector<FitRow> rows = held_rows(question);
-  const auto as_logged = window_set(robot, log, settings);
-  if (!as_logged) return std::nullopt;
-  const double before =
-      WindowFitter(robot, *as_logged, reference).hold(rows, nominals(rows)).objective;
-  std::optional<GroundFault> best;
-  for (std::size_t i = 0; i < catalogue.size(); ++i) {
-    if (!catalogue[i].put_right) continue;
-    GroundFault fault;
-    fault.hypothesis = i;
-    fault.log = log;
-    catalogue[i].put_right(&fault.log);
-    const auto windows = window_set(robot, fault.log, settings);
-    if (!windows) continue;
-    const double stretches =
-        static_cast<double>(windows->trials.size()) / static_cast<double>(windows->horizons);
-    // Densities are of what was logged, in its own unit.
-    fault.objective =
-        WindowFitter(robot, *windows, reference).hold(rows, nominals(rows)).objective +
-        2 * stretches * std::log(catalogue[i].metres);
-    fault.gain = fault.objective - before;
-    fault.shrinks = std::exp(fault.gain / (3 * stretches));
-    if (fault.gain < kFaultGain || fault.shrinks < kFaultShrinks) continue;
-    if (!best || fault.gain > best->gain) best = std::move(fault);
-  }
-  return best;
-}
-
 namespace {
 
-// Puts right what is the wrong way round, and fits what stands as it does.
-Status search_faults(const GroundRobot& robot, const WindowSettings& settings,
-                     const GroundQuestion& question, FitMemo* memo, GroundSearch* search) {
-  while (search->faults.size() < kMostFaults) {
-    auto fault = find_ground_fault(robot, search->log, question, settings);
-    auto windows = window_set(robot, search->log, settings);
-    if (!windows) return windows.error();
-    search->windows = std::move(*windows);
-    search->rows = held_rows(question);
-    const WindowFitter fitter(robot, search->windows, reference_of(question), memo);
-    search->fit = fitter.fit(search->rows);
-    // Values a little off must not do as well.
-    if (!fault || fault->objective < search->fit.objective) break;
-    search->faults.push_back(fault->hypothesis);
-    search->fault_gains.push_back(fault->gain);
-    search->log = std::move(fault->log);
-    auto mended = window_set(robot, search->log, settings);
-    if (!mended) return mended.error();
-    search->windows = std::move(*mended);
-    const WindowFitter again(robot, search->windows, reference_of(question), memo);
-    search->fit = again.fit(search->rows);
-  }
-  return {};
+// What everything that was tried would still close.
+void measure_rest(const WindowFitter& fitter, const GroundWork& work, GroundSearch* search) {
+  std::vector<FitRow> all = search->rows;
+  for (FitRow& row : all) row.free = true;
+  search->free_fit = fitter.fit(all, {}, search->fit.values);
+  WindowFit moved = fit_left_out(fitter, search->rows, search->fit.values);
+  const WindowFit named = search->chain.back();
+  const WindowFit& before = search->reference ? moved : named;
+  WindowFit best = before;
+  std::swap(best, search->best);
+  if (!best.nats.empty()) keep_if_best(search, std::move(best));
+  keep_if_best(search, moved);
+  keep_if_best(search, fit_left_out(fitter, all, search->free_fit.values));
+  search->closable = held_out_gain(search->windows, search->best, before, work.seed);
 }
 
 }  // namespace
@@ -302,7 +293,8 @@ Result<GroundSearch> search_ground(const GroundRobot& robot, const RunLog& log,
     return s.error();
   }
   tell_of_faults(work, search);
-  const WindowFitter fitter(robot, search.windows, reference_of(question), work.memo);
+  const WindowFitter fitter(robot, search.windows,
+                            question.reference ? &*question.reference : nullptr, work.memo);
   stage(kCatalogueStage);
   search.chain.push_back(fit_left_out(fitter, {}, {}));
   while (search.steps.size() < kMostSteps && take_step(fitter, work, &search)) {
@@ -310,44 +302,10 @@ Result<GroundSearch> search_ground(const GroundRobot& robot, const RunLog& log,
   if (work.stopped && work.stopped()) return stopped;
   tell_of_steps(work, search);
   stage(kRestStage);
-  std::vector<FitRow> all = search.rows;
-  for (FitRow& row : all) row.free = true;
-  search.free_fit = fitter.fit(all, {}, search.fit.values);
+  measure_rest(fitter, work, &search);
   if (work.stopped && work.stopped()) return stopped;
   tell_of_rest(work, search);
   return search;
-}
-
-std::vector<FitRow> only_chosen(const GroundSearch& search, std::size_t places,
-                                Eigen::VectorXd* values) {
-  std::vector<FitRow> rows;
-  values->resize(0);
-  for (std::size_t k = 0; k < places; ++k) {
-    rows = with_freed(std::move(rows), search.catalogue[search.steps[k].chosen], values);
-  }
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    const Eigen::Index j = row_index(search.rows, rows[i].row.name);
-    if (j >= 0) (*values)[static_cast<Eigen::Index>(i)] = search.fit.values[j];
-  }
-  return rows;
-}
-
-WindowFit fit_left_out(const WindowFitter& fitter, const std::vector<FitRow>& rows,
-                       const Eigen::VectorXd& start) {
-  const auto blocks = static_cast<std::size_t>(fitter.windows().blocks);
-  WindowFit whole = fitter.hold(rows, start);
-  for (int fold = 0; fold < kFolds; ++fold) {
-    std::vector<char> out(blocks, 0);
-    for (std::size_t b = 0; b < blocks; ++b) out[b] = static_cast<int>(b % kFolds) == fold;
-    const WindowFit part =
-        rows.empty() ? fitter.hold(rows, start, out) : fitter.fit(rows, out, start, 1);
-    for (std::size_t i = 0; i < whole.nats.size(); ++i) {
-      if (!out[static_cast<std::size_t>(fitter.windows().block[i])]) continue;
-      whole.nats[i] = part.nats[i];
-      whole.residuals[i] = part.residuals[i];
-    }
-  }
-  return whole;
 }
 
 }  // namespace gapfarm

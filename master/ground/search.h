@@ -12,18 +12,13 @@
 #include "common/base/result.h"
 #include "common/robot/robot.h"
 #include "common/runs/run.h"
+#include "common/score/pose_readings.h"
+#include "master/ground/held_out.h"
 #include "master/ground/hypotheses.h"
 #include "master/ground/window_fit.h"
 #include "master/progress/finding.h"
 
 namespace gapfarm {
-
-// A log must tell so many nats more for a name to be given: the price of what a well-kept file may
-// be off by is in them.  Real logs with the files that were calibrated on them came to 2.4 at
-// most, real ones with one wrong value to 10 and more (docs/ground.md).
-inline constexpr double kLeastGroundGain = 6;
-// What is left when everything moves freely and is no chance any more.
-inline constexpr double kUnknownGroundGain = 25;
 
 // Stages of a search, in their order.
 inline constexpr const char* kFaultStage = "look for faults of the log";
@@ -38,8 +33,11 @@ struct Offer {
 
 struct GroundStep {
   std::size_t chosen = 0;
-  double gain = 0;
-  double sure = 0;  // standard errors by which it is better on what was left out
+  double gain = 0;       // nats over all windows
+  HeldOutGain held_out;  // over `before`
+  // Held out: what it is compared with. What was named before, or that with all values moved within
+  // their tolerances, where only then it shows.
+  WindowFit before;
   std::vector<std::size_t> not_told_apart;
 };
 
@@ -57,7 +55,8 @@ struct GroundWork {
   std::function<void(std::size_t done, std::size_t total)> on_progress;
   std::function<bool()> stopped;
   FitMemo* memo = nullptr;
-  OnFinding on_finding;  // for who watches
+  OnFinding on_finding;    // for who watches
+  std::uint64_t seed = 1;  // of the draws behind intervals
 };
 
 struct GroundSearch {
@@ -65,6 +64,8 @@ struct GroundSearch {
   std::optional<GroundReference> reference;
   std::vector<std::size_t> faults;  // of the log, as found; put right in `log`
   std::vector<double> fault_gains;
+  PoseGrid grid;      // that the poses are rounded to
+  StaleFrames stale;  // taken out of `log`
   RunLog log;
   WindowSet windows;                       // of that log
   std::vector<std::vector<Offer>> offers;  // of each step, best first
@@ -75,6 +76,11 @@ struct GroundSearch {
   // Predictions of stretches that were left out: the file as it is, with the first thing that was
   // chosen, with the first two, ...
   std::vector<WindowFit> chain;
+  // The best such prediction of all that was tried: the chain's last, values within their
+  // tolerances, the best of the catalogue that was not named, every value free.  `closable`: what
+  // it gains over the chain's last; of a change, over values within what a robot changes by.
+  WindowFit best;
+  HeldOutGain closable;
 };
 
 // A fault of the log that, put right, explains it far better than the file does as it is; nothing
@@ -90,27 +96,24 @@ std::optional<GroundFault> find_ground_fault(const GroundRobot& robot, const Run
                                              const GroundQuestion& question,
                                              const WindowSettings& settings);
 
+// Takes stale frames out of the search's log, puts right what is the wrong way round, finds the
+// grid of the poses, and fits what stands as it does.  Errors: no window fits.
+Status search_faults(const GroundRobot& robot, const WindowSettings& settings,
+                     const GroundQuestion& question, FitMemo* memo, GroundSearch* search);
+
 // Errors: no window fits, stopped.
 Result<GroundSearch> search_ground(const GroundRobot& robot, const RunLog& log,
                                    const WindowSettings& settings, const GroundQuestion& question,
                                    const GroundWork& work);
 
-// Standard errors, by blocks, by which one prediction of what was left out is better than another.
-double surely_better(const WindowSet& windows, const WindowFit& with, const WindowFit& without);
+// What the poses show by themselves, where it matters.
+bool names_stale_frames(const GroundSearch& search);
+bool names_rounding(const GroundSearch& search);
 
 // Values whose delay is the best of those within 10 s of where it stands: one that is far off is
 // no slope away.
 Eigen::VectorXd scan_delay(const WindowFitter& fitter, const std::vector<FitRow>& rows,
                            const Eigen::VectorXd& values);
-
-// Nats of every window with the rows fitted to other blocks than its own (five folds); no rows:
-// the file's values as they are.
-WindowFit fit_left_out(const WindowFitter& fitter, const std::vector<FitRow>& rows,
-                       const Eigen::VectorXd& start);
-
-// Rows of what was chosen first, `places` of it, and nothing else; `values` as fitted.
-std::vector<FitRow> only_chosen(const GroundSearch& search, std::size_t places,
-                                Eigen::VectorXd* values);
 
 // The file's rows with those of a hypothesis freed, new ones behind; `values` grows with them.
 std::vector<FitRow> with_freed(std::vector<FitRow> rows, const GroundHypothesis& hypothesis,

@@ -4,6 +4,9 @@
 
 #include <algorithm>
 
+#include "master/ground/ground_verdict.h"
+#include "master/ground/tolerances.h"
+
 namespace gapfarm {
 namespace {
 
@@ -87,12 +90,11 @@ void tell_of_steps(const GroundWork& work, const GroundSearch& search) {
 
 void tell_of_rest(const GroundWork& work, const GroundSearch& search) {
   if (!work.on_finding) return;
-  const double more = search.free_fit.objective - search.fit.objective;
   Finding told;
   told.about = "what is left";
-  told.text = fmt::format(
-      "With every value free at once the fit gains another {:.1f} nats: {}.", more,
-      more < kUnknownGroundGain ? "no more than chance" : "something is left that has no name");
+  GroundFigures figures;
+  figures.closable = search.closable;
+  told.text = verdict_reason(figures);
   work.on_finding(std::move(told));
 }
 

@@ -16,13 +16,6 @@ constexpr double kStepShare = 0.05;  // of a row's tolerance: to find slopes
 constexpr double kFaster = 0.02;     // to find how ends move with speed
 constexpr double kEnough = 1e-3;     // nats a step
 
-double log_density(double r, double s) {
-  static const double constant = std::lgamma((kWindowTail + 1) / 2) - std::lgamma(kWindowTail / 2) -
-                                 0.5 * std::log(kWindowTail * std::acos(-1.0));
-  const double z = r / s;
-  return constant - std::log(s) - (kWindowTail + 1) / 2 * std::log1p(z * z / kWindowTail);
-}
-
 double robust_deviation(std::vector<double>* sizes) {
   const auto middle = sizes->begin() + static_cast<long>(sizes->size() / 2);
   std::nth_element(sizes->begin(), middle, sizes->end());
@@ -30,6 +23,13 @@ double robust_deviation(std::vector<double>* sizes) {
 }
 
 }  // namespace
+
+double window_nats(double residual, double scale) {
+  static const double constant = std::lgamma((kWindowTail + 1) / 2) - std::lgamma(kWindowTail / 2) -
+                                 0.5 * std::log(kWindowTail * std::acos(-1.0));
+  const double z = residual / scale;
+  return constant - std::log(scale) - (kWindowTail + 1) / 2 * std::log1p(z * z / kWindowTail);
+}
 
 WindowFitter::WindowFitter(const GroundRobot& robot, const WindowSet& windows,
                            const GroundReference* reference, FitMemo* memo)
@@ -156,7 +156,7 @@ double WindowFitter::score(WindowFit* fit, const std::vector<double>& use) const
   for (std::size_t i = 0; i < use.size(); ++i) {
     const Eigen::Vector3d& s = fit->scales[static_cast<std::size_t>(windows_.horizon[i])];
     for (Eigen::Index c = 0; c < 3; ++c) {
-      fit->nats[i] += log_density(fit->residuals[i][c], s[c]);
+      fit->nats[i] += window_nats(fit->residuals[i][c], s[c]);
     }
     fit->objective += use[i] * fit->nats[i];
   }

@@ -33,7 +33,7 @@ Result<WindowSet> window_set(const GroundRobot& robot, const RunLog& log,
 
 struct FitRow {
   KinematicRow row;
-  bool free = false;  // no prior
+  bool free = false;  // held by plausible_error() in place of the tolerance
 };
 
 // What a fit to another log says of the values, and how sure that is.

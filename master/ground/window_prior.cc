@@ -4,47 +4,13 @@
 #include <algorithm>
 
 #include "common/base/hash.h"
-#include "common/random/stream.h"
 #include "common/robot/robot_file.h"
 #include "common/score/algebra.h"
+#include "master/ground/held_out.h"
+#include "master/ground/tolerances.h"
 
 namespace gapfarm {
 namespace {
-
-constexpr int kDraws = 400;       // of the bootstrap
-constexpr double kFreely = 1e-6;  // of a tolerance's precision: so wide that it only keeps the
-                                  // equations sound
-
-// First block and count of every run that has windows.
-std::vector<std::pair<int, int>> blocks_of_runs(const WindowSet& windows) {
-  std::vector<std::pair<int, int>> runs;
-  for (std::size_t r = 0; r < windows.run_blocks.size(); ++r) {
-    const int first = windows.run_blocks[r];
-    const bool last = r + 1 == windows.run_blocks.size();
-    const int end = last ? windows.blocks : windows.run_blocks[r + 1];
-    const bool used = std::any_of(windows.block.begin(), windows.block.end(),
-                                  [&](int block) { return block >= first && block < end; });
-    if (used) runs.emplace_back(first, end - first);
-  }
-  return runs;
-}
-
-// How often each block counts in a draw.  Of n runs n - 1 are drawn, so that the scatter of few is
-// not taken for small, and of each run as many blocks as it has; together they count as n.
-std::vector<double> draw_blocks(const std::vector<std::pair<int, int>>& runs, std::size_t blocks,
-                                Stream* stream) {
-  std::vector<double> times(blocks, 0.0);
-  const std::size_t draws = std::max<std::size_t>(1, runs.size() - 1);
-  const double weight = static_cast<double>(runs.size()) / static_cast<double>(draws);
-  for (std::size_t d = 0; d < draws; ++d) {
-    const auto [first, count] = runs[static_cast<std::size_t>(stream->below(runs.size()))];
-    for (int k = 0; k < count; ++k) {
-      const auto pick = stream->below(static_cast<std::uint64_t>(count));
-      times[static_cast<std::size_t>(first) + static_cast<std::size_t>(pick)] += weight;
-    }
-  }
-  return times;
-}
 
 void add_pose(const Pose& X, Hasher* hasher) { hasher->add(X.x).add(X.y).add(X.theta); }
 
@@ -99,7 +65,8 @@ Eigen::MatrixXd WindowFitter::prior_precision(const std::vector<FitRow>& rows) c
   Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(n, n);
   for (Eigen::Index k = 0; k < n; ++k) {
     const FitRow& row = rows[static_cast<std::size_t>(k)];
-    covariance(k, k) = row.row.tolerance * row.row.tolerance / (row.free ? kFreely : 1);
+    const double deviation = row.free ? plausible_error(row.row) : row.row.tolerance;
+    covariance(k, k) = deviation * deviation;
   }
   if (reference_ == nullptr) return covariance.diagonal().cwiseInverse().asDiagonal();
   for (Eigen::Index k = 0; k < n; ++k) {
@@ -114,11 +81,9 @@ Eigen::MatrixXd WindowFitter::prior_precision(const std::vector<FitRow>& rows) c
 
 Eigen::VectorXd WindowFitter::from_middle(const std::vector<FitRow>& rows,
                                           const Eigen::VectorXd& values) const {
-  Eigen::VectorXd away(values.size());
+  Eigen::VectorXd away = values;
   for (Eigen::Index k = 0; k < values.size(); ++k) {
-    const FitRow& row = rows[static_cast<std::size_t>(k)];
-    const bool held = !row.free || in_reference(row) >= 0;
-    away[k] = held ? values[k] - row.row.nominal : 0;
+    away[k] -= rows[static_cast<std::size_t>(k)].row.nominal;
   }
   return away;
 }
@@ -147,10 +112,9 @@ Eigen::MatrixXd WindowFitter::draws(const WindowFit& fit, std::uint64_t seed) co
   }
   const Eigen::MatrixXd P = prior_precision(fit.rows);
   const Eigen::VectorXd away = from_middle(fit.rows, fit.values);
-  Stream stream({seed, Purpose::kStatistics, 0, 0, 0});
-  const auto runs = blocks_of_runs(windows_);
-  Eigen::MatrixXd drawn(n, kDraws);
-  for (int d = 0; d < kDraws; ++d) {
+  const std::vector<std::vector<double>> all_times = draw_blocks(windows_, seed, 1);
+  Eigen::MatrixXd drawn(n, kGroundDraws);
+  for (int d = 0; d < kGroundDraws; ++d) {
     Eigen::VectorXd from = away;
     for (Eigen::Index k = 0; k < n && reference_ != nullptr; ++k) {
       const Eigen::Index a = in_reference(fit.rows[static_cast<std::size_t>(k)]);
@@ -158,7 +122,7 @@ Eigen::MatrixXd WindowFitter::draws(const WindowFit& fit, std::uint64_t seed) co
     }
     Eigen::MatrixXd A = P;
     Eigen::VectorXd b = P * from;
-    const std::vector<double> times = draw_blocks(runs, blocks, &stream);
+    const std::vector<double>& times = all_times[static_cast<std::size_t>(d)];
     for (std::size_t k = 0; k < blocks; ++k) {
       A += times[k] * H[k];
       b += times[k] * g[k];
@@ -178,8 +142,8 @@ Eigen::MatrixX2d WindowFitter::intervals(const WindowFit& fit, std::uint64_t see
       row[static_cast<std::size_t>(d)] = drawn(k, d) - (a >= 0 ? reference_->draws(a, d) : 0);
     }
     std::sort(row.begin(), row.end());
-    bounds(k, 0) = row[kDraws / 20];
-    bounds(k, 1) = row[kDraws - 1 - kDraws / 20];
+    bounds(k, 0) = row[kGroundDraws / 20];
+    bounds(k, 1) = row[kGroundDraws - 1 - kGroundDraws / 20];
   }
   return bounds;
 }

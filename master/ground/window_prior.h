@@ -15,6 +15,9 @@ inline double window_weight(double r, double s) {
   return (kWindowTail + 1) / (kWindowTail + z * z) / (s * s);
 }
 
+// Log density of a residual: Student's.
+double window_nats(double residual, double scale);
+
 // Hash of all that fits to these windows depend on beside rows and start.
 std::string question_of(const GroundRobot& robot, const WindowSet& windows,
                         const GroundReference* reference);

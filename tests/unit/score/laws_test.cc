@@ -28,5 +28,32 @@ TEST(Laws, TheNoncentralityIsTheOneAskedFor) {
   }
 }
 
+// A chi-squared of -nan ended a diagnosis of pushes.
+TEST(Laws, WhatHasNoLawIsNoEvidenceAndNoAbort) {
+  const double nan = std::nan("");
+  const std::uint64_t before = undefined_laws();
+  EXPECT_EQ(chi_squared_above(2, nan), 1);
+  EXPECT_EQ(chi_squared_above(2, -1), 1);
+  EXPECT_EQ(chi_squared_above(-1, 2), 1);
+  EXPECT_EQ(chi_squared_below(2, nan), 1);
+  EXPECT_EQ(normal_above(nan), 1);
+  EXPECT_EQ(noncentral_chi_squared_above(2, nan, 3), 1);
+  EXPECT_EQ(fisher_above(0, 3, 1), 1);
+  EXPECT_EQ(binomial_above(-1, 0.5, 2), 1);
+  EXPECT_EQ(binomial_below(3, nan, 2), 1);
+  EXPECT_TRUE(std::isnan(normal_quantile(nan)));
+  EXPECT_TRUE(std::isnan(chi_squared_quantile(2, 1.5)));
+  EXPECT_TRUE(std::isnan(noncentrality_of(2, nan, 0.5)));
+  EXPECT_TRUE(std::isnan(beta_quantile(0, 0, 0.5)));
+  EXPECT_TRUE(std::isnan(log_gamma(nan)));
+  EXPECT_EQ(undefined_laws(), before + 14);
+}
+
+TEST(Laws, InfinityIsALimit) {
+  const double infinity = INFINITY;
+  EXPECT_LE(chi_squared_above(3, infinity), 1);  // 0, or no evidence
+  EXPECT_LE(normal_above(infinity), 1);
+}
+
 }  // namespace
 }  // namespace gapfarm

@@ -1,0 +1,131 @@
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "master/ground/search.h"
+#include "master/ground/tolerances.h"
+
+namespace gapfarm {
+namespace {
+
+Eigen::VectorXd nominals(const std::vector<FitRow>& rows) {
+  Eigen::VectorXd values(static_cast<Eigen::Index>(rows.size()));
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    values[static_cast<Eigen::Index>(i)] = rows[i].row.nominal;
+  }
+  return values;
+}
+
+std::vector<FitRow> held_rows(const GroundQuestion& question) {
+  std::vector<FitRow> rows;
+  for (const KinematicRow& row : question.rows) rows.push_back({row, false});
+  return rows;
+}
+
+const GroundReference* reference_of(const GroundQuestion& question) {
+  return question.reference ? &*question.reference : nullptr;
+}
+
+}  // namespace
+
+std::optional<GroundFault> find_ground_fault(const GroundRobot& robot, const RunLog& log,
+                                             const GroundQuestion& question,
+                                             const WindowSettings& settings) {
+  const std::vector<GroundHypothesis>& catalogue = question.catalogue;
+  const GroundReference* reference = reference_of(question);
+  const std::vector<FitRow> rows = held_rows(question);
+  const auto as_logged = window_set(robot, log, settings);
+  if (!as_logged) return std::nullopt;
+  const double before =
+      WindowFitter(robot, *as_logged, reference).hold(rows, nominals(rows)).objective;
+  std::optional<GroundFault> best;
+  for (std::size_t i = 0; i < catalogue.size(); ++i) {
+    if (!catalogue[i].put_right) continue;
+    GroundFault fault;
+    fault.hypothesis = i;
+    fault.log = log;
+    catalogue[i].put_right(&fault.log);
+    const auto windows = window_set(robot, fault.log, settings);
+    if (!windows) continue;
+    const double stretches =
+        static_cast<double>(windows->trials.size()) / static_cast<double>(windows->horizons);
+    // Densities are of what was logged, in its own unit.
+    fault.objective =
+        WindowFitter(robot, *windows, reference).hold(rows, nominals(rows)).objective +
+        2 * stretches * std::log(catalogue[i].metres);
+    fault.gain = fault.objective - before;
+    fault.shrinks = std::exp(fault.gain / (3 * stretches));
+    if (fault.gain < kFaultGain || fault.shrinks < kFaultShrinks) continue;
+    if (!best || fault.gain > best->gain) best = std::move(fault);
+  }
+  return best;
+}
+
+namespace {
+
+PoseGrid grid_of(const RunLog& log) {
+  std::vector<Pose> all;
+  for (const LoggedRun& run : log.runs) {
+    for (const PoseRow& row : run.poses) all.push_back(row.X_WM);
+  }
+  return pose_grid(all);
+}
+
+// Frames that repeat the one before say where the robot was, not where it is: they go.
+void drop_stale_frames(GroundSearch* search) {
+  std::vector<std::vector<Pose>> tracks;
+  for (const LoggedRun& run : search->log.runs) {
+    std::vector<Pose>& track = tracks.emplace_back();
+    for (const PoseRow& row : run.poses) track.push_back(row.X_WM);
+  }
+  const double step_m = grid_of(search->log).step_m;
+  search->stale = count_stale(tracks, step_m);
+  if (search->stale.repeats == 0) return;
+  for (std::size_t r = 0; r < tracks.size(); ++r) {
+    const std::vector<char> stale = stale_flags(tracks[r], step_m);
+    std::vector<PoseRow> kept;
+    for (std::size_t i = 0; i < stale.size(); ++i) {
+      if (!stale[i]) kept.push_back(search->log.runs[r].poses[i]);
+    }
+    search->log.runs[r].poses = std::move(kept);
+  }
+}
+
+}  // namespace
+
+Status search_faults(const GroundRobot& robot, const WindowSettings& settings,
+                     const GroundQuestion& question, FitMemo* memo, GroundSearch* search) {
+  drop_stale_frames(search);
+  while (search->faults.size() < kMostFaults) {
+    auto fault = find_ground_fault(robot, search->log, question, settings);
+    auto windows = window_set(robot, search->log, settings);
+    if (!windows) return windows.error();
+    search->windows = std::move(*windows);
+    search->rows = held_rows(question);
+    const WindowFitter fitter(robot, search->windows, reference_of(question), memo);
+    search->fit = fitter.fit(search->rows);
+    // Values a little off must not do as well.
+    if (!fault || fault->objective < search->fit.objective) break;
+    search->faults.push_back(fault->hypothesis);
+    search->fault_gains.push_back(fault->gain);
+    search->log = std::move(fault->log);
+    auto mended = window_set(robot, search->log, settings);
+    if (!mended) return mended.error();
+    search->windows = std::move(*mended);
+    const WindowFitter again(robot, search->windows, reference_of(question), memo);
+    search->fit = again.fit(search->rows);
+  }
+  search->grid = grid_of(search->log);  // in metres by now
+  return {};
+}
+
+bool names_stale_frames(const GroundSearch& search) { return search.stale.lo >= kLeastStaleShare; }
+
+bool names_rounding(const GroundSearch& search) {
+  if (search.grid.step_m <= 0) return false;
+  // Of the difference of two rounded positions.
+  const double rounding_m = search.grid.step_m / std::sqrt(6.0);
+  return rounding_m >= kLeastRounding * search.free_fit.scales.front().head<2>().minCoeff();
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,58 @@
+#include "master/ground/ground_verdict.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "master/ground/tolerances.h"
+
+namespace gapfarm {
+namespace {
+
+GroundFigures left(double lo, double mean, double hi) {
+  GroundFigures figures;
+  figures.closable = {mean, lo, hi};
+  return figures;
+}
+
+TEST(GroundVerdict, NoneOnlyWhereAllOfTheIntervalIsTolerated) {
+  for (double mean = -1; mean < 1; mean += 0.05) {
+    for (double half = 0; half < 1; half += 0.05) {
+      const GroundFigures figures = left(mean - half, mean, mean + half);
+      const bool tolerated = mean + half <= kToleratedGap;
+      EXPECT_EQ(ground_verdict(figures), tolerated ? Verdict::kNone : Verdict::kUnknown);
+    }
+  }
+}
+
+TEST(GroundVerdict, NamesDoNotHideWhatIsLeft) {
+  GroundFigures figures = left(1, 2, 3);
+  figures.named = {{0.5, 0.1, 0.9}};
+  EXPECT_EQ(ground_verdict(figures), Verdict::kEffectAndUnknown);
+  figures.closable = {};
+  EXPECT_EQ(ground_verdict(figures), Verdict::kEffect);
+  figures.named.clear();
+  figures.faults = 1;
+  EXPECT_EQ(ground_verdict(figures), Verdict::kEffect);
+}
+
+TEST(GroundVerdict, WhatIsNoNumberIsNotNothing) {
+  EXPECT_EQ(ground_verdict(left(0, 0, std::nan(""))), Verdict::kUnknown);
+  EXPECT_EQ(ground_verdict(left(0, std::nan(""), 0)), Verdict::kUnknown);
+  EXPECT_FALSE(may_be_named({1, std::nan(""), 2}));
+}
+
+TEST(GroundVerdict, AGainWhoseIntervalHoldsZeroIsNoName) {
+  EXPECT_FALSE(may_be_named({0.5, 0, 1}));
+  EXPECT_FALSE(may_be_named({0.5, -0.1, 1}));
+  EXPECT_TRUE(may_be_named({0.5, 0.1, 1}));
+}
+
+TEST(GroundVerdict, ItsReasonHasItsFigures) {
+  EXPECT_NE(verdict_reason(left(1.6, 2.9, 4.2)).find("2.9 [1.6, 4.2]"), std::string::npos);
+  EXPECT_NE(verdict_reason(left(-0.5, 0.2, 0.9)).find("log more runs"), std::string::npos);
+  EXPECT_NE(verdict_reason(left(0, 0.1, 0.2)).find("within"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace gapfarm

@@ -1,0 +1,174 @@
+// Real logs with one wrong value, and what no diagnosis may do on any log: contradict its figures.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <sstream>
+
+#include "common/problem/run_files.h"
+#include "common/robot/robot_file.h"
+#include "master/ground/diagnose_ground.h"
+#include "master/ground/tolerances.h"
+#include "tests/unit/ground/driven_log.h"
+#include "tests/unit/trials/shared_data.h"
+
+namespace gapfarm {
+namespace {
+
+struct RealCase {
+  GroundRobot robot;
+  RunLog log;
+};
+
+std::optional<RealCase> practice_case(const std::string& name) {
+  const auto folder = shared_data("ground/wrong_robot/" + name);
+  if (!folder) return std::nullopt;
+  std::ifstream file(*folder / "robot.toml");
+  std::stringstream text;
+  text << file.rdbuf();
+  RealCase real{robot_of(text.str().c_str()), {}};
+  const std::vector<std::string> folders = {(*folder / "fit").string(),
+                                            (*folder / "test").string()};
+  auto log = read_run_folders(folders, real.robot.channels);
+  EXPECT_TRUE(log.ok()) << log.error().message;
+  if (log) real.log = std::move(*log);
+  return real;
+}
+
+// No verdict beside figures that say otherwise, and no name that gained nothing.
+void expect_no_contradiction(const GroundDiagnosis& found, const std::string& which) {
+  const Diagnosis& d = found.diagnosis;
+  EXPECT_EQ(d.verdict, ground_verdict(found.figures)) << which;
+  const bool none = d.verdict == Verdict::kNone || d.verdict == Verdict::kEffect;
+  if (none) {
+    EXPECT_LE(found.figures.closable.hi, kToleratedGap) << which;
+    EXPECT_LE(d.gap.final_, kToleratedGap) << which;
+    EXPECT_LE(d.gap.final_, found.figures.closable.hi + 1e-9) << which;
+  } else {
+    EXPECT_FALSE(d.where.empty()) << which;
+  }
+  EXPECT_NEAR(d.gap.final_, found.figures.closable.mean, 1e-9) << which;
+  const std::size_t faults = d.effects.size() - found.figures.named.size();
+  for (std::size_t k = 0; k < d.effects.size(); ++k) {
+    if (k < faults) continue;
+    EXPECT_GT(d.effects[k].closed_lo, 0) << which << ": " << d.effects[k].name;
+    EXPECT_GT(found.figures.named[k - faults].lo, 0) << which;
+  }
+}
+
+GroundDiagnosis checked(const GroundRobot& robot, const RunLog& log, const std::string& which) {
+  auto found = diagnose_ground(robot, log, {});
+  EXPECT_TRUE(found.ok()) << which << ": " << found.error().message;
+  expect_no_contradiction(*found, which);
+  return *std::move(found);
+}
+
+bool names(const GroundDiagnosis& found, const std::string& name) {
+  return std::any_of(found.diagnosis.effects.begin(), found.diagnosis.effects.end(),
+                     [&](const NamedEffect& e) { return e.name == name; });
+}
+
+// Ten and five runs of a vacuum cleaner with a pose at either end, its separation 4.8 % too large.
+// What its file had wrong before is put right.
+TEST(WrongFile, ASeparationIsNamedFromRunsOfTwoPoses) {
+  auto real = practice_case("case08");
+  if (!real) GTEST_SKIP() << "no shared data";
+  for (RobotWheel& w : real->robot.wheels) {
+    if (w.side == WheelSide::kRight) *w.radius_m /= 1.03;
+  }
+  const GroundDiagnosis right = checked(real->robot, real->log, "right");
+  EXPECT_FALSE(names(right, "wheel_separation")) << right.diagnosis.headline;
+  *real->robot.controller.wheel_separation_m *= 1.048;
+  for (RobotWheel& w : real->robot.wheels) *w.y_m *= 1.048;
+  const GroundDiagnosis wrong = checked(real->robot, real->log, "4.8 % wrong");
+  ASSERT_FALSE(wrong.diagnosis.effects.empty()) << wrong.diagnosis.headline;
+  const NamedEffect& effect = wrong.diagnosis.effects.front();
+  EXPECT_EQ(effect.name, "wheel_separation") << wrong.diagnosis.headline;
+  EXPECT_NEAR(effect.parameters.front().value, 1 / 1.048 - 1, 0.02);
+}
+
+RunLog posed(RunLog log, const std::function<Pose(const Pose&)>& change) {
+  for (LoggedRun& run : log.runs) {
+    for (PoseRow& row : run.poses) row.X_WM = change(row.X_WM);
+  }
+  return log;
+}
+
+RunLog thinned(RunLog log) {
+  for (LoggedRun& run : log.runs) {
+    std::vector<PoseRow> kept;
+    for (std::size_t i = 0; i < run.poses.size(); i += 3) kept.push_back(run.poses[i]);
+    run.poses = std::move(kept);
+  }
+  return log;
+}
+
+// The same log in another place, turned, scaled, mirrored, thinned: whatever is concluded, it is
+// what the figures say.  Where the place alone differs, the names are the same.
+TEST(WrongFile, NoVerdictContradictsItsFiguresOnAnyLog) {
+  for (const char* name : {"case02", "case07", "case08", "case11", "case12"}) {
+    const auto real = practice_case(name);
+    if (!real) GTEST_SKIP() << "no shared data";
+    const std::string which = name;
+    const GroundDiagnosis as_logged = checked(real->robot, real->log, which);
+    const Pose moved{12, -7, 1.1};
+    const auto elsewhere = posed(real->log, [&](const Pose& X) { return moved * X; });
+    const GroundDiagnosis there = checked(real->robot, elsewhere, which + " elsewhere");
+    EXPECT_EQ(as_logged.diagnosis.effects.size(), there.diagnosis.effects.size()) << which;
+    checked(real->robot, thinned(real->log), which + " thinned");
+    checked(real->robot,
+            posed(real->log,
+                  [](const Pose& X) {
+                    return Pose{1.06 * X.x, 1.06 * X.y, X.theta};
+                  }),
+            which + " scaled");
+    checked(real->robot,
+            posed(real->log,
+                  [](const Pose& X) {
+                    return Pose{X.x, -X.y, -X.theta};
+                  }),
+            which + " mirrored");
+  }
+}
+
+// A scale of y by half is no tracker's: rounded or stale poses are named as what they are.
+TEST(WrongFile, ReadingsAreNamedAndNoAbsurdScale) {
+  const auto real = practice_case("case11");  // a skid-steer
+  if (!real) GTEST_SKIP() << "no shared data";
+  const double step = 0.25;
+  const GroundDiagnosis rounded = checked(
+      real->robot,
+      posed(real->log,
+            [&](const Pose& X) {
+              return Pose{step * std::round(X.x / step), step * std::round(X.y / step), X.theta};
+            }),
+      "rounded");
+  EXPECT_TRUE(names(rounded, "pose_quantisation")) << rounded.diagnosis.headline;
+  EXPECT_FALSE(names(rounded, "camera_aspect")) << rounded.diagnosis.headline;
+  Stream stream({11, Purpose::kTest, 0, 0, 0});
+  RunLog stale = real->log;
+  for (LoggedRun& run : stale.runs) {
+    for (std::size_t i = 1; i < run.poses.size(); ++i) {
+      if (stream.bernoulli(0.2)) run.poses[i].X_WM = run.poses[i - 1].X_WM;
+    }
+  }
+  const GroundDiagnosis repeated = checked(real->robot, stale, "stale");
+  ASSERT_TRUE(names(repeated, "stale_frames")) << repeated.diagnosis.headline;
+  EXPECT_NEAR(repeated.diagnosis.effects.front().parameters.front().value, 0.2, 0.04);
+}
+
+TEST(WrongFile, AnAccelerationLimitThatTheRobotHasNotIsNamed) {
+  GroundRobot robot = robot_of(kDifferential);
+  const RunLog log = driven(robot, {});
+  robot.motors.acceleration_limit_m_s2 = 0.2;
+  const GroundDiagnosis found = checked(robot, log, "limit");
+  ASSERT_FALSE(found.diagnosis.effects.empty()) << found.diagnosis.headline;
+  EXPECT_EQ(found.diagnosis.effects.front().name, "acceleration_limit");
+}
+
+}  // namespace
+}  // namespace gapfarm
