@@ -40,7 +40,8 @@ inline constexpr double kKeptSlipAngle_rad = 0.02;  // how well that is known
 inline constexpr double kKeptGripShape = 0.05;      // of a logarithm; the reference sets it
 
 // -- Plausible errors: standard deviations of a value that is wrong.  What lies far outside has to
-// -- explain that many more nats: a scale of y by half is 60 of them.  Sizes: a wrong wheel or gear
+// -- explain that many more nats: a scale of y by half is 133 of them.  Sizes: a wrong wheel or
+// gear
 // -- of the same series; times: what recorders lose; the tracker: what lenses and marks do.
 struct PlausibleError {
   const char* row;  // of the kinematic model (common/score/kinematic.h)
