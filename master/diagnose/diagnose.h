@@ -12,8 +12,8 @@
 #include "common/base/result.h"
 #include "common/problem/problem.h"
 #include "master/diagnose/diagnosis.h"
-#include "master/infer/predictor.h"
 #include "master/farm/farm.h"
+#include "master/infer/predictor.h"
 #include "master/progress/finding.h"
 
 namespace gapfarm {

@@ -5,8 +5,8 @@
 #include <string>
 
 #include "master/diagnose/diagnose.h"
-#include "master/infer/predictor.h"
 #include "master/diagnose/subject.h"
+#include "master/infer/predictor.h"
 
 namespace gapfarm::steps {
 

@@ -4,8 +4,8 @@
 #include <cstddef>
 
 #include "common/base/result.h"
-#include "master/infer/predictor.h"
 #include "master/diagnose/study.h"
+#include "master/infer/predictor.h"
 
 namespace gapfarm {
 

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "common/base/result.h"
-#include "master/infer/predictor.h"
 #include "master/diagnose/study.h"
+#include "master/infer/predictor.h"
 
 namespace gapfarm {
 

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "common/base/result.h"
-#include "master/infer/predictor.h"
 #include "master/diagnose/study.h"
+#include "master/infer/predictor.h"
 
 namespace gapfarm {
 

@@ -132,8 +132,8 @@ Result<Judgement> judge(const Inquiry& of, const Screening& screening) {
   }
   Explanation& named = judged.named;
   const Regression explained = explained_by(*screening.catalogue, named);
-  const double by_means = screening.explained ? *screening.explained
-                                              : explained_nats(*screening.catalogue, explained);
+  const double by_means =
+      screening.explained ? *screening.explained : explained_nats(*screening.catalogue, explained);
   judged.left = all_leftovers(named, explained);
   judged.scale = leftover_scale(explained);
   double nats = by_means + named.slip.gain + (named.as_logged ? named.latency.gain : 0);

@@ -54,8 +54,9 @@ Result<std::optional<SecondLook>> look_without_dropped(const Inquiry& of, const 
                                                        const Refit& refit) {
   const Judgement& judged = refit.judged;
   const std::vector<ChosenEffect>& chosen = screening.found.chosen;
-  if (of.subject.signatures == nullptr || chosen.empty() || !judged.unnamed.empty() || judged.named.names_anything() ||
-      !judged.doubts.empty() || judged.verdict != Verdict::kUnknown) {
+  if (of.subject.signatures == nullptr || chosen.empty() || !judged.unnamed.empty() ||
+      judged.named.names_anything() || !judged.doubts.empty() ||
+      judged.verdict != Verdict::kUnknown) {
     return std::optional<SecondLook>();
   }
   DiagnoseOptions options = of.options;

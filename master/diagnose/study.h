@@ -11,8 +11,8 @@
 #include "common/base/result.h"
 #include "common/score/pose_readings.h"
 #include "master/diagnose/drive_base.h"
-#include "master/infer/predictor.h"
 #include "master/diagnose/residuals.h"
+#include "master/infer/predictor.h"
 
 namespace gapfarm {
 

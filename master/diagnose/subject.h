@@ -80,9 +80,8 @@ struct DiagnosisSubject {
   Result<Eigen::MatrixXd> (*nuisances)(Predictor& predictor, Study& study);
   std::vector<CovariateBlock> (*blocks)(const Study& study);
   // Null where base and hypotheses are searched together instead: EffectDiagnosis::searched.
-  Result<std::vector<Signature>> (*signatures)(
-      Predictor& predictor, const Study& study,
-      const std::vector<std::string>& left_out) = nullptr;
+  Result<std::vector<Signature>> (*signatures)(Predictor& predictor, const Study& study,
+                                               const std::vector<std::string>& left_out) = nullptr;
   // Of every trial, with the study's base; null as above, as is `patches`.
   std::vector<PatchReach> (*patch_reach)(const Problem& problem, const Study& study,
                                          const Patch& patch) = nullptr;

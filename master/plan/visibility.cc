@@ -7,8 +7,8 @@
 #include "common/base/try.h"
 #include "common/random/stream.h"
 #include "common/score/statistics.h"
-#include "master/infer/predictor.h"
 #include "master/diagnose/subject.h"
+#include "master/infer/predictor.h"
 #include "master/plan/selection.h"
 
 namespace gapfarm::plan {

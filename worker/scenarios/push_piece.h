@@ -54,7 +54,7 @@ class PushedPiece {
   const Piece& piece_;
   ActiveEffects effects_;
   double camera_scale_;  // logged lengths over true ones
-  Pose X_RC_;  // centroid in the log's frame
+  Pose X_RC_;            // centroid in the log's frame
   PushSimulator simulator_;
   double simulated_s_ = 0;
   unsigned runs_ = 0;

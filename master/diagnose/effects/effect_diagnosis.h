@@ -74,8 +74,8 @@ struct EffectDiagnosis {
 
   // What is moved where base and effect are searched together; with `polar`, its strength alone.
   std::vector<SearchedSize> searched = {};
-  // Where such a search begins, beside what the sizes say; null: nowhere else.  Effects with a place
-  // do nothing at their neutral value, and no slope leads away from it.
+  // Where such a search begins, beside what the sizes say; null: nowhere else.  Effects with a
+  // place do nothing at their neutral value, and no slope leads away from it.
   std::vector<infer::Start> (*proposals)(const Study& study) = nullptr;
 
   // Its mark: by steps of parameters, or by probes of its own; without either it is looked for in
