@@ -48,6 +48,11 @@ Estimate told_estimate(const Inquiry& of, const Judgement& judged, const ChosenE
   for (const FittedParameter& fitted : estimates.parameters) {
     if (fitted.row == row) fit_error = fitted.standard_error * std::sqrt(judged.scale);
   }
+  // What the base could take over is part of it where both were searched.
+  const Overrides& searched = judged.named.searched_error;
+  if (const auto wide = searched.find(row); wide != searched.end()) {
+    fit_error = std::max(fit_error, wide->second);
+  }
   const double half =
       kNormal90 * std::hypot(fit_error, error_beyond_fit(judged.named.study(), of.table(), row,
                                                          estimates.at, chosen.candidate.gain));

@@ -267,7 +267,8 @@ Result<Found> select(const Inquiry& of, const Study& study, const Competition& c
 Result<Screening> compete(const Inquiry& of, const Evidence& measured) {
   const auto configured = by_configured_noise(of, measured.study);
   if (!configured) return configured.error();
-  auto found = select(of, *configured, competition(of, *configured));
+  const Competition c = competition(of, *configured);
+  auto found = select(of, *configured, c);
   if (!found) return found.error();
   // Everything from here on is about the point that explains the log.
   Study study = measured.study;
@@ -280,12 +281,15 @@ Result<Screening> compete(const Inquiry& of, const Evidence& measured) {
   Screening screening;
   screening.found.evidence = std::make_shared<const Evidence>(std::move(*evidence));
   screening.found.tuned_alone = found->base.space.values(found->base.fit.u);
+  const infer::Fitter fitter(c.forward, c.observations, found->model.space, {});
+  screening.found.searched_error =
+      found->model.space.deviations(found->model.fit.u, fitter.covariance(found->model.fit));
   screening.rows = std::move(found->rows);
   screening.catalogue =
       std::make_unique<Selector>(of.predictor, screening.found.study(), std::vector<Signature>(),
                                  screening.found.evidence->base);
   screening.explained = 0;
-  for (const ChosenEffect& c : found->chosen) *screening.explained += c.candidate.gain;
+  for (const ChosenEffect& e : found->chosen) *screening.explained += e.candidate.gain;
   screening.found.chosen = std::move(found->chosen);
   if (screening.found.chosen.empty()) return screening;
   const Explanation& named = screening.found;

@@ -48,6 +48,7 @@ struct Explanation {
   double grid_m = 0;                 // of the positions, once it is named
   std::vector<ChosenEffect> chosen;
   std::optional<JointFit> estimates;  // of these, base held, beside nuisances
+  Overrides searched_error;  // standard errors with the base free, where it was searched too
 
   std::string odd_readings;  // what readings show that no effect looked for explains
   std::string odd_drives;    // the same of drives that stray in one place
