@@ -20,6 +20,12 @@ Result<RunLog> read_run_folders(std::span<const std::string> folders,
     const std::filesystem::path path(folder);
     auto log = read_runs((path / "commands.csv").string(), (path / "poses.csv").string(), channels);
     if (!log) return log.error();
+    log->wheel_channels = all.wheel_channels;
+    const std::filesystem::path wheels = path / "wheels.csv";
+    if (std::error_code none; std::filesystem::exists(wheels, none)) {
+      if (Status s = read_wheel_speeds(wheels.string(), &*log); !s) return s.error();
+    }
+    all.wheel_channels = log->wheel_channels;
     for (LoggedRun& run : log->runs) {
       // Runs of two folders may bear one name.
       if (folders.size() > 1 && run.session.empty()) run.session = path.filename().string();
