@@ -7,6 +7,7 @@
 #include <tuple>
 
 #include "common/random/stream.h"
+#include "master/ground/edge.h"
 #include "master/ground/ground_words.h"
 #include "master/ground/run_clocks.h"
 
@@ -147,6 +148,7 @@ NamedEffect GroundReport::effect_of(const GroundStep& step, std::size_t place) {
   effect.confidence = std::min(kAlmostSure, 1 - 0.5 * std::exp((kLeastGroundGain - step.gain) / 2));
   effect.text = search_.reference ? words_of_change(robot_, h, effect) + "."
                                   : words_of_value(robot_, h, effect);
+  if (h.name == kFloorEdge) describe_floor_edge(fitter_, search_.fit, options_.seed, &effect);
   return effect;
 }
 
@@ -211,7 +213,7 @@ void GroundReport::figures() {
   if (search_.windows.blocks < 8) {
     d_.cautions.push_back("Few runs: intervals are from runs drawn again, and these are few.");
   }
-  if (robot_.measured) {
+  if (robot_.measured && !search_.loop) {
     d_.cautions.push_back(
         "Wheel speeds were measured: what lies before them (dead time, ramps) "
         "cannot show.");
@@ -347,6 +349,7 @@ Diagnosis GroundReport::write() {
   left_out();
   faults();
   values();
+  if (search_.loop) report_wheel_loop(*search_.loop, search_.reference.has_value(), &d_);
   figures();
   clocks();
   screening();

@@ -23,7 +23,10 @@ std::vector<KinematicRow> kinematic_rows(const GroundRobot& robot) {
   if (is_holonomic(robot)) {
     rows = {{"ahead", 1, kGainShare, "ratio", "-"},
             {"aside", 1, kGainShare, "ratio", "-"},
-            {"turn", 1, kGainShare, "ratio", "-"}};
+            {"turn", 1, kGainShare, "ratio", "-"},
+            {"traction", 1, kGainShare, "ratio", "-"},
+            {"load_x", robot.com_x_m.value_or(0), kLoadShare * wheel_reach_m(robot), "x", "m"},
+            {"load_y", robot.com_y_m.value_or(0), kLoadShare * wheel_reach_m(robot), "y", "m"}};
   } else if (is_steered(robot)) {
     const double slow = robot.steering.understeer_s2_m2;
     rows = {{"steering_offset", 0, kSteering_rad, "angle", "rad"},
@@ -69,6 +72,7 @@ std::vector<KinematicRow> change_rows(const GroundRobot& robot) {
                                               {"separation", kKeptTurnShare},
                                               {"aside", kKeptTurnShare},
                                               {"turn", kKeptTurnShare},
+                                              {"traction", kKeptTractionShare},
                                               {"steering_gain", kKeptTurnShare}};
   std::vector<KinematicRow> rows = kinematic_rows(robot);
   for (KinematicRow& row : rows) {

@@ -13,6 +13,7 @@
 #include "common/robot/robot.h"
 #include "common/runs/run.h"
 #include "master/ground/hypotheses.h"
+#include "master/ground/wheel_loop.h"
 #include "master/ground/window_fit.h"
 #include "master/progress/finding.h"
 
@@ -63,6 +64,7 @@ struct GroundWork {
 struct GroundSearch {
   std::vector<GroundHypothesis> catalogue;
   std::optional<GroundReference> reference;
+  std::optional<WheelLoop> loop;    // where speeds were measured beside commands
   std::vector<std::size_t> faults;  // of the log, as found; put right in `log`
   std::vector<double> fault_gains;
   RunLog log;
