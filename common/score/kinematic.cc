@@ -70,7 +70,11 @@ class Body {
     for (std::size_t i = 0; i < at.names.size(); ++i) {
       put(at.names[i], at.values[static_cast<Eigen::Index>(i)]);
     }
-    if (holonomic(robot_)) inverse_ = omni_inverse(robot_, traction_, load_);
+    if (holonomic(robot_)) {
+      omni_.emplace(robot_);
+      omni_->load(load_);
+      inverse_ = omni_->inverse(Eigen::VectorXd::Constant(omni_->wheels(), traction_));
+    }
     separation_ratio_ = separation_;
     const auto& k = robot_.controller;
     separation_ *= k.wheel_separation_m.value_or(1) * k.wheel_separation_multiplier;
@@ -144,13 +148,17 @@ class Body {
       return on_floor(ahead_ * beyond_edge(X_WR, {}) * drive.traction_m_s(), drive.curvature());
     }
     if (holonomic(robot_)) {
-      Eigen::VectorXd speeds(inverse_.cols());
+      Eigen::VectorXd speeds(inverse_.cols()), tractions(inverse_.cols());
       Eigen::Index n = 0;
       for (std::size_t i = 0; i < wheels.size(); ++i) {
         const RobotWheel& w = robot_.wheels[i];
         if (!w.driven) continue;
-        speeds[n++] = beyond_edge(X_WR, {*w.x_m, *w.y_m, 0}) * wheels[i].speed_m_s *
-                      std::cos(w.roller_angle_rad);
+        tractions[n] = traction_ * beyond_edge(X_WR, {*w.x_m, *w.y_m, 0});
+        speeds[n++] = wheels[i].speed_m_s * std::cos(w.roller_angle_rad);
+      }
+      if (X_WR != nullptr && tractions != tractions_) {
+        tractions_ = tractions;
+        inverse_ = omni_->inverse(tractions);
       }
       const Eigen::Vector3d twist = inverse_ * speeds;
       return {travel_ * ahead_ * twist[0], travel_ * aside_ * twist[1], travel_ * turn_ * twist[2]};
@@ -269,16 +277,17 @@ class Body {
   GroundRobot robot_;
   double left_ = 1, right_ = 1, separation_ = 1, ahead_ = 1, aside_ = 1, turn_ = 1;
   double separation_ratio_ = 1;
-  double travel_ = 1;  // of holonomic robots, all ways
-  double traction_ =
-      1;  // of holonomic robots: of the wheels' way, what a robot that does not turn goes
-  Eigen::Vector2d load_;  // where the weight stands on the wheels
+  double travel_ = 1, traction_ = 1;  // of holonomic robots
+  Eigen::Vector2d load_;              // where the weight stands on their wheels
   double sag_ = 0, drift_ = 0, scale_ = 1, aspect_ = 1;
   double edge_rad_ = 0, edge_m_ = 0, edge_ratio_ = 1;
   std::optional<double> grip_m_s2_;  // none: no speed slips
   double slip_angle_rad_ = 0;
   double grip_shape_ = 2;
-  Eigen::MatrixXd inverse_;
+  std::optional<OmniWheels> omni_;
+  // Of the tractions that wheels had last: they change while wheels cross an edge.
+  mutable Eigen::VectorXd tractions_;
+  mutable Eigen::MatrixXd inverse_;
 };
 
 // Where a run's marker was measured, straight on between.

@@ -22,7 +22,6 @@ constexpr double kLoopStep_s = 0.04;
 constexpr int kWindowsABlock = 5;  // where there are few runs
 constexpr std::size_t kFewRuns = 10;
 constexpr int kLoopDraws = 400;
-constexpr std::size_t kMostLevels = 200;  // of measured speeds; more are not in steps
 constexpr double kLeastLoss = 0.02;  // of the fastest command: below it losses are in proportion
 constexpr double kLooseGain = 1;     // prior s.d. about 1 and 0, so that one speed does
 constexpr double kLooseLoss = 0.1;   // of the fastest command
@@ -37,8 +36,6 @@ struct LoopWindows {
   std::vector<LoopWindow> all;
   std::size_t blocks = 0;
   double fastest = 1e-9;
-  double step = 0;         // of the measured speeds; 0: they have none
-  std::size_t levels = 1;  // of the commands that such steps tell apart
 };
 
 std::optional<std::size_t> wheel_channel(const RobotWheel& wheel,
@@ -53,27 +50,6 @@ std::optional<std::size_t> wheel_channel(const RobotWheel& wheel,
     }
   }
   return {};
-}
-
-// The smallest step between measured speeds, where they come in steps.
-double step_of(const RunLog& log) {
-  std::set<double> speeds;
-  for (const LoggedRun& run : log.runs) {
-    for (const CommandRow& row : run.wheel_speeds) {
-      for (const double value : row.values) speeds.insert(std::abs(value));
-      if (speeds.size() > kMostLevels) return 0;
-    }
-  }
-  double step = 0, before = 0, fastest = 1e-9;
-  if (!speeds.empty()) fastest = *speeds.rbegin();
-  for (const double speed : speeds) {
-    // Digits of one level may differ.
-    if (speed - before > 1e-3 * fastest && (step == 0 || speed - before < step)) {
-      step = speed - before;
-    }
-    before = speed;
-  }
-  return step;
 }
 
 void cut_run(const GroundRobot& robot, const RunLog& log, const LoggedRun& run, bool few,
@@ -114,14 +90,6 @@ LoopWindows loop_windows(const GroundRobot& robot, const RunLog& log) {
     if (run.commands.empty() || run.wheel_speeds.empty()) continue;
     cut_run(robot, log, run, log.runs.size() < kFewRuns, &windows);
   }
-  windows.step = step_of(log);
-  std::set<long> levels;
-  for (const LoopWindow& w : windows.all) {
-    const double size = std::abs(w.commanded);
-    if (windows.step > 0 && size > windows.step / 2)
-      levels.insert(std::lround(4 * size / windows.step));
-  }
-  windows.levels = windows.step > 0 ? std::max<std::size_t>(1, levels.size()) : windows.blocks;
   return windows;
 }
 
@@ -192,7 +160,13 @@ GroundRobot driven_by_wheels(GroundRobot robot, const RunLog& log) {
 
 RunLog driven_by_wheels(RunLog log) {
   log.channels = log.wheel_channels;
-  for (LoggedRun& run : log.runs) run.commands = run.wheel_speeds;
+  for (LoggedRun& run : log.runs) {
+    run.commands = run.wheel_speeds;
+    const auto driving = std::find_if(run.poses.begin(), run.poses.end(), [&](const PoseRow& p) {
+      return p.t_s >= run.poses.front().t_s + kStart_s;
+    });
+    run.poses.erase(run.poses.begin(), driving);
+  }
   return log;
 }
 
@@ -219,14 +193,7 @@ WheelLoop measure_wheel_loop(const GroundRobot& robot, const RunLog& log, const 
     squares += change * change;
   }
   const double mean = sum / kLoopDraws;
-  double variance = std::max(0.0, squares / kLoopDraws - mean * mean);
-  // A loop that measures in steps holds a speed no better than that, the same way each time: the
-  // s.d. of an even error of one step, averaged over the commands that steps tell apart.
-  double commanded = 0;
-  for (const LoopWindow& w : here.all) commanded += std::abs(w.commanded);
-  commanded /= static_cast<double>(here.all.size());
-  const double steps = here.step / std::sqrt(12.0) / std::max(commanded, 1e-9);
-  variance += steps * steps / static_cast<double>(here.levels);
+  const double variance = std::max(0.0, squares / kLoopDraws - mean * mean);
   const double change = share / expected - 1, wide = 1.645 * std::sqrt(variance);
   result.share = share;
   result.expected = expected;

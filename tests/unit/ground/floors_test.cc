@@ -31,7 +31,7 @@ struct Floor {
   double traction = 0.9;
   Eigen::Vector2d load_m{0, 0};
   double loop_gain = 0.95, loop_loss_rad_s = 0.05;
-  // Beyond x cos(angle) + y sin(angle) = offset wheels travel `ratio` times as far.
+  // Beyond x cos(angle) + y sin(angle) = offset the traction is `ratio` times as much.
   double edge_rad = 0, edge_m = 1e9, ratio = 1;
 };
 
@@ -39,7 +39,8 @@ struct Floor {
 // does by a simulation of the test's own, with the camera's noise.
 RunLog driven_on(const Floor& floor, double first_deg, std::uint64_t seed) {
   const GroundRobot robot = robotino();
-  const Eigen::MatrixXd motion = omni_inverse(robot, floor.traction, floor.load_m);
+  OmniWheels omni(robot);
+  omni.load(floor.load_m);
   Stream stream({seed, Purpose::kTest, 0, 0, 0});
   RunLog log;
   log.channels = log.wheel_channels = robot.channels;
@@ -68,16 +69,16 @@ RunLog driven_on(const Floor& floor, double first_deg, std::uint64_t seed) {
                              {X_WM.x + 3e-4 * stream.normal(), X_WM.y + 3e-4 * stream.normal(),
                               wrap_angle(X_WM.theta + 2e-3 * stream.normal())}});
       }
-      Eigen::Vector3d surface;
+      Eigen::Vector3d surface, tractions;
       for (Eigen::Index i = 0; i < 3; ++i) {
         const RobotWheel& wheel = robot.wheels[static_cast<std::size_t>(i)];
         const Pose at = X_WR * Pose{*wheel.x_m, *wheel.y_m, 0};
         const bool beyond =
             at.x * std::cos(floor.edge_rad) + at.y * std::sin(floor.edge_rad) > floor.edge_m;
-        surface[i] =
-            0.04 * measured.values[static_cast<std::size_t>(i)] * (beyond ? floor.ratio : 1);
+        surface[i] = 0.04 * measured.values[static_cast<std::size_t>(i)];
+        tractions[i] = floor.traction * (beyond ? floor.ratio : 1);
       }
-      X_WR = X_WR * exp(Twist(kDt_s * motion * surface));
+      X_WR = X_WR * exp(Twist(kDt_s * omni.inverse(tractions) * surface));
     }
     log.runs.push_back(std::move(run));
   }
