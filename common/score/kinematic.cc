@@ -73,7 +73,8 @@ class Body {
     if (holonomic(robot_)) {
       omni_.emplace(robot_);
       omni_->load(load_);
-      inverse_ = omni_->inverse(Eigen::VectorXd::Constant(omni_->wheels(), traction_));
+      tractions_ = Eigen::VectorXd::Constant(omni_->wheels(), traction_);
+      inverse_ = omni_->inverse(tractions_);
     }
     separation_ratio_ = separation_;
     const auto& k = robot_.controller;

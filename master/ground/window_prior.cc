@@ -100,6 +100,7 @@ Eigen::MatrixXd WindowFitter::prior_precision(const std::vector<FitRow>& rows) c
   for (Eigen::Index k = 0; k < n; ++k) {
     const FitRow& row = rows[static_cast<std::size_t>(k)];
     covariance(k, k) = row.row.tolerance * row.row.tolerance / (row.free ? kFreely : 1);
+    if (row.free && row.row.farthest > 0) covariance(k, k) = row.row.farthest * row.row.farthest;
   }
   if (reference_ == nullptr) return covariance.diagonal().cwiseInverse().asDiagonal();
   for (Eigen::Index k = 0; k < n; ++k) {
@@ -117,7 +118,7 @@ Eigen::VectorXd WindowFitter::from_middle(const std::vector<FitRow>& rows,
   Eigen::VectorXd away(values.size());
   for (Eigen::Index k = 0; k < values.size(); ++k) {
     const FitRow& row = rows[static_cast<std::size_t>(k)];
-    const bool held = !row.free || in_reference(row) >= 0;
+    const bool held = !row.free || row.row.farthest > 0 || in_reference(row) >= 0;
     away[k] = held ? values[k] - row.row.nominal : 0;
   }
   return away;

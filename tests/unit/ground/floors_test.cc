@@ -105,7 +105,7 @@ TEST(Floors, SlipAndTheMotorsLoopArePartedOnAnotherFloor) {
   ASSERT_EQ(found.effects.size(), 1u) << found.headline;
   EXPECT_EQ(found.effects[0].name, "floor") << found.headline;
   ASSERT_EQ(found.effects[0].parameters.size(), 2u);
-  expect_holds(found.effects[0].parameters[0], 0.65 / 0.9 - 1, 0.02);
+  expect_holds(found.effects[0].parameters[0], 0.65 - 0.9, 0.02);
   expect_holds(found.effects[0].parameters[1], 0.8 / 0.95 - 1, 0.03);
 }
 
