@@ -114,10 +114,9 @@ class Cutter {
     }
     skip_blanks();
     if (at_line_end() || text_[at_] == separator_) return {};
-    return text_error(
-        file_, place(), quoted_word(text_.substr(at_, 1)),
-        quoted_word({&separator_, 1}) + " or the end of the line after a closing quote",
-        "double a quote that belongs to the text");
+    return text_error(file_, place(), quoted_word(text_.substr(at_, 1)),
+                      "a separator or the end of the line after a closing quote",
+                      "double a quote that belongs to the text");
   }
 
   std::string_view text_;
@@ -208,10 +207,6 @@ std::string quoted_word(std::string_view word) {
 bool is_comment(std::string_view line) {
   if (line.empty() || line[0] != '#') return false;
   return line.substr(0, 6) == "# log:" || line.find(',') == line.npos;
-}
-
-Result<std::vector<CsvRow>> parse_csv(std::string_view text, std::string_view file) {
-  return parse_separated(text, file, ',');
 }
 
 Result<std::vector<CsvRow>> parse_separated(std::string_view text, std::string_view file,

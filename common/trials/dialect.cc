@@ -87,6 +87,10 @@ char find_separator(std::string_view text) {
   return best;
 }
 
+Result<std::vector<CsvRow>> parse_csv(std::string_view text, std::string_view file) {
+  return parse_separated(text, file, ',');
+}
+
 std::optional<double> parse_decimal(std::string_view text, char separator) {
   if (const auto value = parse_double(text)) return value;
   const std::size_t comma = text.find(',');

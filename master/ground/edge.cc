@@ -14,11 +14,12 @@ namespace gapfarm {
 namespace {
 
 // Lines that are looked at: normals 15 degrees apart, over half a turn since the other half is the
-// same lines with inverse ratios; at each so many as part the windows evenly.
+// same lines with inverse ratios; at each those with these shares of the wheels' places before
+// them.
 constexpr int kAngles = 12;
-constexpr int kOffsets = 11;
-constexpr double kLeastSide = 0.08;  // of the windows, on the smaller side
-constexpr std::size_t kClimbed = 3;  // of the lines that promise most
+constexpr double kShares[] = {0.03, 0.06, 0.12, 0.22, 0.35, 0.5, 0.65, 0.78, 0.88, 0.94, 0.97};
+constexpr double kLeastSide = 0.015;  // of the wheels' places, on the smaller side
+constexpr std::size_t kClimbed = 3;   // of the lines that promise most
 
 struct EdgeRows {
   Eigen::Index ratio = -1, angle = -1, offset = -1;
@@ -39,11 +40,16 @@ double along_normal(const Pose& X, double angle) {
   return X.x * std::cos(angle) + X.y * std::sin(angle);
 }
 
-// How far the middles of the windows lie along a normal, ascending.
-std::vector<double> places_along(const WindowSet& windows, double angle) {
+// How far wheels stand along a normal where windows begin, ascending.
+std::vector<double> places_along(const WindowFitter& fitter, double angle) {
+  const Pose X_MR = inverse(fitter.robot().X_RM);
   std::vector<double> places;
-  for (const Trial& trial : windows.trials) {
-    places.push_back((along_normal(trial.X_WS, angle) + along_normal(trial.X_WE, angle)) / 2);
+  for (const Trial& trial : fitter.windows().trials) {
+    for (const RobotWheel& wheel : fitter.robot().wheels) {
+      if (!wheel.driven) continue;
+      const Pose X_RP{wheel.x_m.value_or(0), wheel.y_m.value_or(0), 0};
+      places.push_back(along_normal(trial.X_WS * X_MR * X_RP, angle));
+    }
   }
   std::sort(places.begin(), places.end());
   return places;
@@ -85,9 +91,8 @@ Eigen::VectorXd scan_floor_edge(const WindowFitter& fitter, const WindowFit& fit
   std::vector<std::pair<double, Eigen::VectorXd>> lines;
   for (int a = 0; a < kAngles; ++a) {
     const double angle = std::numbers::pi * a / kAngles;
-    const std::vector<double> places = places_along(fitter.windows(), angle);
-    for (int k = 0; k < kOffsets; ++k) {
-      const double share = kLeastSide + (1 - 2 * kLeastSide) * k / (kOffsets - 1);
+    const std::vector<double> places = places_along(fitter, angle);
+    for (const double share : kShares) {
       Eigen::VectorXd start = values;
       start[at.ratio] = 1;
       start[at.angle] = angle;
@@ -114,11 +119,11 @@ Eigen::VectorXd scan_floor_edge(const WindowFitter& fitter, const WindowFit& fit
 bool parts_windows(const WindowFitter& fitter, const WindowFit& fit) {
   const EdgeRows at = edge_rows(fit.rows);
   if (at.angle < 0 || !(fit.values[at.ratio] > 0)) return false;
-  const std::vector<double> places = places_along(fitter.windows(), fit.values[at.angle]);
+  const std::vector<double> places = places_along(fitter, fit.values[at.angle]);
   const auto beyond = std::lower_bound(places.begin(), places.end(), fit.values[at.offset]);
   const double share =
       static_cast<double>(beyond - places.begin()) / static_cast<double>(places.size());
-  return std::min(share, 1 - share) > kLeastSide / 2;
+  return std::min(share, 1 - share) > kLeastSide;
 }
 
 void describe_floor_edge(const WindowFitter& fitter, const WindowFit& fit, std::uint64_t seed,
