@@ -18,8 +18,9 @@ namespace {
 // them.
 constexpr int kAngles = 12;
 constexpr double kShares[] = {0.03, 0.06, 0.12, 0.22, 0.35, 0.5, 0.65, 0.78, 0.88, 0.94, 0.97};
-constexpr double kLeastSide = 0.015;  // of the wheels' places, on the smaller side
-constexpr std::size_t kClimbed = 3;   // of the lines that promise most
+constexpr double kLeastSide = 0.015;           // of the wheels' places, on the smaller side
+constexpr double kTried[] = {0.75, 1 / 0.75};  // ratios, as of two floors that differ clearly
+constexpr std::size_t kClimbed = 4;            // of the angles, each from its best line
 
 struct EdgeRows {
   Eigen::Index ratio = -1, angle = -1, offset = -1;
@@ -88,10 +89,14 @@ Eigen::VectorXd scan_floor_edge(const WindowFitter& fitter, const WindowFit& fit
     J.conservativeResize(3, J.cols() + 2);
     J.rightCols(2).setZero();
   }
-  std::vector<std::pair<double, Eigen::VectorXd>> lines;
+  std::vector<std::pair<double, Eigen::VectorXd>> lines;  // the best of each angle
   for (int a = 0; a < kAngles; ++a) {
     const double angle = std::numbers::pi * a / kAngles;
     const std::vector<double> places = places_along(fitter, angle);
+    lines.emplace_back(-std::numeric_limits<double>::infinity(), values);
+    const auto offer = [&](double gain, const Eigen::VectorXd& start) {
+      if (gain > lines.back().first) lines.back() = {gain, start};
+    };
     for (const double share : kShares) {
       Eigen::VectorXd start = values;
       start[at.ratio] = 1;
@@ -99,8 +104,12 @@ Eigen::VectorXd scan_floor_edge(const WindowFitter& fitter, const WindowFit& fit
       start[at.offset] =
           places[static_cast<std::size_t>(share * static_cast<double>(places.size() - 1))];
       one.values = start.head(start.size() - 1);
-      const double promised = fitter.promise(one, slopes, rows, start);
-      lines.emplace_back(promised, std::move(start));
+      offer(fitter.promise(one, slopes, rows, start), start);
+      // Windows over an edge are outliers of one floor, so that slopes there promise too little.
+      for (const double ratio : kTried) {
+        start[at.ratio] = ratio;
+        offer(fitter.hold(rows, start).objective - fit.objective, start);
+      }
     }
   }
   std::sort(lines.begin(), lines.end(),
