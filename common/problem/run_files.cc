@@ -21,6 +21,12 @@ Result<RunLog> read_run_folders(std::span<const std::string> folders,
     const std::filesystem::path path(folder);
     ASSIGN_OR_RETURN(auto log, read_runs((path / "commands.csv").string(),
                                          (path / "poses.csv").string(), channels));
+    log.wheel_channels = all.wheel_channels;
+    const std::filesystem::path wheels = path / "wheels.csv";
+    if (std::error_code none; std::filesystem::exists(wheels, none)) {
+      RETURN_IF_ERROR(read_wheel_speeds(wheels.string(), &log));
+    }
+    all.wheel_channels = log.wheel_channels;
     for (LoggedRun& run : log.runs) {
       // Runs of two folders may bear one name.
       if (folders.size() > 1 && run.session.empty()) run.session = path.filename().string();

@@ -12,7 +12,7 @@ namespace gapfarm {
 
 std::vector<std::string> command_names(const std::vector<CommandSpec>& commands);
 
-// Reads commands.csv and poses.csv of each folder, one after another.
+// Reads commands.csv and poses.csv of each folder, and wheels.csv where it is, one after another.
 Result<RunLog> read_run_folders(std::span<const std::string> folders,
                                 std::span<const std::string> channels);
 

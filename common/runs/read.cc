@@ -121,4 +121,27 @@ Result<RunLog> read_runs(const std::string& commands_path, const std::string& po
   return log;
 }
 
+Status read_wheel_speeds(const std::string& path, RunLog* log) {
+  const auto text = read_text_file(path);
+  if (!text) return text.error();
+  const auto head = parse_csv(std::string_view(*text).substr(0, text->find('\n')), path);
+  if (!head) return head.error();
+  std::vector<std::string> wheels;
+  for (std::size_t c = 0; !head->empty() && c < head->front().fields.size(); ++c) {
+    const std::string& name = head->front().fields[c].text;
+    if (name != "session" && name != "run" && name != "t") wheels.push_back(name);
+  }
+  const auto table = RunTable::read(path, wheels, "a log of wheel speeds");
+  if (!table) return table.error();
+  if (!log->wheel_channels.empty() && log->wheel_channels != wheels) {
+    return Error{path + ": other wheels than the logs before have; give all logs the same columns"};
+  }
+  log->wheel_channels = std::move(wheels);
+  for (LoggedRun& run : log->runs) {
+    const RunKey key{run.session, run.run};
+    if (table->has(key)) run.wheel_speeds = table->of(key);
+  }
+  return {};
+}
+
 }  // namespace gapfarm

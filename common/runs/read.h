@@ -16,4 +16,8 @@ namespace gapfarm {
 Result<RunLog> read_runs(const std::string& commands_path, const std::string& poses_path,
                          std::span<const std::string> channels);
 
+// wheels.csv: measured wheel speeds (rad/s) of the log's runs, a column a wheel.  Runs that it does
+// not have keep none.  Errors: as read_runs(); other wheels than the log has already.
+Status read_wheel_speeds(const std::string& path, RunLog* log);
+
 }  // namespace gapfarm

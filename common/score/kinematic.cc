@@ -9,12 +9,15 @@
 
 #include "common/base/constants.h"
 #include "common/robot/robot_drive.h"
-#include "common/score/algebra.h"
+#include "common/score/omni_inverse.h"
 
 namespace gapfarm {
 namespace {
 
 constexpr double kStep_s = 0.04;
+// Half of the way over which a wheel passes from one floor to the other: what touches the floor,
+// and what a tracker errs by; a hard step would have no slope to fit by.
+constexpr double kEdge_m = 0.02;
 
 bool steered(const GroundRobot& robot) {
   return robot.drive == DriveKind::kAckermann || robot.drive == DriveKind::kTricycle;
@@ -62,11 +65,17 @@ std::vector<Row> rows_of(const GroundRobot& robot) {
 // The robot and the gains of its motion at some values.
 class Body {
  public:
-  Body(const GroundRobot& robot, const Kinematics& at) : robot_(robot) {
+  Body(const GroundRobot& robot, const Kinematics& at)
+      : robot_(robot), load_(robot.com_x_m.value_or(0), robot.com_y_m.value_or(0)) {
     for (std::size_t i = 0; i < at.names.size(); ++i) {
       put(at.names[i], at.values[static_cast<Eigen::Index>(i)]);
     }
-    if (holonomic(robot_)) invert_wheels();
+    if (holonomic(robot_)) {
+      omni_.emplace(robot_);
+      omni_->load(load_);
+      tractions_ = Eigen::VectorXd::Constant(omni_->wheels(), traction_);
+      inverse_ = omni_->inverse(tractions_);
+    }
     separation_ratio_ = separation_;
     const auto& k = robot_.controller;
     separation_ *= k.wheel_separation_m.value_or(1) * k.wheel_separation_multiplier;
@@ -97,10 +106,12 @@ class Body {
       *w.y_m *= across;
       const double side = w.side == WheelSide::kLeft    ? left_
                           : w.side == WheelSide::kRight ? right_
-                                                        : ahead_;
+                                                        : travel_ * ahead_;
       *w.radius_m *= side;
     }
     if (holonomic(robot)) correct_arms(&robot);
+    if (robot.com_x_m) *robot.com_x_m = load_[0];
+    if (robot.com_y_m) *robot.com_y_m = load_[1];
     return robot;
   }
 
@@ -129,26 +140,38 @@ class Body {
 
   const GroundRobot& robot() const { return robot_; }
 
-  Twist velocity(std::span<const WheelMotion> wheels, const RobotDrive& drive) const {
+  bool has_edge() const { return edge_ratio_ != 1; }
+
+  // `X_WR`: where the robot is on two floors; null where there is one.
+  Twist velocity(std::span<const WheelMotion> wheels, const RobotDrive& drive,
+                 const Pose* X_WR = nullptr) const {
     if (steered(robot_)) {
-      return on_floor(ahead_ * drive.traction_m_s(), drive.curvature());
+      return on_floor(ahead_ * beyond_edge(X_WR, {}) * drive.traction_m_s(), drive.curvature());
     }
     if (holonomic(robot_)) {
-      Eigen::VectorXd speeds(inverse_.cols());
+      Eigen::VectorXd speeds(inverse_.cols()), tractions(inverse_.cols());
       Eigen::Index n = 0;
       for (std::size_t i = 0; i < wheels.size(); ++i) {
         const RobotWheel& w = robot_.wheels[i];
-        if (w.driven) speeds[n++] = wheels[i].speed_m_s * std::cos(w.roller_angle_rad);
+        if (!w.driven) continue;
+        tractions[n] = traction_ * beyond_edge(X_WR, {*w.x_m, *w.y_m, 0});
+        speeds[n++] = wheels[i].speed_m_s * std::cos(w.roller_angle_rad);
+      }
+      if (X_WR != nullptr && tractions != tractions_) {
+        tractions_ = tractions;
+        inverse_ = omni_->inverse(tractions);
       }
       const Eigen::Vector3d twist = inverse_ * speeds;
-      return {ahead_ * twist[0], aside_ * twist[1], turn_ * twist[2]};
+      return {travel_ * ahead_ * twist[0], travel_ * aside_ * twist[1], travel_ * turn_ * twist[2]};
     }
     double sum[2] = {0, 0};
     double count[2] = {0, 0};
     for (std::size_t i = 0; i < wheels.size(); ++i) {
       if (!robot_.wheels[i].driven) continue;
-      const int side = robot_.wheels[i].side == WheelSide::kLeft ? 0 : 1;
-      sum[side] += wheels[i].speed_m_s;
+      const RobotWheel& w = robot_.wheels[i];
+      const int side = w.side == WheelSide::kLeft ? 0 : 1;
+      sum[side] +=
+          beyond_edge(X_WR, {w.x_m.value_or(0), w.y_m.value_or(0), 0}) * wheels[i].speed_m_s;
       count[side] += 1;
     }
     const double l = left_ * sum[0] / std::max(count[0], 1.0);
@@ -162,11 +185,19 @@ class Body {
     if (is_magnitude(name)) value = std::abs(value);
     if (name == "left") left_ *= value;
     if (name == "right") right_ *= value;
-    if (name == "travel") left_ *= value;
-    if (name == "travel") right_ *= value;
-    if (name == "travel") {
-      for (double* gain : {&ahead_, &aside_, &turn_}) *gain *= value;
+    if (name == "travel" && holonomic(robot_)) {
+      travel_ = value;
+    } else if (name == "travel") {
+      left_ *= value;
+      right_ *= value;
+      ahead_ *= value;
     }
+    if (name == "traction") traction_ = value;
+    if (name == "load_x") load_[0] = value;
+    if (name == "load_y") load_[1] = value;
+    if (name == "edge_angle") edge_rad_ = value;
+    if (name == "edge_offset") edge_m_ = value;
+    if (name == "edge_ratio") edge_ratio_ = value;
     if (name == "separation") separation_ = value;
     if (name == "ahead") ahead_ *= value;
     if (name == "aside") aside_ *= value;
@@ -207,6 +238,14 @@ class Body {
     if (name == "marker_yaw") robot_.X_RM.theta = value;
   }
 
+  // What the floor makes of the travel of a wheel there.
+  double beyond_edge(const Pose* X_WR, const Pose& X_RW) const {
+    if (X_WR == nullptr) return 1;
+    const Pose at = *X_WR * X_RW;
+    const double beyond = at.x * std::cos(edge_rad_) + at.y * std::sin(edge_rad_) - edge_m_;
+    return 1 + (edge_ratio_ - 1) * std::clamp(0.5 + beyond / (2 * kEdge_m), 0.0, 1.0);
+  }
+
   // What tyres make of a speed and a curvature: the acceleration to the side nears what the floor
   // holds and does not pass it, and the rear axle slips outwards by its share of that.
   Twist on_floor(double v, double curvature) const {
@@ -236,43 +275,58 @@ class Body {
     }
   }
 
-  // e1 (v + w x p) = s of every driven wheel, in the least-squares sense.
-  void invert_wheels() {
-    std::vector<Eigen::RowVector3d> rows;
-    for (const RobotWheel& w : robot_.wheels) {
-      if (!w.driven) continue;
-      const double e1 = w.heading_rad + w.roller_angle_rad;
-      const double c = std::cos(e1), s = std::sin(e1);
-      rows.emplace_back(c, s, *w.x_m * s - *w.y_m * c);
-    }
-    Eigen::MatrixXd A(static_cast<Eigen::Index>(rows.size()), 3);
-    for (std::size_t i = 0; i < rows.size(); ++i) A.row(static_cast<Eigen::Index>(i)) = rows[i];
-    inverse_ = pseudo_inverse(A);
-  }
-
   GroundRobot robot_;
   double left_ = 1, right_ = 1, separation_ = 1, ahead_ = 1, aside_ = 1, turn_ = 1;
   double separation_ratio_ = 1;
+  double travel_ = 1, traction_ = 1;  // of holonomic robots
+  Eigen::Vector2d load_;              // where the weight stands on their wheels
   double sag_ = 0, drift_ = 0, scale_ = 1, aspect_ = 1;
+  double edge_rad_ = 0, edge_m_ = 0, edge_ratio_ = 1;
   std::optional<double> grip_m_s2_;  // none: no speed slips
   double slip_angle_rad_ = 0;
   double grip_shape_ = 2;
-  Eigen::MatrixXd inverse_;
+  std::optional<OmniWheels> omni_;
+  // Of the tractions that wheels had last: they change while wheels cross an edge.
+  mutable Eigen::VectorXd tractions_;
+  mutable Eigen::MatrixXd inverse_;
 };
 
-// The robot's way through one run, at the times that are asked for.
+// Where a run's marker was measured, straight on between.
+class MeasuredPath {
+ public:
+  void add(double t_s, const Pose& X_WM) { poses_[t_s] = X_WM; }
+
+  Pose at(double t_s) const {
+    const auto after = poses_.lower_bound(t_s);
+    if (after == poses_.begin()) return after->second;
+    const auto before = std::prev(after);
+    if (after == poses_.end()) return before->second;
+    const double share = (t_s - before->first) / (after->first - before->first);
+    return before->second *
+           exp(Twist(share * gapfarm::log(between(before->second, after->second))));
+  }
+
+ private:
+  std::map<double, Pose> poses_;
+};
+
+// The robot's way through one run, at the times that are asked for; where it is on two floors, by
+// what was measured.
 std::map<double, Pose> way(const Body& body, const CommandedRun& run, double began_s,
-                           const std::vector<double>& times) {
+                           const std::vector<double>& times, const MeasuredPath* measured) {
   std::map<double, Pose> poses;
   std::vector<CommandRow> changed;
   RobotDrive drive(body.robot(), body.taken(run.commands, began_s, &changed), run.speed_m_s);
   Pose X;
   double omega = run.turn_rad_s;
   std::size_t next = 0;
+  const Pose X_MR = inverse(body.robot().X_RM);
   for (long step = 0; next < times.size(); ++step) {
     const double t = run.start_s + static_cast<double>(step) * kStep_s;
     const auto wheels = drive.advance(t, kStep_s, omega);
-    const Twist v = body.velocity(wheels, drive);
+    std::optional<Pose> X_WR;
+    if (measured != nullptr) X_WR = body.unobserved(measured->at(t + kStep_s / 2)) * X_MR;
+    const Twist v = body.velocity(wheels, drive, X_WR ? &*X_WR : nullptr);
     omega = v[2];
     for (; next < times.size() && times[next] < t + kStep_s; ++next) {
       poses[times[next]] = X * exp(Twist((times[next] - t) * v));
@@ -318,14 +372,20 @@ std::vector<Pose> kinematic_ends(const GroundRobot& robot, std::span<const Comma
     began_s = run.commands.front().t_s;
     break;
   }
+  std::vector<MeasuredPath> measured(body.has_edge() ? runs.size() : 0);
   for (const Trial& trial : trials) {
+    const double end_s = *trial.t_s + *trial.duration_s;
     times[*trial.run].push_back(*trial.t_s);
-    times[*trial.run].push_back(*trial.t_s + *trial.duration_s);
+    times[*trial.run].push_back(end_s);
+    if (!body.has_edge()) continue;
+    measured[*trial.run].add(*trial.t_s, trial.X_WS);
+    measured[*trial.run].add(end_s, trial.X_WE);
   }
   std::vector<std::map<double, Pose>> ways(runs.size());
   for (std::size_t i = 0; i < times.size(); ++i) {
     std::sort(times[i].begin(), times[i].end());
-    if (!times[i].empty()) ways[i] = way(body, runs[i], began_s, times[i]);
+    if (times[i].empty()) continue;
+    ways[i] = way(body, runs[i], began_s, times[i], body.has_edge() ? &measured[i] : nullptr);
   }
   const Pose& X_RM = body.robot().X_RM;
   std::vector<Pose> ends;

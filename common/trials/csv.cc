@@ -8,6 +8,7 @@
 
 #include "common/base/suggest.h"
 #include "common/pose/pose.h"
+#include "common/trials/dialect.h"
 
 namespace gapfarm {
 namespace {
@@ -29,7 +30,8 @@ std::string_view trimmed(std::string_view text) {
 // Walks over the text once and cuts it into rows.
 class Cutter {
  public:
-  Cutter(std::string_view text, std::string_view file) : text_(text), file_(file) {}
+  Cutter(std::string_view text, std::string_view file, char separator)
+      : text_(text), file_(file), separator_(separator) {}
 
   Result<std::vector<CsvRow>> cut() {
     if (text_.substr(0, kByteOrderMark.size()) == kByteOrderMark) at_ = kByteOrderMark.size();
@@ -67,7 +69,7 @@ class Cutter {
     }
   }
   void skip_blanks() {
-    while (at_ < text_.size() && is_blank(text_[at_])) ++at_;
+    while (at_ < text_.size() && is_blank(text_[at_]) && text_[at_] != separator_) ++at_;
   }
 
   Status cut_row(CsvRow& row) {
@@ -80,7 +82,7 @@ class Cutter {
         if (!status.ok()) return status;
       } else {
         const std::size_t begin = at_;
-        while (!at_line_end() && text_[at_] != ',') ++at_;
+        while (!at_line_end() && text_[at_] != separator_) ++at_;
         field.text = trimmed(text_.substr(begin, at_ - begin));
       }
       row.fields.push_back(std::move(field));
@@ -89,7 +91,7 @@ class Cutter {
         next_line();
         return {};
       }
-      ++at_;  // the comma
+      ++at_;  // the separator
     }
   }
 
@@ -111,14 +113,15 @@ class Cutter {
       field.text += c;
     }
     skip_blanks();
-    if (at_line_end() || text_[at_] == ',') return {};
+    if (at_line_end() || text_[at_] == separator_) return {};
     return text_error(file_, place(), quoted_word(text_.substr(at_, 1)),
-                      "',' or the end of the line after a closing quote",
+                      "a separator or the end of the line after a closing quote",
                       "double a quote that belongs to the text");
   }
 
   std::string_view text_;
   std::string_view file_;
+  char separator_;
   std::size_t at_ = 0;
   std::size_t line_ = 1;
   std::size_t line_start_ = 0;
@@ -206,10 +209,11 @@ bool is_comment(std::string_view line) {
   return line.substr(0, 6) == "# log:" || line.find(',') == line.npos;
 }
 
-Result<std::vector<CsvRow>> parse_csv(std::string_view text, std::string_view file) {
+Result<std::vector<CsvRow>> parse_separated(std::string_view text, std::string_view file,
+                                            char separator) {
   Status encoding = check_utf8(text, file);
   if (!encoding.ok()) return encoding.error();
-  return Cutter(text, file).cut();
+  return Cutter(text, file, separator).cut();
 }
 
 std::string csv_field(std::string_view text) {

@@ -78,6 +78,10 @@ std::string log_hash(const RunLog& log) {
       hasher.add(row.t_s);
       for (const double value : row.values) hasher.add(value);
     }
+    for (const CommandRow& row : run.wheel_speeds) {
+      hasher.add(row.t_s);
+      for (const double value : row.values) hasher.add(value);
+    }
     for (const PoseRow& row : run.poses) {
       hasher.add(row.t_s).add(row.X_WM.x).add(row.X_WM.y).add(row.X_WM.theta);
     }

@@ -117,13 +117,16 @@ Result<int> run_import(ImportOptions& options, CliContext& context) {
 SubcommandRun setup_import(CLI::App& app) {
   auto options = std::make_shared<ImportOptions>();
   app.add_option("FORMAT", options->format,
-                 "bbautotune: its trials; runs: drives of a ground robot as CSV, TUM, Motive, "
+                 "bbautotune: its trials; runs: drives of a ground robot as a table (separated by "
+                 "commas, semicolons or tabs), TUM, Motive, "
                  "rostopic or ros2 topic echo, PlotJuggler, .bag, .db3 or .mcap")
       ->required();
   app.add_option("FILES", options->files, "Logs; each becomes a session or a run")->required();
   app.add_option("-o,--out", options->out,
                  "Trial log to write, - for standard output; of runs: a folder");
-  app.add_option("--map", options->map, "Of runs: TOML that says which column is what");
+  app.add_option(
+      "--map", options->map,
+      "Of runs: TOML that says which column is what, with unit, scale, offset, sign and gear");
   app.add_flag("--print-map", options->print_map, "Of runs: print columns and map; write nothing");
   options->outputs.declare(app);
   options->reading.declare_reading(app);

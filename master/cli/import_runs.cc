@@ -36,7 +36,9 @@ std::string columns_text(const std::vector<Recording>& recordings) {
       text += "# " + printable(table.source) + " (" + printable(table.type) + ", " +
               std::to_string(table.rows()) + " rows):";
       for (std::size_t i = 0; i < table.columns.size(); ++i) {
-        text += (i == 0 ? " " : ", ") + printable(table.columns[i]);
+        const std::string unit = table.unit_of(table.columns[i]);
+        text += (i == 0 ? " " : ", ") + printable(table.columns[i]) +
+                (unit.empty() ? "" : " [" + printable(unit) + "]");
       }
       text += "\n";
     }

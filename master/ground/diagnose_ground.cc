@@ -52,12 +52,22 @@ Status leave_out(const std::vector<std::string>& names, std::vector<GroundHypoth
   return {};
 }
 
-}  // namespace
+// What lies before measured wheel speeds is not the file's.
+void leave_motors_out(Kinematics* values) {
+  Kinematics kept;
+  for (std::size_t k = 0; k < values->names.size(); ++k) {
+    if (values->names[k] == "lag" || values->names[k] == "delay") continue;
+    kept.names.push_back(values->names[k]);
+    kept.values.conservativeResize(kept.values.size() + 1);
+    kept.values[kept.values.size() - 1] = values->values[static_cast<Eigen::Index>(k)];
+  }
+  *values = std::move(kept);
+}
 
-namespace {
-
-Result<GroundDiagnosis> take_stages(const GroundRobot& robot, const RunLog& log,
-                                    const GroundDiagnoseOptions& options) {
+// The file's robot, driven as `driven` is.
+Result<GroundDiagnosis> diagnose_driven(const GroundRobot& file, const GroundRobot& robot,
+                                        const RunLog& log, const GroundDiagnoseOptions& options,
+                                        const std::optional<WheelLoop>& loop) {
   StageClock clock(options.on_stage);
   GroundQuestion question = ask_what_is_wrong(robot);
   if (options.reference) {
@@ -76,8 +86,12 @@ Result<GroundDiagnosis> take_stages(const GroundRobot& robot, const RunLog& log,
                            options.seed};
   auto search = search_ground(robot, log, options.windows, question, work);
   if (!search) return search.error();
+  search->loop = loop;
   clock.begin(std::end(kGroundStages)[-1].name);
   GroundDiagnosis result = report_ground(robot, *search, options);
+  Kinematics chosen = chosen_values(*search);
+  if (loop) leave_motors_out(&chosen);
+  result.corrected = robot_with(file, chosen);
   clock.begin("");
   result.diagnosis.timing_s = std::move(clock.timing_s);
   return result;
@@ -87,7 +101,16 @@ Result<GroundDiagnosis> take_stages(const GroundRobot& robot, const RunLog& log,
 
 Result<GroundDiagnosis> diagnose_ground(const GroundRobot& robot, const RunLog& log,
                                         const GroundDiagnoseOptions& options) {
-  return guarded([&] { return take_stages(robot, log, options); });
+  return guarded([&]() -> Result<GroundDiagnosis> {
+    const RunLog* reference = options.reference ? &*options.reference : nullptr;
+    const bool measured = has_wheel_speeds(robot, log) &&
+                          (reference == nullptr || has_wheel_speeds(robot, *reference));
+    if (!measured) return diagnose_driven(robot, robot, log, options, {});
+    GroundDiagnoseOptions of_slip = options;
+    if (reference != nullptr) of_slip.reference = driven_by_wheels(*reference);
+    return diagnose_driven(robot, driven_by_wheels(robot, log), driven_by_wheels(log), of_slip,
+                           measure_wheel_loop(robot, log, reference, options.seed));
+  });
 }
 
 std::vector<SanityFinding> check_ground_log(const GroundRobot& robot, const RunLog& log) {

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <tuple>
 
+#include "common/random/stream.h"
+#include "master/ground/edge.h"
 #include "master/ground/ground_verdict.h"
 #include "master/ground/ground_where.h"
 #include "master/ground/ground_words.h"
@@ -118,6 +120,7 @@ NamedEffect GroundReport::effect_of(const GroundStep& step, std::size_t place) {
   effect.confidence = std::min(kAlmostSure, 1 - 0.5 * std::exp((kLeastGroundGain - step.gain) / 2));
   effect.text = search_.reference ? words_of_change(robot_, h, effect) + "."
                                   : words_of_value(robot_, h, effect);
+  if (h.name == kFloorEdge) describe_floor_edge(fitter_, search_.fit, options_.seed, &effect);
   return effect;
 }
 
@@ -196,7 +199,7 @@ void GroundReport::figures() {
   if (search_.windows.blocks < 8) {
     d_.cautions.push_back("Few runs: intervals are from runs drawn again, and these are few.");
   }
-  if (robot_.measured) {
+  if (robot_.measured && !search_.loop) {
     d_.cautions.push_back(
         "Wheel speeds were measured: what lies before them (dead time, ramps) "
         "cannot show.");
@@ -348,6 +351,7 @@ Diagnosis GroundReport::write() {
   faults();
   readings();
   values();
+  if (search_.loop) report_wheel_loop(*search_.loop, search_.reference.has_value(), &d_);
   figures();
   judge();
   clocks();
@@ -366,7 +370,6 @@ GroundDiagnosis report_ground(const GroundRobot& robot, const GroundSearch& sear
   result.values = report.said();
   result.diagnosis = report.write();
   result.figures = report.figures_of();
-  result.corrected = robot_with(robot, chosen_values(search));
   return result;
 }
 

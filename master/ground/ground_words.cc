@@ -61,6 +61,7 @@ std::string share_words(double value, double lo, double hi) {
 
 // The value of the robot's file, or of the floor, that a ratio is of; 0: none.
 double own_value(const GroundRobot& robot, const KinematicRow& row) {
+  if (row.name == "traction") return 1;
   if (row.name == "separation") {
     const ControllerKinematics& k = robot.controller;
     const bool skids = robot.drive == DriveKind::kSkid || robot.drive == DriveKind::kTracked;

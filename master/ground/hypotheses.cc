@@ -5,6 +5,7 @@
 #include <numbers>
 #include <utility>
 
+#include "master/ground/edge.h"
 #include "master/ground/tolerances.h"
 
 namespace gapfarm {
@@ -172,6 +173,11 @@ void Catalogue::sizes() {
   if (is_holonomic(robot_)) {
     value("wheel_radius", {"speed_gain"}, "the radius of all wheels",
           {{"travel", 1, share, "ratio", "-"}});
+    value("wheel_slip", {"floor", "roller_drag"}, "how far the robot goes of its wheels' way",
+          {row("traction")});
+    value("com_offset", {"payload"}, "where the weight stands on the wheels",
+          {row("load_x"), row("load_y")});
+    all.back().price = kPriceOfAValue;
     value("ahead_gain", {"roller_drag", "speed_gain"}, "travel ahead", {row("ahead")});
     value("aside_gain", {"roller_drag"}, "travel aside", {row("aside")});
     value("wheel_separation", {"robot_radius", "turn_gain"},
@@ -211,10 +217,11 @@ void Catalogue::steering() {
 void Catalogue::motors() {
   value("command_delay", {"pose_latency", "clock_offset"}, "the time from a command to its pose",
         {row("delay")});
-  value(is_steered(robot_) ? "steering_lag" : "motor_lag", {"motor_lag"},
-        is_steered(robot_) ? "the lag of the steering" : "the lag of the wheels", {row("lag")});
   value("clock_drift", {"clock_offset"}, "the rate of one clock against the other",
         {{"drift", 0, 2e-5, "rate", "s/s"}});
+  if (robot_.measured) return;  // motors lie before what was measured
+  value(is_steered(robot_) ? "steering_lag" : "motor_lag", {"motor_lag"},
+        is_steered(robot_) ? "the lag of the steering" : "the lag of the wheels", {row("lag")});
   more("battery_sag", {}, "what the drive loses a minute", {{"sag", 0, 0.005, "rate", "1/min"}});
   if (is_throttled(robot_)) {
     value("throttle_gain", {"payload", "battery_voltage"}, "the acceleration a unit of throttle",
@@ -259,6 +266,8 @@ void Catalogue::floors() {
           "how the wheels slip:", {{"travel", 1, kSlipShare, "ratio", "-"}, row("separation")});
     all.back().price = kPriceOfAValue;
   } else if (is_holonomic(robot_)) {
+    value("floor", {"wheel_slip", "roller_drag"}, "how far the robot goes of its wheels' way",
+          {row("traction")});
     value("wheel_slip", {"wheel_radius", "speed_gain"}, "how far the wheels travel a turn",
           {{"travel", 1, kSlipShare, "ratio", "-"}});
   }
@@ -276,6 +285,7 @@ std::vector<GroundHypothesis> change_hypotheses(const GroundRobot& robot,
   catalogue.steering();
   catalogue.motors();
   catalogue.marker();
+  catalogue.all.push_back(floor_edge());
   // What turns or travels on another floor has the floor's name.
   for (GroundHypothesis& h : catalogue.all) {
     for (GroundHypothesis& other : catalogue.all) {
@@ -297,6 +307,7 @@ std::vector<GroundHypothesis> ground_hypotheses(const GroundRobot& robot) {
   catalogue.motors();
   catalogue.marker();
   catalogue.tracker();
+  catalogue.all.push_back(floor_edge());
   return std::move(catalogue.all);
 }
 

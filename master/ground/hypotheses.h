@@ -21,6 +21,7 @@ struct KinematicRow {
   std::string key;        // in a diagnosis: "ratio", "angle", "x"; "log" of a logarithm
   std::string unit;       // of the difference from nominal
   bool positive = false;  // below 0 it has no meaning
+  double farthest = 0;    // how far off nominal it may be where it is asked for; 0: anywhere
 };
 
 struct GroundHypothesis {

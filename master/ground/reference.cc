@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "common/random/stream.h"
+#include "master/ground/edge.h"
 #include "master/ground/tolerances.h"
 
 namespace gapfarm {
@@ -48,8 +49,9 @@ WindowFit with_traits(const WindowFitter& fitter, const std::vector<GroundHypoth
       Eigen::VectorXd values = fit.values;
       std::vector<FitRow> rows = with_freed(fit.rows, h, &values);
       if (rows.size() == fit.rows.size()) continue;
+      if (h.name == kFloorEdge) values = scan_floor_edge(fitter, fit, rows, values);
       for (std::size_t k = 0; k < rows.size(); ++k) {
-        rows[k].free = false;
+        rows[k].free = k >= fit.rows.size() && h.name == kFloorEdge;  // a line is anywhere
         if (k >= fit.rows.size()) rows[k].row.tolerance *= kFarOff;
       }
       if (fitter.promise(fit, slopes, rows, values) < kLeastPromise) continue;

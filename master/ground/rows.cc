@@ -27,10 +27,14 @@ double plausible_error(const KinematicRow& row) {
 
 std::vector<KinematicRow> kinematic_rows(const GroundRobot& robot) {
   std::vector<KinematicRow> rows;
+  const double reach = wheel_reach_m(robot);
   if (is_holonomic(robot)) {
     rows = {{"ahead", 1, kGainShare, "ratio", "-"},
             {"aside", 1, kGainShare, "ratio", "-"},
-            {"turn", 1, kGainShare, "ratio", "-"}};
+            {"turn", 1, kGainShare, "ratio", "-"},
+            {"traction", 1, kGainShare, "ratio", "-"},
+            {"load_x", robot.com_x_m.value_or(0), kLoadShare * reach, "x", "m", false, reach},
+            {"load_y", robot.com_y_m.value_or(0), kLoadShare * reach, "y", "m", false, reach}};
   } else if (is_steered(robot)) {
     const double slow = robot.steering.understeer_s2_m2;
     rows = {{"steering_offset", 0, kSteering_rad, "angle", "rad"},
@@ -61,8 +65,9 @@ std::vector<KinematicRow> kinematic_rows(const GroundRobot& robot) {
   const Pose& X = robot.X_RM;
   rows.push_back({"lag", robot.motors.lag_s, kLag_s, "tau", "s", true});
   rows.push_back({"delay", robot.motors.delay_s, kDelay_s, "latency", "s"});
-  rows.push_back({"marker_x", X.x, marker, "x", "m"});
-  rows.push_back({"marker_y", X.y, marker, "y", "m"});
+  // A marker, and the weight, are on the robot.
+  rows.push_back({"marker_x", X.x, marker, "x", "m", false, reach});
+  rows.push_back({"marker_y", X.y, marker, "y", "m", false, reach});
   rows.push_back({"marker_yaw", X.theta, is_steered(robot) ? kCarMarkerYaw_rad : kMarkerYaw_rad,
                   "angle", "rad"});
   return rows;
@@ -76,6 +81,7 @@ std::vector<KinematicRow> change_rows(const GroundRobot& robot) {
                                               {"separation", kKeptTurnShare},
                                               {"aside", kKeptTurnShare},
                                               {"turn", kKeptTurnShare},
+                                              {"traction", kKeptTractionShare},
                                               {"steering_gain", kKeptTurnShare}};
   std::vector<KinematicRow> rows = kinematic_rows(robot);
   for (KinematicRow& row : rows) {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "master/ground/edge.h"
 #include "master/ground/ground_verdict.h"
 #include "master/ground/so_far.h"
 #include "master/ground/tolerances.h"
@@ -53,7 +54,9 @@ Offer try_one(const WindowFitter& fitter, const GroundSearch& search,
     values = scan_delay(fitter, rows, values);
   }
   if (hypothesis.name == "friction") values = scan_grip(fitter, rows, values);
-  const bool afar = values.head(search.fit.values.size()) != search.fit.values;
+  if (hypothesis.name == kFloorEdge) values = scan_floor_edge(fitter, search.fit, rows, values);
+  const bool afar =
+      hypothesis.name == kFloorEdge || values.head(search.fit.values.size()) != search.fit.values;
   if (!afar) {
     const double promised = fitter.promise(search.fit, slopes, rows, values);
     if (promised < kLeastPromise) return {index, std::max(promised, 0.0), {}};
@@ -69,6 +72,7 @@ Offer try_one(const WindowFitter& fitter, const GroundSearch& search,
       offer.gain = 0;
     }
   }
+  if (hypothesis.name == kFloorEdge && !parts_windows(fitter, *fit)) offer.gain = 0;
   return offer;
 }
 

@@ -15,6 +15,7 @@
 #include "common/score/pose_readings.h"
 #include "master/ground/held_out.h"
 #include "master/ground/hypotheses.h"
+#include "master/ground/wheel_loop.h"
 #include "master/ground/window_fit.h"
 #include "master/progress/finding.h"
 
@@ -62,6 +63,7 @@ struct GroundWork {
 struct GroundSearch {
   std::vector<GroundHypothesis> catalogue;
   std::optional<GroundReference> reference;
+  std::optional<WheelLoop> loop;    // where speeds were measured beside commands
   std::vector<std::size_t> faults;  // of the log, as found; put right in `log`
   std::vector<double> fault_gains;
   PoseGrid grid;      // that the poses are rounded to

@@ -24,6 +24,8 @@ inline constexpr double kPowerShare = 0.05;  // of a throttle's values
 inline constexpr double kDelay_s = 0.015;    // what clocks and pollers lose
 inline constexpr double kLag_s = 0.03;
 inline constexpr double kMarkerShare = 0.02;  // of the wheels' reach
+// Where the weight stands, of the wheels' reach: cables and a battery that was put back.
+inline constexpr double kLoadShare = 0.05;
 inline constexpr double kMarkerYaw_rad = 0.01;
 inline constexpr double kSteering_rad = 0.003;
 // Tyres that slip sideways move the point that a car turns about, as if its marker stood elsewhere.
@@ -35,6 +37,8 @@ inline constexpr double kCarMarkerYaw_rad = 0.02;
 inline constexpr double kSlipShare = 0.003;
 inline constexpr double kKeptTurnShare = 0.01;
 inline constexpr double kGripShare = 0.05;
+// How far a robot goes of its wheels' way depends on what rollers pick up, and on where it drives.
+inline constexpr double kKeptTractionShare = 0.01;
 inline constexpr double kSlipAngle_rad = 0.17;      // rear tyres where they hold no more
 inline constexpr double kKeptSlipAngle_rad = 0.02;  // how well that is known
 inline constexpr double kKeptGripShape = 0.05;      // of a logarithm; the reference sets it
@@ -92,6 +96,9 @@ inline constexpr double kLeastChangeGain = 6;
 // nats by second-order slopes below which nothing is fitted: a third of the above.
 inline constexpr double kLeastPromise = kLeastGroundGain / 3;
 inline constexpr double kPriceOfAValue = 2;  // nats that a second value of one name must gain
+// Of an edge: two values more than one, and that the best of some tens of lines that differ was
+// looked for (their logarithm).
+inline constexpr double kPriceOfAnEdge = 2 * kPriceOfAValue + 4;
 inline constexpr double kShareOfBest = 0.5;  // of the best gain, for an offer to compete held out
 // A further name must gain this share, held out, of what the best name gains: a robot is rarely
 // wrong in two ways, and a model that is wrong by some share leaves traces of the first.  Chosen:

@@ -98,6 +98,7 @@ class WindowFitter {
   Eigen::MatrixX2d intervals(const WindowFit& fit, std::uint64_t seed) const;
 
   const WindowSet& windows() const { return windows_; }
+  const GroundRobot& robot() const { return robot_; }
 
   // A fit's residuals as they are: m, m, rad.
   std::vector<Eigen::Vector3d> raw_residuals(const WindowFit& fit) const;

@@ -65,7 +65,8 @@ Eigen::MatrixXd WindowFitter::prior_precision(const std::vector<FitRow>& rows) c
   Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(n, n);
   for (Eigen::Index k = 0; k < n; ++k) {
     const FitRow& row = rows[static_cast<std::size_t>(k)];
-    const double deviation = row.free ? plausible_error(row.row) : row.row.tolerance;
+    double deviation = row.free ? plausible_error(row.row) : row.row.tolerance;
+    if (row.free && row.row.farthest > 0) deviation = row.row.farthest;
     covariance(k, k) = deviation * deviation;
   }
   if (reference_ == nullptr) return covariance.diagonal().cwiseInverse().asDiagonal();

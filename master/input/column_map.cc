@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <numbers>
 #include <tuple>
 
@@ -38,6 +39,17 @@ constexpr Unit kUnits[] = {{"s", 1},
                            {"%", 1e-2},
                            {"1", 1}};
 
+struct ColumnNumber {
+  const char* key;
+  double MappedColumn::*value;
+  double lower, upper;
+};
+
+constexpr ColumnNumber kNumbers[] = {{"scale", &MappedColumn::scale, 0, 1e12},
+                                     {"offset", &MappedColumn::offset, -1e12, 1e12},
+                                     {"sign", &MappedColumn::sign, -1, 1},
+                                     {"gear", &MappedColumn::gear, 1e-6, 1e6}};
+
 // As TOML's basic string.  Bags may hold any bytes: what TOML cannot hold becomes '_'.
 std::string quoted(const std::string& text) {
   std::string word = "\"", plain = "\"";
@@ -68,7 +80,12 @@ void write_table(const char* name, const TableMap& table, std::string& out) {
                            "abcdefghijklmnopqrstuvwxyz"
                            "ABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-") == c.role.npos;
     out += (plain ? c.role : quoted(c.role)) + " = { column = " + quoted(c.column) +
-           (c.unit.empty() ? "" : ", unit = " + quoted(c.unit)) + " }\n";
+           (c.unit.empty() ? "" : ", unit = " + quoted(c.unit));
+    for (const ColumnNumber& number : kNumbers) {
+      if (c.*number.value == MappedColumn{}.*number.value) continue;
+      out += std::string(", ") + number.key + " = " + format_double(c.*number.value);
+    }
+    out += c.rate ? ", rate = true }\n" : " }\n";
   }
 }
 
@@ -114,7 +131,19 @@ class MapReader {
     } else if (auto inner = section.section(role)) {
       inner->read("column", column.column);
       inner->read("unit", column.unit);
+      for (const ColumnNumber& number : kNumbers) {
+        inner->read(number.key, column.*number.value, number.lower, number.upper);
+      }
+      inner->read("rate", column.rate);
       inner->finish();
+      if (column.scale == 0) {
+        inner->fail("scale",
+                    "found 0, expected what one of the column is in the unit; a column "
+                    "that counts the other way has sign = -1");
+      }
+      if (std::abs(column.sign) != 1) {
+        inner->fail("sign", "found " + format_double(column.sign) + ", expected 1 or -1");
+      }
       if (!column.unit.empty() && unit_factor(column.unit) == 0) {
         inner->fail("unit", "unknown unit " + quoted_word(column.unit) +
                                 suggestion(column.unit, known_units()));

@@ -10,10 +10,16 @@
 
 namespace gapfarm {
 
+// A number n of the column is (sign scale / gear n + offset) of the unit.
 struct MappedColumn {
   std::string role;    // t, x, y, theta, qx, ... of poses; t and channels of commands
   std::string column;  // as the recording names it
-  std::string unit;    // one of known_units(); empty: already SI
+  std::string unit;    // one of known_units(); empty: the file's own, without one SI
+  double scale = 1;    // with one and no unit the result is SI: 0.0018 m a pixel
+  double offset = 0;   // in the unit
+  double sign = 1;     // or -1: an axis or a motor that counts the other way
+  double gear = 1;     // turns of a motor a turn of its wheel
+  bool rate = false;   // the column counts (an encoder's position): its change a second is meant
 };
 
 // Where one kind of rows comes from.

@@ -228,7 +228,7 @@ class Guess {
       for (MappedColumn& c : found.columns) {
         if (c.role == "omega") c.unit = rate_unit(table, c.column);
         const bool rim = c.role == "left" || c.role == "right" || c.role == "speed";
-        if (rim) c.unit = rim_unit(c.column);
+        if (rim) c.unit = rim_unit(table, c.column);
       }
       map_.commands = std::move(found);
       return;
@@ -253,7 +253,7 @@ class Guess {
     start(table, time, found);
     for (const Role& role : wheel_roles()) {
       const std::string column = column_of(table, role.aliases);
-      if (!column.empty()) found.columns.push_back({role.name, column, rim_unit(column)});
+      if (!column.empty()) found.columns.push_back({role.name, column, rim_unit(table, column)});
     }
     // Joint states: a column velocity.NAME a joint.
     if (found.columns.size() == 1 && table.type.find("JointState") != std::string::npos) {
@@ -266,8 +266,14 @@ class Guess {
     if (found.columns.size() > 1) map_.wheels = std::move(found);
   }
 
+  // Whether the file has a row of units: what it states is not guessed.
+  static bool stated(const LogTable& table, const std::string& column) {
+    return !table.unit_of(column).empty();
+  }
+
   // Clocks count seconds since 1970 or since something; a day has 86,400.
   std::string time_unit(const LogTable& table, const std::string& column) const {
+    if (stated(table, column)) return "";
     if (has_word(column, "ns")) return "ns";
     if (has_word(column, "us")) return "us";
     if (has_word(column, "ms")) return "ms";
@@ -277,15 +283,17 @@ class Guess {
 
   std::string length_unit(const LogTable& table, const TableMap& found) {
     const std::string& x = found.find("x")->column;
+    if (stated(table, x)) return "";
     for (const char* unit : {"mm", "cm"}) {
       if (has_word(x, unit)) return unit;
     }
     const auto xi = table.find(x), ti = table.find(found.find("t")->column);
     // The median outlives jumps between runs and stamps that hardly differ.
     std::vector<double> speeds;
+    const MappedColumn& t = *found.find("t");
+    const double second = unit_factor(t.unit.empty() ? table.unit_of(t.column) : t.unit);
     for (std::size_t r = 1; r < table.rows(); ++r) {
-      const double dt =
-          (table.at(r, *ti) - table.at(r - 1, *ti)) * unit_factor(found.find("t")->unit);
+      const double dt = (table.at(r, *ti) - table.at(r - 1, *ti)) * second;
       const double dx = std::abs(table.at(r, *xi) - table.at(r - 1, *xi));
       if (dt > 0 && dx > 0) speeds.push_back(dx / dt);
     }
@@ -300,6 +308,7 @@ class Guess {
 
   // Headings in radians stay within a turn or grow smoothly past it; 60 rad are ten turns.
   std::string angle_unit(const LogTable& table, const std::string& column) {
+    if (stated(table, column)) return "";
     if (has_word(column, "deg") || column.find("_deg") != column.npos) return "deg";
     const std::vector<double> values = numbers(table, column);
     double jump = 0;
@@ -317,11 +326,13 @@ class Guess {
   }
 
   static std::string rate_unit(const LogTable& table, const std::string& column) {
+    if (stated(table, column)) return "";
     if (column.find("deg") != column.npos) return "deg/s";
     return greatest(numbers(table, column)) > 60 ? "deg/s" : "rad/s";
   }
 
-  static std::string rim_unit(const std::string& column) {
+  static std::string rim_unit(const LogTable& table, const std::string& column) {
+    if (stated(table, column)) return "";
     if (column.find("rpm") != column.npos) return "rpm";
     const std::string name = plain(column);
     const bool speed = name == "vl" || name == "vr" || name == "v_left" || name == "v_right" ||

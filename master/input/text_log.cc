@@ -3,6 +3,7 @@
 #include <limits>
 
 #include "common/trials/csv.h"
+#include "common/trials/dialect.h"
 #include "common/trials/format.h"
 #include "master/input/log_table.h"
 
@@ -11,8 +12,10 @@ namespace {
 
 constexpr double kBlank = std::numeric_limits<double>::quiet_NaN();
 // Words in cells that mean true or nothing; other words make a column one of words.
-double number_of(const std::string& text) {
-  if (const auto value = parse_double(text)) return std::isfinite(*value) ? *value : kBlank;
+double number_of(const std::string& text, char separator = ',') {
+  if (const auto value = parse_decimal(text, separator)) {
+    return std::isfinite(*value) ? *value : kBlank;
+  }
   if (text == "true" || text == "True") return 1;
   if (text == "false" || text == "False") return 0;
   return kBlank;
@@ -149,12 +152,13 @@ bool fits(const EchoType& type, const CsvRow& row, bool longer) {
 }
 
 // Numbers without names: a map may call the columns column_1, column_2, ...
-Result<Recording> parse_unnamed(const std::vector<CsvRow>& rows, const std::string& file) {
+Result<Recording> parse_unnamed(const std::vector<CsvRow>& rows, const std::string& file,
+                                char separator) {
   LogTable table{file, "", "csv", {}, {}};
   const std::size_t width = rows.front().fields.size();
   if (width < 2) {
-    return text_error(file, {}, "a table of one column", "columns between commas",
-                      "separate columns by commas and write decimals with a point");
+    return text_error(file, {}, "a table of one column",
+                      "columns between commas, semicolons or tabs", "separate its columns");
   }
   for (std::size_t i = 0; i < width; ++i) {
     table.columns.push_back("column_" + std::to_string(i + 1));
@@ -165,7 +169,9 @@ Result<Recording> parse_unnamed(const std::vector<CsvRow>& rows, const std::stri
                         std::to_string(width) + " as in the first line",
                         "the last line may have broken off: remove it");
     }
-    for (const CsvField& field : row.fields) table.values.push_back(number_of(field.text));
+    for (const CsvField& field : row.fields) {
+      table.values.push_back(number_of(field.text, separator));
+    }
   }
   Recording recording{file, "a CSV file without a header", {std::move(table)}, "", {}};
   recording.notes.push_back(file + ": has no header; its columns are column_1 to column_" +
@@ -175,7 +181,8 @@ Result<Recording> parse_unnamed(const std::vector<CsvRow>& rows, const std::stri
   return recording;
 }
 
-Result<Recording> parse_echo(const std::vector<CsvRow>& rows, const std::string& file) {
+Result<Recording> parse_echo(const std::vector<CsvRow>& rows, const std::string& file,
+                             char separator) {
   for (const EchoType& type : echo_types()) {
     // Odometry and poses with covariance are followed by 36 numbers and more.
     const std::string_view name = type.type;
@@ -207,41 +214,85 @@ Result<Recording> parse_echo(const std::vector<CsvRow>& rows, const std::string&
     recording.tables.push_back(std::move(table));
     return recording;
   }
-  return parse_unnamed(rows, file);
+  return parse_unnamed(rows, file, separator);
 }
 
-Result<Recording> parse_headed(const std::vector<CsvRow>& rows, const std::string& file) {
-  const CsvRow& header = rows.front();
-  LogTable table{file, "", "csv", {}, {}};
-  for (const CsvField& field : header.fields) {
+// Rows that end in a separator have an empty last field everywhere.
+void drop_empty_last(std::vector<CsvRow>* rows) {
+  const std::size_t width = rows->front().fields.size();
+  const bool ends_empty = std::all_of(rows->begin(), rows->end(), [&](const CsvRow& row) {
+    return row.fields.size() != width || row.fields.back().text.empty();
+  });
+  if (!ends_empty || width < 2) return;
+  for (CsvRow& row : *rows) {
+    if (row.fields.size() == width) row.fields.pop_back();
+  }
+}
+
+// Names of the columns; a table may have an unnamed column of row numbers (pandas).
+Result<std::vector<std::string>> column_names(const TableHead& head, const std::string& file) {
+  std::vector<std::string> names;
+  for (const CsvField& field : head.names) {
     std::string name = field.text;
-    // A table may have an unnamed column of row numbers (pandas).
-    if (name.empty()) name = "column_" + std::to_string(table.columns.size() + 1);
-    if (table.find(name)) {
+    if (name.empty()) name = "column_" + std::to_string(names.size() + 1);
+    if (std::find(names.begin(), names.end(), name) != names.end()) {
       return text_error(file, field.place, "column " + quoted_word(name) + " again",
                         "each column once", "rename or remove one of the two");
     }
-    table.columns.push_back(name);
+    names.push_back(std::move(name));
   }
+  return names;
+}
+
+// A log writes its decimals one way: where points and commas are mixed, one of them groups digits.
+Status check_decimals(const std::vector<CsvRow>& rows, std::size_t first, char separator,
+                      const std::string& file) {
+  const CsvField* point = nullptr;
+  const CsvField* comma = nullptr;
+  for (std::size_t r = first; r < rows.size() && separator != ','; ++r) {
+    for (const CsvField& field : rows[r].fields) {
+      if (!parse_decimal(field.text, separator)) continue;
+      if (field.text.find('.') != std::string::npos && point == nullptr) point = &field;
+      if (field.text.find(',') != std::string::npos && comma == nullptr) comma = &field;
+    }
+  }
+  if (point == nullptr || comma == nullptr) return {};
+  return text_error(file, comma->place, quoted_word(comma->text),
+                    "decimal points, as in " + quoted_word(point->text) + " in line " +
+                        std::to_string(point->place.line),
+                    "write all decimals alike, and no separators of thousands");
+}
+
+Result<Recording> parse_headed(std::vector<CsvRow> rows, const std::string& file, char separator) {
+  drop_empty_last(&rows);
+  const TableHead head = read_head(rows, separator);
+  const auto names = column_names(head, file);
+  if (!names) return names.error();
+  LogTable table{file, "", "csv", *names, {}};
+  for (const CsvField& field : head.titles) table.titles.push_back(field.text);
+  table.units = head.units;
+  if (Status s = check_decimals(rows, head.rows, separator, file); !s) return s.error();
   std::vector<std::size_t> bad(table.columns.size(), 0), good(table.columns.size(), 0);
   std::vector<const CsvField*> example(table.columns.size(), nullptr);
-  for (std::size_t r = 1; r < rows.size(); ++r) {
+  for (std::size_t r = head.rows; r < rows.size(); ++r) {
     const auto& fields = rows[r].fields;
-    if (fields.size() != header.fields.size()) {
+    if (fields.size() != table.columns.size()) {
       return text_error(file, rows[r].end, std::to_string(fields.size()) + " fields",
-                        std::to_string(header.fields.size()) + " as in the header",
-                        "leave unknown values empty, but keep their commas");
+                        std::to_string(table.columns.size()) + " as in the header, separated by " +
+                            (separator == '\t' ? "tabs" : quoted_word({&separator, 1})),
+                        "leave unknown values empty, but keep their separators");
     }
     for (std::size_t i = 0; i < fields.size(); ++i) {
-      const double value = number_of(fields[i].text);
-      const bool word = std::isnan(value) && !fields[i].text.empty() && !is_number(fields[i].text);
+      const double value = number_of(fields[i].text, separator);
+      const bool word =
+          std::isnan(value) && !fields[i].text.empty() && !parse_decimal(fields[i].text, separator);
       (word ? bad : good)[i] += 1;
       if (word && example[i] == nullptr) example[i] = &fields[i];
       table.values.push_back(value);
     }
   }
   if (table.rows() == 0) {
-    return text_error(file, rows.front().end, "a header without rows", "a row a measurement",
+    return text_error(file, rows.back().end, "a header without rows", "a row a measurement",
                       "check that the log was written");
   }
   for (std::size_t i = 0; i < bad.size(); ++i) {
@@ -253,7 +304,7 @@ Result<Recording> parse_headed(const std::vector<CsvRow>& rows, const std::strin
         "a number, as in its other rows", "correct it or leave it empty");
   }
   const std::string& first = table.columns.front();
-  std::string format = "a CSV file with a header";
+  std::string format = "a table with a header";
   if (first == "%time") format = "rostopic echo -p";
   if (first == "__time") format = "a PlotJuggler export";
   return Recording{file, format, {std::move(table)}, "", {}};
@@ -282,11 +333,8 @@ Result<Recording> parse_text_log(std::string_view text, const std::string& file)
                      format == TextFormat::kBinary || format == TextFormat::kRunStore;
   if (other) return wrong_format(file, format, "a log of drives");
   if (looks_like_tum(text)) return parse_tum(text, file);
-  const std::string_view line = first_line(text);
-  if (line.find(',') == line.npos && line.find_first_of(";\t") != line.npos) {
-    return wrong_format(file, TextFormat::kOtherSeparator, "a log of drives");
-  }
-  const Result<std::vector<CsvRow>> rows = parse_csv(text, file);
+  const char separator = find_separator(text);
+  Result<std::vector<CsvRow>> rows = parse_separated(text, file, separator);
   if (!rows) return rows.error();
   if (rows->empty()) return wrong_format(file, TextFormat::kEmpty, "a log of drives");
   const CsvRow& first = rows->front();
@@ -298,9 +346,21 @@ Result<Recording> parse_text_log(std::string_view text, const std::string& file)
   if (format == TextFormat::kTrialLog && named("x0") && named("theta1")) {
     return wrong_format(file, format, "a log of drives");
   }
-  const bool headed = std::none_of(first.fields.begin(), first.fields.end(),
-                                   [](const CsvField& f) { return is_number(f.text); });
-  return headed ? parse_headed(*rows, file) : parse_echo(*rows, file);
+  const bool headed =
+      std::none_of(first.fields.begin(), first.fields.end(),
+                   [&](const CsvField& f) { return parse_decimal(f.text, separator).has_value(); });
+  return headed ? parse_headed(*std::move(rows), file, separator)
+                : parse_echo(*rows, file, separator);
+}
+
+std::string LogTable::unit_of(std::string_view name) const {
+  const auto at = find(name);
+  if (!at || *at >= units.size()) return "";
+  std::string unit = units[*at].text;
+  if (unit.size() > 2 && (unit.front() == '[' || unit.front() == '(')) {
+    unit = unit.substr(1, unit.size() - 2);
+  }
+  return unit;
 }
 
 }  // namespace gapfarm

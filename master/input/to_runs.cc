@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <filesystem>
 #include <map>
 #include <set>
@@ -103,29 +102,54 @@ class Importer {
     return {};
   }
 
-  // Factor of a column; speeds of rims become those of wheels.
-  Result<double> factor_of(const LogTable& table, const TableMap& map, const MappedColumn& c,
-                           bool poses) const {
-    const double factor = unit_factor(c.unit);
-    const bool rim = !poses && c.unit.ends_with("/s") && c.unit.find("m/") != c.unit.npos &&
-                     c.role != "v" && c.role != "vy";
-    if (!rim) return factor;
-    if (map.wheel_radius_m > 0) return factor / map.wheel_radius_m;
-    return Error{table.source + ":1: found column " + quoted_word(c.column) + " in " + c.unit +
-                 ", expected the wheels' radius too; print the map (--print-map), add "
-                 "wheel_radius = 0.05 (m) to it and give it by --map"};
+  // What a column's numbers become in SI.
+  struct Line {
+    double slope, offset;
+  };
+
+  // The map's unit, else the file's where the map does not say what one of the column is.
+  static Result<std::string> unit_of(const LogTable& table, const MappedColumn& c) {
+    if (!c.unit.empty() || c.scale != 1) return c.unit;
+    const std::string own = table.unit_of(c.column);
+    const bool none = own.empty() || own == "-";
+    if (none || unit_factor(own) != 0) return none ? "" : own;
+    const std::string role = c.role + " = { column = \"" + c.column + "\", ";
+    return text_error(table.source, table.units[*table.find(c.column)].place,
+                      "unit " + quoted_word(own) + " of column " + quoted_word(c.column),
+                      "one of s, ms, m, mm, rad, deg, rad/s, rpm, ... (docs/formats.md)" +
+                          suggestion(own, known_units()),
+                      "say in the map what one of it is in SI: " + role + "scale = 0.001 }, or " +
+                          role + "unit = \"...\" }");
+  }
+
+  // Speeds of rims become those of wheels.
+  Result<Line> line_of(const LogTable& table, const TableMap& map, const MappedColumn& c,
+                       bool poses) const {
+    const Result<std::string> unit = unit_of(table, c);
+    if (!unit) return unit.error();
+    double factor = unit_factor(*unit);
+    const bool length = *unit == "m" || *unit == "cm" || *unit == "mm";
+    const bool speed = unit->ends_with("/s") && unit->find("m/") != unit->npos;
+    const bool rim = !poses && (speed || (c.rate && length)) && c.role != "v" && c.role != "vy";
+    if (rim && map.wheel_radius_m <= 0) {
+      return Error{table.source + ":1: found column " + quoted_word(c.column) + " in " + *unit +
+                   ", expected the wheels' radius too; print the map (--print-map), add "
+                   "wheel_radius = 0.05 (m) to it and give it by --map"};
+    }
+    if (rim) factor /= map.wheel_radius_m;
+    return Line{c.sign * c.scale / c.gear * factor, c.offset * factor};
   }
 
   Status take_table(std::size_t recording, const LogTable& table, const Kind& kind) {
     const TableMap& map = *kind.map;
     const bool poses = kind.map == &map_.poses;
     std::vector<std::size_t> at;
-    std::vector<double> factors;
+    std::vector<Line> lines;
     for (const MappedColumn& c : map.columns) {
       at.push_back(*table.find(c.column));
-      const Result<double> factor = factor_of(table, map, c, poses);
-      if (!factor) return factor.error();
-      factors.push_back(*factor);
+      const Result<Line> line = line_of(table, map, c, poses);
+      if (!line) return line.error();
+      lines.push_back(*line);
     }
     std::optional<std::size_t> run, keep;
     for (const auto& [name, to] : {std::pair{&map.run, &run}, {&map.keep, &keep}}) {
@@ -136,6 +160,9 @@ class Importer {
                      ", expected it for [" + kind.name + "]" + suggestion(*name, table.columns)};
       }
     }
+    const bool rates = std::any_of(map.columns.begin(), map.columns.end(),
+                                   [](const MappedColumn& c) { return c.rate; });
+    std::map<std::string, std::vector<double>> before;  // of each run: its last row
     Tally& tally = tallies_[kind.name];
     for (std::size_t r = 0; r < table.rows(); ++r) {
       if (keep && !(table.at(r, *keep) != 0)) {
@@ -143,17 +170,35 @@ class Importer {
         continue;
       }
       std::vector<double> values;
-      for (std::size_t c = 0; c < at.size(); ++c) values.push_back(table.at(r, at[c]) * factors[c]);
+      for (std::size_t c = 0; c < at.size(); ++c) {
+        values.push_back(lines[c].slope * table.at(r, at[c]) + lines[c].offset);
+      }
       const bool whole = std::all_of(values.begin(), values.end(),
                                      [](double v) { return std::abs(v) < kGreatest; });
       if (!whole || (poses && !to_pose(map, values))) {
         ++tally.blank;
         continue;
       }
-      put(tally, stretches_[kind.name][recording][run_name(table, run, r)], values);
+      const std::string name = run_name(table, run, r);
+      if (rates && !to_rates(map, before[name], values)) continue;
+      put(tally, stretches_[kind.name][recording][name], values);
     }
     used_.insert(table.source);
     return {};
+  }
+
+  // The row before with its counts' rates up to this one; false where there is none.
+  static bool to_rates(const TableMap& map, std::vector<double>& before,
+                       std::vector<double>& values) {
+    const double dt = before.empty() ? 0 : values[0] - before[0];
+    if (dt < 0 || (dt == 0 && !before.empty())) return false;
+    std::vector<double> row = before;
+    for (std::size_t c = 0; c < row.size(); ++c) {
+      if (map.columns[c].rate) row[c] = (values[c] - before[c]) / dt;
+    }
+    before = values;
+    values = std::move(row);
+    return !values.empty();
   }
 
   static std::string run_name(const LogTable& table, const std::optional<std::size_t>& run,
@@ -337,36 +382,6 @@ class Importer {
   ImportedRuns out_;
 };
 
-// Nanoseconds of a clock, micrometres of a pose: more digits are noise.
-std::string digits(double value, int decimals) {
-  char text[48];
-  std::snprintf(text, sizeof text, "%.*f", decimals, value);
-  std::string out = text;
-  while (out.find('.') != out.npos && (out.back() == '0' || out.back() == '.')) {
-    const bool point = out.back() == '.';
-    out.pop_back();
-    if (point) break;
-  }
-  return out == "-0" ? "0" : out;
-}
-
-std::string format_commands(const std::vector<std::string>& channels, const RunLog& log,
-                            std::vector<CommandRow> LoggedRun::*rows) {
-  std::string out = "run,t";
-  for (const std::string& channel : channels) out += "," + csv_field(channel);
-  out += "\n";
-  bool any = false;
-  for (const LoggedRun& run : log.runs) {
-    for (const CommandRow& row : run.*rows) {
-      out += csv_field(run.run) + "," + digits(row.t_s, 6);
-      for (const double value : row.values) out += "," + digits(value, 9);
-      out += "\n";
-      any = true;
-    }
-  }
-  return any ? out : "";
-}
-
 }  // namespace
 
 Result<ImportedRuns> to_runs(const std::vector<Recording>& recordings, const LogMap& map) {
@@ -377,20 +392,6 @@ Result<ImportedRuns> to_runs(const std::vector<Recording>& recordings, const Log
                           [](const MappedColumn& c) { return c.role == "t"; });
   }
   return Importer(recordings, ordered).run();
-}
-
-RunFiles format_runs(const RunLog& log) {
-  RunFiles files;
-  files.commands = format_commands(log.channels, log, &LoggedRun::commands);
-  files.wheels = format_commands(log.wheel_channels, log, &LoggedRun::wheel_speeds);
-  files.poses = "run,t,x,y,theta\n";
-  for (const LoggedRun& run : log.runs) {
-    for (const PoseRow& row : run.poses) {
-      files.poses += csv_field(run.run) + "," + digits(row.t_s, 6) + "," + digits(row.X_WM.x, 6) +
-                     "," + digits(row.X_WM.y, 6) + "," + digits(row.X_WM.theta, 7) + "\n";
-    }
-  }
-  return files;
 }
 
 }  // namespace gapfarm

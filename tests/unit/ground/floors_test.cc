@@ -1,0 +1,185 @@
+// Floors under robots whose wheel speeds were measured: slip and the motors' loop are two things,
+// two floors in one log have an edge, and directions and drift are no change.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "common/random/stream.h"
+#include "common/robot/robot_file.h"
+#include "common/score/omni_inverse.h"
+#include "common/trials/files.h"
+#include "master/ground/diagnose_ground.h"
+#include "master/ground/wheel_loop.h"
+#include "master/input/bags.h"
+#include "master/input/to_runs.h"
+#include "tests/unit/trials/shared_data.h"
+
+namespace gapfarm {
+namespace {
+
+using std::numbers::pi;
+
+GroundRobot robotino() {
+  const auto text = read_text_file(GAPFARM_SOURCE_DIR "/configs/robots/robotino.toml");
+  auto robot = parse_robot(*text, "robotino.toml");
+  EXPECT_TRUE(robot.ok()) << robot.error().message;
+  return *robot;
+}
+
+struct Floor {
+  double traction = 0.9;
+  Eigen::Vector2d load_m{0, 0};
+  double loop_gain = 0.95, loop_loss_rad_s = 0.05;
+  // Beyond x cos(angle) + y sin(angle) = offset the traction is `ratio` times as much.
+  double edge_rad = 0, edge_m = 1e9, ratio = 1;
+};
+
+// Twelve runs of 8 s from the origin, 30 degrees apart beginning with `first_deg`: what the robot
+// does by a simulation of the test's own, with the camera's noise.
+RunLog driven_on(const Floor& floor, double first_deg, std::uint64_t seed) {
+  const GroundRobot robot = robotino();
+  OmniWheels omni(robot);
+  omni.load(floor.load_m);
+  Stream stream({seed, Purpose::kTest, 0, 0, 0});
+  RunLog log;
+  log.channels = log.wheel_channels = robot.channels;
+  for (int r = 0; r < 12; ++r) {
+    LoggedRun run;
+    run.run = std::to_string(r);
+    const double way = (first_deg + 30 * r) * pi / 180;
+    const double v[2] = {0.1 * std::cos(way), 0.1 * std::sin(way)};
+    CommandRow commanded{0, {}}, measured{0, {}};
+    for (const RobotWheel& wheel : robot.wheels) {
+      const double rad_s =
+          (v[0] * std::cos(wheel.heading_rad) + v[1] * std::sin(wheel.heading_rad)) / 0.04;
+      const double loss = std::min(floor.loop_loss_rad_s, std::abs(rad_s) * floor.loop_gain);
+      commanded.values.push_back(rad_s);
+      measured.values.push_back(floor.loop_gain * rad_s - std::copysign(loss, rad_s));
+    }
+    Pose X_WR{0, 0, 2 * pi * stream.uniform()};
+    constexpr double kDt_s = 0.005;
+    for (int k = 0; k < 1600; ++k) {
+      if (k % 10 == 0) {
+        commanded.t_s = measured.t_s = k * kDt_s;
+        run.commands.push_back(commanded);
+        run.wheel_speeds.push_back(measured);
+        const Pose X_WM = X_WR * robot.X_RM;
+        run.poses.push_back({k * kDt_s,
+                             {X_WM.x + 3e-4 * stream.normal(), X_WM.y + 3e-4 * stream.normal(),
+                              wrap_angle(X_WM.theta + 2e-3 * stream.normal())}});
+      }
+      Eigen::Vector3d surface, tractions;
+      for (Eigen::Index i = 0; i < 3; ++i) {
+        const RobotWheel& wheel = robot.wheels[static_cast<std::size_t>(i)];
+        const Pose at = X_WR * Pose{*wheel.x_m, *wheel.y_m, 0};
+        const bool beyond =
+            at.x * std::cos(floor.edge_rad) + at.y * std::sin(floor.edge_rad) > floor.edge_m;
+        surface[i] = 0.04 * measured.values[static_cast<std::size_t>(i)];
+        tractions[i] = floor.traction * (beyond ? floor.ratio : 1);
+      }
+      X_WR = X_WR * exp(Twist(kDt_s * omni.inverse(tractions) * surface));
+    }
+    log.runs.push_back(std::move(run));
+  }
+  return log;
+}
+
+Diagnosis diagnosed(const RunLog& log, const RunLog* reference = nullptr) {
+  GroundDiagnoseOptions options;
+  if (reference != nullptr) options.reference = *reference;
+  auto result = diagnose_ground(robotino(), log, options);
+  EXPECT_TRUE(result.ok()) << result.error().message;
+  return result.ok() ? std::move(result->diagnosis) : Diagnosis{};
+}
+
+void expect_holds(const Estimate& e, double truth, double near) {
+  EXPECT_NEAR(e.value, truth, near) << e.key;
+  EXPECT_LE(e.lo, truth + near / 2) << e.key;
+  EXPECT_GE(e.hi, truth - near / 2) << e.key;
+}
+
+TEST(Floors, SlipAndTheMotorsLoopArePartedOnAnotherFloor) {
+  const RunLog before = driven_on({0.9, {-0.01, 0}, 0.95}, 0, 1);
+  const Diagnosis found = diagnosed(driven_on({0.65, {-0.01, 0}, 0.8}, 15, 2), &before);
+  ASSERT_EQ(found.effects.size(), 1u) << found.headline;
+  EXPECT_EQ(found.effects[0].name, "floor") << found.headline;
+  ASSERT_EQ(found.effects[0].parameters.size(), 2u);
+  expect_holds(found.effects[0].parameters[0], 0.65 - 0.9, 0.02);
+  expect_holds(found.effects[0].parameters[1], 0.8 / 0.95 - 1, 0.03);
+}
+
+TEST(Floors, MotorsThatRunShortAreNoFloor) {
+  const RunLog before = driven_on({0.9, {0, 0}, 0.95}, 0, 1);
+  const Diagnosis found = diagnosed(driven_on({0.9, {0, 0}, 0.75}, 0, 2), &before);
+  ASSERT_EQ(found.effects.size(), 1u) << found.headline;
+  EXPECT_EQ(found.effects[0].name, "wheel_loop");
+  EXPECT_EQ(found.verdict, Verdict::kEffect);
+  expect_holds(found.effects[0].parameters.at(0), 0.75 / 0.95 - 1, 0.03);
+}
+
+// Weight behind the middle turns the robot though nobody told it to, each direction otherwise.
+TEST(Floors, DirectionsAndDriftAreNoChange) {
+  const Floor floor{0.6, {-0.015, 0.003}, 0.8, 0.15};
+  const RunLog even = driven_on(floor, 0, 1), odd = driven_on(floor, 10, 2);
+  const double turned =
+      wrap_angle(even.runs[3].poses.back().X_WM.theta - even.runs[3].poses.front().X_WM.theta);
+  EXPECT_GT(std::abs(turned), 0.05);
+  const Diagnosis found = diagnosed(odd, &even);
+  EXPECT_TRUE(found.effects.empty()) << found.headline;
+  EXPECT_EQ(found.verdict, Verdict::kNone) << found.headline;
+}
+
+TEST(Floors, AnEdgeIsFoundWhereItIs) {
+  const Floor floor{0.9, {0, 0}, 0.95, 0.05, 0.6, 0.25, 0.6};
+  const RunLog before = driven_on({}, 0, 1);
+  const RunLog over = driven_on(floor, 15, 2);
+  for (const RunLog* reference : {&before, static_cast<const RunLog*>(nullptr)}) {
+    const Diagnosis found = diagnosed(over, reference);
+    const auto edge = std::find_if(found.effects.begin(), found.effects.end(),
+                                   [](const NamedEffect& e) { return e.name == "floor_edge"; });
+    ASSERT_NE(edge, found.effects.end()) << found.headline;
+    ASSERT_EQ(edge->parameters.size(), 4u);
+    expect_holds(edge->parameters[0], -0.4, 0.04);
+    const double x = edge->parameters[1].value, y = edge->parameters[2].value;
+    EXPECT_NEAR(x * std::cos(0.6) + y * std::sin(0.6), 0.25, 0.015);
+    expect_holds(edge->parameters[3], 0.6, 0.06);
+    if (reference == nullptr) continue;
+    EXPECT_EQ(found.effects.size(), 1u) << found.headline;
+  }
+}
+
+// The runs of a floor that go every 30th degree.
+RunLog logged_on(const std::filesystem::path& data, const std::string& floor, int first) {
+  const auto map = parse_map(
+      *read_text_file(GAPFARM_SOURCE_DIR "/configs/robots/robotino_map.toml"), "robotino_map.toml");
+  EXPECT_TRUE(map.ok()) << map.error().message;
+  std::vector<Recording> recordings;
+  for (int k = first; k < 72; k += 6) {
+    const std::string name = (k < 10 ? "exp0" : "exp") + std::to_string(k) + ".csv";
+    if (!std::filesystem::exists(data / floor / name)) continue;
+    auto recording = read_recording((data / floor / name).string());
+    EXPECT_TRUE(recording.ok()) << recording.error().message;
+    recordings.push_back(*std::move(recording));
+  }
+  auto runs = to_runs(recordings, *map);
+  EXPECT_TRUE(runs.ok()) << runs.error().message;
+  return std::move(runs->log);
+}
+
+TEST(Floors, ARealRobotsFloorsAreTold) {
+  const auto data = shared_data("ground/robotino");
+  if (!data) GTEST_SKIP() << "no shared data beside the sources";
+  const RunLog table = logged_on(*data, "table", 0);
+  const Diagnosis floor = diagnosed(logged_on(*data, "gray", 2), &table);
+  ASSERT_EQ(floor.effects.size(), 1u) << floor.headline;
+  EXPECT_EQ(floor.effects[0].name, "floor") << floor.headline;
+  ASSERT_EQ(floor.effects[0].parameters.size(), 2u) << floor.headline;
+  EXPECT_LT(floor.effects[0].parameters[0].hi, -0.1);
+  EXPECT_LT(floor.effects[0].parameters[1].hi, -0.1);
+  const Diagnosis same = diagnosed(logged_on(*data, "table", 2), &table);
+  EXPECT_TRUE(same.effects.empty()) << same.headline;
+}
+
+}  // namespace
+}  // namespace gapfarm

@@ -1,0 +1,151 @@
+// Tables as loggers and spreadsheets write them, and the arithmetic of a map's columns.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "common/runs/read.h"
+#include "common/trials/dialect.h"
+#include "common/trials/files.h"
+#include "master/input/to_runs.h"
+
+namespace gapfarm {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::StartsWith;
+
+Recording table_of(const std::string& text) {
+  auto recording = parse_text_log(text, "f.csv");
+  EXPECT_TRUE(recording) << recording.error().message;
+  return recording ? *std::move(recording) : Recording{"", "", {LogTable{}}, "", {}};
+}
+
+std::string message_of(const std::string& text) {
+  const auto recording = parse_text_log(text, "f.csv");
+  return recording ? "" : recording.error().message;
+}
+
+// Long names, units, short names; rows end in a separator.
+const std::string kCamera =
+    "Time;X position;Y position;Angle;1st set;1st turns;\n"
+    "ms;pix;pix;deg;rad/s;ticks;\n"
+    "t;xpos;ypos;ang;m1set;m1pos;\n"
+    "0,5;100;200;90;-32;1000;\n"
+    "500,5;150;180;95;-32;900;\n"
+    "1000,5;200;160;100;-16;700;\n";
+
+TEST(Tables, SeparatorsAndDecimalsAreFound) {
+  const std::string numbers = "1.5,2,3\n4,5,6\n";
+  EXPECT_EQ(find_separator("a,b,c\n" + numbers), ',');
+  EXPECT_EQ(find_separator("a;b;c\n1,5;2;3\n4,5;5,5;6\n"), ';');
+  EXPECT_EQ(find_separator("a\tb\tc\n1,5\t2\t3\n"), '\t');
+  EXPECT_EQ(find_separator("a;b\n\"x;y\";2\n"), ';');
+  // A comma in a title is no column.
+  EXPECT_EQ(find_separator("speed, set;speed, read;t\n1;2;3\n4;5;6\n7;8;9\n"), ';');
+  EXPECT_EQ(parse_decimal("1,25", ';'), 1.25);
+  EXPECT_EQ(parse_decimal("-1,2e3", '\t'), -1200);
+  EXPECT_FALSE(parse_decimal("1,25", ','));
+  EXPECT_FALSE(parse_decimal("1.000,5", ';'));
+  for (const char separator : {';', '\t'}) {
+    std::string text = "t,x\n0.5,1.5\n1.5,2.5\n", other = text;
+    for (char& c : other) c = c == ',' ? separator : c == '.' ? ',' : c;
+    EXPECT_EQ(table_of(text).tables[0].values, table_of(other).tables[0].values);
+  }
+}
+
+TEST(Tables, RowsOfUnitsAndOtherNamesStandAboveTheNumbers) {
+  const Recording recording = table_of(kCamera);
+  const LogTable& table = recording.tables[0];
+  EXPECT_THAT(table.columns, ElementsAre("t", "xpos", "ypos", "ang", "m1set", "m1pos"));
+  EXPECT_EQ(table.rows(), 3u);
+  EXPECT_EQ(table.at(1, 0), 500.5);
+  EXPECT_EQ(table.find("X position"), table.find("xpos"));
+  EXPECT_EQ(table.unit_of("xpos"), "pix");
+  EXPECT_EQ(table.unit_of("Time"), "ms");
+  // Units alone, in brackets; no second row of names.
+  const Recording plain = table_of("t,x\n[s],[mm]\n0,1\n1,2\n");
+  EXPECT_EQ(plain.tables[0].unit_of("x"), "mm");
+  EXPECT_EQ(plain.tables[0].rows(), 2u);
+  // A first row of words is no head where words go on.
+  EXPECT_EQ(table_of("t,state\n0,go\n1,stop\n").tables[0].rows(), 2u);
+}
+
+TEST(Tables, MapsScaleTurnGearAndDifferentiate) {
+  const auto map = parse_map(
+      "[poses]\nt = \"t\"\nx = { column = \"xpos\", scale = 0.002 }\n"
+      "y = { column = \"ypos\", scale = 0.002, sign = -1 }\n"
+      "theta = { column = \"Angle\", unit = \"deg\", offset = -90 }\n"
+      "[commands]\nt = \"t\"\nw1 = { column = \"m1set\", gear = 16, sign = -1 }\n"
+      "[wheels]\nt = \"t\"\n"
+      "w1 = { column = \"m1pos\", scale = 0.01, gear = 4, sign = -1, rate = true }\n",
+      "m.toml");
+  ASSERT_TRUE(map) << map.error().message;
+  const auto again = parse_map(format_map(*map), "m.toml");
+  ASSERT_TRUE(again) << again.error().message;
+  EXPECT_EQ(format_map(*again), format_map(*map));
+  const auto runs = to_runs({table_of(kCamera)}, *map);
+  ASSERT_TRUE(runs) << runs.error().message;
+  const LoggedRun& run = runs->log.runs.at(0);
+  ASSERT_EQ(run.poses.size(), 3u);
+  EXPECT_NEAR(run.poses[1].t_s, 0.5005, 1e-12);  // by the row of units
+  EXPECT_NEAR(run.poses[1].X_WM.x, 0.3, 1e-12);
+  EXPECT_NEAR(run.poses[1].X_WM.y, -0.36, 1e-12);
+  EXPECT_NEAR(run.poses[1].X_WM.theta, 5 * std::numbers::pi / 180, 1e-12);
+  EXPECT_NEAR(run.commands[2].values[0], 1, 1e-12);
+  // Counts become speeds that hold until the next row; the last row has none.
+  ASSERT_EQ(run.wheel_speeds.size(), 2u);
+  EXPECT_NEAR(run.wheel_speeds[0].t_s, 0.0005, 1e-12);
+  EXPECT_NEAR(run.wheel_speeds[0].values[0], 100 * 0.01 / 4 / 0.5, 1e-9);
+  EXPECT_NEAR(run.wheel_speeds[1].values[0], 200 * 0.01 / 4 / 0.5, 1e-9);
+}
+
+TEST(Tables, ErrorsNamePlaceValueAndRemedy) {
+  // Pixels are metres to nobody.
+  const auto map =
+      parse_map("[poses]\nt = \"t\"\nx = \"xpos\"\ny = \"ypos\"\ntheta = \"ang\"\n", "m.toml");
+  ASSERT_TRUE(map) << map.error().message;
+  const auto runs = to_runs({table_of(kCamera)}, *map);
+  ASSERT_FALSE(runs);
+  EXPECT_THAT(runs.error().message,
+              StartsWith("f.csv:2:4: found unit 'pix' of column 'xpos', expected one of"));
+  EXPECT_THAT(runs.error().message, HasSubstr("x = { column = \"xpos\", scale ="));
+  EXPECT_THAT(message_of("t;x\n0,5;1\n1,5;2.5\n"),
+              StartsWith("f.csv:2:1: found '0,5', expected decimal points, as in '2.5' in line 3"));
+  EXPECT_THAT(message_of("t;x\n0;1\n1;2\n2\n"),
+              StartsWith("f.csv:4:2: found 1 fields, expected 2 as in the header, separated by"));
+  std::string slip = "t;x\ns;m\n";
+  for (int i = 0; i < 40; ++i) slip += std::to_string(i) + ";1,5\n";
+  EXPECT_THAT(message_of(slip + "41;1.000,5\n"), StartsWith("f.csv:43:4: found column 'x'"));
+  const auto bad = parse_map(
+      "[poses]\nt = \"t\"\nx = { column = \"x\", scale = 0 }\n"
+      "y = { column = \"y\", sign = 0.5 }\ntheta = { column = \"a\", gear = -1 }\n",
+      "m.toml");
+  ASSERT_FALSE(bad);
+  EXPECT_THAT(bad.error().message, HasSubstr("m.toml:3:"));
+  EXPECT_THAT(bad.error().message, HasSubstr("found 0.5, expected 1 or -1"));
+  EXPECT_THAT(bad.error().message, HasSubstr("m.toml:5:"));
+}
+
+TEST(Tables, WheelSpeedsAreReadBesideCommands) {
+  const std::string folder = testing::TempDir() + "/wheel_speeds";
+  ASSERT_TRUE(write_file_atomically(folder + "/commands.csv", "run,t,w1\na,0,1\nb,0,2\n"));
+  ASSERT_TRUE(write_file_atomically(folder + "/poses.csv",
+                                    "run,t,x,y,theta\na,0,0,0,0\na,1,1,0,0\nb,0,0,0,0\n"));
+  ASSERT_TRUE(write_file_atomically(folder + "/wheels.csv", "run,t,w1\na,0,0.9\na,1,0.8\n"));
+  const std::vector<std::string> channels = {"w1"};
+  auto log = read_runs(folder + "/commands.csv", folder + "/poses.csv", channels);
+  ASSERT_TRUE(log) << log.error().message;
+  ASSERT_TRUE(read_wheel_speeds(folder + "/wheels.csv", &*log));
+  EXPECT_THAT(log->wheel_channels, ElementsAre("w1"));
+  ASSERT_EQ(log->runs[0].wheel_speeds.size(), 2u);
+  EXPECT_EQ(log->runs[0].wheel_speeds[1].values[0], 0.8);
+  EXPECT_TRUE(log->runs[1].wheel_speeds.empty());
+  log->wheel_channels = {"left"};
+  EXPECT_FALSE(read_wheel_speeds(folder + "/wheels.csv", &*log));
+}
+
+}  // namespace
+}  // namespace gapfarm
