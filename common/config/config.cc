@@ -7,9 +7,9 @@
 #include "common/config/sections.h"
 #include "common/external/simulator.h"
 #include "common/process/process_pool.h"
-#include "common/trials/csv.h"
 #include "common/trials/files.h"
 #include "common/trials/format.h"
+#include "common/trials/text/csv.h"
 
 namespace gapfarm {
 namespace {

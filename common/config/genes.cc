@@ -3,7 +3,7 @@
 
 #include "common/base/suggest.h"
 #include "common/config/sections.h"
-#include "common/trials/csv.h"
+#include "common/trials/text/csv.h"
 
 namespace gapfarm {
 namespace {

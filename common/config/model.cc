@@ -8,9 +8,9 @@
 #include "common/base/try.h"
 #include "common/config/residual_section.h"
 #include "common/config/sections.h"
-#include "common/trials/csv.h"
 #include "common/trials/files.h"
 #include "common/trials/format.h"
+#include "common/trials/text/csv.h"
 
 namespace gapfarm {
 namespace {

@@ -6,8 +6,8 @@
 #include "common/config/residual_section.h"
 #include "common/config/sections.h"
 #include "common/config/toml_string.h"
-#include "common/trials/csv.h"
 #include "common/trials/files.h"
+#include "common/trials/text/csv.h"
 
 namespace gapfarm {
 namespace {

@@ -4,7 +4,7 @@
 #include <optional>
 
 #include "common/base/try.h"
-#include "common/trials/csv.h"
+#include "common/trials/text/csv.h"
 
 namespace gapfarm {
 namespace {

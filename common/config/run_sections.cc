@@ -2,7 +2,7 @@
 #include <algorithm>
 
 #include "common/config/sections.h"
-#include "common/trials/csv.h"
+#include "common/trials/text/csv.h"
 
 namespace gapfarm {
 namespace {

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "common/base/suggest.h"
-#include "common/trials/csv.h"
+#include "common/trials/text/csv.h"
 
 namespace gapfarm {
 

@@ -13,8 +13,8 @@
 #include "common/parameters/table.h"
 #include "common/parameters/tracked.h"
 #include "common/problem/piece.h"
+#include "common/recordings/windows.h"
 #include "common/residual/strays.h"
-#include "common/runs/windows.h"
 #include "common/trials/trial.h"
 #include "gapfarm/v1/problem.pb.h"
 

@@ -3,8 +3,8 @@
 #include <filesystem>
 
 #include "common/base/try.h"
-#include "common/runs/afresh.h"
-#include "common/runs/read.h"
+#include "common/recordings/afresh.h"
+#include "common/recordings/read.h"
 
 namespace gapfarm {
 

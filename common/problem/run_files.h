@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "common/problem/problem.h"
-#include "common/runs/run.h"
+#include "common/recordings/run.h"
 
 namespace gapfarm {
 

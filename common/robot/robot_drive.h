@@ -5,8 +5,8 @@
 #include <span>
 #include <vector>
 
+#include "common/recordings/run.h"
 #include "common/robot/robot.h"
-#include "common/runs/run.h"
 
 namespace gapfarm {
 

@@ -1,7 +1,7 @@
 // Writing robot.toml.
 #include "common/config/toml_string.h"
 #include "common/robot/robot_file.h"
-#include "common/trials/csv.h"
+#include "common/trials/text/csv.h"
 
 namespace gapfarm {
 namespace {

@@ -9,8 +9,8 @@
 #include <numbers>
 #include <tuple>
 
+#include "common/math/laws.h"
 #include "common/score/density.h"
-#include "common/score/laws.h"
 #include "common/score/motion_model.h"
 
 namespace gapfarm {

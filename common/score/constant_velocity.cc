@@ -2,10 +2,10 @@
 
 #include <algorithm>
 
+#include "common/math/statistics.h"
 #include "common/score/fitness.h"
 #include "common/score/motion_model.h"
 #include "common/score/robust_distance.h"
-#include "common/score/statistics.h"
 
 namespace gapfarm {
 namespace {

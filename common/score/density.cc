@@ -9,7 +9,7 @@
 #include <numbers>
 #include <sstream>
 
-#include "common/score/normal.h"
+#include "common/math/normal.h"
 
 namespace gapfarm {
 namespace {

@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/score/bounded_minimum.h"
+#include "common/math/bounded_minimum.h"
 #include "common/score/kinematic.h"
 
 namespace gapfarm {

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "common/base/result.h"
+#include "common/math/mcd.h"
 #include "common/problem/problem.h"
-#include "common/score/mcd.h"
 #include "common/trials/trial.h"
 
 namespace gapfarm {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/score/algebra.h"
+#include "common/math/algebra.h"
 
 namespace gapfarm {
 namespace {

@@ -7,7 +7,7 @@
 #include <set>
 #include <utility>
 
-#include "common/score/laws.h"
+#include "common/math/laws.h"
 
 namespace gapfarm {
 namespace {

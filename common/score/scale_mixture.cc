@@ -5,8 +5,8 @@
 #include <cassert>
 #include <cmath>
 
+#include "common/math/normal.h"
 #include "common/score/density.h"
-#include "common/score/normal.h"
 
 namespace gapfarm {
 namespace {

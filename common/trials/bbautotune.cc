@@ -5,8 +5,8 @@
 #include <numbers>
 #include <optional>
 
-#include "common/trials/csv.h"
 #include "common/trials/format.h"
+#include "common/trials/text/csv.h"
 
 namespace gapfarm {
 namespace {

@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-#include "common/trials/csv.h"
+#include "common/trials/text/csv.h"
 
 namespace gapfarm {
 

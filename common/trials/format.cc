@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <vector>
 
-#include "common/trials/csv.h"
+#include "common/trials/text/csv.h"
 
 namespace gapfarm {
 namespace {

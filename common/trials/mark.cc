@@ -4,7 +4,7 @@
 #include <filesystem>
 
 #include "common/base/hash.h"
-#include "common/trials/csv.h"
+#include "common/trials/text/csv.h"
 
 namespace gapfarm {
 namespace {

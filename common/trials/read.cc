@@ -9,9 +9,9 @@
 #include "common/trials/files.h"
 #include "common/trials/format.h"
 #include "common/trials/mark.h"
-#include "common/trials/mistakes.h"
-#include "common/trials/samples.h"
-#include "common/trials/trial_parser.h"
+#include "common/trials/text/mistakes.h"
+#include "common/trials/text/samples.h"
+#include "common/trials/text/trial_parser.h"
 
 namespace gapfarm {
 namespace {

@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "common/base/suggest.h"
-#include "common/trials/csv.h"
+#include "common/trials/text/csv.h"
 
 namespace gapfarm {
 namespace {

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <optional>
 
-#include "common/trials/csv.h"
 #include "common/trials/files.h"
+#include "common/trials/text/csv.h"
 
 namespace gapfarm {
 namespace {

@@ -6,10 +6,10 @@
 #include <string_view>
 #include <utility>
 
-#include "common/trials/columns.h"
-#include "common/trials/csv.h"
 #include "common/trials/files.h"
 #include "common/trials/mark.h"
+#include "common/trials/text/columns.h"
+#include "common/trials/text/csv.h"
 
 namespace gapfarm {
 namespace {

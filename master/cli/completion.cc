@@ -5,6 +5,7 @@
 
 #include "master/cli/app.h"
 #include "master/cli/next_words.h"
+#include "master/cli/subcommand.h"
 
 namespace gapfarm {
 namespace {

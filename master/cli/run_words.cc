@@ -6,9 +6,9 @@
 #include "common/base/suggest.h"
 #include "common/usage/usage.h"
 #include "master/cli/app.h"
-#include "master/cli/inputs.h"
-#include "master/cli/long_command.h"
-#include "master/cli/signals.h"
+#include "master/command/inputs.h"
+#include "master/command/long_command.h"
+#include "master/command/signals.h"
 
 namespace gapfarm {
 namespace {

@@ -6,12 +6,12 @@
 
 #include "common/base/guarded.h"
 #include "common/base/suggest.h"
-#include "common/score/laws.h"
-#include "master/diagnose/headline.h"
-#include "master/diagnose/prepare.h"
-#include "master/diagnose/report_parts.h"
-#include "master/diagnose/steps.h"
-#include "master/diagnose/watch.h"
+#include "common/math/laws.h"
+#include "master/diagnose/conclusions/headline.h"
+#include "master/diagnose/conclusions/report_parts.h"
+#include "master/diagnose/steps/prepare.h"
+#include "master/diagnose/steps/steps.h"
+#include "master/diagnose/steps/watch.h"
 
 namespace gapfarm {
 namespace {

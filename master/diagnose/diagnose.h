@@ -11,10 +11,10 @@
 
 #include "common/base/result.h"
 #include "common/problem/problem.h"
-#include "master/diagnose/diagnosis.h"
+#include "common/progress/finding.h"
+#include "master/diagnose/result/diagnosis.h"
 #include "master/farm/farm.h"
 #include "master/infer/predictor.h"
-#include "master/progress/finding.h"
 
 namespace gapfarm {
 

@@ -4,7 +4,7 @@
 #include <array>
 #include <numbers>
 
-#include "master/diagnose/findings.h"
+#include "master/diagnose/conclusions/findings.h"
 
 namespace gapfarm {
 namespace {

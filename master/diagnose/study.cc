@@ -6,11 +6,11 @@
 #include <map>
 #include <tuple>
 
+#include "common/math/statistics.h"
 #include "common/score/motion_model.h"
-#include "common/score/statistics.h"
-#include "master/diagnose/distribution.h"
-#include "master/diagnose/free_commands.h"
-#include "master/diagnose/nuisance.h"
+#include "master/diagnose/evidence/distribution.h"
+#include "master/diagnose/fit/free_commands.h"
+#include "master/diagnose/fit/nuisance.h"
 #include "master/diagnose/subject.h"
 
 namespace gapfarm {

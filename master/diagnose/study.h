@@ -11,7 +11,7 @@
 #include "common/base/result.h"
 #include "common/score/pose_readings.h"
 #include "master/diagnose/drive_base.h"
-#include "master/diagnose/residuals.h"
+#include "master/diagnose/evidence/residuals.h"
 #include "master/infer/predictor.h"
 
 namespace gapfarm {

@@ -13,13 +13,13 @@
 #include <vector>
 
 #include "common/base/result.h"
-#include "master/diagnose/covariates.h"
-#include "master/diagnose/diagnosis.h"
-#include "master/diagnose/effects/effect_diagnosis.h"
-#include "master/diagnose/findings.h"
-#include "master/diagnose/next_experiment.h"
-#include "master/diagnose/patch.h"
-#include "master/diagnose/signatures.h"
+#include "master/diagnose/conclusions/findings.h"
+#include "master/diagnose/conclusions/next_experiment.h"
+#include "master/diagnose/effect_diagnosis.h"
+#include "master/diagnose/evidence/covariates.h"
+#include "master/diagnose/fit/signatures.h"
+#include "master/diagnose/places/patch.h"
+#include "master/diagnose/result/diagnosis.h"
 #include "master/diagnose/study.h"
 
 namespace gapfarm {

@@ -6,16 +6,16 @@
 
 #include "common/parameters/push.h"
 #include "common/pose/pose.h"
+#include "master/diagnose/conclusions/findings.h"
 #include "master/diagnose/drive_designs.h"
-#include "master/diagnose/estimate.h"
-#include "master/diagnose/findings.h"
-#include "master/diagnose/footprint.h"
-#include "master/diagnose/free_commands.h"
-#include "master/diagnose/nuisance.h"
-#include "master/diagnose/patch_sketch.h"
+#include "master/diagnose/fit/estimate.h"
+#include "master/diagnose/fit/free_commands.h"
+#include "master/diagnose/fit/nuisance.h"
+#include "master/diagnose/places/footprint.h"
+#include "master/diagnose/places/patch_sketch.h"
+#include "master/diagnose/places/where.h"
 #include "master/diagnose/push/push_subject.h"
 #include "master/diagnose/subject.h"
-#include "master/diagnose/where.h"
 
 namespace gapfarm {
 namespace {

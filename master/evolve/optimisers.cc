@@ -4,11 +4,11 @@
 #include <cassert>
 
 #include "common/base/try.h"
-#include "master/evolve/cma_es.h"
-#include "master/evolve/de_simplex.h"
-#include "master/evolve/genetic.h"
-#include "master/evolve/random_search.h"
-#include "master/evolve/search_optimiser.h"
+#include "master/evolve/genetic/genetic.h"
+#include "master/evolve/methods/cma_es.h"
+#include "master/evolve/methods/de_simplex.h"
+#include "master/evolve/methods/random_search.h"
+#include "master/evolve/methods/search_optimiser.h"
 
 namespace gapfarm {
 namespace {

@@ -6,8 +6,8 @@
 #include <chrono>
 
 #include "common/base/guarded.h"
-#include "master/ground/ground_report.h"
 #include "master/ground/reference.h"
+#include "master/ground/report/ground_report.h"
 
 namespace gapfarm {
 

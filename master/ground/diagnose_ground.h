@@ -9,13 +9,13 @@
 #include <vector>
 
 #include "common/base/result.h"
+#include "common/recordings/run.h"
+#include "common/recordings/windows.h"
 #include "common/robot/robot.h"
-#include "common/runs/run.h"
-#include "common/runs/windows.h"
-#include "master/diagnose/diagnosis.h"
-#include "master/ground/ground_verdict.h"
+#include "master/diagnose/result/diagnosis.h"
+#include "master/ground/report/ground_verdict.h"
+#include "master/ground/report/values_file.h"
 #include "master/ground/search.h"
-#include "master/ground/values_file.h"
 
 namespace gapfarm {
 

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <map>
 
+#include "common/math/statistics.h"
 #include "common/random/stream.h"
-#include "common/score/statistics.h"
 
 namespace gapfarm {
 namespace {

@@ -6,9 +6,9 @@
 #include <cmath>
 #include <span>
 
-#include "common/runs/afresh.h"
+#include "common/recordings/afresh.h"
 #include "common/score/fitness.h"
-#include "common/trials/csv.h"
+#include "common/trials/text/csv.h"
 
 namespace gapfarm {
 namespace {

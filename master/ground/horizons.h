@@ -7,7 +7,7 @@
 
 #include "common/base/result.h"
 #include "common/problem/problem.h"
-#include "common/runs/run.h"
+#include "common/recordings/run.h"
 #include "common/score/kinematic.h"
 #include "master/farm/farm.h"
 #include "master/ground/drawn_ratio.h"

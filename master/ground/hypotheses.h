@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "common/recordings/run.h"
 #include "common/robot/robot.h"
-#include "common/runs/run.h"
 
 namespace gapfarm {
 

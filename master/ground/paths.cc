@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/runs/session.h"
-#include "common/runs/windows.h"
-#include "master/report/svg.h"
+#include "common/recordings/session.h"
+#include "common/recordings/windows.h"
+#include "common/svg/svg.h"
 
 namespace gapfarm {
 namespace {

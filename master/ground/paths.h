@@ -6,7 +6,7 @@
 
 #include "common/base/result.h"
 #include "common/problem/problem.h"
-#include "common/runs/run.h"
+#include "common/recordings/run.h"
 #include "master/farm/farm.h"
 
 namespace gapfarm {

@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "common/random/stream.h"
-#include "master/ground/edge.h"
+#include "master/ground/fit/edge.h"
 #include "master/ground/tolerances.h"
 
 namespace gapfarm {

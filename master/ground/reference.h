@@ -4,8 +4,8 @@
 #include <cstdint>
 
 #include "common/base/result.h"
+#include "common/recordings/run.h"
 #include "common/robot/robot.h"
-#include "common/runs/run.h"
 #include "master/ground/search.h"
 
 namespace gapfarm {

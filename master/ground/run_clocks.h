@@ -5,7 +5,7 @@
 #include <optional>
 #include <vector>
 
-#include "master/ground/window_fit.h"
+#include "master/ground/fit/window_fit.h"
 
 namespace gapfarm {
 

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <utility>
 
-#include "master/ground/edge.h"
-#include "master/ground/ground_verdict.h"
+#include "master/ground/fit/edge.h"
+#include "master/ground/report/ground_verdict.h"
 #include "master/ground/so_far.h"
 #include "master/ground/tolerances.h"
 

@@ -10,14 +10,14 @@
 #include <vector>
 
 #include "common/base/result.h"
+#include "common/progress/finding.h"
+#include "common/recordings/run.h"
 #include "common/robot/robot.h"
-#include "common/runs/run.h"
 #include "common/score/pose_readings.h"
-#include "master/ground/held_out.h"
+#include "master/ground/fit/held_out.h"
+#include "master/ground/fit/wheel_loop.h"
+#include "master/ground/fit/window_fit.h"
 #include "master/ground/hypotheses.h"
-#include "master/ground/wheel_loop.h"
-#include "master/ground/window_fit.h"
-#include "master/progress/finding.h"
 
 namespace gapfarm {
 

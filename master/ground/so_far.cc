@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "master/ground/ground_verdict.h"
+#include "master/ground/report/ground_verdict.h"
 #include "master/ground/tolerances.h"
 
 namespace gapfarm {

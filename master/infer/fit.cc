@@ -4,8 +4,8 @@
 #include <cmath>
 #include <utility>
 
-#include "common/score/algebra.h"
-#include "common/score/bounded_minimum.h"
+#include "common/math/algebra.h"
+#include "common/math/bounded_minimum.h"
 #include "master/infer/settings.h"
 
 namespace gapfarm::infer {

@@ -6,7 +6,7 @@
 #include <tuple>
 
 #include "common/score/motion_model.h"
-#include "master/diagnose/digits.h"
+#include "master/diagnose/conclusions/digits.h"
 
 namespace gapfarm {
 namespace {

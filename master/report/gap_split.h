@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "master/diagnose/diagnosis.h"
+#include "master/diagnose/result/diagnosis.h"
 
 namespace gapfarm {
 

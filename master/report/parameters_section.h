@@ -5,7 +5,7 @@
 #include <string_view>
 #include <vector>
 
-#include "master/diagnose/parameter_row.h"
+#include "master/diagnose/result/parameter_row.h"
 
 namespace gapfarm {
 

@@ -2,7 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "master/diagnose/diagnosis_json.h"
+#include "master/diagnose/result/diagnosis_json.h"
 #include "master/report/gap_split.h"
 #include "master/report/glossary.h"
 #include "master/report/html.h"

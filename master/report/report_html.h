@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "master/diagnose/diagnosis.h"
+#include "master/diagnose/result/diagnosis.h"
 
 namespace gapfarm {
 

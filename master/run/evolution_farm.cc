@@ -3,8 +3,8 @@
 #include <algorithm>
 
 #include "common/base/try.h"
+#include "common/progress/words.h"
 #include "master/evolve/evaluation.h"
-#include "master/progress/words.h"
 
 namespace gapfarm {
 namespace {

@@ -9,10 +9,10 @@
 
 #include "common/log/log.h"
 #include "common/problem/problem.h"
+#include "common/progress/worker_wait.h"
 #include "master/evolve/evolve.h"
 #include "master/evolve/time_left.h"
 #include "master/farm/socket_farm.h"
-#include "master/progress/worker_wait.h"
 #include "master/run/run_watcher.h"
 #include "master/store/run_store.h"
 

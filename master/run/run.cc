@@ -9,7 +9,7 @@
 #include "master/evolve/evaluation.h"
 #include "master/evolve/optimisers.h"
 #include "master/evolve/staged.h"
-#include "master/ground/simulated_start.h"
+#include "master/ground/fit/simulated_start.h"
 #include "master/run/baseline_notes.h"
 #include "master/run/leave_behind.h"
 

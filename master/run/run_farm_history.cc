@@ -11,7 +11,7 @@
 #include <utility>
 
 #include "common/base/try.h"
-#include "master/progress/words.h"
+#include "common/progress/words.h"
 #include "master/store/run_lock.h"
 #include "master/store/run_status.h"
 

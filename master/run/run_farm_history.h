@@ -2,7 +2,7 @@
 #pragma once
 
 #include "common/base/result.h"
-#include "master/report/run_report.h"
+#include "master/report/run/run_report.h"
 #include "master/store/run_reader.h"
 
 namespace gapfarm {

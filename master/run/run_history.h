@@ -3,7 +3,7 @@
 
 #include "common/base/result.h"
 #include "common/problem/problem.h"
-#include "master/report/run_report.h"
+#include "master/report/run/run_report.h"
 #include "master/store/run_reader.h"
 
 namespace gapfarm {

@@ -6,8 +6,8 @@
 
 #include "common/base/result.h"
 #include "common/problem/problem.h"
-#include "master/report/pose_panels.h"
-#include "master/report/run_report.h"
+#include "master/report/figures/pose_panels.h"
+#include "master/report/run/run_report.h"
 #include "master/run/validation.h"
 #include "master/store/records.h"
 

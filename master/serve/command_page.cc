@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "common/base/try.h"
-#include "master/progress/words.h"
+#include "common/progress/words.h"
 #include "master/report/glossary.h"
 #include "master/report/html.h"
 #include "master/report/page_frame.h"

@@ -8,11 +8,11 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "master/progress/words.h"
+#include "common/progress/words.h"
 #include "master/report/glossary.h"
 #include "master/report/html.h"
 #include "master/report/page_frame.h"
-#include "master/report/run_live.h"
+#include "master/report/run/run_live.h"
 #include "master/serve/page_parts.h"
 #include "master/serve/request.h"
 

@@ -5,7 +5,7 @@
 
 #include "common/base/try.h"
 #include "common/trials/files.h"
-#include "master/diagnose/diagnosis_json.h"
+#include "master/diagnose/result/diagnosis_json.h"
 #include "master/report/html.h"
 #include "master/report/report_html.h"
 #include "master/serve/pages.h"

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "common/base/result.h"
-#include "master/report/run_report.h"
+#include "master/report/run/run_report.h"
 #include "master/serve/found.h"
 #include "master/serve/request.h"
 

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "common/base/result.h"
-#include "master/progress/finding.h"
+#include "common/progress/finding.h"
 #include "master/store/records.h"
 
 namespace gapfarm {

@@ -9,7 +9,7 @@
 
 #include "common/parameters/genome.h"
 #include "worker/evaluate.h"
-#include "worker/sim/ground.h"
+#include "worker/sim/robot/ground.h"
 
 namespace gapfarm {
 namespace {

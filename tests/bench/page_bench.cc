@@ -5,7 +5,7 @@
 #include <cstdlib>
 #include <filesystem>
 
-#include "master/cli/inputs.h"
+#include "master/command/inputs.h"
 #include "master/run/run_page.h"
 #include "master/serve/site.h"
 #include "master/store/run_lock.h"

@@ -3,8 +3,8 @@
 
 #include <array>
 
-#include "worker/scenarios/srv1_robot.h"
-#include "worker/sim/simulator.h"
+#include "worker/scenarios/srv1/srv1_robot.h"
+#include "worker/sim/robot/simulator.h"
 
 namespace gapfarm {
 namespace {

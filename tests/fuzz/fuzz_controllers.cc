@@ -1,6 +1,6 @@
 // Controller files: no crash, errors with places.
-#include "master/robot/controllers.h"
-#include "master/robot/understand.h"
+#include "master/io/robot_files/controllers.h"
+#include "master/io/robot_files/understand.h"
 #include "tests/fuzz/fuzz_target.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

@@ -34,11 +34,11 @@ outside() {
 
 outside common/net 'zmq' 'only common/net includes ZeroMQ'
 outside worker/sim '(bullet|Bullet|LinearMath|btBullet)' 'only worker/sim includes Bullet'
-outside 'master/(store|input)' 'sqlite3' 'only the run store and the reader of bags include SQLite'
-outside master/input '(bzlib|lz4|zstd)' 'only master/input unpacks'
+outside 'master/(store|io/logs)' 'sqlite3' 'only the run store and the reader of bags include SQLite'
+outside master/io/logs '(bzlib|lz4|zstd)' 'only master/io/logs unpacks'
 outside common/config 'toml' 'only common/config includes toml++'
-outside 'common/score' 'boost/math' 'probabilities are asked of common/score/laws.h'
-outside master/robot '(tinyxml2|yaml-cpp)' 'only master/robot includes tinyxml2 and yaml-cpp'
+outside 'common/(math|score)' 'boost/math' 'probabilities are asked of common/math/laws.h'
+outside master/io/robot_files '(tinyxml2|yaml-cpp)' 'only master/io/robot_files includes tinyxml2 and yaml-cpp'
 
 # Headers that take seconds to read: in these places only, and in no header but those named.
 # heavy PATTERN PLACES REMEDY: PLACES is a regular expression of file names.
@@ -52,10 +52,11 @@ heavy() {
   fi
 }
 source='[a-z_0-9]*\.cc'
-heavy 'CLI/' "master/cli/.*|common/usage/.*|worker/main.cc" 'command lines are read in master/cli and worker/main.cc'
-heavy 'nlohmann/json\.hpp' "common/(log|external|json)/$source|master/.*/$source|common/json/fields.h|master/cli/question_stamp.h|master/diagnose/json_fields.h" \
+heavy 'CLI/' "master/(cli|command)/.*|common/usage/.*|worker/main.cc" \
+  'command lines are read in master/cli, master/command and worker/main.cc'
+heavy 'nlohmann/json\.hpp' "common/(log|external|json)/$source|master/.*/$source|common/json/fields.h|master/command/question_stamp.h|master/diagnose/result/json_fields.h" \
   'headers include json_fwd.hpp, and the worker writes no JSON itself'
-heavy 'Eigen/(Dense|SVD|Eigenvalues|QR|Geometry|LU|Cholesky)' ".*/$source|master/robot/.*" \
+heavy 'Eigen/(Dense|SVD|Eigenvalues|QR|Geometry|LU|Cholesky)' ".*/$source|master/io/robot_files/.*" \
   'headers include Eigen/Core'
 heavy 'spdlog/' "common/log/$source|master/.*/$source" 'logs go through common/log, fmt is for sources'
 heavy '(google/protobuf|boost)/' ".*/$source" 'sources only'

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/trials/csv.h"
+#include "common/trials/text/csv.h"
 
 namespace gapfarm::truths {
 namespace {

@@ -14,11 +14,11 @@
 #include "common/parameters/table.h"
 #include "common/pose/pose.h"
 #include "common/random/stream.h"
-#include "worker/sim/motion.h"
+#include "worker/sim/robot/motion.h"
 
 namespace gapfarm {
 
-struct PushSettings;  // worker/sim/push.h
+struct PushSettings;  // worker/sim/push/push.h
 
 using EffectValues = std::span<const double>;
 

@@ -1,6 +1,6 @@
 #include "worker/effects/behaviour.h"
 #include "worker/effects/table.h"
-#include "worker/sim/push.h"
+#include "worker/sim/push/push.h"
 
 namespace gapfarm::effects {
 namespace com_offset_hooks {

@@ -6,7 +6,7 @@
 
 #include "common/external/simulator.h"
 #include "common/process/process_pool.h"
-#include "worker/scenarios/srv1.h"
+#include "worker/scenarios/srv1/srv1.h"
 
 namespace gapfarm {
 namespace {

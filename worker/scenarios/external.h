@@ -4,7 +4,7 @@
 #include <memory>
 
 #include "worker/scenarios/scenario.h"
-#include "worker/scenarios/vehicle.h"
+#include "worker/scenarios/srv1/vehicle.h"
 
 namespace gapfarm {
 

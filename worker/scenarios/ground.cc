@@ -6,7 +6,7 @@
 
 #include "common/score/fitness.h"
 #include "worker/scenarios/outcome.h"
-#include "worker/sim/ground.h"
+#include "worker/sim/robot/ground.h"
 
 namespace gapfarm {
 namespace {

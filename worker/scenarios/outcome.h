@@ -2,7 +2,7 @@
 #pragma once
 
 #include "gapfarm/v1/task.pb.h"
-#include "worker/sim/motion.h"
+#include "worker/sim/robot/motion.h"
 
 namespace gapfarm {
 

@@ -2,10 +2,10 @@
 
 #include "worker/scenarios/external.h"
 #include "worker/scenarios/ground.h"
-#include "worker/scenarios/push.h"
+#include "worker/scenarios/push/push.h"
 #include "worker/scenarios/racquetball.h"
 #include "worker/scenarios/scenario.h"
-#include "worker/scenarios/srv1.h"
+#include "worker/scenarios/srv1/srv1.h"
 
 namespace gapfarm {
 

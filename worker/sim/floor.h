@@ -3,7 +3,7 @@
 
 #include <Eigen/Core>
 
-#include "worker/sim/motion.h"
+#include "worker/sim/robot/motion.h"
 
 namespace gapfarm {
 

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "worker/sim/bullet.h"
-#include "worker/sim/motion.h"
+#include "worker/sim/robot/motion.h"
 
 namespace gapfarm {
 

@@ -4,7 +4,7 @@
 #include <memory>
 
 #include "worker/sim/bullet.h"
-#include "worker/sim/motion.h"
+#include "worker/sim/robot/motion.h"
 #include "worker/sim/solver.h"
 
 namespace gapfarm {

@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "master/diagnose/effects/effect_diagnosis.h"
+#include "master/diagnose/effect_diagnosis.h"
 
 namespace gapfarm {
 namespace {

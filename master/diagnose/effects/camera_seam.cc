@@ -1,9 +1,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "master/diagnose/effects/effect_diagnosis.h"
-#include "master/diagnose/intervals.h"
-#include "master/diagnose/seam.h"
+#include "master/diagnose/effect_diagnosis.h"
+#include "master/diagnose/fit/intervals.h"
+#include "master/diagnose/places/seam.h"
 
 namespace gapfarm {
 namespace {

@@ -2,8 +2,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "master/diagnose/effect_diagnosis.h"
 #include "master/diagnose/effects/drive_kinds.h"
-#include "master/diagnose/effects/effect_diagnosis.h"
 
 namespace gapfarm {
 namespace {

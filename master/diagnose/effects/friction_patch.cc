@@ -2,8 +2,8 @@
 #include <cmath>
 
 #include "common/pose/segment.h"
-#include "master/diagnose/effects/effect_diagnosis.h"
-#include "master/diagnose/effects/patch_places.h"
+#include "master/diagnose/effect_diagnosis.h"
+#include "master/diagnose/places/patch_places.h"
 
 namespace gapfarm {
 namespace {

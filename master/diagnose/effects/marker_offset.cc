@@ -1,4 +1,4 @@
-#include "master/diagnose/effects/effect_diagnosis.h"
+#include "master/diagnose/effect_diagnosis.h"
 
 namespace gapfarm {
 

@@ -1,5 +1,5 @@
+#include "master/diagnose/effect_diagnosis.h"
 #include "master/diagnose/effects/drive_kinds.h"
-#include "master/diagnose/effects/effect_diagnosis.h"
 
 namespace gapfarm {
 namespace {

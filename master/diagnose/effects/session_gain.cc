@@ -1,5 +1,5 @@
-#include "master/diagnose/effects/effect_diagnosis.h"
-#include "master/diagnose/session_gains.h"
+#include "master/diagnose/effect_diagnosis.h"
+#include "master/diagnose/evidence/session_gains.h"
 
 namespace gapfarm {
 namespace {

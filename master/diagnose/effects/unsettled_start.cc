@@ -5,10 +5,10 @@
 #include <numbers>
 
 #include "common/effects/start_turns.h"
-#include "master/diagnose/effects/effect_diagnosis.h"
-#include "master/diagnose/estimate.h"
-#include "master/diagnose/intervals.h"
-#include "master/diagnose/spread_row.h"
+#include "master/diagnose/effect_diagnosis.h"
+#include "master/diagnose/evidence/spread_row.h"
+#include "master/diagnose/fit/estimate.h"
+#include "master/diagnose/fit/intervals.h"
 
 namespace gapfarm {
 namespace {

@@ -3,7 +3,7 @@
 #include <functional>
 
 #include "common/parameters/push.h"
-#include "master/diagnose/probes.h"
+#include "master/diagnose/fit/probes.h"
 #include "master/diagnose/push/push_subject.h"
 
 namespace gapfarm {

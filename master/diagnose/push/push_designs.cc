@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "common/parameters/push.h"
-#include "master/diagnose/findings.h"
+#include "master/diagnose/conclusions/findings.h"
 #include "master/diagnose/push/push_geometry.h"
 
 namespace gapfarm {

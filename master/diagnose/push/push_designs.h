@@ -1,7 +1,7 @@
 // Pushes that might part rival explanations.
 #pragma once
 
-#include "master/diagnose/next_experiment.h"
+#include "master/diagnose/conclusions/next_experiment.h"
 
 namespace gapfarm {
 

@@ -1,5 +1,5 @@
-#include "master/diagnose/effects/effect_diagnosis.h"
-#include "master/diagnose/effects/patch_places.h"
+#include "master/diagnose/effect_diagnosis.h"
+#include "master/diagnose/places/patch_places.h"
 #include "master/diagnose/push/push_subject.h"
 
 namespace gapfarm {

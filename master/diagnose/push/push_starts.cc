@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "common/pose/segment.h"
-#include "master/diagnose/effects/patch_places.h"
+#include "master/diagnose/places/patch_places.h"
 #include "master/diagnose/push/push_subject.h"
 
 namespace gapfarm {

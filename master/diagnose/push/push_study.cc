@@ -7,7 +7,7 @@
 
 #include "common/parameters/push.h"
 #include "common/score/motion_model.h"
-#include "master/diagnose/estimate.h"
+#include "master/diagnose/fit/estimate.h"
 #include "master/diagnose/push/push_subject.h"
 
 namespace gapfarm {

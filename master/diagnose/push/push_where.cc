@@ -5,10 +5,10 @@
 #include <numbers>
 #include <set>
 
+#include "common/math/statistics.h"
 #include "common/score/fitness.h"
-#include "common/score/statistics.h"
+#include "master/diagnose/places/where.h"
 #include "master/diagnose/push/push_subject.h"
-#include "master/diagnose/where.h"
 
 namespace gapfarm {
 namespace {

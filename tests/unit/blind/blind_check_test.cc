@@ -1,5 +1,5 @@
 // The whole check with real simulations and fake diagnoses.
-#include "master/blind/blind_check.h"
+#include "master/experiments/blind_check/blind_check.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

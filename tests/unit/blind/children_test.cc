@@ -1,4 +1,4 @@
-#include "master/blind/children.h"
+#include "master/experiments/blind_check/children.h"
 
 #include <gtest/gtest.h>
 

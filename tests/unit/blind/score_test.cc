@@ -1,4 +1,4 @@
-#include "master/blind/score.h"
+#include "master/experiments/blind_check/score.h"
 
 #include <gtest/gtest.h>
 #include <stdlib.h>

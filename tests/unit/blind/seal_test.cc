@@ -1,4 +1,4 @@
-#include "master/blind/seal.h"
+#include "master/experiments/blind_check/cases/seal.h"
 
 #include <gtest/gtest.h>
 #include <sys/prctl.h>

@@ -1,4 +1,4 @@
-#include "master/blind/sizing.h"
+#include "master/experiments/blind_check/cases/sizing.h"
 
 #include <gtest/gtest.h>
 
@@ -6,8 +6,8 @@
 #include <functional>
 
 #include "common/problem/problem.h"
-#include "master/blind/blind_check.h"
-#include "master/blind/design.h"
+#include "master/experiments/blind_check/blind_check.h"
+#include "master/experiments/blind_check/cases/design.h"
 #include "tests/unit/blind/worker_farm.h"
 
 namespace gapfarm {

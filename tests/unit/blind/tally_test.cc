@@ -1,11 +1,11 @@
-#include "master/blind/tally.h"
+#include "master/experiments/blind_check/tally.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
 
-#include "master/blind/tables.h"
+#include "master/experiments/blind_check/tables.h"
 
 namespace gapfarm {
 namespace {

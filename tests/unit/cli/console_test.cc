@@ -1,4 +1,4 @@
-#include "master/cli/console.h"
+#include "master/command/console.h"
 
 #include <gmock/gmock.h>
 

@@ -1,4 +1,4 @@
-#include "master/cli/outputs.h"
+#include "master/command/outputs.h"
 
 #include <gmock/gmock.h>
 #include <sys/stat.h>

@@ -1,6 +1,6 @@
 #include <gmock/gmock.h>
 
-#include "master/cli/question_stamp.h"
+#include "master/command/question_stamp.h"
 #include "tests/unit/trials/trial_text.h"
 
 namespace gapfarm {

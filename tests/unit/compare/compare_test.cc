@@ -1,4 +1,4 @@
-#include "master/compare/compare.h"
+#include "master/experiments/compare/compare.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -9,9 +9,9 @@
 
 #include "common/config/config.h"
 #include "common/trials/files.h"
-#include "master/compare/summary.h"
 #include "master/evolve/evaluation.h"
 #include "master/evolve/optimisers.h"
+#include "master/experiments/compare/summary.h"
 
 namespace gapfarm {
 namespace {

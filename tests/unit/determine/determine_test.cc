@@ -1,4 +1,4 @@
-#include "master/determine/determine.h"
+#include "master/experiments/determine/determine.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

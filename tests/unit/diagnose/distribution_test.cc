@@ -1,4 +1,4 @@
-#include "master/diagnose/distribution.h"
+#include "master/diagnose/evidence/distribution.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <numbers>
 
 #include "common/random/stream.h"
-#include "master/diagnose/latency.h"
+#include "master/diagnose/evidence/latency.h"
 
 namespace gapfarm {
 namespace {

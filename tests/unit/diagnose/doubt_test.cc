@@ -1,16 +1,16 @@
 // A diagnosis that cannot go on as planned still ends with a report.
 #include <gtest/gtest.h>
 
-#include "master/diagnose/confidence.h"
+#include "master/diagnose/conclusions/confidence.h"
+#include "master/diagnose/conclusions/digits.h"
+#include "master/diagnose/conclusions/findings.h"
+#include "master/diagnose/conclusions/report_parts.h"
 #include "master/diagnose/diagnose.h"
-#include "master/diagnose/diagnosis_json.h"
-#include "master/diagnose/digits.h"
-#include "master/diagnose/estimate.h"
-#include "master/diagnose/findings.h"
-#include "master/diagnose/prepare.h"
-#include "master/diagnose/probes.h"
-#include "master/diagnose/report_parts.h"
-#include "master/diagnose/slopes.h"
+#include "master/diagnose/fit/estimate.h"
+#include "master/diagnose/fit/probes.h"
+#include "master/diagnose/fit/slopes.h"
+#include "master/diagnose/result/diagnosis_json.h"
+#include "master/diagnose/steps/prepare.h"
 #include "master/diagnose/subject.h"
 #include "tests/unit/diagnose/kinematic_farm.h"
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "common/random/stream.h"
-#include "master/diagnose/residuals.h"
+#include "master/diagnose/evidence/residuals.h"
 
 namespace gapfarm {
 

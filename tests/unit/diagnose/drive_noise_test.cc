@@ -1,4 +1,4 @@
-#include "master/diagnose/drive_noise.h"
+#include "master/diagnose/evidence/drive_noise.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "master/diagnose/free_commands.h"
+#include "master/diagnose/fit/free_commands.h"
 
 #include <gtest/gtest.h>
 

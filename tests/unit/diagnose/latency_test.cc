@@ -1,4 +1,4 @@
-#include "master/diagnose/latency.h"
+#include "master/diagnose/evidence/latency.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "master/diagnose/patch_moves.h"
+#include "master/diagnose/places/patch_moves.h"
 
 #include <gtest/gtest.h>
 

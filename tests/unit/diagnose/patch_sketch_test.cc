@@ -1,4 +1,4 @@
-#include "master/diagnose/patch_sketch.h"
+#include "master/diagnose/places/patch_sketch.h"
 
 #include <gtest/gtest.h>
 

@@ -6,7 +6,7 @@
 #include <numbers>
 
 #include "common/random/stream.h"
-#include "master/diagnose/noise.h"
+#include "master/diagnose/evidence/noise.h"
 #include "master/diagnose/push/push_subject.h"
 #include "tests/unit/diagnose/drawn_pushes.h"
 

@@ -1,12 +1,12 @@
-#include "master/diagnose/regression.h"
+#include "master/diagnose/fit/regression.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
 #include "common/random/stream.h"
-#include "master/diagnose/nuisance.h"
-#include "master/diagnose/verdict.h"
+#include "master/diagnose/conclusions/verdict.h"
+#include "master/diagnose/fit/nuisance.h"
 
 namespace gapfarm {
 namespace {

@@ -1,4 +1,4 @@
-#include "master/diagnose/session_gains.h"
+#include "master/diagnose/evidence/session_gains.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <numeric>
 #include <vector>
 
-#include "master/diagnose/estimate.h"
+#include "master/diagnose/fit/estimate.h"
 #include "master/diagnose/subject.h"
 #include "tests/unit/diagnose/drawn_drives.h"
 

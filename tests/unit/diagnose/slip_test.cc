@@ -1,4 +1,4 @@
-#include "master/diagnose/slip.h"
+#include "master/diagnose/evidence/slip.h"
 
 #include <gtest/gtest.h>
 
@@ -8,10 +8,10 @@
 #include <cstdio>
 #include <vector>
 
+#include "common/math/statistics.h"
 #include "common/score/density.h"
-#include "common/score/statistics.h"
-#include "master/diagnose/drive_noise.h"
-#include "master/diagnose/slip_places.h"
+#include "master/diagnose/evidence/drive_noise.h"
+#include "master/diagnose/places/slip_places.h"
 #include "tests/unit/diagnose/drawn_drives.h"
 
 namespace gapfarm {

@@ -8,11 +8,11 @@
 #include <set>
 #include <utility>
 
-#include "master/diagnose/estimate.h"
-#include "master/diagnose/nuisance.h"
-#include "master/diagnose/selection.h"
-#include "master/diagnose/signatures.h"
-#include "master/diagnose/step_parts.h"
+#include "master/diagnose/fit/estimate.h"
+#include "master/diagnose/fit/nuisance.h"
+#include "master/diagnose/fit/selection.h"
+#include "master/diagnose/fit/signatures.h"
+#include "master/diagnose/steps/step_parts.h"
 #include "master/diagnose/subject.h"
 #include "tests/unit/diagnose/kinematic_farm.h"
 

@@ -2,10 +2,10 @@
 #include <gtest/gtest.h>
 
 #include "common/random/stream.h"
+#include "master/diagnose/conclusions/findings.h"
 #include "master/diagnose/diagnose.h"
-#include "master/diagnose/findings.h"
-#include "master/diagnose/seam.h"
-#include "master/diagnose/selection.h"
+#include "master/diagnose/fit/selection.h"
+#include "master/diagnose/places/seam.h"
 #include "master/diagnose/subject.h"
 #include "tests/unit/diagnose/drawn_drives.h"
 #include "tests/unit/diagnose/kinematic_farm.h"

@@ -1,4 +1,4 @@
-#include "master/diagnose/tail_noise.h"
+#include "master/diagnose/evidence/tail_noise.h"
 
 #include <gtest/gtest.h>
 

@@ -2,9 +2,9 @@
 
 #include <numeric>
 
-#include "master/diagnose/estimate.h"
-#include "master/diagnose/report_parts.h"
-#include "master/diagnose/spread_row.h"
+#include "master/diagnose/conclusions/report_parts.h"
+#include "master/diagnose/evidence/spread_row.h"
+#include "master/diagnose/fit/estimate.h"
 #include "master/diagnose/subject.h"
 #include "tests/unit/diagnose/drawn_drives.h"
 

@@ -1,4 +1,4 @@
-#include "master/diagnose/where.h"
+#include "master/diagnose/places/where.h"
 
 #include <gtest/gtest.h>
 
@@ -10,10 +10,10 @@
 
 #include "common/effects/catalogue.h"
 #include "common/random/stream.h"
-#include "master/diagnose/findings.h"
-#include "master/diagnose/headline.h"
-#include "master/diagnose/spread_row.h"
-#include "master/diagnose/trend_test.h"
+#include "master/diagnose/conclusions/findings.h"
+#include "master/diagnose/conclusions/headline.h"
+#include "master/diagnose/evidence/spread_row.h"
+#include "master/diagnose/evidence/trend_test.h"
 
 namespace gapfarm {
 namespace {

@@ -1,4 +1,4 @@
-#include "master/drive/band.h"
+#include "master/experiments/drive/band.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "master/drive/drive.h"
+#include "master/experiments/drive/drive.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,7 +7,7 @@
 
 #include "common/config/config.h"
 #include "common/trials/waypoint_log.h"
-#include "master/drive/drive_report.h"
+#include "master/experiments/drive/drive_report.h"
 #include "tests/unit/blind/worker_farm.h"
 
 namespace gapfarm {

@@ -1,4 +1,4 @@
-#include "master/evolve/genetic.h"
+#include "master/evolve/genetic/genetic.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

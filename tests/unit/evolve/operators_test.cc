@@ -7,10 +7,10 @@
 #include <numeric>
 #include <set>
 
+#include "master/evolve/genetic/roulette.h"
+#include "master/evolve/genetic/selection.h"
+#include "master/evolve/genetic/variation.h"
 #include "master/evolve/individual.h"
-#include "master/evolve/roulette.h"
-#include "master/evolve/selection.h"
-#include "master/evolve/variation.h"
 #include "tests/unit/evolve/toy_problems.h"
 
 namespace gapfarm {

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "master/evolve/genetic.h"
+#include "master/evolve/genetic/genetic.h"
 #include "master/evolve/optimisers.h"
 
 namespace gapfarm {

@@ -1,10 +1,9 @@
-#include "master/experiment/plan.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <set>
 
+#include "master/farm/planned_trials.h"
 #include "tests/unit/worker/problems.h"
 
 namespace gapfarm {

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "common/random/stream.h"
+#include "common/recordings/run.h"
 #include "common/robot/robot_file.h"
-#include "common/runs/run.h"
 #include "common/score/kinematic.h"
 
 namespace gapfarm {

@@ -10,9 +10,9 @@
 #include "common/score/omni_inverse.h"
 #include "common/trials/files.h"
 #include "master/ground/diagnose_ground.h"
-#include "master/ground/wheel_loop.h"
-#include "master/input/bags.h"
-#include "master/input/to_runs.h"
+#include "master/ground/fit/wheel_loop.h"
+#include "master/io/logs/bags.h"
+#include "master/io/logs/to_runs.h"
 #include "tests/unit/trials/shared_data.h"
 
 namespace gapfarm {

@@ -1,4 +1,4 @@
-#include "master/ground/ground_verdict.h"
+#include "master/ground/report/ground_verdict.h"
 
 #include <gtest/gtest.h>
 

@@ -7,7 +7,7 @@
 #include "common/random/stream.h"
 #include "common/score/kinematic.h"
 #include "tests/unit/worker/ground_problem.h"
-#include "worker/sim/ground.h"
+#include "worker/sim/robot/ground.h"
 
 namespace gapfarm {
 namespace {

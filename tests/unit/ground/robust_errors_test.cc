@@ -1,4 +1,4 @@
-#include "master/ground/robust_errors.h"
+#include "master/ground/fit/robust_errors.h"
 
 #include <gtest/gtest.h>
 

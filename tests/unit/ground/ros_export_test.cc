@@ -1,4 +1,4 @@
-#include "master/ground/ros_export.h"
+#include "master/ground/report/ros_export.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "master/ground/fit_file.h"
+#include "master/ground/fit/fit_file.h"
 #include "tests/unit/ground/driven_log.h"
 
 namespace gapfarm {

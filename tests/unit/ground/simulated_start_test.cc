@@ -1,4 +1,4 @@
-#include "master/ground/simulated_start.h"
+#include "master/ground/fit/simulated_start.h"
 
 #include <gtest/gtest.h>
 

@@ -1,11 +1,11 @@
-#include "master/influence/influence.h"
+#include "master/experiments/influence/influence.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "common/config/config.h"
 #include "common/parameters/racquetball.h"
-#include "master/influence/stability.h"
+#include "master/experiments/influence/stability.h"
 #include "tests/unit/blind/worker_farm.h"
 #include "tests/unit/worker/push_problem.h"
 

@@ -1,5 +1,5 @@
 // The same small drive in every kind of bag (data/, written by make_logs.py) reads as one run.
-#include "master/input/bags.h"
+#include "master/io/logs/bags.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,8 +8,8 @@
 #include <filesystem>
 
 #include "common/trials/files.h"
-#include "master/input/decompress.h"
-#include "master/input/to_runs.h"
+#include "master/io/logs/decompress.h"
+#include "master/io/logs/to_runs.h"
 
 namespace gapfarm {
 namespace {

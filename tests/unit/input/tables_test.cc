@@ -5,10 +5,10 @@
 #include <cmath>
 #include <numbers>
 
-#include "common/runs/read.h"
+#include "common/recordings/read.h"
 #include "common/trials/dialect.h"
 #include "common/trials/files.h"
-#include "master/input/to_runs.h"
+#include "master/io/logs/to_runs.h"
 
 namespace gapfarm {
 namespace {

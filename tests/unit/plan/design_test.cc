@@ -1,10 +1,10 @@
-#include "master/plan/design.h"
+#include "master/experiments/plan/design.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "master/experiment/plan.h"
+#include "master/farm/planned_trials.h"
 #include "tests/unit/blind/worker_farm.h"
 
 namespace gapfarm::plan {

@@ -1,4 +1,4 @@
-#include "master/plan/selection.h"
+#include "master/experiments/plan/selection.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,8 +1,8 @@
-#include "master/progress/overall_progress.h"
+#include "common/progress/overall_progress.h"
 
 #include <gmock/gmock.h>
 
-#include "master/progress/words.h"
+#include "common/progress/words.h"
 
 namespace gapfarm {
 namespace {

@@ -1,4 +1,4 @@
-#include "master/progress/worker_wait.h"
+#include "common/progress/worker_wait.h"
 
 #include <gmock/gmock.h>
 

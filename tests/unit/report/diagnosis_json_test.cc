@@ -1,4 +1,4 @@
-#include "master/diagnose/diagnosis_json.h"
+#include "master/diagnose/result/diagnosis_json.h"
 
 #include <gmock/gmock.h>
 

@@ -1,7 +1,7 @@
 // A diagnosis as a tracked robot on a sagging battery and a lopsided floor would give.
 #pragma once
 
-#include "master/diagnose/diagnosis.h"
+#include "master/diagnose/result/diagnosis.h"
 
 namespace gapfarm {
 

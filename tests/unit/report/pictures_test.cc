@@ -11,8 +11,8 @@
 #include <sstream>
 
 #include "common/random/stream.h"
-#include "master/report/fitness_chart.h"
-#include "master/report/pose_picture.h"
+#include "master/report/figures/fitness_chart.h"
+#include "master/report/figures/pose_picture.h"
 
 namespace gapfarm {
 namespace {

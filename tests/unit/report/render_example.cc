@@ -4,7 +4,7 @@
 #include <iostream>
 
 #include "master/report/report_html.h"
-#include "master/report/run_report.h"
+#include "master/report/run/run_report.h"
 #include "tests/unit/report/example_diagnosis.h"
 
 namespace gapfarm {

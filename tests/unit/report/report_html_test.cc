@@ -11,7 +11,7 @@
 #include "master/report/gap_split.h"
 #include "master/report/html.h"
 #include "master/report/parameters_section.h"
-#include "master/report/run_report.h"
+#include "master/report/run/run_report.h"
 #include "tests/unit/report/example_diagnosis.h"
 
 namespace gapfarm {

@@ -1,4 +1,4 @@
-#include "master/report/svg.h"
+#include "common/svg/svg.h"
 
 #include <gmock/gmock.h>
 

@@ -7,7 +7,7 @@
 #include <string_view>
 
 #include "common/random/stream.h"
-#include "master/residual/fit.h"
+#include "master/diagnose/correction/fit.h"
 
 namespace gapfarm::tests {
 

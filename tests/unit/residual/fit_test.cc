@@ -1,8 +1,8 @@
-#include "master/residual/fit.h"
+#include "master/diagnose/correction/fit.h"
 
 #include <gtest/gtest.h>
 
-#include "master/residual/edge.h"
+#include "master/diagnose/correction/edge.h"
 #include "tests/unit/residual/fields.h"
 
 namespace gapfarm {

@@ -1,4 +1,4 @@
-#include "master/residual/stray_fit.h"
+#include "master/diagnose/correction/stray_fit.h"
 
 #include <gtest/gtest.h>
 

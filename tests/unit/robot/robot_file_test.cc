@@ -5,7 +5,7 @@
 
 #include <filesystem>
 
-#include "common/runs/read.h"
+#include "common/recordings/read.h"
 #include "common/trials/files.h"
 
 namespace gapfarm {

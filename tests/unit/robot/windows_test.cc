@@ -1,12 +1,12 @@
 // Runs cut into windows.
-#include "common/runs/windows.h"
+#include "common/recordings/windows.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 
-#include "common/runs/afresh.h"
+#include "common/recordings/afresh.h"
 
 namespace gapfarm {
 namespace {

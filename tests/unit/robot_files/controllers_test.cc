@@ -1,9 +1,9 @@
-#include "master/robot/controllers.h"
+#include "master/io/robot_files/controllers.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "master/robot/understand.h"
+#include "master/io/robot_files/understand.h"
 
 namespace gapfarm {
 namespace {

@@ -1,12 +1,12 @@
-#include "master/robot/understand.h"
+#include "master/io/robot_files/understand.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <numbers>
 
-#include "master/robot/controllers.h"
-#include "master/robot/robot_text.h"
+#include "master/io/robot_files/controllers.h"
+#include "master/io/robot_files/robot_text.h"
 #include "tests/unit/robot_files/sample_urdf.h"
 
 namespace gapfarm {

@@ -1,9 +1,9 @@
-#include "master/robot/urdf.h"
+#include "master/io/robot_files/urdf/urdf.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "master/robot/xacro_text.h"
+#include "master/io/robot_files/urdf/xacro_text.h"
 #include "tests/unit/robot_files/sample_urdf.h"
 
 namespace gapfarm {

@@ -1,5 +1,5 @@
 // Doubts about logs of drives that were drawn from plain kinematics and then spoiled in one way.
-#include "master/sanity/sanity.h"
+#include "master/io/log_checks/sanity.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <numbers>
 
 #include "common/random/stream.h"
-#include "master/sanity/words.h"
+#include "master/io/log_checks/words.h"
 
 namespace gapfarm {
 namespace {

@@ -1,4 +1,4 @@
-#include "common/score/algebra.h"
+#include "common/math/algebra.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "common/score/bounded_minimum.h"
+#include "common/math/bounded_minimum.h"
 
 #include <gtest/gtest.h>
 

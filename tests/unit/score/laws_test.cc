@@ -1,4 +1,4 @@
-#include "common/score/laws.h"
+#include "common/math/laws.h"
 
 #include <gtest/gtest.h>
 

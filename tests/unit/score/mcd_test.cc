@@ -1,4 +1,4 @@
-#include "common/score/mcd.h"
+#include "common/math/mcd.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "common/score/path_distance.h"
+#include "common/math/path_distance.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "common/random/stream.h"
-#include "common/trials/csv.h"
 #include "common/trials/files.h"
+#include "common/trials/text/csv.h"
 #include "tests/unit/trials/shared_data.h"
 
 namespace gapfarm {

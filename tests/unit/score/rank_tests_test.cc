@@ -1,4 +1,4 @@
-#include "common/score/rank_tests.h"
+#include "common/math/rank_tests.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "common/score/statistics.h"
+#include "common/math/statistics.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

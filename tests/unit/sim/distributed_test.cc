@@ -4,8 +4,8 @@
 #include <numbers>
 
 #include "tests/unit/sim/push_test_util.h"
-#include "worker/sim/face.h"
-#include "worker/sim/face_step.h"
+#include "worker/sim/push/face.h"
+#include "worker/sim/push/face_step.h"
 
 namespace gapfarm {
 namespace {

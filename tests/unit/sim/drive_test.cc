@@ -1,4 +1,4 @@
-#include "worker/sim/drive.h"
+#include "worker/sim/robot/drive.h"
 
 #include <gtest/gtest.h>
 

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "worker/sim/ground.h"
+#include "worker/sim/robot/ground.h"
 
 namespace gapfarm::tests {
 

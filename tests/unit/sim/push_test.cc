@@ -6,8 +6,8 @@
 #include <new>
 
 #include "tests/unit/sim/push_test_util.h"
-#include "worker/sim/outline.h"
-#include "worker/sim/push_world.h"
+#include "worker/sim/push/outline.h"
+#include "worker/sim/push/push_world.h"
 
 namespace gapfarm {
 namespace {

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <vector>
 
-#include "worker/sim/push.h"
+#include "worker/sim/push/push.h"
 
 namespace gapfarm {
 

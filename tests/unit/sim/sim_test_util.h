@@ -6,8 +6,8 @@
 #include <numbers>
 #include <vector>
 
-#include "worker/scenarios/srv1_robot.h"
-#include "worker/sim/simulator.h"
+#include "worker/scenarios/srv1/srv1_robot.h"
+#include "worker/sim/robot/simulator.h"
 
 namespace gapfarm {
 

@@ -1,4 +1,4 @@
-#include "worker/sim/step_plan.h"
+#include "worker/sim/robot/step_plan.h"
 
 #include <gtest/gtest.h>
 

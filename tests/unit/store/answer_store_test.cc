@@ -4,7 +4,7 @@
 
 #include <fstream>
 
-#include "master/experiment/recorded_farm.h"
+#include "master/store/recorded_farm.h"
 #include "tests/unit/store/store_fixture.h"
 
 namespace gapfarm {

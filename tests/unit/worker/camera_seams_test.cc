@@ -2,7 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/unit/worker/effect_util.h"
-#include "worker/scenarios/views.h"
+#include "worker/scenarios/srv1/views.h"
 
 namespace gapfarm {
 namespace {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "tests/unit/worker/problems.h"
-#include "worker/scenarios/srv1_robot.h"
+#include "worker/scenarios/srv1/srv1_robot.h"
 
 namespace gapfarm::tests {
 

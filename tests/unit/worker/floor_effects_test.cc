@@ -6,7 +6,7 @@
 #include <numbers>
 
 #include "tests/unit/worker/effect_util.h"
-#include "worker/scenarios/srv1_motions.h"
+#include "worker/scenarios/srv1/srv1_motions.h"
 
 namespace gapfarm {
 namespace {

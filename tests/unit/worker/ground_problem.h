@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "common/problem/problem.h"
-#include "worker/sim/ground.h"
+#include "worker/sim/robot/ground.h"
 
 namespace gapfarm::tests {
 

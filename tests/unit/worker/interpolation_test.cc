@@ -1,4 +1,4 @@
-#include "worker/scenarios/interpolation.h"
+#include "worker/scenarios/srv1/interpolation.h"
 
 #include <gtest/gtest.h>
 

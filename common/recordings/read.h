@@ -1,0 +1,23 @@
+// Run logs: commands.csv with poses.csv beside it (docs/formats.md).
+#pragma once
+
+#include <span>
+#include <string>
+
+#include "common/base/result.h"
+#include "common/recordings/run.h"
+
+namespace gapfarm {
+
+// `channels`: the columns of the commands that the robot takes, in its order; others are left out.
+// Errors name file, line and column, what was found and what was expected: a column that is
+// missing, a number that is not one, times that go back within a run, a run with poses and no
+// commands.  Noted: a run with commands and no poses, poses at the time of the one before.
+Result<RunLog> read_runs(const std::string& commands_path, const std::string& poses_path,
+                         std::span<const std::string> channels);
+
+// wheels.csv: measured wheel speeds (rad/s) of the log's runs, a column a wheel.  Runs that it does
+// not have keep none.  Errors: as read_runs(); other wheels than the log has already.
+Status read_wheel_speeds(const std::string& path, RunLog* log);
+
+}  // namespace gapfarm

@@ -1,0 +1,133 @@
+#include "common/recordings/windows.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/recordings/session.h"
+
+namespace gapfarm {
+namespace {
+
+constexpr double kSlack = 0.1;         // of a horizon: how much earlier a window may end
+constexpr double kGap = 1.5;           // horizons: a longer way to the next pose is a gap
+constexpr double kSpeedSpan_s = 0.25;  // over which the speed at a run's start is measured
+constexpr std::size_t kLeastPoses = 2;
+
+bool stands(const CommandRow& row) {
+  return std::all_of(row.values.begin(), row.values.end(), [](double v) { return v == 0; });
+}
+
+double median_interval(const std::vector<PoseRow>& poses) {
+  std::vector<double> intervals;
+  for (std::size_t i = 1; i < poses.size(); ++i) {
+    intervals.push_back(poses[i].t_s - poses[i - 1].t_s);
+  }
+  std::nth_element(intervals.begin(), intervals.begin() + static_cast<long>(intervals.size() / 2),
+                   intervals.end());
+  return intervals[intervals.size() / 2];
+}
+
+CommandedRun commanded(const LoggedRun& run) {
+  CommandedRun to;
+  to.commands = run.commands;
+  to.start_s = run.poses.front().t_s;
+  const auto later = std::find_if(run.poses.begin(), run.poses.end(), [&](const PoseRow& p) {
+    return p.t_s >= to.start_s + kSpeedSpan_s;
+  });
+  if (stands(run.commands.front()) || later == run.poses.end()) return to;
+  const double dt = later->t_s - to.start_s;
+  if (dt > 2 * kSpeedSpan_s) return to;
+  const Twist xi = gapfarm::log(between(run.poses.front().X_WM, later->X_WM));
+  to.speed_m_s = xi[0] / dt;
+  to.turn_rad_s = xi[2] / dt;
+  return to;
+}
+
+class Cutter {
+ public:
+  Cutter(const RunLog& log, const WindowSettings& settings, WindowedRuns* to)
+      : log_(log), settings_(settings), to_(*to) {}
+
+  void cut(std::size_t index) {
+    const LoggedRun& run = log_.runs[index];
+    const bool rests = stands(run.commands.front());
+    const double begin = run.poses.front().t_s + (rests ? 0 : settings_.run_in_s);
+    const auto first = std::find_if(run.poses.begin(), run.poses.end(),
+                                    [&](const PoseRow& p) { return p.t_s >= begin; });
+    const auto from = static_cast<std::size_t>(first - run.poses.begin());
+    for (const double horizon : settings_.horizons_s) {
+      if (horizon > 0) {
+        tile(index, from, horizon);
+      } else if (from + 1 < run.poses.size()) {
+        add(index, from, run.poses.size() - 1);
+      }
+    }
+  }
+
+ private:
+  void tile(std::size_t index, std::size_t from, double horizon) {
+    const std::vector<PoseRow>& poses = log_.runs[index].poses;
+    // Poses so rare that every way between two is a window of its own.
+    const bool rare = median_interval(poses) > horizon;
+    while (from + 1 < poses.size()) {
+      const double wanted = poses[from].t_s + horizon;
+      std::size_t end = from + 1;
+      while (end < poses.size() && poses[end].t_s < wanted) ++end;
+      // The pose before may be nearer, and the last one near enough.
+      const bool early = end - 1 > from && poses[end - 1].t_s >= wanted - kSlack * horizon;
+      if (end == poses.size() && !early) return;
+      if (early && (end == poses.size() || wanted - poses[end - 1].t_s < poses[end].t_s - wanted)) {
+        --end;
+      }
+      const bool gap = poses[end].t_s - poses[from].t_s > kGap * horizon;
+      if (!gap || rare) add(index, from, end);
+      from = end;
+    }
+  }
+
+  void add(std::size_t index, std::size_t from, std::size_t end) {
+    const LoggedRun& run = log_.runs[index];
+    Trial trial;
+    trial.session = session_of(run);
+    trial.trial = static_cast<std::int64_t>(to_.log.trials.size());
+    trial.command = kWindowCommand;
+    trial.run = static_cast<std::uint32_t>(index);
+    trial.t_s = run.poses[from].t_s;
+    trial.duration_s = run.poses[end].t_s - run.poses[from].t_s;
+    trial.X_WS = run.poses[from].X_WM;
+    trial.X_WE = run.poses[end].X_WM;
+    to_.log.trials.push_back(std::move(trial));
+  }
+
+  const RunLog& log_;
+  const WindowSettings& settings_;
+  WindowedRuns& to_;
+};
+
+}  // namespace
+
+Result<WindowedRuns> cut_windows(const RunLog& log, const WindowSettings& settings) {
+  if (log.runs.empty()) return Error{"the log has no runs"};
+  WindowedRuns windows;
+  windows.log.notes = log.notes;
+  Cutter cutter(log, settings, &windows);
+  double longest_s = 0;
+  for (std::size_t i = 0; i < log.runs.size(); ++i) {
+    const LoggedRun& run = log.runs[i];
+    if (run.commands.empty() || run.poses.size() < kLeastPoses) {
+      windows.runs.emplace_back();
+      windows.log.notes.push_back("run " + run.run + " has fewer than two poses; left out");
+      continue;
+    }
+    longest_s = std::max(longest_s, run.poses.back().t_s - run.poses.front().t_s);
+    windows.runs.push_back(commanded(run));
+    cutter.cut(i);
+  }
+  if (windows.log.trials.empty()) {
+    return Error{"no window fits into the runs, of which the longest has poses over " +
+                 std::to_string(longest_s) + " s; choose shorter horizons"};
+  }
+  return windows;
+}
+
+}  // namespace gapfarm

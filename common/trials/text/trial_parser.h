@@ -1,0 +1,49 @@
+// One row a trial, whatever the log is called: internal to common/trials.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "common/base/result.h"
+#include "common/trials/format.h"
+#include "common/trials/text/csv.h"
+#include "common/trials/text/mistakes.h"
+#include "common/trials/trial.h"
+
+namespace gapfarm {
+
+using TrialKey = std::pair<std::string, std::int64_t>;
+
+// "trial 3 of session 'a'".
+std::string key_text(const TrialKey& key);
+
+// A session is a battery charge and a command is atomic: greater numbers are milliseconds.
+inline constexpr double kLongestSession_s = 1e6;
+inline constexpr double kLongestCommand_s = 60;
+
+// Where a kind of log keeps what, as positions in its `columns`; all begin with session and trial.
+struct LogForm {
+  TextFormat format;
+  const std::vector<std::string>& (*columns)();
+  std::size_t command;               // the word in it is one of the scenario's commands
+  const char* command_is;            // "a command of the scenario"
+  const char* command_remedy;        // "write one of those it knows"
+  std::size_t pose;                  // x0; y0, theta0, x1, y1 and theta1 follow
+  std::optional<std::size_t> time;   // of the trial's start
+  std::optional<std::size_t> drive;  // left; right and duration follow
+};
+
+extern const LogForm kTrialLogForm;
+extern const LogForm kPushLogForm;
+
+// The text of such a log.  What is wrong goes into `mistakes`; the trials are those of the rows in
+// which nothing is.
+TrialLog parse_log(const LogForm& form, std::string_view text, const std::string& file,
+                   std::span<const std::string> commands, Mistakes& mistakes);
+
+}  // namespace gapfarm

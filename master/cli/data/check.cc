@@ -1,0 +1,266 @@
+// gapfarm check CONFIG: everything that a run would need, without running it.
+#include <algorithm>
+#include <map>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "common/base/try.h"
+#include "common/config/config.h"
+#include "common/problem/run_files.h"
+#include "common/trials/context.h"
+#include "master/cli/subcommand.h"
+#include "master/command/inputs.h"
+#include "master/diagnose/result/diagnosis_json.h"
+#include "master/evolve/evaluation.h"
+#include "master/ground/diagnose_ground.h"
+#include "master/io/log_checks/sanity.h"
+#include "master/io/log_checks/words.h"
+#include "master/run/validation.h"
+
+namespace gapfarm {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+struct CheckOptions {
+  std::string config;
+  TrialOptions trials;
+};
+
+struct Summary {
+  std::size_t trials = 0;
+  std::size_t sessions = 0;
+  std::map<std::string, std::size_t> commands;
+  std::size_t conditions = 0;
+  std::vector<std::string> effects;  // enabled: not neutral, or searched
+  double evaluation_s = 0;           // on one worker here, as measured
+  std::vector<SanityFinding> sanity;
+};
+
+// What a run may take at most, as far as its settings say.
+std::uint64_t most_evaluations(const Config& config) {
+  const std::uint64_t all = config.evolution.generations * config.evolution.population;
+  return config.evolution.evaluations ? std::min(all, *config.evolution.evaluations) : all;
+}
+
+// Seconds that one worker takes for the config's own values, once it knows the problem.
+Result<double> measure_evaluation(const Config& config, CliContext& context) {
+  FarmOptions options;
+  options.workers = 1;
+  ASSIGN_OR_RETURN(auto farm, start_farm(options, {}, context));
+  const std::string hash = farm->add_problem(to_proto(config.problem));
+  double last_s = 0;
+  // The first one brings the problem to the worker.
+  for (unsigned replicate = 0; replicate < 2; ++replicate) {
+    const double began_s = steady_now_s();
+    ASSIGN_OR_RETURN(const auto results,
+                     farm->run(hash, {evaluation_task({0, replicate, {}}, config.seed)}));
+    last_s = steady_now_s() - began_s;
+  }
+  return last_s;
+}
+
+// Effects that are on in the config's own values or that a gene may turn on.
+std::vector<std::size_t> enabled_effects(const Problem& problem) {
+  const ParameterTable& table = problem.table();
+  std::vector<std::size_t> enabled;
+  for (std::size_t e = 0; e < table.effects().size(); ++e) {
+    const std::size_t first = table.effect_row(e);
+    const std::size_t past = first + table.effects()[e].parameters.size();
+    const bool searched =
+        std::any_of(problem.genes.begin(), problem.genes.end(),
+                    [&](const Gene& gene) { return gene.row >= first && gene.row < past; });
+    if (searched || !table.is_neutral(e, problem.values)) enabled.push_back(e);
+  }
+  return enabled;
+}
+
+std::size_t piece_of(const Problem& problem, const Trial& trial) {
+  const auto& pieces = problem.pieces;
+  return static_cast<std::size_t>(
+      std::find_if(pieces.begin(), pieces.end(),
+                   [&](const auto& piece) { return piece.name == trial.command; }) -
+      pieces.begin());
+}
+
+// Trials that differ in nothing that the enabled effects look at share one condition.
+std::size_t count_conditions(const Problem& problem, unsigned context) {
+  std::vector<DrivenCommand> driven;
+  for (const Trial& trial : problem.log.trials) {
+    const CommandSpec& spec = problem.command(trial.command);
+    driven.push_back({trial.left.value_or(spec.left), trial.right.value_or(spec.right),
+                      trial.duration_s.value_or(spec.duration_s)});
+  }
+  const std::vector<TrialContext> around = trial_contexts(problem.log, driven);
+  std::set<std::vector<double>> conditions;
+  for (std::size_t i = 0; i < driven.size(); ++i) {
+    const Trial& trial = problem.log.trials[i];
+    std::vector<double> key = {driven[i].left, driven[i].right, driven[i].duration_s};
+    // A push is nothing but where the piece lay and how the finger went.
+    if (!trial.tip.empty()) {
+      key.insert(key.end(),
+                 {double(piece_of(problem, trial)), trial.X_WS.x, trial.X_WS.y, trial.X_WS.theta});
+      for (const TipSample& tip : trial.tip) key.insert(key.end(), {tip.t_s, tip.x, tip.y});
+    }
+    if (context & kStartHeading) key.push_back(trial.X_WS.theta);
+    if (context & kStartPlace) key.insert(key.end(), {trial.X_WS.x, trial.X_WS.y});
+    if (context & kSessionTime) key.push_back(around[i].session_time_s);
+    if (context & kLastDirection) {
+      key.insert(key.end(), {double(around[i].last_left), double(around[i].last_right)});
+    }
+    if (context & kUnrecordedMove) key.push_back(around[i].moved ? 1 : 0);
+    conditions.insert(std::move(key));
+  }
+  return conditions.size();
+}
+
+// What is the wrong way round in a ground robot's runs.
+std::vector<SanityFinding> doubts(const Config& config) {
+  const Problem& problem = config.problem;
+  if (!problem.ground) return check_sanity(problem);
+  const GroundRobot robot = problem.ground->robot_at(problem.values);
+  const auto runs = read_run_folders(config.trial_files, robot.channels);
+  return runs ? check_ground_log(robot, *runs) : std::vector<SanityFinding>();
+}
+
+Summary summarise(const Config& config) {
+  const Problem& problem = config.problem;
+  Summary summary;
+  std::set<std::string> sessions;
+  for (const Trial& trial : problem.log.trials) {
+    sessions.insert(trial.session);
+    ++summary.commands[trial.command];
+  }
+  summary.trials = problem.log.trials.size();
+  summary.sessions = sessions.size();
+  unsigned context = kNoContext;
+  for (const std::size_t e : enabled_effects(problem)) {
+    const Effect& effect = problem.table().effects()[e];
+    context |= effect.context;
+    summary.effects.push_back(effect.name);
+  }
+  summary.conditions = count_conditions(problem, context);
+  summary.sanity = doubts(config);
+  return summary;
+}
+
+Json to_json(const Config& config, const Summary& summary, unsigned workers) {
+  Json genes = Json::array();
+  for (const Gene& gene : config.problem.genes) {
+    const Parameter& row = config.problem.table()[gene.row];
+    genes.push_back({{"parameter", row.key},
+                     {"unit", row.unit},
+                     {"lower", gene.lower},
+                     {"upper", gene.upper},
+                     {"log_scale", gene.scale == ParameterScale::kLog}});
+  }
+  return {{"config", config.path},
+          {"scenario", config.problem.scenario},
+          {"fitness", fitness_name(config.problem.fitness.kind)},
+          {"problem", problem_hash(to_proto(config.problem))},
+          {"trials", summary.trials},
+          {"sessions", summary.sessions},
+          {"commands", summary.commands},
+          {"conditions", summary.conditions},
+          {"evaluation_s", summary.evaluation_s},
+          {"most_evaluations", most_evaluations(config)},
+          {"effects", summary.effects},
+          {"genes", genes},
+          {"population", config.evolution.population},
+          {"generations", config.evolution.generations},
+          {"workers", workers},
+          {"seed", config.seed},
+          {"sanity", sanity_json(summary.sanity)}};
+}
+
+std::string standing(const std::vector<SanityFinding>& findings) {
+  for (const SanityFinding& f : findings) {
+    if (f.severity == Severity::kUnusable) return "readable, but " + finding_phrase(f);
+  }
+  return "fine";
+}
+
+std::string robot_name(const Problem& problem) {
+  const std::string& name = problem.tracked->name();
+  return name.empty() ? "the file of [robot]" : name;
+}
+
+std::string describe(const Config& config, const Summary& summary, unsigned workers) {
+  const Problem& problem = config.problem;
+  std::string text = config.path + ": " + standing(summary.sanity) + "\n";
+  for (const SanityFinding& f : summary.sanity) {
+    text += std::string(f.severity == Severity::kUnusable ? "doubt" : "note ") + "        " +
+            f.name + ": " + f.text + " " + f.remedy + "\n";
+  }
+  // The first row of every other table is the model that is simulated.
+  text += "scenario     " + problem.scenario + ", ";
+  if (problem.ground) {
+    text += drive_words()[static_cast<std::size_t>(problem.ground->robot().drive)] + "\n";
+  } else {
+    text += problem.table()[0].key + " " + problem.table().format(0, problem.values[0]);
+    if (problem.tracked) text += ", sizes of " + robot_name(problem);
+    text += "\n";
+  }
+  text += "trials       " + std::to_string(summary.trials) + " in " +
+          std::to_string(summary.sessions) + " sessions:";
+  for (const auto& [command, count] : summary.commands) {
+    text += " " + std::to_string(count) + " " + command;
+  }
+  text += "\nconditions   " + std::to_string(summary.conditions) +
+          " distinct, each simulated once " + "an evaluation";
+  text += "\neffects      ";
+  if (summary.effects.empty()) text += "none";
+  for (std::size_t i = 0; i < summary.effects.size(); ++i) {
+    text += (i ? ", " : "") + summary.effects[i];
+  }
+  text += "\nfitness      " + std::string(fitness_name(problem.fitness.kind)) +
+          (higher_is_better(problem.fitness.kind) ? ", higher is better" : ", lower is better");
+  text += "\ngenes        " + std::to_string(problem.genes.size()) + "\n";
+  for (const Gene& gene : problem.genes) {
+    const Parameter& row = problem.table()[gene.row];
+    text += "             " + row.key + " in [" + problem.table().format(gene.row, gene.lower) +
+            ", " + problem.table().format(gene.row, gene.upper) + "]" +
+            (gene.scale == ParameterScale::kLog ? ", log scale" : "") + "\n";
+  }
+  text += "evolution    " + std::to_string(config.evolution.population) + " individuals, at most " +
+          std::to_string(config.evolution.generations) + " generations, seed " +
+          std::to_string(config.seed) + "\n";
+  const auto most = most_evaluations(config);
+  const double all_s = summary.evaluation_s * static_cast<double>(most);
+  text += "cost         " + format_duration(summary.evaluation_s) +
+          " an evaluation (one, measured here); " + std::to_string(most) + " of them about " +
+          format_duration(all_s / std::max(1u, workers)) + " on " + std::to_string(workers) +
+          " workers like it\n";
+  text += "farm         " + std::to_string(workers) + " local workers";
+  if (config.farm.listen) text += ", and remote ones at " + *config.farm.listen;
+  text += "\nproblem      " + problem_hash(to_proto(problem)) + "\n";
+  return text;
+}
+
+Result<int> run_check(const CheckOptions& options, CliContext& context) {
+  Console& console = context.console;
+  ASSIGN_OR_RETURN(const auto config,
+                   open_config(options.config, options.trials, console, check_runnable));
+  const unsigned workers = local_workers({}, config.farm);
+  Summary summary = summarise(config);
+  ASSIGN_OR_RETURN(const auto measured, measure_evaluation(config, context));
+  summary.evaluation_s = measured;
+  console.result(describe(config, summary, workers), to_json(config, summary, workers));
+  return kExitDone;
+}
+
+}  // namespace
+
+SubcommandRun setup_check(CLI::App& app) {
+  auto options = std::make_shared<CheckOptions>();
+  app.add_option("CONFIG", options->config, "Config file (TOML)")->required();
+  options->trials.declare(app);
+  app.footer(
+      "Examples:\n"
+      "  gapfarm check configs/demo.toml\n"
+      "  gapfarm check configs/srv1_forward.toml --trials logs/*.dat");
+  return [options](CliContext& context) { return run_check(*options, context); };
+}
+
+}  // namespace gapfarm

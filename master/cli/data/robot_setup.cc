@@ -1,0 +1,115 @@
+#include "master/cli/data/robot_setup.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "common/base/try.h"
+#include "common/robot/robot_file.h"
+#include "master/cli/data/robot_files.h"
+#include "master/io/robot_files/robot_config.h"
+
+namespace gapfarm {
+namespace {
+
+namespace fs = std::filesystem;
+
+bool is_robot_file(const std::string& word) {
+  static constexpr const char* kExtensions[] = {".urdf", ".xacro", ".xml",
+                                                ".yaml", ".yml",   ".toml"};
+  const std::string extension = fs::path(word).extension().string();
+  return std::any_of(std::begin(kExtensions), std::end(kExtensions),
+                     [&](const char* e) { return extension == e; });
+}
+
+// Where the robot goes: husky.toml has its robot in husky_robot.toml.
+std::string robot_beside(const std::string& out) {
+  if (out == "-") return "robot.toml";
+  const fs::path path(out);
+  return (path.parent_path() / (path.stem().string() + "_robot.toml")).string();
+}
+
+RobotSetup setup_of_words(const std::vector<std::string>& words, const std::string& out) {
+  RobotSetup setup;
+  std::error_code ignored;
+  for (const std::string& word : words) {
+    (fs::is_directory(word, ignored) ? setup.runs : setup.files).push_back(word);
+  }
+  setup.robot = robot_beside(out);
+  setup.config = out;
+  return setup;
+}
+
+}  // namespace
+
+Result<RobotTexts> set_up_robot(const RobotSetup& setup, Outputs& outputs) {
+  ASSIGN_OR_RETURN(RobotReading reading, read_robot_files(setup.files, setup.controllers));
+  RobotTexts texts;
+  texts.completed = reading.robot;
+  if (const Status s = complete_robot(&texts.completed); !s) {
+    return Error{setup.files[0] + ": " + s.error().message +
+                 "; state it in a robot.toml (docs/formats.md) and give that"};
+  }
+  for (const auto* files : {&setup.files, &setup.controllers}) {
+    for (const std::string& file : *files) outputs.reads(file);
+  }
+  RobotConfigWords words;
+  const auto add = [](const std::vector<std::string>& said, std::vector<std::string>& to) {
+    for (const std::string& text : said) to.push_back(printable(text));
+  };
+  add(setup.files, words.made_of);
+  add(setup.controllers, words.made_of);
+  add(reading.disagreements, words.questions);
+  add(reading.remarks, words.questions);
+  add(texts.completed.notes, words.questions);
+  words.robot = file_seen_from(setup.config, setup.robot);
+  for (const std::string& run : setup.runs) words.runs.push_back(file_seen_from(setup.config, run));
+  texts.robot = format_robot(texts.completed);
+  texts.config = config_of_robot(texts.completed, words);
+  texts.reading = std::move(reading);
+  return texts;
+}
+
+Status write_robot(const RobotSetup& setup, const RobotTexts& texts, const Outputs& outputs) {
+  const std::pair<const std::string*, const std::string*> files[] = {
+      {&setup.robot, &texts.robot}, {&setup.config, &texts.config}};
+  for (const auto& [path, text] : files) {
+    if (path->empty()) continue;
+    RETURN_IF_ERROR(outputs.write(*path, *text));
+  }
+  return {};
+}
+
+std::string file_seen_from(const std::string& out, const std::string& file) {
+  std::error_code error;
+  const auto folder = fs::absolute(out == "-" ? "." : out, error).parent_path();
+  const auto base = out == "-" ? fs::current_path(error) : folder;
+  const auto path = fs::proximate(file, base, error);
+  return error || path.empty() ? file : path.string();
+}
+
+bool names_a_robot(const std::vector<std::string>& words) {
+  return std::any_of(words.begin(), words.end(), is_robot_file);
+}
+
+Result<int> run_init_robot(const std::vector<std::string>& words, const std::string& out,
+                           Outputs& outputs, CliContext& context) {
+  Console& console = context.console;
+  const RobotSetup setup = setup_of_words(words, out);
+  ASSIGN_OR_RETURN(const RobotTexts texts, set_up_robot(setup, outputs));
+  if (out != "-") RETURN_IF_ERROR(outputs.plan(std::vector<std::string>{setup.robot, out}));
+  nlohmann::ordered_json json = {{"out", out}, {"robot", setup.robot}, {"runs", setup.runs}};
+  if (out == "-") {
+    json["config"] = texts.config;
+    console.result(texts.config, json);
+    return kExitDone;
+  }
+  context.begun = true;
+  RETURN_IF_ERROR(write_robot(setup, texts, outputs));
+  console.result(out + ": a config for the robot in " + setup.robot +
+                     "; answer its QUESTIONs, then: gapfarm check " + out + "\n",
+                 json);
+  return kExitDone;
+}
+
+}  // namespace gapfarm

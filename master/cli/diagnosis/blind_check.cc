@@ -1,0 +1,279 @@
+// gapfarm blind-check CONFIG: the diagnosis against sealed truths.
+#include "master/experiments/blind_check/blind_check.h"
+
+#include <algorithm>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "common/base/build_info.h"
+#include "common/base/hash.h"
+#include "common/base/try.h"
+#include "common/config/config.h"
+#include "common/process/process_pool.h"
+#include "common/trials/files.h"
+#include "common/trials/read.h"
+#include "master/cli/subcommand.h"
+#include "master/command/inputs.h"
+#include "master/command/long_command.h"
+#include "master/command/outputs.h"
+#include "master/farm/planned_trials.h"
+
+namespace gapfarm {
+namespace {
+
+struct BlindCheckOptions {
+  std::string config;
+  std::string out;
+  std::string foreign, truth, like, model, key;
+  std::vector<std::string> effects;
+  std::vector<std::string> sizes = {"clear", "subtle"};
+  unsigned nulls = 60, pairs = 19, left_out = 19, per_effect = 1;
+  std::optional<unsigned> trials, workers, jobs;
+  std::optional<std::uint64_t> seed;
+  double time_limit_s = 1800;
+  bool resume = false, strengths = false;
+};
+
+Result<DesignSettings> design_of(const BlindCheckOptions& options, const Config& config) {
+  RETURN_IF_ERROR(check_effects(config.problem.table(), options.effects));
+  DesignSettings design;
+  design.effects = options.effects;
+  for (const std::string& word : options.sizes) {
+    ASSIGN_OR_RETURN(const SizeLevel level, size_level(word));
+    design.sizes.push_back(level);
+  }
+  design.per_effect = options.per_effect;
+  design.nulls = options.nulls;
+  design.pairs = options.pairs;
+  design.left_out = options.left_out;
+  design.seed = config.seed;
+  return design;
+}
+
+Result<Config> config_of(const BlindCheckOptions& options, SessionPlans& plan, Console& console) {
+  Result<Config> config = read_config(options.config);
+  if (!config) return config;
+  if (options.seed) config->seed = *options.seed;
+  SimulateSettings& simulate = config->simulate;
+  if (options.trials) {
+    simulate.trials_per_session = (*options.trials + simulate.sessions - 1) / simulate.sessions;
+  }
+  if (!options.like.empty()) {
+    const std::vector<std::string> files = {options.like};
+    ASSIGN_OR_RETURN(const auto log,
+                     read_trial_files(files, command_names(config->problem.commands)));
+    show_notes(log, console);
+    plan = plan_of(config->problem, log);
+  }
+  return config;
+}
+
+DiagnoseSettings diagnose_of(const BlindCheckOptions& options) {
+  const unsigned cores = std::max(1u, std::thread::hardware_concurrency());
+  DiagnoseSettings diagnose;
+  diagnose.command = {executable_path(), "diagnose"};
+  diagnose.config_path = options.config;
+  diagnose.model_path = options.model;
+  diagnose.jobs = options.jobs.value_or(std::max(1u, cores / 2));
+  diagnose.workers = options.workers.value_or(std::max(1u, cores / diagnose.jobs));
+  diagnose.time_limit_s = options.time_limit_s;
+  return diagnose;
+}
+
+// Diagnoses take by far the most.
+std::vector<ProgressStage> blind_check_stages() {
+  return {{"find strengths", 4}, {"drive the cases", 1}, {"diagnose", 94}, {"judge", 1}};
+}
+
+// What is being done, in the words of the check, as a stage of the whole.
+std::size_t stage_of(const std::string& what, std::size_t now) {
+  if (what == "strengths") return 0;
+  if (what == "sessions simulated") return now >= 2 ? 3 : 1;
+  return what == "cases diagnosed" ? 2 : 3;
+}
+
+Result<std::unique_ptr<Farm>> start(const BlindCheckOptions& options, const Config& config,
+                                    CliContext& context) {
+  // Cases are made and scored while no diagnosis runs: with all the workers together.
+  FarmOptions farm;
+  const DiagnoseSettings diagnose = diagnose_of(options);
+  farm.workers = static_cast<int>(diagnose.workers * diagnose.jobs);
+  ASSIGN_OR_RETURN(auto started, start_farm(farm, config.farm, context));
+  if (!context.work->begun()) context.work->stage(0);
+  return context.work->over(std::move(started));
+}
+
+BlindCheckHooks hooks_of(const BlindCheckOptions& options, const Config& config,
+                         CliContext& context) {
+  BlindCheckHooks hooks;
+  hooks.stop = &context.stop;
+  hooks.start_farm = [&options, &config, &context] { return start(options, config, context); };
+  hooks.note = [&context](const std::string& sentence) { context.console.note(sentence); };
+  hooks.progress = [&context, stage = std::size_t{0}](const std::string& what, std::size_t done,
+                                                      std::size_t total,
+                                                      double /*elapsed_s*/) mutable {
+    const std::size_t k = stage_of(what, stage);
+    if (k != stage) context.work->stage(k);
+    stage = k;
+    context.work->advance(done, total);
+  };
+  hooks.on_sealed = [&context] {
+    return context.work->keeps() ? context.work->answers().forget() : Status();
+  };
+  return hooks;
+}
+
+Result<int> show_strengths(const BlindCheckOptions& options, const Config& config,
+                           const SessionPlans& plan, DesignSettings design, CliContext& context) {
+  LongCommand::begin_if_possible("blind-check", KeepOption{}.place("blind-check", ""),
+                                 {{"find strengths"}}, context);
+  ASSIGN_OR_RETURN(const auto farm, start(options, config, context));
+  ASSIGN_OR_RETURN(const auto planned, planned_problem(config, plan, config.seed, *farm));
+  // The rest is made of the same effects and robots.
+  design.nulls = design.pairs = design.left_out = 0;
+  const BlindCheckHooks hooks = hooks_of(options, config, context);
+  const double begin = monotonic_seconds();
+  ASSIGN_OR_RETURN(const auto drawn,
+                   draw_design(planned, design, *farm,
+                               [&](const std::string& what, std::size_t done, std::size_t total) {
+                                 hooks.progress(what, done, total, monotonic_seconds() - begin);
+                               }));
+  const std::size_t trials = planned.log.trials.size();
+  const std::string table = format_design(drawn, planned.table());
+  context.console.result(std::to_string(trials) +
+                             " trials a case.  A case of every effect and size, with the strength "
+                             "that this experiment takes:\n\n" +
+                             table + "\nBeside these " + std::to_string(options.nulls) +
+                             " nulls, " + std::to_string(options.pairs) + " pairs and " +
+                             std::to_string(options.left_out) +
+                             " effects left out of the catalogue.\n",
+                         {{"trials", trials},
+                          {"design", table},
+                          {"nulls", options.nulls},
+                          {"pairs", options.pairs},
+                          {"left_out", options.left_out}});
+  return kExitDone;
+}
+
+Result<int> say_check(const BlindCheckOptions& options, const Config& config, CliContext& context) {
+  FarmOptions farm;
+  const DiagnoseSettings diagnose = diagnose_of(options);
+  farm.workers = static_cast<int>(diagnose.workers * diagnose.jobs);
+  const std::string cases = options.foreign.empty()
+                                ? "cases of effects, " + std::to_string(options.nulls) +
+                                      " nulls and " + std::to_string(options.pairs) + " pairs"
+                                : "the cases of " + options.foreign;
+  return say_dry_run("diagnose " + cases + (options.out.empty() ? "" : " into " + options.out),
+                     {{"out", options.out}, {"nulls", options.nulls}, {"pairs", options.pairs}},
+                     farm, config.farm, context);
+}
+
+// All that makes the cases and what is asked of them; not how many workers do it.
+std::string asked(const BlindCheckOptions& options, const std::string& config_text) {
+  std::string text = config_text;
+  const auto add = [&](const std::string& word) { text += '\0' + word; };
+  for (const std::string& word : {options.foreign, options.truth, options.like, options.model}) {
+    add(word);
+  }
+  for (const auto* words : {&options.effects, &options.sizes}) {
+    for (const std::string& word : *words) add(word);
+    add("");
+  }
+  for (const unsigned n : {options.nulls, options.pairs, options.left_out, options.per_effect,
+                           options.trials.value_or(0)}) {
+    add(std::to_string(n));
+  }
+  add(options.seed ? std::to_string(*options.seed) : "");
+  return content_hash(text);
+}
+
+Result<int> run_blind(const BlindCheckOptions& options, CliContext& context) {
+  BlindCheckSettings settings;
+  ASSIGN_OR_RETURN(const Config config, config_of(options, settings.plan, context.console));
+  ASSIGN_OR_RETURN(const auto design, design_of(options, config));
+  if (context.dry_run) return say_check(options, config, context);
+  if (options.strengths && options.foreign.empty()) {
+    return show_strengths(options, config, settings.plan, design, context);
+  }
+  if (options.out.empty()) {
+    return Error{"--out DIR is missing: the folder for cases, seals and result"};
+  }
+  RETURN_IF_ERROR(check_folder(options.out, FolderKind::kBlindCheck));
+  settings.design = design;
+  settings.diagnose = diagnose_of(options);
+  settings.out = options.out;
+  settings.key_path = options.key;
+  settings.resume = options.resume;
+  settings.provenance = {
+      {"command", command_line()},
+      {"program", "gapfarm " + build_info().version + ", build " + build_info().fingerprint},
+      {"seed", std::to_string(config.seed)}};
+  settings.asked = asked(options, config.text);
+  const KeepingPlace place{options.out, /*passing=*/false, /*forget=*/true};
+  RETURN_IF_ERROR(LongCommand::begin("blind-check", place, blind_check_stages(), context));
+  const BlindCheckHooks hooks = hooks_of(options, config, context);
+  ASSIGN_OR_RETURN(const BlindReport report,
+                   options.foreign.empty()
+                       ? run_blind_check(config, settings, hooks)
+                       : run_foreign_check(options.foreign, options.truth, settings, hooks));
+  context.console.print(context.console.json() ? format_blind_json(report)
+                                               : format_blind_summary(report));
+  context.console.note("tables: " + options.out + "/blind_check.md");
+  return kExitDone;
+}
+
+void declare_cases(CLI::App& app, BlindCheckOptions& options) {
+  app.add_option("--effects", options.effects, "Only these effects of the catalogue");
+  app.add_option("--sizes", options.sizes,
+                 "clear (5), subtle (1.6) or numbers: mean squared shift of the end poses in units "
+                 "of their spread; 1 is nothing")
+      ->delimiter(',');
+  app.add_option("--per-effect", options.per_effect, "Cases an effect and size");
+  app.add_option("--nulls", options.nulls, "Cases without any effect");
+  app.add_option("--pairs", options.pairs, "Cases with two effects");
+  app.add_option("--left-out", options.left_out,
+                 "Cases whose effect, and what passes for it, the diagnosis has to do without");
+  app.add_option("--trials", options.trials, "Trials a case (default: as [simulate] says)")
+      ->check(CLI::Range(1, 1000000));
+  app.add_option("--like", options.like, "Repeat the plan of this trial log");
+  app.add_option("--foreign", options.foreign, "Diagnose the cases FOLDER/CASE/trials.csv instead");
+  app.add_option("--truth", options.truth, "Truths of the foreign cases, FOLDER/CASE.json");
+}
+
+}  // namespace
+
+SubcommandRun setup_blind_check(CLI::App& app) {
+  auto options = std::make_shared<BlindCheckOptions>();
+  app.add_option("CONFIG", options->config, "Config file (TOML)")->required();
+  app.add_option("--out", options->out, "Folder for cases, seals, diagnoses and result");
+  declare_cases(app, *options);
+  app.add_option("--model", options->model, "Base model for every diagnosis");
+  app.add_option("--seed", options->seed, "Of robots, effects, plans and noise");
+  app.add_option("--workers", options->workers, "Worker processes of each diagnosis")
+      ->check(CLI::Range(1, 4096));
+  app.add_option("--jobs", options->jobs, "Diagnoses at a time (default: half the cores)")
+      ->check(CLI::Range(1, 4096));
+  app.add_option("--time-limit", options->time_limit_s, "s; a slower diagnosis counts as failed")
+      ->check(CLI::PositiveNumber);
+  app.add_option("--key", options->key,
+                 "Keep the truths' key in this file, outside the folder, so that even a killed "
+                 "check can be resumed (default: OUT.key, written when stopped)");
+  app.add_flag(
+      "--resume", options->resume,
+      "Go on with the check in the folder as it was asked, whatever is asked now, or judge "
+      "a finished one again; the same command goes on by itself");
+  app.add_flag("--strengths", options->strengths,
+               "Only say which strengths would be needed for every effect to be that large");
+  declare_long_command(app);
+  app.footer(
+      "Examples:\n"
+      "  gapfarm blind-check configs/srv1.toml --strengths\n"
+      "  gapfarm blind-check configs/srv1.toml --out run/blind --seed 7\n"
+      "  gapfarm blind-check configs/push.toml --out run/pushes --sizes clear --trials 90\n"
+      "  gapfarm blind-check configs/srv1.toml --out run/foreign --foreign logs/cases \\\n"
+      "      --truth logs/cases/truth");
+  return [options](CliContext& context) { return run_blind(*options, context); };
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,270 @@
+// gapfarm diagnose CONFIG: where the gap lies, which effect causes it, how far it shrinks.
+#include "master/diagnose/diagnose.h"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "common/base/build_info.h"
+#include "common/base/try.h"
+#include "common/json/json.h"
+#include "common/problem/run_files.h"
+#include "common/robot/robot_file.h"
+#include "master/cli/diagnosis/diagnose_command.h"
+#include "master/cli/subcommand.h"
+#include "master/command/inputs.h"
+#include "master/command/long_command.h"
+#include "master/command/outputs.h"
+#include "master/command/page_along.h"
+#include "master/command/question_stamp.h"
+#include "master/command/run_model.h"
+#include "master/diagnose/result/diagnosis_json.h"
+#include "master/report/report_html.h"
+
+namespace gapfarm {
+
+void add_diagnosis_provenance(const Config& config, const DiagnoseCommand& command,
+                              Diagnosis* diagnosis) {
+  auto& to = diagnosis->provenance;
+  const TrialLog& log = config.problem.log;
+  std::set<std::string> sessions;
+  for (const Trial& trial : log.trials) sessions.insert(trial.session);
+  to.emplace_back("config", config.path);
+  for (const std::string& file : config.trial_files) to.emplace_back("trials", file);
+  to.emplace_back("problem", problem_hash(to_proto(config.problem)));
+  to.emplace_back("trials read",
+                  fmt::format("{} in {} sessions", log.trials.size(), sessions.size()));
+  to.emplace_back("base model", command.model.empty() ? "tuned on this log" : command.model);
+  for (const std::string& effect : command.leave_out) {
+    to.emplace_back("left out of the catalogue", effect);
+  }
+  to.emplace_back("program", build_summary("gapfarm"));
+  to.emplace_back("seed", std::to_string(config.seed));
+}
+
+std::string diagnosis_summary(const Diagnosis& d) {
+  std::string text = d.headline + "\n  " + d.action + "\n";
+  for (const SanityFinding& f : d.sanity) {
+    text += "  " + f.name + ": " + f.text + " " + f.remedy + "\n";
+  }
+  if (d.verdict == Verdict::kUnusable) return text;
+  for (const NamedEffect& e : d.effects) {
+    text += fmt::format("  {}: confidence {:.2f}, closes {:.0f} % [{:.0f}, {:.0f}] of the gap",
+                        e.name, e.confidence, 100 * e.closed, 100 * e.closed_lo, 100 * e.closed_hi);
+    for (const Estimate& p : e.parameters) {
+      // A seam's place is one along an axis.
+      const std::string key =
+          p.key == "position" && !e.axis.empty() ? p.key + " along " + e.axis : p.key;
+      text += fmt::format(", {} {:.4g} [{:.4g}, {:.4g}] {}", key, p.value, p.lo, p.hi, p.unit);
+    }
+    for (std::size_t i = 0; i < e.aliases.size(); ++i) {
+      text += (i == 0 ? "; not told from " : ", ") + e.aliases[i];
+    }
+    text += "\n";
+  }
+  text += fmt::format(
+      "  gap {:.3f} nats a trial tuned, {:.3f} final; {:.1f} mm and {:.1f} mrad tuned, {:.1f} and "
+      "{:.1f} final, {:.1f} and {:.1f} at the floor\n",
+      d.gap.tuned, d.gap.final_, d.position_mm.tuned, d.heading_mrad.tuned, d.position_mm.final_,
+      d.heading_mrad.final_, d.position_mm.floor, d.heading_mrad.floor);
+  for (const std::string& caution : d.cautions) text += "  note: " + caution + "\n";
+  return text;
+}
+
+// diagnosis.json without its trials.
+nlohmann::ordered_json diagnosis_summary_json(const Diagnosis& diagnosis,
+                                              const DiagnoseCommand& command) {
+  auto json = parse_json(to_json(diagnosis));
+  json.erase("trials");
+  json["out"] = command.out;
+  return json;
+}
+
+namespace {
+
+constexpr const char* kAnswers = "simulations.sqlite";
+
+Model model_of(const Config& config, const DiagnosisResult& result, const ParameterValues& values,
+               const std::string& kind) {
+  Model model = model_of_problem(config.problem, values);
+  model.kind = kind;
+  model.frame_x_m = result.frame_x_m;
+  model.frame_y_m = result.frame_y_m;
+  model.data = {problem_hash(to_proto(config.problem)), config.problem.log.trials.size(),
+                config.trial_files};
+  return model;
+}
+
+Status write_model(const Model& model, const std::filesystem::path& path, const Outputs& outputs) {
+  if (Status s = check_model(model); !s) return Error{path.string() + ": " + s.error().message};
+  return outputs.write(path.string(), format_model(model));
+}
+
+Status write_all(const Config& config, const DiagnoseCommand& command,
+                 const DiagnosisResult& result) {
+  const std::filesystem::path out(command.out);
+  Model model = model_of(config, result, result.final_, "diagnosed");
+  model.residual = result.residual;
+  model.intervals.resize(model.values.size());
+  for (std::size_t i = 0; i < result.intervals.size(); ++i) {
+    const auto& [lo, hi] = result.intervals[i];
+    if (lo < hi) model.intervals[i] = Interval{lo, hi};
+  }
+  RETURN_IF_ERROR(write_model(model, out / "model.toml", command.outputs));
+  const Model tuned = model_of(config, result, result.tuned, "tuned");
+  RETURN_IF_ERROR(write_model(tuned, out / "tuned.toml", command.outputs));
+  const Status report =
+      command.outputs.write((out / "report.html").string(), report_html(result.diagnosis));
+  if (!report) return report;
+  // Last: whoever sees it sees the rest.
+  return command.outputs.write((out / kDiagnosisFile).string(), to_json(result.diagnosis));
+}
+
+QuestionStamp stamp_of(const Config& config, const DiagnoseCommand& command,
+                       const std::vector<Gene>& searched) {
+  QuestionStamp stamp;
+  stamp.command = "diagnose";
+  stamp.problem = problem_hash(to_proto(config.problem));
+  nlohmann::ordered_json genes = nlohmann::ordered_json::object();
+  for (const Gene& gene : searched) {
+    genes[config.problem.table()[gene.row].key] = {gene.lower, gene.upper};
+  }
+  stamp.options = {{"genes", genes},
+                   {"model", !command.model.empty()},
+                   {"leave-out", command.leave_out},
+                   {"seed", config.seed}};
+  if (command.reference_log) stamp.options["reference"] = log_hash(*command.reference_log);
+  stamp.about = {{"config", config.path}, {"trials", config.trial_files}};
+  stamp.build = build_info().fingerprint;
+  return stamp;
+}
+
+// Makes sure that the folder takes this diagnosis, a new one or the same again.
+Status plan_outputs(DiagnoseCommand& command, const Config& config, const QuestionStamp& stamp) {
+  Outputs& outputs = command.outputs;
+  RETURN_IF_ERROR(check_folder(command.out, FolderKind::kDiagnosis));
+  outputs.reads(config.problem.log);
+  outputs.reads(command.config);
+  outputs.reads(command.model);
+  ASSIGN_OR_RETURN(const auto state,
+                   compare_stamp(command.out, kDiagnosisFile, stamp, outputs.force()));
+  std::vector<const char*> names = {kStampFile, "model.toml", "tuned.toml", "report.html",
+                                    kDiagnosisFile};
+  if (config.problem.ground)
+    names = {kStampFile, "robot.toml", "values.json", "report.html", kDiagnosisFile};
+  for (const char* name : names) {
+    const std::string path = (std::filesystem::path(command.out) / name).string();
+    const Status s = state == FolderState::kNew ? outputs.plan(path) : outputs.plan_again(path);
+    if (!s) return s;
+  }
+  return {};
+}
+
+std::vector<ProgressStage> diagnosis_stages() {
+  std::vector<ProgressStage> all;
+  for (const DiagnosisStage& stage : kDiagnosisStages) all.push_back({stage.name, stage.share});
+  return all;
+}
+
+// What the command line says of the problem, on top of the config.
+Status apply_options(const DiagnoseCommand& command, Config& config, std::vector<Gene>& searched,
+                     std::optional<Eigen::Vector2d>& frame, Console& console) {
+  if (command.seed) config.seed = *command.seed;
+  if (!command.model.empty()) {
+    ASSIGN_OR_RETURN(const Model model, read_model_of(command.model, console));
+    RETURN_IF_ERROR(check_no_residual(model, command.model, "a base to diagnose"));
+    RETURN_IF_ERROR(check_same_robot(model, command.model, config, command.config));
+    config.problem.values = model.values;
+    frame = {model.frame_x_m, model.frame_y_m};
+  }
+  searched = std::move(config.problem.genes);
+  config.problem.genes.clear();
+  config.problem.fitness.kind = FitnessKind::kLogScore;
+  return {};
+}
+
+Result<int> run_diagnose(DiagnoseCommand& command, CliContext& context) {
+  DiagnoseOptions options;
+  ASSIGN_OR_RETURN(
+      const auto config,
+      open_config(command.config, command.trials, context.console, [&](Config& read) -> Status {
+        return apply_options(command, read, options.genes, options.frame_m, context.console);
+      }));
+  RETURN_IF_ERROR(read_reference(&command, config, context.console));
+  const QuestionStamp stamp = stamp_of(config, command, options.genes);
+  RETURN_IF_ERROR(plan_outputs(command, config, stamp));
+  if (context.dry_run) {
+    const std::size_t trials = config.problem.log.trials.size();
+    return say_dry_run(
+        fmt::format("diagnose {} trials of {} into {}, {}", trials, command.config, command.out,
+                    command.model.empty() ? "the base tuned on them" : "by " + command.model),
+        {{"out", command.out}, {"trials", trials}, {"seed", config.seed}}, command.farm,
+        config.farm, context);
+  }
+  if (config.problem.ground) {
+    return run_diagnose_ground(command, config, format_stamp(stamp), context);
+  }
+  // Every simulation goes into the folder: what a figure rests on can be looked up.
+  RETURN_IF_ERROR(LongCommand::begin("diagnose", {command.out}, diagnosis_stages(), context));
+  ASSIGN_OR_RETURN(const auto page, open_page(command.page, command.out, context));
+  ASSIGN_OR_RETURN(const auto asked, start_recorded(command.farm, config.farm, context));
+  options.keep_base = !command.model.empty();
+  options.left_out = command.leave_out;
+  options.seed = config.seed;
+  const std::string stamp_file = (std::filesystem::path(command.out) / kStampFile).string();
+  RETURN_IF_ERROR(command.outputs.write(stamp_file, format_stamp(stamp)));
+  LongCommand& work = *context.work;
+  options.on_stage = [&](const std::string& stage) { work.stage(stage); };
+  options.on_finding = [&](Finding finding) { work.found(std::move(finding)); };
+  ASSIGN_OR_RETURN(auto result, diagnose(*asked, config.problem, options));
+  add_diagnosis_provenance(config, command, &result.diagnosis);
+  for (const auto& [fit, tasks] : result.fits) {
+    // A stop may have come between them: their numbers need not follow one another.
+    std::string questions;
+    for (const v1::Task& task : tasks) {
+      questions += (questions.empty() ? "" : ", ") + work.answers().key(result.problem, task);
+    }
+    result.diagnosis.provenance.emplace_back("predictions of " + fit,
+                                             fmt::format("{}, questions {}", kAnswers, questions));
+  }
+  RETURN_IF_ERROR(write_all(config, command, result));
+  context.console.result(diagnosis_summary(result.diagnosis),
+                         diagnosis_summary_json(result.diagnosis, command));
+  context.console.note("left behind: " + command.out + "/report.html, diagnosis.json, model.toml");
+  return asked.sockets->counts().quarantined > 0 ? kExitQuarantined : kExitDone;
+}
+
+}  // namespace
+
+SubcommandRun setup_diagnose(CLI::App& app) {
+  auto command = std::make_shared<DiagnoseCommand>();
+  app.add_option("CONFIG", command->config, "Config file (TOML)")->required();
+  command->trials.declare(app);
+  app.add_option("--out", command->out, "Folder for report, diagnosis and models")->required();
+  app.add_option("--model", command->model, "Base model (run or model.toml); default: tuned here");
+  app.add_option("--reference", command->reference,
+                 "Of ground robots: an earlier log, or a run or model and so its log; asks what "
+                 "changed since")
+      ->type_name("FOLDER|RUN|MODEL");
+  app.add_option("--leave-out", command->leave_out, "Effects that the catalogue is to be without");
+  app.add_option("--seed", command->seed, "Of the bootstrap");
+  command->outputs.declare(app);
+  command->farm.declare(app, true);
+  command->page.declare(app);
+  declare_long_command(app);
+  app.footer(
+      "Examples:\n"
+      "  gapfarm diagnose configs/srv1.toml --trials log.csv --out diagnosis\n"
+      "  gapfarm diagnose configs/srv1.toml --trials log.csv --out d2 --model run/srv1\n"
+      "  gapfarm diagnose configs/push.toml --trials pushes.csv --out d3\n"
+      "  gapfarm diagnose husky.toml --out d4\n"
+      "  gapfarm diagnose husky.toml --reference monday --trials friday --out changed\n"
+      "Stopped?  The same command goes on: simulations are kept in OUT/simulations.sqlite,\n"
+      "fits of ground robots in OUT/fits.jsonl.");
+  return [command](CliContext& context) { return run_diagnose(*command, context); };
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,51 @@
+// gapfarm diagnose: what its parts share.
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/recordings/run.h"
+#include "master/command/inputs.h"
+#include "master/command/outputs.h"
+#include "master/command/page_along.h"
+#include "master/diagnose/result/diagnosis.h"
+
+namespace gapfarm {
+
+inline constexpr const char* kDiagnosisFile = "diagnosis.json";
+
+struct DiagnoseCommand {
+  std::string config;
+  TrialOptions trials;
+  std::string out;
+  std::string model;
+  std::vector<std::string> reference;  // of ground robots: what changed since
+  std::optional<RunLog> reference_log;
+  std::vector<std::string> leave_out;
+  std::optional<std::uint64_t> seed;
+  Outputs outputs;
+  FarmOptions farm;
+  PageOption page;
+};
+
+void add_diagnosis_provenance(const Config& config, const DiagnoseCommand& command,
+                              Diagnosis* diagnosis);
+
+std::string diagnosis_summary(const Diagnosis& diagnosis);
+// diagnosis.json without its trials.
+nlohmann::ordered_json diagnosis_summary_json(const Diagnosis& diagnosis,
+                                              const DiagnoseCommand& command);
+
+// Reads the log that --reference names, if it does.  Errors: the scenario is not of ground robots;
+// a model whose log is gone.
+Status read_reference(DiagnoseCommand* command, const Config& config, Console& console);
+std::string log_hash(const RunLog& log);
+
+// A ground robot: its file and its runs, by its kinematics.  Nothing is simulated.  `stamp`: the
+// text of question.json.
+Result<int> run_diagnose_ground(DiagnoseCommand& command, const Config& config,
+                                const std::string& stamp, CliContext& context);
+
+}  // namespace gapfarm

@@ -1,0 +1,134 @@
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "common/base/hash.h"
+#include "common/base/try.h"
+#include "common/problem/run_files.h"
+#include "common/robot/robot_file.h"
+#include "master/cli/diagnosis/diagnose_command.h"
+#include "master/command/long_command.h"
+#include "master/command/question_stamp.h"
+#include "master/command/run_model.h"
+#include "master/diagnose/result/diagnosis_json.h"
+#include "master/ground/diagnose_ground.h"
+#include "master/ground/fit/fit_file.h"
+#include "master/report/report_html.h"
+
+namespace gapfarm {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kFits = "fits.jsonl";
+
+std::vector<ProgressStage> ground_stages() {
+  std::vector<ProgressStage> all;
+  for (const GroundStage& stage : kGroundStages) all.push_back({stage.name, stage.share});
+  return all;
+}
+
+// The folders of a log, or those that a run's model was fitted to.
+Result<std::vector<std::string>> reference_folders(const std::vector<std::string>& named,
+                                                   Console& console) {
+  std::vector<std::string> folders;
+  std::error_code ignored;
+  for (const std::string& name : named) {
+    if (fs::exists(fs::path(name) / "commands.csv", ignored)) {
+      folders.push_back(name);
+      continue;
+    }
+    const auto model = read_model_of(name, console);
+    if (!model) {
+      return Error{"--reference " + name + ": neither a folder with commands.csv and poses.csv " +
+                   "nor a run or model (" + model.error().message + ")"};
+    }
+    for (const std::string& folder : model->data.files) {
+      if (fs::exists(fs::path(folder) / "commands.csv", ignored)) {
+        folders.push_back(folder);
+        continue;
+      }
+      return Error{"--reference " + name + ": the log that it was fitted to, " + folder +
+                   ", is not there; name its folder instead"};
+    }
+  }
+  return folders;
+}
+
+}  // namespace
+
+Status read_reference(DiagnoseCommand* command, const Config& config, Console& console) {
+  if (command->reference.empty()) return {};
+  if (!config.problem.ground) {
+    return Error{"--reference: asks what changed of a ground robot, but the scenario is " +
+                 config.problem.scenario + "; diagnose both logs, or use crossfit"};
+  }
+  ASSIGN_OR_RETURN(const auto folders, reference_folders(command->reference, console));
+  auto log = read_run_folders(folders, config.problem.ground->robot().channels);
+  if (!log) return Error{"--reference: " + log.error().message};
+  for (const std::string& note : log->notes) console.note("reference: " + note);
+  command->reference_log = std::move(*log);
+  return {};
+}
+
+std::string log_hash(const RunLog& log) {
+  Hasher hasher;
+  for (const LoggedRun& run : log.runs) {
+    hasher.add(run.session).add(run.run);
+    for (const CommandRow& row : run.commands) {
+      hasher.add(row.t_s);
+      for (const double value : row.values) hasher.add(value);
+    }
+    for (const CommandRow& row : run.wheel_speeds) {
+      hasher.add(row.t_s);
+      for (const double value : row.values) hasher.add(value);
+    }
+    for (const PoseRow& row : run.poses) {
+      hasher.add(row.t_s).add(row.X_WM.x).add(row.X_WM.y).add(row.X_WM.theta);
+    }
+  }
+  return hasher.finish();
+}
+
+Result<int> run_diagnose_ground(DiagnoseCommand& command, const Config& config,
+                                const std::string& stamp, CliContext& context) {
+  context.begun = true;
+  const GroundRobot robot = config.problem.ground->robot_at(config.problem.values);
+  ASSIGN_OR_RETURN(const auto runs, read_run_folders(config.trial_files, robot.channels));
+  RETURN_IF_ERROR(LongCommand::begin("diagnose", {command.out}, ground_stages(), context));
+  ASSIGN_OR_RETURN(const auto page, open_page(command.page, command.out, context));
+  const fs::path out(command.out);
+  RETURN_IF_ERROR(command.outputs.write((out / kStampFile).string(), stamp));
+  LongCommand& work = *context.work;
+  FitFile fits(out / kFits);
+  work.keeps_also("fitted", out / kFits);
+  GroundDiagnoseOptions options;
+  options.left_out = command.leave_out;
+  options.seed = config.seed;
+  options.windows.run_in_s = config.windows.run_in_s;
+  options.reference = command.reference_log;
+  options.on_stage = [&](const std::string& stage) { work.stage(stage); };
+  options.on_finding = [&](Finding finding) { work.found(std::move(finding)); };
+  options.on_progress = [&](std::size_t done, std::size_t total) { work.advance(done, total); };
+  options.stopped = [&] { return context.stop.requested(); };
+  options.memo = &fits;
+  ASSIGN_OR_RETURN(auto result, diagnose_ground(robot, runs, options));
+  add_diagnosis_provenance(config, command, &result.diagnosis);
+  for (const std::string& name : command.reference) {
+    result.diagnosis.provenance.emplace_back("reference", name);
+  }
+  RETURN_IF_ERROR(command.outputs.write_in(
+      command.out, {{"robot.toml", format_robot(result.corrected)},
+                    {"values.json", format_values({robot, config.trial_files, result.values})},
+                    {"report.html", report_html(result.diagnosis)},
+                    {kDiagnosisFile, to_json(result.diagnosis)}}));
+  fits.remove();
+  context.console.result(diagnosis_summary(result.diagnosis),
+                         diagnosis_summary_json(result.diagnosis, command));
+  context.console.note("left behind: " + command.out +
+                       "/report.html, diagnosis.json, and robot.toml with what was named put in; "
+                       "next: gapfarm export ros " +
+                       command.out);
+  return kExitDone;
+}
+
+}  // namespace gapfarm

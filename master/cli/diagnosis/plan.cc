@@ -1,0 +1,216 @@
+// gapfarm plan CONFIG|MODEL: what to drive so that a diagnosis sees most.
+#include <spdlog/fmt/fmt.h>
+
+#include <charconv>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "common/base/try.h"
+#include "common/trials/shifted.h"
+#include "common/trials/write.h"
+#include "master/cli/subcommand.h"
+#include "master/command/inputs.h"
+#include "master/command/long_command.h"
+#include "master/command/outputs.h"
+#include "master/diagnose/conclusions/findings.h"
+#include "master/experiments/plan/design.h"
+#include "master/experiments/plan/picture.h"
+
+namespace gapfarm {
+namespace {
+
+constexpr double kAlike = 0.9;  // |cosine| from which two effects are said to look alike
+
+struct PlanOptions {
+  std::string source;
+  std::string out;
+  std::string picture;
+  std::string place;
+  std::string effects = "all";
+  plan::PlanSettings settings;
+  std::optional<unsigned> sessions, chain;
+  std::vector<double> levels, durations;
+  Outputs outputs;
+  FarmOptions farm;
+  KeepOption keep;
+};
+
+// "2" or "2x2": the width of a square, m.
+Result<double> width_of_place(const std::string& text) {
+  const auto wrong = [&] {
+    return Error{"--place is '" + text +
+                 "', expected the width of a square floor in metres, such as 2 or 2x2"};
+  };
+  const std::size_t x = text.find('x');
+  double width = 0, depth = 0;
+  const auto read = [](std::string_view part, double* value) {
+    const auto [end, error] = std::from_chars(part.data(), part.data() + part.size(), *value);
+    return error == std::errc() && end == part.data() + part.size();
+  };
+  if (!read(std::string_view(text).substr(0, x), &width)) return wrong();
+  depth = width;
+  if (x != std::string::npos && !read(std::string_view(text).substr(x + 1), &depth)) return wrong();
+  if (!(width > 0 && width <= 1000) || depth != width) return wrong();
+  return width;
+}
+
+Status apply_options(PlanOptions& options, Config& config) {
+  SimulateSettings& s = config.simulate;
+  if (!options.place.empty()) {
+    ASSIGN_OR_RETURN(const double width, width_of_place(options.place));
+    s.arena_m = width;
+  }
+  if (options.sessions) s.sessions = *options.sessions;
+  if (options.chain) s.chain = *options.chain;
+  if (!options.levels.empty()) s.levels = options.levels;
+  if (!options.durations.empty()) s.durations_s = options.durations;
+  if (options.settings.trials < s.sessions * std::max(1U, s.chain)) {
+    return Error{
+        fmt::format("{} trials are fewer than one chain of {} in each of {} sessions; ask "
+                    "for more --trials, or fewer --sessions or a shorter --chain",
+                    options.settings.trials, s.chain, s.sessions)};
+  }
+  std::string name;
+  for (const char c : options.effects + ",") {
+    if (c != ',') {
+      name += c;
+      continue;
+    }
+    if (!name.empty() && name != "all") options.settings.effects.push_back(name);
+    name.clear();
+  }
+  return {};
+}
+
+std::string size_words(const plan::Visibility& seen) {
+  if (!seen.size) return "-";
+  return plain_number(*seen.size) + (seen.unit == "-" ? "" : " " + seen.unit);
+}
+
+std::string table_text(const plan::DesignedPlan& plan) {
+  std::string text = fmt::format("{:<32} {:>14} {:>14}  {}\n", "named 9 times in 10 from", "here",
+                                 "random plan", "looks like");
+  for (std::size_t k = 0; k < plan.seen.size(); ++k) {
+    const plan::Visibility& seen = plan.seen[k];
+    text +=
+        fmt::format("{:<32} {:>14} {:>14}  {}\n", seen.parameter, size_words(seen),
+                    size_words(plan.seen_at_random[k]), seen.likeness >= kAlike ? seen.like : "");
+  }
+  if (const auto as_good = plan::trials_as_good(plan.power)) {
+    text +=
+        fmt::format("On average over effects {:.0f} of these trials name what {} random ones do.\n",
+                    *as_good, plan.power.back().trials);
+  }
+  const auto list = [&](const std::vector<std::string>& names, const std::string& words) {
+    for (std::size_t k = 0; k < names.size(); ++k) text += (k == 0 ? "" : ", ") + names[k];
+    if (!names.empty()) text += words + "\n";
+  };
+  list(plan.not_planned_for, ": do not move where trials end, only how far repeats scatter");
+  list(plan.without_shift, ": could not be simulated with this robot");
+  text +=
+      "Sizes are distances from neutral; -: not within the catalogue's bounds. What does not show "
+      "in "
+      "poses at rest (motor_lag) needs paths: log them too.\n";
+  return text;
+}
+
+nlohmann::ordered_json table_json(const plan::DesignedPlan& plan) {
+  nlohmann::ordered_json rows = nlohmann::ordered_json::array();
+  for (std::size_t k = 0; k < plan.seen.size(); ++k) {
+    const plan::Visibility& seen = plan.seen[k];
+    nlohmann::ordered_json row = {{"effect", seen.effect},    {"parameter", seen.parameter},
+                                  {"unit", seen.unit},        {"size", nullptr},
+                                  {"size_random", nullptr},   {"like", seen.like},
+                                  {"likeness", seen.likeness}};
+    if (seen.size) row["size"] = *seen.size;
+    if (plan.seen_at_random[k].size) row["size_random"] = *plan.seen_at_random[k].size;
+    rows.push_back(std::move(row));
+  }
+  nlohmann::ordered_json power = nlohmann::ordered_json::array();
+  for (const plan::PowerPoint& p : plan.power) {
+    power.push_back({{"trials", p.trials}, {"planned", p.planned}, {"random", p.random}});
+  }
+  return {{"effects", rows},
+          {"power", power},
+          {"not_planned_for", plan.not_planned_for},
+          {"without_shift", plan.without_shift}};
+}
+
+Result<plan::DesignedPlan> design(const PlanOptions& options, const Config& config,
+                                  CliContext& context) {
+  LongCommand::begin_if_possible("plan", options.keep.place("plan", options.out),
+                                 {{"candidates", 10, 0}, {"what they show", 3, 0}}, context);
+  ASSIGN_OR_RETURN(const auto asked, start_recorded(options.farm, config.farm, context));
+  context.work->stage(0);
+  bool first = true;
+  return plan::design_plan(*asked, config, options.settings, [&](const std::string& /*what*/) {
+    if (!first) context.work->stage(1);
+    first = false;
+  });
+}
+
+Result<int> run_plan(PlanOptions& options, CliContext& context) {
+  ASSIGN_OR_RETURN(Source source, read_source(options.source));
+  // What a correction would shift is no part of what effects do: it takes none along.
+  source.config.problem.residual = {};
+  RETURN_IF_ERROR(apply_options(options, source.config));
+  options.outputs.reads(options.source);
+  RETURN_IF_ERROR(options.outputs.plan({options.out, options.picture}));
+  if (context.dry_run) {
+    return say_dry_run(fmt::format("plan {} trials for {} into {}", options.settings.trials,
+                                   options.source, options.out),
+                       {{"out", options.out}, {"trials", options.settings.trials}}, options.farm,
+                       source.config.farm, context);
+  }
+  ASSIGN_OR_RETURN(const auto plan, design(options, source.config, context));
+  RETURN_IF_ERROR(options.outputs.write(
+      options.out, format_trials(shifted(plan.log, source.frame_x_m, source.frame_y_m))));
+  if (!options.picture.empty()) {
+    RETURN_IF_ERROR(
+        options.outputs.write(options.picture, plan::plan_picture(source.config.problem, plan)));
+  }
+  nlohmann::ordered_json json = table_json(plan);
+  json["out"] = options.out;
+  json["trials"] = plan.log.trials.size();
+  context.console.result(
+      table_text(plan) +
+          fmt::format("{}: {} trials to drive, in this order; x1, y1, theta1 are where the model "
+                      "says the robot stops\n",
+                      options.out, plan.log.trials.size()),
+      json);
+  return kExitDone;
+}
+
+}  // namespace
+
+SubcommandRun setup_plan(CLI::App& app) {
+  auto options = std::make_shared<PlanOptions>();
+  app.add_option("CONFIG|MODEL", options->source, "The robot as far as it is known")->required();
+  app.add_option("--out", options->out, "Trial log to write: what to drive")->required();
+  app.add_option("--picture", options->picture, "SVG to write: the floor, and power by trials");
+  app.add_option("--trials", options->settings.trials, "In all; rounded up to whole chains")
+      ->check(CLI::Range(1, 5000));
+  app.add_option("--effects", options->effects, "Names with commas between, or all");
+  app.add_option("--place", options->place, "Square floor to stay on, from the origin, m: 2x2");
+  app.add_option("--sessions", options->sessions, "Sessions")->check(CLI::Range(1, 100));
+  app.add_option("--chain", options->chain, "Trials before the robot is put down anew")
+      ->check(CLI::Range(1, 1000));
+  app.add_option("--levels", options->levels, "Factors of the commands' duties")
+      ->check(CLI::Range(0.0, 1.0));
+  app.add_option("--durations", options->durations, "s")->check(CLI::Range(0.0, 60.0));
+  app.add_option("--pool", options->settings.pool, "Chains to choose each one from")
+      ->check(CLI::Range(2, 100));
+  app.add_option("--seed", options->settings.seed, "Of the chains to choose from");
+  options->outputs.declare(app);
+  options->keep.declare(app);
+  options->farm.declare(app, false);
+  declare_long_command(app);
+  app.footer(
+      "Examples:\n"
+      "  gapfarm plan configs/srv1.toml --trials 120 --place 2x2 --out plan.csv\n"
+      "  gapfarm plan run/demo/model.toml --effects floor_tilt,motor_asymmetry --out plan.csv "
+      "--picture plan.svg");
+  return [options](CliContext& context) { return run_plan(*options, context); };
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,84 @@
+// gapfarm report RUN|DIAGNOSIS: the page of a run or of a diagnosis, from what they keep alone.
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "common/base/try.h"
+#include "common/trials/files.h"
+#include "master/cli/subcommand.h"
+#include "master/command/outputs.h"
+#include "master/diagnose/result/diagnosis_json.h"
+#include "master/report/report_html.h"
+#include "master/report/run/run_report.h"
+#include "master/run/run_page.h"
+
+namespace gapfarm {
+namespace {
+
+struct ReportCommand {
+  std::string from;
+  std::string out;
+  Outputs outputs;
+};
+
+struct Page {
+  std::string html;
+  std::filesystem::path from;  // what was read
+  std::filesystem::path out;   // where it goes unless told otherwise
+};
+
+Result<Page> page_of_diagnosis(const std::filesystem::path& from) {
+  ASSIGN_OR_RETURN(const std::string text, read_text_file(from.string()));
+  const auto diagnosis = parse_diagnosis(text);
+  if (!diagnosis) return Error{from.string() + ": " + diagnosis.error().message};
+  return Page{report_html(*diagnosis), from, from.parent_path() / "report.html"};
+}
+
+Result<Page> page_of_run(const std::filesystem::path& run) {
+  ASSIGN_OR_RETURN(const auto report, read_run_report({run, {}, {}}));
+  return Page{run_html(report), run / "run.sqlite", run / "report.html"};
+}
+
+Result<Page> page_of(const std::filesystem::path& from) {
+  std::error_code ignored;
+  if (!std::filesystem::is_directory(from, ignored)) return page_of_diagnosis(from);
+  if (std::filesystem::exists(from / "diagnosis.json", ignored)) {
+    return page_of_diagnosis(from / "diagnosis.json");
+  }
+  if (std::filesystem::exists(from / "run.sqlite", ignored)) return page_of_run(from);
+  return Error{from.string() +
+               ": holds neither a diagnosis.json nor a run.sqlite; give a folder that diagnose or "
+               "evolve wrote"};
+}
+
+Result<int> run_report(ReportCommand& command, CliContext& context) {
+  ASSIGN_OR_RETURN(const Page page, page_of(command.from));
+  const std::string out = command.out.empty() ? page.out.string() : command.out;
+  command.outputs.reads(page.from.string());
+  // Its own page is what it is there to draw again.
+  RETURN_IF_ERROR(command.out.empty() ? command.outputs.plan_again(out)
+                                      : command.outputs.plan(out));
+  context.begun = true;
+  RETURN_IF_ERROR(command.outputs.write(out, page.html));
+  context.console.result(out + "\n", {{"report", out}});
+  return kExitDone;
+}
+
+}  // namespace
+
+SubcommandRun setup_report(CLI::App& app) {
+  auto command = std::make_shared<ReportCommand>();
+  app.add_option("RUN|DIAGNOSIS", command->from,
+                 "Folder of a run or of a diagnosis, or a diagnosis.json")
+      ->required();
+  app.add_option("--out", command->out, "HTML file; default: report.html beside it");
+  command->outputs.declare(app);
+  app.footer(
+      "Examples:\n"
+      "  gapfarm report run/demo\n"
+      "  gapfarm report diagnosis\n"
+      "  gapfarm report diagnosis/diagnosis.json --out page.html");
+  return [command](CliContext& context) { return run_report(*command, context); };
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,252 @@
+// gapfarm compare FILE...: searches side by side over seeds.
+#include "master/experiments/compare/compare.h"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <cmath>
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "common/base/build_info.h"
+#include "common/base/shipped.h"
+#include "common/base/try.h"
+#include "common/config/config.h"
+#include "common/json/fields.h"
+#include "common/score/constant_velocity.h"
+#include "common/trials/files.h"
+#include "common/trials/read.h"
+#include "master/cli/subcommand.h"
+#include "master/command/inputs.h"
+#include "master/command/long_command.h"
+#include "master/command/outputs.h"
+#include "master/experiments/compare/summary.h"
+
+namespace gapfarm {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+struct CompareCommand {
+  std::vector<std::string> files;
+  TrialOptions trials;
+  std::string out;
+  std::optional<unsigned> seeds;
+  std::optional<std::uint64_t> first_seed, evaluations;
+  std::optional<double> target;
+  Outputs outputs;
+  FarmOptions farm;
+};
+
+constexpr const char* kFiles[] = {"summary.csv", "runs.csv", "convergence.csv", "compare.html"};
+
+struct Inputs {
+  std::vector<Variant> variants;
+  CompareOptions options;
+  std::optional<double> target;
+};
+
+// Comparison files give variants and settings, configs a variant each; the command line outranks.
+Result<Inputs> read_inputs(const CompareCommand& command) {
+  Inputs inputs;
+  for (const std::string& named : command.files) {
+    const std::string file = shipped_file(named);
+    ASSIGN_OR_RETURN(const auto text, read_text_file(file));
+    if (is_comparison(text)) {
+      ASSIGN_OR_RETURN(auto comparison, read_comparison(file));
+      if (comparison.seeds) inputs.options.seeds = *comparison.seeds;
+      if (comparison.evaluations) inputs.options.evaluations = *comparison.evaluations;
+      if (comparison.target_fitness) inputs.target = comparison.target_fitness;
+      for (Variant& v : comparison.variants) inputs.variants.push_back(std::move(v));
+    } else {
+      ASSIGN_OR_RETURN(auto config, read_config(file));
+      inputs.variants.push_back({std::filesystem::path(file).stem().string(), std::move(config)});
+    }
+  }
+  inputs.options.seeds = command.seeds.value_or(inputs.options.seeds);
+  inputs.options.first_seed = command.first_seed.value_or(inputs.options.first_seed);
+  inputs.options.evaluations = command.evaluations.value_or(inputs.options.evaluations);
+  if (command.target) inputs.target = command.target;
+  return inputs;
+}
+
+// Reads every variant's trials; equal lists of files only once.
+Status read_trials(const TrialOptions& given, std::vector<Variant>& variants, Console& console) {
+  const Variant* before = nullptr;
+  for (Variant& variant : variants) {
+    Config& config = variant.config;
+    if (!given.files.empty()) config.trial_files = given.files;
+    if (config.trial_files.empty()) {
+      return Error{config.path + ": no trials; name them in the config or with --trials"};
+    }
+    if (before != nullptr && before->config.trial_files == config.trial_files) {
+      config.problem.log = before->config.problem.log;
+    } else {
+      ASSIGN_OR_RETURN(
+          auto log,
+          read_trial_files(config.trial_files, command_names(config.problem.commands), given.read));
+      config.problem.log = std::move(log);
+      show_notes(config.problem.log, console);
+    }
+    before = &variant;
+  }
+  return {};
+}
+
+// What makes fitness values comparable.
+Status check_alike(const std::vector<Variant>& variants) {
+  const Problem& first = variants.front().config.problem;
+  for (const Variant& variant : variants) {
+    const Problem& problem = variant.config.problem;
+    const auto refuse = [&](const std::string& what) {
+      return Error{"variant \"" + variant.name + "\" has another " + what + " than \"" +
+                   variants.front().name + "\", so their fitness cannot be compared"};
+    };
+    if (problem.scenario != first.scenario) return refuse("scenario");
+    if (problem.fitness.kind != first.fitness.kind) return refuse("fitness");
+    if (variant.config.trial_files != variants.front().config.trial_files) return refuse("log");
+    RETURN_IF_ERROR(check_evolvable(variant.config));
+  }
+  return {};
+}
+
+void add_random_search(std::vector<Variant>& variants) {
+  for (const Variant& variant : variants) {
+    if (variant.config.evolution.optimiser.kind == OptimiserKind::kRandom) return;
+  }
+  Variant random{"random search", variants.front().config};
+  random.config.evolution.optimiser = {};
+  random.config.evolution.optimiser.kind = OptimiserKind::kRandom;
+  variants.push_back(std::move(random));
+}
+
+// The config's own values, nothing searched.
+Result<Baseline> untuned(Farm& farm, const Problem& problem) {
+  v1::Task task;
+  task.mutable_evaluate();
+  ASSIGN_OR_RETURN(const auto results, farm.run(farm.add_problem(to_proto(problem)), {task}));
+  Baseline baseline{"the config's own values", std::nullopt};
+  if (results.front().outcome() == v1::OK) baseline.fitness = results.front().evaluate().fitness();
+  return baseline;
+}
+
+std::vector<std::pair<std::string, std::string>> provenance(const CompareCommand& command,
+                                                            const Inputs& inputs) {
+  std::vector<std::pair<std::string, std::string>> rows;
+  for (const std::string& file : command.files) rows.emplace_back("file", file);
+  const Config& first = inputs.variants.front().config;
+  for (const std::string& file : first.trial_files) rows.emplace_back("trials", file);
+  rows.emplace_back("trials read", std::to_string(first.problem.log.trials.size()));
+  rows.emplace_back("seeds", fmt::format("{} to {}", inputs.options.first_seed,
+                                         inputs.options.first_seed + inputs.options.seeds - 1));
+  rows.emplace_back("program", build_summary("gapfarm"));
+  return rows;
+}
+
+Status write_all(const CompareCommand& command, const Inputs& inputs,
+                 const ComparisonSummary& summary, const std::vector<ComparedRun>& runs) {
+  return command.outputs.write_in(
+      command.out,
+      {{kFiles[0], summary_csv(summary)},
+       {kFiles[1], runs_csv(summary, runs)},
+       {kFiles[2], convergence_csv(summary)},
+       {kFiles[3], comparison_page(summary, "Searches compared", provenance(command, inputs))}});
+}
+
+nlohmann::ordered_json to_json(const ComparisonSummary& summary) {
+  Json baselines = Json::array(), variants = Json::array();
+  for (const Baseline& b : summary.baselines) {
+    baselines.push_back({{"name", b.name}, {"fitness", number_or_null(b.fitness)}});
+  }
+  for (const VariantSummary& v : summary.variants) {
+    variants.push_back({{"name", v.name},
+                        {"median", v.median},
+                        {"median_lo", v.median_95.lower},
+                        {"median_hi", v.median_95.upper},
+                        {"mean_rank", v.mean_rank},
+                        {"successes", v.successes},
+                        {"median_to_target", number_or_null(v.median_to_target)},
+                        {"expected_to_target", number_or_null(v.expected_to_target)},
+                        {"final", v.final_fitness}});
+  }
+  return {{"fitness", summary.fitness},
+          {"higher_is_better", summary.higher_is_better},
+          {"target", number_or_null(summary.target)},
+          {"evaluations", summary.evaluations},
+          {"seeds", summary.seeds},
+          {"baselines", baselines},
+          {"variants", variants}};
+}
+
+Status plan_outputs(CompareCommand& command, const Inputs& inputs) {
+  for (const std::string& file : command.files) command.outputs.reads(file);
+  for (const Variant& variant : inputs.variants) command.outputs.reads(variant.config.problem.log);
+  return command.outputs.plan_in(command.out, {std::begin(kFiles), std::end(kFiles)});
+}
+
+Result<int> run_compare(CompareCommand& command, CliContext& context) {
+  ASSIGN_OR_RETURN(Inputs inputs, read_inputs(command));
+  RETURN_IF_ERROR(read_trials(command.trials, inputs.variants, context.console));
+  RETURN_IF_ERROR(check_alike(inputs.variants));
+  RETURN_IF_ERROR(plan_outputs(command, inputs));
+  add_random_search(inputs.variants);
+  const Config& first = inputs.variants.front().config;
+  if (context.dry_run) {
+    const CompareOptions& options = inputs.options;
+    return say_dry_run(
+        fmt::format("compare {} searches, {} runs of {} evaluations each, into {}",
+                    inputs.variants.size(), options.seeds, options.evaluations, command.out),
+        {{"out", command.out},
+         {"variants", inputs.variants.size()},
+         {"seeds", options.seeds},
+         {"evaluations", options.evaluations}},
+        command.farm, first.farm, context);
+  }
+  RETURN_IF_ERROR(LongCommand::begin("compare", {command.out}, {{"evaluate"}}, context));
+  ASSIGN_OR_RETURN(const auto asked, start_recorded(command.farm, first.farm, context));
+  context.work->stage(
+      0, 1 + inputs.options.evaluations * inputs.options.seeds * inputs.variants.size());
+  ASSIGN_OR_RETURN(const auto as_written, untuned(*asked, first.problem));
+  ASSIGN_OR_RETURN(const auto runs,
+                   compare(inputs.variants, inputs.options, farm_scorer(*asked, inputs.variants)));
+  ComparisonSummary summary =
+      summarise_comparison(inputs.variants, runs, inputs.options, inputs.target);
+  const auto constant = constant_velocity_fitness(first.problem);
+  if (!constant) context.console.note("no constant-velocity baseline: " + constant.error().message);
+  summary.baselines = {{"constant velocity", constant ? std::optional(*constant) : std::nullopt},
+                       as_written};
+  RETURN_IF_ERROR(write_all(command, inputs, summary, runs));
+  context.console.result(comparison_text(summary), to_json(summary));
+  context.console.note(
+      "left behind: " + (std::filesystem::path(command.out) / "compare.html").string() +
+      ", summary.csv, runs.csv, convergence.csv");
+  return asked.sockets->counts().quarantined > 0 ? kExitQuarantined : kExitDone;
+}
+
+}  // namespace
+
+SubcommandRun setup_compare(CLI::App& app) {
+  auto command = std::make_shared<CompareCommand>();
+  app.add_option("FILE", command->files,
+                 "Comparison files with [compare] and [variants], or configs, a variant each")
+      ->required();
+  command->trials.declare(app, "Trial logs in place of the configs'");
+  app.add_option("--out", command->out, "Folder for the tables and the page")->required();
+  app.add_option("--seeds", command->seeds, "Runs of each variant")->check(CLI::Range(1, 10000));
+  app.add_option("--first-seed", command->first_seed, "Seed of each variant's first run");
+  app.add_option("--evaluations", command->evaluations, "Evaluations of each run")
+      ->check(CLI::PositiveNumber);
+  app.add_option("--target", command->target, "Fitness whose reaching counts as success");
+  command->outputs.declare(app);
+  command->farm.declare(app, true);
+  declare_long_command(app);
+  app.footer(
+      "Random search, constant-velocity motion and the config's own values are always among the\n"
+      "baselines.\n\n"
+      "Examples:\n"
+      "  gapfarm compare configs/compare/forward.toml --trials log/*.dat --out compared\n"
+      "  gapfarm compare a.toml b.toml --seeds 20 --evaluations 2000 --target 0.5 --out compared");
+  return [command](CliContext& context) { return run_compare(*command, context); };
+}
+
+}  // namespace gapfarm

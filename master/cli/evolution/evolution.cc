@@ -1,0 +1,152 @@
+#include "master/cli/evolution/evolution.h"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <limits>
+#include <nlohmann/json.hpp>
+
+#include "common/base/try.h"
+#include "common/json/fields.h"
+#include "master/command/long_command.h"
+#include "master/run/run.h"
+
+namespace gapfarm {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+// A run's words, to its user.
+class OnConsole : public RunWatcher {
+ public:
+  explicit OnConsole(Console& console) : console_(console) {}
+  void note(std::string_view text) override { console_.note(text); }
+  void error(const Error& error) override { console_.error(error); }
+  void progress(std::string_view text, bool news) override {
+    if (text.empty()) return console_.clear_progress();
+    console_.progress(text, news);
+  }
+  void read(const TrialLog& log) override { show_notes(log, console_); }
+
+ private:
+  Console& console_;
+};
+
+void declare_overrides(EvolutionOverrides& overrides, CLI::App& app) {
+  constexpr std::uint64_t kMost = std::numeric_limits<std::int64_t>::max();
+  app.add_option("--generations", overrides.generations, "Stop after so many generations")
+      ->check(CLI::Range(std::uint64_t{1}, kMost));
+  app.add_option("--evaluations", overrides.evaluations,
+                 "Stop after the generation in which so many evaluations are reached")
+      ->check(CLI::Range(std::uint64_t{1}, kMost));
+  app.add_option("--time", overrides.time_s, "Stop after so many seconds")
+      ->check(CLI::PositiveNumber);
+  app.add_option("--target", overrides.target_fitness, "Stop at this fitness");
+  app.add_option("--population", overrides.population, "Individuals")
+      ->check(CLI::Range(2, 1000000));
+}
+
+Result<std::unique_ptr<FarmOfRun>> open_farm(const RunStore& store, const Config& config,
+                                             const EvolutionOptions& options, Log& log,
+                                             const std::function<void(const FarmEvent&)>& keep,
+                                             CliContext& context) {
+  SocketFarmOptions base;
+  base.epoch = store.epoch();
+  base.numeric_class = store.info().numeric_class;
+  base.shuffle_seed = options.shuffle;
+  report_to(log, base);
+  base.on_event = [keep, next = base.on_event](const FarmEvent& event) {
+    keep(event);
+    if (next) next(event);
+  };
+  ASSIGN_OR_RETURN(auto farm, start_farm(options.farm, config.farm, context, base));
+  for (const std::string& endpoint : farm->endpoints()) {
+    if (endpoint.rfind("ipc://", 0) != 0) {
+      context.console.note("listening for workers: gapfarm-worker --connect " + endpoint);
+    }
+  }
+  return farm_of_run(std::move(farm));
+}
+
+void add_validation(const RunSummary& summary, const Problem& problem, std::string& text,
+                    Json& json) {
+  if (summary.validated.empty()) return;
+  text += fmt::format("validation on {} {} kept apart, {}:\n", summary.kept_apart,
+                      problem.ground ? "windows" : "trials", fitness_name(problem.fitness.kind));
+  for (const Validated& row : summary.validated) {
+    text += fmt::format("  {:<24} {}\n", row.name,
+                        row.fitness ? fmt::format("{:.6g}", *row.fitness) : "does not end well");
+    json["validation"].push_back({{"name", row.name}, {"fitness", number_or_null(row.fitness)}});
+  }
+}
+
+void show(const RunSummary& summary, const RunStore& store, const Problem& problem,
+          Console& console) {
+  const EvolveSummary& evolved = summary.evolved;
+  const FitnessKind kind = problem.fitness.kind;
+  Json json = {
+      {"run", store.run().string()},        {"state", summary.stopped() ? "stopped" : "finished"},
+      {"stop_reason", evolved.text},        {"generations", evolved.generations},
+      {"evaluations", evolved.evaluations}, {"wall_s", evolved.wall_s},
+      {"fitness", fitness_name(kind)},      {"best_fitness", nullptr}};
+  std::string text = evolved.text;
+  if (evolved.best && evolved.best->outcome == v1::OK) {
+    const double best = fitness_of_cost(kind, evolved.best->cost);
+    text += fmt::format("; best {} {:.6g}", fitness_name(kind), best);
+    json["best_fitness"] = best;
+  }
+  text += fmt::format(" after {} generations, {} evaluations, {}\n", evolved.generations,
+                      evolved.evaluations, format_duration(evolved.wall_s));
+  add_validation(summary, problem, text, json);
+  for (const std::string& file : summary.files) json["files"].push_back(file);
+  if (!summary.files.empty()) {
+    text += fmt::format("left behind: {}\n", fmt::join(summary.files, ", "));
+  }
+  if (!summary.stopped()) json["given_up"] = summary.given_up;
+  console.result(text, json);
+}
+
+}  // namespace
+
+void EvolutionOptions::declare(CLI::App& app) {
+  declare_overrides(overrides, app);
+  farm.declare(app, true);
+  page.declare(app);
+  declare_long_command(app);
+  app.add_option("--shuffle", shuffle,
+                 "Hand jobs out in an order shuffled by this seed; the results do not change");
+}
+
+int run_evolution(RunStore& store, const Config& config, const EvolutionOptions& options, Log& log,
+                  CliContext& context) {
+  const std::string run = store.run().string();
+  log.set({"run", run});
+  // Without it the run goes on all the same.
+  if (Status s = context.console.keep((store.run() / "log.txt").string()); !s) {
+    context.console.error(s.error());
+  }
+  log.copy_to(context.console.kept());
+  OnConsole watcher(context.console);
+  std::unique_ptr<PageAlong> page;
+  const auto farm = [&](const auto& keep) -> Result<std::unique_ptr<FarmOfRun>> {
+    ASSIGN_OR_RETURN(auto opened, open_page(options.page, store.run(), context));
+    page = std::move(opened);
+    return open_farm(store, config, options, log, keep, context);
+  };
+  const auto summary = evolve_run(
+      store, {config, config.problem, log, farm, [&] { return context.stop.requested(); }},
+      watcher);
+  if (!summary) return failed(summary.error(), context);
+  show(*summary, store, config.problem, context.console);
+  if (summary->stopped()) {
+    context.console.note("continue with: gapfarm resume " + run);
+    return kExitResumable;
+  }
+  if (summary->given_up == 0) return kExitDone;
+  context.console.note(fmt::format(
+      "{} given up; which and why: gapfarm status {}",
+      summary->given_up == 1 ? "1 task was" : std::to_string(summary->given_up) + " tasks were",
+      run));
+  return kExitQuarantined;
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,28 @@
+// What `evolve` and `resume` share: their options, and how a run is shown to its user.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <optional>
+
+#include "master/command/inputs.h"
+#include "master/command/page_along.h"
+#include "master/run/overrides.h"
+#include "master/store/run_store.h"
+
+namespace gapfarm {
+
+struct EvolutionOptions {
+  EvolutionOverrides overrides;
+  FarmOptions farm;
+  PageOption page;
+  std::optional<std::uint64_t> shuffle;
+
+  void declare(CLI::App& app);
+};
+
+// Evolves (evolve_run()) and shows what comes of it.  `config`: overrides applied.  Returns an
+// ExitCode.
+int run_evolution(RunStore& store, const Config& config, const EvolutionOptions& options, Log& log,
+                  CliContext& context);
+
+}  // namespace gapfarm

@@ -1,0 +1,92 @@
+// gapfarm evolve CONFIG: evolve parameters against a trial log.
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "common/base/try.h"
+#include "common/config/config.h"
+#include "master/cli/evolution/evolution.h"
+#include "master/cli/subcommand.h"
+#include "master/command/long_command.h"
+#include "master/command/outputs.h"
+#include "master/run/stored_run.h"
+#include "master/run/validation.h"
+
+namespace gapfarm {
+namespace {
+
+struct EvolveCommand {
+  std::string config;
+  TrialOptions trials;
+  std::string out;
+  std::optional<std::uint64_t> seed;
+  EvolutionOptions options;
+};
+
+Result<int> say_plan(const EvolveCommand& command, const Config& config, CliContext& context) {
+  const std::size_t genes = config.problem.genes.size(), trials = config.problem.log.trials.size();
+  const std::string would = "evolve " + std::to_string(genes) + " parameters on " +
+                            std::to_string(trials) + " trials into " + command.out + ", seed " +
+                            std::to_string(config.seed) + ", population " +
+                            std::to_string(config.evolution.population) + ", at most " +
+                            std::to_string(config.evolution.generations) + " generations";
+  return say_dry_run(would,
+                     {{"out", command.out},
+                      {"genes", genes},
+                      {"trials", trials},
+                      {"seed", config.seed},
+                      {"population", config.evolution.population},
+                      {"generations", config.evolution.generations}},
+                     command.options.farm, config.farm, context);
+}
+
+Result<int> run_evolve(const EvolveCommand& command, CliContext& context) {
+  const std::unique_ptr<Log> log = command.options.farm.log.open();
+  const NotesGoTo notes(*log, context.console);
+  ASSIGN_OR_RETURN(
+      const auto config,
+      open_config(command.config, command.trials, context.console, [&](Config& read) -> Status {
+        command.options.overrides.apply(read.evolution);
+        if (command.seed) read.seed = *command.seed;
+        RETURN_IF_ERROR(check_runnable(read));
+        RETURN_IF_ERROR(check_farm(command.options.farm, read.farm));
+        return check_folder(command.out, FolderKind::kRun);
+      }));
+  if (context.dry_run) return say_plan(command, config, context);
+  std::error_code ignored;
+  const bool folder_was_there = std::filesystem::exists(command.out, ignored);
+  ASSIGN_OR_RETURN(RunStore store,
+                   RunStore::create(command.out, run_info(config, command.options.overrides)));
+  context.console.note(command.out + ": evolving " + std::to_string(config.problem.genes.size()) +
+                       " parameters on " + std::to_string(config.problem.log.trials.size()) +
+                       " trials, seed " + std::to_string(config.seed));
+  const int code = run_evolution(store, config, command.options, *log, context);
+  // What failed before its first generation is not to be in the way of the next attempt.
+  const auto checkpoint = store.checkpoint();
+  if (code == kExitFailed && checkpoint && !*checkpoint) {
+    if (Status s = RunStore::discard(std::move(store), !folder_was_there); !s) {
+      context.console.error(s.error());
+    }
+  }
+  return code;
+}
+
+}  // namespace
+
+SubcommandRun setup_evolve(CLI::App& app) {
+  auto command = std::make_shared<EvolveCommand>();
+  app.add_option("CONFIG", command->config, "Config file (TOML)")->required();
+  command->trials.declare(app);
+  app.add_option("--out", command->out, "Run folder to make")->required();
+  app.add_option("--seed", command->seed, "In place of the config's");
+  command->options.declare(app);
+  app.footer(
+      "Examples:\n"
+      "  gapfarm evolve configs/demo.toml --out run/demo\n"
+      "  gapfarm evolve configs/srv1.toml --trials monday.csv tuesday.csv --out run/srv1\n"
+      "  gapfarm evolve configs/srv1.toml --trials log.csv --out run/big --workers 0 \\\n"
+      "      --listen tcp://0.0.0.0:5555     # then: gapfarm-worker --connect tcp://HOST:5555");
+  return [command](CliContext& context) { return run_evolve(*command, context); };
+}
+
+}  // namespace gapfarm

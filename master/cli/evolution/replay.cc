@@ -1,0 +1,246 @@
+// gapfarm replay RUN --genome ID: one individual of a run again, from what the run store keeps.
+#include <bit>
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "common/base/try.h"
+#include "common/json/fields.h"
+#include "common/trials/text/csv.h"
+#include "common/trials/write.h"
+#include "master/cli/subcommand.h"
+#include "master/command/inputs.h"
+#include "master/command/outputs.h"
+#include "master/command/run_model.h"
+#include "master/evolve/evaluation.h"
+#include "master/evolve/individual.h"
+#include "master/farm/planned_trials.h"
+#include "master/run/evolution_farm.h"
+#include "master/store/run_reader.h"
+
+namespace gapfarm {
+namespace {
+
+struct ReplayOptions {
+  std::string run;
+  std::string genome;  // a birth id, or "best"
+  std::optional<std::uint64_t> generation;
+  std::string paths;
+  double interval_s = 0.05;
+  Outputs outputs;
+};
+
+struct Found {
+  StoredIndividual individual;
+  std::uint64_t generation = 0;
+};
+
+// The individual as the latest generation up to `until` has it.
+Result<Found> find_individual(const RunReader& reader, std::uint64_t birth_id,
+                              std::optional<std::uint64_t> until) {
+  ASSIGN_OR_RETURN(const auto generations, reader.generations());
+  for (auto g = generations.rbegin(); g != generations.rend(); ++g) {
+    if (until && g->generation > *until) continue;
+    ASSIGN_OR_RETURN(const auto individuals, reader.individuals(g->generation));
+    for (const StoredIndividual& individual : individuals) {
+      if (individual.birth_id == birth_id) return Found{individual, g->generation};
+    }
+  }
+  return Error{reader.run().string() + ": no generation" +
+               (until ? " up to " + std::to_string(*until) : "") + " holds genome " +
+               std::to_string(birth_id) + "; --genome best is its best, and `sqlite3 " +
+               reader.run().string() +
+               "/run.sqlite 'SELECT DISTINCT birth_id FROM individuals'` lists them"};
+}
+
+// The best of the latest generation up to `until`.
+Result<Found> find_best(const RunReader& reader, std::optional<std::uint64_t> until) {
+  ASSIGN_OR_RETURN(const auto generations, reader.generations());
+  for (auto g = generations.rbegin(); g != generations.rend(); ++g) {
+    if (until && g->generation > *until) continue;
+    ASSIGN_OR_RETURN(const auto individuals, reader.individuals(g->generation));
+    const StoredIndividual* best = nullptr;
+    const bool higher = reader.info().higher_is_better;
+    for (const StoredIndividual& other : individuals) {
+      if (!other.fitness) continue;
+      const bool better = best == nullptr || (higher ? *other.fitness > *best->fitness
+                                                     : *other.fitness < *best->fitness);
+      if (better) best = &other;
+    }
+    if (best != nullptr) return Found{*best, g->generation};
+  }
+  return Error{reader.run().string() +
+               ": no generation holds an individual that ended well; evolve it further"};
+}
+
+Result<Found> find(const RunReader& reader, const ReplayOptions& options) {
+  if (options.genome == "best") return find_best(reader, options.generation);
+  const auto id = parse_integer(options.genome);
+  if (!id || *id < 0) {
+    return Error{"--genome is '" + options.genome + "', expected a birth id or 'best'"};
+  }
+  return find_individual(reader, static_cast<std::uint64_t>(*id), options.generation);
+}
+
+// A duplicate took its score from the first individual of that genome: who that is.
+Result<std::optional<std::uint64_t>> earlier_twin(const RunReader& reader, const Found& found) {
+  ASSIGN_OR_RETURN(const auto generations, reader.generations());
+  std::optional<std::uint64_t> twin;
+  for (const StoredGeneration& g : generations) {
+    if (g.generation > found.generation) break;
+    ASSIGN_OR_RETURN(const auto individuals, reader.individuals(g.generation));
+    for (const StoredIndividual& other : individuals) {
+      const bool earlier = other.birth_id < twin.value_or(found.individual.birth_id);
+      if (earlier && other.genome == found.individual.genome) twin = other.birth_id;
+    }
+  }
+  return twin;
+}
+
+class Replay {
+ public:
+  Replay(SocketFarm& farm, const Problem& problem, std::uint64_t seed)
+      : farm_(farm), problem_(problem), seed_(seed), hash_(farm.add_problem(to_proto(problem))) {}
+
+  // All scores of `individual`, on the random streams of `birth_id`.
+  Result<Standing> standing(const StoredIndividual& individual, std::uint64_t birth_id) {
+    std::vector<v1::Task> tasks;
+    for (unsigned replicate = 0; replicate < std::max(1u, individual.scores); ++replicate) {
+      tasks.push_back(evaluation_task({birth_id, replicate, individual.genome}, seed_));
+    }
+    ASSIGN_OR_RETURN(const auto results, farm_.run(hash_, tasks));
+    Standing standing;
+    for (const v1::TaskResult& result : results) {
+      ASSIGN_OR_RETURN(const Score score, score_of(result, problem_.fitness.kind));
+      standing.add(score);
+    }
+    return standing;
+  }
+
+  // Drives the whole log with this individual, pose by pose.
+  Result<TrialLog> drive(const StoredIndividual& individual, double interval_s) {
+    std::vector<v1::Task> tasks =
+        simulate_tasks(plan_of(problem_, problem_.log), {}, seed_, interval_s);
+    for (v1::Task& task : tasks) {
+      task.mutable_simulate()->mutable_point()->mutable_genome()->Assign(individual.genome.begin(),
+                                                                         individual.genome.end());
+    }
+    ASSIGN_OR_RETURN(const auto results, farm_.run(hash_, tasks));
+    TrialLog log;
+    for (const v1::TaskResult& result : results) {
+      if (result.outcome() != v1::OK) {
+        return Error{"the drive ended with " + v1::Outcome_Name(result.outcome()) + " (" +
+                     result.message() + ")"};
+      }
+      for (const v1::Trial& trial : result.simulate().trials()) {
+        log.trials.push_back(from_proto(trial));
+      }
+    }
+    return log;
+  }
+
+ private:
+  SocketFarm& farm_;
+  const Problem& problem_;
+  std::uint64_t seed_;
+  std::string hash_;
+};
+
+std::string in_full(const std::string& outcome, const std::optional<double>& fitness) {
+  return fitness ? format_number(fitness, 17) : outcome;
+}
+
+// Whether it is the same to the bit, in words and as JSON.
+struct Comparison {
+  bool same = false;
+  std::string text;
+  nlohmann::ordered_json json;
+};
+
+Comparison compare(const Found& found, const Standing& again, const Problem& problem) {
+  const FitnessKind kind = problem.fitness.kind;
+  const std::string outcome = v1::Outcome_Name(again.outcome);
+  std::optional<double> fitness;
+  if (again.outcome == v1::OK) fitness = fitness_of_cost(kind, again.cost);
+  const StoredIndividual& stored = found.individual;
+  Comparison result;
+  result.same = outcome == stored.outcome && fitness.has_value() == stored.fitness.has_value() &&
+                (!fitness || std::bit_cast<std::uint64_t>(*fitness) ==
+                                 std::bit_cast<std::uint64_t>(*stored.fitness));
+  const std::string who = "genome " + std::to_string(stored.birth_id) + " of generation " +
+                          std::to_string(found.generation) + ": " + fitness_name(kind) + " ";
+  result.text = result.same ? who + in_full(outcome, fitness) + " from " +
+                                  std::to_string(again.scores) + " scores, the same to the bit\n"
+                            : who + "differs: stored " + in_full(stored.outcome, stored.fitness) +
+                                  ", replayed " + in_full(outcome, fitness) + "\n";
+  result.json = {
+      {"genome", stored.birth_id},
+      {"generation", found.generation},
+      {"fitness", fitness_name(kind)},
+      {"same", result.same},
+      {"stored", {{"outcome", stored.outcome}, {"fitness", number_or_null(stored.fitness)}}},
+      {"replayed", {{"outcome", outcome}, {"fitness", number_or_null(fitness)}}},
+      {"scores", again.scores}};
+  return result;
+}
+
+Result<int> run_replay(ReplayOptions& options, CliContext& context) {
+  ASSIGN_OR_RETURN(const RunReader reader, RunReader::open(options.run));
+  const RunInfo& info = reader.info();
+  ASSIGN_OR_RETURN(const Problem problem, stored_problem(reader));
+  ASSIGN_OR_RETURN(const Found found, find(reader, options));
+
+  options.outputs.reads((std::filesystem::path(options.run) / "run.sqlite").string());
+  RETURN_IF_ERROR(options.outputs.plan(options.paths));
+
+  FarmOptions local;
+  local.workers = 1;
+  ASSIGN_OR_RETURN(auto farm, start_farm(local, {}, context));
+  Replay replay(*farm, problem, info.seed);
+  Result<Standing> again = replay.standing(found.individual, found.individual.birth_id);
+  if (!again) return again.error();
+  if (const auto twin = earlier_twin(reader, found); twin && *twin) {
+    context.console.note("scored as its twin, genome " + std::to_string(**twin));
+    again = replay.standing(found.individual, **twin);
+    if (!again) return again.error();
+  }
+  Comparison comparison = compare(found, *again, problem);
+  if (!comparison.same && farm->numeric_class() != info.numeric_class) {
+    context.console.note("this machine computes other last bits: numeric class " +
+                         farm->numeric_class() + ", the run's " + info.numeric_class);
+  }
+  if (!options.paths.empty()) {
+    ASSIGN_OR_RETURN(const TrialLog log, replay.drive(found.individual, options.interval_s));
+    // Without a mark: they were not measured, so no log may read them by itself.
+    RETURN_IF_ERROR(options.outputs.write(options.paths, format_paths(log)));
+    comparison.text +=
+        options.paths + ": " + std::to_string(log.trials.size()) + " trials driven by it\n";
+    comparison.json["paths"] = options.paths;
+  }
+  context.console.result(comparison.text, comparison.json);
+  return comparison.same ? kExitDone : kExitFailed;
+}
+
+}  // namespace
+
+SubcommandRun setup_replay(CLI::App& app) {
+  auto options = std::make_shared<ReplayOptions>();
+  app.add_option("RUN", options->run, "Folder of the run")->required();
+  app.add_option("--genome", options->genome, "Birth id of the individual, or best")->required();
+  app.add_option("--generation", options->generation,
+                 "As it was then (default: the last that holds it)");
+  app.add_option("--paths", options->paths,
+                 "Drive the run's log with it and write the poses on the way to this file");
+  app.add_option("--interval", options->interval_s, "Between two poses, s")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  options->outputs.declare(app);
+  app.footer(
+      "Examples:\n"
+      "  gapfarm replay run/demo --genome best\n"
+      "  gapfarm replay run/demo --genome 1284 --paths driven_by_1284.csv --interval 0.02\n"
+      "Exit status: 0 the same to the bit, 1 it differs (both values are shown).");
+  return [options](CliContext& context) { return run_replay(*options, context); };
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,69 @@
+// gapfarm resume RUN: continue a run from its last generation, or from an earlier one.
+#include <algorithm>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "common/base/try.h"
+#include "master/cli/evolution/evolution.h"
+#include "master/cli/subcommand.h"
+#include "master/command/long_command.h"
+#include "master/run/run.h"
+#include "master/run/stored_run.h"
+#include "master/store/run_reader.h"
+
+namespace gapfarm {
+namespace {
+
+struct ResumeCommand {
+  std::string run;
+  std::optional<std::uint64_t> generation;
+  EvolutionOptions options;
+};
+
+// By its reader: a store of an older version stays as it is.
+Result<int> say_resume(const ResumeCommand& command, CliContext& context) {
+  ASSIGN_OR_RETURN(const auto reader, RunReader::open(command.run));
+  ASSIGN_OR_RETURN(const auto generations, reader.generations());
+  ASSIGN_OR_RETURN(const Config config, stored_config(reader.info(), command.options.overrides));
+  const std::uint64_t last = generations.empty() ? 0 : generations.back().generation;
+  const std::uint64_t from = std::min(command.generation.value_or(last), last);
+  return say_dry_run(
+      "go on with " + command.run + " after generation " + std::to_string(from) + " to at most " +
+          std::to_string(config.evolution.generations),
+      {{"run", command.run}, {"generation", from}, {"generations", config.evolution.generations}},
+      command.options.farm, config.farm, context);
+}
+
+Result<int> run_resume(const ResumeCommand& command, CliContext& context) {
+  if (context.dry_run) return say_resume(command, context);
+  const std::unique_ptr<Log> log = command.options.farm.log.open();
+  const NotesGoTo notes(*log, context.console);
+  ASSIGN_OR_RETURN(RunStore store, RunStore::open(command.run));
+  context.begun = true;
+  const Result<Config> config = stored_config(store.info(), command.options.overrides);
+  if (!config) return stopped_by(store, {command.run + ": " + config.error().message});
+  if (command.generation) {
+    const auto kept = store.truncate_after(*command.generation);
+    if (!kept) return stopped_by(store, kept.error());
+    if (!kept->empty()) context.console.note("later generations are kept in " + kept->string());
+  }
+  return run_evolution(store, *config, command.options, *log, context);
+}
+
+}  // namespace
+
+SubcommandRun setup_resume(CLI::App& app) {
+  auto command = std::make_shared<ResumeCommand>();
+  app.add_option("RUN", command->run, "Folder of the run")->required();
+  app.add_option("--generation", command->generation,
+                 "Continue after this generation; later ones are moved to a file of their own");
+  command->options.declare(app);
+  app.footer(
+      "Examples:\n"
+      "  gapfarm resume run/demo\n"
+      "  gapfarm resume run/demo --generations 200    # evolve a finished run further\n"
+      "  gapfarm resume run/demo --generation 20      # from an earlier generation");
+  return [command](CliContext& context) { return run_resume(*command, context); };
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,338 @@
+// gapfarm drive RUN|MODEL: a list of commands or way-points, many times.
+#include "master/experiments/drive/drive.h"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <charconv>
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "common/base/suggest.h"
+#include "common/base/try.h"
+#include "common/trials/read.h"
+#include "common/trials/waypoint_log.h"
+#include "master/cli/subcommand.h"
+#include "master/command/inputs.h"
+#include "master/command/long_command.h"
+#include "master/command/outputs.h"
+#include "master/command/run_model.h"
+#include "master/experiments/drive/drive_report.h"
+
+namespace gapfarm {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr double kSpacing_m = 0.02;  // between points of paths that are compared
+
+struct DriveCommand {
+  std::string model;
+  std::vector<std::string> commands, waypoints, mined;
+  TrialOptions reading;
+  std::string start = "0,0,0";
+  std::string log;  // blendersim's
+  std::string out;
+  unsigned runs = 200;
+  unsigned targets = 0;  // of the log; 0: all
+  double coverage = 0.9;
+  DriveSettings settings;
+  Outputs outputs;
+  FarmOptions farm;
+};
+
+// What is to be driven, and what was.
+struct Task {
+  Pose start;
+  std::vector<CommandSpec> commands;     // either these
+  std::vector<Eigen::Vector2d> targets;  // or those
+  std::vector<PathPoint> real;
+};
+
+Result<std::vector<double>> numbers(const std::string& text, std::size_t count,
+                                    const std::string& what) {
+  std::vector<double> found;
+  const char* at = text.data();
+  const char* const end = text.data() + text.size();
+  while (at < end && found.size() < count) {
+    double value = 0;
+    const auto [rest, error] = std::from_chars(at, end, value);
+    if (error != std::errc()) break;
+    found.push_back(value);
+    at = rest;
+    if (at < end && *at == ',') ++at;
+  }
+  if (found.size() != count || at != end) {
+    return Error{what + " is '" + text + "', expected " + std::to_string(count) +
+                 " numbers with commas between"};
+  }
+  return found;
+}
+
+// "forward" or "turn_ccw:0.5".
+Result<CommandSpec> command_of(const std::string& text, const std::vector<CommandSpec>& known) {
+  const std::size_t colon = text.find(':');
+  const std::string name = text.substr(0, colon);
+  for (const CommandSpec& spec : known) {
+    if (spec.name != name) continue;
+    CommandSpec command = spec;
+    if (colon != std::string::npos) {
+      ASSIGN_OR_RETURN(const auto seconds,
+                       numbers(text.substr(colon + 1), 1, "the duration of " + name));
+      if (!(seconds[0] > 0 && seconds[0] <= 60)) {
+        return Error{"command '" + text + "' lasts outside (0, 60] s"};
+      }
+      command.duration_s = seconds[0];
+    }
+    return command;
+  }
+  return Error{"there is no command '" + name + "'" + suggestion(name, command_names(known))};
+}
+
+Result<Task> read_task(const DriveCommand& command, const Model& model) {
+  const int kinds = (command.commands.empty() ? 0 : 1) + (command.waypoints.empty() ? 0 : 1) +
+                    (command.log.empty() ? 0 : 1);
+  if (kinds != 1) return Error{"give one of --commands, --waypoints and --log"};
+  Task task;
+  ASSIGN_OR_RETURN(const auto start, numbers(command.start, 3, "--start"));
+  task.start = {start[0], start[1], wrap_angle(start[2])};
+  for (const std::string& text : command.commands) {
+    ASSIGN_OR_RETURN(const auto spec, command_of(text, model.commands));
+    task.commands.push_back(spec);
+  }
+  for (const std::string& text : command.waypoints) {
+    ASSIGN_OR_RETURN(const auto xy, numbers(text, 2, "a way-point"));
+    task.targets.emplace_back(xy[0], xy[1]);
+  }
+  if (command.log.empty()) return task;
+  ASSIGN_OR_RETURN(auto log, read_waypoint_log(command.log));
+  task.start = log.path.front().pose;
+  task.targets = log.targets;
+  if (command.targets > 0 && command.targets < task.targets.size()) {
+    // The real path ends where it came closest to the last target that is kept, after the one
+    // before.
+    task.targets.resize(command.targets);
+    std::size_t from = 0;
+    for (const Eigen::Vector2d& target : task.targets) {
+      std::size_t nearest = from;
+      double least = INFINITY;
+      bool left = false;
+      for (std::size_t i = from; i < log.path.size() && !left; ++i) {
+        const double d =
+            std::hypot(log.path[i].pose.x - target.x(), log.path[i].pose.y - target.y());
+        if (d < least) {
+          least = d;
+          nearest = i;
+        }
+        left = least < 0.2 && d > least + 0.1;
+      }
+      from = nearest;
+    }
+    log.path.resize(from + 1);
+  }
+  task.real = floor_path(log.path, kSpacing_m);
+  return task;
+}
+
+class Driving {
+ public:
+  Driving(const DriveCommand& command, const Task& task, const Problem& problem, Farm& farm,
+          Console& console)
+      : command_(command), task_(task), problem_(problem), farm_(farm), console_(console) {
+    report_.coverage = command.coverage;
+    report_.real = task.real;
+    report_.targets = task.targets;
+  }
+
+  Result<DriveReport> run() {
+    ASSIGN_OR_RETURN(const auto nominal, nominal_velocities(farm_, problem_));
+    RETURN_IF_ERROR(simulate(nominal));
+    auto constant = nominal;
+    if (!command_.mined.empty()) {
+      ASSIGN_OR_RETURN(const auto log,
+                       read_trial_files(command_.mined, command_names(problem_.commands),
+                                        command_.reading.read));
+      show_notes(log, console_);
+      ASSIGN_OR_RETURN(const auto fitted, constant_velocities(log, problem_.commands));
+      constant = fitted;
+      ASSIGN_OR_RETURN(const auto mined, MotionModel::mine(log, problem_.commands));
+      const auto mover = mined_mover(mined, command_.settings);
+      RETURN_IF_ERROR(add("mined motion model", drive(*mover, constant, command_.runs), true));
+    }
+    const auto mover = constant_velocity_mover(constant, command_.settings);
+    RETURN_IF_ERROR(add("constant velocity", drive(*mover, constant, 2), false));
+    compare_targets();
+    return report_;
+  }
+
+ private:
+  Status simulate(const std::vector<ConstantVelocity>& nominal) {
+    if (task_.targets.empty()) {
+      return add("simulation",
+                 drive_commands(farm_, problem_, task_.start, task_.commands, command_.runs,
+                                command_.settings),
+                 true);
+    }
+    const auto mover = simulated_mover(farm_, problem_, command_.settings);
+    return add("simulation", drive(*mover, nominal, command_.runs), true);
+  }
+
+  // `rates`: what a pilot would have measured of the robot that the mover moves.
+  Result<std::vector<DrivenRun>> drive(const Mover& mover,
+                                       const std::vector<ConstantVelocity>& rates,
+                                       unsigned runs) const {
+    if (task_.targets.empty()) return drive_commands(mover, task_.start, task_.commands, runs);
+    ASSIGN_OR_RETURN(const auto pilot, make_pilot(rates));
+    return drive_waypoints(mover, pilot, task_.start, task_.targets, runs);
+  }
+
+  Status add(const std::string& name, Result<std::vector<DrivenRun>> runs, bool spread) {
+    if (!runs) return runs.error();
+    DriverReport driver;
+    driver.name = name;
+    driver.runs = *std::move(runs);
+    driver.end = end_ellipse(driver.runs, command_.coverage);
+    if (spread) driver.band = PathBand::fit(driver.runs, command_.coverage);
+    if (!task_.real.empty()) {
+      driver.real = distances_to(driver.runs, task_.real, kSpacing_m);
+    }
+    report_.drivers.push_back(std::move(driver));
+    return {};
+  }
+
+  void compare_targets() {
+    if (task_.real.empty()) return;
+    std::vector<PathSample> lines = {{0, task_.start}};
+    for (const Eigen::Vector2d& target : task_.targets) {
+      const Pose from = lines.back().pose;
+      const double length = std::hypot(target.x() - from.x, target.y() - from.y);
+      const int steps = std::max(1, static_cast<int>(length / kSpacing_m));
+      for (int i = 1; i <= steps; ++i) {
+        const double share = static_cast<double>(i) / steps;
+        lines.push_back(
+            {0,
+             {from.x + share * (target.x() - from.x), from.y + share * (target.y() - from.y), 0}});
+      }
+    }
+    const std::vector<DrivenRun> straight = {{Leg{{}, lines}}};
+    report_.real_to_targets = distances_to(straight, task_.real, 0);
+  }
+
+  const DriveCommand& command_;
+  const Task& task_;
+  const Problem& problem_;
+  Farm& farm_;
+  Console& console_;
+  DriveReport report_;
+};
+
+Json to_json(const DriveReport& report) {
+  Json drivers = Json::array();
+  for (const DriverReport& d : report.drivers) {
+    Json driver = {{"name", d.name}, {"runs", d.runs.size()}};
+    if (d.real) {
+      driver["to_real_m"] = {{"lettier", d.real->lettier},
+                             {"hausdorff", d.real->hausdorff},
+                             {"frechet", d.real->frechet}};
+    }
+    Json ends = Json::array();
+    for (const DrivenRun& run : d.runs) {
+      if (run.empty() || run.back().path.empty()) continue;
+      const Pose end = run.back().path.back().pose;
+      ends.push_back({end.x, end.y, end.theta});
+    }
+    driver["ends"] = std::move(ends);
+    drivers.push_back(std::move(driver));
+  }
+  return {{"coverage", report.coverage}, {"drivers", std::move(drivers)}};
+}
+
+constexpr const char* kBand = "band.csv";
+constexpr const char* kEnds = "ends.csv";
+constexpr const char* kPage = "drive.html";
+
+Status plan_outputs(DriveCommand& command) {
+  command.outputs.reads(command.model);
+  command.outputs.reads(command.log);
+  for (const std::string& file : command.mined) command.outputs.reads(file);
+  for (const std::string& file : command.reading.read.paths) command.outputs.reads(file);
+  return command.outputs.plan_in(command.out, {kBand, kEnds, kPage});
+}
+
+Result<int> run_drive(DriveCommand& command, CliContext& context) {
+  ASSIGN_OR_RETURN(const auto model, read_model_of(command.model, context.console));
+  RETURN_IF_ERROR(check_no_residual(model, command.model, "drive"));
+  ASSIGN_OR_RETURN(const Task task, read_task(command, model));
+  RETURN_IF_ERROR(plan_outputs(command));
+  const Problem problem = problem_of(model);
+  command.settings.frame_x_m = model.frame_x_m;
+  command.settings.frame_y_m = model.frame_y_m;
+  // The commands' nominal motions, then the runs; way-points are a turn and a way each.
+  const std::uint64_t legs = task.targets.empty() ? 1 : 2 * task.targets.size();
+  const std::uint64_t tasks = problem.commands.size() + legs * command.runs;
+  if (context.dry_run) {
+    return say_dry_run(fmt::format("drive {} times by {}, {} simulations, into {}", command.runs,
+                                   command.model, tasks, command.out),
+                       {{"out", command.out}, {"runs", command.runs}, {"simulations", tasks}},
+                       command.farm, {}, context);
+  }
+  const KeepingPlace place{command.out, /*passing=*/false, /*forget=*/true};
+  RETURN_IF_ERROR(LongCommand::begin("drive", place, {{"drive", 1, tasks}}, context));
+  ASSIGN_OR_RETURN(const auto asked, start_recorded(command.farm, {}, context));
+  context.work->stage(0);
+  ASSIGN_OR_RETURN(const auto report,
+                   Driving(command, task, problem, *asked, context.console).run());
+  RETURN_IF_ERROR(command.outputs.write_in(
+      command.out,
+      {{kBand, band_csv(report)},
+       {kEnds, ends_csv(report)},
+       {kPage, drive_page(report, "Driven " + std::to_string(command.runs) + " times")}}));
+  Json json = to_json(report);
+  json["out"] = command.out;
+  context.console.result(drive_text(report), json);
+  context.console.note("left behind: " + (std::filesystem::path(command.out) / kPage).string() +
+                       ", band.csv, ends.csv");
+  return kExitDone;
+}
+
+}  // namespace
+
+SubcommandRun setup_drive(CLI::App& app) {
+  auto command = std::make_shared<DriveCommand>();
+  app.add_option("MODEL", command->model, "Model file, or a run or diagnosis with a model.toml")
+      ->required();
+  app.add_option("--commands", command->commands, "Commands in order, NAME or NAME:SECONDS");
+  app.add_option("--waypoints", command->waypoints, "Way-points in order, X,Y in m");
+  app.add_option("--log", command->log,
+                 "A blendersim way-point log: start, way-points and the real path come from it");
+  app.add_option("--targets", command->targets, "Only so many way-points of the log");
+  app.add_option("--start", command->start, "X,Y,THETA in m and rad")->capture_default_str();
+  app.add_option("--mined", command->mined,
+                 "Trial logs that the mined motion model and constant velocities are fitted to");
+  command->reading.declare_reading(app);
+  app.add_option("--runs", command->runs)->check(CLI::Range(8, 1000000))->capture_default_str();
+  app.add_option("--coverage", command->coverage, "Share of paths that the band is to hold")
+      ->check(CLI::Range(0.05, 0.99))
+      ->capture_default_str();
+  app.add_option("--seed", command->settings.seed)->capture_default_str();
+  app.add_option("--interval", command->settings.interval_s, "Seconds between path samples")
+      ->check(CLI::Range(0.005, 1.0))
+      ->capture_default_str();
+  app.add_option("--out", command->out, "Folder for the tables and the page")->required();
+  command->outputs.declare(app);
+  command->farm.declare(app, true);
+  declare_long_command(app);
+  app.footer(
+      "Constant velocity, and with --mined the motion model mined from a log, drive the same "
+      "list.\n"
+      "Way-points are driven as a robot under a camera does: turn toward the next, go as far as "
+      "it\n"
+      "is, look again.\n\n"
+      "Examples:\n"
+      "  gapfarm drive run/demo --commands forward turn_ccw:0.5 forward --out driven\n"
+      "  gapfarm drive model.toml --waypoints 0.5,0 0.5,0.5 0,0.5 --runs 400 --out driven\n"
+      "  gapfarm drive model.toml --log waypoint_1.log --mined trials.csv --out driven");
+  return [command](CliContext& context) { return run_drive(*command, context); };
+}
+
+}  // namespace gapfarm

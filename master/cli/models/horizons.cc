@@ -1,0 +1,115 @@
+// gapfarm horizons RUN|CONFIG: how far off a ground robot's simulation is at several horizons.
+#include "master/ground/horizons.h"
+
+#include <filesystem>
+#include <memory>
+
+#include "common/base/try.h"
+#include "common/problem/run_files.h"
+#include "common/recordings/read.h"
+#include "master/cli/subcommand.h"
+#include "master/command/inputs.h"
+#include "master/command/outputs.h"
+#include "master/command/run_model.h"
+#include "master/ground/paths.h"
+#include "master/store/run_reader.h"
+
+namespace gapfarm {
+namespace {
+
+struct HorizonsCommand {
+  std::string source;
+  std::vector<std::string> runs;
+  std::vector<double> horizons = {0.5, 2, 5, 0};
+  std::string picture;
+  std::string out;
+  Outputs outputs;
+  FarmOptions farm;
+};
+
+// What was fitted to, and at which values the simulation is measured.
+struct Fitted {
+  Problem problem;
+  ParameterValues values;
+  WindowSettings windows;
+  std::vector<std::string> folders;
+};
+
+Result<Fitted> open_fitted(const std::string& source, Console& console) {
+  std::error_code ignored;
+  if (!std::filesystem::is_directory(source, ignored)) {
+    ASSIGN_OR_RETURN(auto config, read_config_and_trials(source, {}));
+    return Fitted{config.problem, config.problem.values, config.windows, config.trial_files};
+  }
+  ASSIGN_OR_RETURN(const auto reader, RunReader::open(source));
+  ASSIGN_OR_RETURN(auto problem, stored_problem(reader));
+  ASSIGN_OR_RETURN(const auto model, read_model_of(source, console));
+  return Fitted{problem, model.values, {}, model.data.files};
+}
+
+// Whole runs, before and after, as a picture.
+Status draw_runs(const HorizonsCommand& command, const Fitted& fitted, const RunLog& runs,
+                 Farm& farm, Console& console) {
+  if (command.picture.empty()) return {};
+  ASSIGN_OR_RETURN(const auto paths, drive_paths(farm, fitted.problem, fitted.values, runs));
+  RETURN_IF_ERROR(command.outputs.write(command.picture, draw_paths(paths)));
+  console.note("paths drawn in " + command.picture);
+  return {};
+}
+
+Result<int> run_horizons(HorizonsCommand& command, CliContext& context) {
+  Console& console = context.console;
+  RETURN_IF_ERROR(command.outputs.plan({command.picture, command.out}));
+  ASSIGN_OR_RETURN(const auto fitted, open_fitted(command.source, console));
+  if (!fitted.problem.ground) {
+    return Error{command.source + ": scenario " + fitted.problem.scenario +
+                 " has no runs to cut into windows; gapfarm predict compares its trials"};
+  }
+  ASSIGN_OR_RETURN(const auto runs,
+                   read_run_folders(command.runs.empty() ? fitted.folders : command.runs,
+                                    fitted.problem.ground->robot().channels));
+  for (const std::string& note : runs.notes) console.note(note);
+  if (context.dry_run) {
+    return say_dry_run("measure horizons of " + command.source,
+                       {{"source", command.source}, {"horizons", command.horizons}}, command.farm,
+                       {}, context);
+  }
+  ASSIGN_OR_RETURN(auto farm, start_farm(command.farm, {}, context));
+  ASSIGN_OR_RETURN(const auto horizons,
+                   measure_horizons(*farm, fitted.problem, fitted.values, runs,
+                                    {command.horizons, fitted.windows.run_in_s}));
+  RETURN_IF_ERROR(draw_runs(command, fitted, runs, *farm, console));
+  if (!command.out.empty()) {
+    RETURN_IF_ERROR(command.outputs.write(command.out, windows_csv(horizons)));
+  }
+  console.print(format_horizons(horizons));
+  return kExitDone;
+}
+
+}  // namespace
+
+SubcommandRun setup_horizons(CLI::App& app) {
+  auto command = std::make_shared<HorizonsCommand>();
+  app.add_option("RUN|CONFIG", command->source,
+                 "A finished run, or a config for its own values, of scenario ground")
+      ->required();
+  app.add_option("--trials", command->runs,
+                 "Folders with commands.csv and poses.csv (default: those that were fitted to)");
+  app.add_option("--horizons", command->horizons, "Lengths of windows, s; 0: whole runs")
+      ->capture_default_str();
+  app.add_option("--picture", command->picture,
+                 "Draw the runs: logged, as simulated before and after the fit (SVG)");
+  app.add_option("--out", command->out, "Every window with its errors, m and rad (CSV)");
+  command->outputs.declare(app);
+  command->farm.declare(app, false);
+  declare_long_command(app);
+  app.footer(
+      "Beside the simulation stand the robot's own kinematics, fitted to the same windows by least "
+      "squares,\nand constant velocity.\n\n"
+      "Examples:\n"
+      "  gapfarm horizons run/warthog --trials held_out --picture paths.svg\n"
+      "  gapfarm horizons warthog.toml --horizons 1 10");
+  return [command](CliContext& context) { return run_horizons(*command, context); };
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,127 @@
+// gapfarm influence CONFIG: which parameters move the path further than a repeat does.
+#include "master/experiments/influence/influence.h"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <cmath>
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "common/base/try.h"
+#include "common/config/config.h"
+#include "master/cli/subcommand.h"
+#include "master/command/inputs.h"
+#include "master/command/long_command.h"
+#include "master/command/outputs.h"
+#include "master/command/traced.h"
+
+namespace gapfarm {
+namespace {
+
+struct InfluenceCommand {
+  std::string config;
+  std::string out;
+  std::string distance = "frechet";
+  TracedCommands traced;
+  InfluenceSettings settings;
+  Outputs outputs;
+  FarmOptions farm;
+};
+
+nlohmann::ordered_json to_json(const InfluenceReport& report, const ParameterTable& table) {
+  nlohmann::ordered_json factors = nlohmann::ordered_json::array();
+  for (const FactorInfluence& f : report.factors) {
+    factors.push_back({{"parameter", table[f.gene.row].key},
+                       {"alone_m", f.alone.distance},
+                       {"alone_at", f.alone.value},
+                       {"alone_p", f.alone.p},
+                       {"alone_influential", f.alone.influential},
+                       {"morris_m", f.morris.mean},
+                       {"morris_p", f.morris.p},
+                       {"morris_influential", f.morris.influential}});
+  }
+  return {{"horizon_s", report.horizon_s},
+          {"repeat_distance_m", report.repeat_distance},
+          {"factors", factors}};
+}
+
+Result<int> run_influence(InfluenceCommand command, CliContext& context) {
+  ASSIGN_OR_RETURN(const Config config,
+                   command.traced.open(command.config, &command.settings.trace));
+  command.outputs.reads(command.config);
+  command.outputs.reads(config.problem.log);
+  RETURN_IF_ERROR(
+      command.outputs.plan_in(command.out, {"influence.csv", "influence.html", "genes.toml"}));
+  show_notes(config.problem.log, context.console);
+  for (std::size_t i = 0; i < path_distances().size(); ++i) {
+    if (command.distance == path_distances()[i].name) command.settings.distance = i;
+  }
+  const ParameterTable& table = config.problem.table();
+  const std::vector<Gene> genes =
+      config.problem.genes.empty() ? all_base_genes(table) : config.problem.genes;
+  if (context.dry_run) {
+    return say_dry_run(fmt::format("trace what {} parameters of {} do to paths, into {}",
+                                   genes.size(), command.config, command.out),
+                       {{"out", command.out}, {"parameters", genes.size()}}, command.farm,
+                       config.farm, context);
+  }
+  // The paths are large, and no figure refers to them.
+  const KeepingPlace place{command.out, /*passing=*/false, /*forget=*/true};
+  RETURN_IF_ERROR(LongCommand::begin("influence", place, {{"trace paths"}}, context));
+  ASSIGN_OR_RETURN(const auto asked, start_recorded(command.farm, config.farm, context));
+  ASSIGN_OR_RETURN(const auto report, find_influence(*asked, config.problem, genes,
+                                                     command.settings, context.work->hooks()));
+  RETURN_IF_ERROR(command.outputs.write_in(
+      command.out,
+      {{"influence.csv", influence_csv(report, table)},
+       {"influence.html", influence_page(report, table, command.settings,
+                                         "Influence of parameters: " + config.problem.scenario)},
+       {"genes.toml", influential_genes(report, table)}}));
+  context.console.result(influence_text(report, table), to_json(report, table));
+  context.console.note(
+      "left behind: " + (std::filesystem::path(command.out) / "influence.html").string() +
+      ", influence.csv, genes.toml");
+  return kExitDone;
+}
+
+}  // namespace
+
+SubcommandRun setup_influence(CLI::App& app) {
+  auto command = std::make_shared<InfluenceCommand>();
+  InfluenceSettings& to = command->settings;
+  app.add_option("CONFIG", command->config,
+                 "The standard; its [genes] say what to vary and how far, without them every base "
+                 "parameter varies over its range")
+      ->required();
+  app.add_option("--out", command->out, "Folder for the tables, the page and genes.toml")
+      ->required();
+  app.add_option("--distance", command->distance, "Between paths")
+      ->check(CLI::IsMember({"lettier", "hausdorff", "frechet"}))
+      ->capture_default_str();
+  app.add_option("--horizon", to.horizon_s,
+                 "Seconds of the paths to compare; left out: as long as repeats stay close")
+      ->check(CLI::PositiveNumber);
+  app.add_option("--repeats", to.repeats, "Noisy runs of each level")
+      ->check(CLI::Range(4, 10000))
+      ->capture_default_str();
+  app.add_option("--levels", to.levels, "Levels of a real parameter")
+      ->check(CLI::Range(2, 64))
+      ->capture_default_str();
+  app.add_option("--trajectories", to.trajectories, "Random walks of Morris's method")
+      ->check(CLI::Range(4, 100000))
+      ->capture_default_str();
+  command->traced.declare(app);
+  command->outputs.declare(app);
+  command->farm.declare(app, true);
+  declare_long_command(app);
+  app.footer(
+      "Examples:\n"
+      "  gapfarm influence configs/racquetball.toml --out influence\n"
+      "  gapfarm influence configs/srv1.toml --command forward --distance hausdorff --out "
+      "influence\n"
+      "then put influence/genes.toml into the config that evolve is to search.");
+  return [command](CliContext& context) { return run_influence(*command, context); };
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,82 @@
+#include "master/cli/models/parameter_options.h"
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+
+#include "common/base/suggest.h"
+
+namespace gapfarm {
+namespace {
+
+std::vector<std::string> keys_of(const ParameterTable& table) {
+  std::vector<std::string> keys;
+  for (const Parameter& row : table.rows()) keys.push_back(row.key);
+  return keys;
+}
+
+}  // namespace
+
+Status apply_setting(const std::string& setting, Problem& problem) {
+  const ParameterTable& table = problem.table();
+  const std::size_t equals = setting.find('=');
+  const std::string key = setting.substr(0, equals);
+  const std::vector<std::string> known = keys_of(table);
+  const auto row = table.find(key);
+  if (!row || equals == std::string::npos) {
+    return Error{"--set " + setting + ": expected PARAMETER=VALUE" +
+                 (row ? "" : ", and there is no parameter '" + key + "'" + suggestion(key, known))};
+  }
+  const std::string text = setting.substr(equals + 1);
+  const std::vector<std::string>& choices = table[*row].choices;
+  const auto choice = std::find(choices.begin(), choices.end(), text);
+  double value = static_cast<double>(choice - choices.begin());
+  if (choice == choices.end() && !CLI::detail::lexical_cast(text, value)) {
+    return Error{"--set " + setting + ": '" + text + "' is not a number" +
+                 (choices.empty() ? "" : suggestion(text, choices))};
+  }
+  if (Status s = table.check(*row, value); !s)
+    return Error{"--set " + setting + ": " + s.error().message};
+  problem.values[*row] = value;
+  return {};
+}
+
+Status apply_genes(const std::vector<std::string>& genes, Problem& problem,
+                   const std::string& option) {
+  const ParameterTable& table = problem.table();
+  problem.genes.clear();
+  for (const std::string& text : genes) {
+    const std::size_t equals = text.find('=');
+    const std::string key = text.substr(0, equals);
+    const auto row = table.find(key);
+    if (!row) {
+      return Error{option + " " + text + ": there is no parameter '" + key + "'" +
+                   suggestion(key, keys_of(table))};
+    }
+    Gene gene{*row, table[*row].lower, table[*row].upper, table[*row].scale};
+    if (equals != std::string::npos) {
+      const std::size_t comma = text.find(',', equals);
+      const bool read =
+          comma != std::string::npos &&
+          CLI::detail::lexical_cast(text.substr(equals + 1, comma - equals - 1), gene.lower) &&
+          CLI::detail::lexical_cast(text.substr(comma + 1), gene.upper);
+      if (!read) return Error{option + " " + text + ": expected KEY or KEY=LOWER,UPPER"};
+    }
+    for (const double end : {gene.lower, gene.upper}) {
+      if (Status s = table.check(*row, end); !s) {
+        return Error{option + " " + text + ": " + s.error().message};
+      }
+    }
+    const bool twice = std::any_of(problem.genes.begin(), problem.genes.end(),
+                                   [&](const Gene& other) { return other.row == *row; });
+    if (twice || gene.lower >= gene.upper) {
+      return Error{option + " " + text + ": " + (twice ? "is there twice" : "has an empty range")};
+    }
+    if (gene.lower <= 0) gene.scale = ParameterScale::kLinear;
+    problem.genes.push_back(gene);
+  }
+  std::sort(problem.genes.begin(), problem.genes.end(),
+            [](const Gene& a, const Gene& b) { return a.row < b.row; });
+  return {};
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,141 @@
+// gapfarm stability CONFIG: where tiny changes of the start change the outcome least.
+#include "master/experiments/influence/stability.h"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "common/base/build_info.h"
+#include "common/base/try.h"
+#include "common/config/config.h"
+#include "common/json/fields.h"
+#include "master/cli/subcommand.h"
+#include "master/command/inputs.h"
+#include "master/command/long_command.h"
+#include "master/command/outputs.h"
+#include "master/command/traced.h"
+
+namespace gapfarm {
+namespace {
+
+struct StabilityCommand {
+  std::string config;
+  std::string out;
+  TracedCommands traced;
+  StabilitySettings settings;
+  Outputs outputs;
+  FarmOptions farm;
+};
+
+std::string spread_text(const std::optional<double>& spread) {
+  return spread ? fmt::format("{:.4g} m", *spread) : std::string("does not end well");
+}
+
+std::string tried_csv(const StabilityReport& report, const Problem& problem) {
+  std::string text = "spread_m";
+  for (const Gene& gene : problem.genes) text += "," + problem.table()[gene.row].key;
+  text += "\n";
+  for (const StablePoint& point : report.tried) {
+    text += fmt::format("{}", point.spread);
+    for (const Gene& gene : problem.genes) text += fmt::format(",{}", point.values[gene.row]);
+    text += "\n";
+  }
+  return text;
+}
+
+Status write_all(const StabilityCommand& command, const Config& config,
+                 const StabilityReport& report) {
+  const std::filesystem::path out(command.out);
+  const Status tried =
+      command.outputs.write((out / "stability.csv").string(), tried_csv(report, config.problem));
+  if (!tried) return tried;
+  Model model = model_of_problem(config.problem, report.best.values);
+  model.kind = "stable";
+  const std::string path = (out / "model.toml").string();
+  if (Status s = check_model(model); !s) return Error{path + ": " + s.error().message};
+  return command.outputs.write(path, format_model(model));
+}
+
+Result<int> run_stability(StabilityCommand command, CliContext& context) {
+  ASSIGN_OR_RETURN(const Config config,
+                   command.traced.open(command.config, &command.settings.trace));
+  RETURN_IF_ERROR(check_evolvable(config));
+  command.outputs.reads(command.config);
+  command.outputs.reads(config.problem.log);
+  RETURN_IF_ERROR(command.outputs.plan_in(command.out, {"model.toml", "stability.csv"}));
+  show_notes(config.problem.log, context.console);
+  command.settings.evolution = config.evolution;
+  if (context.dry_run) {
+    const std::size_t genes = config.problem.genes.size();
+    return say_dry_run(
+        fmt::format("search {} parameters of {} for the least spread over {} repeats, into {}",
+                    genes, command.config, command.settings.repeats, command.out),
+        {{"out", command.out}, {"genes", genes}, {"repeats", command.settings.repeats}},
+        command.farm, config.farm, context);
+  }
+  // The paths are large, and no figure refers to them.
+  const KeepingPlace place{command.out, /*passing=*/false, /*forget=*/true};
+  RETURN_IF_ERROR(LongCommand::begin("stability", place, {{"trace paths"}}, context));
+  ASSIGN_OR_RETURN(const auto asked, start_recorded(command.farm, config.farm, context));
+  ASSIGN_OR_RETURN(const auto report,
+                   find_stability(*asked, config.problem, command.settings, context.work->hooks()));
+  RETURN_IF_ERROR(write_all(command, config, report));
+  const ParameterTable& table = config.problem.table();
+  std::string text = fmt::format(
+      "spread of the ends over {} repeats, {} points tried\n"
+      "  the config's own values  {}, on fresh repeats {}\n"
+      "  the most stable found    {}, on fresh repeats {}\n",
+      command.settings.repeats, report.evaluations, spread_text(report.standard_spread),
+      spread_text(report.standard_fresh), spread_text(report.best.spread),
+      spread_text(report.best_fresh));
+  nlohmann::ordered_json values = nlohmann::ordered_json::object();
+  for (const Gene& gene : config.problem.genes) {
+    values[table[gene.row].key] = report.best.values[gene.row];
+    text += fmt::format("  {:<22} {}\n", table[gene.row].key,
+                        table.format(gene.row, report.best.values[gene.row]));
+  }
+  context.console.result(text, {{"repeats", command.settings.repeats},
+                                {"evaluations", report.evaluations},
+                                {"config_spread_m", number_or_null(report.standard_spread)},
+                                {"config_fresh_m", number_or_null(report.standard_fresh)},
+                                {"best_spread_m", report.best.spread},
+                                {"best_fresh_m", number_or_null(report.best_fresh)},
+                                {"best", values}});
+  context.console.note(
+      "left behind: " + (std::filesystem::path(command.out) / "model.toml").string() +
+      ", stability.csv");
+  return kExitDone;
+}
+
+}  // namespace
+
+SubcommandRun setup_stability(CLI::App& app) {
+  auto command = std::make_shared<StabilityCommand>();
+  app.add_option("CONFIG", command->config, "Its [genes] say what to search, its [optimiser] how")
+      ->required();
+  app.add_option("--out", command->out, "Folder for model.toml and stability.csv")->required();
+  app.add_option("--repeats", command->settings.repeats, "Runs with tiny changes at each point")
+      ->check(CLI::Range(2, 10000))
+      ->capture_default_str();
+  app.add_option("--evaluations", command->settings.evaluations, "Points to try")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  command->traced.declare(app);
+  command->outputs.declare(app);
+  command->farm.declare(app, true);
+  declare_long_command(app);
+  app.footer(
+      "The tiny changes are the scenario's own noise: of the start and launch in racquetball, of "
+      "the\n"
+      "drive in srv1, of a reading of the start in push (pose_noise_position and _heading; spread\n"
+      "over the piece's corners and the log's pushes).\n\n"
+      "Examples:\n"
+      "  gapfarm stability configs/racquetball_stability.toml --out stable\n"
+      "  gapfarm stability configs/push_stability.toml --trials pushes.csv --only start=0.15 \\\n"
+      "      --out stable");
+  return [command](CliContext& context) { return run_stability(*command, context); };
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,372 @@
+#include "master/command/long_command.h"
+
+#include <spdlog/fmt/fmt.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <nlohmann/json.hpp>
+
+#include "common/base/build_info.h"
+#include "common/base/hash.h"
+#include "common/base/host.h"
+#include "common/base/try.h"
+#include "common/json/json.h"
+#include "common/trials/files.h"
+#include "master/command/context.h"
+
+namespace gapfarm {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kRecordInterval_s = 1;  // each costs a disk write
+
+// Words of this process's command line, without the program.
+std::vector<std::string> own_arguments() {
+  const Result<std::string> bytes = read_text_file("/proc/self/cmdline");
+  std::vector<std::string> words;
+  if (!bytes) return words;
+  std::string word;
+  for (const char c : *bytes) {
+    if (c != '\0') {
+      word += c;
+      continue;
+    }
+    words.push_back(std::exchange(word, {}));
+  }
+  if (!words.empty()) words.erase(words.begin());
+  return words;
+}
+
+// How many workers and how loud changes nothing of what is asked; cheap to leave at that.
+std::string state_folder() {
+  const char* state = std::getenv("XDG_STATE_HOME");
+  if (state != nullptr && *state == '/') return std::string(state) + "/gapfarm";
+  const char* home = std::getenv("HOME");
+  if (home != nullptr && *home == '/') return std::string(home) + "/.local/state/gapfarm";
+  return {};
+}
+
+std::string state_of(int exit_code) {
+  if (exit_code == kExitDone || exit_code == kExitQuarantined) return "finished";
+  if (exit_code == kExitResumable || exit_code > kExitSignalBase) return "stopped";
+  return "failed";
+}
+
+bool present(const WorkerStatus& worker) { return worker.state != "gone"; }
+
+}  // namespace
+
+std::string command_line() {
+  std::string text = "gapfarm";
+  for (const std::string& word : own_arguments()) text += " " + word;
+  return text;
+}
+
+void KeepOption::declare(CLI::App& app) {
+  app.add_option("--keep", folder,
+                 "Folder for what is simulated, so that a stopped command goes on (default: "
+                 "OUT.partial or, without a file, one in ~/.local/state/gapfarm; gone at the end)")
+      ->type_name("FOLDER");
+}
+
+Result<KeepingPlace> KeepOption::place(const std::string& command, const std::string& out) const {
+  if (!folder.empty()) return KeepingPlace{folder, false};
+  if (!out.empty() && out != "-") return KeepingPlace{out + ".partial", true};
+  const std::string state = state_folder();
+  if (state.empty()) {
+    return Error{"neither XDG_STATE_HOME nor HOME names a folder; give --keep FOLDER"};
+  }
+  std::error_code ignored;
+  std::string question = fs::current_path(ignored).string();
+  for (const std::string& word : own_arguments()) question += '\0' + word;
+  const std::string name = command + "-" + content_hash(question).substr(0, 16);
+  return KeepingPlace{fs::path(state) / name, true};
+}
+
+// The farm that a command asks: it remembers, and every batch is shown.
+class LongCommand::Asked : public RecordedFarm {
+ public:
+  Asked(SocketFarm& farm, LongCommand& work)
+      : RecordedFarm(farm, *work.answers_, &farm), work_(work), wait_(farm.endpoints()) {
+    set_stage(work.stage_);
+    watch([this, &farm](const RecordedProgress& progress) {
+      set_stage(work_.stage_);
+      work_.on_progress(progress, farm, wait_);
+    });
+  }
+  ~Asked() override { work_.farm_gone(); }
+
+ private:
+  LongCommand& work_;
+  WorkerWait wait_;
+};
+
+Status LongCommand::begin(const std::string& command, const KeepingPlace& place,
+                          std::vector<ProgressStage> stages, CliContext& context) {
+  context.begun = true;
+  std::error_code code;
+  fs::create_directories(place.folder, code);
+  if (code) return Error{place.folder.string() + ": cannot make the folder: " + code.message()};
+  ASSIGN_OR_RETURN(auto lock, RunLock::take(place.folder));
+  ASSIGN_OR_RETURN(auto answers,
+                   AnswerStore::open(answer_file(place.folder), build_info().fingerprint));
+  ASSIGN_OR_RETURN(const std::int64_t at_hand, answers.count());
+  auto work = std::make_shared<LongCommand>(command, std::move(stages), context.console);
+  work->place_ = place;
+  work->lock_ = std::move(lock);
+  work->answers_ = std::make_unique<AnswerStore>(std::move(answers));
+  work->at_hand_ = at_hand;
+  if (!place.passing) {
+    RETURN_IF_ERROR(context.console.keep((place.folder / "log.txt").string()));
+    context.console.kept()->write(LogLevel::kInfo, work->record_.arguments);
+  }
+  work->write_record();
+  context.work = std::move(work);
+  return {};
+}
+
+void LongCommand::begin_if_possible(const std::string& command, const Result<KeepingPlace>& place,
+                                    std::vector<ProgressStage> stages, CliContext& context) {
+  context.begun = true;
+  const Status begun = place ? begin(command, *place, stages, context) : Status(place.error());
+  if (begun) return;
+  context.console.note("a stop would lose what is simulated: " + begun.error().message);
+  context.work = std::make_shared<LongCommand>(command, std::move(stages), context.console);
+}
+
+LongCommand::LongCommand(std::string command, std::vector<ProgressStage> stages, Console& console)
+    : console_(console), progress_(std::move(stages)) {
+  record_.command = std::move(command);
+  record_.arguments = command_line();
+  record_.state = "running";
+  record_.began_unix_s = unix_now_s();
+  record_.pid = ::getpid();
+  record_.host = host_name();
+  plan_stages();
+}
+
+LongCommand::~LongCommand() = default;
+
+namespace {
+
+// Where nothing is kept, the farm as it is, with its progress shown.
+class Watched : public Farm {
+ public:
+  Watched(Farm& farm, std::function<void(const RecordedProgress&)> watcher)
+      : farm_(farm), watcher_(std::move(watcher)) {}
+
+  std::string add_problem(const v1::Problem& problem) override {
+    return farm_.add_problem(problem);
+  }
+  Result<std::vector<v1::TaskResult>> run(
+      const std::string& problem_hash, const std::vector<v1::Task>& tasks,
+      const std::function<void(const FarmProgress&)>& on_progress) override {
+    const std::uint64_t before = asked_;
+    asked_ += tasks.size();
+    watcher_({0, before, asked_});
+    auto results = farm_.run(problem_hash, tasks, [&](const FarmProgress& progress) {
+      watcher_({0, before + progress.done, asked_});
+      if (on_progress) on_progress(progress);
+    });
+    if (results) watcher_({0, asked_, asked_});
+    return results;
+  }
+  std::vector<WorkerStatus> workers() const override { return farm_.workers(); }
+  std::uint64_t retries() const override { return farm_.retries(); }
+
+ private:
+  Farm& farm_;
+  std::function<void(const RecordedProgress&)> watcher_;
+  std::uint64_t asked_ = 0;
+};
+
+}  // namespace
+
+std::unique_ptr<Farm> LongCommand::over(SocketFarm& farm) {
+  if (keeps()) return std::make_unique<Asked>(farm, *this);
+  const auto wait = std::make_shared<WorkerWait>(farm.endpoints());
+  farm_gone();
+  return std::make_unique<Watched>(farm, [this, &farm, wait](const RecordedProgress& progress) {
+    on_progress(progress, farm, *wait);
+  });
+}
+
+namespace {
+
+// A farm and what is asked in its place, one after the other.
+class Owned : public Farm {
+ public:
+  Owned(std::unique_ptr<SocketFarm> farm, LongCommand& work)
+      : farm_(std::move(farm)), asked_(work.over(*farm_)) {}
+
+  std::string add_problem(const v1::Problem& problem) override {
+    return asked_->add_problem(problem);
+  }
+  Result<std::vector<v1::TaskResult>> run(
+      const std::string& problem_hash, const std::vector<v1::Task>& tasks,
+      const std::function<void(const FarmProgress&)>& on_progress) override {
+    return asked_->run(problem_hash, tasks, on_progress);
+  }
+  std::vector<WorkerStatus> workers() const override { return farm_->workers(); }
+  std::uint64_t retries() const override { return farm_->retries(); }
+
+ private:
+  std::unique_ptr<SocketFarm> farm_;
+  std::unique_ptr<Farm> asked_;
+};
+
+}  // namespace
+
+std::unique_ptr<Farm> LongCommand::over(std::unique_ptr<SocketFarm> farm) {
+  return std::make_unique<Owned>(std::move(farm), *this);
+}
+
+void LongCommand::plan_stages() {
+  record_.plan.clear();
+  for (const ProgressStage& stage : progress_.stages()) record_.plan.push_back({stage.name, 0});
+}
+
+StageHooks LongCommand::hooks() {
+  return {[this](std::vector<ProgressStage> stages) {
+            progress_ = OverallProgress(std::move(stages));
+            plan_stages();
+          },
+          [this](std::size_t k, std::uint64_t tasks) { stage(k, tasks); }};
+}
+
+void LongCommand::entered() {
+  counts_itself_ = false;
+  stage_began_ = now_;
+  const ProgressView view = progress_.at(steady_now_s());
+  stage_ = view.stage;
+  if (view.number > 0 && view.number <= record_.plan.size()) {
+    record_.plan[view.number - 1].began_unix_s = unix_now_s();
+  }
+  show();
+}
+
+void LongCommand::stage(std::size_t k, std::uint64_t tasks) {
+  const bool goes_on = progress_.at(steady_now_s()).number == k + 1;
+  progress_.begin(k, steady_now_s(), tasks);
+  if (!goes_on) entered();
+}
+
+void LongCommand::stage(const std::string& name) {
+  if (progress_.begin(name, steady_now_s())) entered();
+}
+
+void LongCommand::found(Finding finding) {
+  std::vector<StageFinding>& all = record_.findings;
+  const auto same = std::find_if(all.begin(), all.end(), [&](const StageFinding& f) {
+    return f.found.about == finding.about;
+  });
+  if (same != all.end()) all.erase(same);
+  all.push_back({stage_, std::move(finding)});
+  write_record();
+}
+
+void LongCommand::advance(std::uint64_t done, std::uint64_t total) {
+  counts_itself_ = true;
+  progress_.expect(total);
+  progress_.answered(0, done);
+  show();
+}
+
+void LongCommand::on_progress(const RecordedProgress& progress, const SocketFarm& farm,
+                              WorkerWait& wait) {
+  now_ = {before_.remembered + progress.remembered, before_.simulated + progress.simulated,
+          before_.asked + progress.asked};
+  if (!counts_itself_) {
+    progress_.answered(now_.remembered - stage_began_.remembered,
+                       now_.simulated - stage_began_.simulated);
+  }
+  workers_ = farm.workers();
+  const auto there = std::count_if(workers_.begin(), workers_.end(), present);
+  const std::string waiting =
+      wait.words(static_cast<std::size_t>(there), steady_now_s()).value_or("");
+  const bool news = waiting.empty() != waiting_.empty();
+  waiting_ = waiting;
+  show(news);
+}
+
+void LongCommand::farm_gone() {
+  before_ = now_;
+  waiting_.clear();
+  workers_.clear();
+}
+
+void LongCommand::show(bool news) {
+  const ProgressView view = progress_.at(steady_now_s());
+  console_.progress(record_.command + ": " + (waiting_.empty() ? progress_words(view) : waiting_),
+                    news);
+  if (steady_now_s() - written_s_ >= kRecordInterval_s) write_record();
+}
+
+void LongCommand::write_record() {
+  if (!keeps()) return;
+  written_s_ = steady_now_s();
+  const ProgressView view = progress_.at(written_s_);
+  record_.stage = view.stage;
+  record_.stage_number = view.number;
+  record_.stages = view.stages;
+  record_.done = view.done;
+  record_.total = view.total;
+  record_.share = record_.state == "finished" ? 1 : view.share;
+  record_.rate_per_s = view.rate_per_s;
+  record_.time_left_s = view.time_left_s;
+  record_.remembered = view.remembered;
+  record_.simulated = view.simulated;
+  record_.waiting = waiting_;
+  record_.workers.clear();
+  for (const WorkerStatus& w : workers_) {
+    record_.workers.push_back({w.name, w.host, w.state, w.jobs, w.finished, w.rate_per_s});
+  }
+  record_.heartbeat_unix_s = unix_now_s();
+  // A courtesy: the command goes on when it cannot be written.
+  const auto text = json_text(to_json(record_));
+  if (Status s = answers_->set_command(text); !s) console_.error(s.error());
+}
+
+std::string LongCommand::how_to_go_on() const {
+  return "stopped; what was " + (also_.empty() ? "simulated" : also_) + " is kept in " +
+         (also_.empty() ? answer_file(place_.folder).string() : also_in_) +
+         ", and the same command goes on from there";
+}
+
+void LongCommand::keeps_also(const std::string& done, const fs::path& file) {
+  also_ = done;
+  also_in_ = file.string();
+}
+
+void LongCommand::end(int exit_code) {
+  console_.clear_progress();
+  if (!keeps()) return;
+  if (at_hand_ > 0 && exit_code != kExitResumable) {
+    console_.note(fmt::format("{} of {} simulations were in {} already", now_.remembered,
+                              now_.remembered + now_.simulated,
+                              answer_file(place_.folder).string()));
+  }
+  record_.state = state_of(exit_code);
+  record_.reason = record_.state == "stopped" ? "stopped by request"
+                   : record_.state == "failed"
+                       ? "failed with exit code " + std::to_string(exit_code)
+                       : "";
+  const Result<std::int64_t> kept = answers_->count();
+  if (place_.passing && (record_.state == "finished" || (kept && *kept == 0))) {
+    answers_.reset();
+    lock_.reset();
+    std::error_code ignored;
+    fs::remove(answer_file(place_.folder), ignored);
+    fs::remove(place_.folder / "run.lock", ignored);
+    fs::remove(place_.folder, ignored);  // unless somebody put something there
+    return;
+  }
+  if (place_.forget && record_.state == "finished") {
+    if (Status s = answers_->forget(); !s) console_.error(s.error());
+  }
+  write_record();
+}
+
+}  // namespace gapfarm

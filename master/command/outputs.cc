@@ -1,0 +1,182 @@
+#include "master/command/outputs.h"
+
+#include <stdlib.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+
+#include "common/base/try.h"
+#include "common/trials/files.h"
+#include "master/store/command_record.h"
+
+namespace gapfarm {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Marker {
+  FolderKind kind;
+  const char* file;
+  const char* words;
+};
+
+constexpr Marker kMarkers[] = {
+    {FolderKind::kRun, "run.sqlite", "a run"},
+    {FolderKind::kDiagnosis, "simulations.sqlite", "a diagnosis"},
+    {FolderKind::kDiagnosis, "diagnosis.json", "a diagnosis"},
+    {FolderKind::kBlindCheck, "seals.txt", "a blind check"},
+};
+
+// Of the long command that keeps its simulations in the folder; empty: of an older diagnosis, or
+// none.
+std::string command_in(const fs::path& folder) {
+  const auto record = command_status(folder, 0);
+  return record && *record ? (*record)->command : std::string();
+}
+
+bool same_file(const std::string& a, const std::string& b) {
+  std::error_code code;
+  if (fs::equivalent(a, b, code)) return true;
+  const fs::path left = fs::weakly_canonical(a, code);
+  return !code && left == fs::weakly_canonical(b, code) && !code;
+}
+
+// The folder that a file would be made in, or the nearest one above that is there.
+fs::path standing_folder(const fs::path& path) {
+  fs::path folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
+  std::error_code code;
+  while (!fs::exists(folder, code) && folder.has_parent_path() && folder != folder.parent_path()) {
+    folder = folder.parent_path();
+  }
+  return fs::exists(folder, code) ? folder : fs::path(".");
+}
+
+// Permissions alone do not tell (root, read-only mounts): tries it.
+Status check_writable(const std::string& path) {
+  const fs::path folder = standing_folder(path);
+  std::error_code code;
+  if (!fs::is_directory(folder, code)) {
+    return Error{path + ": " + folder.string() + " is no folder; give another name"};
+  }
+  std::string trial = (folder / ".gapfarm-XXXXXX").string();
+  const int fd = ::mkstemp(trial.data());
+  if (fd < 0) {
+    return Error{path + ": cannot be written: " + std::strerror(errno) + " in " + folder.string() +
+                 "; give another name, or make that folder writable"};
+  }
+  ::close(fd);
+  ::unlink(trial.c_str());
+  return {};
+}
+
+bool is_in_place(const std::string& path) {
+  std::error_code code;
+  const auto status = fs::status(path, code);
+  return fs::exists(status) && !fs::is_regular_file(status) && !fs::is_directory(status);
+}
+
+}  // namespace
+
+Status check_folder(const std::string& folder, FolderKind kind) {
+  std::error_code code;
+  if (fs::exists(folder, code) && !fs::is_directory(folder, code)) {
+    return Error{folder + ": is a file, expected a folder; choose another --out"};
+  }
+  const std::string command = command_in(folder);
+  const bool alone = kind == FolderKind::kDiagnosis || kind == FolderKind::kRun;
+  if (alone && !command.empty() && command != "diagnose") {
+    return Error{folder + ": holds what `gapfarm " + command +
+                 "` simulated, and nothing else belongs there; choose another --out"};
+  }
+  for (const Marker& marker : kMarkers) {
+    if (marker.kind == kind || !fs::exists(fs::path(folder) / marker.file, code)) continue;
+    const bool of_another = !command.empty() && command != "diagnose";
+    if (std::string_view(marker.file) == "simulations.sqlite" && of_another) continue;
+    return Error{folder + ": holds " + marker.words +
+                 ", and nothing else belongs there; choose another --out"};
+  }
+  return {};
+}
+
+void Outputs::declare(CLI::App& app) {
+  app.add_flag("--force", force_, "Replace files that are there already");
+}
+
+void Outputs::reads(const std::string& path) {
+  if (!path.empty()) inputs_.push_back(path);
+}
+
+void Outputs::reads(const TrialLog& log) {
+  for (const std::string& file : log.files) reads(file);
+}
+
+Status Outputs::check(const std::string& path, bool replace) const {
+  if (is_in_place(path)) return {};
+  const auto input = std::find_if(inputs_.begin(), inputs_.end(),
+                                  [&](const std::string& other) { return same_file(path, other); });
+  if (input != inputs_.end()) {
+    return Error{path + ": is read by this command, so it cannot be written; give another name"};
+  }
+  std::error_code code;
+  if (fs::is_directory(path, code)) {
+    return Error{path + ": is a folder, expected a file; give another name"};
+  }
+  if (!replace && fs::exists(fs::symlink_status(path, code))) {
+    return Error{path + ": exists already; give another name, or --force to replace it"};
+  }
+  return check_writable(path);
+}
+
+Status Outputs::plan(const std::string& path) {
+  if (path.empty() || path == "-") return {};
+  std::error_code ignored;
+  const fs::path own = fs::weakly_canonical(path, ignored);
+  for (const Planned& other : planned_) {
+    if (own != "/dev/null" && fs::weakly_canonical(other.path, ignored) == own) {
+      return Error{path + ": is to be written twice; give one of the outputs another name"};
+    }
+  }
+  RETURN_IF_ERROR(check(path, force_));
+  planned_.push_back({path, force_});
+  return {};
+}
+
+Status Outputs::plan(const std::vector<std::string>& paths) {
+  for (const std::string& path : paths) {
+    RETURN_IF_ERROR(plan(path));
+  }
+  return {};
+}
+
+Status Outputs::plan_in(const std::string& folder, const std::vector<std::string>& names,
+                        FolderKind kind) {
+  RETURN_IF_ERROR(check_folder(folder, kind));
+  for (const std::string& name : names) {
+    RETURN_IF_ERROR(plan((fs::path(folder) / name).string()));
+  }
+  return {};
+}
+
+Status Outputs::plan_again(const std::string& path) {
+  planned_.push_back({path, true});
+  return check(path, true);
+}
+
+Status Outputs::write(const std::string& path, std::string_view bytes) const {
+  const auto planned = std::find_if(planned_.begin(), planned_.end(),
+                                    [&](const Planned& other) { return other.path == path; });
+  const bool replace = planned != planned_.end() ? planned->replace : force_;
+  return write_file_atomically(path, bytes, replace ? IfThere::kReplace : IfThere::kKeep);
+}
+
+Status Outputs::write_in(const std::string& folder, const NamedTexts& files) const {
+  for (const auto& [name, text] : files) {
+    if (!text.empty()) RETURN_IF_ERROR(write((fs::path(folder) / name).string(), text));
+  }
+  return {};
+}
+
+}  // namespace gapfarm

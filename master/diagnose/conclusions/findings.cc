@@ -1,0 +1,341 @@
+#include "master/diagnose/conclusions/findings.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <numbers>
+#include <set>
+
+#include "common/math/statistics.h"
+#include "master/diagnose/fit/free_commands.h"
+#include "master/diagnose/fit/selection.h"
+
+namespace gapfarm {
+namespace {
+
+constexpr double kFewInCell = 4;
+
+std::string told(const Estimate& e, double factor, const std::string& unit, bool intervals) {
+  std::string text = plain_number(factor * e.value) + unit;
+  if (!intervals || !std::isfinite(e.lo) || !std::isfinite(e.hi) || !(e.lo < e.hi)) return text;
+  return text + " (" + plain_number(factor * e.lo) + " to " + plain_number(factor * e.hi) + ")";
+}
+
+const Estimate* find(const NamedEffect& effect, std::string_view key) {
+  for (const Estimate& e : effect.parameters) {
+    if (e.key == key) return &e;
+  }
+  return nullptr;
+}
+
+// Without the words of a table: "name with key value unit, ...".
+std::string plain_claim(const NamedEffect& effect, bool intervals) {
+  std::vector<std::string> values;
+  for (const Estimate& e : effect.parameters) {
+    values.push_back(e.key + " " +
+                     told(e, 1, e.unit.empty() || e.unit == "-" ? "" : " " + e.unit, intervals));
+  }
+  return "The data show " + effect.name + (values.empty() ? "" : " with " + listed(values));
+}
+
+std::string claim(const NamedEffect& effect, const EffectDiagnoses& effects, bool intervals) {
+  const EffectWords& words = effects.row(effect.name).words;
+  if (words.sentence == nullptr) return plain_claim(effect, intervals);
+  std::string text;
+  for (const char* c = words.sentence; *c != 0; ++c) {
+    if (*c != '%') {
+      text += *c;
+      continue;
+    }
+    if (*++c == 'a') {
+      text += effect.axis.empty() ? "its axis" : effect.axis;
+      continue;
+    }
+    const Telling& telling = words.parameters[static_cast<std::size_t>(*c - '1')];
+    const Estimate* e = find(effect, telling.key);
+    if (e == nullptr) return plain_claim(effect, intervals);
+    text += told(*e, telling.factor, telling.unit, intervals);
+  }
+  return text;
+}
+
+std::string percent(double share) {
+  return std::to_string(std::lround(100 * std::clamp(share, 0.0, 1.0))) + " %";
+}
+
+std::string counted(std::size_t count, const std::string& one, const std::string& many) {
+  return std::to_string(count) + " " + (count == 1 ? one : many);
+}
+
+std::vector<std::string> names_of(const Diagnosis& diagnosis) {
+  std::vector<std::string> names;
+  for (const NamedEffect& effect : diagnosis.effects) names.push_back(effect.name);
+  return names;
+}
+
+}  // namespace
+
+std::string plain_number(double value) {
+  if (!std::isfinite(value)) return "an unknown number";
+  char text[32];
+  const double size = std::abs(value);
+  if (size >= 1000 && size < 1e7) {
+    std::snprintf(text, sizeof text, "%.0f", value);
+  } else {
+    std::snprintf(text, sizeof text, "%.3g", value);
+  }
+  return std::string(text) == "-0" ? "0" : text;
+}
+
+std::string listed(std::span<const std::string> words, std::string_view last) {
+  std::string text;
+  for (std::size_t i = 0; i < words.size(); ++i) {
+    if (i > 0) text += i + 1 == words.size() ? " " + std::string(last) + " " : ", ";
+    text += words[i];
+  }
+  return text;
+}
+
+std::string motions_of(const std::string& command) {
+  static const std::map<std::string, std::string> words = {
+      {"all", "All motions"},
+      {"forward", "Forward drives"},
+      {"backward", "Backward drives"},
+      {"turn_ccw", "Counter-clockwise turns"},
+      {"turn_cw", "Clockwise turns"},
+      {"wide_ccw", "Wide counter-clockwise arcs"},
+      {"wide_cw", "Wide clockwise arcs"}};
+  const auto found = words.find(command);
+  return found != words.end() ? found->second : "Trials of " + command;
+}
+
+std::string amount_words(double size, int component) {
+  return plain_number(std::abs(size)) + (component == 2 ? " mrad" : " mm");
+}
+
+std::string component_words(int component) {
+  if (component == 2) return "heading";
+  return component == 0 ? "end along its heading" : "end across its heading";
+}
+
+std::string deviation_words(int component, double size, bool along_motion, bool trend) {
+  const std::string much = amount_words(size, component);
+  const bool positive = size > 0;
+  if (along_motion) {
+    const std::string verb = component == 2 ? "turn " : "travel ";
+    const std::string aside = component == 1 ? " sideways" : "";
+    if (trend) return verb + much + (positive ? " more" : " less") + aside;
+    return verb + much + (positive ? " too far" : " too little") + aside;
+  }
+  const std::string far = trend ? "farther" : "too far";
+  if (component == 0) return "end " + much + " " + far + (positive ? " ahead" : " back");
+  const std::string side = positive ? "left" : "right";
+  if (component == 1) return "end " + much + " " + far + " to the " + side;
+  return "end turned " + much + " " + far + " to the " + side;
+}
+
+// " (errors from 66 to 58.6 mm and from 103 to 98.7 mrad)".
+std::string change_words(const GapFigures& position_mm, const GapFigures& heading_mrad) {
+  return " (errors from " + plain_number(position_mm.tuned) + " to " +
+         plain_number(position_mm.final_) + " mm and from " + plain_number(heading_mrad.tuned) +
+         " to " + plain_number(heading_mrad.final_) + " mrad)";
+}
+
+std::string effect_sentence(const NamedEffect& effect, const EffectDiagnoses& effects) {
+  std::string text = claim(effect, effects, true);
+  if (std::isfinite(effect.closed) && effect.closed > 0) {
+    text += "; adding that closes " + percent(effect.closed) + " of the gap in log score";
+    if (effect.position_mm_before && effect.position_mm_after && effect.heading_mrad_before &&
+        effect.heading_mrad_after) {
+      text += change_words({*effect.position_mm_before, *effect.position_mm_after, 0},
+                           {*effect.heading_mrad_before, *effect.heading_mrad_after, 0});
+    }
+  }
+  return text + ".";
+}
+
+std::string effect_claim(const NamedEffect& effect, const EffectDiagnoses& effects) {
+  return claim(effect, effects, false);
+}
+
+std::vector<std::string> findings(const Diagnosis& diagnosis) {
+  const std::vector<std::string> names = names_of(diagnosis);
+  const double gap = diagnosis.gap.tuned - diagnosis.gap.floor;
+  const double closed = gap > 0 ? (diagnosis.gap.tuned - diagnosis.gap.final_) / gap : 0;
+  std::vector<std::string> text;
+  for (const NamedEffect& effect : diagnosis.effects) {
+    text.push_back(effect.text.empty() ? effect_sentence(effect) : effect.text);
+  }
+  if (names.size() > 1) {
+    text.push_back("Together they close " + percent(closed) + " of the gap" +
+                   change_words(diagnosis.position_mm, diagnosis.heading_mrad) + ".");
+  }
+  switch (diagnosis.verdict) {
+    case Verdict::kNone:
+      text.emplace_back("The tuned model predicts the log as well as its own noise allows.");
+      break;
+    case Verdict::kUnknown:
+    case Verdict::kEffectAndUnknown:
+      if (diagnosis.verdict == Verdict::kEffectAndUnknown) {
+        text.emplace_back("Something remains that no effect of the catalogue explains.");
+      }
+      if (!diagnosis.unexplained.empty()) {
+        text.push_back(diagnosis.unexplained.front().text);
+      } else if (!diagnosis.where.empty()) {
+        text.push_back(diagnosis.where.front().text);
+      }
+      break;
+    case Verdict::kEffect:
+    case Verdict::kUnusable:
+      break;
+  }
+  return text;
+}
+
+LogVariety log_variety(std::span<const ResidualTrial> trials, std::span<const Cell> cells,
+                       const TrialLog& log) {
+  LogVariety v;
+  v.trials = trials.size();
+  v.paths = log.has_paths();
+  for (const Trial& trial : log.trials) v.times = v.times || trial.t_s.has_value();
+  std::set<std::size_t> sessions, commands;
+  std::set<int> sectors;
+  std::set<long> durations, levels;
+  double x0 = INFINITY, x1 = -INFINITY, y0 = INFINITY, y1 = -INFINITY;
+  for (const ResidualTrial& t : trials) {
+    sessions.insert(t.session);
+    commands.insert(t.command);
+    durations.insert(std::lround(1000 * cells[t.cell].command.duration_s));
+    levels.insert(std::lround(1000 * cells[t.cell].level));
+    const double turn = (t.X_WS.theta + std::numbers::pi) / (2 * std::numbers::pi);
+    sectors.insert(static_cast<int>(std::floor(turn * kHeadingSectors)) % kHeadingSectors);
+    x0 = std::min(x0, t.X_WS.x), x1 = std::max(x1, t.X_WS.x);
+    y0 = std::min(y0, t.X_WS.y), y1 = std::max(y1, t.X_WS.y);
+    v.longest_min = std::max(v.longest_min, t.context.session_time_s / 60);
+    if (!t.context.moved) ++v.followers;
+  }
+  v.sessions = sessions.size();
+  v.commands = commands.size();
+  v.durations = durations.size();
+  v.levels = levels.size();
+  v.headings = sectors.size();
+  if (!trials.empty()) v.width_m = std::max(x1 - x0, y1 - y0);
+  std::vector<double> counts;
+  for (const Cell& cell : cells) {
+    if (cell.trials > 0) counts.push_back(double(cell.trials));
+  }
+  if (!counts.empty()) v.typical_cell = median(counts);
+  return v;
+}
+
+std::vector<std::string> lacking(const LogVariety& v) {
+  std::vector<std::string> lacks;
+  if (v.commands < 3) lacks.emplace_back("several commands");
+  if (v.durations < 2) lacks.emplace_back("several durations");
+  if (v.levels < 2) lacks.emplace_back("several levels");
+  if (v.headings < 4) lacks.emplace_back("several start headings");
+  if (v.width_m < 0.3) lacks.emplace_back("several start places");
+  if (v.followers == 0) lacks.emplace_back("trials that start where the one before ended");
+  if (!v.times) lacks.emplace_back("times");
+  if (!v.paths) lacks.emplace_back("paths");
+  return lacks;
+}
+
+std::string alias_sentence(std::string_view effect, std::span<const AliasReason> aliases,
+                           std::span<const std::string> lacks) {
+  if (aliases.empty()) return "";
+  std::vector<std::string> parallel, others;
+  double least = 1;
+  for (const AliasReason& alias : aliases) {
+    const bool alike = std::abs(alias.cosine) > kAliasCosine;
+    (alike ? parallel : others).push_back(alias.name);
+    if (alike) least = std::min(least, std::abs(alias.cosine));
+  }
+  std::string text;
+  if (!parallel.empty()) {
+    char cosine[16];
+    std::snprintf(cosine, sizeof cosine, "%.2f", std::floor(100 * least) / 100);
+    text = "In these data " + std::string(effect) + " and " + listed(parallel, "or") +
+           " change the end poses alike (|cos| " + (parallel.size() > 1 ? "at least " : "") +
+           cosine + " after retuning the base)";
+  }
+  if (!others.empty()) {
+    text += (text.empty() ? "In these data " : "; ") + listed(others, "or") +
+            " would explain about as much as " + std::string(effect) + " in another way";
+  }
+  if (!lacks.empty()) text += "; the log lacks " + listed(lacks);
+  return text + ".";
+}
+
+std::vector<std::string> cautions(std::span<const ResidualTrial> trials,
+                                  std::span<const Cell> cells, const TrialLog& log) {
+  const LogVariety v = log_variety(trials, cells, log);
+  std::vector<std::string> text;
+  if (v.trials < kFewTrialsToTell) {
+    text.push_back("There " + std::string(v.trials == 1 ? "is " : "are ") +
+                   counted(v.trials, "trial", "trials") + "; below " +
+                   std::to_string(kFewTrialsToTell) +
+                   " only large effects show, and no claim is sure.");
+  }
+  if (v.trials == 0) return text;
+  if (commands_are_free(cells)) {
+    text.emplace_back(
+        "Hardly a command repeats: the noise is what trials vary by beyond a smooth dependence on "
+        "duties and duration, so a small dependence that is not smooth may pass for noise.");
+  } else if (v.typical_cell < kFewInCell) {
+    text.push_back("Most conditions were driven " +
+                   (v.typical_cell <= 1 ? std::string("once")
+                                        : "about " + plain_number(v.typical_cell) + " times") +
+                   ", so what repeating one varies by is hardly known, and noise may pass for an "
+                   "effect or hide one.");
+  }
+  if (v.sessions == 1) {
+    text.emplace_back(
+        "All trials are of one session: what would differ in another session cannot "
+        "be seen, and held-out trials are from the same one.");
+  }
+  if (v.commands == 1) {
+    text.push_back("All trials drive one command (" + cells[trials.front().cell].command.name +
+                   "): effects that differ between straight drives and turns cannot be told "
+                   "apart.");
+  }
+  if (v.durations == 1) {
+    text.emplace_back(
+        "Every command lasts equally long: motor_lag, timing_offset and backlash look "
+        "like another speed.");
+  }
+  if (v.levels == 1) {
+    text.emplace_back(
+        "Every command runs at one level: motor_deadband and rolling_resistance look "
+        "like another speed.");
+  }
+  if (v.headings < 4) {
+    text.push_back("All trials start in " + counted(v.headings, "direction", "directions") +
+                   " (of twelve): floor_tilt, floor_nap and camera_aspect need several headings.");
+  }
+  if (v.width_m < 0.3) {
+    text.push_back("All starts lie within " + plain_number(1000 * v.width_m) +
+                   " mm: friction_patch, camera_seam and camera_distortion need several places.");
+  }
+  if (v.followers == 0) {
+    text.emplace_back(
+        "No trial starts where the one before ended: backlash, a stale start pose and "
+        "the noise of one reading cannot be seen.");
+  }
+  if (!v.times) {
+    text.emplace_back(
+        "The log has no times; they were guessed from the order of the trials, so the "
+        "rate of battery_sag is rough.");
+  } else if (v.longest_min < 3) {
+    text.push_back("The longest session lasts " + plain_number(v.longest_min) +
+                   " minutes: battery_sag needs longer ones.");
+  }
+  if (!v.paths) {
+    text.emplace_back(
+        "Start and end poses only: what happens on the way (motor_lag, the moment at "
+        "which a pose was read) shows only by where the robot ends.");
+  }
+  return text;
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,81 @@
+// What a diagnosis found, in plain words.
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "common/trials/trial.h"
+#include "master/diagnose/effect_diagnosis.h"
+#include "master/diagnose/evidence/residuals.h"
+#include "master/diagnose/result/diagnosis.h"
+
+namespace gapfarm {
+
+// Drives go in so many directions at most, and fewer trials tell little.
+inline constexpr int kHeadingSectors = 12;
+inline constexpr std::size_t kFewTrialsToTell = 60;
+
+// "3.14" to three significant digits, without trailing zeros and exponents where it can be read.
+std::string plain_number(double value);
+// "a", "a and b", "a, b and c".
+std::string listed(std::span<const std::string> words, std::string_view last = "and");
+
+// "Forward drives", "Clockwise turns"; "all": "All motions".
+std::string motions_of(const std::string& command);
+// "3.1 mm", "0.9 mrad": without its sign.  Components are 0, 1, 2 for x, y, theta here and below.
+std::string amount_words(double size, int component);
+// "heading", "end along its heading", "end across its heading".
+std::string component_words(int component);
+// "end 3.1 mm too far to the left" for a residual or, as a trend, "end 3.1 mm farther to the left";
+// along the motion "turn 0.9 mrad too little" or "turn 0.9 mrad less".
+std::string deviation_words(int component, double size, bool along_motion, bool trend);
+
+// "The battery loses 0.35 % of its speed a minute (0.31 to 0.4); adding that closes 88 % of the
+// gap."  Effects without words, or without their parameters, are named with what is there.
+std::string effect_sentence(const NamedEffect& effect,
+                            const EffectDiagnoses& effects = drive_effect_diagnoses());
+
+// Its claim alone, without intervals and full stop.
+std::string effect_claim(const NamedEffect& effect, const EffectDiagnoses& effects);
+
+// The verdict and its reasons, a sentence each.
+std::vector<std::string> findings(const Diagnosis& diagnosis);
+
+// How much of what effects look at varies in a log.
+struct LogVariety {
+  std::size_t trials = 0;
+  std::size_t sessions = 0;
+  std::size_t commands = 0;
+  std::size_t durations = 0;
+  std::size_t levels = 0;
+  std::size_t headings = 0;   // of twelve sectors of the start heading, those with trials
+  double width_m = 0;         // of the box around the starts, its greater side
+  double longest_min = 0;     // of a session
+  std::size_t followers = 0;  // trials that start where the one before ended
+  bool times = false;         // some are logged
+  bool paths = false;
+  double typical_cell = 0;  // trials with the same command, duties and duration, median
+};
+LogVariety log_variety(std::span<const ResidualTrial> trials, std::span<const Cell> cells,
+                       const TrialLog& log);
+
+// What the log lacks and two effects would need to part: "several durations", ...
+std::vector<std::string> lacking(const LogVariety& variety);
+
+// An effect whose signature is parallel to another's in these data.
+struct AliasReason {
+  std::string name;
+  double cosine = 0;  // absolute, of what retuning the base leaves of both
+};
+// One sentence; empty without aliases.  `lacks`: what the log would need to part them.
+std::string alias_sentence(std::string_view effect, std::span<const AliasReason> aliases,
+                           std::span<const std::string> lacks);
+
+// What cannot be seen, or not be trusted, in data as thin as these; one sentence each.
+std::vector<std::string> cautions(std::span<const ResidualTrial> trials,
+                                  std::span<const Cell> cells, const TrialLog& log);
+
+}  // namespace gapfarm

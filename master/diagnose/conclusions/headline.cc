@@ -1,0 +1,122 @@
+#include "master/diagnose/conclusions/headline.h"
+
+#include <cmath>
+#include <optional>
+
+#include "master/io/log_checks/words.h"
+
+namespace gapfarm {
+namespace {
+
+constexpr std::size_t kLine = 100;  // characters, about what fits on one line in large print
+
+const Estimate* size_of(const NamedEffect& effect, const ShortWords& words) {
+  for (const Estimate& e : effect.parameters) {
+    if (e.key == words.key && std::isfinite(e.value)) return &e;
+  }
+  return nullptr;
+}
+
+std::string filled(const char* text, const NamedEffect& effect, const ShortWords& words,
+                   double value) {
+  std::string line;
+  for (const char* c = text; *c != 0; ++c) {
+    if (*c == '%') {
+      line += plain_number(std::abs(words.factor * value)) + words.unit;
+    } else if (*c == '@') {
+      line += effect.axis.empty() ? "the seam" : effect.axis;
+    } else {
+      line += *c;
+    }
+  }
+  return line;
+}
+
+std::string cause_of(const NamedEffect& effect, const EffectDiagnoses& effects) {
+  const std::optional<ShortWords>& words = effects.row(effect.name).short_words;
+  const Estimate* size = words ? size_of(effect, *words) : nullptr;
+  if (size == nullptr) return effect_claim(effect, effects);
+  const bool opposite = size->value < 0 && words->opposite != nullptr;
+  std::string line = filled(opposite ? words->opposite : words->cause, effect, *words, size->value);
+  for (const Estimate& e : effect.parameters) {
+    if (words->toward != nullptr && e.key == words->toward) {
+      line += " toward " + plain_number(std::round(kDegrees * e.value)) + " degrees";
+    }
+  }
+  return line;
+}
+
+std::string first_cause(const Diagnosis& d, const EffectDiagnoses& effects) {
+  if (d.effects.empty()) return "The readings, not the robot, are odd";
+  std::string line = cause_of(d.effects.front(), effects);
+  std::string others;
+  for (std::size_t i = 1; i < d.effects.size(); ++i) {
+    others += (i > 1 ? ", " : "; also ") + d.effects[i].name;
+  }
+  if (line.size() + others.size() > kLine) {
+    const std::size_t more = d.effects.size() - 1;
+    others = "; " + std::to_string(more) + (more == 1 ? " more cause" : " more causes");
+  }
+  return line + others;
+}
+
+// What keeps the diagnosis from naming anything; null where nothing does.
+const SanityFinding* doubt_of(const Diagnosis& d) {
+  const bool doubtful = d.verdict == Verdict::kUnusable || d.verdict == Verdict::kUnknown;
+  if (!doubtful || d.sanity.empty() || d.sanity.front().severity == Severity::kNote) return nullptr;
+  return &d.sanity.front();
+}
+
+}  // namespace
+
+std::string headline(const Diagnosis& diagnosis, const EffectDiagnoses& effects) {
+  const SanityFinding* doubt = doubt_of(diagnosis);
+  switch (diagnosis.verdict) {
+    case Verdict::kUnusable:
+      return "Not usable as it is: " +
+             (doubt != nullptr ? finding_phrase(*doubt) : "something is wrong with it") + ".";
+    case Verdict::kNone:
+      return "Nothing is missing that these data could show.";
+    case Verdict::kUnknown:
+      if (doubt != nullptr) return "No cause can be named: " + finding_phrase(*doubt) + ".";
+      return "Something is missing that no effect of the catalogue explains.";
+    case Verdict::kEffect:
+      return first_cause(diagnosis, effects) + ".";
+    case Verdict::kEffectAndUnknown:
+      return first_cause(diagnosis, effects) + "; something more is unexplained.";
+  }
+  return "";
+}
+
+std::string action(const Diagnosis& diagnosis, const EffectDiagnoses& effects) {
+  if (const SanityFinding* doubt = doubt_of(diagnosis); doubt != nullptr) return doubt->remedy;
+  if (diagnosis.effects.empty()) {
+    if (diagnosis.verdict == Verdict::kNone) {
+      return "Use tuned.toml as it is; only more trials, or other ones, could show more.";
+    }
+    if (diagnosis.where.empty()) return "Look at the worst drives below.";
+    const Where& w = diagnosis.where.front();
+    return "Look first at how " + (w.command == "all" ? "all commands" : w.command) +
+           (w.covariate.empty() ? " miss" : " depend on " + w.covariate) +
+           ": the first row under where the model goes wrong.";
+  }
+  const NamedEffect& first = diagnosis.effects.front();
+  if (!first.aliases.empty() && !diagnosis.next.empty() && diagnosis.next.front().trials > 0) {
+    return "Drive the " + std::to_string(diagnosis.next.front().trials) +
+           " trials under what to try next: they tell " + first.name + " from " +
+           first.aliases.front() + ".";
+  }
+  const std::optional<ShortWords>& words = effects.row(first.name).short_words;
+  const Estimate* size = words ? size_of(first, *words) : nullptr;
+  const std::string paste = "paste the parameters below into your config.";
+  if (size == nullptr) return "P" + paste.substr(1);
+  return filled(words->remedy, first, *words, size->value) + ", or " + paste;
+}
+
+void tell(const EffectDiagnoses& effects, Diagnosis* diagnosis) {
+  diagnosis->headline = headline(*diagnosis, effects);
+  diagnosis->action = action(*diagnosis, effects);
+  diagnosis->findings = findings(*diagnosis);
+}
+
+}  // namespace gapfarm

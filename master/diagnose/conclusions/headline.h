@@ -1,0 +1,24 @@
+// A diagnosis in one line and one action.
+#pragma once
+
+#include <string>
+
+#include "master/diagnose/conclusions/findings.h"
+#include "master/diagnose/result/diagnosis.h"
+
+namespace gapfarm {
+
+// "Two cameras disagree at y = 1.34 m; something more is unexplained.": the likeliest cause in
+// plain words, about a line long; of a log that is doubtful, what is wrong with it.
+std::string headline(const Diagnosis& diagnosis,
+                     const EffectDiagnoses& effects = drive_effect_diagnoses());
+
+// "Trim the faster side's duty by 4.8 %, or paste the parameters below into your config.": the one
+// thing to do next.  Once next experiments are known.
+std::string action(const Diagnosis& diagnosis,
+                   const EffectDiagnoses& effects = drive_effect_diagnoses());
+
+// Fills in headline, action and findings.
+void tell(const EffectDiagnoses& effects, Diagnosis* diagnosis);
+
+}  // namespace gapfarm

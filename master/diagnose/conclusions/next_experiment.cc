@@ -1,0 +1,248 @@
+#include "master/diagnose/conclusions/next_experiment.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <optional>
+#include <set>
+#include <utility>
+
+#include "common/score/fitness.h"
+#include "master/diagnose/conclusions/findings.h"
+
+namespace gapfarm {
+namespace {
+
+constexpr std::uint64_t kFewestRepeats = 3;
+constexpr double kAlikeFromAnywhere = 0.7;  // least over mean divergence of the starts
+constexpr double kWorthTheTrouble = 1.5;    // divergence of a special way over the ordinary one's
+
+using Predictions = std::vector<std::optional<PredictedEnd>>;  // one a synthetic trial
+
+void keep(const v1::PredictResult& result, Predictions& to) {
+  for (const v1::Predicted& predicted : result.predictions()) {
+    if (predicted.trial() >= to.size() || predicted.cov_size() != 6) continue;
+    PredictedEnd end;
+    end.X_WM = from_proto(predicted.end());
+    int k = 0;
+    for (const auto& [row, column] : {std::pair{0, 0}, {0, 1}, {0, 2}, {1, 1}, {1, 2}, {2, 2}}) {
+      end.covariance(row, column) = end.covariance(column, row) = predicted.cov(k++);
+    }
+    to[predicted.trial()] = end;
+  }
+}
+
+std::vector<std::string> groups_of(const ExperimentPlan& plan) {
+  std::vector<std::string> groups;
+  for (const Design& design : plan.designs) {
+    if (std::find(groups.begin(), groups.end(), design.group) != groups.end()) continue;
+    groups.push_back(design.group);
+  }
+  return groups;
+}
+
+// One task a rival and group: enough to keep many workers busy, and what one of them cannot
+// simulate costs no other.
+Result<std::vector<Predictions>> predict(Farm& farm, const ExperimentPlan& plan,
+                                         const Rivals& rivals) {
+  std::vector<v1::Task> tasks;
+  std::vector<std::size_t> of_rival;
+  for (std::size_t r = 0; r < rivals.size(); ++r) {
+    for (const std::string& group : groups_of(plan)) {
+      v1::Task task;
+      v1::PredictTask& to = *task.mutable_predict();
+      for (const v1::Override& o : rivals[r].overrides) *to.mutable_point()->add_overrides() = o;
+      for (const Design& design : plan.designs) {
+        if (design.group != group) continue;
+        for (const std::uint32_t i : design.trials) to.add_trials(i);
+      }
+      tasks.push_back(std::move(task));
+      of_rival.push_back(r);
+    }
+  }
+  const std::string hash = farm.add_problem(to_proto(plan.problem));
+  const auto results = farm.run(hash, tasks);
+  if (!results) return results.error();
+  std::vector<Predictions> all(rivals.size(), Predictions(plan.problem.log.trials.size()));
+  std::vector<bool> survived(rivals.size(), false);
+  std::string last;
+  for (std::size_t i = 0; i < results->size(); ++i) {
+    const v1::TaskResult& result = (*results)[i];
+    if (result.outcome() != v1::OK) {
+      last = v1::Outcome_Name(result.outcome()) + " (" + result.message() + ")";
+      continue;  // that group cannot tell this rival from another
+    }
+    survived[of_rival[i]] = true;
+    keep(result.predict(), all[of_rival[i]]);
+  }
+  for (std::size_t r = 0; r < rivals.size(); ++r) {
+    if (survived[r]) continue;
+    return Error{"rival '" + rivals[r].name + "' cannot be simulated in any design: " + last +
+                 "; its parameters must leave something that moves"};
+  }
+  return all;
+}
+
+struct Separation {
+  std::uint64_t trials = 0;
+  bool many_starts = false;  // one start alone would tell less
+};
+
+// None: the design does not part the two within `most` trials.
+std::optional<Separation> separation(const Design& design, const Predictions& a,
+                                     const Predictions& b, std::uint64_t most) {
+  double sum = 0, least = INFINITY;
+  for (const std::uint32_t i : design.trials) {
+    if (!a[i] || !b[i]) return std::nullopt;
+    const double d = divergence(*a[i], *b[i]);
+    sum += d;
+    least = std::min(least, d);
+  }
+  const double mean = sum / static_cast<double>(design.trials.size());
+  if (design.ordinary) {
+    const std::uint32_t i = *design.ordinary;
+    if (!a[i] || !b[i] || mean < kWorthTheTrouble * divergence(*a[i], *b[i])) return std::nullopt;
+  }
+  const std::uint64_t needed = trials_needed(mean);
+  if (needed > most) return std::nullopt;
+  const bool many = design.trials.size() > 1 && least < kAlikeFromAnywhere * mean;
+  // The mean over the starts holds only when all of them are driven.
+  return Separation{many ? std::max<std::uint64_t>(needed, design.trials.size()) : needed, many};
+}
+
+using Pair = std::pair<std::size_t, std::size_t>;
+
+struct Choice {
+  std::size_t design = 0;
+  std::vector<Pair> pairs;
+  std::uint64_t trials = 0;  // for the hardest of them
+  bool many_starts = false;
+};
+
+bool better(const Choice& a, const Choice& b, const std::vector<Design>& designs) {
+  if (a.pairs.size() != b.pairs.size()) return a.pairs.size() > b.pairs.size();
+  if (a.trials != b.trials) return a.trials < b.trials;
+  return designs[a.design].cost < designs[b.design].cost;
+}
+
+// The design that parts most of `pairs`, with the fewest trials.
+std::optional<Choice> best_design(const ExperimentPlan& plan,
+                                  const std::vector<Predictions>& predictions,
+                                  const std::vector<Pair>& pairs, std::uint64_t most,
+                                  const std::function<bool(const Design&)>& allowed) {
+  std::optional<Choice> best;
+  for (std::size_t i = 0; i < plan.designs.size(); ++i) {
+    const Design& design = plan.designs[i];
+    if (!allowed(design)) continue;
+    Choice choice{i, {}, 0, false};
+    for (const Pair& pair : pairs) {
+      const auto parted =
+          separation(design, predictions[pair.first], predictions[pair.second], most);
+      if (!parted) continue;
+      choice.pairs.push_back(pair);
+      choice.trials = std::max(choice.trials, parted->trials);
+      choice.many_starts = choice.many_starts || parted->many_starts;
+    }
+    if (choice.pairs.empty()) continue;
+    if (!best || better(choice, *best, plan.designs)) best = std::move(choice);
+  }
+  return best;
+}
+
+std::vector<std::string> names_in(const std::vector<Pair>& pairs, const Rivals& rivals) {
+  std::set<std::size_t> indices;
+  for (const auto& [a, b] : pairs) indices.insert({a, b});
+  std::vector<std::string> names;
+  for (const std::size_t i : indices) names.push_back(rivals[i].name);
+  return names;
+}
+
+std::string told_apart(const std::vector<Pair>& pairs, const Rivals& rivals) {
+  const std::vector<std::string> names = names_in(pairs, rivals);
+  if (names.size() == 2) return names[0] + " from " + names[1];
+  if (2 * pairs.size() == names.size() * (names.size() - 1)) return listed(names) + " apart";
+  std::vector<std::string> told;
+  for (const auto& [a, b] : pairs) told.push_back(rivals[a].name + " from " + rivals[b].name);
+  return listed(told);
+}
+
+NextExperiment sentence(const Choice& choice, const ExperimentPlan& plan, const Rivals& rivals) {
+  NextExperiment next;
+  next.text = plan.designs[choice.design].action(choice.many_starts) + ": " +
+              std::to_string(choice.trials) + " trials tell " + told_apart(choice.pairs, rivals) +
+              ".";
+  next.separates = names_in(choice.pairs, rivals);
+  next.trials = choice.trials;
+  return next;
+}
+
+NextExperiment hopeless(const std::vector<Pair>& pairs, const ExperimentPlan& plan,
+                        const Rivals& rivals, std::uint64_t most) {
+  return {"No " + plan.designs_are + " tells " + told_apart(pairs, rivals) + " within " +
+              std::to_string(most) + " trials by end poses; " + plan.instead + ".",
+          names_in(pairs, rivals), 0};
+}
+
+void erase(const std::vector<Pair>& done, std::vector<Pair>& pairs) {
+  std::erase_if(pairs, [&](const Pair& pair) {
+    return std::find(done.begin(), done.end(), pair) != done.end();
+  });
+}
+
+}  // namespace
+
+double divergence(const PredictedEnd& a, const PredictedEnd& b) {
+  const Eigen::Vector3d d = local_difference(a.X_WM, b.X_WM);
+  const Eigen::Matrix3d& A = a.covariance;
+  const Eigen::Matrix3d B = rotate_covariance(b.covariance, d[2]);
+  const Eigen::LLT<Eigen::Matrix3d> of_a(A), of_b(B), of_mean((A + B) / 2);
+  if (of_a.info() != Eigen::Success || of_b.info() != Eigen::Success ||
+      of_mean.info() != Eigen::Success) {
+    return 0;
+  }
+  const double shift = d.dot(of_mean.solve(d)) / 2;
+  const double shape = (of_a.solve(B).trace() + of_b.solve(A).trace() - 6) / 4;
+  return shift + std::max(0.0, shape);
+}
+
+std::uint64_t trials_needed(double divergence) {
+  constexpr double kQuantile = 1.6448536269514722;  // 0.95 of a standard normal
+  constexpr double kMost = 1e15;
+  if (!(divergence > 0)) return static_cast<std::uint64_t>(kMost);
+  const double needed = std::ceil(std::min(kMost, 2 * kQuantile * kQuantile / divergence));
+  return std::max(kFewestRepeats, static_cast<std::uint64_t>(needed));
+}
+
+Result<std::vector<NextExperiment>> next_experiments(Farm& farm, const ExperimentPlan& plan,
+                                                     const Rivals& rivals,
+                                                     const NextExperimentOptions& options) {
+  std::vector<NextExperiment> next;
+  if (rivals.size() < 2 || plan.designs.empty() || options.sentences == 0) return next;
+  const auto predictions = predict(farm, plan, rivals);
+  if (!predictions) return predictions.error();
+  std::vector<Pair> pairs;
+  for (std::size_t a = 0; a < rivals.size(); ++a) {
+    for (std::size_t b = a + 1; b < rivals.size(); ++b) pairs.emplace_back(a, b);
+  }
+  std::vector<Pair> open = pairs;
+  std::set<std::string> used;
+  const auto anything = [](const Design&) { return true; };
+  const auto unused = [&](const Design& d) { return !used.contains(d.group); };
+  while (next.size() < options.sentences) {
+    const bool again = open.empty();  // all are parted: offer another group
+    const auto choice = again
+                            ? best_design(plan, *predictions, pairs, options.most_trials, unused)
+                            : best_design(plan, *predictions, open, options.most_trials, anything);
+    if (!choice) {
+      if (!again) next.push_back(hopeless(open, plan, rivals, options.most_trials));
+      break;
+    }
+    used.insert(plan.designs[choice->design].group);
+    next.push_back(sentence(*choice, plan, rivals));
+    erase(choice->pairs, open);
+  }
+  return next;
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,81 @@
+// Which trials to drive next so that rival explanations part.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/base/result.h"
+#include "common/pose/pose.h"
+#include "common/problem/problem.h"
+#include "gapfarm/v1/task.pb.h"
+#include "master/diagnose/result/diagnosis.h"
+#include "master/farm/farm.h"
+
+namespace gapfarm {
+
+// An explanation at its best fit: what it changes in the problem's values.
+struct Rival {
+  std::string name;
+  std::vector<v1::Override> overrides;
+};
+using Rivals = std::vector<Rival>;
+
+// Trials that might be made, all alike but for where they start.
+struct Design {
+  std::string group;                  // a further sentence offers a design of another group
+  std::vector<std::uint32_t> trials;  // of the plan's log, to be predicted
+  // What is special about it must be why it tells: the trial without that, from the same start.
+  std::optional<std::uint32_t> ordinary;
+  double cost = 0;  // of two that tell as much the cheaper is offered
+  // What to do, without a full stop; `many_starts`: one start alone would tell less.
+  std::function<std::string(bool many_starts)> action;
+};
+
+struct ExperimentPlan {
+  Problem problem;  // without genes, and with the synthetic log of all designs
+  std::vector<Design> designs;
+  std::string designs_are;  // "No ... tells them apart"
+  std::string instead;      // what to do when no design tells rivals apart
+};
+
+struct NextExperimentOptions {
+  std::uint64_t most_trials = 500;  // a design that needs more separates nothing
+  std::size_t sentences = 2;
+};
+
+// A predicted measured end pose in the world, covariance in its own axes.
+struct PredictedEnd {
+  Pose X_WM;
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();
+};
+
+// Mean Kullback-Leibler divergence a trial of two Gaussian predictions, nats:
+//
+//   d' S^-1 d / 2 + (tr(A^-1 B) + tr(B^-1 A) - 6) / 4,    S = (A + B) / 2
+//
+// d: from one mean to the other; A, B: the covariances in the axes of the first end.  The second
+// term is the mean of both directions' divergences at equal means.  Infinite means are not allowed;
+// 0 when a covariance is not positive definite (nothing is known then).
+double divergence(const PredictedEnd& a, const PredictedEnd& b);
+
+// Trials after which the likelihood ratio of the two is wrong at most once in twenty, either way.
+// For n trials it is about normal with mean +-n D and variance 2 n D (exactly so for a shift of a
+// Gaussian), so n = 2 * 1.645^2 / D = 5.41 / D.  (Chernoff and Stein's lemma gives the same rate
+// in D at a fixed level: ln 20 / D = 3.0 / D for one error alone.)  At least 3.
+std::uint64_t trials_needed(double divergence);
+
+// Predicts every rival on the plan's designs and says which of them tell the rivals apart with the
+// fewest trials; at most `sentences`.  A further sentence parts rivals that the ones before left
+// together, or offers a design of another group.  Rivals that no design parts get a sentence saying
+// so, with 0 trials.  Fewer than two rivals need no experiment.  Rivals are taken at their fits:
+// the base is not retuned to the new trials.
+// Errors: the farm's, and a rival that cannot be simulated anywhere.
+Result<std::vector<NextExperiment>> next_experiments(Farm& farm, const ExperimentPlan& plan,
+                                                     const Rivals& rivals,
+                                                     const NextExperimentOptions& options = {});
+
+}  // namespace gapfarm

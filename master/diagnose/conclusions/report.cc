@@ -1,0 +1,199 @@
+// Figures and words.
+
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/math/statistics.h"
+#include "common/score/baselines.h"
+#include "master/diagnose/conclusions/findings.h"
+#include "master/diagnose/conclusions/headline.h"
+#include "master/diagnose/conclusions/report_parts.h"
+
+namespace gapfarm::steps {
+namespace {
+
+void fill_gap(const Inquiry& of, const Refit& refit, Diagnosis* d) {
+  const NestedFit &base = refit.nested.front(), &model = refit.nested.back();
+  d->gap.tuned = refit.floor - mean(base.scores);
+  d->gap.final_ =
+      d->effects.empty() ? refit.floor - mean(model.scores) : d->effects.back().gap_after;
+  d->gap.floor = 0;
+  const std::vector<std::size_t> folds = of.subject.folds(refit.judged.named.study());
+  const RootMeanSquare tuned = held_out_error(base, folds);
+  const RootMeanSquare last = held_out_error(model, folds);
+  double position = 0, heading = 0;
+  const auto n = static_cast<double>(model.study.size());
+  for (const Eigen::Matrix3d& cov : model.study.covariances()) {
+    position += (cov(0, 0) + cov(1, 1)) / n;
+    heading += cov(2, 2) / n;
+  }
+  d->position_mm = {tuned.position_mm, last.position_mm, 1e3 * std::sqrt(position)};
+  d->heading_mrad = {tuned.heading_mrad, last.heading_mrad, 1e3 * std::sqrt(heading)};
+}
+
+void fill_where(const Inquiry& of, const Refit& refit, Diagnosis* d) {
+  const Study& study = refit.judged.named.study();
+  const auto look = [&](const NestedFit& nested) {
+    return of.subject.where(study, nested.fit.residuals, of.problem);
+  };
+  d->where = look(refit.nested.front());
+  const bool unexplained =
+      d->verdict == Verdict::kUnknown || d->verdict == Verdict::kEffectAndUnknown;
+  if (unexplained) d->unexplained = look(refit.nested.back());
+}
+
+void append(const std::vector<std::string>& more, Diagnosis* d) {
+  d->cautions.insert(d->cautions.end(), more.begin(), more.end());
+}
+
+void fill_judgement(const Judgement& judged, Diagnosis* d) {
+  d->verdict = judged.verdict;
+  d->cautions = judged.cautions;
+  d->nearest = judged.nearest;
+  d->sanity.insert(d->sanity.begin(), judged.doubts.begin(), judged.doubts.end());
+  for (const Leftover& l : judged.left) d->checks.push_back({l.covariate, l.log10_p, l.excess});
+}
+
+void fill_steps(const Screening& screening, Diagnosis* d) {
+  if (screening.doubt) return;
+  for (const SelectionStep& step : screening.catalogue->steps()) {
+    d->steps.push_back({step.explained, step.offered});
+  }
+}
+
+DiagnosisResult begun(const Inquiry& of) {
+  DiagnosisResult result;
+  result.problem = of.predictor.problem_hash();
+  result.frame_x_m = of.frame_m.x();
+  result.frame_y_m = of.frame_m.y();
+  return result;
+}
+
+}  // namespace
+
+std::vector<std::string> leftover_caution(std::vector<Leftover> left, double unknown_log10_p) {
+  std::erase_if(left, [&](const Leftover& l) { return !(l.log10_p < unknown_log10_p); });
+  std::stable_sort(left.begin(), left.end(),
+                   [](const Leftover& a, const Leftover& b) { return a.log10_p < b.log10_p; });
+  std::vector<std::string> covariates;
+  for (const Leftover& l : left) covariates.push_back(l.covariate);
+  if (covariates.empty()) return {};
+  return {"What is left still depends on " + listed(covariates) +
+          (covariates.size() > 1 ? " (the clearest first)." : ".")};
+}
+
+Status compare_with_baselines(const Inquiry& of, const Refit& refit, Diagnosis* d) {
+  if (scenario_form(of.problem.scenario).pieces) return {};
+  const Explanation& named = refit.judged.named;
+  const auto baselines =
+      crossfitted_baselines(of.problem.log, of.problem.commands, of.subject.folds(named.study()));
+  if (!baselines) return baselines.error();
+  const auto by_tuned = gapfarm::compare_with_baselines(*baselines, refit.nested.front().scores);
+  const auto by_model = gapfarm::compare_with_baselines(
+      *baselines, named.slip.gain > 0     ? refit.slip_scores
+                  : named.spreads.empty() ? refit.nested.back().scores
+                                          : named.spreads.back().scores);
+  if (by_model.empty()) {
+    d->provenance.emplace_back("without a simulation",
+                               "no command is driven often enough to be learned from by itself");
+  }
+  for (std::size_t b = 0; b < by_model.size(); ++b) {
+    const BaselineComparison &model = by_model[b], &tuned = by_tuned[b];
+    d->provenance.emplace_back(
+        "without a simulation: " + model.name,
+        fmt::format("{:.3f} nats a trial on {} trials left out; tuned base {:.3f}, model {:.3f}",
+                    model.baseline, model.trials, tuned.model, model.model));
+    if (!model.beaten()) {
+      d->cautions.push_back(fmt::format(
+          "The simulation does not beat {}, which needs none: {:.3f} nats a trial against {:.3f} "
+          "on {} trials left out.",
+          model.name, model.model, model.baseline, model.trials));
+    } else if (!tuned.beaten()) {
+      d->cautions.push_back(
+          fmt::format("The tuned base alone does not beat {}, which needs no simulation: {:.3f} "
+                      "nats a trial against {:.3f}; with what was found the model does ({:.3f}).",
+                      model.name, tuned.model, model.baseline, model.model));
+    }
+  }
+  return {};
+}
+
+Result<DiagnosisResult> report(const Inquiry& of, const Screening& screening, const Refit& refit) {
+  DiagnosisResult result = begun(of);
+  Diagnosis& d = result.diagnosis;
+  const Explanation& named = refit.judged.named;
+  fill_judgement(refit.judged, &d);
+  fill_steps(screening, &d);
+  for (const NestedFit& n : refit.nested) result.fits.emplace_back(n.name, n.tasks);
+  d.residual = refit.shape;
+  result.residual = refit.residual;
+  d.effects = named_effects(of, refit);
+  fill_gap(of, refit, &d);
+  d.shown = of.subject.shown;
+  d.words = of.subject.words;
+  d.trials = diagnosed_trials(of, refit);
+  // Cautions, the gravest first: what the simulation does not explain or model, then what the log
+  // does not show, then what is only to be known.
+  if (Status s = compare_with_baselines(of, refit, &d); !s) return s.error();
+  append(leftover_caution(refit.judged.left, of.subject.unknown_log10_p), &d);
+  fill_values(of, refit, &result);
+  fill_where(of, refit, &d);
+  // What is simulated from here on joins a catalogue of its own.
+  std::optional<Selector> catalogue;
+  if (!named.chosen.empty()) catalogue = *screening.catalogue;
+  if (d.verdict == Verdict::kEffectAndUnknown && catalogue) {
+    const auto places = second_places(of, named, &*catalogue);
+    if (!places) return places.error();
+    append(*places, &d);
+  }
+  append(of.subject.cautions(named.study(), of.problem.log), &d);
+  fill_parameters(of, refit, &result);
+  auto drives = shown_drives(of, result);
+  if (!drives) return drives.error();
+  d.drives = std::move(*drives);
+  d.screening = complete_screening(of, screening, refit.judged);
+  append(not_looked_for(of), &d);
+  if (of.frame_m.x() != 0 || of.frame_m.y() != 0) {
+    d.cautions.push_back(
+        "The log lies far from the world's origin: model.toml counts places from x "
+        "= " +
+        plain_number(of.frame_m.x()) + " m, y = " + plain_number(of.frame_m.y()) +
+        " m (its [frame]), and a seam's shift is the one there.");
+  }
+  if (catalogue) {
+    if (Status s = plan_next(of, named, &*catalogue, &d); !s) return s.error();
+  }
+  return result;
+}
+
+DiagnosisResult give_up(const Inquiry& of, const KnownSoFar& known, const std::string& step,
+                        const Error& error) {
+  DiagnosisResult result = begun(of);
+  Diagnosis& d = result.diagnosis;
+  if (known.screening != nullptr) {
+    d.screening = known.screening->rows;
+    fill_steps(*known.screening, &d);
+  }
+  if (known.judged != nullptr) fill_judgement(*known.judged, &d);
+  const bool base = known.tuned == nullptr;
+  d.verdict = base ? Verdict::kUnusable : Verdict::kUnknown;
+  d.sanity.insert(d.sanity.begin(),
+                  {base ? "base_not_simulated" : "unfinished",
+                   "While it was to " + step + ": " + error.message + ".",
+                   base ? "Give the config values at which the robot moves and comes to rest."
+                        : "Bring [parameters] nearer to the robot; --leave-out NAME goes on "
+                          "without an effect.",
+                   base ? Severity::kUnusable : Severity::kDoubt});
+  append(not_simulated(of), &d);
+  result.tuned = of.problem.values;
+  if (!base) {
+    for (const auto& [row, value] : known.tuned->base) result.tuned[row] = value;
+  }
+  result.final_ = result.tuned;
+  result.intervals.assign(of.problem.values.size(), {1, 0});
+  return result;
+}
+
+}  // namespace gapfarm::steps

@@ -1,0 +1,273 @@
+// Names with their figures.
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/math/statistics.h"
+#include "common/random/stream.h"
+#include "master/diagnose/conclusions/confidence.h"
+#include "master/diagnose/conclusions/findings.h"
+#include "master/diagnose/conclusions/report_parts.h"
+#include "master/diagnose/fit/intervals.h"
+#include "master/diagnose/places/seam.h"
+
+namespace gapfarm::steps {
+namespace {
+
+constexpr int kBootstraps = 400;
+
+// For so long another robot may roll on by itself: what a late reading's age is counted from is its
+// recorder's secret.
+constexpr double kCoasting_s = 0.04;
+constexpr double kLagError = 0.05;  // of a lag seen in paths, between simulations
+
+std::vector<double> difference(std::vector<double> values, const std::vector<double>& less) {
+  for (std::size_t i = 0; i < values.size(); ++i) values[i] -= less[i];
+  return values;
+}
+
+// Of every trial, by a nested fit over the one before.
+std::vector<double> gained_by(const Refit& refit, std::size_t nested) {
+  return difference(refit.nested[nested].scores, refit.nested[nested - 1].scores);
+}
+
+// With the gap that it closes, and 90 % of how sure that is.
+void set_closed(const ClosedShare& closed, NamedEffect* effect) {
+  effect->closed = closed.share;
+  effect->closed_lo = closed.lo;
+  effect->closed_hi = closed.hi;
+}
+
+// One row of the table with what the fit and what lies beyond it leave open.
+Estimate told_estimate(const Inquiry& of, const Judgement& judged, const ChosenEffect& chosen,
+                       std::size_t row, double value) {
+  const JointFit& estimates = *judged.named.estimates;
+  const Parameter& p = of.table()[row];
+  Estimate e{p.key.substr(p.key.find('.') + 1), value, value, value, p.unit};
+  double fit_error = 0;
+  for (const FittedParameter& fitted : estimates.parameters) {
+    if (fitted.row == row) fit_error = fitted.standard_error * std::sqrt(judged.scale);
+  }
+  // What the base could take over is part of it where both were searched.
+  const Overrides& searched = judged.named.searched_error;
+  if (const auto wide = searched.find(row); wide != searched.end()) {
+    fit_error = std::max(fit_error, wide->second);
+  }
+  const double half =
+      kNormal90 * std::hypot(fit_error, error_beyond_fit(judged.named.study(), of.table(), row,
+                                                         estimates.at, chosen.candidate.gain));
+  e.lo = value - half;
+  e.hi = value + half;
+  if (!e.key.ends_with("direction")) {
+    e.lo = std::max(e.lo, p.lower);
+    e.hi = std::min(e.hi, p.upper);
+  }
+  const double frame = of.frame_of(p.key, estimates.at);
+  for (double* told : {&e.value, &e.lo, &e.hi}) *told += frame;
+  return e;
+}
+
+// Without words, and with a gap that only its change counts of.
+NamedEffect named_mean(const Inquiry& of, const Refit& refit, std::size_t k) {
+  const Explanation& named = refit.judged.named;
+  const ChosenEffect& chosen = named.chosen[k];
+  NamedEffect effect;
+  effect.name = chosen.candidate.signature.effect;
+  std::vector<AliasReason> reasons;
+  for (const Alias& alias : chosen.aliases) {
+    effect.aliases.push_back(alias.effect);
+    reasons.push_back({alias.effect, std::abs(alias.cosine)});
+  }
+  effect.alias_reason =
+      alias_sentence(effect.name, reasons, of.subject.lacks(named.study(), of.problem.log));
+  effect.confidence = confidence_of(chosen.candidate.gain, of.subject.least_gain);
+  for (const auto& [row, value] : named.estimates->at) {
+    const Parameter& p = of.table()[row];
+    if (p.effect != effect.name || p.kind != ParameterKind::kReal) continue;
+    effect.parameters.push_back(told_estimate(of, refit.judged, chosen, row, value));
+  }
+  if (is_seam(effect.name)) {
+    effect.axis = named.estimates->at.at(of.table().row(effect.name + ".axis")) == 0 ? "x" : "y";
+  }
+  const std::size_t before = k + (named.as_logged ? 1 : 0);
+  effect.gap_before = refit.floor - mean(refit.nested[before].scores);
+  effect.gap_after = refit.floor - mean(refit.nested[before + 1].scores);
+  set_closed(closed_share(of, refit, gained_by(refit, before + 1)), &effect);
+  const std::vector<std::size_t> folds = of.subject.folds(named.study());
+  const RootMeanSquare without_it = held_out_error(refit.nested[before], folds),
+                       with = held_out_error(refit.nested[before + 1], folds);
+  effect.position_mm_before = without_it.position_mm;
+  effect.heading_mrad_before = without_it.heading_mrad;
+  effect.position_mm_after = with.position_mm;
+  effect.heading_mrad_after = with.heading_mrad;
+  return effect;
+}
+
+// An effect on the spread: gain in nats over all trials.
+struct SpreadEffect {
+  std::string name;
+  double gain = 0;
+  std::vector<Estimate> estimates;
+  std::vector<double> gained;  // of each trial, where that is known
+  std::vector<SessionGain> sessions = {};
+};
+
+// Effects that widen the distribution rather than move it: their gain is that of the mixture.
+std::vector<SpreadEffect> spread_effects(const Refit& refit) {
+  const Explanation& named = refit.judged.named;
+  std::vector<SpreadEffect> found;
+  if (!named.first.empty()) {
+    const double age = named.latency_from_rest_s, share = named.latency.share;
+    found.push_back({"pose_latency",
+                     named.latency.gain,
+                     {{"latency", age, std::max(0.0, 0.8 * named.latency.latency_s - kCoasting_s),
+                       1.2 * age, "s"},
+                      {"share", share, 0.7 * share, std::min(1.0, 1.4 * share), "-"}},
+                     gained_by(refit, 1)});
+  }
+  if (named.lag.gain > 0) {
+    const double tau = named.lag.tau_s;
+    const double half = kNormal90 * std::hypot(named.lag.standard_error_s, kLagError * tau);
+    found.push_back({"motor_lag", named.lag.gain, {{"tau", tau, tau - half, tau + half, "s"}}, {}});
+  }
+  const std::vector<double>& last = refit.nested.back().scores;
+  if (named.slip.gain > 0) {
+    const double p = named.slip.probability, loss = named.slip.loss;
+    found.push_back(
+        {"slip_events",
+         named.slip.gain,
+         {{"probability", p, 0.6 * p, 1.6 * p, "-"}, {"loss", loss, 0.7 * loss, 1.4 * loss, "-"}},
+         difference(refit.slip_scores, last)});
+  }
+  for (const FoundSpread& spread : named.spreads) {
+    found.push_back({spread.row->effect, spread.fit.gain, spread.fit.estimates,
+                     difference(spread.scores, last), spread.fit.sessions});
+  }
+  if (named.grid_m > 0) {
+    const PoseGrid& grid = named.study().grid;
+    found.push_back(
+        {"pose_quantisation", grid.nats, {{"step", grid.step_m, grid.lo_m, grid.hi_m, "m"}}, {}});
+  }
+  return found;
+}
+
+// With the names that the log has for them.
+std::vector<SessionGain> named_sessions(const Inquiry& of, const Study& study,
+                                        std::vector<SessionGain> gains) {
+  for (std::size_t i = 0; i < study.size() && !gains.empty(); ++i) {
+    gains[study.trials[i].session].session = of.problem.log.trials[i].session;
+  }
+  return gains;
+}
+
+// " How much faster than on average each session drove: a 3.1 % [2.6, 3.6], b -2 % [-2.4, -1.6]."
+std::string sessions_words(const std::vector<SessionGain>& gains) {
+  const auto percent = [](double share) { return plain_number(100 * share); };
+  std::string text;
+  for (const SessionGain& s : gains) {
+    text += (text.empty() ? " How much faster than on average each session drove: " : ", ") +
+            s.session + " " + percent(s.gain) + " % [" + percent(s.lo) + ", " + percent(s.hi) + "]";
+  }
+  return text.empty() ? text : text + ".";
+}
+
+NamedEffect named_spread(const Inquiry& of, const Refit& refit, const SpreadEffect& found) {
+  NamedEffect effect;
+  effect.name = found.name;
+  effect.confidence = confidence_of(found.gain, of.subject.least_gain);
+  effect.parameters = found.estimates;
+  effect.sessions = named_sessions(of, refit.judged.named.study(), found.sessions);
+  effect.text = sessions_words(effect.sessions);
+  std::vector<double> gained = found.gained;
+  if (gained.empty()) {
+    // The gain is over all that the readings tell; of the gap it can close what the means left.
+    const std::size_t trials = refit.judged.named.study().size();
+    const double left = std::max(0.0, refit.floor - mean(refit.nested.back().scores));
+    const double per_trial = std::min(found.gain / static_cast<double>(trials), left);
+    effect.gap_after = -per_trial;
+    gained.assign(trials, per_trial);
+  } else {
+    effect.gap_after = -mean(gained);
+  }
+  set_closed(closed_share(of, refit, gained), &effect);
+  return effect;
+}
+
+}  // namespace
+
+RootMeanSquare root_mean_square(const std::vector<Eigen::Vector3d>& residuals) {
+  double position = 0, heading = 0;
+  for (const Eigen::Vector3d& r : residuals) {
+    position += r.head<2>().squaredNorm() / static_cast<double>(residuals.size());
+    heading += r[2] * r[2] / static_cast<double>(residuals.size());
+  }
+  return {1e3 * std::sqrt(position), 1e3 * std::sqrt(heading)};
+}
+
+RootMeanSquare held_out_error(const NestedFit& nested, const std::vector<std::size_t>& folds) {
+  // Standard deviations of the noise.  Beside a seam, say, a slope is that of a jump, and a step
+  // along it leads metres away; scores hardly feel such a trial, squares nothing else.
+  constexpr double kFarthestStep = 5;
+  std::vector<Eigen::Vector3d> residuals = held_out_residuals(nested.study, nested.fit, folds);
+  for (std::size_t i = 0; i < residuals.size(); ++i) {
+    const Eigen::Vector3d& own = nested.fit.residuals[i];
+    if ((nested.study.whitener[i] * (residuals[i] - own)).norm() > kFarthestStep)
+      residuals[i] = own;
+  }
+  return root_mean_square(residuals);
+}
+
+ClosedShare closed_share(const Inquiry& of, const Refit& refit, const std::vector<double>& gained) {
+  const Study& study = refit.judged.named.study();
+  std::vector<std::vector<std::size_t>> chains;
+  for (std::size_t i = 0; i < study.size(); ++i) {
+    if (chains.empty() || study.trials[i].context.moved) chains.emplace_back();
+    chains.back().push_back(i);
+  }
+  const std::vector<double>& base = refit.nested.front().scores;
+  const auto share = [&](const std::vector<std::size_t>& drawn) {
+    double gain = 0, gap = 0;
+    for (std::size_t c : drawn) {
+      for (std::size_t i : chains[c]) {
+        gain += gained[i];
+        gap += refit.floor - base[i];
+      }
+    }
+    return gap > 0 ? std::clamp(gain / gap, -1.0, 1.5) : 0.0;
+  };
+  std::vector<std::size_t> all(chains.size());
+  for (std::size_t c = 0; c < all.size(); ++c) all[c] = c;
+  const double whole = share(all);
+  Stream stream({of.options.seed, Purpose::kStatistics, 3, 0, 0});
+  std::vector<double> shares;
+  for (int b = 0; b < kBootstraps; ++b) {
+    for (std::size_t& c : all) c = stream.below(chains.size());
+    shares.push_back(share(all));
+  }
+  return {whole, quantile(shares, 0.05), quantile(shares, 0.95)};
+}
+
+std::vector<NamedEffect> named_effects(const Inquiry& of, const Refit& refit) {
+  const Explanation& named = refit.judged.named;
+  std::vector<std::pair<double, NamedEffect>> all;
+  for (std::size_t k = 0; k < named.chosen.size(); ++k) {
+    all.emplace_back(named.chosen[k].candidate.gain, named_mean(of, refit, k));
+  }
+  for (const SpreadEffect& found : spread_effects(refit)) {
+    all.emplace_back(found.gain, named_spread(of, refit, found));
+  }
+  std::stable_sort(all.begin(), all.end(),
+                   [](const auto& a, const auto& b) { return a.first > b.first; });
+  std::vector<NamedEffect> effects;
+  double gap = refit.floor - mean(refit.nested.front().scores);
+  for (auto& [gain, effect] : all) {
+    const double change = effect.gap_after - effect.gap_before;
+    effect.gap_before = gap;
+    effect.gap_after = gap += change;
+    effect.text = effect_sentence(effect, *of.subject.effects) + effect.text;
+    effects.push_back(std::move(effect));
+  }
+  return effects;
+}
+
+}  // namespace gapfarm::steps

@@ -1,0 +1,152 @@
+#include "master/diagnose/correction/fit.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "common/math/normal.h"
+#include "common/math/statistics.h"
+#include "master/diagnose/correction/basis.h"
+#include "master/diagnose/correction/edge.h"
+
+namespace gapfarm {
+namespace {
+
+constexpr std::size_t kMostFittedTerms = 3;
+// Prior standard deviations of shifts, in units of the noise's.
+const std::vector<double> kAmplitudes = {0.5, 2, 8, 32};
+
+// The procedure on some of a log's trials.
+class FieldSearch {
+ public:
+  FieldSearch(const ResidualData& data, const Residuals& residuals, const std::vector<bool>& seen)
+      : data_(data), seen_(seen), left_(residuals) {
+    learn_ = seen;
+    for (std::size_t i = 0; i < data.size(); ++i) learn_[i] = seen[i] && data.learn[i];
+    for (std::size_t f = 0; f < data.folds(); ++f) {
+      std::vector<bool> others = learn_, own = seen;
+      std::size_t count = 0;
+      for (std::size_t i = 0; i < data.size(); ++i) {
+        const bool in = data.fold[i] == f;
+        if (in) others[i] = false;
+        own[i] = in && seen[i];
+        count += own[i];
+      }
+      if (count > 0) folds_.push_back({std::move(others), std::move(own), residuals});
+    }
+  }
+
+  ResidualField run() {
+    ResidualField field;
+    while (folds_.size() > 1 && field.size() < kMostFittedTerms) {
+      set_bases();
+      const auto best = best_next();
+      if (!best) break;
+      const auto [basis, amplitude] = *best;
+      field.push_back(bases_[basis].fit(left_, learn_, amplitude));
+      take(bases_[basis].shifts_of(field.back()), &left_);
+      for (Fold& fold : folds_) {
+        take(bases_[basis].shifts(fold.left, fold.learn, {amplitude}, seen_).front(), &fold.left);
+      }
+    }
+    return field;
+  }
+
+ private:
+  // A part of the seen trials that is predicted from the others.
+  struct Fold {
+    std::vector<bool> learn, own;
+    Residuals left;  // after the terms so far, fitted without it
+  };
+
+  // Of all that may come next.
+  void set_bases() {
+    bases_.clear();
+    for (const ResidualShape& shape : residual_shapes(data_.free_commands)) {
+      for (const std::vector<double>& lengths : shape.lengths) {
+        ResidualBasis basis(data_, left_, learn_, shape, lengths);
+        if (basis.useful()) bases_.push_back(std::move(basis));
+      }
+    }
+  }
+
+  static void take(const Residuals& shifts, Residuals* left) {
+    for (std::size_t i = 0; i < left->size(); ++i) (*left)[i] -= shifts[i];
+  }
+
+  // Basis and amplitude of the next term; nothing where none surely gains.
+  std::optional<std::pair<std::size_t, double>> best_next() const {
+    std::optional<std::pair<std::size_t, double>> best;
+    double most = 0;
+    for (std::size_t b = 0; b < bases_.size(); ++b) {
+      std::vector<std::vector<double>> gains(kAmplitudes.size());
+      for (const Fold& fold : folds_) {
+        const auto shifts = bases_[b].shifts(fold.left, fold.learn, kAmplitudes, fold.own);
+        for (std::size_t i = 0; i < data_.size(); ++i) {
+          if (!fold.own[i]) continue;
+          const double before = straying_nats(data_.whiteners[i] * fold.left[i]);
+          for (std::size_t a = 0; a < kAmplitudes.size(); ++a) {
+            const double after = straying_nats(data_.whiteners[i] * (fold.left[i] - shifts[a][i]));
+            gains[a].push_back(after - before);
+          }
+        }
+      }
+      for (std::size_t a = 0; a < kAmplitudes.size(); ++a) {
+        const double gain = mean(gains[a]);
+        if (gain <= most || !surely_gains(gains[a])) continue;
+        most = gain;
+        best = {b, kAmplitudes[a]};
+      }
+    }
+    return best;
+  }
+
+  const ResidualData& data_;
+  const std::vector<bool>& seen_;
+  Residuals left_;
+  std::vector<bool> learn_;
+  std::vector<ResidualBasis> bases_;
+  std::vector<Fold> folds_;
+};
+
+}  // namespace
+
+bool surely_gains(const std::vector<double>& gains) {
+  double sum = 0, squares = 0;
+  for (const double g : gains) {
+    sum += g;
+    squares += g * g;
+  }
+  const auto n = static_cast<double>(gains.size());
+  const double variance = std::max(0.0, squares / n - (sum / n) * (sum / n));
+  return sum / n > kNormal90 * std::sqrt(variance / n);
+}
+
+std::size_t ResidualData::folds() const {
+  return fold.empty() ? 0 : 1 + *std::max_element(fold.begin(), fold.end());
+}
+
+ResidualField fit_field(const ResidualData& data, const Residuals& residuals,
+                        const std::vector<bool>& seen) {
+  return FieldSearch(data, residuals, seen).run();
+}
+
+ResidualFit fit_residual(const ResidualData& data, const Residuals& residuals,
+                         const std::function<Residuals(std::size_t)>& without) {
+  ResidualFit fit;
+  fit.field = fit_field(data, residuals, std::vector<bool>(data.size(), true));
+  fit.unseen.assign(data.size(), Eigen::Vector3d::Zero());
+  if (fit.field.empty()) return fit;
+  for (std::size_t f = 0; f < data.folds(); ++f) {
+    std::vector<bool> seen(data.size(), true);
+    for (std::size_t i = 0; i < data.size(); ++i) seen[i] = data.fold[i] != f;
+    const ResidualField field = fit_field(data, without(f), seen);
+    for (std::size_t i = 0; i < data.size(); ++i) {
+      if (seen[i] || field.empty()) continue;
+      fit.unseen[i] = residual_shift(field, data.facts[i], data.ends[i]);
+    }
+  }
+  return fit;
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,63 @@
+#include "master/diagnose/effect_diagnosis.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace gapfarm {
+
+// A file a row.
+#define ROW(name) extern const EffectDiagnosis name;
+#include "master/diagnose/effects/rows.inc"
+#undef ROW
+
+const EffectDiagnoses& drive_effect_diagnoses() {
+  static const EffectDiagnoses rows({
+#define ROW(name) &name,
+#include "master/diagnose/effects/rows.inc"
+#undef ROW
+  });
+  return rows;
+}
+
+const EffectDiagnosis* EffectDiagnoses::find(std::string_view effect) const {
+  const auto found = std::find_if(rows_.begin(), rows_.end(), [&](const EffectDiagnosis* row) {
+    return row->effect == effect;
+  });
+  return found == rows_.end() ? nullptr : *found;
+}
+
+const EffectDiagnosis& EffectDiagnoses::row(std::string_view effect) const {
+  static const EffectDiagnosis nothing = {.effect = ""};
+  const EffectDiagnosis* found = find(effect);
+  return found == nullptr ? nothing : *found;
+}
+
+const EffectDiagnosis& effect_diagnosis(std::string_view effect) {
+  const EffectDiagnosis* driven = drive_effect_diagnoses().find(effect);
+  return driven != nullptr ? *driven : push_effect_diagnoses().row(effect);
+}
+
+const WorldPlace* place_of(const EffectDiagnoses& effects, const Parameter& p) {
+  const std::vector<WorldPlace>& places = effects.row(p.effect).places;
+  const auto found = std::find_if(places.begin(), places.end(), [&](const WorldPlace& place) {
+    return p.key == p.effect + "." + place.key;
+  });
+  return found == places.end() ? nullptr : &*found;
+}
+
+EffectDiagnosis second_of_a_kind(EffectDiagnosis first, const char* effect, const char* sentence) {
+  first.effect = effect;
+  first.marks = nullptr;
+  first.words.sentence = sentence;
+  first.short_words.reset();
+  return first;
+}
+
+void start_polar(const Polar& polar, const EffectStart& at, std::map<std::string, double>* values) {
+  const Eigen::VectorXd& c = at.coefficients;
+  const double strength = std::hypot(c[0], c[1]);
+  (*values)[polar.strength] = polar.ratio ? std::exp(strength) : strength;
+  (*values)[polar.direction] = std::atan2(c[1], c[0]) / polar.symmetry;
+}
+
+}  // namespace gapfarm

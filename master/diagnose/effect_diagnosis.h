@@ -1,0 +1,162 @@
+// All that a diagnosis knows of one effect, as a row; each in a file of its own.
+#pragma once
+
+#include <Eigen/Core>
+#include <map>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "common/parameters/table.h"
+#include "master/diagnose/effect_words.h"
+#include "master/diagnose/fit/probes.h"
+#include "master/diagnose/fit/regression.h"
+#include "master/diagnose/fit/signatures.h"
+#include "master/infer/compete.h"
+
+namespace gapfarm {
+
+struct SpreadRow;
+
+// One of the effect's parameters, moved by a step from where it does nothing.
+struct ProbedStep {
+  const char* key;
+  double size;
+  bool both_ways;
+};
+
+// Derivatives of the ends, a probe each.
+using ProbedSlopes = std::span<const std::vector<Eigen::Vector3d>>;
+
+// A strength and a direction, whose first two columns belong to its cosine and sine.
+struct Polar {
+  const char* strength;
+  const char* direction;
+  double symmetry;  // looks the same after this share of a turn
+  bool ratio;       // the strength is the logarithm of a ratio
+};
+
+// Effects whose difference is small beside what one contact model and another make of them: of
+// these a second one must gain this share of what the first did.
+struct EffectFamily {
+  double share;
+};
+inline constexpr EffectFamily kReachFamily{0.75};  // how far every command drives
+inline constexpr EffectFamily kSlopeFamily{0.15};  // what pulls one way on all the floor
+
+// A parameter that is a place in the world.
+struct WorldPlace {
+  const char* key;
+  int axis;  // 0: x, 1: y, -1: what the effect's `axis` says
+};
+
+// Where a fit of the effect begins: data with everything else explained, and what the columns of
+// its signature take of them.
+struct EffectStart {
+  const Study& study;
+  const Regression& others;
+  const Signature& signature;
+  const Eigen::VectorXd& coefficients;
+};
+
+// A parameter that a search moves, and the size of it that a careless laboratory has: of the
+// logarithm where only positive values have a meaning.
+struct SearchedSize {
+  const char* key;
+  double size;
+  bool logarithm = false;
+};
+
+struct EffectDiagnosis {
+  const char* effect;
+
+  // What is moved where base and effect are searched together; with `polar`, its strength alone.
+  std::vector<SearchedSize> searched = {};
+  // Where such a search begins, beside what the sizes say; null: nowhere else.  Effects with a
+  // place do nothing at their neutral value, and no slope leads away from it.
+  std::vector<infer::Start> (*proposals)(const Study& study) = nullptr;
+
+  // Its mark: by steps of parameters, or by probes of its own; without either it is looked for in
+  // another way.
+  std::vector<ProbedStep> steps = {};
+  std::vector<Probe> (*probes)(const Study& study) = nullptr;
+  // From the probes' slopes; null: one signature with a column a probe.
+  std::vector<Signature> (*signatures)(const Study& study, ProbedSlopes slopes) = nullptr;
+  // Without a probe: marks at places, which the log alone tells.
+  std::vector<Signature> (*marks)(const Study& study) = nullptr;
+  // One level and one duration show nothing of it that another full speed would not do.
+  bool changes_reach = false;
+  // A force, whose share in straight, turning and wide drives another contact model would make
+  // another one.
+  bool by_contact = false;
+
+  // A camera that sees one place otherwise than another: not offered where one linear map of all
+  // positions explains as much.
+  bool bends_view = false;
+
+  // Rivals, whatever the log.
+  const EffectFamily* family = nullptr;
+  std::vector<const char*> aliases = {};
+
+  // Where a fit begins.  Neither: the coefficients are what its parameters are above neutral.
+  std::optional<Polar> polar = {};
+  void (*start)(const EffectStart& at, std::map<std::string, double>* values) = nullptr;
+
+  // Standard deviation of its size between simulations that share the effect but not the contact of
+  // treads and floor (docs/diagnosis.md), relative; of its direction, rad.
+  double model_error = 0;
+  double direction_error_rad = 0;
+  // What was searched rather than fitted may be a neighbour of the best: standard deviation for a
+  // gain in nats, and of what the readings leave open whatever it gained; in the parameter's unit.
+  double (*search_error)(const Parameter& p, double value, double gain) = nullptr;
+  double (*ambiguity)(const Study& study, const Parameter& p, const Overrides& at) = nullptr;
+
+  // Places in the world, and the keys that tell where a second one would be.
+  std::vector<WorldPlace> places = {};
+  std::vector<const char*> told_by = {};
+  // Of an effect of which there may be two: whether two marks of it are of two such things.
+  bool (*are_two)(const Signature& a, const Signature& b) = nullptr;
+  // The key of a strength that may end on its bound: beyond it the motion hardly changes any more.
+  const char* saturates = nullptr;
+  // Whether it makes single trials stray, as slips would.
+  bool (*strays)(const Signature& chosen, const ResidualTrial& trial) = nullptr;
+
+  EffectWords words = {};
+  std::optional<ShortWords> short_words = {};
+  const SpreadRow* spread = nullptr;  // of an effect that makes some trials stray
+};
+
+// The effects that a scenario's diagnosis knows.
+class EffectDiagnoses {
+ public:
+  explicit EffectDiagnoses(std::vector<const EffectDiagnosis*> rows) : rows_(std::move(rows)) {}
+  auto begin() const { return rows_.begin(); }
+  auto end() const { return rows_.end(); }
+  // Null where the effect has no row.
+  const EffectDiagnosis* find(std::string_view effect) const;
+  // A row of nothing where it has none.
+  const EffectDiagnosis& row(std::string_view effect) const;
+
+ private:
+  std::vector<const EffectDiagnosis*> rows_;
+};
+
+// Of robots that drive on two sides; of pieces that are pushed.
+const EffectDiagnoses& drive_effect_diagnoses();
+const EffectDiagnoses& push_effect_diagnoses();
+// Of any scenario, since what bears one name is one effect; a row of nothing where there is none.
+const EffectDiagnosis& effect_diagnosis(std::string_view effect);
+
+// The place that a parameter of an effect is; null: none.
+const WorldPlace* place_of(const EffectDiagnoses& effects, const Parameter& p);
+
+// The row of a second one of a kind, whose marks are the first one's, which the search offers
+// again.
+EffectDiagnosis second_of_a_kind(EffectDiagnosis first, const char* effect, const char* sentence);
+
+// Strength and direction from the cosine's and sine's coefficients.
+void start_polar(const Polar& polar, const EffectStart& at, std::map<std::string, double>* values);
+
+}  // namespace gapfarm

@@ -1,0 +1,384 @@
+#include "master/diagnose/fit/estimate.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+
+#include "common/math/algebra.h"
+#include "common/math/bounded_minimum.h"
+#include "common/score/density.h"
+#include "master/diagnose/evidence/tail_noise.h"
+#include "master/diagnose/fit/slopes.h"
+#include "master/diagnose/places/seam.h"
+#include "master/diagnose/subject.h"
+
+namespace gapfarm {
+namespace {
+
+constexpr int kMostHalvings = 4;
+// Of the objective (twice nats): less is no progress, where the noise is as large as it was taken
+// for.
+constexpr double kSettled = 1;
+constexpr double kMostOfRange = 0.3;  // of a parameter's range, that one step may go
+// Of a finite difference, root mean square in standard deviations a row.
+constexpr double kLeastMove = 1e-4, kMostMove = 5, kGoodMove = 0.3;
+constexpr double kFarSquared = 16;  // squared distance beyond which a trial counts linearly
+
+// Step of a finite difference in a parameter: a hundredth of its value, but no less than what the
+// catalogue's bounds make a small change.
+double step_of(const Parameter& row, double value) {
+  return std::max(0.01 * std::abs(value), 0.002 * (row.upper - row.lower) / 2);
+}
+
+std::vector<FittedParameter> parameters_of(const Study& study, const Overrides& start,
+                                           const std::vector<EffectCandidate>& effects,
+                                           BaseParameters base, std::size_t* base_count) {
+  std::vector<FittedParameter> parameters;
+  if (base == BaseParameters::kFitted) {
+    for (const BaseParameter& p : study.base_parameters) {
+      parameters.push_back({p.row, start.at(p.row), 0});
+    }
+  }
+  *base_count = parameters.size();
+  for (const EffectCandidate& effect : effects) {
+    for (const auto& [row, value] : start) {
+      const Parameter& p = (*study.table)[row];
+      // Where a seam runs is searched, not sloped: residuals jump as a trial changes sides.
+      const bool jumps = p.kind != ParameterKind::kReal || is_seam_position(p.key);
+      if (p.effect == effect.signature.effect && !jumps) parameters.push_back({row, value, 0});
+    }
+  }
+  return parameters;
+}
+
+// Predictions at `fit.at`.
+Status predict(Predictor& predictor, const Study& study, JointFit* fit) {
+  auto ends = predictor.ends({{fit->at, {}}});
+  if (!ends) return ends.error();
+  fit->ends = std::move(ends->front());
+  fit->residuals.clear();
+  for (std::size_t i = 0; i < study.size(); ++i) {
+    fit->residuals.push_back(residual_of(study.trials[i], fit->ends[i]));
+  }
+  return {};
+}
+
+// Steps that moved the ends by many standard deviations, or by next to nothing, are taken again so
+// that they move them by a part of one: what a small change is, the motion says, not the bounds.
+Status rescale(Predictor& predictor, const Study& study, const SlopePoint& from,
+               const std::vector<SlopeRequest>& requests,
+               std::vector<std::optional<Slope>>* slopes) {
+  std::vector<SlopeRequest> again;
+  std::vector<std::size_t> of;
+  for (std::size_t k = 0; k < requests.size(); ++k) {
+    if (!(*slopes)[k]) continue;
+    const double rows = static_cast<double>(3 * study.size());
+    const double a_unit = std::sqrt(study.whiten(*(*slopes)[k]).squaredNorm() / rows);
+    const double moved = a_unit * requests[k].step;
+    if (!(a_unit > 0) || (moved > kLeastMove && moved < kMostMove)) continue;
+    const Parameter& row = predictor.problem().table()[requests[k].row];
+    const double step = std::min(kGoodMove / a_unit, kMostOfRange * (row.upper - row.lower));
+    again.push_back({requests[k].row, step});
+    of.push_back(k);
+  }
+  if (again.empty()) return {};
+  auto better = slopes_at(predictor, from, again);
+  if (!better) return better.error();
+  for (std::size_t j = 0; j < of.size(); ++j) {
+    if ((*better)[j]) (*slopes)[of[j]] = std::move((*better)[j]);
+  }
+  return {};
+}
+
+// Derivatives of the predictions there.  What cannot be moved at all has none, and stays.
+Status differentiate(Predictor& predictor, const Study& study, JointFit* fit) {
+  std::vector<SlopeRequest> requests;
+  for (const FittedParameter& p : fit->parameters) {
+    requests.push_back({p.row, step_of(predictor.problem().table()[p.row], p.value)});
+  }
+  fit->jacobian.setZero(static_cast<Eigen::Index>(3 * study.size()),
+                        static_cast<Eigen::Index>(fit->parameters.size()));
+  if (requests.empty()) return {};
+  const auto from = slope_point(predictor, study, fit->at, fit->ends);
+  if (!from) return from.error();
+  auto slopes = slopes_at(predictor, *from, requests);
+  if (!slopes) return slopes.error();
+  if (Status s = rescale(predictor, study, *from, requests, &*slopes); !s) return s;
+  for (std::size_t k = 0; k < slopes->size(); ++k) {
+    if (!(*slopes)[k]) continue;
+    fit->jacobian.col(static_cast<Eigen::Index>(k)) = study.whiten(*(*slopes)[k]);
+  }
+  return {};
+}
+
+// Directions go round: beyond the one bound they come in at the other.
+bool goes_round(const Parameter& row) { return row.key.ends_with(".direction"); }
+
+double within(const Parameter& row, double value) {
+  if (!goes_round(row)) return std::clamp(value, row.lower, row.upper);
+  const double turn = row.upper - row.lower;
+  return value - turn * std::floor((value - row.lower) / turn);
+}
+
+double way_between(const Parameter& row, double from, double to) {
+  if (!goes_round(row)) return to - from;
+  const double turn = row.upper - row.lower;
+  return to - from - turn * std::round((to - from) / turn);
+}
+
+struct Normal {
+  Eigen::MatrixXd matrix;
+  Eigen::VectorXd right;
+};
+
+// Prior of the base parameters about the tuned base, in their own units.
+void add_prior(const Study& study, const JointFit& fit, Normal* normal) {
+  const std::vector<BaseParameter>& base = study.base_parameters;
+  for (std::size_t k = 0; k < fit.base_parameters; ++k) {
+    const double sd = base[k].prior_log_sd * study.base.at(base[k].row);
+    const auto i = static_cast<Eigen::Index>(k);
+    normal->matrix(i, i) += 1 / (sd * sd);
+    normal->right[i] += (study.base.at(base[k].row) - fit.parameters[k].value) / (sd * sd);
+  }
+  // Keeps a direction that the data do not see where it is.
+  const double scale = normal->matrix.diagonal().maxCoeff();
+  normal->matrix.diagonal().array() += 1e-12 * scale;
+}
+
+// Bounded for trials far out.
+double weight_of(const Study& study, Eigen::Index trial, const Eigen::VectorXd& z) {
+  if (study.ignores(static_cast<std::size_t>(trial))) return 0;
+  const double d2 = z.segment<3>(3 * trial).squaredNorm();
+  return d2 > kFarSquared ? std::sqrt(kFarSquared / d2) : 1;
+}
+
+Eigen::VectorXd weights_of(const Study& study, const Eigen::VectorXd& z) {
+  Eigen::VectorXd weight(z.size());
+  for (Eigen::Index i = 0; i < z.size(); i += 3) {
+    weight.segment<3>(i).setConstant(weight_of(study, i / 3, z));
+  }
+  return weight;
+}
+
+// One step, with bounded weights for trials far out; fills in the standard errors.
+void step(const Problem& problem, const Study& study, const Eigen::MatrixXd& nuisances,
+          JointFit* fit) {
+  const Eigen::Index p = fit->jacobian.cols(), q = nuisances.cols();
+  Eigen::MatrixXd all(fit->jacobian.rows(), p + q);
+  all << fit->jacobian, nuisances;
+  const Eigen::VectorXd z = study.whiten(fit->residuals);
+  const Eigen::VectorXd weight = weights_of(study, z);
+  Normal normal{all.transpose() * weight.asDiagonal() * all,
+                all.transpose() * weight.asDiagonal() * z};
+  normal.matrix.diagonal().tail(q).array() += 1;
+  add_prior(study, *fit, &normal);
+  const Eigen::MatrixXd inverse = inverse_of_symmetric(normal.matrix);
+  Eigen::VectorXd lower = Eigen::VectorXd::Constant(p + q, -INFINITY), upper = -lower;
+  for (Eigen::Index k = 0; k < p; ++k) {
+    const FittedParameter& parameter = fit->parameters[static_cast<std::size_t>(k)];
+    const Parameter& row = problem.table()[parameter.row];
+    upper[k] = kMostOfRange * (row.upper - row.lower);
+    lower[k] = -upper[k];
+    if (goes_round(row)) continue;
+    upper[k] = std::min(upper[k], row.upper - parameter.value);
+    lower[k] = std::max(lower[k], row.lower - parameter.value);
+  }
+  const Eigen::VectorXd delta = bounded_minimum(normal.matrix, normal.right, lower, upper);
+  for (Eigen::Index k = 0; k < p; ++k) {
+    FittedParameter& parameter = fit->parameters[static_cast<std::size_t>(k)];
+    const Parameter& row = problem.table()[parameter.row];
+    parameter.value = within(row, parameter.value + delta[k]);
+    parameter.standard_error = std::sqrt(std::max(0.0, inverse(k, k)));
+    fit->at[parameter.row] = parameter.value;
+  }
+}
+
+// Residuals that are larger than their noise tell as much less.
+double settled_within(const Study& study, double misfit) {
+  return kSettled * std::max(1.0, misfit / static_cast<double>(3 * study.size()));
+}
+
+struct Moved {
+  JointFit fit;
+  double misfit = 0;
+};
+
+// One step downhill, with the derivatives of before; where there is none, the fit with the standard
+// errors found here.  A step may lead past the optimum, or to where the robot nearly falls over:
+// half of it, then.
+Result<Moved> moved_on(Predictor& predictor, const Study& study, const Eigen::MatrixXd& nuisances,
+                       double best, const JointFit& fit) {
+  Moved next{fit, 0};
+  step(predictor.problem(), study, nuisances, &next.fit);
+  const std::vector<FittedParameter> whole = next.fit.parameters;
+  for (int half = 0;; ++half) {
+    const Status moved = predict(predictor, study, &next.fit);
+    if (moved) next.misfit = misfit_of(study, next.fit, nuisances);
+    if (moved && next.misfit <= best) return next;
+    if (!moved && moved.error().code != ErrorCode::kSimulation) return moved.error();
+    const bool level = moved && next.misfit < best + settled_within(study, best);
+    if (level || half == kMostHalvings) break;
+    for (std::size_t k = 0; k < whole.size(); ++k) {
+      FittedParameter& p = next.fit.parameters[k];
+      const double last = fit.parameters[k].value;
+      const Parameter& row = predictor.problem().table()[p.row];
+      next.fit.at[p.row] = p.value = within(row, last + way_between(row, last, p.value) / 2);
+    }
+  }
+  next = {fit, best};
+  for (std::size_t k = 0; k < whole.size(); ++k) {
+    next.fit.parameters[k].standard_error = whole[k].standard_error;
+  }
+  return next;
+}
+
+// To the parameters that fit without fold `f`, to first order.
+Eigen::VectorXd step_without(const Study& study, const JointFit& fit,
+                             const std::vector<std::size_t>& fold_of, std::size_t f) {
+  const Eigen::VectorXd z = study.whiten(fit.residuals);
+  const bool only = *std::max_element(fold_of.begin(), fold_of.end()) == 0;
+  const Eigen::Index p = fit.jacobian.cols();
+  Normal normal{Eigen::MatrixXd::Zero(p, p), Eigen::VectorXd::Zero(p)};
+  for (std::size_t i = 0; i < study.size(); ++i) {
+    if (fold_of[i] == f && !only) continue;
+    const auto at = static_cast<Eigen::Index>(3 * i);
+    const double weight = weight_of(study, at / 3, z);
+    const auto rows = fit.jacobian.middleRows(at, 3);
+    normal.matrix += weight * rows.transpose() * rows;
+    normal.right += weight * rows.transpose() * z.segment<3>(at);
+  }
+  add_prior(study, fit, &normal);
+  return solve_symmetric(normal.matrix, normal.right);
+}
+
+}  // namespace
+
+double misfit_of(const Study& study, const JointFit& fit, const Eigen::MatrixXd& nuisances) {
+  const Eigen::VectorXd z = study.whiten(fit.residuals);
+  const Eigen::VectorXd weight = weights_of(study, z);
+  Eigen::MatrixXd normal = nuisances.transpose() * weight.asDiagonal() * nuisances;
+  normal.diagonal().array() += 1;
+  const Eigen::VectorXd taken =
+      solve_symmetric(normal, nuisances.transpose() * weight.asDiagonal() * z);
+  const Eigen::VectorXd left = z - nuisances * taken;
+  double sum = taken.squaredNorm();
+  for (Eigen::Index i = 0; i < left.size() / 3; ++i) {
+    if (study.ignores(static_cast<std::size_t>(i))) continue;
+    const double d2 = left.segment<3>(3 * i).squaredNorm();
+    sum += d2 > kFarSquared ? 2 * std::sqrt(kFarSquared * d2) - kFarSquared : d2;
+  }
+  const std::vector<BaseParameter>& base = study.base_parameters;
+  for (std::size_t k = 0; k < fit.base_parameters; ++k) {
+    const double tuned = study.base.at(base[k].row);
+    const double away = (fit.parameters[k].value / tuned - 1) / base[k].prior_log_sd;
+    sum += away * away;
+  }
+  return sum;
+}
+
+std::map<std::string, double> start_values(const Study& study, const Regression& others,
+                                           const Signature& signature) {
+  // Coefficients of the columns, given everything else.
+  const Eigen::VectorXd data = others.left();
+  Eigen::MatrixXd columns = signature.columns;
+  const Eigen::MatrixXd normal = columns.transpose() * columns;
+  Eigen::MatrixXd ridged = normal;
+  ridged.diagonal() *= 1 + 1e-6;
+  const Eigen::VectorXd c = solve_symmetric(ridged, columns.transpose() * data);
+  std::map<std::string, double> values = signature.fixed;
+  const EffectDiagnosis& effect = study.subject->effects->row(signature.effect);
+  const EffectStart at{study, others, signature, c};
+  const ParameterTable& table = *study.table;
+  if (effect.polar) {
+    start_polar(*effect.polar, at, &values);
+  } else if (effect.start != nullptr) {
+    effect.start(at, &values);
+  } else {
+    for (std::size_t k = 0; k < signature.parameters.size(); ++k) {
+      const std::string& key = signature.parameters[k];
+      values[key] = table[table.row(key)].nominal + c[static_cast<Eigen::Index>(k)];
+    }
+  }
+  for (auto& [key, value] : values) {
+    const Parameter& row = table[table.row(key)];
+    value = std::clamp(value, row.lower, row.upper);
+  }
+  return values;
+}
+
+Result<JointFit> fit_jointly(Predictor& predictor, const Study& study,
+                             const std::vector<EffectCandidate>& effects, const Overrides& start,
+                             BaseParameters base, const Eigen::MatrixXd& nuisances, int rounds) {
+  JointFit fit;
+  fit.at = start;
+  fit.parameters = parameters_of(study, start, effects, base, &fit.base_parameters);
+  if (Status s = predict(predictor, study, &fit); !s) return s.error();
+  if (Status s = differentiate(predictor, study, &fit); !s) return s.error();
+  if (fit.parameters.empty()) return fit;
+  double best = misfit_of(study, fit, nuisances);
+  for (int round = 0; round < rounds; ++round) {
+    auto moved = moved_on(predictor, study, nuisances, best, fit);
+    if (!moved) return moved.error();
+    const bool settled = moved->misfit > best - settled_within(study, best);
+    best = moved->misfit;
+    fit = std::move(moved->fit);
+    // So near, the derivatives of before will do.
+    if (settled) break;
+    if (Status s = differentiate(predictor, study, &fit); !s) return s.error();
+  }
+  return fit;
+}
+
+std::vector<Eigen::Vector3d> held_out_residuals(const Study& study, const JointFit& fit,
+                                                const std::vector<std::size_t>& fold_of) {
+  if (fit.jacobian.cols() == 0) return fit.residuals;
+  const std::size_t folds = 1 + *std::max_element(fold_of.begin(), fold_of.end());
+  Eigen::VectorXd left = study.whiten(fit.residuals);
+  for (std::size_t f = 0; f < folds; ++f) {
+    const Eigen::VectorXd delta = step_without(study, fit, fold_of, f);
+    for (std::size_t i = 0; i < study.size(); ++i) {
+      if (fold_of[i] != f) continue;
+      const auto at = static_cast<Eigen::Index>(3 * i);
+      left.segment<3>(at) -= fit.jacobian.middleRows(at, 3) * delta;
+    }
+  }
+  return study.unwhiten(left);
+}
+
+std::vector<Eigen::Vector3d> left_without(const Study& study, const JointFit& fit,
+                                          const std::vector<std::size_t>& fold_of, std::size_t f) {
+  if (fit.jacobian.cols() == 0) return fit.residuals;
+  const Eigen::VectorXd step = fit.jacobian * step_without(study, fit, fold_of, f);
+  return study.unwhiten(study.whiten(fit.residuals) - step);
+}
+
+std::vector<double> scores_of(const Study& study, const std::vector<Eigen::Vector3d>& residuals,
+                              double outlier_share) {
+  return predictive_scores(study.trials, residuals, study.predictive_noise(), *study.subject,
+                           outlier_share);
+}
+
+std::vector<double> held_out_scores(const Study& study, const JointFit& fit,
+                                    const std::vector<std::size_t>& fold_of, double outlier_share) {
+  return scores_of(study, held_out_residuals(study, fit, fold_of), outlier_share);
+}
+
+std::vector<std::size_t> folds_of(const Study& study) {
+  std::vector<std::size_t> folds;
+  for (std::size_t i = 0; i < study.size(); ++i) {
+    folds.push_back(study.sessions > 1 ? study.trials[i].session : i * 5 / study.size());
+  }
+  return folds;
+}
+
+double floor_score(const Study& study, double outlier_share) {
+  double sum = 0;
+  for (const Eigen::Matrix3d& cov : study.covariances()) {
+    // Gaussian: -(3 log 2 pi + log det S + 3) / 2, and the share of the tail, which adds little.
+    sum += -0.5 * (3 * std::log(2 * M_PI) + std::log(cov.determinant()) + 3) +
+           std::log1p(-outlier_share);
+  }
+  return sum / static_cast<double>(study.size());
+}
+
+}  // namespace gapfarm

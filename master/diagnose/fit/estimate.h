@@ -1,0 +1,74 @@
+// How large the chosen effects are, and how far the gap shrinks with them.
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "common/base/result.h"
+#include "master/diagnose/fit/regression.h"
+#include "master/diagnose/fit/selection.h"
+
+namespace gapfarm {
+
+struct FittedParameter {
+  std::size_t row = 0;
+  double value = 0;
+  double standard_error = 0;
+};
+
+// The base and some effects, fitted together.
+struct JointFit {
+  Overrides at;                             // base and effects
+  std::vector<FittedParameter> parameters;  // the base's first
+  std::size_t base_parameters = 0;
+  std::vector<Eigen::Vector3d> residuals;  // in the fit's own predicted ends' axes
+  std::vector<Pose> ends;
+  Eigen::MatrixXd jacobian;  // whitened rows by parameters
+};
+
+enum class BaseParameters { kHeld, kFitted };
+
+// Gauss-Newton on the predictions, `rounds` re-linearisations; fitted base parameters have their
+// prior; `nuisances` (may have no columns) take part and are thrown away.
+Result<JointFit> fit_jointly(Predictor& predictor, const Study& study,
+                             const std::vector<EffectCandidate>& effects, const Overrides& start,
+                             BaseParameters base, const Eigen::MatrixXd& nuisances, int rounds);
+
+// What a fit makes smaller: Huber's function of every trial's distance once the nuisances have
+// taken their part, and what that and the parameters cost under their priors.
+double misfit_of(const Study& study, const JointFit& fit, const Eigen::MatrixXd& nuisances);
+
+// Where the seams of a fit run, searched with everything else held: the derivatives of a fit know
+// of no line.  Whether any moved; residuals and derivatives are then those of before.
+Result<bool> move_seams(Predictor& predictor, const Study& study, const Eigen::MatrixXd& nuisances,
+                        JointFit* fit);
+
+// Parameter values at which a refinement of the effect begins.
+std::map<std::string, double> start_values(const Study& study, const Regression& others,
+                                           const Signature& signature);
+
+// Log scores (nats) of every trial that misses its prediction so far.
+std::vector<double> scores_of(const Study& study, const std::vector<Eigen::Vector3d>& residuals,
+                              double outlier_share);
+
+// Log scores (nats) of every trial, predicted from a fit to the other folds' trials alone: the
+// joint fit's linearisation is solved again without the fold.
+std::vector<double> held_out_scores(const Study& study, const JointFit& fit,
+                                    const std::vector<std::size_t>& fold_of, double outlier_share);
+
+// Residuals of every trial under those fits.
+std::vector<Eigen::Vector3d> held_out_residuals(const Study& study, const JointFit& fit,
+                                                const std::vector<std::size_t>& fold_of);
+
+// Of every trial, seen or not, under the one that did not see fold `f`.
+std::vector<Eigen::Vector3d> left_without(const Study& study, const JointFit& fit,
+                                          const std::vector<std::size_t>& fold_of, std::size_t f);
+
+// Sessions when there are several, else five contiguous blocks.
+std::vector<std::size_t> folds_of(const Study& study);
+
+// What a trial scores on average when its prediction is perfect and its noise is as estimated.
+double floor_score(const Study& study, double outlier_share);
+
+}  // namespace gapfarm

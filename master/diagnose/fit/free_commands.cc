@@ -1,0 +1,239 @@
+#include "master/diagnose/fit/free_commands.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <numbers>
+
+#include "master/diagnose/fit/nuisance.h"
+#include "master/diagnose/fit/probes.h"
+
+namespace gapfarm {
+namespace {
+
+constexpr std::size_t kFreedRepeats = 4;  // trials of a cell that make its mean worth something
+constexpr double kFreeShare = 1.0 / 3.0;  // of the trials
+constexpr double kWayTrust = 1e-3;        // of the duties' word on the way, beside the ends'
+
+// A command seen along and across: both sides together, and against each other.
+struct Duties {
+  double drive = 0;  // mean of the sides, [-1, 1]
+  double turn = 0;   // half the right's more than the left, [-1, 1]
+  double duration_s = 0;
+
+  double level() const { return std::abs(drive) + std::abs(turn); }  // of the faster side
+  double bend() const { return level() > 0 ? std::abs(turn) / level() : 0; }
+};
+
+Duties duties_of(const Study& study, std::size_t trial) {
+  const CommandSpec& c = study.cells[study.trials[trial].cell].command;
+  return {(c.left + c.right) / 2, (c.right - c.left) / 2, c.duration_s};
+}
+
+// Factors of a squared-exponential covariance over (level, bend), one column each, by pivoted
+// Cholesky until a hundredth of the variance is left.
+Eigen::MatrixXd smooth_factors(const std::vector<Duties>& duties, double length) {
+  const auto n = static_cast<Eigen::Index>(duties.size());
+  const auto kernel = [&](Eigen::Index i, Eigen::Index j) {
+    const Duties& a = duties[static_cast<std::size_t>(i)];
+    const Duties& b = duties[static_cast<std::size_t>(j)];
+    const double away = std::hypot(a.level() - b.level(), a.bend() - b.bend()) / length;
+    return std::exp(-away * away / 2);
+  };
+  constexpr double kLeft = 0.01;
+  Eigen::VectorXd left = Eigen::VectorXd::Ones(n);
+  Eigen::MatrixXd factors(n, 0);
+  for (Eigen::Index k = 0; k < n; ++k) {
+    Eigen::Index pivot = 0;
+    if (left.maxCoeff(&pivot) < kLeft) break;
+    Eigen::VectorXd column(n);
+    for (Eigen::Index i = 0; i < n; ++i) column[i] = kernel(i, pivot);
+    if (k > 0) column -= factors * factors.row(pivot).transpose();
+    column /= std::sqrt(left[pivot]);
+    left -= column.cwiseAbs2();
+    factors.conservativeResize(Eigen::NoChange, k + 1);
+    factors.col(k) = column;
+  }
+  return factors;
+}
+
+class ColumnMaker {
+ public:
+  explicit ColumnMaker(const Study& study) : study_(study) {
+    for (std::size_t i = 0; i < study.size(); ++i) {
+      duties_.push_back(duties_of(study, i));
+      carried_.push_back(carried_to_end(study, i));
+    }
+  }
+
+  const std::vector<Duties>& duties() const { return duties_; }
+  std::vector<Eigen::VectorXd> take() { return std::move(columns_); }
+
+  using Size = std::function<double(std::size_t trial, const Duties& duties)>;
+  using Carry = std::function<Eigen::Matrix3d(const CarriedToEnd& carried)>;
+
+  // A disturbance of one component, `size` large, carried to the end; once for each factor.
+  void add(const Carry& carry, int component, const Size& size, const Eigen::MatrixXd& factors) {
+    std::vector<Eigen::Vector3d> whole(study_.size()), values(study_.size());
+    for (std::size_t i = 0; i < whole.size(); ++i) {
+      whole[i] = carry(carried_[i]).col(component) * size(i, duties_[i]);
+    }
+    for (Eigen::Index f = 0; f < factors.cols(); ++f) {
+      for (std::size_t i = 0; i < whole.size(); ++i) {
+        values[i] = factors(static_cast<Eigen::Index>(i), f) * whole[i];
+      }
+      columns_.push_back(study_.whiten(values));
+    }
+  }
+
+ private:
+  const Study& study_;
+  std::vector<Duties> duties_;
+  std::vector<CarriedToEnd> carried_;
+  std::vector<Eigen::VectorXd> columns_;
+};
+
+Eigen::Matrix3d at_end(const CarriedToEnd& /*carried*/) { return Eigen::Matrix3d::Identity(); }
+Eigen::Matrix3d at_start(const CarriedToEnd& carried) { return carried.start; }
+Eigen::Matrix3d under_way(const CarriedToEnd& carried) { return carried.rate; }
+
+}  // namespace
+
+bool commands_are_free(std::span<const Cell> cells) {
+  std::size_t trials = 0, few = 0;
+  for (const Cell& cell : cells) {
+    trials += cell.trials;
+    if (cell.trials < kFreedRepeats) few += cell.trials;
+  }
+  return static_cast<double>(few) > kFreeShare * static_cast<double>(trials);
+}
+
+Twist way_of(const Study& study, std::size_t trial) {
+  constexpr double kPi = std::numbers::pi;
+  const ResidualTrial& t = study.trials[trial];
+  const Pose X_SE = between(t.X_WS, t.X_WP);
+  const double turns = std::round(((t.left + t.right)[2] - X_SE.theta) / (2 * kPi));
+  if (turns == 0) return log(X_SE);
+  const double theta = X_SE.theta + 2 * kPi * turns;
+  Eigen::Matrix2d v;
+  v << std::sin(theta), std::cos(theta) - 1, 1 - std::cos(theta), std::sin(theta);
+  v /= theta;
+  const Duties duties = duties_of(study, trial);
+  const Eigen::Vector2d told(study.speed_m_s * duties.drive * duties.duration_s, 0);
+  const Eigen::Matrix2d normal = v.transpose() * v + kWayTrust * Eigen::Matrix2d::Identity();
+  const Eigen::Vector2d way =
+      normal.ldlt().solve(v.transpose() * Eigen::Vector2d(X_SE.x, X_SE.y) + kWayTrust * told);
+  return {way.x(), way.y(), theta};
+}
+
+CarriedToEnd carried_to_end(const Study& study, std::size_t trial) {
+  const ResidualTrial& t = study.trials[trial];
+  const Twist way = way_of(study, trial);
+  const int steps = 8 + static_cast<int>(4 * std::abs(way[2]));
+  CarriedToEnd carried;
+  carried.rate.setZero();
+  Eigen::Vector2d rest = Eigen::Vector2d::Zero();  // of the way, from here to the end
+  for (int k = steps; k-- > 0;) {
+    const double behind = way[2] * (1 - (k + 0.5) / steps);
+    Eigen::Matrix2d axes;  // the robot's here, seen from the end's
+    axes << std::cos(behind), std::sin(behind), -std::sin(behind), std::cos(behind);
+    const Eigen::Vector2d step = axes * way.head<2>() / steps;
+    rest += step / 2;
+    carried.rate.topLeftCorner<2, 2>() += axes / steps;
+    carried.rate.topRightCorner<2, 1>() += Eigen::Vector2d(-rest.y(), rest.x()) / steps;
+    rest += step / 2;
+  }
+  carried.rate(2, 2) = 1;
+  const Pose X_SE = between(t.X_WS, t.X_WP);
+  const double c = std::cos(X_SE.theta), s = std::sin(X_SE.theta);
+  carried.start << c, s, s * X_SE.x - c * X_SE.y, -s, c, c * X_SE.x + s * X_SE.y, 0, 0, 1;
+  return carried;
+}
+
+// Sizes: those of nuisance.cc's cells, spread over the commands between.  How a tread turns at a
+// slight difference of the sides depends on the contact model most of all.
+std::vector<Eigen::VectorXd> smooth_misfits(const Study& study) {
+  constexpr double kLength = 0.35, kSmootherLength = 1;
+  ColumnMaker maker(study);
+  const Eigen::MatrixXd factors = smooth_factors(maker.duties(), kLength);
+  const Eigen::MatrixXd smoother = smooth_factors(maker.duties(), kSmootherLength);
+  const double speed = study.speed_m_s;
+  maker.add(
+      under_way, 0,
+      [&](std::size_t, const Duties& d) {
+        return speed * d.duration_s * d.drive * (0.001 + 0.012 * d.bend());
+      },
+      factors);
+  maker.add(
+      under_way, 1,
+      [&](std::size_t, const Duties& d) {
+        const double both = d.level() > 0 ? d.drive * d.turn / d.level() : 0;
+        return speed * d.duration_s * 0.04 * both;
+      },
+      factors);
+  maker.add(
+      under_way, 2,
+      [&](std::size_t i, const Duties& d) {
+        const double straightness = 1 - d.bend();
+        return way_of(study, i)[2] * (0.003 + 0.03 * straightness * straightness);
+      },
+      factors);
+  for (const auto& carry : {at_start, at_end}) {
+    const double scale = speed / kMeasuredSpeed_m_s;
+    const auto ahead = [&](std::size_t, const Duties& d) { return 0.0015 * scale * d.drive; };
+    const auto aside = [&](std::size_t, const Duties& d) {
+      return 0.006 * scale * d.drive * d.turn;
+    };
+    const auto turned = [&](std::size_t, const Duties& d) { return 0.008 * scale * d.turn; };
+    maker.add(carry, 0, ahead, smoother);
+    maker.add(carry, 1, aside, smoother);
+    maker.add(carry, 2, turned, smoother);
+  }
+  return maker.take();
+}
+
+CovariateBlock free_command_block(const Study& study) {
+  ColumnMaker maker(study);
+  const Eigen::MatrixXd once = Eigen::MatrixXd::Ones(static_cast<Eigen::Index>(study.size()), 1);
+  using Shape = double (*)(const Duties& d);
+  const Shape shapes[] = {
+      [](const Duties& d) { return d.drive; },
+      [](const Duties& d) { return d.turn; },
+      [](const Duties& d) { return std::abs(d.drive); },
+      [](const Duties& d) { return std::abs(d.turn); },
+      [](const Duties& d) { return d.drive * std::abs(d.drive); },
+      [](const Duties& d) { return d.turn * std::abs(d.turn); },
+      [](const Duties& d) { return d.drive * std::abs(d.turn); },
+      [](const Duties& d) { return d.turn * std::abs(d.drive); },
+  };
+  for (const Shape& shape : shapes) {
+    const auto size = [&](std::size_t, const Duties& d) { return d.duration_s * shape(d); };
+    for (int component : {0, 1, 2}) maker.add(under_way, component, size, once);
+  }
+  for (const Shape& shape : {shapes[0], shapes[1]}) {
+    const auto size = [&](std::size_t, const Duties& d) { return shape(d); };
+    for (int component : {0, 1, 2}) maker.add(at_end, component, size, once);
+  }
+  for (int component : {0, 1, 2}) {
+    maker.add(
+        at_end, component, [](std::size_t, const Duties&) { return 1.0; }, once);
+  }
+  return {"duties and duration", stack(maker.take())};
+}
+
+std::vector<std::vector<double>> drive_classes(const Study& study) {
+  std::vector<std::vector<double>> classes(4, std::vector<double>(study.size(), 0));
+  for (std::size_t i = 0; i < study.size(); ++i) {
+    const Duties d = duties_of(study, i);
+    const bool turns = std::abs(d.turn) > std::abs(d.drive);
+    const bool positive = (turns ? d.turn : d.drive) > 0;
+    classes[(turns ? 2U : 0U) + (positive ? 0U : 1U)][i] = 1;
+  }
+  std::erase_if(classes, [](const std::vector<double>& in) {
+    return std::all_of(in.begin(), in.end(), [](double v) { return v == 0; });
+  });
+  return classes;
+}
+
+}  // namespace gapfarm

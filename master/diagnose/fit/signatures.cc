@@ -1,0 +1,175 @@
+#include "master/diagnose/fit/signatures.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <iterator>
+
+#include "master/diagnose/effect_diagnosis.h"
+#include "master/diagnose/fit/probes.h"
+#include "master/diagnose/fit/slopes.h"
+#include "master/diagnose/places/patch_places.h"
+#include "master/diagnose/subject.h"
+
+namespace gapfarm {
+namespace {
+
+// Those of an effect's own, or its parameters moved by their steps.
+std::vector<Probe> probes_of(const EffectDiagnosis& row, const Study& study) {
+  if (row.probes != nullptr) return row.probes(study);
+  std::vector<Probe> all;
+  for (const ProbedStep& step : row.steps) {
+    const std::string key = std::string(row.effect) + "." + step.key;
+    const Parameter& parameter = (*study.table)[study.table->row(key)];
+    const double neutral = parameter.nominal;
+    const double size = step.size * (parameter.unit == "m" ? study.scale : 1);
+    Probe& probe = all.emplace_back();
+    probe.effect = row.effect;
+    probe.plus = {{key, neutral + size}};
+    if (step.both_ways) probe.minus = {{key, neutral - size}};
+    probe.scale = (step.both_ways ? 2 : 1) * size;
+  }
+  return all;
+}
+
+bool has_effect(const Study& study, const std::string& name) {
+  const std::span<const Effect> known = study.table->effects();
+  return std::any_of(known.begin(), known.end(), [&](const Effect& e) { return e.name == name; });
+}
+
+bool one_condition(const Study& study) {
+  const auto same = [&](const Cell& c) {
+    return c.kind == study.cells.front().kind && c.level == study.cells.front().level &&
+           c.command.duration_s == study.cells.front().command.duration_s;
+  };
+  return std::all_of(study.cells.begin(), study.cells.end(), same);
+}
+
+// A column a probe.
+Signature plain_signature(const EffectDiagnosis& row, const Study& study, ProbedSlopes slopes,
+                          std::span<const Probe> probes) {
+  Signature s;
+  s.effect = row.effect;
+  std::vector<Eigen::VectorXd> columns;
+  for (const auto& d : slopes) columns.push_back(study.whiten(d));
+  s.columns = stack(columns);
+  s.penalty = 0.5 * static_cast<double>(slopes.size());
+  for (const Probe& probe : probes) {
+    if (probe.plus.size() == 1) s.parameters.push_back(probe.plus.begin()->first);
+  }
+  return s;
+}
+
+}  // namespace
+
+Eigen::MatrixXd split_by_kind(const Study& study, const Eigen::MatrixXd& columns) {
+  std::vector<Eigen::VectorXd> parts;
+  for (Eigen::Index k = 0; k < columns.cols(); ++k) {
+    for (MotionKind kind : {MotionKind::kStraight, MotionKind::kTurn, MotionKind::kWide}) {
+      Eigen::VectorXd part = columns.col(k);
+      for (std::size_t i = 0; i < study.size(); ++i) {
+        if (study.cells[study.trials[i].cell].kind != kind)
+          part.segment<3>(static_cast<Eigen::Index>(3 * i)).setZero();
+      }
+      if (part.squaredNorm() > 0) parts.push_back(std::move(part));
+    }
+  }
+  return stack(parts);
+}
+
+Eigen::Vector2d middle_of(const Study& study) {
+  Eigen::Vector2d middle = Eigen::Vector2d::Zero();
+  for (const ResidualTrial& t : study.trials) {
+    middle += Eigen::Vector2d(t.X_WS.x, t.X_WS.y) / static_cast<double>(study.size());
+  }
+  return middle;
+}
+
+Result<std::vector<Signature>> signatures(Predictor& predictor, const Study& study,
+                                          const std::vector<std::string>& left_out) {
+  std::vector<Probe> probes;
+  std::vector<std::size_t> first;  // probe of each row, and behind the last one
+  for (const EffectDiagnosis* row : *study.subject->effects) {
+    first.push_back(probes.size());
+    if (!has_effect(study, row->effect)) continue;
+    for (Probe& probe : probes_of(*row, study)) probes.push_back(std::move(probe));
+  }
+  first.push_back(probes.size());
+  const auto probed = probe_all(predictor, study, probes);
+  if (!probed) return probed.error();
+
+  std::vector<Signature> found, marks;
+  std::size_t k = 0;
+  for (const EffectDiagnosis* row : *study.subject->effects) {
+    const std::size_t from = first[k], count = first[k + 1] - from;
+    ++k;
+    if (row->marks != nullptr && has_effect(study, row->effect)) {
+      std::vector<Signature> all = row->marks(study);
+      std::move(all.begin(), all.end(), std::back_inserter(marks));
+    }
+    const ProbedSlopes slopes = ProbedSlopes(*probed).subspan(from, count);
+    if (slopes.empty() ||
+        std::any_of(slopes.begin(), slopes.end(), [](const auto& d) { return d.empty(); })) {
+      continue;
+    }
+    if (row->signatures == nullptr) {
+      found.push_back(plain_signature(*row, study, slopes,
+                                      std::span<const Probe>(probes).subspan(from, count)));
+      continue;
+    }
+    std::vector<Signature> all = row->signatures(study, slopes);
+    std::move(all.begin(), all.end(), std::back_inserter(found));
+  }
+  std::move(marks.begin(), marks.end(), std::back_inserter(found));
+  const bool only_reach = one_condition(study);
+  std::erase_if(found, [&](const Signature& s) {
+    return (only_reach && study.subject->effects->row(s.effect).changes_reach) ||
+           std::find(left_out.begin(), left_out.end(), s.effect) != left_out.end();
+  });
+  return found;
+}
+
+Result<std::vector<Signature>> patch_signatures(Predictor& predictor, const Study& study,
+                                                const std::vector<Patch>& places,
+                                                const PatchTrials& trials) {
+  std::vector<Pose> ends_without;
+  for (const ResidualTrial& trial : study.trials) ends_without.push_back(trial.X_WP);
+  const auto without = slope_point(predictor, study, study.base, ends_without);
+  if (!without) return without.error();
+  std::vector<PredictionRequest> requests;
+  std::vector<std::map<std::string, double>> values;
+  for (const Patch& place : places) {
+    PredictionRequest request;
+    const auto reach = study.subject->patch_reach(predictor.problem(), study, place);
+    for (std::size_t i = 0; i < study.size(); ++i) {
+      if (trials(i, reach[i])) request.trials.push_back(static_cast<std::uint32_t>(i));
+    }
+    values.push_back(patch_values(place));
+    request.at = without->at;
+    request.headings = without->headings;
+    for (const auto& [key, value] : values.back()) request.at[study.table->row(key)] = value;
+    if (request.trials.empty()) request.trials.push_back(0);
+    requests.push_back(std::move(request));
+  }
+  const auto ends = predictor.attempt(requests);
+  if (!ends) return ends.error();
+  std::vector<Signature> all;
+  for (std::size_t k = 0; k < requests.size(); ++k) {
+    if (!(*ends)[k]) predictor.leave_out(std::string("some places of ") + kPatchEffect);
+    std::vector<Eigen::Vector3d> d(study.size(), Eigen::Vector3d::Zero());
+    for (std::size_t j = 0; (*ends)[k] && j < requests[k].trials.size(); ++j) {
+      const std::size_t i = requests[k].trials[j];
+      d[i] = local_difference(without->ends[i], (*(*ends)[k])[j]);
+    }
+    Signature s;
+    s.effect = kPatchEffect;
+    s.columns = stack({study.whiten(d)});
+    s.fixed = values[k];
+    s.penalty = 6;
+    s.whole = true;
+    all.push_back(std::move(s));
+  }
+  return all;
+}
+
+}  // namespace gapfarm

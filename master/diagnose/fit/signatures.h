@@ -1,0 +1,49 @@
+// What each effect of the catalogue would do to the residuals, to first order.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <functional>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "common/base/result.h"
+#include "master/diagnose/places/patch.h"
+#include "master/diagnose/study.h"
+
+namespace gapfarm {
+
+// A way in which an effect may show.  Effects with a place or a direction that no slope leads to
+// have several, one a place.
+struct Signature {
+  std::string effect;
+  Eigen::MatrixXd columns;              // whitened; the first ones belong to `parameters`
+  std::vector<std::string> parameters;  // table keys whose values the fitted coefficients are, or
+                                        // empty: see EffectDiagnosis::start
+  std::map<std::string, double> fixed;  // other parameters of the effect at this signature
+  double penalty = 0.5;                 // nats that its best fit gains by luck
+  bool whole = false;  // the column is all that the effect does at `fixed`, and no slope
+};
+
+// All of the catalogue but `left_out` and what cannot be simulated: by finite differences of
+// predictions, one batch of farm work.
+Result<std::vector<Signature>> signatures(Predictor& predictor, const Study& study,
+                                          const std::vector<std::string>& left_out);
+
+// Each column in three, one a kind of drive; those of nothing but zeros left out.
+Eigen::MatrixXd split_by_kind(const Study& study, const Eigen::MatrixXd& columns);
+
+// Which trials a disc is simulated in; it does nothing in the others.
+using PatchTrials = std::function<bool(std::size_t trial, PatchReach reach)>;
+inline bool touched_trials(std::size_t, PatchReach reach) { return reach != PatchReach::kNone; }
+
+// Discs of floor, simulated trial by trial.  One that cannot be simulated explains nothing.
+Result<std::vector<Signature>> patch_signatures(Predictor& predictor, const Study& study,
+                                                const std::vector<Patch>& places,
+                                                const PatchTrials& trials = touched_trials);
+
+// Middle of the start places along each axis.
+Eigen::Vector2d middle_of(const Study& study);
+
+}  // namespace gapfarm

@@ -1,0 +1,272 @@
+#include "master/diagnose/places/patch_sketch.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+
+#include "common/base/constants.h"
+#include "common/pose/pose.h"
+#include "master/diagnose/fit/free_commands.h"
+#include "master/diagnose/places/footprint.h"
+
+namespace gapfarm {
+namespace {
+
+constexpr int kSteps = 16;  // of a way
+// A fitted share of the mark scales it, so few stand for all; but where a robot can no longer turn
+// its way out of a patch, that is so from some ratio on.
+constexpr std::array<double, 8> kRatios = {0.1, 0.14, 0.2, 0.3, 0.45, 0.67, 1.6, 2.5};
+constexpr std::array<std::size_t, 3> kGridRatios = {2, 4, 7};  // of these
+// Lengths for an SRV-1; a larger robot tells discs as much larger apart.
+constexpr std::array<double, 6> kPatchRadii_m = {0.14, 0.20, 0.28, 0.38, 0.50, 0.65};
+constexpr double kPatchStep_m = 0.1;
+constexpr double kApart_m = 0.08;  // discs nearer than this, in all of x, y and radius, are one
+constexpr Eigen::Index kFewestMarked = 30;  // rows, three a trial
+constexpr double kMostSteps = 20;           // of the grid, along each axis
+constexpr std::size_t kClimbs = 12;
+constexpr double kLeastRatio = 0.08;
+constexpr double kMostRatio = 2.8;
+
+// Which contacts lie in the patch, a bit each.
+unsigned inside(const std::array<Eigen::Vector2d, 4>& contacts, const Patch& patch) {
+  const Eigen::Vector2d centre(patch[0], patch[1]);
+  unsigned set = 0;
+  for (unsigned c = 0; c < 4; ++c) {
+    set |= (contacts[c] - centre).squaredNorm() < patch[2] * patch[2] ? 1U << c : 0U;
+  }
+  return set;
+}
+
+constexpr unsigned kAllInside = 15;
+
+bool near(const Patch& a, const Patch& b, double apart_m) {
+  return std::abs(a[0] - b[0]) < apart_m && std::abs(a[1] - b[1]) < apart_m &&
+         std::abs(a[2] - b[2]) < apart_m;
+}
+
+}  // namespace
+
+PatchSketch::PatchSketch(const Problem& problem, const Study& study)
+    : study_(study), scale_(problem.treads().scale()) {
+  const Footprint footprint = footprint_of(problem, study);
+  contacts_ = footprint.contacts();
+  lateral_ = footprint.friction_ratio;
+  creep_ = footprint.creep;
+  speed_m_s_ = study.speed_m_s;
+  for (std::size_t i = 0; i < study.size(); ++i) {
+    const ResidualTrial& trial = study.trials[i];
+    Way& way = ways_.emplace_back();
+    const Twist whole = way_of(study, i);
+    way.step_s = study.cells[trial.cell].command.duration_s / kSteps;
+    way.step = whole / kSteps;
+    way.half = exp(Twist(way.step / 2));
+    way.whole = exp(way.step);
+    way.X_WE = trial.X_WS * exp(whole);
+    for (int k = 0; k < kSteps; ++k) {
+      way.X_WB.push_back(trial.X_WS * exp(Twist(whole * k / kSteps)));
+      way.contacts.push_back(contacts_at(trial.X_WS * exp(Twist(whole * (k + 0.5) / kSteps))));
+    }
+  }
+  for (double ratio : kRatios) shifts_.push_back(shifts(ratio));
+  lay_grid();
+}
+
+void PatchSketch::lay_grid() {
+  Eigen::Vector2d low(1e9, 1e9), high(-1e9, -1e9);
+  for (const ResidualTrial& t : study_.trials) {
+    low = low.cwiseMin(Eigen::Vector2d(t.X_WS.x, t.X_WS.y));
+    high = high.cwiseMax(Eigen::Vector2d(t.X_WS.x, t.X_WS.y));
+  }
+  const double step = std::max(kPatchStep_m * scale_, (high - low).maxCoeff() / kMostSteps);
+  std::vector<Eigen::VectorXd> marks;
+  for (const std::size_t r : kGridRatios) {
+    for (double radius_m : kPatchRadii_m) {
+      const double radius = radius_m * scale_;
+      for (double x = low.x(); x <= high.x(); x += step) {
+        for (double y = low.y(); y <= high.y(); y += step) {
+          const Patch patch = {x, y, radius, kRatios[r]};
+          Eigen::VectorXd mark = column(patch, shifts_[r]);
+          if ((mark.array() != 0).count() < kFewestMarked) continue;
+          grid_.push_back(patch);
+          marks.push_back(std::move(mark));
+        }
+      }
+    }
+  }
+  marks_.resize(static_cast<Eigen::Index>(3 * study_.size()),
+                static_cast<Eigen::Index>(marks.size()));
+  for (std::size_t k = 0; k < marks.size(); ++k) {
+    marks_.col(static_cast<Eigen::Index>(k)) = marks[k];
+  }
+}
+
+// Newton's method on a convex function; a step that does not lower it is halved.
+Eigen::Vector3d PatchSketch::twist(double left, double right,
+                                   const Eigen::Vector4d& friction) const {
+  const double gauge = contacts_[0].y() - contacts_[2].y();
+  Eigen::Vector3d v((left + right) / 2, 0, (right - left) / gauge / 3);
+  const auto losses = [&](const Eigen::Vector3d& at, Eigen::Vector3d* slope,
+                          Eigen::Matrix3d* curvature) {
+    double sum = 0;
+    for (int c = 0; c < 4; ++c) {
+      const double tread = c < 2 ? left : right;
+      const double creep = creep_ * std::abs(tread) + kCreepAtRest_m_s;
+      Eigen::Matrix<double, 2, 3> of_twist;
+      of_twist << 1, 0, -contacts_[c].y(), 0, lateral_, lateral_ * contacts_[c].x();
+      const Eigen::Vector2d slip = of_twist * at - Eigen::Vector2d(tread, 0);
+      const double r = std::sqrt(slip.squaredNorm() + creep * creep);
+      sum += friction[c] * r;
+      if (slope == nullptr) continue;
+      *slope += friction[c] / r * of_twist.transpose() * slip;
+      *curvature += friction[c] / r * of_twist.transpose() *
+                    (Eigen::Matrix2d::Identity() - slip * slip.transpose() / (r * r)) * of_twist;
+    }
+    return sum;
+  };
+  for (int i = 0; i < 60; ++i) {
+    Eigen::Vector3d slope = Eigen::Vector3d::Zero();
+    Eigen::Matrix3d curvature = Eigen::Matrix3d::Zero();
+    const double now = losses(v, &slope, &curvature);
+    curvature.diagonal() *= 1 + 1e-9;
+    Eigen::Vector3d step = -curvature.ldlt().solve(slope);
+    for (int half = 0; half < 40 && losses(v + step, nullptr, nullptr) > now; ++half) step /= 2;
+    v += step;
+    if (step.cwiseAbs().maxCoeff() < 1e-9) break;
+  }
+  return v;
+}
+
+std::vector<PatchSketch::Shifts> PatchSketch::shifts(double ratio) const {
+  std::vector<Shifts> all;
+  for (const Cell& cell : study_.cells) {
+    const double left = cell.command.left * speed_m_s_, right = cell.command.right * speed_m_s_;
+    const Eigen::Vector3d even = twist(left, right, Eigen::Vector4d::Ones());
+    Shifts& shifts = all.emplace_back();
+    for (std::size_t set = 0; set < shifts.size(); ++set) {
+      Eigen::Vector4d friction = Eigen::Vector4d::Ones();
+      for (std::size_t c = 0; c < 4; ++c) {
+        if ((set >> c & 1) != 0) friction[static_cast<Eigen::Index>(c)] = ratio;
+      }
+      shifts[set] = twist(left, right, friction) - even;
+    }
+  }
+  return all;
+}
+
+PatchSketch::Contacts PatchSketch::contacts_at(const Pose& X_WB) const {
+  Contacts contacts;
+  const double c = std::cos(X_WB.theta), s = std::sin(X_WB.theta);
+  for (std::size_t k = 0; k < 4; ++k) {
+    const Eigen::Vector2d& at = contacts_[k];
+    contacts[k] = {X_WB.x + c * at.x() - s * at.y(), X_WB.y + s * at.x() + c * at.y()};
+  }
+  return contacts;
+}
+
+// Of the end, in the predicted end's axes.
+Eigen::Vector3d PatchSketch::shift_of(const Way& way, const Patch& patch,
+                                      const Shifts& shifts) const {
+  std::size_t k = 0;
+  while (k < kSteps) {
+    const unsigned set = inside(way.contacts[k], patch);
+    if (set != 0 && set != kAllInside) break;
+    ++k;
+  }
+  if (k == kSteps) return Eigen::Vector3d::Zero();
+  Pose X_WB = way.X_WB[k];
+  for (; k < kSteps; ++k) {
+    const unsigned set = inside(contacts_at(X_WB * way.half), patch);
+    const Twist more = shifts[set] * way.step_s;
+    X_WB = X_WB * (set == 0 ? way.whole : exp(Twist(way.step + more)));
+  }
+  const Pose shift = between(way.X_WE, X_WB);
+  return {shift.x, shift.y, shift.theta};
+}
+
+Eigen::VectorXd PatchSketch::column(const Patch& patch, const std::vector<Shifts>& shifts) const {
+  Eigen::VectorXd column = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(3 * study_.size()));
+  for (std::size_t i = 0; i < study_.size(); ++i) {
+    const Eigen::Vector3d shift = shift_of(ways_[i], patch, shifts[study_.trials[i].cell]);
+    if (shift.isZero(0)) continue;
+    column.segment<3>(static_cast<Eigen::Index>(3 * i)) = study_.whitener[i] * shift;
+  }
+  study_.drop_ignored(column);
+  return column;
+}
+
+Eigen::VectorXd PatchSketch::column(const Patch& patch) const {
+  return column(patch, shifts(patch[3]));
+}
+
+// Up the nearest hill, in ever smaller steps of place and radius and from ratio to ratio.
+void PatchSketch::climb(const Regression& explained, Place* place) const {
+  for (double step : {0.05, 0.025, 0.012}) {
+    const double step_m = step * scale_;
+    for (bool better = true; better;) {
+      better = false;
+      for (int k = 0; k < 8; ++k) {
+        Place next = *place;
+        const std::size_t at =
+            std::find(kRatios.begin(), kRatios.end(), next.patch[3]) - kRatios.begin();
+        std::size_t to = at;
+        if (k < 6) {
+          next.patch[static_cast<std::size_t>(k / 2)] += k % 2 == 0 ? step_m : -step_m;
+        } else {
+          to = k == 6 ? at + 1 : at - 1;  // below 0 it is large
+          if (to >= kRatios.size()) continue;
+          next.patch[3] = kRatios[to];
+        }
+        if (next.patch[2] < 0.08 * scale_) continue;
+        next.squares = explained.each_gain(column(next.patch, shifts_[to]))[0];
+        if (next.squares <= place->squares * (1 + 1e-9)) continue;
+        *place = next;
+        better = true;
+      }
+    }
+  }
+}
+
+// The mark grows about with the logarithm of the ratio.
+double PatchSketch::fitted_ratio(const Regression& explained, const Patch& patch) const {
+  const Eigen::VectorXd mark = column(patch);
+  const double own = explained.own_squares(mark);
+  const double share = own > 0 ? mark.dot(explained.left()) / own : 0;
+  return std::clamp(std::pow(patch[3], share), kLeastRatio, kMostRatio);
+}
+
+std::vector<PatchSketch::Place> PatchSketch::search(const Regression& explained,
+                                                    const PatchWish& wish) const {
+  const Eigen::VectorXd squares = explained.each_gain(marks_);
+  std::vector<Place> places;
+  const auto is_wanted = [&](const Patch& patch) {
+    return !wish.beside || are_two_patches(*wish.beside, patch);
+  };
+  for (std::size_t k = 0; k < grid_.size(); ++k) {
+    if (!is_wanted(grid_[k])) continue;
+    places.push_back({grid_[k], squares[static_cast<Eigen::Index>(k)]});
+  }
+  const auto best_first = [](const Place& a, const Place& b) { return a.squares > b.squares; };
+  std::stable_sort(places.begin(), places.end(), best_first);
+  std::vector<Place> apart;
+  const auto add = [&](const Place& place, std::vector<Place>* to) {
+    const bool known = std::any_of(to->begin(), to->end(), [&](const Place& other) {
+      return near(place.patch, other.patch, kApart_m * scale_);
+    });
+    if (!known) to->push_back(place);
+  };
+  for (const Place& place : places) {
+    // A disc of the grid that is off by half a step shows a third of what the right one would.
+    if (apart.size() < kClimbs && 3 * place.squares > wish.least) add(place, &apart);
+  }
+  for (Place& place : apart) climb(explained, &place);
+  std::stable_sort(apart.begin(), apart.end(), best_first);
+  std::vector<Place> found;
+  for (const Place& place : apart) {
+    if (found.size() == wish.most || place.squares < wish.least) break;
+    if (is_wanted(place.patch)) add(place, &found);  // it may have climbed too near
+  }
+  for (Place& place : found) place.patch[3] = fitted_ratio(explained, place.patch);
+  return found;
+}
+
+}  // namespace gapfarm

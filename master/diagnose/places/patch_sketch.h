@@ -1,0 +1,71 @@
+// Where on the floor a patch of other friction could lie: a sketch that is quick enough to try
+// thousands of discs.  The simulation has the last word on those that it proposes.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <vector>
+
+#include "common/pose/pose.h"
+#include "master/diagnose/fit/regression.h"
+#include "master/diagnose/places/patch.h"
+#include "master/diagnose/study.h"
+
+namespace gapfarm {
+
+// Quasi-static: four contacts whose friction outweighs all else.  On a floor of one friction the
+// motion does not depend on it; while some contacts are inside the disc, the body moves with the
+// twist that makes the least of sum mu_i sqrt(s_i^2 + creep^2) over the contacts' sliding speeds
+// s_i.  The base's motion with what that differs by from the twist on an even floor is followed to
+// its end, for a strong patch leads elsewhere; how that end differs is the disc's mark.
+class PatchSketch {
+ public:
+  PatchSketch(const Problem& problem, const Study& study);
+
+  // Whitened shifts of the predicted ends, three rows a trial.
+  Eigen::VectorXd column(const Patch& patch) const;
+
+  // Twist (m/s, m/s, rad/s in body axes) of the robot with these tread speeds (m/s) while the
+  // contacts have these relative frictions: left front, left rear, right front, right rear.
+  Eigen::Vector3d twist(double left, double right, const Eigen::Vector4d& friction) const;
+
+  struct Place {
+    Patch patch;
+    double squares = 0;  // that its mark explains beyond the regression's
+  };
+  // The best first, none near another, with the ratio that fits best.  Start places bound the
+  // search.
+  std::vector<Place> search(const Regression& explained, const PatchWish& wish) const;
+
+ private:
+  using Contacts = std::array<Eigen::Vector2d, 4>;  // world, m
+  struct Way {                                      // that the base predicts of a trial
+    double step_s = 0;
+    Twist step = Twist::Zero();
+    Pose half, whole;  // exp() of half of it, and of it
+    Pose X_WE;
+    std::vector<Pose> X_WB;          // where each step begins
+    std::vector<Contacts> contacts;  // in its middle
+  };
+  using Shifts = std::array<Eigen::Vector3d, 16>;  // of the twist, by the set of contacts inside
+  Contacts contacts_at(const Pose& X_WB) const;
+  Eigen::Vector3d shift_of(const Way& way, const Patch& patch, const Shifts& shifts) const;
+  std::vector<Shifts> shifts(double ratio) const;  // by cell
+  Eigen::VectorXd column(const Patch& patch, const std::vector<Shifts>& shifts) const;
+  void lay_grid();
+  void climb(const Regression& explained, Place* place) const;
+  double fitted_ratio(const Regression& explained, const Patch& patch) const;
+
+  const Study& study_;
+  double scale_ = 1;                         // TrackedTable::scale()
+  std::array<Eigen::Vector2d, 4> contacts_;  // body axes, m
+  double lateral_ = 1;                       // over longitudinal friction
+  double creep_ = 0;
+  double speed_m_s_ = 0;
+  std::vector<Way> ways_;                    // by trial
+  std::vector<std::vector<Shifts>> shifts_;  // of kRatios
+  std::vector<Patch> grid_;
+  Eigen::MatrixXd marks_;  // of the grid's discs
+};
+
+}  // namespace gapfarm

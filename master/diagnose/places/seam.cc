@@ -1,0 +1,138 @@
+#include "master/diagnose/places/seam.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <vector>
+
+#include "common/effects/catalogue.h"
+
+namespace gapfarm {
+namespace {
+
+// Where one line is not known better than by a shift's width, two this near are one.
+constexpr double kLeastApart_m = 0.3;
+
+double value_in(const Signature& seam, const char* key) {
+  return seam.fixed.at(seam.effect + "." + key);
+}
+
+}  // namespace
+
+bool is_seam(const std::string& effect) { return kind_of(effect) == "camera_seam"; }
+
+bool is_seam_position(const std::string& key) {
+  return key.ends_with(".position") && is_seam(key.substr(0, key.find('.')));
+}
+
+Signature renamed(Signature signature, const std::string& effect) {
+  const std::size_t own = signature.effect.size();
+  for (std::string& key : signature.parameters) key = effect + key.substr(own);
+  std::map<std::string, double> fixed;
+  for (const auto& [key, value] : signature.fixed) {
+    const bool is_own = key.rfind(signature.effect + ".", 0) == 0;
+    fixed[is_own ? effect + key.substr(own) : key] = value;
+  }
+  signature.fixed = std::move(fixed);
+  signature.effect = effect;
+  return signature;
+}
+
+bool are_two_seams(const Signature& a, const Signature& b) {
+  return value_in(a, "axis") != value_in(b, "axis") ||
+         std::abs(value_in(a, "position") - value_in(b, "position")) >= kLeastApart_m;
+}
+
+Signature seam_signature(const Study& study, int axis, double position_m) {
+  const Eigen::Vector2d middle = middle_of(study);
+  Signature seam;
+  seam.columns.resize(static_cast<Eigen::Index>(3 * study.size()), 4);
+  Eigen::Index column = 0;
+  for (bool sloped : {false, true}) {
+    for (int component = 0; component < 2; ++component) {
+      std::vector<Eigen::Vector3d> d(study.size(), Eigen::Vector3d::Zero());
+      const auto shift = [&](const Pose& X) {
+        if ((axis == 0 ? X.x : X.y) <= position_m) return 0.0;
+        return sloped ? (axis == 0 ? X.y - middle.y() : X.x - middle.x()) : 1.0;
+      };
+      for (std::size_t i = 0; i < d.size(); ++i) {
+        const ResidualTrial& t = study.trials[i];
+        const double jump = shift(t.X_WP) - shift(t.X_WS);
+        const double c = std::cos(t.X_WP.theta), s = std::sin(t.X_WP.theta);
+        d[i] = component == 0 ? Eigen::Vector3d(c * jump, -s * jump, 0)
+                              : Eigen::Vector3d(s * jump, c * jump, 0);
+      }
+      seam.columns.col(column++) = study.whiten(d);
+    }
+  }
+  seam.effect = "camera_seam";
+  seam.parameters = {"camera_seam.offset_x", "camera_seam.offset_y", "camera_seam.slope_x",
+                     "camera_seam.slope_y"};
+  seam.fixed = {{"camera_seam.axis", axis}, {"camera_seam.position", position_m}};
+  seam.penalty = 6.5;
+  return seam;
+}
+
+Signature linear_view_signature(const Study& study) {
+  Signature view;
+  view.columns.resize(static_cast<Eigen::Index>(3 * study.size()), 4);
+  for (int shown = 0; shown < 2; ++shown) {
+    for (int seen = 0; seen < 2; ++seen) {
+      std::vector<Eigen::Vector3d> d;
+      for (const ResidualTrial& t : study.trials) {
+        const double moved = seen == 0 ? t.X_WP.x - t.X_WS.x : t.X_WP.y - t.X_WS.y;
+        const double c = std::cos(t.X_WP.theta), s = std::sin(t.X_WP.theta);
+        d.push_back(shown == 0 ? Eigen::Vector3d(c * moved, -s * moved, 0)
+                               : Eigen::Vector3d(s * moved, c * moved, 0));
+      }
+      view.columns.col(2 * shown + seen) = study.whiten(d);
+    }
+  }
+  view.penalty = 2;
+  return view;
+}
+
+double seam_position(const Study& study, const Regression& others, const Signature& seam,
+                     const Eigen::Vector4d& coefficients) {
+  const bool across_x = value_in(seam, "axis") == 0;
+  const Eigen::Vector2d middle = middle_of(study);
+  const auto shift = [&](const Pose& X, double line) {
+    if ((across_x ? X.x : X.y) <= line) return Pose{};
+    const double along = across_x ? X.y - middle.y() : X.x - middle.x();
+    return Pose{coefficients[0] + coefficients[2] * along,
+                coefficients[1] + coefficients[3] * along, 0};
+  };
+  const double about = value_in(seam, "position");
+  // Of signatures that are nearly alike a coefficient may be of any size; no shift is.
+  const Parameter& offset = (*study.table)[study.table->row(seam.effect + ".offset_x")];
+  const double shifted = std::min(std::abs(coefficients[across_x ? 0 : 1]), offset.upper);
+  const double reach = shifted + 4 * kFineSeamStep_m;
+  std::vector<Pose> ways;
+  for (const ResidualTrial& t : study.trials) ways.push_back(between(t.X_WS, t.X_WP));
+  const Eigen::VectorXd left = others.left();
+  double best = about, least = INFINITY;
+  for (double line = about - reach; line <= about + reach; line += kFineSeamStep_m) {
+    std::vector<Eigen::Vector3d> d;
+    for (std::size_t i = 0; i < study.size(); ++i) {
+      const ResidualTrial& t = study.trials[i];
+      Pose start = t.X_WS;
+      for (int round = 0; round < 3; ++round) {  // as the simulated camera's readings are undone
+        const Pose s = shift(start, line);
+        start = {t.X_WS.x - s.x, t.X_WS.y - s.y, t.X_WS.theta};
+      }
+      const Pose end = start * ways[i];
+      const Pose s = shift(end, line);
+      d.push_back(local_difference(t.X_WP, {end.x + s.x, end.y + s.y, end.theta}));
+    }
+    Eigen::VectorXd mark = study.whiten(d);
+    study.drop_ignored(mark);
+    // What would be left with this mark taken out, less what is left without.
+    const double change = others.own_squares(mark) - 2 * mark.dot(left);
+    if (change >= least) continue;
+    least = change;
+    best = line;
+  }
+  return best;
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,369 @@
+#include "master/diagnose/places/where.h"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <functional>
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+
+#include "common/math/laws.h"
+#include "common/math/statistics.h"
+#include "master/diagnose/evidence/trend_test.h"
+
+namespace gapfarm {
+namespace {
+
+constexpr double kOutlierSds = 3.2905;  // square root of the 0.999 quantile of chi2, 1 dof
+constexpr double kOutlierShare = 0.001;
+constexpr double kTrialsForCells = 4;  // a cell, on average, for cell means to be worth their cost
+constexpr std::size_t kFewestTold = 8;
+constexpr double kClearMotion = 5;    // s.d.s of the end by which a unit gain must move it
+constexpr int kMostDependences = 12;  // dependences taken out of one component
+const char* const kComponents[] = {"x", "y", "theta"};
+
+// One component of one selection of trials.
+struct Selection {
+  std::string command;
+  int component = 0;
+  bool along_motion = false;  // signs turned so that positive is too much motion
+  std::vector<std::size_t> trials;
+  std::vector<double> sign;
+};
+
+class Looker {
+ public:
+  Looker(std::span<const ResidualTrial> trials, std::span<const Eigen::Vector3d> residuals,
+         std::span<const Eigen::Matrix3d> covariances, std::span<const Cell> cells,
+         const WhereOptions& options)
+      : words_(options.words),
+        trials_(trials),
+        residuals_(residuals),
+        covariances_(covariances),
+        cells_(cells),
+        left_(residuals.begin(), residuals.end()),
+        spent_(residuals.size(), Eigen::Vector3d::Zero()) {
+    double squares = 0;
+    for (std::size_t i = 0; i < trials.size(); ++i) {
+      for (int k = 0; k < 3; ++k) squares += std::pow(residuals[i][k] / sd(i, k), 2);
+    }
+    const auto n = static_cast<double>(trials.size());
+    excess_ = std::max(squares - 3 * n, std::sqrt(6 * n));
+    covariates_ = options.covariates(trials, residuals, cells);
+  }
+
+  // All rows whose corrected p is at most `level`.
+  std::vector<Where> look(const Problem& problem, double level) {
+    std::vector<std::vector<Selection>> selections;
+    for (int k = 0; k < 3; ++k) selections.push_back(selections_of(k, problem));
+    for (const auto& component : selections) {
+      for (const Selection& s : component) looks_ += covariates_.size() + (s.along_motion ? 1 : 3);
+    }
+    for (const auto& component : selections) {
+      look_for_means(component, level);
+      look_at_scatter(component, level);
+    }
+    return std::move(rows_);
+  }
+
+ private:
+  std::string deviation(const Selection& s, double size, bool trend) const {
+    return words_.deviation(s.component, size, s.along_motion, trend);
+  }
+  double sd(std::size_t trial, int k) const { return std::sqrt(covariances_[trial](k, k)); }
+  double path(std::size_t trial) const { return cells_[trials_[trial].cell].path; }
+
+  std::vector<Selection> selections_of(int k, const Problem& problem) const {
+    Selection all{"all", k, false, {}, {}};
+    Selection motion{"all", k, true, {}, {}};
+    std::map<std::size_t, Selection> commands;
+    for (std::size_t i = 0; i < trials_.size(); ++i) {
+      const std::size_t c = trials_[i].command;
+      Selection& own =
+          commands.try_emplace(c, Selection{problem.commands[c].name, k, false, {}, {}})
+              .first->second;
+      for (Selection* s : {&all, &own}) {
+        s->trials.push_back(i);
+        s->sign.push_back(1);
+      }
+      const double moved = (trials_[i].left + trials_[i].right)[k];
+      if (std::abs(moved) < kClearMotion * sd(i, k)) continue;
+      motion.trials.push_back(i);
+      motion.sign.push_back(moved > 0 ? 1 : -1);
+    }
+    std::vector<Selection> some;
+    if (commands.size() > 1) some = {all, motion};
+    for (const auto& [c, own] : commands) some.push_back(own);
+    std::erase_if(some, [](const Selection& s) { return s.trials.size() < kFewestTold; });
+    return some;
+  }
+
+  // The clearest dependence of the component is told and taken out, then the next clearest.
+  void look_for_means(const std::vector<Selection>& selections, double level) {
+    for (int round = 0; round < kMostDependences; ++round) {
+      std::optional<Found> best;
+      for (const Selection& s : selections) {
+        const View v = view(s);
+        const auto offer = [&](const WhereCovariate* covariate, TrendTest test) {
+          if (test.dimensions == 0) return;
+          const bool clearer = !best || test.p < best->test.p ||
+                               (test.p == best->test.p && test.squares > best->test.squares);
+          if (clearer) best = Found{&s, covariate, std::move(test)};
+        };
+        const std::vector<int> none(s.trials.size(), -1);
+        offer(nullptr, trend_test(v.u, mean_column(s), v.scale, none));
+        for (const WhereCovariate& c : covariates_) {
+          offer(&c,
+                trend_test(v.u, columns_of(c, s), v.scale, c.within_cells ? v.groups : v.commands));
+        }
+      }
+      if (!best || corrected(best->test.p) > level) return;
+      tell(*best);
+      const Selection& s = *best->selection;
+      // With the part that the cells' means took: covariates are centred over all trials.
+      const Eigen::VectorXd fitted =
+          (best->covariate == nullptr ? mean_column(s) : columns_of(*best->covariate, s)) *
+          best->test.coefficients;
+      for (std::size_t i = 0; i < s.trials.size(); ++i) {
+        left_[s.trials[i]][s.component] -= s.sign[i] * fitted[static_cast<Eigen::Index>(i)];
+        spent_[s.trials[i]][s.component] += best->test.dimensions / double(s.trials.size());
+      }
+    }
+  }
+
+  struct View {
+    Eigen::VectorXd u, scale;
+    std::vector<int> commands, groups;
+  };
+  struct Found {
+    const Selection* selection = nullptr;
+    const WhereCovariate* covariate = nullptr;  // null: the mean
+    TrendTest test;
+  };
+
+  View view(const Selection& s) const {
+    const auto n = static_cast<Eigen::Index>(s.trials.size());
+    View v{Eigen::VectorXd(n), Eigen::VectorXd(n), {}, {}};
+    std::set<int> seen;
+    for (std::size_t i = 0; i < s.trials.size(); ++i) {
+      const std::size_t trial = s.trials[i];
+      const auto at = static_cast<Eigen::Index>(i);
+      v.scale[at] = sd(trial, s.component);
+      v.u[at] = s.sign[i] * left_[trial][s.component] / v.scale[at];
+      v.commands.push_back(static_cast<int>(trials_[trial].command));
+      v.groups.push_back(static_cast<int>(trials_[trial].cell));
+      seen.insert(v.groups.back());
+    }
+    if (double(n) < kTrialsForCells * double(seen.size())) v.groups = v.commands;
+    return v;
+  }
+
+  // Holm's step-down: the rows already told are not looked at again.
+  double corrected(double p) const {
+    return std::min(1.0, p * double(looks_ - std::min(looks_ - 1, rows_.size())));
+  }
+
+  // What a dependence that grows with the motion is multiplied by: the motion itself where signs
+  // are turned along it (m, m, rad for the whole of it), else the path.
+  double motion(const Selection& s, std::size_t trial) const {
+    const ResidualTrial& t = trials_[trial];
+    return s.along_motion ? std::abs((t.left + t.right)[s.component]) : path(trial);
+  }
+
+  double mean_motion(const Selection& s) const {
+    double sum = 0;
+    for (const std::size_t i : s.trials) sum += motion(s, i);
+    return sum / double(s.trials.size());
+  }
+
+  Eigen::MatrixXd columns_of(const WhereCovariate& covariate, const Selection& s) const {
+    Eigen::MatrixXd columns(static_cast<Eigen::Index>(s.trials.size()), covariate.columns.cols());
+    for (std::size_t i = 0; i < s.trials.size(); ++i) {
+      columns.row(static_cast<Eigen::Index>(i)) =
+          covariate.columns.row(static_cast<Eigen::Index>(s.trials[i])) *
+          (covariate.with_motion ? motion(s, s.trials[i]) : 1.0);
+    }
+    return columns;
+  }
+
+  Eigen::MatrixXd mean_column(const Selection& s) const {
+    Eigen::MatrixXd column(static_cast<Eigen::Index>(s.trials.size()), 1);
+    for (std::size_t i = 0; i < s.trials.size(); ++i) {
+      column(static_cast<Eigen::Index>(i), 0) = s.along_motion ? motion(s, s.trials[i]) : 1.0;
+    }
+    return column;
+  }
+
+  void push(const Selection& s, const char* kind, const std::string& covariate, double size,
+            double squares, double p, std::string text) {
+    rows_.push_back({s.command, kComponents[s.component], kind, covariate, size,
+                     std::clamp(squares / excess_, 0.0, 1.0), corrected(p), std::move(text)});
+  }
+
+  void tell(const Found& found) {
+    const Selection& s = *found.selection;
+    if (found.covariate != nullptr) {
+      tell_trend(s, *found.covariate, found.test, view(s).scale);
+      return;
+    }
+    const double mean = 1000 * found.test.coefficients[0] * (s.along_motion ? mean_motion(s) : 1.0);
+    push(s, "bias", "", std::abs(mean), found.test.squares - 1, found.test.p,
+         words_.motions(s.command) + " " + deviation(s, mean, false) + " on average.");
+  }
+
+  void tell_trend(const Selection& s, const WhereCovariate& covariate, const TrendTest& test,
+                  const Eigen::VectorXd& scale) {
+    const Eigen::VectorXd fitted = test.fitted.cwiseProduct(scale);
+    const double size = 1000 * std::sqrt(fitted.squaredNorm() / double(fitted.size()));
+    double slope = 1000 * test.coefficients[0] * covariate.unit;
+    if (covariate.with_motion) slope *= mean_motion(s);
+    std::string text = words_.motions(s.command) + " ";
+    if (!covariate.each.empty()) {
+      text += deviation(s, slope, true) + " " + covariate.each + ".";
+    } else {
+      text +=
+          "differ in " + words_.component(s.component) + " by " + amount_words(size, s.component) +
+          " (s.d.) with the " +
+          (covariate.name == "previous residual" ? "error of the trial before" : covariate.name) +
+          ".";
+    }
+    push(s, "trend", covariate.name, size, test.squares - test.dimensions, test.p, text);
+  }
+
+  // What is left about the means, apart from outliers.
+  struct Scatter {
+    Selection selection;
+    double count = 0, freedom = 0, squares = 0, wild = 0, variance = 0;
+    std::vector<double> beyond;  // sizes of the outliers, mm or mrad
+    double p_spread = 1, p_outliers = 1;
+  };
+
+  Scatter scatter_of(const Selection& s) const {
+    Scatter scatter;
+    scatter.selection = s;
+    const View v = view(s);
+    scatter.count = double(s.trials.size());
+    scatter.freedom =
+        scatter.count - double(std::set<int>(v.groups.begin(), v.groups.end()).size());
+    for (const std::size_t i : s.trials) scatter.freedom -= spent_[i][s.component];
+    scatter.variance = 1e6 * v.scale.squaredNorm();
+    // Outliers must not pull the means that they are judged by: they are put onto them.
+    Eigen::VectorXd clean = v.u, left;
+    double limit = 0;
+    for (int round = 0; round < 4; ++round) {
+      const Eigen::VectorXd means = group_means(clean, v.scale, v.groups);
+      left = v.u - means;
+      std::vector<double> sizes;
+      for (const double value : left) sizes.push_back(std::abs(value));
+      limit = kOutlierSds * std::max(1.0, 1.4826 * median(sizes));
+      for (Eigen::Index i = 0; i < left.size(); ++i) {
+        clean[i] = std::abs(left[i]) > limit ? means[i] : v.u[i];
+      }
+    }
+    for (Eigen::Index i = 0; i < left.size(); ++i) {
+      if (std::abs(left[i]) > limit) {
+        scatter.beyond.push_back(1000 * std::abs(left[i]) * v.scale[i]);
+        scatter.wild += left[i] * left[i] - 1;
+      } else {
+        scatter.squares += left[i] * left[i];
+      }
+    }
+    scatter.freedom -= double(scatter.beyond.size());
+    return scatter;
+  }
+
+  static void judge(Scatter& s) {
+    if (s.freedom < 4) return;
+    s.p_spread = std::min(1.0, 2 * std::min(chi_squared_below(s.freedom, s.squares),
+                                            chi_squared_above(s.freedom, s.squares)));
+    if (s.beyond.empty()) return;
+    s.p_outliers = binomial_above(s.count, kOutlierShare, double(s.beyond.size()) - 1);
+  }
+
+  // The commands one by one, and all of them pooled; all when most of them scatter so.
+  void look_at_scatter(const std::vector<Selection>& selections, double level) {
+    std::vector<Scatter> single;
+    Scatter pooled;
+    for (const Selection& s : selections) {
+      if (s.command == "all") {
+        pooled.selection = s.along_motion ? pooled.selection : s;
+        continue;
+      }
+      single.push_back(scatter_of(s));
+      Scatter& one = single.back();
+      judge(one);
+      pooled.count += one.count;
+      pooled.freedom += one.freedom;
+      pooled.squares += one.squares;
+      pooled.wild += one.wild;
+      pooled.variance += one.variance;
+      pooled.beyond.insert(pooled.beyond.end(), one.beyond.begin(), one.beyond.end());
+    }
+    judge(pooled);
+    const bool several = single.size() > 1;
+    for (double Scatter::*p : {&Scatter::p_spread, &Scatter::p_outliers}) {
+      const auto clear = [&](const Scatter& s) { return corrected(s.*p) <= level; };
+      const auto count = std::count_if(single.begin(), single.end(), clear);
+      const bool most = 2 * static_cast<std::size_t>(count) > single.size();
+      if (several && clear(pooled) && (most || count == 0)) {
+        tell_scatter(pooled, p == &Scatter::p_spread);
+        continue;
+      }
+      for (const Scatter& s : single) {
+        if (clear(s)) tell_scatter(s, p == &Scatter::p_spread);
+      }
+    }
+  }
+
+  void tell_scatter(const Scatter& scatter, bool spread) {
+    const Selection& s = scatter.selection;
+    const std::string what = words_.component(s.component);
+    if (!spread) {
+      const std::string of = std::to_string(std::lround(scatter.count));
+      push(s, "outliers", "", median(scatter.beyond), scatter.wild, scatter.p_outliers,
+           words_.motions(s.command) + ": " + std::to_string(scatter.beyond.size()) + " of " + of +
+               " are far off in " + what + ", where " +
+               plain_number(kOutlierShare * scatter.count) + " would be by chance.");
+      return;
+    }
+    const double ratio = scatter.squares / scatter.freedom;
+    const double size =
+        std::sqrt(scatter.variance / scatter.count) * std::sqrt(std::abs(ratio - 1));
+    push(s, "spread", "", size, scatter.squares - scatter.freedom, scatter.p_spread,
+         words_.motions(s.command) + " scatter " + plain_number(std::sqrt(ratio)) +
+             " times as much in " + what + " as the noise allows (" +
+             amount_words(size, s.component) + (ratio > 1 ? " beyond it)." : " below it)."));
+  }
+
+  WhereWords words_;
+  std::span<const ResidualTrial> trials_;
+  std::span<const Eigen::Vector3d> residuals_;
+  std::span<const Eigen::Matrix3d> covariances_;
+  std::span<const Cell> cells_;
+  double excess_ = 1;
+  std::vector<WhereCovariate> covariates_;
+  std::vector<Eigen::Vector3d> left_;   // residuals without what was told
+  std::vector<Eigen::Vector3d> spent_;  // degrees of freedom that took
+  std::size_t looks_ = 0;
+  std::vector<Where> rows_;
+};
+
+}  // namespace
+
+std::vector<Where> where(std::span<const ResidualTrial> trials,
+                         std::span<const Eigen::Vector3d> residuals,
+                         std::span<const Eigen::Matrix3d> covariances, std::span<const Cell> cells,
+                         const Problem& problem, const WhereOptions& options) {
+  assert(trials.size() == residuals.size() && trials.size() == covariances.size());
+  if (trials.empty()) return {};
+  std::vector<Where> rows =
+      Looker(trials, residuals, covariances, cells, options).look(problem, options.level);
+  std::stable_sort(rows.begin(), rows.end(),
+                   [](const Where& a, const Where& b) { return a.share > b.share; });
+  if (rows.size() > options.most) rows.resize(options.most);
+  return rows;
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,238 @@
+// Trials as a table, drives with their paths, and how the pictures tell of both.
+
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <type_traits>
+
+#include "common/json/json.h"
+#include "master/diagnose/result/diagnosis_json.h"
+#include "master/diagnose/result/json_fields.h"
+
+namespace gapfarm {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+// Calls visit(name, field) for every column in order, so that writing and reading cannot disagree.
+// `Trial` is DiagnosedTrial or const DiagnosedTrial.
+template <class Trial, class Visit>
+void visit_columns(Trial& trial, const Visit& visit) {
+  visit("session", trial.session);
+  visit("trial", trial.trial);
+  visit("command", trial.command);
+  visit("session_time_s", trial.session_time_s);
+  visit("duration_s", trial.duration_s);
+  visit("level", trial.level);
+  visit("place_in_run", trial.place_in_run);
+  visit("held_out", trial.held_out);
+  const auto pose = [&](const std::string& name, auto& X) {
+    visit(name + "_x", X.x);
+    visit(name + "_y", X.y);
+    visit(name + "_theta", X.theta);
+  };
+  pose("start", trial.X_WS);
+  pose("measured", trial.measured);
+  pose("tuned", trial.tuned);
+  pose("final", trial.final_);
+  const auto covariance = [&](const std::string& name, auto& cov) {
+    const char* axes = "xyt";
+    for (int row = 0; row < 3; ++row) {
+      for (int column = row; column < 3; ++column) {
+        visit(name + "_cov_" + axes[row] + axes[column], cov(row, column));
+      }
+    }
+  };
+  covariance("tuned", trial.tuned_cov);
+  covariance("final", trial.final_cov);
+  const auto residual = [&](const std::string& name, auto& r) {
+    visit(name + "_residual_x", r.x());
+    visit(name + "_residual_y", r.y());
+    visit(name + "_residual_theta", r.z());
+  };
+  residual("tuned", trial.tuned_residual);
+  residual("final", trial.final_residual);
+  visit("tuned_score", trial.tuned_score);
+  visit("final_score", trial.final_score);
+}
+
+DiagnosedTrial blank_trial() {
+  DiagnosedTrial trial;
+  trial.tuned_cov = trial.final_cov = Eigen::Matrix3d::Zero();
+  trial.tuned_residual = trial.final_residual = Eigen::Vector3d::Zero();
+  return trial;
+}
+
+double rounded(double value, int digits) {
+  if (digits <= 0 || !std::isfinite(value)) return value;
+  char text[40];
+  std::snprintf(text, sizeof text, "%.*g", digits, value);
+  return std::strtod(text, nullptr);
+}
+
+// Whether `json` fits `field`; sets it when so.
+template <class Field>
+bool read_cell(const Json& json, Field& field) {
+  if constexpr (std::is_same_v<Field, std::string>) {
+    if (!json.is_string()) return false;
+  } else if constexpr (std::is_same_v<Field, bool>) {
+    if (!json.is_boolean()) return false;
+  } else if constexpr (std::is_integral_v<Field>) {
+    if (!json.is_number_integer()) return false;
+  } else if (json.is_null()) {
+    field = std::numeric_limits<double>::quiet_NaN();
+    return true;
+  } else if (!json.is_number()) {
+    return false;
+  }
+  field = json.get<Field>();
+  return true;
+}
+
+Json path_json(const std::vector<PathSample>& path) {
+  Json list = Json::array();
+  for (const PathSample& s : path) list.push_back({s.t_s, s.pose.x, s.pose.y, s.pose.theta});
+  return list;
+}
+
+bool read_path(const Json& json, std::vector<PathSample>* path) {
+  if (!json.is_array()) return false;
+  for (const Json& sample : json) {
+    if (!sample.is_array() || sample.size() != 4) return false;
+    for (const Json& v : sample) {
+      if (!v.is_number()) return false;
+    }
+    path->push_back({sample[0].get<double>(),
+                     {sample[1].get<double>(), sample[2].get<double>(), sample[3].get<double>()}});
+  }
+  return true;
+}
+
+constexpr auto kShown = [](auto& v, auto& shown) {
+  v.field("key", shown.key);
+  v.field("label", shown.label);
+  v.field("matches", shown.matches);
+};
+constexpr auto kWords = [](auto& v, auto& words) {
+  v.field("ends", words.ends);
+  v.field("residuals", words.residuals);
+  v.field("x", words.x);
+  v.field("y", words.y);
+};
+
+}  // namespace
+
+Json trials_json(const Diagnosis& diagnosis, int digits) {
+  Json columns = Json::array();
+  const DiagnosedTrial blank = blank_trial();
+  visit_columns(blank, [&](const std::string& name, const auto&) { columns.push_back(name); });
+  for (const ShownCovariate& shown : diagnosis.shown) columns.push_back(shown.key);
+  Json rows = Json::array();
+  for (const DiagnosedTrial& trial : diagnosis.trials) {
+    Json row = Json::array();
+    visit_columns(trial, [&](const std::string&, const auto& field) {
+      if constexpr (std::is_same_v<std::decay_t<decltype(field)>, double>) {
+        row.push_back(rounded(field, digits));
+      } else {
+        row.push_back(field);
+      }
+    });
+    for (double value : trial.covariates) row.push_back(rounded(value, digits));
+    rows.push_back(std::move(row));
+  }
+  return {{"columns", std::move(columns)}, {"rows", std::move(rows)}};
+}
+
+Result<std::vector<DiagnosedTrial>> parse_trials(const Json& table,
+                                                 const std::vector<ShownCovariate>& shown) {
+  Diagnosis none;
+  none.shown = shown;
+  const Json expected = trials_json(none)["columns"];
+  if (!table.is_object() || !table.contains("columns") || !table.contains("rows") ||
+      !table["rows"].is_array()) {
+    return Error{"diagnosis.json: \"trials\" must be an object with \"columns\" and \"rows\""};
+  }
+  if (table["columns"] != expected) {
+    return Error{
+        "diagnosis.json: \"trials.columns\" are not those of this version; diagnose again"};
+  }
+  std::vector<DiagnosedTrial> trials;
+  trials.reserve(table["rows"].size());
+  for (const Json& row : table["rows"]) {
+    const std::string where = "diagnosis.json: trials.rows[" + std::to_string(trials.size()) + "]";
+    if (!row.is_array() || row.size() != expected.size()) {
+      return Error{where + " must be a list of " + std::to_string(expected.size()) + " cells"};
+    }
+    DiagnosedTrial trial = blank_trial();
+    trial.covariates.resize(shown.size());
+    std::size_t column = 0;
+    std::string error;
+    const auto read = [&](const std::string& name, auto& field) {
+      const Json& cell = row[column++];
+      if (error.empty() && !read_cell(cell, field)) {
+        error =
+            where + ": " + name + " is " + json_text(cell) + ", which is not of its column's type";
+      }
+    };
+    visit_columns(trial, read);
+    for (std::size_t k = 0; k < shown.size(); ++k) read(shown[k].key, trial.covariates[k]);
+    if (!error.empty()) return Error{error};
+    for (Eigen::Matrix3d* cov : {&trial.tuned_cov, &trial.final_cov}) {
+      cov->triangularView<Eigen::StrictlyLower>() = cov->transpose();
+    }
+    trials.push_back(std::move(trial));
+  }
+  return trials;
+}
+
+Json drives_json(const std::vector<ShownDrive>& drives) {
+  Json list = Json::array();
+  for (const ShownDrive& drive : drives) {
+    Json json = {{"trial", drive.trial}, {"why", drive.why}};
+    if (!drive.measured.empty()) json["measured"] = path_json(drive.measured);
+    if (!drive.tuned.empty()) json["tuned"] = path_json(drive.tuned);
+    if (!drive.final_.empty()) json["final"] = path_json(drive.final_);
+    list.push_back(std::move(json));
+  }
+  return list;
+}
+
+Status read_drives(const Json& json, std::vector<ShownDrive>* drives) {
+  const Error damaged{
+      "diagnosis.json: drives: expected a list of {trial, why, paths}; was this "
+      "written by gapfarm diagnose?"};
+  if (!json.is_array()) return damaged;
+  for (const Json& item : json) {
+    if (!item.is_object() || !item.contains("trial") || !item["trial"].is_number_unsigned() ||
+        !item.contains("why") || !item["why"].is_string()) {
+      return damaged;
+    }
+    ShownDrive& drive = drives->emplace_back();
+    drive.trial = item["trial"].get<std::size_t>();
+    drive.why = item["why"].get<std::string>();
+    for (const auto& [key, path] : {std::pair{"measured", &drive.measured},
+                                    {"tuned", &drive.tuned},
+                                    {"final", &drive.final_}}) {
+      if (item.contains(key) && !read_path(item[key], path)) return damaged;
+    }
+  }
+  return {};
+}
+
+Json pictures_json(const Diagnosis& diagnosis) {
+  Json json = FieldWriter::written(diagnosis.words, kWords);
+  json["shown"] = FieldWriter::list(diagnosis.shown, kShown);
+  return json;
+}
+
+Status read_pictures(const Json& pictures, Diagnosis* diagnosis) {
+  std::string error;
+  Fields fields(pictures, "pictures", error);
+  kWords(fields, diagnosis->words);
+  fields.list("shown", diagnosis->shown, kShown);
+  return error.empty() ? Status{} : Error{error};
+}
+
+}  // namespace gapfarm

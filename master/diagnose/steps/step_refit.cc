@@ -1,0 +1,234 @@
+// The fits behind the figures.
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "common/math/statistics.h"
+#include "master/diagnose/evidence/noise.h"
+#include "master/diagnose/steps/step_parts.h"
+#include "master/diagnose/steps/watch.h"
+
+namespace gapfarm::steps {
+namespace {
+
+Eigen::MatrixXd no_nuisances(const Study& study) {
+  return Eigen::MatrixXd(static_cast<Eigen::Index>(3 * study.size()), 0);
+}
+
+// `scored_in`: by its noise, where the fit had another.
+NestedFit nested_fit(const Inquiry& of, std::string name, JointFit fit, const Study& fitted_in,
+                     Study scored_in, const std::vector<std::size_t>& folds) {
+  fit.jacobian = scored_in.rewhitened(fitted_in, fit.jacobian);
+  NestedFit nested{
+      std::move(name), of.predictor.tasks(fit.at), std::move(fit), std::move(scored_in), {}};
+  score(of, folds, &nested);
+  return nested;
+}
+
+// The base alone, as it was logged and with late readings put right, then with one effect more at a
+// time.
+Result<std::vector<NestedFit>> nested_fits(const Inquiry& of, const Explanation& named,
+                                           const std::vector<std::size_t>& folds) {
+  const Study& study = named.study();
+  const Eigen::MatrixXd none = no_nuisances(study);
+  const int base_rounds = of.options.keep_base ? 0 : kMostRounds;
+  std::vector<NestedFit> nested;
+  if (named.as_logged) {
+    const Study& logged = *named.as_logged;
+    auto fit = fit_jointly(of.predictor, logged, {}, logged.base, BaseParameters::kFitted, none,
+                           base_rounds);
+    if (!fit) return fit.error();
+    nested.push_back(nested_fit(of, "the tuned base", std::move(*fit), logged, logged, folds));
+  }
+  std::set<std::string> names;
+  std::vector<EffectCandidate> effects;
+  const Study beside = named.chosen.empty() ? study : study_beside(named, *named.estimates);
+  for (std::size_t count = 0; count <= named.chosen.size(); ++count) {
+    if (count > 0) {
+      effects.push_back(named.chosen[count - 1].candidate);
+      names.insert(effects.back().signature.effect);
+    }
+    const bool alone = count == 0;
+    Overrides start = alone && !named.tuned_alone.empty() ? named.tuned_alone : study.base;
+    for (const auto& [row, value] : named.estimates ? named.estimates->at : Overrides{}) {
+      const std::string& effect = of.table()[row].effect;
+      if (!alone && (effect.empty() || names.count(effect))) start[row] = value;
+    }
+    const Study& fitted_in = alone ? study : beside;
+    auto fit = fit_jointly(of.predictor, fitted_in, effects, start, BaseParameters::kFitted, none,
+                           alone ? base_rounds : kMostRounds);
+    if (!fit) return fit.error();
+    std::string name =
+        named.as_logged ? "the tuned base, late readings put right" : "the tuned base";
+    for (std::size_t k = 0; k < effects.size(); ++k) {
+      name += (k == 0 ? ", " : " and ") + effects[k].signature.effect;
+    }
+    Study scored_in = alone ? study : study_beside(named, *fit);
+    nested.push_back(nested_fit(of, name, std::move(*fit), fitted_in, std::move(scored_in), folds));
+  }
+  return nested;
+}
+
+// The base that was tuned alone has taken up a part of what the effects do: a share of all speeds,
+// say, when a battery sags.  Their sizes come from beside the base that was fitted with them: from
+// where that fit ended, which can be simulated, since with this base and another fit's effects the
+// robot may fall over.
+Result<JointFit> estimate_beside(const Inquiry& of, const Explanation& named,
+                                 const NestedFit& with_base) {
+  return fit_jointly(of.predictor, named.study(), candidates_of(named.chosen), with_base.fit.at,
+                     BaseParameters::kHeld, named.evidence->nuisances, kMostRounds);
+}
+
+// Where more is left than a name allows, what the catalogue does explain is named as no cause; the
+// model that is left behind has it all the same when trials left out are clearly better predicted
+// so.
+Result<Refit> with_correction(const Inquiry& of, const Screening& screening, Refit refit,
+                              const std::vector<std::size_t>& folds) {
+  const Explanation& named = refit.judged.named;
+  if (refit.judged.unnamed.empty() || of.options.keep_base) return refit;
+  const std::vector<EffectCandidate> effects = candidates_of(refit.judged.unnamed);
+  std::set<std::string> names;
+  for (const EffectCandidate& effect : effects) names.insert(effect.signature.effect);
+  const Study& study = named.study();
+  Overrides start =
+      named.estimates ? study.base : start_of(of, *screening.catalogue, named, effects);
+  for (const auto& [row, value] : named.estimates ? named.estimates->at : Overrides{}) {
+    const std::string& effect = of.table()[row].effect;
+    if (effect.empty() || names.count(effect) > 0) start[row] = value;
+  }
+  auto fit = fit_jointly(of.predictor, study, effects, start, BaseParameters::kFitted,
+                         no_nuisances(study), kMostRounds);
+  if (!fit && fit.error().code == ErrorCode::kSimulation) return refit;
+  if (!fit) return fit.error();
+  std::string name;
+  for (const std::string& effect : names) name += (name.empty() ? "" : " and ") + effect;
+  Study scored_in = study_beside(named, *fit);
+  NestedFit corrected = nested_fit(of, "the tuned base, corrected by " + name, std::move(*fit),
+                                   study, std::move(scored_in), folds);
+  if (!clearly_better(corrected.scores, refit.nested.back().scores)) return refit;
+  refit.nested.push_back(std::move(corrected));
+  refit.correction =
+      "model.toml holds " + name +
+      " as a correction: trials left out are predicted better so, but too much is left to call it "
+      "the cause.";
+  refit.judged.cautions.push_back(refit.correction);
+  return refit;
+}
+
+// Nor is anything left to explain beside it; of a robot of another kind there is.
+bool explains_bounds(const Refit& refit) {
+  const Explanation& named = refit.judged.named;
+  return refit.judged.verdict == Verdict::kEffect && !named.chosen.empty() &&
+         base_on_bounds(named.study(), refit.nested.back().fit.at).empty();
+}
+
+// The base alone is what is left to tell of.
+Result<Refit> naming_none(const Inquiry& of, const Evidence& measured, Refit refit,
+                          std::optional<SanityFinding> missing,
+                          const std::vector<std::size_t>& folds) {
+  Judgement& judged = refit.judged;
+  judged.named.chosen.clear();
+  judged.named.estimates.reset();
+  std::erase(judged.cautions, refit.correction);
+  refit.correction.clear();
+  const bool freed = judged.named.frees_base;
+  if (missing) judged = doubted(std::move(judged), std::move(*missing));
+  if (freed) judged = base_doubted(of, measured, std::move(judged));
+  auto nested = nested_fits(of, judged.named, folds);
+  if (!nested) return nested.error();
+  refit.nested = std::move(*nested);
+  return with_floor(of, std::move(refit), folds);
+}
+
+// Beside a gap of something else a prediction misses either way, and what explains the rest shows
+// only when that is explained: an effect has to be of no use beside all others.
+void put_last(std::size_t effect, std::vector<ChosenEffect>* chosen, std::set<std::string>* names) {
+  names->insert((*chosen)[effect].candidate.signature.effect);
+  const auto at = chosen->begin() + static_cast<std::ptrdiff_t>(effect);
+  std::rotate(at, at + 1, chosen->end());
+}
+
+// The values that are told, with the base that fits beside them: report and model say the same.
+Result<Refit> with_final_fit(const Inquiry& of, Refit refit) {
+  const Explanation& named = refit.judged.named;
+  if (named.chosen.empty()) return refit;
+  auto fit = fit_jointly(of.predictor, refit.nested.back().study, {}, named.estimates->at,
+                         BaseParameters::kFitted, no_nuisances(named.study()),
+                         of.options.keep_base ? 0 : 2);
+  if (!fit && fit.error().code != ErrorCode::kSimulation) return fit.error();
+  refit.final_fit = fit ? std::move(*fit) : *named.estimates;
+  return refit;
+}
+
+}  // namespace
+
+Study study_beside(const Explanation& named, const JointFit& fit) {
+  Study study = named.study();
+  if (named.names_strays()) return study;
+  for (std::size_t i = 0; i < study.size(); ++i) study.trials[i].residual = fit.residuals[i];
+  estimate_noise(Regression(named.evidence->nuisances, study.whitened_residuals()),
+                 named.evidence->blocks, &study);
+  return study;
+}
+
+void score(const Inquiry& of, const std::vector<std::size_t>& folds, NestedFit* nested) {
+  const double share = of.outlier_share();
+  std::vector<double> scores = held_out_scores(nested->study, nested->fit, folds, share);
+  // The folds' fits are linear steps from this one: what they reach beyond it is not to be had.
+  std::vector<double> own = scores_of(nested->study, nested->fit.residuals, share);
+  nested->scores = mean(own) < mean(scores) ? std::move(own) : std::move(scores);
+}
+
+Result<Refit> refit(const Inquiry& of, const Evidence& measured, const Screening& screening,
+                    const Judgement& judgement) {
+  Refit refit;
+  refit.judged = judgement;
+  Explanation& named = refit.judged.named;
+  const std::size_t found = named.chosen.size();
+  if (found > 0) {
+    auto fit = estimate(of, *screening.catalogue, named, candidates_of(named.chosen),
+                        named.estimates ? 1 : 2);
+    if (!fit) return fit.error();
+    named.estimates = std::move(*fit);
+    tell_of_fit(of, *named.estimates);
+  }
+  const std::vector<std::size_t> folds = of.subject.folds(named.study());
+  std::set<std::string> were_last;
+  for (;;) {
+    auto nested = nested_fits(of, named, folds);
+    if (!nested) return nested.error();
+    refit.nested = std::move(*nested);
+    tell_of_gaps(of, refit.nested);
+    auto idle = of_no_use(refit.judged, refit.nested, std::nullopt, were_last);
+    std::optional<Worthless> worthless;
+    if (!idle && !named.chosen.empty()) {
+      auto fit = estimate_beside(of, named, refit.nested.back());
+      if (!fit) return fit.error();
+      named.estimates = std::move(*fit);
+      worthless = at_its_bound(of, named);
+    }
+    if (!idle && !worthless) {
+      if (named.chosen.size() < found) {
+        refit.judged = judge_again(of, *screening.catalogue, std::move(refit.judged));
+      }
+      auto corrected = with_correction(of, screening, std::move(refit), folds);
+      if (!corrected) return corrected;
+      refit = with_floor(of, std::move(*corrected), folds);
+      idle = of_no_use(refit.judged, refit.nested, refit.floor, were_last);
+    }
+    if (!idle && !worthless) break;
+    if (idle && idle->effect + 1 < named.chosen.size()) {
+      put_last(idle->effect, &named.chosen, &were_last);
+      continue;
+    }
+    refit.judged = dropped(std::move(refit.judged), idle ? *idle : *worthless);
+  }
+  const auto missing = missing_too_much(refit);
+  if (missing || (named.frees_base && !explains_bounds(refit))) {
+    return naming_none(of, measured, std::move(refit), missing, folds);
+  }
+  return with_final_fit(of, std::move(refit));
+}
+
+}  // namespace gapfarm::steps

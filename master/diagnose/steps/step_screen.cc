@@ -1,0 +1,383 @@
+// What the catalogue offers, and what of it the log calls for.
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/math/laws.h"
+#include "master/diagnose/conclusions/digits.h"
+#include "master/diagnose/evidence/noise.h"
+#include "master/diagnose/places/patch_places.h"
+#include "master/diagnose/steps/step_parts.h"
+#include "master/diagnose/steps/watch.h"
+
+namespace gapfarm::steps {
+namespace {
+
+// What draws a base to its bounds is strong; beside it the base comes free, and all is looked for
+// again from there.
+constexpr std::size_t kMostToFreeBase = 2;
+
+// Rows of the screening table, a candidate each.
+std::vector<Screened> screened(const Inquiry& of, const Evidence& evidence,
+                               const std::vector<EffectCandidate>& candidates) {
+  const ParameterTable& table = of.table();
+  std::vector<Eigen::VectorXd> explained;
+  for (const EffectCandidate& c : candidates) {
+    explained.push_back(evidence.base.explained(c.signature.columns));
+  }
+  std::vector<Screened> rows;
+  for (std::size_t i = 0; i < candidates.size(); ++i) {
+    const Signature& s = candidates[i].signature;
+    Screened row;
+    row.effect = s.effect;
+    row.gain = candidates[i].gain;
+    const Gain gain = evidence.base.gain(s.columns);
+    if (gain.dimensions == 0) {
+      row.note = "cannot be seen in this log: the base model absorbs all that it would do";
+    } else {
+      row.p = chi_squared_above(gain.dimensions, gain.squares);
+    }
+    Overrides start;
+    const auto values = start_values(evidence.study, evidence.base, s);
+    for (const auto& [key, value] : values) start[table.row(key)] = value;
+    for (const auto& [key, value] : values) {
+      if (key.rfind(s.effect + ".", 0) != 0) continue;
+      const std::size_t at = table.row(key);
+      row.estimate += (row.estimate.empty() ? "" : ", ") + key.substr(key.find('.') + 1) + " " +
+                      table.format(at, rounded_to_digits(value + of.frame_of(key, start), 4));
+    }
+    for (std::size_t j = 0; j < candidates.size(); ++j) {
+      const double lengths = explained[i].norm() * explained[j].norm();
+      if (i == j || lengths == 0) continue;
+      if (std::abs(explained[i].dot(explained[j])) > kAliasCosine * lengths) {
+        row.alias_set.push_back(candidates[j].signature.effect);
+      }
+    }
+    rows.push_back(std::move(row));
+  }
+  return rows;
+}
+
+// The effects at their joint estimate, for a selection that goes on from there; no columns where
+// that cannot be simulated.
+Result<Relinearised> relinearised_at(const Inquiry& of, const Study& study, const JointFit& fit,
+                                     const std::vector<EffectCandidate>& effects) {
+  const ParameterTable& table = of.table();
+  std::vector<PredictionRequest> without;
+  for (const EffectCandidate& effect : effects) {
+    without.push_back({fit.at, {}});
+    std::erase_if(without.back().at, [&](const auto& entry) {
+      return table[entry.first].effect == effect.signature.effect;
+    });
+  }
+  const auto ends = of.predictor.attempt(without);
+  if (!ends) return ends.error();
+  for (const auto& simulated : *ends) {
+    if (!simulated) return Relinearised{};
+  }
+  Relinearised at_estimate{study.whiten(fit.residuals), {}};
+  for (std::size_t k = 0; k < effects.size(); ++k) {
+    const std::string& name = effects[k].signature.effect;
+    std::vector<Eigen::Vector3d> contribution;
+    for (std::size_t i = 0; i < study.size(); ++i) {
+      contribution.push_back(local_difference((*(*ends)[k])[i], fit.ends[i]));
+    }
+    std::vector<Eigen::Index> own;
+    for (std::size_t p = 0; p < fit.parameters.size(); ++p) {
+      if (table[fit.parameters[p].row].effect == name) own.push_back(static_cast<Eigen::Index>(p));
+    }
+    Eigen::MatrixXd columns(at_estimate.data.size(), static_cast<Eigen::Index>(own.size()) + 1);
+    columns.col(0) = study.whiten(contribution);
+    columns.rightCols(columns.cols() - 1) = fit.jacobian(Eigen::all, own);
+    at_estimate.data += columns.col(0);
+    if (of.subject.effects->row(name).by_contact) columns = split_by_kind(study, columns);
+    study.drop_ignored(columns);
+    at_estimate.columns.push_back(std::move(columns));
+  }
+  study.drop_ignored(at_estimate.data);
+  return at_estimate;
+}
+
+// Chooses from the catalogue beside what is explained first.
+Result<Screening> choose(const Inquiry& of, Screening screening) {
+  Explanation& found = screening.found;
+  Selector& catalogue = *screening.catalogue;
+  found.estimates.reset();
+  const Relinearise relinearise =
+      [&](const std::vector<EffectCandidate>& effects) -> Result<Relinearised> {
+    auto fit = estimate(of, catalogue, found, effects, 2);
+    if (!fit && fit.error().code == ErrorCode::kSimulation) return Relinearised{};
+    if (!fit) return fit.error();
+    auto at_estimate = relinearised_at(of, found.study(), *fit, effects);
+    if (!at_estimate || at_estimate->columns.empty()) return at_estimate;
+    found.estimates = std::move(*fit);  // where the next estimate begins
+    tell_of_fit(of, *found.estimates);
+    return at_estimate;
+  };
+  const bool to_free_base = found.frees_base && found.tuned_alone.empty();
+  auto chosen = catalogue.select(found.first, found.first.empty() ? 0 : found.latency.gain,
+                                 relinearise, to_free_base ? kMostToFreeBase : kMostEffects);
+  if (!chosen) return chosen.error();
+  found.chosen = std::move(*chosen);
+  return screening;
+}
+
+Result<Screening> search_catalogue(const Inquiry& of, Explanation found) {
+  std::vector<std::string> left_out = of.options.left_out;
+  if (found.lag.trials > 0) left_out.emplace_back("motor_lag");
+  const Evidence& evidence = *found.evidence;
+  auto signatures = of.subject.signatures(of.predictor, evidence.study, left_out);
+  if (!signatures) return signatures.error();
+  for (Signature& s : *signatures) evidence.study.drop_ignored(s.columns);
+  Screening screening;
+  screening.catalogue = std::make_unique<Selector>(of.predictor, evidence.study,
+                                                   std::move(*signatures), evidence.base);
+  Selector& catalogue = *screening.catalogue;
+  catalogue.leave_out({of.options.left_out.begin(), of.options.left_out.end()});
+  if (!of.left_out(kPatchEffect)) catalogue.look_for_patches();
+  found.chosen.clear();
+  auto alone = catalogue.candidates(explained_by(catalogue, found), {});
+  if (!alone) return alone.error();
+  screening.rows = screened(of, evidence, *alone);
+  tell_of_candidates(of, *alone);
+  screening.alone = std::move(*alone);
+  screening.found = std::move(found);
+  return choose(of, std::move(screening));
+}
+
+// A strong effect draws a base to its bounds, too; beside it the base comes back.  If not, nothing
+// stays chosen.
+Result<Screening> free_base(const Inquiry& of, Screening screening) {
+  Explanation& found = screening.found;
+  if (found.chosen.empty()) return screening;
+  const std::vector<EffectCandidate> effects = candidates_of(found.chosen);
+  const Eigen::MatrixXd none(static_cast<Eigen::Index>(3 * found.study().size()), 0);
+  const Overrides start =
+      found.estimates ? found.estimates->at : start_of(of, *screening.catalogue, found, effects);
+  auto fit = fit_jointly(of.predictor, found.study(), effects, start, BaseParameters::kFitted, none,
+                         kMostRounds);
+  if (!fit) return fit.error();
+  if (!base_on_bounds(found.study(), fit->at).empty()) found.chosen.clear();
+  found.estimates = std::move(*fit);
+  return screening;
+}
+
+// Strong effects drew the base to themselves and passed for noise where they are not smooth: the
+// catalogue is gone through once more from the base that fits beside them, with the noise that they
+// leave.
+Result<Screening> search_again(const Inquiry& of, Explanation found) {
+  const JointFit& beside = *found.estimates;
+  Study study = found.study();
+  Regression left(found.evidence->nuisances, study.whiten(beside.residuals));
+  left.add(beside.jacobian);
+  study.trust.clear();
+  estimate_noise(left, found.evidence->blocks, &study);
+  found.tuned_alone = study.base;
+  for (auto& [row, value] : study.base) value = beside.at.at(row);
+  if (Status s = of.subject.tune(of.predictor, /*keep=*/true, &study); !s) return s.error();
+  auto evidence = evidence_of(of, std::move(study));
+  if (!evidence) return evidence.error();
+  found.evidence = std::make_shared<const Evidence>(std::move(*evidence));
+  return search_catalogue(of, std::move(found));
+}
+
+// Chooses again, without trials that are ignored by now.
+Result<Screening> choose_among_the_rest(const Inquiry& of, Screening screening) {
+  const Evidence& rest = *screening.found.evidence;
+  screening.catalogue->recount(rest.study, rest.base);
+  return choose(of, std::move(screening));
+}
+
+// Beside a strong effect on the mean nothing strays visibly; with it explained some may.
+Result<Screening> look_for_spreads_again(const Inquiry& of, Screening screening) {
+  Explanation& found = screening.found;
+  if (found.names_strays() || found.chosen.empty()) return screening;
+  found = look_for_spreads(of, found, explained_by(*screening.catalogue, found));
+  if (!found.names_strays()) return screening;
+  return choose_among_the_rest(of, std::move(screening));
+}
+
+// Trials in which a side slipped pull on every mean: the effects are looked for again without them,
+// but for those that are kept (none: empty).
+Result<Screening> choose_without_slips(const Inquiry& of, Screening screening,
+                                       const Regression& explained, const std::vector<bool>& kept) {
+  Explanation& found = screening.found;
+  const Eigen::VectorXd z = studentised(explained, 0.2);
+  std::vector<bool> ignored = found.study().ignored;
+  ignored.resize(found.study().size(), false);
+  for (std::size_t i = 0; i < ignored.size(); ++i) {
+    const bool slipped =
+        z.segment<3>(static_cast<Eigen::Index>(3 * i)).squaredNorm() > kSlippedSquared;
+    if (slipped && (kept.empty() || !kept[i])) ignored[i] = true;
+  }
+  found = without(found, ignored);
+  return choose_among_the_rest(of, std::move(screening));
+}
+
+Result<Screening> look_for_slips_and_choose(const Inquiry& of, Screening screening) {
+  const Regression explained = explained_by(*screening.catalogue, screening.found);
+  screening.found = look_for_slips(of, std::move(screening.found), *screening.catalogue, explained);
+  if (!(screening.found.slip.gain > 0)) return screening;
+  const Explanation before = screening.found;
+  const Selector all = *screening.catalogue;
+  auto rest = choose_without_slips(of, std::move(screening), explained, {});
+  if (!rest) return rest;
+  // A patch of floor moves single drives, too: it may have been left out with them.
+  const auto gathering = gathering_beside(of, before, all, rest->found);
+  if (!gathering) return rest;
+  *rest->catalogue = all;
+  rest->found = before;
+  rest = choose_without_slips(of, std::move(*rest), explained, gathering->passed);
+  if (!rest) return rest;
+  rest->found.slip = {};
+  rest->found = look_for_slips(of, rest->found, all, explained_by(all, rest->found));
+  return rest;
+}
+
+// What the chosen effects leave of every trial, sessions' gains left in.
+std::vector<Eigen::Vector3d> left_with_sessions(const Explanation& found) {
+  if (found.estimates) return found.estimates->residuals;
+  const Study& study = found.study();
+  const Eigen::MatrixXd& all = found.evidence->nuisances;
+  const auto sessions =
+      found.names_session_gains() ? static_cast<Eigen::Index>(study.sessions) : Eigen::Index{0};
+  Eigen::VectorXd residuals = study.whitened_residuals();
+  study.drop_ignored(residuals);
+  Regression explained(all.rightCols(all.cols() - sessions), residuals);
+  for (const ChosenEffect& c : found.chosen) explained.add(c.candidate.signature.columns);
+  return study.unwhiten(explained.left());
+}
+
+// Beside a strong effect on the mean sessions may seem alike; with it explained they may not be.
+Result<Screening> look_for_session_gains_again(const Inquiry& of, Screening screening) {
+  Explanation& found = screening.found;
+  if (found.names_session_gains() || found.chosen.empty()) return screening;
+  found = look_for_session_gains(of, found, left_with_sessions(found));
+  if (!found.names_session_gains()) return screening;
+  return choose_among_the_rest(of, std::move(screening));
+}
+
+Result<Screening> look_beside_readings(const Inquiry& of, const Explanation& found) {
+  auto screening = search_catalogue(of, look_for_spreads(of, found, found.evidence->base));
+  if (screening && found.frees_base) {
+    screening = free_base(of, std::move(*screening));
+    if (screening && screening->found.chosen.empty()) return screening;
+  }
+  if (!screening) return screening;
+  if ((of.subject.base_moves || found.frees_base) && screening->found.estimates) {
+    screening = search_again(of, screening->found);
+  }
+  if (screening) screening = look_for_spreads_again(of, std::move(*screening));
+  if (screening) screening = look_for_session_gains_again(of, std::move(*screening));
+  if (!screening) return screening;
+  return look_for_slips_and_choose(of, std::move(*screening));
+}
+
+// Whether sessions differ beside what was chosen, too, as clearly as it takes to name that.
+bool sessions_still_differ(const Inquiry& of, const Explanation& found) {
+  for (const FoundSpread& spread : found.spreads) {
+    if (!spread.row->by_session) continue;
+    return found.chosen.empty() ||
+           spread.row->fit(found.study(), left_with_sessions(found), of.outlier_share()).gain >=
+               spread.row->least_gain;
+  }
+  return false;
+}
+
+// Sessions that seem to differ are measured again with what they have of their own taken out; they
+// may do so because of something else that the catalogue holds.
+Result<Screening> look_for_all(const Inquiry& of, Explanation so_far) {
+  auto found = look_for_late_readings(of, std::move(so_far));
+  if (found) found = look_for_lag(of, std::move(*found));
+  if (!found) return found.error();
+  const Study& study = found->study();
+  Explanation differ =
+      look_for_session_gains(of, *found, study.unwhiten(study.whitened_residuals()));
+  if (!differ.names_session_gains()) return look_beside_readings(of, *found);
+  auto measured = measure(of, differ.study());
+  if (!measured) return measured.error();
+  differ.evidence = std::make_shared<const Evidence>(std::move(*measured));
+  auto screening = look_beside_readings(of, differ);
+  if (screening && !sessions_still_differ(of, screening->found)) {
+    return look_beside_readings(of, *found);
+  }
+  return screening;
+}
+
+}  // namespace
+
+std::vector<EffectCandidate> candidates_of(const std::vector<ChosenEffect>& chosen) {
+  std::vector<EffectCandidate> effects;
+  for (const ChosenEffect& c : chosen) effects.push_back(c.candidate);
+  return effects;
+}
+
+Regression explained_by(const Selector& catalogue, const Explanation& explanation) {
+  std::vector<const Signature*> all;
+  for (const Signature& s : explanation.first) all.push_back(&s);
+  for (const ChosenEffect& c : explanation.chosen) all.push_back(&c.candidate.signature);
+  return catalogue.with(all);
+}
+
+double explained_nats(const Selector& catalogue, const Regression& explained) {
+  return (catalogue.nothing_explained().left_squares() - explained.left_squares()) / 2;
+}
+
+Overrides start_of(const Inquiry& of, const Selector& catalogue, const Explanation& so_far,
+                   const std::vector<EffectCandidate>& effects) {
+  Overrides at = so_far.study().base;
+  for (std::size_t k = 0; k < effects.size(); ++k) {
+    std::vector<const Signature*> others;
+    for (const Signature& s : so_far.first) others.push_back(&s);
+    for (std::size_t j = 0; j < effects.size(); ++j) {
+      if (j != k) others.push_back(&effects[j].signature);
+    }
+    const Regression explained = catalogue.with(others);
+    for (const auto& [key, value] : start_values(so_far.study(), explained, effects[k].signature)) {
+      at[of.table().row(key)] = value;
+    }
+  }
+  return at;
+}
+
+Result<JointFit> estimate(const Inquiry& of, const Selector& catalogue, const Explanation& so_far,
+                          const std::vector<EffectCandidate>& effects, int rounds) {
+  const bool moves = of.subject.base_moves || so_far.frees_base;
+  Overrides start = start_of(of, catalogue, so_far, effects);
+  for (const EffectCandidate& effect : effects) {
+    for (const auto& [row, value] : so_far.estimates ? so_far.estimates->at : Overrides{}) {
+      const std::string& belongs = of.table()[row].effect;
+      if (belongs == effect.signature.effect || (belongs.empty() && moves)) start[row] = value;
+    }
+  }
+  const BaseParameters base = moves ? BaseParameters::kFitted : BaseParameters::kHeld;
+  const Study& study = so_far.study();
+  const Eigen::MatrixXd& nuisances = so_far.evidence->nuisances;
+  auto fit = fit_jointly(of.predictor, study, effects, start, base, nuisances, rounds);
+  if (!fit) return fit;
+  const auto moved = move_seams(of.predictor, study, nuisances, &*fit);
+  if (!moved) return moved.error();
+  if (!*moved) return fit;
+  return fit_jointly(of.predictor, study, effects, fit->at, base, nuisances, rounds);
+}
+
+Result<Screening> screen(const Inquiry& of, const Evidence& measured, bool free_base) {
+  if (of.subject.signatures == nullptr) return compete(of, measured);
+  Explanation nothing;
+  nothing.evidence = std::make_shared<const Evidence>(measured);
+  nothing.frees_base = free_base || !measured.study.on_bounds.empty();
+  auto screening = look_for_all(of, nothing);
+  if (!nothing.frees_base) return screening;
+  // A base on its bounds may be one that cannot be simulated with much of the catalogue.
+  const bool fell = !screening && screening.error().code == ErrorCode::kSimulation;
+  if (fell || (screening && screening->found.chosen.empty())) {
+    Screening none;
+    none.found = std::move(nothing);
+    none.found.frees_base = false;
+    none.doubt = on_bounds(of, measured.study);
+    return none;
+  }
+  return screening;
+}
+
+}  // namespace gapfarm::steps

@@ -1,0 +1,230 @@
+// The shape of what nobody can name: a smooth correction of what the last model leaves.
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/math/statistics.h"
+#include "common/score/logged_motions.h"
+#include "master/diagnose/conclusions/findings.h"
+#include "master/diagnose/conclusions/report_parts.h"
+#include "master/diagnose/correction/fit.h"
+#include "master/diagnose/evidence/noise.h"
+#include "master/diagnose/evidence/tail_noise.h"
+#include "master/diagnose/fit/intervals.h"
+#include "master/diagnose/steps/step_parts.h"
+
+namespace gapfarm::steps {
+namespace {
+
+constexpr std::size_t kLeastFolds = 5, kMostFolds = 8;
+
+// Sessions, joined where there are many and cut into blocks where there are few.
+std::vector<std::size_t> residual_folds(const Study& study) {
+  const std::size_t sessions = std::max<std::size_t>(study.sessions, 1);
+  const std::size_t blocks = (kLeastFolds + sessions - 1) / sessions;
+  std::vector<std::size_t> counts(sessions, 0), seen(sessions, 0), folds;
+  for (const ResidualTrial& t : study.trials) ++counts[t.session];
+  for (const ResidualTrial& t : study.trials) {
+    const std::size_t block = seen[t.session]++ * blocks / counts[t.session];
+    folds.push_back(t.session * blocks + block);
+  }
+  const std::size_t count = sessions * blocks;
+  for (std::size_t& f : folds) f = count > kMostFolds ? f * kMostFolds / count : f;
+  return folds;
+}
+
+std::string percent_words(double share) { return plain_number(std::round(100 * share)) + " %"; }
+
+// "each command's shift by duration and greater duty, in the robot's axes"
+std::string term_words(const ResidualTerm& term) {
+  std::vector<std::string> labels;
+  for (const std::size_t row : term.covariates) {
+    labels.emplace_back(residual_covariates()[row].label);
+  }
+  const std::string by = listed(labels);
+  if (term.frame == ResidualFrame::kReadings) return "a shift of every reading by its " + by;
+  if (term.frame == ResidualFrame::kMotion) return "shares of the motion by " + by;
+  const std::string whose = term.weights.size() > 1 ? "each command's shift" : "a shift";
+  return whose + " by " + by +
+         (term.frame == ResidualFrame::kRobot ? ", in the robot's axes" : ", in the world's axes");
+}
+
+// Places count from the world's origin where they did from `origin`.
+ResidualField in_world(ResidualField field, const Eigen::Vector2d& origin) {
+  for (ResidualTerm& term : field) {
+    for (std::size_t j = 0; j < term.covariates.size(); ++j) {
+      const std::string_view name = residual_covariates()[term.covariates[j]].name;
+      const auto column = static_cast<Eigen::Index>(j);
+      if (name == "x") term.centres.col(column).array() += origin.x();
+      if (name == "y") term.centres.col(column).array() += origin.y();
+    }
+  }
+  return field;
+}
+
+std::string residual_sentence(const FoundResidual& found) {
+  if (found.correction.empty()) {
+    return "Corrections of what is left were tried, smooth ones and of single drives that stray; "
+           "none surely helps on trials that no fit saw, so none is kept.";
+  }
+  std::vector<std::string> terms;
+  for (const ResidualTerm& term : found.correction.field) terms.push_back(term_words(term));
+  if (found.correction.strays) terms.push_back(stray_words(*found.correction.strays));
+  std::string text;
+  for (const std::string& term : terms) text += (text.empty() ? "" : "; ") + term;
+  return "A correction without a cause closes " + percent_words(found.closed) + " [" +
+         percent_words(found.closed_lo) + ", " + percent_words(found.closed_hi) +
+         "] of the gap on trials that its fit did not see: " + text +
+         ". model.toml has it as [residual].";
+}
+
+// A correction beside one of the nested fits, with scores on trials that neither saw.
+struct TriedShape {
+  std::size_t nested = 0;
+  Residual residual;  // empty: none helps
+  std::vector<double> without_it, with_it;
+  NoiseEstimate noise;  // of predictions beside it
+  // What the smooth part leaves, and of that what may stray.
+  Study beside;
+  StrayLesson lesson;
+  std::vector<double> chances;  // of every trial to have strayed
+};
+
+// What a smooth correction makes of scores and noise.
+void predict_beside(const Inquiry& of, const Refit& refit, const Residuals& after, Study* beside,
+                    TriedShape* tried) {
+  const Explanation& named = refit.judged.named;
+  const double share = of.outlier_share();
+  if (!named.names_strays()) {
+    estimate_noise(Regression(named.evidence->nuisances, beside->whitened_residuals()),
+                   named.evidence->blocks, beside);
+  }
+  if (beside->predictive) {
+    beside->predictive =
+        fit_predictive_noise(beside->trials, after, beside->noise, of.subject, share, true).noise;
+  }
+  tried->with_it = scores_of(*beside, after, share);
+  tried->noise = beside->predictive_noise();
+}
+
+// The smooth part's ends and what they leave; strays are looked for about them.
+StrayLesson lesson_about(const ResidualData& data, const JointFit& told, const ResidualFit& smooth,
+                         Residuals unseen) {
+  StrayLesson lesson{data.ends, told.residuals, std::move(unseen), data.fold, data.learn};
+  if (smooth.field.empty()) return lesson;
+  for (std::size_t i = 0; i < data.size(); ++i) {
+    const Eigen::Vector3d& r = told.residuals[i];
+    lesson.ends[i] = corrected_end(smooth.field, data.facts[i], data.ends[i]);
+    lesson.residuals[i] = local_difference(lesson.ends[i], data.ends[i] * Pose{r[0], r[1], r[2]});
+  }
+  return lesson;
+}
+
+// Each model with the noise that it leaves.
+TriedShape try_shape(const Inquiry& of, const Refit& refit, std::size_t k) {
+  const JointFit& last = refit.nested[k].fit;
+  const JointFit& told = refit.final_fit ? *refit.final_fit : last;
+  const Study& study = refit.nested[k].study;
+  const std::vector<std::size_t> folds = residual_folds(study);
+  ResidualData data{logged_motions(of.problem),
+                    told.ends,
+                    study.whitener,
+                    folds,
+                    std::vector<bool>(study.size(), true),
+                    study.free_commands};
+  for (std::size_t i = 0; i < study.size(); ++i) data.learn[i] = !study.ignores(i);
+  const ResidualFit fit = fit_residual(data, told.residuals, [&](std::size_t fold) {
+    return left_without(study, last, folds, fold);
+  });
+  TriedShape tried;
+  tried.nested = k;
+  tried.residual.field = fit.field;
+  const double share = of.outlier_share();
+  const std::vector<Eigen::Vector3d> before = held_out_residuals(study, last, folds);
+  std::vector<Eigen::Vector3d> after = before;
+  Study beside = study;
+  for (std::size_t i = 0; i < study.size(); ++i) {
+    after[i] -= fit.unseen[i];
+    beside.trials[i].residual = after[i];
+  }
+  tried.without_it = tried.with_it = scores_of(study, before, share);
+  if (!fit.field.empty()) predict_beside(of, refit, after, &beside, &tried);
+  tried.lesson = lesson_about(data, told, fit, after);
+  tried.beside = std::move(beside);
+  return tried;
+}
+
+TriedShape with_strays(const Inquiry& of, const Refit& refit, TriedShape tried) {
+  if (refit.judged.named.names_strays()) return tried;
+  auto astray = look_astray(of, tried.beside, tried.lesson);
+  if (!astray || !clearly_better(astray->scores, tried.with_it)) return tried;
+  tried.residual.strays = astray->strays;
+  tried.with_it = std::move(astray->scores);
+  tried.noise = astray->noise;
+  tried.chances = std::move(astray->chances);
+  return tried;
+}
+
+// Of a correction by effects that are no cause, the smooth one takes the place unless both together
+// predict clearly better.
+TriedShape best_shape(const Inquiry& of, const Refit& refit) {
+  TriedShape tried = try_shape(of, refit, refit.nested.size() - 1);
+  if (refit.correction.empty()) return tried;
+  TriedShape alone = try_shape(of, refit, refit.nested.size() - 2);
+  const bool better = !alone.residual.empty() &&
+                      (tried.residual.empty() || !clearly_better(tried.with_it, alone.with_it));
+  return better ? alone : tried;
+}
+
+}  // namespace
+
+Refit add_shape(const Inquiry& of, const Refit& refit) {
+  Refit with = refit;
+  const Verdict verdict = refit.judged.verdict;
+  const bool unexplained = verdict == Verdict::kUnknown || verdict == Verdict::kEffectAndUnknown;
+  // A lag found in paths is in the model that is left behind, but not in these fits.
+  const bool possible =
+      scenario_form(of.problem.scenario).residual && refit.judged.named.lag.gain == 0;
+  if (!unexplained || !possible) return with;
+  FoundResidual& found = with.shape.emplace();
+  found.text = residual_sentence(found);
+  const TriedShape tried = with_strays(of, refit, best_shape(of, refit));
+  if (tried.residual.empty() || !clearly_better(tried.with_it, refit.nested.back().scores))
+    return with;
+  const auto n = static_cast<double>(tried.with_it.size());
+  std::vector<double> gains = tried.with_it;
+  for (std::size_t i = 0; i < gains.size(); ++i) gains[i] -= tried.without_it[i];
+  const double gained = mean(gains);
+  double squares = 0;
+  for (const double g : gains) squares += (g - gained) * (g - gained);
+  const double half = kNormal90 * std::sqrt(squares) / n;
+  // The noise that passed for the floor had the strays in it.
+  if (tried.residual.strays) with.floor = std::max(refit.floor, mean(tried.with_it));
+  const ClosedShare closed = closed_share(of, with, gains);
+  if (!(gained - half > 0 && closed.lo > 0)) {
+    with.floor = refit.floor;
+    return with;
+  }
+  if (tried.nested + 1 < with.nested.size()) {
+    with.nested.pop_back();
+    std::erase(with.judged.cautions, with.correction);
+    with.correction.clear();
+  }
+  found = {{in_world(tried.residual.field, of.frame_m), tried.residual.strays},
+           gained,
+           gained - half,
+           gained + half,
+           with.floor - mean(tried.without_it),
+           std::max(0.0, with.floor - mean(tried.with_it)),
+           std::min(1.0, closed.share),
+           std::min(1.0, closed.lo),
+           std::min(1.0, closed.hi),
+           "",
+           tried.chances};
+  found.text = residual_sentence(found);
+  with.residual = tried.residual;
+  with.noise = tried.noise;
+  return with;
+}
+
+}  // namespace gapfarm::steps

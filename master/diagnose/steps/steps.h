@@ -1,0 +1,155 @@
+// The steps of diagnose(), and the values that they hand on.  None changes what it was given; each
+// asks the simulation through the inquiry alone.
+#pragma once
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "master/diagnose/conclusions/verdict.h"
+#include "master/diagnose/evidence/covariates.h"
+#include "master/diagnose/evidence/latency.h"
+#include "master/diagnose/evidence/path_lag.h"
+#include "master/diagnose/evidence/slip.h"
+#include "master/diagnose/evidence/spread_row.h"
+#include "master/diagnose/fit/estimate.h"
+#include "master/diagnose/fit/selection.h"
+#include "master/diagnose/steps/inquiry.h"
+#include "master/diagnose/study.h"
+
+namespace gapfarm::steps {
+
+// A log beside the tuned base, whitened by its noise, with what no effect may claim.
+struct Evidence {
+  Study study;
+  Eigen::MatrixXd nuisances;  // rows of ignored trials are 0, here and below
+  std::vector<CovariateBlock> blocks;
+  Regression base;  // the nuisances alone
+};
+
+// The evidence as it is read now, and what explains it so far.
+struct Explanation {
+  std::shared_ptr<const Evidence> evidence;
+  // What is strong may have drawn the base to itself: beside it the base is fitted once more, and
+  // all is looked for again from there.
+  bool frees_base = false;
+  Overrides tuned_alone;  // the base without any effect, where the study's is not it
+
+  LatencyFit latency;              // also where too little speaks for it
+  double latency_from_rest_s = 0;  // as the parameter has it
+  std::vector<Signature> first;    // explained before anything else: late readings
+  std::optional<Study> as_logged;  // where they were put right: the study before that
+  PathLag lag;
+  SlipFit slip;
+  std::vector<FoundSpread> spreads;  // what else makes trials stray
+  double grid_m = 0;                 // of the positions, once it is named
+  std::vector<ChosenEffect> chosen;
+  std::optional<JointFit> estimates;  // of these, base held, beside nuisances
+  Overrides searched_error;  // standard errors with the base free, where it was searched too
+
+  std::string odd_readings;  // what readings show that no effect looked for explains
+  std::string odd_drives;    // the same of drives that stray in one place
+
+  const Study& study() const { return evidence->study; }
+  bool names_a_spread() const { return slip.gain > 0 || !spreads.empty(); }
+  bool names_session_gains() const { return study().session_spread > 0; }
+  bool names_strays() const {
+    return slip.gain > 0 || std::any_of(spreads.begin(), spreads.end(),
+                                        [](const FoundSpread& s) { return !s.row->by_session; });
+  }
+  // But for the grid, which closes next to nothing.
+  bool names_anything() const {
+    return !first.empty() || !chosen.empty() || names_a_spread() || lag.gain > 0;
+  }
+};
+
+struct Screening {
+  Explanation found;
+  std::vector<Screened> rows;           // of the table
+  std::vector<EffectCandidate> alone;   // of every effect, before anything was chosen
+  std::unique_ptr<Selector> catalogue;  // refers to the evidence
+  std::optional<SanityFinding> doubt;   // why nothing is to be looked for
+  std::optional<double> explained;      // nats, held out, where hypotheses competed
+};
+
+// What is to be believed of that.
+struct Judgement {
+  Explanation named;
+  Verdict verdict = Verdict::kNone;
+  std::vector<Leftover> left;
+  double scale = 1;  // leftover variance over the noise's
+  // What explains something, but too little of what is there to be named: as a correction it may
+  // still help.
+  std::vector<ChosenEffect> unnamed;
+  std::vector<NearMiss> nearest;
+  std::vector<std::string> cautions;
+  std::vector<SanityFinding> doubts;  // with any, nothing is to be named
+  bool base_in_doubt = false;         // as if nothing had been looked for
+};
+
+// A model fitted without nuisances, since this is what a user's predictions will come from.
+struct NestedFit {
+  std::string name;             // "the tuned base, floor_tilt and backlash"
+  std::vector<v1::Task> tasks;  // that predicted it
+  JointFit fit;
+  Study study;                 // with the noise that the fit leaves
+  std::vector<double> scores;  // held out, one a trial
+};
+
+struct Refit {
+  Judgement judged;
+  // Base alone; with late readings put right, where there are any; with the first effect, with the
+  // first two, ...; with a correction by effects that are not named.
+  std::vector<NestedFit> nested;
+  std::vector<double> slip_scores;     // held out, of the last fit and slips
+  double floor = 0;                    // what a perfect prediction would score
+  std::string correction;              // what is said of that; empty: there is none
+  std::optional<JointFit> final_fit;   // base and effects as they are told
+  std::optional<FoundResidual> shape;  // a smooth correction of what is unexplained
+  Residual residual;                   // the same in the log's frame; empty: none helps
+  std::optional<NoiseEstimate> noise;  // of predictions beside it
+};
+
+// A base that fits the log, or the problem's own.
+Result<Study> tune(const Inquiry& of);
+
+// The noise that no smooth function explains, and the log by it.
+Result<Evidence> measure(const Inquiry& of, const Study& tuned);
+
+// All that the catalogue offers, and what of it the log calls for.  `free_base`: see Explanation; a
+// base on its bounds is freed in any case.
+Result<Screening> screen(const Inquiry& of, const Evidence& measured, bool free_base = false);
+
+// Whether that explains enough to be named.
+Result<Judgement> judge(const Inquiry& of, const Screening& screening);
+
+// What is named, fitted with the base and scored on trials that no fit saw; what proves worthless
+// is dropped.
+Result<Refit> refit(const Inquiry& of, const Evidence& measured, const Screening& screening,
+                    const Judgement& judgement);
+
+// All that follows from looking once more where the first look ended with nothing.
+struct SecondLook {
+  Screening screening;
+  Refit refit;
+};
+// Where what explains most was still too little to be named, looked for from the base that tuning
+// drew to it: the same with the base freed, where that explains everything; else nothing.
+Result<std::optional<SecondLook>> look_from_free_base(const Inquiry& of, const Evidence& measured,
+                                                      const Judgement& judgement);
+// Where all that was chosen was dropped again and something is left to explain: what the rest of
+// the catalogue explains, if that is everything; else nothing.
+Result<std::optional<SecondLook>> look_without_dropped(const Inquiry& of, const Evidence& measured,
+                                                       const Screening& screening,
+                                                       const Refit& refit);
+
+// Where something is unexplained: a smooth correction of it, if one surely helps.
+Refit add_shape(const Inquiry& of, const Refit& refit);
+
+// Figures, words, values and what to drive next.
+Result<DiagnosisResult> report(const Inquiry& of, const Screening& screening, const Refit& refit);
+
+}  // namespace gapfarm::steps

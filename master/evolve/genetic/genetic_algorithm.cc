@@ -1,0 +1,235 @@
+#include "master/evolve/genetic/genetic_algorithm.h"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <unordered_set>
+
+namespace gapfarm {
+
+GeneticAlgorithm::GeneticAlgorithm(const OptimiserSetup& setup)
+    : settings_(setup.settings),
+      breeder_(setup.settings, GeneSpace(*setup.table, setup.genes)),
+      nominal_(setup.nominal),
+      run_seed_(setup.run_seed),
+      noisy_(setup.noisy) {}
+
+std::vector<Candidate> GeneticAlgorithm::ask() {
+  if (!plan_) plan_ = plan_generation();
+  return plan_->candidates;
+}
+
+void GeneticAlgorithm::tell(std::span<const Score> scores) {
+  assert(plan_ && scores.size() == plan_->candidates.size());
+  Plan plan = std::move(*plan_);
+  plan_.reset();
+  take_scores(plan, scores);
+  learn(plan);
+  ++generation_;
+  evaluations_ += scores.size();
+  population_ = std::move(plan.elites);
+  for (Newborn& newborn : plan.newborns) population_.push_back(std::move(newborn.individual));
+  sort_best_first(population_);
+  seen_.trim();
+  update_best();
+}
+
+GeneticAlgorithm::Plan GeneticAlgorithm::plan_generation() {
+  Plan plan;
+  if (generation_ == 0) {
+    add_first_generation(plan);
+  } else {
+    plan.elites = choose_elites();
+    if (restart_due()) {
+      add_random(plan);
+      last_restart_ = generation_ + 1;
+      ++restarts_;
+    } else {
+      add_children(plan);
+    }
+  }
+  add_candidates(plan);
+  return plan;
+}
+
+Stream GeneticAlgorithm::stream_of(std::uint64_t birth_id) const {
+  return Stream({.run_seed = run_seed_,
+                 .purpose = Purpose::kEvolution,
+                 .generation = generation_ + 1,
+                 .birth_id = birth_id});
+}
+
+void GeneticAlgorithm::add_first_generation(Plan& plan) {
+  if (settings_.seed_nominal && !nominal_.empty()) {
+    Newborn newborn;
+    newborn.individual.birth_id = next_birth_id_++;
+    newborn.individual.genome = breeder_.space().snapped(nominal_);
+    newborn.individual.origin = kNominal;
+    plan.newborns.push_back(std::move(newborn));
+  }
+  add_random(plan);
+}
+
+void GeneticAlgorithm::add_random(Plan& plan) {
+  while (plan.elites.size() + plan.newborns.size() < settings_.population) {
+    Newborn newborn;
+    newborn.individual.birth_id = next_birth_id_++;
+    Stream stream = stream_of(newborn.individual.birth_id);
+    newborn.individual.genome = breeder_.space().random(stream);
+    newborn.individual.origin = kRandom;
+    plan.newborns.push_back(std::move(newborn));
+  }
+}
+
+void GeneticAlgorithm::add_children(Plan& plan) {
+  const Selection selection(settings_, population_.size());
+  while (plan.elites.size() + plan.newborns.size() < settings_.population) {
+    Newborn newborn;
+    newborn.individual.birth_id = next_birth_id_++;
+    Stream stream = stream_of(newborn.individual.birth_id);
+    Child child = breeder_.breed(population_, selection, stream);
+    newborn.individual.genome = std::move(child.genome);
+    newborn.individual.origin = child.origin;
+    for (std::size_t rank : child.parents) {
+      newborn.individual.parents.push_back(population_[rank].birth_id);
+    }
+    newborn.arms = std::move(child.arms);
+    newborn.parent =
+        population_[*std::min_element(child.parents.begin(), child.parents.end())].standing;
+    plan.newborns.push_back(std::move(newborn));
+  }
+}
+
+unsigned GeneticAlgorithm::full_scores() const {
+  return noisy_ ? std::max(1U, settings_.elite_replicates) : 1;
+}
+
+bool GeneticAlgorithm::fully_scored(const Standing& standing) const {
+  return standing.scores >= full_scores();
+}
+
+std::vector<Individual> GeneticAlgorithm::choose_elites() const {
+  std::size_t count = settings_.elitism;
+  if (full_scores() > 1 && count > 0) count = std::max<std::size_t>(count, 2);
+  count = std::min<std::size_t>(count, settings_.population - 1);
+  std::vector<Individual> elites;
+  const auto take = [&](const Individual& individual) {
+    const bool known = std::any_of(elites.begin(), elites.end(), [&](const Individual& elite) {
+      return elite.genome == individual.genome;
+    });
+    if (known || elites.size() >= count) return;
+    elites.push_back(individual);
+    elites.back().origin = kElite;
+  };
+  take(best_);  // under noise it need not be the first of the population
+  for (const Individual& individual : population_) take(individual);
+  return elites;
+}
+
+bool GeneticAlgorithm::restart_due() const {
+  if (!settings_.restart_generations) return false;
+  const std::uint64_t since = std::max(last_improvement_, last_restart_);
+  return generation_ - since >= *settings_.restart_generations;
+}
+
+void GeneticAlgorithm::add_candidates(Plan& plan) const {
+  for (const Individual& elite : plan.elites) {
+    if (elite.standing.outcome != v1::OK) continue;
+    for (unsigned k = elite.standing.scores; k < full_scores(); ++k) {
+      plan.candidates.push_back({elite.birth_id, k, elite.genome});
+    }
+  }
+  std::unordered_set<std::uint64_t> siblings;
+  for (Newborn& newborn : plan.newborns) {
+    const Genome& genome = newborn.individual.genome;
+    newborn.asked =
+        seen_.find(genome) == nullptr && siblings.insert(SeenGenomes::key(genome)).second;
+    if (newborn.asked) plan.candidates.push_back({newborn.individual.birth_id, 0, genome});
+  }
+}
+
+void GeneticAlgorithm::take_scores(Plan& plan, std::span<const Score> scores) {
+  auto next = scores.begin();
+  for (Individual& elite : plan.elites) {
+    if (elite.standing.outcome == v1::OK) {
+      for (unsigned k = elite.standing.scores; k < full_scores(); ++k) elite.standing.add(*next++);
+    }
+    seen_.remember(elite.genome, elite.standing);
+  }
+  for (Newborn& newborn : plan.newborns) {
+    Individual& individual = newborn.individual;
+    if (newborn.asked) {
+      individual.standing.add(*next++);
+      seen_.remember(individual.genome, individual.standing);
+    } else {
+      individual.standing = *seen_.find(individual.genome);
+    }
+  }
+  assert(next == scores.end());
+}
+
+void GeneticAlgorithm::learn(const Plan& plan) {
+  std::vector<Standing> pool;
+  for (const Individual& individual : population_) pool.push_back(individual.standing);
+  for (const Newborn& newborn : plan.newborns) pool.push_back(newborn.individual.standing);
+  std::sort(pool.begin(), pool.end(), better);
+  const auto worse_or_equal = [&](const Standing& standing) {
+    return pool.end() - std::lower_bound(pool.begin(), pool.end(), standing, better);
+  };
+  std::vector<Breeder::Progress> children;
+  for (const Newborn& newborn : plan.newborns) {
+    if (!newborn.parent) continue;
+    const auto ranks =
+        worse_or_equal(newborn.individual.standing) - worse_or_equal(*newborn.parent);
+    const double share = static_cast<double>(ranks) / static_cast<double>(pool.size());
+    children.push_back({newborn.arms, std::max(0.0, share)});
+  }
+  breeder_.learn(children);
+}
+
+// The best individual so far.  Under noise a full set of scores outranks any lower cost, and the
+// old best is judged by what its re-scoring has shown.
+void GeneticAlgorithm::update_best() {
+  const auto preferred = [this](const Individual& a, const Individual& b) {
+    const bool a_ok = a.standing.outcome == v1::OK, b_ok = b.standing.outcome == v1::OK;
+    if (a_ok && b_ok && fully_scored(a.standing) != fully_scored(b.standing)) {
+      return fully_scored(a.standing);
+    }
+    return better(a.standing, b.standing);
+  };
+  const bool first = generation_ == 1;
+  if (first) best_ = population_.front();
+  for (const Individual& individual : population_) {
+    if (individual.birth_id == best_.birth_id) best_.standing = individual.standing;
+  }
+  const Standing before = best_.standing;
+  for (const Individual& individual : population_) {
+    if (preferred(individual, best_)) best_ = individual;
+  }
+  if (first || better(best_.standing, before)) last_improvement_ = generation_;
+  best_member_ = to_member(best_);
+}
+
+std::vector<Member> GeneticAlgorithm::members() const {
+  std::vector<Member> members;
+  for (const Individual& individual : population_) {
+    if (individual.birth_id == best_.birth_id)
+      members.insert(members.begin(), to_member(individual));
+    else
+      members.push_back(to_member(individual));
+  }
+  return members;
+}
+
+const Member& GeneticAlgorithm::best() const {
+  assert(generation_ > 0);
+  return best_member_;
+}
+
+double GeneticAlgorithm::diversity() const { return diversity_of(population_); }
+
+std::vector<NamedNumber> GeneticAlgorithm::operator_probabilities() const {
+  return breeder_.probabilities();
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,222 @@
+#include "master/evolve/methods/cma_es.h"
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <numeric>
+
+#include "common/math/algebra.h"
+
+namespace gapfarm {
+namespace {
+
+constexpr double kLeastStep_share = 1e-11;
+constexpr double kFlatCost = 1e-12;
+// Above this doubling stops: a generation would outlast most runs.
+constexpr std::size_t kLargestPopulation = 1024;
+constexpr double kLevelDeviation = 0.2;
+
+struct Axes {
+  Eigen::MatrixXd directions;
+  Eigen::VectorXd deviations;
+};
+
+Axes axes_of(const Eigen::MatrixXd& covariance) {
+  const SymmetricAxes axes = axes_of_symmetric(covariance);
+  return {axes.vectors, axes.values.cwiseMax(1e-300).cwiseSqrt()};
+}
+
+Eigen::VectorXd to_vector(const Genome& genome) {
+  return Eigen::Map<const Eigen::VectorXd>(genome.data(), static_cast<Eigen::Index>(genome.size()));
+}
+
+Genome to_genome(const Eigen::VectorXd& vector) { return {vector.begin(), vector.end()}; }
+
+}  // namespace
+
+CmaEs::CmaEs(const MethodSetup& setup) : setup_(setup) {
+  const auto n = static_cast<Eigen::Index>(setup.space.size());
+  begin(setup.start.empty() ? Eigen::VectorXd::Constant(n, 0.5) : to_vector(setup.start));
+  if (setup.start.empty() || setup.spread.empty()) return;
+  covariance_ = Eigen::Map<const Eigen::MatrixXd>(setup.spread.data(), n, n) / (sigma_ * sigma_);
+}
+
+void CmaEs::begin(Eigen::VectorXd mean) {
+  const Eigen::Index n = mean.size();
+  generation_ = 0;
+  sigma_ = setup_.settings.sigma;
+  mean_ = std::move(mean);
+  path_sigma_ = Eigen::VectorXd::Zero(n);
+  path_c_ = Eigen::VectorXd::Zero(n);
+  covariance_ = Eigen::MatrixXd::Identity(n, n);
+  bests_.clear();
+  anywhere_ = false;
+}
+
+std::size_t CmaEs::population() const {
+  const double n = static_cast<double>(setup_.space.size());
+  const auto standard = static_cast<std::size_t>(4 + std::floor(3 * std::log(n)));
+  const std::size_t base = setup_.settings.population.value_or(static_cast<unsigned>(standard));
+  return std::max(base,
+                  std::min(base << std::min<std::uint64_t>(restarts_, 20), kLargestPopulation));
+}
+
+CmaEs::Weights CmaEs::weights() const {
+  const double n = static_cast<double>(setup_.space.size());
+  const auto lambda = static_cast<double>(population());
+  Weights w;
+  w.of_rank.resize(static_cast<Eigen::Index>(population() / 2));
+  for (Eigen::Index i = 0; i < w.of_rank.size(); ++i) {
+    w.of_rank[i] = std::log((lambda + 1) / 2) - std::log(static_cast<double>(i + 1));
+  }
+  w.of_rank /= w.of_rank.sum();
+  w.mu_eff = 1 / w.of_rank.squaredNorm();
+  w.c_sigma = (w.mu_eff + 2) / (n + w.mu_eff + 5);
+  w.d_sigma = 1 + 2 * std::max(0.0, std::sqrt((w.mu_eff - 1) / (n + 1)) - 1) + w.c_sigma;
+  w.c_c = (4 + w.mu_eff / n) / (n + 4 + 2 * w.mu_eff / n);
+  w.c_1 = 2 / ((n + 1.3) * (n + 1.3) + w.mu_eff);
+  w.c_mu = std::min(1 - w.c_1,
+                    2 * (0.25 + w.mu_eff + 1 / w.mu_eff - 2) / ((n + 2) * (n + 2) + w.mu_eff));
+  w.chi_n = std::sqrt(n) * (1 - 1 / (4 * n) + 1 / (21 * n * n));
+  return w;
+}
+
+std::vector<Genome> CmaEs::propose(const StreamOf& stream_of) const {
+  Eigen::VectorXd mean = mean_;
+  if (anywhere_) {
+    Stream stream = stream_of(population());
+    mean = to_vector(setup_.space.random(stream));
+  }
+  const Axes axes = axes_of(covariance_);
+  std::vector<Genome> proposed;
+  if (generation_ == 0 && (anywhere_ || !setup_.start.empty())) proposed.push_back(to_genome(mean));
+  while (proposed.size() < population()) {
+    Stream stream = stream_of(proposed.size());
+    Eigen::VectorXd draw(mean.size());
+    for (double& number : draw) number = stream.normal();
+    proposed.push_back(
+        to_genome(mean + sigma_ * (axes.directions * axes.deviations.cwiseProduct(draw))));
+  }
+  return proposed;
+}
+
+void CmaEs::learn(std::span<const Genome> proposed, std::span<const Standing> standings) {
+  assert(proposed.size() == population() && standings.size() == proposed.size());
+  if (anywhere_) begin(to_vector(proposed.front()));  // the first proposal was the mean itself
+  std::vector<std::size_t> order(proposed.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    return better(standings[a], standings[b]);
+  });
+  const auto parents = static_cast<Eigen::Index>(population() / 2);
+  Eigen::MatrixXd steps(mean_.size(), parents);
+  for (Eigen::Index i = 0; i < parents; ++i) {
+    steps.col(i) = (to_vector(proposed[order[static_cast<std::size_t>(i)]]) - mean_) / sigma_;
+  }
+  adapt(steps);
+  keep_levels_alive();
+  ++generation_;
+  const Standing& best = standings[order.front()];
+  if (best.outcome == v1::OK) bests_.push_back(best.cost);
+  const auto n = static_cast<double>(mean_.size());
+  const auto span =
+      static_cast<std::size_t>(10 + std::ceil(30 * n / static_cast<double>(population())));
+  if (bests_.size() > span) bests_.erase(bests_.begin());
+  const bool flat =
+      bests_.size() == span && *std::max_element(bests_.begin(), bests_.end()) -
+                                       *std::min_element(bests_.begin(), bests_.end()) <=
+                                   kFlatCost;
+  if (flat || converged()) {
+    ++restarts_;
+    begin(mean_);
+    anywhere_ = true;
+  }
+}
+
+void CmaEs::adapt(const Eigen::MatrixXd& steps) {
+  const Weights w = weights();
+  const double n = static_cast<double>(mean_.size());
+  const Axes axes = axes_of(covariance_);
+  const Eigen::VectorXd step = steps * w.of_rank;
+  mean_ += sigma_ * step;
+  const Eigen::VectorXd whitened =
+      axes.directions * (axes.directions.transpose() * step).cwiseQuotient(axes.deviations);
+  path_sigma_ =
+      (1 - w.c_sigma) * path_sigma_ + std::sqrt(w.c_sigma * (2 - w.c_sigma) * w.mu_eff) * whitened;
+  const double age = static_cast<double>(generation_ + 1);
+  const double unbiased = std::sqrt(1 - std::pow(1 - w.c_sigma, 2 * age));
+  const bool calm = path_sigma_.norm() / unbiased < (1.4 + 2 / (n + 1)) * w.chi_n;
+  path_c_ *= 1 - w.c_c;
+  if (calm) path_c_ += std::sqrt(w.c_c * (2 - w.c_c) * w.mu_eff) * step;
+  const double lost = calm ? 0 : w.c_c * (2 - w.c_c);
+  covariance_ = (1 - w.c_1 - w.c_mu + w.c_1 * lost) * covariance_ +
+                w.c_1 * path_c_ * path_c_.transpose() +
+                w.c_mu * steps * w.of_rank.asDiagonal() * steps.transpose();
+  covariance_ = (covariance_ + covariance_.transpose().eval()) / 2;
+  sigma_ *= std::exp(std::min(1.0, w.c_sigma / w.d_sigma * (path_sigma_.norm() / w.chi_n - 1)));
+  // Wider than the range a Gaussian is uniform after the mirrors: more says nothing.
+  const double widest = std::sqrt(covariance_.diagonal().maxCoeff());
+  sigma_ = std::min(sigma_, 1 / widest);
+}
+
+void CmaEs::keep_levels_alive() {
+  for (std::size_t gene = 0; gene < setup_.space.size(); ++gene) {
+    const GeneKind& kind = setup_.space[gene];
+    if (kind.shape == GeneShape::kReal || kind.levels < 2) continue;
+    const auto i = static_cast<Eigen::Index>(gene);
+    const double least = kLevelDeviation / static_cast<double>(kind.levels) / sigma_;
+    covariance_(i, i) = std::max(covariance_(i, i), least * least);
+  }
+}
+
+bool CmaEs::converged() const {
+  if (!std::isfinite(sigma_) || !covariance_.allFinite()) return true;
+  double widest = 0;
+  bool reals = false;
+  for (std::size_t gene = 0; gene < setup_.space.size(); ++gene) {
+    if (setup_.space[gene].shape != GeneShape::kReal) continue;
+    reals = true;
+    const auto i = static_cast<Eigen::Index>(gene);
+    widest = std::max(widest, std::sqrt(covariance_(i, i)));
+  }
+  return reals && sigma_ * widest < kLeastStep_share;
+}
+
+std::vector<NamedNumber> CmaEs::figures() const {
+  return {{"step_size", sigma_}, {"restarts", static_cast<double>(restarts_)}};
+}
+
+void CmaEs::save(v1::MethodState& message) const {
+  v1::CmaEsState& state = *message.mutable_cma_es();
+  state.set_generation(generation_);
+  state.set_restarts(restarts_);
+  state.set_anywhere(anywhere_);
+  state.set_sigma(sigma_);
+  state.mutable_mean()->Add(mean_.begin(), mean_.end());
+  state.mutable_path_sigma()->Add(path_sigma_.begin(), path_sigma_.end());
+  state.mutable_path_c()->Add(path_c_.begin(), path_c_.end());
+  state.mutable_covariance()->Add(covariance_.data(), covariance_.data() + covariance_.size());
+  state.mutable_bests()->Add(bests_.begin(), bests_.end());
+}
+
+Status CmaEs::restore(const v1::MethodState& message) {
+  const v1::CmaEsState& state = message.cma_es();
+  const auto n = mean_.size();
+  if (state.mean_size() != n || state.path_sigma_size() != n || state.path_c_size() != n ||
+      state.covariance_size() != n * n) {
+    return damaged_method_state("CMA-ES");
+  }
+  generation_ = state.generation();
+  restarts_ = state.restarts();
+  anywhere_ = state.anywhere();
+  sigma_ = state.sigma();
+  std::copy(state.mean().begin(), state.mean().end(), mean_.begin());
+  std::copy(state.path_sigma().begin(), state.path_sigma().end(), path_sigma_.begin());
+  std::copy(state.path_c().begin(), state.path_c().end(), path_c_.begin());
+  std::copy(state.covariance().begin(), state.covariance().end(), covariance_.data());
+  bests_.assign(state.bests().begin(), state.bests().end());
+  return {};
+}
+
+}  // namespace gapfarm

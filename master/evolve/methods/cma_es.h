@@ -1,0 +1,49 @@
+// CMA-ES: the covariance matrix adaptation evolution strategy with rank-one and rank-mu updates
+// and cumulative step-size adaptation (Hansen, arXiv:1604.00772, with its default constants and
+// positive weights), restarted with twice the population when it has converged (IPOP; Auger and
+// Hansen, CEC 2005).
+//
+// It moves in an unbounded space that mirrors fold into [0, 1] (see placed()).  The s.d. of a gene
+// with levels never falls below a fifth of a level, so that it does not freeze between two.
+#pragma once
+
+#include <Eigen/Core>
+
+#include "master/evolve/methods/search_method.h"
+
+namespace gapfarm {
+
+class CmaEs final : public SearchMethod {
+ public:
+  explicit CmaEs(const MethodSetup& setup);
+
+  std::vector<Genome> propose(const StreamOf& stream_of) const override;
+  void learn(std::span<const Genome> proposed, std::span<const Standing> standings) override;
+  unsigned origin() const override { return kSampled; }
+  std::vector<NamedNumber> figures() const override;
+  void save(v1::MethodState& message) const override;
+  Status restore(const v1::MethodState& message) override;
+
+ private:
+  struct Weights {
+    Eigen::VectorXd of_rank;  // mu positive ones that sum to 1
+    double mu_eff = 0, c_sigma = 0, d_sigma = 0, c_c = 0, c_1 = 0, c_mu = 0, chi_n = 0;
+  };
+  Weights weights() const;
+  std::size_t population() const;
+  void begin(Eigen::VectorXd mean);
+  void adapt(const Eigen::MatrixXd& steps);
+  void keep_levels_alive();
+  bool converged() const;
+
+  MethodSetup setup_;
+  std::uint64_t generation_ = 0;  // since the last restart
+  std::uint64_t restarts_ = 0;
+  bool anywhere_ = false;  // the next generation begins at a random mean
+  double sigma_ = 0;
+  Eigen::VectorXd mean_, path_sigma_, path_c_;
+  Eigen::MatrixXd covariance_;
+  std::vector<double> bests_;  // least costs of the last generations
+};
+
+}  // namespace gapfarm

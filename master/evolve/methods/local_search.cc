@@ -1,0 +1,159 @@
+#include "master/evolve/methods/local_search.h"
+
+#include <algorithm>
+#include <array>
+#include <cassert>
+#include <cmath>
+
+namespace gapfarm {
+namespace {
+
+constexpr double kPrecision_share = 1e-7;
+constexpr std::size_t kEvaluationsPerGene = 100;
+constexpr std::array kAlgorithms = {nlopt::LN_NELDERMEAD, nlopt::LN_SBPLX, nlopt::LN_BOBYQA,
+                                    nlopt::LN_COBYLA};
+
+// What NLopt's callback reads and leaves.
+struct Replay {
+  const std::vector<double>* costs = nullptr;
+  std::size_t asked = 0;
+  std::vector<double> unknown;  // the first point without a cost
+};
+
+double replay(const std::vector<double>& x, std::vector<double>&, void* data) {
+  auto& state = *static_cast<Replay*>(data);
+  if (state.asked < state.costs->size()) return (*state.costs)[state.asked++];
+  state.unknown = x;
+  throw nlopt::forced_stop();
+}
+
+}  // namespace
+
+LocalSearch::LocalSearch(const MethodSetup& setup, bool restarts)
+    : setup_(setup), restarts_(restarts), start_(setup.start) {
+  for (std::size_t gene = 0; gene < setup.space.size(); ++gene) {
+    if (setup.space[gene].shape == GeneShape::kReal) moving_.push_back(gene);
+  }
+  if (moving_.empty()) {
+    for (std::size_t gene = 0; gene < setup.space.size(); ++gene) moving_.push_back(gene);
+  }
+}
+
+nlopt::algorithm LocalSearch::algorithm() const {
+  const nlopt::algorithm wanted = kAlgorithms[static_cast<std::size_t>(setup_.settings.local)];
+  // BOBYQA's quadratic model needs two dimensions at least.
+  return wanted == nlopt::LN_BOBYQA && moving_.size() < 2 ? nlopt::LN_SBPLX : wanted;
+}
+
+void LocalSearch::begin(const Genome& start, const Standing& standing) {
+  start_ = start;
+  best_ = start;
+  costs_.clear();
+  converged_ = false;
+  add_cost(standing);
+  best_cost_ = costs_.front();
+}
+
+// Where NLopt wants to look next; none when it is content.
+std::optional<Genome> LocalSearch::next_point() const {
+  Replay state;
+  state.costs = &costs_;
+  nlopt::opt search(algorithm(), static_cast<unsigned>(moving_.size()));
+  search.set_lower_bounds(0);
+  search.set_upper_bounds(1);
+  search.set_initial_step(setup_.settings.step);
+  search.set_xtol_abs(kPrecision_share);
+  const std::size_t limit = setup_.settings.local_evaluations > 0
+                                ? setup_.settings.local_evaluations
+                                : kEvaluationsPerGene * moving_.size();
+  search.set_maxeval(static_cast<int>(limit));
+  search.set_min_objective(replay, &state);
+  std::vector<double> x;
+  for (const std::size_t gene : moving_) x.push_back(start_[gene]);
+  double least = 0;
+  try {
+    search.optimize(x, least);
+  } catch (const nlopt::forced_stop&) {
+    if (!state.unknown.empty()) {
+      Genome point = start_;
+      for (std::size_t i = 0; i < moving_.size(); ++i) point[moving_[i]] = state.unknown[i];
+      return point;
+    }
+  } catch (const nlopt::roundoff_limited&) {
+  } catch (const std::runtime_error&) {
+    // NLopt's general failure: the simplex has collapsed, say.
+  }
+  return std::nullopt;
+}
+
+std::vector<Genome> LocalSearch::propose(const StreamOf& stream_of) const {
+  if (start_.empty()) {
+    Stream stream = stream_of(0);
+    return {setup_.space.random(stream)};
+  }
+  if (costs_.empty()) return {start_};
+  if (converged_) return {best_};
+  const std::optional<Genome> point = next_point();
+  return {point ? *point : best_};
+}
+
+void LocalSearch::add_cost(const Standing& standing) {
+  if (standing.outcome == v1::OK) {
+    costs_.push_back(standing.cost);
+    return;
+  }
+  double worst = 0;
+  for (double cost : costs_) worst = std::max(worst, cost);
+  costs_.push_back(2 * worst + 1);
+}
+
+void LocalSearch::learn(std::span<const Genome> proposed, std::span<const Standing> standings) {
+  assert(proposed.size() == 1);
+  if (converged_) return;
+  if (start_.empty()) start_ = proposed[0];
+  add_cost(standings[0]);
+  if (costs_.size() == 1 || costs_.back() < best_cost_) {
+    best_ = proposed[0];
+    best_cost_ = costs_.back();
+  }
+  if (next_point()) return;
+  ++searches_;
+  if (!restarts_) {
+    converged_ = true;
+    return;
+  }
+  start_.clear();
+  costs_.clear();
+}
+
+std::vector<NamedNumber> LocalSearch::figures() const {
+  return {{"searches", static_cast<double>(searches_)}};
+}
+
+void LocalSearch::save(v1::MethodState& message) const {
+  v1::LocalSearchState& state = *message.mutable_local_search();
+  state.set_searches(searches_);
+  state.set_converged(converged_);
+  state.mutable_start()->Add(start_.begin(), start_.end());
+  state.mutable_best()->Add(best_.begin(), best_.end());
+  state.set_best_cost(best_cost_);
+  state.mutable_costs()->Add(costs_.begin(), costs_.end());
+}
+
+Status LocalSearch::restore(const v1::MethodState& message) {
+  const v1::LocalSearchState& state = message.local_search();
+  const int n = static_cast<int>(setup_.space.size());
+  const auto is_size = [&](int size) { return size == 0 || size == n; };
+  if (!message.has_local_search() || !is_size(state.start_size()) || !is_size(state.best_size())) {
+    return damaged_method_state("local search");
+  }
+  searches_ = state.searches();
+  converged_ = state.converged();
+  start_.assign(state.start().begin(), state.start().end());
+  best_.assign(state.best().begin(), state.best().end());
+  best_cost_ = state.best_cost();
+  costs_.assign(state.costs().begin(), state.costs().end());
+  return {};
+}
+
+}  // namespace gapfarm

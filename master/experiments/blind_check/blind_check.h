@@ -1,0 +1,85 @@
+// The blind check from cases to result, and its folder:
+//
+//   check.json            what it was made of
+//   seals.txt             a seal a case, published before the first diagnosis
+//   truths.box            truths and salts, sealed up until all cases are diagnosed
+//   cases/ID/trials.csv   all that a diagnosis is given, beside the config
+//   diagnoses/ID/         what it answered, output.txt, and outcome.json once it has ended
+//   truth/ID.json, truth/salts.txt, truth.key    when opened
+//   blind_check.json, blind_check.md             the result
+//
+// The key of the box stays in this process's memory, which no other process of the user can read
+// (PrivateMemory).  It is written to a file only when the check is stopped, after the last
+// diagnosis process has ended, and taken away again when the check is resumed.  A user who wants to
+// resume even after SIGKILL names a key file beforehand; it then lies there while diagnoses run.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "common/process/stop.h"
+#include "master/experiments/blind_check/cases/design.h"
+#include "master/experiments/blind_check/tables.h"
+#include "master/farm/farm.h"
+
+namespace gapfarm {
+
+struct BlindCheckHooks {
+  // Farm work comes in two stages, with the diagnoses between; the farm goes after each.
+  std::function<Result<std::unique_ptr<Farm>>()> start_farm;
+  // What is being done, how much of it is done, and the seconds since it began.
+  std::function<void(const std::string& what, std::size_t done, std::size_t total,
+                     double elapsed_s)>
+      progress;
+  std::function<void(const std::string& sentence)> note;
+  // Before the first diagnosis, with the truths sealed: whatever else would tell them has to go.
+  // May be empty.
+  std::function<Status()> on_sealed;
+  StopSource* stop = nullptr;  // not owned
+};
+
+struct DiagnoseSettings {
+  // The program and its first arguments: {"/usr/bin/gapfarm", "diagnose"}.  Then come CONFIG,
+  // --trials FILE, --out DIR, --workers N, --seed N and, when asked for, --model MODEL and
+  // --leave-out EFFECT.
+  std::vector<std::string> command;
+  std::string config_path;
+  std::string model_path;      // empty: the diagnosis tunes the base itself
+  unsigned workers = 1;        // of each diagnosis
+  unsigned jobs = 1;           // diagnoses at a time
+  double time_limit_s = 1800;  // of each
+};
+
+struct BlindCheckSettings {
+  DesignSettings design;
+  DiagnoseSettings diagnose;
+  std::string out;
+  std::string key_path;  // empty: `out` + ".key", written only when the check is stopped
+  bool resume = false;   // also a check that is opened, or whose `asked` is another
+  // What the check is asked, in any words; one that was stopped goes on when it is asked the same.
+  std::string asked;
+  SessionPlans plan;  // of every case; empty: each draws its own as the config says
+  std::vector<std::pair<std::string, std::string>> provenance;  // for the report
+};
+
+// Errors: `out` holds another check, or a finished one without `resume`; seals that do not match; a
+// lost key; kStopped, when everything is in place to resume; the farm's and the file
+// system's own.
+Result<BlindReport> run_blind_check(const Config& config, const BlindCheckSettings& settings,
+                                    const BlindCheckHooks& hooks);
+
+// The same over cases that others made: CASES/ID/trials.csv, judged by TRUTHS/ID.json where there
+// is one (`truths` may be empty).  Truths are read after the last diagnosis; that no diagnosis
+// process reads them is their owner's care.
+Result<BlindReport> run_foreign_check(const std::string& cases, const std::string& truths,
+                                      const BlindCheckSettings& settings,
+                                      const BlindCheckHooks& hooks);
+
+// The log that sizes are measured on: the experiment as the config (or `plan`) plans it, driven by
+// the config's own robot.
+Result<Problem> planned_problem(const Config& config, const SessionPlans& plan, std::uint64_t seed,
+                                Farm& farm);
+
+}  // namespace gapfarm

@@ -1,0 +1,321 @@
+#include "master/experiments/blind_check/cases/design.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/base/suggest.h"
+#include "common/base/try.h"
+#include "common/math/statistics.h"
+#include "common/trials/text/csv.h"
+
+namespace gapfarm {
+namespace {
+
+constexpr std::uint64_t kDesignStream = 0xb11d;  // generation word of the design's streams
+constexpr unsigned kMostDraws = 6;  // of signs and places before an effect is out of reach
+constexpr std::size_t kMostSizeTrials = 300;
+
+struct Spread {
+  const char* key;
+  double factor;
+  bool noise;
+};
+constexpr Spread kSpreads[] = {
+    {"mass", 1.25, false},
+    {"contact_length", 1.1, false},
+    {"track_gauge", 1.08, false},
+    {"friction", 1.3, false},
+    {"friction_ratio", 1.15, false},
+    {"full_speed", 1.12, false},
+    {"maximum_velocity", 1.12, false},
+    {"motor_torque", 1.2, false},
+    {"drive_noise_common", 1.2, true},
+    {"drive_noise_side", 1.2, true},
+    {"pose_noise_position", 1.2, true},
+    {"pose_noise_heading", 1.2, true},
+    {"shape_factor", 1.15, false},
+    {"pressure", 1.3, false},
+    {"ground_friction", 1.5, false},
+    {"finger_friction", 1.3, false},
+    {"push_noise_slide", 1.2, true},
+    {"push_noise_turn", 1.2, true},
+};
+
+// The search for one effect's strength in one case.
+struct Sizing {
+  std::size_t in_case;
+  std::size_t effect;  // of the table
+  SizeLevel level;
+  Stream stream;
+  EffectDraw draw;
+  StrengthSearch search;
+  unsigned draws = 1;
+  bool out_of_reach = false;
+};
+
+std::vector<std::string> effect_names(const ParameterTable& table) {
+  std::vector<std::string> names;
+  for (const Effect& effect : table.effects()) names.push_back(effect.name);
+  return names;
+}
+
+// REQUIRES: check_effects() accepts the names.
+std::vector<std::size_t> chosen_effects(const ParameterTable& table,
+                                        const std::vector<std::string>& names) {
+  const std::vector<std::string> known = effect_names(table);
+  std::vector<std::size_t> chosen;
+  for (std::size_t e = 0; names.empty() && e < known.size(); ++e) {
+    // By itself a second one of a kind is the first under another name.
+    if (table.effects()[e].repeats.empty()) chosen.push_back(e);
+  }
+  for (const std::string& name : names) {
+    const auto found = std::find(known.begin(), known.end(), name);
+    chosen.push_back(static_cast<std::size_t>(found - known.begin()));
+  }
+  return chosen;
+}
+
+Arena arena_of(const TrialLog& log) {
+  std::vector<double> x, y;
+  for (const Trial& trial : log.trials) {
+    x.push_back(trial.X_WS.x);
+    y.push_back(trial.X_WS.y);
+  }
+  return {quantile(x, 0.02), quantile(x, 0.98), quantile(y, 0.02), quantile(y, 0.98)};
+}
+
+// Collects cases before their names are dealt.
+class Drafts {
+ public:
+  Drafts(const Problem& problem, const DesignSettings& settings)
+      : problem_(problem), settings_(settings), arena_(arena_of(problem.log)) {}
+
+  void add(CaseKind kind, const SizeLevel& level, const std::vector<std::size_t>& effects) {
+    const std::size_t index = cases.size();
+    Stream stream({settings_.seed, Purpose::kSimulation, kDesignStream, index, 0});
+    Truth truth;
+    truth.kind = kind;
+    truth.level = level.name;
+    truth.robot = draw_robot(problem_, stream);
+    truth.seed = stream.bits() >> 1;  // leaves room for an offset
+    if (kind == CaseKind::kOutside) truth.left_out = problem_.table().effects()[effects[0]].name;
+    cases.push_back(std::move(truth));
+    for (std::size_t i = 0; i < effects.size(); ++i) {
+      Stream draws({settings_.seed, Purpose::kSimulation, kDesignStream, index, i + 1});
+      const EffectDraw draw = draw_effect(problem_.table(), effects[i], arena_, draws);
+      sizings.push_back({index, effects[i], level, draws, draw, StrengthSearch(level.size)});
+    }
+  }
+
+  const Arena& arena() const { return arena_; }
+
+  std::vector<Truth> cases;
+  std::vector<Sizing> sizings;
+
+ private:
+  const Problem& problem_;
+  const DesignSettings& settings_;
+  Arena arena_;
+};
+
+void draft_cases(const DesignSettings& settings, const std::vector<std::size_t>& effects,
+                 Drafts& drafts) {
+  for (const SizeLevel& level : settings.sizes) {
+    for (const std::size_t e : effects) {
+      for (unsigned i = 0; i < settings.per_effect; ++i) drafts.add(CaseKind::kSingle, level, {e});
+    }
+  }
+  for (unsigned i = 0; i < settings.nulls; ++i) drafts.add(CaseKind::kNull, {}, {});
+  Stream stream({settings.seed, Purpose::kSimulation, kDesignStream, ~std::uint64_t{0}, 0});
+  if (effects.empty() || settings.sizes.empty()) return;
+  for (unsigned i = 0; i < settings.pairs && effects.size() > 1; ++i) {
+    const std::size_t a = stream.below(effects.size());
+    const std::size_t b = (a + 1 + stream.below(effects.size() - 1)) % effects.size();
+    drafts.add(CaseKind::kPair, settings.sizes[0], {effects[a], effects[b]});
+  }
+  for (unsigned i = 0; i < settings.left_out; ++i) {
+    drafts.add(CaseKind::kOutside, settings.sizes[0], {effects[i % effects.size()]});
+  }
+}
+
+void add_overrides(const ParameterTable& table, std::size_t effect,
+                   const std::vector<double>& values, v1::Point& point) {
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    v1::Override* override = point.add_overrides();
+    override->set_parameter(static_cast<std::uint32_t>(table.effect_row(effect) + i));
+    override->set_value(values[i]);
+  }
+}
+
+// Predictions of some of the planned trials by the robot of `truth`.
+v1::Task predict_task(const Problem& planned, const Truth& truth) {
+  v1::Task task;
+  v1::PredictTask* predict = task.mutable_predict();
+  const std::vector<v1::Override> robot = overrides_of(planned.table(), truth);
+  predict->mutable_point()->mutable_overrides()->Add(robot.begin(), robot.end());
+  const std::size_t count = planned.log.trials.size();
+  const std::size_t wanted = std::min(count, kMostSizeTrials);
+  for (std::size_t i = 0; i < wanted; ++i) {
+    predict->add_trials(static_cast<std::uint32_t>(i * count / wanted));
+  }
+  return task;
+}
+
+void tell(const ParameterTable& table, const Arena& arena, const v1::TaskResult& result,
+          const v1::PredictResult& base, Sizing& sizing) {
+  const bool by_spread = !table.effects()[sizing.effect].moves_means();
+  sizing.search.tell(result.outcome() == v1::OK ? size_of(base, result.predict(), by_spread)
+                                                : std::nullopt);
+  if (!sizing.search.done() || sizing.search.found()) return;
+  if (sizing.draws >= kMostDraws) {
+    sizing.out_of_reach = true;
+    return;
+  }
+  ++sizing.draws;
+  sizing.draw = draw_effect(table, sizing.effect, arena, sizing.stream);
+  sizing.search = StrengthSearch(sizing.level.size);
+}
+
+// All searches side by side, a round of farm work a step.
+Status search_strengths(const Problem& planned, Drafts& drafts, Farm& farm,
+                        const DesignProgress& progress) {
+  const ParameterTable& table = planned.table();
+  const std::string hash = farm.add_problem(to_proto(planned));
+  std::vector<v1::Task> tasks;
+  for (const Truth& truth : drafts.cases) tasks.push_back(predict_task(planned, truth));
+  ASSIGN_OR_RETURN(const auto base, farm.run(hash, tasks));
+  for (std::size_t i = 0; i < base.size(); ++i) {
+    if (base[i].outcome() == v1::OK) continue;
+    return Error{"a robot near the config's ends with " + v1::Outcome_Name(base[i].outcome()) +
+                 " (" + base[i].message() + "); the config's values do not make one that drives"};
+  }
+  for (;;) {
+    std::vector<std::size_t> open;
+    std::vector<v1::Task> round;
+    for (std::size_t i = 0; i < drafts.sizings.size(); ++i) {
+      const Sizing& s = drafts.sizings[i];
+      if (s.search.done()) continue;
+      v1::Task task = predict_task(planned, drafts.cases[s.in_case]);
+      add_overrides(table, s.effect, effect_values(table, s.draw, s.search.strength()),
+                    *task.mutable_predict()->mutable_point());
+      task.mutable_predict()->set_means_only(table.effects()[s.effect].moves_means());
+      open.push_back(i);
+      round.push_back(std::move(task));
+    }
+    if (progress) {
+      progress("strengths", drafts.sizings.size() - open.size(), drafts.sizings.size());
+    }
+    if (open.empty()) return {};
+    ASSIGN_OR_RETURN(const auto results, farm.run(hash, round));
+    for (std::size_t i = 0; i < open.size(); ++i) {
+      Sizing& sizing = drafts.sizings[open[i]];
+      tell(table, drafts.arena(), results[i], base[sizing.in_case].predict(), sizing);
+    }
+  }
+}
+
+TrueEffect true_effect(const ParameterTable& table, const Sizing& sizing) {
+  const Effect& entry = table.effects()[sizing.effect];
+  TrueEffect effect{entry.name, {}, sizing.search.size()};
+  const auto values = effect_values(table, sizing.draw, sizing.search.strength());
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    effect.parameters[entry.parameters[i].key] = values[i];
+  }
+  return effect;
+}
+
+std::string case_name(std::size_t number) {
+  const std::string digits = std::to_string(number);
+  return "case" + std::string(digits.size() < 3 ? 3 - digits.size() : 0, '0') + digits;
+}
+
+BlindDesign deal(const ParameterTable& table, const DesignSettings& settings, Drafts drafts) {
+  BlindDesign design;
+  std::vector<bool> possible(drafts.cases.size(), true);
+  for (const Sizing& sizing : drafts.sizings) {
+    if (sizing.out_of_reach) {
+      possible[sizing.in_case] = false;
+      design.out_of_reach.push_back(
+          {table.effects()[sizing.effect].name, sizing.level.name, sizing.search.size()});
+    } else {
+      drafts.cases[sizing.in_case].effects.push_back(true_effect(table, sizing));
+    }
+  }
+  Stream stream({settings.seed, Purpose::kSimulation, kDesignStream, ~std::uint64_t{0}, 1});
+  for (const std::size_t i : stream.permutation(drafts.cases.size())) {
+    if (!possible[i]) continue;
+    design.cases.push_back(std::move(drafts.cases[i]));
+    design.cases.back().id = case_name(design.cases.size());
+  }
+  return design;
+}
+
+}  // namespace
+
+Status check_effects(const ParameterTable& table, const std::vector<std::string>& names) {
+  const std::vector<std::string> known = effect_names(table);
+  for (const std::string& name : names) {
+    if (std::find(known.begin(), known.end(), name) != known.end()) continue;
+    return Error{"unknown effect '" + name + "'" + suggestion(name, known)};
+  }
+  return {};
+}
+
+Result<SizeLevel> size_level(const std::string& word) {
+  if (word == "clear") return SizeLevel{word, 5};
+  if (word == "subtle") return SizeLevel{word, 1.6};
+  const auto number = parse_double(word);
+  if (number && *number > 1 && *number < 1e6) return SizeLevel{word, *number};
+  return Error{"size '" + word + "': expected clear (5), subtle (1.6) or a number above 1"};
+}
+
+std::map<std::string, double> draw_robot(const Problem& problem, Stream& stream) {
+  const ParameterTable& table = problem.table();
+  std::map<std::string, double> robot;
+  for (const Spread& spread : kSpreads) {
+    const auto row = table.find(spread.key);
+    if (!row) continue;
+    const double factor = std::pow(spread.factor, stream.uniform(-1, 1));
+    double lower = table[*row].lower;
+    double upper = table[*row].upper;
+    bool free = problem.genes.empty() || spread.noise;
+    for (const Gene& gene : problem.genes) {
+      if (gene.row != *row) continue;
+      free = true;
+      lower = gene.lower;
+      upper = gene.upper;
+    }
+    const double value = problem.values[*row];
+    if (free) robot[spread.key] = std::clamp(factor * value, lower, upper);
+  }
+  return robot;
+}
+
+Result<BlindDesign> draw_design(const Problem& planned, const DesignSettings& settings, Farm& farm,
+                                const DesignProgress& progress) {
+  const ParameterTable& table = planned.table();
+  RETURN_IF_ERROR(check_effects(table, settings.effects));
+  const std::vector<std::size_t> effects = chosen_effects(table, settings.effects);
+  Drafts drafts(planned, settings);
+  draft_cases(settings, effects, drafts);
+  RETURN_IF_ERROR(search_strengths(planned, drafts, farm, progress));
+  return deal(table, settings, std::move(drafts));
+}
+
+std::vector<v1::Override> overrides_of(const ParameterTable& table, const Truth& truth) {
+  std::vector<v1::Override> overrides;
+  const auto add = [&](const std::string& key, double value) {
+    const auto row = table.find(key);
+    if (!row) return;
+    overrides.emplace_back();
+    overrides.back().set_parameter(static_cast<std::uint32_t>(*row));
+    overrides.back().set_value(value);
+  };
+  for (const auto& [key, value] : truth.robot) add(key, value);
+  for (const TrueEffect& effect : truth.effects) {
+    for (const auto& [key, value] : effect.parameters) add(effect.name + "." + key, value);
+  }
+  return overrides;
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,78 @@
+// The design of a blind check: which cases, with which robots and which strengths of which effects.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "common/base/result.h"
+#include "common/config/settings.h"
+#include "master/experiments/blind_check/cases/sizing.h"
+#include "master/experiments/blind_check/cases/truth.h"
+#include "master/farm/farm.h"
+
+namespace gapfarm {
+
+struct SizeLevel {
+  std::string name;
+  double size = 1;  // TrueEffect::size
+};
+// "clear" 5, "subtle" 1.6; other sizes by number ("2.5").  Error: neither, or not above 1.
+Result<SizeLevel> size_level(const std::string& word);
+
+struct DesignSettings {
+  std::vector<std::string> effects;  // empty: the whole catalogue
+  std::vector<SizeLevel> sizes;      // pairs and left-out effects have the first
+  unsigned per_effect = 1;           // cases an effect and size
+  unsigned nulls = 60;
+  unsigned pairs = 19;
+  unsigned left_out = 19;
+  std::uint64_t seed = 1;
+};
+
+// An effect that no strength within the catalogue's bounds makes as large as wanted.
+struct OutOfReach {
+  std::string effect;
+  std::string level;
+  double size = 1;  // at the last strength tried
+};
+
+struct BlindDesign {
+  std::vector<Truth> cases;  // shuffled: names tell nothing
+  std::vector<OutOfReach> out_of_reach;
+};
+
+// Error: an effect that the table does not have, with a suggestion.
+Status check_effects(const ParameterTable& table, const std::vector<std::string>& names);
+
+using DesignProgress =
+    std::function<void(const std::string& what, std::size_t done, std::size_t total)>;
+
+// What a case's robot may differ by from the config's: each factor is log-uniform within
+// [1 / spread, spread].  Parameters that are genes of the config stay within the genes' ranges; in
+// a config with genes those that are not stay as they are, noise excepted.
+//   mass 1.25, contact_length 1.1, track_gauge 1.08, friction 1.3, friction_ratio 1.15,
+//   full_speed 1.12, maximum_velocity 1.12, motor_torque 1.2, each noise parameter 1.2,
+//   shape_factor 1.15, pressure 1.3, ground_friction 1.5, finger_friction 1.3
+std::map<std::string, double> draw_robot(const Problem& problem, Stream& stream);
+
+// Draws robots and effects, and searches every strength on the farm, all cases side by side, on
+// the trials of `planned`: a log of the experiment with the config's own robot.
+// Errors: an unknown effect; the farm's own.
+Result<BlindDesign> draw_design(const Problem& planned, const DesignSettings& settings, Farm& farm,
+                                const DesignProgress& progress = {});
+
+// What differs from the problem's values in a case.
+std::vector<v1::Override> overrides_of(const ParameterTable& table, const Truth& truth);
+
+using SessionPlans = std::vector<std::vector<v1::PlannedTrial>>;
+
+// The trial log of every case, each driven by its own seed plus `seed_offset` and, when `plan` is
+// empty, its own plan.  Errors: a simulation that did not end well, by case; the farm's own.
+Result<std::vector<TrialLog>> simulate_cases(const Config& config, const std::vector<Truth>& cases,
+                                             const SessionPlans& plan, std::uint64_t seed_offset,
+                                             Farm& farm, const DesignProgress& progress = {});
+
+}  // namespace gapfarm

@@ -1,0 +1,169 @@
+#include "master/experiments/blind_check/cases/seal.h"
+
+#include <fcntl.h>
+#include <sodium.h>
+#include <sys/prctl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cassert>
+#include <cerrno>
+#include <cstring>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "common/json/json.h"
+
+namespace gapfarm {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr std::size_t kSaltBytes = 16;
+constexpr std::size_t kSealBytes = 32;
+
+void start_sodium() {
+  const int ready = sodium_init();
+  assert(ready >= 0);
+  (void)ready;
+}
+
+std::string hex(const unsigned char* bytes, std::size_t size) {
+  std::string text(2 * size + 1, '\0');
+  sodium_bin2hex(text.data(), text.size(), bytes, size);
+  text.pop_back();
+  return text;
+}
+
+const unsigned char* raw(std::string_view text) {
+  return reinterpret_cast<const unsigned char*>(text.data());
+}
+
+}  // namespace
+
+std::string random_salt() {
+  start_sodium();
+  unsigned char bytes[kSaltBytes];
+  randombytes_buf(bytes, sizeof bytes);
+  return hex(bytes, sizeof bytes);
+}
+
+std::string seal_of(std::string_view salt, std::string_view truth) {
+  start_sodium();
+  crypto_generichash_state state;
+  crypto_generichash_init(&state, nullptr, 0, kSealBytes);
+  crypto_generichash_update(&state, raw(salt), salt.size());
+  crypto_generichash_update(&state, raw(truth), truth.size());
+  unsigned char digest[kSealBytes];
+  crypto_generichash_final(&state, digest, sizeof digest);
+  return hex(digest, sizeof digest);
+}
+
+std::string format_seals(const std::vector<SealedTruth>& truths) {
+  std::string text;
+  for (const SealedTruth& t : truths) text += t.id + " " + seal_of(t.salt, t.truth) + "\n";
+  return text;
+}
+
+Status verify_seals(const std::vector<SealedTruth>& truths, std::string_view seals,
+                    const std::string& file) {
+  std::map<std::string, std::string> published;
+  std::istringstream lines{std::string(seals)};
+  for (std::string id, seal; lines >> id >> seal;) {
+    if (!published.emplace(id, seal).second) return Error{file + ": two seals of " + id};
+  }
+  for (const SealedTruth& t : truths) {
+    const auto found = published.find(t.id);
+    if (found == published.end()) return Error{file + ": no seal of " + t.id};
+    if (found->second != seal_of(t.salt, t.truth)) {
+      return Error{file + ": the truth of " + t.id +
+                   " does not match its seal; one of them was changed after sealing"};
+    }
+    published.erase(found);
+  }
+  if (published.empty()) return {};
+  return Error{file + ": the truth of " + published.begin()->first + " is missing"};
+}
+
+TruthKey TruthKey::random() {
+  start_sodium();
+  TruthKey key;
+  key.bytes_.resize(crypto_secretbox_KEYBYTES);
+  crypto_secretbox_keygen(key.bytes_.data());
+  return key;
+}
+
+Result<TruthKey> TruthKey::parse(std::string_view text, const std::string& file) {
+  start_sodium();
+  TruthKey key;
+  key.bytes_.resize(crypto_secretbox_KEYBYTES);
+  std::size_t size = 0;
+  const int failed = sodium_hex2bin(key.bytes_.data(), key.bytes_.size(), text.data(), text.size(),
+                                    " \r\n", &size, nullptr);
+  if (failed != 0 || size != key.bytes_.size()) {
+    return Error{file + ": is not the key of a blind check, expected 64 hex digits"};
+  }
+  return key;
+}
+
+TruthKey::~TruthKey() { sodium_memzero(bytes_.data(), bytes_.size()); }
+
+std::string TruthKey::text() const { return hex(bytes_.data(), bytes_.size()) + "\n"; }
+
+std::string TruthKey::close_box(const std::vector<SealedTruth>& truths) const {
+  Json json = Json::array();
+  for (const SealedTruth& t : truths) {
+    json.push_back({{"id", t.id}, {"salt", t.salt}, {"truth", t.truth}});
+  }
+  const std::string plain = json_text(json);
+  std::string box(crypto_secretbox_NONCEBYTES + crypto_secretbox_MACBYTES + plain.size(), '\0');
+  auto* bytes = reinterpret_cast<unsigned char*>(box.data());
+  randombytes_buf(bytes, crypto_secretbox_NONCEBYTES);
+  crypto_secretbox_easy(bytes + crypto_secretbox_NONCEBYTES, raw(plain), plain.size(), bytes,
+                        bytes_.data());
+  return box;
+}
+
+Result<std::vector<SealedTruth>> TruthKey::open_box(std::string_view box,
+                                                    const std::string& file) const {
+  constexpr std::size_t kHead = crypto_secretbox_NONCEBYTES + crypto_secretbox_MACBYTES;
+  const Error closed{file +
+                     ": the key does not open it; it is another check's key, or the box was "
+                     "changed"};
+  if (box.size() < kHead) return closed;
+  std::string plain(box.size() - kHead, '\0');
+  const std::string_view cipher = box.substr(crypto_secretbox_NONCEBYTES);
+  if (crypto_secretbox_open_easy(reinterpret_cast<unsigned char*>(plain.data()), raw(cipher),
+                                 cipher.size(), raw(box), bytes_.data()) != 0) {
+    return closed;
+  }
+  const Json json = parse_json(plain);
+  std::vector<SealedTruth> truths;
+  for (const Json& t : json) truths.push_back({t["id"], t["salt"], t["truth"]});
+  return truths;
+}
+
+Status write_private_file(const std::string& path, std::string_view bytes) {
+  std::string temporary = path + ".XXXXXX";
+  const int fd = ::mkstemp(temporary.data());  // 0600
+  const auto failure = [&] { return Error{path + ": cannot be written: " + std::strerror(errno)}; };
+  if (fd < 0) return failure();
+  Status status;
+  const std::size_t size = bytes.size();
+  if (::write(fd, bytes.data(), size) != static_cast<ssize_t>(size) || ::fsync(fd) != 0) {
+    status = failure();
+  }
+  ::close(fd);
+  if (status && ::rename(temporary.c_str(), path.c_str()) != 0) status = failure();
+  if (!status) ::unlink(temporary.c_str());
+  return status;
+}
+
+PrivateMemory::PrivateMemory() : before_(::prctl(PR_GET_DUMPABLE)) { ::prctl(PR_SET_DUMPABLE, 0); }
+
+PrivateMemory::~PrivateMemory() {
+  if (before_ == 1) ::prctl(PR_SET_DUMPABLE, 1);
+}
+
+}  // namespace gapfarm

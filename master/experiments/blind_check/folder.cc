@@ -1,0 +1,160 @@
+#include "master/experiments/blind_check/folder.h"
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "common/base/try.h"
+#include "common/json/json.h"
+#include "common/trials/files.h"
+#include "master/diagnose/effect_diagnosis.h"
+
+namespace gapfarm {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+std::vector<std::string> diagnose_command(const OpenCase& open, std::size_t number,
+                                          const CheckPaths& paths,
+                                          const DiagnoseSettings& settings) {
+  std::vector<std::string> words = settings.command;
+  words.insert(words.end(),
+               {settings.config_path, "--trials", open.trials, "--out", paths.diagnosis(open.id),
+                "--workers", std::to_string(settings.workers), "--seed", std::to_string(number)});
+  // In a case's folder nothing lies but the case: its paths need no mark.
+  const std::filesystem::path recorded =
+      std::filesystem::path(open.trials).parent_path() / "paths.csv";
+  std::error_code code;
+  if (std::filesystem::exists(recorded, code)) {
+    words.insert(words.end(), {"--paths", recorded.string()});
+  }
+  if (!settings.model_path.empty()) {
+    words.insert(words.end(), {"--model", settings.model_path});
+  }
+  if (!open.left_out.empty()) {
+    // An effect that passes for another one is no stranger while the other one is there.
+    words.insert(words.end(), {"--leave-out", open.left_out});
+    for (const char* alias : effect_diagnosis(open.left_out).aliases) words.emplace_back(alias);
+  }
+  return words;
+}
+
+Status write_outcome(const ChildEnd& end, const std::string& path) {
+  const Json json = {{"outcome", child_state_name(end.state)},
+                     {"status", end.status},
+                     {"wall_s", end.wall_s},
+                     {"cpu_s", end.cpu_s},
+                     {"text", end.text}};
+  return write_file_atomically(path, json_text(json, 1) + "\n");
+}
+
+// A diagnosis that was cut short goes on with what it simulated; nothing else of it stays.
+Status make_empty(const std::string& folder) {
+  std::error_code code;
+  std::filesystem::create_directories(folder, code);
+  std::vector<std::filesystem::path> others;
+  for (const auto& entry : std::filesystem::directory_iterator(folder, code)) {
+    if (entry.path().filename() != "simulations.sqlite") others.push_back(entry.path());
+  }
+  for (const std::filesystem::path& other : others) std::filesystem::remove_all(other, code);
+  if (code) return Error{folder + ": cannot be made: " + code.message()};
+  return {};
+}
+
+}  // namespace
+
+Status write_check_state(const CheckState& state, const std::string& path) {
+  Json out_of_reach = Json::array();
+  for (const OutOfReach& o : state.out_of_reach) {
+    out_of_reach.push_back({{"effect", o.effect}, {"level", o.level}, {"size", o.size}});
+  }
+  const Json json = {{"version", 1},
+                     {"made_of", state.made_of},
+                     {"asked", state.asked},
+                     {"out_of_reach", out_of_reach}};
+  return write_file_atomically(path, json_text(json, 1) + "\n");
+}
+
+Result<CheckState> read_check_state(const std::string& path) {
+  ASSIGN_OR_RETURN(const std::string text, read_text_file(path));
+  const Json json = parse_json(text);
+  if (!json.is_object() || !json.value("made_of", Json()).is_string()) {
+    return Error{path + ": is not the state of a blind check; choose another --out"};
+  }
+  CheckState state;
+  state.made_of = json["made_of"].get<std::string>();
+  if (json.contains("asked") && json["asked"].is_string()) {
+    state.asked = json["asked"].get<std::string>();
+  }
+  const Json out_of_reach = json.value("out_of_reach", Json::array());
+  for (const Json& o : out_of_reach) {
+    state.out_of_reach.push_back(
+        {o.value("effect", ""), o.value("level", ""), o.value("size", 1.0)});
+  }
+  return state;
+}
+
+Status diagnose_cases(const std::vector<OpenCase>& cases, const CheckPaths& paths,
+                      const DiagnoseSettings& settings, const BlindCheckHooks& hooks) {
+  std::vector<ChildJob> jobs;
+  for (std::size_t i = 0; i < cases.size(); ++i) {
+    const std::string& id = cases[i].id;
+    if (std::filesystem::exists(paths.outcome(id))) continue;
+    RETURN_IF_ERROR(make_empty(paths.diagnosis(id)));
+    jobs.push_back({id, diagnose_command(cases[i], i + 1, paths, settings),
+                    paths.diagnosis(id) + "/output.txt"});
+  }
+  if (jobs.size() < cases.size() && hooks.note) {
+    hooks.note(std::to_string(cases.size() - jobs.size()) + " cases are diagnosed already");
+  }
+  Status written;
+  ChildrenOptions options;
+  options.at_once = settings.jobs;
+  options.time_limit_s = settings.time_limit_s;
+  options.stop = hooks.stop;
+  // 3: some tasks were given up, but there is an answer.
+  options.done = [](int status) { return status == 0 || status == 3; };
+  options.on_end = [&](const ChildJob& job, const ChildEnd& end) {
+    if (Status s = write_outcome(end, paths.outcome(job.id)); !s) written = s;
+    if (end.state != ChildState::kDone && hooks.note) {
+      hooks.note(job.id + ": the diagnosis " + end.text + "; see " + job.log_path);
+    }
+  };
+  options.on_tick = [&](std::size_t ended, double elapsed_s) {
+    if (hooks.progress) hooks.progress("cases diagnosed", ended, jobs.size(), elapsed_s);
+  };
+  RETURN_IF_ERROR(run_children(jobs, options));
+  return written;
+}
+
+ChildEnd read_outcome(const std::string& path) {
+  const Result<std::string> text = read_text_file(path);
+  const Json json = text ? parse_json(*text) : Json();
+  ChildEnd end;
+  if (!json.is_object()) {
+    end.state = ChildState::kFailed;
+    end.text = "has no outcome";
+    return end;
+  }
+  const std::string name = json.value("outcome", "");
+  for (const ChildState state :
+       {ChildState::kDone, ChildState::kFailed, ChildState::kCrashed, ChildState::kTimedOut}) {
+    if (name == child_state_name(state)) end.state = state;
+  }
+  end.status = json.value("status", 0);
+  end.wall_s = json.value("wall_s", 0.0);
+  end.cpu_s = json.value("cpu_s", 0.0);
+  end.text = json.value("text", "");
+  return end;
+}
+
+std::optional<Said> read_said(const std::string& folder, ChildEnd& end) {
+  if (end.state != ChildState::kDone) return std::nullopt;
+  const std::string path = folder + "/diagnosis.json";
+  const Result<std::string> text = read_text_file(path);
+  const Result<Said> said = text ? parse_said(*text, path) : Result<Said>(text.error());
+  if (said) return *said;
+  end.text = "left no readable diagnosis (" + said.error().message + ")";
+  return std::nullopt;
+}
+
+}  // namespace gapfarm

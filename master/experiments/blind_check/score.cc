@@ -1,0 +1,171 @@
+#include "master/experiments/blind_check/score.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <set>
+
+#include "master/diagnose/effect_diagnosis.h"
+
+namespace gapfarm {
+namespace {
+
+using Family = std::set<std::string>;
+
+Family family_of(const SaidEffect& effect) {
+  Family family = {effect.name};
+  const std::size_t count = std::min(effect.aliases.size(), kMaxAliases);
+  family.insert(effect.aliases.begin(), effect.aliases.begin() + static_cast<long>(count));
+  return family;
+}
+
+std::string names_of(const Said& said) {
+  std::string text;
+  for (const SaidEffect& effect : said.effects) text += (text.empty() ? "" : "+") + effect.name;
+  return text.empty() ? said.verdict : said.verdict + " " + text;
+}
+
+std::string names_of(const Truth& truth) {
+  std::string text;
+  for (const TrueEffect& effect : truth.effects) text += (text.empty() ? "" : "+") + effect.name;
+  return text;
+}
+
+Judgement judge_effects(const Truth& truth, const Said& said) {
+  const std::string what = names_of(truth);
+  if (said.verdict != "effect" && said.verdict != "effect+unknown") {
+    return {false, what + "; said " + said.verdict};
+  }
+  std::vector<Family> left;
+  for (const SaidEffect& effect : said.effects) left.push_back(family_of(effect));
+  for (const TrueEffect& effect : truth.effects) {
+    const auto hit = std::find_if(left.begin(), left.end(), [&](const Family& family) {
+      return family.count(effect.name) > 0;
+    });
+    if (hit == left.end()) {
+      return {false, what + "; missed " + effect.name + ", said " + names_of(said)};
+    }
+    left.erase(hit);
+  }
+  if (truth.effects.size() == 1 &&
+      family_of(said.effects.front()).count(truth.effects.front().name) == 0) {
+    return {false, what + "; named after " + said.effects.front().name};
+  }
+  if (!left.empty()) return {false, what + "; also said more: " + names_of(said)};
+  return {true, what + "; said " + names_of(said)};
+}
+
+// Strengths all neutral: places and directions mean nothing.
+bool does_nothing(const Effect& entry, const TrueEffect& effect) {
+  for (std::size_t i = 0; i < entry.strengths; ++i) {
+    const auto found = effect.parameters.find(entry.parameters[i].key);
+    if (found != effect.parameters.end() && found->second != entry.parameters[i].neutral) {
+      return false;
+    }
+  }
+  return true;
+}
+
+// `turn`: after which the value means the same; 0: never.
+bool holds(double lo, double hi, double value, double turn) {
+  if (turn == 0) return value >= lo && value <= hi;
+  // The turn of `value` that is the first at or above lo.
+  return value + turn * std::ceil((lo - value) / turn) <= hi;
+}
+
+// Effects without an arrow: half a turn changes nothing, and a quarter of one undoes them.
+bool has_no_arrow(const std::string& effect) {
+  const std::optional<Polar>& polar = effect_diagnosis(effect).polar;
+  return polar && polar->symmetry == 2;
+}
+
+// The same effect with its strength above neutral, as a diagnosis tells it.
+std::map<std::string, double> as_told(const TrueEffect& effect) {
+  std::map<std::string, double> told = effect.parameters;
+  if (!has_no_arrow(effect.name) || !told.count("direction")) return told;
+  const auto ratio = told.find("ratio"), stretch = told.find("stretch");
+  const bool across =
+      (ratio != told.end() && ratio->second < 1) || (stretch != told.end() && stretch->second < 0);
+  if (!across) return told;
+  if (ratio != told.end()) ratio->second = 1 / ratio->second;
+  if (stretch != told.end()) stretch->second = -stretch->second;
+  told["direction"] += std::numbers::pi / 2;
+  return told;
+}
+
+}  // namespace
+
+Judgement judge(const Truth& truth, const Said& said) {
+  for (const SaidEffect& effect : said.effects) {
+    if (effect.aliases.size() > kMaxAliases) {
+      return {false, "more than " + std::to_string(kMaxAliases) + " aliases say nothing"};
+    }
+  }
+  switch (truth.kind) {
+    case CaseKind::kNull:
+      return {said.verdict == "none" && said.effects.empty(), "null; said " + names_of(said)};
+    case CaseKind::kOutside:
+      return {
+          (said.verdict == "unknown" || said.verdict == "effect+unknown") && said.effects.empty(),
+          "outside the catalogue; said " + names_of(said)};
+    case CaseKind::kSingle:
+    case CaseKind::kPair:
+      break;
+  }
+  return judge_effects(truth, said);
+}
+
+std::string first_said(const Said& said) {
+  return said.effects.empty() ? said.verdict : said.effects.front().name;
+}
+
+std::vector<Coverage> coverage_of(const Truth& truth, const Said& said) {
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  std::vector<Coverage> all;
+  for (const TrueEffect& effect : truth.effects) {
+    const auto named = std::find_if(said.effects.begin(), said.effects.end(),
+                                    [&](const SaidEffect& s) { return s.name == effect.name; });
+    const Effect* entry = catalogue_entry(effect.name);
+    if (named == said.effects.end() || !entry) continue;
+    const bool neutral = does_nothing(*entry, effect);
+    const std::map<std::string, double> told = as_told(effect);
+    for (std::size_t i = 0; i < entry->parameters.size(); ++i) {
+      const EffectParameter& p = entry->parameters[i];
+      const auto value = told.find(p.key);
+      if (value == told.end() || !p.choices.empty()) continue;
+      if (neutral && i >= entry->strengths) continue;
+      Coverage coverage{effect.name, p.key, value->second,       kNone,
+                        kNone,       false, i < entry->strengths};
+      for (const SaidParameter& s : named->parameters) {
+        if (s.key != p.key) continue;
+        coverage.lo = s.lo;
+        coverage.hi = s.hi;
+        // A direction's bounds are a whole turn of it apart.
+        const double turn = p.key == "direction" ? p.upper - p.lower : 0;
+        coverage.covered = holds(s.lo, s.hi, value->second, turn);
+      }
+      all.push_back(coverage);
+    }
+  }
+  return all;
+}
+
+double promised_shrinkage(const Said& said) {
+  double sum = 0;
+  for (const SaidEffect& effect : said.effects) sum += effect.closed;
+  return sum;
+}
+
+RateInterval wilson_interval(const Rate& rate, double z) {
+  if (rate.total == 0) return {};
+  const double n = rate.total;
+  const double p = rate.share();
+  const double z2 = z * z;
+  const double centre = (p + z2 / (2 * n)) / (1 + z2 / n);
+  const double half = z / (1 + z2 / n) * std::sqrt(p * (1 - p) / n + z2 / (4 * n * n));
+  return {rate.hits == 0 ? 0 : std::max(0.0, centre - half),
+          rate.hits == rate.total ? 1 : std::min(1.0, centre + half)};
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,67 @@
+// Is a diagnosis right?  The rules by which every case is judged.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "master/experiments/blind_check/cases/truth.h"
+#include "master/experiments/blind_check/said.h"
+
+namespace gapfarm {
+
+constexpr std::size_t kMaxAliases = 3;  // more say nothing
+
+struct Judgement {
+  bool right = false;
+  std::string why;  // "floor_nap; said unknown"
+};
+
+// A null must be called `none`; what the catalogue does not hold `unknown`, or `effect+unknown`
+// naming nothing; a single effect must be the first named or one of its aliases; of a pair both
+// must be named; and nothing else may be.
+Judgement judge(const Truth& truth, const Said& said);
+
+// The first named effect, or the verdict when none is named.
+std::string first_said(const Said& said);
+
+// Whether the interval of one true parameter held it.
+struct Coverage {
+  std::string effect;
+  std::string key;
+  double truth = 0;
+  double lo = 0;  // NaN when the diagnosis gave no interval
+  double hi = 0;
+  bool covered = false;
+  bool is_strength = true;  // or a place, a direction, ... that means nothing without one
+};
+
+// One entry a parameter of every true effect that was named by its own name: an alias has other
+// parameters.  Angles are compared on the circle.  Left out: choices (they have no interval) and
+// what means nothing since the effect's strengths are neutral.
+std::vector<Coverage> coverage_of(const Truth& truth, const Said& said);
+
+// The share of the explainable gap that the diagnosis promises its effects close: the sum of
+// `closed`, NaN when an effect has none.  0 without effects.
+double promised_shrinkage(const Said& said);
+
+struct Rate {
+  unsigned hits = 0;
+  unsigned total = 0;
+
+  void add(bool hit) {
+    hits += hit;
+    ++total;
+  }
+  double share() const { return total ? static_cast<double>(hits) / total : 0; }
+};
+
+struct RateInterval {
+  double lower = 0;
+  double upper = 1;
+};
+
+// Score interval for a binomial share (Wilson 1927) of the given coverage's normal quantile `z`;
+// [0, 1] for no trials.
+RateInterval wilson_interval(const Rate& rate, double z = 1.959964);
+
+}  // namespace gapfarm

@@ -1,0 +1,351 @@
+#include "master/experiments/blind_check/tables.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "common/json/fields.h"
+#include "common/json/json.h"
+#include "common/trials/text/csv.h"
+
+namespace gapfarm {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+template <class... Values>
+std::string formatted(const char* format, Values... values) {
+  char text[160];
+  std::snprintf(text, sizeof text, format, values...);
+  return text;
+}
+
+// A rate as a row: label, wanted, share with interval, counts.
+struct RateRow {
+  std::string label;
+  std::string wanted;
+  Rate rate;
+};
+
+// With what DIAGNOSIS asks of each.
+std::vector<RateRow> rate_rows(const Tally& sum) {
+  std::vector<RateRow> rows;
+  rows.push_back({"all cases right", "", sum.right});
+  for (const auto& [level, rate] : sum.singles_right) {
+    const std::string wanted = level == "clear" ? ">= 95 %" : level == "subtle" ? ">= 70 %" : "";
+    rows.push_back({"single " + level + " effects: first or alias right", wanted, rate});
+  }
+  for (const auto& [level, rate] : sum.singles_first) {
+    rows.push_back({"single " + level + " effects: the true name first", "", rate});
+  }
+  rows.push_back({"nulls called none", ">= 95 %", sum.null_none});
+  rows.push_back({"nulls with an effect named (false alarms)", "", sum.false_alarms});
+  rows.push_back({"effects outside the catalogue called unknown", ">= 85 %", sum.outside_unknown});
+  rows.push_back(
+      {"... of these, model.toml closes half of the truth's", ">= 79 %", sum.outside_closed});
+  rows.push_back({"pairs right", ">= 80 %", sum.pairs_right});
+  rows.push_back({"parameters within their 90 % interval", "85 to 95 %", sum.covered});
+  rows.push_back({"... of these, strengths", "", sum.strengths_covered});
+  rows.push_back({"... of these, places, directions and the like", "", sum.places_covered});
+  rows.push_back({"promised shrinkage within 0.1 of realised", ">= 90 %", sum.promise_kept});
+  rows.push_back({"diagnoses that failed", "0", sum.failed});
+  return rows;
+}
+
+std::string percent(const Rate& rate) {
+  if (rate.total == 0) return "-";
+  const RateInterval i = wilson_interval(rate);
+  return formatted("%.0f %% [%.0f, %.0f]", 100 * rate.share(), 100 * i.lower, 100 * i.upper);
+}
+
+std::string counts(const Rate& rate) {
+  return std::to_string(rate.hits) + "/" + std::to_string(rate.total);
+}
+
+std::string short_number(double value) { return formatted("%.4g", value); }
+
+std::string share(const std::optional<double>& value) {
+  return value ? formatted("%.2f", *value) : "-";
+}
+
+Json rate_json(const Rate& rate) {
+  const RateInterval i = wilson_interval(rate);
+  Json json = {{"hits", rate.hits}, {"total", rate.total}};
+  if (rate.total > 0) {
+    json["share"] = rate.share();
+    json["lo"] = i.lower;
+    json["hi"] = i.upper;
+  }
+  return json;
+}
+
+Json rates_json(const std::map<std::string, Rate>& rates) {
+  Json json = Json::object();
+  for (const auto& [name, rate] : rates) json[name] = rate_json(rate);
+  return json;
+}
+
+Json said_json(const Said& said) {
+  Json effects = Json::array();
+  for (const SaidEffect& e : said.effects) {
+    effects.push_back({{"name", e.name}, {"aliases", e.aliases}});
+  }
+  return {{"verdict", said.verdict}, {"effects", effects}};
+}
+
+Json case_json(const ScoredCase& c) {
+  Json json = {{"case", c.truth.id},
+               {"outcome", child_state_name(c.end.state)},
+               {"wall_s", c.end.wall_s},
+               {"cpu_s", c.end.cpu_s},
+               {"said", c.said ? said_json(*c.said) : Json()}};
+  if (!c.end.text.empty()) json["outcome_text"] = c.end.text;
+  if (!c.has_truth) return json;
+  json["truth"] = parse_json(format_truth(c.truth));
+  json["right"] = c.judgement.right;
+  json["why"] = c.judgement.why;
+  Json coverage = Json::array();
+  for (const Coverage& p : c.coverage) {
+    coverage.push_back({{"parameter", p.effect + "." + p.key},
+                        {"truth", p.truth},
+                        {"lo", p.lo},
+                        {"hi", p.hi},
+                        {"strength", p.is_strength},
+                        {"covered", p.covered}});
+  }
+  json["coverage"] = coverage;
+  json["promised"] = number_or_null(c.promised);
+  json["realised"] = number_or_null(c.realised);
+  if (c.fresh) {
+    json["fresh_scores"] = {{"unit", "nats/trial"},
+                            {"tuned", c.fresh->tuned},
+                            {"final", c.fresh->final_},
+                            {"truth", c.fresh->truth}};
+    if (c.fresh->corrected) json["fresh_scores"]["corrected"] = *c.fresh->corrected;
+  }
+  return json;
+}
+
+std::string row_of_cells(const std::vector<std::string>& cells) {
+  std::string row = "|";
+  for (const std::string& cell : cells) row += " " + cell + " |";
+  return row + "\n";
+}
+
+std::string table_head(const std::vector<std::string>& cells) {
+  std::string rule = "|";
+  for (std::size_t i = 0; i < cells.size(); ++i) rule += " --- |";
+  return row_of_cells(cells) + rule + "\n";
+}
+
+std::string rates_markdown(const Tally& sum) {
+  std::string text = table_head({"what", "wanted", "found [95 % interval]", "cases"});
+  for (const RateRow& row : rate_rows(sum)) {
+    text += row_of_cells({row.label, row.wanted, percent(row.rate), counts(row.rate)});
+  }
+  return text;
+}
+
+std::string effects_markdown(const Tally& sum) {
+  std::set<std::string> levels;
+  for (const auto& [effect, rates] : sum.by_effect) {
+    for (const auto& [level, rate] : rates) levels.insert(level);
+  }
+  std::vector<std::string> head = {"effect"};
+  for (const std::string& level : levels) head.push_back(level + ", right");
+  head.push_back("parameters covered");
+  std::string text = table_head(head);
+  for (const auto& [effect, rates] : sum.by_effect) {
+    std::vector<std::string> cells = {effect};
+    for (const std::string& level : levels) {
+      const auto found = rates.find(level);
+      cells.push_back(found == rates.end() ? "-" : counts(found->second));
+    }
+    Rate covered;
+    for (const auto& [key, rate] : sum.covered_by_parameter) {
+      if (key.compare(0, effect.size() + 1, effect + ".") != 0) continue;
+      covered.hits += rate.hits;
+      covered.total += rate.total;
+    }
+    cells.push_back(covered.total ? counts(covered) : "-");
+    text += row_of_cells(cells);
+  }
+  return text;
+}
+
+std::string confusion_markdown(const Tally& sum) {
+  std::set<std::string> said;
+  for (const auto& [truth, row] : sum.confusion) {
+    for (const auto& [name, count] : row) said.insert(name);
+  }
+  std::vector<std::string> head = {"truth \\ said first"};
+  head.insert(head.end(), said.begin(), said.end());
+  std::string text = table_head(head);
+  for (const auto& [truth, row] : sum.confusion) {
+    std::vector<std::string> cells = {truth};
+    for (const std::string& name : said) {
+      const auto found = row.find(name);
+      cells.push_back(found == row.end() ? "" : std::to_string(found->second));
+    }
+    text += row_of_cells(cells);
+  }
+  return text;
+}
+
+std::string effects_text(const Truth& truth) {
+  std::string text;
+  for (const TrueEffect& effect : truth.effects) {
+    text += (text.empty() ? "" : "; ") + effect.name;
+    for (const auto& [key, value] : effect.parameters)
+      text += " " + key + " " + short_number(value);
+  }
+  return text.empty() ? "none" : text;
+}
+
+std::string said_text(const ScoredCase& c) {
+  if (!c.said) return c.end.text.empty() ? "no diagnosis" : c.end.text;
+  std::string text = c.said->verdict;
+  for (const SaidEffect& e : c.said->effects) {
+    text += " " + e.name;
+    for (std::size_t i = 0; i < e.aliases.size(); ++i) text += (i ? ", " : " (or ") + e.aliases[i];
+    if (!e.aliases.empty()) text += ")";
+  }
+  return text;
+}
+
+// In the catalogue's order, the larger sizes first.
+std::vector<Truth> by_effect(std::vector<Truth> cases, const ParameterTable& table) {
+  const auto rank = [&table](const Truth& truth) {
+    if (truth.effects.empty()) return std::pair(table.size(), 0.0);
+    const TrueEffect& effect = truth.effects.front();
+    std::size_t e = 0;
+    while (e < table.effects().size() && table.effects()[e].name != effect.name) ++e;
+    return std::pair(e, -std::round(10 * effect.size));
+  };
+  std::stable_sort(cases.begin(), cases.end(),
+                   [&](const Truth& a, const Truth& b) { return rank(a) < rank(b); });
+  return cases;
+}
+
+std::string cases_markdown(const std::vector<ScoredCase>& cases) {
+  std::string text = table_head({"case", "kind", "level", "truth", "said", "right", "covered",
+                                 "promised", "realised", "s", "CPU s"});
+  for (const ScoredCase& c : cases) {
+    Rate covered;
+    for (const Coverage& p : c.coverage) covered.add(p.covered);
+    text +=
+        row_of_cells({c.truth.id, c.has_truth ? case_kind_name(c.truth.kind) : "-", c.truth.level,
+                      c.has_truth ? effects_text(c.truth) : "-", said_text(c),
+                      !c.has_truth        ? "-"
+                      : c.judgement.right ? "yes"
+                                          : "NO",
+                      covered.total ? counts(covered) : "-", share(c.promised), share(c.realised),
+                      formatted("%.0f", c.end.wall_s), formatted("%.0f", c.end.cpu_s)});
+  }
+  return text;
+}
+
+}  // namespace
+
+std::string format_blind_json(const BlindReport& report) {
+  const Tally sum = tally(report.cases);
+  Json provenance = Json::object();
+  for (const auto& [label, value] : report.provenance) provenance[label] = value;
+  Json by_effect = Json::object();
+  for (const auto& [effect, rates] : sum.by_effect) by_effect[effect] = rates_json(rates);
+  Json cases = Json::array();
+  for (const ScoredCase& c : report.cases) cases.push_back(case_json(c));
+  Json out_of_reach = Json::array();
+  for (const OutOfReach& o : report.out_of_reach) {
+    out_of_reach.push_back({{"effect", o.effect}, {"level", o.level}, {"size", o.size}});
+  }
+  const Json rates = {{"right", rate_json(sum.right)},
+                      {"singles_right", rates_json(sum.singles_right)},
+                      {"singles_first", rates_json(sum.singles_first)},
+                      {"null_none", rate_json(sum.null_none)},
+                      {"false_alarms", rate_json(sum.false_alarms)},
+                      {"outside_unknown", rate_json(sum.outside_unknown)},
+                      {"outside_closed", rate_json(sum.outside_closed)},
+                      {"pairs_right", rate_json(sum.pairs_right)},
+                      {"covered", rate_json(sum.covered)},
+                      {"strengths_covered", rate_json(sum.strengths_covered)},
+                      {"places_covered", rate_json(sum.places_covered)},
+                      {"promise_kept", rate_json(sum.promise_kept)},
+                      {"failed", rate_json(sum.failed)}};
+  const Json json = {{"version", 1},
+                     {"provenance", provenance},
+                     {"rates", rates},
+                     {"by_effect", by_effect},
+                     {"covered_by_parameter", rates_json(sum.covered_by_parameter)},
+                     {"confusion", sum.confusion},
+                     {"out_of_reach", out_of_reach},
+                     {"cases", cases}};
+  return json_text(json, 1) + "\n";
+}
+
+std::string format_blind_markdown(const BlindReport& report) {
+  const Tally sum = tally(report.cases);
+  std::string text = "# Blind check\n\n";
+  for (const auto& [label, value] : report.provenance) text += "- " + label + ": `" + value + "`\n";
+  text += "\n## Rates\n\n" + rates_markdown(sum);
+  text += "\n## Single effects\n\n" + effects_markdown(sum);
+  text +=
+      "\n## Confusion\n\nTrue family against what was said first.\n\n" + confusion_markdown(sum);
+  if (!report.out_of_reach.empty()) {
+    text +=
+        "\n## Out of reach\n\nNo strength within the catalogue's bounds is as large as wanted "
+        "on this experiment; these cases were not made.\n\n" +
+        table_head({"effect", "level", "greatest size"});
+    for (const OutOfReach& o : report.out_of_reach) {
+      text += row_of_cells({o.effect, o.level, short_number(o.size)});
+    }
+  }
+  return text + "\n## Cases\n\n" + cases_markdown(report.cases);
+}
+
+std::string format_blind_summary(const BlindReport& report) {
+  std::string text;
+  for (const RateRow& row : rate_rows(tally(report.cases))) {
+    if (row.rate.total == 0) continue;
+    text += formatted("%-52s %-16s %9s  %s\n", row.label.c_str(), percent(row.rate).c_str(),
+                      counts(row.rate).c_str(), row.wanted.c_str());
+  }
+  for (const ScoredCase& c : report.cases) {
+    if (c.has_truth && c.judgement.right) continue;
+    text += (c.has_truth ? "WRONG " : "      ") + c.truth.id + ": " +
+            (c.has_truth ? c.judgement.why : said_text(c)) + "\n";
+  }
+  return text;
+}
+
+std::string format_design(const BlindDesign& design, const ParameterTable& table) {
+  std::map<std::string, unsigned> kinds;
+  std::string text = formatted("%-9s %-8s %-8s %6s  %s\n", "case", "kind", "level", "size",
+                               "effect and parameters");
+  for (const Truth& truth : by_effect(design.cases, table)) {
+    ++kinds[case_kind_name(truth.kind)];
+    for (const TrueEffect& effect : truth.effects) {
+      text += formatted("%-9s %-8s %-8s %6.2f  ", truth.id.c_str(), case_kind_name(truth.kind),
+                        truth.level.c_str(), effect.size) +
+              effect.name;
+      for (const auto& [key, value] : effect.parameters) {
+        const auto row = table.find(effect.name + "." + key);
+        const Parameter* p = row ? &table[*row] : nullptr;
+        const bool choice = p && p->kind == ParameterKind::kChoice;
+        text += " " + key + " " + (choice ? table.format(*row, value) : short_number(value));
+        if (p && !choice && p->unit != "-") text += " " + p->unit;
+      }
+      text += "\n";
+    }
+  }
+  for (const OutOfReach& o : design.out_of_reach) {
+    text += o.effect + ": out of reach at " + o.level +
+            "; the strongest that the catalogue allows has size " + short_number(o.size) + "\n";
+  }
+  for (const auto& [kind, count] : kinds) text += std::to_string(count) + " " + kind + "  ";
+  return text + "\n";
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,231 @@
+#include "master/experiments/crossfit/crossfit.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+
+#include "common/base/try.h"
+#include "common/math/statistics.h"
+#include "common/trials/select.h"
+
+namespace gapfarm {
+namespace {
+
+std::vector<std::string> values_in(const TrialLog& log, const TrialColumnReader& column) {
+  std::vector<std::string> values;
+  for (const Trial& trial : log.trials) {
+    const std::string word = column(trial);
+    if (std::find(values.begin(), values.end(), word) == values.end()) values.push_back(word);
+  }
+  return values;
+}
+
+// The mean end of each trial's condition, over its repeats as seen from their own starts.
+std::vector<Pose> mean_of_repeats(const TrialLog& log,
+                                  const std::vector<TrialColumnReader>& columns) {
+  std::map<std::vector<std::string>, Eigen::Vector4d> sums;  // x, y, cos, sin
+  std::vector<std::vector<std::string>> keys;
+  for (const Trial& trial : log.trials) {
+    std::vector<std::string> key;
+    for (const TrialColumnReader& column : columns) key.push_back(column(trial));
+    const Pose& X = trial.X_WE;
+    const auto [entry, fresh] = sums.try_emplace(key, Eigen::Vector4d::Zero());
+    entry->second += Eigen::Vector4d(X.x, X.y, std::cos(X.theta), std::sin(X.theta));
+    keys.push_back(std::move(key));
+  }
+  std::vector<Pose> ends;
+  for (const auto& key : keys) {
+    const auto n = static_cast<double>(std::count(keys.begin(), keys.end(), key));
+    const Eigen::Vector4d mean = sums.at(key) / n;
+    ends.push_back({mean[0], mean[1], std::atan2(mean[3], mean[2])});
+  }
+  return ends;
+}
+
+std::string joined(const std::vector<std::string>& words) {
+  std::string text;
+  for (const std::string& word : words) text += (text.empty() ? "" : " ") + word;
+  return text;
+}
+
+class Crossfit {
+ public:
+  Crossfit(const Problem& problem, const CrossfitPlan& plan, Farm& farm)
+      : problem_(problem), plan_(plan), farm_(farm) {}
+
+  Result<CrossfitGroup> group(const std::string& name, const TrialLog& log) {
+    CrossfitGroup group;
+    group.name = name;
+    ASSIGN_OR_RETURN(const TrialLog train, select_trials(log, plan_.train));
+    ASSIGN_OR_RETURN(const auto tuned, tune(with(train), farm_, plan_.tuning));
+    group.tuned = tuned;
+    RETURN_IF_ERROR(add_set("train", train, group));
+    TrialLog tests;
+    for (const std::vector<std::string>& filters : plan_.tests) {
+      ASSIGN_OR_RETURN(const TrialLog test, select_trials(log, filters));
+      RETURN_IF_ERROR(add_set(joined(filters), test, group));
+      tests.trials.insert(tests.trials.end(), test.trials.begin(), test.trials.end());
+    }
+    for (const std::string& key : plan_.sweeps) {
+      ASSIGN_OR_RETURN(auto swept, sweep(key, train, tests, group.tuned.values));
+      group.sweeps.push_back(std::move(swept));
+    }
+    return group;
+  }
+
+ private:
+  Problem with(const TrialLog& log) const {
+    Problem problem = problem_;
+    problem.log = log;
+    return problem;
+  }
+
+  Status add_set(const std::string& name, const TrialLog& log, CrossfitGroup& group) {
+    ASSIGN_OR_RETURN(const auto ends,
+                     predict_ends(with(log), {problem_.values, group.tuned.values}, farm_));
+    for (std::size_t k = 0; k < 2; ++k) {
+      if (ends[k].failure.empty()) continue;
+      return Error{"the simulation of " + name + " at the " + (k == 1 ? "tuned" : "config's own") +
+                   " parameters ended with " + ends[k].failure};
+    }
+    std::vector<Pose> starts, repeats;
+    for (const Trial& trial : log.trials) starts.push_back(trial.X_WS);
+    std::vector<TrialColumnReader> condition;
+    for (const std::string& column : plan_.repeats) {
+      ASSIGN_OR_RETURN(const auto reader, trial_column_reader(log, column));
+      condition.push_back(reader);
+    }
+    if (!condition.empty()) repeats = mean_of_repeats(log, condition);
+    std::vector<std::string> parts = {""};
+    TrialColumnReader per;
+    if (!plan_.per.empty()) {
+      ASSIGN_OR_RETURN(const auto reader, trial_column_reader(log, plan_.per));
+      per = reader;
+      const auto values = values_in(log, per);
+      if (values.size() > 1) parts.insert(parts.end(), values.begin(), values.end());
+    }
+    for (const std::string& part : parts) {
+      std::vector<std::size_t> members;
+      for (std::size_t i = 0; i < log.trials.size(); ++i) {
+        if (part.empty() || per(log.trials[i]) == part) members.push_back(i);
+      }
+      const auto errors = [&](const std::vector<Pose>& all) {
+        std::vector<Trial> trials;
+        std::vector<Pose> chosen;
+        for (const std::size_t i : members) {
+          if (i >= all.size()) return EndErrors{};
+          trials.push_back(log.trials[i]);
+          chosen.push_back(all[i]);
+        }
+        return end_errors(problem_, trials, chosen);
+      };
+      group.sets.push_back({name, part, errors(ends[0].ends), errors(ends[1].ends), errors(starts),
+                            errors(repeats)});
+    }
+    return {};
+  }
+
+  Result<Sweep> sweep(const std::string& key, const TrialLog& train, const TrialLog& test,
+                      const ParameterValues& around) {
+    const ParameterTable& table = problem_.table();
+    const auto row = table.find(key);
+    if (!row) return Error{"--sweep " + key + ": there is no such parameter"};
+    // Over the gene's range where it is one, else over the row's.
+    Gene gene{*row, table[*row].lower, table[*row].upper, table[*row].scale};
+    for (const Gene& searched : problem_.genes) {
+      if (searched.row == *row) gene = searched;
+    }
+    Sweep sweep{key, {}};
+    std::vector<ParameterValues> points;
+    for (unsigned i = 0; i < plan_.sweep_points; ++i) {
+      const double g = plan_.sweep_points < 2 ? 0.5 : double(i) / (plan_.sweep_points - 1);
+      points.push_back(around);
+      points.back()[*row] = decode_gene(table, gene, g);
+      sweep.points.push_back({points.back()[*row], 0, 0});
+    }
+    for (const auto& [log, member] :
+         {std::pair{&train, &SweepPoint::train_m}, std::pair{&test, &SweepPoint::test_m}}) {
+      if (log->trials.empty()) continue;
+      ASSIGN_OR_RETURN(const auto ends, predict_ends(with(*log), points, farm_));
+      for (std::size_t i = 0; i < points.size(); ++i) {
+        const PredictedEnds& predicted = ends[i];
+        sweep.points[i].*member = predicted.failure.empty()
+                                      ? end_errors(problem_, log->trials, predicted.ends).mean_m
+                                      : std::numeric_limits<double>::quiet_NaN();
+      }
+    }
+    return sweep;
+  }
+
+  const Problem& problem_;
+  const CrossfitPlan& plan_;
+  Farm& farm_;
+};
+
+// A stage each group: its evaluations, its sets, its sweeps.
+std::vector<ProgressStage> stages_of(const std::vector<std::string>& groups,
+                                     const CrossfitPlan& plan) {
+  const std::uint64_t tasks = expected_evaluations(plan.tuning.evolution) +
+                              2 * (1 + plan.tests.size()) +
+                              2 * plan.sweeps.size() * plan.sweep_points;
+  std::vector<ProgressStage> stages;
+  for (const std::string& group : groups) {
+    stages.push_back({group.empty() ? "fit" : "fit " + plan.by + "=" + group, 1, tasks});
+  }
+  return stages;
+}
+
+}  // namespace
+
+double end_error(const Problem& problem, const Trial& trial, const Pose& X_WE) {
+  if (problem.pieces.empty()) return std::hypot(X_WE.x - trial.X_WE.x, X_WE.y - trial.X_WE.y);
+  return corner_distance(problem.piece(trial.command), X_WE, trial.X_WE);
+}
+
+EndErrors end_errors(const Problem& problem, std::span<const Trial> trials,
+                     std::span<const Pose> ends) {
+  EndErrors errors;
+  if (trials.empty()) return errors;
+  std::vector<double> whole, position, heading;
+  for (std::size_t i = 0; i < trials.size(); ++i) {
+    whole.push_back(end_error(problem, trials[i], ends[i]));
+    const Pose& X = trials[i].X_WE;
+    position.push_back(std::hypot(ends[i].x - X.x, ends[i].y - X.y));
+    heading.push_back(std::abs(wrap_angle(ends[i].theta - X.theta)));
+    errors.mean_m += whole.back();
+  }
+  errors.trials = trials.size();
+  errors.mean_m /= static_cast<double>(trials.size());
+  errors.median_m = median(whole);
+  errors.median_position_m = median(position);
+  errors.median_heading_rad = median(heading);
+  return errors;
+}
+
+Result<std::vector<CrossfitGroup>> crossfit(const Problem& problem, const CrossfitPlan& plan,
+                                            Farm& farm) {
+  Crossfit fit(problem, plan, farm);
+  std::vector<CrossfitGroup> groups;
+  if (plan.by.empty()) {
+    plan.hooks.planned(stages_of({""}, plan));
+    plan.hooks.began(0);
+    ASSIGN_OR_RETURN(auto group, fit.group("", problem.log));
+    groups.push_back(std::move(group));
+    return groups;
+  }
+  ASSIGN_OR_RETURN(const auto by, trial_column_reader(problem.log, plan.by));
+  const std::vector<std::string> values = values_in(problem.log, by);
+  plan.hooks.planned(stages_of(values, plan));
+  for (const std::string& value : values) {
+    plan.hooks.began(groups.size());
+    const std::string filter = plan.by + "=" + value;
+    ASSIGN_OR_RETURN(const auto log, select_trials(problem.log, {&filter, 1}));
+    auto group = fit.group(value, log);
+    if (!group) return Error{filter + ": " + group.error().message};
+    groups.push_back(std::move(*group));
+  }
+  return groups;
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,197 @@
+#include "master/experiments/drive/drive.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/base/try.h"
+
+namespace gapfarm {
+namespace {
+
+// Shorter commands are not worth giving, but every run gets each, so that legs correspond.
+constexpr double kShortest_s = 0.01;
+constexpr double kPause_s = 1;  // between commands of a list
+
+Trial planned(const CommandSpec& command, std::size_t index, double t_s, const Pose& X_WS) {
+  Trial trial;
+  trial.session = "drive";
+  trial.trial = static_cast<std::int64_t>(index) + 1;
+  trial.t_s = t_s;
+  trial.command = command.name;
+  trial.left = command.left;
+  trial.right = command.right;
+  trial.duration_s = command.duration_s;
+  trial.X_WS = trial.X_WE = X_WS;
+  return trial;
+}
+
+CommandSpec lasting(const ConstantVelocity& model, double seconds, double longest_s) {
+  CommandSpec command = model.command;
+  command.duration_s = std::clamp(seconds, kShortest_s, longest_s);
+  return command;
+}
+
+CommandSpec turn_toward(const WaypointPilot& pilot, const Pose& X_WR,
+                        const Eigen::Vector2d& target) {
+  const double bearing = std::atan2(target.y() - X_WR.y, target.x() - X_WR.x);
+  const double error = wrap_angle(bearing - X_WR.theta);
+  const ConstantVelocity& turn = error > 0 ? pilot.left : pilot.right;
+  return lasting(turn, error / turn.turn_rad_s, pilot.longest_s);
+}
+
+CommandSpec go_to(const WaypointPilot& pilot, const Pose& X_WR, const Eigen::Vector2d& target) {
+  const double distance = std::hypot(target.x() - X_WR.x, target.y() - X_WR.y);
+  return lasting(pilot.forward, distance / pilot.forward.speed_m_s, pilot.longest_s);
+}
+
+// Appends one leg to every run; `choose` gives each its command.
+template <class Choose>
+Status drive_leg(const Mover& mover, std::uint64_t leg, std::vector<Pose>& at,
+                 std::vector<DrivenRun>& runs, const Choose& choose) {
+  std::vector<Mover::Start> starts;
+  for (std::size_t r = 0; r < runs.size(); ++r) starts.push_back({at[r], choose(at[r]), r, leg});
+  ASSIGN_OR_RETURN(auto legs, mover.drive(starts));
+  for (std::size_t r = 0; r < runs.size(); ++r) {
+    at[r] = legs[r].path.back().pose;
+    runs[r].push_back(std::move(legs[r]));
+  }
+  return {};
+}
+
+}  // namespace
+
+void move_path(double dx_m, double dy_m, std::vector<PathSample>* path) {
+  for (PathSample& sample : *path) {
+    sample.pose.x += dx_m;
+    sample.pose.y += dy_m;
+  }
+}
+
+Result<std::vector<ConstantVelocity>> nominal_velocities(Farm& farm, const Problem& problem) {
+  std::vector<v1::Task> tasks;
+  for (const CommandSpec& command : problem.commands) {
+    v1::Task task;
+    v1::TraceTask* trace = task.mutable_trace();
+    trace->mutable_command()->set_name(command.name);
+    trace->mutable_command()->set_left(command.left);
+    trace->mutable_command()->set_right(command.right);
+    trace->mutable_command()->set_duration(command.duration_s);
+    trace->set_interval(0.05);
+    tasks.push_back(std::move(task));
+  }
+  ASSIGN_OR_RETURN(const auto results, farm.run(farm.add_problem(to_proto(problem)), tasks));
+  std::vector<ConstantVelocity> models;
+  for (std::size_t i = 0; i < tasks.size(); ++i) {
+    const v1::TaskResult& result = results[i];
+    if (result.outcome() != v1::OK || result.trace().samples_size() == 0) {
+      return Error{"command '" + problem.commands[i].name + "' ends with " +
+                   v1::Outcome_Name(result.outcome()) + " in this model " + result.message()};
+    }
+    if (!(problem.commands[i].duration_s > 0)) continue;
+    const auto& samples = result.trace().samples();
+    const Twist twist = log(from_proto(samples[samples.size() - 1].pose()));
+    ConstantVelocity model;
+    model.command = problem.commands[i];
+    model.speed_m_s = twist[0] / model.command.duration_s;
+    model.turn_rad_s = twist[2] / model.command.duration_s;
+    models.push_back(model);
+  }
+  return models;
+}
+
+Result<std::vector<DrivenRun>> drive_commands(Farm& farm, const Problem& problem, const Pose& X_WS,
+                                              const std::vector<CommandSpec>& commands,
+                                              unsigned runs, const DriveSettings& settings) {
+  std::vector<v1::Task> tasks;
+  for (unsigned r = 0; r < runs; ++r) {
+    v1::Task task;
+    v1::SimulateTask* simulate = task.mutable_simulate();
+    simulate->mutable_stream()->set_run_seed(settings.seed);
+    simulate->mutable_stream()->set_birth_id(r);
+    simulate->set_path_interval(settings.interval_s);
+    double t_s = 0;
+    for (std::size_t c = 0; c < commands.size(); ++c) {
+      v1::PlannedTrial* plan = simulate->add_plan();
+      plan->set_moved(c == 0);
+      *plan->mutable_trial() =
+          to_proto(planned(commands[c], c, t_s,
+                           {X_WS.x - settings.frame_x_m, X_WS.y - settings.frame_y_m, X_WS.theta}));
+      t_s += commands[c].duration_s + kPause_s;
+    }
+    tasks.push_back(std::move(task));
+  }
+  ASSIGN_OR_RETURN(const auto results, farm.run(farm.add_problem(to_proto(problem)), tasks));
+  std::vector<DrivenRun> driven;
+  for (const v1::TaskResult& result : results) {
+    if (result.outcome() != v1::OK) {
+      return Error{"a run ended with " + v1::Outcome_Name(result.outcome()) + " (" +
+                   result.message() + ")"};
+    }
+    DrivenRun run;
+    for (std::size_t c = 0; c < commands.size(); ++c) {
+      run.push_back({commands[c], from_proto(result.simulate().trials(static_cast<int>(c))).path});
+      move_path(settings.frame_x_m, settings.frame_y_m, &run.back().path);
+    }
+    driven.push_back(std::move(run));
+  }
+  return driven;
+}
+
+Result<std::vector<DrivenRun>> drive_commands(const Mover& mover, const Pose& X_WS,
+                                              const std::vector<CommandSpec>& commands,
+                                              unsigned runs) {
+  std::vector<DrivenRun> driven(runs);
+  std::vector<Pose> at(runs, X_WS);
+  for (std::size_t c = 0; c < commands.size(); ++c) {
+    const auto given = [&](const Pose&) { return commands[c]; };
+    RETURN_IF_ERROR(drive_leg(mover, c, at, driven, given));
+  }
+  return driven;
+}
+
+Result<WaypointPilot> make_pilot(std::span<const ConstantVelocity> models) {
+  WaypointPilot pilot;
+  double best_ahead = 0, best_left = 0, best_right = 0;
+  // Metres against radians as the corner of a robot sees them.
+  constexpr double kHalfRobot_m = 0.05;
+  for (const ConstantVelocity& model : models) {
+    const double turn = kHalfRobot_m * model.turn_rad_s, speed = model.speed_m_s;
+    const double ahead = speed - 10 * std::abs(turn);
+    const double left = turn - std::abs(speed), right = -turn - std::abs(speed);
+    if (ahead > best_ahead) {
+      best_ahead = ahead;
+      pilot.forward = model;
+    }
+    if (left > best_left) {
+      best_left = left;
+      pilot.left = model;
+    }
+    if (right > best_right) {
+      best_right = right;
+      pilot.right = model;
+    }
+  }
+  if (best_ahead <= 0 || best_left <= 0 || best_right <= 0) {
+    return Error{
+        "way-points take a command that goes ahead and one each that turns left and right "
+        "on the spot; the model's commands have none"};
+  }
+  return pilot;
+}
+
+Result<std::vector<DrivenRun>> drive_waypoints(const Mover& mover, const WaypointPilot& pilot,
+                                               const Pose& X_WS,
+                                               std::span<const Eigen::Vector2d> targets,
+                                               unsigned runs) {
+  std::vector<DrivenRun> driven(runs);
+  std::vector<Pose> at(runs, X_WS);
+  for (std::size_t i = 0; i < targets.size(); ++i) {
+    const auto turn = [&](const Pose& X_WR) { return turn_toward(pilot, X_WR, targets[i]); };
+    const auto go = [&](const Pose& X_WR) { return go_to(pilot, X_WR, targets[i]); };
+    RETURN_IF_ERROR(drive_leg(mover, 2 * i, at, driven, turn));
+    RETURN_IF_ERROR(drive_leg(mover, 2 * i + 1, at, driven, go));
+  }
+  return driven;
+}
+
+}  // namespace gapfarm

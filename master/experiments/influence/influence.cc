@@ -1,0 +1,317 @@
+#include "master/experiments/influence/influence.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/base/try.h"
+#include "common/math/rank_tests.h"
+#include "common/random/stream.h"
+
+namespace gapfarm {
+namespace {
+
+constexpr int kHorizons = 20;
+constexpr double kMorrisStep = 2.0 / 3;  // of four levels, as usual
+constexpr unsigned kBootstrap = 1000;
+// A run that did not end well is further away than anything in the scene.
+constexpr double kFailed_m = 1e6;
+// Differences below are rounding.
+constexpr double kLeast_m = 1e-9;
+// Repeats of different uses must not share noise.
+constexpr std::uint64_t kLevelNoise = 1u << 20, kMorrisNoise = 1u << 24;
+
+class Study {
+ public:
+  Study(Farm& farm, const Problem& problem, const std::vector<Gene>& genes,
+        const InfluenceSettings& settings, const StageHooks& hooks)
+      : farm_(farm),
+        problem_(problem),
+        genes_(genes),
+        settings_(settings),
+        distance_(path_distances()[settings.distance].distance),
+        hooks_(hooks) {}
+
+  Result<InfluenceReport> run() {
+    for (const Gene& gene : genes_) report_.factors.push_back({gene, {}, {}});
+    plan();
+    RETURN_IF_ERROR(standard());
+    RETURN_IF_ERROR(one_at_a_time());
+    RETURN_IF_ERROR(morris());
+    std::stable_sort(report_.factors.begin(), report_.factors.end(),
+                     [](const FactorInfluence& a, const FactorInfluence& b) {
+                       if (a.alone.influential != b.alone.influential) return a.alone.influential;
+                       return a.alone.distance > b.alone.distance;
+                     });
+    return report_;
+  }
+
+ private:
+  double apart(const PathSet& a, const PathSet& b) const {
+    return a.ok && b.ok ? set_distance(a, b, distance_, samples_) : kFailed_m;
+  }
+
+  // Later stages trace only to the horizon.
+  void plan() const {
+    const std::uint64_t traces = traces_of_a_set(problem_, settings_.trace);
+    std::uint64_t levels = 0;
+    for (const Gene& gene : genes_) levels += levels_of(gene).size();
+    const std::uint64_t standard = traces * (1 + 2 * settings_.repeats);
+    const std::uint64_t alone = traces * levels * settings_.repeats;
+    const std::uint64_t walks = traces * settings_.trajectories * (genes_.size() + 3);
+    const auto real = [](std::uint64_t tasks) { return static_cast<double>(tasks); };
+    hooks_.planned({{"repeat the standard", real(standard), standard},
+                    {"move one parameter at a time", real(alone), alone},
+                    {"walk through the box (Morris)", real(walks), walks}});
+  }
+
+  Status standard() {
+    hooks_.began(0);
+    std::vector<TraceRequest> requests = {{{}, std::nullopt}};
+    for (unsigned r = 0; r < 2 * settings_.repeats; ++r) requests.push_back({{}, r});
+    ASSIGN_OR_RETURN(auto sets, trace_paths(farm_, problem_, settings_.trace, requests));
+    for (const PathSet& set : sets) {
+      if (!set.ok) return Error{"the standard itself does not end well; change its [parameters]"};
+    }
+    nominal_ = sets.front();
+    repeats_.assign(sets.begin() + 1, sets.begin() + 1 + settings_.repeats);
+    others_.assign(sets.begin() + 1 + settings_.repeats, sets.end());
+    choose_horizon();
+    for (unsigned r = 0; r < settings_.repeats; ++r)
+      noise_.push_back(apart(repeats_[r], others_[r]));
+    report_.repeat_distance = median(noise_);
+    report_.repeat_95 = {quantile(noise_, 0.025), quantile(noise_, 0.975)};
+    return {};
+  }
+
+  void choose_horizon() {
+    const double interval_s = settings_.trace.interval_s;
+    double longest_s = 0;  // of the paths: a robot moves on for a while after its command
+    for (const std::vector<PathPoint>& path : nominal_.paths) {
+      longest_s = std::max(longest_s, static_cast<double>(path.size() - 1) * interval_s);
+    }
+    const auto samples_of = [&](double horizon_s) {
+      return static_cast<std::size_t>(std::floor(horizon_s / interval_s + 1e-9)) + 1;
+    };
+    report_.horizon_s = longest_s / kHorizons;
+    bool calm = true;
+    for (int i = 1; i <= kHorizons; ++i) {
+      HorizonPoint point{longest_s * i / kHorizons, 0, 0};
+      samples_ = samples_of(point.horizon_s);
+      std::vector<double> distances;
+      for (unsigned r = 0; r < settings_.repeats; ++r) {
+        distances.push_back(apart(repeats_[r], others_[r]));
+      }
+      point.repeat_distance = median(distances);
+      point.extent = set_extent(nominal_, samples_);
+      calm = calm && point.repeat_distance <= settings_.chaos_share * point.extent;
+      if (calm) report_.horizon_s = point.horizon_s;
+      report_.horizons.push_back(point);
+    }
+    if (settings_.horizon_s) report_.horizon_s = std::min(*settings_.horizon_s, longest_s);
+    samples_ = samples_of(report_.horizon_s);
+    // What comes after the horizon need not be driven.
+    for (CommandSpec& command : settings_.trace.commands) {
+      command.duration_s = std::min(command.duration_s, report_.horizon_s);
+    }
+  }
+
+  // Different values of the gene over its range, without the standard's.
+  std::vector<double> levels_of(const Gene& gene) const {
+    const Parameter& row = problem_.table()[gene.row];
+    std::size_t count = settings_.levels;
+    if (row.kind != ParameterKind::kReal) {
+      count = std::min<std::size_t>(count, static_cast<std::size_t>(gene.upper - gene.lower) + 1);
+      if (row.kind == ParameterKind::kChoice) {
+        count = static_cast<std::size_t>(gene.upper - gene.lower) + 1;
+      }
+    }
+    std::vector<double> levels;
+    for (std::size_t k = 0; k < count; ++k) {
+      const double g = count == 1 ? 0 : static_cast<double>(k) / static_cast<double>(count - 1);
+      const double value = decode_gene(problem_.table(), gene, g);
+      const bool known = std::find(levels.begin(), levels.end(), value) != levels.end();
+      if (!known && value != problem_.values[gene.row]) levels.push_back(value);
+    }
+    return levels;
+  }
+
+  Status one_at_a_time() {
+    hooks_.began(1);
+    std::vector<double> p;
+    for (std::size_t f = 0; f < report_.factors.size(); ++f) {
+      FactorInfluence& factor = report_.factors[f];
+      const std::vector<double> levels = levels_of(factor.gene);
+      std::vector<TraceRequest> requests;
+      for (std::size_t l = 0; l < levels.size(); ++l) {
+        for (unsigned r = 0; r < settings_.repeats; ++r) {
+          requests.push_back({{override_of(factor.gene.row, levels[l])},
+                              kLevelNoise + (f * 64 + l) * settings_.repeats + r});
+        }
+      }
+      ASSIGN_OR_RETURN(const auto sets, trace_paths(farm_, problem_, settings_.trace, requests));
+      p.push_back(judge_levels(levels, sets, factor.alone));
+    }
+    const std::vector<double> adjusted = holm(p);
+    for (std::size_t f = 0; f < p.size(); ++f) {
+      OneAtATime& alone = report_.factors[f].alone;
+      alone.p = adjusted[f];
+      alone.influential = alone.p < settings_.alpha;
+    }
+    return {};
+  }
+
+  // Fills in the level that moves furthest; returns the p of the best level times their number.
+  double judge_levels(const std::vector<double>& levels, const std::vector<PathSet>& sets,
+                      OneAtATime& alone) const {
+    double least_p = 1;
+    alone.distance = -1;
+    for (std::size_t l = 0; l < levels.size(); ++l) {
+      std::vector<double> distances;
+      for (unsigned r = 0; r < settings_.repeats; ++r) {
+        const PathSet& set = sets[l * settings_.repeats + r];
+        alone.failures += set.ok ? 0 : 1;
+        distances.push_back(apart(set, repeats_[r]));
+      }
+      const double middle = median(distances);
+      if (middle > median(noise_) + kLeast_m) {
+        least_p = std::min(least_p, mann_whitney(distances, noise_).p);
+      }
+      if (middle <= alone.distance) continue;
+      alone.distance = middle;
+      alone.distance_95 = median_interval(distances, 0.95);
+      alone.value = levels[l];
+    }
+    alone.distance = std::max(alone.distance, 0.0);
+    return std::min(1.0, least_p * static_cast<double>(std::max<std::size_t>(levels.size(), 1)));
+  }
+
+  static v1::Override override_of(std::size_t row, double value) {
+    v1::Override override;
+    override.set_parameter(static_cast<std::uint32_t>(row));
+    override.set_value(value);
+    return override;
+  }
+
+  std::vector<v1::Override> overrides_of(const Genome& genome) const {
+    std::vector<v1::Override> overrides;
+    for (std::size_t i = 0; i < genes_.size(); ++i) {
+      overrides.push_back(
+          override_of(genes_[i].row, decode_gene(problem_.table(), genes_[i], genome[i])));
+    }
+    return overrides;
+  }
+
+  Status morris() {
+    hooks_.began(2);
+    const std::size_t k = genes_.size();
+    std::vector<TraceRequest> requests;
+    std::vector<std::vector<std::size_t>> orders;
+    for (unsigned t = 0; t < settings_.trajectories; ++t) {
+      Stream stream({settings_.trace.seed, Purpose::kStatistics, 1, t});
+      Genome genome(k);
+      for (double& g : genome) g = stream.bernoulli(0.5) ? 0 : 1.0 / 3;
+      std::vector<bool> down(k);
+      for (std::size_t i = 0; i < k; ++i) {
+        down[i] = stream.bernoulli(0.5);
+        if (down[i]) genome[i] += kMorrisStep;
+      }
+      orders.push_back(stream.permutation(k));
+      for (std::uint64_t side = 0; side < 2; ++side) {
+        requests.push_back({overrides_of(genome), kMorrisNoise + 2 * t + side});
+      }
+      requests.push_back({overrides_of(genome), std::nullopt});
+      for (const std::size_t i : orders.back()) {
+        genome[i] += down[i] ? -kMorrisStep : kMorrisStep;
+        requests.push_back({overrides_of(genome), std::nullopt});
+      }
+    }
+    ASSIGN_OR_RETURN(const auto sets, trace_paths(farm_, problem_, settings_.trace, requests));
+    judge_walks(sets, orders);
+    return {};
+  }
+
+  void judge_walks(const std::vector<PathSet>& sets,
+                   const std::vector<std::vector<std::size_t>>& orders) {
+    const std::size_t k = genes_.size(), length = k + 3;
+    std::vector<double> noise;
+    std::vector<std::vector<double>> steps(k);
+    for (std::size_t t = 0; t < orders.size(); ++t) {
+      const auto at = [&](std::size_t i) -> const PathSet& { return sets[t * length + i]; };
+      if (at(0).ok && at(1).ok) noise.push_back(apart(at(0), at(1)));
+      for (std::size_t s = 0; s < k; ++s) {
+        const PathSet& from = at(2 + s);
+        const PathSet& to = at(3 + s);
+        if (from.ok && to.ok) {
+          steps[orders[t][s]].push_back(apart(from, to));
+        } else {
+          ++report_.factors[orders[t][s]].morris.failures;
+        }
+      }
+    }
+    if (noise.empty()) return;
+    report_.box_repeat_distance = median(noise);
+    std::vector<double> p;
+    for (std::size_t f = 0; f < k; ++f) {
+      const bool further = !steps[f].empty() && median(steps[f]) > median(noise) + kLeast_m;
+      p.push_back(further ? mann_whitney(steps[f], noise).p : 1);
+      summarise_steps(steps[f], f, report_.factors[f].morris);
+    }
+    const std::vector<double> adjusted = holm(p);
+    for (std::size_t f = 0; f < k; ++f) {
+      report_.factors[f].morris.p = adjusted[f];
+      report_.factors[f].morris.influential = adjusted[f] < settings_.alpha;
+    }
+  }
+
+  void summarise_steps(const std::vector<double>& steps, std::size_t f, MorrisEffect& to) const {
+    if (steps.empty()) return;
+    const auto mean = [&](std::span<const std::size_t> members) {
+      double sum = 0;
+      for (const std::size_t i : members) sum += steps[i];
+      return sum / static_cast<double>(members.size());
+    };
+    std::vector<std::vector<std::size_t>> blocks;
+    std::vector<std::size_t> all;
+    for (std::size_t i = 0; i < steps.size(); ++i) {
+      blocks.push_back({i});
+      all.push_back(i);
+    }
+    to.mean = mean(all);
+    for (const double step : steps) to.deviation += (step - to.mean) * (step - to.mean);
+    to.deviation = std::sqrt(to.deviation / static_cast<double>(steps.size()));
+    Stream stream({settings_.trace.seed, Purpose::kStatistics, 2, f});
+    to.mean_95 = bootstrap_interval(blocks, mean, 0.95, kBootstrap, stream);
+  }
+
+  Farm& farm_;
+  const Problem& problem_;
+  const std::vector<Gene>& genes_;
+  InfluenceSettings settings_;
+  PathDistance distance_;
+  const StageHooks& hooks_;
+  InfluenceReport report_;
+  PathSet nominal_;
+  std::vector<PathSet> repeats_, others_;
+  std::vector<double> noise_;
+  std::size_t samples_ = 0;
+};
+
+}  // namespace
+
+Result<InfluenceReport> find_influence(Farm& farm, const Problem& problem,
+                                       const std::vector<Gene>& genes,
+                                       const InfluenceSettings& settings, const StageHooks& hooks) {
+  if (genes.empty()) return Error{"there are no parameters to look at"};
+  return Study(farm, problem, genes, settings, hooks).run();
+}
+
+std::vector<Gene> all_base_genes(const ParameterTable& table) {
+  std::vector<Gene> genes;
+  for (std::size_t row = 0; row < table.size(); ++row) {
+    if (!table[row].effect.empty()) continue;
+    genes.push_back({row, table[row].lower, table[row].upper, table[row].scale});
+  }
+  return genes;
+}
+
+}  // namespace gapfarm

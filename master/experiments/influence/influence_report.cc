@@ -1,0 +1,166 @@
+// The influence of parameters as text, CSV, page and genes.
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+
+#include "master/experiments/influence/influence.h"
+#include "master/report/figures/line_chart.h"
+#include "master/report/html.h"
+#include "master/report/plain_page.h"
+
+namespace gapfarm {
+namespace {
+
+std::string distance_text(double distance_m) {
+  return distance_m >= 1e5 ? std::string("fails") : fmt::format("{:.3g}", distance_m);
+}
+
+std::string interval_text(const Interval& interval) {
+  return distance_text(interval.lower) + " to " + distance_text(interval.upper);
+}
+
+std::string gene_range(const Gene& gene, const ParameterTable& table) {
+  return table.format(gene.row, gene.lower) + " to " + table.format(gene.row, gene.upper);
+}
+
+// The value without its unit, as TOML has it.
+std::string toml_value(const ParameterTable& table, std::size_t row, double value) {
+  const Parameter& parameter = table[row];
+  switch (parameter.kind) {
+    case ParameterKind::kChoice:
+      return "\"" + parameter.choices[static_cast<std::size_t>(value)] + "\"";
+    case ParameterKind::kBoolean:
+      return value != 0 ? "true" : "false";
+    default:
+      return fmt::format("{}", value);
+  }
+}
+
+std::vector<ChartBar> bars_of(const InfluenceReport& report, const ParameterTable& table,
+                              bool morris) {
+  std::vector<ChartBar> bars;
+  for (const FactorInfluence& factor : report.factors) {
+    const Interval& interval = morris ? factor.morris.mean_95 : factor.alone.distance_95;
+    const double value = morris ? factor.morris.mean : factor.alone.distance;
+    if (value >= 1e5) continue;  // no bar is that long
+    bars.push_back({table[factor.gene.row].key, value, interval.lower,
+                    std::min(interval.upper, 1e5),
+                    morris ? factor.morris.influential : factor.alone.influential});
+  }
+  std::stable_sort(bars.begin(), bars.end(),
+                   [](const ChartBar& a, const ChartBar& b) { return a.value > b.value; });
+  return bars;
+}
+
+}  // namespace
+
+std::string influence_text(const InfluenceReport& report, const ParameterTable& table) {
+  std::string text = fmt::format(
+      "paths are compared over the first {:.3g} s, where repeats of the standard are {:.3g} m "
+      "apart "
+      "(95 %: {})\n\n{:<24} {:>9} {:>20} {:>9} {:>8}   {:>9} {:>20} {:>9} {:>8}\n",
+      report.horizon_s, report.repeat_distance, interval_text(report.repeat_95), "alone: m further",
+      "median", "95 %", "at", "p", "Morris", "95 %", "sigma", "p");
+  for (const FactorInfluence& f : report.factors) {
+    text += fmt::format("{:<24} {:>9} {:>20} {:>9.3g} {:>8.1g} {} {:>9} {:>20} {:>9} {:>8.1g} {}\n",
+                        table[f.gene.row].key, distance_text(f.alone.distance),
+                        interval_text(f.alone.distance_95), f.alone.value, f.alone.p,
+                        f.alone.influential ? '*' : ' ', distance_text(f.morris.mean),
+                        interval_text(f.morris.mean_95), distance_text(f.morris.deviation),
+                        f.morris.p, f.morris.influential ? '*' : ' ');
+  }
+  return text + "\n* moves the path further than repeats do, at 5 % over all parameters\n";
+}
+
+std::string influence_csv(const InfluenceReport& report, const ParameterTable& table) {
+  std::string text =
+      "parameter,lower,upper,alone_value,alone_distance_m,alone_low_95,alone_high_95,alone_p,"
+      "alone_influential,alone_failures,morris_mean_m,morris_low_95,morris_high_95,morris_sigma_m,"
+      "morris_p,morris_influential,morris_failures,repeat_distance_m,horizon_s\n";
+  for (const FactorInfluence& f : report.factors) {
+    text += fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n",
+                        table[f.gene.row].key, f.gene.lower, f.gene.upper, f.alone.value,
+                        f.alone.distance, f.alone.distance_95.lower, f.alone.distance_95.upper,
+                        f.alone.p, f.alone.influential ? 1 : 0, f.alone.failures, f.morris.mean,
+                        f.morris.mean_95.lower, f.morris.mean_95.upper, f.morris.deviation,
+                        f.morris.p, f.morris.influential ? 1 : 0, f.morris.failures,
+                        report.repeat_distance, report.horizon_s);
+  }
+  return text;
+}
+
+std::string influence_page(const InfluenceReport& report, const ParameterTable& table,
+                           const InfluenceSettings& settings, const std::string& title) {
+  PlainPage page(title);
+  page.paragraph(fmt::format(
+      "Distances between paths ({}) over the first {} s. A parameter counts as influential when it "
+      "moves the path further than repeating the run does: Mann-Whitney test, adjusted by Holm "
+      "over "
+      "the parameters, level {}.",
+      path_distances()[settings.distance].name, number_text(report.horizon_s), settings.alpha));
+  page.heading("How far ahead paths can be compared");
+  page.paragraph(
+      "Tiny differences at the start grow with every collision. Beyond the horizon repeats of the "
+      "same run are as far apart as anything, and no parameter could be told from chance.");
+  LineChart growth;
+  growth.title = "Repeats of the standard";
+  growth.x_title = "s compared";
+  growth.y_title = "m, median over pairs of repeats";
+  growth.log_y = true;
+  ChartSeries apart{.name = "apart", .line = {}, .lower = {}, .upper = {}};
+  ChartSeries allowed{
+      .name = "allowed share of the path's extent", .line = {}, .lower = {}, .upper = {}};
+  for (const HorizonPoint& point : report.horizons) {
+    apart.line.push_back({point.horizon_s, point.repeat_distance});
+    allowed.line.push_back({point.horizon_s, settings.chaos_share * point.extent});
+  }
+  growth.series = {apart, allowed};
+  page.picture(line_chart(growth), growth.title);
+  page.heading("One parameter at a time");
+  page.picture(bar_chart("Furthest level of each parameter", "m from the standard's path, median",
+                         bars_of(report, table, false), report.repeat_distance, "repeats"),
+               "bars of distances, the influential ones filled");
+  page.heading("Morris: one parameter a step, all over the box");
+  page.picture(bar_chart("Mean distance a step of two thirds of the range moves the path", "m",
+                         bars_of(report, table, true), report.box_repeat_distance, "repeats"),
+               "bars of mean distances, the influential ones filled");
+  page.heading("Numbers");
+  std::vector<std::vector<std::string>> rows;
+  for (const FactorInfluence& f : report.factors) {
+    rows.push_back({table[f.gene.row].key, gene_range(f.gene, table),
+                    table.format(f.gene.row, f.alone.value), distance_text(f.alone.distance),
+                    interval_text(f.alone.distance_95), p_text(f.alone.p),
+                    f.alone.influential ? "yes" : "no", distance_text(f.morris.mean),
+                    interval_text(f.morris.mean_95), distance_text(f.morris.deviation),
+                    p_text(f.morris.p), f.morris.influential ? "yes" : "no",
+                    std::to_string(f.alone.failures + f.morris.failures)});
+  }
+  page.table({"parameter", "range", "furthest at", "m", "95 %", "p", "influential", "Morris m",
+              "95 %", "sigma", "p", "influential", "runs that failed"},
+             rows);
+  return page.finish();
+}
+
+std::string influential_genes(const InfluenceReport& report, const ParameterTable& table) {
+  std::string text =
+      "# Parameters that move the path further than repeats do, most influential first.\n[genes]\n";
+  for (const FactorInfluence& f : report.factors) {
+    if (!f.alone.influential && !f.morris.influential) continue;
+    const Parameter& parameter = table[f.gene.row];
+    std::string range = "[" + toml_value(table, f.gene.row, f.gene.lower) + ", " +
+                        toml_value(table, f.gene.row, f.gene.upper) + "]";
+    if (parameter.kind == ParameterKind::kChoice) {
+      range = "[";
+      for (double choice = f.gene.lower; choice <= f.gene.upper; ++choice) {
+        range += (range.size() > 1 ? ", " : "") + toml_value(table, f.gene.row, choice);
+      }
+      range += "]";
+    }
+    text += parameter.key + " = " + range;
+    if (parameter.unit != "-") text += "  # " + parameter.unit;
+    text += "\n";
+  }
+  return text;
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,119 @@
+#include "master/experiments/influence/stability.h"
+
+#include <cmath>
+
+#include "common/base/try.h"
+#include "master/evolve/evaluation.h"
+#include "master/evolve/optimisers.h"
+
+namespace gapfarm {
+namespace {
+
+constexpr std::uint64_t kFreshNoise = 1u << 20;
+constexpr int kMostIdleGenerations = 100;
+
+std::vector<v1::Override> overrides_of(const Problem& problem, const Genome& genome) {
+  std::vector<v1::Override> overrides;
+  for (std::size_t i = 0; i < genome.size(); ++i) {
+    v1::Override override;
+    override.set_parameter(static_cast<std::uint32_t>(problem.genes[i].row));
+    override.set_value(decode_gene(problem.table(), problem.genes[i], genome[i]));
+    overrides.push_back(std::move(override));
+  }
+  return overrides;
+}
+
+class Search {
+ public:
+  Search(Farm& farm, const Problem& problem, const StabilitySettings& settings)
+      : farm_(farm), problem_(problem), settings_(settings) {}
+
+  // Spread at each genome; an empty genome stands for the problem's own values.
+  Result<std::vector<std::optional<double>>> spreads(const std::vector<Genome>& genomes,
+                                                     std::uint64_t first_repeat) const {
+    std::vector<TraceRequest> requests;
+    for (const Genome& genome : genomes) {
+      for (unsigned r = 0; r < settings_.repeats; ++r) {
+        requests.push_back({overrides_of(problem_, genome), first_repeat + r});
+      }
+    }
+    ASSIGN_OR_RETURN(const auto sets, trace_paths(farm_, problem_, settings_.trace, requests));
+    std::vector<std::optional<double>> found;
+    for (std::size_t i = 0; i < genomes.size(); ++i) {
+      found.push_back(
+          end_spread(std::span(sets).subspan(i * settings_.repeats, settings_.repeats)));
+    }
+    return found;
+  }
+
+ private:
+  Farm& farm_;
+  const Problem& problem_;
+  const StabilitySettings& settings_;
+};
+
+std::vector<Score> scores_of(const std::vector<std::optional<double>>& spreads) {
+  std::vector<Score> scores;
+  for (const auto& spread : spreads) {
+    scores.push_back({spread ? v1::OK : v1::DIVERGED, spread.value_or(0)});
+  }
+  return scores;
+}
+
+}  // namespace
+
+std::optional<double> end_spread(std::span<const PathSet> repeats) {
+  double squares = 0;
+  std::size_t count = 0;
+  for (const PathSet& set : repeats) {
+    if (!set.ok) return std::nullopt;
+  }
+  for (std::size_t c = 0; c < repeats.front().paths.size(); ++c) {
+    PathPoint mean = PathPoint::Zero();
+    for (const PathSet& set : repeats) {
+      mean += set.paths[c].back() / static_cast<double>(repeats.size());
+    }
+    for (const PathSet& set : repeats) squares += (set.paths[c].back() - mean).squaredNorm();
+    count += repeats.size();
+  }
+  return std::sqrt(squares / static_cast<double>(count));
+}
+
+Result<StabilityReport> find_stability(Farm& farm, const Problem& problem,
+                                       const StabilitySettings& settings, const StageHooks& hooks) {
+  OptimiserSetup setup = optimiser_setup(settings.evolution, problem, settings.trace.seed);
+  setup.noisy = false;
+  ASSIGN_OR_RETURN(auto optimiser, make_optimiser(setup));
+  const Search search(farm, problem, settings);
+  StabilityReport report;
+  // The config's own values, then the points, then those two and the best on fresh repeats.
+  const std::uint64_t tasks =
+      traces_of_a_set(problem, settings.trace) * settings.repeats * (settings.evaluations + 3);
+  hooks.planned({{"try points", 1, tasks}});
+  hooks.began(0);
+  ASSIGN_OR_RETURN(auto standard, search.spreads({{}}, 0));
+  report.standard_spread = standard.front();
+  for (int idle = 0;
+       optimiser->evaluations() < settings.evaluations && idle < kMostIdleGenerations;) {
+    std::vector<Genome> genomes;
+    for (const Candidate& candidate : optimiser->ask()) genomes.push_back(candidate.genome);
+    ASSIGN_OR_RETURN(const auto spreads, search.spreads(genomes, 0));
+    for (std::size_t i = 0; i < genomes.size(); ++i) {
+      if (spreads[i]) report.tried.push_back({problem.values_of(genomes[i]), *spreads[i]});
+    }
+    optimiser->tell(scores_of(spreads));
+    idle = genomes.empty() ? idle + 1 : 0;
+  }
+  report.evaluations = optimiser->evaluations();
+  const Member& best = optimiser->best();
+  if (best.outcome != v1::OK) {
+    return Error{"no point of the searched box ends well; narrow the genes' ranges"};
+  }
+  report.best = {problem.values_of(best.genome), best.cost};
+  ASSIGN_OR_RETURN(const auto fresh, search.spreads({{}, best.genome}, kFreshNoise));
+  report.standard_fresh = fresh[0];
+  report.best_fresh = fresh[1];
+  return report;
+}
+
+}  // namespace gapfarm

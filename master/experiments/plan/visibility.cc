@@ -1,0 +1,219 @@
+#include "master/experiments/plan/visibility.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "common/base/try.h"
+#include "common/math/statistics.h"
+#include "common/random/stream.h"
+#include "master/diagnose/subject.h"
+#include "master/experiments/plan/selection.h"
+#include "master/infer/predictor.h"
+
+namespace gapfarm::plan {
+namespace {
+
+constexpr double kPower = 0.9;
+constexpr int kMostHalvings = 4;  // where the robot cannot be simulated at the first strength
+
+NoiseEstimate noise_of(const DiagnosisSubject& subject, const ParameterValues& values) {
+  const auto value = [&](const NoiseRow& from) { return values[from.row] / from.unit; };
+  NoiseEstimate noise;
+  noise.drive_common = value(subject.drive_common);
+  noise.drive_side = value(subject.drive_side);
+  noise.pose.position_m = value(subject.pose_position);
+  noise.pose.heading_rad = value(subject.pose_heading);
+  return noise;
+}
+
+Arena arena_of(const TrialLog& log) {
+  std::vector<double> x, y;
+  for (const Trial& trial : log.trials) {
+    x.push_back(trial.X_WS.x);
+    y.push_back(trial.X_WS.y);
+  }
+  return {quantile(x, 0), quantile(x, 1), quantile(y, 0), quantile(y, 1)};
+}
+
+Overrides with_effect(const Study& study, const EffectDraw& draw, double strength) {
+  Overrides at = study.base;
+  const std::vector<double> values = effect_values(*study.table, draw, strength);
+  for (std::size_t k = 0; k < values.size(); ++k) {
+    at[study.table->effect_row(draw.effect) + k] = values[k];
+  }
+  return at;
+}
+
+// Simulates every shift at its strength; those that cannot be are tried at half of it.
+Status simulate_shifts(Predictor& predictor, const Study& study, std::vector<Shift>* shifts) {
+  std::vector<std::size_t> open(shifts->size());
+  for (std::size_t k = 0; k < open.size(); ++k) open[k] = k;
+  for (int half = 0; half <= kMostHalvings && !open.empty(); ++half) {
+    std::vector<PredictionRequest> requests;
+    for (const std::size_t k : open) {
+      requests.push_back({with_effect(study, (*shifts)[k].draw, (*shifts)[k].strength), {}});
+    }
+    ASSIGN_OR_RETURN(const auto ends, predictor.attempt(requests));
+    std::vector<std::size_t> failed;
+    for (std::size_t i = 0; i < open.size(); ++i) {
+      Shift& shift = (*shifts)[open[i]];
+      if (ends[i]) {
+        shift.rows = study.whiten(differences(study, *ends[i], 1));
+      } else {
+        shift.strength /= 2;
+        failed.push_back(open[i]);
+      }
+    }
+    open = std::move(failed);
+  }
+  std::erase_if(*shifts, [](const Shift& shift) { return shift.rows.size() == 0; });
+  return {};
+}
+
+// Distance of a draw's strongest parameter from neutral.
+struct Deviation {
+  std::size_t row = 0;
+  double size = 0;
+};
+
+Deviation deviation(const ParameterTable& table, const EffectDraw& draw, double strength) {
+  std::size_t strongest = 0;
+  for (std::size_t k = 1; k < draw.towards.size(); ++k) {
+    if (std::abs(draw.towards[k]) > std::abs(draw.towards[strongest])) strongest = k;
+  }
+  const std::size_t row = table.effect_row(draw.effect) + strongest;
+  const double value = effect_values(table, draw, std::min(1.0, strength))[strongest];
+  return {row, std::abs(value - table[row].nominal)};
+}
+
+std::map<std::size_t, std::vector<const Shift*>> by_effect(const Signals& signals) {
+  std::map<std::size_t, std::vector<const Shift*>> found;
+  for (const Shift& shift : signals.shifts) found[shift.draw.effect].push_back(&shift);
+  return found;
+}
+
+double threshold_of(const Problem& problem, std::size_t effect) {
+  return 2 * gain_to_be_named(*diagnosis_subject(problem),
+                              problem.table().effects()[effect].parameters.size());
+}
+
+double freedom_of(const Problem& problem, std::size_t effect) {
+  return static_cast<double>(problem.table().effects()[effect].parameters.size());
+}
+
+void find_like(const ParameterTable& table, const Signals& signals,
+               const std::vector<const Shift*>& own, Visibility* seen) {
+  for (const auto& [other, shifts] : by_effect(signals)) {
+    if (other == own.front()->draw.effect) continue;
+    std::vector<double> greatest;
+    for (const Shift* a : own) {
+      double most = 0;
+      for (const Shift* b : shifts) {
+        most = std::max(most, std::abs(plan::likeness(a->rows, b->rows, signals.nuisances)));
+      }
+      greatest.push_back(most);
+    }
+    const double typical = median(greatest);
+    if (typical <= seen->likeness) continue;
+    seen->likeness = typical;
+    seen->like = table.effects()[other].name;
+  }
+}
+
+}  // namespace
+
+Signals Signals::of(const std::vector<std::size_t>& trials) const {
+  const auto pick = [&](const auto& rows, auto& into) {
+    into.resize(static_cast<Eigen::Index>(3 * trials.size()), rows.cols());
+    for (std::size_t i = 0; i < trials.size(); ++i) {
+      into.middleRows(static_cast<Eigen::Index>(3 * i), 3) =
+          rows.middleRows(static_cast<Eigen::Index>(3 * trials[i]), 3);
+    }
+  };
+  Signals part;
+  pick(nuisances, part.nuisances);
+  for (const Shift& shift : shifts) {
+    part.shifts.push_back({shift.draw, shift.strength, {}});
+    pick(shift.rows, part.shifts.back().rows);
+  }
+  return part;
+}
+
+Result<Signals> signals(Farm& farm, const Problem& problem, const TrialLog& log,
+                        const SignalSettings& settings) {
+  const std::shared_ptr<const DiagnosisSubject> keeps_subject = diagnosis_subject(problem);
+  const DiagnosisSubject& subject = *keeps_subject;
+  Problem planned = problem;
+  planned.log = log;
+  planned.genes.clear();
+  planned.fitness.kind = FitnessKind::kLogScore;
+  ASSIGN_OR_RETURN(auto study, subject.make_study(planned, problem.genes));
+  Predictor predictor(farm, planned);
+  RETURN_IF_ERROR(subject.tune(predictor, true, &study));
+  study.use_noise(noise_of(subject, planned.values));
+  ASSIGN_OR_RETURN(auto nuisances, subject.nuisances(predictor, study));
+  Signals found;
+  found.nuisances = std::move(nuisances);
+  const Arena arena = arena_of(log);
+  for (const std::size_t effect : settings.effects) {
+    if (!planned.table().effects()[effect].moves_means()) continue;
+    for (unsigned d = 0; d < settings.draws; ++d) {
+      Stream stream({settings.seed, Purpose::kSimulation, 2, effect, d});
+      found.shifts.push_back(
+          {draw_effect(planned.table(), effect, arena, stream), kFirstStrength, {}});
+    }
+  }
+  RETURN_IF_ERROR(simulate_shifts(predictor, study, &found.shifts));
+  return found;
+}
+
+double gain_to_be_named(const DiagnosisSubject& subject, std::size_t parameters) {
+  return subject.least_gain + 0.5 * static_cast<double>(parameters);
+}
+
+std::vector<Visibility> visibility(const Problem& problem, const Signals& signals) {
+  const ParameterTable& table = problem.table();
+  std::vector<Visibility> all;
+  for (const auto& [effect, shifts] : by_effect(signals)) {
+    const double wanted =
+        noncentrality_for(kPower, threshold_of(problem, effect), freedom_of(problem, effect));
+    std::vector<double> strengths, sizes;
+    for (const Shift* shift : shifts) {
+      const double now = information(shift->rows, signals.nuisances);
+      strengths.push_back(now > 0 ? shift->strength * std::sqrt(wanted / now) : 1e6);
+      sizes.push_back(deviation(table, shift->draw, strengths.back()).size);
+    }
+    Visibility seen;
+    const Parameter& p = table[deviation(table, shifts.front()->draw, 1).row];
+    seen.effect = table.effects()[effect].name;
+    seen.parameter = p.key;
+    seen.unit = p.unit;
+    seen.strength = median(strengths);
+    if (seen.strength <= 1) seen.size = median(sizes);
+    find_like(table, signals, shifts, &seen);
+    all.push_back(std::move(seen));
+  }
+  return all;
+}
+
+double mean_power(const Problem& problem, const Signals& signals,
+                  const std::vector<Visibility>& at) {
+  double sum = 0;
+  std::size_t count = 0;
+  for (const auto& [effect, shifts] : by_effect(signals)) {
+    const auto wanted = std::find_if(at.begin(), at.end(), [&, name = effect](const Visibility& v) {
+      return v.effect == problem.table().effects()[name].name;
+    });
+    if (wanted == at.end() || wanted->strength > 1) continue;
+    for (const Shift* shift : shifts) {
+      const double times = wanted->strength / shift->strength;
+      sum += chance_of_exceeding(threshold_of(problem, effect), freedom_of(problem, effect),
+                                 times * times * information(shift->rows, signals.nuisances));
+      ++count;
+    }
+  }
+  return count == 0 ? 0 : sum / static_cast<double>(count);
+}
+
+}  // namespace gapfarm::plan

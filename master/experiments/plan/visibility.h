@@ -1,0 +1,73 @@
+// From which size on the trials of a plan would show each effect of the catalogue.
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/base/result.h"
+#include "common/problem/problem.h"
+#include "common/trials/trial.h"
+#include "master/experiments/blind_check/cases/sizing.h"
+#include "master/farm/farm.h"
+
+namespace gapfarm {
+struct DiagnosisSubject;
+}
+
+namespace gapfarm::plan {
+
+// One way in which an effect may be there, and what it does to every trial.
+struct Shift {
+  EffectDraw draw;
+  double strength = 0;   // share of the way to the bound at which `rows` were simulated
+  Eigen::VectorXd rows;  // whitened, three a trial
+};
+
+// What a log of these trials would show, whitened by the noise that the problem's values say.
+struct Signals {
+  std::vector<Shift> shifts;  // several an effect: directions, places
+  Eigen::MatrixXd nuisances;  // what no effect may claim, scaled to a prior s.d. of 1
+
+  // The rows of these trials alone, in this order.
+  Signals of(const std::vector<std::size_t>& trials) const;
+};
+
+struct SignalSettings {
+  std::vector<std::size_t> effects;  // of the table; those on the spread alone have no shift
+  unsigned draws = 4;                // an effect: directions and places
+  std::uint64_t seed = 1;
+};
+
+// By differences of predictions at the problem's own values; an effect that no strength lets be
+// simulated has no shift.  REQUIRES: a scenario with a diagnosis_subject(); a log that is not
+// empty.  Errors: the farm's, and a robot that does not drive at all.
+Result<Signals> signals(Farm& farm, const Problem& problem, const TrialLog& log,
+                        const SignalSettings& settings);
+
+// Nats that an effect with so many parameters must gain to be named: the diagnosis's threshold and
+// what as many parameters gain by luck.
+double gain_to_be_named(const DiagnosisSubject& subject, std::size_t parameters);
+
+struct Visibility {
+  std::string effect;
+  std::string parameter;  // its first strength's key in the table
+  std::string unit;
+  // Distance from neutral at which a diagnosis names it nine times in ten, the median over the
+  // shifts; none: not within the catalogue's bounds.  Motions are taken to grow in proportion.
+  std::optional<double> size;
+  double strength = 0;  // the same as a share of the way to the bound; may exceed 1
+  std::string like;     // the effect that looks most like it; empty: there is no other
+  double likeness = 0;  // |cosine|, the median over the shifts of the greatest
+};
+
+// One an effect that has shifts, in the table's order.
+std::vector<Visibility> visibility(const Problem& problem, const Signals& signals);
+
+// Chance that each effect is named, at these strengths (one an effect of `at`, by its name), the
+// mean over effects and shifts.
+double mean_power(const Problem& problem, const Signals& signals,
+                  const std::vector<Visibility>& at);
+
+}  // namespace gapfarm::plan

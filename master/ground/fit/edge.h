@@ -1,0 +1,33 @@
+// The edge between two floors, as a hypothesis of a ground robot's diagnosis: beyond a line a wheel
+// travels less far, or farther (common/score/kinematic.h).
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <vector>
+
+#include "master/diagnose/result/diagnosis.h"
+#include "master/ground/fit/window_fit.h"
+#include "master/ground/hypotheses.h"
+
+namespace gapfarm {
+
+inline constexpr const char* kFloorEdge = "floor_edge";
+
+GroundHypothesis floor_edge();
+
+// Values with the best of the lines that part the windows, at every angle.  `rows` hold those of
+// floor_edge() behind those of `fit`.
+Eigen::VectorXd scan_floor_edge(const WindowFitter& fitter, const WindowFit& fit,
+                                const std::vector<FitRow>& rows, const Eigen::VectorXd& values);
+
+// Whether enough of the windows lie on either side of a fit's line: a line with all on one side is
+// another floor and no edge.
+bool parts_windows(const WindowFitter& fitter, const WindowFit& fit);
+
+// Parameters and text of a named edge: how much less far wheels travel on the slower side, where
+// the line passes nearest to the middle of the log, and which side is slower.
+void describe_floor_edge(const WindowFitter& fitter, const WindowFit& fit, std::uint64_t seed,
+                         NamedEffect* effect);
+
+}  // namespace gapfarm

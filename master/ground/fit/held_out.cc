@@ -1,0 +1,134 @@
+#include "master/ground/fit/held_out.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "common/random/stream.h"
+#include "master/ground/tolerances.h"
+
+namespace gapfarm {
+namespace {
+
+// First block and count of every run that has windows.
+std::vector<std::pair<int, int>> blocks_of_runs(const WindowSet& windows) {
+  std::vector<std::pair<int, int>> runs;
+  for (std::size_t r = 0; r < windows.run_blocks.size(); ++r) {
+    const int first = windows.run_blocks[r];
+    const bool last = r + 1 == windows.run_blocks.size();
+    const int end = last ? windows.blocks : windows.run_blocks[r + 1];
+    const bool used = std::any_of(windows.block.begin(), windows.block.end(),
+                                  [&](int block) { return block >= first && block < end; });
+    if (used) runs.emplace_back(first, end - first);
+  }
+  return runs;
+}
+
+// Of every block, the fold that it is held out with.  What a run has of its own, such as its
+// clock's offset, is held out together where there are runs enough.
+std::vector<int> folds_of(const WindowSet& windows) {
+  std::vector<int> folds(static_cast<std::size_t>(windows.blocks));
+  const auto runs = blocks_of_runs(windows);
+  const bool whole = runs.size() >= kLeastRunsHeldOut;
+  for (std::size_t b = 0; b < folds.size(); ++b) folds[b] = static_cast<int>(b) % kFolds;
+  for (std::size_t r = 0; whole && r < runs.size(); ++r) {
+    for (int k = 0; k < runs[r].second; ++k) {
+      folds[static_cast<std::size_t>(runs[r].first + k)] = static_cast<int>(r) % kFolds;
+    }
+  }
+  return folds;
+}
+
+// Of every block.
+std::vector<double> block_gains(const WindowSet& windows, const WindowFit& with,
+                                const WindowFit& without) {
+  std::vector<double> gains(static_cast<std::size_t>(windows.blocks), 0.0);
+  for (std::size_t i = 0; i < with.nats.size(); ++i) {
+    gains[static_cast<std::size_t>(windows.block[i])] += with.nats[i] - without.nats[i];
+  }
+  return gains;
+}
+
+double weighted(const std::vector<double>& values, const std::vector<double>& times) {
+  double sum = 0;
+  for (std::size_t k = 0; k < values.size(); ++k) sum += times[k] * values[k];
+  return sum;
+}
+
+HeldOutGain interval_of(double mean, std::vector<double> drawn) {
+  std::sort(drawn.begin(), drawn.end());
+  const std::size_t tail = drawn.size() / 20;
+  return {mean, drawn[tail], drawn[drawn.size() - 1 - tail]};
+}
+
+}  // namespace
+
+WindowFit fit_left_out(const WindowFitter& fitter, const std::vector<FitRow>& rows,
+                       const Eigen::VectorXd& start) {
+  const auto blocks = static_cast<std::size_t>(fitter.windows().blocks);
+  const std::vector<int> folds = folds_of(fitter.windows());
+  WindowFit whole = fitter.hold(rows, start);
+  for (int fold = 0; fold < kFolds; ++fold) {
+    std::vector<char> out(blocks, 0);
+    for (std::size_t b = 0; b < blocks; ++b) out[b] = folds[b] == fold;
+    const WindowFit part =
+        rows.empty() ? fitter.hold(rows, start, out) : fitter.fit(rows, out, start, 1);
+    for (std::size_t i = 0; i < whole.nats.size(); ++i) {
+      if (!out[static_cast<std::size_t>(fitter.windows().block[i])]) continue;
+      whole.nats[i] = part.nats[i];
+      whole.residuals[i] = part.residuals[i];
+    }
+  }
+  return whole;
+}
+
+std::vector<std::vector<double>> draw_blocks(const WindowSet& windows, std::uint64_t seed,
+                                             std::size_t spared) {
+  Stream stream({seed, Purpose::kStatistics, 0, 0, 0});
+  const auto runs = blocks_of_runs(windows);
+  const std::size_t drawn = std::max<std::size_t>(1, runs.size() - std::min(spared, runs.size()));
+  const double weight = static_cast<double>(runs.size()) / static_cast<double>(drawn);
+  std::vector<std::vector<double>> all(
+      kGroundDraws, std::vector<double>(static_cast<std::size_t>(windows.blocks), 0.0));
+  for (std::vector<double>& times : all) {
+    for (std::size_t d = 0; d < drawn; ++d) {
+      const auto [first, count] = runs[static_cast<std::size_t>(stream.below(runs.size()))];
+      for (int k = 0; k < count; ++k) {
+        const auto pick = stream.below(static_cast<std::uint64_t>(count));
+        times[static_cast<std::size_t>(first) + static_cast<std::size_t>(pick)] += weight;
+      }
+    }
+  }
+  return all;
+}
+
+HeldOutGain held_out_gain(const WindowSet& windows, const WindowFit& with, const WindowFit& without,
+                          std::uint64_t seed) {
+  const std::vector<double> gains = block_gains(windows, with, without);
+  std::vector<double> counts(gains.size(), 0.0);
+  for (const int block : windows.block) counts[static_cast<std::size_t>(block)] += 1;
+  std::vector<double> drawn;
+  for (const std::vector<double>& times : draw_blocks(windows, seed, 0)) {
+    drawn.push_back(weighted(gains, times) / std::max(1.0, weighted(counts, times)));
+  }
+  double sum = 0;
+  for (const double gain : gains) sum += gain;
+  return interval_of(sum / static_cast<double>(with.nats.size()), std::move(drawn));
+}
+
+HeldOutGain share_of_gap(const WindowSet& windows, const WindowFit& with, const WindowFit& without,
+                         const WindowFit& best, const WindowFit& worst, std::uint64_t seed) {
+  const std::vector<double> gained = block_gains(windows, with, without);
+  const std::vector<double> gap = block_gains(windows, best, worst);
+  // What is gained is part of the gap, so that a share above 0 is a gain above 0.
+  const auto share = [](double part, double all) {
+    return part > 0 ? part / std::max(part, all) : 0.0;
+  };
+  std::vector<double> drawn;
+  for (const std::vector<double>& times : draw_blocks(windows, seed, 0)) {
+    drawn.push_back(share(weighted(gained, times), weighted(gap, times)));
+  }
+  const std::vector<double> once(gained.size(), 1.0);
+  return interval_of(share(weighted(gained, once), weighted(gap, once)), std::move(drawn));
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,36 @@
+// Predictions of stretches of a log that were not fitted, and how surely one is better than
+// another.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "master/ground/fit/window_fit.h"
+
+namespace gapfarm {
+
+// Nats of every window with the rows fitted to other blocks than its own (kFolds folds); no rows:
+// the file's values as they are.
+WindowFit fit_left_out(const WindowFitter& fitter, const std::vector<FitRow>& rows,
+                       const Eigen::VectorXd& start);
+
+// How often each block of a log counts, draw by draw.  Of n runs n less `spared` are drawn (of
+// values one is spared, so that the scatter of few is not taken for small), and of each as many
+// blocks as it has; together they count as n.
+std::vector<std::vector<double>> draw_blocks(const WindowSet& windows, std::uint64_t seed,
+                                             std::size_t spared);
+
+// Nats a window, with a 90 % interval by runs and blocks drawn again.
+struct HeldOutGain {
+  double mean = 0;
+  double lo = 0;
+  double hi = 0;
+};
+
+HeldOutGain held_out_gain(const WindowSet& windows, const WindowFit& with, const WindowFit& without,
+                          std::uint64_t seed);
+// Share that `with` gains over `without` of what `best` gains over `worst`, within [0, 1].
+HeldOutGain share_of_gap(const WindowSet& windows, const WindowFit& with, const WindowFit& without,
+                         const WindowFit& best, const WindowFit& worst, std::uint64_t seed);
+
+}  // namespace gapfarm

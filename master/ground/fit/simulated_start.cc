@@ -1,0 +1,330 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
+
+#include "common/math/algebra.h"
+#include "common/score/kinematic_start.h"
+#include "master/ground/fit/kinematic_rival.h"
+#include "master/ground/fit/simulation_fit.h"
+
+namespace gapfarm {
+namespace {
+
+constexpr int kMostRounds = 24;
+constexpr int kRaceRounds = 3;  // of every start, before the best go on
+// What windows of one run tell is less than their number says: how much more than one of them a
+// value's start counts is tried on stretches that were left out.
+constexpr std::array<double, 6> kHolds = {1, 3, 10, 30, 100, 300};
+constexpr int kSharpenings = 4;
+constexpr double kFirmly = 1000;   // held where nothing slips
+constexpr double kWorseCosts = 1;  // nats a window for errors e times as large
+// Position and heading count alike, and what is worse than the kinematics' more.
+constexpr double kHeadingCounts = 2;
+constexpr int kEmphases = 3;
+constexpr double kEmphasis = 4;  // power of the ratio
+constexpr double kMostLogRatio = 0.26;
+constexpr double kAsGood = 1.02;   // a ratio that is not worth climbing for
+constexpr std::size_t kLooks = 3;  // starts a gene that kinematics do not tell
+// What is left to find is mostly the noise: a search that has the windows' whole spread to roam in
+// trades ends for the noise's likelihood.
+constexpr double kFoundSpread = 0.1;  // of what the windows leave unsure
+constexpr double kHeldSpread = 1e-3;
+
+double emphasis_of(const Unsure& log_ratio) {
+  return std::exp(kEmphasis * std::clamp(log_ratio.value, 0.0, kMostLogRatio));
+}
+
+}  // namespace
+
+// What kinematics tell is moved to suit the rest, by the slopes of the first climb.
+Status SimulationFit::settle(std::vector<std::optional<At>>* looks, const std::vector<Hold>& holds,
+                             const Climb& first) {
+  std::vector<Genome> genomes;
+  std::vector<std::size_t> whose;
+  std::vector<Hold> held;
+  for (std::size_t k = 0; k < looks->size(); ++k) {
+    const std::optional<At>& look = (*looks)[k];
+    if (!look) continue;
+    NormalEquations equations = normal_equations(*errors_, look->ends, first.slopes);
+    const NormalEquations prior = prior_at(look->genome, holds[k]);
+    equations.H += prior.H;
+    equations.g += prior.g;
+    for (std::size_t j = 0; j < told_.size(); ++j) {
+      if (std::find(untold_.begin(), untold_.end(), told_[j]) == untold_.end()) continue;
+      const auto row = static_cast<Eigen::Index>(j);
+      equations.H.row(row).setZero();
+      equations.H.col(row).setZero();
+      equations.H(row, row) = 1;
+      equations.g[row] = 0;
+    }
+    genomes.push_back(moved(*look, equations));
+    whose.push_back(k);
+    held.push_back(holds[k]);
+  }
+  auto settled = look_at(genomes, held);
+  if (!settled) return settled.error();
+  for (std::size_t j = 0; j < whose.size(); ++j) {
+    std::optional<At>& look = (*looks)[whose[j]];
+    if ((*settled)[j] && (*settled)[j]->nats > look->nats) look = std::move((*settled)[j]);
+  }
+  return {};
+}
+
+Result<std::vector<Climb>> SimulationFit::other_climbs(const Climb& first) {
+  std::vector<Climb> climbs;
+  if (untold_.size() < 2 || first.slopes.empty()) return climbs;
+  const auto starts = spread_starts(start_, untold_, kLooks * untold_.size());
+  std::vector<Hold> holds;
+  for (const Genome& start : starts) holds.push_back({start, 1});
+  auto looks = look_at(starts, holds);
+  if (!looks) return looks.error();
+  for (int round = 0; round < 2; ++round) {
+    if (Status s = settle(&*looks, holds, first); !s) return s.error();
+  }
+  for (std::size_t k = 0; k < looks->size(); ++k) {
+    std::optional<At>& look = (*looks)[k];
+    if (look) climbs.push_back({std::move(*look), holds[k], {}, {}, {}, false});
+  }
+  std::stable_sort(climbs.begin(), climbs.end(),
+                   [](const Climb& a, const Climb& b) { return a.at.nats > b.at.nats; });
+  climbs.resize(std::min(climbs.size(), untold_.size() / 2));
+  return climbs;
+}
+
+WindowEnds SimulationFit::left_out(const Climb& climb, const Hold& hold) const {
+  return left_out_ends(*errors_, climb.at.ends, climb.slopes, prior_at(climb.at.genome, hold),
+                       stretches_);
+}
+
+// The same by simulations at the values of every step: where contacts begin to slip the first order
+// promises what is not to be had.
+Result<WindowEnds> SimulationFit::simulated_left_out(const Climb& climb) {
+  const auto steps = left_out_steps(*errors_, climb.at.ends, climb.slopes,
+                                    prior_at(climb.at.genome, climb.hold), stretches_);
+  std::vector<Genome> genomes;
+  for (const Eigen::VectorXd& step : steps) {
+    genomes.push_back(told_at(climb.at.genome, told_of(climb.at.genome) - step));
+  }
+  const auto there = look_at(genomes, {climb.hold});
+  if (!there) return there.error();
+  WindowEnds ends = left_out(climb, climb.hold);
+  for (std::size_t i = 0; i < ends.size(); ++i) {
+    const std::optional<At>& at = (*there)[stretches_[i]];
+    if (at) ends[i] = at->ends[i];
+  }
+  return ends;
+}
+
+// What is better must be so surely: a standard error is taken off every gain.
+SimulationFit::Foretold SimulationFit::foretold(const WindowEnds& ends) const {
+  const Unsure gain = plain_->gain(ends, rival_, parts_);
+  Foretold of{gain.value, 0, gain.error - gain.value};
+  for (const auto& ratios : plain_->log_ratios(ends, rival_, parts_)) {
+    for (const Unsure& ratio : ratios) {
+      of.worst = std::max(of.worst, std::exp(ratio.value));
+      of.cost += kWorseCosts * std::max(ratio.value + ratio.error, 0.0);
+    }
+  }
+  return of;
+}
+
+// From where the climb stands, with another hold or other errors.
+Status SimulationFit::climb_again(Climb* climb) {
+  climb->at.nats = errors_->nats(climb->at.ends) - cost_of(climb->at.genome, climb->hold);
+  climb->over = false;
+  return climb_on(climb, kMostRounds);
+}
+
+// What stands on the kinematics' values and hardly slips.
+Result<std::optional<Climb>> SimulationFit::firm_climb() {
+  if (firm_ == start_ && untold_.empty()) return std::optional<Climb>();
+  const Hold hold{firm_, 1, kFirmly};
+  auto look = look_at({firm_}, {hold});
+  if (!look) return look.error();
+  if (!look->front()) return std::optional<Climb>();
+  Climb climb{*std::move(look->front()), hold, {}, {}, {}, false};
+  if (Status s = climb_on(&climb, kMostRounds); !s) return s.error();
+  return std::optional(std::move(climb));
+}
+
+// What foretells stretches that were left out best, held as firmly as is best for these.
+Result<Climb> SimulationFit::best_of(std::vector<Climb> climbs) {
+  const auto by_nats = [](const Climb& a, const Climb& b) { return a.at.nats > b.at.nats; };
+  for (Climb& climb : climbs) {
+    if (Status s = climb_on(&climb, kRaceRounds); !s) return s.error();
+  }
+  std::erase_if(climbs, [](const Climb& climb) { return climb.slopes.empty(); });
+  std::stable_sort(climbs.begin(), climbs.end(), by_nats);
+  if (climbs.size() > 2) climbs.resize(2);
+  for (Climb& climb : climbs) {
+    if (Status s = climb_on(&climb, kMostRounds); !s) return s.error();
+  }
+  auto firm = firm_climb();
+  if (!firm) return firm.error();
+  if (*firm) climbs.push_back(**std::move(firm));
+  std::size_t best = 0;
+  Hold held = climbs.front().hold;
+  double least = INFINITY;
+  for (std::size_t k = 0; k < climbs.size(); ++k) {
+    if (climbs[k].slopes.empty()) continue;
+    double cost = INFINITY;
+    const Hold hold = best_hold(climbs[k], &cost);
+    if (!(cost < least)) continue;
+    best = k;
+    held = hold;
+    least = cost;
+  }
+  Climb chosen = std::move(climbs[best]);
+  if (held.strength != chosen.hold.strength) {
+    chosen.hold = held;
+    if (Status s = climb_again(&chosen); !s) return s.error();
+  }
+  auto sharp = sharpen(std::move(chosen));
+  if (!sharp) return sharp.error();
+  return weigh_worse(*std::move(sharp));
+}
+
+// As firmly as foretells best what was left out; `cost` is that of it.
+Hold SimulationFit::best_hold(const Climb& climb, double* cost) const {
+  Hold best = climb.hold;
+  *cost = INFINITY;
+  for (const double strength : kHolds) {
+    const Hold hold{climb.hold.start, strength, climb.hold.untold};
+    const double own = foretold(left_out(climb, hold)).cost;
+    if (!(own < *cost)) continue;
+    best = hold;
+    *cost = own;
+  }
+  return best;
+}
+
+// Kinematics that leave much more than the simulation are no measure of which windows stray.
+Result<Climb> SimulationFit::sharpen(Climb best) {
+  for (int round = 0; round < kSharpenings && !best.slopes.empty(); ++round) {
+    const WindowEnds ends = left_out(best, best.hold);
+    if (!plain_->sharpen(ends)) break;
+    errors_->sharpen(ends);
+    Climb next = best;
+    if (Status s = climb_again(&next); !s) return s.error();
+    double cost = INFINITY;
+    next.hold = best_hold(next, &cost);
+    if (Status s = climb_again(&next); !s) return s.error();
+    const double before = foretold(left_out(best, best.hold)).cost;
+    if (!(foretold(left_out(next, next.hold)).cost < before)) break;
+    best = std::move(next);
+  }
+  return best;
+}
+
+// What is foretold worse than by the kinematics counts more, as long as that helps.
+Result<Climb> SimulationFit::weigh_worse(Climb best) {
+  for (int round = 0; round < kEmphases && !best.slopes.empty(); ++round) {
+    const WindowEnds ends = left_out(best, best.hold);
+    if (foretold(ends).worst <= kAsGood) break;
+    std::vector<std::array<double, 2>> factors;
+    for (const auto& [position, heading] : plain_->log_ratios(ends, rival_, parts_)) {
+      factors.push_back({emphasis_of(position), emphasis_of(heading)});
+    }
+    errors_->emphasise(factors);
+    Climb next = best;
+    if (Status s = climb_again(&next); !s) return s.error();
+    if (foretold(left_out(next, next.hold)).cost >= foretold(ends).cost) break;
+    best = std::move(next);
+  }
+  return best;
+}
+
+// Against the kinematics, whose values in the simulation are `begin` or, without slip, stand firm.
+Status SimulationFit::judge(const Climb& best, const At& begin, SimulatedStart* found) {
+  const auto met = simulated_left_out(best);
+  if (!met) return met.error();
+  const Foretold own = foretold(*met);
+  found->left_out_gain = own.gain;
+  found->worst_ratio = own.worst;
+  const WindowEnds ends = window_errors(problem_, kinematic_ends(problem_, kinematics_));
+  auto firm = look_at({firm_}, {Hold{firm_}});
+  if (!firm) return firm.error();
+  double least = own.cost;
+  for (const At& at : {begin, firm->front().value_or(begin)}) {
+    // What the simulation makes of the kinematics' values is nearly what they make of them.
+    WindowEnds foretells = rival_;
+    for (std::size_t i = 0; i < ends.size(); ++i) foretells[i] += at.ends[i] - ends[i];
+    const Foretold theirs = foretold(foretells);
+    if (theirs.cost >= least) continue;
+    least = theirs.cost;
+    found->kinematic = true;
+    found->genome = at.genome;
+    found->worst_ratio = theirs.worst;
+  }
+  if (found->kinematic) return {};
+  found->genome = best.at.genome;
+  found->gain = (plain_->nats(best.at.ends) - plain_->nats(begin.ends)) /
+                static_cast<double>(plain_->windows());
+  return {};
+}
+
+void SimulationFit::take_spread(const Climb& climb, double widest, SimulatedStart* found) const {
+  const auto n = static_cast<Eigen::Index>(start_.size());
+  Eigen::MatrixXd precision = Eigen::MatrixXd::Identity(n, n) / (widest * widest);
+  for (std::size_t j = 0; j < told_.size(); ++j) {
+    for (std::size_t k = 0; k < told_.size(); ++k) {
+      precision(static_cast<Eigen::Index>(told_[j]), static_cast<Eigen::Index>(told_[k])) +=
+          climb.equations.H(static_cast<Eigen::Index>(j), static_cast<Eigen::Index>(k)) /
+          (kFoundSpread * kFoundSpread);
+    }
+    if (!found->kinematic) continue;
+    const auto own = static_cast<Eigen::Index>(told_[j]);
+    precision(own, own) += 1 / (kHeldSpread * kHeldSpread);
+  }
+  const Eigen::MatrixXd spread = inverse_of_symmetric(precision);
+  found->spread.assign(spread.data(), spread.data() + spread.size());
+}
+
+Result<SimulatedStart> SimulationFit::run(double widest) {
+  const auto kinematics = fit_kinematics(problem_);
+  if (!kinematics) return kinematics.error();
+  kinematics_ = *kinematics;
+  std::vector<double> durations_s;
+  for (const Trial& trial : problem_.log.trials) durations_s.push_back(*trial.duration_s);
+  plain_.emplace(durations_s, window_errors(problem_, kinematic_ends(problem_, kinematics_)));
+  errors_ = plain_;
+  errors_->emphasise(std::vector<std::array<double, 2>>(errors_->lengths(), {1, kHeadingCounts}));
+  rival_ = kinematic_left_out(problem_, kinematics_, *plain_, stretches_);
+  const ParameterValues values = kinematic_start(problem_, kinematics_);
+  for (const Gene& gene : problem_.genes) {
+    start_.push_back(encode_gene(problem_.table(), gene, values[gene.row]));
+  }
+  const ParameterValues grip = without_slip(problem_, values);
+  for (const Gene& gene : problem_.genes) {
+    firm_.push_back(encode_gene(problem_.table(), gene, grip[gene.row]));
+  }
+  const Hold hold{start_, 1};
+  auto first = look_at({start_}, {hold});
+  if (!first) return first.error();
+  SimulatedStart found;
+  found.genome = start_;
+  found.simulations = simulations_;
+  if (!first->front() || told_.empty()) return found;
+  const At begin = *first->front();
+  std::vector<Climb> climbs = {{begin, hold, {}, {}, {}, false}};
+  if (Status s = step(&climbs.front()); !s) return s.error();
+  found.simulations = simulations_;
+  if (climbs.front().slopes.empty()) return found;
+  auto others = other_climbs(climbs.front());
+  if (!others) return others.error();
+  for (Climb& climb : *others) climbs.push_back(std::move(climb));
+  found.starts = climbs.size();
+  const auto best = best_of(std::move(climbs));
+  if (!best) return best.error();
+  if (Status s = judge(*best, begin, &found); !s) return s.error();
+  found.simulations = simulations_;
+  take_spread(*best, widest, &found);
+  return found;
+}
+
+Result<SimulatedStart> fit_by_simulation(Farm& farm, const Problem& problem, double widest) {
+  return SimulationFit(farm, problem).run(widest);
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,204 @@
+#include "master/ground/fit/simulation_fit.h"
+
+#include <algorithm>
+#include <array>
+
+#include "master/ground/fit/kinematic_rival.h"
+
+namespace gapfarm {
+namespace {
+
+constexpr double kGeneStep = 0.01;     // to find slopes; contacts are noisy below
+constexpr double kEnoughNats = 1;      // less is within a standard error or so of the values
+constexpr double kLeastSecant = 3e-3;  // of a move from which slopes can be told
+constexpr std::array<double, 2> kDampings = {0, 1};
+constexpr std::array<double, 3> kGreatDampings = {10, 100, 1000};
+constexpr std::size_t kStretches = 6;
+constexpr std::size_t kParts = 12;    // of the log, that tell how sure a gain is
+constexpr double kFreelyMoves = 0.3;  // of a gene's range, where the windows do not tell
+
+}  // namespace
+
+SimulationFit::SimulationFit(Farm& farm, const Problem& problem)
+    : farm_(farm),
+      problem_(problem),
+      hash_(farm.add_problem(to_proto(problem))),
+      stretches_(left_out_stretches(problem.log.trials, problem.runs, kStretches)),
+      parts_(left_out_stretches(problem.log.trials, problem.runs, kParts)) {
+  const std::vector<bool> kinematic = told_by_kinematics(problem);
+  for (std::size_t g = 0; g < problem.genes.size(); ++g) {
+    const Parameter& row = problem.table()[problem.genes[g].row];
+    const bool noise = row.key.find("_noise_") != std::string::npos;
+    if (noise || row.kind != ParameterKind::kReal) continue;
+    told_.push_back(g);
+    if (!kinematic[g]) untold_.push_back(g);
+  }
+}
+
+Result<std::vector<std::optional<At>>> SimulationFit::look_at(const std::vector<Genome>& genomes,
+                                                              const std::vector<Hold>& holds) {
+  std::vector<v1::Task> tasks;
+  for (const Genome& genome : genomes) {
+    v1::PredictTask* predict = tasks.emplace_back().mutable_predict();
+    predict->mutable_point()->mutable_genome()->Assign(genome.begin(), genome.end());
+    predict->set_means_only(true);
+  }
+  simulations_ += tasks.size();
+  const auto results = farm_.run(hash_, tasks);
+  if (!results) return results.error();
+  std::vector<std::optional<At>> all;
+  for (std::size_t k = 0; k < genomes.size(); ++k) {
+    const v1::TaskResult& result = (*results)[k];
+    all.emplace_back();
+    if (result.outcome() != v1::OK) continue;
+    std::vector<Pose> ends;
+    for (const v1::Predicted& p : result.predict().predictions()) {
+      ends.push_back(from_proto(p.end()));
+    }
+    At at{genomes[k], window_errors(problem_, ends), 0};
+    at.nats = errors_->nats(at.ends);
+    at.nats -= cost_of(at.genome, holds[holds.size() == 1 ? 0 : k]);
+    all.back() = std::move(at);
+  }
+  return all;
+}
+
+double SimulationFit::strength_of(const Hold& hold, std::size_t gene) const {
+  const bool untold = std::find(untold_.begin(), untold_.end(), gene) != untold_.end();
+  return hold.strength * (untold ? hold.untold : 1);
+}
+
+double SimulationFit::cost_of(const Genome& genome, const Hold& hold) const {
+  double sum = 0;
+  for (const std::size_t g : told_) {
+    const double moved = (genome[g] - hold.start[g]) / kFreelyMoves;
+    sum += strength_of(hold, g) * moved * moved / 2;
+  }
+  return sum;
+}
+
+NormalEquations SimulationFit::prior_at(const Genome& genome, const Hold& hold) const {
+  const auto n = static_cast<Eigen::Index>(told_.size());
+  NormalEquations prior{Eigen::MatrixXd::Zero(n, n), Eigen::VectorXd(n)};
+  for (std::size_t k = 0; k < told_.size(); ++k) {
+    const std::size_t gene = told_[k];
+    const auto row = static_cast<Eigen::Index>(k);
+    prior.H(row, row) = strength_of(hold, gene) / (kFreelyMoves * kFreelyMoves);
+    prior.g[row] = prior.H(row, row) * (genome[gene] - hold.start[gene]);
+  }
+  return prior;
+}
+
+Eigen::VectorXd SimulationFit::told_of(const Genome& genome) const {
+  Eigen::VectorXd values(static_cast<Eigen::Index>(told_.size()));
+  for (std::size_t k = 0; k < told_.size(); ++k) {
+    values[static_cast<Eigen::Index>(k)] = genome[told_[k]];
+  }
+  return values;
+}
+
+Genome SimulationFit::moved(const At& at, const NormalEquations& equations) const {
+  return told_at(at.genome, step_within_bounds(equations, told_of(at.genome)));
+}
+
+Genome SimulationFit::told_at(const Genome& genome, const Eigen::VectorXd& values) const {
+  Genome to = genome;
+  for (std::size_t k = 0; k < told_.size(); ++k) {
+    to[told_[k]] = std::clamp(values[static_cast<Eigen::Index>(k)], 0.0, 1.0);
+  }
+  return to;
+}
+
+void SimulationFit::make_equations(Climb* climb) const {
+  climb->equations = normal_equations(*errors_, climb->at.ends, climb->slopes);
+  const NormalEquations prior = prior_at(climb->at.genome, climb->hold);
+  climb->equations.H += prior.H;
+  climb->equations.g += prior.g;
+}
+
+Status SimulationFit::look_round(Climb* climb) {
+  const At& at = climb->at;
+  if (climb->sloped == at.genome) return {};
+  std::vector<Genome> genomes;
+  for (const std::size_t gene : told_) {
+    genomes.push_back(at.genome);
+    double& value = genomes.back()[gene];
+    value += value + kGeneStep > 1 ? -kGeneStep : kGeneStep;
+  }
+  const auto beside = look_at(genomes, {climb->hold});
+  if (!beside) return beside.error();
+  climb->over = std::any_of(beside->begin(), beside->end(), [](const auto& b) { return !b; });
+  if (climb->over) return {};
+  climb->sloped = at.genome;
+  climb->slopes.assign(at.ends.size(), Eigen::MatrixXd(3, static_cast<Eigen::Index>(told_.size())));
+  for (std::size_t k = 0; k < told_.size(); ++k) {
+    const At& there = *(*beside)[k];
+    const double step = there.genome[told_[k]] - at.genome[told_[k]];
+    for (std::size_t i = 0; i < at.ends.size(); ++i) {
+      climb->slopes[i].col(static_cast<Eigen::Index>(k)) = (there.ends[i] - at.ends[i]) / step;
+    }
+  }
+  return {};
+}
+
+// Broyden's: so that they say what this move did.
+void SimulationFit::correct_slopes(const At& before, Climb* climb) const {
+  const Eigen::VectorXd move = told_of(climb->at.genome) - told_of(before.genome);
+  if (move.norm() < kLeastSecant) return;
+  for (std::size_t i = 0; i < climb->slopes.size(); ++i) {
+    Eigen::MatrixXd& slopes = climb->slopes[i];
+    const Eigen::Vector3d missed = climb->at.ends[i] - before.ends[i] - slopes * move;
+    slopes += missed * move.transpose() / move.squaredNorm();
+  }
+}
+
+double SimulationFit::promised(const Climb& climb) const {
+  const Eigen::VectorXd move = told_of(moved(climb.at, climb.equations)) - told_of(climb.at.genome);
+  return -climb.equations.g.dot(move) - move.dot(climb.equations.H * move) / 2;
+}
+
+// The best of these, and the nats that it gains.
+Result<double> SimulationFit::try_steps(Climb* climb, std::span<const double> dampings) {
+  std::vector<Genome> genomes;
+  for (const double damping : dampings) {
+    NormalEquations damped = climb->equations;
+    damped.H.diagonal() *= 1 + damping;
+    genomes.push_back(moved(climb->at, damped));
+  }
+  auto tried = look_at(genomes, {climb->hold});
+  if (!tried) return tried.error();
+  const At before = climb->at;
+  for (std::optional<At>& there : *tried) {
+    if (there && there->nats > climb->at.nats) climb->at = std::move(*there);
+  }
+  correct_slopes(before, climb);
+  return climb->at.nats - before.nats;
+}
+
+// By the slopes that there are while these lead up, else by new ones, with greater dampings where
+// the usual do not help.
+Status SimulationFit::step(Climb* climb) {
+  if (!climb->slopes.empty() && climb->sloped != climb->at.genome) {
+    make_equations(climb);
+    const auto gained = try_steps(climb, kDampings);
+    if (!gained) return gained.error();
+    if (*gained >= kEnoughNats) return {};
+  }
+  if (Status s = look_round(climb); !s || climb->over) return s;
+  make_equations(climb);
+  const bool worth_more = promised(*climb) >= kEnoughNats;
+  auto gained = try_steps(climb, kDampings);
+  if (gained && *gained == 0 && worth_more) gained = try_steps(climb, kGreatDampings);
+  if (!gained) return gained.error();
+  climb->over = *gained < kEnoughNats;
+  return {};
+}
+
+Status SimulationFit::climb_on(Climb* climb, int rounds) {
+  for (int k = 0; k < rounds && !climb->over; ++k) {
+    if (Status s = step(climb); !s) return s;
+  }
+  return {};
+}
+
+}  // namespace gapfarm

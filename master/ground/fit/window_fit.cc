@@ -1,0 +1,315 @@
+#include "master/ground/fit/window_fit.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+
+#include "common/math/algebra.h"
+#include "common/score/kinematic.h"
+#include "master/ground/fit/window_prior.h"
+
+namespace gapfarm {
+namespace {
+
+constexpr int kSteps = 6;            // of Gauss and Newton a round
+constexpr double kStepShare = 0.05;  // of a row's tolerance: to find slopes
+constexpr double kFaster = 0.02;     // to find how ends move with speed
+constexpr double kEnough = 1e-3;     // nats a step
+
+double robust_deviation(std::vector<double>* sizes) {
+  const auto middle = sizes->begin() + static_cast<long>(sizes->size() / 2);
+  std::nth_element(sizes->begin(), middle, sizes->end());
+  return std::max(1.4826 * *middle, 1e-5);
+}
+
+}  // namespace
+
+double window_nats(double residual, double scale) {
+  static const double constant = std::lgamma((kWindowTail + 1) / 2) - std::lgamma(kWindowTail / 2) -
+                                 0.5 * std::log(kWindowTail * std::acos(-1.0));
+  const double z = residual / scale;
+  return constant - std::log(scale) - (kWindowTail + 1) / 2 * std::log1p(z * z / kWindowTail);
+}
+
+WindowFitter::WindowFitter(const GroundRobot& robot, const WindowSet& windows,
+                           const GroundReference* reference, FitMemo* memo)
+    : robot_(robot), windows_(windows), reference_(reference), memo_(memo) {
+  if (memo != nullptr) question_ = question_of(robot, windows, reference);
+  if (robot.command == CommandKind::kThrottleSteering) shape_by_speed();
+}
+
+void WindowFitter::shape_by_speed() {
+  const std::vector<FitRow> rows = {{{"ahead", 1, 0.02, "ratio", "-"}, false}};
+  const auto here = residuals(rows, Eigen::VectorXd::Constant(1, 1.0));
+  const auto faster = residuals(rows, Eigen::VectorXd::Constant(1, 1 + kFaster));
+  const auto n = static_cast<std::size_t>(windows_.horizons);
+  std::vector<Eigen::Vector3d> ways(here.size());
+  std::vector<std::vector<double>> shares(n), rests(3 * n);
+  for (std::size_t i = 0; i < here.size(); ++i) {
+    const auto h = static_cast<std::size_t>(windows_.horizon[i]);
+    ways[i] = (faster[i] - here[i]) / kFaster;
+    const double share = ways[i].dot(here[i]) / std::max(ways[i].squaredNorm(), 1e-12);
+    shares[h].push_back(std::abs(share));
+    const Eigen::Vector3d rest = here[i] - share * ways[i];
+    for (std::size_t c = 0; c < 3; ++c) {
+      rests[3 * h + c].push_back(std::abs(rest[static_cast<Eigen::Index>(c)]));
+    }
+  }
+  std::vector<Eigen::Matrix3d> shapes(here.size());
+  for (std::size_t i = 0; i < here.size(); ++i) {
+    const auto h = static_cast<std::size_t>(windows_.horizon[i]);
+    Eigen::Vector3d s;
+    for (std::size_t c = 0; c < 3; ++c) {
+      s[static_cast<Eigen::Index>(c)] = robust_deviation(&rests[3 * h + c]);
+    }
+    const Eigen::Vector3d d = robust_deviation(&shares[h]) * ways[i].cwiseQuotient(s);
+    // (1 + d d')^-1/2 in units of s.
+    const double square = d.squaredNorm();
+    Eigen::Matrix3d root = Eigen::Matrix3d::Identity();
+    if (square > 0) root += (1 / std::sqrt(1 + square) - 1) / square * d * d.transpose();
+    shapes[i] = s.asDiagonal() * root * s.cwiseInverse().asDiagonal();
+  }
+  shapes_ = std::move(shapes);
+}
+
+std::vector<Eigen::Vector3d> WindowFitter::raw_residuals(const WindowFit& fit) const {
+  std::vector<Eigen::Vector3d> raw = fit.residuals;
+  for (std::size_t i = 0; i < shapes_.size(); ++i) raw[i] = shapes_[i].inverse() * raw[i];
+  return raw;
+}
+
+std::vector<Eigen::Vector3d> WindowFitter::residuals(const std::vector<FitRow>& rows,
+                                                     const Eigen::VectorXd& values) const {
+  Kinematics at;
+  at.values = values;
+  for (const FitRow& row : rows) at.names.push_back(row.row.name);
+  for (std::size_t k = 0; reference_ != nullptr && k < reference_->names.size(); ++k) {
+    const std::string& name = reference_->names[k];
+    if (std::find(at.names.begin(), at.names.end(), name) != at.names.end()) continue;
+    at.names.push_back(name);
+    at.values.conservativeResize(at.values.size() + 1);
+    at.values[at.values.size() - 1] = reference_->values[static_cast<Eigen::Index>(k)];
+  }
+  const std::vector<Pose> ends = kinematic_ends(robot_, windows_.runs, windows_.trials, at);
+  std::vector<Eigen::Vector3d> r;
+  r.reserve(ends.size());
+  for (std::size_t i = 0; i < ends.size(); ++i) {
+    r.push_back(local_difference(ends[i], windows_.trials[i].X_WE));
+    if (!shapes_.empty()) r.back() = shapes_[i] * r.back();
+  }
+  return r;
+}
+
+std::vector<double> WindowFitter::uses(const std::vector<char>& left_out) const {
+  std::vector<double> use(windows_.trials.size());
+  for (std::size_t i = 0; i < use.size(); ++i) {
+    const bool out = !left_out.empty() && left_out[static_cast<std::size_t>(windows_.block[i])];
+    // Windows of several horizons tell of the same stretch.
+    use[i] = out ? 0 : 1.0 / windows_.horizons;
+  }
+  return use;
+}
+
+// Scales of Student's density, by its iteration.
+void WindowFitter::rescale(WindowFit* fit, const std::vector<double>& use) const {
+  const auto n = static_cast<std::size_t>(windows_.horizons);
+  if (fit->scales.empty()) {
+    std::vector<std::vector<double>> sizes(3 * n);
+    for (std::size_t i = 0; i < use.size(); ++i) {
+      for (std::size_t c = 0; c < 3 && use[i] > 0; ++c) {
+        const auto h = static_cast<std::size_t>(windows_.horizon[i]);
+        sizes[3 * h + c].push_back(std::abs(fit->residuals[i][static_cast<Eigen::Index>(c)]));
+      }
+    }
+    fit->scales.assign(n, Eigen::Vector3d::Constant(1e-5));
+    for (std::size_t k = 0; k < sizes.size(); ++k) {
+      if (sizes[k].empty()) continue;
+      const auto middle = sizes[k].begin() + static_cast<long>(sizes[k].size() / 2);
+      std::nth_element(sizes[k].begin(), middle, sizes[k].end());
+      fit->scales[k / 3][static_cast<Eigen::Index>(k % 3)] = std::max(1.3 * *middle, 1e-5);
+    }
+  }
+  for (int round = 0; round < 20; ++round) {
+    std::vector<Eigen::Vector3d> sums(n, Eigen::Vector3d::Zero());
+    std::vector<double> counts(n, 0.0);
+    for (std::size_t i = 0; i < use.size(); ++i) {
+      const auto h = static_cast<std::size_t>(windows_.horizon[i]);
+      counts[h] += use[i];
+      for (Eigen::Index c = 0; c < 3; ++c) {
+        const double r = fit->residuals[i][c];
+        const double s = fit->scales[h][c];
+        sums[h][c] += use[i] * window_weight(r, s) * s * s * r * r;
+      }
+    }
+    for (std::size_t h = 0; h < n; ++h) {
+      if (counts[h] == 0) continue;
+      for (Eigen::Index c = 0; c < 3; ++c) {
+        fit->scales[h][c] = std::max(std::sqrt(sums[h][c] / counts[h]), 1e-5);
+      }
+    }
+  }
+}
+
+double WindowFitter::score(WindowFit* fit, const std::vector<double>& use) const {
+  fit->nats.assign(use.size(), 0.0);
+  fit->objective = prior(*fit);
+  for (std::size_t i = 0; i < use.size(); ++i) {
+    const Eigen::Vector3d& s = fit->scales[static_cast<std::size_t>(windows_.horizon[i])];
+    for (Eigen::Index c = 0; c < 3; ++c) {
+      fit->nats[i] += window_nats(fit->residuals[i][c], s[c]);
+    }
+    fit->objective += use[i] * fit->nats[i];
+  }
+  return fit->objective;
+}
+
+void WindowFitter::slope(const WindowFit& fit, Eigen::Index k,
+                         std::vector<Eigen::MatrixXd>* J) const {
+  const double step = kStepShare * fit.rows[static_cast<std::size_t>(k)].row.tolerance;
+  Eigen::VectorXd moved = fit.values;
+  moved[k] += step;
+  const auto r = residuals(fit.rows, moved);
+  for (std::size_t i = 0; i < r.size(); ++i) (*J)[i].col(k) = (r[i] - fit.residuals[i]) / step;
+}
+
+std::vector<Eigen::MatrixXd> WindowFitter::slopes(const WindowFit& fit) const {
+  std::vector<Eigen::MatrixXd> J(fit.residuals.size(), Eigen::MatrixXd(3, fit.values.size()));
+  for (Eigen::Index k = 0; k < fit.values.size(); ++k) slope(fit, k, &J);
+  return J;
+}
+
+void WindowFitter::normal_equations(const WindowFit& fit, const std::vector<Eigen::MatrixXd>& J,
+                                    const std::vector<double>& use, Eigen::MatrixXd* H,
+                                    Eigen::VectorXd* g) const {
+  const Eigen::Index n = fit.values.size();
+  *H = Eigen::MatrixXd::Zero(n, n);
+  *g = Eigen::VectorXd::Zero(n);
+  for (std::size_t i = 0; i < use.size(); ++i) {
+    if (use[i] == 0) continue;
+    const Eigen::Vector3d& s = fit.scales[static_cast<std::size_t>(windows_.horizon[i])];
+    for (Eigen::Index c = 0; c < 3; ++c) {
+      const double w = use[i] * window_weight(fit.residuals[i][c], s[c]);
+      *H += w * J[i].row(c).transpose() * J[i].row(c);
+      *g += w * J[i].row(c).transpose() * fit.residuals[i][c];
+    }
+  }
+  const Eigen::MatrixXd P = prior_precision(fit.rows);
+  *H += P;
+  *g += P * from_middle(fit.rows, fit.values);
+}
+
+double WindowFitter::promise(const WindowFit& fit, const std::vector<Eigen::MatrixXd>& fit_slopes,
+                             const std::vector<FitRow>& rows, const Eigen::VectorXd& values) const {
+  WindowFit moved = fit;
+  moved.rows = rows;
+  moved.values = values;
+  std::vector<Eigen::MatrixXd> J(fit_slopes.size(), Eigen::MatrixXd(3, values.size()));
+  for (std::size_t i = 0; i < J.size(); ++i) J[i].leftCols(fit.values.size()) = fit_slopes[i];
+  for (Eigen::Index k = fit.values.size(); k < values.size(); ++k) slope(moved, k, &J);
+  Eigen::MatrixXd H;
+  Eigen::VectorXd g;
+  normal_equations(moved, J, uses({}), &H, &g);
+  return prior(moved) - prior(fit) + g.dot(solve_symmetric(H, g)) / 2;
+}
+
+namespace {
+
+// Values after a step of Gauss and Newton; what would fall below where it has a meaning stays at 0.
+Eigen::VectorXd stepped(const WindowFit& fit, const Eigen::MatrixXd& H, const Eigen::VectorXd& g) {
+  std::vector<char> at_zero(fit.rows.size(), 0);
+  while (true) {
+    Eigen::MatrixXd A = H;
+    Eigen::VectorXd b = g;
+    for (Eigen::Index k = 0; k < g.size(); ++k) {
+      if (!at_zero[static_cast<std::size_t>(k)]) continue;
+      A.row(k).setZero();
+      A(k, k) = 1;
+      b[k] = fit.values[k];
+    }
+    const Eigen::VectorXd next = fit.values - solve_square(A, b);
+    bool more = false;
+    for (std::size_t k = 0; k < at_zero.size(); ++k) {
+      const bool below = fit.rows[k].row.positive && next[static_cast<Eigen::Index>(k)] < 0;
+      if (!below || at_zero[k]) continue;
+      at_zero[k] = 1;
+      more = true;
+    }
+    if (!more) return next;
+  }
+}
+
+}  // namespace
+
+bool WindowFitter::step(WindowFit* fit, const std::vector<double>& use, double* damping) const {
+  Eigen::MatrixXd H;
+  Eigen::VectorXd g;
+  normal_equations(*fit, slopes(*fit), use, &H, &g);
+  for (int attempt = 0; attempt < 5; ++attempt) {
+    Eigen::MatrixXd damped = H;
+    damped.diagonal() *= 1 + *damping;
+    WindowFit next = *fit;
+    next.values = stepped(*fit, damped, g);
+    if (next.values.allFinite()) {
+      next.residuals = residuals(next.rows, next.values);
+      if (score(&next, use) > fit->objective) {
+        const double gained = next.objective - fit->objective;
+        *fit = std::move(next);
+        *damping = std::max(*damping / 10, 1e-6);
+        return gained > kEnough;
+      }
+    }
+    *damping = std::max(*damping, 1e-3) * 10;
+  }
+  return false;
+}
+
+WindowFit WindowFitter::hold(const std::vector<FitRow>& rows, const Eigen::VectorXd& values,
+                             const std::vector<char>& left_out) const {
+  WindowFit fit;
+  fit.rows = rows;
+  fit.values = values;
+  fit.residuals = residuals(rows, values);
+  const std::vector<double> use = uses(left_out);
+  rescale(&fit, use);
+  score(&fit, use);
+  return fit;
+}
+
+WindowFit WindowFitter::fit(const std::vector<FitRow>& rows, const std::vector<char>& left_out,
+                            const Eigen::VectorXd& values, int rounds) const {
+  Eigen::VectorXd start(static_cast<Eigen::Index>(rows.size()));
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    start[static_cast<Eigen::Index>(i)] = rows[i].row.nominal;
+  }
+  if (values.size() == start.size()) start = values;
+  const std::string key = memo_ != nullptr ? key_of(rows, left_out, start, rounds) : "";
+  if (const auto kept = memo_ != nullptr ? memo_->find(key) : std::nullopt) {
+    return fit_from(rows, left_out, *kept);
+  }
+  WindowFit fit = hold(rows, start, left_out);
+  const std::vector<double> use = uses(left_out);
+  for (int round = 0; round < rounds && !rows.empty(); ++round) {
+    const double before = fit.objective;
+    double damping = 1e-3;
+    for (int k = 0; k < kSteps && step(&fit, use, &damping); ++k) {
+    }
+    rescale(&fit, use);
+    score(&fit, use);
+    if (fit.objective - before < 0.01) break;
+  }
+  if (memo_ != nullptr) memo_->keep(key, {fit.values, fit.scales});
+  return fit;
+}
+
+WindowFit WindowFitter::fit_from(const std::vector<FitRow>& rows, const std::vector<char>& left_out,
+                                 const KeptFit& kept) const {
+  WindowFit fit;
+  fit.rows = rows;
+  fit.values = kept.values;
+  fit.scales = kept.scales;
+  fit.residuals = residuals(rows, fit.values);
+  score(&fit, uses(left_out));
+  return fit;
+}
+
+}  // namespace gapfarm

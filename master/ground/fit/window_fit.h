@@ -1,0 +1,143 @@
+// Fits of the kinematic model to windows of runs: maximum of a heavy-tailed likelihood with the
+// tolerances of a well-kept robot file as prior.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/base/result.h"
+#include "common/recordings/windows.h"
+#include "common/robot/robot.h"
+#include "master/ground/hypotheses.h"
+
+namespace gapfarm {
+
+// Windows of several horizons; their residuals share scales by horizon and component.
+struct WindowSet {
+  std::vector<CommandedRun> runs;
+  std::vector<Trial> trials;
+  std::vector<int> horizon;  // of each trial
+  std::vector<int> block;    // of each trial: what is left out or resampled together
+  int horizons = 0;
+  int blocks = 0;
+  std::vector<int> run_blocks;  // of each run: its first block; those of one run follow each other
+};
+
+// Blocks are runs, or stretches of them where there are fewer than ten.  Windows of robots with a
+// throttle begin afresh (common/recordings/afresh.h).  Errors: no window fits.
+Result<WindowSet> window_set(const GroundRobot& robot, const RunLog& log,
+                             const WindowSettings& settings);
+
+struct FitRow {
+  KinematicRow row;
+  bool free = false;  // held by plausible_error() in place of the tolerance
+};
+
+// What a fit to another log says of the values, and how sure that is.
+struct GroundReference {
+  std::vector<std::string> names;
+  Eigen::VectorXd values;  // hold where they are not among the rows of a fit
+  Eigen::MatrixXd draws;   // a column each: how far off the values may be, all at once
+  Eigen::MatrixXd covariance;
+};
+
+struct WindowFit {
+  std::vector<FitRow> rows;
+  Eigen::VectorXd values;
+  std::vector<Eigen::Vector3d> scales;     // of each horizon: m, m, rad
+  std::vector<Eigen::Vector3d> residuals;  // of each window, in the predicted end's axes, shaped
+  std::vector<double> nats;                // log density of each window
+  double objective = 0;                    // nats of the windows of its blocks, and the prior
+};
+
+// A fit as far as it cannot be had in no time.
+struct KeptFit {
+  Eigen::VectorXd values;
+  std::vector<Eigen::Vector3d> scales;
+};
+
+// Fits that were made before, so that what was stopped goes on from there.
+class FitMemo {
+ public:
+  virtual ~FitMemo() = default;
+  virtual std::optional<KeptFit> find(const std::string& key) = 0;
+  virtual void keep(const std::string& key, const KeptFit& fit) = 0;
+};
+
+class WindowFitter {
+ public:
+  // All outlive the fitter.  With a reference its values are in place of the robot's, and rows are
+  // held to them by their tolerance and by how sure it is of them.
+  WindowFitter(const GroundRobot& robot, const WindowSet& windows,
+               const GroundReference* reference = nullptr, FitMemo* memo = nullptr);
+
+  // Maximum over windows whose block is not in `left_out` (one flag a block; empty: none).
+  // Starts at `values` where that has the size of `rows`, else at the rows' nominals; fewer rounds
+  // do from near by.
+  WindowFit fit(const std::vector<FitRow>& rows, const std::vector<char>& left_out = {},
+                const Eigen::VectorXd& values = {}, int rounds = 10) const;
+  // The rows' values held, scales fitted.
+  WindowFit hold(const std::vector<FitRow>& rows, const Eigen::VectorXd& values,
+                 const std::vector<char>& left_out = {}) const;
+
+  // Of every window, 3 by rows: how its residuals change with the values of a fit.
+  std::vector<Eigen::MatrixXd> slopes(const WindowFit& fit) const;
+  // Nats that `rows` (those of the fit first, some of them freed, then new ones that stand at
+  // `values`) promise beyond a fit with these slopes, to second order.
+  double promise(const WindowFit& fit, const std::vector<Eigen::MatrixXd>& fit_slopes,
+                 const std::vector<FitRow>& rows, const Eigen::VectorXd& values) const;
+
+  // Values by runs drawn with replacement and blocks of them, one Gauss-Newton step each, a column
+  // a draw: what differs from run to run (a clock's offset) is no surer for a run that is long.
+  Eigen::MatrixXd draws(const WindowFit& fit, std::uint64_t seed) const;
+  // 90 % intervals of them; a row of (lo, hi) for each of the fit's.  With a reference: of how far
+  // they are from it, which is not sure either, beside its values.
+  Eigen::MatrixX2d intervals(const WindowFit& fit, std::uint64_t seed) const;
+
+  const WindowSet& windows() const { return windows_; }
+  const GroundRobot& robot() const { return robot_; }
+
+  // A fit's residuals as they are: m, m, rad.
+  std::vector<Eigen::Vector3d> raw_residuals(const WindowFit& fit) const;
+
+ private:
+  std::vector<Eigen::Vector3d> residuals(const std::vector<FitRow>& rows,
+                                         const Eigen::VectorXd& values) const;
+  void rescale(WindowFit* fit, const std::vector<double>& use) const;
+  double score(WindowFit* fit, const std::vector<double>& use) const;
+  // The column of slopes that belongs to row k.
+  void slope(const WindowFit& fit, Eigen::Index k, std::vector<Eigen::MatrixXd>* J) const;
+  // Equations of one step: weighted squares of slopes, and of slopes with residuals, priors in.
+  void normal_equations(const WindowFit& fit, const std::vector<Eigen::MatrixXd>& J,
+                        const std::vector<double>& use, Eigen::MatrixXd* H,
+                        Eigen::VectorXd* g) const;
+  bool step(WindowFit* fit, const std::vector<double>& use, double* damping) const;
+  std::vector<double> uses(const std::vector<char>& left_out) const;
+  // Of the prior of these rows, and how far from its middle the values are.
+  Eigen::MatrixXd prior_precision(const std::vector<FitRow>& rows) const;
+  Eigen::VectorXd from_middle(const std::vector<FitRow>& rows, const Eigen::VectorXd& values) const;
+  double prior(const WindowFit& fit) const;
+  // Of a row in the reference; -1: it is not there.
+  Eigen::Index in_reference(const FitRow& row) const;
+  WindowFit fit_from(const std::vector<FitRow>& rows, const std::vector<char>& left_out,
+                     const KeptFit& kept) const;
+  // A name for this very fit.
+  std::string key_of(const std::vector<FitRow>& rows, const std::vector<char>& left_out,
+                     const Eigen::VectorXd& start, int rounds) const;
+
+  void shape_by_speed();
+
+  const GroundRobot& robot_;
+  const WindowSet& windows_;
+  const GroundReference* reference_;
+  FitMemo* memo_;
+  std::string question_;  // hash of robot, windows and reference; empty without a memo
+  // Where a throttle leaves the speed unsure, the ends of a window err along its way above all:
+  // what residuals are multiplied by, a window, so that the way counts less; empty: nothing.
+  std::vector<Eigen::Matrix3d> shapes_;
+};
+
+}  // namespace gapfarm

@@ -1,0 +1,152 @@
+#include "master/ground/fit/window_prior.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+
+#include "common/base/hash.h"
+#include "common/math/algebra.h"
+#include "common/robot/robot_file.h"
+#include "master/ground/fit/held_out.h"
+#include "master/ground/tolerances.h"
+
+namespace gapfarm {
+namespace {
+
+void add_pose(const Pose& X, Hasher* hasher) { hasher->add(X.x).add(X.y).add(X.theta); }
+
+}  // namespace
+
+std::string question_of(const GroundRobot& robot, const WindowSet& windows,
+                        const GroundReference* reference) {
+  Hasher hasher;
+  hasher.add(format_robot(robot));
+  for (const CommandedRun& run : windows.runs) {
+    hasher.add(run.start_s).add(run.speed_m_s).add(run.turn_rad_s);
+    for (const CommandRow& row : run.commands) {
+      hasher.add(row.t_s);
+      for (const double value : row.values) hasher.add(value);
+    }
+  }
+  for (std::size_t i = 0; i < windows.trials.size(); ++i) {
+    const Trial& trial = windows.trials[i];
+    hasher.add(*trial.t_s).add(*trial.duration_s).add(std::uint64_t{*trial.run});
+    add_pose(trial.X_WS, &hasher);
+    add_pose(trial.X_WE, &hasher);
+  }
+  for (std::size_t k = 0; reference != nullptr && k < reference->names.size(); ++k) {
+    const auto i = static_cast<Eigen::Index>(k);
+    hasher.add(reference->names[k]).add(reference->values[i]);
+    for (Eigen::Index j = 0; j <= i; ++j) hasher.add(reference->covariance(i, j));
+  }
+  return hasher.finish();
+}
+
+std::string WindowFitter::key_of(const std::vector<FitRow>& rows, const std::vector<char>& left_out,
+                                 const Eigen::VectorXd& start, int rounds) const {
+  Hasher hasher;
+  hasher.add(question_).add(static_cast<std::uint64_t>(rounds));
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    hasher.add(rows[k].row.name).add(rows[k].row.nominal).add(rows[k].row.tolerance);
+    hasher.add(std::uint64_t{rows[k].free}).add(start[static_cast<Eigen::Index>(k)]);
+  }
+  hasher.add(std::string_view(left_out.data(), left_out.size()));
+  return hasher.finish();
+}
+
+Eigen::Index WindowFitter::in_reference(const FitRow& row) const {
+  if (reference_ == nullptr) return -1;
+  const auto& names = reference_->names;
+  const auto found = std::find(names.begin(), names.end(), row.row.name);
+  return found == names.end() ? -1 : found - names.begin();
+}
+
+Eigen::MatrixXd WindowFitter::prior_precision(const std::vector<FitRow>& rows) const {
+  const auto n = static_cast<Eigen::Index>(rows.size());
+  Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(n, n);
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const FitRow& row = rows[static_cast<std::size_t>(k)];
+    double deviation = row.free ? plausible_error(row.row) : row.row.tolerance;
+    if (row.free && row.row.farthest > 0) deviation = row.row.farthest;
+    covariance(k, k) = deviation * deviation;
+  }
+  if (reference_ == nullptr) return covariance.diagonal().cwiseInverse().asDiagonal();
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const Eigen::Index a = in_reference(rows[static_cast<std::size_t>(k)]);
+    for (Eigen::Index l = 0; a >= 0 && l < n; ++l) {
+      const Eigen::Index b = in_reference(rows[static_cast<std::size_t>(l)]);
+      if (b >= 0) covariance(k, l) += reference_->covariance(a, b);
+    }
+  }
+  return inverse_of_symmetric(covariance);
+}
+
+Eigen::VectorXd WindowFitter::from_middle(const std::vector<FitRow>& rows,
+                                          const Eigen::VectorXd& values) const {
+  Eigen::VectorXd away = values;
+  for (Eigen::Index k = 0; k < values.size(); ++k) {
+    away[k] -= rows[static_cast<std::size_t>(k)].row.nominal;
+  }
+  return away;
+}
+
+double WindowFitter::prior(const WindowFit& fit) const {
+  if (fit.rows.empty()) return 0;
+  const Eigen::VectorXd away = from_middle(fit.rows, fit.values);
+  return -away.dot(prior_precision(fit.rows) * away) / 2;
+}
+
+Eigen::MatrixXd WindowFitter::draws(const WindowFit& fit, std::uint64_t seed) const {
+  const Eigen::Index n = fit.values.size();
+  const auto blocks = static_cast<std::size_t>(windows_.blocks);
+  const std::vector<double> use = uses({});
+  const std::vector<Eigen::MatrixXd> J = slopes(fit);
+  std::vector<Eigen::MatrixXd> H(blocks, Eigen::MatrixXd::Zero(n, n));
+  std::vector<Eigen::VectorXd> g(blocks, Eigen::VectorXd::Zero(n));
+  for (std::size_t i = 0; i < use.size(); ++i) {
+    const auto b = static_cast<std::size_t>(windows_.block[i]);
+    const Eigen::Vector3d& s = fit.scales[static_cast<std::size_t>(windows_.horizon[i])];
+    for (Eigen::Index c = 0; c < 3; ++c) {
+      const double w = use[i] * window_weight(fit.residuals[i][c], s[c]);
+      H[b] += w * J[i].row(c).transpose() * J[i].row(c);
+      g[b] += w * J[i].row(c).transpose() * fit.residuals[i][c];
+    }
+  }
+  const Eigen::MatrixXd P = prior_precision(fit.rows);
+  const Eigen::VectorXd away = from_middle(fit.rows, fit.values);
+  const std::vector<std::vector<double>> all_times = draw_blocks(windows_, seed, 1);
+  Eigen::MatrixXd drawn(n, kGroundDraws);
+  for (int d = 0; d < kGroundDraws; ++d) {
+    Eigen::VectorXd from = away;
+    for (Eigen::Index k = 0; k < n && reference_ != nullptr; ++k) {
+      const Eigen::Index a = in_reference(fit.rows[static_cast<std::size_t>(k)]);
+      if (a >= 0) from[k] -= reference_->draws(a, d);
+    }
+    Eigen::MatrixXd A = P;
+    Eigen::VectorXd b = P * from;
+    const std::vector<double>& times = all_times[static_cast<std::size_t>(d)];
+    for (std::size_t k = 0; k < blocks; ++k) {
+      A += times[k] * H[k];
+      b += times[k] * g[k];
+    }
+    drawn.col(d) = fit.values - solve_symmetric(A, b);
+  }
+  return drawn;
+}
+
+Eigen::MatrixX2d WindowFitter::intervals(const WindowFit& fit, std::uint64_t seed) const {
+  const Eigen::MatrixXd drawn = draws(fit, seed);
+  Eigen::MatrixX2d bounds(drawn.rows(), 2);
+  for (Eigen::Index k = 0; k < drawn.rows(); ++k) {
+    const Eigen::Index a = in_reference(fit.rows[static_cast<std::size_t>(k)]);
+    std::vector<double> row(static_cast<std::size_t>(drawn.cols()));
+    for (Eigen::Index d = 0; d < drawn.cols(); ++d) {
+      row[static_cast<std::size_t>(d)] = drawn(k, d) - (a >= 0 ? reference_->draws(a, d) : 0);
+    }
+    std::sort(row.begin(), row.end());
+    bounds(k, 0) = row[kGroundDraws / 20];
+    bounds(k, 1) = row[kGroundDraws - 1 - kGroundDraws / 20];
+  }
+  return bounds;
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,394 @@
+#include "master/ground/report/ground_report.h"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+#include <cmath>
+#include <tuple>
+
+#include "common/random/stream.h"
+#include "master/ground/fit/edge.h"
+#include "master/ground/report/ground_verdict.h"
+#include "master/ground/report/ground_where.h"
+#include "master/ground/report/ground_words.h"
+#include "master/ground/run_clocks.h"
+#include "master/ground/tolerances.h"
+
+namespace gapfarm {
+namespace {
+
+constexpr std::size_t kMostAliases = 3;
+constexpr double kAlmostSure = 0.99;  // no log makes surer than this
+
+// What was found, with what is needed to put it into words and figures.
+class GroundReport {
+ public:
+  GroundReport(const GroundRobot& robot, const GroundSearch& search,
+               const GroundDiagnoseOptions& options)
+      : robot_(robot),
+        search_(search),
+        options_(options),
+        fitter_(robot, search.windows, search.reference ? &*search.reference : nullptr,
+                options.memo),
+        intervals_(fitter_.intervals(search.fit, options.seed)) {}
+
+  Diagnosis write();
+  std::vector<SaidValue> said() const;
+  const GroundFigures& figures_of() const { return figures_; }
+
+ private:
+  void clocks();
+  void readings();
+  void faults();
+  void values();
+  void figures();
+  void screening();
+  void trials();
+  NamedEffect effect_of(const GroundStep& step, std::size_t place);
+  void name_headline();
+  void judge();
+  double sum(const std::vector<double>& nats) const;
+  double rms_mm(const WindowFit& fit) const;
+  double rms_mrad(const WindowFit& fit) const;
+
+  const GroundRobot& robot_;
+  const GroundSearch& search_;
+  const GroundDiagnoseOptions& options_;
+  WindowFitter fitter_;
+  Eigen::MatrixX2d intervals_;
+  GroundFigures figures_;
+  Diagnosis d_;
+};
+
+double GroundReport::rms_mm(const WindowFit& fit) const {
+  double sum = 0;
+  for (const Eigen::Vector3d& r : fitter_.raw_residuals(fit)) sum += r.head<2>().squaredNorm();
+  return 1e3 * std::sqrt(sum / static_cast<double>(fit.residuals.size()));
+}
+double GroundReport::rms_mrad(const WindowFit& fit) const {
+  double sum = 0;
+  for (const Eigen::Vector3d& r : fitter_.raw_residuals(fit)) sum += r[2] * r[2];
+  return 1e3 * std::sqrt(sum / static_cast<double>(fit.residuals.size()));
+}
+
+void add_alias(const std::string& name, NamedEffect* effect) {
+  if (name == effect->name || effect->aliases.size() >= kMostAliases) return;
+  const auto& have = effect->aliases;
+  if (std::find(have.begin(), have.end(), name) == have.end()) effect->aliases.push_back(name);
+}
+
+double GroundReport::sum(const std::vector<double>& nats) const {
+  double sum = 0;
+  for (const double n : nats) sum += n;
+  return sum / static_cast<double>(nats.size());
+}
+
+NamedEffect GroundReport::effect_of(const GroundStep& step, std::size_t place) {
+  const GroundHypothesis& h = search_.catalogue[step.chosen];
+  NamedEffect effect;
+  effect.name = h.name;
+  for (const std::size_t other : step.not_told_apart) {
+    add_alias(search_.catalogue[other].name, &effect);
+  }
+  for (const std::string& alias : h.aliases) add_alias(alias, &effect);
+  if (!effect.aliases.empty()) {
+    effect.alias_reason = "They move this robot alike on these runs.";
+  }
+  for (const KinematicRow& row : h.freed) {
+    for (std::size_t j = 0; j < search_.rows.size(); ++j) {
+      if (search_.rows[j].row.name != row.name) continue;
+      const auto k = static_cast<Eigen::Index>(j);
+      effect.parameters.push_back(
+          estimate_of(row, search_.fit.values[k], intervals_(k, 0), intervals_(k, 1)));
+    }
+  }
+  const double floor = sum(search_.best.nats);
+  const WindowFit& before = step.before;
+  const WindowFit& after = search_.chain[place + 1];
+  effect.gap_before = floor - sum(before.nats);
+  effect.gap_after = floor - sum(after.nats);
+  effect.position_mm_before = rms_mm(before);
+  effect.position_mm_after = rms_mm(after);
+  effect.heading_mrad_before = rms_mrad(before);
+  effect.heading_mrad_after = rms_mrad(after);
+  const HeldOutGain closed =
+      share_of_gap(search_.windows, after, before, search_.best, search_.chain[0], options_.seed);
+  effect.closed = closed.mean;
+  effect.closed_lo = closed.lo;
+  effect.closed_hi = closed.hi;
+  // What was gained over what would just have been worth a name.
+  effect.confidence = std::min(kAlmostSure, 1 - 0.5 * std::exp((kLeastGroundGain - step.gain) / 2));
+  effect.text = search_.reference ? words_of_change(robot_, h, effect) + "."
+                                  : words_of_value(robot_, h, effect);
+  if (h.name == kFloorEdge) describe_floor_edge(fitter_, search_.fit, options_.seed, &effect);
+  return effect;
+}
+
+void GroundReport::faults() {
+  for (std::size_t k = 0; k < search_.faults.size(); ++k) {
+    const GroundHypothesis& h = search_.catalogue[search_.faults[k]];
+    NamedEffect effect;
+    effect.name = h.name;
+    for (const std::string& alias : h.aliases) add_alias(alias, &effect);
+    effect.confidence = kAlmostSure;
+    effect.closed = effect.closed_hi = 1;
+    const double stretches = static_cast<double>(search_.windows.trials.size()) /
+                             static_cast<double>(search_.windows.horizons);
+    effect.gap_before = search_.fault_gains[k] / stretches;
+    const double shrinks = std::exp(effect.gap_before / 3);
+    effect.text = fmt::format(
+        "The log is wrong in {}: put right, what the robot's file expects is {:.1f} times as near "
+        "to "
+        "what was measured. {}",
+        h.thing, shrinks, h.remedy);
+    d_.sanity.push_back({h.name, effect.text, h.remedy, Severity::kNote, true, effect.aliases});
+    d_.effects.push_back(std::move(effect));
+  }
+}
+
+// What the poses show by themselves.
+void GroundReport::readings() {
+  const auto add = [&](const char* name, std::vector<std::string> aliases, Estimate estimate,
+                       std::string text, const char* remedy) {
+    NamedEffect effect;
+    effect.name = name;
+    effect.aliases = std::move(aliases);
+    effect.confidence = kAlmostSure;
+    effect.parameters = {std::move(estimate)};
+    effect.text = std::move(text);
+    d_.sanity.push_back({name, effect.text, remedy, Severity::kNote, true, effect.aliases});
+    d_.effects.push_back(std::move(effect));
+    ++figures_.faults;
+  };
+  if (names_stale_frames(search_)) {
+    const StaleFrames& s = search_.stale;
+    add("stale_frames", {"pose_latency"}, {"share", s.share, s.lo, s.hi, "-"},
+        fmt::format("{} of {} poses on the way, {:.1f} % [{:.1f}, {:.1f}], repeat the one before; "
+                    "they were left out.",
+                    s.repeats, s.frames, 100 * s.share, 100 * s.lo, 100 * s.hi),
+        "Log a pose once, with the time at which it was measured.");
+  }
+  if (names_rounding(search_)) {
+    const PoseGrid& g = search_.grid;
+    add("pose_quantisation", {}, {"step", g.step_m, g.lo_m, g.hi_m, "m"},
+        fmt::format("Positions are rounded to a grid of {:.4g} mm ({:.0f} nats).", 1e3 * g.step_m,
+                    g.nats),
+        "Log more digits.");
+  }
+}
+
+void GroundReport::values() {
+  for (std::size_t k = 0; k < search_.steps.size(); ++k) {
+    d_.effects.push_back(effect_of(search_.steps[k], k));
+    figures_.named.push_back(search_.steps[k].held_out);
+  }
+}
+
+void GroundReport::figures() {
+  const double floor = sum(search_.best.nats);
+  d_.gap = {floor - sum(search_.chain.front().nats), floor - sum(search_.chain.back().nats), 0};
+  d_.position_mm = {rms_mm(search_.chain.front()), rms_mm(search_.chain.back()),
+                    rms_mm(search_.best)};
+  d_.heading_mrad = {rms_mrad(search_.chain.front()), rms_mrad(search_.chain.back()),
+                     rms_mrad(search_.best)};
+  if (search_.reference) {
+    d_.cautions.push_back(
+        "Against the reference's log: sizes and intervals are of the change, what the reference "
+        "leaves unsure is in them.");
+  }
+  if (search_.windows.blocks < 8) {
+    d_.cautions.push_back("Few runs: intervals are from runs drawn again, and these are few.");
+  }
+  if (robot_.measured && !search_.loop) {
+    d_.cautions.push_back(
+        "Wheel speeds were measured: what lies before them (dead time, ramps) "
+        "cannot show.");
+  }
+}
+
+void GroundReport::judge() {
+  figures_.faults += static_cast<int>(search_.faults.size());
+  figures_.closable = search_.closable;
+  d_.verdict = ground_verdict(figures_);
+  d_.findings.push_back(verdict_reason(figures_));
+  if (nothing_is_left(figures_)) return;
+  d_.where = where_left(fitter_, search_, options_.windows.horizons_s);
+  const std::string moved = values_that_would_move(search_);
+  if (!moved.empty()) {
+    d_.findings.push_back("Were all values free, these would move most: " + moved + ".");
+  }
+}
+
+void GroundReport::clocks() {
+  const auto apart = clocks_apart(fitter_, search_.fit);
+  if (!apart) return;
+  std::string runs;
+  for (const RunClock& clock : *apart) {
+    runs += fmt::format("{}{:+.2f} s in run {}", runs.empty() ? "" : ", ", clock.delay_s,
+                        search_.log.runs[clock.run].run);
+  }
+  d_.cautions.push_back(
+      "The runs' clocks are apart: from command to pose it takes " + runs +
+      ". Each log's commands and poses need one clock; how late they are on the whole is no surer "
+      "than that.");
+}
+
+void GroundReport::screening() {
+  if (search_.offers.empty()) return;
+  for (const Offer& offer : search_.offers.front()) {
+    const GroundHypothesis& h = search_.catalogue[offer.hypothesis];
+    Screened s;
+    s.effect = h.name;
+    s.gain = offer.gain;
+    s.p = std::exp(-std::max(0.0, offer.gain));
+    const bool fitted = offer.values.size() > 0;
+    for (std::size_t k = 0; fitted && k < h.freed.size(); ++k) {
+      s.estimate += fmt::format("{}{} {:+.4g} {}", k > 0 ? ", " : "", h.freed[k].key,
+                                offer.values[static_cast<Eigen::Index>(k)] - h.freed[k].nominal,
+                                h.freed[k].unit);
+    }
+    s.note = h.thing;
+    d_.screening.push_back(std::move(s));
+  }
+  for (const auto& offers : search_.offers) {
+    SelectionRecord record;
+    for (std::size_t k = 0; k < d_.steps.size(); ++k) {
+      record.explained.push_back(search_.catalogue[search_.steps[k].chosen].name);
+    }
+    for (std::size_t k = 0; k < std::min<std::size_t>(offers.size(), 5); ++k) {
+      record.offered.emplace_back(search_.catalogue[offers[k].hypothesis].name, offers[k].gain);
+    }
+    d_.steps.push_back(std::move(record));
+  }
+}
+
+void GroundReport::trials() {
+  const auto cov_of = [&](const WindowFit& fit, std::size_t i) {
+    const Eigen::Vector3d s = fit.scales[static_cast<std::size_t>(search_.windows.horizon[i])];
+    return Eigen::Matrix3d(s.cwiseProduct(s).asDiagonal());
+  };
+  const auto tuned = fitter_.raw_residuals(search_.chain.front());
+  const auto last = fitter_.raw_residuals(search_.chain.back());
+  for (std::size_t i = 0; i < search_.windows.trials.size(); ++i) {
+    const Trial& from = search_.windows.trials[i];
+    DiagnosedTrial t;
+    t.session = from.session;
+    t.trial = static_cast<std::int64_t>(i);
+    t.command = fmt::format("{:g} s", options_.windows.horizons_s.at(std::min<std::size_t>(
+                                          static_cast<std::size_t>(search_.windows.horizon[i]),
+                                          options_.windows.horizons_s.size() - 1)));
+    t.session_time_s = *from.t_s;
+    t.duration_s = *from.duration_s;
+    t.held_out = true;
+    t.X_WS = from.X_WS;
+    t.measured = between(from.X_WS, from.X_WE);
+    // The prediction is where the measured end lies off by the residual.
+    const auto predicted = [&](const Eigen::Vector3d& r) {
+      const double theta = t.measured.theta - r[2];
+      const double c = std::cos(theta), s = std::sin(theta);
+      return Pose{t.measured.x - c * r[0] + s * r[1], t.measured.y - s * r[0] - c * r[1],
+                  wrap_angle(theta)};
+    };
+    t.tuned_residual = tuned[i];
+    t.final_residual = last[i];
+    t.tuned = predicted(t.tuned_residual);
+    t.final_ = predicted(t.final_residual);
+    t.tuned_cov = cov_of(search_.chain.front(), i);
+    t.final_cov = cov_of(search_.chain.back(), i);
+    t.tuned_score = search_.chain.front().nats[i];
+    t.final_score = search_.chain.back().nats[i];
+    d_.trials.push_back(std::move(t));
+  }
+}
+
+void GroundReport::name_headline() {
+  const bool changes = search_.reference.has_value();
+  if (d_.effects.empty()) {
+    const bool nothing = d_.verdict == Verdict::kNone;
+    d_.headline =
+        changes   ? (nothing ? "Nothing changed by more than a robot does from log to log."
+                             : "Something changed that nothing of the catalogue explains alone.")
+        : nothing ? "Nothing of the robot's file or log is wrong by more than a well-kept file's "
+                    "values are."
+        : figures_.closable.lo > 0
+            ? "Something is wrong that nothing of the catalogue explains alone."
+            : "Nothing is surely wrong, but these runs do not exclude it.";
+    if (!d_.findings.empty()) d_.headline += " " + d_.findings.front();
+    return;
+  }
+  d_.headline = d_.effects.front().text;
+  if (changes && d_.effects.size() == 1 && !d_.headline.empty()) {
+    d_.headline.back() = ';';
+    d_.headline += d_.verdict == Verdict::kEffect
+                       ? " nothing else."
+                       : " no other value, but not all is explained by that.";
+  }
+  if (d_.effects.size() > 1) {
+    d_.headline += " Beside it: ";
+    for (std::size_t k = 1; k < d_.effects.size(); ++k) {
+      d_.headline += (k > 1 ? ", " : "") + d_.effects[k].name;
+    }
+    d_.headline += ".";
+  }
+}
+
+std::vector<SaidValue> GroundReport::said() const {
+  std::vector<SaidValue> values;
+  for (std::size_t j = 0; j < search_.rows.size(); ++j) {
+    const FitRow& row = search_.rows[j];
+    const auto k = static_cast<Eigen::Index>(j);
+    // Against a reference every value is the two logs' own.
+    values.push_back({row.row.name,
+                      value_in_file(robot_, row.row.name),
+                      search_.fit.values[k],
+                      {intervals_(k, 0), intervals_(k, 1)},
+                      row.free || search_.reference.has_value()});
+  }
+  return values;
+}
+
+Diagnosis GroundReport::write() {
+  faults();
+  readings();
+  values();
+  if (search_.loop) report_wheel_loop(*search_.loop, search_.reference.has_value(), &d_);
+  figures();
+  judge();
+  clocks();
+  screening();
+  trials();
+  name_headline();
+  return std::move(d_);
+}
+
+}  // namespace
+
+GroundDiagnosis report_ground(const GroundRobot& robot, const GroundSearch& search,
+                              const GroundDiagnoseOptions& options) {
+  GroundReport report(robot, search, options);
+  GroundDiagnosis result;
+  result.values = report.said();
+  result.diagnosis = report.write();
+  result.figures = report.figures_of();
+  return result;
+}
+
+Kinematics chosen_values(const GroundSearch& search) {
+  Kinematics at;
+  for (std::size_t j = 0; j < search.rows.size(); ++j) {
+    if (!search.rows[j].free) continue;
+    at.names.push_back(search.rows[j].row.name);
+    at.values.conservativeResize(at.values.size() + 1);
+    at.values[at.values.size() - 1] = search.fit.values[static_cast<Eigen::Index>(j)];
+  }
+  for (std::size_t k = 0; search.reference && k < search.reference->names.size(); ++k) {
+    const std::string& name = search.reference->names[k];
+    if (std::find(at.names.begin(), at.names.end(), name) != at.names.end()) continue;
+    at.names.push_back(name);
+    at.values.conservativeResize(at.values.size() + 1);
+    at.values[at.values.size() - 1] = search.reference->values[static_cast<Eigen::Index>(k)];
+  }
+  return at;
+}
+
+}  // namespace gapfarm

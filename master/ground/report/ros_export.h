@@ -1,0 +1,57 @@
+// What a log says of a ground robot, in the words of its user's own files: parameters of
+// ros2_controllers, and friction tags of Gazebo.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "master/ground/report/values_file.h"
+
+namespace gapfarm {
+
+// A line of a controller's parameters.
+struct RosValue {
+  std::string key;  // "wheel_separation_multiplier"
+  double had = 0;
+  double says = 0;
+  Interval interval;
+  bool known = false;  // the interval is of this log; else the value is the file's own
+};
+
+// Friction of the floor, where the log or the simulation tells it.
+struct RosFriction {
+  std::optional<double> along, across;  // none: the log does not show it
+  std::string from;                     // "as simulated", "by four-point theory from ..."
+};
+
+struct RosWheel {
+  std::string link;
+  std::optional<double> mu1, mu2;  // as the URDF has them
+};
+
+struct RosExport {
+  std::string source;             // run or diagnosis
+  std::vector<std::string> logs;  // that it was fitted to
+  std::string controller;         // its name in the user's file
+  std::vector<RosValue> values;
+  std::vector<std::string> remarks;  // what no controller has a word for
+  RosFriction friction;
+  std::vector<RosWheel> wheels;
+};
+
+// The controller's parameters by what a log says; names and values follow the drive.
+std::vector<RosValue> ros_values(const SaidValues& said);
+// What is off and has no parameter: a trim of the steering, a delay.
+std::vector<std::string> ros_remarks(const SaidValues& said);
+// Of the floor as far as the robot's motion tells: a car's grip, a skid-steer's multiplier.
+RosFriction ros_friction(const SaidValues& said);
+
+// A table of what the user had and what the log says.
+std::string ros_table(const RosExport& data);
+// controllers.yaml to merge.
+std::string ros_yaml(const RosExport& data);
+// <gazebo> tags to paste into the URDF; empty where nothing of friction is known.
+std::string ros_gazebo(const RosExport& data);
+
+}  // namespace gapfarm

@@ -1,0 +1,106 @@
+#include "master/io/log_checks/log_checks.h"
+
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <map>
+#include <tuple>
+
+#include "master/io/log_checks/sanity.h"
+
+namespace gapfarm {
+namespace {
+
+constexpr double kManyCopies = 0.2;  // of the trials that moved
+constexpr double kManySteps = 0.02;  // back in time, of all steps
+constexpr std::array<LengthUnit, 5> kUnits = {{{"millimetres", 0.001},
+                                               {"centimetres", 0.01},
+                                               {"inches", 0.0254},
+                                               {"feet", 0.3048},
+                                               {"kilometres", 1000}}};
+
+std::string row_words(const Trial& trial) {
+  return "session " + trial.session + ", trial " + std::to_string(trial.trial);
+}
+
+}  // namespace
+
+std::string few_digits(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.3g", value);
+  return text;
+}
+
+const LengthUnit* likely_unit(double logged, double lower_m, double upper_m, double expected_m) {
+  const LengthUnit* best = nullptr;
+  double least = INFINITY;
+  for (const LengthUnit& unit : kUnits) {
+    const double in_metres = logged * unit.metres;
+    if (in_metres < lower_m || in_metres > upper_m) continue;
+    const double far = std::abs(std::log(in_metres / expected_m));
+    if (far < least) least = far, best = &unit;
+  }
+  return best;
+}
+
+void doubt_count(const TrialLog& log, std::vector<SanityFinding>* findings) {
+  const std::size_t count = log.trials.size();
+  if (count >= kFewestTrials) return;
+  findings->push_back({"too_few_trials",
+                       (count == 1 ? std::string("There is one trial")
+                                   : "There are " + std::to_string(count) + " trials") +
+                           ": of fewer than " + std::to_string(kFewestTrials) +
+                           " any cause can be made up, and none can be ruled out.",
+                       "Log at least " + std::to_string(kFewestTrials) +
+                           " trials, better 200, and repeat commands."});
+}
+
+void doubt_copies(const TrialLog& log, std::vector<SanityFinding>* findings) {
+  using Key = std::tuple<double, double, double, double, double, double>;
+  std::map<Key, const Trial*> seen;
+  std::size_t copies = 0, moved = 0;
+  std::string example;
+  for (const Trial& t : log.trials) {
+    if (t.X_WS == t.X_WE) continue;
+    ++moved;
+    const Key key{t.X_WS.x, t.X_WS.y, t.X_WS.theta, t.X_WE.x, t.X_WE.y, t.X_WE.theta};
+    const auto [first, fresh] = seen.try_emplace(key, &t);
+    if (fresh) continue;
+    if (copies++ == 0) example = row_words(t) + " and " + row_words(*first->second);
+  }
+  if (copies == 0) return;
+  const bool many = static_cast<double>(copies) > kManyCopies * static_cast<double>(moved);
+  findings->push_back({"duplicates",
+                       std::to_string(copies) + " of " + std::to_string(moved) +
+                           " trials repeat the poses of another one to the last digit (" + example +
+                           "): no two drives are that much alike.",
+                       "Leave the copies out: they count the same evidence twice.",
+                       many ? Severity::kUnusable : Severity::kNote});
+}
+
+void doubt_clock(const TrialLog& log, std::vector<SanityFinding>* findings) {
+  std::map<std::string, double> last;
+  std::size_t steps = 0, back = 0;
+  std::string example;
+  for (const Trial& t : log.trials) {
+    if (!t.t_s) continue;
+    const auto [before, fresh] = last.try_emplace(t.session, *t.t_s);
+    if (fresh) continue;
+    ++steps;
+    if (*t.t_s < before->second && back++ == 0) {
+      example = row_words(t) + " begins at " + few_digits(*t.t_s) + " s, the one before it at " +
+                few_digits(before->second) + " s";
+    }
+    before->second = *t.t_s;
+  }
+  if (back == 0) return;
+  const bool many = static_cast<double>(back) > kManySteps * static_cast<double>(steps);
+  findings->push_back({"clock_backward",
+                       "Time runs backward " + std::to_string(back) + " times in " +
+                           std::to_string(steps) + " steps: " + example + ".",
+                       "Sort the rows of each session by time, begin a new session where a clock "
+                       "was set, or leave t empty.",
+                       many ? Severity::kUnusable : Severity::kNote});
+}
+
+}  // namespace gapfarm

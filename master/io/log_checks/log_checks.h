@@ -1,0 +1,30 @@
+// Doubts about a log that do not depend on what moves.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "common/trials/trial.h"
+#include "master/io/log_checks/finding.h"
+
+namespace gapfarm {
+
+void doubt_count(const TrialLog& log, std::vector<SanityFinding>* findings);
+// Rows that repeat another one's poses to the last digit although something moved.
+void doubt_copies(const TrialLog& log, std::vector<SanityFinding>* findings);
+// Times that run backward within a session.
+void doubt_clock(const TrialLog& log, std::vector<SanityFinding>* findings);
+
+// "3.1 %", "0.25": few digits, no trailing zeros.
+std::string few_digits(double value);
+
+// A unit that lengths may have been logged in: "centimetres", how many metres one is.
+struct LengthUnit {
+  const char* name = "";
+  double metres = 1;
+};
+// The unit in which `logged` comes nearest to `expected_m`, among those that put it into
+// [lower_m, upper_m]; null where none does.
+const LengthUnit* likely_unit(double logged, double lower_m, double upper_m, double expected_m);
+
+}  // namespace gapfarm

@@ -1,0 +1,97 @@
+#include "master/io/log_checks/sanity.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "master/io/log_checks/axes.h"
+#include "master/io/log_checks/drive_checks.h"
+#include "master/io/log_checks/log_checks.h"
+#include "master/io/log_checks/push_checks.h"
+
+namespace gapfarm {
+namespace {
+
+constexpr double kMostImpossible = 0.05;  // of the trials
+constexpr double kTimesAsFar = 2;
+constexpr double kBeyond_m = 0.3;  // what a camera's seam or a late reading may add
+
+// Nobody says how fast and how wide a program's robot may be, so no log is doubted for it.
+constexpr double kSlowestProgram_m_s = 0.005;
+
+bool has_drives(const Problem& problem) {
+  return problem.scenario == "srv1" || scenario_form(problem.scenario).program;
+}
+
+DriveLimits limits_of(const Problem& problem) {
+  if (scenario_form(problem.scenario).program) return {kSlowestProgram_m_s, INFINITY, 0, 0};
+  const Parameter& speed = problem.table()[row_of(Srv1::kFullSpeed)];
+  return {speed.lower, speed.upper, problem.values[row_of(Srv1::kFullSpeed)],
+          problem.values[row_of(Srv1::kTrackGauge)]};
+}
+
+void note_impossible(const Problem& problem, std::vector<SanityFinding>* findings) {
+  const std::vector<std::size_t> rows = impossible_trials(problem);
+  if (rows.empty()) return;
+  const Trial& first = problem.log.trials[rows.front()];
+  findings->push_back(
+      {"impossible_rows",
+       std::to_string(rows.size()) + " of " + std::to_string(problem.log.trials.size()) +
+           " trials end farther from their start than twice the log's own speed leads (the first: "
+           "session " +
+           first.session + ", trial " + std::to_string(first.trial) + ").",
+       "Look at these rows; a diagnosis leaves them out.", Severity::kNote});
+}
+
+// Each only where the one before leaves it meaning: what does not move has no speed, and axes that
+// do not fit say nothing of turns.
+void doubt_drives(const Problem& problem, std::vector<SanityFinding>* findings) {
+  const std::vector<DriveSample> samples = drive_samples(problem);
+  const DriveLimits limits = limits_of(problem);
+  if (doubt_motion(samples, limits, findings)) return;
+  bool doubted = doubt_speed(samples, limits, findings);
+  if (doubt_heading_unit(samples, findings)) {
+    doubted = true;
+  } else if (auto axes = doubt_axes(samples)) {
+    findings->push_back(std::move(*axes));
+    doubted = true;
+  }
+  if (doubted) return;
+  doubt_turning(samples, limits, findings);
+  note_impossible(problem, findings);
+}
+
+}  // namespace
+
+std::vector<std::size_t> impossible_trials(const Problem& problem) {
+  if (!has_drives(problem)) return {};
+  const std::vector<DriveSample> samples = drive_samples(problem);
+  const double speed = full_speed_of(samples);
+  std::vector<std::size_t> rows;
+  if (speed <= 0) return rows;
+  for (const DriveSample& s : samples) {
+    if (s.distance_m() > kTimesAsFar * speed * s.most_s + kBeyond_m) rows.push_back(s.trial);
+  }
+  const auto all = static_cast<double>(samples.size());
+  if (static_cast<double>(rows.size()) > kMostImpossible * all) rows.clear();
+  return rows;
+}
+
+std::vector<SanityFinding> check_sanity(const Problem& problem) {
+  std::vector<SanityFinding> findings;
+  if (problem.log.trials.empty()) return findings;
+  if (has_drives(problem)) doubt_drives(problem, &findings);
+  if (problem.scenario == "push") doubt_pushes(problem, &findings);
+  for (SanityFinding& f : findings) f.names_an_effect |= f.name == "unit_error";
+  doubt_clock(problem.log, &findings);
+  const bool still = std::any_of(findings.begin(), findings.end(),
+                                 [](const SanityFinding& f) { return f.name == "no_motion"; });
+  if (!still) doubt_copies(problem.log, &findings);
+  doubt_count(problem.log, &findings);
+  std::stable_sort(findings.begin(), findings.end(),
+                   [](const SanityFinding& a, const SanityFinding& b) {
+                     return a.severity == Severity::kUnusable && b.severity == Severity::kNote;
+                   });
+  return findings;
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,222 @@
+#include "master/io/logs/column_map.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <tuple>
+
+#include "common/base/constants.h"
+#include "common/base/suggest.h"
+#include "common/config/toml_section.h"
+#include "common/trials/text/csv.h"
+
+namespace gapfarm {
+namespace {
+
+struct Unit {
+  const char* name;
+  double factor;
+};
+
+constexpr Unit kUnits[] = {{"s", 1},
+                           {"ms", 1e-3},
+                           {"us", 1e-6},
+                           {"ns", 1e-9},
+                           {"m", 1},
+                           {"cm", 1e-2},
+                           {"mm", 1e-3},
+                           {"rad", 1},
+                           {"mrad", 1e-3},
+                           {"deg", kDegree},
+                           {"m/s", 1},
+                           {"cm/s", 1e-2},
+                           {"mm/s", 1e-3},
+                           {"km/h", 1 / 3.6},
+                           {"rad/s", 1},
+                           {"deg/s", kDegree},
+                           {"rpm", std::numbers::pi / 30},
+                           {"%", 1e-2},
+                           {"1", 1}};
+
+struct ColumnNumber {
+  const char* key;
+  double MappedColumn::*value;
+  double lower, upper;
+};
+
+constexpr ColumnNumber kNumbers[] = {{"scale", &MappedColumn::scale, 0, 1e12},
+                                     {"offset", &MappedColumn::offset, -1e12, 1e12},
+                                     {"sign", &MappedColumn::sign, -1, 1},
+                                     {"gear", &MappedColumn::gear, 1e-6, 1e6}};
+
+// As TOML's basic string.  Bags may hold any bytes: what TOML cannot hold becomes '_'.
+std::string quoted(const std::string& text) {
+  std::string word = "\"", plain = "\"";
+  for (const char c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    const std::string escape = c == '"' || c == '\\' ? "\\" : "";
+    const bool control = byte < 0x20 || byte == 0x7f;
+    word += escape + (control ? '_' : c);
+    plain += escape + (control || byte >= 0x80 ? '_' : c);
+  }
+  word += '"';
+  plain += '"';
+  return parse_toml("k = " + word, "").ok() ? word : plain;
+}
+
+void write_table(const char* name, const TableMap& table, std::string& out) {
+  if (table.columns.empty()) return;
+  out += std::string(out.empty() ? "" : "\n") + "[" + name + "]\n";
+  if (!table.source.empty()) out += "source = " + quoted(table.source) + "\n";
+  if (!table.run.empty()) out += "run = " + quoted(table.run) + "\n";
+  if (!table.keep.empty()) out += "keep = " + quoted(table.keep) + "\n";
+  if (table.up != "z") out += "up = " + quoted(table.up) + "\n";
+  if (table.wheel_radius_m > 0) {
+    out += "wheel_radius = " + format_double(table.wheel_radius_m) + "\n";
+  }
+  for (const MappedColumn& c : table.columns) {
+    const bool plain = c.role.find_first_not_of(
+                           "abcdefghijklmnopqrstuvwxyz"
+                           "ABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-") == c.role.npos;
+    out += (plain ? c.role : quoted(c.role)) + " = { column = " + quoted(c.column) +
+           (c.unit.empty() ? "" : ", unit = " + quoted(c.unit));
+    for (const ColumnNumber& number : kNumbers) {
+      if (c.*number.value == MappedColumn{}.*number.value) continue;
+      out += std::string(", ") + number.key + " = " + format_double(c.*number.value);
+    }
+    out += c.rate ? ", rate = true }\n" : " }\n";
+  }
+}
+
+class MapReader {
+ public:
+  explicit MapReader(TomlErrors& errors) : errors_(errors) {}
+
+  void read(TomlSection& root, const char* name, TableMap& map) {
+    auto section = root.section(name);
+    if (!section) return;
+    section->read("source", map.source);
+    section->read("run", map.run);
+    section->read("keep", map.keep);
+    static const std::vector<std::string> kUp = {"z", "y"};
+    if (const auto up = section->choice("up", kUp)) map.up = kUp[*up];
+    section->read("wheel_radius", map.wheel_radius_m, 1e-4, 100, "m");
+    for (const auto& [key, node] : section->table()) {
+      const std::string role(key.str());
+      const bool option = role == "source" || role == "run" || role == "keep" || role == "up" ||
+                          role == "wheel_radius";
+      if (option) continue;
+      read_column(*section, role, node, map);
+    }
+    // TOML's tables are sorted by name; channels keep the file's order.
+    std::sort(places_.begin(), places_.end());
+    std::vector<MappedColumn> ordered;
+    for (const auto& [line, column, i] : places_) ordered.push_back(map.columns[i]);
+    map.columns = std::move(ordered);
+    places_.clear();
+    if (map.find("t") == nullptr) {
+      errors_.add(section->table().source().begin,
+                  section->name() + " has no t, expected the column of the times");
+    }
+  }
+
+ private:
+  void read_column(TomlSection& section, const std::string& role, const toml::node& node,
+                   TableMap& map) {
+    MappedColumn column{role, "", ""};
+    if (const auto* word = node.as_string()) {
+      section.find(role);
+      column.column = word->get();
+    } else if (auto inner = section.section(role)) {
+      inner->read("column", column.column);
+      inner->read("unit", column.unit);
+      for (const ColumnNumber& number : kNumbers) {
+        inner->read(number.key, column.*number.value, number.lower, number.upper);
+      }
+      inner->read("rate", column.rate);
+      inner->finish();
+      if (column.scale == 0) {
+        inner->fail("scale",
+                    "found 0, expected what one of the column is in the unit; a column "
+                    "that counts the other way has sign = -1");
+      }
+      if (std::abs(column.sign) != 1) {
+        inner->fail("sign", "found " + format_double(column.sign) + ", expected 1 or -1");
+      }
+      if (!column.unit.empty() && unit_factor(column.unit) == 0) {
+        inner->fail("unit", "unknown unit " + quoted_word(column.unit) +
+                                suggestion(column.unit, known_units()));
+      }
+    }
+    if (column.column.empty()) {
+      errors_.add(node, role + " names no column, expected " + role +
+                            " = { column = \"...\", unit = \"...\" }");
+    }
+    places_.emplace_back(node.source().begin.line, node.source().begin.column, map.columns.size());
+    map.columns.push_back(std::move(column));
+  }
+
+  TomlErrors& errors_;
+  std::vector<std::tuple<unsigned, unsigned, std::size_t>> places_;  // of map.columns
+};
+
+}  // namespace
+
+const MappedColumn* TableMap::find(std::string_view role) const {
+  for (const MappedColumn& column : columns) {
+    if (column.role == role) return &column;
+  }
+  return nullptr;
+}
+
+double unit_factor(std::string_view unit) {
+  if (unit.empty()) return 1;
+  for (const Unit& known : kUnits) {
+    if (unit == known.name) return known.factor;
+  }
+  return 0;
+}
+
+std::span<const std::string> known_units() {
+  static const std::vector<std::string> kNames = [] {
+    std::vector<std::string> names;
+    for (const Unit& unit : kUnits) names.emplace_back(unit.name);
+    return names;
+  }();
+  return kNames;
+}
+
+std::string format_map(const LogMap& map) {
+  std::string out;
+  write_table("poses", map.poses, out);
+  write_table("commands", map.commands, out);
+  write_table("wheels", map.wheels, out);
+  return out;
+}
+
+Result<LogMap> parse_map(std::string_view text, const std::string& file) {
+  const Result<toml::table> table = parse_toml(text, file);
+  if (!table) return table.error();
+  TomlErrors errors(file);
+  TomlSection root(*table, "", errors);
+  LogMap map;
+  MapReader reader(errors);
+  reader.read(root, "poses", map.poses);
+  reader.read(root, "commands", map.commands);
+  reader.read(root, "wheels", map.wheels);
+  root.finish();
+  const TableMap& p = map.poses;
+  const bool heading =
+      p.find("theta") != nullptr || (p.find("qx") != nullptr && p.find("qy") != nullptr &&
+                                     p.find("qz") != nullptr && p.find("qw") != nullptr);
+  const bool level = p.find("x") != nullptr && (p.find("y") != nullptr || p.find("z") != nullptr);
+  if (!p.columns.empty() && (!level || !heading)) {
+    errors.add(table->get("poses")->source().begin,
+               "[poses] needs x, y and theta, or x, y and qx, qy, qz, qw");
+  }
+  if (!errors.empty()) return errors.error();
+  return map;
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,55 @@
+// Which columns of a recording are what, in which units: guessed, or read from the user's TOML.
+#pragma once
+
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "master/io/logs/log_table.h"
+
+namespace gapfarm {
+
+// A number n of the column is (sign scale / gear n + offset) of the unit.
+struct MappedColumn {
+  std::string role;    // t, x, y, theta, qx, ... of poses; t and channels of commands
+  std::string column;  // as the recording names it
+  std::string unit;    // one of known_units(); empty: the file's own, without one SI
+  double scale = 1;    // with one and no unit the result is SI: 0.0018 m a pixel
+  double offset = 0;   // in the unit
+  double sign = 1;     // or -1: an axis or a motor that counts the other way
+  double gear = 1;     // turns of a motor a turn of its wheel
+  bool rate = false;   // the column counts (an encoder's position): its change a second is meant
+};
+
+// Where one kind of rows comes from.
+struct TableMap {
+  std::string source;    // topic, or the end of a file's name; empty: the one table that has all
+  std::string run;       // column that numbers the runs; empty: a file is a run
+  std::string keep;      // column that is not zero where a row counts; empty: all rows count
+  std::string up = "z";  // poses: the world's upward axis; Motive's is y
+  double wheel_radius_m = 0;  // turns rims' m/s into rad/s; 0: not stated
+  std::vector<MappedColumn> columns;
+
+  const MappedColumn* find(std::string_view role) const;
+};
+
+struct LogMap {
+  TableMap poses, commands, wheels;  // no columns: the recording has none
+  std::vector<std::string> notes;    // why a guess is what it is
+};
+
+// Factor to SI of a unit ("mm", "deg", "ns", "rpm", ...), 0 when nobody knows it.
+double unit_factor(std::string_view unit);
+std::span<const std::string> known_units();
+
+// The best guess by names, types and ranges.  Kinds that were not found have no columns.
+LogMap guess_map(const std::vector<Recording>& recordings);
+
+// TOML of [poses], [commands] and [wheels], for `--map`.
+std::string format_map(const LogMap& map);
+// Errors with file, line and column: unknown units, kinds without t, poses without x, y and a
+// heading.
+Result<LogMap> parse_map(std::string_view text, const std::string& file);
+
+}  // namespace gapfarm

@@ -1,0 +1,113 @@
+#include <sqlite3.h>
+
+#include <map>
+#include <memory>
+
+#include "common/trials/text/csv.h"
+#include "master/io/logs/bags.h"
+#include "master/io/logs/topics.h"
+
+namespace gapfarm {
+namespace {
+
+struct Close {
+  void operator()(sqlite3* database) const { sqlite3_close(database); }
+  void operator()(sqlite3_stmt* statement) const { sqlite3_finalize(statement); }
+};
+using Database = std::unique_ptr<sqlite3, Close>;
+using Statement = std::unique_ptr<sqlite3_stmt, Close>;
+
+struct Topic {
+  std::string name, type;
+  std::unique_ptr<MessageSchema> schema;  // null: not read
+};
+
+std::string text_of(sqlite3_stmt* row, int column) {
+  const auto* text = reinterpret_cast<const char*>(sqlite3_column_text(row, column));
+  return text == nullptr ? "" : text;
+}
+
+class Reader {
+ public:
+  explicit Reader(const std::string& path) : path_(path), topics_(path, "a rosbag2 SQLite file") {}
+
+  Result<Recording> run() {
+    sqlite3* raw = nullptr;
+    const int code = sqlite3_open_v2(path_.c_str(), &raw, SQLITE_OPEN_READONLY, nullptr);
+    database_.reset(raw);
+    if (code != SQLITE_OK) return broken();
+    if (Status s = read_topics(); !s) return s.error();
+    if (Status s = read_messages(); !s) return s.error();
+    return topics_.finish();
+  }
+
+ private:
+  Error broken() const {
+    return Error{path_ + ":1: found a SQLite file that rosbag2 did not write or that is damaged (" +
+                 sqlite3_errmsg(database_.get()) +
+                 "), expected its tables topics and messages; give the .db3 of the bag's folder"};
+  }
+
+  Result<Statement> prepare(const char* sql) {
+    sqlite3_stmt* raw = nullptr;
+    if (sqlite3_prepare_v2(database_.get(), sql, -1, &raw, nullptr) != SQLITE_OK) return broken();
+    return Statement(raw);
+  }
+
+  Status read_topics() {
+    Result<Statement> rows = prepare("SELECT id, name, type, serialization_format FROM topics");
+    if (!rows) return rows.error();
+    int code = SQLITE_ROW;
+    while ((code = sqlite3_step(rows->get())) == SQLITE_ROW) {
+      Topic topic{text_of(rows->get(), 1), text_of(rows->get(), 2), nullptr};
+      if (serves_ground_robots(topic.type) && text_of(rows->get(), 3) == "cdr") {
+        // Another package's type of the same name is left.
+        Result<MessageSchema> schema = MessageSchema::known(topic.type);
+        if (schema) topic.schema = std::make_unique<MessageSchema>(*std::move(schema));
+      }
+      by_id_.emplace(sqlite3_column_int64(rows->get(), 0), std::move(topic));
+    }
+    if (code != SQLITE_DONE) return broken();
+    return {};
+  }
+
+  Status read_messages() {
+    Result<Statement> rows =
+        prepare("SELECT topic_id, timestamp, data, id FROM messages ORDER BY timestamp, id");
+    if (!rows) return rows.error();
+    int code = SQLITE_ROW;
+    while ((code = sqlite3_step(rows->get())) == SQLITE_ROW) {
+      const auto found = by_id_.find(sqlite3_column_int64(rows->get(), 0));
+      if (found == by_id_.end()) return broken();
+      const Topic& topic = found->second;
+      if (topic.schema == nullptr) {
+        topics_.skip(topic.name, topic.type);
+        continue;
+      }
+      const sqlite3_int64 ns = sqlite3_column_int64(rows->get(), 1);
+      const double t =
+          static_cast<double>(ns / 1'000'000'000) + 1e-9 * static_cast<double>(ns % 1'000'000'000);
+      const auto* data = static_cast<const char*>(sqlite3_column_blob(rows->get(), 2));
+      const auto size = static_cast<std::size_t>(sqlite3_column_bytes(rows->get(), 2));
+      const std::string_view bytes(data == nullptr ? "" : data, data == nullptr ? 0 : size);
+      if (Status s =
+              topics_.add(topic.name, topic.type, *topic.schema, MessageWire::kCdr, t, bytes);
+          !s) {
+        return Error{path_ + ":1: message " + text_of(rows->get(), 3) + ": " + s.error().message};
+      }
+    }
+    if (code != SQLITE_DONE) return broken();
+    return {};
+  }
+
+  const std::string& path_;
+  Topics topics_;
+  Database database_;
+  std::map<sqlite3_int64, Topic> by_id_;
+};
+
+}  // namespace
+
+Result<Recording> read_db3(const std::string& path) { return Reader(path).run(); }
+
+}  // namespace gapfarm

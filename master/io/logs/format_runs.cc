@@ -1,0 +1,55 @@
+#include <cstdio>
+
+#include "common/trials/text/csv.h"
+#include "master/io/logs/to_runs.h"
+
+namespace gapfarm {
+namespace {
+
+// Nanoseconds of a clock, micrometres of a pose: more digits are noise.
+std::string digits(double value, int decimals) {
+  char text[48];
+  std::snprintf(text, sizeof text, "%.*f", decimals, value);
+  std::string out = text;
+  while (out.find('.') != out.npos && (out.back() == '0' || out.back() == '.')) {
+    const bool point = out.back() == '.';
+    out.pop_back();
+    if (point) break;
+  }
+  return out == "-0" ? "0" : out;
+}
+
+std::string format_commands(const std::vector<std::string>& channels, const RunLog& log,
+                            std::vector<CommandRow> LoggedRun::*rows) {
+  std::string out = "run,t";
+  for (const std::string& channel : channels) out += "," + csv_field(channel);
+  out += "\n";
+  bool any = false;
+  for (const LoggedRun& run : log.runs) {
+    for (const CommandRow& row : run.*rows) {
+      out += csv_field(run.run) + "," + digits(row.t_s, 6);
+      for (const double value : row.values) out += "," + digits(value, 9);
+      out += "\n";
+      any = true;
+    }
+  }
+  return any ? out : "";
+}
+
+}  // namespace
+
+RunFiles format_runs(const RunLog& log) {
+  RunFiles files;
+  files.commands = format_commands(log.channels, log, &LoggedRun::commands);
+  files.wheels = format_commands(log.wheel_channels, log, &LoggedRun::wheel_speeds);
+  files.poses = "run,t,x,y,theta\n";
+  for (const LoggedRun& run : log.runs) {
+    for (const PoseRow& row : run.poses) {
+      files.poses += csv_field(run.run) + "," + digits(row.t_s, 6) + "," + digits(row.X_WM.x, 6) +
+                     "," + digits(row.X_WM.y, 6) + "," + digits(row.X_WM.theta, 7) + "\n";
+    }
+  }
+  return files;
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,353 @@
+// Columns told by their names, their types and the numbers in them.
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+
+#include "master/io/logs/column_map.h"
+
+namespace gapfarm {
+namespace {
+
+// Nothing on wheels in a user's log goes faster, m/s; headings and rates are judged alike.
+constexpr double kFastest_m_s = 30;
+// A stamp further from the time of recording is on a clock of its own, or was never set.
+constexpr double kNearClocks_s = 60;
+
+// "Vicon x [mm]" to "vicon.x"; paths and blanks become dots, units in brackets go.
+std::string plain(const std::string& name) {
+  std::string out;
+  for (std::size_t i = 0; i < name.size(); ++i) {
+    const char c = name[i];
+    if (c == '[' || c == '(') break;
+    const bool word = std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_' || c == '%';
+    if (word) {
+      out += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    } else if (!out.empty() && out.back() != '.') {
+      out += '.';
+    }
+  }
+  while (!out.empty() && out.back() == '.') out.pop_back();
+  if (out.rfind("field.", 0) == 0) out.erase(0, 6);
+  return out;
+}
+
+// "*." in front: any path before; the first alias that a column has wins.
+bool fits(const std::string& column, const std::string& alias) {
+  if (alias.rfind("*.", 0) != 0) return column == alias;
+  const std::string end = alias.substr(1);
+  return column == alias.substr(2) ||
+         (column.size() > end.size() &&
+          column.compare(column.size() - end.size(), end.size(), end) == 0);
+}
+
+using Aliases = std::vector<std::string>;
+
+struct Role {
+  const char* name;
+  Aliases aliases;
+};
+
+const Aliases kTime = {"t",
+                       "time",
+                       "header.stamp",
+                       "*.header.stamp",
+                       "timestamp",
+                       "stamp",
+                       "%time",
+                       "__time",
+                       "vicon.time",
+                       "time_s",
+                       "secs",
+                       "*.time",
+                       "elapsed.time.sensors"};
+const Aliases kRun = {"run", "step", "trial", "take"};
+const Aliases kKeep = {"pose_new"};
+
+const std::vector<Role>& pose_roles() {
+  static const std::vector<Role> kRoles = {
+      {"x", {"x", "*.position.x", "vicon.x", "*.pose.x", "*.translation.x", "px", "pos_x", "x_m"}},
+      {"y", {"y", "*.position.y", "vicon.y", "*.pose.y", "*.translation.y", "py", "pos_y", "y_m"}},
+      {"z", {"z", "*.position.z", "*.translation.z"}},
+      {"theta",
+       {"theta", "yaw", "heading", "vicon.yaw", "*.pose.theta", "theta_rad", "yaw_deg", "theta_deg",
+        "heading_deg"}},
+      {"qx", {"qx", "*.orientation.x", "*.rotation.x"}},
+      {"qy", {"qy", "*.orientation.y", "*.rotation.y"}},
+      {"qz", {"qz", "*.orientation.z", "*.rotation.z"}},
+      {"qw", {"qw", "*.orientation.w", "*.rotation.w"}}};
+  return kRoles;
+}
+
+// Sets of channels that go together; the first that is whole counts.
+const std::vector<std::vector<Role>>& command_roles() {
+  static const std::vector<std::vector<Role>> kSets = {
+      {{"left", {"cmd_left", "command_left", "left_cmd", "left"}},
+       {"right", {"cmd_right", "command_right", "right_cmd", "right"}}},
+      {{"throttle", {"throttle", "*.throttle"}}, {"steering", {"steering", "*.steering"}}},
+      {{"v", {"v", "cmd_v", "v_cmd", "*.cmd_vel.linear.x", "*.twist.linear.x", "linear.x"}},
+       {"omega",
+        {"w", "omega", "cmd_w", "w_cmd", "*.cmd_vel.angular.z", "*.twist.angular.z", "angular.z"}}},
+      {{"speed", {"drive.speed", "speed", "cmd_speed"}},
+       {"steering", {"drive.steering_angle", "steering_angle", "cmd_steering"}}},
+      {{"left", {"vl", "v_left"}}, {"right", {"vr", "v_right"}}},
+      {{"w1", {"w1"}}, {"w2", {"w2"}}, {"w3", {"w3"}}, {"w4", {"w4"}}}};
+  return kSets;
+}
+
+const std::vector<Role>& wheel_roles() {
+  static const std::vector<Role> kRoles = {
+      {"left", {"wheel_left", "left_wheel", "enc_left", "odol"}},
+      {"right", {"wheel_right", "right_wheel", "enc_right", "odor"}}};
+  return kRoles;
+}
+
+// The numbers of a column that are there.
+std::vector<double> numbers(const LogTable& table, const std::string& column) {
+  std::vector<double> all;
+  const auto at = table.find(column);
+  if (!at) return all;
+  for (std::size_t r = 0; r < table.rows(); ++r) {
+    if (std::isfinite(table.at(r, *at))) all.push_back(table.at(r, *at));
+  }
+  return all;
+}
+
+double greatest(const std::vector<double>& values) {
+  double most = 0;
+  for (const double value : values) most = std::max(most, std::abs(value));
+  return most;
+}
+
+bool has_word(const std::string& name, const std::string& word) {
+  for (std::size_t at = name.find(word); at != name.npos; at = name.find(word, at + 1)) {
+    const bool before = at == 0 || std::isalnum(static_cast<unsigned char>(name[at - 1])) == 0;
+    const std::size_t end = at + word.size();
+    const bool after =
+        end >= name.size() || std::isalnum(static_cast<unsigned char>(name[end])) == 0;
+    if (before && after) return true;
+  }
+  return false;
+}
+
+class Guess {
+ public:
+  explicit Guess(const std::vector<Recording>& recordings) : recordings_(recordings) {}
+
+  LogMap run() {
+    for (const Recording& recording : recordings_) {
+      for (const LogTable& table : recording.tables) consider(table);
+    }
+    return std::move(map_);
+  }
+
+ private:
+  static std::string column_of(const LogTable& table, const Aliases& aliases) {
+    for (const std::string& alias : aliases) {
+      for (const std::string& column : table.columns) {
+        if (fits(plain(column), alias)) return column;
+      }
+    }
+    return {};
+  }
+
+  // The stamp of the message where it is set and on the recorder's clock, else the recorder's time.
+  static std::string time_of(const LogTable& table) {
+    const std::string stamp = column_of(table, {"header.stamp", "*.header.stamp"});
+    const std::string time = column_of(table, kTime);
+    if (stamp.empty() || table.topic.empty()) return stamp.empty() ? time : stamp;
+    const auto stamps = numbers(table, stamp), times = numbers(table, "t");
+    const bool near = stamps.size() == times.size() && !times.empty() &&
+                      std::abs(stamps.back() - times.back()) < kNearClocks_s &&
+                      std::abs(stamps.front() - times.front()) < kNearClocks_s;
+    return near ? stamp : time;
+  }
+
+  void consider(const LogTable& table) {
+    const std::string time = time_of(table);
+    if (time.empty()) return;
+    // A better pose than odometry replaces it: odometry cannot show slip.
+    const bool odometry = table.type.find("Odometry") != std::string::npos;
+    if (map_.poses.columns.empty() || (odometry_ && !odometry)) guess_poses(table, time, odometry);
+    if (map_.commands.columns.empty() && !odometry) guess_commands(table, time);
+    if (map_.wheels.columns.empty()) guess_wheels(table, time);
+  }
+
+  void start(const LogTable& table, const std::string& time, TableMap& to) const {
+    to = {};
+    to.source = table.topic;
+    to.run = column_of(table, kRun);
+    to.columns.push_back({"t", time, time_unit(table, time)});
+  }
+
+  void guess_poses(const LogTable& table, const std::string& time, bool odometry) {
+    TableMap found;
+    start(table, time, found);
+    for (const Role& role : pose_roles()) {
+      const std::string column = column_of(table, role.aliases);
+      if (!column.empty()) found.columns.push_back({role.name, column, ""});
+    }
+    bool quaternion = true;
+    for (const char* part : {"qx", "qy", "qz", "qw"}) {
+      quaternion = quaternion && found.find(part) != nullptr;
+    }
+    const bool place = found.find("x") != nullptr && found.find("y") != nullptr;
+    if (!place || (!quaternion && found.find("theta") == nullptr)) return;
+    if (table.type == "motive") found.up = "y";
+    found.keep = column_of(table, kKeep);
+    auto& columns = found.columns;
+    columns.erase(std::remove_if(columns.begin(), columns.end(),
+                                 [&](const MappedColumn& c) {
+                                   const bool part = c.role[0] == 'q' && c.role.size() == 2;
+                                   return (c.role == "z" && found.up == "z") ||
+                                          (part && found.find("theta") != nullptr);
+                                 }),
+                  columns.end());
+    const std::string unit = length_unit(table, found);
+    for (MappedColumn& c : columns) {
+      if (c.role == "x" || c.role == "y" || c.role == "z") c.unit = unit;
+      if (c.role == "theta") c.unit = angle_unit(table, c.column);
+    }
+    odometry_ = odometry;
+    map_.poses = std::move(found);
+    if (odometry) {
+      map_.notes.push_back("poses are odometry (" + table.source +
+                           "): wheels' slip cannot be seen in what wheels say; record poses by "
+                           "motion capture, laser or tags");
+    }
+  }
+
+  void guess_commands(const LogTable& table, const std::string& time) {
+    for (const std::vector<Role>& set : command_roles()) {
+      TableMap found;
+      start(table, time, found);
+      for (const Role& role : set) {
+        const std::string column = column_of(table, role.aliases);
+        if (!column.empty()) found.columns.push_back({role.name, column, ""});
+      }
+      if (found.columns.size() != set.size() + 1) continue;
+      for (MappedColumn& c : found.columns) {
+        if (c.role == "omega") c.unit = rate_unit(table, c.column);
+        const bool rim = c.role == "left" || c.role == "right" || c.role == "speed";
+        if (rim) c.unit = rim_unit(table, c.column);
+      }
+      map_.commands = std::move(found);
+      return;
+    }
+  }
+
+  // A joint's name as a key of the map: plain letters, each once, none of the map's own.
+  static std::string role_of(const std::string& joint, const TableMap& taken) {
+    std::string role;
+    for (const char c : joint) {
+      role += std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '-' ? c : '_';
+    }
+    for (const char* own : {"", "source", "run", "keep", "up", "wheel_radius"}) {
+      if (role == own) role += "_joint";
+    }
+    while (taken.find(role) != nullptr) role += "_2";
+    return role;
+  }
+
+  void guess_wheels(const LogTable& table, const std::string& time) {
+    TableMap found;
+    start(table, time, found);
+    for (const Role& role : wheel_roles()) {
+      const std::string column = column_of(table, role.aliases);
+      if (!column.empty()) found.columns.push_back({role.name, column, rim_unit(table, column)});
+    }
+    // Joint states: a column velocity.NAME a joint.
+    if (found.columns.size() == 1 && table.type.find("JointState") != std::string::npos) {
+      for (const std::string& column : table.columns) {
+        if (column.rfind("velocity.", 0) == 0) {
+          found.columns.push_back({role_of(column.substr(9), found), column, "rad/s"});
+        }
+      }
+    }
+    if (found.columns.size() > 1) map_.wheels = std::move(found);
+  }
+
+  // Whether the file has a row of units: what it states is not guessed.
+  static bool stated(const LogTable& table, const std::string& column) {
+    return !table.unit_of(column).empty();
+  }
+
+  // Clocks count seconds since 1970 or since something; a day has 86,400.
+  std::string time_unit(const LogTable& table, const std::string& column) const {
+    if (stated(table, column)) return "";
+    if (has_word(column, "ns")) return "ns";
+    if (has_word(column, "us")) return "us";
+    if (has_word(column, "ms")) return "ms";
+    const double most = greatest(numbers(table, column));
+    return most > 1e17 ? "ns" : most > 1e14 ? "us" : most > 1e11 ? "ms" : "s";
+  }
+
+  std::string length_unit(const LogTable& table, const TableMap& found) {
+    const std::string& x = found.find("x")->column;
+    if (stated(table, x)) return "";
+    for (const char* unit : {"mm", "cm"}) {
+      if (has_word(x, unit)) return unit;
+    }
+    const auto xi = table.find(x), ti = table.find(found.find("t")->column);
+    // The median outlives jumps between runs and stamps that hardly differ.
+    std::vector<double> speeds;
+    const MappedColumn& t = *found.find("t");
+    const double second = unit_factor(t.unit.empty() ? table.unit_of(t.column) : t.unit);
+    for (std::size_t r = 1; r < table.rows(); ++r) {
+      const double dt = (table.at(r, *ti) - table.at(r - 1, *ti)) * second;
+      const double dx = std::abs(table.at(r, *xi) - table.at(r - 1, *xi));
+      if (dt > 0 && dx > 0) speeds.push_back(dx / dt);
+    }
+    if (speeds.size() < 2) return "m";
+    std::nth_element(speeds.begin(), speeds.begin() + speeds.size() / 2, speeds.end());
+    const double median = speeds[speeds.size() / 2];
+    if (median < kFastest_m_s) return "m";
+    map_.notes.push_back("x changes by " + std::to_string(static_cast<long>(median)) +
+                         " a second, half of the time by more: taken as mm");
+    return "mm";
+  }
+
+  // Headings in radians stay within a turn or grow smoothly past it; 60 rad are ten turns.
+  std::string angle_unit(const LogTable& table, const std::string& column) {
+    if (stated(table, column)) return "";
+    if (has_word(column, "deg") || column.find("_deg") != column.npos) return "deg";
+    const std::vector<double> values = numbers(table, column);
+    double jump = 0;
+    for (std::size_t i = 1; i < values.size(); ++i) {
+      jump = std::max(jump, std::abs(values[i] - values[i - 1]));
+    }
+    if (greatest(values) < 60 && jump < 60) return "rad";
+    if (jump < 60 && greatest(values) < 361 && values.size() > 1) {
+      map_.notes.push_back(column + " reaches " +
+                           std::to_string(static_cast<long>(greatest(values))) +
+                           ": taken as degrees");
+      return "deg";
+    }
+    return jump >= 60 ? "deg" : "rad";
+  }
+
+  static std::string rate_unit(const LogTable& table, const std::string& column) {
+    if (stated(table, column)) return "";
+    if (column.find("deg") != column.npos) return "deg/s";
+    return greatest(numbers(table, column)) > 60 ? "deg/s" : "rad/s";
+  }
+
+  static std::string rim_unit(const LogTable& table, const std::string& column) {
+    if (stated(table, column)) return "";
+    if (column.find("rpm") != column.npos) return "rpm";
+    const std::string name = plain(column);
+    const bool speed = name == "vl" || name == "vr" || name == "v_left" || name == "v_right" ||
+                       name.find("speed") != name.npos;
+    if (speed) return "m/s";
+    return "rad/s";
+  }
+
+  const std::vector<Recording>& recordings_;
+  LogMap map_;
+  bool odometry_ = false;
+};
+
+}  // namespace
+
+LogMap guess_map(const std::vector<Recording>& recordings) { return Guess(recordings).run(); }
+
+}  // namespace gapfarm

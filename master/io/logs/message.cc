@@ -1,0 +1,274 @@
+#include "master/io/logs/message.h"
+
+#include <algorithm>
+#include <bit>
+#include <cstdint>
+#include <cstring>
+
+#include "common/trials/text/csv.h"
+#include "master/io/logs/message_texts.h"
+
+namespace gapfarm {
+
+struct PrimitiveType {
+  const char* name;
+  unsigned size;  // bytes; 0: a string
+  char kind;      // i, u, f, s; t: ROS 1's time and duration
+};
+
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "messages are copied as they are");
+
+constexpr PrimitiveType kPrimitives[] = {
+    {"bool", 1, 'u'},    {"byte", 1, 'u'},   {"char", 1, 'u'},   {"int8", 1, 'i'},
+    {"uint8", 1, 'u'},   {"int16", 2, 'i'},  {"uint16", 2, 'u'}, {"int32", 4, 'i'},
+    {"uint32", 4, 'u'},  {"int64", 8, 'i'},  {"uint64", 8, 'u'}, {"float32", 4, 'f'},
+    {"float64", 8, 'f'}, {"string", 0, 's'}, {"time", 8, 't'},   {"duration", 8, 't'}};
+
+constexpr int kDeepest = 16;
+// Elements of one array that become columns; clouds and images do not.
+constexpr std::size_t kMostElements = 64;
+constexpr std::size_t kMostInMessage = 1'000'000;
+
+int primitive_of(std::string_view name) {
+  for (std::size_t i = 0; i < std::size(kPrimitives); ++i) {
+    if (name == kPrimitives[i].name) return static_cast<int>(i);
+  }
+  return -1;
+}
+
+std::string_view trimmed(std::string_view text) {
+  const std::size_t begin = text.find_first_not_of(" \t\r");
+  if (begin == text.npos) return {};
+  return text.substr(begin, text.find_last_not_of(" \t\r") - begin + 1);
+}
+
+}  // namespace
+
+std::string short_type(std::string_view type) {
+  std::string out(type);
+  const std::size_t at = out.find("/msg/");
+  if (at != out.npos) out.erase(at, 4);
+  return out;
+}
+
+bool serves_ground_robots(std::string_view type) {
+  static constexpr std::string_view kServed[] = {
+      "Twist",        "TwistStamped", "AckermannDrive",   "AckermannDriveStamped",
+      "Odometry",     "JointState",   "PoseStamped",      "PoseWithCovarianceStamped",
+      "Pose2D",       "TFMessage",    "TransformStamped", "Imu",
+      "BatteryState", "String"};
+  const std::string_view name = type.substr(type.rfind('/') + 1);
+  return std::find(std::begin(kServed), std::end(kServed), name) != std::end(kServed);
+}
+
+Status MessageSchema::check(const std::string& type, int depth) const {
+  const auto found = types_.find(type);
+  if (found == types_.end()) {
+    return Error{"type " + quoted_word(type_) + " needs " + quoted_word(type) +
+                 ", which its definition does not hold"};
+  }
+  if (depth > kDeepest) return Error{"type " + quoted_word(type_) + " holds itself"};
+  for (const Field& field : found->second) {
+    if (field.primitive >= 0) continue;
+    if (Status s = check(field.type, depth + 1); !s) return s;
+  }
+  return {};
+}
+
+Result<MessageSchema> MessageSchema::parse(const std::string& type, std::string_view definition) {
+  MessageSchema schema;
+  schema.type_ = short_type(type);
+  std::string current = schema.type_;
+  schema.types_[current];
+  // Types within are named with their package, or without it when it is the holder's own.
+  std::vector<std::string> defined;
+  for (std::size_t at = 0; at < definition.size();) {
+    const std::size_t end = std::min(definition.find('\n', at), definition.size());
+    std::string_view line = definition.substr(at, end - at);
+    at = end + 1;
+    if (const std::size_t hash = line.find('#'); hash != line.npos) line = line.substr(0, hash);
+    line = trimmed(line);
+    if (line.empty() || line[0] == '=') continue;
+    if (line.substr(0, 4) == "MSG:") {
+      current = short_type(trimmed(line.substr(4)));
+      schema.types_[current];
+      continue;
+    }
+    const std::size_t blank = line.find_first_of(" \t");
+    if (blank == line.npos) return Error{"found the definition line " + quoted_word(line)};
+    std::string_view word = line.substr(0, blank);
+    std::string_view name = trimmed(line.substr(blank));
+    name = name.substr(0, name.find_first_of(" \t="));
+    // Constants take no room; ROS 2's defaults stand behind a blank.
+    const std::size_t equals = line.find('=');
+    if (equals != line.npos && trimmed(line.substr(blank, equals - blank)) == name) continue;
+    Field field;
+    field.name = name;
+    if (const std::size_t bracket = word.find('['); bracket != word.npos) {
+      field.array = true;
+      const std::string_view inside = word.substr(bracket + 1, word.size() - bracket - 2);
+      if (inside.substr(0, 2) != "<=") {
+        field.fixed = static_cast<std::size_t>(
+            std::clamp<std::int64_t>(parse_integer(inside).value_or(0), 0, 1 << 20));
+      }
+      word = word.substr(0, bracket);
+    }
+    word = word.substr(0, word.find("<="));  // string<=10
+    field.primitive = primitive_of(word);
+    if (field.primitive < 0) field.type = short_type(word);
+    schema.types_[current].push_back(std::move(field));
+  }
+  for (auto& [holder, fields] : schema.types_) {
+    for (Field& field : fields) {
+      if (field.primitive >= 0 || schema.types_.count(field.type) != 0) continue;
+      const std::string package = holder.substr(0, holder.find('/') + 1);
+      const std::string name = field.type == "Header" ? "std_msgs/Header" : package + field.type;
+      field.type = name;
+    }
+  }
+  if (Status s = schema.check(schema.type_, 0); !s) return s.error();
+  return schema;
+}
+
+Result<MessageSchema> MessageSchema::known(const std::string& type) {
+  const std::string text = message_text(short_type(type));
+  if (text.empty()) return Error{"no definition of " + quoted_word(type) + " is known"};
+  return parse(type, text);
+}
+
+class MessageDecoder {
+ public:
+  MessageDecoder(const MessageSchema& schema, std::string_view bytes, MessageWire wire)
+      : schema_(schema), bytes_(bytes), cdr_(wire == MessageWire::kCdr) {}
+
+  Result<MessageContent> run() {
+    if (cdr_) {
+      // A header of four bytes; alignment counts from behind it.
+      if (bytes_.size() < 4) return ended();
+      if (bytes_[1] != 1 && bytes_[1] != 3) {
+        return Error{"found a CDR message that is not little-endian"};
+      }
+      bytes_.remove_prefix(4);
+    }
+    if (!message(schema_.type_, "")) return error_;
+    return std::move(content_);
+  }
+
+ private:
+  Error ended() const {
+    return Error{"the message of type " + schema_.type_ + " ends at byte " +
+                 std::to_string(bytes_.size()) + ", within it"};
+  }
+  bool fail() {
+    error_ = ended();
+    return false;
+  }
+
+  bool take(void* to, std::size_t size) {
+    if (cdr_ && size > 1) at_ = (at_ + size - 1) / size * size;
+    if (at_ > bytes_.size() || bytes_.size() - at_ < size) return fail();
+    std::memcpy(to, bytes_.data() + at_, size);
+    at_ += size;
+    return true;
+  }
+
+  bool message(const std::string& type, const std::string& path) {
+    for (const MessageSchema::Field& field : schema_.types_.find(type)->second) {
+      const std::string inside = path.empty() ? field.name : path + "." + field.name;
+      if (!field.array) {
+        if (!element(field, inside)) return false;
+        continue;
+      }
+      std::uint32_t count = static_cast<std::uint32_t>(field.fixed);
+      if (field.fixed == 0 && !take(&count, 4)) return false;
+      // Each element takes a byte at least.
+      if (count > bytes_.size()) return fail();
+      const bool quiet = count > kMostElements || field.name.find("covariance") != field.name.npos;
+      for (std::uint32_t i = 0; i < count; ++i) {
+        if (quiet) ++quiet_;
+        const bool fine = element(field, inside + "[" + std::to_string(i) + "]");
+        if (quiet) --quiet_;
+        if (!fine) return false;
+      }
+    }
+    return true;
+  }
+
+  bool element(const MessageSchema::Field& field, const std::string& path) {
+    // Elements without bytes cost nothing to claim.
+    if (++elements_ > kMostInMessage) return fail();
+    if (field.primitive < 0) {
+      const bool time = cdr_ && (field.type == "builtin_interfaces/Time" ||
+                                 field.type == "builtin_interfaces/Duration");
+      return time ? stamp(path) : message(field.type, path);
+    }
+    const PrimitiveType& type = kPrimitives[field.primitive];
+    if (type.kind == 's') return word(path);
+    if (type.kind == 't') return stamp(path);
+    double value = 0;
+    if (!number(type, value)) return false;
+    put(path, value);
+    return true;
+  }
+
+  void put(const std::string& path, double value) {
+    if (quiet_ == 0) content_.numbers.emplace_back(path, value);
+  }
+
+  bool stamp(const std::string& path) {
+    std::uint32_t s = 0, ns = 0;
+    if (!take(&s, 4) || !take(&ns, 4)) return false;
+    put(path, static_cast<double>(s) + 1e-9 * static_cast<double>(ns));
+    return true;
+  }
+
+  bool word(const std::string& path) {
+    std::uint32_t length = 0;
+    if (!take(&length, 4)) return false;
+    if (bytes_.size() - at_ < length) return fail();
+    std::string text(bytes_.substr(at_, length));
+    at_ += length;
+    if (cdr_ && !text.empty() && text.back() == '\0') text.pop_back();
+    if (quiet_ == 0) content_.words[path] = std::move(text);
+    return true;
+  }
+
+  template <class T>
+  bool read(double& value) {
+    T raw{};
+    if (!take(&raw, sizeof raw)) return false;
+    value = static_cast<double>(raw);
+    return true;
+  }
+
+  bool number(const PrimitiveType& type, double& value) {
+    if (type.kind == 'f') return type.size == 4 ? read<float>(value) : read<double>(value);
+    switch (type.size) {
+      case 1:
+        return type.kind == 'i' ? read<std::int8_t>(value) : read<std::uint8_t>(value);
+      case 2:
+        return type.kind == 'i' ? read<std::int16_t>(value) : read<std::uint16_t>(value);
+      case 4:
+        return type.kind == 'i' ? read<std::int32_t>(value) : read<std::uint32_t>(value);
+      default:
+        return type.kind == 'i' ? read<std::int64_t>(value) : read<std::uint64_t>(value);
+    }
+  }
+
+  const MessageSchema& schema_;
+  std::string_view bytes_;
+  bool cdr_;
+  std::size_t at_ = 0;
+  std::size_t elements_ = 0;
+  int quiet_ = 0;  // within arrays that become no columns
+  MessageContent content_;
+  Error error_;
+};
+
+Result<MessageContent> MessageSchema::decode(std::string_view bytes, MessageWire wire) const {
+  return MessageDecoder(*this, bytes, wire).run();
+}
+
+}  // namespace gapfarm

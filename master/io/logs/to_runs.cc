@@ -1,0 +1,397 @@
+#include "master/io/logs/to_runs.h"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <map>
+#include <set>
+
+#include "common/base/suggest.h"
+#include "common/trials/text/csv.h"
+
+namespace gapfarm {
+namespace {
+
+// A quaternion this far from unit length was not measured (Motive and TUM write zeros).
+constexpr double kUnitLength = 0.1;
+
+// Seconds since 1970 are 2e9; what is greater than this was never measured.
+constexpr double kGreatest = 1e12;
+
+struct Kind {
+  const char* name;
+  const TableMap* map;
+};
+
+// Rows of one kind, of one run; values in SI, one a role after t.
+struct Stretch {
+  std::vector<double> t_s;
+  std::vector<std::vector<double>> rows;
+};
+using Stretches = std::map<std::string, Stretch>;  // by run
+
+struct Tally {
+  std::size_t taken = 0, blank = 0, back = 0, dropped = 0;
+};
+
+// A file's name without its ending; its folder's where the name says nothing.
+std::string stem_of(const std::string& file) {
+  const std::filesystem::path path(file);
+  const std::string stem = path.stem().string();
+  const bool plain = stem == "poses" || stem == "commands" || stem == "wheels";
+  const std::string folder = path.parent_path().filename().string();
+  return plain && !folder.empty() ? folder : stem;
+}
+
+class Importer {
+ public:
+  Importer(const std::vector<Recording>& recordings, const LogMap& map)
+      : recordings_(recordings), map_(map) {}
+
+  Result<ImportedRuns> run() {
+    for (std::size_t i = 0; i < recordings_.size(); ++i) {
+      for (const Kind& kind : kinds()) {
+        if (Status s = take(i, kind); !s) return s.error();
+      }
+    }
+    for (const Kind& kind : {kinds()[0], kinds()[1]}) {
+      if (!kind.map->columns.empty() && tallies_[kind.name].taken == 0) return none_found(kind);
+    }
+    assemble();
+    report();
+    return std::move(out_);
+  }
+
+ private:
+  std::vector<Kind> kinds() const {
+    return {{"poses", &map_.poses}, {"commands", &map_.commands}, {"wheels", &map_.wheels}};
+  }
+
+  static bool has_all(const LogTable& table, const TableMap& map) {
+    return std::all_of(map.columns.begin(), map.columns.end(),
+                       [&](const MappedColumn& c) { return table.find(c.column).has_value(); });
+  }
+
+  Error none_found(const Kind& kind) const {
+    std::string there;
+    for (const Recording& recording : recordings_) {
+      for (const LogTable& table : recording.tables) {
+        if (there.size() > 600) break;
+        there += (there.empty() ? "" : "; ") + table.source + ": ";
+        for (std::size_t i = 0; i < table.columns.size(); ++i) {
+          there += (i == 0 ? "" : ", ") + table.columns[i];
+        }
+      }
+    }
+    return Error{recordings_.front().file + ":1: found no " + kind.name +
+                 " in any table, expected the columns of [" + kind.name + "] of the map" +
+                 (kind.map->source.empty() ? "" : " in " + kind.map->source) + "; there is " +
+                 there};
+  }
+
+  Status take(std::size_t recording, const Kind& kind) {
+    const TableMap& map = *kind.map;
+    if (map.columns.empty()) return {};
+    for (const LogTable& table : recordings_[recording].tables) {
+      if (!map.source.empty() && table.topic != map.source && !table.source.ends_with(map.source)) {
+        continue;
+      }
+      if (!has_all(table, map)) continue;
+      return take_table(recording, table, kind);
+    }
+    return {};
+  }
+
+  // What a column's numbers become in SI.
+  struct Line {
+    double slope, offset;
+  };
+
+  // The map's unit, else the file's where the map does not say what one of the column is.
+  static Result<std::string> unit_of(const LogTable& table, const MappedColumn& c) {
+    if (!c.unit.empty() || c.scale != 1) return c.unit;
+    const std::string own = table.unit_of(c.column);
+    const bool none = own.empty() || own == "-";
+    if (none || unit_factor(own) != 0) return none ? "" : own;
+    const std::string role = c.role + " = { column = \"" + c.column + "\", ";
+    return text_error(table.source, table.units[*table.find(c.column)].place,
+                      "unit " + quoted_word(own) + " of column " + quoted_word(c.column),
+                      "one of s, ms, m, mm, rad, deg, rad/s, rpm, ... (docs/formats.md)" +
+                          suggestion(own, known_units()),
+                      "say in the map what one of it is in SI: " + role + "scale = 0.001 }, or " +
+                          role + "unit = \"...\" }");
+  }
+
+  // Speeds of rims become those of wheels.
+  Result<Line> line_of(const LogTable& table, const TableMap& map, const MappedColumn& c,
+                       bool poses) const {
+    const Result<std::string> unit = unit_of(table, c);
+    if (!unit) return unit.error();
+    double factor = unit_factor(*unit);
+    const bool length = *unit == "m" || *unit == "cm" || *unit == "mm";
+    const bool speed = unit->ends_with("/s") && unit->find("m/") != unit->npos;
+    const bool rim = !poses && (speed || (c.rate && length)) && c.role != "v" && c.role != "vy";
+    if (rim && map.wheel_radius_m <= 0) {
+      return Error{table.source + ":1: found column " + quoted_word(c.column) + " in " + *unit +
+                   ", expected the wheels' radius too; print the map (--print-map), add "
+                   "wheel_radius = 0.05 (m) to it and give it by --map"};
+    }
+    if (rim) factor /= map.wheel_radius_m;
+    return Line{c.sign * c.scale / c.gear * factor, c.offset * factor};
+  }
+
+  Status take_table(std::size_t recording, const LogTable& table, const Kind& kind) {
+    const TableMap& map = *kind.map;
+    const bool poses = kind.map == &map_.poses;
+    std::vector<std::size_t> at;
+    std::vector<Line> lines;
+    for (const MappedColumn& c : map.columns) {
+      at.push_back(*table.find(c.column));
+      const Result<Line> line = line_of(table, map, c, poses);
+      if (!line) return line.error();
+      lines.push_back(*line);
+    }
+    std::optional<std::size_t> run, keep;
+    for (const auto& [name, to] : {std::pair{&map.run, &run}, {&map.keep, &keep}}) {
+      if (name->empty()) continue;
+      *to = table.find(*name);
+      if (!*to) {
+        return Error{table.source + ":1: found no column " + quoted_word(*name) +
+                     ", expected it for [" + kind.name + "]" + suggestion(*name, table.columns)};
+      }
+    }
+    const bool rates = std::any_of(map.columns.begin(), map.columns.end(),
+                                   [](const MappedColumn& c) { return c.rate; });
+    std::map<std::string, std::vector<double>> before;  // of each run: its last row
+    Tally& tally = tallies_[kind.name];
+    for (std::size_t r = 0; r < table.rows(); ++r) {
+      if (keep && !(table.at(r, *keep) != 0)) {
+        ++tally.dropped;
+        continue;
+      }
+      std::vector<double> values;
+      for (std::size_t c = 0; c < at.size(); ++c) {
+        values.push_back(lines[c].slope * table.at(r, at[c]) + lines[c].offset);
+      }
+      const bool whole = std::all_of(values.begin(), values.end(),
+                                     [](double v) { return std::abs(v) < kGreatest; });
+      if (!whole || (poses && !to_pose(map, values))) {
+        ++tally.blank;
+        continue;
+      }
+      const std::string name = run_name(table, run, r);
+      if (rates && !to_rates(map, before[name], values)) continue;
+      put(tally, stretches_[kind.name][recording][name], values);
+    }
+    used_.insert(table.source);
+    return {};
+  }
+
+  // The row before with its counts' rates up to this one; false where there is none.
+  static bool to_rates(const TableMap& map, std::vector<double>& before,
+                       std::vector<double>& values) {
+    const double dt = before.empty() ? 0 : values[0] - before[0];
+    if (dt < 0 || (dt == 0 && !before.empty())) return false;
+    std::vector<double> row = before;
+    for (std::size_t c = 0; c < row.size(); ++c) {
+      if (map.columns[c].rate) row[c] = (values[c] - before[c]) / dt;
+    }
+    before = values;
+    values = std::move(row);
+    return !values.empty();
+  }
+
+  static std::string run_name(const LogTable& table, const std::optional<std::size_t>& run,
+                              std::size_t row) {
+    return run ? format_double(table.at(row, *run)) : "";
+  }
+
+  void put(Tally& tally, Stretch& stretch, std::vector<double> values) {
+    const double t = t_of(values);
+    if (!stretch.t_s.empty() && t < stretch.t_s.back()) {
+      ++tally.back;
+      return;
+    }
+    values.erase(values.begin() + static_cast<std::ptrdiff_t>(time_index_));
+    stretch.t_s.push_back(t);
+    stretch.rows.push_back(std::move(values));
+    ++tally.taken;
+  }
+
+  double t_of(const std::vector<double>& values) const { return values[time_index_]; }
+
+  // {t, x, y, theta} out of the mapped columns; false where nothing was measured.
+  static bool to_pose(const TableMap& map, std::vector<double>& values) {
+    const auto value = [&](std::string_view role) {
+      for (std::size_t i = 0; i < map.columns.size(); ++i) {
+        if (map.columns[i].role == role) return values[i];
+      }
+      return 0.0;
+    };
+    const bool y_up = map.up == "y";
+    double theta = value("theta");
+    if (map.find("qw") != nullptr) {
+      double x = value("qx"), y = value("qy"), z = value("qz"), w = value("qw");
+      const double length = std::sqrt(x * x + y * y + z * z + w * w);
+      if (std::abs(length - 1) > kUnitLength) return false;
+      // With y up the floor's y is -z: turned about x, which keeps x.
+      if (y_up) std::tie(y, z) = std::pair(-z, y);
+      theta = std::atan2(2 * (w * z + x * y), w * w + x * x - y * y - z * z);
+    }
+    values = {value("t"), value("x"), y_up ? -value("z") : value("y"), wrap_angle(theta)};
+    return true;
+  }
+
+  // Recordings that have both kinds are drives of their own; others are put together in order.
+  std::vector<std::vector<std::size_t>> groups() {
+    std::vector<std::vector<std::size_t>> whole;
+    std::vector<std::size_t> only_poses, others;
+    for (std::size_t i = 0; i < recordings_.size(); ++i) {
+      const bool poses = stretches_["poses"].count(i) != 0;
+      const bool told = stretches_["commands"].count(i) != 0 || stretches_["wheels"].count(i) != 0;
+      if (poses && told) whole.push_back({i});
+      if (poses && !told) only_poses.push_back(i);
+      if (!poses && told) others.push_back(i);
+    }
+    if (only_poses.size() == 1) {
+      // One log of poses, with commands and wheels in files of their own.
+      only_poses.insert(only_poses.end(), others.begin(), others.end());
+      whole.push_back(only_poses);
+    } else {
+      for (std::size_t k = 0; k < only_poses.size() && k < others.size(); ++k) {
+        whole.push_back({only_poses[k], others[k]});
+      }
+    }
+    return whole;
+  }
+
+  void assemble() {
+    RunLog& log = out_.log;
+    for (const MappedColumn& c : map_.commands.columns) {
+      if (c.role != "t") log.channels.push_back(c.role);
+    }
+    for (const MappedColumn& c : map_.wheels.columns) {
+      if (c.role != "t") log.wheel_channels.push_back(c.role);
+    }
+    const auto all = groups();
+    for (const auto& group : all) {
+      std::map<std::string, LoggedRun> runs;
+      std::vector<std::string> order;
+      for (const Kind& kind : kinds()) {
+        for (const std::size_t i : group) {
+          const auto found = stretches_[kind.name].find(i);
+          if (found == stretches_[kind.name].end()) continue;
+          for (const auto& [run, stretch] : found->second)
+            add(kind, stretch, runs[run], order, run);
+        }
+      }
+      std::sort(order.begin(), order.end(), [&](const auto& a, const auto& b) {
+        const double ta = first_time(runs[a]), tb = first_time(runs[b]);
+        const auto na = parse_double(a), nb = parse_double(b);
+        return na && nb && *na != *nb ? *na < *nb : ta < tb;
+      });
+      for (const std::string& name : order) {
+        LoggedRun& run = runs[name];
+        const std::string stem = stem_of(recordings_[group.front()].file);
+        run.run = name.empty() ? stem : all.size() == 1 ? name : stem + "_" + name;
+        for (char& c : run.run) c = c == ',' || static_cast<unsigned char>(c) < 0x20 ? '_' : c;
+        if (run.poses.empty() || (run.commands.empty() && !log.channels.empty())) {
+          out_.report.push_back("left: run " + run.run + ", which has " +
+                                (run.poses.empty() ? "no poses" : "no commands"));
+          continue;
+        }
+        log.runs.push_back(std::move(run));
+      }
+    }
+    shift_clocks();
+  }
+
+  static double first_time(const LoggedRun& run) {
+    double first = 1e300;
+    if (!run.poses.empty()) first = std::min(first, run.poses.front().t_s);
+    if (!run.commands.empty()) first = std::min(first, run.commands.front().t_s);
+    return first;
+  }
+
+  static void add(const Kind& kind, const Stretch& stretch, LoggedRun& run,
+                  std::vector<std::string>& order, const std::string& name) {
+    if (std::find(order.begin(), order.end(), name) == order.end()) order.push_back(name);
+    const std::string_view what = kind.name;
+    for (std::size_t i = 0; i < stretch.t_s.size(); ++i) {
+      const std::vector<double>& row = stretch.rows[i];
+      if (what == "poses") run.poses.push_back({stretch.t_s[i], {row[0], row[1], row[2]}});
+      if (what == "commands") run.commands.push_back({stretch.t_s[i], row});
+      if (what == "wheels") run.wheel_speeds.push_back({stretch.t_s[i], row});
+    }
+  }
+
+  // Times from zero: Unix seconds would eat the digits of milliseconds.
+  void shift_clocks() {
+    double first = 1e300;
+    for (const LoggedRun& run : out_.log.runs) first = std::min(first, first_time(run));
+    if (out_.log.runs.empty() || std::abs(first) < 1e6) return;
+    out_.clock_start_s = std::floor(first);
+    for (LoggedRun& run : out_.log.runs) {
+      for (PoseRow& row : run.poses) row.t_s -= out_.clock_start_s;
+      for (CommandRow& row : run.commands) row.t_s -= out_.clock_start_s;
+      for (CommandRow& row : run.wheel_speeds) row.t_s -= out_.clock_start_s;
+    }
+  }
+
+  void report() {
+    for (const Kind& kind : kinds()) {
+      if (kind.map->columns.empty()) continue;
+      const Tally& tally = tallies_[kind.name];
+      std::string line = "took: " + std::to_string(tally.taken) + " " + kind.name;
+      if (!kind.map->source.empty()) line += " of " + kind.map->source;
+      line += " (";
+      for (std::size_t i = 0; i < kind.map->columns.size(); ++i) {
+        line += (i == 0 ? "" : ", ") + kind.map->columns[i].column;
+      }
+      line += ")";
+      out_.report.push_back(line);
+      if (tally.dropped > 0) {
+        out_.report.push_back("left: " + std::to_string(tally.dropped) + " rows of " + kind.name +
+                              " where " + kind.map->keep + " is 0");
+      }
+      if (tally.blank > 0) {
+        out_.report.push_back("left: " + std::to_string(tally.blank) + " rows of " + kind.name +
+                              " without all their numbers");
+      }
+      if (tally.back > 0) {
+        out_.report.push_back("left: " + std::to_string(tally.back) + " rows of " + kind.name +
+                              " whose time goes back");
+      }
+    }
+    for (const Recording& recording : recordings_) {
+      for (const LogTable& table : recording.tables) {
+        if (used_.count(table.source) != 0) continue;
+        out_.report.push_back("left: " + table.source + " (" + table.type + ", " +
+                              std::to_string(table.rows()) + " rows)");
+      }
+      for (const std::string& note : recording.notes) out_.report.push_back(note);
+    }
+  }
+
+  const std::vector<Recording>& recordings_;
+  const LogMap& map_;
+  const std::size_t time_index_ = 0;
+  std::map<std::string, std::map<std::size_t, Stretches>> stretches_;  // by kind and recording
+  std::map<std::string, Tally> tallies_;
+  std::set<std::string> used_;
+  ImportedRuns out_;
+};
+
+}  // namespace
+
+Result<ImportedRuns> to_runs(const std::vector<Recording>& recordings, const LogMap& map) {
+  LogMap ordered = map;
+  // The time stands first in every row.
+  for (TableMap* table : {&ordered.poses, &ordered.commands, &ordered.wheels}) {
+    std::stable_partition(table->columns.begin(), table->columns.end(),
+                          [](const MappedColumn& c) { return c.role == "t"; });
+  }
+  return Importer(recordings, ordered).run();
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,122 @@
+#include "master/io/logs/topics.h"
+
+#include <limits>
+
+#include "common/trials/text/csv.h"
+
+namespace gapfarm {
+namespace {
+
+// Ten hours of a hundred topics' numbers at 50 Hz; memory for it is there.
+constexpr std::size_t kMostNumbers = 100'000'000;
+constexpr std::size_t kMostColumns = 512;  // of one topic
+
+// "velocity[3]" to its array and element.
+bool element_of(const std::string& path, std::string& array, std::string& index) {
+  if (path.empty() || path.back() != ']') return false;
+  const std::size_t open = path.rfind('[');
+  array = path.substr(0, open);
+  index = path.substr(open + 1, path.size() - open - 2);
+  return true;
+}
+
+}  // namespace
+
+Topics::Topics(std::string file, std::string format) {
+  recording_.file = std::move(file);
+  recording_.format = std::move(format);
+}
+
+Status Topics::put(const std::string& topic, const std::string& type, double t_s,
+                   const std::vector<std::pair<std::string, double>>& numbers) {
+  Rows& rows = topics_[topic];
+  if (rows.names.empty()) {
+    rows.type = type;
+    rows.names.emplace_back("t");
+    rows.columns["t"] = 0;
+  }
+  std::vector<std::pair<std::size_t, double>> row = {{0, t_s}};
+  for (const auto& [path, value] : numbers) {
+    auto found = rows.columns.find(path);
+    if (found == rows.columns.end()) {
+      if (rows.names.size() >= kMostColumns) continue;
+      found = rows.columns.emplace(path, rows.names.size()).first;
+      rows.names.push_back(path);
+    }
+    row.emplace_back(found->second, value);
+  }
+  numbers_ += row.size();
+  if (numbers_ > kMostNumbers) {
+    return Error{"found more than " + std::to_string(kMostNumbers) +
+                 " numbers, expected a log of drives; cut the recording or filter its topics"};
+  }
+  rows.rows.push_back(std::move(row));
+  return {};
+}
+
+Status Topics::add(const std::string& topic, const std::string& type, const MessageSchema& schema,
+                   MessageWire wire, double t_s, std::string_view bytes) {
+  Result<MessageContent> content = schema.decode(bytes, wire);
+  if (!content) return Error{"topic " + quoted_word(topic) + ": " + content.error().message};
+  const std::string_view name = std::string_view(type).substr(type.rfind('/') + 1);
+  if (name == "String") {
+    const auto data = content->words.find("data");
+    if (data != content->words.end() && topic.find("robot_description") != topic.npos) {
+      recording_.robot_description = data->second;
+    } else {
+      skip(topic, type);
+    }
+    return {};
+  }
+  if (name == "JointState") {
+    std::string array, index;
+    for (auto& [path, value] : content->numbers) {
+      if (!element_of(path, array, index)) continue;
+      const auto joint = content->words.find("name[" + index + "]");
+      path = array + "." + (joint == content->words.end() ? index : joint->second);
+    }
+  }
+  if (name != "TFMessage") return put(topic, type, t_s, content->numbers);
+  // One message holds transforms of many frames.
+  std::map<std::string, std::vector<std::pair<std::string, double>>> frames;
+  for (const auto& [path, value] : content->numbers) {
+    const std::size_t dot = path.find("].");
+    if (dot == path.npos) continue;
+    const std::string at = path.substr(0, dot + 1);
+    const auto child = content->words.find(at + ".child_frame_id");
+    const std::string frame = child == content->words.end() ? "" : child->second;
+    frames[topic + ":" + frame].emplace_back(path.substr(dot + 2), value);
+  }
+  for (const auto& [frame, numbers] : frames) {
+    if (Status s = put(frame, type, t_s, numbers); !s) return s;
+  }
+  return {};
+}
+
+void Topics::skip(const std::string& topic, const std::string& type) {
+  auto& [kind, count] = skipped_[topic];
+  kind = type;
+  ++count;
+}
+
+Recording Topics::finish() {
+  for (auto& [topic, rows] : topics_) {
+    LogTable table{recording_.file + " " + topic, topic, short_type(rows.type), rows.names, {}};
+    table.values.assign(rows.rows.size() * rows.names.size(),
+                        std::numeric_limits<double>::quiet_NaN());
+    for (std::size_t r = 0; r < rows.rows.size(); ++r) {
+      for (const auto& [column, value] : rows.rows[r]) {
+        table.values[r * rows.names.size() + column] = value;
+      }
+    }
+    rows.rows = {};
+    recording_.tables.push_back(std::move(table));
+  }
+  for (const auto& [topic, what] : skipped_) {
+    recording_.notes.push_back("left: " + recording_.file + " " + topic + " (" + what.first + ", " +
+                               std::to_string(what.second) + " messages)");
+  }
+  return std::move(recording_);
+}
+
+}  // namespace gapfarm

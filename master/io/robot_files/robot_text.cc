@@ -1,0 +1,212 @@
+#include "master/io/robot_files/robot_text.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+#include <numbers>
+
+#include "common/json/json.h"
+
+namespace gapfarm {
+namespace {
+
+std::string number(double value, const char* format = "%.4g") {
+  char text[32];
+  // Sums of decimals end in 1e-17; nobody measures nanometres.
+  std::snprintf(text, sizeof text, format, std::abs(value) < 1e-9 ? 0.0 : value);
+  return text;
+}
+
+std::string number(const std::optional<double>& value, const char* format = "%.4g") {
+  return value ? number(*value, format) : "-";
+}
+
+std::string padded(std::string text, std::size_t width) {
+  if (text.size() < width) text.append(width - text.size(), ' ');
+  return text;
+}
+
+std::string role(const RobotWheel& wheel) {
+  if (wheel.kind == WheelKind::kCaster) return "caster";
+  std::string words = wheel.driven ? "driven" : "free";
+  if (wheel.steered) words += ", steered";
+  if (wheel.kind == WheelKind::kOmni || wheel.kind == WheelKind::kMecanum) {
+    words += ", " + wheel_words()[static_cast<std::size_t>(wheel.kind)];
+  }
+  return words;
+}
+
+std::string source_text(const WheelSource& source) {
+  if (source.link.empty()) return "assumed";
+  std::string text;
+  if (source.joint.empty())
+    return "link '" + source.link + "', line " + std::to_string(source.line);
+  text = "joint '" + source.joint + "', line " + std::to_string(source.line);
+  if (!source.turning.empty()) text += ", on '" + source.turning + "'";
+  if (!source.radius_from.empty()) text += "; radius: " + source.radius_from;
+  if (source.mu1) text += "; mu1 " + number(*source.mu1) + ", mu2 " + number(source.mu2);
+  return text;
+}
+
+// The source of a wheel of the completed robot; wheels that were assumed have none.
+WheelSource source_of(const RobotReading& reading, const std::string& name) {
+  for (std::size_t i = 0; i < reading.sources.size(); ++i) {
+    if (reading.robot.wheels[i].name == name) return reading.sources[i];
+  }
+  return {};
+}
+
+// Loads of a mass that was assumed mean nothing.
+std::vector<double> known_loads(const RobotReading& reading, const GroundRobot& completed) {
+  return reading.robot.mass_kg ? standing_loads(completed) : std::vector<double>();
+}
+
+std::string wheel_table(const RobotReading& reading, const GroundRobot& completed) {
+  std::vector<std::vector<std::string>> rows = {
+      {"wheel", "role", "x m", "y m", "radius m", "width m", "load N", "from"}};
+  const std::vector<double> loads = known_loads(reading, completed);
+  for (std::size_t i = 0; i < completed.wheels.size(); ++i) {
+    const RobotWheel& wheel = completed.wheels[i];
+    const WheelSource source = source_of(reading, wheel.name);
+    rows.push_back({wheel.name, role(wheel), number(wheel.x_m), number(wheel.y_m),
+                    number(wheel.radius_m), number(wheel.width_m),
+                    loads.empty() ? "-" : number(loads[i], "%.1f"), source_text(source)});
+  }
+  std::vector<std::size_t> widths(rows[0].size(), 0);
+  for (const auto& row : rows) {
+    for (std::size_t i = 0; i + 1 < row.size(); ++i) widths[i] = std::max(widths[i], row[i].size());
+  }
+  std::string text;
+  for (const auto& row : rows) {
+    text += "  ";
+    for (std::size_t i = 0; i + 1 < row.size(); ++i) text += padded(row[i], widths[i] + 2);
+    text += row.back() + "\n";
+  }
+  return text;
+}
+
+std::string list(const std::string& heading, const std::vector<std::string>& sentences) {
+  if (sentences.empty()) return {};
+  std::string text = heading + "\n";
+  for (const std::string& sentence : sentences) text += "  - " + sentence + "\n";
+  return text;
+}
+
+std::string controller_text(const ControllerKinematics& c) {
+  const std::pair<const char*, std::optional<double>> sizes[] = {
+      {"wheel_separation", c.wheel_separation_m},
+      {"wheel_radius", c.wheel_radius_m},
+      {"wheelbase", c.wheelbase_m},
+      {"traction_track_width", c.traction_track_width_m},
+      {"steering_track_width", c.steering_track_width_m},
+      {"lx + ly", c.sum_of_robot_center_projection_m},
+      {"robot_radius", c.robot_radius_m}};
+  std::string text;
+  for (const auto& [name, value] : sizes) {
+    if (value) text += (text.empty() ? "" : ", ") + std::string(name) + " " + number(value) + " m";
+  }
+  const std::pair<const char*, double> multipliers[] = {
+      {"wheel_separation_multiplier", c.wheel_separation_multiplier},
+      {"left_wheel_radius_multiplier", c.left_wheel_radius_multiplier},
+      {"right_wheel_radius_multiplier", c.right_wheel_radius_multiplier}};
+  for (const auto& [name, value] : multipliers) {
+    if (value != 1) text += std::string(text.empty() ? "" : ", ") + name + " " + number(value);
+  }
+  return text;
+}
+
+}  // namespace
+
+std::string describe_robot(const RobotReading& reading, const GroundRobot& completed) {
+  const std::string drive = drive_words()[static_cast<std::size_t>(completed.drive)];
+  std::string text = (completed.name.empty() ? "the robot" : completed.name) + ": drive " + drive;
+  for (std::size_t i = 0; i < reading.evidence.size(); ++i) {
+    text += (i == 0 ? ", because " : "; ") + reading.evidence[i];
+  }
+  text += "\n";
+  if (!reading.base_link.empty()) {
+    text += "frame: x ahead, y left, origin on the floor at x " + number(reading.X_BR.x) + ", y " +
+            number(reading.X_BR.y) + ", z " + number(reading.floor_z_B_m) + " m of link '" +
+            reading.base_link + "'";
+    if (reading.X_BR.theta != 0) {
+      text += ", turned by " + number(reading.X_BR.theta * 180 / std::numbers::pi) + " degrees";
+    }
+    text += "; floor: " + reading.floor_from + "\n";
+  }
+  if (reading.robot.mass_kg) {
+    text += "mass: " + number(reading.robot.mass_kg) + " kg, centre of mass at x " +
+            number(completed.com_x_m) + ", y " + number(completed.com_y_m) + ", z " +
+            number(completed.com_z_m) + " m";
+    if (reading.robot.yaw_inertia_kg_m2) {
+      text += ", yaw inertia " + number(reading.robot.yaw_inertia_kg_m2) + " kg m^2";
+    }
+    text += "\n";
+  }
+  text += wheel_table(reading, completed);
+  const bool stated = std::any_of(reading.sources.begin(), reading.sources.end(),
+                                  [](const WheelSource& source) { return source.mu1.has_value(); });
+  if (stated) {
+    text += "floor: friction " + number(completed.friction) + " along the wheels, " +
+            number(completed.friction_ratio) + " times that across (Gazebo's mu1, mu2)\n";
+  }
+  const std::string controller = controller_text(completed.controller);
+  if (!controller.empty()) text += "controller: " + controller + "\n";
+  text += list("disagreements:", reading.disagreements);
+  text += list("mind:", reading.remarks);
+  text += list("assumed:", completed.notes);
+  return text;
+}
+
+std::string describe_robot_json(const RobotReading& reading, const GroundRobot& completed,
+                                const std::string& toml) {
+  using nlohmann::json;
+  const auto optional = [](const std::optional<double>& value) {
+    return value ? json(*value) : json(nullptr);
+  };
+  json wheels = json::array();
+  const std::vector<double> loads = known_loads(reading, completed);
+  for (std::size_t i = 0; i < completed.wheels.size(); ++i) {
+    const RobotWheel& wheel = completed.wheels[i];
+    const WheelSource source = source_of(reading, wheel.name);
+    wheels.push_back({{"name", wheel.name},
+                      {"kind", wheel_words()[static_cast<std::size_t>(wheel.kind)]},
+                      {"driven", wheel.driven},
+                      {"steered", wheel.steered},
+                      {"x", optional(wheel.x_m)},
+                      {"y", optional(wheel.y_m)},
+                      {"radius", optional(wheel.radius_m)},
+                      {"width", optional(wheel.width_m)},
+                      {"heading", wheel.heading_rad},
+                      {"load_n", loads.empty() ? json(nullptr) : json(loads[i])},
+                      {"joint", source.joint},
+                      {"link", source.link},
+                      {"line", source.line},
+                      {"turning_joint", source.turning},
+                      {"radius_from", source.radius_from},
+                      {"turns_backward", source.turns_backward},
+                      {"mu1", optional(source.mu1)},
+                      {"mu2", optional(source.mu2)}});
+  }
+  const json out = {{"name", completed.name},
+                    {"drive", drive_words()[static_cast<std::size_t>(completed.drive)]},
+                    {"evidence", reading.evidence},
+                    {"base_link", reading.base_link},
+                    {"origin_in_base_link",
+                     {{"x", reading.X_BR.x}, {"y", reading.X_BR.y}, {"theta", reading.X_BR.theta}}},
+                    {"mass", optional(reading.robot.mass_kg)},
+                    {"centre_of_mass",
+                     {{"x", optional(completed.com_x_m)},
+                      {"y", optional(completed.com_y_m)},
+                      {"z", optional(completed.com_z_m)}}},
+                    {"yaw_inertia", optional(reading.robot.yaw_inertia_kg_m2)},
+                    {"wheels", wheels},
+                    {"disagreements", reading.disagreements},
+                    {"remarks", reading.remarks},
+                    {"assumed", completed.notes},
+                    {"toml", toml}};
+  // Names come from files: bytes that are not UTF-8 become marks, not exceptions.
+  return json_text(out, 2) + "\n";
+}
+
+}  // namespace gapfarm

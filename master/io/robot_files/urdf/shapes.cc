@@ -1,0 +1,126 @@
+#include "master/io/robot_files/urdf/shapes.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace gapfarm {
+namespace {
+
+std::optional<RoundShape> roundest(const std::vector<UrdfGeometry>& shapes,
+                                   const Eigen::Isometry3d& X_BL) {
+  std::optional<RoundShape> best;
+  for (const UrdfGeometry& shape : shapes) {
+    const bool ball = shape.shape == UrdfShape::kSphere;
+    if (!ball && shape.shape != UrdfShape::kCylinder) continue;
+    if (shape.radius_m <= 0) continue;
+    // A cylinder tells its axis; a ball only when there is none.
+    const bool better =
+        !best || (best->ball && !ball) || (best->ball == ball && shape.radius_m > best->radius_m);
+    if (!better) continue;
+    const Eigen::Isometry3d X_BG = X_BL * shape.X_LG;
+    RoundShape round;
+    round.radius_m = shape.radius_m;
+    if (!ball) round.width_m = shape.length_m;
+    round.axis_B = X_BG.linear().col(2);
+    round.centre_B_m = X_BG.translation();
+    round.ball = ball;
+    round.from = std::string(ball ? "sphere" : "cylinder") + ", line " + std::to_string(shape.line);
+    best = round;
+  }
+  return best;
+}
+
+// Corners of what bounds the shape, in B; a cylinder's rims as sixteen points each.
+std::vector<Eigen::Vector3d> hull_points(const Eigen::Isometry3d& X_BL, const UrdfGeometry& shape) {
+  constexpr int kRim = 16;
+  std::vector<Eigen::Vector3d> points;
+  const Eigen::Isometry3d X_BG = X_BL * shape.X_LG;
+  if (shape.shape == UrdfShape::kBox) {
+    for (int corner = 0; corner < 8; ++corner) {
+      const Eigen::Vector3d sign(corner & 1 ? 1 : -1, corner & 2 ? 1 : -1, corner & 4 ? 1 : -1);
+      points.push_back(X_BG * Eigen::Vector3d(0.5 * sign.cwiseProduct(shape.size_m)));
+    }
+  } else if (shape.shape == UrdfShape::kCylinder) {
+    for (int i = 0; i < 2 * kRim; ++i) {
+      const double angle = 2 * std::numbers::pi * (i / 2) / kRim;
+      points.push_back(X_BG * Eigen::Vector3d(shape.radius_m * std::cos(angle),
+                                              shape.radius_m * std::sin(angle),
+                                              (i % 2 ? 0.5 : -0.5) * shape.length_m));
+    }
+  } else if (shape.shape == UrdfShape::kSphere) {
+    for (int i = 0; i < kRim; ++i) {
+      const double angle = 2 * std::numbers::pi * i / kRim;
+      points.push_back(X_BG.translation() +
+                       shape.radius_m * Eigen::Vector3d(std::cos(angle), std::sin(angle), 0));
+    }
+    points.push_back(X_BG.translation() - shape.radius_m * Eigen::Vector3d::UnitZ());
+  }
+  return points;
+}
+
+double cross(const Eigen::Vector2d& o, const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
+  return (a - o).x() * (b - o).y() - (a - o).y() * (b - o).x();
+}
+
+// Andrew's monotone chain.
+std::vector<Eigen::Vector2d> convex_hull(std::vector<Eigen::Vector2d> points) {
+  std::sort(points.begin(), points.end(), [](const auto& a, const auto& b) {
+    return a.x() != b.x() ? a.x() < b.x() : a.y() < b.y();
+  });
+  if (points.size() < 3) return points;
+  std::vector<Eigen::Vector2d> hull;
+  for (int pass = 0; pass < 2; ++pass) {
+    const std::size_t start = hull.size();
+    for (const Eigen::Vector2d& point : points) {
+      while (hull.size() >= start + 2 && cross(hull[hull.size() - 2], hull.back(), point) <= 0) {
+        hull.pop_back();
+      }
+      hull.push_back(point);
+    }
+    hull.pop_back();
+    std::reverse(points.begin(), points.end());
+  }
+  return hull;
+}
+
+}  // namespace
+
+std::optional<RoundShape> round_shape(const UrdfModel& model, const UrdfLink& link,
+                                      const LinkPoses& poses) {
+  const auto of = [&](const UrdfLink& l) {
+    const Eigen::Isometry3d& X_BL = poses.find(l.name)->second;
+    auto round = roundest(l.collisions, X_BL);
+    return round ? round : roundest(l.visuals, X_BL);
+  };
+  if (auto round = of(link)) return round;
+  for (const UrdfJoint& joint : model.joints) {
+    if (joint.parent != link.name || joint.type != "fixed") continue;
+    if (auto round = of(*model.find_link(joint.child))) return round;
+  }
+  return {};
+}
+
+Eigen::Vector3d lowest_point(const Eigen::Isometry3d& X_BL, const UrdfGeometry& shape) {
+  const std::vector<Eigen::Vector3d> points = hull_points(X_BL, shape);
+  if (points.empty()) return (X_BL * shape.X_LG).translation();
+  double lowest = points.front().z();
+  for (const Eigen::Vector3d& point : points) lowest = std::min(lowest, point.z());
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  int count = 0;
+  for (const Eigen::Vector3d& point : points) {
+    // Right angles are written as 1.57: a face that leans by that still lies on the floor.
+    if (point.z() > lowest + 2e-4) continue;
+    sum += point;
+    ++count;
+  }
+  return sum / count;
+}
+
+std::vector<Eigen::Vector2d> outline(const Eigen::Isometry3d& X_BL, const UrdfGeometry& shape) {
+  std::vector<Eigen::Vector2d> flat;
+  for (const Eigen::Vector3d& point : hull_points(X_BL, shape)) flat.push_back(point.head<2>());
+  return convex_hull(std::move(flat));
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,104 @@
+#include "master/io/robot_files/urdf/xml_reader.h"
+
+#include <cmath>
+
+#include "common/trials/text/csv.h"
+
+namespace gapfarm {
+namespace {
+
+// A robot is metres and tonnes; greater numbers are slips that would upset everything after.
+constexpr double kGreatestNumber = 1e6;
+
+}  // namespace
+
+void XmlReader::fail(const Element& at, const std::string& sentence) {
+  if (!error_) error_ = Error{file_ + ":" + std::to_string(at.GetLineNum()) + ": " + sentence};
+}
+
+std::string XmlReader::attribute(const Element& element, const char* name) {
+  const char* raw = element.Attribute(name);
+  if (raw == nullptr) return {};
+  if (!has_xacro(raw)) return raw;
+  expanded_ = true;
+  return expand_xacro(raw, names_);
+}
+
+std::string XmlReader::needed(const Element& element, const char* name) {
+  std::string text = attribute(element, name);
+  if (text.empty()) {
+    fail(element, std::string("found <") + element.Name() + "> without '" + name +
+                      "', expected it; fill it in");
+  } else if (has_xacro(text)) {
+    fail(element, "found the xacro expression " + quoted_word(text) + ", expected a " + name +
+                      "; " + kExpand);
+  }
+  return text;
+}
+
+std::string XmlReader::value_of(const Element& element) {
+  std::string value = attribute(element, "value");
+  if (!value.empty() || element.GetText() == nullptr) return value;
+  value = expand_xacro(element.GetText(), names_);
+  const std::size_t begin = value.find_first_not_of(" \t\r\n");
+  if (begin == value.npos) return {};
+  return value.substr(begin, value.find_last_not_of(" \t\r\n") - begin + 1);
+}
+
+std::optional<std::vector<double>> XmlReader::numbers(const Element& element, const char* name,
+                                                      std::size_t count, std::string& unread) {
+  const std::string text = attribute(element, name);
+  if (text.empty()) return {};
+  if (has_xacro(text)) {
+    unread = text;
+    return {};
+  }
+  std::vector<double> all;
+  for (std::size_t at = text.find_first_not_of(" \t\r\n"); at != text.npos;) {
+    const std::size_t end = std::min(text.find_first_of(" \t\r\n", at), text.size());
+    const auto value = parse_double(std::string_view(text).substr(at, end - at));
+    if (!value || !(std::abs(*value) <= kGreatestNumber)) {
+      fail(element, "found " + quoted_word(text.substr(at, end - at)) + " in '" + name +
+                        "', expected a number; write decimals with a point");
+      return {};
+    }
+    all.push_back(*value);
+    at = text.find_first_not_of(" \t\r\n", end);
+  }
+  if (all.size() == count) return all;
+  fail(element, "found " + std::to_string(all.size()) + " numbers in '" + name + "', expected " +
+                    std::to_string(count));
+  return {};
+}
+
+double XmlReader::number(const Element& element, const char* name, std::string& unread) {
+  const auto value = numbers(element, name, 1, unread);
+  if (value) return value->front();
+  if (unread.empty()) needed(element, name);
+  return 0;
+}
+
+std::optional<double> XmlReader::optional_number(const Element& element, const char* name) {
+  std::string unread;
+  const auto value = numbers(element, name, 1, unread);
+  if (value) return value->front();
+  return {};
+}
+
+Eigen::Isometry3d XmlReader::origin(const Element& parent, std::string& unread) {
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  const Element* element = parent.FirstChildElement("origin");
+  if (element == nullptr) return pose;
+  if (const auto xyz = numbers(*element, "xyz", 3, unread)) {
+    pose.translation() = Eigen::Vector3d((*xyz)[0], (*xyz)[1], (*xyz)[2]);
+  }
+  if (const auto rpy = numbers(*element, "rpy", 3, unread)) {
+    pose.linear() = (Eigen::AngleAxisd((*rpy)[2], Eigen::Vector3d::UnitZ()) *
+                     Eigen::AngleAxisd((*rpy)[1], Eigen::Vector3d::UnitY()) *
+                     Eigen::AngleAxisd((*rpy)[0], Eigen::Vector3d::UnitX()))
+                        .toRotationMatrix();
+  }
+  return pose;
+}
+
+}  // namespace gapfarm

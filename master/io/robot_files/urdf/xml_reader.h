@@ -1,0 +1,52 @@
+// Attributes and numbers of one XML file; the first error sticks.
+#pragma once
+
+#include <tinyxml2.h>
+
+#include <Eigen/Geometry>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/base/result.h"
+#include "master/io/robot_files/urdf/xacro_text.h"
+
+namespace gapfarm {
+
+class XmlReader {
+ public:
+  using Element = tinyxml2::XMLElement;
+  explicit XmlReader(std::string file) : file_(std::move(file)) {}
+
+  static constexpr const char* kExpand = "expand it first: xacro FILE > robot.urdf";
+
+ protected:
+  void fail(const Element& at, const std::string& sentence);
+
+  // With expressions put in where names() settle them.  Empty when it is not there.
+  std::string attribute(const Element& element, const char* name);
+  // An error when it is empty or still an expression.
+  std::string needed(const Element& element, const char* name);
+  // Text of the element or its attribute "value": Gazebo's files write either.
+  std::string value_of(const Element& element);
+  // `count` numbers, or none with the reason in `unread` (an expression) or an error.
+  std::optional<std::vector<double>> numbers(const Element& element, const char* name,
+                                             std::size_t count, std::string& unread);
+  double number(const Element& element, const char* name, std::string& unread);
+  std::optional<double> optional_number(const Element& element, const char* name);
+  // Of the child <origin>; the identity without one.
+  Eigen::Isometry3d origin(const Element& parent, std::string& unread);
+
+  XacroNames& names() { return names_; }
+  bool expanded() const { return expanded_; }
+  const std::string& file() const { return file_; }
+  const std::optional<Error>& error() const { return error_; }
+
+ private:
+  std::string file_;
+  XacroNames names_;
+  bool expanded_ = false;
+  std::optional<Error> error_;
+};
+
+}  // namespace gapfarm

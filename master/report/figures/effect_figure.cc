@@ -1,0 +1,211 @@
+#include "master/report/figures/effect_figure.h"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <optional>
+
+#include "common/svg/svg.h"
+
+namespace gapfarm {
+namespace {
+
+constexpr unsigned kColumns = 3;
+constexpr double kPanelWidth = 240;
+constexpr double kPanelHeight = 190;
+constexpr double kPlotTop = 38;  // below the panel's two lines of text
+constexpr double kMargin = 26;   // of the plot, px: room for end marks
+constexpr double kFooter = 42;
+constexpr double kLeastSpan_m = 0.04;
+
+const SvgStyle kWithout = {.stroke = "#888888", .stroke_width = 1.5, .dash = "5 3"};
+const SvgStyle kWith = {.stroke = "#111111", .stroke_width = 2};
+const SvgStyle kScene = {.stroke = "#aaaaaa", .stroke_width = 1, .dash = "1 3"};
+
+// What of an effect has a place in the world.
+struct Scene {
+  std::optional<double> direction;
+  std::optional<Pose> centre;
+  double radius_m = 0;
+  std::optional<double> line_x, line_y;  // a line across this axis at this place
+};
+
+// Seen from X_WS.
+Scene scene_of(const Effect& effect, std::span<const double> values, const Pose& X_WS) {
+  Scene scene;
+  std::optional<double> position;
+  bool along_x = false;
+  Pose centre;
+  bool has_centre = false;
+  for (std::size_t i = effect.strengths; i < effect.parameters.size(); ++i) {
+    const std::string& key = effect.parameters[i].key;
+    if (key == "direction") scene.direction = values[i];
+    if (key == "radius") scene.radius_m = values[i];
+    if (key == "position") position = values[i];
+    if (key == "axis") along_x = values[i] != 0;
+    if (key == "x") centre.x = values[i];
+    if (key == "y") centre.y = values[i];
+    has_centre = has_centre || key == "x";
+  }
+  if (has_centre) scene.centre = Pose{centre.x - X_WS.x, centre.y - X_WS.y, 0};
+  if (position && along_x) scene.line_y = *position - X_WS.y;
+  if (position && !along_x) scene.line_x = *position - X_WS.x;
+  return scene;
+}
+
+// From metres to a panel's pixels, equally long along both axes.
+class View {
+ public:
+  View(SvgPoint corner, const EffectDrives& drives) {
+    double left = 0, right = 0, low = 0, high = 0;
+    const auto reach = [&](const Pose& X) {
+      left = std::min(left, X.x);
+      right = std::max(right, X.x);
+      low = std::min(low, X.y);
+      high = std::max(high, X.y);
+    };
+    const auto reach_all = [&](const LoggedDrive& drive) {
+      std::for_each(drive.path.begin(), drive.path.end(), reach);
+      reach(drive.end);
+    };
+    reach_all(drives.without);
+    std::for_each(drives.with.begin(), drives.with.end(), reach_all);
+    const double width = kPanelWidth - 2 * kMargin;
+    const double height = kPanelHeight - kPlotTop - 2 * kMargin;
+    scale_ = std::min(width / std::max(right - left, kLeastSpan_m),
+                      height / std::max(high - low, kLeastSpan_m));
+    origin_ = {corner.x + kPanelWidth / 2 - scale_ * (left + right) / 2,
+               corner.y + (kPanelHeight + kPlotTop) / 2 + scale_ * (low + high) / 2};
+  }
+
+  double scale() const { return scale_; }  // px/m
+  SvgPoint at(double x, double y) const { return {origin_.x + scale_ * x, origin_.y - scale_ * y}; }
+  SvgPoint at(const Pose& X) const { return at(X.x, X.y); }
+
+ private:
+  double scale_ = 1;
+  SvgPoint origin_;
+};
+
+void draw(Svg& svg, const View& view, const LoggedDrive& drive, const SvgStyle& style,
+          const char* fill) {
+  constexpr double kHeading_px = 20;
+  std::vector<SvgPoint> points;
+  for (const Pose& X : drive.path) points.push_back(view.at(X));
+  svg.polyline(points, style);
+  const SvgPoint end = view.at(drive.end);
+  const SvgPoint tip = {end.x + kHeading_px * std::cos(drive.end.theta),
+                        end.y - kHeading_px * std::sin(drive.end.theta)};
+  svg.line(end, tip, {.stroke = style.stroke, .stroke_width = 2});
+  svg.circle(end, 4, {.fill = fill, .stroke = style.stroke, .stroke_width = 1.5});
+}
+
+void draw_arrow(Svg& svg, SvgPoint middle, double direction) {
+  constexpr double kHalf_px = 12, kBarb_px = 6;
+  const auto ahead = [&](SvgPoint from, double angle, double length) {
+    return SvgPoint{from.x + length * std::cos(angle), from.y - length * std::sin(angle)};
+  };
+  const SvgPoint tip = ahead(middle, direction, kHalf_px);
+  const SvgStyle style = {.stroke = "#888888", .stroke_width = 1.5};
+  svg.line(ahead(middle, direction, -kHalf_px), tip, style);
+  for (const double side : {0.85, -0.85}) {
+    svg.line(tip, ahead(tip, direction + side * std::numbers::pi, kBarb_px), style);
+  }
+}
+
+void draw_scene(Svg& svg, const View& view, SvgPoint corner, const Scene& scene) {
+  if (scene.centre && scene.radius_m > 0) {
+    SvgStyle disc = kScene;
+    disc.fill = "#f0f0f0";
+    svg.circle(view.at(*scene.centre), scene.radius_m * view.scale(), disc);
+  } else if (scene.centre) {
+    const SvgPoint c = view.at(*scene.centre);
+    svg.line({c.x - 5, c.y}, {c.x + 5, c.y}, kScene);
+    svg.line({c.x, c.y - 5}, {c.x, c.y + 5}, kScene);
+  }
+  constexpr double kFar_m = 100;
+  if (scene.line_x) {
+    svg.line(view.at(*scene.line_x, -kFar_m), view.at(*scene.line_x, kFar_m), kScene);
+  }
+  if (scene.line_y) {
+    svg.line(view.at(-kFar_m, *scene.line_y), view.at(kFar_m, *scene.line_y), kScene);
+  }
+  if (scene.direction) {
+    draw_arrow(svg, {corner.x + kPanelWidth - 24, corner.y + kPlotTop + 18}, *scene.direction);
+  }
+}
+
+// A bar of a round length, at most a third of the panel.
+void draw_bar(Svg& svg, const View& view, SvgPoint corner) {
+  double length_m = 0.01;
+  for (const double next : {0.02, 0.05, 0.1, 0.2, 0.5, 1.0}) {
+    if (next * view.scale() <= kPanelWidth / 3) length_m = next;
+  }
+  const SvgPoint left = {corner.x + 8, corner.y + kPanelHeight - 8};
+  const SvgPoint right = {left.x + length_m * view.scale(), left.y};
+  svg.line(left, right, {.stroke = "#222222", .stroke_width = 1.5});
+  svg.text({right.x + 5, right.y + 3}, fmt::format("{:g} cm", 100 * length_m), {.size = 10});
+}
+
+std::string difference(const EffectDrives& drives) {
+  double greatest_mm = 0, greatest_mrad = 0;
+  for (const LoggedDrive& with : drives.with) {
+    const Pose d = between(drives.without.end, with.end);
+    greatest_mm = std::max(greatest_mm, 1000 * std::hypot(d.x, d.y));
+    greatest_mrad = std::max(greatest_mrad, 1000 * std::abs(wrap_angle(d.theta)));
+  }
+  const char* upto = drives.with.size() > 1 ? "up to " : "";
+  return fmt::format("end differs by {0}{1:.0f} mm, {0}{2:.0f} mrad", upto, greatest_mm,
+                     greatest_mrad);
+}
+
+std::string values_text(const Effect& effect, std::span<const double> values) {
+  std::string text;
+  for (std::size_t i = 0; i < effect.parameters.size(); ++i) {
+    const EffectParameter& p = effect.parameters[i];
+    text += text.empty() ? "" : ", ";
+    text += p.key + " = ";
+    text += p.choices.empty() ? fmt::format("{:.4g}", values[i])
+                              : p.choices[static_cast<std::size_t>(values[i])];
+    if (p.choices.empty() && p.unit != "-") text += " " + p.unit;
+  }
+  return text;
+}
+
+void draw_panel(Svg& svg, SvgPoint corner, const Scene& scene, const EffectDrives& drives) {
+  const View view(corner, drives);
+  svg.rectangle({corner.x + 1, corner.y + 1}, kPanelWidth - 2, kPanelHeight - 2,
+                {.stroke = "#cccccc"});
+  svg.text({corner.x + 8, corner.y + 16}, drives.command, {.size = 12, .bold = true});
+  svg.text({corner.x + 8, corner.y + 31}, difference(drives), {.size = 10, .colour = "#444444"});
+  svg.begin_clip({corner.x + 1, corner.y + kPlotTop}, kPanelWidth - 2, kPanelHeight - kPlotTop - 1);
+  draw_scene(svg, view, corner, scene);
+  for (const LoggedDrive& with : drives.with) draw(svg, view, with, kWith, "#111111");
+  draw(svg, view, drives.without, kWithout, "#ffffff");
+  svg.end_clip();
+  draw_bar(svg, view, corner);
+}
+
+}  // namespace
+
+std::string effect_figure(const Effect& effect, std::span<const double> values, const Pose& X_WS,
+                          std::span<const EffectDrives> drives) {
+  const std::size_t rows = (drives.size() + kColumns - 1) / kColumns;
+  Svg svg(kColumns * kPanelWidth, static_cast<double>(rows) * kPanelHeight + kFooter);
+  const Scene scene = scene_of(effect, values, X_WS);
+  for (std::size_t i = 0; i < drives.size(); ++i) {
+    draw_panel(svg,
+               {static_cast<double>(i % kColumns) * kPanelWidth,
+                static_cast<double>(i / kColumns) * kPanelHeight},
+               scene, drives[i]);
+  }
+  const double foot = static_cast<double>(rows) * kPanelHeight;
+  svg.text({8, foot + 18}, "solid, filled: with " + effect.name + "; dashed, hollow: without",
+           {.size = 11});
+  svg.text({8, foot + 34}, values_text(effect, values), {.size = 11, .colour = "#444444"});
+  return svg.finish();
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,231 @@
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "master/diagnose/result/diagnosis_json.h"
+#include "master/report/glossary.h"
+#include "master/report/html.h"
+#include "master/report/page_frame.h"
+#include "master/report/parameters_section.h"
+#include "master/report/run/run_live.h"
+#include "master/report/run/run_report.h"
+
+namespace gapfarm {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr int kRunPlotDigits = 7;
+
+struct Errors {
+  double position_mm = 0, heading_mrad = 0, score = 0;
+};
+
+// Root mean squares and the mean log score, over the trials that one of the two has.
+Errors errors_of(const std::vector<DiagnosedTrial>& trials, bool after) {
+  Errors sum;
+  for (const DiagnosedTrial& t : trials) {
+    const Eigen::Vector3d& r = after ? t.final_residual : t.tuned_residual;
+    sum.position_mm += r.head<2>().squaredNorm();
+    sum.heading_mrad += r[2] * r[2];
+    sum.score += after ? t.final_score : t.tuned_score;
+  }
+  const auto n = static_cast<double>(trials.size());
+  return {1e3 * std::sqrt(sum.position_mm / n), 1e3 * std::sqrt(sum.heading_mrad / n),
+          sum.score / n};
+}
+
+std::string tile(const std::string& title, double before, double after, const std::string& unit) {
+  return fmt::format(
+      R"(<div class="tile"><dt>{}</dt><dd><span class="from">{}</span> <span aria-label="to">→</span> <strong>{}</strong> {}</dd></div>)",
+      title, number_text(before), number_text(after), unit);
+}
+
+std::string summary(const RunReport& report) {
+  std::string html = fmt::format(
+      R"(<section id="summary"><p class="verdict verdict-none">Run {}</p><h1 data-file="run" id="headline" data-live>{}</h1>)",
+      html_escaped(report.name), html_escaped(report.headline));
+  if (!report.action.empty()) {
+    html += R"(<p class="action"><span aria-hidden="true">→</span> )" +
+            html_escaped(report.action) + "</p>";
+  }
+  if (!report.farm.state.empty()) html += state_line(report.farm);
+  if (!report.outcome || report.outcome->trials.empty()) {
+    return html + "<p>" + html_escaped(report.without_outcome) + "</p></section>\n";
+  }
+  const Errors before = errors_of(report.outcome->trials, false);
+  const Errors after = errors_of(report.outcome->trials, true);
+  html += R"(<dl class="tiles">)" +
+          tile("Log score, these trials", before.score, after.score, term("nat", "nats/trial")) +
+          tile("Position, " + term("rms", "rms"), before.position_mm, after.position_mm, "mm") +
+          tile("Heading, " + term("rms", "rms"), before.heading_mrad, after.heading_mrad, "mrad");
+  return html + "</dl></section>\n";
+}
+
+std::string score_cell(const std::optional<double>& value, const char* label) {
+  return fmt::format(R"(<td class="number" data-label="{}">{}</td>)", label,
+                     value ? number_text(*value, 5) : "–");
+}
+
+std::string score_table(const std::vector<ScoreRow>& rows, const std::string& column,
+                        const char* file) {
+  const bool errors = std::any_of(rows.begin(), rows.end(), [](const ScoreRow& row) {
+    return row.position_mm || row.heading_mrad;
+  });
+  std::string body;
+  for (const ScoreRow& row : rows) {
+    body += R"(<tr><th scope="row">)" + html_escaped(row.name) + "</th>" +
+            score_cell(row.score, "score");
+    if (errors) {
+      body += score_cell(row.position_mm, "position, mm") +
+              score_cell(row.heading_mrad, "heading, mrad");
+    }
+    body += "</tr>";
+  }
+  return fmt::format(
+      R"(<table class="parts" data-file="{}"><caption class="unseen">{}</caption><thead><tr><th scope="col"></th>)"
+      R"(<th scope="col" class="number">{}</th>{}</tr></thead><tbody>{}</tbody></table>)",
+      file, file, html_escaped(column),
+      errors ? R"(<th scope="col" class="number">position, mm</th>)"
+               R"(<th scope="col" class="number">heading, mrad</th>)"
+             : "",
+      body);
+}
+
+std::string fitness_words(const RunReport& report) {
+  return report.fitness + (report.unit.empty() || report.unit == "-" ? "" : ", " + report.unit);
+}
+
+std::string scores(const RunReport& report) {
+  std::string html =
+      R"(<section id="scores"><h2>On trials )" + term("validation", "kept apart") + "</h2>";
+  const RunOutcome none;
+  const RunOutcome& outcome = report.outcome ? *report.outcome : none;
+  if (outcome.validation.empty()) {
+    html +=
+        "<p>None were: [validation] in the config names files that evolution does not see. "
+        "What stands above is of the trials that were evolved on.</p>";
+  } else {
+    html += score_table(outcome.validation, fitness_words(report), "kept-apart");
+  }
+  if (!outcome.baselines.empty()) {
+    html += "<h3>" + term("baseline", "Without a simulation") + "</h3>" +
+            score_table(outcome.baselines, "nats a trial", "baselines");
+  }
+  return html + "</section>\n";
+}
+
+std::string progress(const RunReport& report) {
+  if (report.generations.empty()) {
+    return R"(<section id="progress"><h2>Fitness</h2><p>No generation was completed yet.</p></section>)";
+  }
+  return R"(<section id="progress"><h2>Fitness by )" + term("generation", "generation") +
+         R"(</h2><div class="controls" id="progress-controls"></div><div id="progress-plot"></div>)" +
+         kNoScript + "</section>\n";
+}
+
+std::string provenance(const RunReport& report) {
+  std::string html = R"(<section id="provenance"><h2>What went in</h2><dl class="provenance">)";
+  for (const auto& [label, value] : report.provenance) {
+    html += "<div><dt>" + html_escaped(label) + "</dt><dd>" + html_escaped(value) + "</dd></div>";
+  }
+  return html + "</dl></section>\n";
+}
+
+std::string pose_sections() {
+  return R"(<section id="poses"><h2>Measured against simulated end poses</h2>
+<p>One picture a command, seen from where each trial began; turns on the spot by their headings, a row a condition. An ellipse or a bar should hold nine trials in ten.</p>)" +
+         plot_key(measured_key() + model_keys("before", "after")) +
+         R"(<div class="controls" id="pose-controls"></div><div class="grid" id="pose-plots"></div>)" +
+         kNoScript + R"(</section>
+<section id="residuals"><h2>)" +
+         term("residual", "Residuals") +
+         R"(</h2><h3 id="residual-title">Against what may drive them</h3>
+<p>Measured minus predicted, along the axes of the predicted end pose. Lines join the means of neighbouring trials, with 90 % intervals.</p>)" +
+         plot_key(model_keys("before", "after")) +
+         R"(<div class="controls" id="residual-controls"></div><div class="grid" id="residual-plots"></div>)" +
+         kNoScript + "</section>\n";
+}
+
+Json page_json(const RunReport& report) {
+  Json page = {{"models", {{"tuned", "before"}, {"final", "after"}}},
+               {"without_trials", report.without_outcome},
+               {"fitness",
+                {{"name", report.fitness},
+                 {"unit", report.unit},
+                 {"higher_is_better", report.higher_is_better}}},
+               {"generations", generations_json(report)},
+               {"operators", operators_json(report)},
+               {"genes", densities_json(report)},
+               {"elite", elite_json(report)},
+               {"timeline", timeline_json(report.farm)},
+               {"served", report.served},
+               {"run", report.name},
+               {"windows", report.windows},
+               {"logged_trials", report.trials},
+               {"kept_apart", report.served ? report.kept_apart : 0},
+               {"parameters", parameters_json(report.parameters)},
+               {"effects", Json::array()},
+               {"where", Json::array()}};
+  for (const ParameterRow& row : report.parameters) {
+    // Effects that were searched have places, too.
+    if (row.effect.empty()) continue;
+    bool there = false;
+    for (const Json& effect : page["effects"]) there = there || effect["name"] == row.effect;
+    if (!there) page["effects"].push_back({{"name", row.effect}, {"parameters", Json::object()}});
+  }
+  if (report.pieces) {
+    page["pictures"] = {
+        {"ends", ""}, {"residuals", ""}, {"x", "x"}, {"y", "y"}, {"shown", Json::array()}};
+  }
+  return page;
+}
+
+}  // namespace
+
+std::string run_html(const RunReport& report) {
+  const bool poses = report.outcome && !report.outcome->trials.empty();
+  const bool driven = poses && !report.pieces;
+  PageFrame frame;
+  frame.title = "gapfarm run " + report.name;
+  frame.brand = "run";
+  frame.served = report.served;
+  frame.places = {{"progress", "Fitness"}, {"parameters", "Parameters"}};
+  if (!report.densities.empty()) frame.places.emplace_back("genes", "Genes");
+  if (!report.elite.lines.empty()) frame.places.emplace_back("elite", "Elite");
+  frame.places.emplace_back("scores", "Kept apart");
+  if (driven) {
+    frame.places.emplace_back("floor", "Floor");
+    frame.places.emplace_back("drives", "Drives");
+  }
+  if (poses) {
+    frame.places.emplace_back("poses", "Poses");
+    frame.places.emplace_back("residuals", "Residuals");
+  }
+  const bool farmed = !report.farm.state.empty();
+  const bool watched = report.served && !report.genomes.empty();
+  if (watched) frame.places.emplace_back("watch", "Watch");
+  if (!report.genomes.empty()) frame.places.emplace_back("genomes", "Genomes");
+  if (farmed) frame.places.emplace_back("farm", "Farm");
+  frame.places.emplace_back("provenance", "Inputs");
+  frame.places.emplace_back("words", "Words");
+  std::string& body = frame.body;
+  body = summary(report) + progress(report) + operators_section(report) +
+         parameters_section(
+             report.parameters, {},
+             {{"before", "before"}, {"after", "after"}, {"population", "last generation"}}) +
+         densities_section(report) + elite_section(report) + scores(report);
+  if (driven) body += floor_section() + drives_section("before", "after");
+  if (poses) body += pose_sections();
+  if (watched) body += watch_section(report.windows ? "window" : report.pieces ? "push" : "drive");
+  body += genomes_section(report);
+  if (farmed) body += farm_section(report.farm);
+  body += provenance(report) + glossary_section(run_terms());
+  Diagnosis table;
+  if (report.outcome) table.trials = report.outcome->trials;
+  return framed_page(frame, page_json(report), trials_json(table, kRunPlotDigits));
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,78 @@
+// From parameter values to what the simulator is built from, and one driven command.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "common/parameters/table.h"
+#include "common/score/fitness.h"
+#include "common/score/scale_mixture.h"
+#include "common/trials/context.h"
+#include "gapfarm/v1/task.pb.h"
+#include "worker/effects/behaviour.h"
+#include "worker/scenarios/outcome.h"
+#include "worker/scenarios/srv1/motion_memo.h"
+#include "worker/scenarios/srv1/vehicle.h"
+#include "worker/sim/robot/simulator.h"
+
+namespace gapfarm {
+
+struct NoiseSettings {
+  double drive_common = 0;  // s.d. of both sides' gain, per trial
+  double drive_side = 0;    // s.d. of each side's gain, per trial
+  PoseNoise pose;
+  NoiseTails tails = {};  // with tails the above are those of Student's t's core
+};
+
+// Gains of the two sides' speed in one trial.
+struct Gains {
+  double left = 1;
+  double right = 1;
+};
+
+// Third-degree cubature of the drive noise (Arasaratnam and Haykin 2009, sec. III): equally
+// weighted points at +-sqrt(2) standard deviations along the two principal axes.  Empty without
+// noise.
+std::vector<Gains> cubature_points(const NoiseSettings& noise);
+// Within [0, 2] where the noise has a tail.
+Gains draw_gains(const NoiseSettings& noise, Stream& stream);
+
+// One robot at one set of parameter values, with the effects that are active there.
+class Srv1Robot {
+ public:
+  // Of scenario srv1.
+  explicit Srv1Robot(const ParameterValues& values, StepCounter* steps = nullptr);
+  // Of the problem's scenario: srv1, or external, whose effects are a part of srv1's.
+  Srv1Robot(const Problem& problem, const ParameterValues& values, StepCounter* steps,
+            MotionMemo* memo = nullptr);
+
+  const ActiveEffects& effects() const { return effects_; }
+  const NoiseSettings& noise() const { return noise_; }
+  // Of a trial in a session of which nothing is known: how fast that drives is a part of it.
+  NoiseSettings foreseen_noise() const;
+  // The gain that a session has, drawn.
+  double draw_session_gain(Stream& stream) const;
+
+  Motion run(const DrivenCommand& drive, const Situation& situation, const Gains& gains,
+             std::vector<MotionSample>* path = nullptr, double interval_s = 0);
+  // Motions that the memo had count like others.
+  double simulated_s() const { return simulated_s_; }
+  unsigned runs() const { return runs_; }
+
+ private:
+  ActiveEffects effects_;
+  NoiseSettings noise_;
+  double full_speed_m_s_ = 0;
+  std::unique_ptr<Vehicle> vehicle_;
+  double simulated_s_ = 0;
+  unsigned runs_ = 0;
+};
+
+SimSettings sim_settings(const RobotSize& size, const ParameterValues& values,
+                         const ActiveEffects& effects);
+
+// Pose `age_s` before the end of a path sampled from the start to rest, by interpolation; before
+// the first sample the robot stood at the first.
+Pose pose_before_end(const std::vector<MotionSample>& path, double age_s);
+
+}  // namespace gapfarm

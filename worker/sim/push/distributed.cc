@@ -1,0 +1,234 @@
+// Pushes of a piece that rests on its whole face, in the plane: see face.h and face_step.h.
+//
+// A step looks at finger and face where they are half a step later if the piece keeps its velocity,
+// so that ways converge with the square of the step.
+#include <algorithm>
+#include <cmath>
+
+#include "worker/sim/floor.h"
+#include "worker/sim/observe.h"
+#include "worker/sim/push/face.h"
+#include "worker/sim/push/face_step.h"
+#include "worker/sim/push/outline.h"
+#include "worker/sim/push/push_engine.h"
+
+namespace gapfarm {
+namespace {
+
+constexpr double kNear_m = 2e-3;        // the finger is looked at from so near
+constexpr double kLeastGain = 0.05;     // share that a falling friction keeps
+constexpr double kRepairedDepth = 0.2;  // of a depth, a step
+const Eigen::Vector2d kNowhere(1e3, 1e3);
+
+Eigen::Vector2d turned(double angle, const Eigen::Vector2d& d) {
+  const double c = std::cos(angle), s = std::sin(angle);
+  return {c * d[0] - s * d[1], s * d[0] + c * d[1]};
+}
+
+class DistributedPush final : public PushSimulator::Engine {
+ public:
+  explicit DistributedPush(const PushSettings& settings)
+      : Engine(settings),
+        face_(face_points(settings)),
+        centre_(settings.com_x_m, settings.com_y_m),
+        step_(settings.mass_kg, settings.mass_kg * settings.gyration_m2) {}
+
+  Motion run(std::span<const FingerSample> finger, const Floor& table,
+             std::vector<MotionSample>* path, double interval_s) override {
+    reset(table, Eigen::Vector3d::Zero());
+    return follow(FingerWay(finger), /*at_rest=*/table.tilt_rad == 0, path, interval_s);
+  }
+
+  Motion slide(const Eigen::Vector2d& velocity, double spin, const Floor& table,
+               std::vector<MotionSample>* path, double interval_s) override {
+    const Eigen::Vector2d at_centre = velocity + spin * Eigen::Vector2d(-centre_[1], centre_[0]);
+    reset(table, {at_centre[0], at_centre[1], spin});
+    const FingerSample nowhere[] = {{0, kNowhere}, {1e-9, kNowhere}};
+    return follow(FingerWay(nowhere), false, path, interval_s);
+  }
+
+ private:
+  void reset(const Floor& table, const Eigen::Vector3d& velocity);
+  Motion follow(const FingerWay& way, bool at_rest, std::vector<MotionSample>* path,
+                double interval_s);
+  void advance(const Eigen::Vector2d& from, const Eigen::Vector2d& to, double dt);
+  void place_points(const Pose& X_SM, double dt);
+  bool place_touch(const Pose& X_SM, const Eigen::Vector2d& from, const Eigen::Vector2d& to,
+                   double dt, FingerTouch& touch) const;
+
+  // The centroid's pose when the centre of mass is at X_SM, and back.
+  Pose centroid_pose(const Pose& X_SM) const {
+    const Eigen::Vector2d p = Eigen::Vector2d(X_SM.x, X_SM.y) - turned(X_SM.theta, centre_);
+    return {p[0], p[1], X_SM.theta};
+  }
+  MotionSample state(double t_s) const;
+  bool still() const {
+    return std::hypot(velocity_[0], velocity_[1]) < kRestSpeed_m_s &&
+           std::abs(velocity_[2]) < kRestTurn_rad_s;
+  }
+  // The step from which on the finger may touch a piece that rests now; none: never.
+  std::optional<long> next_touch(const FingerWay& way, double t_s, double dt_s) const {
+    const double reach = settings_.finger_radius_m + settings_.contact_margin_m + kNear_m;
+    const auto when = way.approach(t_s, centroid_pose(X_SM_), settings_.corners, reach);
+    if (!when) return std::nullopt;
+    return std::max(0L, static_cast<long>((*when - way.begin_s()) / dt_s));
+  }
+
+  std::vector<FacePoint> face_;
+  Eigen::Vector2d centre_;  // of mass, from the centroid
+  FaceStep step_;
+  FaceStep::Points points_;  // in the grain's axes
+  Floor table_;
+  double load_n_ = 0;                               // on the whole face
+  Eigen::Vector2d pull_ = Eigen::Vector2d::Zero();  // of gravity down a slope, m/s^2
+  Pose X_SM_;                                       // centre of mass
+  Eigen::Vector3d velocity_ = Eigen::Vector3d::Zero();
+};
+
+void DistributedPush::reset(const Floor& table, const Eigen::Vector3d& velocity) {
+  table_ = table;
+  const Eigen::Vector3d gravity = gravity_in_start_frame(table, settings_.gravity_m_s2);
+  load_n_ = -gravity[2] * settings_.mass_kg;
+  pull_ = gravity.head<2>();
+  X_SM_ = {centre_[0], centre_[1], 0};
+  velocity_ = velocity;
+  step_.reset();
+  for (auto* of_points : {&points_.x, &points_.y, &points_.extent, &points_.impulse}) {
+    of_points->assign(face_.size(), 0);
+  }
+  for (std::size_t i = 0; i < face_.size(); ++i) points_.extent[i] = face_[i].extent_m;
+  // Friction is mu / sqrt(ratio) along the grain and mu sqrt(ratio) across it.
+  points_.q_x = 1 / table.grain_ratio;
+  points_.q_y = table.grain_ratio;
+}
+
+void DistributedPush::place_points(const Pose& X_SM, double dt) {
+  const double angle = X_SM.theta - table_.grain_direction_rad;
+  const double c = std::cos(angle), s = std::sin(angle);
+  const double whole = settings_.ground_friction * load_n_ * dt;
+  const bool varies = table_.speed_slope_s_m != 0 ||
+                      std::any_of(table_.patches.begin(), table_.patches.end(),
+                                  [](const FrictionDisc& disc) { return disc.ratio != 1; });
+  for (std::size_t i = 0; i < face_.size(); ++i) {
+    const Eigen::Vector2d r = face_[i].p - centre_;
+    points_.x[i] = c * r[0] - s * r[1];
+    points_.y[i] = s * r[0] + c * r[1];
+    points_.impulse[i] = whole * face_[i].share;
+    if (!varies) continue;
+    const Eigen::Vector2d arm = turned(X_SM.theta, r);
+    const double speed =
+        std::hypot(velocity_[0] - velocity_[2] * arm[1], velocity_[1] + velocity_[2] * arm[0]);
+    points_.impulse[i] *= std::max(kLeastGain, 1 + table_.speed_slope_s_m * speed) *
+                          patch_factor(table_, X_SM.x + arm[0], X_SM.y + arm[1]);
+  }
+}
+
+// False: too far to matter in this step.
+bool DistributedPush::place_touch(const Pose& X_SM, const Eigen::Vector2d& from,
+                                  const Eigen::Vector2d& to, double dt, FingerTouch& touch) const {
+  const Pose X_SC = centroid_pose(X_SM);
+  const Eigen::Vector2d finger = (from + to) / 2;
+  const Eigen::Vector2d seen = turned(-X_SC.theta, finger - Eigen::Vector2d(X_SC.x, X_SC.y));
+  const Touch nearest = nearest_touch(settings_.corners, seen);
+  const double gap = nearest.distance_m - settings_.finger_radius_m - settings_.contact_margin_m;
+  const double moved = (std::hypot(velocity_[0], velocity_[1]) * dt + (to - from).norm());
+  if (gap > kNear_m + moved) return false;
+  const Eigen::Vector2d inward = turned(X_SC.theta, -nearest.normal);
+  const Eigen::Vector2d arm = turned(X_SC.theta, nearest.point - centre_);
+  touch.velocity = (to - from) / dt;
+  const Eigen::Vector2d material =
+      velocity_.head<2>() + velocity_[2] * Eigen::Vector2d(-arm[1], arm[0]);
+  // From the middle of the step back to its begin, as far as the piece's own motion goes, and on to
+  // the end with the finger's.
+  touch.gap_m = gap - dt / 2 * inward.dot(material + touch.velocity);
+  const bool rigid = settings_.finger_compliance_m_n <= 0;
+  if (rigid) {
+    const double before = gap - dt / 2 * inward.dot(material - touch.velocity);
+    if (before < 0) touch.gap_m -= (1 - kRepairedDepth) * before;
+  }
+  touch.compliance_m_n = settings_.finger_compliance_m_n;
+  touch.friction = settings_.finger_friction;
+  const double grain = table_.grain_direction_rad;
+  touch.inward = turned(-grain, inward);
+  touch.arm = turned(-grain, arm);
+  touch.velocity = turned(-grain, touch.velocity);
+  return true;
+}
+
+void DistributedPush::advance(const Eigen::Vector2d& from, const Eigen::Vector2d& to, double dt) {
+  const Pose middle{X_SM_.x + dt / 2 * velocity_[0], X_SM_.y + dt / 2 * velocity_[1],
+                    X_SM_.theta + dt / 2 * velocity_[2]};
+  place_points(middle, dt);
+  FingerTouch touch;
+  const bool near = place_touch(middle, from, to, dt, touch);
+  const double grain = table_.grain_direction_rad;
+  const Eigen::Vector2d now = turned(-grain, velocity_.head<2>());
+  const Eigen::Vector2d free = now + dt * turned(-grain, pull_);
+  const Eigen::Vector3d after =
+      step_.solve(points_, {free[0], free[1], velocity_[2]}, {now[0], now[1], velocity_[2]},
+                  near ? &touch : nullptr, dt);
+  velocity_ << turned(grain, after.head<2>()), after[2];
+  X_SM_.x += dt * velocity_[0];
+  X_SM_.y += dt * velocity_[1];
+  X_SM_.theta += dt * velocity_[2];
+}
+
+MotionSample DistributedPush::state(double t_s) const {
+  MotionSample sample;
+  sample.t_s = t_s;
+  sample.X_SB = centroid_pose(X_SM_);
+  sample.X_SB.theta = wrap_angle(sample.X_SB.theta);
+  sample.kinetic_energy_j =
+      settings_.mass_kg / 2 *
+      (velocity_.head<2>().squaredNorm() + settings_.gyration_m2 * velocity_[2] * velocity_[2]);
+  return sample;
+}
+
+Motion DistributedPush::follow(const FingerWay& way, bool at_rest, std::vector<MotionSample>* path,
+                               double interval_s) {
+  const double dt = 1 / (settings_.step_rate_hz * settings_.sub_steps);
+  const double begin = way.begin_s();
+  PathRecorder recorder(path, interval_s);
+  recorder.add(state(begin));
+  Motion motion;
+  motion.outcome = MotionOutcome::kNeverRested;
+  double rest_s = at_rest ? kRestTime_s : 0;
+  double t = begin, moved_until = begin;
+  long steps = 0;
+  for (long k = 0; t < way.end_s() + kSettleLimit_s; ++k) {
+    if (rest_s >= kRestTime_s) {
+      const auto touched = t < way.end_s() ? next_touch(way, t, dt) : std::nullopt;
+      if (!touched) {
+        motion.outcome = MotionOutcome::kOk;
+        break;
+      }
+      k = std::max(k, *touched);  // nothing happens until then
+      rest_s = 0;
+    }
+    t = begin + static_cast<double>(k) * dt;
+    const double next = begin + static_cast<double>(k + 1) * dt;
+    advance(way.at(t), way.at(next), dt);
+    t = next;
+    ++steps;
+    if (!is_sane({velocity_[0], velocity_[1], 0}, {0, 0, velocity_[2]})) {
+      motion.outcome = MotionOutcome::kDiverged;
+      return motion;
+    }
+    if (recorder.wanted()) recorder.add(state(t));
+    rest_s = still() ? rest_s + dt : 0;
+    if (!still()) moved_until = t;
+  }
+  motion.duration_s = static_cast<double>(steps) * dt;
+  motion.X_SE = state(t).X_SB;
+  motion.rest_time_s = std::max(0.0, moved_until - way.end_s());
+  recorder.finish();
+  return motion;
+}
+
+}  // namespace
+
+std::unique_ptr<PushSimulator::Engine> make_distributed_push(const PushSettings& settings) {
+  return std::make_unique<DistributedPush>(settings);
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,61 @@
+// What a model of pushing offers, and what the models share.  Internal to worker/sim.
+#pragma once
+
+#include <memory>
+#include <optional>
+
+#include "worker/sim/push/push.h"
+
+namespace gapfarm {
+
+class PushSimulator::Engine {
+ public:
+  explicit Engine(const PushSettings& settings) : settings_(settings) {}
+  virtual ~Engine() = default;
+  virtual Motion run(std::span<const FingerSample> finger, const Floor& table,
+                     std::vector<MotionSample>* path, double interval_s) = 0;
+  virtual Motion slide(const Eigen::Vector2d& velocity, double spin, const Floor& table,
+                       std::vector<MotionSample>* path, double interval_s) = 0;
+  const PushSettings& settings() const { return settings_; }
+
+ protected:
+  PushSettings settings_;
+};
+
+std::unique_ptr<PushSimulator::Engine> make_push_world(const PushSettings& settings);
+std::unique_ptr<PushSimulator::Engine> make_limit_surface(const PushSettings& settings);
+std::unique_ptr<PushSimulator::Engine> make_distributed_push(const PushSettings& settings);
+
+// The finger's way: straight between samples, standing still before and after.
+class FingerWay {
+ public:
+  // REQUIRES: samples at increasing times that outlive this.
+  explicit FingerWay(std::span<const FingerSample> samples) : samples_(samples) {}
+  Eigen::Vector2d at(double t_s) const;
+  double begin_s() const { return samples_.front().t_s; }
+  double end_s() const { return samples_.back().t_s; }
+  // Time from `t_s` on at which a finger of this reach first touches the outline at X_SC, to within
+  // the way's own samples and never late; none when it does not.
+  std::optional<double> approach(double t_s, const Pose& X_SC,
+                                 std::span<const Eigen::Vector2d> corners, double reach_m) const;
+
+ private:
+  std::span<const FingerSample> samples_;
+};
+
+// Samples at every `interval_s`, between the states that a model passes through.
+class PathRecorder {
+ public:
+  PathRecorder(std::vector<MotionSample>* path, double interval_s);
+  bool wanted() const { return path_ != nullptr; }
+  void add(const MotionSample& sample);  // times must not decrease
+  void finish();                         // the last state is always kept
+
+ private:
+  std::vector<MotionSample>* path_;
+  double interval_s_;
+  double next_s_ = 0;
+  MotionSample last_;
+};
+
+}  // namespace gapfarm

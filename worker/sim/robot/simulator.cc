@@ -1,0 +1,140 @@
+#include "worker/sim/robot/simulator.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "worker/sim/observe.h"
+#include "worker/sim/robot/drive.h"
+#include "worker/sim/robot/step_plan.h"
+#include "worker/sim/world.h"
+
+namespace gapfarm {
+namespace {
+
+constexpr double kTimeSlack_s = 1e-9;  // rounding of step times
+
+}  // namespace
+
+class Simulator::Impl {
+ public:
+  Impl(const SimSettings& settings, StepCounter* steps)
+      : settings_(settings), world_(settings), watched_(steps) {}
+
+  Motion run(const DriveInput& drive, const Floor& floor, std::vector<MotionSample>* path,
+             double interval_s);
+
+  const SimSettings& settings() const { return settings_; }
+  std::uint64_t steps() const { return steps_; }
+
+ private:
+  MotionSample sample(double t_s);
+  Pose pose();
+
+  SimSettings settings_;
+  RobotWorld world_;
+  std::uint64_t steps_ = 0;
+  StepCounter* watched_;
+};
+
+Pose Simulator::Impl::pose() {
+  const btTransform& X_SB = world_.robot().body().getWorldTransform();
+  const btVector3 centre = X_SB * world_.robot().turning_centre();
+  const btVector3 ahead = X_SB.getBasis().getColumn(0);
+  return {centre.x(), centre.y(), wrap_angle(std::atan2(ahead.y(), ahead.x()))};
+}
+
+MotionSample Simulator::Impl::sample(double t_s) {
+  const btTransform& X_SB = world_.robot().body().getWorldTransform();
+  MotionSample result;
+  result.t_s = t_s;
+  result.X_SB = pose();
+  result.height_m = (X_SB * world_.robot().turning_centre()).z();
+  result.roll_rad = clamped_asin(X_SB.getBasis()[2][1]);
+  result.pitch_rad = -clamped_asin(X_SB.getBasis()[2][0]);
+  result.kinetic_energy_j = world_.robot().kinetic_energy();
+  return result;
+}
+
+Motion Simulator::Impl::run(const DriveInput& drive, const Floor& floor,
+                            std::vector<MotionSample>* path, double interval_s) {
+  world_.reset(floor);
+  const SideMotion left(drive.left, drive.duration_s);
+  const SideMotion right(drive.right, drive.duration_s);
+  const double still_s = std::max(left.still_time(), right.still_time());
+  StepPlan plan(1 / (settings_.step_rate_hz * settings_.sub_steps), left, right, drive.duration_s);
+  const btRigidBody& body = world_.robot().body();
+  const btVector3 centre = world_.robot().turning_centre();
+
+  Motion motion;
+  motion.outcome = MotionOutcome::kNeverRested;
+  MotionSample last;
+  double next_sample_s = interval_s;
+  if (path != nullptr) {
+    path->clear();
+    last = sample(0);
+    path->push_back(last);
+  }
+  double max_roll_sine = 0;
+  double max_pitch_sine = 0;
+  double rest_s = 0;
+  double t = 0;
+  while (t < still_s + kSettleLimit_s) {
+    const btTransform before = body.getWorldTransform();
+    plan.advance();
+    t = plan.start_s();
+    const double dt = plan.length_s();
+    world_.step({left.mean_speed(t, dt), right.mean_speed(t, dt)}, dt);
+    ++steps_;
+    count_step(watched_);
+    const bool stopped = t >= still_s - kTimeSlack_s;
+    t = plan.end_s();
+    const btTransform& now = body.getWorldTransform();
+    if (!is_sane(body.getLinearVelocity(), body.getAngularVelocity())) {
+      motion.outcome = MotionOutcome::kDiverged;
+      break;
+    }
+    const btVector3& up = now.getBasis()[2];
+    max_roll_sine = std::max(max_roll_sine, std::abs(up.y()));
+    max_pitch_sine = std::max(max_pitch_sine, std::abs(up.x()));
+    const double height = now.getOrigin().z() + up.dot(centre);
+    motion.max_heave_m = std::max(motion.max_heave_m, std::abs(height));
+    if (path != nullptr) {
+      const MotionSample current = sample(t);
+      for (; interval_s > 0 && next_sample_s <= t;
+           next_sample_s = static_cast<double>(path->size()) * interval_s) {
+        path->push_back(blend(last, current, next_sample_s));
+      }
+      last = current;
+    }
+    if (has_fallen(now.getBasis())) {
+      motion.outcome = MotionOutcome::kFellOver;
+      break;
+    }
+    rest_s = stopped && is_still(before, now, dt) ? rest_s + dt : 0;
+    if (rest_s >= kRestTime_s) {
+      motion.outcome = MotionOutcome::kOk;
+      break;
+    }
+  }
+  motion.duration_s = t;
+  motion.max_roll_rad = clamped_asin(max_roll_sine);
+  motion.max_pitch_rad = clamped_asin(max_pitch_sine);
+  if (motion.outcome == MotionOutcome::kDiverged) return motion;
+  motion.X_SE = pose();
+  motion.rest_time_s = std::max(0.0, t - rest_s - drive.duration_s);
+  if (path != nullptr && path->back().t_s < t) path->push_back(last);
+  return motion;
+}
+
+Simulator::Simulator(const SimSettings& settings, StepCounter* steps)
+    : impl_(std::make_unique<Impl>(settings, steps)) {}
+Simulator::~Simulator() = default;
+const SimSettings& Simulator::settings() const { return impl_->settings(); }
+std::uint64_t Simulator::steps() const { return impl_->steps(); }
+
+Motion Simulator::run(const DriveInput& drive, const Floor& floor, std::vector<MotionSample>* path,
+                      double interval_s) {
+  return impl_->run(drive, floor, path, interval_s);
+}
+
+}  // namespace gapfarm
