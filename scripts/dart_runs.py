@@ -4,7 +4,7 @@
     scripts/dart_runs.py OUT LOG.csv [LOG.csv ...] [--half first|second]
 
 Throttle counts while the driver holds the button; what is before the first and after the last motion
-is left out; poses are thinned to 40 Hz.
+is excluded; poses are thinned to 40 Hz.
 """
 import argparse
 import csv
@@ -55,11 +55,11 @@ def main():
         if args.half:
             middle = (rows[0][0] + rows[-1][0]) / 2
             rows = [r for r in rows if (r[0] < middle) == (args.half == "first")]
-        start, told, last = rows[0][0], None, -1.0
+        start, commanded, last = rows[0][0], None, -1.0
         for t, x, y, theta, throttle, steering in rows:
             at = began + t - start
-            if told != (throttle, steering):
-                told = (throttle, steering)
+            if commanded != (throttle, steering):
+                commanded = (throttle, steering)
                 commands.append(f"{run},{at:.4f},{throttle:.5f},{steering:.5f}")
             if t - last >= RATE_S - 1e-3:
                 last = t

@@ -5,13 +5,13 @@
                                [--gapfarm build/release/bin/gapfarm] LOG...
     scripts/diagnosis_times.py --check run/a [--again run/b [--jobs 2]]
 
-LOG is a trials.csv; each is diagnosed afresh, one after the other, with two workers, in a folder of
+LOG is a trials.csv; each is diagnosed again, one after the other, with two workers, in a folder of
 OUT that is named after the log's folder.  A LOG may be followed by :NAME,... of effects that its
-diagnosis leaves out.  CPU seconds do not depend on what else the machine does, those of the stages
-do.  With --check nothing is diagnosed: what the cases of a finished blind check cost is told by kind, the
+diagnosis excludes.  CPU seconds do not depend on what else the machine does, those of the stages
+do.  With --check nothing is diagnosed: what the cases of a finished blind check cost is printed by kind, the
 CPU seconds of a case shared among its stages as its wall seconds are.  With --again, by this
 build: its cases are diagnosed once more in a folder of their own, one worker each, and how many are
-called and named as in the check is told with what they cost; given again, it goes on.  Standard
+called and named as in the check is printed with what they cost; given again, it goes on.  Standard
 library only.
 """
 import argparse
@@ -39,7 +39,7 @@ def diagnose(args, log, left_out):
     command = [args.gapfarm, "diagnose", args.config, "--trials", log, "--out", folder,
                "--workers", "2"]
     if left_out:
-        command += ["--leave-out", *left_out.split(",")]
+        command += ["--exclude", *left_out.split(",")]
     cpu = cpu_s_of(command)
     return folder, cpu, read(args.out, os.path.basename(folder))
 
@@ -74,7 +74,7 @@ def diagnose_again(args, case):
                os.path.join(args.check, "cases", case, "trials.csv"), "--out", out,
                "--workers", "1", "--seed", str(options["seed"])]
     if options.get("leave-out"):
-        command += ["--leave-out", *options["leave-out"]]
+        command += ["--exclude", *options["leave-out"]]
     shutil.rmtree(out, ignore_errors=True)
     spent = cpu_s_of(command)
     with open(cost, "w", encoding="utf-8") as file:
@@ -124,7 +124,7 @@ def tell_kinds(cases, diagnoses):
     slowest = sorted(cases, key=lambda case: -case["cpu_s"])[:5]
     print(f"\n{len(all_spent)} cases: median {statistics.median(all_spent):.1f} CPU s; slowest: " + ", ".join(
         f"{c['case']} ({c['truth'].get('left_out') or ' and '.join(c['truth']['effects']) or 'null'}"
-        f"{' left out' if c['truth'].get('left_out') else ''}) {c['cpu_s']:.0f}" for c in slowest))
+        f"{' excluded' if c['truth'].get('left_out') else ''}) {c['cpu_s']:.0f}" for c in slowest))
 
 
 def main():

@@ -73,7 +73,7 @@ def rates(cases):
 def wrong(cases):
     if all(c["right"] for c in cases):
         return
-    head("wrong", "truth", "said")
+    head("wrong", "truth", "reported")
     for c in cases:
         if not c["right"]:
             truth = "; ".join(f"{n} {named(v)}" for n, v in c["truth"]["effects"].items())

@@ -39,12 +39,12 @@ class Folder:
         """Rows (t, values...) and (t, x, y, theta); both count from the same moment."""
         self.runs += 1
         start = min(commands[0][0], poses[0][0])
-        told, last = None, -1e9
+        commanded, last = None, -1e9
         for t, *values in commands:
-            if values != told:
+            if values != commanded:
                 row = ",".join(f"{v:.6g}" for v in values)
                 self.commands.append(f"{self.runs},{self.clock + t - start:.4f},{row}")
-                told = values
+                commanded = values
         for t, x, y, theta in poses:
             if t - last < 1 / POSES_HZ - 1e-3 and t != poses[-1][0]:
                 continue
@@ -68,7 +68,7 @@ def write(out, robot, fit, test):
 
 
 def drive(data, out, floor):
-    """A Warthog; the last third of its steps is kept apart."""
+    """A Warthog; the last third of its steps is held out."""
     parts = [Folder(["left", "right"]), Folder(["left", "right"])]
     with open(f"{data}/drive/{floor}.csv", newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
@@ -103,7 +103,7 @@ def dart(data, out, which):
 
 
 def optiodom(data, out, kind):
-    """The first run of every session is fitted, the second is kept apart."""
+    """The first run of every session is fitted, the second is held out."""
     turn = 2 * math.pi
     # What a tick is in rad of the wheel; the columns of a run; what they are called.
     tick, cycle, channels, robot = {
@@ -140,7 +140,7 @@ def optiodom(data, out, kind):
 
 
 def neato(data, out, _):
-    """Open-loop runs with a pose at either end; every third is kept apart."""
+    """Open-loop runs with a pose at either end; every third is held out."""
     parts = [Folder(["left", "right"]), Folder(["left", "right"])]
     commands = numbers(f"{data}/neato/open_loop_commands.csv", 1)
     for i, (run, x0, y0, a0, x1, y1, a1, _) in enumerate(
@@ -152,7 +152,7 @@ def neato(data, out, _):
 
 
 def mrclam(data, out, number):
-    """A Create for ten minutes; the last third is kept apart."""
+    """A Create for ten minutes; the last third is held out."""
     parts = [Folder(["v", "omega"]), Folder(["v", "omega"])]
     commands = numbers(f"{data}/mrclam/dataset6_robot{number}/commands.csv", 1)
     poses = numbers(f"{data}/mrclam/dataset6_robot{number}/poses.csv", 1)
@@ -180,19 +180,19 @@ def tricycle(data, out, _):
     commands = [[], []]
     poses = [[], []]
     # Stamps are of receipt and jitter by half a cycle, so speeds are of a fifth of a second.
-    told = [rows[0]]
+    commanded = [rows[0]]
     for row in rows:
         part = int(3 * (row[0] - begin) >= 2 * length)
         poses[part].append([row[0] - begin, *row[3:]])
-        if row[0] - told[0][0] < SPEED_S and row is not rows[-1]:
-            told.append(row)
+        if row[0] - commanded[0][0] < SPEED_S and row is not rows[-1]:
+            commanded.append(row)
             continue
-        ticks = (row[2] - told[0][2] + 2**31) % 2**32 - 2**31
-        turned = [(r[1] + 4096) % 8192 - 4096 for r in told]
+        ticks = (row[2] - commanded[0][2] + 2**31) % 2**32 - 2**31
+        turned = [(r[1] + 4096) % 8192 - 4096 for r in commanded]
         metres = traction_gain * ticks / 5000
-        commands[part].append([told[0][0] - begin, metres / 0.1 / (row[0] - told[0][0]),
+        commands[part].append([commanded[0][0] - begin, metres / 0.1 / (row[0] - commanded[0][0]),
                                steer_gain * 2 * math.pi * sum(turned) / len(turned) / 8192])
-        told = [row]
+        commanded = [row]
     for part in range(2):
         parts[part].add(commands[part], poses[part])
     write(out, 'drive = "tricycle"\ncommands = ["speed", "steering"]\nmeasured = true\n'
@@ -200,7 +200,7 @@ def tricycle(data, out, _):
 
 
 def rutgers(data, out, apart):
-    """A mecanum robot at constant duties; this one of its nine commands is kept apart, or none: then
+    """A mecanum robot at constant duties; this one of its nine commands is held out, or none: then
     all are fitted and predicted.
 
     Wheels are where the motion says they are: [80, -80, 80, -80] drives along the camera's y, each

@@ -4,10 +4,10 @@
     gapfarm blind-check configs/srv1.toml --out run/a --sizes clear --left-out 20 --nulls 60 --seed 31
     scripts/left_out_residuals.py run/a
 
-Reads a finished blind check.  For each case whose effect was left out of the catalogue the check has
+Reads a finished blind check.  For each case whose effect was excluded from the catalogue the check has
 simulated a second log of the same robot and effect (other drives, other noise) and had three models
 predict it: the tuned base, the diagnosis's model.toml with its [residual], and the truth itself.  Gains
-over the tuned base are told, in nats a trial.  Where the truth gains less than 0.02 there is nothing to
+over the tuned base are printed, in nats a trial.  Where the truth gains less than 0.02 there is nothing to
 close.  Of nulls nothing is to be kept."""
 
 import argparse
@@ -36,9 +36,9 @@ def left_out_row(folder, case):
     whole = fresh.get("corrected", fresh["final"]) - fresh["tuned"]
     by_model = whole >= to_close / 2
     by_residual = by_model and kept(diagnosis)
-    told = "nothing to close" if to_close < LEAST_GAP else "yes" if by_residual else "no"
+    text = "nothing to close" if to_close < LEAST_GAP else "yes" if by_residual else "no"
     print(f"| {case['case']} | {truth['left_out']} | {diagnosis.get('verdict', '-')} | {to_close:.3f} | "
-          f"{catalogue:.3f} | {f'{whole:.3f}' if kept(diagnosis) else '-'} | {told} |")
+          f"{catalogue:.3f} | {f'{whole:.3f}' if kept(diagnosis) else '-'} | {text} |")
     return to_close >= LEAST_GAP, by_residual, by_model
 
 
@@ -55,7 +55,7 @@ def main():
     if unscored:
         sys.exit(f"{result} has no fresh_scores of {', '.join(unscored)}: it was judged by an earlier version, "
                  "or a simulation failed. Remove blind_check.json and run blind-check again: it only judges")
-    print("| case | left out | verdict | truth closes | catalogue's correction | with [residual] | at least half |\n"
+    print("| case | excluded | verdict | truth closes | catalogue's correction | with [residual] | at least half |\n"
           "|---|---|---|---|---|---|---|")
     rows = [left_out_row(folder, case) for case in left_out]
     empty = sum(not some for some, _, _ in rows)

@@ -29,8 +29,8 @@ warthog() {  # FOLDER NAME
   awk -F, -v to="$1" -v rest="$rest" '
     BEGIN { print "run,t,left,right" > to "/commands.csv"; print "run,t,x,y,theta" > to "/poses.csv" }
     NR == 1 || (rest != "" && $1 % 2 != rest) { next }
-    { t = $2 + 16 * $1; told = $1 "," $3 "," $4 }
-    told != before { printf "%d,%.3f,%s,%s\n", $1, t, $3, $4 > to "/commands.csv"; before = told }
+    { t = $2 + 16 * $1; commanded = $1 "," $3 "," $4 }
+    commanded != before { printf "%d,%.3f,%s,%s\n", $1, t, $3, $4 > to "/commands.csv"; before = commanded }
     $11 == 1 { printf "%d,%.3f,%s,%s,%s\n", $1, t, $7, $8, $9 > to "/poses.csv" }' "$file"
 }
 

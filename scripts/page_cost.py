@@ -9,7 +9,7 @@ the server's share of a core.
 With --bench, `bench_farm` runs beside each run instead, and what its master costs is printed: CPU time
 of its thread a task, and tasks a second.
 
-GAPFARM: the program, build/release/bin/gapfarm unless told otherwise.
+GAPFARM: the program, build/release/bin/gapfarm unless configured otherwise.
 """
 
 import argparse
@@ -41,7 +41,7 @@ def cpu_s(pid):
 
 
 class Page(threading.Thread):
-    """One open page: an event stream, and a fetch of what it tells of."""
+    """One open page: an event stream, and a fetch of what it names."""
 
     def __init__(self, port, run):
         super().__init__(daemon=True)
@@ -53,8 +53,8 @@ class Page(threading.Thread):
         stream.request("GET", f"/events?at=/view&of={self.run_name}")
         answer, pages, etag = stream.getresponse(), None, ""
         while line := answer.readline():
-            told = line.decode().removeprefix("data: ").strip()
-            if not line.startswith(b"data: ") or f'"{told}"' == etag:
+            reported = line.decode().removeprefix("data: ").strip()
+            if not line.startswith(b"data: ") or f'"{reported}"' == etag:
                 continue
             pages = pages or http.client.HTTPConnection("127.0.0.1", self.port)
             pages.request("GET", f"/view?of={self.run_name}", headers={"If-None-Match": etag})

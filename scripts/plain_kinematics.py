@@ -149,17 +149,17 @@ class Model:
         omega = 0.0
         while at < end - 1e-9:
             dt = min(STEP_S, (begin if at < begin - 1e-9 else end) - at)
-            told = track.mean(at - delay, dt)
+            commanded = track.mean(at - delay, dt)
             if self.kind == "car":
-                wanted = self.angle(told[1], values)
+                wanted = self.angle(commanded[1], values)
                 decay = math.exp(-dt / lag) if lag > 1e-4 and state is not None else 0.0
                 state = wanted + ((state or 0.0) - wanted) * decay
                 if at < begin - 1e-9:
                     v = speed
                 else:
-                    push = max(0.0, abs(told[0]) - values["zero"])
+                    push = max(0.0, abs(commanded[0]) - values["zero"])
                     slow = push * values["back_emf"] + values["drag"] + values["cornering"] * abs(omega)
-                    after = (speed + dt * math.copysign(push * values["gain"], told[0])) / (1 + dt * slow)
+                    after = (speed + dt * math.copysign(push * values["gain"], commanded[0])) / (1 + dt * slow)
                     held = values["coulomb"] * dt
                     after = 0.0 if abs(after) <= held else after - math.copysign(held, after)
                     v, speed = (speed + after) / 2, after
@@ -168,16 +168,16 @@ class Model:
                 twist = (v, 0.0, omega)
             else:
                 if state is None:
-                    state = told[:]
+                    state = commanded[:]
                 decay = math.exp(-dt / lag) if lag > 1e-4 else 0.0
                 share = (1 - decay) * lag / dt if lag > 1e-4 else 0.0
                 if limit:
                     most = limit / self.radius * dt
-                    limited = self.limited if at > begin - RUN_IN_S + 1e-9 else told
-                    told = [min(max(u, l - most), l + most) for u, l in zip(told, limited)]
-                    self.limited = told
-                used = [u + (s - u) * share for u, s in zip(told, state)]
-                state = [u + (s - u) * decay for u, s in zip(told, state)]
+                    limited = self.limited if at > begin - RUN_IN_S + 1e-9 else commanded
+                    commanded = [min(max(u, l - most), l + most) for u, l in zip(commanded, limited)]
+                    self.limited = commanded
+                used = [u + (s - u) * share for u, s in zip(commanded, state)]
+                state = [u + (s - u) * decay for u, s in zip(commanded, state)]
                 twist = self.twist(values, used)
             if at >= begin - 1e-9:
                 half = twist[2] * dt / 2

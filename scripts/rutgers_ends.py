@@ -5,7 +5,7 @@
 
 DATA holds rutgers_mecanum/; OUT is where scripts/measure_ground.sh left the sets rutgers_of_nine_1 to
 rutgers_of_nine_9 (each command predicted by a fit to the eight others) and rutgers_all (all fitted).
-What was not measured is left out.  The same for all: from the first frame to the last one of the
+What was not measured is excluded.  The same for all: from the first frame to the last one of the
 recording, every take on its own.  Needs only the standard library.
 """
 import csv

@@ -3,7 +3,7 @@
 # them as an ordinary user, and lets the worker's service work.
 #   scripts/try_packages.sh [FOLDER]     with the .deb files (build/packages)
 # Needs root, debootstrap and a Debian mirror (scripts/bare_debian.sh); without them it says so and ends with
-# status 77.  Where systemd cannot be booted (scripts/boot_debian.sh) the service is left out, and it says so.
+# status 77.  Where systemd cannot be booted (scripts/boot_debian.sh) the service is omitted, and it says so.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 packages=$(cd "${1:-build/packages}" && pwd)

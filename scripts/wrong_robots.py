@@ -180,7 +180,7 @@ def wrong_runs(runs, error, size, model, rng):
     begin = runs[0][0][0][0]
     out = []
     for commands, poses in runs:
-        if error == "battery_sag":  # what was told is written down as more than it was, later more so
+        if error == "battery_sag":  # what was commanded is written down as more than it was, later more so
             commands = [(t, [v / (1 - size * (t - begin) / 60) if c in model.driving else v
                              for c, v in enumerate(values)]) for t, values in commands]
         elif error == "asymmetry":

@@ -36,21 +36,22 @@ class Prepared : public PreparedProblem {
     }
     return prediction;
   }
-  // What strays does so about every way of the model's.
+  // Outliers lie about every alternative of the model's.
   void correct(const LoggedMotion& facts, TrialPrediction* trial) const {
     const Residual& residual = problem_.residual;
     std::vector<Alternative> all;
-    for (Alternative& way : trial->alternatives) {
-      way.X_WM = corrected_end(residual.field, facts, way.X_WM);
-      if (!residual.strays) continue;
-      for (const StrayWay& stray : stray_ways(*residual.strays, facts, way.X_WM)) {
-        Alternative& added = all.emplace_back(way);
-        added.weight *= stray.weight;
-        added.X_WM = stray.X_WE;
-        added.cov += stray.spread * stray.spread.transpose();
+    for (Alternative& alternative : trial->alternatives) {
+      alternative.X_WM = corrected_end(residual.field, facts, alternative.X_WM);
+      if (!residual.outliers) continue;
+      for (const OutlierMode& outlier :
+           outlier_modes(*residual.outliers, facts, alternative.X_WM)) {
+        Alternative& added = all.emplace_back(alternative);
+        added.weight *= outlier.weight;
+        added.X_WM = outlier.X_WE;
+        added.cov += outlier.spread * outlier.spread.transpose();
       }
     }
-    if (residual.strays) trial->alternatives = std::move(all);
+    if (residual.outliers) trial->alternatives = std::move(all);
   }
   const FitnessReference& reference() const { return reference_; }
   void set_reference(FitnessReference reference) { reference_ = std::move(reference); }

@@ -15,8 +15,9 @@
 namespace gapfarm {
 namespace {
 
-// Results of tasks shorter than that (s) are told several at a time, while more is left to do than
-// is to be told: each telling wakes a handful of threads here and at the master.
+// Results of tasks shorter than that (s) are
+// handed on several at a time, while more is left to do than is to be handed on: each hand-over
+// wakes a handful of threads here and at the master.
 constexpr double kShort_s = 0.004;
 
 // Problems that are ready for work, the latest used first.  Belongs to the evaluating thread: it is
@@ -108,7 +109,7 @@ void EvaluationThread::run() {
   PreparedProblems problems;
   std::unique_lock lock(mutex_);
   for (;;) {
-    if (queue_.empty()) tell();
+    if (queue_.empty()) notify();
     wake_.wait(lock, [this] { return stop_ || !queue_.empty(); });
     if (stop_) return;
     const Work work = std::move(queue_.front());
@@ -127,13 +128,13 @@ void EvaluationThread::run() {
     begun_ = -1;
     const bool later = result.wall() < kShort_s && finished_.size() + 1 < queue_.size();
     finished_.push_back(std::move(result));
-    if (!later) tell();
+    if (!later) notify();
   }
 }
 
-void EvaluationThread::tell() {
-  if (told_ || finished_.empty()) return;
-  told_ = true;
+void EvaluationThread::notify() {
+  if (notified_ || finished_.empty()) return;
+  notified_ = true;
   const std::uint64_t one = 1;
   [[maybe_unused]] const ssize_t written = write(fd_, &one, sizeof one);
 }
@@ -171,10 +172,10 @@ std::vector<AttemptKey> EvaluationThread::drop_all() {
 std::vector<v1::JobResult> EvaluationThread::take_finished() {
   const std::lock_guard lock(mutex_);
   if (finished_.empty()) return {};
-  if (told_) {
+  if (notified_) {
     std::uint64_t count = 0;
     [[maybe_unused]] const ssize_t got = read(fd_, &count, sizeof count);
-    told_ = false;
+    notified_ = false;
   }
   return std::exchange(finished_, {});
 }

@@ -37,7 +37,7 @@ class EvaluationThread {
 
  private:
   void run();
-  void tell();  // that there are results
+  void notify();  // that there are results
 
   WorkerProgress unwatched_;
   WorkerProgress& progress_;
@@ -47,7 +47,7 @@ class EvaluationThread {
   std::deque<Work> queue_;
   std::vector<v1::JobResult> finished_;
   double begun_ = -1;  // s; negative: idle
-  bool told_ = false;
+  bool notified_ = false;
   bool stop_ = false;
   std::thread thread_;  // last: it uses the rest
 };

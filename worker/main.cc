@@ -77,7 +77,7 @@ void describe(CLI::App& app, Arguments* arguments) {
       ->check(CLI::Range(1, 4096))
       ->capture_default_str();
   app.add_flag("--drain", arguments->drain,
-               "When told to stop, finish all jobs in hand instead of only the one in work");
+               "When asked to stop, finish all jobs in hand instead of only the one in work");
   app.add_option("--lifetime", arguments->lifetime_s,
                  "Be gone after so many seconds, and begin no job that would take longer")
       ->check(CLI::PositiveNumber)
@@ -119,7 +119,8 @@ int complain(const Error& error, int status) {
   return status;
 }
 
-// A worker that was told to trust whoever answers may do so anywhere: the endpoint names the place.
+// A worker that is configured to trust whoever answers may do so anywhere: the endpoint names the
+// place.
 Result<LinkSecurity> link_security(const Arguments& arguments) {
   LinkSecurity security;
   if (arguments.endpoint.rfind("tcp://", 0) != 0) return security;

@@ -78,8 +78,8 @@ class Service {
   void announce(double now) {
     if (!options_.announce) return;
     const bool working = session_.state() == WorkerSession::State::kWorking;
-    if (const auto words = wait_.say(working, now)) {
-      std::fprintf(stderr, "gapfarm-worker: %s\n", words->c_str());
+    if (const auto message = wait_.message(working, now)) {
+      std::fprintf(stderr, "gapfarm-worker: %s\n", message->c_str());
     }
   }
 

@@ -15,7 +15,7 @@ struct ServiceOptions {
   std::string endpoint;   // the master's
   LinkSecurity security;  // for a tcp:// endpoint
   SessionOptions session;
-  // Belongs to the master's own process tree: ends when the master says goodbye, without finishing
+  // Belongs to the master's own process tree: ends when the master sends goodbye, without finishing
   // the job in hand.  Otherwise waits for the next master.
   bool local = false;
   // A stop request finishes all jobs in hand instead of the one in work.
@@ -35,7 +35,7 @@ enum class ServiceEnd {
 // A name for this process that no other has: PREFIX (or the host) + pid + random tail.
 std::string unique_worker_name(const std::string& prefix);
 
-// Works until told otherwise: one stop request finishes the job in work (or all in hand, with
+// Works until stopped: one stop request finishes the job in work (or all in hand, with
 // `drain`) and sends its result, a second leaves at once.  The others go to other workers.
 // Errors: a bad endpoint; refused by the master, with its reason.  `evaluation` may still have work
 // in hand afterwards (its destructor would wait for that), but nobody wants it.

@@ -82,7 +82,7 @@ void WorkerSession::on_welcome(const v1::Welcome& welcome, double now) {
 void WorkerSession::on_job(v1::Job* job) {
   if (job->epoch() != epoch_ || epoch_ == 0) return;
   const auto [mine, fresh] = in_hand_.try_emplace(job->attempt_id());
-  if (!fresh) return;  // told twice
+  if (!fresh) return;  // sent twice
   if (leaving_ != Leaving::kNo) {
     on_dropped({epoch_, job->attempt_id()});
     return;
@@ -193,7 +193,7 @@ void WorkerSession::on_unsent(v1::Envelope* envelope) {
   }
   // A hello that nobody got is no reason to wait longer with the next.
   if (envelope->has_hello()) hello_wait_ = std::min(hello_wait_, kUnheardWait);
-  if (!envelope->has_results()) return;  // the rest is said again in time
+  if (!envelope->has_results()) return;  // the rest is sent again in time
   auto& results = *envelope->mutable_results()->mutable_results();
   for (auto result = results.rbegin(); result != results.rend(); ++result) {
     in_hand_.insert(sending_.extract(result->attempt_id()));
@@ -279,7 +279,7 @@ void WorkerSession::offer_kept() {
 
 void WorkerSession::leave(Leaving how) {
   leaving_ = how;
-  next_heartbeat_ = 0;  // tell at once
+  next_heartbeat_ = 0;  // send at once
   if (how == Leaving::kAfterCurrent) refuse_work();
 }
 

@@ -57,7 +57,7 @@ class WorkerSession {
   enum class State {
     kGreeting,  // no master, or it has not been heard of for too long
     kWorking,
-    kDismissed,  // the master said goodbye
+    kDismissed,  // the master sent goodbye
     kRefused,    // for good; reason() says why
   };
 
@@ -143,7 +143,7 @@ class WorkerSession {
   std::vector<AttemptKey> cancelled_;
   std::deque<v1::JobResult> results_;        // not sent yet
   std::map<std::uint64_t, InHand> sending_;  // of the results in the last outbox
-  std::vector<std::uint64_t> dropped_;       // not told yet
+  std::vector<std::uint64_t> dropped_;       // not sent yet
   // Work of a master that is gone: its answers are offered to the next one by their questions.
   struct Former {
     AttemptKey key;

@@ -17,15 +17,15 @@ struct SupervisorOptions {
   std::vector<std::string> arguments;  // for every worker, beside --name and --parent
   unsigned processes = 1;
   ProcessLimits limits;
-  // s of the monotonic clock, by which the workers have gone (they are told, and none is started
-  // again after it).
+  // s of the monotonic clock, by which the workers have gone (they are asked to go, and none is
+  // started again after it).
   double deadline_s = std::numeric_limits<double>::infinity();
 };
 
 // Starts the workers, kills those that hang (see ProcessLimits) and starts them again when they
-// end; the new one tells the master how the old one ended, so that a task that kills workers is
-// found out.  Passes a first and a second stop
-// request on.  Returns when asked to stop and all have ended; error: none could be kept alive.
+// end; the new one reports to the master how the old one ended, so that a task that kills workers
+// is found out.  Passes a first and a second stop request on.  Returns when asked to stop and all
+// have ended; error: none could be kept alive.
 Status supervise(const SupervisorOptions& options, StopSource& stop);
 
 }  // namespace gapfarm

@@ -1,4 +1,4 @@
-// Content hashes.  BLAKE2b from libsodium; 128 bits are plenty to tell problems and runs apart.
+// Content hashes.  BLAKE2b from libsodium; 128 bits are plenty to keep problems and runs distinct.
 #pragma once
 
 #include <cstdint>

@@ -9,7 +9,7 @@
 
 namespace gapfarm {
 
-// What a caller may have to tell apart; everything else is for people to read.
+// What a caller may have to distinguish; everything else is for people to read.
 enum class ErrorCode {
   kOther,
   kStopped,     // by request

@@ -66,7 +66,7 @@ bool read_robot_section(TomlSection& top, Config& config) {
 }  // namespace
 
 Result<std::string> start_no_program(const ExternalCommand& command) {
-  return Error{"would have to start '" + command.words[0] + "', and here nothing is started"};
+  return Error{"would have to start '" + command.argv[0] + "', and here nothing is started"};
 }
 
 Result<std::string> start_program(const ExternalCommand& command) {
@@ -78,8 +78,8 @@ Result<Config> parse_config(std::string_view text, const std::string& path,
   auto parsed = parse_toml(text, path);
   if (!parsed.ok()) {
     const TextFormat format = sniff_format(text);
-    const bool told = format != TextFormat::kToml && format != TextFormat::kUnknown;
-    return told ? wrong_format(path, format, "a config") : parsed.error();
+    const bool recognised = format != TextFormat::kToml && format != TextFormat::kUnknown;
+    return recognised ? wrong_format(path, format, "a config") : parsed.error();
   }
   if (parsed->contains("model")) {
     return text_error(path, {}, "a model", "a config",

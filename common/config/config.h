@@ -16,7 +16,7 @@ Result<std::string> start_no_program(const ExternalCommand& command);
 // Starts it, reads its first line and ends it.
 Result<std::string> start_program(const ExternalCommand& command);
 
-// Keys that the file leaves out keep their defaults.  The error lists everything that is wrong, a
+// Keys that the file omits keep their defaults.  The error lists everything that is wrong, a
 // line each: "file:line:column: sentence", with "did you mean" for unknown words.
 // `start` starts the simulator that scenario `external` names, and returns how it introduces
 // itself.

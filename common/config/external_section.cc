@@ -18,10 +18,10 @@ bool read_external_section(TomlSection& top, const std::string& config_path,
         "  program = [\"python3\", \"simulator.py\"]");
   }
   ExternalCommand command;
-  command.words = section->strings("program").value_or(std::vector<std::string>());
+  command.argv = section->strings("program").value_or(std::vector<std::string>());
   section->read("answer_limit", command.answer_limit_s, 1e-3, 1e6, "s");
   section->finish();
-  if (command.words.empty() || command.words[0].empty()) {
+  if (command.argv.empty() || command.argv[0].empty()) {
     return fail(
         "[external] program names no program, expected words such as "
         "[\"python3\", \"simulator.py\"]");

@@ -8,7 +8,7 @@
 namespace gapfarm {
 namespace {
 
-const std::vector<std::string> kScaleWords = {"linear", "log"};
+const std::vector<std::string> kScaleNames = {"linear", "log"};
 constexpr const char* kForms =
     "[lower, upper], {range = [lower, upper], scale = \"log\"} or \"table\"";
 
@@ -28,7 +28,7 @@ class GeneReader {
       } else if (node.is_table() && begins_a_row(word)) {
         read_table(*node.as_table(), word + ".");
       } else {
-        unknown(key, word, known_words());
+        unknown(key, word, known_names());
       }
     }
   }
@@ -47,15 +47,15 @@ class GeneReader {
     return {};
   }
 
-  std::vector<std::string> known_words() const {
-    std::vector<std::string> words;
-    for (const Parameter& row : table_.rows()) words.push_back(row.key);
-    return words;
+  std::vector<std::string> known_names() const {
+    std::vector<std::string> known;
+    for (const Parameter& row : table_.rows()) known.push_back(row.key);
+    return known;
   }
 
   void unknown(const toml::key& key, const std::string& word,
-               const std::vector<std::string>& words) {
-    errors_.add(key.source().begin, "unknown gene " + quoted_word(word) + suggestion(word, words));
+               const std::vector<std::string>& known) {
+    errors_.add(key.source().begin, "unknown gene " + quoted_word(word) + suggestion(word, known));
   }
 
   // [genes.motor_asymmetry] ratio = [...]
@@ -68,15 +68,15 @@ class GeneReader {
                             "] with its parameters");
       return;
     }
-    std::vector<std::string> words;
-    for (const EffectParameter& parameter : effect.parameters) words.push_back(parameter.key);
+    std::vector<std::string> known;
+    for (const EffectParameter& parameter : effect.parameters) known.push_back(parameter.key);
     for (const auto& [key, value] : *section) {
       const std::string word(key.str());
       const auto row = table_.find(effect.name + "." + word);
       if (row) {
         read_gene(*row, value);
       } else {
-        unknown(key, word, words);
+        unknown(key, word, known);
       }
     }
   }
@@ -104,7 +104,7 @@ class GeneReader {
   }
 
   bool read_spelled_out(TomlSection& section, Gene& gene) {
-    if (const auto scale = section.choice("scale", kScaleWords)) {
+    if (const auto scale = section.choice("scale", kScaleNames)) {
       gene.scale = *scale == 1 ? ParameterScale::kLog : ParameterScale::kLinear;
     }
     const toml::node* range = section.find("range");
@@ -150,13 +150,13 @@ class GeneReader {
     bool run = ends.size() >= 2;
     for (std::size_t i = 1; i < ends.size(); ++i) run = run && ends[i] == ends[i - 1] + 1;
     if (!run) {
-      std::string words;
+      std::string known;
       for (const std::string& word : table_[gene.row].choices) {
-        words += (words.empty() ? "" : ", ") + word;
+        known += (known.empty() ? "" : ", ") + word;
       }
       errors_.add(range,
                   "gene " + table_[gene.row].key +
-                      " needs two or more different choices that are neighbours in: " + words);
+                      " needs two or more different choices that are neighbours in: " + known);
       return false;
     }
     gene.lower = ends.front();

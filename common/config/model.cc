@@ -142,7 +142,7 @@ Status read_model_program(TomlSection& top, Model& model) {
   ExternalCommand command;
   std::string introduction;
   if (auto section = top.section("external")) {
-    command.words = section->strings("program").value_or(std::vector<std::string>());
+    command.argv = section->strings("program").value_or(std::vector<std::string>());
     section->read("folder", command.folder);
     section->read("answer_limit", command.answer_limit_s, 1e-3, 1e6, "s");
     section->read("introduction", introduction);
@@ -217,8 +217,8 @@ Result<Model> parse_model(std::string_view text, const std::string& path) {
   auto parsed = parse_toml(text, path);
   if (!parsed.ok()) {
     const TextFormat format = sniff_format(text);
-    const bool told = format != TextFormat::kToml && format != TextFormat::kUnknown;
-    return told ? wrong_format(path, format, "a model") : parsed.error();
+    const bool recognised = format != TextFormat::kToml && format != TextFormat::kUnknown;
+    return recognised ? wrong_format(path, format, "a model") : parsed.error();
   }
   if (!parsed->contains("model")) {
     return text_error(path, {}, "no key 'model'", "a model",
@@ -245,7 +245,7 @@ Result<Model> parse_model(std::string_view text, const std::string& path) {
     model.robot_file = problem.robot_file;
     model.tracked = problem.tracked;
     model.ground = problem.ground;
-    model.values = model.table().nominal();  // effects that the file leaves out are neutral
+    model.values = model.table().nominal();  // effects that the file omits are neutral
   }
   if (form.program) {
     if (Status s = read_model_program(top, model); !s)

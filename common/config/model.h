@@ -1,4 +1,4 @@
-// Models: what evolving and diagnosing leave behind, and predict and simulate take (model.toml).
+// Models: what evolving and diagnosing write, and predict and simulate take (model.toml).
 #pragma once
 
 #include <cstdint>
@@ -81,7 +81,7 @@ Status check_model(const Model& model);
 // Errors beside the file system's: of check_model().
 Status write_model(const Model& model, const std::string& path);
 
-// Rows that the file leaves out are nominal.  Errors as parse_config(), a unit that is not the
+// Rows that the file omits are nominal.  Errors as parse_config(), a unit that is not the
 // table's among them.
 Result<Model> parse_model(std::string_view text, const std::string& path);
 Result<Model> read_model(const std::string& path);

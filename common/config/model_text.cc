@@ -88,11 +88,11 @@ std::string robot_text(const Model& model) {
 std::string program_section(const Model& model) {
   if (!model.external) return "";
   const ExternalCommand& command = model.external->command;
-  std::string words;
-  for (const std::string& word : command.words) {
-    words += (words.empty() ? "" : ", ") + toml_string(word);
+  std::string argv;
+  for (const std::string& word : command.argv) {
+    argv += (argv.empty() ? "" : ", ") + toml_string(word);
   }
-  return "\n[external]\nprogram = [" + words + "]\nfolder = " + toml_string(command.folder) +
+  return "\n[external]\nprogram = [" + argv + "]\nfolder = " + toml_string(command.folder) +
          "\nanswer_limit = " + toml_number(command.answer_limit_s) +
          "\nintroduction = " + toml_string(model.external->introduction) + "\n";
 }
@@ -137,7 +137,7 @@ std::string score_sections(const Model& model) {
           "\nrest_penalty = " + toml_number(fitness.rest_penalty) +
           "\nrest_limit = " + toml_number(fitness.rest_limit_s) + "\n";
   text += "\n[spread]\nkind = " +
-          toml_string(spread_words()[static_cast<std::size_t>(model.spread.kind)]) + "\n";
+          toml_string(spread_names()[static_cast<std::size_t>(model.spread.kind)]) + "\n";
   if (model.spread.kind == SpreadKind::kSampled) {
     text += "replicates = " + std::to_string(model.spread.replicates) + "\n";
   }

@@ -4,20 +4,20 @@
 namespace gapfarm {
 namespace {
 
-const std::vector<std::string> kLocalWords = {"nelder_mead", "subplex", "bobyqa", "cobyla"};
+const std::vector<std::string> kLocalNames = {"nelder_mead", "subplex", "bobyqa", "cobyla"};
 
 }  // namespace
 
-const std::vector<std::string>& optimiser_words() {
-  static const std::vector<std::string> words = {
+const std::vector<std::string>& optimiser_names() {
+  static const std::vector<std::string> names = {
       "genetic", "differential_evolution", "cma_es", "local", "de_simplex", "random"};
-  return words;
+  return names;
 }
 
 void read_optimiser(TomlSection& top, OptimiserSettings& to) {
   auto section = top.section("optimiser");
   if (!section) return;
-  if (const auto kind = section->choice("kind", optimiser_words())) {
+  if (const auto kind = section->choice("kind", optimiser_names())) {
     to.kind = static_cast<OptimiserKind>(*kind);
   }
   if (const auto population = section->count("population", 4, 1000000)) {
@@ -27,7 +27,7 @@ void read_optimiser(TomlSection& top, OptimiserSettings& to) {
   section->read("crossover_rate", to.crossover_rate, 0, 1);
   section->read("sigma", to.sigma, 1e-4, 1);
   section->read("iterations", to.iterations, 1, 1000000);
-  if (const auto local = section->choice("local", kLocalWords)) {
+  if (const auto local = section->choice("local", kLocalNames)) {
     to.local = static_cast<LocalSearchKind>(*local);
   }
   section->read("step", to.step, 1e-6, 0.5);

@@ -37,14 +37,14 @@ std::optional<double> row_value(const toml::node& node, const ParameterTable& ta
       break;
     case ParameterKind::kChoice:
       if (const auto* word = node.as_string()) {
-        const auto& words = parameter.choices;
-        const auto found = std::find(words.begin(), words.end(), word->get());
-        if (found == words.end()) {
+        const auto& choices = parameter.choices;
+        const auto found = std::find(choices.begin(), choices.end(), word->get());
+        if (found == choices.end()) {
           errors.add(node, "unknown " + parameter.key + " " + quoted_word(word->get()) +
-                               suggestion(word->get(), words));
+                               suggestion(word->get(), choices));
           return {};
         }
-        value = static_cast<double>(found - words.begin());
+        value = static_cast<double>(found - choices.begin());
       }
       break;
   }

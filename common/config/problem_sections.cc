@@ -3,16 +3,16 @@
 
 namespace gapfarm {
 
-const std::vector<std::string>& fitness_words() {
-  static const std::vector<std::string> words = {
+const std::vector<std::string>& fitness_names() {
+  static const std::vector<std::string> names = {
       fitness_name(FitnessKind::kLogScore), fitness_name(FitnessKind::kRobustMahalanobis),
       fitness_name(FitnessKind::kEnergyScore), fitness_name(FitnessKind::kCornerDistance)};
-  return words;
+  return names;
 }
 
-const std::vector<std::string>& spread_words() {
-  static const std::vector<std::string> words = {"cubature", "sampled"};
-  return words;
+const std::vector<std::string>& spread_names() {
+  static const std::vector<std::string> names = {"cubature", "sampled"};
+  return names;
 }
 
 void read_commands(TomlSection& top, std::vector<CommandSpec>& commands) {
@@ -37,7 +37,7 @@ void read_fitness(TomlSection& top, FitnessSettings& fitness) {
 }
 
 void read_fitness_of(TomlSection& section, FitnessSettings& fitness) {
-  if (const auto kind = section.choice("kind", fitness_words())) {
+  if (const auto kind = section.choice("kind", fitness_names())) {
     fitness.kind = static_cast<FitnessKind>(*kind);
   }
   section.read("outlier_share", fitness.outlier_share, 0, kMostOutliers);
@@ -51,7 +51,7 @@ void read_fitness_of(TomlSection& section, FitnessSettings& fitness) {
 void read_spread(TomlSection& top, SpreadSettings& spread) {
   auto section = top.section("spread");
   if (!section) return;
-  if (const auto kind = section->choice("kind", spread_words())) {
+  if (const auto kind = section->choice("kind", spread_names())) {
     spread.kind = static_cast<SpreadKind>(*kind);
   }
   section->read("replicates", spread.replicates, 2, 100000);

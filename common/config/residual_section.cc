@@ -61,7 +61,7 @@ void read_weights(TomlSection& section, const Model& model, ResidualTerm* term) 
 ResidualTerm read_term(TomlSection& section, const Model& model) {
   ResidualTerm term;
   term.frame =
-      static_cast<ResidualFrame>(section.choice("frame", residual_frame_words()).value_or(0));
+      static_cast<ResidualFrame>(section.choice("frame", residual_frame_names()).value_or(0));
   section.read("by_drive", term.by_drive);
   const std::vector<std::string> names = covariate_names();
   term.covariates = section.choices("covariates", names).value_or(std::vector<std::size_t>());
@@ -75,23 +75,23 @@ ResidualTerm read_term(TomlSection& section, const Model& model) {
   return term;
 }
 
-// What is left out is 0.
-void read_strays(TomlSection& section, Model& model) {
+// What is omitted is 0.
+void read_outliers(TomlSection& section, Model& model) {
   auto read = section.section("strays");
   if (!read) return;
-  StrayDrives strays;
-  strays.kind = static_cast<StrayKind>(read->choice("kind", stray_kind_words()).value_or(0));
-  for (const auto& [key, value] : stray_values(strays)) {
+  OutlierDrives outliers;
+  outliers.kind = static_cast<OutlierKind>(read->choice("kind", outlier_kind_names()).value_or(0));
+  for (const auto& [key, value] : outlier_values(outliers)) {
     *value = read->number(key, -1e3, 1e3).value_or(*value);
   }
   read->finish();
-  model.residual.strays = strays;
+  model.residual.outliers = outliers;
 }
 
-std::string strays_text(StrayDrives strays) {
+std::string outliers_text(OutlierDrives outliers) {
   std::string text = "\n[residual.strays]\nkind = \"" +
-                     stray_kind_words()[static_cast<std::size_t>(strays.kind)] + "\"\n";
-  for (const auto& [key, value] : stray_values(strays)) {
+                     outlier_kind_names()[static_cast<std::size_t>(outliers.kind)] + "\"\n";
+  for (const auto& [key, value] : outlier_values(outliers)) {
     if (*value != 0) text += std::string(key) + " = " + format_double(*value) + "\n";
   }
   return text;
@@ -118,7 +118,7 @@ std::string term_text(const ResidualTerm& term) {
     lengths += separator + format_double(term.lengths[j]);
   }
   std::string text = "\n[[residual.terms]]\nframe = \"" +
-                     residual_frame_words()[static_cast<std::size_t>(term.frame)] +
+                     residual_frame_names()[static_cast<std::size_t>(term.frame)] +
                      "\"\nby_drive = " + (term.by_drive ? "true" : "false") + "\ncovariates = [" +
                      names + "]\nlengths = [" + lengths +
                      "]\ncentres = " + rows_text(term.centres) + "\n[residual.terms.weights]\n";
@@ -139,19 +139,19 @@ Status check_residual_of(const Model& model) {
   std::vector<std::string> commands;
   for (const CommandSpec& c : model.commands) commands.push_back(c.name);
   RETURN_IF_ERROR(check_residual(model.residual.field, commands));
-  return model.residual.strays ? check_strays(*model.residual.strays) : Status();
+  return model.residual.outliers ? check_outliers(*model.residual.outliers) : Status();
 }
 
 void read_residual(TomlSection& top, Model& model) {
   auto section = top.section("residual");
   if (!section) return;
-  read_strays(*section, model);
+  read_outliers(*section, model);
   const toml::node* node = section->find("terms");
   const auto check = [&](const toml::source_position& place) {
     if (!top.errors().empty()) return;
     if (Status s = check_residual_of(model); !s) top.errors().add(place, s.error().message);
   };
-  if (node == nullptr && model.residual.strays) {
+  if (node == nullptr && model.residual.outliers) {
     section->finish();
     check(section->table().source().begin);
     return;
@@ -182,10 +182,10 @@ std::string residual_section(const Model& model) {
   std::string text =
       "\n# What nothing in the catalogue explains, as a correction of where drives end; it is no "
       "cause.\n# Each term: sum of weights (m, m, rad) times exp(-|(z - centre) / length|^2 / 2) "
-      "over its covariates z.\n# Strays: a share of drives has an amount, uniform from least to "
+      "over its covariates z.\n# Outliers: a share of drives has an amount, uniform from least to "
       "most, of what all others have `rest` of.\n[residual]\n";
   for (const ResidualTerm& term : model.residual.field) text += term_text(term);
-  if (model.residual.strays) text += strays_text(*model.residual.strays);
+  if (model.residual.outliers) text += outliers_text(*model.residual.outliers);
   return text;
 }
 

@@ -7,17 +7,17 @@
 namespace gapfarm {
 namespace {
 
-const std::vector<std::string> kSelectionWords = {"tournament", "rank"};
-const std::vector<std::string> kCrossoverWords = {"one_point", "uniform", "blend"};
-const std::vector<std::string> kMutationWords = {"gaussian", "uniform_reset"};
-const std::vector<std::string> kOrderWords = {"separate", "sequence"};
+const std::vector<std::string> kSelectionNames = {"tournament", "rank"};
+const std::vector<std::string> kCrossoverNames = {"one_point", "uniform", "blend"};
+const std::vector<std::string> kMutationNames = {"gaussian", "uniform_reset"};
+const std::vector<std::string> kOrderNames = {"separate", "sequence"};
 
 constexpr unsigned kMany = 1000000;
 
 template <class Kind>
-void read_kinds(TomlSection& section, const char* key, const std::vector<std::string>& words,
+void read_kinds(TomlSection& section, const char* key, const std::vector<std::string>& known_names,
                 std::vector<Kind>& to) {
-  const auto found = section.choices(key, words);
+  const auto found = section.choices(key, known_names);
   if (!found) return;
   const std::string name = key;
   if (found->empty()) section.fail(key, name + " is empty, expected at least one");
@@ -114,14 +114,14 @@ void read_evolution(TomlSection& top, EvolutionSettings& to) {
   if (!section) return;
   section->read("population", to.population, 2, kMany);
   section->read("elitism", to.elitism, 0, kMany);
-  if (const auto kind = section->choice("selection", kSelectionWords)) {
+  if (const auto kind = section->choice("selection", kSelectionNames)) {
     to.selection = static_cast<SelectionKind>(*kind);
   }
   section->read("tournament_size", to.tournament_size, 1, kMany);
   section->read("rank_pressure", to.rank_pressure, 1.01, 2);
-  read_kinds(*section, "crossovers", kCrossoverWords, to.crossovers);
-  read_kinds(*section, "mutations", kMutationWords, to.mutations);
-  if (const auto order = section->choice("order", kOrderWords)) {
+  read_kinds(*section, "crossovers", kCrossoverNames, to.crossovers);
+  read_kinds(*section, "mutations", kMutationNames, to.mutations);
+  if (const auto order = section->choice("order", kOrderNames)) {
     to.order = static_cast<VariationOrder>(*order);
   }
   section->read("crossover_probability", to.crossover_probability, 0, 1);

@@ -35,8 +35,8 @@ std::optional<double> row_value(const toml::node& node, const ParameterTable& ta
                                 std::size_t row, TomlErrors& errors);
 
 // Words of the enums, in their order.
-const std::vector<std::string>& fitness_words();
-const std::vector<std::string>& spread_words();
-const std::vector<std::string>& optimiser_words();
+const std::vector<std::string>& fitness_names();
+const std::vector<std::string>& spread_names();
+const std::vector<std::string>& optimiser_names();
 
 }  // namespace gapfarm

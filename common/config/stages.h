@@ -1,4 +1,4 @@
-// Stages of a config: some genes first, then others (Laue and Hebbel 2009), and trials kept apart
+// Stages of a config: some genes first, then others (Laue and Hebbel 2009), and trials held out
 // to validate what comes of it.
 #pragma once
 

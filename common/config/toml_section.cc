@@ -103,18 +103,18 @@ std::optional<double> TomlSection::number_of(std::string_view key, const toml::n
 }
 
 std::optional<std::size_t> TomlSection::choice_of(std::string_view key, const toml::node& node,
-                                                  std::span<const std::string> words) {
+                                                  std::span<const std::string> names) {
   const auto* word = node.as_string();
   if (word == nullptr) {
     std::string list;
-    for (const std::string& known : words) list += (list.empty() ? "\"" : ", \"") + known + "\"";
+    for (const std::string& known : names) list += (list.empty() ? "\"" : ", \"") + known + "\"";
     wrong_type(key, node, "one of " + list);
     return {};
   }
-  const auto found = std::find(words.begin(), words.end(), word->get());
-  if (found != words.end()) return static_cast<std::size_t>(found - words.begin());
+  const auto found = std::find(names.begin(), names.end(), word->get());
+  if (found != names.end()) return static_cast<std::size_t>(found - names.begin());
   errors_->add(node, "unknown " + std::string(key) + " " + quoted_word(word->get()) +
-                         suggestion(word->get(), words));
+                         suggestion(word->get(), names));
   return {};
 }
 
@@ -164,10 +164,10 @@ std::optional<std::string> TomlSection::string(std::string_view key) {
 }
 
 std::optional<std::size_t> TomlSection::choice(std::string_view key,
-                                               std::span<const std::string> words) {
+                                               std::span<const std::string> names) {
   const toml::node* node = find(key);
   if (node == nullptr) return {};
-  return choice_of(key, *node, words);
+  return choice_of(key, *node, names);
 }
 
 std::optional<std::vector<std::string>> TomlSection::strings(std::string_view key) {
@@ -186,15 +186,15 @@ std::optional<std::vector<std::string>> TomlSection::strings(std::string_view ke
 }
 
 std::optional<std::vector<std::size_t>> TomlSection::choices(std::string_view key,
-                                                             std::span<const std::string> words) {
+                                                             std::span<const std::string> names) {
   const toml::node* node = find(key);
   if (node == nullptr) return {};
   std::vector<std::size_t> all;
   for (const toml::node* element : elements(*node)) {
-    const auto value = choice_of(key, *element, words);
+    const auto value = choice_of(key, *element, names);
     if (!value) return {};
     if (std::find(all.begin(), all.end(), *value) != all.end()) {
-      errors_->add(*element, std::string(key) + " names " + quoted_word(words[*value]) + " twice");
+      errors_->add(*element, std::string(key) + " names " + quoted_word(names[*value]) + " twice");
       return {};
     }
     all.push_back(*value);

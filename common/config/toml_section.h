@@ -71,11 +71,11 @@ class TomlSection {
   std::optional<bool> boolean(std::string_view key);
   std::optional<std::string> string(std::string_view key);
   // Index of the value in `words`.
-  std::optional<std::size_t> choice(std::string_view key, std::span<const std::string> words);
+  std::optional<std::size_t> choice(std::string_view key, std::span<const std::string> names);
   // Lists; a single value counts as a list of one.
   std::optional<std::vector<std::string>> strings(std::string_view key);
   std::optional<std::vector<std::size_t>> choices(std::string_view key,
-                                                  std::span<const std::string> words);
+                                                  std::span<const std::string> names);
   std::optional<std::vector<double>> numbers(std::string_view key, double lower, double upper,
                                              std::string_view unit = "");
   std::optional<TomlSection> section(std::string_view key);
@@ -103,7 +103,7 @@ class TomlSection {
   std::optional<double> number_of(std::string_view key, const toml::node& node, double lower,
                                   double upper, std::string_view unit);
   std::optional<std::size_t> choice_of(std::string_view key, const toml::node& node,
-                                       std::span<const std::string> words);
+                                       std::span<const std::string> names);
   // The elements of an array, or the node alone.
   static std::vector<const toml::node*> elements(const toml::node& node);
 

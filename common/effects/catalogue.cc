@@ -17,7 +17,7 @@ std::vector<Effect> build_catalogue() {
             {real("duty", "-", 0, 0, 0.3, "width of the dead band")}),
       drive("motor_lag", kNoContext, "first-order response of the tread speed to the duty",
             {real("tau", "s", 0, 0, 0.5, "time constant")}),
-      drive("timing_offset", kNoContext, "motors run this much longer than told",
+      drive("timing_offset", kNoContext, "motors run this much longer than commanded",
             {real("offset", "s", 0, -0.2, 0.2, "extra running time")}),
       drive("battery_sag", kSessionTime, "speed lost per minute since the session began",
             {real("rate", "1/min", 0, -0.05, 0.05, "share of the speed lost a minute")}),

@@ -1,4 +1,4 @@
-// THE effect catalogue: what the base simulation leaves out, by name, with units, bounds and the
+// THE effect catalogue: what the base simulation omits, by name, with units, bounds and the
 // neutral value at which an effect does nothing, exactly.  What each does lives in worker/effects.
 #pragma once
 
@@ -23,7 +23,7 @@ enum EffectContext : unsigned {
 };
 
 // What repeating a trial shows of an effect: another mean, a wider spread about it, or now and then
-// a trial that strays.
+// an outlier trial.
 enum class EffectShows { kMean, kSpread, kChance };
 
 struct EffectParameter {

@@ -21,7 +21,7 @@ namespace {
 
 constexpr std::size_t kShownBytes = 80;
 
-// The beginning of what was said, with control bytes as '?'.
+// The beginning of what was reported, with control bytes as '?'.
 std::string shown_line(std::string text) {
   const bool cut = text.size() > kShownBytes;
   text.resize(std::min(text.size(), kShownBytes));
@@ -50,15 +50,15 @@ void close_fd(int* fd) {
 
 }  // namespace
 
-LineProgram::LineProgram(std::vector<std::string> words, std::string folder, LineLimits limits,
+LineProgram::LineProgram(std::vector<std::string> argv, std::string folder, LineLimits limits,
                          Clock clock)
-    : words_(std::move(words)), folder_(std::move(folder)), limits_(limits), clock_(clock) {}
+    : argv_(std::move(argv)), folder_(std::move(folder)), limits_(limits), clock_(clock) {}
 
 LineProgram::~LineProgram() { kill(); }
 
 std::string LineProgram::name() const {
   std::string text;
-  for (const std::string& word : words_) text += (text.empty() ? "" : " ") + word;
+  for (const std::string& word : argv_) text += (text.empty() ? "" : " ") + word;
   return text;
 }
 
@@ -66,7 +66,7 @@ std::string LineProgram::by_hand(const std::vector<std::string>& lines) const {
   std::string text = "cd " + shell_quoted(folder_.empty() ? "." : folder_) + " && printf '%s\\n'";
   for (const std::string& line : lines) text += " " + shell_quoted(line);
   text += " |";
-  for (const std::string& word : words_) text += " " + shell_quoted(word);
+  for (const std::string& word : argv_) text += " " + shell_quoted(word);
   return text;
 }
 
@@ -106,15 +106,15 @@ Error LineProgram::ended() {
 }
 
 Status LineProgram::start() {
-  if (words_.empty()) return failed("has no name");
-  // A socket, since writing to one that is closed can be told to raise no signal.
+  if (argv_.empty()) return failed("has no name");
+  // A socket, since writing to one that is closed can be made to raise no signal.
   int in[2], out[2];
   if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, in) != 0) {
     return failed(std::string("got no pipe: ") + strerror(errno));
   }
   if (pipe2(out, O_CLOEXEC) != 0) return failed(std::string("got no pipe: ") + strerror(errno));
   ChildSetup setup;
-  setup.words = words_;
+  setup.argv = argv_;
   setup.folder = folder_;
   setup.in = in[1];
   setup.out = out[1];
@@ -157,7 +157,7 @@ Result<std::string> LineProgram::receive(double until, double limit_s) {
   for (;;) {
     const std::size_t end = rest_.find('\n');
     if (std::min(end, rest_.size()) > limits_.answer_bytes) {
-      return failed("said more than the " + std::to_string(limits_.answer_bytes) +
+      return failed("sent more than the " + std::to_string(limits_.answer_bytes) +
                     " bytes that a line may have: " + shown_line(rest_));
     }
     if (end != rest_.npos) {

@@ -24,14 +24,14 @@ class LineProgram {
   using Clock = double (*)();  // seconds; never goes back
 
   // `words`: program and arguments, found by PATH, started in `folder`.
-  LineProgram(std::vector<std::string> words, std::string folder, LineLimits limits, Clock clock);
+  LineProgram(std::vector<std::string> argv, std::string folder, LineLimits limits, Clock clock);
   ~LineProgram();
   LineProgram(const LineProgram&) = delete;
   LineProgram& operator=(const LineProgram&) = delete;
 
   // The line that answers `line`, both without their end.  Errors name the program and what it did:
   // it cannot be started, has ended (with what status or signal), does not answer in time, says
-  // more than a line may hold, or said something before it was asked.  After an error it is dead.
+  // more than a line may hold, or sent something before it was asked.  After an error it is dead.
   Result<std::string> ask(const std::string& line);
 
   bool running() const { return pid_ > 0; }
@@ -49,7 +49,7 @@ class LineProgram {
   Error failed(const std::string& what);
   bool wait_for(int fd, short events, double until) const;
 
-  std::vector<std::string> words_;
+  std::vector<std::string> argv_;
   std::string folder_;
   LineLimits limits_;
   Clock clock_;

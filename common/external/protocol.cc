@@ -58,12 +58,12 @@ double number_of(const Json& json, const char* key, double fallback) {
 Result<unsigned> read_inputs(const Json& json) {
   unsigned inputs = 0;
   std::vector<std::string> known;
-  for (const ExternalInputWord& row : kExternalInputWords) known.emplace_back(row.word);
+  for (const ExternalInputWord& row : kExternalInputNames) known.emplace_back(row.word);
   for (const Json& word : json.value("inputs", Json::array())) {
     const std::string text = word.is_string() ? word.get<std::string>() : json_text(word);
-    const auto row = std::find_if(std::begin(kExternalInputWords), std::end(kExternalInputWords),
+    const auto row = std::find_if(std::begin(kExternalInputNames), std::end(kExternalInputNames),
                                   [&](const ExternalInputWord& r) { return text == r.word; });
-    if (row == std::end(kExternalInputWords)) {
+    if (row == std::end(kExternalInputNames)) {
       return Error{"declares the unknown input '" + text + "'" + suggestion(text, known) +
                    "; known: lag, dead_travel, floor, path"};
     }
@@ -160,10 +160,10 @@ Result<ExternalDeclaration> parse_declaration(const std::string& line) {
 
 Result<std::shared_ptr<const ExternalProgram>> make_external_program(ExternalCommand command,
                                                                      std::string introduction) {
-  if (command.words.empty()) return Error{"the external program has no name"};
+  if (command.argv.empty()) return Error{"the external program has no name"};
   auto declaration = parse_declaration(introduction);
   if (!declaration) {
-    return Error{"external program '" + command.words[0] + "' " + declaration.error().message};
+    return Error{"external program '" + command.argv[0] + "' " + declaration.error().message};
   }
   return std::shared_ptr<const ExternalProgram>(new ExternalProgram{
       std::move(command), std::move(introduction), ExternalTable(std::move(*declaration))});

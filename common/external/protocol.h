@@ -58,7 +58,7 @@ std::string hello_line();
 // an input that is none.
 Result<ExternalDeclaration> parse_declaration(const std::string& line);
 
-// A program as a problem has it: how it is started, what it said of itself, the table of that.
+// A program as a problem has it: how it is started, what it reported of itself, the table of that.
 struct ExternalProgram {
   ExternalCommand command;
   std::string introduction;  // the line

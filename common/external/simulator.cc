@@ -30,7 +30,7 @@ ExternalSimulator::ExternalSimulator(const ExternalCommand& command, LineProgram
 
 ExternalSimulator::ExternalSimulator(const ExternalCommand& command, LineLimits limits,
                                      LineProgram::Clock clock)
-    : program_(command.words, command.folder, limits, clock) {}
+    : program_(command.argv, command.folder, limits, clock) {}
 
 Result<std::string> ExternalSimulator::introduce() {
   if (program_.running()) return introduction_;

@@ -11,7 +11,7 @@
 namespace gapfarm {
 
 // Whether this process may start the programs that problems name: they come from whoever is the
-// master.  False until it is said.
+// master.  False until it is reported.
 void allow_external_programs(bool allowed);
 bool external_programs_allowed();
 

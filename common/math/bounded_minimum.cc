@@ -42,9 +42,9 @@ Eigen::VectorXd bounded_minimum(const Eigen::MatrixXd& a, const Eigen::VectorXd&
       if (at[static_cast<std::size_t>(i)] != At::kFree) continue;
       const double bound = aim[i] < lower[i] ? lower[i] : upper[i];
       if (aim[i] >= lower[i] && aim[i] <= upper[i]) continue;
-      const double way = (bound - x[i]) / (aim[i] - x[i]);
-      if (way < share) {
-        share = way;
+      const double fraction = (bound - x[i]) / (aim[i] - x[i]);
+      if (fraction < share) {
+        share = fraction;
         hit = i;
       }
     }

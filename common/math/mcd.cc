@@ -81,12 +81,12 @@ class Concentration {
     const Eigen::VectorXd d = distances(from);
     std::vector<std::size_t> order(static_cast<std::size_t>(points_.cols()));
     std::iota(order.begin(), order.end(), std::size_t{0});
-    const auto nearer = [&d](std::size_t a, std::size_t b) {
+    const auto closer = [&d](std::size_t a, std::size_t b) {
       const double da = d[static_cast<Index>(a)], db = d[static_cast<Index>(b)];
       return da != db ? da < db : a < b;
     };
     const auto end = order.begin() + static_cast<std::ptrdiff_t>(support_);
-    std::nth_element(order.begin(), end - 1, order.end(), nearer);
+    std::nth_element(order.begin(), end - 1, order.end(), closer);
     order.erase(end, order.end());
     std::sort(order.begin(), order.end());
     return fit(std::move(order));

@@ -16,18 +16,18 @@ constexpr std::size_t kExact = 30;
 double exact_share_up_to(double u, std::size_t a, std::size_t b) {
   const std::size_t most = a * b;
   // ways[k][s]: subsets of k ranks whose U is s, over the ranks so far.
-  std::vector<std::vector<double>> ways(a + 1, std::vector<double>(most + 1, 0));
-  ways[0][0] = 1;
+  std::vector<std::vector<double>> counts(a + 1, std::vector<double>(most + 1, 0));
+  counts[0][0] = 1;
   for (std::size_t rank = 0; rank < a + b; ++rank) {
     for (std::size_t k = std::min(a, rank + 1); k >= 1; --k) {
       const std::size_t gain = rank - (k - 1);  // values of b below the k-th of a
       if (gain > b) continue;
-      for (std::size_t s = gain; s <= most; ++s) ways[k][s] += ways[k - 1][s - gain];
+      for (std::size_t s = gain; s <= most; ++s) counts[k][s] += counts[k - 1][s - gain];
     }
   }
-  const double all = std::accumulate(ways[a].begin(), ways[a].end(), 0.0);
+  const double all = std::accumulate(counts[a].begin(), counts[a].end(), 0.0);
   const auto last = static_cast<std::ptrdiff_t>(std::floor(u)) + 1;
-  return std::accumulate(ways[a].begin(), ways[a].begin() + last, 0.0) / all;
+  return std::accumulate(counts[a].begin(), counts[a].begin() + last, 0.0) / all;
 }
 
 // Sum of t^3 - t over groups of t equal values.

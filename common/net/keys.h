@@ -37,7 +37,7 @@ KeyPair make_key_pair(const std::string& name);
 
 // A public key file.  Errors: cannot be read, no key in it, writable for other users.
 Result<PublicKey> read_public_key(const std::string& path);
-// All *.pub of a folder, by name.  What cannot be read is left out and described in `trouble`.
+// All *.pub of a folder, by name.  What cannot be read is omitted and described in `trouble`.
 Result<std::vector<PublicKey>> read_listed_keys(const std::string& folder,
                                                 std::vector<std::string>* trouble);
 

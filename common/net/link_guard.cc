@@ -32,7 +32,7 @@ double seconds() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
-// Tells two connections with one descriptor apart; 0: no socket.
+// Distinguishes two connections with one descriptor; 0: no socket.
 std::uint64_t cookie_of(int fd) {
   std::uint64_t cookie = 0;
   socklen_t size = sizeof cookie;
@@ -209,7 +209,8 @@ class LinkGuard::Watch {
     }
     shared_.strange[static_cast<std::size_t>(fd)] = true;
     strangers_.push_back(fd);
-    // Whichever falls, an honest peer comes again, and none of them can be told from the others.
+    // Whichever falls, an honest peer comes again, and none of them can be distinguished from the
+    // others.
     while (strangers_.size() > limits_.strangers) drop_stranger(random_() % strangers_.size());
   }
 
@@ -256,7 +257,7 @@ class LinkGuard::Watch {
   }
 
   // The socket's own thread closes it when it reads the end.  Should the descriptor have been used
-  // again in between, the cookie tells.
+  // again in between, the cookie decides.
   void drop(int fd, Link& link) {
     if (link.closing || link.cookie == 0 || cookie_of(fd) != link.cookie) return;
     link.closing = true;

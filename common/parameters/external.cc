@@ -39,7 +39,7 @@ bool can_be_applied(const Effect& effect, unsigned inputs) {
   for (const EffectNeed& need : kEffectNeeds) {
     if (effect.kind() == need.effect) return (inputs & need.inputs) == need.inputs;
   }
-  // One that nobody has sorted yet is left out rather than left without effect.
+  // One that nobody has sorted yet is omitted rather than left without effect.
   return effect.stage != EffectStage::kFloor;
 }
 
@@ -80,7 +80,7 @@ Status check_row(const Parameter& p) {
     return wrong("is an integer, so its bounds and its nominal value must be whole numbers");
   }
   if (p.scale == ParameterScale::kLog) {
-    return wrong("is an integer, whose values are searched evenly; leave out \"log\"");
+    return wrong("is an integer, whose values are searched evenly; omit \"log\"");
   }
   return {};
 }

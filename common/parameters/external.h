@@ -23,7 +23,7 @@ struct ExternalInputWord {
   const char* word;
   ExternalInput input;
 };
-inline constexpr ExternalInputWord kExternalInputWords[] = {{"lag", kExternalLag},
+inline constexpr ExternalInputWord kExternalInputNames[] = {{"lag", kExternalLag},
                                                             {"dead_travel", kExternalDeadTravel},
                                                             {"floor", kExternalFloor},
                                                             {"path", kExternalPath}};
@@ -37,9 +37,9 @@ struct ExternalDeclaration {
 
 // How it is started.
 struct ExternalCommand {
-  std::vector<std::string> words;  // program and arguments, found by PATH
-  std::string folder;              // where it is started
-  double answer_limit_s = 60;      // for one motion
+  std::vector<std::string> argv;  // program and arguments, found by PATH
+  std::string folder;             // where it is started
+  double answer_limit_s = 60;     // for one motion
 
   bool operator==(const ExternalCommand&) const = default;
 };

@@ -248,13 +248,14 @@ void Rows::steering() {
   if (!steered()) return;
   const RobotSteering& s = robot_.steering;
   add("steering.offset", "rad", s.offset_rad - 0.2, s.offset_rad + 0.2, s.offset_rad,
-      "wheels point here when told straight",
+      "wheels point here when commanded straight",
       [](GroundRobot& robot, double v) { robot.steering.offset_rad = v; });
   const Put put_gain = [](GroundRobot& robot, double v) { robot.steering.gain = v; };
   if (s.gain > 0) {  // encoders are scaled by hand: more than a size may be off by
-    add("steering.gain", "-", s.gain / 10, s.gain * 10, s.gain, "turned over told", put_gain, kLog);
+    add("steering.gain", "-", s.gain / 10, s.gain * 10, s.gain, "turned over commanded", put_gain,
+        kLog);
   } else {
-    size("steering.gain", "-", s.gain, "turned over told", put_gain);
+    size("steering.gain", "-", s.gain, "turned over commanded", put_gain);
   }
   // A model car on a slippery floor has come to 0.43.
   add("understeer", "s^2/m^2", 0, std::max(1.0, 4 * s.understeer_s2_m2), s.understeer_s2_m2,

@@ -137,7 +137,7 @@ RobotSize size_of(const GroundRobot& robot) {
 }
 
 // What the file says that is an effect here, by row; only what is not neutral.
-std::vector<std::pair<const char*, double>> said_effects(const GroundRobot& robot) {
+std::vector<std::pair<const char*, double>> stated_effects(const GroundRobot& robot) {
   const std::pair<const char*, double> all[] = {
       {"motor_lag.tau", robot.motors.lag_s},
       {"motor_deadband.duty", robot.motors.dead_band},
@@ -147,11 +147,11 @@ std::vector<std::pair<const char*, double>> said_effects(const GroundRobot& robo
       {"heading_offset.angle", robot.X_RM.theta},
       {"marker_offset.x", robot.X_RM.x},
       {"marker_offset.y", robot.X_RM.y}};
-  std::vector<std::pair<const char*, double>> said;
+  std::vector<std::pair<const char*, double>> stated;
   for (const auto& [key, value] : all) {
-    if (value != 0) said.emplace_back(key, value);
+    if (value != 0) stated.emplace_back(key, value);
   }
-  return said;
+  return stated;
 }
 
 bool alike(double a, double b) { return std::abs(a - b) <= 1e-6 * (std::abs(a) + std::abs(b)); }
@@ -170,7 +170,8 @@ Status check_treads(const GroundRobot& robot) {
   if (treads != 2 || robot.wheels.size() != 2 || !mirrored || !same || !straight) {
     return Error{
         "trials from rest (scenario \"srv1\") take two like treads, \"left\" and \"right\", that "
-        "mirror one another with x = 0; what differs between the sides is said by [effects] of the "
+        "mirror one another with x = 0; what differs between the sides is reported by [effects] of "
+        "the "
         "config (motor_asymmetry, com_offset)"};
   }
   if (!(*left.contact_length_m > 0)) return Error{"a tread's contact_length must be more than 0 m"};
@@ -181,7 +182,7 @@ Status check_treads(const GroundRobot& robot) {
 
 Status check_tracked(const GroundRobot& robot) {
   if (robot.drive != DriveKind::kTracked) {
-    return Error{"the drive is \"" + drive_words()[static_cast<std::size_t>(robot.drive)] +
+    return Error{"the drive is \"" + drive_names()[static_cast<std::size_t>(robot.drive)] +
                  "\", but trials from rest (scenario \"srv1\") are of tracked robots; log its runs "
                  "and use scenario = \"ground\" (docs/ground.md), or say drive = \"tracked\" with "
                  "the treads' contact_length"};
@@ -213,7 +214,7 @@ TrackedTable::TrackedTable(const GroundRobot& robot)
       effects_(tracked_effects(scale_)),
       table_(std::make_unique<ParameterTable>(tracked_rows(numbers_of(robot)), effects_)),
       values_(table_->nominal()) {
-  for (const auto& [key, value] : said_effects(robot)) values_[table_->row(key)] = value;
+  for (const auto& [key, value] : stated_effects(robot)) values_[table_->row(key)] = value;
 }
 
 Result<std::shared_ptr<const TrackedTable>> make_tracked_table(const GroundRobot& robot) {

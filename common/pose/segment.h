@@ -15,10 +15,11 @@ struct OnSegment {
 // A way without length is its first point.
 inline OnSegment nearest_on_segment(const Eigen::Vector2d& point, const Eigen::Vector2d& from,
                                     const Eigen::Vector2d& to) {
-  const Eigen::Vector2d way = to - from;
-  const double length2 = way.squaredNorm();
-  const double share = length2 > 0 ? std::clamp((point - from).dot(way) / length2, 0.0, 1.0) : 0.0;
-  return {share, (from + share * way - point).norm()};
+  const Eigen::Vector2d along = to - from;
+  const double length2 = along.squaredNorm();
+  const double share =
+      length2 > 0 ? std::clamp((point - from).dot(along) / length2, 0.0, 1.0) : 0.0;
+  return {share, (from + share * along - point).norm()};
 }
 
 }  // namespace gapfarm

@@ -5,7 +5,7 @@ namespace gapfarm {
 void write_external(const Problem& problem, v1::Problem* message) {
   if (!problem.external) return;
   v1::External* to = message->mutable_external();
-  for (const std::string& word : problem.external->command.words) to->add_words(word);
+  for (const std::string& word : problem.external->command.argv) to->add_argv(word);
   to->set_folder(problem.external->command.folder);
   to->set_answer_limit(problem.external->command.answer_limit_s);
   to->set_introduction(problem.external->introduction);
@@ -20,7 +20,7 @@ Status read_external(const v1::Problem& message, Problem* problem) {
   if (!wanted) return {};
   const v1::External& from = message.external();
   ExternalCommand command{
-      {from.words().begin(), from.words().end()}, from.folder(), from.answer_limit()};
+      {from.argv().begin(), from.argv().end()}, from.folder(), from.answer_limit()};
   if (!(command.answer_limit_s > 0 && command.answer_limit_s <= 1e6)) {
     return Error{"problem: an external program's answer limit must be in (0, 1000000] s"};
   }

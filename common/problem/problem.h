@@ -14,13 +14,13 @@
 #include "common/parameters/tracked.h"
 #include "common/problem/piece.h"
 #include "common/recordings/windows.h"
-#include "common/residual/strays.h"
+#include "common/residual/outliers.h"
 #include "common/trials/trial.h"
 #include "gapfarm/v1/problem.pb.h"
 
 namespace gapfarm {
 
-// An atomic command: what the motors are told when a trial does not say otherwise.
+// An atomic command: what the motors are commanded when a trial does not say otherwise.
 struct CommandSpec {
   std::string name;
   double left = 0;  // duty, [-1, 1]

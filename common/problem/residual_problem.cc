@@ -5,7 +5,7 @@
 namespace gapfarm {
 namespace {
 
-// Row by row; a last row that breaks off is left out, which check_residual() then misses.
+// Row by row; a last row that breaks off is omitted, which check_residual() then misses.
 Eigen::MatrixXd rows_of(const google::protobuf::RepeatedField<double>& numbers, int columns) {
   Eigen::MatrixXd rows(columns > 0 ? numbers.size() / columns : 0, columns);
   for (Eigen::Index k = 0; k < rows.rows(); ++k) {
@@ -25,16 +25,16 @@ void write_rows(const Eigen::MatrixXd& rows, google::protobuf::RepeatedField<dou
 }  // namespace
 
 void write_residual(const Problem& problem, v1::Problem* message) {
-  if (const auto& strays = problem.residual.strays) {
-    v1::StrayDrives* to = message->mutable_strays();
-    to->set_kind(static_cast<std::uint32_t>(strays->kind));
-    to->set_share(strays->share);
-    to->set_least(strays->least);
-    to->set_most(strays->most);
-    to->set_rest(strays->rest);
-    to->set_direction(strays->direction_rad);
-    to->set_speed(strays->speed_m_s);
-    to->set_gauge(strays->gauge_m);
+  if (const auto& outliers = problem.residual.outliers) {
+    v1::OutlierDrives* to = message->mutable_outliers();
+    to->set_kind(static_cast<std::uint32_t>(outliers->kind));
+    to->set_share(outliers->share);
+    to->set_least(outliers->least);
+    to->set_most(outliers->most);
+    to->set_rest(outliers->rest);
+    to->set_direction(outliers->direction_rad);
+    to->set_speed(outliers->speed_m_s);
+    to->set_gauge(outliers->gauge_m);
   }
   for (const ResidualTerm& term : problem.residual.field) {
     v1::ResidualTerm* to = message->add_residual();
@@ -53,37 +53,37 @@ void write_residual(const Problem& problem, v1::Problem* message) {
 
 namespace {
 
-Status read_strays(const v1::Problem& message, Problem* problem) {
-  if (!message.has_strays()) return {};
-  const v1::StrayDrives& from = message.strays();
-  if (from.kind() >= stray_kind_words().size()) {
+Status read_outliers(const v1::Problem& message, Problem* problem) {
+  if (!message.has_outliers()) return {};
+  const v1::OutlierDrives& from = message.outliers();
+  if (from.kind() >= outlier_kind_names().size()) {
     return Error{"problem: residual.strays of kind number " + std::to_string(from.kind()) +
                  "; master and worker must be the same build"};
   }
-  const StrayDrives strays{static_cast<StrayKind>(from.kind()),
-                           from.share(),
-                           from.least(),
-                           from.most(),
-                           from.rest(),
-                           from.direction(),
-                           from.speed(),
-                           from.gauge()};
-  if (Status s = check_strays(strays); !s) return Error{"problem: " + s.error().message};
-  problem->residual.strays = strays;
+  const OutlierDrives outliers{static_cast<OutlierKind>(from.kind()),
+                               from.share(),
+                               from.least(),
+                               from.most(),
+                               from.rest(),
+                               from.direction(),
+                               from.speed(),
+                               from.gauge()};
+  if (Status s = check_outliers(outliers); !s) return Error{"problem: " + s.error().message};
+  problem->residual.outliers = outliers;
   return {};
 }
 
 }  // namespace
 
 Status read_residual(const v1::Problem& message, Problem* problem) {
-  if (message.residual_size() == 0 && !message.has_strays()) return {};
+  if (message.residual_size() == 0 && !message.has_outliers()) return {};
   if (!scenario_form(problem->scenario).residual) {
     return Error{"problem: scenario '" + problem->scenario +
                  "' takes no residual; leave [residual] out of its model"};
   }
   for (const v1::ResidualTerm& from : message.residual()) {
     ResidualTerm term;
-    if (from.frame() >= residual_frame_words().size()) {
+    if (from.frame() >= residual_frame_names().size()) {
       return Error{"problem: a residual of frame number " + std::to_string(from.frame()) +
                    "; master and worker must be the same build"};
     }
@@ -97,7 +97,7 @@ Status read_residual(const v1::Problem& message, Problem* problem) {
     }
     problem->residual.field.push_back(std::move(term));
   }
-  RETURN_IF_ERROR(read_strays(message, problem));
+  RETURN_IF_ERROR(read_outliers(message, problem));
   std::vector<std::string> commands;
   for (const CommandSpec& c : problem->commands) commands.push_back(c.name);
   if (Status s = check_residual(problem->residual.field, commands); !s) {

@@ -3,8 +3,8 @@
 #include <filesystem>
 
 #include "common/base/try.h"
-#include "common/recordings/afresh.h"
 #include "common/recordings/read.h"
+#include "common/recordings/restart.h"
 
 namespace gapfarm {
 
@@ -42,7 +42,7 @@ Status read_problem_runs(std::span<const std::string> folders, const WindowSetti
   ASSIGN_OR_RETURN(const auto all, read_run_folders(folders, problem->ground->robot().channels));
   ASSIGN_OR_RETURN(auto cut, cut_windows(all, windows));
   if (problem->ground->robot().command == CommandKind::kThrottleSteering) {
-    cut = begin_afresh(all, std::move(cut), windows.run_in_s, kWindowMargin_s);
+    cut = restart_at_measured_speed(all, std::move(cut), windows.run_in_s, kWindowMargin_s);
   }
   for (const std::string& note : problem->ground->robot().notes) cut.log.notes.push_back(note);
   problem->runs = std::move(cut.runs);

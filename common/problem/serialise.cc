@@ -62,9 +62,9 @@ Status check_score(const FitnessSettings& fitness, const SpreadSettings& spread)
   return {};
 }
 
-// Rows that a message must have: those from a second one of a kind on, which are younger, are left
-// out where they do nothing, so that problems without them are, to the byte, what they were before
-// there were any.
+// Rows that a message must have: those from a second one of a kind on, which are younger, are
+// omitted where they do nothing, so that problems without them are, to the byte, what they were
+// before there were any.
 std::size_t least_rows(const ParameterTable& table) {
   for (std::size_t e = 0; e < table.effects().size(); ++e) {
     if (!table.effects()[e].repeats.empty()) return table.effect_row(e);
@@ -147,7 +147,7 @@ Status check_tip(const Trial& trial, bool wanted, const std::string& where) {
                  " s, expected up to 120 s; t is in s");
 }
 
-// A robot and what it was told, where the scenario has them.
+// A robot and its commands, where the scenario has them.
 Status read_runs(const v1::Problem& message, Problem* problem) {
   const ScenarioForm& form = scenario_form(problem->scenario);
   if (!form.robot && (message.runs_size() > 0 || (!message.robot().empty() && !form.other_robot))) {

@@ -16,9 +16,9 @@ constexpr int kKept = 3;
 
 // What the child needs, made before fork().
 struct Prepared {
-  std::vector<char*> words, environment;
+  std::vector<char*> text, environment;
   int null = -1;
-  int told = -1;  // where it writes what keeps it from starting
+  int reported = -1;  // where it writes what keeps it from starting
   pid_t parent = 0;
 };
 
@@ -32,7 +32,7 @@ void pass(int fd, int null, int as) { dup2(fd < 0 ? null : fd, as); }
     if (getppid() != prepared.parent) _exit(0);
   }
   if (setup.leads_group) setpgid(0, 0);
-  const int told = fcntl(prepared.told, F_DUPFD_CLOEXEC, kKept + 1);
+  const int reported = fcntl(prepared.reported, F_DUPFD_CLOEXEC, kKept + 1);
   pass(setup.in, prepared.null, STDIN_FILENO);
   pass(setup.out, prepared.null, STDOUT_FILENO);
   pass(setup.err, prepared.null, STDERR_FILENO);
@@ -47,10 +47,10 @@ void pass(int fd, int null, int as) { dup2(fd < 0 ? null : fd, as); }
   errno = 0;
   if (setup.niceness != 0 && nice(setup.niceness) < 0) errno = 0;
   if (setup.folder.empty() || chdir(setup.folder.c_str()) == 0) {
-    execvpe(prepared.words[0], prepared.words.data(), prepared.environment.data());
+    execvpe(prepared.text[0], prepared.text.data(), prepared.environment.data());
   }
   const int error = errno;
-  [[maybe_unused]] const ssize_t n = write(told, &error, sizeof error);
+  [[maybe_unused]] const ssize_t n = write(reported, &error, sizeof error);
   _exit(127);
 }
 
@@ -63,11 +63,11 @@ std::vector<char*> pointers(const std::vector<std::string>& texts) {
 }  // namespace
 
 Result<pid_t> start_child(const ChildSetup& setup) {
-  int told[2];
-  if (pipe2(told, O_CLOEXEC) != 0) return Error{strerror(errno)};
-  Prepared prepared{pointers(setup.words), pointers(setup.environment),
-                    open("/dev/null", O_RDWR | O_CLOEXEC), told[1], getpid()};
-  prepared.words.push_back(nullptr);
+  int reported[2];
+  if (pipe2(reported, O_CLOEXEC) != 0) return Error{strerror(errno)};
+  Prepared prepared{pointers(setup.text), pointers(setup.environment),
+                    open("/dev/null", O_RDWR | O_CLOEXEC), reported[1], getpid()};
+  prepared.text.push_back(nullptr);
   for (char** variable = environ; *variable != nullptr; ++variable) {
     prepared.environment.push_back(*variable);
   }
@@ -80,13 +80,13 @@ Result<pid_t> start_child(const ChildSetup& setup) {
   if (pid == 0) become(setup, prepared);
   int error = pid < 0 ? errno : 0;
   pthread_sigmask(SIG_SETMASK, &before, nullptr);
-  close(told[1]);
+  close(reported[1]);
   close(prepared.null);
   // Its end of the pipe closes when it has become the program.
   ssize_t n = 0;
-  while (pid > 0 && (n = read(told[0], &error, sizeof error)) < 0 && errno == EINTR) {
+  while (pid > 0 && (n = read(reported[0], &error, sizeof error)) < 0 && errno == EINTR) {
   }
-  close(told[0]);
+  close(reported[0]);
   if (n > 0) waitpid(pid, nullptr, 0);
   if (pid < 0 || n > 0) return Error{strerror(error)};
   return pid;

@@ -82,8 +82,8 @@ Status ProcessPool::start_place(Place& place, unsigned index) {
     return page.error();
   }
   ChildSetup setup;
-  setup.words = options_.arguments(place.name, place.replaced ? &*place.replaced : nullptr);
-  setup.words.insert(setup.words.begin(), options_.program);
+  setup.arguments = options_.arguments(place.name, place.replaced ? &*place.replaced : nullptr);
+  setup.arguments.insert(setup.arguments.begin(), options_.program);
   setup.kept = page->fd();
   setup.blocks_interrupt = true;
   setup.death_signal = 0;  // die_with_parent() in the child

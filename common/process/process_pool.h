@@ -66,7 +66,7 @@ struct ProcessPoolOptions {
   ProcessLimits limits;
 };
 
-// Children die with the thread that starts them (they are told its pid and ask the kernel for it,
+// Children die with the thread that starts them (they get its pid and ask the kernel for it,
 // see die_with_parent), so start and reap from a thread that lives as long as the pool.
 // Times are seconds of one monotonic clock that the caller reads.
 class ProcessPool {

@@ -22,7 +22,7 @@ struct WorkerProgress {
   std::array<char, 3072> failure{};
 
   void report_failure(const std::string& why);  // cut to the room that there is
-  // For the parent, once the worker has ended: "" where it said nothing.
+  // For the parent, once the worker has ended: "" where it reported nothing.
   std::string reported_failure() const;
 };
 static_assert(std::atomic<std::uint64_t>::is_always_lock_free);

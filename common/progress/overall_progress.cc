@@ -4,12 +4,12 @@
 #include <cstdio>
 #include <utility>
 
-#include "common/progress/words.h"
+#include "common/progress/number_text.h"
 
 namespace gapfarm {
 namespace {
 
-// Of less than this nothing is said about the rest.
+// Below this no time is estimated for the rest.
 constexpr double kLeastPace_s = 0.5;
 
 }  // namespace
@@ -109,7 +109,7 @@ ProgressView OverallProgress::at(double now_s) const {
   return view;
 }
 
-std::string progress_words(const ProgressView& view) {
+std::string progress_line(const ProgressView& view) {
   std::string text;
   if (view.stages > 1 && view.number > 0) {
     text = "stage " + std::to_string(view.number) + " of " + std::to_string(view.stages) + ", ";

@@ -16,7 +16,7 @@ struct ProgressStage {
   std::uint64_t tasks = 0;  // that it will ask; 0: only it knows, so its own time is the guide
 };
 
-// How a study tells its caller of its stages; either may be empty.
+// How a study reports its stages to its caller; either may be empty.
 struct StageHooks {
   // Before the first stage: all of them.
   std::function<void(std::vector<ProgressStage>)> plan;
@@ -31,7 +31,7 @@ struct StageHooks {
   }
 };
 
-// What can be said of it now.
+// What is known of it now.
 struct ProgressView {
   std::string stage;
   std::size_t number = 0, stages = 0;  // of the stage, from 1; 0: none has begun
@@ -82,7 +82,7 @@ class OverallProgress {
 
 // "stage 3 of 6, screen the catalogue: 41 % done, 85/s, about 2 min 10 s left".  A command of one
 // stage is not numbered, and known tasks are counted: "evaluate: 410 of 1000, ...".
-std::string progress_words(const ProgressView& view);
+std::string progress_line(const ProgressView& view);
 
 // When a line that stays is due: at once, and then every `interval_s`.
 class LineCadence {

@@ -1,6 +1,6 @@
 #include "common/progress/worker_wait.h"
 
-#include "common/progress/words.h"
+#include "common/progress/number_text.h"
 
 namespace gapfarm {
 namespace {
@@ -25,7 +25,7 @@ WorkerWait::WorkerWait(const std::vector<std::string>& endpoints) {
   }
 }
 
-std::optional<std::string> WorkerWait::words(std::size_t workers, double now_s) {
+std::optional<std::string> WorkerWait::message(std::size_t workers, double now_s) {
   if (workers > 0) {
     since_s_.reset();
     return std::nullopt;

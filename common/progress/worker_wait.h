@@ -16,7 +16,7 @@ class WorkerWait {
   // None while there are workers, and at first: they are on their way then, local ones take a
   // while. After half a minute the words say how to start one.  Times are of one clock of the
   // caller's.
-  std::optional<std::string> words(std::size_t workers, double now_s);
+  std::optional<std::string> message(std::size_t workers, double now_s);
 
  private:
   std::string where_;    // "at tcp://..."

@@ -115,7 +115,7 @@ Result<RunLog> read_runs(const std::string& commands_path, const std::string& po
   for (const RunKey& key : commands->order()) {
     if (!poses->has(key)) {
       log.notes.push_back(commands_path + ": run " + quoted_word(name_of(key)) +
-                          " has no poses and is left out");
+                          " has no poses and is omitted");
     }
   }
   return log;

@@ -9,7 +9,7 @@
 
 namespace gapfarm {
 
-// `channels`: the columns of the commands that the robot takes, in its order; others are left out.
+// `channels`: the columns of the commands that the robot takes, in its order; others are omitted.
 // Errors name file, line and column, what was found and what was expected: a column that is
 // missing, a number that is not one, times that go back within a run, a run with poses and no
 // commands.  Noted: a run with commands and no poses, poses at the time of the one before.

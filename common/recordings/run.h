@@ -1,4 +1,4 @@
-// Logged runs of a ground robot: what it was told, and where it was (docs/formats.md).
+// Logged runs of a ground robot: what it was commanded, and where it was (docs/formats.md).
 #pragma once
 
 #include <string>
@@ -8,7 +8,7 @@
 
 namespace gapfarm {
 
-// What was told from t on; it holds until the next row of its run.
+// The command from t on; it holds until the next row of its run.
 struct CommandRow {
   double t_s = 0;
   std::vector<double> values;  // one a channel of the log
@@ -33,7 +33,7 @@ struct RunLog {
   std::vector<std::string> channels;        // of commands
   std::vector<std::string> wheel_channels;  // of wheel_speeds
   std::vector<LoggedRun> runs;              // in driving order
-  // What reading left out and why, one sentence each; show them to the user.
+  // What reading omitted and why, one sentence each; show them to the user.
   std::vector<std::string> notes;
 };
 

@@ -73,7 +73,7 @@ class Cutter {
       const double wanted = poses[from].t_s + horizon;
       std::size_t end = from + 1;
       while (end < poses.size() && poses[end].t_s < wanted) ++end;
-      // The pose before may be nearer, and the last one near enough.
+      // The pose before may be closer, and the last one near enough.
       const bool early = end - 1 > from && poses[end - 1].t_s >= wanted - kSlack * horizon;
       if (end == poses.size() && !early) return;
       if (early && (end == poses.size() || wanted - poses[end - 1].t_s < poses[end].t_s - wanted)) {
@@ -116,7 +116,7 @@ Result<WindowedRuns> cut_windows(const RunLog& log, const WindowSettings& settin
     const LoggedRun& run = log.runs[i];
     if (run.commands.empty() || run.poses.size() < kLeastPoses) {
       windows.runs.emplace_back();
-      windows.log.notes.push_back("run " + run.run + " has fewer than two poses; left out");
+      windows.log.notes.push_back("run " + run.run + " has fewer than two poses; omitted");
       continue;
     }
     longest_s = std::max(longest_s, run.poses.back().t_s - run.poses.front().t_s);

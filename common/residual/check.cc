@@ -107,7 +107,7 @@ Status check_residual(const ResidualField& field, std::span<const std::string> c
     const bool own = term.frame == ResidualFrame::kReadings || term.frame == ResidualFrame::kMotion;
     if (own && term.by_drive) {
       return Error{where + " has frame \"" +
-                   residual_frame_words()[static_cast<std::size_t>(term.frame)] +
+                   residual_frame_names()[static_cast<std::size_t>(term.frame)] +
                    "\" and by_drive = true; that frame has its own measure, so leave by_drive out"};
     }
     if (Status s = check_weights(term, commands, where); !s) return s;

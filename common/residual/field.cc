@@ -57,9 +57,9 @@ const ResidualWeights* weights_of(const ResidualTerm& term, const std::string& c
 
 std::span<const ResidualCovariate> residual_covariates() { return kCovariates; }
 
-const std::vector<std::string>& residual_frame_words() {
-  static const std::vector<std::string> words = {"robot", "world", "readings", "motion"};
-  return words;
+const std::vector<std::string>& residual_frame_names() {
+  static const std::vector<std::string> names = {"robot", "world", "readings", "motion"};
+  return names;
 }
 
 double drive_s(const LoggedMotion& facts) {

@@ -56,7 +56,7 @@ enum class ResidualFrame {
   kMotion     // shares of the predicted motion's own parts, in the axes of the predicted end
 };
 // "robot", "world", "readings", "motion", in that order.
-const std::vector<std::string>& residual_frame_words();
+const std::vector<std::string>& residual_frame_names();
 
 struct ResidualWeights {
   std::string command;     // empty: all commands

@@ -39,7 +39,7 @@ class Completion {
   void assume(const std::string& sentence) { r_.notes.push_back("assumed: " + sentence); }
 
   Error missing(const std::string& what) const {
-    return Error{"a robot of drive \"" + drive_words()[static_cast<std::size_t>(r_.drive)] +
+    return Error{"a robot of drive \"" + drive_names()[static_cast<std::size_t>(r_.drive)] +
                  "\" needs " + what};
   }
 
@@ -263,7 +263,7 @@ class Completion {
   }
 
   // Of the driven axle: stated, or assumed from the wheelbase, which is.
-  double said_track() {
+  double stated_track() {
     auto& k = r_.controller;
     if (!k.traction_track_width_m) k.traction_track_width_m = k.wheel_separation_m;
     if (!k.traction_track_width_m) {
@@ -276,7 +276,7 @@ class Completion {
   Status ackermann() {
     auto& k = r_.controller;
     if (!k.wheelbase_m) return missing("wheelbase in m");
-    const double track = said_track();
+    const double track = stated_track();
     const double front = k.steering_track_width_m.value_or(track);
     for (const char* name : {"front_left", "front_right", "rear_left", "rear_right"}) {
       const bool made = find(name) == nullptr;
@@ -294,7 +294,7 @@ class Completion {
   Status tricycle() {
     auto& k = r_.controller;
     if (!k.wheelbase_m) return missing("wheelbase in m");
-    const double track = said_track();
+    const double track = stated_track();
     const bool made = find("front") == nullptr;
     RobotWheel& front = ensure("front");
     place(front, *k.wheelbase_m, 0);

@@ -4,26 +4,26 @@
 
 namespace gapfarm {
 
-std::span<const std::string> drive_words() {
-  static const std::vector<std::string> words = {"differential", "skid",      "tracked", "omni",
+std::span<const std::string> drive_names() {
+  static const std::vector<std::string> names = {"differential", "skid",      "tracked", "omni",
                                                  "mecanum",      "ackermann", "tricycle"};
-  return words;
+  return names;
 }
 
-std::span<const std::string> wheel_words() {
-  static const std::vector<std::string> words = {"plain", "omni", "mecanum", "caster", "tread"};
-  return words;
+std::span<const std::string> wheel_names() {
+  static const std::vector<std::string> names = {"plain", "omni", "mecanum", "caster", "tread"};
+  return names;
 }
 
-std::span<const std::string> side_words() {
-  static const std::vector<std::string> words = {"none", "left", "right"};
-  return words;
+std::span<const std::string> side_names() {
+  static const std::vector<std::string> names = {"none", "left", "right"};
+  return names;
 }
 
-std::span<const std::string> command_words() {
-  static const std::vector<std::string> words = {"duties", "wheel_speeds", "twist",
+std::span<const std::string> command_kind_names() {
+  static const std::vector<std::string> names = {"duties", "wheel_speeds", "twist",
                                                  "throttle_steering", "speed_steering"};
-  return words;
+  return names;
 }
 
 const RobotWheel* GroundRobot::wheel(std::string_view wanted) const {

@@ -18,16 +18,16 @@ namespace gapfarm {
 
 enum class DriveKind { kDifferential, kSkid, kTracked, kOmni, kMecanum, kAckermann, kTricycle };
 // "differential", "skid", "tracked", "omni", "mecanum", "ackermann", "tricycle".
-std::span<const std::string> drive_words();
+std::span<const std::string> drive_names();
 
 // A swivelling caster and a ball are one kind: they carry load and hardly resist.
 enum class WheelKind { kPlain, kOmni, kMecanum, kCaster, kTread };
 // "plain", "omni", "mecanum", "caster", "tread".
-std::span<const std::string> wheel_words();
+std::span<const std::string> wheel_names();
 
 enum class WheelSide { kNone, kLeft, kRight };  // whose motor drives it
 // "none", "left", "right".
-std::span<const std::string> side_words();
+std::span<const std::string> side_names();
 
 struct RobotWheel {
   std::string name;
@@ -56,7 +56,7 @@ enum class CommandKind {
   kSpeedSteering,     // rad/s of the traction wheel (or both), and rad of the steering
 };
 // "duties", "wheel_speeds", "twist", "throttle_steering", "speed_steering".
-std::span<const std::string> command_words();
+std::span<const std::string> command_kind_names();
 
 // The controller's own idea of the robot, in the words of ros2_controllers.  It turns twists into
 // wheel speeds, right or wrong; the simulation rolls on the wheels above.
@@ -134,7 +134,7 @@ struct GroundRobot {
   // wheels; kTwist: "v", "omega" and "vy"; kThrottleSteering: "throttle", "steering";
   // kSpeedSteering: "speed", "steering".
   std::vector<std::string> channels = {"left", "right"};
-  // The channels are what encoders read, not what the controller told: motors follow already.
+  // The channels are what encoders read, not what the controller commanded: motors follow already.
   bool measured = false;
   // What reading took from where and every disagreement; a sentence each, for the user.
   std::vector<std::string> notes;

@@ -14,8 +14,8 @@ int index_of(const std::vector<std::string>& names, std::string_view name) {
   return found == names.end() ? -1 : static_cast<int>(found - names.begin());
 }
 
-double at(const std::vector<double>& told, int channel) {
-  return channel < 0 ? 0 : told[static_cast<std::size_t>(channel)];
+double at(const std::vector<double>& commanded, int channel) {
+  return channel < 0 ? 0 : commanded[static_cast<std::size_t>(channel)];
 }
 
 }  // namespace
@@ -84,11 +84,11 @@ double RobotDrive::dead(double value) const {
   return std::copysign(std::max(0.0, std::abs(value) - band), value);
 }
 
-void RobotDrive::wheel_targets(const std::vector<double>& told) {
+void RobotDrive::wheel_targets(const std::vector<double>& commanded) {
   const bool duties = robot_.command == CommandKind::kDuties;
   const double scale = duties ? robot_.motors.full_speed_rad_s.value_or(1) : 1;
   for (std::size_t i = 0; i < targets_.size(); ++i) {
-    targets_[i] = dead(at(told, channel_[i])) * scale * *robot_.wheels[i].radius_m;
+    targets_[i] = dead(at(commanded, channel_[i])) * scale * *robot_.wheels[i].radius_m;
   }
 }
 
@@ -154,12 +154,12 @@ void RobotDrive::steer(double wanted_rad, double dt_s) {
   }
 }
 
-double RobotDrive::throttle(double told, double dt_s, double yaw_rate_rad_s) {
+double RobotDrive::throttle(double commanded, double dt_s, double yaw_rate_rad_s) {
   const RobotThrottle& t = robot_.throttle;
   const double v = throttle_m_s_;
-  const double push = std::max(0.0, std::abs(told) - t.zero);
+  const double push = std::max(0.0, std::abs(commanded) - t.zero);
   const double decay = push * t.back_emf + t.drag + t.cornering * std::abs(yaw_rate_rad_s);
-  double next = (v + dt_s * std::copysign(push * t.gain, told)) / (1 + dt_s * decay);
+  double next = (v + dt_s * std::copysign(push * t.gain, commanded)) / (1 + dt_s * decay);
   const double held = t.coulomb * dt_s;  // dry friction stops, and does not turn round
   next = std::abs(next) <= held ? 0 : next - std::copysign(held, next);
   throttle_m_s_ = next;
@@ -208,22 +208,22 @@ double RobotDrive::follow(std::size_t i, double target, double dt_s) {
 }
 
 std::span<const WheelMotion> RobotDrive::advance(double t_s, double dt_s, double yaw_rate_rad_s) {
-  const std::vector<double>& told = track_.mean(t_s - robot_.motors.delay_s, dt_s);
+  const std::vector<double>& commanded = track_.mean(t_s - robot_.motors.delay_s, dt_s);
   if (steered_) {
     double speed = 0;
-    double wanted = angle_of(at(told, steering_));
+    double wanted = angle_of(at(commanded, steering_));
     if (robot_.command == CommandKind::kThrottleSteering) {
-      speed = throttle(dead(at(told, throttle_)), dt_s, yaw_rate_rad_s);
+      speed = throttle(dead(at(commanded, throttle_)), dt_s, yaw_rate_rad_s);
     } else if (robot_.command == CommandKind::kTwist) {
-      const double v = at(told, v_);
+      const double v = at(commanded, v_);
       if (v != 0)
-        wanted = angle_of(std::atan(at(told, omega_) * *robot_.controller.wheelbase_m / v));
+        wanted = angle_of(std::atan(at(commanded, omega_) * *robot_.controller.wheelbase_m / v));
       speed = follow(0, dead(v), dt_s);
     } else {
       const auto driven = std::find_if(robot_.wheels.begin(), robot_.wheels.end(),
                                        [](const RobotWheel& w) { return w.driven; });
       const double radius = driven == robot_.wheels.end() ? 1 : *driven->radius_m;
-      speed = follow(0, dead(at(told, speed_)) * radius, dt_s);
+      speed = follow(0, dead(at(commanded, speed_)) * radius, dt_s);
       // The middle of the unsteered axle is slower than a steered traction wheel.
       if (driven != robot_.wheels.end() && driven->steered) speed *= std::cos(steering_rad_);
     }
@@ -234,9 +234,9 @@ std::span<const WheelMotion> RobotDrive::advance(double t_s, double dt_s, double
     return motions_;
   }
   if (robot_.command == CommandKind::kTwist) {
-    twist_targets(dead(at(told, v_)), at(told, omega_), at(told, vy_));
+    twist_targets(dead(at(commanded, v_)), at(commanded, omega_), at(commanded, vy_));
   } else {
-    wheel_targets(told);
+    wheel_targets(commanded);
   }
   stands_ = true;
   for (std::size_t i = 0; i < motions_.size(); ++i) {

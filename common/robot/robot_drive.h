@@ -16,8 +16,8 @@ struct WheelMotion {
   double heading_rad = 0;  // of rolling, in the robot's frame, the steering included
 };
 
-// The mean of piecewise constant commands over a step, so that what is told between two steps
-// counts by how long it was told.
+// The mean of piecewise constant commands over a step, so that what is commanded between two steps
+// counts by how long it was commanded.
 class CommandTrack {
  public:
   // `rows` outlive the track.  Before the first row its values count; after `timeout_s` without a
@@ -47,7 +47,7 @@ class RobotDrive {
   // REQUIRES: steps that follow one another.
   std::span<const WheelMotion> advance(double t_s, double dt_s, double yaw_rate_rad_s);
 
-  // Whether the wheels stand and are told to; and when they are told otherwise.
+  // Whether the wheels stand and are commanded to; and when the command differs.
   bool stands() const { return stands_; }
   double next_motion(double t_s) const;
 
@@ -57,10 +57,10 @@ class RobotDrive {
   double traction_m_s() const { return traction_m_s_; }
 
  private:
-  void wheel_targets(const std::vector<double>& told);
+  void wheel_targets(const std::vector<double>& commanded);
   void twist_targets(double v, double omega, double vy);
   void steer(double wanted_rad, double dt_s);
-  double throttle(double told, double dt_s, double yaw_rate_rad_s);
+  double throttle(double commanded, double dt_s, double yaw_rate_rad_s);
   void place_on_curve(double speed_m_s);
   double follow(std::size_t wheel, double target_m_s, double dt_s);
   double angle_of(double command) const;

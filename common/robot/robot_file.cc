@@ -11,10 +11,10 @@ namespace gapfarm {
 namespace {
 
 void read_wheel(TomlSection& own, RobotWheel& wheel) {
-  if (const auto kind = own.choice("kind", wheel_words())) {
+  if (const auto kind = own.choice("kind", wheel_names())) {
     wheel.kind = static_cast<WheelKind>(*kind);
   }
-  if (const auto side = own.choice("side", side_words())) {
+  if (const auto side = own.choice("side", side_names())) {
     wheel.side = static_cast<WheelSide>(*side);
   }
   own.read("x", wheel.x_m, -50, 50, "m");
@@ -152,7 +152,7 @@ void read_commands(TomlSection& top, GroundRobot& robot) {
                   : has("throttle") ? CommandKind::kThrottleSteering
                   : has("steering") ? CommandKind::kSpeedSteering
                                     : CommandKind::kWheelSpeeds;
-  if (const auto kind = top.choice("command_kind", command_words())) {
+  if (const auto kind = top.choice("command_kind", command_kind_names())) {
     robot.command = static_cast<CommandKind>(*kind);
   }
   top.read("measured", robot.measured);
@@ -167,11 +167,11 @@ Result<GroundRobot> parse_robot(std::string_view text, const std::string& path) 
   TomlSection top(*parsed, "", errors);
   GroundRobot robot;
   top.read("name", robot.name);
-  if (const auto drive = top.choice("drive", drive_words())) {
+  if (const auto drive = top.choice("drive", drive_names())) {
     robot.drive = static_cast<DriveKind>(*drive);
   } else if (!parsed->contains("drive")) {
     std::string known;
-    for (const std::string& word : drive_words()) known += (known.empty() ? "" : ", ") + word;
+    for (const std::string& word : drive_names()) known += (known.empty() ? "" : ", ") + word;
     return Error{path + ": no key 'drive', expected one of " + known};
   }
   read_commands(top, robot);

@@ -33,13 +33,13 @@ class Lines {
 
 void write_top(const GroundRobot& robot, Lines& out) {
   if (!robot.name.empty()) out.word("name", robot.name);
-  out.word("drive", drive_words()[static_cast<std::size_t>(robot.drive)]);
+  out.word("drive", drive_names()[static_cast<std::size_t>(robot.drive)]);
   std::string channels;
   for (const std::string& c : robot.channels) {
     channels += (channels.empty() ? "" : ", ") + toml_string(c);
   }
   out.raw("commands = [" + channels + "]\n");
-  out.word("command_kind", command_words()[static_cast<std::size_t>(robot.command)]);
+  out.word("command_kind", command_kind_names()[static_cast<std::size_t>(robot.command)]);
   if (robot.measured) out.truth("measured", true);
   const ControllerKinematics& k = robot.controller;
   out.number("wheel_separation", k.wheel_separation_m);
@@ -99,8 +99,8 @@ void write_steering(const GroundRobot& robot, Lines& out) {
 
 void write_wheel(const RobotWheel& wheel, Lines& out) {
   out.section("wheels." + toml_string(wheel.name));
-  out.word("kind", wheel_words()[static_cast<std::size_t>(wheel.kind)]);
-  out.word("side", side_words()[static_cast<std::size_t>(wheel.side)]);
+  out.word("kind", wheel_names()[static_cast<std::size_t>(wheel.kind)]);
+  out.word("side", side_names()[static_cast<std::size_t>(wheel.side)]);
   out.number("x", wheel.x_m);
   out.number("y", wheel.y_m);
   out.number("radius", wheel.radius_m);

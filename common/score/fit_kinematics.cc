@@ -117,7 +117,7 @@ void descend(const Windows& windows, const Eigen::VectorXd& weights, Kinematics*
   }
 }
 
-// Over long windows a robot turns so far with a file's wrong values that headings are told wrong by
+// Over long windows a robot turns so far with a file's wrong values that headings are wrong by
 // whole turns: what the short ones say is where the fit to all begins.
 Windows short_windows(const Problem& problem) {
   double shortest_s = INFINITY;

@@ -312,8 +312,8 @@ class MeasuredPath {
 
 // The robot's way through one run, at the times that are asked for; where it is on two floors, by
 // what was measured.
-std::map<double, Pose> way(const Body& body, const CommandedRun& run, double began_s,
-                           const std::vector<double>& times, const MeasuredPath* measured) {
+std::map<double, Pose> path(const Body& body, const CommandedRun& run, double began_s,
+                            const std::vector<double>& times, const MeasuredPath* measured) {
   std::map<double, Pose> poses;
   std::vector<CommandRow> changed;
   RobotDrive drive(body.robot(), body.taken(run.commands, began_s, &changed), run.speed_m_s);
@@ -381,16 +381,16 @@ std::vector<Pose> kinematic_ends(const GroundRobot& robot, std::span<const Comma
     measured[*trial.run].add(*trial.t_s, trial.X_WS);
     measured[*trial.run].add(end_s, trial.X_WE);
   }
-  std::vector<std::map<double, Pose>> ways(runs.size());
+  std::vector<std::map<double, Pose>> paths(runs.size());
   for (std::size_t i = 0; i < times.size(); ++i) {
     std::sort(times[i].begin(), times[i].end());
     if (times[i].empty()) continue;
-    ways[i] = way(body, runs[i], began_s, times[i], body.has_edge() ? &measured[i] : nullptr);
+    paths[i] = path(body, runs[i], began_s, times[i], body.has_edge() ? &measured[i] : nullptr);
   }
   const Pose& X_RM = body.robot().X_RM;
   std::vector<Pose> ends;
   for (const Trial& trial : trials) {
-    const auto& poses = ways[*trial.run];
+    const auto& poses = paths[*trial.run];
     const Pose X_SE = between(poses.at(*trial.t_s), poses.at(*trial.t_s + *trial.duration_s));
     ends.push_back(body.observed(body.unobserved(trial.X_WS) * inverse(X_RM) * X_SE * X_RM));
   }

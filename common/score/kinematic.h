@@ -50,7 +50,7 @@ std::vector<Pose> kinematic_ends(const GroundRobot& robot, std::span<const Comma
                                  std::span<const Trial> trials, const Kinematics& kinematics);
 
 // The robot's file with the values put in: what may be pasted back.  What no file has a word for
-// (a battery that sags, a clock that drifts) is left out.
+// (a battery that sags, a clock that drifts) is omitted.
 GroundRobot robot_with(const GroundRobot& robot, const Kinematics& kinematics);
 
 // Levenberg's and Marquardt's least squares on the problem's windows, Huber's weights beyond two

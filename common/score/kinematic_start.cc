@@ -87,20 +87,20 @@ ParameterValues without_slip(const Problem& problem, ParameterValues values) {
   return values;
 }
 
-std::vector<bool> told_by_kinematics(const Problem& problem) {
+std::vector<bool> identified_by_kinematics(const Problem& problem) {
   Kinematics moved = nominal_kinematics(problem.ground->robot());
   for (double& value : moved.values) value += 1e-3 * (1 + std::abs(value));
   const GroundTable there(robot_with(problem.ground->robot(), moved));
   const GroundTable here(problem.ground->robot());
-  std::vector<bool> told;
+  std::vector<bool> identified;
   for (const Gene& gene : problem.genes) {
     const std::string& key = problem.table()[gene.row].key;
     const auto now = there.table().find(key), before = here.table().find(key);
     const bool rolls = key == "wheelbase" && problem.ground->robot().drive == DriveKind::kSkid;
-    told.push_back(rolls || (now && before && !is_noise(key) &&
-                             there.table()[*now].nominal != here.table()[*before].nominal));
+    identified.push_back(rolls || (now && before && !is_noise(key) &&
+                                   there.table()[*now].nominal != here.table()[*before].nominal));
   }
-  return told;
+  return identified;
 }
 
 }  // namespace gapfarm

@@ -8,7 +8,7 @@
 
 namespace gapfarm {
 
-// The problem's values with those of its genes that the robot's own kinematics tell (radii, sizes,
+// The problem's values with those of its genes that the robot's own kinematics show (radii, sizes,
 // clock, lag, marker, steering), fitted to its windows by least squares and kept within the genes'
 // ranges.  The problem's own where it has no ground robot or no windows.
 ParameterValues kinematic_start(const Problem& problem);
@@ -21,6 +21,6 @@ ParameterValues kinematic_start(const Problem& problem, const Kinematics& fitted
 ParameterValues without_slip(const Problem& problem, ParameterValues values);
 
 // Whether the kinematics have a word for each of the problem's genes.  REQUIRES: a ground robot.
-std::vector<bool> told_by_kinematics(const Problem& problem);
+std::vector<bool> identified_by_kinematics(const Problem& problem);
 
 }  // namespace gapfarm

@@ -38,7 +38,7 @@ CommandSpec resolved_command(const Trial& trial, std::span<const CommandSpec> co
 
 class MotionModel {
  public:
-  // Trials are grouped by command, duty and duration, `commands` giving what a trial leaves out.
+  // Trials are grouped by command, duty and duration, `commands` giving what a trial omits.
   // Errors: an empty log, a command that `commands` does not have.
   static Result<MotionModel> mine(const TrialLog& log, std::span<const CommandSpec> commands,
                                   const MotionModelSettings& settings = {});

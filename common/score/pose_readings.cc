@@ -18,7 +18,7 @@ constexpr double kLeastStep_m = 2e-4;
 constexpr std::size_t kLeastDistinct = 7;
 constexpr double kOffGrid = 0.03;     // of the step
 constexpr double kDigits_m = 1.2e-5;  // a log prints 1e-5 m: half of that at each of two ends
-// Of the readings, and of their distinct values: few strays may be many among those of a coarse
+// Of the readings, and of their distinct values: few outliers may be many among those of a coarse
 // grid.
 constexpr double kLeastOnGrid = 0.95;
 constexpr double kLeastDistinctOnGrid = 0.8;
@@ -36,7 +36,7 @@ std::vector<double> distinct(std::vector<double> values) {
 }
 
 // Steps worth trying: the smallest and the commonest differences between neighbours, to the digits
-// of a log (1e-5 m).  Those of a dense grid are the step itself, whatever strays lie between.
+// of a log (1e-5 m).  Those of a dense grid are the step itself, whatever outliers lie between.
 std::vector<double> likely_steps(const std::vector<double>& values) {
   std::map<long, int> counts;
   for (std::size_t i = 1; i < values.size(); ++i) {
@@ -136,7 +136,7 @@ PoseGrid pose_grid(std::span<const Pose> poses) {
   double span = 0;
   for (const std::vector<double>* axis : {&x, &y}) {
     const std::vector<double> values = distinct(*axis);
-    if (values.size() < kLeastDistinct) continue;  // cannot tell
+    if (values.size() < kLeastDistinct) continue;  // cannot decide
     const double own = grid_of(*axis, values);
     if (own <= 0) return {};
     // Anywhere, a value lies this near to a line of the grid with that chance; what repeats is one.

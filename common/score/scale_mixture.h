@@ -3,9 +3,9 @@
 //
 // Student's t with n degrees of freedom is a Gaussian whose covariance is multiplied by a random
 // scale a, n / a being chi-square with n.  A residual is the sum of what the drive does and of what
-// the readings do, each with a scale of its own: sum_jk w_j w_k N(0, a_j D + b_k R).  A drive that
-// strays and a reading that is off then leave different marks, and a far residual is judged by the
-// source that can have made it.
+// the readings do, each with a scale of its own: sum_jk w_j w_k N(0, a_j D + b_k R).  An
+// outlier drive and a reading that is off then leave different marks, and a far residual is judged
+// by the source that can have made it.
 #pragma once
 
 #include <Eigen/Core>

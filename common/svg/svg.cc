@@ -83,7 +83,7 @@ void Svg::circle(SvgPoint centre, double radius, const SvgStyle& style) {
            attribute("r", radius) + styled(style) + "/>\n";
 }
 
-void Svg::text(SvgPoint place, std::string_view words, const SvgText& how) {
+void Svg::text(SvgPoint place, std::string_view content, const SvgText& how) {
   body_ += "<text" + attribute("x", place.x) + attribute("y", place.y) +
            attribute("font-size", how.size) + " fill=\"" + how.colour + "\"";
   if (how.anchor == SvgAnchor::kMiddle) body_ += " text-anchor=\"middle\"";
@@ -93,7 +93,7 @@ void Svg::text(SvgPoint place, std::string_view words, const SvgText& how) {
     body_ += " transform=\"rotate(" + number(how.rotation_deg) + " " + number(place.x) + " " +
              number(place.y) + ")\"";
   }
-  body_ += ">" + escaped(words) + "</text>\n";
+  body_ += ">" + escaped(content) + "</text>\n";
 }
 
 void Svg::begin_clip(SvgPoint corner, double width, double height) {

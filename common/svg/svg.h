@@ -39,7 +39,7 @@ class Svg {
   void polyline(const std::vector<SvgPoint>& points, const SvgStyle& style, bool closed = false);
   void rectangle(SvgPoint corner, double width, double height, const SvgStyle& style);
   void circle(SvgPoint centre, double radius, const SvgStyle& style);
-  void text(SvgPoint place, std::string_view words, const SvgText& how);
+  void text(SvgPoint place, std::string_view content, const SvgText& how);
   // What comes between the two is cut at the rectangle.
   void begin_clip(SvgPoint corner, double width, double height);
   void end_clip();

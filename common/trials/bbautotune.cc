@@ -157,7 +157,7 @@ Result<TrialLog> parse_bbautotune(std::string_view text, const std::string& file
     reader.expect_end();
     if (reader.error()) {
       if (!reader.cut_short() || !is_blank_line(text) || log.trials.empty()) return *reader.error();
-      log.notes.push_back(reader.error()->message + "; the last line breaks off and was left out");
+      log.notes.push_back(reader.error()->message + "; the last line breaks off and was omitted");
       break;
     }
     log.trials.push_back(std::move(trial));

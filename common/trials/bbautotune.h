@@ -15,7 +15,7 @@ namespace gapfarm {
 // The text of one run as a session of that name; trials are numbered from 0, times, duties and
 // durations are unknown.  Blanks around fields and in place of the last semicolon are accepted.
 // Errors carry file:line:column; a move() other than (25, 0, 0) is one, since its meaning is not
-// known.  A last line that breaks off was cut short with its logger: it is left out with a note.
+// known.  A last line that breaks off was cut short with its logger: it is omitted with a note.
 // Errors when `commands` has no "forward".
 Result<TrialLog> parse_bbautotune(std::string_view text, const std::string& file,
                                   const std::string& session,

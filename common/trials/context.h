@@ -10,7 +10,7 @@
 
 namespace gapfarm {
 
-// What the motors were told in one trial, defaults filled in.
+// What the motors were commanded in one trial, defaults filled in.
 struct DrivenCommand {
   double left = 0;  // duty, [-1, 1]
   double right = 0;

@@ -28,12 +28,12 @@ bool is_unit(std::string text) {
   if (text.size() > 2 && (text.front() == '[' || text.front() == '(')) {
     text = text.substr(1, text.size() - 2);
   }
-  static const std::set<std::string> kWords = {
+  static const std::set<std::string> kText = {
       "s",     "sec",    "ms",  "us",   "ns",    "m",      "cm",    "mm",      "px",   "pix",
       "pixel", "pixels", "rad", "mrad", "deg",   "m/s",    "cm/s",  "mm/s",    "km/h", "rad/s",
       "deg/s", "rpm",    "%",   "1",    "-",     "A",      "mA",    "V",       "mV",   "N",
       "Nm",    "W",      "Hz",  "K",    "ticks", "counts", "m/s^2", "rad/s^2", "bool", "degC"};
-  return kWords.count(text) != 0;
+  return kText.count(text) != 0;
 }
 
 bool has_number(const CsvRow& row, char separator) {
@@ -43,7 +43,7 @@ bool has_number(const CsvRow& row, char separator) {
   });
 }
 
-std::size_t words_in(const CsvRow& row) {
+std::size_t text_in(const CsvRow& row) {
   return static_cast<std::size_t>(std::count_if(row.fields.begin(), row.fields.end(),
                                                 [](const CsvField& f) { return !f.text.empty(); }));
 }
@@ -51,7 +51,7 @@ std::size_t words_in(const CsvRow& row) {
 bool are_units(const CsvRow& row) {
   const auto units = std::count_if(row.fields.begin(), row.fields.end(),
                                    [](const CsvField& f) { return is_unit(f.text); });
-  return static_cast<double>(units) > kMostlyUnits * static_cast<double>(words_in(row));
+  return static_cast<double>(units) > kMostlyUnits * static_cast<double>(text_in(row));
 }
 
 bool are_unique(const CsvRow& row) {
@@ -107,19 +107,19 @@ TableHead read_head(const std::vector<CsvRow>& rows, char separator) {
   TableHead head;
   head.names = rows.front().fields;
   std::size_t end = 1;
-  while (end < rows.size() && end < kMostHeads && words_in(rows[end]) > 0 &&
+  while (end < rows.size() && end < kMostHeads && text_in(rows[end]) > 0 &&
          rows[end].fields.size() == rows.front().fields.size() &&
          !has_number(rows[end], separator)) {
     ++end;
   }
   // Words to the end are the rows of a table of words.
   if (end == 1 || end == rows.size() || end == kMostHeads) return head;
-  if (words_in(rows[end]) == 0 || !has_number(rows[end], separator)) return head;
+  if (text_in(rows[end]) == 0 || !has_number(rows[end], separator)) return head;
   head.rows = end;
   for (std::size_t r = 1; r < end; ++r) {
     if (are_units(rows[r])) {
       head.units = rows[r].fields;
-    } else if (are_unique(rows[r]) && words_in(rows[r]) >= words_in(rows.front())) {
+    } else if (are_unique(rows[r]) && text_in(rows[r]) >= text_in(rows.front())) {
       head.titles = rows.front().fields;
       head.names = rows[r].fields;
     }

@@ -12,7 +12,7 @@ namespace gapfarm {
 Result<std::string> read_text_file(const std::string& path);
 
 // What becomes of a file in the way: replaced, or kept.  Kept, the new one stays beside it, under a
-// name that the error tells.
+// name that the error shows.
 enum class IfThere { kReplace, kKeep };
 
 // Writes beside `path` and renames, so a reader sees the old file or the new one, never a part.

@@ -56,13 +56,13 @@ TextFormat sniff_table(std::string_view line) {
   return column("session") || column("trial") ? TextFormat::kTrialLog : TextFormat::kUnknown;
 }
 
-struct FormatWords {
+struct FormatTexts {
   TextFormat format;
   const char* name;
   const char* remedy;  // $FILE stands for the file
 };
 
-constexpr FormatWords kWords[] = {
+constexpr FormatTexts kTexts[] = {
     {TextFormat::kEmpty, "an empty file", "check that the log was written"},
     {TextFormat::kTrialLog, "a trial log", "give it as a trial file, it needs no import"},
     {TextFormat::kPaths, "the paths of a trial log",
@@ -87,11 +87,11 @@ constexpr FormatWords kWords[] = {
      "a trial log begins with a line of column names (docs/formats.md)"},
 };
 
-const FormatWords& words_of(TextFormat format) {
-  for (const FormatWords& words : kWords) {
-    if (words.format == format) return words;
+const FormatTexts& texts_of(TextFormat format) {
+  for (const FormatTexts& texts : kTexts) {
+    if (texts.format == format) return texts;
   }
-  return kWords[std::size(kWords) - 1];
+  return kTexts[std::size(kTexts) - 1];
 }
 
 }  // namespace
@@ -118,14 +118,14 @@ TextFormat sniff_format(std::string_view text) {
   return sniff_table(line);
 }
 
-std::string format_name(TextFormat format) { return words_of(format).name; }
+std::string format_name(TextFormat format) { return texts_of(format).name; }
 
 Error wrong_format(std::string_view file, TextFormat found, std::string_view expected) {
-  const FormatWords& words = words_of(found);
-  std::string remedy = words.remedy;
+  const FormatTexts& texts = texts_of(found);
+  std::string remedy = texts.remedy;
   const std::size_t at = remedy.find("$FILE");
   if (at != remedy.npos) remedy.replace(at, 5, file);
-  return text_error(file, {}, words.name, expected, remedy);
+  return text_error(file, {}, texts.name, expected, remedy);
 }
 
 }  // namespace gapfarm

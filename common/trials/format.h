@@ -1,4 +1,4 @@
-// Which format a text is, told by its content alone.
+// Which format a text is, recognised by its content alone.
 #pragma once
 
 #include <string>

@@ -77,7 +77,7 @@ TrialLog parse_run(std::string_view text, const std::string& file,
 }
 
 const ReadableLog& readable_log(TextFormat format) {
-  // The first is what another format is told to be.
+  // The first is what another format is reported as.
   static const ReadableLog kLogs[] = {
       {TextFormat::kTrialLog, parse_trial_rows, false, true},
       {TextFormat::kPushLog, parse_push_rows, true, true},

@@ -1,5 +1,5 @@
 // Reads trial logs (docs/formats.md).  A log comes back whole or not at all, unless the user wants
-// rows with mistakes left out.
+// rows with mistakes omitted.
 #pragma once
 
 #include <span>
@@ -34,7 +34,7 @@ Result<TrialLog> parse_pushes(std::string_view text, const std::string& file,
                               std::span<const std::string> commands);
 
 // Adds the text of a paths.csv to the trials it names.  Rows of trials that `log` does not hold are
-// left out, with a note: a log may be split while its paths are not.  On an error `log` is
+// omitted, with a note: a log may be split while its paths are not.  On an error `log` is
 // unchanged.
 Status parse_paths(std::string_view text, const std::string& file, TrialLog& log);
 
@@ -45,7 +45,7 @@ Status parse_tips(std::string_view text, const std::string& file, TrialLog& log)
 Result<TrialLog> read_trials(const std::string& path, std::span<const std::string> commands);
 
 // Several files as one log, in the order given; each may be a trials.csv, a pushes.csv (with the
-// tips.csv beside it) or a bbautotune run, told apart by content.  A session split over files is
+// tips.csv beside it) or a bbautotune run, distinguished by content.  A session split over files is
 // put together in trial order.  Errors beside the formats' own: no files, a (session, trial) in two
 // files, a file of another format.
 Result<TrialLog> read_trial_files(std::span<const std::string> paths,

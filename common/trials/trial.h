@@ -43,7 +43,7 @@ struct Trial {
 struct TrialLog {
   std::vector<Trial> trials;
   std::vector<std::string> extra_columns;
-  // What reading left out and why, one sentence each with file:line:column; show them to the user.
+  // What reading omitted and why, one sentence each with file:line:column; show them to the user.
   std::vector<std::string> notes;
   // What was read for it, what lay beside the logs included.
   std::vector<std::string> files;

@@ -13,15 +13,15 @@ namespace {
 constexpr double kDay_s = 86400;
 constexpr double kUnit_m = 0.01;
 
-std::vector<std::string_view> split_words(std::string_view line) {
-  std::vector<std::string_view> words;
+std::vector<std::string_view> split_arguments(std::string_view line) {
+  std::vector<std::string_view> tokens;
   std::size_t at = 0;
   while ((at = line.find_first_not_of(" \t\r", at)) != std::string_view::npos) {
     const std::size_t end = std::min(line.find_first_of(" \t\r", at), line.size());
-    words.push_back(line.substr(at, end - at));
+    tokens.push_back(line.substr(at, end - at));
     at = end;
   }
-  return words;
+  return tokens;
 }
 
 std::optional<double> number(std::string_view word) {
@@ -49,16 +49,16 @@ std::optional<double> time_of(std::string_view word) {
 class Reader {
  public:
   // The sentence of what is wrong with a line, if anything.
-  std::optional<std::string> take(const std::vector<std::string_view>& words) {
-    if (words.size() < 5) return {};
-    const bool pose = words[4] == "CAMPOSE", targets = words[4] == "WAYPOINTS";
+  std::optional<std::string> take(const std::vector<std::string_view>& tokens) {
+    if (tokens.size() < 5) return {};
+    const bool pose = tokens[4] == "CAMPOSE", targets = tokens[4] == "WAYPOINTS";
     if (!pose && !targets) return {};
-    auto time_s = time_of(words[0]);
+    auto time_s = time_of(tokens[0]);
     if (!time_s) return "a time HH:MM:SS:mmm:uuu";
     std::vector<double> numbers;
-    for (std::size_t i = 6; i < words.size() && words[i] != "["; ++i) {
-      const auto value = number(words[i]);
-      if (!value) return "a number in place of '" + std::string(words[i]) + "'";
+    for (std::size_t i = 6; i < tokens.size() && tokens[i] != "["; ++i) {
+      const auto value = number(tokens[i]);
+      if (!value) return "a number in place of '" + std::string(tokens[i]) + "'";
       numbers.push_back(*value);
     }
     return pose ? take_pose(*time_s, numbers) : take_targets(*time_s, numbers);
@@ -109,7 +109,7 @@ Result<WaypointLog> parse_waypoint_log(std::string_view text, const std::string&
   while (!text.empty()) {
     const std::size_t end = std::min(text.find('\n'), text.size());
     ++line_number;
-    if (const auto expected = reader.take(split_words(text.substr(0, end)))) {
+    if (const auto expected = reader.take(split_arguments(text.substr(0, end)))) {
       return text_error(file, {line_number, 1}, "a broken line", *expected);
     }
     text.remove_prefix(std::min(end + 1, text.size()));

@@ -1,4 +1,4 @@
-// blendersim's way-point logs: where a robot was seen and where it was told to go.
+// blendersim's way-point logs: where a robot was seen and where it was sent.
 #pragma once
 
 #include <Eigen/Core>

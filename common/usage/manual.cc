@@ -60,19 +60,19 @@ std::vector<const CLI::App*> shown_commands(const CLI::App& app) {
   return app.get_subcommands([](const CLI::App* sub) { return !sub->get_group().empty(); });
 }
 
-void describe_command(const CLI::App& app, const std::string& words, std::string& text) {
-  text += ".SS " + roff(synopsis(app, words)) + "\n" + roff(app.get_description()) + "\n";
+void describe_command(const CLI::App& app, const std::string& invocation, std::string& text) {
+  text += ".SS " + roff(synopsis(app, invocation)) + "\n" + roff(app.get_description()) + "\n";
   text += options_of(app);
   if (!app.get_footer().empty()) text += ".PP\n" + verbatim(app.get_footer());
   for (const CLI::App* sub : shown_commands(app)) {
-    describe_command(*sub, words + " " + sub->get_name(), text);
+    describe_command(*sub, invocation + " " + sub->get_name(), text);
   }
 }
 
 }  // namespace
 
-std::string synopsis(const CLI::App& app, const std::string& words) {
-  std::string text = words;
+std::string synopsis(const CLI::App& app, const std::string& invocation) {
+  std::string text = invocation;
   const auto commands = shown_commands(app);
   if (!commands.empty()) return text + " COMMAND";
   text += " [OPTIONS]";

@@ -8,7 +8,7 @@ namespace gapfarm {
 
 // "gapfarm evolve [OPTIONS] CONFIG": what is typed for `app`, REQUIRES: its name begins with
 // `words`.
-std::string synopsis(const CLI::App& app, const std::string& words);
+std::string synopsis(const CLI::App& app, const std::string& invocation);
 
 // A page of section 1 for man(7): name, options, every command with its own, examples.  `version`
 // is "gapfarm 0.1.0".

@@ -18,7 +18,7 @@ std::string shown(const std::string& number) {
 }
 
 // "a whole number from 0 to 4096", of the two ends as CLI11 writes them.
-std::string range_words(const std::string& lower, const std::string& upper) {
+std::string bounds_text(const std::string& lower, const std::string& upper) {
   const double least = std::strtod(lower.c_str(), nullptr);
   const double greatest = std::strtod(upper.c_str(), nullptr);
   if (greatest > 1e300) return least < 0 ? "a number" : "a number of at least 0";
@@ -28,7 +28,7 @@ std::string range_words(const std::string& lower, const std::string& upper) {
 }
 
 // "a whole number", of the type name that CLI11 gives an option.
-std::string type_words(const std::string& type) {
+std::string type_names(const std::string& type) {
   if (type.find("UINT") != type.npos) return "a whole number of at least 0";
   if (type.find("INT") != type.npos) return "a whole number";
   if (type.find("FLOAT") != type.npos) return "a number";
@@ -62,8 +62,8 @@ std::string usage_sentence(const CLI::App& app, const CLI::ParseError& error) {
   std::smatch part;
   static const std::regex out_of_range("(\\S+): Value (.*) not in range (\\S+) to (\\S+)");
   if (std::regex_match(text, part, out_of_range)) {
-    std::string expected = range_words(part[3], part[4]);
-    // The least positive number is CLI11's way of saying more than 0.
+    std::string expected = bounds_text(part[3], part[4]);
+    // The least positive number is CLI11's way of stating more than 0.
     const double least = std::strtod(part[3].str().c_str(), nullptr);
     const CLI::Option* option = find_option(app, part[1]);
     const bool positive = option && option->get_type_name().find("POSITIVE") != std::string::npos;
@@ -74,7 +74,7 @@ std::string usage_sentence(const CLI::App& app, const CLI::ParseError& error) {
   if (std::regex_match(text, part, no_number)) {
     const CLI::Option* option = find_option(app, part[1]);
     return part[1].str() + " is '" + part[2].str() + "', expected " +
-           type_words(option ? option->get_type_name() : "");
+           type_names(option ? option->get_type_name() : "");
   }
   static const std::regex required("(\\S+) is required");
   if (std::regex_match(text, part, required)) {

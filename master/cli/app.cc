@@ -48,13 +48,13 @@ std::unique_ptr<Program> make_program() {
   return program;
 }
 
-void parse_words(Program& program, std::vector<std::string> words) {
-  if (!words.empty() && words[0] == "help") {
-    words.erase(words.begin());
-    words.push_back("--help");
+void parse_arguments(Program& program, std::vector<std::string> arguments) {
+  if (!arguments.empty() && arguments[0] == "help") {
+    arguments.erase(arguments.begin());
+    arguments.push_back("--help");
   }
-  std::reverse(words.begin(), words.end());  // as CLI11 wants them
-  program.app->parse(std::move(words));
+  std::reverse(arguments.begin(), arguments.end());  // as CLI11 wants them
+  program.app->parse(std::move(arguments));
 }
 
 }  // namespace gapfarm

@@ -20,6 +20,6 @@ std::unique_ptr<Program> make_program();
 
 // Parses `words`, without the program's name; "help COMMAND" is "COMMAND --help".  Throws
 // CLI::ParseError.
-void parse_words(Program& program, std::vector<std::string> words);
+void parse_arguments(Program& program, std::vector<std::string> arguments);
 
 }  // namespace gapfarm

@@ -4,7 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "master/cli/app.h"
-#include "master/cli/next_words.h"
+#include "master/cli/completion_candidates.h"
 #include "master/cli/subcommand.h"
 
 namespace gapfarm {
@@ -12,7 +12,7 @@ namespace {
 
 struct CompletionOptions {
   std::string shell;
-  std::vector<std::string> words;
+  std::vector<std::string> arguments;
 };
 
 constexpr const char* kBash = R"(# gapfarm for bash: gapfarm completion bash
@@ -54,11 +54,11 @@ end
 complete -c gapfarm -f -a '(__gapfarm_words)'
 )";
 
-Result<int> print_words(const CompletionOptions& options, CliContext& context) {
+Result<int> print_candidates(const CompletionOptions& options, CliContext& context) {
   const std::unique_ptr<Program> program = make_program();
   std::string text;
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
-  for (const NextWord& c : next_words(*program->app, options.words)) {
+  for (const CompletionCandidate& c : completion_candidates(*program->app, options.arguments)) {
     text += c.word + "\t" + c.summary + "\n";
     list.push_back({{"word", c.word}, {"summary", c.summary}});
   }
@@ -67,7 +67,7 @@ Result<int> print_words(const CompletionOptions& options, CliContext& context) {
 }
 
 Result<int> run_completion(const CompletionOptions& options, CliContext& context) {
-  if (options.shell == "words") return print_words(options, context);
+  if (options.shell == "words") return print_candidates(options, context);
   const char* script = options.shell == "bash" ? kBash : options.shell == "zsh" ? kZsh : kFish;
   context.console.result(script, {{"shell", options.shell}, {"script", script}});
   return kExitDone;
@@ -81,7 +81,7 @@ SubcommandRun setup_completion(CLI::App& app) {
                  "bash, zsh or fish: its script; words: what may stand in place of the last WORD")
       ->required()
       ->check(CLI::IsMember({"bash", "zsh", "fish", "words"}));
-  app.add_option("WORDS", options->words, "Of a command line that is being typed; after --");
+  app.add_option("WORDS", options->arguments, "Of a command line that is being typed; after --");
   app.footer(
       "Packages install the scripts.  Elsewhere:\n"
       "  bash: source <(gapfarm completion bash)     in ~/.bashrc\n"

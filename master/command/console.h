@@ -11,8 +11,8 @@
 
 #include "common/base/result.h"
 #include "common/log/log.h"
+#include "common/progress/number_text.h"
 #include "common/progress/overall_progress.h"
-#include "common/progress/words.h"
 
 namespace gapfarm {
 
@@ -35,7 +35,7 @@ class Console {
   // What came of a command, once: the text, or with --json the value.
   void result(std::string_view text, const nlohmann::ordered_json& value);
   // To be called last: with --json, where no result was shown, {"error": {"message", "exit_code"}}
-  // with all that error() was told.  Returns `exit_code`.
+  // with all that error() was given.  Returns `exit_code`.
   int end(int exit_code);
 
   // To stdout, as it is and at once.

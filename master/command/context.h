@@ -23,7 +23,7 @@ struct CliContext {
   Console& console;
   StopSource& stop;  // requested by SIGINT and SIGTERM; a second one ends the program at once
   std::shared_ptr<LongCommand> work{};  // of a long command, once it has begun
-  bool dry_run = false;                 // all is to be checked and said, and nothing done
+  bool dry_run = false;                 // all is to be checked and reported, and nothing done
   // Set as soon as the input is found good: an error is then kExitFailed, before kExitBadUsage.
   bool begun = false;
 };

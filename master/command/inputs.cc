@@ -149,9 +149,9 @@ Result<RecordedWork> start_recorded(const FarmOptions& options, const FarmSettin
   return RecordedWork{std::move(farm), std::move(recorded)};
 }
 
-Result<int> say_dry_run(const std::string& would, nlohmann::ordered_json facts,
-                        const FarmOptions& options, const FarmSettings& settings,
-                        CliContext& context) {
+Result<int> print_dry_run(const std::string& would, nlohmann::ordered_json facts,
+                          const FarmOptions& options, const FarmSettings& settings,
+                          CliContext& context) {
   RETURN_IF_ERROR(check_farm(options, settings));
   const unsigned workers = local_workers(options, settings);
   const std::vector<std::string> endpoints = endpoints_of(options, settings);

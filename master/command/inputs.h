@@ -50,7 +50,7 @@ struct FarmOptions {
 
 unsigned local_workers(const FarmOptions& options, const FarmSettings& settings);
 
-// What can be said before anything is made: keys that are missing, endpoints that would be open.
+// What can be checked before anything is made: keys that are missing, endpoints that would be open.
 Status check_farm(const FarmOptions& options, const FarmSettings& settings);
 
 // Starts the farm: the work has begun.
@@ -60,9 +60,9 @@ Result<std::unique_ptr<SocketFarm>> start_farm(const FarmOptions& options,
 
 // Where --dry-run ends a command whose input is checked: says what `would` be done ("evolve 7
 // parameters ...") and by whom, with `facts` for --json.
-Result<int> say_dry_run(const std::string& would, nlohmann::ordered_json facts,
-                        const FarmOptions& options, const FarmSettings& settings,
-                        CliContext& context);
+Result<int> print_dry_run(const std::string& would, nlohmann::ordered_json facts,
+                          const FarmOptions& options, const FarmSettings& settings,
+                          CliContext& context);
 
 // A farm that is asked through the command's LongCommand.
 struct RecordedWork {

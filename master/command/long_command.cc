@@ -25,18 +25,18 @@ constexpr double kRecordInterval_s = 1;  // each costs a disk write
 // Words of this process's command line, without the program.
 std::vector<std::string> own_arguments() {
   const Result<std::string> bytes = read_text_file("/proc/self/cmdline");
-  std::vector<std::string> words;
-  if (!bytes) return words;
+  std::vector<std::string> program_arguments;
+  if (!bytes) return program_arguments;
   std::string word;
   for (const char c : *bytes) {
     if (c != '\0') {
       word += c;
       continue;
     }
-    words.push_back(std::exchange(word, {}));
+    program_arguments.push_back(std::exchange(word, {}));
   }
-  if (!words.empty()) words.erase(words.begin());
-  return words;
+  if (!program_arguments.empty()) program_arguments.erase(program_arguments.begin());
+  return program_arguments;
 }
 
 // How many workers and how loud changes nothing of what is asked; cheap to leave at that.
@@ -285,7 +285,7 @@ void LongCommand::on_progress(const RecordedProgress& progress, const SocketFarm
   workers_ = farm.workers();
   const auto there = std::count_if(workers_.begin(), workers_.end(), present);
   const std::string waiting =
-      wait.words(static_cast<std::size_t>(there), steady_now_s()).value_or("");
+      wait.message(static_cast<std::size_t>(there), steady_now_s()).value_or("");
   const bool news = waiting.empty() != waiting_.empty();
   waiting_ = waiting;
   show(news);
@@ -299,7 +299,7 @@ void LongCommand::farm_gone() {
 
 void LongCommand::show(bool news) {
   const ProgressView view = progress_.at(steady_now_s());
-  console_.progress(record_.command + ": " + (waiting_.empty() ? progress_words(view) : waiting_),
+  console_.progress(record_.command + ": " + (waiting_.empty() ? progress_line(view) : waiting_),
                     news);
   if (steady_now_s() - written_s_ >= kRecordInterval_s) write_record();
 }

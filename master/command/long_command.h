@@ -114,7 +114,7 @@ bool is_dry_run(const CLI::App& command);
 
 // When `command` is over with this exit code: ends its work, and runs what --on-end names with
 // GAPFARM_COMMAND, GAPFARM_OUT, GAPFARM_STATE and GAPFARM_EXIT in the environment.  What becomes of
-// that is said and changes nothing.
+// that is reported and changes nothing.
 void conclude_command(const CLI::App& command, int exit_code, CliContext& context);
 
 }  // namespace gapfarm

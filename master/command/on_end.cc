@@ -36,7 +36,7 @@ const char* state_word(int exit_code) {
 // Its exit status, or what kept it from starting.
 Result<int> run_shell(const std::string& text, const std::vector<std::string>& variables) {
   ChildSetup setup;
-  setup.words = {"/bin/sh", "-c", text};
+  setup.arguments = {"/bin/sh", "-c", text};
   setup.environment = variables;
   setup.in = STDIN_FILENO;
   setup.death_signal = 0;
@@ -57,7 +57,7 @@ void declare_long_command(CLI::App& app) {
          "Shell command to run when this one ends, stops or fails, with GAPFARM_COMMAND, "
          "GAPFARM_OUT, GAPFARM_STATE (finished, stopped, failed) and GAPFARM_EXIT set")
       ->type_name("COMMAND");
-  const std::string summary = "Check everything and say what would be done; do nothing";
+  const std::string summary = "Check everything and report what would be done; do nothing";
   app.add_flag("--dry-run", summary);
 }
 

@@ -20,7 +20,7 @@ namespace fs = std::filesystem;
 struct Marker {
   FolderKind kind;
   const char* file;
-  const char* words;
+  const char* label;
 };
 
 constexpr Marker kMarkers[] = {
@@ -54,7 +54,7 @@ fs::path standing_folder(const fs::path& path) {
   return fs::exists(folder, code) ? folder : fs::path(".");
 }
 
-// Permissions alone do not tell (root, read-only mounts): tries it.
+// Permissions alone do not decide (root, read-only mounts): tries it.
 Status check_writable(const std::string& path) {
   const fs::path folder = standing_folder(path);
   std::error_code code;
@@ -95,7 +95,7 @@ Status check_folder(const std::string& folder, FolderKind kind) {
     if (marker.kind == kind || !fs::exists(fs::path(folder) / marker.file, code)) continue;
     const bool of_another = !command.empty() && command != "diagnose";
     if (std::string_view(marker.file) == "simulations.sqlite" && of_another) continue;
-    return Error{folder + ": holds " + marker.words +
+    return Error{folder + ": holds " + marker.label +
                  ", and nothing else belongs there; choose another --out"};
   }
   return {};

@@ -39,9 +39,9 @@ class Outputs {
   Status plan_again(const std::string& path);
 
   // Writes beside `path` and renames.  A file that has appeared since it was planned is kept, and
-  // the new one lies beside it under another name, which the error tells.
+  // the new one lies beside it under another name, which the error shows.
   Status write(const std::string& path, std::string_view bytes) const;
-  // Texts under their names in a folder; those that are empty are left out.
+  // Texts under their names in a folder; those that are empty are omitted.
   using NamedTexts = std::vector<std::pair<std::string, std::string>>;
   Status write_in(const std::string& folder, const NamedTexts& files) const;
 

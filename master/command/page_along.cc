@@ -34,11 +34,11 @@ std::string up_to(std::string_view text, std::string_view mark, std::string_view
 }
 
 // Of what a server that did not come up says, the sentence.
-std::string complaint(std::string said) {
+std::string complaint(std::string output) {
   constexpr std::string_view kProgram = "gapfarm: ";
-  if (said.starts_with(kProgram)) said.erase(0, kProgram.size());
-  while (!said.empty() && said.back() == '\n') said.pop_back();
-  return said.empty() ? "it ended without a word" : said;
+  if (output.starts_with(kProgram)) output.erase(0, kProgram.size());
+  while (!output.empty() && output.back() == '\n') output.pop_back();
+  return output.empty() ? "it ended without a word" : output;
 }
 
 }  // namespace
@@ -61,7 +61,8 @@ Result<std::unique_ptr<PageAlong>> PageAlong::start(const std::filesystem::path&
   // Whoever listens stops at the address: what comes later is dropped and blocks nobody.
   ::fcntl(ends[1], F_SETFL, O_NONBLOCK);
   ChildSetup setup;
-  setup.words = {executable_path(), "serve", "--port", std::to_string(port), "--", folder.string()};
+  setup.arguments = {executable_path(),    "serve", "--port",
+                     std::to_string(port), "--",    folder.string()};
   setup.out = setup.err = ends[1];
   setup.death_signal = SIGTERM;
   setup.leads_group = true;  // Ctrl-C is for the command, which ends this when it is done
@@ -73,30 +74,30 @@ Result<std::unique_ptr<PageAlong>> PageAlong::start(const std::filesystem::path&
     return Error{"the page cannot be started: " + pid.error().message};
   }
   std::unique_ptr<PageAlong> page(new PageAlong(*pid, ends[0]));
-  const std::string said = page->hear();
-  const std::string digits = up_to(said, kAddress, "/");
-  page->tunnel_ = up_to(said, kTunnel, ",");
+  const std::string output = page->hear();
+  const std::string digits = up_to(output, kAddress, "/");
+  page->tunnel_ = up_to(output, kTunnel, ",");
   const auto [end, error] =
       std::from_chars(digits.data(), digits.data() + digits.size(), page->port_);
   if (digits.empty() || error != std::errc() || page->tunnel_.empty()) {
-    return Error{"the page cannot be shown: " + complaint(said)};
+    return Error{"the page cannot be shown: " + complaint(output)};
   }
   return page;
 }
 
 std::string PageAlong::hear() const {
-  std::string said;
+  std::string output;
   std::array<char, 1024> bytes;
   const double until_s = monotonic_seconds() + 1e-3 * kStartLimit_ms;
-  while (said.find(", then open") == said.npos) {
+  while (output.find(", then open") == output.npos) {
     const double left_s = until_s - monotonic_seconds();
     pollfd polled = {out_, POLLIN, 0};
     if (left_s <= 0 || ::poll(&polled, 1, static_cast<int>(1e3 * left_s) + 1) <= 0) break;
     const ssize_t n = ::read(out_, bytes.data(), bytes.size());
     if (n <= 0) break;
-    said.append(bytes.data(), static_cast<std::size_t>(n));
+    output.append(bytes.data(), static_cast<std::size_t>(n));
   }
-  return said;
+  return output;
 }
 
 PageAlong::~PageAlong() {

@@ -40,7 +40,7 @@ class PageAlong {
 
  private:
   PageAlong(pid_t pid, int out) : pid_(pid), out_(out) {}
-  // What the server said until it served or ended.
+  // What the server reported until it served or ended.
   std::string hear() const;
 
   pid_t pid_;
@@ -55,7 +55,7 @@ Result<std::unique_ptr<PageAlong>> open_page(const PageOption& option,
                                              const std::filesystem::path& folder,
                                              CliContext& context);
 
-// `gapfarm serve`'s port unless told otherwise.
+// `gapfarm serve`'s port unless configured otherwise.
 inline constexpr unsigned kPagePort = 8421;
 
 }  // namespace gapfarm

@@ -49,7 +49,7 @@ Result<Model> read_model_of(const std::string& run_or_model, Console& console) {
   ASSIGN_OR_RETURN(const auto generations, run.generations());
   const std::uint64_t reached = generations.empty() ? 0 : generations.back().generation;
   if (left && left->origin.generation >= reached) return *std::move(left);
-  Result<Model> model = best_so_far(run);
+  Result<Model> model = current_best(run);
   if (!model) return model;
   console.note(run_or_model + ": this run is not finished; taking its best so far, " +
                run.info().fitness + " " + format_number(model->score) + " of generation " +

@@ -12,7 +12,7 @@
 namespace gapfarm {
 
 // A model file, or the model of a run's or a diagnosis's folder: its model.toml, or, where a run
-// has gone further than that says or left none, its best so far, of which a note tells.
+// has gone further than that says or left none, its best so far, of which a note shows.
 Result<Model> read_model_of(const std::string& run_or_model, Console& console);
 
 // An error where the model is one of another scenario or robot than the config's.

@@ -11,7 +11,7 @@
 namespace gapfarm {
 
 void TracedCommands::declare(CLI::App& app) {
-  app.add_option("--command", names, "Commands whose paths to look at; left out: all");
+  app.add_option("--command", names, "Commands whose paths to look at; omitted: all");
   trials.declare(app, "Where commands are pieces: the pushes to trace, in place of the config's");
   app.add_option("--only", only,
                  "COLUMN=VALUE[,VALUE...]: leave all other pushes out; may repeat, all must hold");
@@ -29,7 +29,7 @@ Result<Config> TracedCommands::open(const std::string& path, TraceSettings* to) 
   if (config->problem.pieces.empty()) {
     if (trials.files.empty() && only.empty()) return config;
     return Error{path + ": scenario " + config->problem.scenario +
-                 " traces commands and no trials; leave out --trials and --only"};
+                 " traces commands and no trials; omit --trials and --only"};
   }
   config = read_config_and_trials(path, trials);
   if (!config) return config.error();

@@ -21,7 +21,7 @@ void TrialOptions::declare_reading(CLI::App& app) {
                  "paths.csv beside a log that says it belongs to it)")
       ->type_name("FILE");
   app.add_flag("--skip-invalid", read.skip_invalid,
-               "Leave rows with mistakes out of the logs, and say which");
+               "Leave rows with mistakes out of the logs, and report which");
   app.add_flag("--session-prefix", read.name_sessions,
                "Put each log's file name before its sessions' names, for recorders that call them "
                "alike every day");

@@ -25,7 +25,7 @@ struct TrialOptions {
   void declare_reading(CLI::App& app);
 };
 
-// What the readers left out of a log and which files they read, to stderr.
+// What the readers omitted from a log and which files they read, to stderr.
 void show_notes(const TrialLog& log, Console& console);
 
 }  // namespace gapfarm

@@ -16,12 +16,12 @@
 namespace gapfarm {
 namespace {
 
-Status check_left_out(const Problem& problem, const std::vector<std::string>& left_out) {
+Status check_excluded(const Problem& problem, const std::vector<std::string>& excluded) {
   std::vector<std::string> known;
   for (const Effect& effect : problem.table().effects()) known.push_back(effect.name);
-  for (const std::string& name : left_out) {
+  for (const std::string& name : excluded) {
     if (std::find(known.begin(), known.end(), name) == known.end()) {
-      return Error{"there is no effect '" + name + "' to leave out" + suggestion(name, known)};
+      return Error{"there is no effect '" + name + "' to omit" + suggestion(name, known)};
     }
   }
   return {};
@@ -55,36 +55,36 @@ class Stages {
 };
 
 // The steps in the order of docs/diagnosis.md.
-Result<DiagnosisResult> take_steps(const steps::Inquiry& of, Stages* stages) {
-  steps::KnownSoFar known;
+Result<DiagnosisResult> take_steps(const steps::DiagnosisRequest& of, Stages* stages) {
+  steps::PartialResult known;
   const auto end_with = [&](const Error& error) -> Result<DiagnosisResult> {
     // What cannot be simulated is no reason to be without a report.
     if (error.code != ErrorCode::kSimulation) return error;
-    return give_up(of, known, stages->present(), error);
+    return fail_with_partial_report(of, known, stages->present(), error);
   };
   stages->begin(0);
   const Result<Study> tuned = guarded([&] { return steps::tune(of); });
   if (!tuned) return end_with(tuned.error());
   known.tuned = &*tuned;
-  tell_of_base(of, *tuned);
+  emit_base(of, *tuned);
 
   stages->begin(1);
   const Result<steps::Evidence> measured = guarded([&] { return steps::measure(of, *tuned); });
   if (!measured) return end_with(measured.error());
-  tell_of_noise(of, measured->study);
+  emit_noise(of, measured->study);
 
   stages->begin(2);
   const Result<steps::Screening> screening = guarded([&] { return steps::screen(of, *measured); });
   if (!screening) return end_with(screening.error());
   known.screening = &*screening;
-  tell_of_readings(of, screening->found);
-  tell_of_choice(of, screening->found, screening->doubt.has_value());
+  emit_readings(of, screening->found);
+  emit_choice(of, screening->found, screening->warning.has_value());
 
   stages->begin(3);
   const Result<steps::Judgement> judgement = guarded([&] { return steps::judge(of, *screening); });
   if (!judgement) return end_with(judgement.error());
   known.judged = &*judgement;
-  tell_of_verdict(of, *judgement);
+  emit_verdict(of, *judgement);
 
   stages->begin(4);
   auto again = guarded([&] { return steps::look_from_free_base(of, *measured, *judgement); });
@@ -95,14 +95,15 @@ Result<DiagnosisResult> take_steps(const steps::Inquiry& of, Stages* stages) {
   if (!refit) return end_with(refit.error());
   known.judged = &refit->judged;
   if (!*again) {
-    again = guarded([&] { return steps::look_without_dropped(of, *measured, *screening, *refit); });
+    again =
+        guarded([&] { return steps::reselect_without_dropped(of, *measured, *screening, *refit); });
     if (!again) return end_with(again.error());
     if (*again) *refit = std::move((*again)->refit);
   }
   if (*again) {
     known.screening = &(*again)->screening;
-    tell_of_choice(of, known.screening->found, false);
-    tell_of_verdict(of, *known.judged);
+    emit_choice(of, known.screening->found, false);
+    emit_verdict(of, *known.judged);
   }
 
   stages->begin(5);
@@ -112,11 +113,11 @@ Result<DiagnosisResult> take_steps(const steps::Inquiry& of, Stages* stages) {
 }
 
 // A test whose number is none is no evidence, neither of an effect nor of its absence.
-void doubt_undefined_tests(Diagnosis* d) {
+void warn_of_undefined_tests(Diagnosis* d) {
   d->cautions.push_back(
       "Some tests met numbers that are not finite and count as no evidence (p = 1): look for "
       "trials "
-      "far from all others, or bring [parameters] nearer to the robot.");
+      "far from all others, or bring [parameters] closer to the robot.");
   if (d->verdict == Verdict::kNone) d->verdict = Verdict::kUnknown;
 }
 
@@ -130,7 +131,7 @@ Result<DiagnosisResult> diagnose(Farm& farm, const Problem& problem,
                  " cannot be diagnosed: it has no catalogue of effects; `gapfarm influence` says "
                  "what its parameters do"};
   }
-  if (Status s = check_left_out(problem, options.left_out); !s) return s.error();
+  if (Status s = check_excluded(problem, options.excluded); !s) return s.error();
   const PreparedLog log = prepare_log(problem, options.frame_m);
   if (any_unusable(log.sanity)) return unusable_result(log);
   Predictor predictor(farm, log.problem);
@@ -142,10 +143,10 @@ Result<DiagnosisResult> diagnose(Farm& farm, const Problem& problem,
   if (!result) return result;
   stages.end();
   Diagnosis& d = result->diagnosis;
-  if (undefined_laws() != undefined_before) doubt_undefined_tests(&d);
+  if (undefined_laws() != undefined_before) warn_of_undefined_tests(&d);
   d.timing_s = stages.took_s();
   d.sanity.insert(d.sanity.end(), log.sanity.begin(), log.sanity.end());
-  tell(*subject->effects, &d);
+  fill_conclusions(*subject->effects, &d);
   return result;
 }
 

@@ -30,11 +30,11 @@ inline constexpr std::array<DiagnosisStage, 6> kDiagnosisStages = {
      {"screen the catalogue", 0.6},
      {"judge what is left", 0.01},
      {"refit base and effects together", 0.2},
-     {"say where, how far and what next", 0.03}}};
+     {"report where, how far and what next", 0.03}}};
 
 struct DiagnoseOptions {
   bool keep_base = false;             // the problem's values are a tuned model
-  std::vector<std::string> left_out;  // effects that the catalogue is to be without
+  std::vector<std::string> excluded;  // effects that the catalogue is to be without
   std::uint64_t seed = 1;             // of the bootstrap
   // World position that the values' places count from, where the problem's values have such places;
   // else it is chosen by the log.
@@ -59,9 +59,9 @@ struct DiagnosisResult {
   std::vector<std::pair<std::string, std::vector<v1::Task>>> fits;
 };
 
-// A log that cannot be used is told without any simulation (verdict "unusable"), and what cannot be
-// simulated is left out and said.  Errors: a scenario that cannot be diagnosed, an empty log, an
-// effect to leave out that the catalogue does not have, the farm's.
+// A log that cannot be used is reported without any simulation (verdict "unusable"), and what
+// cannot be simulated is excluded and reported.  Errors: a scenario that cannot be diagnosed, an
+// empty log, an effect to omit that the catalogue does not have, the farm's.
 Result<DiagnosisResult> diagnose(Farm& farm, const Problem& problem,
                                  const DiagnoseOptions& options);
 

@@ -11,7 +11,7 @@
 namespace gapfarm {
 
 // A base parameter that tuning moves, with a weak prior on the logarithm of its value: the data
-// cannot tell some of them apart, and the prior keeps those where the config had them.
+// cannot distinguish some of them, and the prior keeps those where the config had them.
 struct BaseParameter {
   std::size_t row = 0;
   double prior_log_sd = 1;

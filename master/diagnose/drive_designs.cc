@@ -54,13 +54,13 @@ Trial trial_of(const CommandSpec& c, const Pose& start, double t_s, const std::s
 
 // Every trial has a session of its own, so that what went before is what the design says.
 std::vector<std::uint32_t> add_trials(const std::vector<Pose>& starts, const CommandSpec& command,
-                                      StartKind way, std::vector<Trial>* log) {
+                                      StartKind start_kind, std::vector<Trial>* log) {
   std::vector<std::uint32_t> indices;
-  const std::size_t count = way == StartKind::kManyStarts ? starts.size() : 1;
+  const std::size_t count = start_kind == StartKind::kManyStarts ? starts.size() : 1;
   for (std::size_t k = 0; k < count; ++k) {
     const std::string session = "d" + std::to_string(log->size());
-    double t_s = way == StartKind::kLate ? kLate_s : kEarly_s;
-    if (way == StartKind::kAfterOpposite) {
+    double t_s = start_kind == StartKind::kLate ? kLate_s : kEarly_s;
+    if (start_kind == StartKind::kAfterOpposite) {
       CommandSpec opposite = command;
       opposite.left = -opposite.left;
       opposite.right = -opposite.right;
@@ -69,16 +69,18 @@ std::vector<std::uint32_t> add_trials(const std::vector<Pose>& starts, const Com
     }
     indices.push_back(static_cast<std::uint32_t>(log->size()));
     log->push_back(trial_of(command, starts[k], t_s, session));
-    log->back().trial = way == StartKind::kAfterOpposite ? 1 : 0;
+    log->back().trial = start_kind == StartKind::kAfterOpposite ? 1 : 0;
   }
   return indices;
 }
 
-std::string drive_words(const CommandSpec& command, double level, StartKind way, bool many_starts) {
+std::string drive_names(const CommandSpec& command, double level, StartKind start_kind,
+                        bool many_starts) {
   std::string how = " from any start";
   if (many_starts) how = " from several headings and places";
-  if (way == StartKind::kAfterOpposite) how = " straight after driving the opposite way";
-  if (way == StartKind::kLate) how = " " + plain_number(kLate_s / 60) + " minutes into a session";
+  if (start_kind == StartKind::kAfterOpposite) how = " straight after driving the opposite way";
+  if (start_kind == StartKind::kLate)
+    how = " " + plain_number(kLate_s / 60) + " minutes into a session";
   return "Drive " + command.name + " for " + plain_number(command.duration_s) + " s at " +
          (level == 1 ? "full" : "half") + " level" + how;
 }
@@ -99,16 +101,16 @@ ExperimentPlan plan_drives(const Problem& problem) {
         command.right *= level;
         command.duration_s = duration;
         std::uint32_t ordinary = 0;
-        for (const StartKind way :
+        for (const StartKind start_kind :
              {StartKind::kManyStarts, StartKind::kAfterOpposite, StartKind::kLate}) {
           Design design;
           design.group = command.name;
-          design.trials = add_trials(starts, command, way, &plan.problem.log.trials);
-          design.cost = duration + (way == StartKind::kManyStarts ? 0 : kTrouble_s);
-          if (way == StartKind::kManyStarts) ordinary = design.trials.front();
-          if (way != StartKind::kManyStarts) design.ordinary = ordinary;
-          design.action = [command, level, way](bool many_starts) {
-            return drive_words(command, level, way, many_starts);
+          design.trials = add_trials(starts, command, start_kind, &plan.problem.log.trials);
+          design.cost = duration + (start_kind == StartKind::kManyStarts ? 0 : kTrouble_s);
+          if (start_kind == StartKind::kManyStarts) ordinary = design.trials.front();
+          if (start_kind != StartKind::kManyStarts) design.ordinary = ordinary;
+          design.action = [command, level, start_kind](bool many_starts) {
+            return drive_names(command, level, start_kind, many_starts);
           };
           plan.designs.push_back(std::move(design));
         }

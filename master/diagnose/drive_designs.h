@@ -1,4 +1,4 @@
-// Drives of a tracked robot that might part rival explanations.
+// Drives of a tracked robot that might part competing explanations.
 #pragma once
 
 #include "master/diagnose/conclusions/next_experiment.h"

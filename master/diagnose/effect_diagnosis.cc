@@ -48,8 +48,8 @@ const WorldPlace* place_of(const EffectDiagnoses& effects, const Parameter& p) {
 EffectDiagnosis second_of_a_kind(EffectDiagnosis first, const char* effect, const char* sentence) {
   first.effect = effect;
   first.marks = nullptr;
-  first.words.sentence = sentence;
-  first.short_words.reset();
+  first.phrases.sentence = sentence;
+  first.short_phrases.reset();
   return first;
 }
 

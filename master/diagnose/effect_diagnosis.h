@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "common/parameters/table.h"
-#include "master/diagnose/effect_words.h"
+#include "master/diagnose/effect_phrases.h"
 #include "master/diagnose/fit/probes.h"
 #include "master/diagnose/fit/regression.h"
 #include "master/diagnose/fit/signatures.h"
@@ -84,7 +84,7 @@ struct EffectDiagnosis {
   std::vector<Probe> (*probes)(const Study& study) = nullptr;
   // From the probes' slopes; null: one signature with a column a probe.
   std::vector<Signature> (*signatures)(const Study& study, ProbedSlopes slopes) = nullptr;
-  // Without a probe: marks at places, which the log alone tells.
+  // Without a probe: marks at places, which the log alone shows.
   std::vector<Signature> (*marks)(const Study& study) = nullptr;
   // One level and one duration show nothing of it that another full speed would not do.
   bool changes_reach = false;
@@ -96,7 +96,7 @@ struct EffectDiagnosis {
   // positions explains as much.
   bool bends_view = false;
 
-  // Rivals, whatever the log.
+  // Alternatives, whatever the log.
   const EffectFamily* family = nullptr;
   std::vector<const char*> aliases = {};
 
@@ -113,19 +113,19 @@ struct EffectDiagnosis {
   double (*search_error)(const Parameter& p, double value, double gain) = nullptr;
   double (*ambiguity)(const Study& study, const Parameter& p, const Overrides& at) = nullptr;
 
-  // Places in the world, and the keys that tell where a second one would be.
+  // Places in the world, and the keys that state where a second one would be.
   std::vector<WorldPlace> places = {};
-  std::vector<const char*> told_by = {};
+  std::vector<const char*> identified_by = {};
   // Of an effect of which there may be two: whether two marks of it are of two such things.
   bool (*are_two)(const Signature& a, const Signature& b) = nullptr;
   // The key of a strength that may end on its bound: beyond it the motion hardly changes any more.
   const char* saturates = nullptr;
-  // Whether it makes single trials stray, as slips would.
-  bool (*strays)(const Signature& chosen, const ResidualTrial& trial) = nullptr;
+  // Whether it makes single trials outliers, as slips would.
+  bool (*contaminates)(const Signature& chosen, const ResidualTrial& trial) = nullptr;
 
-  EffectWords words = {};
-  std::optional<ShortWords> short_words = {};
-  const SpreadRow* spread = nullptr;  // of an effect that makes some trials stray
+  EffectPhrases phrases = {};
+  std::optional<ShortPhrases> short_phrases = {};
+  const SpreadRow* spread = nullptr;  // of an effect that makes some trials outliers
 };
 
 // The effects that a scenario's diagnosis knows.

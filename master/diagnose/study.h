@@ -37,7 +37,7 @@ struct Study {
   bool free_commands = false;  // hardly a command repeats: see free_commands.h
   PoseGrid grid;               // of the logged positions
   NoiseEstimate noise;         // by which rows are whitened and dependences judged
-  // By which trials are scored and the models left behind predict, where that is another one:
+  // By which trials are scored and the models written predict, where that is another one:
   // drives or readings with heavy tails.
   std::optional<NoiseEstimate> predictive;
   bool reading_noise_known = true;     // from gaps between readings, rather than the config's

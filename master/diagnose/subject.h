@@ -41,8 +41,8 @@ struct NoiseRow {
 
 // How the pictures show a trial.
 struct TrialView {
-  Pose X_WV;                       // ends are seen from here
-  double turn_rad = 0;             // residuals are told in the predicted end's axes turned by this
+  Pose X_WV;            // ends are seen from here
+  double turn_rad = 0;  // residuals are reported in the predicted end's axes turned by this
   std::vector<double> covariates;  // one a DiagnosisSubject::shown
 };
 
@@ -81,7 +81,7 @@ struct DiagnosisSubject {
   std::vector<CovariateBlock> (*blocks)(const Study& study);
   // Null where base and hypotheses are searched together instead: EffectDiagnosis::searched.
   Result<std::vector<Signature>> (*signatures)(Predictor& predictor, const Study& study,
-                                               const std::vector<std::string>& left_out) = nullptr;
+                                               const std::vector<std::string>& excluded) = nullptr;
   // Of every trial, with the study's base; null as above, as is `patches`.
   std::vector<PatchReach> (*patch_reach)(const Problem& problem, const Study& study,
                                          const Patch& patch) = nullptr;
@@ -94,11 +94,11 @@ struct DiagnosisSubject {
   std::vector<std::string> (*cautions)(const Study& study, const TrialLog& log);
   // What the log would need to part effects that look alike in it.
   std::vector<std::string> (*lacks)(const Study& study, const TrialLog& log);
-  // Trials that might part rival explanations.
+  // Trials that might part competing explanations.
   ExperimentPlan (*experiments)(const Problem& problem);
   TrialView (*view)(const Study& study, std::size_t trial);
   std::vector<ShownCovariate> shown;  // in the pictures, beside what every log has
-  PictureWords words;
+  PictureLabels labels;
 };
 
 // Null where the problem's scenario cannot be diagnosed.

@@ -38,12 +38,13 @@ struct Span {
   double nearest = std::numeric_limits<double>::infinity(), farthest = 0;
 };
 
-Span span_of(const Pose& X_WS, const Twist& way, const Footprint& footprint, const Patch& patch) {
+Span span_of(const Pose& X_WS, const Twist& motion, const Footprint& footprint,
+             const Patch& patch) {
   constexpr int kLooks = 16;
   const auto contacts = footprint.contacts();
   Span span;
   for (int k = 0; k <= kLooks; ++k) {
-    const Pose X_WB = X_WS * exp(Twist(way * k / kLooks));
+    const Pose X_WB = X_WS * exp(Twist(motion * k / kLooks));
     for (const Eigen::Vector2d& contact : contacts) {
       const Pose at = X_WB * Pose{contact.x(), contact.y(), 0};
       const double distance = std::hypot(at.x - patch[0], at.y - patch[1]);
@@ -61,7 +62,7 @@ std::vector<PatchReach> drive_patch_reach(const Problem& problem, const Study& s
   const Footprint footprint = footprint_of(problem, study);
   std::vector<PatchReach> reach;
   for (std::size_t i = 0; i < study.size(); ++i) {
-    const Span span = span_of(study.trials[i].X_WS, way_of(study, i), footprint, patch);
+    const Span span = span_of(study.trials[i].X_WS, motion_of(study, i), footprint, patch);
     const bool touched = span.nearest < patch[2] + spare;
     const bool inside = span.farthest < patch[2] - spare;
     reach.push_back(inside ? PatchReach::kInside : touched ? PatchReach::kRim : PatchReach::kNone);

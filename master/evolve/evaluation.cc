@@ -13,7 +13,7 @@ OptimiserSetup optimiser_setup(const EvolutionSettings& settings, const Problem&
   setup.run_seed = seed;
   setup.noisy =
       problem.spread.kind == SpreadKind::kSampled && !compares_means(problem.fitness.kind);
-  // Where kinematics tell a value, no generation need look for it.
+  // Where kinematics show a value, no generation need look for it.
   const ParameterValues start = settings.seed_nominal ? kinematic_start(problem) : problem.values;
   for (const Gene& gene : setup.genes) {
     setup.nominal.push_back(encode_gene(*setup.table, gene, start[gene.row]));

@@ -84,7 +84,7 @@ std::optional<std::pair<StopReason, std::string>> reason_to_stop(const Optimiser
                                                                  double wall_s, bool requested);
 
 // Runs `optimiser` until there is a reason to stop.  `stop_requested` is polled between generations
-// (the backend is told by its own means).  Errors: of the backend or the sink.
+// (the backend is notified separately).  Errors: of the backend or the sink.
 Result<EvolveSummary> evolve(Optimiser& optimiser, EvaluationBackend& backend, GenerationSink& sink,
                              const EvolveClock& clock, const EvolveOptions& options,
                              const std::function<bool()>& stop_requested = {});

@@ -32,8 +32,8 @@ std::string origin_name(unsigned origin) {
 
 void Standing::add(const Score& score) {
   const bool usable = score.outcome == v1::OK && std::isfinite(score.cost);
-  const v1::Outcome told = score.outcome == v1::OK && !usable ? v1::DIVERGED : score.outcome;
-  if (scores == 0 || outcome_rank(told) > outcome_rank(outcome)) outcome = told;
+  const v1::Outcome counted = score.outcome == v1::OK && !usable ? v1::DIVERGED : score.outcome;
+  if (scores == 0 || outcome_rank(counted) > outcome_rank(outcome)) outcome = counted;
   ++scores;
   if (outcome != v1::OK) {
     cost = 0;

@@ -52,7 +52,7 @@ class Optimiser {
   virtual void tell(std::span<const Score> scores) = 0;
 
   virtual std::uint64_t generation() const = 0;        // completed generations
-  virtual std::uint64_t evaluations() const = 0;       // scores told since the start
+  virtual std::uint64_t evaluations() const = 0;       // scores given since the start
   virtual std::uint64_t last_improvement() const = 0;  // generation
   virtual std::vector<Member> members() const = 0;     // best first
   virtual const Member& best() const = 0;              // REQUIRES: generation() > 0

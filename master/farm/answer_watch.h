@@ -8,7 +8,7 @@
 
 namespace gapfarm {
 
-// Told of an answer by its place in the batch.
+// Reported an answer by its place in the batch.
 using AnswerWatcher = std::function<void(std::size_t task, const v1::TaskResult& result)>;
 
 class AnswerSource {

@@ -11,7 +11,7 @@
 namespace gapfarm {
 namespace {
 
-// Between being told to go and being made to.  Long enough to close a socket, short enough for
+// Between being asked to go and being made to.  Long enough to close a socket, short enough for
 // Ctrl-C to feel answered.
 constexpr double kGoodbyeGrace = 0.5;
 constexpr double kTerminateGrace = 0.5;

@@ -30,11 +30,11 @@ class PrivateFolder {
 };
 
 // Started by the constructor's caller through start(); one that ends is started again, unless it
-// ended three times in a row before it said hello.
+// ended three times in a row before it sent hello.
 class LocalWorkers {
  public:
   LocalWorkers(std::string program, unsigned count, std::string endpoint, ProcessLimits limits);
-  // Tells them to go (SIGTERM), then makes them (SIGKILL): they keep nothing that could be lost.
+  // Asks them to go (SIGTERM), then makes them (SIGKILL): they keep nothing that could be lost.
   ~LocalWorkers();
   LocalWorkers(const LocalWorkers&) = delete;
   LocalWorkers& operator=(const LocalWorkers&) = delete;

@@ -273,7 +273,7 @@ void Scheduler::on_committed(const Committed& committed) {
   const Disagreement& d = *committed.disagreement;
   report(FarmEvent::kDisagreement, d.second->name,
          d.question + " has two answers: " + d.first->name + " on " + d.first->host +
-             " said one thing and " + d.second->name + " on " + d.second->host +
+             " gave one answer and " + d.second->name + " on " + d.second->host +
              " another; one of these machines computes wrongly, take it off the farm");
 }
 
@@ -369,7 +369,7 @@ void Scheduler::on_tick(double now) {
   dispatch(now);
 }
 
-void Scheduler::say_goodbye(const std::string& reason) {
+void Scheduler::send_goodbye(const std::string& reason) {
   for (const auto& [id, worker] : registry_.all()) {
     post(worker->peer).mutable_goodbye()->set_reason(reason);
   }

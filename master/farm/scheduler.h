@@ -117,8 +117,8 @@ class Scheduler {
   // Judges silence and gives out jobs.  Call when all messages that have arrived are handled: what
   // waits unread must not count as silence.
   void on_tick(double now);
-  // Tells every worker that this master leaves.
-  void say_goodbye(const std::string& reason);
+  // Informs every worker that this master leaves.
+  void send_goodbye(const std::string& reason);
 
   // To be sent by the caller, in order; cleared by it.
   std::vector<Outgoing>& outbox() { return outbox_; }

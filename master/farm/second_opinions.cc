@@ -98,7 +98,7 @@ bool SecondOpinions::compare(const WorkerIdentityPtr& worker, const v1::JobResul
 void SecondOpinions::give_back(WorkerId worker, std::uint64_t attempt) {
   const auto found = expected_.find(attempt);
   if (found == expected_.end() || found->second.worker != worker) return;
-  // What only a straggler's original would have said is not worth waiting for.
+  // What only a straggler's original would have reported is not worth waiting for.
   if (found->second.audit && ++found->second.audit->tries < kAuditTries) {
     audits_.push_back(std::move(*found->second.audit));
   }

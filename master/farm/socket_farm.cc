@@ -34,7 +34,7 @@ void complain(const FarmEvent& event) {
   }
 }
 
-// The count tells the lives of one run apart, the random bits those of different runs that one
+// The count distinguishes the lives of one run, the random bits those of different runs that one
 // worker serves one after the other: their counts, and so their attempt ids, may be the same.
 std::uint64_t unique_epoch(std::uint64_t count) {
   std::random_device device;
@@ -174,7 +174,7 @@ Result<std::unique_ptr<SocketFarm>> SocketFarm::create(SocketFarmOptions options
 }
 
 SocketFarm::~SocketFarm() {
-  impl_->scheduler->say_goodbye("the run is over");
+  impl_->scheduler->send_goodbye("the run is over");
   pump(*impl_->socket, *impl_->scheduler, monotonic_seconds());
 }
 

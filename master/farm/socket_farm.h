@@ -47,7 +47,7 @@ class SocketFarm : public Farm, public AnswerSource {
   // Listens and starts the local workers.  Errors: an endpoint that cannot be bound, no worker
   // program, neither local workers nor an endpoint.
   static Result<std::unique_ptr<SocketFarm>> create(SocketFarmOptions options);
-  // Says goodbye to all workers and ends the local ones.
+  // Sends goodbye to all workers and ends the local ones.
   ~SocketFarm() override;
 
   std::string add_problem(const v1::Problem& problem) override;

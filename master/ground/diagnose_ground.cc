@@ -41,11 +41,11 @@ GroundQuestion ask_what_is_wrong(const GroundRobot& robot) {
   return {kinematic_rows(robot), ground_hypotheses(robot), {}};
 }
 
-Status leave_out(const std::vector<std::string>& names, std::vector<GroundHypothesis>* catalogue) {
+Status exclude(const std::vector<std::string>& names, std::vector<GroundHypothesis>* catalogue) {
   for (const std::string& name : names) {
     const auto wanted = [&](const GroundHypothesis& h) { return h.name == name; };
     if (std::none_of(catalogue->begin(), catalogue->end(), wanted)) {
-      return Error{"--leave-out: this robot's catalogue has no \"" + name + "\""};
+      return Error{"--exclude: this robot's catalogue has no \"" + name + "\""};
     }
     std::erase_if(*catalogue, wanted);
   }
@@ -77,7 +77,7 @@ Result<GroundDiagnosis> diagnose_driven(const GroundRobot& file, const GroundRob
     if (!asked) return asked.error();
     question = std::move(*asked);
   }
-  if (Status s = leave_out(options.left_out, &question.catalogue); !s) return s.error();
+  if (Status s = exclude(options.excluded, &question.catalogue); !s) return s.error();
   const GroundWork work = {[&](const std::string& stage) { clock.begin(stage); },
                            options.on_progress,
                            options.stopped,
@@ -123,7 +123,7 @@ std::vector<SanityFinding> check_ground_log(const GroundRobot& robot, const RunL
        fmt::format("With {} put right, what the robot's file expects is {:.1f} times as near to "
                    "what was measured.",
                    h.thing, fault->shrinks),
-       h.remedy, Severity::kDoubt, true, h.aliases}};
+       h.remedy, Severity::kWarning, true, h.aliases}};
 }
 
 }  // namespace gapfarm

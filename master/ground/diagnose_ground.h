@@ -21,7 +21,7 @@ namespace gapfarm {
 
 struct GroundDiagnoseOptions {
   WindowSettings windows = {{0.5, 2, 5}, 0.5};
-  std::vector<std::string> left_out;  // hypotheses that are not to be thought of
+  std::vector<std::string> excluded;  // hypotheses that are not to be thought of
   std::uint64_t seed = 1;             // of the bootstrap
   // Of the same robot: asks what changed since; none: asks what of the file or the log is wrong.
   std::optional<RunLog> reference;
@@ -46,11 +46,11 @@ inline constexpr GroundStage kGroundStages[] = {{"fit the reference", 0.2},
 struct GroundDiagnosis {
   Diagnosis diagnosis;
   GroundRobot corrected;  // the robot with what was named put in
-  std::vector<SaidValue> values;
+  std::vector<ReportedValue> values;
   GroundFigures figures;  // behind the verdict
 };
 
-// Errors: no window fits, a hypothesis to leave out that there is not, a reference whose log is the
+// Errors: no window fits, a hypothesis to omit that there is not, a reference whose log is the
 // wrong way round, stopped.
 Result<GroundDiagnosis> diagnose_ground(const GroundRobot& robot, const RunLog& log,
                                         const GroundDiagnoseOptions& options);

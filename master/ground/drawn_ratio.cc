@@ -15,8 +15,8 @@ constexpr std::size_t kLeastDrawn = 5;  // fewer do not span 90 % of where a med
 constexpr double kRatioTail = 0.05;
 constexpr double kNoError = 1e-12;
 
-double ratio_of(std::span<const double> own, std::span<const double> rival) {
-  return std::max(median(own), kNoError) / std::max(median(rival), kNoError);
+double ratio_of(std::span<const double> own, std::span<const double> baseline) {
+  return std::max(median(own), kNoError) / std::max(median(baseline), kNoError);
 }
 
 // Windows that are drawn together, by their places.
@@ -41,23 +41,23 @@ std::vector<std::vector<std::size_t>> groups_of(std::span<const std::size_t> run
 
 }  // namespace
 
-DrawnRatio drawn_ratio(std::span<const double> own, std::span<const double> rival,
+DrawnRatio drawn_ratio(std::span<const double> own, std::span<const double> baseline,
                        std::span<const std::size_t> run, std::uint64_t seed) {
   DrawnRatio drawn;
-  drawn.ratio = ratio_of(own, rival);
+  drawn.ratio = ratio_of(own, baseline);
   const auto groups = groups_of(run);
   if (groups.size() < kLeastDrawn) return drawn;
   Stream stream({seed, Purpose::kStatistics, 0, 0, 0});
   std::vector<double> ratios;
   for (std::size_t draw = 0; draw < kRatioDraws; ++draw) {
-    std::vector<double> of_own, of_rival;
+    std::vector<double> of_own, of_baseline;
     for (std::size_t k = 0; k + 1 < groups.size(); ++k) {
       for (const std::size_t i : groups[stream.below(groups.size())]) {
         of_own.push_back(own[i]);
-        of_rival.push_back(rival[i]);
+        of_baseline.push_back(baseline[i]);
       }
     }
-    ratios.push_back(ratio_of(of_own, of_rival));
+    ratios.push_back(ratio_of(of_own, of_baseline));
   }
   drawn.interval = {quantile(ratios, kRatioTail), quantile(ratios, 1 - kRatioTail)};
   return drawn;

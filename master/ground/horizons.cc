@@ -6,7 +6,7 @@
 #include <cmath>
 #include <span>
 
-#include "common/recordings/afresh.h"
+#include "common/recordings/restart.h"
 #include "common/score/fitness.h"
 #include "common/trials/text/csv.h"
 
@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kSpeedSpan_s = 0.5;  // of poses before a window, for constant velocity
 // Windows in which the robot hardly went anywhere have no error a metre.
-constexpr double kLeastWayShare = 0.1;  // of the median way
+constexpr double kLeastPathShare = 0.1;  // of the median way
 
 // Windows of one horizon: trials of a problem, one after another.
 struct Tiles {
@@ -25,7 +25,7 @@ struct Tiles {
 };
 
 // Length of the marker's measured way in a window.
-double way_of(const LoggedRun& run, const Trial& trial) {
+double travel_of(const LoggedRun& run, const Trial& trial) {
   const std::vector<PoseRow>& poses = run.poses;
   double sum = 0;
   for (std::size_t i = 1; i < poses.size(); ++i) {
@@ -59,15 +59,15 @@ double median_a_metre(const std::vector<double>& errors) {
 }
 
 WindowErrors medians_of(std::span<const WindowRow> windows, WindowError WindowRow::*which,
-                        double way_m) {
+                        double travel_m) {
   std::vector<double> position, heading, position_m, heading_m;
   for (const WindowRow& row : windows) {
     const WindowError& error = row.*which;
     position.push_back(error.position_m);
     heading.push_back(error.heading_rad);
-    if (!(row.way_m > kLeastWayShare * way_m)) continue;
-    position_m.push_back(error.position_m / row.way_m);
-    heading_m.push_back(error.heading_rad / row.way_m);
+    if (!(row.travel_m > kLeastPathShare * travel_m)) continue;
+    position_m.push_back(error.position_m / row.travel_m);
+    heading_m.push_back(error.heading_rad / row.travel_m);
   }
   return {median(position), median(heading), median_a_metre(position_m), median_a_metre(heading_m)};
 }
@@ -90,12 +90,12 @@ HorizonRow row_of(std::span<const WindowRow> windows, std::span<const std::size_
   HorizonRow row;
   row.horizon_s = windows.front().horizon_s;
   row.windows = windows.size();
-  std::vector<double> ways;
-  for (const WindowRow& window : windows) ways.push_back(window.way_m);
-  row.way_m = median(ways);
-  row.simulation = medians_of(windows, &WindowRow::simulation, row.way_m);
-  row.kinematics = medians_of(windows, &WindowRow::kinematics, row.way_m);
-  row.constant_velocity = medians_of(windows, &WindowRow::constant_velocity, row.way_m);
+  std::vector<double> travels;
+  for (const WindowRow& window : windows) travels.push_back(window.travel_m);
+  row.travel_m = median(travels);
+  row.simulation = medians_of(windows, &WindowRow::simulation, row.travel_m);
+  row.kinematics = medians_of(windows, &WindowRow::kinematics, row.travel_m);
+  row.constant_velocity = medians_of(windows, &WindowRow::constant_velocity, row.travel_m);
   row.position = drawn_ratio_of(windows, &WindowError::position_m, run);
   row.heading = drawn_ratio_of(windows, &WindowError::heading_rad, run);
   return row;
@@ -112,7 +112,7 @@ std::string ratio_cell(const DrawnRatio& drawn) {
                      (*drawn.interval)[1]);
 }
 
-std::string surely_apart(const Horizons& horizons) {
+std::string significantly_apart(const Horizons& horizons) {
   int below = 0, above = 0, untold = 0, all = 0;
   for (const HorizonRow& row : horizons.rows) {
     for (const DrawnRatio& drawn : {row.position, row.heading}) {
@@ -124,7 +124,8 @@ std::string surely_apart(const Horizons& horizons) {
     }
   }
   return fmt::format(
-      "of {} medians {} surely below the kinematics', {} surely above (90 % intervals of their "
+      "of {} medians {} significantly below the kinematics', {} significantly above (90 % "
+      "intervals of their "
       "ratio, by drawing runs again){}\n",
       all, below, above, untold > 0 ? fmt::format("; {} of too few windows", untold) : "");
 }
@@ -139,16 +140,17 @@ Result<Horizons> measure_horizons(Farm& farm, const Problem& fitted, const Param
   asked.log = {};
   std::vector<Tiles> tiles;
   std::vector<std::size_t> run_of;  // of each window, in the log
-  const bool afresh = fitted.ground->robot().command == CommandKind::kThrottleSteering;
+  const bool restarts = fitted.ground->robot().command == CommandKind::kThrottleSteering;
   asked.runs.clear();
   for (const double horizon : windows.horizons_s) {
     auto cut = cut_windows(runs, {{horizon}, windows.run_in_s});
     if (!cut) continue;  // longer than every run
     tiles.push_back({horizon, asked.log.trials.size(), cut->log.trials.size()});
     for (const Trial& trial : cut->log.trials) run_of.push_back(*trial.run);
-    if (afresh) *cut = begin_afresh(runs, *std::move(cut), windows.run_in_s, kWindowMargin_s);
-    const auto before = static_cast<std::uint32_t>(afresh ? asked.runs.size() : 0);
-    if (!afresh) asked.runs.clear();
+    if (restarts)
+      *cut = restart_at_measured_speed(runs, *std::move(cut), windows.run_in_s, kWindowMargin_s);
+    const auto before = static_cast<std::uint32_t>(restarts ? asked.runs.size() : 0);
+    if (!restarts) asked.runs.clear();
     for (CommandedRun& run : cut->runs) asked.runs.push_back(std::move(run));
     for (Trial& trial : cut->log.trials) {
       *trial.run += before;
@@ -176,10 +178,10 @@ Result<Horizons> measure_horizons(Farm& farm, const Problem& fitted, const Param
       const v1::Predicted& simulated = result.predict().predictions(static_cast<int>(i));
       const Trial& trial = asked.log.trials[i];
       const LoggedRun& run = runs.runs[run_of[i]];
-      horizons.windows.push_back({t.horizon_s, run.session, run.run, *trial.t_s, *trial.duration_s,
-                                  way_of(run, trial), error_of(from_proto(simulated.end()), trial),
-                                  error_of(kinematic[i], trial),
-                                  error_of(constant_end(run, trial), trial)});
+      horizons.windows.push_back(
+          {t.horizon_s, run.session, run.run, *trial.t_s, *trial.duration_s, travel_of(run, trial),
+           error_of(from_proto(simulated.end()), trial), error_of(kinematic[i], trial),
+           error_of(constant_end(run, trial), trial)});
       log_score += simulated.log_score() / static_cast<double>(t.count);
     }
     horizons.rows.push_back(row_of(std::span(horizons.windows).subspan(t.first, t.count),
@@ -201,12 +203,12 @@ std::string format_horizons(const Horizons& horizons) {
   text += fmt::format(" {:>9} | {:>20}  {:>20}\n", "", "mm", "mrad");
   for (const HorizonRow& row : horizons.rows) {
     const std::string name = row.horizon_s > 0 ? fmt::format("{:g}", row.horizon_s) : "whole";
-    text += fmt::format("{:>7} {:>7} {:>6.2f} |", name, row.windows, row.way_m) +
+    text += fmt::format("{:>7} {:>7} {:>6.2f} |", name, row.windows, row.travel_m) +
             cells(row.simulation) + cells(row.kinematics) + cells(row.constant_velocity) +
             fmt::format(" {:>9.3f} | {:>20}  {:>20}\n", row.log_score, ratio_cell(row.position),
                         ratio_cell(row.heading));
   }
-  text += surely_apart(horizons) + "kinematics:";
+  text += significantly_apart(horizons) + "kinematics:";
   for (std::size_t i = 0; i < horizons.kinematics.names.size(); ++i) {
     text += fmt::format(" {} {:.4g}", horizons.kinematics.names[i],
                         horizons.kinematics.values[static_cast<Eigen::Index>(i)]);
@@ -220,7 +222,7 @@ std::string windows_csv(const Horizons& horizons) {
       "constant_position,constant_heading\n";
   for (const WindowRow& w : horizons.windows) {
     text += fmt::format("{:g},{},{},{:.4f},{:.4f},{:.4f}", w.horizon_s, csv_field(w.session),
-                        csv_field(w.run), w.start_s, w.duration_s, w.way_m);
+                        csv_field(w.run), w.start_s, w.duration_s, w.travel_m);
     for (const WindowError& e : {w.simulation, w.kinematics, w.constant_velocity}) {
       text += fmt::format(",{:.6f},{:.6f}", e.position_m, e.heading_rad);
     }

@@ -32,14 +32,14 @@ struct WindowRow {
   double horizon_s = 0;  // 0: a whole run
   std::string session, run;
   double start_s = 0, duration_s = 0;
-  double way_m = 0;
+  double travel_m = 0;
   WindowError simulation, kinematics, constant_velocity;
 };
 
 struct HorizonRow {
   double horizon_s = 0;  // 0: whole runs
   std::size_t windows = 0;
-  double way_m = 0;      // median of the marker's way
+  double travel_m = 0;   // median of the marker's way
   double log_score = 0;  // of the simulation, mean, nats a window
   WindowErrors simulation, kinematics, constant_velocity;
   DrawnRatio position, heading;  // of the simulation's medians, over the kinematics'
@@ -57,7 +57,7 @@ struct Horizons {
 Result<Horizons> measure_horizons(Farm& farm, const Problem& fitted, const ParameterValues& values,
                                   const RunLog& runs, const WindowSettings& windows);
 
-// A table, and how many of its medians are surely below and above the kinematics'.
+// A table, and how many of its medians are significantly below and above the kinematics'.
 std::string format_horizons(const Horizons& horizons);
 
 // Every window as a headed CSV table (docs/formats.md).

@@ -198,9 +198,9 @@ void Catalogue::sizes() {
 
 void Catalogue::steering() {
   if (!is_steered(robot_)) return;
-  value("steering_offset", {}, "where the wheels point when told straight",
+  value("steering_offset", {}, "where the wheels point when commanded straight",
         {row("steering_offset")});
-  value("steering_gain", {"wheelbase"}, "the angle that is steered over that told",
+  value("steering_gain", {"wheelbase"}, "the angle that is steered over the commanded one",
         {row("steering_gain")});
   if (has("understeer")) {
     value("understeer", {"friction_anisotropy"}, "the loss of curvature with speed",

@@ -26,7 +26,7 @@ struct KinematicRow {
 
 struct GroundHypothesis {
   std::string name;
-  std::vector<std::string> aliases;  // other words for what logs cannot tell apart
+  std::vector<std::string> aliases;  // other words for what logs cannot distinguish
   std::string thing;                 // "the radius of the right wheels"
   std::vector<KinematicRow> freed;
   // A log that is the wrong way round or in another unit, put right; empty: nothing to put right.
@@ -34,7 +34,7 @@ struct GroundHypothesis {
   double metres = 1;  // logged positions times this are metres
   std::string remedy;
   bool only_more = false;  // less than 0 has no meaning
-  double price = 0;        // nats that it must tell more, having more values than others
+  double price = 0;        // nats that it must gain more, having more values than others
 };
 
 // Standard deviation of a value that is wrong (kPlausibleErrors).

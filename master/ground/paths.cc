@@ -217,9 +217,9 @@ std::string draw_paths(const DrivenPaths& paths, std::size_t most) {
                &svg);
   }
   const double y = static_cast<double>(down) * kPanel + 18;
-  const auto name = [&](double x, double row, const char* colour, const std::string& words) {
+  const auto name = [&](double x, double row, const char* colour, const std::string& label) {
     svg.line({x, row - 4}, {x + 22, row - 4}, {"none", colour, 3});
-    svg.text({x + 28, row}, words, {});
+    svg.text({x + 28, row}, label, {});
   };
   name(14, y, kLogged, "logged");
   name(110, y, kBefore,

@@ -16,7 +16,7 @@ constexpr double kFarOff = 20;
 
 // A grip that was never reached has no upper end that shows, and none below that does not: half of
 // how far it may fall, in its logarithm, before the log would be two nats less likely.
-constexpr double kTellsGrip = 2;  // nats
+constexpr double kLeastGripGain = 2;  // nats
 constexpr double kMostUnsureGrip = 2, kGripStep = 0.1;
 constexpr double kSharpGrip = 1.8;  // of its shape
 
@@ -31,7 +31,7 @@ double unsure_grip(const WindowFitter& fitter, const WindowFit& fit, std::size_t
       if (fit.rows[k].row.name == "grip_shape") values[static_cast<Eigen::Index>(k)] = kSharpGrip;
     }
     best = std::max(best, fitter.hold(fit.rows, values).objective);
-    if (fit.objective - best > kTellsGrip) return fall / 2;
+    if (fit.objective - best > kLeastGripGain) return fall / 2;
   }
   return kMostUnsureGrip / 2;
 }

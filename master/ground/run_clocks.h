@@ -14,9 +14,9 @@ struct RunClock {
   double delay_s = 0;   // from command to pose, its own
 };
 
-// The clocks of two to nine runs, where they are surely apart: where each run has its own, the
-// windows are by so much better told than by one for all.  More runs than these are drawn again as
-// they are, and tell of themselves.
+// The clocks of two to nine runs, where they are significantly apart: where each run has its own,
+// the windows are by so much better explained than by one for all.  More runs than these are drawn
+// again as they are, and stand for themselves.
 std::optional<std::vector<RunClock>> clocks_apart(const WindowFitter& fitter, const WindowFit& fit);
 
 }  // namespace gapfarm

@@ -5,8 +5,8 @@
 #include <utility>
 
 #include "master/ground/fit/edge.h"
+#include "master/ground/partial_result.h"
 #include "master/ground/report/ground_verdict.h"
-#include "master/ground/so_far.h"
 #include "master/ground/tolerances.h"
 
 namespace gapfarm {
@@ -77,7 +77,7 @@ Offer try_one(const WindowFitter& fitter, const GroundSearch& search,
 }
 
 bool chosen_before(const GroundSearch& search, std::size_t index) {
-  // Rows of what is offered that are free already have nothing to tell.
+  // Rows of what is offered that are free already have nothing to show.
   for (const KinematicRow& row : search.catalogue[index].freed) {
     const Eigen::Index at = row_index(search.rows, row.name);
     if (at < 0 || !search.rows[static_cast<std::size_t>(at)].free) return false;
@@ -85,7 +85,7 @@ bool chosen_before(const GroundSearch& search, std::size_t index) {
   return true;
 }
 
-// Nats that the next name must tell.  What changed is modelled with a form that is wrong by some
+// Nats that the next name must gain.  What changed is modelled with a form that is wrong by some
 // share, and the more it changed, the more is left over for others to explain.
 double least_gain(const GroundSearch& search) {
   if (!search.reference) return kLeastGroundGain;
@@ -122,15 +122,15 @@ Candidate predict_held_out(const WindowFitter& fitter, const GroundWork& work,
     if (j >= 0) start[static_cast<Eigen::Index>(i)] = fit.values[j];
   }
   Candidate candidate{
-      offer, std::move(fit), fit_left_out(fitter, rows, start), search.chain.back(), {}};
+      offer, std::move(fit), fit_held_out(fitter, rows, start), search.chain.back(), {}};
   const WindowSet& windows = fitter.windows();
   candidate.held_out_gain = held_out_gain(windows, candidate.held_out, candidate.before, work.seed);
   const bool first = offer.hypothesis == search.offers.back().front().hypothesis;
   if (!first || may_be_named(candidate.held_out_gain)) return candidate;
   // What gains most may show only once the others have moved a little.
   Candidate beside = candidate;
-  beside.before = fit_left_out(fitter, search.rows, search.fit.values);
-  beside.held_out = fit_left_out(fitter, beside.fit.rows, beside.fit.values);
+  beside.before = fit_held_out(fitter, search.rows, search.fit.values);
+  beside.held_out = fit_held_out(fitter, beside.fit.rows, beside.fit.values);
   beside.held_out_gain = held_out_gain(windows, beside.held_out, beside.before, work.seed);
   return may_be_named(beside.held_out_gain) ? beside : candidate;
 }
@@ -152,7 +152,7 @@ void name_candidate(const WindowSet& windows, const GroundWork& work,
   GroundStep step{
       chosen.offer.hypothesis, chosen.offer.gain, chosen.held_out_gain, chosen.before, {}};
   const auto add = [&](std::size_t hypothesis) {
-    auto& alike = step.not_told_apart;
+    auto& alike = step.not_distinguished;
     const bool there = std::find(alike.begin(), alike.end(), hypothesis) != alike.end();
     if (hypothesis != step.chosen && !there) alike.push_back(hypothesis);
   };
@@ -161,8 +161,8 @@ void name_candidate(const WindowSet& windows, const GroundWork& work,
     if (over.lo <= 0 && may_be_named(other.held_out_gain)) add(other.offer.hypothesis);
   }
   for (const Offer& offer : offers) {
-    if (offer.values.size() > 0 && offer.gain > chosen.offer.gain - kNotToldApart &&
-        offer.gain > kNotToldApart) {
+    if (offer.values.size() > 0 && offer.gain > chosen.offer.gain - kNotDistinguished &&
+        offer.gain > kNotDistinguished) {
       add(offer.hypothesis);
     }
   }
@@ -186,7 +186,7 @@ bool take_step(const WindowFitter& fitter, const GroundWork& work, GroundSearch*
     WindowFit fit;
     Offer offer = try_one(fitter, *search, slopes, i, &fit);
     tried.emplace_back(std::move(offer), std::move(fit));
-    tell_of_offers(work, *search, tried);
+    emit_offers(work, *search, tried);
   }
   std::stable_sort(tried.begin(), tried.end(),
                    [](const auto& a, const auto& b) { return a.first.gain > b.first.gain; });
@@ -220,7 +220,7 @@ bool take_step(const WindowFitter& fitter, const GroundWork& work, GroundSearch*
     return false;
   }
   name_candidate(fitter.windows(), work, offers, candidates, *chosen, search);
-  tell_of_steps(work, *search);
+  emit_steps(work, *search);
   return true;
 }
 
@@ -268,14 +268,14 @@ void measure_rest(const WindowFitter& fitter, const GroundWork& work, GroundSear
   std::vector<FitRow> all = search->rows;
   for (FitRow& row : all) row.free = true;
   search->free_fit = fitter.fit(all, {}, search->fit.values);
-  WindowFit moved = fit_left_out(fitter, search->rows, search->fit.values);
+  WindowFit moved = fit_held_out(fitter, search->rows, search->fit.values);
   const WindowFit named = search->chain.back();
   const WindowFit& before = search->reference ? moved : named;
   WindowFit best = before;
   std::swap(best, search->best);
   if (!best.nats.empty()) keep_if_best(search, std::move(best));
   keep_if_best(search, moved);
-  keep_if_best(search, fit_left_out(fitter, all, search->free_fit.values));
+  keep_if_best(search, fit_held_out(fitter, all, search->free_fit.values));
   search->closable = held_out_gain(search->windows, search->best, before, work.seed);
 }
 
@@ -296,19 +296,19 @@ Result<GroundSearch> search_ground(const GroundRobot& robot, const RunLog& log,
   if (Status s = search_faults(robot, settings, question, work.memo, &search); !s) {
     return s.error();
   }
-  tell_of_faults(work, search);
+  emit_faults(work, search);
   const WindowFitter fitter(robot, search.windows,
                             question.reference ? &*question.reference : nullptr, work.memo);
   stage(kCatalogueStage);
-  search.chain.push_back(fit_left_out(fitter, {}, {}));
+  search.chain.push_back(fit_held_out(fitter, {}, {}));
   while (search.steps.size() < kMostSteps && take_step(fitter, work, &search)) {
   }
   if (work.stopped && work.stopped()) return stopped;
-  tell_of_steps(work, search);
+  emit_steps(work, search);
   stage(kRestStage);
   measure_rest(fitter, work, &search);
   if (work.stopped && work.stopped()) return stopped;
-  tell_of_rest(work, search);
+  emit_rest(work, search);
   return search;
 }
 

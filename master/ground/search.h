@@ -39,7 +39,7 @@ struct GroundStep {
   // Held out: what it is compared with. What was named before, or that with all values moved within
   // their tolerances, where only then it shows.
   WindowFit before;
-  std::vector<std::size_t> not_told_apart;
+  std::vector<std::size_t> not_distinguished;
 };
 
 // What a search is about.
@@ -75,7 +75,7 @@ struct GroundSearch {
   std::vector<FitRow> rows;  // the file's with those chosen freed
   WindowFit fit;
   WindowFit free_fit;  // every row free
-  // Predictions of stretches that were left out: the file as it is, with the first thing that was
+  // Predictions of stretches that were held out: the file as it is, with the first thing that was
   // chosen, with the first two, ...
   std::vector<WindowFit> chain;
   // The best such prediction of all that was tried: the chain's last, values within their

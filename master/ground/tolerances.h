@@ -104,7 +104,7 @@ inline constexpr double kShareOfBest = 0.5;  // of the best gain, for an offer t
 // wrong in two ways, and a model that is wrong by some share leaves traces of the first.  Chosen:
 // traces in the cases come to 0.2.
 inline constexpr double kShareOfBestName = 0.25;
-inline constexpr double kNotToldApart = 2;  // nats: Bayes factors of 7 hardly tell
+inline constexpr double kNotDistinguished = 2;  // nats: Bayes factors of 7 hardly show
 // nats a window that may be left unexplained for "none": residuals 10 % smaller, 3 ln 1.1.
 inline constexpr double kToleratedGap = 0.286;
 // Of a fault of the log: residuals shrink by this ratio, and nats.  Chosen on the practice cases.

@@ -33,7 +33,7 @@ v1::Task task_of(const Overrides& at, const std::vector<std::uint32_t>& trials, 
 }
 
 // The point by what differs from the problem's own values, no more than can be read.
-std::string point_words(const Problem& problem, const Overrides& at) {
+std::string point_text(const Problem& problem, const Overrides& at) {
   constexpr std::size_t kMostNamed = 6;
   std::string text;
   std::size_t named = 0, others = 0;
@@ -52,7 +52,7 @@ std::string point_words(const Problem& problem, const Overrides& at) {
 Error bad_point(const Problem& problem, const Overrides& at, const v1::TaskResult& result) {
   const std::string why = result.message().empty() ? "" : " (" + result.message() + ")";
   return {"the simulation ended with " + v1::Outcome_Name(result.outcome()) + why +
-              point_words(problem, at),
+              point_text(problem, at),
           ErrorCode::kSimulation};
 }
 

@@ -44,9 +44,9 @@ class Predictor {
   // the speed of a robot whose parameters may know of none.
   Result<std::optional<std::vector<Pose>>> attempt_slower(const Overrides& at, double factor);
   const std::string& last_failure() const { return last_failure_; }
-  // Keeps the last failure as the reason why `what` ("floor_tilt") had to be left out.
-  void leave_out(const std::string& what) { left_out_.try_emplace(what, last_failure_); }
-  const std::map<std::string, std::string>& left_out() const { return left_out_; }
+  // Keeps the last failure as the reason why `what` ("floor_tilt") had to be omitted.
+  void exclude(const std::string& what) { excluded_.try_emplace(what, last_failure_); }
+  const std::map<std::string, std::string>& excluded() const { return excluded_; }
   // The farm's tasks behind a lone request for all trials.
   std::vector<v1::Task> tasks(const Overrides& at) const;
   // Nominal path of each command in its start frame.
@@ -73,7 +73,7 @@ class Predictor {
   std::vector<std::uint32_t> by_condition_;  // trials, those that share a simulation in a row
   std::uint64_t predictions_ = 0;
   std::string last_failure_;
-  std::map<std::string, std::string> left_out_;
+  std::map<std::string, std::string> excluded_;
 };
 
 }  // namespace gapfarm

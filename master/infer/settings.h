@@ -40,7 +40,7 @@ inline constexpr std::size_t kFewStarts = 16;
 inline constexpr int kMiddleSearch = 4, kLongSearch = 10;
 // Hypotheses that go on.
 inline constexpr std::size_t kLeaders = 5, kFinalists = 3;
-// Standard errors by which a gain, or a lead over a rival, is no chance: one case in forty.
+// Standard errors by which a gain, or a lead over an alternative, is no chance: one case in forty.
 inline constexpr double kSureGain = 2;
 
 }  // namespace gapfarm::infer

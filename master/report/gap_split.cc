@@ -41,12 +41,12 @@ std::optional<double> level_after(const NamedEffect& effect, GapUnit unit) {
   return std::nullopt;
 }
 
-struct UnitWords {
+struct UnitLabels {
   const char* title;
   const char* unit;
 };
 
-UnitWords words(GapUnit unit) {
+UnitLabels labels_of(GapUnit unit) {
   switch (unit) {
     case GapUnit::kNats:
       return {"Log score lost a trial", "nats"};
@@ -128,10 +128,10 @@ std::string stacked_bar(const GapSplit& split, bool before, double scale) {
     svg += fmt::format(
         R"(<svg x="{:.3f}%" width="{:.3f}%"><rect class="part {}" width="100%" height="100%"/>)",
         at, width, stretch.look.css_class);
-    // A name is drawn where the bar is surely wide enough for it, a badge where that fits.
+    // A name is drawn where the bar is certainly wide enough for it, a badge where that fits.
     const double share = width / 100;
-    const auto middle = [&](const char* css_class, const std::string& words) {
-      svg += fmt::format(R"(<text class="{}" x="50%" y="50%">{}</text>)", css_class, words);
+    const auto middle = [&](const char* css_class, const std::string& label) {
+      svg += fmt::format(R"(<text class="{}" x="50%" y="50%">{}</text>)", css_class, label);
     };
     if (share > 0.03 + 0.0135 * static_cast<double>(stretch.label.size())) {
       middle("wide", html_escaped(stretch.label));
@@ -149,7 +149,7 @@ std::string bars(const GapSplit& split) {
   // A gap of next to nothing shall not fill the bar.
   const double least = split.unit == GapUnit::kNats ? kLeastScaleNats : 0;
   const double scale = std::max({drawn_total(split, true), drawn_total(split, false), least});
-  const UnitWords w = words(split.unit);
+  const UnitLabels w = labels_of(split.unit);
   return fmt::format(
       R"(<div class="split"><h3>{}</h3>)"
       R"(<div class="split-row"><span class="split-name">before</span>{}<span class="split-value">{} {}</span></div>)"
@@ -195,7 +195,7 @@ std::string parts_table(const std::vector<GapSplit>& splits) {
         l.css_class, l.badge, html_escaped(part->label));
     for (const GapSplit& split : splits) {
       const GapPart* same = find_part(split, *part);
-      const UnitWords w = words(split.unit);
+      const UnitLabels w = labels_of(split.unit);
       rows += fmt::format(R"(<td class="number" data-label="{}">{}</td>)", w.unit,
                           same ? amount_text(*same, split) : "with the others");
     }
@@ -203,7 +203,7 @@ std::string parts_table(const std::vector<GapSplit>& splits) {
   }
   rows += R"(<tr class="sum"><th scope="row">tuned model, in all</th>)";
   for (const GapSplit& split : splits) {
-    rows += fmt::format(R"(<td class="number" data-label="{}">{}</td>)", words(split.unit).unit,
+    rows += fmt::format(R"(<td class="number" data-label="{}">{}</td>)", labels_of(split.unit).unit,
                         number_text(split.tuned));
   }
   return R"(<table class="parts" data-file="gap"><caption class="unseen">The gap by cause</caption><thead><tr><th scope="col">part</th>)"

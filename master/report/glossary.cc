@@ -17,7 +17,7 @@ struct Entry {
 
 constexpr Entry kEntries[] = {
     {"nat", "nat a trial",
-     "How much worse a model foretells where a trial ends, as the logarithm of the density that it "
+     "How much worse a model predicts where a trial ends, as the logarithm of the density that it "
      "gave to the measured pose. One nat less: the pose was thought e = 2.7 times less likely. 0.1 "
      "is hardly seen in a plot, 1 is."},
     {"gap", "gap",
@@ -43,7 +43,7 @@ constexpr Entry kEntries[] = {
      "go on: the model lacks something, or the range is too narrow."},
     {"correlation", "correlation",
      "From −1 to 1: how far a change of one parameter can be made up for by another. Near ±1 the "
-     "log tells only a combination of the two."},
+     "log shows only a combination of the two."},
     {"rms", "rms",
      "Root mean square: the square root of the mean of the squared errors. A few far trials count "
      "a lot."},
@@ -60,7 +60,7 @@ constexpr Entry kEntries[] = {
      "chance."},
     {"gain", "gain",
      "By how many nats, over all trials together, the effect at its best strength explains the "
-     "residuals better than retuning does. Below about 9 it is not told from luck."},
+     "residuals better than retuning does. Below about 9 it is not distinguished from luck."},
     {"closed", "closes",
      "The share of the gap, in nats, that went away when the effect was added. mm and mrad, which "
      "include the floor, shrink less."},
@@ -77,7 +77,7 @@ constexpr Entry kEntries[] = {
      "The middle nine tenths of the last generation's values. It is narrow where the search has "
      "settled, which does not mean that the data determine the value: `gapfarm determine` says "
      "that."},
-    {"validation", "kept apart",
+    {"validation", "held out",
      "Trials of other files, named in the config, that evolution never saw."},
     {"baseline", "without a simulation",
      "Predictions that need no simulation: what the logged drives themselves did. A simulation "
@@ -92,9 +92,9 @@ const Entry* find(std::string_view id) {
 
 }  // namespace
 
-std::string term(std::string_view id, std::string_view words) {
+std::string term(std::string_view id, std::string_view shown) {
   assert(find(id) != nullptr);
-  return fmt::format(R"(<a class="term" href="#term-{}">{}</a>)", id, html_escaped(words));
+  return fmt::format(R"(<a class="term" href="#term-{}">{}</a>)", id, html_escaped(shown));
 }
 
 std::string glossary_section(const std::vector<std::string_view>& ids) {

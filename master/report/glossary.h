@@ -9,7 +9,7 @@ namespace gapfarm {
 
 // `words` as a link to what the glossary says of `id`; pages show that beside it on hover or focus.
 // REQUIRES: the glossary has `id`.
-std::string term(std::string_view id, std::string_view words);
+std::string term(std::string_view id, std::string_view shown);
 
 // The section with the explanations of `ids`, in this order; it prints, too.
 std::string glossary_section(const std::vector<std::string_view>& ids);

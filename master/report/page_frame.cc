@@ -45,7 +45,7 @@ std::string head(const PageFrame& frame) {
   return html + "</head>\n";
 }
 
-// Patterns tell the parts of the gap apart without colour.
+// Patterns distinguish the parts of the gap without colour.
 constexpr const char* kHatches =
     R"html(<svg class="hatches" width="0" height="0" aria-hidden="true"><defs>
 <pattern id="hatch-1" width="8" height="8" patternUnits="userSpaceOnUse"><rect class="ground-1" width="8" height="8"/></pattern>
@@ -61,8 +61,8 @@ constexpr const char* kHatches =
 
 std::string top(const PageFrame& frame) {
   std::string links;
-  for (const auto& [id, words] : frame.places) {
-    links += fmt::format(R"(<a href="#{}">{}</a>)", id, words);
+  for (const auto& [id, label] : frame.places) {
+    links += fmt::format(R"(<a href="#{}">{}</a>)", id, label);
   }
   return fmt::format(
       R"(<a class="skip" href="#{}">Skip to the first section</a>

@@ -18,7 +18,7 @@ std::string value_with_unit(double value, const std::string& unit) {
 
 std::string parameter_cell(std::string_view label, const std::string& html,
                            const char* css_class = "") {
-  // Where rows become cards, on a narrow screen, cells without content are left out.
+  // Where rows become cards, on a narrow screen, cells without content are omitted.
   const char* empty = html.empty() || html == "–" ? " empty" : "";
   return fmt::format(R"(<td class="{}{}" data-label="{}">{}</td>)", css_class, empty, label, html);
 }
@@ -51,11 +51,11 @@ std::string row_html(const ParameterRow& row, const ParameterColumns& columns) {
       row.choice.empty() ? number_text(row.lower) + " to " + number_text(row.upper) : "";
   return fmt::format(R"(<tr><th scope="row"><code>{}</code><small>{}</small></th>)",
                      html_escaped(row.key), html_escaped(row.summary)) +
-         parameter_cell(columns.before.words,
+         parameter_cell(columns.before.shown,
                         row.before ? value_with_unit(*row.before, row.unit) : "–", "number") +
-         parameter_cell(columns.after.words, "<strong>" + after + "</strong>", "number") +
+         parameter_cell(columns.after.shown, "<strong>" + after + "</strong>", "number") +
          parameter_cell(
-             columns.interval.words,
+             columns.interval.shown,
              row.lo && row.hi ? number_text(*row.lo, 4) + " to " + number_text(*row.hi, 4) : "–",
              "number") +
          parameter_cell("searched between", bounds_svg(row) + "<small>" + between + "</small>",
@@ -68,7 +68,7 @@ std::string plain_head(const std::string& html, const char* css_class = "") {
 }
 
 std::string column_head(const TermColumn& column) {
-  return plain_head(term(column.term, column.words), "number");
+  return plain_head(term(column.term, column.shown), "number");
 }
 
 std::string warnings(const std::vector<ParameterRow>& rows) {
@@ -92,7 +92,7 @@ std::string correlations_html(const std::vector<ParameterCorrelation>& correlati
                          html_escaped(c.b), number_text(c.r, 2));
   }
   return "<h3>What makes up for what</h3><p>Strong " + term("correlation", "correlations") +
-         ": the log tells a combination of the two better than either.</p><ul "
+         ": the log shows a combination of the two better than either.</p><ul "
          "class=\"correlations\">" +
          items + "</ul>";
 }
@@ -102,7 +102,8 @@ std::string toml_value(const ParameterRow& row) {
   return fmt::format("{:.6g}", row.after);
 }
 
-// Where a population lay is no interval of anything: there what `gapfarm determine` said stands.
+// Where a population lay is no interval of anything: there what `gapfarm determine` reported
+// stands.
 std::string toml_comment(const ParameterRow& row, bool intervals) {
   std::string text = row.unit == "-" ? "" : row.unit;
   if (!intervals && !row.note.empty()) text += (text.empty() ? "" : "; ") + row.note;

@@ -11,7 +11,7 @@ namespace gapfarm {
 
 // How a page calls a column, and which word of the glossary (glossary.h) says what it is.
 struct TermColumn {
-  std::string_view term, words;
+  std::string_view term, shown;
 };
 struct ParameterColumns {
   TermColumn before, after, interval;

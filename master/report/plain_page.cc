@@ -26,12 +26,12 @@ std::string_view without_declaration(std::string_view svg) {
 
 }  // namespace
 
-void PlainPage::heading(std::string_view words) {
-  body_ += fmt::format("<h2>{}</h2>\n", html_escaped(words));
+void PlainPage::heading(std::string_view content) {
+  body_ += fmt::format("<h2>{}</h2>\n", html_escaped(content));
 }
 
-void PlainPage::paragraph(std::string_view words) {
-  body_ += fmt::format("<p>{}</p>\n", html_escaped(words));
+void PlainPage::paragraph(std::string_view content) {
+  body_ += fmt::format("<p>{}</p>\n", html_escaped(content));
 }
 
 void PlainPage::table(const std::vector<std::string>& header,
@@ -49,9 +49,9 @@ void PlainPage::table(const std::vector<std::string>& header,
   body_ += "</tbody></table></div>\n";
 }
 
-void PlainPage::picture(std::string_view svg, std::string_view words) {
-  body_ += fmt::format("<figure role=\"img\" aria-label=\"{}\">{}</figure>\n", html_escaped(words),
-                       without_declaration(svg));
+void PlainPage::picture(std::string_view svg, std::string_view content) {
+  body_ += fmt::format("<figure role=\"img\" aria-label=\"{}\">{}</figure>\n",
+                       html_escaped(content), without_declaration(svg));
 }
 
 std::string PlainPage::finish() const {

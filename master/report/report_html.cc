@@ -20,13 +20,13 @@ constexpr const char* kDrivenEnds =
 constexpr const char* kDrivenResiduals =
     R"(Measured minus predicted, along the axes of the predicted end pose.)";
 
-std::string or_else(const std::string& words, const char* driven) {
-  return words.empty() ? driven : html_escaped(words);
+std::string or_else(const std::string& label, const char* driven) {
+  return label.empty() ? driven : html_escaped(label);
 }
 
 std::string poses_section(const Diagnosis& diagnosis) {
   return R"(<section id="poses"><h2>Measured against predicted end poses</h2>
-<p>)" + or_else(diagnosis.words.ends, kDrivenEnds) +
+<p>)" + or_else(diagnosis.labels.ends, kDrivenEnds) +
          "</p>" +
          plot_key(measured_key() + model_keys("tuned base model", "final model, with effects")) +
          R"(<div class="controls" id="pose-controls"></div>
@@ -44,7 +44,7 @@ std::string residuals_section(const Diagnosis& diagnosis) {
   }
   return html + R"(<h3 id="residual-title">)" + term("residual", "Residuals") +
          R"( against what may drive them</h3>
-<p>)" + or_else(diagnosis.words.residuals, kDrivenResiduals) +
+<p>)" + or_else(diagnosis.labels.residuals, kDrivenResiduals) +
          R"( Lines join the means of neighbouring trials, with 90 % intervals.</p>)" +
          plot_key(model_keys("tuned base model", "final model, with effects")) +
          R"(<div class="controls" id="residual-controls"></div>
@@ -71,7 +71,7 @@ std::string shape_section(const Diagnosis& diagnosis) {
         R"(<div class="controls" id="shape-controls"></div><div class="grid" id="shape-plots"></div>)";
     html += kNoScript;
   }
-  if (diagnosis.residual && diagnosis.residual->correction.strays) {
+  if (diagnosis.residual && diagnosis.residual->correction.outliers) {
     html += R"(<div class="grid" id="stray-plots"></div>)";
     html += kNoScript;
   }
@@ -92,7 +92,7 @@ std::string report_html(const Diagnosis& diagnosis, bool served) {
   frame.title = diagnosis.headline.empty() ? "gapfarm diagnosis" : diagnosis.headline;
   frame.brand = "diagnosis";
   frame.served = served;
-  const bool driven = diagnosis.words.ends.empty();
+  const bool driven = diagnosis.labels.ends.empty();
   Json page = summary_json(diagnosis);
   page["drives"] = drives_json(diagnosis.drives);
   page["models"] = {{"tuned", "tuned"}, {"final", "final"}};

@@ -11,14 +11,14 @@
 namespace gapfarm {
 namespace {
 
-struct VerdictWords {
+struct VerdictLabels {
   const char* css_class;
   const char* sign;
   const char* title;
   const char* meaning;  // when the diagnosis has no headline of its own
 };
 
-VerdictWords verdict_words(Verdict verdict) {
+VerdictLabels verdict_labels(Verdict verdict) {
   switch (verdict) {
     case Verdict::kEffect:
       return {"verdict-effect", "◆", "Effect found", "A known effect explains the gap."};
@@ -60,7 +60,7 @@ std::string tile(const std::string& title, const GapFigures& figures, bool chang
 }
 
 std::string cell(const char* label, const std::string& html, const char* css_class = "") {
-  // Where rows become cards, on a narrow screen, cells without content are left out.
+  // Where rows become cards, on a narrow screen, cells without content are omitted.
   const char* empty = html.empty() || html == "–" ? " empty" : "";
   return fmt::format(R"(<td class="{}{}" data-label="{}">{}</td>)", css_class, empty, label, html);
 }
@@ -191,11 +191,11 @@ std::string screened_row(const Diagnosis& diagnosis, const Screened& s, double l
 }  // namespace
 
 std::string summary_section(const Diagnosis& diagnosis) {
-  const VerdictWords words = verdict_words(diagnosis.verdict);
+  const VerdictLabels labels = verdict_labels(diagnosis.verdict);
   std::string html = fmt::format(
       R"(<section id="summary"><p class="verdict {}"><span aria-hidden="true">{}</span> {}</p><h1 data-file="diagnosis">{}</h1>)",
-      words.css_class, words.sign, words.title,
-      html_escaped(diagnosis.headline.empty() ? words.meaning : diagnosis.headline));
+      labels.css_class, labels.sign, labels.title,
+      html_escaped(diagnosis.headline.empty() ? labels.meaning : diagnosis.headline));
   if (!diagnosis.action.empty()) {
     html += R"(<p class="action"><span aria-hidden="true">→</span> )" +
             html_escaped(diagnosis.action) + "</p>";
@@ -224,7 +224,7 @@ std::string summary_section(const Diagnosis& diagnosis) {
 
 std::string sanity_section(const Diagnosis& diagnosis) {
   if (diagnosis.sanity.empty()) return "";
-  std::string html = R"(<section id="sanity"><h2>What is doubtful</h2><ul class="cautions">)";
+  std::string html = R"(<section id="sanity"><h2>Data-quality warnings</h2><ul class="cautions">)";
   for (const SanityFinding& f : diagnosis.sanity) {
     html += "<li><p><code>" + html_escaped(f.name) + "</code>: " + html_escaped(f.text) +
             "</p><p><strong>What to do:</strong> " + html_escaped(f.remedy) + "</p></li>";

@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "common/base/try.h"
-#include "common/progress/words.h"
+#include "common/progress/number_text.h"
 #include "master/evolve/evaluation.h"
 
 namespace gapfarm {
@@ -154,7 +154,7 @@ void FarmProgressWriter::on_generation(const GenerationRecord& record, std::opti
   refresh(clock_.now_s());
 }
 
-std::string FarmProgressWriter::words(const Pace& pace) const {
+std::string FarmProgressWriter::message(const Pace& pace) const {
   std::string text = "generation " + std::to_string(generation_ + 1) + " of " +
                      std::to_string(settings_.generations) +
                      (best_.empty() ? "" : ", best " + best_);
@@ -181,8 +181,8 @@ void FarmProgressWriter::refresh(double now_s) {
   last_.time_left_s = time_left_s(settings_, pace);
   const std::vector<WorkerStatus> workers = farm_.farm().workers();
   const bool waited = !last_.waiting.empty();
-  last_.waiting = wait_.words(workers.size(), now_s).value_or("");
-  watcher_.progress("evolve: " + (last_.waiting.empty() ? words(pace) : last_.waiting),
+  last_.waiting = wait_.message(workers.size(), now_s).value_or("");
+  watcher_.progress("evolve: " + (last_.waiting.empty() ? message(pace) : last_.waiting),
                     waited == last_.waiting.empty());
   if (now_s - written_s_ < kWriteInterval_s) return;
   written_s_ = now_s;

@@ -69,7 +69,7 @@ class FarmProgressWriter {
 
  private:
   void refresh(double now_s);
-  std::string words(const Pace& pace) const;
+  std::string message(const Pace& pace) const;
 
   RunStore& store_;
   FarmOfRun& farm_;

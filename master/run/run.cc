@@ -11,7 +11,7 @@
 #include "master/evolve/staged.h"
 #include "master/ground/fit/simulated_start.h"
 #include "master/run/baseline_notes.h"
-#include "master/run/leave_behind.h"
+#include "master/run/outputs.h"
 
 namespace gapfarm {
 namespace {
@@ -28,14 +28,14 @@ class SteadyClock : public EvolveClock {
 struct RunInputs {
   std::optional<Checkpoint> checkpoint;
   StagePlan plan;
-  std::optional<Problem> kept_apart;
+  std::optional<Problem> held_out;
 };
 
 Result<RunInputs> read_inputs(const RunStore& store, const Config& config) {
   ASSIGN_OR_RETURN(auto checkpoint, store.checkpoint());
   ASSIGN_OR_RETURN(auto plan, read_stages(config));
-  ASSIGN_OR_RETURN(auto kept_apart, read_validation(plan, config));
-  return RunInputs{std::move(checkpoint), std::move(plan), std::move(kept_apart)};
+  ASSIGN_OR_RETURN(auto held_out, read_validation(plan, config));
+  return RunInputs{std::move(checkpoint), std::move(plan), std::move(held_out)};
 }
 
 // Where the search of a ground robot's values begins; nothing where the config has the say, and
@@ -53,9 +53,9 @@ Result<std::optional<SimulatedStart>> start_of(const RunInputs& inputs, const Ru
       "a window more than with the values of the robot's own kinematics",
       start.simulations, start.starts, start.starts == 1 ? "" : "s", start.gain));
   watcher.note(fmt::format(
-      "on stretches left out of the fit the simulation foretells {:.2f} nats a window {} than the "
+      "on stretches held out of the fit the simulation predicts {:.2f} nats a window {} than the "
       "kinematics{}; no typical error there is more than {:.2f} times theirs",
-      std::abs(start.left_out_gain), start.left_out_gain < 0 ? "less" : "more",
+      std::abs(start.held_out_gain), start.held_out_gain < 0 ? "less" : "more",
       start.kinematic ? ", too little to leave the kinematics' values" : "", start.worst_ratio));
   return std::optional(std::move(start));
 }
@@ -84,7 +84,7 @@ Status write_end(RunStore& store, Progress progress, RunState state, const std::
   return store.set_progress(progress);
 }
 
-// How the run's results do on what was kept apart.
+// How the run's results do on what was held out.
 Result<std::vector<Validated>> validated_by(const RunStore& store, const Problem& apart, Farm& farm,
                                             const Genome& best) {
   ASSIGN_OR_RETURN(const auto checkpoint, store.checkpoint());
@@ -93,29 +93,29 @@ Result<std::vector<Validated>> validated_by(const RunStore& store, const Problem
   return validate(farm, apart, stages, best);
 }
 
-// What a finished run is for: its model, held against trials kept apart and against no simulation.
+// What a finished run is for: its model, held against trials held out and against no simulation.
 Status leave_model(RunStore& store, const RunRequest& run, const RunInputs& inputs, Farm& farm,
                    RunWatcher& watcher, RunSummary& summary) {
   const Genome& best = summary.evolved.best->genome;
-  if (inputs.kept_apart) {
-    watcher.read(inputs.kept_apart->log);
-    ASSIGN_OR_RETURN(auto validated, validated_by(store, *inputs.kept_apart, farm, best));
-    summary.kept_apart = inputs.kept_apart->log.trials.size();
+  if (inputs.held_out) {
+    watcher.read(inputs.held_out->log);
+    ASSIGN_OR_RETURN(auto validated, validated_by(store, *inputs.held_out, farm, best));
+    summary.held_out = inputs.held_out->log.trials.size();
     summary.validated = std::move(validated);
   }
   const Status left =
-      leave_behind(store, run.problem, run.config, summary.evolved, farm, summary.validated);
+      write_outputs(store, run.problem, run.config, summary.evolved, farm, summary.validated);
   if (!left) return left;
   ASSIGN_OR_RETURN(const auto beside, baseline_note_of_run(run.problem, best, farm));
   if (!beside.empty()) watcher.note(beside);
-  for (const char* name : kLeftBehind) summary.files.push_back((store.run() / name).string());
+  for (const char* name : kOutputFiles) summary.files.push_back((store.run() / name).string());
   return {};
 }
 
 }  // namespace
 
 Error stopped_by(RunStore& store, Error error, const Progress& last) {
-  // Where even that cannot be written, status finds the master gone, and the error is told.
+  // Where even that cannot be written, status finds the master gone, and the error is reported.
   static_cast<void>(write_end(store, last, RunState::kStopped, error.message));
   return error;
 }

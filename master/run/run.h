@@ -20,17 +20,17 @@ struct RunRequest {
   const Config& config;  // overrides applied; its log may be empty
   const Problem& problem;
   Log& log;
-  // Called once all inputs are known to be sound.  What happens in the farm is told to `keep`.
+  // Called once all inputs are known to be sound.  What happens in the farm goes to `keep`.
   std::function<Result<std::unique_ptr<FarmOfRun>>(std::function<void(const FarmEvent&)> keep)>
       open_farm;
-  std::function<bool()> stop_requested;  // may be empty; the farm is told by its own means
+  std::function<bool()> stop_requested;  // may be empty; the farm is notified separately
 };
 
 struct RunSummary {
   EvolveSummary evolved;
   // Tasks given up, by this master and those before it.
   std::uint64_t given_up = 0;
-  std::size_t kept_apart = 0;        // trials or windows
+  std::size_t held_out = 0;          // trials or windows
   std::vector<Validated> validated;  // on those
   // Left in the run's folder; none where the run was stopped, or nothing ended well.
   std::vector<std::string> files;
@@ -39,7 +39,7 @@ struct RunSummary {
 };
 
 // Evolves from the store's last checkpoint and commits every generation.  Unless it was stopped it
-// holds the best against what was kept apart, and leaves model.toml, report.html, poses.svg and
+// holds the best against what was held out, and leaves model.toml, report.html, poses.svg and
 // fitness.svg behind.  Errors: of the store, the farm, what [validation] names; the store says then
 // that the run stopped, and why.
 Result<RunSummary> evolve_run(RunStore& store, const RunRequest& request, RunWatcher& watcher);

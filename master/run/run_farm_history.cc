@@ -11,7 +11,7 @@
 #include <utility>
 
 #include "common/base/try.h"
-#include "common/progress/words.h"
+#include "common/progress/number_text.h"
 #include "master/store/run_lock.h"
 #include "master/store/run_status.h"
 
@@ -30,7 +30,7 @@ constexpr std::size_t kMostSpans = 40;
 constexpr std::size_t kMostRows = 200;  // in the table
 
 // Every count of a farm, for people.
-constexpr std::pair<std::uint64_t FarmTally::*, const char*> kTallyWords[] = {
+constexpr std::pair<std::uint64_t FarmTally::*, const char*> kTallyLabels[] = {
     {&FarmTally::retries, "retries: jobs given out again"},
     {&FarmTally::copies, "copies: jobs given to a second worker, the first took long"},
     {&FarmTally::compared, "audits and copies: answers held against another worker's"},
@@ -44,7 +44,7 @@ constexpr std::pair<std::uint64_t FarmTally::*, const char*> kTallyWords[] = {
     {&FarmTally::refused_keys, "of them refused: keys that are not listed"},
     {&FarmTally::failed_handshakes, "of them failed: handshakes"},
     {&FarmTally::dropped_links, "of them closed by the limits"}};
-static_assert(std::size(kTallyWords) == std::tuple_size_v<decltype(FarmTally::kRows)>);
+static_assert(std::size(kTallyLabels) == std::tuple_size_v<decltype(FarmTally::kRows)>);
 
 std::vector<std::string> log_tail(const std::filesystem::path& run) {
   std::ifstream file(run / "log.txt", std::ios::binary | std::ios::ate);
@@ -84,8 +84,8 @@ void add_facts(const RunStatus& status, RunFarm* farm) {
   add("last heard of", day_and_time(progress.heartbeat_unix_s) + " on " + progress.host);
   if (progress.epoch > 1) add("masters so far", std::to_string(progress.epoch));
   if (status.quarantined > 0) add("tasks given up", std::to_string(status.quarantined));
-  for (const auto& [count, words] : kTallyWords) {
-    farm->tally.emplace_back(words, std::to_string(progress.farm.*count));
+  for (const auto& [count, tally_label] : kTallyLabels) {
+    farm->tally.emplace_back(tally_label, std::to_string(progress.farm.*count));
   }
 }
 
@@ -196,7 +196,7 @@ Status add_farm(const RunReader& reader, RunReport* report) {
   RunFarm& farm = report->farm;
   farm.state = run_state_name(status.state);
   const bool running = status.state == RunState::kRunning;
-  farm.told = running ? status.progress.waiting : status.stop_reason;
+  farm.message = running ? status.progress.waiting : status.stop_reason;
   add_facts(status, &farm);
   RETURN_IF_ERROR(add_workers(reader, running, &farm));
   for (auto it = status.incidents.rbegin(); it != status.incidents.rend(); ++it) {

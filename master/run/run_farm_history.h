@@ -1,4 +1,4 @@
-// What a run's store tells of its farm, for its page.
+// What a run's store shows of its farm, for its page.
 #pragma once
 
 #include "common/base/result.h"

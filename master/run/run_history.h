@@ -1,4 +1,4 @@
-// What a run's store tells of how it went on, for its page.
+// What a run's store shows of how it went on, for its page.
 #pragma once
 
 #include "common/base/result.h"

@@ -27,14 +27,15 @@ namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
-struct Foretold {
+struct PredictedLogEnd {
   Pose X_SE{kNaN, kNaN, kNaN};
   Eigen::Matrix3d cov = Eigen::Matrix3d::Constant(kNaN);
   Eigen::Vector3d residual = Eigen::Vector3d::Constant(kNaN);
   double score = kNaN;
 };
 
-Foretold foretold(const PredictionOfLog* prediction, std::size_t trial, const Trial& logged) {
+PredictedLogEnd predicted(const PredictionOfLog* prediction, std::size_t trial,
+                          const Trial& logged) {
   if (prediction == nullptr) return {};
   const v1::Predicted& p = prediction->prediction.predictions(static_cast<int>(trial));
   const Pose X_WP = from_proto(p.end());
@@ -160,7 +161,7 @@ RunOutcome run_outcome(const Problem& problem, const PredictionOfLog* before,
     trial.level = std::max(std::abs(driven[i].left), std::abs(driven[i].right));
     trial.X_WS = logged.X_WS;
     trial.measured = between(logged.X_WS, logged.X_WE);
-    const Foretold first = foretold(before, i, logged), last = foretold(after, i, logged);
+    const PredictedLogEnd first = predicted(before, i, logged), last = predicted(after, i, logged);
     trial.tuned = first.X_SE, trial.final_ = last.X_SE;
     trial.tuned_cov = first.cov, trial.final_cov = last.cov;
     trial.tuned_residual = first.residual, trial.final_residual = last.residual;
@@ -173,7 +174,7 @@ RunOutcome run_outcome(const Problem& problem, const PredictionOfLog* before,
   return outcome;
 }
 
-Result<std::optional<Problem>> kept_apart_of(const RunInfo& info, const Problem& problem) {
+Result<std::optional<Problem>> held_out_of(const RunInfo& info, const Problem& problem) {
   Config config;
   config.path = info.config_path;
   config.text = info.config_text;
@@ -215,8 +216,8 @@ Result<RunReport> read_run_report(const RunQuestion& question) {
   ASSIGN_OR_RETURN(auto outcome, stored_outcome(reader, last, &report));
   report.outcome = std::move(outcome);
   RETURN_IF_ERROR(add_history(reader, problem, generations, question, &report));
-  const auto apart = kept_apart_of(info, problem);
-  if (apart && *apart) report.kept_apart = (*apart)->log.trials.size();
+  const auto apart = held_out_of(info, problem);
+  if (apart && *apart) report.held_out = (*apart)->log.trials.size();
   report.windows = problem.ground != nullptr;
   report.headline = headline(report);
   report.action = action(report, info);

@@ -25,9 +25,9 @@ inline constexpr const char* kOutcomeDocument = "outcome";
 // problem that cannot be read.
 Result<RunReport> read_run_report(const RunQuestion& question);
 
-// The problem on what the run's config keeps apart; none when it names nothing.  Errors: of reading
+// The problem on what the run's config holds out; none when it names nothing.  Errors: of reading
 // that, which may have gone since.
-Result<std::optional<Problem>> kept_apart_of(const RunInfo& info, const Problem& problem);
+Result<std::optional<Problem>> held_out_of(const RunInfo& info, const Problem& problem);
 
 // Beside a run: what `gapfarm determine --out` wrote of it.
 inline constexpr const char* kDeterminedFile = "determined.csv";

@@ -1,4 +1,4 @@
-// What those who watch a run are told while it goes on.
+// What those who watch a run hear while it goes on.
 #pragma once
 
 #include <string_view>

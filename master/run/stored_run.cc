@@ -50,7 +50,7 @@ Result<Config> stored_config(const RunInfo& info, const EvolutionOverrides& over
   return config;
 }
 
-Result<Model> best_so_far(const RunReader& run) {
+Result<Model> current_best(const RunReader& run) {
   ASSIGN_OR_RETURN(const auto generations, run.generations());
   const std::string name = run.run().string();
   if (generations.empty()) {

@@ -23,6 +23,6 @@ Result<Config> stored_config(const RunInfo& info, const EvolutionOverrides& over
 
 // The best of the last committed generation.  Errors: none was committed, or nothing of it ends
 // well.
-Result<Model> best_so_far(const RunReader& run);
+Result<Model> current_best(const RunReader& run);
 
 }  // namespace gapfarm

@@ -19,7 +19,7 @@ Result<std::optional<Problem>> read_validation(const StagePlan& plan, const Conf
       return file == other || std::filesystem::equivalent(file, other, code);
     };
     if (std::any_of(config.trial_files.begin(), config.trial_files.end(), same)) {
-      return Error{file + " is both evolved on and kept apart; a validation takes other trials"};
+      return Error{file + " is both evolved on and held out; a validation takes other trials"};
     }
   }
   Problem apart = config.problem;

@@ -16,7 +16,7 @@ struct Validated {
   std::optional<double> fitness;
 };
 
-// The problem with what [validation] keeps apart in place of its trials; none when it names none.
+// The problem with what [validation] holds out in place of its trials; none when it names none.
 // Errors: of reading, a file or folder that is among those evolved on.
 Result<std::optional<Problem>> read_validation(const StagePlan& plan, const Config& config);
 
@@ -24,7 +24,7 @@ Result<std::optional<Problem>> read_validation(const StagePlan& plan, const Conf
 // read_validation().
 Status check_runnable(const Config& config);
 
-// Fitness on what was kept apart of the problem's own values, each stage's result and the best.
+// Fitness on what was held out of the problem's own values, each stage's result and the best.
 Result<std::vector<Validated>> validate(Farm& farm, const Problem& apart,
                                         const std::vector<Genome>& stages, const Genome& best);
 

@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "common/base/try.h"
-#include "common/progress/words.h"
+#include "common/progress/number_text.h"
 #include "master/report/glossary.h"
 #include "master/report/html.h"
 #include "master/report/page_frame.h"
@@ -57,12 +57,12 @@ std::string command_tiles(const CommandRecord& r) {
 // Words that need it lead to their explanation.
 std::string with_terms(const std::string& text) {
   std::string html = html_escaped(text);
-  for (const auto& [id, words] : {std::pair{"nat", "nats a trial"},
+  for (const auto& [id, label] : {std::pair{"nat", "nats a trial"},
                                   {"rms", "root mean square"},
                                   {"gain", "gain, nats"},
                                   {"gap", "gap, nats"},
                                   {"held-out", "trials that a fit did not see"}}) {
-    const std::string found = words;
+    const std::string found = label;
     if (const auto at = html.find(found); at != html.npos) {
       html.replace(at, found.size(), term(id, found));
     }
@@ -86,7 +86,7 @@ std::string finding_html(const Finding& found) {
 }
 
 // Whether stage `k` of the plan is over, in work or to come, and how long it took.
-std::string stage_words(const CommandRecord& r, std::size_t k) {
+std::string stage_text(const CommandRecord& r, std::size_t k) {
   const double began_s = r.plan[k].began_unix_s;
   const bool last = k + 1 >= r.stage_number;
   if (k + 1 > r.stage_number) return r.state == "running" ? "to come" : "not reached";
@@ -109,7 +109,7 @@ std::string findings_list(const CommandRecord& r) {
     const bool now = r.state == "running" && k + 1 == r.stage_number;
     html +=
         fmt::format(R"(<li{}><h3>{} <small>{}</small></h3>)", now ? R"( aria-current="step")" : "",
-                    html_escaped(r.plan[k].name), stage_words(r, k));
+                    html_escaped(r.plan[k].name), stage_text(r, k));
     bool any = false;
     for (const auto& [stage, found] : r.findings) {
       if (stage != r.plan[k].name) continue;
@@ -174,24 +174,26 @@ Result<std::string> command_page(const FoundWork& found, double now_unix_s) {
   ASSIGN_OR_RETURN(const auto record, command_status(found.path, now_unix_s));
   const CommandRecord r = record.value_or(CommandRecord());
   ASSIGN_OR_RETURN(const auto stages, read_stages(answer_file(found.path)));
-  const bool tells = r.command == "diagnose";
+  const bool is_diagnosis = r.command == "diagnose";
   PageFrame frame;
   frame.served = true;
   frame.title = r.command + " " + r.state + ": " + found.name;
   frame.brand = r.command.empty() ? "simulations" : r.command;
   frame.places = {{"summary", "State"}};
-  if (tells) frame.places.emplace_back("found", "Found so far");
+  if (is_diagnosis) frame.places.emplace_back("found", "Found so far");
   frame.places.insert(frame.places.end(), {{"stages", "Simulations"}, {"workers", "Workers"}});
-  if (tells) frame.places.emplace_back("words", "Words");
-  const std::string told =
+  if (is_diagnosis) frame.places.emplace_back("words", "Words");
+  const std::string message =
       r.state == "running" ? (r.waiting.empty() ? r.stage : r.waiting) : r.reason;
   frame.body = fmt::format(
       R"(<section id="summary"><div id="now" data-live><p class="verdict verdict-none">{}</p><h1 data-file="{}">{}</h1><p>{}</p></div>{}</section>)",
       html_escaped(r.state.empty() ? "unknown" : r.state), html_escaped(r.command),
-      html_escaped(told.empty() ? found.name : told), html_escaped(r.arguments), command_tiles(r));
-  if (tells) frame.body += found_section(r);
+      html_escaped(message.empty() ? found.name : message), html_escaped(r.arguments),
+      command_tiles(r));
+  if (is_diagnosis) frame.body += found_section(r);
   frame.body += stages_section(r, stages) + workers_section(r);
-  if (tells) frame.body += glossary_section({"nat", "gap", "rms", "gain", "held-out", "alias"});
+  if (is_diagnosis)
+    frame.body += glossary_section({"nat", "gap", "rms", "gain", "held-out", "alias"});
   return framed_page(frame, plain_page_json(), no_trials_json());
 }
 

@@ -19,9 +19,9 @@ constexpr std::size_t kMostFound = 2000;
 constexpr std::size_t kMostFiles = 50000;
 constexpr std::size_t kMostPoints = 60;
 constexpr double kLookAgain_s = 5;  // at what says that it runs: its master may have died
-constexpr double kBusy_s = 10;      // a store that cannot be read for so long is told of
+constexpr double kBusy_s = 10;      // a store that cannot be read for so long is reported
 
-constexpr const char* kTelling[] = {
+constexpr const char* kResultFiles[] = {
     "run.sqlite",     "run.sqlite-wal", "simulations.sqlite", "simulations.sqlite-wal",
     "diagnosis.json", "log.txt",        "determined.csv"};
 
@@ -93,7 +93,7 @@ void read_run(const FoundWork& found, double now_unix_s, WorkEntry* entry) {
   const Progress& progress = status->progress;
   entry->state = run_state_name(status->state);
   const bool running = status->state == RunState::kRunning;
-  entry->told = running ? progress.waiting : status->stop_reason;
+  entry->status_text = running ? progress.waiting : status->stop_reason;
   entry->fitness = status->info.fitness;
   entry->unit = status->info.fitness_unit;
   entry->best = status->best;
@@ -129,7 +129,7 @@ void read_command_of(const FoundWork& found, double now_unix_s, WorkEntry* entry
   const bool running = r.state == "running";
   entry->what = r.command.empty() ? entry->what : r.command;
   entry->state = r.state;
-  entry->told = running ? (r.waiting.empty() ? r.stage : r.waiting) : r.reason;
+  entry->status_text = running ? (r.waiting.empty() ? r.stage : r.waiting) : r.reason;
   entry->config = r.arguments;
   entry->share = r.share;
   entry->rate_per_s = running ? r.rate_per_s : 0;
@@ -147,7 +147,7 @@ void read_headline(const FoundWork& found, WorkEntry* entry) {
   const auto json = parse_json(*text);
   if (!json.is_object()) return;
   if (json.contains("headline") && json["headline"].is_string()) {
-    entry->told = json["headline"].get<std::string>();
+    entry->status_text = json["headline"].get<std::string>();
   }
   if (entry->state.empty()) entry->state = "finished";
 }
@@ -162,7 +162,7 @@ std::vector<FoundWork> find_work(const std::vector<fs::path>& roots) {
 
 std::string stamp_of(const fs::path& folder) {
   std::string stamp;
-  for (const char* name : kTelling) {
+  for (const char* name : kResultFiles) {
     std::error_code no_size, no_time;
     const auto size = fs::file_size(folder / name, no_size);
     const auto time = fs::last_write_time(folder / name, no_time);

@@ -23,10 +23,10 @@ struct FoundWork {
 };
 
 // Folders down to four beneath each of `roots`, in order of their names; hidden ones and symbolic
-// links are left out.  At most 2,000, of at most 50,000 files.
+// links are omitted.  At most 2,000, of at most 50,000 files.
 std::vector<FoundWork> find_work(const std::vector<std::filesystem::path>& roots);
 
-// When what is in `folder` last changed, as far as its size and times tell: equal stamps, equal
+// When what is in `folder` last changed, as far as its size and times show: equal stamps, equal
 // content.
 std::string stamp_of(const std::filesystem::path& folder);
 
@@ -34,9 +34,9 @@ std::string stamp_of(const std::filesystem::path& folder);
 struct WorkEntry {
   FoundWork::Kind kind = FoundWork::Kind::kRun;
   std::string name;
-  std::string what;   // "run", "diagnosis", "compare"
-  std::string state;  // "running", "finished", "stopped", "failed"
-  std::string told;   // the headline, why it stopped or what it waits for
+  std::string what;         // "run", "diagnosis", "compare"
+  std::string state;        // "running", "finished", "stopped", "failed"
+  std::string status_text;  // the headline, why it stopped or what it waits for
   std::string fitness, unit;
   std::optional<double> best;
   std::vector<double> best_by_generation;  // those that there are, at most 60

@@ -39,7 +39,7 @@ void set_policies(Response& r) {
   r.set("Cross-Origin-Opener-Policy", "same-origin");
 }
 
-// Errors of connections are their own end: there is nobody to tell.
+// Errors of connections are their own end: there is nobody to notify.
 class Connection : public std::enable_shared_from_this<Connection> {
  public:
   using List = std::list<std::shared_ptr<Connection>>;
@@ -146,7 +146,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
     if (parser_->get().method() == http::verb::head) return write(plain_response(200, ""), false);
     if (streams_ >= limits_.streams) {
       return write(plain_response(503,
-                                  "Too many pages are open for each to be told of what is "
+                                  "Too many pages are open for each to hear what is "
                                   "new; this one has to ask by itself."),
                    false);
     }
@@ -178,9 +178,9 @@ class Connection : public std::enable_shared_from_this<Connection> {
     if (sending_ && ++late_ * limits_.watch_interval > limits_.time) return close();
     if (!sending_) {
       late_ = 0;
-      if (std::string now = watched_(); now != told_) {
-        told_ = std::move(now);
-        send("data: " + told_ + "\n\n");
+      if (std::string now = watched_(); now != reported_) {
+        reported_ = std::move(now);
+        send("data: " + reported_ + "\n\n");
       } else if (++quiet_ >= kQuietTicks) {
         send(": still here\n\n");
       }
@@ -214,7 +214,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
   std::size_t& streams_;  // of all connections
   asio::steady_timer timer_;
   std::function<std::string()> watched_;  // of a stream
-  std::string told_, outgoing_, on_wire_;
+  std::string reported_, outgoing_, on_wire_;
   bool sending_ = false;
   unsigned quiet_ = 0, late_ = 0;  // ticks
   std::array<char, 64> unexpected_;

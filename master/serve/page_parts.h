@@ -10,7 +10,7 @@ namespace gapfarm {
 nlohmann::ordered_json plain_page_json();
 nlohmann::ordered_json no_trials_json();
 
-// Where rows become cards, on a narrow screen, cells without content are left out.
+// Where rows become cards, on a narrow screen, cells without content are omitted.
 std::string list_cell(const char* label, const std::string& html, bool is_number = false);
 
 }  // namespace gapfarm

@@ -8,7 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "common/progress/words.h"
+#include "common/progress/number_text.h"
 #include "master/report/glossary.h"
 #include "master/report/html.h"
 #include "master/report/page_frame.h"
@@ -21,7 +21,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// The best by generation, worst tenth left out of its scale.
+// The best by generation, worst tenth omitted from its scale.
 std::string spark(const std::vector<double>& values) {
   if (values.size() < 2) return "";
   std::vector<double> sorted = values;
@@ -41,7 +41,7 @@ std::string spark(const std::vector<double>& values) {
          d + R"("/></svg>)";
 }
 
-std::string state_words(const WorkEntry& e) {
+std::string state_text(const WorkEntry& e) {
   if (!e.trouble.empty()) {
     return R"(<span class="warning">cannot be read</span><small>)" + html_escaped(e.trouble) +
            "</small>";
@@ -56,7 +56,7 @@ std::string state_words(const WorkEntry& e) {
     text += fmt::format(R"( <span class="warning">▲ {} given up, {} alarms</span>)", e.given_up,
                         e.farm.alarms);
   }
-  return text + (e.told.empty() ? "" : "<small>" + html_escaped(e.told) + "</small>");
+  return text + (e.status_text.empty() ? "" : "<small>" + html_escaped(e.status_text) + "</small>");
 }
 
 // With what a nat is, where it is one.
@@ -83,7 +83,7 @@ std::string row_of_entry(const WorkEntry& e) {
   }
   return fmt::format(R"(<tr><th scope="row">{}<a href="/view?of={}">{}</a><small>{}</small></th>)",
                      box, percent_encoded(e.name), html_escaped(e.name), html_escaped(e.what)) +
-         list_cell("state", state_words(e)) + list_cell("best", best, true) +
+         list_cell("state", state_text(e)) + list_cell("best", best, true) +
          list_cell("by generation", spark(e.best_by_generation)) + list_cell("so far", extent) +
          list_cell("trials", run ? std::to_string(e.trials) : "", true) +
          list_cell("seed", run ? std::to_string(e.seed) : "", true) +
@@ -93,16 +93,16 @@ std::string row_of_entry(const WorkEntry& e) {
 
 std::string list_address(const ListView& view, const std::string& sort) {
   std::string address = "/?sort=" + sort;
-  if (!view.words.empty()) address += "&q=" + percent_encoded(view.words);
+  if (!view.query.empty()) address += "&q=" + percent_encoded(view.query);
   if (!view.state.empty()) address += "&state=" + percent_encoded(view.state);
   return html_escaped(address);
 }
 
-std::string sorted_head(const char* key, const char* words, const ListView& view,
+std::string sorted_head(const char* key, const char* label, const ListView& view,
                         bool is_number = false) {
   return fmt::format(
       R"(<th scope="col"{}{}><a href="{}">{}</a></th>)", is_number ? R"( class="number")" : "",
-      view.sort == key ? R"( aria-sort="descending")" : "", list_address(view, key), words);
+      view.sort == key ? R"( aria-sort="descending")" : "", list_address(view, key), label);
 }
 
 void sort_entries(std::vector<WorkEntry>* entries, const std::string& sort) {
@@ -127,10 +127,10 @@ std::string lowered(std::string text) {
 
 bool is_wanted(const WorkEntry& e, const ListView& view) {
   if (!view.state.empty() && e.state != view.state) return false;
-  const std::string all = lowered(e.name + " " + e.what + " " + e.config + " " + e.told + " seed " +
-                                  std::to_string(e.seed));
-  std::istringstream words(lowered(view.words));
-  for (std::string word; words >> word;) {
+  const std::string all = lowered(e.name + " " + e.what + " " + e.config + " " + e.status_text +
+                                  " seed " + std::to_string(e.seed));
+  std::istringstream terms(lowered(view.query));
+  for (std::string word; terms >> word;) {
     if (all.find(word) == all.npos) return false;
   }
   return true;
@@ -145,7 +145,7 @@ std::string filter_form(const ListView& view) {
   }
   return fmt::format(
       R"(<form action="/" class="controls" id="filter" role="search"><label>Filter <input type="search" name="q" value="{}" placeholder="name, config, seed"></label><label>State <select name="state">{}</select></label>{}<button>Filter</button></form>)",
-      html_escaped(view.words), options,
+      html_escaped(view.query), options,
       view.sort.empty()
           ? ""
           : R"(<input type="hidden" name="sort" value=")" + html_escaped(view.sort) + R"(">)");
@@ -211,7 +211,7 @@ std::string list_page(std::vector<WorkEntry> entries, const ListView& view,
   std::string where;
   for (const std::string& folder : folders) where += (where.empty() ? "" : ", ") + folder;
   frame.body = fmt::format(
-      R"(<section id="work"><h1 id="headline" data-file="gapfarm" data-live>{} here, {} running{}</h1><p>Beneath <code>{}</code>: runs, diagnoses, comparisons and studies, as their stores tell. Tick two runs or more to see them beside each other.</p>)",
+      R"(<section id="work"><h1 id="headline" data-file="gapfarm" data-live>{} here, {} running{}</h1><p>Beneath <code>{}</code>: runs, diagnoses, comparisons and studies, as their stores show. Tick two runs or more to see them beside each other.</p>)",
       all, running, entries.size() == all ? "" : fmt::format("; {} shown", entries.size()),
       html_escaped(where));
   if (all == 0) {

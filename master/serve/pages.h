@@ -1,4 +1,4 @@
-// The pages that a server makes by itself.  The others are those that commands leave behind.
+// The pages that a server makes by itself.  The others are those that commands write.
 #pragma once
 
 #include <span>
@@ -15,7 +15,7 @@ namespace gapfarm {
 struct ListView {
   std::string sort;  // "name", "state", "best", "trials", "seed", "config"; else latest first
   std::string
-      words;  // each in an entry's name, command, config, seed or headline, whatever the case
+      query;  // each in an entry's name, command, config, seed or headline, whatever the case
   std::string state;  // empty: any
 };
 std::string list_page(std::vector<WorkEntry> entries, const ListView& view,

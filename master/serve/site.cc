@@ -29,8 +29,8 @@ HttpResponse unchanged(const std::string& etag) {
 }
 
 // What a page says of itself changes with its folder and with whether its process lives.
-std::string words_of(const WorkEntry& entry) {
-  return entry.stamp + entry.state + "|" + entry.told + "|";
+std::string tokens_of(const WorkEntry& entry) {
+  return entry.stamp + entry.state + "|" + entry.status_text + "|";
 }
 
 std::optional<std::uint64_t> whole_number(const std::string& text) {
@@ -118,7 +118,7 @@ Result<Site::Standing> Site::standing(const Target& target) const {
   Standing now;
   if (target.path == "/") {
     for (const WorkEntry& e : entries_) {
-      now.tag += e.name + words_of(e);
+      now.tag += e.name + tokens_of(e);
       now.state += e.name + e.state + "|";
     }
   } else {
@@ -127,7 +127,7 @@ Result<Site::Standing> Site::standing(const Target& target) const {
     for (const std::string& name : names->second) {
       const FoundWork* found = find(name);
       if (found == nullptr) return Error{no_such(name)};
-      now.tag += words_of(entry(*found));
+      now.tag += tokens_of(entry(*found));
       now.state += entry(*found).state + "|";
     }
   }
@@ -200,7 +200,7 @@ HttpResponse Site::events(const Target& target) {
   watched.path = target.value("at");
   watched.query.erase("at");
   const bool known = watched.path == "/" || watched.path == "/view" || watched.path == "/compare";
-  if (!known) return plain_response(404, "Nothing is to be told of there: / lists what there is.");
+  if (!known) return plain_response(404, "Nothing is reported there: / lists what there is.");
   if (const auto now = standing(watched); !now) return plain_response(404, now.error().message);
   HttpResponse response;
   response.watched = [this, watched] {

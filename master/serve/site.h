@@ -59,7 +59,7 @@ class Site {
   // Of / , /view and /compare.  What a page is of: equal, when the page would be.
   struct Standing {
     std::string tag;
-    std::string state;  // of what is shown: what changes it is told at once
+    std::string state;  // of what is shown: what changes it is sent at once
   };
   Result<Standing> standing(const Target& target) const;
   Result<std::string> made(const Target& target) const;

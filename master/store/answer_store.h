@@ -67,8 +67,8 @@ struct AnsweredStage {
 // In the order in which they began, from a file that may be in use.  Errors: no answer store.
 Result<std::vector<AnsweredStage>> read_stages(const std::filesystem::path& file);
 
-// What the command that wrote `file` last said about itself, from a file that may be in use or in
-// a folder that cannot be written; none: it says nothing.  Errors: no answer store.
+// What the command that wrote `file` last reported about itself, from a file that may be in use or
+// in a folder that cannot be written; none: it says nothing.  Errors: no answer store.
 Result<std::optional<std::string>> read_command(const std::filesystem::path& file);
 
 }  // namespace gapfarm

@@ -55,7 +55,7 @@ nlohmann::ordered_json to_json(const CommandRecord& record);
 // Fields that are missing or of another kind are left as they are by default.
 CommandRecord command_record_of(const nlohmann::ordered_json& json);
 
-// What the command in `folder` last said; one that says it runs but whose process is gone has
+// What the command in `folder` last reported; one that says it runs but whose process is gone has
 // stopped, with the reason.  None: the folder holds no command.  Errors: of reading its file.
 Result<std::optional<CommandRecord>> command_status(const std::filesystem::path& folder,
                                                     double now_unix_s);

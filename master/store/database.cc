@@ -46,12 +46,13 @@ const char* remedy(int code) {
 // `handle` may be null.
 Error sql_error(const std::string& file, const std::string& operation, int code, const char* text,
                 sqlite3* handle) {
-  // What the operating system said tells more than SQLite's "unable to open" or "disk I/O error".
+  // What the operating system reported shows more than SQLite's "unable to open" or "disk I/O
+  // error".
   const bool system = (code & 0xff) == SQLITE_CANTOPEN || (code & 0xff) == SQLITE_IOERR;
   const int number = system && handle != nullptr ? sqlite3_system_errno(handle) : 0;
-  std::string said = text;
-  if (number != 0) said += std::string(" (") + std::strerror(number) + ")";
-  return Error{file + ": cannot " + operation + ": " + said + "; " +
+  std::string detail = text;
+  if (number != 0) detail += std::string(" (") + std::strerror(number) + ")";
+  return Error{file + ": cannot " + operation + ": " + detail + "; " +
                remedy(number == ENOSPC || number == EDQUOT ? SQLITE_FULL : code)};
 }
 

@@ -98,7 +98,7 @@ class SqlStatement {
 };
 
 // For how long connections that this process opens from now on wait for a file that another holds;
-// a minute unless told otherwise.  For who would keep others waiting meanwhile.
+// a minute unless configured otherwise.  For who would keep others waiting meanwhile.
 void set_database_patience_ms(int patience_ms);
 
 class Database {

@@ -75,7 +75,7 @@ Status RecordedFarm::flush() {
   return {};
 }
 
-void RecordedFarm::tell(std::uint64_t done) {
+void RecordedFarm::report_progress(std::uint64_t done) {
   if (watcher_) watcher_({remembered_, simulated_ + done, asked_});
 }
 
@@ -96,10 +96,10 @@ Result<std::vector<v1::TaskResult>> RecordedFarm::run(
   remembered_ += at_hand;
   asked_ += tasks.size();
   flushed_s_ = clock_();
-  tell(0);
+  report_progress(0);
   if (open_.tasks.empty()) return results;
   auto fresh = farm_.run(problem_hash, open_.tasks, [&](const FarmProgress& progress) {
-    tell(progress.done);
+    report_progress(progress.done);
     if (on_progress) on_progress({at_hand + progress.done, tasks.size()});
   });
   if (!fresh) {
@@ -113,7 +113,7 @@ Result<std::vector<v1::TaskResult>> RecordedFarm::run(
   if (trouble_) trouble_ = flush();
   if (!trouble_) return trouble_.error();
   simulated_ += open_.tasks.size();
-  tell(0);
+  report_progress(0);
   for (std::size_t k = 0; k < open_.tasks.size(); ++k) {
     results[open_.places[k]] = std::move((*fresh)[k]);
   }

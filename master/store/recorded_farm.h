@@ -25,7 +25,7 @@ class RecordedFarm : public Farm {
   // Seconds of a clock that never goes back.
   using Clock = double (*)();
 
-  // All outlive this.  `answers`: of the same farm; null: it does not tell them one by one.
+  // All outlive this.  `answers`: of the same farm; null: it does not report them one by one.
   RecordedFarm(Farm& farm, AnswerStore& store, AnswerSource* answers = nullptr);
   RecordedFarm(Farm& farm, AnswerStore& store, AnswerSource* answers, Clock clock);
   ~RecordedFarm() override;
@@ -65,7 +65,7 @@ class RecordedFarm : public Farm {
                        std::vector<v1::TaskResult>& results);
   void on_answer(std::size_t task, const v1::TaskResult& result);
   Status flush();
-  void tell(std::uint64_t done);
+  void report_progress(std::uint64_t done);
 
   Farm& farm_;
   AnswerStore& store_;

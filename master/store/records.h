@@ -123,7 +123,7 @@ struct StoredDocument {
   std::string json;
 };
 
-// The live part: what a running master last said about itself.
+// The live part: what a running master last reported about itself.
 struct Progress {
   RunState state = RunState::kRunning;
   std::string stop_reason;  // empty while running
@@ -147,7 +147,7 @@ std::string readable_values(const Problem& problem, const Genome& genome);
 void summarise_fitness(StoredGeneration& generation, bool higher_is_better);
 
 // Digest of `generation` after `previous`: its number and each individual's birth id, genome,
-// outcome, fitness and number of scores, by their bits.  Times and workers are left out.
+// outcome, fitness and number of scores, by their bits.  Times and workers are omitted.
 std::string generation_digest(const std::string& previous, const StoredGeneration& generation);
 
 }  // namespace gapfarm

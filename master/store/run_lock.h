@@ -25,7 +25,7 @@ class RunLock {
   int fd_ = -1;
 };
 
-// Whether some process holds the lock of `run`; none when the file system cannot tell.  Takes
+// Whether some process holds the lock of `run`; none when the file system does not know.  Takes
 // nothing and writes nothing, so it works on a read-only folder and never disturbs a master.
 std::optional<bool> run_lock_held(const std::filesystem::path& run);
 

@@ -34,7 +34,7 @@ def command(words: Sequence[str], progress: Optional[Progress] = None) -> Any:
     """Runs ``gapfarm WORDS --json`` and returns its result as Python values.
 
     ``progress`` is called with every line of notes and progress as it comes.  Raises GapfarmError
-    with what gapfarm said and its exit code; exit code 3 (done, but tasks were given up) is no error.
+    with what gapfarm printed and its exit code; exit code 3 (done, but tasks were given up) is no error.
     """
     process = subprocess.Popen(
         [_program(), *map(str, words), "--json"],
@@ -47,14 +47,14 @@ def command(words: Sequence[str], progress: Optional[Progress] = None) -> Any:
     # Results are small enough for the pipe only sometimes, so both are read at once.
     import threading
 
-    said: list[str] = []
+    printed: list[str] = []
 
     def listen() -> None:
         assert process.stderr is not None
         for line in process.stderr:
-            said.append(line.rstrip("\n"))
+            printed.append(line.rstrip("\n"))
             if progress is not None:
-                progress(said[-1])
+                progress(printed[-1])
 
     listener = threading.Thread(target=listen, daemon=True)
     listener.start()
@@ -71,10 +71,10 @@ def command(words: Sequence[str], progress: Optional[Progress] = None) -> Any:
     try:
         result = json.loads(output) if output.strip() else {}
     except json.JSONDecodeError:
-        raise GapfarmError("\n".join(said) or output, exit_code or 1) from None
+        raise GapfarmError("\n".join(printed) or output, exit_code or 1) from None
     if exit_code not in (0, 3):
         error = result.get("error", {}) if isinstance(result, dict) else {}
-        raise GapfarmError(error.get("message", "\n".join(said[-3:])), exit_code)
+        raise GapfarmError(error.get("message", "\n".join(printed[-3:])), exit_code)
     return result
 
 

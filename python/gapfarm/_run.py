@@ -123,7 +123,7 @@ class Run:
 
     @property
     def model(self) -> Model:
-        """What the run left behind, or its best so far."""
+        """What the run wrote, or its best so far."""
         return Model(self.folder)
 
 

@@ -23,21 +23,21 @@ LOG = ROOT / "configs" / "demo" / "trials.csv"
 
 
 @pytest.fixture(scope="session")
-def said():
+def printed():
     return []
 
 
 @pytest.fixture(scope="session")
-def run(tmp_path_factory, said):
+def run(tmp_path_factory, printed):
     folder = tmp_path_factory.mktemp("run") / "demo"
     return gapfarm.evolve(
         DEMO, folder, "--generations", "3", "--population", "8", "--workers", "1",
-        progress=said.append,
+        progress=printed.append,
     )
 
 
-def test_evolve_tells_its_progress(run, said):
-    assert any("evolving 7 parameters" in line for line in said)
+def test_evolve_reports_its_progress(run, printed):
+    assert any("evolving 7 parameters" in line for line in printed)
     assert run.status()["state"] == "finished"
 
 
@@ -161,7 +161,7 @@ def test_the_notebook_runs(tmp_path, monkeypatch):
     scope: dict = {}
     for number, text in enumerate(code):
         exec(compile(text, f"docs/python.ipynb, code cell {number + 1}", "exec"), scope)
-    assert any("stage 1 of 6" in line for line in scope["said"]), "diagnose tells its progress"
+    assert any("stage 1 of 6" in line for line in scope["said"]), "diagnose reports its progress"
     diagnosis = scope["diagnosis"]
     again = pickle.loads(pickle.dumps(diagnosis))
     pd.testing.assert_frame_equal(again.effects, diagnosis.effects)
@@ -247,10 +247,10 @@ def test_annotations_hold_and_help_who_uses_them(tmp_path):
     api = pytest.importorskip("mypy.api")
     # pandas of Debian 12 has no annotations.
     judge = ["--strict", "--ignore-missing-imports", "--no-error-summary", f"--cache-dir={tmp_path}"]
-    said, wrong, code = api.run([*judge, str(package)])
-    assert code == 0, said + wrong
+    printed, wrong, code = api.run([*judge, str(package)])
+    assert code == 0, printed + wrong
     (tmp_path / "used.py").write_text(USED)
-    said, _, _ = api.run([*judge, str(package), str(tmp_path / "used.py")])
-    assert re.search(r":4: note: .*ndarray\[Any, .*float", said), said
-    found = re.findall(r"used.py:(\d+): error: .*\[([a-z-]+)\]", said)
-    assert found == [("6", "arg-type"), ("7", "call-arg"), ("8", "attr-defined")], said
+    printed, _, _ = api.run([*judge, str(package), str(tmp_path / "used.py")])
+    assert re.search(r":4: note: .*ndarray\[Any, .*float", printed), printed
+    found = re.findall(r"used.py:(\d+): error: .*\[([a-z-]+)\]", printed)
+    assert found == [("6", "arg-type"), ("7", "call-arg"), ("8", "attr-defined")], printed

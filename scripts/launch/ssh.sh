@@ -17,7 +17,7 @@ Options:
   --package FILE    for start: a gapfarm-worker .deb to unpack on hosts without the program; root is
                     not needed, the libraries that it depends on are
   --processes N     on each host (one a core)
-  --name NAME       tells farms apart that share hosts (default)
+  --name NAME       distinguishes farms that share hosts (default)
   --lines N         for logs (20)
   --ssh-config FILE for ssh -F
   --insecure        no keys

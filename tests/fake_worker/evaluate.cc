@@ -1,4 +1,4 @@
-// worker/evaluate.h without Bullet: answers at once, or ends the process or hangs when told to.
+// worker/evaluate.h without Bullet: answers at once, or ends the process or hangs when reported to.
 // A machine that computes wrongly has GAPFARM_FAKE_ERROR in its environment: what it adds to a
 // fitness.
 #include "worker/evaluate.h"

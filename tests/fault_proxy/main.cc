@@ -124,31 +124,32 @@ class Proxy {
     return link;
   }
 
-  void disturb(const std::shared_ptr<Link>& link, int way, std::string bytes) {
-    std::optional<std::string> held = std::exchange(link->held[way], std::nullopt);
+  void disturb(const std::shared_ptr<Link>& link, int direction, std::string bytes) {
+    std::optional<std::string> held = std::exchange(link->held[direction], std::nullopt);
     const double drawn = uniform() / options_.share;
     if (drawn >= 1) {
       ++counts_.passed;
-      send(*link, way, bytes);
+      send(*link, direction, bytes);
     } else if (drawn < 0.25) {
       ++counts_.dropped;
     } else if (drawn < 0.5) {
       ++counts_.doubled;
-      send(*link, way, bytes);
-      send(*link, way, bytes);
+      send(*link, direction, bytes);
+      send(*link, direction, bytes);
     } else if (drawn < 0.75) {
       ++counts_.delayed;
-      at(uniform() * kLongestDelay, [this, link, way, bytes] { send(*link, way, bytes); });
+      at(uniform() * kLongestDelay,
+         [this, link, direction, bytes] { send(*link, direction, bytes); });
     } else {
       ++counts_.reordered;
-      link->held[way] = bytes;
-      at(kLongestReorder, [this, link, way] { release(*link, way); });
+      link->held[direction] = bytes;
+      at(kLongestReorder, [this, link, direction] { release(*link, direction); });
     }
-    if (held) send(*link, way, *held);
+    if (held) send(*link, direction, *held);
   }
 
-  void release(Link& link, int way) {
-    if (auto held = std::exchange(link.held[way], std::nullopt)) send(link, way, *held);
+  void release(Link& link, int direction) {
+    if (auto held = std::exchange(link.held[direction], std::nullopt)) send(link, direction, *held);
   }
 
   void at(double in_s, std::function<void()> deliver) {
@@ -156,8 +157,8 @@ class Proxy {
   }
 
   // Whoever is not there does not get it.
-  void send(Link& link, int way, const std::string& bytes) {
-    if (way == 0) {
+  void send(Link& link, int direction, const std::string& bytes) {
+    if (direction == 0) {
       zmq_send(link.to_master.handle(), bytes.data(), bytes.size(), ZMQ_DONTWAIT);
       return;
     }

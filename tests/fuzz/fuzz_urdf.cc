@@ -14,7 +14,7 @@ void check(std::string_view text) {
   GroundRobot completed = reading->robot;
   if (!complete_robot(&completed)) return;
   promise(!draw_robot(*reading, completed).empty(), "a robot can be drawn");
-  promise(!describe_robot_json(*reading, completed, "").empty(), "a robot can be told");
+  promise(!describe_robot_json(*reading, completed, "").empty(), "a robot can be reported");
 }
 
 }  // namespace

@@ -17,7 +17,7 @@ sessions = 2
 trials_per_session = 20
 )";
 
-TEST(BlindCheckCli, DryRunSaysHowStrongEffectsHaveToBe) {
+TEST(BlindCheckCli, DryRunReportsHowStrongEffectsHaveToBe) {
   const TemporaryFolder folder;
   const Finished finished =
       gapfarm_command({"blind-check", folder.write("c.toml", kConfig), "--strengths", "--effects",
@@ -28,7 +28,7 @@ TEST(BlindCheckCli, DryRunSaysHowStrongEffectsHaveToBe) {
   EXPECT_THAT(finished.out, HasSubstr("4 single"));
 }
 
-TEST(BlindCheckCli, WrongUsageIsSaidBeforeAnythingIsRun) {
+TEST(BlindCheckCli, WrongUsageIsReportedBeforeAnythingIsRun) {
   const TemporaryFolder folder;
   const std::string config = folder.write("c.toml", kConfig);
   const Finished no_out = gapfarm_command({"blind-check", config});

@@ -16,13 +16,13 @@ using Json = nlohmann::json;
 class Overwrite : public testing::Test {
  protected:
   // Ends with 2 before it does anything, names the file, and leaves it as it was.
-  void refused(const std::vector<std::string>& words, const std::string& file,
+  void refused(const std::vector<std::string>& arguments, const std::string& file,
                const std::string& sentence) const {
     const std::string before = text_of(file);
-    const Finished tried = gapfarm_command(words);
-    EXPECT_EQ(tried.exit_code, 2) << words[0] << ": " << tried.out << tried.err;
-    EXPECT_THAT(tried.err, HasSubstr(sentence)) << words[0];
-    EXPECT_EQ(text_of(file), before) << words[0];
+    const Finished tried = gapfarm_command(arguments);
+    EXPECT_EQ(tried.exit_code, 2) << arguments[0] << ": " << tried.out << tried.err;
+    EXPECT_THAT(tried.err, HasSubstr(sentence)) << arguments[0];
+    EXPECT_EQ(text_of(file), before) << arguments[0];
   }
   std::string row(const char* session, int trial) const {
     return std::string(session) + "," + std::to_string(trial) + ",,forward,,,,0,0,0,0.25,0.01,0\n";
@@ -90,22 +90,22 @@ TEST_F(Overwrite, ARunAndADiagnosisDoNotShareAFolder) {
 // What cannot begin leaves nothing in the way of the next attempt.
 TEST_F(Overwrite, WhatDoesNotBeginLeavesNoRun) {
   const std::string run = folder_ / "run";
-  const std::vector<std::string> words = {"evolve", config_, "--trials", log_, "--out", run};
-  std::vector<std::string> nobody = words;
+  const std::vector<std::string> arguments = {"evolve", config_, "--trials", log_, "--out", run};
+  std::vector<std::string> nobody = arguments;
   nobody.insert(nobody.end(), {"--workers", "0"});
   const Finished alone = gapfarm_command(nobody);
   EXPECT_EQ(alone.exit_code, 2);
   EXPECT_THAT(alone.err, HasSubstr("--listen"));
   EXPECT_FALSE(std::filesystem::exists(run));
   // Found out only as the farm starts.
-  std::vector<std::string> bad = words;
+  std::vector<std::string> bad = arguments;
   bad.insert(bad.end(), {"--workers", "1", "--listen", "ipc:///proc/nowhere/socket"});
   const Finished failed = gapfarm_command(bad);
   EXPECT_NE(failed.exit_code, 0);
   EXPECT_FALSE(std::filesystem::exists(run));
 }
 
-TEST_F(Overwrite, LogsSayWhatWasRead) {
+TEST_F(Overwrite, LogsReportWhatWasRead) {
   const std::string paths = folder_.write("paths.csv", "session,trial,t,x,y,theta\na,0,0,0,0,0\n");
   const Finished unmarked = gapfarm_command({"check", config_, "--trials", log_});
   EXPECT_EQ(unmarked.exit_code, 0) << unmarked.err;
@@ -116,7 +116,7 @@ TEST_F(Overwrite, LogsSayWhatWasRead) {
   EXPECT_THAT(named.err, Not(HasSubstr("not read")));
 }
 
-TEST_F(Overwrite, RowsWithMistakesAreListedAndLeftOutWhenAsked) {
+TEST_F(Overwrite, RowsWithMistakesAreListedAndHeldOutWhenAsked) {
   const std::string bad = folder_.write(
       "bad.csv", text_of(log_) + "a,2,,forward,,,,0,0,0,nan,0,0\na,3,,foward,,,,0,0,0,0,0,0\n");
   const Finished strict = gapfarm_command({"check", config_, "--trials", bad, "--json"});
@@ -128,19 +128,19 @@ TEST_F(Overwrite, RowsWithMistakesAreListedAndLeftOutWhenAsked) {
               HasSubstr("bad.csv:5:"));
   const Finished lax = gapfarm_command({"check", config_, "--trials", bad, "--skip-invalid"});
   EXPECT_EQ(lax.exit_code, 0) << lax.err;
-  EXPECT_THAT(lax.err, HasSubstr("left out: " + bad + ":4:"));
+  EXPECT_THAT(lax.err, HasSubstr("omitted: " + bad + ":4:"));
   EXPECT_THAT(lax.out, HasSubstr("trials       2 in 1 sessions"));
 }
 
-TEST_F(Overwrite, ResultsAreOnStandardOutputInWordsOrAsJson) {
+TEST_F(Overwrite, ResultsAreOnStandardOutputInTextOrAsJson) {
   const std::vector<std::string> evolve = {
       "evolve", config_, "--trials", log_, "--generations", "1", "--workers", "1", "--out"};
-  const auto with = [](std::vector<std::string> words, const std::vector<std::string>& more) {
-    words.insert(words.end(), more.begin(), more.end());
-    return gapfarm_command(words);
+  const auto with = [](std::vector<std::string> arguments, const std::vector<std::string>& more) {
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return gapfarm_command(arguments);
   };
-  const Finished words = with(evolve, {folder_ / "words"});
-  EXPECT_THAT(words.out, HasSubstr("completed 1 of 1 generations"));
+  const Finished arguments = with(evolve, {folder_ / "words"});
+  EXPECT_THAT(arguments.out, HasSubstr("completed 1 of 1 generations"));
   const Finished run = with(evolve, {folder_ / "run", "--json"});
   EXPECT_EQ(run.exit_code, 0) << run.err;
   EXPECT_EQ(Json::parse(run.out)["generations"], 1);

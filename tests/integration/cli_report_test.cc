@@ -1,4 +1,4 @@
-// The page that a run leaves behind, and `gapfarm report`.
+// The page that a run writes, and `gapfarm report`.
 #include <gmock/gmock.h>
 
 #include <filesystem>
@@ -52,7 +52,7 @@ TEST_F(CliReport, ARunLeavesAPageThatIsMadeAgainFromItsStoreAlone) {
   ASSERT_EQ(evolved.exit_code, 0) << evolved.err;
   EXPECT_THAT(evolved.out, HasSubstr("report.html"));
   const std::string page = text_of(run_ + "/report.html");
-  // Before and after, with bounds, on the trials evolved on and on those kept apart.
+  // Before and after, with bounds, on the trials evolved on and on those held out.
   EXPECT_THAT(page, HasSubstr("<code>contact_length</code>"));
   EXPECT_THAT(page, HasSubstr("0.03 to 0.12"));
   EXPECT_THAT(page, HasSubstr("the config&#39;s own values"));
@@ -67,7 +67,7 @@ TEST_F(CliReport, ARunLeavesAPageThatIsMadeAgainFromItsStoreAlone) {
   EXPECT_EQ(without_farm(text_of(folder_ / "page.html")), without_farm(page));
 }
 
-// What a stopped run has is shown, and what it has not is said.
+// What a stopped run has is shown, and what it has not is reported.
 TEST_F(CliReport, ARunThatGoesOnIsShownWithoutItsEnd) {
   ASSERT_EQ(evolve("", "2").exit_code, 0);
   {
@@ -83,7 +83,7 @@ TEST_F(CliReport, ARunThatGoesOnIsShownWithoutItsEnd) {
   EXPECT_THAT(page, Not(HasSubstr("<section id=\"poses\"")));
 }
 
-TEST_F(CliReport, SaysWhatAFolderHoldsNot) {
+TEST_F(CliReport, ReportsWhatAFolderHoldsNot) {
   const Finished nothing = report(folder_.path().string());
   EXPECT_EQ(nothing.exit_code, 2);
   EXPECT_THAT(nothing.err, HasSubstr("neither a diagnosis.json nor a run.sqlite"));

@@ -131,7 +131,7 @@ TEST_F(CliStatus, LeavesOnCtrlC) {
   EXPECT_EQ(watch.wait().exit_code, 130);
 }
 
-TEST_F(CliStatus, SaysWhatIsNotARun) {
+TEST_F(CliStatus, ReportsWhatIsNotARun) {
   const Finished nothing = gapfarm_command({"status", run_});
   EXPECT_EQ(nothing.exit_code, 2);
   EXPECT_THAT(nothing.err, HasSubstr("holds no run"));

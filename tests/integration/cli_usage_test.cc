@@ -12,7 +12,7 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
 
-TEST(CliUsage, SaysWhatItIs) {
+TEST(CliUsage, ReportsWhatItIs) {
   const Finished version = gapfarm_command({"--version"});
   EXPECT_EQ(version.exit_code, 0);
   EXPECT_EQ(version.out, build_summary("gapfarm") + "\n");
@@ -47,7 +47,7 @@ TEST(CliUsage, HelpFitsAScreenAndHasExamplesEverywhere) {
   }
 }
 
-TEST(CliUsage, InitWritesAConfigThatChecksAndSaysWhatItGuessed) {
+TEST(CliUsage, InitWritesAConfigThatChecksAndReportsWhatItGuessed) {
   const TemporaryFolder folder;
   const std::string log = GAPFARM_SOURCE_DIR "/configs/demo/trials.csv", out = folder / "mine.toml";
   const Finished made = gapfarm_command({"init", log, "--out", out});
@@ -61,7 +61,7 @@ TEST(CliUsage, InitWritesAConfigThatChecksAndSaysWhatItGuessed) {
   EXPECT_EQ(gapfarm_command({"init", log, "--out", out}).exit_code, 2) << "it is there already";
 }
 
-TEST(CliUsage, ADryRunRunsNothingAndSaysSo) {
+TEST(CliUsage, ADryRunRunsNothingAndReportsSo) {
   const TemporaryFolder folder;
   const Finished dry = gapfarm_command({"evolve", GAPFARM_SOURCE_DIR "/configs/demo.toml", "--out",
                                         folder / "run", "--workers", "3", "--dry-run"});
@@ -90,14 +90,14 @@ TEST(CliUsage, EveryLongCommandHasADryRunThatLeavesNothing) {
       {{"effects", demo, "--figures", out}, " pictures into "},
       {{"predict", "--mined", log, "--trials", log, "--out", out}, "would predict 120 trials"},
   };
-  for (auto [words, would] : commands) {
+  for (auto [arguments, would] : commands) {
     const std::string mark = folder / "ended";
-    words.insert(words.end(), {"--dry-run", "--on-end", "touch " + mark});
-    const Finished dry = gapfarm_command(words);
-    EXPECT_EQ(dry.exit_code, 0) << words[0] << ": " << dry.err;
+    arguments.insert(arguments.end(), {"--dry-run", "--on-end", "touch " + mark});
+    const Finished dry = gapfarm_command(arguments);
+    EXPECT_EQ(dry.exit_code, 0) << arguments[0] << ": " << dry.err;
     EXPECT_THAT(dry.out, StartsWith("dry run: nothing was simulated, started or written\n"));
     EXPECT_THAT(dry.out, HasSubstr(would));
-    EXPECT_TRUE(std::filesystem::is_empty(folder.path())) << words[0];
+    EXPECT_TRUE(std::filesystem::is_empty(folder.path())) << arguments[0];
   }
 }
 
@@ -118,14 +118,14 @@ TEST(CliUsage, ADryRunOfWhatGoesOnFromARunLeavesItAsItIs) {
       {{"predict", run, "--trials", GAPFARM_SOURCE_DIR "/configs/demo/trials.csv", "--out", out},
        "would predict 120 trials"},
   };
-  for (auto [words, would] : commands) {
-    words.push_back("--dry-run");
-    const Finished dry = gapfarm_command(words);
-    EXPECT_EQ(dry.exit_code, 0) << words[0] << ": " << dry.err;
+  for (auto [arguments, would] : commands) {
+    arguments.push_back("--dry-run");
+    const Finished dry = gapfarm_command(arguments);
+    EXPECT_EQ(dry.exit_code, 0) << arguments[0] << ": " << dry.err;
     EXPECT_THAT(dry.out, StartsWith("dry run: nothing was simulated, started or written\n"));
     EXPECT_THAT(dry.out, HasSubstr(would));
-    EXPECT_FALSE(std::filesystem::exists(out)) << words[0];
-    EXPECT_EQ(text_of(run + "/run.sqlite"), store) << words[0];
+    EXPECT_FALSE(std::filesystem::exists(out)) << arguments[0];
+    EXPECT_EQ(text_of(run + "/run.sqlite"), store) << arguments[0];
   }
 }
 
@@ -187,7 +187,7 @@ TEST(CliUsage, InitOfAURDFWritesTheRobotAndAConfigThatNamesIt) {
   EXPECT_EQ(config.replace(runs, 11, "\"monday\""), text_of(folder / "car.toml"));
 }
 
-TEST(CliUsage, WrongWordsExitWithTwoAndASuggestion) {
+TEST(CliUsage, WrongTextExitWithTwoAndASuggestion) {
   const Finished command = gapfarm_command({"statsu", "run"});
   EXPECT_EQ(command.exit_code, 2);
   EXPECT_THAT(command.err, HasSubstr("unknown command 'statsu'; did you mean 'status'?"));

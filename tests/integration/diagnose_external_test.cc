@@ -36,7 +36,7 @@ for line in sys.stdin:
     print(json.dumps({'id': task['id'], 'pose': pose}), flush=True)
 )";
 
-// A robot on two tracks on a floor that leans, has a nap and brakes; what it is told of the floor
+// A robot on two tracks on a floor that leans, has a nap and brakes; what it is reported the floor
 // is what it declares.
 std::string on_a_floor(const std::string& inputs, const std::string& floor) {
   return "import json, math, sys\n"
@@ -72,9 +72,9 @@ std::string on_a_floor(const std::string& inputs, const std::string& floor) {
 
 class DiagnoseExternal : public ::testing::Test {
  protected:
-  static std::string external(const std::string& words, const std::string& genes,
+  static std::string external(const std::string& arguments, const std::string& genes,
                               const std::string& more = "") {
-    return "scenario = \"external\"\n[external]\nprogram = [" + words + "]\n[genes]\n" + genes +
+    return "scenario = \"external\"\n[external]\nprogram = [" + arguments + "]\n[genes]\n" + genes +
            "[parameters]\n" + more + kDrives;
   }
   static std::string two_tracks() {
@@ -134,7 +134,7 @@ TEST_F(DiagnoseExternal, NamesAnEffectOfTheCameraAndNoneWhereNothingIsMissing) {
                "camera_aspect", "ratio", 1.08, 0.012);
   const Json none = diagnose(two_tracks(), two_tracks(), 100, {});
   EXPECT_EQ(none["verdict"], "none") << none["headline"];
-  // What the program does not take is said, and not looked for.
+  // What the program does not take is reported, and not looked for.
   const std::string cautions = none["cautions"].dump();
   EXPECT_NE(cautions.find("floor_tilt, floor_nap"), std::string::npos) << cautions;
   for (const Json& row : none["screening"]) EXPECT_NE(row["effect"], "floor_tilt");
@@ -160,10 +160,10 @@ TEST_F(DiagnoseExternal, AFloorIsForProgramsThatDeclareIt) {
   const std::string floor = external("\"python3\", \"floor.py\"", genes),
                     bare = external("\"python3\", \"bare.py\"", genes);
   const std::vector<std::string> leans = {"floor_tilt.angle=0.1", "floor_tilt.direction=0.7"};
-  const Json told = diagnose(floor, floor, 120, leans);
-  expect_named(told, "floor_tilt", "angle", 0.1, 0.02);
-  EXPECT_NEAR(told["effects"][0]["parameters"]["direction"]["value"].get<double>(), 0.7, 0.2);
-  // The same log: a program without a floor is neither asked about one nor told of one.
+  const Json diagnosed = diagnose(floor, floor, 120, leans);
+  expect_named(diagnosed, "floor_tilt", "angle", 0.1, 0.02);
+  EXPECT_NEAR(diagnosed["effects"][0]["parameters"]["direction"]["value"].get<double>(), 0.7, 0.2);
+  // The same log: a program without a floor is neither asked about one nor reported one.
   const Json untold = diagnose(floor, bare, 120, leans);
   for (const Json& effect : untold["effects"]) EXPECT_NE(effect["name"], "floor_tilt");
   for (const Json& row : untold["screening"]) EXPECT_NE(row["effect"], "floor_tilt");

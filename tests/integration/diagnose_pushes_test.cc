@@ -62,7 +62,7 @@ TEST_F(DiagnosePushes, NamesAnEffectWithAnIntervalAndClosesTheGap) {
   EXPECT_GT(y["hi"], 0.008);
   EXPECT_GT(y["lo"], 0.004);
   EXPECT_LT(d["gap"]["final"], d["gap"]["tuned"]);
-  // The pictures show what pushes depend on, and no word of what a robot is told.
+  // The pictures show what pushes depend on, and no word of what a robot is reported.
   EXPECT_EQ(d["pictures"]["x"], "along the push");
   EXPECT_NE(report_.find("along and across the push"), std::string::npos);
   const std::size_t body = report_.find("<body>");
@@ -70,7 +70,7 @@ TEST_F(DiagnosePushes, NamesAnEffectWithAnIntervalAndClosesTheGap) {
     EXPECT_EQ(report_.substr(body, report_.find("<script>") - body).find(word), std::string::npos)
         << word;
   }
-  // The model left behind predicts the log that it was made for.
+  // The model wrote predicts the log that it was made for.
   const Finished predicted = gapfarm_command(
       {"predict", folder_ / "d/model.toml", "--trials", folder_ / "pushes.csv", "--out", "-"});
   EXPECT_EQ(predicted.exit_code, 0) << predicted.err;
@@ -80,15 +80,15 @@ TEST_F(DiagnosePushes, NamesAnEffectWithAnIntervalAndClosesTheGap) {
   EXPECT_EQ(again.exit_code, 0) << again.err;
 }
 
-TEST_F(DiagnosePushes, SayNoneWhenNothingIsMissing) {
+TEST_F(DiagnosePushes, ReportNoneWhenNothingIsMissing) {
   const Json d = diagnose(80, {});
   EXPECT_EQ(d["verdict"], "none") << d["headline"];
   EXPECT_TRUE(d["effects"].empty());
 }
 
 // Seed 137 of scripts/foreign_pushes.sh: a disc of table seemed to explain more than the lens, but
-// foretold nothing.
-TEST_F(DiagnosePushes, WhatForetellsNothingKeepsNoOtherFromBeingFound) {
+// predicted nothing.
+TEST_F(DiagnosePushes, WhatPredictsNothingKeepsNoOtherFromBeingFound) {
   const Finished made =
       run_program("planar_push_log", {folder_.path().string(), "137", "camera_distortion.k1=0.15",
                                       "camera_distortion.x=0.5", "camera_distortion.y=0.5"});
@@ -103,7 +103,7 @@ TEST_F(DiagnosePushes, WhatForetellsNothingKeepsNoOtherFromBeingFound) {
   EXPECT_TRUE(std::any_of(d["screening"].begin(), d["screening"].end(), of_patch));
 }
 
-TEST_F(DiagnosePushes, OfAFewPushesNothingIsSaid) {
+TEST_F(DiagnosePushes, OfAFewPushesNothingIsReported) {
   const Json d = diagnose(12, {"com_offset.y=0.008"});
   EXPECT_EQ(d["verdict"], "unusable") << d["headline"];
   EXPECT_TRUE(d["effects"].empty());

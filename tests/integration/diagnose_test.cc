@@ -42,11 +42,11 @@ class Diagnose : public ::testing::Test {
 
   // What a model scores a trial of the log.
   double nats_of(const char* model) {
-    const Finished said =
+    const Finished reported =
         gapfarm_command({"predict", folder_ / model, "--trials", folder_ / "trials.csv", "--out",
                          folder_ / "p.csv", "--force", "--json"});
-    EXPECT_EQ(said.exit_code, 0) << said.err;
-    return Json::parse(said.out)["log_score"].get<double>();
+    EXPECT_EQ(reported.exit_code, 0) << reported.err;
+    return Json::parse(reported.out)["log_score"].get<double>();
   }
 
   // Writes the log moved along x and y, with y mirrored where asked for; returns its path.
@@ -89,7 +89,7 @@ TEST_F(Diagnose, NamesAnEffectWithAnIntervalAndClosesTheGap) {
   EXPECT_GT(ratio["hi"], 0.048);
   EXPECT_GT(d["effects"][0]["closed"], 0.7);
   EXPECT_LT(d["gap"]["final"], d["gap"]["tuned"]);
-  // The model left behind predicts the log that it was made for.
+  // The model wrote predicts the log that it was made for.
   const Finished predicted = gapfarm_command(
       {"predict", folder_ / "d/model.toml", "--trials", folder_ / "trials.csv", "--out", "-"});
   EXPECT_EQ(predicted.exit_code, 0) << predicted.err;
@@ -204,7 +204,7 @@ TEST_F(Diagnose, GoesOnWithWhatWasSimulatedAlready) {
   EXPECT_EQ(first, second);
 }
 
-TEST_F(Diagnose, SaysNoneWhenNothingIsMissing) {
+TEST_F(Diagnose, ReportsNoneWhenNothingIsMissing) {
   simulate(120, {});
   const Json d = diagnose();
   EXPECT_EQ(d["verdict"], "none") << d["headline"];
@@ -218,7 +218,7 @@ TEST_F(Diagnose, WithoutTheEffectInTheCatalogueItIsNotGivenAnotherName) {
   const Json with = diagnose();
   ASSERT_EQ(with["effects"].size(), 1u) << with["headline"];
   EXPECT_EQ(with["effects"][0]["name"], "battery_sag");
-  const Json without = diagnose({"--leave-out", "battery_sag"});
+  const Json without = diagnose({"--exclude", "battery_sag"});
   EXPECT_EQ(without["verdict"], "unknown") << without["headline"];
   EXPECT_TRUE(without["effects"].empty());
   // What has no name has a shape: it predicts trials that it did not see, another log's, too.
@@ -234,10 +234,10 @@ TEST_F(Diagnose, WithoutTheEffectInTheCatalogueItIsNotGivenAnotherName) {
   EXPECT_GT(nats_of("d/model.toml"), nats_of("d/tuned.toml") + 0.1);
 }
 
-// No smooth shape tells which drives were read late, but how many and how late can be foretold.
-TEST_F(Diagnose, WhatStraysWithoutANameIsForetoldAllTheSame) {
+// No smooth shape shows which drives were read late, but how many and how late can be predicted.
+TEST_F(Diagnose, WhatOutliersWithoutANameIsPredictedAllTheSame) {
   simulate(150, {"pose_latency.share=0.3", "pose_latency.latency=0.25"});
-  const Json d = diagnose({"--leave-out", "pose_latency"});
+  const Json d = diagnose({"--exclude", "pose_latency"});
   EXPECT_EQ(d["verdict"], "unknown") << d["headline"];
   ASSERT_TRUE(d["residual"].contains("strays")) << d["residual"];
   EXPECT_EQ(d["residual"]["strays"]["kind"], "late");
@@ -246,7 +246,7 @@ TEST_F(Diagnose, WhatStraysWithoutANameIsForetoldAllTheSame) {
   EXPECT_GT(nats_of("d/model.toml"), nats_of("d/tuned.toml") + 0.3);
 }
 
-// Both make single drives stray: slips anywhere, a patch where it lies.
+// Both make single drives are outliers: slips anywhere, a patch where it lies.
 TEST_F(Diagnose, SlipsAreNamedButNotForWhatLiesInOnePlace) {
   simulate(200, {"slip_events.probability=0.15", "slip_events.loss=0.35"});
   const Json slips = diagnose();
@@ -255,11 +255,11 @@ TEST_F(Diagnose, SlipsAreNamedButNotForWhatLiesInOnePlace) {
   EXPECT_GT(slips["effects"][0]["closed"].get<double>(), 0.8);
   simulate(200, {"friction_patch.ratio=0.15", "friction_patch.x=1", "friction_patch.y=1",
                  "friction_patch.radius=0.25"});
-  const Json patch = diagnose({"--leave-out", "friction_patch"});
+  const Json patch = diagnose({"--exclude", "friction_patch"});
   EXPECT_EQ(patch["verdict"], "unknown") << patch["headline"];
 }
 
-TEST_F(Diagnose, OfAFewTrialsNothingIsSaid) {
+TEST_F(Diagnose, OfAFewTrialsNothingIsReported) {
   simulate(5, {"motor_asymmetry.ratio=0.02"});
   const Json d = diagnose();
   EXPECT_EQ(d["verdict"], "unusable") << d["headline"];
@@ -268,7 +268,7 @@ TEST_F(Diagnose, OfAFewTrialsNothingIsSaid) {
 }
 
 // In a map whose origin is kilometres away places are found as near to it.
-TEST_F(Diagnose, SaysTheSameWhereverTheLogLies) {
+TEST_F(Diagnose, ReportsTheSameWhereverTheLogLies) {
   simulate(200, {"friction_patch.ratio=0.2", "friction_patch.x=1", "friction_patch.y=1",
                  "friction_patch.radius=0.3"});
   const Json near = diagnose();
@@ -378,11 +378,11 @@ TEST_F(Diagnose, TheRealForwardLogHasSeamsAndLateReadings) {
   }
 }
 
-TEST_F(Diagnose, UnknownEffectToLeaveOutIsRefused) {
+TEST_F(Diagnose, UnknownEffectToExcludeIsRefused) {
   simulate(5, {});
   const Finished finished =
       gapfarm_command({"diagnose", config_, "--trials", folder_ / "trials.csv", "--out",
-                       folder_ / "d", "--leave-out", "batery_sag"});
+                       folder_ / "d", "--exclude", "batery_sag"});
   EXPECT_NE(finished.exit_code, 0);
   EXPECT_NE(finished.err.find("did you mean 'battery_sag'?"), std::string::npos) << finished.err;
 }

@@ -96,7 +96,7 @@ TEST_F(ExternalRuns, AProgramThatMisbehavesStopsNoRun) {
       {"garbage", "    if speed > 0.7: print('bang', flush=True)\n",
        "did not answer with a JSON object: 'bang'"},
       {"flood", "    if speed > 0.7: print('x' * 3000000, flush=True)\n",
-       "said more than the 1048576 bytes"},
+       "sent more than the 1048576 bytes"},
       {"twice",
        "    if speed > 0.7: print(json.dumps({'id': task['id'], 'pose': [0, 0, 0]}), flush=True)\n",
        "answered twice, or late"},

@@ -143,8 +143,8 @@ TEST(FarmFailures, AWorkersLifetimeEndsBetweenJobs) {
   EXPECT_TRUE(brief->wait_all(20)) << "its supervisor goes, too";
 }
 
-// The first master is told to stop while a job is in work; the second asks the same question and
-// need not wait for the job to be done again.
+// The first master is commanded to stop while a job is in work; the second asks the same question
+// and need not wait for the job to be done again.
 TEST(FarmFailures, FinishedWorkIsHandedToTheNextMaster) {
   StopSource stop;
   SocketFarmOptions options = listening();

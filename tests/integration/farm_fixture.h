@@ -57,16 +57,16 @@ inline SocketFarmOptions listening(const std::string& endpoint = "tcp://127.0.0.
 // Workers as a user starts them, with these `words` on the command line; but a test that is killed
 // takes them with it.
 inline std::unique_ptr<ProcessPool> remote_worker(const std::string& endpoint,
-                                                  const std::vector<std::string>& words = {
+                                                  const std::vector<std::string>& arguments = {
                                                       "--processes", "1"}) {
   ProcessPoolOptions options;
   options.program = "/usr/bin/setpriv";  // of util-linux
   options.name_prefix = "remote";
   options.limits = {0, 0};  // a supervisor has no page of its own
-  options.arguments = [endpoint, words](const std::string&, const ProcessEnded*) {
+  options.arguments = [endpoint, arguments](const std::string&, const ProcessEnded*) {
     std::vector<std::string> all = {"--pdeathsig", "KILL",   kWorkerProgram,
                                     "--connect",   endpoint, "--insecure"};
-    all.insert(all.end(), words.begin(), words.end());
+    all.insert(all.end(), arguments.begin(), arguments.end());
     return all;
   };
   auto pool = std::make_unique<ProcessPool>(std::move(options));

@@ -89,7 +89,7 @@ TEST(Farm, WorkersFetchTheProblemByItsHash) {
   }
 }
 
-TEST(Farm, SaysWhenNoWorkerCanBeHad) {
+TEST(Farm, ReportsWhenNoWorkerCanBeHad) {
   SocketFarmOptions options = local(2);
   options.worker_program = "/bin/false";
   auto farm = SocketFarm::create(options);
@@ -205,22 +205,22 @@ TEST(Farm, GarbageDoesNotDisturb) {
   auto rude = DealerSocket::connect(endpoint, open);
   ASSERT_TRUE(rude.ok());
   const auto tasks = echo_tasks(500, 1000);
-  std::uint64_t said = 0;
+  std::uint64_t reported = 0;
   expect_echoes((*farm)->run("", tasks,
                              [&](const FarmProgress&) {
-                               const std::string noise(1000, static_cast<char>(said * 37));
+                               const std::string noise(1000, static_cast<char>(reported * 37));
                                send(raw, noise.data(), noise.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
                                for (int i = 0; i < 100; ++i) {
-                                 said += (*rude)->send("", noise) == SendStatus::kSent;
+                                 reported += (*rude)->send("", noise) == SendStatus::kSent;
                                }
                              }),
                 tasks);
   close(raw);
-  EXPECT_GT(said, 0u);
+  EXPECT_GT(reported, 0u);
   EXPECT_GT((*farm)->counts().malformed, 0u);
 }
 
-TEST(Farm, EndpointErrorsSayWhatToDo) {
+TEST(Farm, EndpointErrorsReportWhatToDo) {
   const auto message = [](const std::string& endpoint) {
     auto farm = SocketFarm::create(listening(endpoint));
     return farm ? std::string() : farm.error().message;

@@ -137,7 +137,7 @@ class Liar {
   std::atomic<unsigned> lies_{0};
 };
 
-// Tries to get in with a key that is not listed, or none; counts what it is told.
+// Tries to get in with a key that is not listed, or none; counts what it is reported.
 class Intruder {
  public:
   Intruder(const std::string& endpoint, const SocketOptions& options)
@@ -156,15 +156,15 @@ class Intruder {
   std::atomic<unsigned> heard_{0};
 };
 
-// Where the master listens, read off what it tells its user.
+// Where the master listens, read off what it shows its user.
 std::string endpoint_of(const RunningProgram& master) {
   const std::string marker = "--connect ";
   for (;;) {
-    const std::string said = master.err();
-    const std::size_t at = said.find(marker);
-    if (at != std::string::npos && said.find('\n', at) != std::string::npos) {
+    const std::string output = master.err();
+    const std::size_t at = output.find(marker);
+    if (at != std::string::npos && output.find('\n', at) != std::string::npos) {
       const std::size_t begin = at + marker.size();
-      return said.substr(begin, said.find_first_of(" \n", begin) - begin);
+      return output.substr(begin, output.find_first_of(" \n", begin) - begin);
     }
     std::this_thread::yield();
   }

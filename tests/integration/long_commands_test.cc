@@ -227,14 +227,14 @@ TEST_F(LongCommands, AModelIsAsNewAsItsRun) {
   EXPECT_THAT(predict().err, HasSubstr("not finished; taking its best so far"));
 }
 
-TEST_F(LongCommands, WorkersAndMastersSayThatTheyWait) {
+TEST_F(LongCommands, WorkersAndMastersReportThatTheyWait) {
   RunningProgram worker("gapfarm-worker",
                         {"--connect", "ipc://" + folder_ / "nobody", "--processes", "2"});
-  const std::string said = "waiting for a master at ipc://" + folder_ / "nobody";
-  EXPECT_TRUE(wait_until([&] { return worker.err().find(said) != std::string::npos; }));
+  const std::string output_file = "waiting for a master at ipc://" + folder_ / "nobody";
+  EXPECT_TRUE(wait_until([&] { return worker.err().find(output_file) != std::string::npos; }));
   worker.send(SIGTERM);
   const std::string err = worker.wait().err;
-  EXPECT_EQ(err.find(said), err.rfind(said)) << "one speaks for all";
+  EXPECT_EQ(err.find(output_file), err.rfind(output_file)) << "one speaks for all";
 
   const std::string run = folder_ / "run", endpoint = "ipc://" + folder_ / "farm";
   RunningProgram master("gapfarm",
@@ -248,9 +248,9 @@ TEST_F(LongCommands, WorkersAndMastersSayThatTheyWait) {
 }
 
 TEST_F(LongCommands, RunsWhatTheUserWantsAtTheEnd) {
-  const std::string told = folder_ / "told";
+  const std::string log_file = folder_ / "told";
   const std::string hook =
-      "echo \"$GAPFARM_COMMAND $GAPFARM_STATE $GAPFARM_EXIT $GAPFARM_OUT\" >> " + told +
+      "echo \"$GAPFARM_COMMAND $GAPFARM_STATE $GAPFARM_EXIT $GAPFARM_OUT\" >> " + log_file +
       "; echo to stdout; exit 7";
   const std::string quick = folder_.write("quick.toml", demo_config(4));
   const Finished done = gapfarm_command(
@@ -267,10 +267,10 @@ TEST_F(LongCommands, RunsWhatTheUserWantsAtTheEnd) {
   ASSERT_TRUE(wait_until([&] { return master.err().find("generation") != std::string::npos; }));
   master.send(SIGINT);
   const int stopped = master.wait().exit_code;
-  EXPECT_EQ(text_of(told), "evolve finished 0 " + folder_ / "run" + "\n" + "evolve failed " +
-                               std::to_string(failed.exit_code) + " " + folder_ / "run" + "\n" +
-                               "resume stopped " + std::to_string(stopped) + " " + folder_ / "run" +
-                               "\n");
+  EXPECT_EQ(text_of(log_file), "evolve finished 0 " + folder_ / "run" + "\n" + "evolve failed " +
+                                   std::to_string(failed.exit_code) + " " + folder_ / "run" + "\n" +
+                                   "resume stopped " + std::to_string(stopped) + " " +
+                                   folder_ / "run" + "\n");
 }
 
 }  // namespace

@@ -138,7 +138,7 @@ TEST_F(Observability, APageComesAlong) {
   std::filesystem::remove_all(folder_ / "run");
 }
 
-TEST_F(Observability, APageOnATakenPortIsSaid) {
+TEST_F(Observability, APageOnATakenPortIsReported) {
   RunningProgram first("gapfarm", {"serve", folder_.path().string(), "--port", "0"});
   while (first.out().find("then open") == std::string::npos) std::this_thread::yield();
   const std::string marker = "127.0.0.1:";
@@ -159,10 +159,10 @@ TEST_F(Observability, AnIndividualIsReplayedToTheBit) {
   ASSERT_FALSE(last->empty());
   const std::string file = folder_ / "paths.csv";
   for (const StoredIndividual& individual : {last->front(), last->back()}) {
-    const std::vector<std::string> words = {
+    const std::vector<std::string> worker_arguments = {
         "replay", folder_ / "run", "--genome", std::to_string(individual.birth_id), "--paths",
         file,     "--force"};
-    const Finished replay = gapfarm_command(words);
+    const Finished replay = gapfarm_command(worker_arguments);
     EXPECT_EQ(replay.exit_code, 0) << replay.out << replay.err;
     EXPECT_THAT(replay.out, HasSubstr("the same to the bit"));
   }

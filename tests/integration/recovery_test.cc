@@ -101,7 +101,7 @@ TEST_F(Recovery, ReachesTheRealForwardLog) {
                                         "--out", folder_ / "run", "--trials"};
   for (const std::string& file : files_in(*data, ".dat")) arguments.push_back(file);
   expect_done(arguments);
-  // 519 lines, the last of run40.dat cut short: said, and not made up.
+  // 519 lines, the last of run40.dat cut short: reported, and not made up.
   EXPECT_THAT(finished_.err, HasSubstr("on 518 trials"));
   EXPECT_THAT(finished_.err, HasSubstr("run40.dat:172:15: found the end of the line"));
   expect_done({"status", folder_ / "run", "--json"});

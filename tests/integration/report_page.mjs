@@ -52,7 +52,7 @@ async function judgeTerms(page) {
   check(await page.run(`document.getElementById("tip").hidden`), "terms: Escape leaves the words");
 }
 
-// Keys zoom, 0 shows all, a drag shows a part, and the marks left out are counted.
+// Keys zoom, 0 shows all, a drag shows a part, and the marks omitted are counted.
 async function judgeZoom(page) {
   const first = `document.querySelector("#residual-plots .canvas")`;
   const ticks = () => page.run(`[...${first}.querySelectorAll("text")].map((t) => t.textContent).join(" ")`);
@@ -61,7 +61,7 @@ async function judgeZoom(page) {
   await page.key("+");
   check((await ticks()) !== all, "zoom: plus changes nothing");
   check(/beyond the frame/.test(await page.run(`${first}.parentElement.querySelector(".note").textContent`)),
-    "zoom: nothing says what is left out");
+    "zoom: nothing says what is omitted");
   await page.key("0");
   check((await ticks()) === all, "zoom: 0 does not show all again");
   await page.run(`${first}.scrollIntoView({ block: "center", behavior: "instant" })`);

@@ -1,5 +1,5 @@
 // Run folders that cannot be used: full, read-only, damaged, another program's, or in use.  Each is
-// said with the file and a remedy, and what was committed is still there afterwards.
+// reported with the file and a remedy, and what was committed is still there afterwards.
 #include <gmock/gmock.h>
 #include <poll.h>
 #include <signal.h>
@@ -57,7 +57,7 @@ class RunFolder : public ::testing::Test {
   const std::string config_ = folder_.write("run.toml", demo_config(6));
 };
 
-TEST_F(RunFolder, ReadOnlyIsSaidAndCanStillBeLookedAt) {
+TEST_F(RunFolder, ReadOnlyIsReportedAndCanStillBeLookedAt) {
   ASSERT_EQ(evolve(run_, "2").exit_code, 0);
   const std::string digest = status(run_)["digest"];
   const Finished tried = with_mounts(

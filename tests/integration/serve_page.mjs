@@ -154,7 +154,7 @@ async function diagnosed(view) {
   await page.close();
 }
 
-// Windows of runs: a ground robot's, those that were kept apart, too.
+// Windows of runs: a ground robot's, those that were held out, too.
 async function windows(view) {
   const rover = (name) => join(source, "configs/rover", name);
   for (const day of ["monday", "tuesday"]) {
@@ -186,7 +186,7 @@ wheels.left.radius = "table"
   await page.picture("serve-window");
   const kept = await page.run(`PAGE.logged_trials + 2`);
   const apart = await open(`${view("rover")}&trial=${kept}`, { may });
-  await until(apart, `/^Window ${kept} .*kept apart/.test(${title})`, "a window that was kept apart is shown");
+  await until(apart, `/^Window ${kept} .*held out/.test(${title})`, "a window that was held out is shown");
   check(/never saw this window/.test(await apart.run(`document.getElementById("watch-plot").innerText`)), "it is not marked");
   for (const complaint of [...page.complaints, ...apart.complaints]) check(false, `windows: ${complaint}`);
   await page.close();

@@ -49,7 +49,7 @@ class Peer {
   Peer& operator=(const Peer&) = delete;
 
   bool there() const { return there_; }
-  void say(const std::string& bytes) const {
+  void send_bytes(const std::string& bytes) const {
     static_cast<void>(::send(fd_, bytes.data(), bytes.size(), MSG_NOSIGNAL));
   }
   std::string hear() const {
@@ -60,7 +60,7 @@ class Peer {
     }
     return all;
   }
-  void say_no_more() const { ::shutdown(fd_, SHUT_WR); }
+  void end_sending() const { ::shutdown(fd_, SHUT_WR); }
 
  private:
   int fd_;
@@ -91,12 +91,12 @@ class Siege : public testing::Test {
   }
   void still_answers() const {
     const Peer peer(port_);
-    peer.say("GET / HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n");
+    peer.send_bytes("GET / HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n");
     const std::string page = peer.hear();
     EXPECT_THAT(page, testing::StartsWith("HTTP/1.1 200"));
     EXPECT_THAT(page, HasSubstr("</html>"));
   }
-  void told(const std::string& what) const {
+  void expect_connected(const std::string& what) const {
     const long peak = peak_kB();
     std::printf("%s: the server had at most %ld kB, %ld before\n", what.c_str(), peak, before_kB_);
     if (kMemoryIsTheProgramsOwn) {
@@ -127,30 +127,30 @@ TEST_F(Siege, MalformedRequests) {
     if (i % 50 == 0) bytes.insert(bytes.size() / 2, 20000, 'x');  // beyond every limit
     const Peer peer(port_);
     ASSERT_TRUE(peer.there()) << "after " << i;
-    peer.say(bytes.substr(0, bits() % (bytes.size() + 1)));
-    if (i % 2 == 0) peer.say_no_more();
+    peer.send_bytes(bytes.substr(0, bits() % (bytes.size() + 1)));
+    if (i % 2 == 0) peer.end_sending();
     if (i % 4 == 0) peer.hear();
   }
   still_answers();
-  told(std::to_string(requests) + " malformed requests");
+  expect_connected(std::to_string(requests) + " malformed requests");
 }
 
-TEST_F(Siege, ManyConnectionsThatSayNothingOrALittle) {
+TEST_F(Siege, ManyConnectionsThatReportNothingOrALittle) {
   const int connections = from_environment("GAPFARM_SIEGE_CONNECTIONS", 600);
   std::vector<std::unique_ptr<Peer>> peers;
   for (int i = 0; i < connections; ++i) {
     peers.push_back(std::make_unique<Peer>(port_));
     ASSERT_TRUE(peers.back()->there()) << "after " << i;
-    if (i % 2 == 0) peers.back()->say("GET / HTTP/1.1\r\nHo");
-    if (i % 5 == 0) peers.back()->say("st: localhost\r\nX: ");
+    if (i % 2 == 0) peers.back()->send_bytes("GET / HTTP/1.1\r\nHo");
+    if (i % 5 == 0) peers.back()->send_bytes("st: localhost\r\nX: ");
   }
   still_answers();
   // A byte now and then from each.
   for (int round = 0; round < 5; ++round) {
-    for (const auto& peer : peers) peer->say("x");
+    for (const auto& peer : peers) peer->send_bytes("x");
     still_answers();
   }
-  told(std::to_string(connections) + " connections");
+  expect_connected(std::to_string(connections) + " connections");
 }
 
 // Whoever asks for a page and does not take it.
@@ -160,12 +160,13 @@ TEST_F(Siege, PagesThatNobodyTakes) {
   for (int i = 0; i < connections; ++i) {
     peers.push_back(std::make_unique<Peer>(port_));
     for (int k = 0; k < 4; ++k) {
-      peers.back()->say("GET / HTTP/1.1\r\nHost: localhost\r\n\r\n");
+      peers.back()->send_bytes("GET / HTTP/1.1\r\nHost: localhost\r\n\r\n");
     }
-    if (i % 3 == 0) peers.back()->say("GET /events?at=/ HTTP/1.1\r\nHost: localhost\r\n\r\n");
+    if (i % 3 == 0)
+      peers.back()->send_bytes("GET /events?at=/ HTTP/1.1\r\nHost: localhost\r\n\r\n");
   }
   still_answers();
-  told(std::to_string(connections) + " connections that take nothing");
+  expect_connected(std::to_string(connections) + " connections that take nothing");
 }
 
 }  // namespace

@@ -38,7 +38,7 @@ class PlanarEngine : public Engine {
     int step = 0;
     const double last_s = drive.on_s + 8 * drive.lag_s + kLongestRest_s;
     while (step * kStep_s < last_s) {
-      advance({left.step(kStep_s), right.step(kStep_s)}, {left.told(), right.told()});
+      advance({left.step(kStep_s), right.step(kStep_s)}, {left.commanded(), right.commanded()});
       ++step;
       if (step % kStepsASample == 0) path.push_back({step * kStep_s, X_WR_});
       if (left.stands() && right.stands() && rests()) break;
@@ -115,18 +115,18 @@ class PlanarEngine : public Engine {
 
   // Force over slip of a strip, along and across; `told` says which of its ends is the front.
   Eigen::Vector2d grip(double x, double y, double load, double slip_x, double slip_y, double tread,
-                       double told) const {
+                       double commanded) const {
     const Robot& r = scene_.robot;
     const double k = r.friction_ratio;
     const double slip = std::max(std::hypot(slip_x, k * slip_y), 1e-9);
-    const double behind = told == 0 ? 0 : told > 0 ? -x : x;
+    const double behind = commanded == 0 ? 0 : commanded > 0 ? -x : x;
     const double front = 0.5 * r.length_m + behind;
     const double shear = slip * front / (std::abs(tread) + kShearRate_m_s);
     const double c = friction_at(x, y) * load * -std::expm1(-shear / r.shear_m) / slip;
     return {c, k * k * c};
   }
 
-  void advance(const std::array<double, 2>& treads, const std::array<double, 2>& told) {
+  void advance(const std::array<double, 2>& treads, const std::array<double, 2>& commanded) {
     const Robot& r = scene_.robot;
     const Eigen::Vector3d inertia(r.mass_kg, r.mass_kg, inertia_);
     // Unknown: the velocity of the centre of mass in the robot's frame, and the spin.
@@ -141,7 +141,7 @@ class PlanarEngine : public Engine {
         const double rx = x - scene_.com_x_m, ry = y - scene_.com_y_m;
         const double u = velocity_[0] - ry * velocity_[2], w = velocity_[1] + rx * velocity_[2];
         const double tread = treads[side];
-        const Eigen::Vector2d c = grip(x, y, load[side][i], u - tread, w, tread, told[side]);
+        const Eigen::Vector2d c = grip(x, y, load[side][i], u - tread, w, tread, commanded[side]);
         const Eigen::Vector2d d(c.x() + rolling_drag(load[side][i], u), c.y());
         a(0, 0) += d.x();
         a(0, 2) -= d.x() * ry;

@@ -52,11 +52,11 @@ PushPlan drawn_push(const std::vector<Shape>& shapes, int number, Random& random
   const Vec a = corners[side], b = corners[(side + 1) % corners.size()];
   const Vec touch = a + random.uniform(0.15, 0.85) * (b - a);
   const Vec inward = 1 / norm(b - a) * Vec{a.y - b.y, b.x - a.x};
-  const Vec way = turn(random.uniform(-0.45, 0.45), inward);
-  const Vec begin = touch - (0.02 + kFingerRadius_m) * way;
+  const Vec heading = turn(random.uniform(-0.45, 0.45), inward);
+  const Vec begin = touch - (0.02 + kFingerRadius_m) * heading;
   const auto to_world = [&](Vec p) { return plan.start.p + turn(plan.start.angle, p); };
   plan.from = to_world(begin);
-  plan.to = to_world(begin + (0.02 + random.uniform(0.06, 0.2)) * way);
+  plan.to = to_world(begin + (0.02 + random.uniform(0.06, 0.2)) * heading);
   plan.speed_m_s = random.uniform(0.02, 0.12);
   return plan;
 }

@@ -222,9 +222,9 @@ class Simulation {
   Pose2 run(Pose2 start, const PushPlan& plan) {
     com_at_ = start.p + turn(start.angle, com_);
     angle_ = start.angle;
-    const Vec way = plan.to - plan.from;
-    const double length = norm(way), end_s = length / plan.speed_m_s;
-    const Vec finger_velocity = plan.speed_m_s / length * way;
+    const Vec heading = plan.to - plan.from;
+    const double length = norm(heading), end_s = length / plan.speed_m_s;
+    const Vec finger_velocity = plan.speed_m_s / length * heading;
     bool moved = false;
     for (long k = 0; k * kStep_s < end_s + 3; ++k) {
       const double t = k * kStep_s;

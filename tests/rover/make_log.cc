@@ -54,23 +54,23 @@ std::string rover() {
   return xml + "</actuator></mujoco>";
 }
 
-struct Told {
+struct CommandAt {
   double t_s, v_m_s, omega_rad_s;
 };
 
 // Somebody drives about: a new speed and turn every one to three seconds.
-std::vector<Told> driving(std::mt19937_64& random, double length_s) {
+std::vector<CommandAt> driving(std::mt19937_64& random, double length_s) {
   const auto uniform = [&](double lo, double hi) {
     return lo + (hi - lo) * static_cast<double>(random() >> 11) / 9007199254740992.0;
   };
-  std::vector<Told> told;
+  std::vector<CommandAt> commanded;
   for (double t = 0.5; t < length_s - 1;) {
     const double v = uniform(-0.3, 0.8), omega = uniform(-1.6, 1.6);
-    told.push_back({t, v, uniform(0, 1) < 0.2 ? 0 : omega});
+    commanded.push_back({t, v, uniform(0, 1) < 0.2 ? 0 : omega});
     t += uniform(1, 3);
   }
-  told.push_back({length_s - 1, 0, 0});
-  return told;
+  commanded.push_back({length_s - 1, 0, 0});
+  return commanded;
 }
 
 double normal(std::mt19937_64& random) {
@@ -83,7 +83,7 @@ double normal(std::mt19937_64& random) {
 void drive(const mjModel* model, std::mt19937_64& random, double length_s, int run,
            std::ofstream& commands, std::ofstream& poses) {
   mjData* data = mj_makeData(model);
-  const std::vector<Told> told = driving(random, length_s);
+  const std::vector<CommandAt> commanded = driving(random, length_s);
   double wanted[2] = {0, 0};
   double v = 0, omega = 0;
   std::size_t next = 0;
@@ -92,14 +92,14 @@ void drive(const mjModel* model, std::mt19937_64& random, double length_s, int r
   const int steps = static_cast<int>(length_s / kStep_s);
   for (int step = 0; step < steps; ++step) {
     const double t = step * kStep_s;
-    while (next < told.size() && told[next].t_s <= t) ++next;
-    while (heard < told.size() && told[heard].t_s + kDeadTime_s <= t) {
-      v = told[heard].v_m_s;
-      omega = told[heard].omega_rad_s;
+    while (next < commanded.size() && commanded[next].t_s <= t) ++next;
+    while (heard < commanded.size() && commanded[heard].t_s + kDeadTime_s <= t) {
+      v = commanded[heard].v_m_s;
+      omega = commanded[heard].omega_rad_s;
       ++heard;
     }
     if (step % kCommandEvery == 0) {  // cmd_vel at 10 Hz
-      const Told now = next > 0 ? told[next - 1] : Told{0, 0, 0};
+      const CommandAt now = next > 0 ? commanded[next - 1] : CommandAt{0, 0, 0};
       std::snprintf(line, sizeof line, "%d,%.3f,%.4f,%.4f\n", run, t, now.v_m_s, now.omega_rad_s);
       commands << line;
     }

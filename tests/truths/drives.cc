@@ -24,8 +24,8 @@ constexpr double kPause_s = 4;
 enum class Luck : std::uint64_t { kPlan, kDrive, kEffects, kStart, kEnd };
 
 Stream luck(std::uint64_t seed, const PlannedDrive& drive, Luck what) {
-  return Stream({seed, Purpose::kTest, drive.told.session, static_cast<std::uint64_t>(drive.trial),
-                 static_cast<std::uint64_t>(what)});
+  return Stream({seed, Purpose::kTest, drive.commanded.session,
+                 static_cast<std::uint64_t>(drive.trial), static_cast<std::uint64_t>(what)});
 }
 
 class Driver {
@@ -42,11 +42,11 @@ class Driver {
   }
 
   Trial drive(const PlannedDrive& planned) {
-    if (planned.told.moved) X_WR_ = planned.X_WP;
+    if (planned.commanded.moved) X_WR_ = planned.X_WP;
     Trial trial;
-    trial.session = "s" + std::to_string(planned.told.session + 1);
+    trial.session = "s" + std::to_string(planned.commanded.session + 1);
     trial.trial = planned.trial;
-    trial.t_s = planned.told.t_s;
+    trial.t_s = planned.commanded.t_s;
     trial.command = planned.command;
     trial.left = planned.left;
     trial.right = planned.right;
@@ -65,7 +65,7 @@ class Driver {
   Pose logged_start(const PlannedDrive& planned, Stream& stream) const {
     Pose X_WS = X_WR_;
     const double chance = stream.uniform(), turn = stream.uniform(-1, 1);
-    if (planned.told.moved && chance < readings_.unsettled_share) {
+    if (planned.commanded.moved && chance < readings_.unsettled_share) {
       X_WS.theta = wrap_angle(X_WS.theta + turn * readings_.unsettled_angle_rad);
     }
     return logged(X_WS, stream);
@@ -84,19 +84,20 @@ class Driver {
   }
 
   Drive drive_of(const PlannedDrive& planned) const {
-    DriveTold told{{planned.left}, {planned.right}, planned.duration_s, robot_.lag_s};
+    CommandedMotion commanded{{planned.left}, {planned.right}, planned.duration_s, robot_.lag_s};
     Stream effects = luck(seed_, planned, Luck::kEffects);
     for (const Cause& cause : causes_) {
-      if (cause.row->drive) cause.row->drive(cause.values, planned.told, effects, told);
+      if (cause.row->drive) cause.row->drive(cause.values, planned.commanded, effects, commanded);
     }
     Stream stream = luck(seed_, planned, Luck::kDrive);
     const double both = 1 + noise_.common * stream.normal();
     const double left = both * (1 + noise_.side * stream.normal());
     const double right = both * (1 + noise_.side * stream.normal());
-    const auto side = [&](const SideTold& s, double varied) {
+    const auto side = [&](const SideCommand& s, double varied) {
       return SideDrive{robot_.full_speed_m_s * s.duty * s.gain * varied, s.dead_travel_m};
     };
-    return {side(told.left, left), side(told.right, right), told.on_s, told.lag_s};
+    return {side(commanded.left, left), side(commanded.right, right), commanded.on_s,
+            commanded.lag_s};
   }
 
   Robot robot_;
@@ -117,7 +118,7 @@ std::vector<PlannedDrive> draw_plan(const PlanSize& size, std::uint64_t seed) {
     for (unsigned i = 0; i < size.trials; ++i) {
       PlannedDrive drive;
       drive.trial = i;
-      drive.told = {t_s, s, i % size.chain == 0, last_left, last_right};
+      drive.commanded = {t_s, s, i % size.chain == 0, last_left, last_right};
       Stream stream = luck(seed, drive, Luck::kPlan);
       const Command& command = kCommands[stream.below(kCommands.size())];
       const double level = kLevels[stream.below(kLevels.size())];

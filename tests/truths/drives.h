@@ -24,7 +24,7 @@ struct PlannedDrive {
   double left = 0, right = 0;  // duties
   double duration_s = 0;
   std::int64_t trial = 0;  // within its session
-  Told told;
+  Commanded commanded;
   Pose X_WP;  // where it is put down, if told.moved
 };
 

@@ -76,39 +76,41 @@ Values draw_compass(double strength, double, Stream stream) {
   return {{"amplitude", 0.5 * strength}, {"phase", direction(stream)}};
 }
 
-void asymmetry(const Values& p, const Told&, Stream&, DriveTold& drive) {
+void asymmetry(const Values& p, const Commanded&, Stream&, CommandedMotion& drive) {
   const double ratio = p.at("ratio");
   drive.left.gain *= 2 / (2 + ratio);
   drive.right.gain *= 2 * (1 + ratio) / (2 + ratio);
 }
 
-void dead_band(const Values& p, const Told&, Stream&, DriveTold& drive) {
-  for (SideTold* side : {&drive.left, &drive.right}) {
+void dead_band(const Values& p, const Commanded&, Stream&, CommandedMotion& drive) {
+  for (SideCommand* side : {&drive.left, &drive.right}) {
     const double beyond = std::max(0.0, std::abs(side->duty) - p.at("duty"));
     side->duty = std::copysign(beyond, side->duty);
   }
 }
 
-void lag(const Values& p, const Told&, Stream&, DriveTold& drive) { drive.lag_s += p.at("tau"); }
+void lag(const Values& p, const Commanded&, Stream&, CommandedMotion& drive) {
+  drive.lag_s += p.at("tau");
+}
 
-void timing(const Values& p, const Told&, Stream&, DriveTold& drive) {
+void timing(const Values& p, const Commanded&, Stream&, CommandedMotion& drive) {
   drive.on_s = std::max(0.0, drive.on_s + p.at("offset"));
 }
 
-void sag(const Values& p, const Told& told, Stream&, DriveTold& drive) {
-  const double left_over = std::max(0.0, 1 - p.at("rate") * told.t_s / 60);
+void sag(const Values& p, const Commanded& commanded, Stream&, CommandedMotion& drive) {
+  const double left_over = std::max(0.0, 1 - p.at("rate") * commanded.t_s / 60);
   drive.left.gain *= left_over;
   drive.right.gain *= left_over;
 }
 
-void backlash(const Values& p, const Told& told, Stream&, DriveTold& drive) {
-  if (told.moved) return;
-  if (told.last_left * drive.left.duty < 0) drive.left.dead_travel_m += p.at("travel");
-  if (told.last_right * drive.right.duty < 0) drive.right.dead_travel_m += p.at("travel");
+void backlash(const Values& p, const Commanded& commanded, Stream&, CommandedMotion& drive) {
+  if (commanded.moved) return;
+  if (commanded.last_left * drive.left.duty < 0) drive.left.dead_travel_m += p.at("travel");
+  if (commanded.last_right * drive.right.duty < 0) drive.right.dead_travel_m += p.at("travel");
 }
 
-void slips(const Values& p, const Told&, Stream& stream, DriveTold& drive) {
-  for (SideTold* side : {&drive.left, &drive.right}) {
+void slips(const Values& p, const Commanded&, Stream& stream, CommandedMotion& drive) {
+  for (SideCommand* side : {&drive.left, &drive.right}) {
     const double chance = stream.uniform(), share = stream.uniform();
     if (chance < p.at("probability")) side->gain *= 1 - p.at("loss") * share;
   }
@@ -177,33 +179,33 @@ void unsettled(const Values& p, Readings& readings) {
 void rounding(const Values& p, Readings& readings) { readings.grid_m = p.at("step"); }
 
 // Speed grows with a power of the duty.
-void bent_duty(const Values& p, const Told&, Stream&, DriveTold& drive) {
-  for (SideTold* side : {&drive.left, &drive.right}) {
+void bent_duty(const Values& p, const Commanded&, Stream&, CommandedMotion& drive) {
+  for (SideCommand* side : {&drive.left, &drive.right}) {
     side->duty = std::copysign(std::pow(std::abs(side->duty), 1 + p.at("bend")), side->duty);
   }
 }
 
 // A side goes faster after it was driven hard.
-void memory(const Values& p, const Told& told, Stream&, DriveTold& drive) {
-  drive.left.gain *= 1 + p.at("share") * std::abs(told.last_left);
-  drive.right.gain *= 1 + p.at("share") * std::abs(told.last_right);
+void memory(const Values& p, const Commanded& commanded, Stream&, CommandedMotion& drive) {
+  drive.left.gain *= 1 + p.at("share") * std::abs(commanded.last_left);
+  drive.right.gain *= 1 + p.at("share") * std::abs(commanded.last_right);
 }
 
 // Charged fully, half, and not at all.
-void session_gain(const Values& p, const Told& told, Stream&, DriveTold& drive) {
+void session_gain(const Values& p, const Commanded& commanded, Stream&, CommandedMotion& drive) {
   constexpr double kDeviations[] = {1, 0.1, -1.1};
-  const double gain = 1 + p.at("spread") * kDeviations[told.session % std::size(kDeviations)];
+  const double gain = 1 + p.at("spread") * kDeviations[commanded.session % std::size(kDeviations)];
   drive.left.gain *= gain;
   drive.right.gain *= gain;
 }
 
 // A share of the left duty leaks into the right one.
-void crosstalk(const Values& p, const Told&, Stream&, DriveTold& drive) {
+void crosstalk(const Values& p, const Commanded&, Stream&, CommandedMotion& drive) {
   drive.right.duty += p.at("share") * drive.left.duty;
 }
 
-void reverse_loss(const Values& p, const Told&, Stream&, DriveTold& drive) {
-  for (SideTold* side : {&drive.left, &drive.right}) {
+void reverse_loss(const Values& p, const Commanded&, Stream&, CommandedMotion& drive) {
+  for (SideCommand* side : {&drive.left, &drive.right}) {
     if (side->duty < 0) side->gain *= 1 - p.at("share");
   }
 }

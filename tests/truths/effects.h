@@ -14,22 +14,22 @@ namespace gapfarm::truths {
 
 using Values = std::map<std::string, double>;
 
-// What a drive is told, beyond the scene.
-struct Told {
+// What a drive is reported, beyond the scene.
+struct Commanded {
   double t_s = 0;  // since the session began
   std::size_t session = 0;
   bool moved = false;                    // by hand, before the trial
   double last_left = 0, last_right = 0;  // duties of the trial before in its session
 };
 
-struct SideTold {
+struct SideCommand {
   double duty = 0;
   double gain = 1;
   double dead_travel_m = 0;
 };
 
-struct DriveTold {
-  SideTold left, right;
+struct CommandedMotion {
+  SideCommand left, right;
   double on_s = 0;
   double lag_s = 0;
 };
@@ -48,7 +48,7 @@ struct EffectRow {
   // there is to draw is drawn alike at every strength.
   Values (*draw)(double strength, double arena_m, Stream stream) = nullptr;
   void (*scene)(const Values&, Scene&) = nullptr;
-  void (*drive)(const Values&, const Told&, Stream&, DriveTold&) = nullptr;
+  void (*drive)(const Values&, const Commanded&, Stream&, CommandedMotion&) = nullptr;
   void (*see)(const Values&, Pose&) = nullptr;  // true to logged pose
   void (*read)(const Values&, Readings&) = nullptr;
 };

@@ -60,13 +60,13 @@ using Path = std::vector<Sample>;
 // Where the robot was `age_s` before the path's end; its start where that is longer ago.
 Pose pose_before_end(const Path& path, double age_s);
 
-// A motor that follows what it is told with a lag, and the tread behind it.
+// A motor that follows what it is reported with a lag, and the tread behind it.
 class Motor {
  public:
   Motor(const SideDrive& side, const Drive& drive) : side_(side), drive_(drive) {}
   // The tread's speed after another `dt_s`.
   double step(double dt_s);
-  double told() const { return side_.speed_m_s; }
+  double commanded() const { return side_.speed_m_s; }
   bool stands() const;
 
  private:

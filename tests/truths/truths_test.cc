@@ -97,8 +97,9 @@ TEST(Truths, BacklashTakesWayFromReversalsAlone) {
   const TrialLog plain = log_of({});
   const TrialLog loose = log_of({caused("backlash", {{"travel", 0.01}})});
   for (std::size_t i = 0; i < plan.size(); ++i) {
-    const bool reversed = !plan[i].told.moved && (plan[i].left * plan[i].told.last_left < 0 ||
-                                                  plan[i].right * plan[i].told.last_right < 0);
+    const bool reversed =
+        !plan[i].commanded.moved && (plan[i].left * plan[i].commanded.last_left < 0 ||
+                                     plan[i].right * plan[i].commanded.last_right < 0);
     const Pose a = between(plain.trials[i].X_WS, plain.trials[i].X_WE);
     const Pose b = between(loose.trials[i].X_WS, loose.trials[i].X_WE);
     const double differ = (Eigen::Vector3d(a.x - b.x, a.y - b.y, a.theta - b.theta)).norm();

@@ -11,7 +11,7 @@
 namespace gapfarm {
 namespace {
 
-constexpr double kWayPoint_s = 0.1;  // between poses along which noise adds up
+constexpr double kPathPoint_s = 0.1;  // between poses along which noise adds up
 
 struct DriftNoise {
   double travel = 0;  // m / sqrt(m)
@@ -30,12 +30,12 @@ Eigen::Matrix3d carry(const Pose& X_SE) {
 
 // A random walk along the way: every stretch of wheel travel ds adds variances travel^2 ds and
 // turn^2 ds.  In the axes of the last pose.
-Eigen::Matrix3d drift(std::span<const GroundSample> way, const DriftNoise& noise) {
+Eigen::Matrix3d drift(std::span<const GroundSample> path, const DriftNoise& noise) {
   Eigen::Matrix3d D = Eigen::Matrix3d::Zero();
-  for (std::size_t k = 1; k < way.size(); ++k) {
-    const double ds = way[k].travel_m - way[k - 1].travel_m;
+  for (std::size_t k = 1; k < path.size(); ++k) {
+    const double ds = path[k].travel_m - path[k - 1].travel_m;
     const double along = noise.travel * noise.travel * ds;
-    const Eigen::Matrix3d J = carry(between(way[k].X_SR, way.back().X_SR));
+    const Eigen::Matrix3d J = carry(between(path[k].X_SR, path.back().X_SR));
     D += J * Eigen::Vector3d(along, along, noise.turn * noise.turn * ds).asDiagonal() *
          J.transpose();
   }
@@ -48,7 +48,7 @@ class GroundModel final : public ScenarioModel {
     for (const Trial& trial : problem.log.trials) {
       const double end = *trial.t_s + *trial.duration_s;
       std::vector<double>& times = times_[*trial.run];
-      const long points = std::max(1L, std::lround(*trial.duration_s / kWayPoint_s));
+      const long points = std::max(1L, std::lround(*trial.duration_s / kPathPoint_s));
       for (long k = 0; k < points; ++k) {
         times.push_back(*trial.t_s +
                         *trial.duration_s * static_cast<double>(k) / static_cast<double>(points));
@@ -94,8 +94,8 @@ TrialPrediction GroundModel::observe(const ParameterValues& values, const Ground
   const PoseNoise reading{at(values, kGroundPositionNoise), at(values, kGroundHeadingNoise)};
   // From the robot's axes at the end to the marker's.
   const Eigen::Matrix3d J = carry(robot.X_RM);
-  const std::span<const GroundSample> way(samples.data() + from, to - from + 1);
-  end.cov = predictive_covariance(X_MM, J * drift(way, noise) * J.transpose(), reading);
+  const std::span<const GroundSample> path(samples.data() + from, to - from + 1);
+  end.cov = predictive_covariance(X_MM, J * drift(path, noise) * J.transpose(), reading);
   return {{end}};
 }
 

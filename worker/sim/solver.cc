@@ -42,7 +42,7 @@ MovingSide moving_side(btAlignedObjectArray<btSolverBody>& bodies, const btSolve
           row.m_angularComponentB};
 }
 
-// Whether one side moves as it is told, whatever pushes back.
+// Whether one side moves as it is commanded, whatever pushes back.
 bool is_driven(btAlignedObjectArray<btSolverBody>& bodies, const btSolverConstraint& row) {
   for (const int id : {row.m_solverBodyIdA, row.m_solverBodyIdB}) {
     const btRigidBody* body = bodies[id].m_originalBody;

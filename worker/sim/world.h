@@ -32,7 +32,7 @@ class Robot {
   // Adds the robot at rest, turning centre at the origin of S, heading along x.
   virtual void enter(btDiscreteDynamicsWorld& world) = 0;
   virtual void leave(btDiscreteDynamicsWorld& world) = 0;
-  // Told before every physics step of `dt_s`.
+  // Reported before every physics step of `dt_s`.
   virtual void drive(const SideSpeeds& speeds, double dt_s) = 0;
   // Speeds that the floor contacts themselves impose; zero for a robot that drives by joints.
   virtual SideSpeeds contact_speeds() const = 0;

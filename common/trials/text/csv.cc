@@ -258,7 +258,7 @@ std::string format_double(double value) {
 
 namespace {
 
-std::string in_words(const std::vector<std::string>& names) {
+std::string listed_names(const std::vector<std::string>& names) {
   std::string text;
   for (const std::string& name : names) text += (text.empty() ? "" : ", ") + quoted_word(name);
   return text;
@@ -282,10 +282,11 @@ Error missing_columns(const CsvRow& row, const std::vector<std::string>& names,
                       "column " + quoted_word(near) + " but no column '" + missing.front() + "'",
                       "column '" + missing.front() + "'", "rename it");
   }
-  const std::string columns = (missing.size() == 1 ? "column " : "columns ") + in_words(missing);
+  const std::string columns =
+      (missing.size() == 1 ? "column " : "columns ") + listed_names(missing);
   const std::string remedy =
       others.empty() ? (missing.size() == 1 ? "add it to every row" : "add them to every row")
-                     : "columns here beyond those of the format: " + in_words(others) +
+                     : "columns here beyond those of the format: " + listed_names(others) +
                            "; rename what is one of them, or add it to every row";
   return text_error(file, row.end, "no " + columns, columns + " of " + std::string(format), remedy);
 }

@@ -19,7 +19,7 @@ struct TextPlace {
   std::size_t column = 1;
 };
 
-// "file:line:column: found FOUND, expected EXPECTED; REMEDY"; an empty remedy is left out.
+// "file:line:column: found FOUND, expected EXPECTED; REMEDY"; an empty remedy is omitted.
 Error text_error(std::string_view file, TextPlace place, std::string_view found,
                  std::string_view expected, std::string_view remedy = {});
 
@@ -41,7 +41,7 @@ struct CsvRow {
 };
 
 // All rows; a byte-order mark, CRLF and empty lines are accepted, a quoted field may hold commas,
-// line breaks and doubled quotes.  Lines at the very beginning that are comments are left out.
+// line breaks and doubled quotes.  Lines at the very beginning that are comments are omitted.
 // Errors: unclosed quote, text after a closing quote, bytes that are not UTF-8.
 Result<std::vector<CsvRow>> parse_csv(std::string_view text, std::string_view file);
 

@@ -8,7 +8,7 @@ namespace {
 
 constexpr std::size_t kMostKinds = 20;      // a screen of them
 constexpr std::size_t kMostLines = 10;      // of a kind
-constexpr std::size_t kMostLeftOut = 1000;  // a record of what is missing, so nearly all
+constexpr std::size_t kMostSkipped = 1000;  // a record of what is missing, so nearly all
 
 std::string counted(std::size_t n, const char* thing) {
   return std::to_string(n) + " " + thing + (n == 1 ? "" : "s");
@@ -41,18 +41,18 @@ void Mistakes::add_row(const std::vector<Error>& errors) {
     const auto [file, line] = cut_line(place);
     const auto [known, is_new] =
         kind_of_.emplace(std::string(file) + std::string(what), kinds_.size());
-    if (is_new && kinds_.size() < (skip_rows_ ? kMostLeftOut : kMostKinds)) {
+    if (is_new && kinds_.size() < (skip_rows_ ? kMostSkipped : kMostKinds)) {
       kinds_.push_back({error.message, {}, 0});
     } else if (is_new) {
       kind_of_.erase(known);
       ++unshown_;
     } else if (Kind& kind = kinds_[known->second];
-               kind.lines.size() < (skip_rows_ ? kMostLeftOut : kMostLines)) {
+               kind.lines.size() < (skip_rows_ ? kMostSkipped : kMostLines)) {
       kind.lines.emplace_back(line);
     } else {
       ++kind.more;
     }
-    // Of a row that is left out one reason is enough.
+    // Of a row that is omitted one reason is enough.
     if (skip_rows_) break;
   }
 }
@@ -96,8 +96,8 @@ Status Mistakes::status() const {
 std::vector<std::string> Mistakes::notes() const {
   std::vector<std::string> notes;
   if (rows_ == 0) return notes;
-  for (const Kind& kind : kinds_) notes.push_back("left out: " + text(kind));
-  notes.push_back("left out " + counted(rows_, "row") + " with mistakes in all");
+  for (const Kind& kind : kinds_) notes.push_back("omitted: " + text(kind));
+  notes.push_back("omitted " + counted(rows_, "row") + " with mistakes in all");
   return notes;
 }
 

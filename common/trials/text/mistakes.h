@@ -1,4 +1,4 @@
-// All that is wrong with a log, said at once, and the rows that may be left out for it.
+// All that is wrong with a log, reported at once, and the rows that may be omitted for it.
 #pragma once
 
 #include <cstddef>
@@ -12,7 +12,7 @@ namespace gapfarm {
 
 class Mistakes {
  public:
-  // `skip_rows`: rows with mistakes are left out, and the mistakes become notes.
+  // `skip_rows`: rows with mistakes are omitted, and the mistakes become notes.
   explicit Mistakes(bool skip_rows) : skip_rows_(skip_rows) {}
 
   // Of one row.
@@ -22,10 +22,10 @@ class Mistakes {
   // Every row of a file has mistakes.
   void add_no_row(const std::string& file);
 
-  // OK when there are none, or rows alone that are left out.  Else all of them, a line each kind
+  // OK when there are none, or rows alone that are omitted.  Else all of them, a line each kind
   // with the places of all its rows; of many the first and their number.
   Status status() const;
-  // What was left out and why.  REQUIRES: status() is OK.
+  // What was held out and why.  REQUIRES: status() is OK.
   std::vector<std::string> notes() const;
 
  private:
@@ -42,7 +42,7 @@ class Mistakes {
   std::size_t count_ = 0;
   std::size_t rows_ = 0;
   std::size_t unshown_ = 0;
-  std::vector<std::string> files_;  // what was said of them
+  std::vector<std::string> files_;  // what was reported of them
   std::vector<Kind> kinds_;
   std::map<std::string, std::size_t> kind_of_;  // by file and what was found there
 };

@@ -111,7 +111,7 @@ void add_samples(const SampleForm<Sample>& form, std::string_view text, const st
     strangers += samples.rows.at(key);
   }
   if (strangers == 0) return;
-  logs.front()->notes.push_back(file + ":" + std::to_string(first_stranger) + ":1: left out " +
+  logs.front()->notes.push_back(file + ":" + std::to_string(first_stranger) + ":1: omitted " +
                                 std::to_string(strangers) + " " + form.rows_are +
                                 " rows of trials that are not in the log");
 }

@@ -12,7 +12,7 @@ namespace gapfarm {
 
 // Adds the samples of a paths.csv or a tips.csv to the trials of `logs` that they name.  Mistakes:
 // also a trial that has such samples already, or that two of the logs hold.  A note in the first
-// log tells of rows without a trial.  Nothing is added when the text cannot be read.
+// log reports rows without a trial.  Nothing is added when the text cannot be read.
 void add_paths(std::string_view text, const std::string& file, const std::vector<TrialLog*>& logs,
                Mistakes& mistakes);
 void add_tips(std::string_view text, const std::string& file, const std::vector<TrialLog*>& logs,

@@ -14,8 +14,8 @@
 #include "master/diagnose/result/diagnosis_json.h"
 #include "master/evolve/evaluation.h"
 #include "master/ground/diagnose_ground.h"
+#include "master/io/log_checks/finding_text.h"
 #include "master/io/log_checks/sanity.h"
-#include "master/io/log_checks/words.h"
 #include "master/run/validation.h"
 
 namespace gapfarm {
@@ -116,7 +116,7 @@ std::size_t count_conditions(const Problem& problem, unsigned context) {
 }
 
 // What is the wrong way round in a ground robot's runs.
-std::vector<SanityFinding> doubts(const Config& config) {
+std::vector<SanityFinding> warnings(const Config& config) {
   const Problem& problem = config.problem;
   if (!problem.ground) return check_sanity(problem);
   const GroundRobot robot = problem.ground->robot_at(problem.values);
@@ -141,7 +141,7 @@ Summary summarise(const Config& config) {
     summary.effects.push_back(effect.name);
   }
   summary.conditions = count_conditions(problem, context);
-  summary.sanity = doubts(config);
+  summary.sanity = warnings(config);
   return summary;
 }
 
@@ -196,7 +196,7 @@ std::string describe(const Config& config, const Summary& summary, unsigned work
   // The first row of every other table is the model that is simulated.
   text += "scenario     " + problem.scenario + ", ";
   if (problem.ground) {
-    text += drive_words()[static_cast<std::size_t>(problem.ground->robot().drive)] + "\n";
+    text += drive_names()[static_cast<std::size_t>(problem.ground->robot().drive)] + "\n";
   } else {
     text += problem.table()[0].key + " " + problem.table().format(0, problem.values[0]);
     if (problem.tracked) text += ", sizes of " + robot_name(problem);

@@ -35,14 +35,15 @@ struct ExportCommand {
 constexpr double kLow = 0.05, kHigh = 0.95;
 
 // Every value of the robot's kinematics by the log that a run was fitted to.
-Result<SaidValues> values_of_run(const Problem& problem, const Model& model, Console& console) {
-  SaidValues said;
-  said.given = problem.ground->robot();
-  said.logs = model.data.files;
-  ASSIGN_OR_RETURN(const auto log, read_run_folders(said.logs, said.given.channels));
+Result<ReportedValues> values_of_run(const Problem& problem, const Model& model, Console& console) {
+  ReportedValues reported_values;
+  reported_values.given = problem.ground->robot();
+  reported_values.logs = model.data.files;
+  ASSIGN_OR_RETURN(const auto log,
+                   read_run_folders(reported_values.logs, reported_values.given.channels));
   console.note("fitting the robot's kinematics to the log of the run, for intervals");
   ASSIGN_OR_RETURN(const auto asked,
-                   ask_what_changed(said.given, log, {{0.5, 2, 5}, 0.5}, 1, nullptr));
+                   ask_what_changed(reported_values.given, log, {{0.5, 2, 5}, 0.5}, 1, nullptr));
   const GroundReference& fit = *asked.reference;
   for (std::size_t k = 0; k < fit.names.size(); ++k) {
     const auto i = static_cast<Eigen::Index>(k);
@@ -54,13 +55,13 @@ Result<SaidValues> values_of_run(const Problem& problem, const Model& model, Con
     const auto at = [&](double share) {
       return drawn[static_cast<std::size_t>(share * static_cast<double>(drawn.size() - 1))];
     };
-    said.values.push_back({fit.names[k],
-                           value_in_file(said.given, fit.names[k]),
-                           fit.values[i],
-                           {at(kLow), at(kHigh)},
-                           true});
+    reported_values.values.push_back({fit.names[k],
+                                      value_in_file(reported_values.given, fit.names[k]),
+                                      fit.values[i],
+                                      {at(kLow), at(kHigh)},
+                                      true});
   }
-  return said;
+  return reported_values;
 }
 
 // Friction as the run has it, where the run searched for it.
@@ -77,19 +78,19 @@ RosFriction simulated_friction(const Problem& problem, const Model& model) {
   return friction;
 }
 
-struct Said {
-  SaidValues values;
+struct Reported {
+  ReportedValues values;
   RosFriction friction;
 };
 
-Result<Said> read_source_of_export(const std::string& source, Console& console) {
+Result<Reported> read_source_of_export(const std::string& source, Console& console) {
   const fs::path values = fs::path(source) / "values.json";
   std::error_code ignored;
   if (fs::exists(values, ignored)) {
     ASSIGN_OR_RETURN(const auto text, read_text_file(values.string()));
-    ASSIGN_OR_RETURN(auto said, parse_values(text, values.string()));
-    const RosFriction friction = ros_friction(said);
-    return Said{std::move(said), friction};
+    ASSIGN_OR_RETURN(auto reported_values, parse_values(text, values.string()));
+    const RosFriction friction = ros_friction(reported_values);
+    return Reported{std::move(reported_values), friction};
   }
   const auto reader = RunReader::open(source);
   if (!reader) {
@@ -102,10 +103,10 @@ Result<Said> read_source_of_export(const std::string& source, Console& console) 
                  " has no robot file whose values could go back; only ground robots have"};
   }
   ASSIGN_OR_RETURN(const auto model, read_model_of(source, console));
-  ASSIGN_OR_RETURN(auto said, values_of_run(problem, model, console));
+  ASSIGN_OR_RETURN(auto reported_values, values_of_run(problem, model, console));
   RosFriction friction = simulated_friction(problem, model);
-  if (!friction.across) friction = ros_friction(said);
-  return Said{std::move(said), friction};
+  if (!friction.across) friction = ros_friction(reported_values);
+  return Reported{std::move(reported_values), friction};
 }
 
 std::string usual_controller(DriveKind drive) {
@@ -143,20 +144,20 @@ Status name_wheels_of_export(const std::string& urdf, const GroundRobot& robot, 
 }
 
 Result<RosExport> export_of(const ExportCommand& command, Console& console) {
-  ASSIGN_OR_RETURN(auto said, read_source_of_export(command.source, console));
+  ASSIGN_OR_RETURN(auto reported_values, read_source_of_export(command.source, console));
   RosExport data;
   data.source = command.source;
-  data.logs = said.values.logs;
-  data.controller = usual_controller(said.values.given.drive);
+  data.logs = reported_values.values.logs;
+  data.controller = usual_controller(reported_values.values.given.drive);
   if (!command.controllers.empty()) {
     ASSIGN_OR_RETURN(const auto text, read_text_file(command.controllers));
     ASSIGN_OR_RETURN(const auto read, parse_controllers(text, command.controllers));
     data.controller = read.drives.front().name;
   }
-  data.values = ros_values(said.values);
-  data.remarks = ros_remarks(said.values);
-  data.friction = said.friction;
-  RETURN_IF_ERROR(name_wheels_of_export(command.urdf, said.values.given, &data));
+  data.values = ros_values(reported_values.values);
+  data.remarks = ros_remarks(reported_values.values);
+  data.friction = reported_values.friction;
+  RETURN_IF_ERROR(name_wheels_of_export(command.urdf, reported_values.values.given, &data));
   return data;
 }
 
@@ -165,7 +166,7 @@ nlohmann::ordered_json export_json(const RosExport& data) {
   for (const RosValue& row : data.values) {
     rows.push_back({{"key", row.key},
                     {"had", row.had},
-                    {"says", row.says},
+                    {"says", row.reported},
                     {"lo", row.interval.lower},
                     {"hi", row.interval.upper},
                     {"known", row.known}});
@@ -196,7 +197,7 @@ Result<int> run_export(ExportCommand& command, CliContext& context) {
   RETURN_IF_ERROR(
       command.outputs.write_in(command.out, {{"controllers.yaml", yaml}, {"gazebo.xml", gazebo}}));
   console.result(text, export_json(data));
-  console.note("left behind: " + command.out + "/controllers.yaml" +
+  console.note("wrote: " + command.out + "/controllers.yaml" +
                (gazebo.empty() ? "" : ", gazebo.xml"));
   return kExitDone;
 }

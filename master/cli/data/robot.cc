@@ -28,7 +28,7 @@ std::string plain_lines(const std::string& text) {
   return out;
 }
 
-std::string next_words_of(const RobotSetup& setup) {
+std::string next_steps_of(const RobotSetup& setup) {
   if (setup.config.empty()) return "gapfarm import runs LOG --out drive";
   return "gapfarm import runs LOG --out " + (setup.runs.empty() ? "drive" : setup.runs[0]) +
          ", then: gapfarm evolve " + setup.config + " --out run/" +
@@ -55,7 +55,7 @@ Result<int> run_robot(RobotOptions& options, CliContext& context) {
     console.print("\nrobot.toml, to paste and correct (--out robot.toml writes it):\n\n" +
                   plain_lines(texts.robot));
   } else {
-    console.note("robot written to " + setup.robot + "; next: " + next_words_of(setup));
+    console.note("robot written to " + setup.robot + "; next: " + next_steps_of(setup));
   }
   return kExitDone;
 }

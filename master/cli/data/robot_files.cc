@@ -66,8 +66,8 @@ Result<RobotReading> read_robot_files(const std::vector<std::string>& files,
       first = std::move(next);
       continue;
     }
-    for (std::string& said : compare_readings(*first, robots[0], next, file)) {
-      first->disagreements.push_back(std::move(said));
+    for (std::string& disagreement : compare_readings(*first, robots[0], next, file)) {
+      first->disagreements.push_back(std::move(disagreement));
     }
   }
   return *std::move(first);

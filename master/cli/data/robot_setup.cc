@@ -29,10 +29,10 @@ std::string robot_beside(const std::string& out) {
   return (path.parent_path() / (path.stem().string() + "_robot.toml")).string();
 }
 
-RobotSetup setup_of_words(const std::vector<std::string>& words, const std::string& out) {
+RobotSetup setup_of_arguments(const std::vector<std::string>& arguments, const std::string& out) {
   RobotSetup setup;
   std::error_code ignored;
-  for (const std::string& word : words) {
+  for (const std::string& word : arguments) {
     (fs::is_directory(word, ignored) ? setup.runs : setup.files).push_back(word);
   }
   setup.robot = robot_beside(out);
@@ -53,19 +53,20 @@ Result<RobotTexts> set_up_robot(const RobotSetup& setup, Outputs& outputs) {
   for (const auto* files : {&setup.files, &setup.controllers}) {
     for (const std::string& file : *files) outputs.reads(file);
   }
-  RobotConfigWords words;
-  const auto add = [](const std::vector<std::string>& said, std::vector<std::string>& to) {
-    for (const std::string& text : said) to.push_back(printable(text));
+  RobotConfigTexts config_texts;
+  const auto add = [](const std::vector<std::string>& sentences, std::vector<std::string>& to) {
+    for (const std::string& text : sentences) to.push_back(printable(text));
   };
-  add(setup.files, words.made_of);
-  add(setup.controllers, words.made_of);
-  add(reading.disagreements, words.questions);
-  add(reading.remarks, words.questions);
-  add(texts.completed.notes, words.questions);
-  words.robot = file_seen_from(setup.config, setup.robot);
-  for (const std::string& run : setup.runs) words.runs.push_back(file_seen_from(setup.config, run));
+  add(setup.files, config_texts.made_of);
+  add(setup.controllers, config_texts.made_of);
+  add(reading.disagreements, config_texts.questions);
+  add(reading.remarks, config_texts.questions);
+  add(texts.completed.notes, config_texts.questions);
+  config_texts.robot = file_seen_from(setup.config, setup.robot);
+  for (const std::string& run : setup.runs)
+    config_texts.runs.push_back(file_seen_from(setup.config, run));
   texts.robot = format_robot(texts.completed);
-  texts.config = config_of_robot(texts.completed, words);
+  texts.config = config_of_robot(texts.completed, config_texts);
   texts.reading = std::move(reading);
   return texts;
 }
@@ -88,14 +89,14 @@ std::string file_seen_from(const std::string& out, const std::string& file) {
   return error || path.empty() ? file : path.string();
 }
 
-bool names_a_robot(const std::vector<std::string>& words) {
-  return std::any_of(words.begin(), words.end(), is_robot_file);
+bool names_a_robot(const std::vector<std::string>& arguments) {
+  return std::any_of(arguments.begin(), arguments.end(), is_robot_file);
 }
 
-Result<int> run_init_robot(const std::vector<std::string>& words, const std::string& out,
+Result<int> run_init_robot(const std::vector<std::string>& arguments, const std::string& out,
                            Outputs& outputs, CliContext& context) {
   Console& console = context.console;
-  const RobotSetup setup = setup_of_words(words, out);
+  const RobotSetup setup = setup_of_arguments(arguments, out);
   ASSIGN_OR_RETURN(const RobotTexts texts, set_up_robot(setup, outputs));
   if (out != "-") RETURN_IF_ERROR(outputs.plan(std::vector<std::string>{setup.robot, out}));
   nlohmann::ordered_json json = {{"out", out}, {"robot", setup.robot}, {"runs", setup.runs}};

@@ -34,11 +34,11 @@ Status write_robot(const RobotSetup& setup, const RobotTexts& texts, const Outpu
 std::string file_seen_from(const std::string& out, const std::string& file);
 
 // Whether the words of the command line name a robot rather than a trial log.
-bool names_a_robot(const std::vector<std::string>& words);
+bool names_a_robot(const std::vector<std::string>& arguments);
 
 // gapfarm init URDF...: `words` are the robot's files and, after them or between, folders of runs.
 // Leaves `out` and beside it the robot.toml that it names; "-" shows the config alone.
-Result<int> run_init_robot(const std::vector<std::string>& words, const std::string& out,
+Result<int> run_init_robot(const std::vector<std::string>& arguments, const std::string& out,
                            Outputs& outputs, CliContext& context);
 
 }  // namespace gapfarm

@@ -28,7 +28,7 @@ struct BlindCheckOptions {
   std::string foreign, truth, like, model, key;
   std::vector<std::string> effects;
   std::vector<std::string> sizes = {"clear", "subtle"};
-  unsigned nulls = 60, pairs = 19, left_out = 19, per_effect = 1;
+  unsigned nulls = 60, pairs = 19, excluded = 19, per_effect = 1;
   std::optional<unsigned> trials, workers, jobs;
   std::optional<std::uint64_t> seed;
   double time_limit_s = 1800;
@@ -46,7 +46,7 @@ Result<DesignSettings> design_of(const BlindCheckOptions& options, const Config&
   design.per_effect = options.per_effect;
   design.nulls = options.nulls;
   design.pairs = options.pairs;
-  design.left_out = options.left_out;
+  design.excluded = options.excluded;
   design.seed = config.seed;
   return design;
 }
@@ -131,7 +131,7 @@ Result<int> show_strengths(const BlindCheckOptions& options, const Config& confi
   ASSIGN_OR_RETURN(const auto farm, start(options, config, context));
   ASSIGN_OR_RETURN(const auto planned, planned_problem(config, plan, config.seed, *farm));
   // The rest is made of the same effects and robots.
-  design.nulls = design.pairs = design.left_out = 0;
+  design.nulls = design.pairs = design.excluded = 0;
   const BlindCheckHooks hooks = hooks_of(options, config, context);
   const double begin = monotonic_seconds();
   ASSIGN_OR_RETURN(const auto drawn,
@@ -146,17 +146,18 @@ Result<int> show_strengths(const BlindCheckOptions& options, const Config& confi
                              "that this experiment takes:\n\n" +
                              table + "\nBeside these " + std::to_string(options.nulls) +
                              " nulls, " + std::to_string(options.pairs) + " pairs and " +
-                             std::to_string(options.left_out) +
-                             " effects left out of the catalogue.\n",
+                             std::to_string(options.excluded) +
+                             " effects excluded from the catalogue.\n",
                          {{"trials", trials},
                           {"design", table},
                           {"nulls", options.nulls},
                           {"pairs", options.pairs},
-                          {"left_out", options.left_out}});
+                          {"left_out", options.excluded}});
   return kExitDone;
 }
 
-Result<int> say_check(const BlindCheckOptions& options, const Config& config, CliContext& context) {
+Result<int> print_check(const BlindCheckOptions& options, const Config& config,
+                        CliContext& context) {
   FarmOptions farm;
   const DiagnoseSettings diagnose = diagnose_of(options);
   farm.workers = static_cast<int>(diagnose.workers * diagnose.jobs);
@@ -164,9 +165,9 @@ Result<int> say_check(const BlindCheckOptions& options, const Config& config, Cl
                                 ? "cases of effects, " + std::to_string(options.nulls) +
                                       " nulls and " + std::to_string(options.pairs) + " pairs"
                                 : "the cases of " + options.foreign;
-  return say_dry_run("diagnose " + cases + (options.out.empty() ? "" : " into " + options.out),
-                     {{"out", options.out}, {"nulls", options.nulls}, {"pairs", options.pairs}},
-                     farm, config.farm, context);
+  return print_dry_run("diagnose " + cases + (options.out.empty() ? "" : " into " + options.out),
+                       {{"out", options.out}, {"nulls", options.nulls}, {"pairs", options.pairs}},
+                       farm, config.farm, context);
 }
 
 // All that makes the cases and what is asked of them; not how many workers do it.
@@ -176,11 +177,11 @@ std::string asked(const BlindCheckOptions& options, const std::string& config_te
   for (const std::string& word : {options.foreign, options.truth, options.like, options.model}) {
     add(word);
   }
-  for (const auto* words : {&options.effects, &options.sizes}) {
-    for (const std::string& word : *words) add(word);
+  for (const auto* lists : {&options.effects, &options.sizes}) {
+    for (const std::string& word : *lists) add(word);
     add("");
   }
-  for (const unsigned n : {options.nulls, options.pairs, options.left_out, options.per_effect,
+  for (const unsigned n : {options.nulls, options.pairs, options.excluded, options.per_effect,
                            options.trials.value_or(0)}) {
     add(std::to_string(n));
   }
@@ -192,7 +193,7 @@ Result<int> run_blind(const BlindCheckOptions& options, CliContext& context) {
   BlindCheckSettings settings;
   ASSIGN_OR_RETURN(const Config config, config_of(options, settings.plan, context.console));
   ASSIGN_OR_RETURN(const auto design, design_of(options, config));
-  if (context.dry_run) return say_check(options, config, context);
+  if (context.dry_run) return print_check(options, config, context);
   if (options.strengths && options.foreign.empty()) {
     return show_strengths(options, config, settings.plan, design, context);
   }
@@ -232,7 +233,7 @@ void declare_cases(CLI::App& app, BlindCheckOptions& options) {
   app.add_option("--per-effect", options.per_effect, "Cases an effect and size");
   app.add_option("--nulls", options.nulls, "Cases without any effect");
   app.add_option("--pairs", options.pairs, "Cases with two effects");
-  app.add_option("--left-out", options.left_out,
+  app.add_option("--left-out", options.excluded,
                  "Cases whose effect, and what passes for it, the diagnosis has to do without");
   app.add_option("--trials", options.trials, "Trials a case (default: as [simulate] says)")
       ->check(CLI::Range(1, 1000000));
@@ -264,7 +265,7 @@ SubcommandRun setup_blind_check(CLI::App& app) {
       "Go on with the check in the folder as it was asked, whatever is asked now, or judge "
       "a finished one again; the same command goes on by itself");
   app.add_flag("--strengths", options->strengths,
-               "Only say which strengths would be needed for every effect to be that large");
+               "Only report which strengths would be needed for every effect to be that large");
   declare_long_command(app);
   app.footer(
       "Examples:\n"

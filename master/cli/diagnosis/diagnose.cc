@@ -19,7 +19,7 @@
 #include "master/command/long_command.h"
 #include "master/command/outputs.h"
 #include "master/command/page_along.h"
-#include "master/command/question_stamp.h"
+#include "master/command/provenance.h"
 #include "master/command/run_model.h"
 #include "master/diagnose/result/diagnosis_json.h"
 #include "master/report/report_html.h"
@@ -38,8 +38,8 @@ void add_diagnosis_provenance(const Config& config, const DiagnoseCommand& comma
   to.emplace_back("trials read",
                   fmt::format("{} in {} sessions", log.trials.size(), sessions.size()));
   to.emplace_back("base model", command.model.empty() ? "tuned on this log" : command.model);
-  for (const std::string& effect : command.leave_out) {
-    to.emplace_back("left out of the catalogue", effect);
+  for (const std::string& effect : command.exclude) {
+    to.emplace_back("omitted from the catalogue", effect);
   }
   to.emplace_back("program", build_summary("gapfarm"));
   to.emplace_back("seed", std::to_string(config.seed));
@@ -61,7 +61,7 @@ std::string diagnosis_summary(const Diagnosis& d) {
       text += fmt::format(", {} {:.4g} [{:.4g}, {:.4g}] {}", key, p.value, p.lo, p.hi, p.unit);
     }
     for (std::size_t i = 0; i < e.aliases.size(); ++i) {
-      text += (i == 0 ? "; not told from " : ", ") + e.aliases[i];
+      text += (i == 0 ? "; not distinguished from " : ", ") + e.aliases[i];
     }
     text += "\n";
   }
@@ -123,9 +123,9 @@ Status write_all(const Config& config, const DiagnoseCommand& command,
   return command.outputs.write((out / kDiagnosisFile).string(), to_json(result.diagnosis));
 }
 
-QuestionStamp stamp_of(const Config& config, const DiagnoseCommand& command,
-                       const std::vector<Gene>& searched) {
-  QuestionStamp stamp;
+Provenance stamp_of(const Config& config, const DiagnoseCommand& command,
+                    const std::vector<Gene>& searched) {
+  Provenance stamp;
   stamp.command = "diagnose";
   stamp.problem = problem_hash(to_proto(config.problem));
   nlohmann::ordered_json genes = nlohmann::ordered_json::object();
@@ -134,7 +134,7 @@ QuestionStamp stamp_of(const Config& config, const DiagnoseCommand& command,
   }
   stamp.options = {{"genes", genes},
                    {"model", !command.model.empty()},
-                   {"leave-out", command.leave_out},
+                   {"leave-out", command.exclude},
                    {"seed", config.seed}};
   if (command.reference_log) stamp.options["reference"] = log_hash(*command.reference_log);
   stamp.about = {{"config", config.path}, {"trials", config.trial_files}};
@@ -143,7 +143,7 @@ QuestionStamp stamp_of(const Config& config, const DiagnoseCommand& command,
 }
 
 // Makes sure that the folder takes this diagnosis, a new one or the same again.
-Status plan_outputs(DiagnoseCommand& command, const Config& config, const QuestionStamp& stamp) {
+Status plan_outputs(DiagnoseCommand& command, const Config& config, const Provenance& stamp) {
   Outputs& outputs = command.outputs;
   RETURN_IF_ERROR(check_folder(command.out, FolderKind::kDiagnosis));
   outputs.reads(config.problem.log);
@@ -194,11 +194,11 @@ Result<int> run_diagnose(DiagnoseCommand& command, CliContext& context) {
         return apply_options(command, read, options.genes, options.frame_m, context.console);
       }));
   RETURN_IF_ERROR(read_reference(&command, config, context.console));
-  const QuestionStamp stamp = stamp_of(config, command, options.genes);
+  const Provenance stamp = stamp_of(config, command, options.genes);
   RETURN_IF_ERROR(plan_outputs(command, config, stamp));
   if (context.dry_run) {
     const std::size_t trials = config.problem.log.trials.size();
-    return say_dry_run(
+    return print_dry_run(
         fmt::format("diagnose {} trials of {} into {}, {}", trials, command.config, command.out,
                     command.model.empty() ? "the base tuned on them" : "by " + command.model),
         {{"out", command.out}, {"trials", trials}, {"seed", config.seed}}, command.farm,
@@ -212,7 +212,7 @@ Result<int> run_diagnose(DiagnoseCommand& command, CliContext& context) {
   ASSIGN_OR_RETURN(const auto page, open_page(command.page, command.out, context));
   ASSIGN_OR_RETURN(const auto asked, start_recorded(command.farm, config.farm, context));
   options.keep_base = !command.model.empty();
-  options.left_out = command.leave_out;
+  options.excluded = command.exclude;
   options.seed = config.seed;
   const std::string stamp_file = (std::filesystem::path(command.out) / kStampFile).string();
   RETURN_IF_ERROR(command.outputs.write(stamp_file, format_stamp(stamp)));
@@ -233,7 +233,7 @@ Result<int> run_diagnose(DiagnoseCommand& command, CliContext& context) {
   RETURN_IF_ERROR(write_all(config, command, result));
   context.console.result(diagnosis_summary(result.diagnosis),
                          diagnosis_summary_json(result.diagnosis, command));
-  context.console.note("left behind: " + command.out + "/report.html, diagnosis.json, model.toml");
+  context.console.note("wrote: " + command.out + "/report.html, diagnosis.json, model.toml");
   return asked.sockets->counts().quarantined > 0 ? kExitQuarantined : kExitDone;
 }
 
@@ -249,7 +249,8 @@ SubcommandRun setup_diagnose(CLI::App& app) {
                  "Of ground robots: an earlier log, or a run or model and so its log; asks what "
                  "changed since")
       ->type_name("FOLDER|RUN|MODEL");
-  app.add_option("--leave-out", command->leave_out, "Effects that the catalogue is to be without");
+  app.add_option("--exclude,--leave-out", command->exclude,
+                 "Effects that the catalogue is to be without (--leave-out is the old name)");
   app.add_option("--seed", command->seed, "Of the bootstrap");
   command->outputs.declare(app);
   command->farm.declare(app, true);

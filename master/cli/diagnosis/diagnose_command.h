@@ -23,7 +23,7 @@ struct DiagnoseCommand {
   std::string model;
   std::vector<std::string> reference;  // of ground robots: what changed since
   std::optional<RunLog> reference_log;
-  std::vector<std::string> leave_out;
+  std::vector<std::string> exclude;
   std::optional<std::uint64_t> seed;
   Outputs outputs;
   FarmOptions farm;

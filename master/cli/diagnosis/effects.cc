@@ -242,9 +242,9 @@ Result<int> draw_figures(EffectsOptions& options, CliContext& context) {
   if (!options.config.empty()) options.outputs.reads(options.config);
   RETURN_IF_ERROR(options.outputs.plan_in(options.figures, names));
   if (context.dry_run) {
-    return say_dry_run("draw " + std::to_string(names.size()) + " pictures into " + options.figures,
-                       {{"out", options.figures}, {"files", names}}, options.farm, config.farm,
-                       context);
+    return print_dry_run(
+        "draw " + std::to_string(names.size()) + " pictures into " + options.figures,
+        {{"out", options.figures}, {"files", names}}, options.farm, config.farm, context);
   }
   ASSIGN_OR_RETURN(auto farm, start_farm(options.farm, config.farm, context));
   const Problem& problem = config.problem;

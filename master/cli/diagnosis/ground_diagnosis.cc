@@ -7,7 +7,7 @@
 #include "common/robot/robot_file.h"
 #include "master/cli/diagnosis/diagnose_command.h"
 #include "master/command/long_command.h"
-#include "master/command/question_stamp.h"
+#include "master/command/provenance.h"
 #include "master/command/run_model.h"
 #include "master/diagnose/result/diagnosis_json.h"
 #include "master/ground/diagnose_ground.h"
@@ -102,7 +102,7 @@ Result<int> run_diagnose_ground(DiagnoseCommand& command, const Config& config,
   FitFile fits(out / kFits);
   work.keeps_also("fitted", out / kFits);
   GroundDiagnoseOptions options;
-  options.left_out = command.leave_out;
+  options.excluded = command.exclude;
   options.seed = config.seed;
   options.windows.run_in_s = config.windows.run_in_s;
   options.reference = command.reference_log;
@@ -124,7 +124,7 @@ Result<int> run_diagnose_ground(DiagnoseCommand& command, const Config& config,
   fits.remove();
   context.console.result(diagnosis_summary(result.diagnosis),
                          diagnosis_summary_json(result.diagnosis, command));
-  context.console.note("left behind: " + command.out +
+  context.console.note("wrote: " + command.out +
                        "/report.html, diagnosis.json, and robot.toml with what was named put in; "
                        "next: gapfarm export ros " +
                        command.out);

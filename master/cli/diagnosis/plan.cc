@@ -19,7 +19,7 @@
 namespace gapfarm {
 namespace {
 
-constexpr double kAlike = 0.9;  // |cosine| from which two effects are said to look alike
+constexpr double kAlike = 0.9;  // |cosine| from which two effects count as alike
 
 struct PlanOptions {
   std::string source;
@@ -82,7 +82,7 @@ Status apply_options(PlanOptions& options, Config& config) {
   return {};
 }
 
-std::string size_words(const plan::Visibility& seen) {
+std::string size_text(const plan::Visibility& seen) {
   if (!seen.size) return "-";
   return plain_number(*seen.size) + (seen.unit == "-" ? "" : " " + seen.unit);
 }
@@ -93,17 +93,17 @@ std::string table_text(const plan::DesignedPlan& plan) {
   for (std::size_t k = 0; k < plan.seen.size(); ++k) {
     const plan::Visibility& seen = plan.seen[k];
     text +=
-        fmt::format("{:<32} {:>14} {:>14}  {}\n", seen.parameter, size_words(seen),
-                    size_words(plan.seen_at_random[k]), seen.likeness >= kAlike ? seen.like : "");
+        fmt::format("{:<32} {:>14} {:>14}  {}\n", seen.parameter, size_text(seen),
+                    size_text(plan.seen_at_random[k]), seen.likeness >= kAlike ? seen.like : "");
   }
   if (const auto as_good = plan::trials_as_good(plan.power)) {
     text +=
         fmt::format("On average over effects {:.0f} of these trials name what {} random ones do.\n",
                     *as_good, plan.power.back().trials);
   }
-  const auto list = [&](const std::vector<std::string>& names, const std::string& words) {
+  const auto list = [&](const std::vector<std::string>& names, const std::string& label) {
     for (std::size_t k = 0; k < names.size(); ++k) text += (k == 0 ? "" : ", ") + names[k];
-    if (!names.empty()) text += words + "\n";
+    if (!names.empty()) text += label + "\n";
   };
   list(plan.not_planned_for, ": do not move where trials end, only how far repeats scatter");
   list(plan.without_shift, ": could not be simulated with this robot");
@@ -157,10 +157,10 @@ Result<int> run_plan(PlanOptions& options, CliContext& context) {
   options.outputs.reads(options.source);
   RETURN_IF_ERROR(options.outputs.plan({options.out, options.picture}));
   if (context.dry_run) {
-    return say_dry_run(fmt::format("plan {} trials for {} into {}", options.settings.trials,
-                                   options.source, options.out),
-                       {{"out", options.out}, {"trials", options.settings.trials}}, options.farm,
-                       source.config.farm, context);
+    return print_dry_run(fmt::format("plan {} trials for {} into {}", options.settings.trials,
+                                     options.source, options.out),
+                         {{"out", options.out}, {"trials", options.settings.trials}}, options.farm,
+                         source.config.farm, context);
   }
   ASSIGN_OR_RETURN(const auto plan, design(options, source.config, context));
   RETURN_IF_ERROR(options.outputs.write(

@@ -24,7 +24,7 @@ struct ReportCommand {
 struct Page {
   std::string html;
   std::filesystem::path from;  // what was read
-  std::filesystem::path out;   // where it goes unless told otherwise
+  std::filesystem::path out;   // where it goes unless configured otherwise
 };
 
 Result<Page> page_of_diagnosis(const std::filesystem::path& from) {

@@ -193,7 +193,7 @@ Result<int> run_compare(CompareCommand& command, CliContext& context) {
   const Config& first = inputs.variants.front().config;
   if (context.dry_run) {
     const CompareOptions& options = inputs.options;
-    return say_dry_run(
+    return print_dry_run(
         fmt::format("compare {} searches, {} runs of {} evaluations each, into {}",
                     inputs.variants.size(), options.seeds, options.evaluations, command.out),
         {{"out", command.out},
@@ -217,9 +217,8 @@ Result<int> run_compare(CompareCommand& command, CliContext& context) {
                        as_written};
   RETURN_IF_ERROR(write_all(command, inputs, summary, runs));
   context.console.result(comparison_text(summary), to_json(summary));
-  context.console.note(
-      "left behind: " + (std::filesystem::path(command.out) / "compare.html").string() +
-      ", summary.csv, runs.csv, convergence.csv");
+  context.console.note("wrote: " + (std::filesystem::path(command.out) / "compare.html").string() +
+                       ", summary.csv, runs.csv, convergence.csv");
   return asked.sockets->counts().quarantined > 0 ? kExitQuarantined : kExitDone;
 }
 

@@ -70,7 +70,7 @@ Result<std::unique_ptr<FarmOfRun>> open_farm(const RunStore& store, const Config
 void add_validation(const RunSummary& summary, const Problem& problem, std::string& text,
                     Json& json) {
   if (summary.validated.empty()) return;
-  text += fmt::format("validation on {} {} kept apart, {}:\n", summary.kept_apart,
+  text += fmt::format("validation on {} {} held out, {}:\n", summary.held_out,
                       problem.ground ? "windows" : "trials", fitness_name(problem.fitness.kind));
   for (const Validated& row : summary.validated) {
     text += fmt::format("  {:<24} {}\n", row.name,
@@ -99,7 +99,7 @@ void show(const RunSummary& summary, const RunStore& store, const Problem& probl
   add_validation(summary, problem, text, json);
   for (const std::string& file : summary.files) json["files"].push_back(file);
   if (!summary.files.empty()) {
-    text += fmt::format("left behind: {}\n", fmt::join(summary.files, ", "));
+    text += fmt::format("wrote: {}\n", fmt::join(summary.files, ", "));
   }
   if (!summary.stopped()) json["given_up"] = summary.given_up;
   console.result(text, json);

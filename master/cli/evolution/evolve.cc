@@ -23,21 +23,21 @@ struct EvolveCommand {
   EvolutionOptions options;
 };
 
-Result<int> say_plan(const EvolveCommand& command, const Config& config, CliContext& context) {
+Result<int> print_plan(const EvolveCommand& command, const Config& config, CliContext& context) {
   const std::size_t genes = config.problem.genes.size(), trials = config.problem.log.trials.size();
   const std::string would = "evolve " + std::to_string(genes) + " parameters on " +
                             std::to_string(trials) + " trials into " + command.out + ", seed " +
                             std::to_string(config.seed) + ", population " +
                             std::to_string(config.evolution.population) + ", at most " +
                             std::to_string(config.evolution.generations) + " generations";
-  return say_dry_run(would,
-                     {{"out", command.out},
-                      {"genes", genes},
-                      {"trials", trials},
-                      {"seed", config.seed},
-                      {"population", config.evolution.population},
-                      {"generations", config.evolution.generations}},
-                     command.options.farm, config.farm, context);
+  return print_dry_run(would,
+                       {{"out", command.out},
+                        {"genes", genes},
+                        {"trials", trials},
+                        {"seed", config.seed},
+                        {"population", config.evolution.population},
+                        {"generations", config.evolution.generations}},
+                       command.options.farm, config.farm, context);
 }
 
 Result<int> run_evolve(const EvolveCommand& command, CliContext& context) {
@@ -52,7 +52,7 @@ Result<int> run_evolve(const EvolveCommand& command, CliContext& context) {
         RETURN_IF_ERROR(check_farm(command.options.farm, read.farm));
         return check_folder(command.out, FolderKind::kRun);
       }));
-  if (context.dry_run) return say_plan(command, config, context);
+  if (context.dry_run) return print_plan(command, config, context);
   std::error_code ignored;
   const bool folder_was_there = std::filesystem::exists(command.out, ignored);
   ASSIGN_OR_RETURN(RunStore store,

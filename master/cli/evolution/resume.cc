@@ -21,13 +21,13 @@ struct ResumeCommand {
 };
 
 // By its reader: a store of an older version stays as it is.
-Result<int> say_resume(const ResumeCommand& command, CliContext& context) {
+Result<int> print_resume(const ResumeCommand& command, CliContext& context) {
   ASSIGN_OR_RETURN(const auto reader, RunReader::open(command.run));
   ASSIGN_OR_RETURN(const auto generations, reader.generations());
   ASSIGN_OR_RETURN(const Config config, stored_config(reader.info(), command.options.overrides));
   const std::uint64_t last = generations.empty() ? 0 : generations.back().generation;
   const std::uint64_t from = std::min(command.generation.value_or(last), last);
-  return say_dry_run(
+  return print_dry_run(
       "go on with " + command.run + " after generation " + std::to_string(from) + " to at most " +
           std::to_string(config.evolution.generations),
       {{"run", command.run}, {"generation", from}, {"generations", config.evolution.generations}},
@@ -35,7 +35,7 @@ Result<int> say_resume(const ResumeCommand& command, CliContext& context) {
 }
 
 Result<int> run_resume(const ResumeCommand& command, CliContext& context) {
-  if (context.dry_run) return say_resume(command, context);
+  if (context.dry_run) return print_resume(command, context);
   const std::unique_ptr<Log> log = command.options.farm.log.open();
   const NotesGoTo notes(*log, context.console);
   ASSIGN_OR_RETURN(RunStore store, RunStore::open(command.run));

@@ -173,7 +173,7 @@ std::string title_of(const Trial& trial, std::size_t number, bool window) {
                      trial.session);
 }
 
-// The poses between a window's ends, from the log that the run was evolved on or kept apart.
+// The poses between a window's ends, from the log that the run was evolved on or held out.
 std::vector<PathSample> logged_window(const RunInfo& info, const Problem& problem,
                                       const Trial& window, bool apart) {
   Config config;
@@ -195,14 +195,14 @@ std::vector<PathSample> logged_window(const RunInfo& info, const Problem& proble
 Result<std::string> DriveShower::show(const DriveQuestion& question) {
   ASSIGN_OR_RETURN(const auto reader, RunReader::open(question.run));
   ASSIGN_OR_RETURN(const auto problem, stored_problem(reader));
-  // Those that were evolved on, then those that were kept apart, where they can still be read.
+  // Those that were evolved on, then those that were held out, where they can still be read.
   const std::size_t logged = problem.log.trials.size();
   const auto apart = question.trial < logged ? Result<std::optional<Problem>>(std::nullopt)
-                                             : kept_apart_of(reader.info(), problem);
+                                             : held_out_of(reader.info(), problem);
   const bool beyond = question.trial >= logged;
   const std::size_t extra = apart && *apart ? (*apart)->log.trials.size() : 0;
   if (beyond && question.trial - logged >= extra) {
-    return Error{fmt::format("the run has {} {}, those that it kept apart included, and no {}",
+    return Error{fmt::format("the run has {} {}, those that it held out included, and no {}",
                              logged + extra, problem.ground ? "windows" : "trials",
                              question.trial + 1)};
   }
@@ -224,8 +224,8 @@ Result<std::string> DriveShower::show(const DriveQuestion& question) {
                                                   logged_window(reader.info(), of, trial, beyond))
                                    : watch_trial(*farm_, problem, trial, best.individual.genome));
   Json json = {{"title", title_of(trial, question.trial + 1, of.ground != nullptr) +
-                             (beyond ? ", kept apart" : "")},
-               {"kept_apart", beyond}};
+                             (beyond ? ", held out" : "")},
+               {"held_out", beyond}};
   json.update(drive.json);
   json["said"] = fmt::format(
       "Best: genome {} of generation {}, {} {}.{}", best.individual.birth_id, best.generation,
@@ -234,9 +234,9 @@ Result<std::string> DriveShower::show(const DriveQuestion& question) {
       drive.failed);
   json["note"] = fmt::format(
       "{}{}",
-      beyond ? fmt::format("▲ Kept apart: evolution never saw this {}. ",
-                           of.ground ? "window" : "trial")
-             : "",
+      beyond
+          ? fmt::format("▲ Held out: evolution never saw this {}. ", of.ground ? "window" : "trial")
+          : "",
       json["measured"].size() > 1 ? ""
       : of.ground ? "Faint: the log of the runs cannot be read (any more), an arc joins the "
                     "start to the measured end."

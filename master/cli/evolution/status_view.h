@@ -12,7 +12,7 @@
 namespace gapfarm {
 
 // A line of eight-level blocks, at most `width` of them, a blank where there is no value.  Longer
-// series are cut into equal stretches and show the last value of each.  The scale leaves out the
+// series are cut into equal stretches and show the last value of each.  The scale omits the
 // worst tenth of the values, so that a bad first generation does not flatten the rest.
 std::string sparkline(const std::vector<std::optional<double>>& values, std::size_t width,
                       bool higher_is_better);

@@ -32,17 +32,17 @@ struct CrossfitOptions {
   KeepOption keep;
 };
 
-std::vector<std::string> words_of(const std::string& text) {
+std::vector<std::string> tokens_of(const std::string& text) {
   std::istringstream in(text);
-  std::vector<std::string> words;
-  for (std::string word; in >> word;) words.push_back(word);
-  return words;
+  std::vector<std::string> tokens;
+  for (std::string word; in >> word;) tokens.push_back(word);
+  return tokens;
 }
 
 CrossfitPlan plan_of(const CrossfitOptions& options, const Config& config) {
   CrossfitPlan plan;
   plan.train = options.train;
-  for (const std::string& test : options.tests) plan.tests.push_back(words_of(test));
+  for (const std::string& test : options.tests) plan.tests.push_back(tokens_of(test));
   plan.by = options.by;
   plan.per = options.per;
   plan.repeats = options.repeats;
@@ -137,19 +137,19 @@ Status apply(const CrossfitOptions& options, Config& config) {
   return check_evolvable(config);
 }
 
-Result<int> say_fits(const CrossfitOptions& options, const Config& config, CliContext& context) {
+Result<int> print_fits(const CrossfitOptions& options, const Config& config, CliContext& context) {
   const std::size_t genes = config.problem.genes.size(), trials = config.problem.log.trials.size();
   const std::string would =
       fmt::format("tune {} parameters on parts of {} trials and try them on others", genes, trials);
-  return say_dry_run(would, {{"genes", genes}, {"trials", trials}}, options.farm, config.farm,
-                     context);
+  return print_dry_run(would, {{"genes", genes}, {"trials", trials}}, options.farm, config.farm,
+                       context);
 }
 
 Result<int> run_crossfit(const CrossfitOptions& options, CliContext& context) {
   ASSIGN_OR_RETURN(const auto config,
                    open_config(options.config, options.trials, context.console,
                                [&](Config& read) { return apply(options, read); }));
-  if (context.dry_run) return say_fits(options, config, context);
+  if (context.dry_run) return print_fits(options, config, context);
   LongCommand::begin_if_possible("crossfit", options.keep.place("crossfit", ""), {{"fit"}},
                                  context);
   CrossfitPlan plan = plan_of(options, config);

@@ -109,10 +109,11 @@ Result<int> run_determine(DetermineCommand& command, CliContext& context) {
   settings.seed = config.seed;
   if (context.dry_run) {
     const std::size_t genes = problem.genes.size(), trials = problem.log.trials.size();
-    return say_dry_run(fmt::format("look at the likelihood of {} parameters about {} on {} trials",
-                                   genes, command.model, trials),
-                       {{"out", command.out}, {"genes", genes}, {"trials", trials}}, command.farm,
-                       config.farm, context);
+    return print_dry_run(
+        fmt::format("look at the likelihood of {} parameters about {} on {} trials", genes,
+                    command.model, trials),
+        {{"out", command.out}, {"genes", genes}, {"trials", trials}}, command.farm, config.farm,
+        context);
   }
   LongCommand::begin_if_possible("determine", command.keep.place("determine", command.out),
                                  {{"evaluate"}}, context);

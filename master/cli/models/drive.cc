@@ -271,10 +271,10 @@ Result<int> run_drive(DriveCommand& command, CliContext& context) {
   const std::uint64_t legs = task.targets.empty() ? 1 : 2 * task.targets.size();
   const std::uint64_t tasks = problem.commands.size() + legs * command.runs;
   if (context.dry_run) {
-    return say_dry_run(fmt::format("drive {} times by {}, {} simulations, into {}", command.runs,
-                                   command.model, tasks, command.out),
-                       {{"out", command.out}, {"runs", command.runs}, {"simulations", tasks}},
-                       command.farm, {}, context);
+    return print_dry_run(fmt::format("drive {} times by {}, {} simulations, into {}", command.runs,
+                                     command.model, tasks, command.out),
+                         {{"out", command.out}, {"runs", command.runs}, {"simulations", tasks}},
+                         command.farm, {}, context);
   }
   const KeepingPlace place{command.out, /*passing=*/false, /*forget=*/true};
   RETURN_IF_ERROR(LongCommand::begin("drive", place, {{"drive", 1, tasks}}, context));
@@ -290,7 +290,7 @@ Result<int> run_drive(DriveCommand& command, CliContext& context) {
   Json json = to_json(report);
   json["out"] = command.out;
   context.console.result(drive_text(report), json);
-  context.console.note("left behind: " + (std::filesystem::path(command.out) / kPage).string() +
+  context.console.note("wrote: " + (std::filesystem::path(command.out) / kPage).string() +
                        ", band.csv, ends.csv");
   return kExitDone;
 }

@@ -70,9 +70,9 @@ Result<int> run_horizons(HorizonsCommand& command, CliContext& context) {
                                     fitted.problem.ground->robot().channels));
   for (const std::string& note : runs.notes) console.note(note);
   if (context.dry_run) {
-    return say_dry_run("measure horizons of " + command.source,
-                       {{"source", command.source}, {"horizons", command.horizons}}, command.farm,
-                       {}, context);
+    return print_dry_run("measure horizons of " + command.source,
+                         {{"source", command.source}, {"horizons", command.horizons}}, command.farm,
+                         {}, context);
   }
   ASSIGN_OR_RETURN(auto farm, start_farm(command.farm, {}, context));
   ASSIGN_OR_RETURN(const auto horizons,

@@ -61,10 +61,10 @@ Result<int> run_influence(InfluenceCommand command, CliContext& context) {
   const std::vector<Gene> genes =
       config.problem.genes.empty() ? all_base_genes(table) : config.problem.genes;
   if (context.dry_run) {
-    return say_dry_run(fmt::format("trace what {} parameters of {} do to paths, into {}",
-                                   genes.size(), command.config, command.out),
-                       {{"out", command.out}, {"parameters", genes.size()}}, command.farm,
-                       config.farm, context);
+    return print_dry_run(fmt::format("trace what {} parameters of {} do to paths, into {}",
+                                     genes.size(), command.config, command.out),
+                         {{"out", command.out}, {"parameters", genes.size()}}, command.farm,
+                         config.farm, context);
   }
   // The paths are large, and no figure refers to them.
   const KeepingPlace place{command.out, /*passing=*/false, /*forget=*/true};
@@ -80,7 +80,7 @@ Result<int> run_influence(InfluenceCommand command, CliContext& context) {
        {"genes.toml", influential_genes(report, table)}}));
   context.console.result(influence_text(report, table), to_json(report, table));
   context.console.note(
-      "left behind: " + (std::filesystem::path(command.out) / "influence.html").string() +
+      "wrote: " + (std::filesystem::path(command.out) / "influence.html").string() +
       ", influence.csv, genes.toml");
   return kExitDone;
 }
@@ -100,7 +100,7 @@ SubcommandRun setup_influence(CLI::App& app) {
       ->check(CLI::IsMember({"lettier", "hausdorff", "frechet"}))
       ->capture_default_str();
   app.add_option("--horizon", to.horizon_s,
-                 "Seconds of the paths to compare; left out: as long as repeats stay close")
+                 "Seconds of the paths to compare; omitted: as long as repeats stay close")
       ->check(CLI::PositiveNumber);
   app.add_option("--repeats", to.repeats, "Noisy runs of each level")
       ->check(CLI::Range(4, 10000))

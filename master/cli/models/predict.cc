@@ -162,9 +162,9 @@ Result<int> run_predict(PredictOptions& options, CliContext& context) {
   RETURN_IF_ERROR(options.outputs.plan(options.out));
   if (context.dry_run) {
     const std::string by = options.mined.empty() ? options.model : "the mined motion model";
-    return say_dry_run(fmt::format("predict {} trials by {}", log.trials.size(), by),
-                       {{"out", options.out}, {"trials", log.trials.size()}}, options.farm, {},
-                       context);
+    return print_dry_run(fmt::format("predict {} trials by {}", log.trials.size(), by),
+                         {{"out", options.out}, {"trials", log.trials.size()}}, options.farm, {},
+                         context);
   }
   context.begun = true;
   ASSIGN_OR_RETURN(const auto predictions, options.mined.empty()

@@ -126,11 +126,11 @@ Result<int> run_simulate(SimulateOptions& options, CliContext& context) {
   if (context.dry_run) {
     std::size_t trials = 0;
     for (const auto& session : plan) trials += session.size();
-    return say_dry_run("simulate " + std::to_string(trials) + " trials in " +
-                           std::to_string(plan.size()) + " sessions into " + options.out +
-                           ", seed " + std::to_string(source.config.seed),
-                       {{"out", options.out}, {"trials", trials}, {"seed", source.config.seed}},
-                       options.farm, source.config.farm, context);
+    return print_dry_run("simulate " + std::to_string(trials) + " trials in " +
+                             std::to_string(plan.size()) + " sessions into " + options.out +
+                             ", seed " + std::to_string(source.config.seed),
+                         {{"out", options.out}, {"trials", trials}, {"seed", source.config.seed}},
+                         options.farm, source.config.farm, context);
   }
   ASSIGN_OR_RETURN(const TrialLog log, simulate(options, source, plan, context));
   if (options.out == "-") {

@@ -69,7 +69,7 @@ Result<int> run_stability(StabilityCommand command, CliContext& context) {
   command.settings.evolution = config.evolution;
   if (context.dry_run) {
     const std::size_t genes = config.problem.genes.size();
-    return say_dry_run(
+    return print_dry_run(
         fmt::format("search {} parameters of {} for the least spread over {} repeats, into {}",
                     genes, command.config, command.settings.repeats, command.out),
         {{"out", command.out}, {"genes", genes}, {"repeats", command.settings.repeats}},
@@ -103,9 +103,8 @@ Result<int> run_stability(StabilityCommand command, CliContext& context) {
                                 {"best_spread_m", report.best.spread},
                                 {"best_fresh_m", number_or_null(report.best_fresh)},
                                 {"best", values}});
-  context.console.note(
-      "left behind: " + (std::filesystem::path(command.out) / "model.toml").string() +
-      ", stability.csv");
+  context.console.note("wrote: " + (std::filesystem::path(command.out) / "model.toml").string() +
+                       ", stability.csv");
   return kExitDone;
 }
 

@@ -12,9 +12,9 @@ namespace {
 struct Counts {
   double of, hits;
 };
-constexpr Counts kRightNames = {99, 98};      // 36 single effects, 31 pairs
-constexpr Counts kNullsWithAName = {120, 1};  // logs with nothing in them
-constexpr Counts kRightDoubts = {121, 121};   // 11 logs, each the wrong way round in 11 ways
+constexpr Counts kRightNames = {99, 98};       // 36 single effects, 31 pairs
+constexpr Counts kNullsWithAName = {120, 1};   // logs with nothing in them
+constexpr Counts kRightWarnings = {121, 121};  // 11 logs, each the wrong way round in 11 ways
 
 constexpr double kTail = 0.05;
 
@@ -33,6 +33,6 @@ double confidence_of(double gain, double least_gain) {
   return at_least(kRightNames) - luck;
 }
 
-double sanity_confidence() { return at_least(kRightDoubts); }
+double sanity_confidence() { return at_least(kRightWarnings); }
 
 }  // namespace gapfarm

@@ -15,7 +15,8 @@ namespace {
 
 constexpr double kFewInCell = 4;
 
-std::string told(const Estimate& e, double factor, const std::string& unit, bool intervals) {
+std::string estimate_text(const Estimate& e, double factor, const std::string& unit,
+                          bool intervals) {
   std::string text = plain_number(factor * e.value) + unit;
   if (!intervals || !std::isfinite(e.lo) || !std::isfinite(e.hi) || !(e.lo < e.hi)) return text;
   return text + " (" + plain_number(factor * e.lo) + " to " + plain_number(factor * e.hi) + ")";
@@ -32,17 +33,18 @@ const Estimate* find(const NamedEffect& effect, std::string_view key) {
 std::string plain_claim(const NamedEffect& effect, bool intervals) {
   std::vector<std::string> values;
   for (const Estimate& e : effect.parameters) {
-    values.push_back(e.key + " " +
-                     told(e, 1, e.unit.empty() || e.unit == "-" ? "" : " " + e.unit, intervals));
+    values.push_back(
+        e.key + " " +
+        estimate_text(e, 1, e.unit.empty() || e.unit == "-" ? "" : " " + e.unit, intervals));
   }
   return "The data show " + effect.name + (values.empty() ? "" : " with " + listed(values));
 }
 
 std::string claim(const NamedEffect& effect, const EffectDiagnoses& effects, bool intervals) {
-  const EffectWords& words = effects.row(effect.name).words;
-  if (words.sentence == nullptr) return plain_claim(effect, intervals);
+  const EffectPhrases& phrases = effects.row(effect.name).phrases;
+  if (phrases.sentence == nullptr) return plain_claim(effect, intervals);
   std::string text;
-  for (const char* c = words.sentence; *c != 0; ++c) {
+  for (const char* c = phrases.sentence; *c != 0; ++c) {
     if (*c != '%') {
       text += *c;
       continue;
@@ -51,10 +53,10 @@ std::string claim(const NamedEffect& effect, const EffectDiagnoses& effects, boo
       text += effect.axis.empty() ? "its axis" : effect.axis;
       continue;
     }
-    const Telling& telling = words.parameters[static_cast<std::size_t>(*c - '1')];
-    const Estimate* e = find(effect, telling.key);
+    const ShownParameter& shown = phrases.parameters[static_cast<std::size_t>(*c - '1')];
+    const Estimate* e = find(effect, shown.key);
     if (e == nullptr) return plain_claim(effect, intervals);
-    text += told(*e, telling.factor, telling.unit, intervals);
+    text += estimate_text(*e, shown.factor, shown.unit, intervals);
   }
   return text;
 }
@@ -87,17 +89,17 @@ std::string plain_number(double value) {
   return std::string(text) == "-0" ? "0" : text;
 }
 
-std::string listed(std::span<const std::string> words, std::string_view last) {
+std::string listed(std::span<const std::string> phrases, std::string_view last) {
   std::string text;
-  for (std::size_t i = 0; i < words.size(); ++i) {
-    if (i > 0) text += i + 1 == words.size() ? " " + std::string(last) + " " : ", ";
-    text += words[i];
+  for (std::size_t i = 0; i < phrases.size(); ++i) {
+    if (i > 0) text += i + 1 == phrases.size() ? " " + std::string(last) + " " : ", ";
+    text += phrases[i];
   }
   return text;
 }
 
 std::string motions_of(const std::string& command) {
-  static const std::map<std::string, std::string> words = {
+  static const std::map<std::string, std::string> phrases = {
       {"all", "All motions"},
       {"forward", "Forward drives"},
       {"backward", "Backward drives"},
@@ -105,21 +107,21 @@ std::string motions_of(const std::string& command) {
       {"turn_cw", "Clockwise turns"},
       {"wide_ccw", "Wide counter-clockwise arcs"},
       {"wide_cw", "Wide clockwise arcs"}};
-  const auto found = words.find(command);
-  return found != words.end() ? found->second : "Trials of " + command;
+  const auto found = phrases.find(command);
+  return found != phrases.end() ? found->second : "Trials of " + command;
 }
 
-std::string amount_words(double size, int component) {
+std::string amount_text(double size, int component) {
   return plain_number(std::abs(size)) + (component == 2 ? " mrad" : " mm");
 }
 
-std::string component_words(int component) {
+std::string component_text(int component) {
   if (component == 2) return "heading";
   return component == 0 ? "end along its heading" : "end across its heading";
 }
 
-std::string deviation_words(int component, double size, bool along_motion, bool trend) {
-  const std::string much = amount_words(size, component);
+std::string deviation_text(int component, double size, bool along_motion, bool trend) {
+  const std::string much = amount_text(size, component);
   const bool positive = size > 0;
   if (along_motion) {
     const std::string verb = component == 2 ? "turn " : "travel ";
@@ -135,7 +137,7 @@ std::string deviation_words(int component, double size, bool along_motion, bool 
 }
 
 // " (errors from 66 to 58.6 mm and from 103 to 98.7 mrad)".
-std::string change_words(const GapFigures& position_mm, const GapFigures& heading_mrad) {
+std::string change_text(const GapFigures& position_mm, const GapFigures& heading_mrad) {
   return " (errors from " + plain_number(position_mm.tuned) + " to " +
          plain_number(position_mm.final_) + " mm and from " + plain_number(heading_mrad.tuned) +
          " to " + plain_number(heading_mrad.final_) + " mrad)";
@@ -147,8 +149,8 @@ std::string effect_sentence(const NamedEffect& effect, const EffectDiagnoses& ef
     text += "; adding that closes " + percent(effect.closed) + " of the gap in log score";
     if (effect.position_mm_before && effect.position_mm_after && effect.heading_mrad_before &&
         effect.heading_mrad_after) {
-      text += change_words({*effect.position_mm_before, *effect.position_mm_after, 0},
-                           {*effect.heading_mrad_before, *effect.heading_mrad_after, 0});
+      text += change_text({*effect.position_mm_before, *effect.position_mm_after, 0},
+                          {*effect.heading_mrad_before, *effect.heading_mrad_after, 0});
     }
   }
   return text + ".";
@@ -168,7 +170,7 @@ std::vector<std::string> findings(const Diagnosis& diagnosis) {
   }
   if (names.size() > 1) {
     text.push_back("Together they close " + percent(closed) + " of the gap" +
-                   change_words(diagnosis.position_mm, diagnosis.heading_mrad) + ".");
+                   change_text(diagnosis.position_mm, diagnosis.heading_mrad) + ".");
   }
   switch (diagnosis.verdict) {
     case Verdict::kNone:
@@ -271,10 +273,10 @@ std::vector<std::string> cautions(std::span<const ResidualTrial> trials,
                                   std::span<const Cell> cells, const TrialLog& log) {
   const LogVariety v = log_variety(trials, cells, log);
   std::vector<std::string> text;
-  if (v.trials < kFewTrialsToTell) {
+  if (v.trials < kFewTrialsToJudge) {
     text.push_back("There " + std::string(v.trials == 1 ? "is " : "are ") +
                    counted(v.trials, "trial", "trials") + "; below " +
-                   std::to_string(kFewTrialsToTell) +
+                   std::to_string(kFewTrialsToJudge) +
                    " only large effects show, and no claim is sure.");
   }
   if (v.trials == 0) return text;
@@ -295,9 +297,9 @@ std::vector<std::string> cautions(std::span<const ResidualTrial> trials,
         "be seen, and held-out trials are from the same one.");
   }
   if (v.commands == 1) {
-    text.push_back("All trials drive one command (" + cells[trials.front().cell].command.name +
-                   "): effects that differ between straight drives and turns cannot be told "
-                   "apart.");
+    text.push_back(
+        "All trials drive one command (" + cells[trials.front().cell].command.name +
+        "): effects that differ between straight drives and turns cannot be distinguished.");
   }
   if (v.durations == 1) {
     text.emplace_back(

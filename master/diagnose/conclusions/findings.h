@@ -1,4 +1,4 @@
-// What a diagnosis found, in plain words.
+// What a diagnosis found, in plain language.
 #pragma once
 
 #include <cstddef>
@@ -14,24 +14,24 @@
 
 namespace gapfarm {
 
-// Drives go in so many directions at most, and fewer trials tell little.
+// Drives go in so many directions at most, and fewer trials show little.
 inline constexpr int kHeadingSectors = 12;
-inline constexpr std::size_t kFewTrialsToTell = 60;
+inline constexpr std::size_t kFewTrialsToJudge = 60;
 
 // "3.14" to three significant digits, without trailing zeros and exponents where it can be read.
 std::string plain_number(double value);
 // "a", "a and b", "a, b and c".
-std::string listed(std::span<const std::string> words, std::string_view last = "and");
+std::string listed(std::span<const std::string> phrases, std::string_view last = "and");
 
 // "Forward drives", "Clockwise turns"; "all": "All motions".
 std::string motions_of(const std::string& command);
 // "3.1 mm", "0.9 mrad": without its sign.  Components are 0, 1, 2 for x, y, theta here and below.
-std::string amount_words(double size, int component);
+std::string amount_text(double size, int component);
 // "heading", "end along its heading", "end across its heading".
-std::string component_words(int component);
+std::string component_text(int component);
 // "end 3.1 mm too far to the left" for a residual or, as a trend, "end 3.1 mm farther to the left";
 // along the motion "turn 0.9 mrad too little" or "turn 0.9 mrad less".
-std::string deviation_words(int component, double size, bool along_motion, bool trend);
+std::string deviation_text(int component, double size, bool along_motion, bool trend);
 
 // "The battery loses 0.35 % of its speed a minute (0.31 to 0.4); adding that closes 88 % of the
 // gap."  Effects without words, or without their parameters, are named with what is there.

@@ -3,26 +3,26 @@
 #include <cmath>
 #include <optional>
 
-#include "master/io/log_checks/words.h"
+#include "master/io/log_checks/finding_text.h"
 
 namespace gapfarm {
 namespace {
 
 constexpr std::size_t kLine = 100;  // characters, about what fits on one line in large print
 
-const Estimate* size_of(const NamedEffect& effect, const ShortWords& words) {
+const Estimate* size_of(const NamedEffect& effect, const ShortPhrases& phrases) {
   for (const Estimate& e : effect.parameters) {
-    if (e.key == words.key && std::isfinite(e.value)) return &e;
+    if (e.key == phrases.key && std::isfinite(e.value)) return &e;
   }
   return nullptr;
 }
 
-std::string filled(const char* text, const NamedEffect& effect, const ShortWords& words,
+std::string filled(const char* text, const NamedEffect& effect, const ShortPhrases& phrases,
                    double value) {
   std::string line;
   for (const char* c = text; *c != 0; ++c) {
     if (*c == '%') {
-      line += plain_number(std::abs(words.factor * value)) + words.unit;
+      line += plain_number(std::abs(phrases.factor * value)) + phrases.unit;
     } else if (*c == '@') {
       line += effect.axis.empty() ? "the seam" : effect.axis;
     } else {
@@ -33,13 +33,14 @@ std::string filled(const char* text, const NamedEffect& effect, const ShortWords
 }
 
 std::string cause_of(const NamedEffect& effect, const EffectDiagnoses& effects) {
-  const std::optional<ShortWords>& words = effects.row(effect.name).short_words;
-  const Estimate* size = words ? size_of(effect, *words) : nullptr;
+  const std::optional<ShortPhrases>& phrases = effects.row(effect.name).short_phrases;
+  const Estimate* size = phrases ? size_of(effect, *phrases) : nullptr;
   if (size == nullptr) return effect_claim(effect, effects);
-  const bool opposite = size->value < 0 && words->opposite != nullptr;
-  std::string line = filled(opposite ? words->opposite : words->cause, effect, *words, size->value);
+  const bool opposite = size->value < 0 && phrases->opposite != nullptr;
+  std::string line =
+      filled(opposite ? phrases->opposite : phrases->cause, effect, *phrases, size->value);
   for (const Estimate& e : effect.parameters) {
-    if (words->toward != nullptr && e.key == words->toward) {
+    if (phrases->toward != nullptr && e.key == phrases->toward) {
       line += " toward " + plain_number(std::round(kDegrees * e.value)) + " degrees";
     }
   }
@@ -61,24 +62,25 @@ std::string first_cause(const Diagnosis& d, const EffectDiagnoses& effects) {
 }
 
 // What keeps the diagnosis from naming anything; null where nothing does.
-const SanityFinding* doubt_of(const Diagnosis& d) {
-  const bool doubtful = d.verdict == Verdict::kUnusable || d.verdict == Verdict::kUnknown;
-  if (!doubtful || d.sanity.empty() || d.sanity.front().severity == Severity::kNote) return nullptr;
+const SanityFinding* warning_of(const Diagnosis& d) {
+  const bool has_warning = d.verdict == Verdict::kUnusable || d.verdict == Verdict::kUnknown;
+  if (!has_warning || d.sanity.empty() || d.sanity.front().severity == Severity::kNote)
+    return nullptr;
   return &d.sanity.front();
 }
 
 }  // namespace
 
 std::string headline(const Diagnosis& diagnosis, const EffectDiagnoses& effects) {
-  const SanityFinding* doubt = doubt_of(diagnosis);
+  const SanityFinding* warning = warning_of(diagnosis);
   switch (diagnosis.verdict) {
     case Verdict::kUnusable:
       return "Not usable as it is: " +
-             (doubt != nullptr ? finding_phrase(*doubt) : "something is wrong with it") + ".";
+             (warning != nullptr ? finding_phrase(*warning) : "something is wrong with it") + ".";
     case Verdict::kNone:
       return "Nothing is missing that these data could show.";
     case Verdict::kUnknown:
-      if (doubt != nullptr) return "No cause can be named: " + finding_phrase(*doubt) + ".";
+      if (warning != nullptr) return "No cause can be named: " + finding_phrase(*warning) + ".";
       return "Something is missing that no effect of the catalogue explains.";
     case Verdict::kEffect:
       return first_cause(diagnosis, effects) + ".";
@@ -89,7 +91,8 @@ std::string headline(const Diagnosis& diagnosis, const EffectDiagnoses& effects)
 }
 
 std::string action(const Diagnosis& diagnosis, const EffectDiagnoses& effects) {
-  if (const SanityFinding* doubt = doubt_of(diagnosis); doubt != nullptr) return doubt->remedy;
+  if (const SanityFinding* warning = warning_of(diagnosis); warning != nullptr)
+    return warning->remedy;
   if (diagnosis.effects.empty()) {
     if (diagnosis.verdict == Verdict::kNone) {
       return "Use tuned.toml as it is; only more trials, or other ones, could show more.";
@@ -103,17 +106,17 @@ std::string action(const Diagnosis& diagnosis, const EffectDiagnoses& effects) {
   const NamedEffect& first = diagnosis.effects.front();
   if (!first.aliases.empty() && !diagnosis.next.empty() && diagnosis.next.front().trials > 0) {
     return "Drive the " + std::to_string(diagnosis.next.front().trials) +
-           " trials under what to try next: they tell " + first.name + " from " +
+           " trials under what to try next: they distinguish " + first.name + " from " +
            first.aliases.front() + ".";
   }
-  const std::optional<ShortWords>& words = effects.row(first.name).short_words;
-  const Estimate* size = words ? size_of(first, *words) : nullptr;
+  const std::optional<ShortPhrases>& phrases = effects.row(first.name).short_phrases;
+  const Estimate* size = phrases ? size_of(first, *phrases) : nullptr;
   const std::string paste = "paste the parameters below into your config.";
   if (size == nullptr) return "P" + paste.substr(1);
-  return filled(words->remedy, first, *words, size->value) + ", or " + paste;
+  return filled(phrases->remedy, first, *phrases, size->value) + ", or " + paste;
 }
 
-void tell(const EffectDiagnoses& effects, Diagnosis* diagnosis) {
+void fill_conclusions(const EffectDiagnoses& effects, Diagnosis* diagnosis) {
   diagnosis->headline = headline(*diagnosis, effects);
   diagnosis->action = action(*diagnosis, effects);
   diagnosis->findings = findings(*diagnosis);

@@ -9,7 +9,7 @@
 namespace gapfarm {
 
 // "Two cameras disagree at y = 1.34 m; something more is unexplained.": the likeliest cause in
-// plain words, about a line long; of a log that is doubtful, what is wrong with it.
+// plain language, about a line long; of a log with a data-quality warning, what is wrong with it.
 std::string headline(const Diagnosis& diagnosis,
                      const EffectDiagnoses& effects = drive_effect_diagnoses());
 
@@ -19,6 +19,6 @@ std::string action(const Diagnosis& diagnosis,
                    const EffectDiagnoses& effects = drive_effect_diagnoses());
 
 // Fills in headline, action and findings.
-void tell(const EffectDiagnoses& effects, Diagnosis* diagnosis);
+void fill_conclusions(const EffectDiagnoses& effects, Diagnosis* diagnosis);
 
 }  // namespace gapfarm

@@ -42,51 +42,52 @@ std::vector<std::string> groups_of(const ExperimentPlan& plan) {
   return groups;
 }
 
-// One task a rival and group: enough to keep many workers busy, and what one of them cannot
+// One task an alternative and group: enough to keep many workers busy, and what one of them cannot
 // simulate costs no other.
 Result<std::vector<Predictions>> predict(Farm& farm, const ExperimentPlan& plan,
-                                         const Rivals& rivals) {
+                                         const CompetingCauses& alternatives) {
   std::vector<v1::Task> tasks;
-  std::vector<std::size_t> of_rival;
-  for (std::size_t r = 0; r < rivals.size(); ++r) {
+  std::vector<std::size_t> of_baseline;
+  for (std::size_t r = 0; r < alternatives.size(); ++r) {
     for (const std::string& group : groups_of(plan)) {
       v1::Task task;
       v1::PredictTask& to = *task.mutable_predict();
-      for (const v1::Override& o : rivals[r].overrides) *to.mutable_point()->add_overrides() = o;
+      for (const v1::Override& o : alternatives[r].overrides)
+        *to.mutable_point()->add_overrides() = o;
       for (const Design& design : plan.designs) {
         if (design.group != group) continue;
         for (const std::uint32_t i : design.trials) to.add_trials(i);
       }
       tasks.push_back(std::move(task));
-      of_rival.push_back(r);
+      of_baseline.push_back(r);
     }
   }
   const std::string hash = farm.add_problem(to_proto(plan.problem));
   const auto results = farm.run(hash, tasks);
   if (!results) return results.error();
-  std::vector<Predictions> all(rivals.size(), Predictions(plan.problem.log.trials.size()));
-  std::vector<bool> survived(rivals.size(), false);
+  std::vector<Predictions> all(alternatives.size(), Predictions(plan.problem.log.trials.size()));
+  std::vector<bool> survived(alternatives.size(), false);
   std::string last;
   for (std::size_t i = 0; i < results->size(); ++i) {
     const v1::TaskResult& result = (*results)[i];
     if (result.outcome() != v1::OK) {
       last = v1::Outcome_Name(result.outcome()) + " (" + result.message() + ")";
-      continue;  // that group cannot tell this rival from another
+      continue;  // that group cannot distinguish this alternative from another
     }
-    survived[of_rival[i]] = true;
-    keep(result.predict(), all[of_rival[i]]);
+    survived[of_baseline[i]] = true;
+    keep(result.predict(), all[of_baseline[i]]);
   }
-  for (std::size_t r = 0; r < rivals.size(); ++r) {
+  for (std::size_t r = 0; r < alternatives.size(); ++r) {
     if (survived[r]) continue;
-    return Error{"rival '" + rivals[r].name + "' cannot be simulated in any design: " + last +
-                 "; its parameters must leave something that moves"};
+    return Error{"alternative '" + alternatives[r].name + "' cannot be simulated in any design: " +
+                 last + "; its parameters must leave something that moves"};
   }
   return all;
 }
 
 struct Separation {
   std::uint64_t trials = 0;
-  bool many_starts = false;  // one start alone would tell less
+  bool many_starts = false;  // one start alone would show less
 };
 
 // None: the design does not part the two within `most` trials.
@@ -150,38 +151,41 @@ std::optional<Choice> best_design(const ExperimentPlan& plan,
   return best;
 }
 
-std::vector<std::string> names_in(const std::vector<Pair>& pairs, const Rivals& rivals) {
+std::vector<std::string> names_in(const std::vector<Pair>& pairs,
+                                  const CompetingCauses& alternatives) {
   std::set<std::size_t> indices;
   for (const auto& [a, b] : pairs) indices.insert({a, b});
   std::vector<std::string> names;
-  for (const std::size_t i : indices) names.push_back(rivals[i].name);
+  for (const std::size_t i : indices) names.push_back(alternatives[i].name);
   return names;
 }
 
-std::string told_apart(const std::vector<Pair>& pairs, const Rivals& rivals) {
-  const std::vector<std::string> names = names_in(pairs, rivals);
+std::string distinguished(const std::vector<Pair>& pairs, const CompetingCauses& alternatives) {
+  const std::vector<std::string> names = names_in(pairs, alternatives);
   if (names.size() == 2) return names[0] + " from " + names[1];
   if (2 * pairs.size() == names.size() * (names.size() - 1)) return listed(names) + " apart";
-  std::vector<std::string> told;
-  for (const auto& [a, b] : pairs) told.push_back(rivals[a].name + " from " + rivals[b].name);
-  return listed(told);
+  std::vector<std::string> pair_texts;
+  for (const auto& [a, b] : pairs)
+    pair_texts.push_back(alternatives[a].name + " from " + alternatives[b].name);
+  return listed(pair_texts);
 }
 
-NextExperiment sentence(const Choice& choice, const ExperimentPlan& plan, const Rivals& rivals) {
+NextExperiment sentence(const Choice& choice, const ExperimentPlan& plan,
+                        const CompetingCauses& alternatives) {
   NextExperiment next;
   next.text = plan.designs[choice.design].action(choice.many_starts) + ": " +
-              std::to_string(choice.trials) + " trials tell " + told_apart(choice.pairs, rivals) +
-              ".";
-  next.separates = names_in(choice.pairs, rivals);
+              std::to_string(choice.trials) + " trials distinguish " +
+              distinguished(choice.pairs, alternatives) + ".";
+  next.separates = names_in(choice.pairs, alternatives);
   next.trials = choice.trials;
   return next;
 }
 
 NextExperiment hopeless(const std::vector<Pair>& pairs, const ExperimentPlan& plan,
-                        const Rivals& rivals, std::uint64_t most) {
-  return {"No " + plan.designs_are + " tells " + told_apart(pairs, rivals) + " within " +
-              std::to_string(most) + " trials by end poses; " + plan.instead + ".",
-          names_in(pairs, rivals), 0};
+                        const CompetingCauses& alternatives, std::uint64_t most) {
+  return {"No " + plan.designs_are + " distinguishes " + distinguished(pairs, alternatives) +
+              " within " + std::to_string(most) + " trials by end poses; " + plan.instead + ".",
+          names_in(pairs, alternatives), 0};
 }
 
 void erase(const std::vector<Pair>& done, std::vector<Pair>& pairs) {
@@ -215,15 +219,15 @@ std::uint64_t trials_needed(double divergence) {
 }
 
 Result<std::vector<NextExperiment>> next_experiments(Farm& farm, const ExperimentPlan& plan,
-                                                     const Rivals& rivals,
+                                                     const CompetingCauses& alternatives,
                                                      const NextExperimentOptions& options) {
   std::vector<NextExperiment> next;
-  if (rivals.size() < 2 || plan.designs.empty() || options.sentences == 0) return next;
-  const auto predictions = predict(farm, plan, rivals);
+  if (alternatives.size() < 2 || plan.designs.empty() || options.sentences == 0) return next;
+  const auto predictions = predict(farm, plan, alternatives);
   if (!predictions) return predictions.error();
   std::vector<Pair> pairs;
-  for (std::size_t a = 0; a < rivals.size(); ++a) {
-    for (std::size_t b = a + 1; b < rivals.size(); ++b) pairs.emplace_back(a, b);
+  for (std::size_t a = 0; a < alternatives.size(); ++a) {
+    for (std::size_t b = a + 1; b < alternatives.size(); ++b) pairs.emplace_back(a, b);
   }
   std::vector<Pair> open = pairs;
   std::set<std::string> used;
@@ -235,11 +239,11 @@ Result<std::vector<NextExperiment>> next_experiments(Farm& farm, const Experimen
                             ? best_design(plan, *predictions, pairs, options.most_trials, unused)
                             : best_design(plan, *predictions, open, options.most_trials, anything);
     if (!choice) {
-      if (!again) next.push_back(hopeless(open, plan, rivals, options.most_trials));
+      if (!again) next.push_back(hopeless(open, plan, alternatives, options.most_trials));
       break;
     }
     used.insert(plan.designs[choice->design].group);
-    next.push_back(sentence(*choice, plan, rivals));
+    next.push_back(sentence(*choice, plan, alternatives));
     erase(choice->pairs, open);
   }
   return next;

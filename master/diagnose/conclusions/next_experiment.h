@@ -1,4 +1,4 @@
-// Which trials to drive next so that rival explanations part.
+// Which trials to drive next so that competing explanations part.
 #pragma once
 
 #include <Eigen/Core>
@@ -18,28 +18,28 @@
 namespace gapfarm {
 
 // An explanation at its best fit: what it changes in the problem's values.
-struct Rival {
+struct CompetingCause {
   std::string name;
   std::vector<v1::Override> overrides;
 };
-using Rivals = std::vector<Rival>;
+using CompetingCauses = std::vector<CompetingCause>;
 
 // Trials that might be made, all alike but for where they start.
 struct Design {
   std::string group;                  // a further sentence offers a design of another group
   std::vector<std::uint32_t> trials;  // of the plan's log, to be predicted
-  // What is special about it must be why it tells: the trial without that, from the same start.
+  // What is special about it must be why it shows: the trial without that, from the same start.
   std::optional<std::uint32_t> ordinary;
-  double cost = 0;  // of two that tell as much the cheaper is offered
-  // What to do, without a full stop; `many_starts`: one start alone would tell less.
+  double cost = 0;  // of two that show as much the cheaper is offered
+  // What to do, without a full stop; `many_starts`: one start alone would show less.
   std::function<std::string(bool many_starts)> action;
 };
 
 struct ExperimentPlan {
   Problem problem;  // without genes, and with the synthetic log of all designs
   std::vector<Design> designs;
-  std::string designs_are;  // "No ... tells them apart"
-  std::string instead;      // what to do when no design tells rivals apart
+  std::string designs_are;  // "No ... shows them apart"
+  std::string instead;      // what to do when no design distinguishes alternatives
 };
 
 struct NextExperimentOptions {
@@ -68,14 +68,14 @@ double divergence(const PredictedEnd& a, const PredictedEnd& b);
 // in D at a fixed level: ln 20 / D = 3.0 / D for one error alone.)  At least 3.
 std::uint64_t trials_needed(double divergence);
 
-// Predicts every rival on the plan's designs and says which of them tell the rivals apart with the
-// fewest trials; at most `sentences`.  A further sentence parts rivals that the ones before left
-// together, or offers a design of another group.  Rivals that no design parts get a sentence saying
-// so, with 0 trials.  Fewer than two rivals need no experiment.  Rivals are taken at their fits:
-// the base is not retuned to the new trials.
-// Errors: the farm's, and a rival that cannot be simulated anywhere.
+// Predicts every alternative on the plan's designs and says which of them distinguish the
+// alternatives with the fewest trials; at most `sentences`.  A further sentence parts alternatives
+// that the ones before left together, or offers a design of another group.  Alternatives that no
+// design parts get a sentence stating so, with 0 trials.  Fewer than two alternatives need no
+// experiment.  Alternatives are taken at their fits: the base is not retuned to the new trials.
+// Errors: the farm's, and an alternative that cannot be simulated anywhere.
 Result<std::vector<NextExperiment>> next_experiments(Farm& farm, const ExperimentPlan& plan,
-                                                     const Rivals& rivals,
+                                                     const CompetingCauses& alternatives,
                                                      const NextExperimentOptions& options = {});
 
 }  // namespace gapfarm

@@ -14,7 +14,7 @@
 namespace gapfarm::steps {
 namespace {
 
-void fill_gap(const Inquiry& of, const Refit& refit, Diagnosis* d) {
+void fill_gap(const DiagnosisRequest& of, const Refit& refit, Diagnosis* d) {
   const NestedFit &base = refit.nested.front(), &model = refit.nested.back();
   d->gap.tuned = refit.floor - mean(base.scores);
   d->gap.final_ =
@@ -33,7 +33,7 @@ void fill_gap(const Inquiry& of, const Refit& refit, Diagnosis* d) {
   d->heading_mrad = {tuned.heading_mrad, last.heading_mrad, 1e3 * std::sqrt(heading)};
 }
 
-void fill_where(const Inquiry& of, const Refit& refit, Diagnosis* d) {
+void fill_where(const DiagnosisRequest& of, const Refit& refit, Diagnosis* d) {
   const Study& study = refit.judged.named.study();
   const auto look = [&](const NestedFit& nested) {
     return of.subject.where(study, nested.fit.residuals, of.problem);
@@ -52,18 +52,18 @@ void fill_judgement(const Judgement& judged, Diagnosis* d) {
   d->verdict = judged.verdict;
   d->cautions = judged.cautions;
   d->nearest = judged.nearest;
-  d->sanity.insert(d->sanity.begin(), judged.doubts.begin(), judged.doubts.end());
+  d->sanity.insert(d->sanity.begin(), judged.warnings.begin(), judged.warnings.end());
   for (const Leftover& l : judged.left) d->checks.push_back({l.covariate, l.log10_p, l.excess});
 }
 
 void fill_steps(const Screening& screening, Diagnosis* d) {
-  if (screening.doubt) return;
+  if (screening.warning) return;
   for (const SelectionStep& step : screening.catalogue->steps()) {
     d->steps.push_back({step.explained, step.offered});
   }
 }
 
-DiagnosisResult begun(const Inquiry& of) {
+DiagnosisResult begun(const DiagnosisRequest& of) {
   DiagnosisResult result;
   result.problem = of.predictor.problem_hash();
   result.frame_x_m = of.frame_m.x();
@@ -84,7 +84,7 @@ std::vector<std::string> leftover_caution(std::vector<Leftover> left, double unk
           (covariates.size() > 1 ? " (the clearest first)." : ".")};
 }
 
-Status compare_with_baselines(const Inquiry& of, const Refit& refit, Diagnosis* d) {
+Status compare_with_baselines(const DiagnosisRequest& of, const Refit& refit, Diagnosis* d) {
   if (scenario_form(of.problem.scenario).pieces) return {};
   const Explanation& named = refit.judged.named;
   const auto baselines =
@@ -103,12 +103,12 @@ Status compare_with_baselines(const Inquiry& of, const Refit& refit, Diagnosis* 
     const BaselineComparison &model = by_model[b], &tuned = by_tuned[b];
     d->provenance.emplace_back(
         "without a simulation: " + model.name,
-        fmt::format("{:.3f} nats a trial on {} trials left out; tuned base {:.3f}, model {:.3f}",
+        fmt::format("{:.3f} nats a trial on {} held-out trials; tuned base {:.3f}, model {:.3f}",
                     model.baseline, model.trials, tuned.model, model.model));
     if (!model.beaten()) {
       d->cautions.push_back(fmt::format(
           "The simulation does not beat {}, which needs none: {:.3f} nats a trial against {:.3f} "
-          "on {} trials left out.",
+          "on {} held-out trials.",
           model.name, model.model, model.baseline, model.trials));
     } else if (!tuned.beaten()) {
       d->cautions.push_back(
@@ -120,7 +120,8 @@ Status compare_with_baselines(const Inquiry& of, const Refit& refit, Diagnosis* 
   return {};
 }
 
-Result<DiagnosisResult> report(const Inquiry& of, const Screening& screening, const Refit& refit) {
+Result<DiagnosisResult> report(const DiagnosisRequest& of, const Screening& screening,
+                               const Refit& refit) {
   DiagnosisResult result = begun(of);
   Diagnosis& d = result.diagnosis;
   const Explanation& named = refit.judged.named;
@@ -132,7 +133,7 @@ Result<DiagnosisResult> report(const Inquiry& of, const Screening& screening, co
   d.effects = named_effects(of, refit);
   fill_gap(of, refit, &d);
   d.shown = of.subject.shown;
-  d.words = of.subject.words;
+  d.labels = of.subject.labels;
   d.trials = diagnosed_trials(of, refit);
   // Cautions, the gravest first: what the simulation does not explain or model, then what the log
   // does not show, then what is only to be known.
@@ -168,8 +169,8 @@ Result<DiagnosisResult> report(const Inquiry& of, const Screening& screening, co
   return result;
 }
 
-DiagnosisResult give_up(const Inquiry& of, const KnownSoFar& known, const std::string& step,
-                        const Error& error) {
+DiagnosisResult fail_with_partial_report(const DiagnosisRequest& of, const PartialResult& known,
+                                         const std::string& step, const Error& error) {
   DiagnosisResult result = begun(of);
   Diagnosis& d = result.diagnosis;
   if (known.screening != nullptr) {
@@ -183,9 +184,9 @@ DiagnosisResult give_up(const Inquiry& of, const KnownSoFar& known, const std::s
                   {base ? "base_not_simulated" : "unfinished",
                    "While it was to " + step + ": " + error.message + ".",
                    base ? "Give the config values at which the robot moves and comes to rest."
-                        : "Bring [parameters] nearer to the robot; --leave-out NAME goes on "
+                        : "Bring [parameters] closer to the robot; --exclude NAME goes on "
                           "without an effect.",
-                   base ? Severity::kUnusable : Severity::kDoubt});
+                   base ? Severity::kUnusable : Severity::kWarning});
   append(not_simulated(of), &d);
   result.tuned = of.problem.values;
   if (!base) {

@@ -39,8 +39,8 @@ void set_closed(const ClosedShare& closed, NamedEffect* effect) {
 }
 
 // One row of the table with what the fit and what lies beyond it leave open.
-Estimate told_estimate(const Inquiry& of, const Judgement& judged, const ChosenEffect& chosen,
-                       std::size_t row, double value) {
+Estimate reported_estimate(const DiagnosisRequest& of, const Judgement& judged,
+                           const ChosenEffect& chosen, std::size_t row, double value) {
   const JointFit& estimates = *judged.named.estimates;
   const Parameter& p = of.table()[row];
   Estimate e{p.key.substr(p.key.find('.') + 1), value, value, value, p.unit};
@@ -63,12 +63,12 @@ Estimate told_estimate(const Inquiry& of, const Judgement& judged, const ChosenE
     e.hi = std::min(e.hi, p.upper);
   }
   const double frame = of.frame_of(p.key, estimates.at);
-  for (double* told : {&e.value, &e.lo, &e.hi}) *told += frame;
+  for (double* bound : {&e.value, &e.lo, &e.hi}) *bound += frame;
   return e;
 }
 
 // Without words, and with a gap that only its change counts of.
-NamedEffect named_mean(const Inquiry& of, const Refit& refit, std::size_t k) {
+NamedEffect named_mean(const DiagnosisRequest& of, const Refit& refit, std::size_t k) {
   const Explanation& named = refit.judged.named;
   const ChosenEffect& chosen = named.chosen[k];
   NamedEffect effect;
@@ -84,7 +84,7 @@ NamedEffect named_mean(const Inquiry& of, const Refit& refit, std::size_t k) {
   for (const auto& [row, value] : named.estimates->at) {
     const Parameter& p = of.table()[row];
     if (p.effect != effect.name || p.kind != ParameterKind::kReal) continue;
-    effect.parameters.push_back(told_estimate(of, refit.judged, chosen, row, value));
+    effect.parameters.push_back(reported_estimate(of, refit.judged, chosen, row, value));
   }
   if (is_seam(effect.name)) {
     effect.axis = named.estimates->at.at(of.table().row(effect.name + ".axis")) == 0 ? "x" : "y";
@@ -152,7 +152,7 @@ std::vector<SpreadEffect> spread_effects(const Refit& refit) {
 }
 
 // With the names that the log has for them.
-std::vector<SessionGain> named_sessions(const Inquiry& of, const Study& study,
+std::vector<SessionGain> named_sessions(const DiagnosisRequest& of, const Study& study,
                                         std::vector<SessionGain> gains) {
   for (std::size_t i = 0; i < study.size() && !gains.empty(); ++i) {
     gains[study.trials[i].session].session = of.problem.log.trials[i].session;
@@ -161,7 +161,7 @@ std::vector<SessionGain> named_sessions(const Inquiry& of, const Study& study,
 }
 
 // " How much faster than on average each session drove: a 3.1 % [2.6, 3.6], b -2 % [-2.4, -1.6]."
-std::string sessions_words(const std::vector<SessionGain>& gains) {
+std::string sessions_text(const std::vector<SessionGain>& gains) {
   const auto percent = [](double share) { return plain_number(100 * share); };
   std::string text;
   for (const SessionGain& s : gains) {
@@ -171,16 +171,17 @@ std::string sessions_words(const std::vector<SessionGain>& gains) {
   return text.empty() ? text : text + ".";
 }
 
-NamedEffect named_spread(const Inquiry& of, const Refit& refit, const SpreadEffect& found) {
+NamedEffect named_spread(const DiagnosisRequest& of, const Refit& refit,
+                         const SpreadEffect& found) {
   NamedEffect effect;
   effect.name = found.name;
   effect.confidence = confidence_of(found.gain, of.subject.least_gain);
   effect.parameters = found.estimates;
   effect.sessions = named_sessions(of, refit.judged.named.study(), found.sessions);
-  effect.text = sessions_words(effect.sessions);
+  effect.text = sessions_text(effect.sessions);
   std::vector<double> gained = found.gained;
   if (gained.empty()) {
-    // The gain is over all that the readings tell; of the gap it can close what the means left.
+    // The gain is over all that the readings show; of the gap it can close what the means left.
     const std::size_t trials = refit.judged.named.study().size();
     const double left = std::max(0.0, refit.floor - mean(refit.nested.back().scores));
     const double per_trial = std::min(found.gain / static_cast<double>(trials), left);
@@ -217,7 +218,8 @@ RootMeanSquare held_out_error(const NestedFit& nested, const std::vector<std::si
   return root_mean_square(residuals);
 }
 
-ClosedShare closed_share(const Inquiry& of, const Refit& refit, const std::vector<double>& gained) {
+ClosedShare closed_share(const DiagnosisRequest& of, const Refit& refit,
+                         const std::vector<double>& gained) {
   const Study& study = refit.judged.named.study();
   std::vector<std::vector<std::size_t>> chains;
   for (std::size_t i = 0; i < study.size(); ++i) {
@@ -247,7 +249,7 @@ ClosedShare closed_share(const Inquiry& of, const Refit& refit, const std::vecto
   return {whole, quantile(shares, 0.05), quantile(shares, 0.95)};
 }
 
-std::vector<NamedEffect> named_effects(const Inquiry& of, const Refit& refit) {
+std::vector<NamedEffect> named_effects(const DiagnosisRequest& of, const Refit& refit) {
   const Explanation& named = refit.judged.named;
   std::vector<std::pair<double, NamedEffect>> all;
   for (std::size_t k = 0; k < named.chosen.size(); ++k) {

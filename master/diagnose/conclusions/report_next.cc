@@ -11,8 +11,8 @@ namespace gapfarm::steps {
 namespace {
 
 // A chosen effect and its aliases, each at its best linear fit beside the others.
-Result<Rivals> rivals_of(const Inquiry& of, const Explanation& named, std::size_t k,
-                         Selector* catalogue) {
+Result<CompetingCauses> alternatives_of(const DiagnosisRequest& of, const Explanation& named,
+                                        std::size_t k, Selector* catalogue) {
   const ParameterTable& table = of.table();
   const ChosenEffect& chosen = named.chosen[k];
   const std::string& own = chosen.candidate.signature.effect;
@@ -23,7 +23,7 @@ Result<Rivals> rivals_of(const Inquiry& of, const Explanation& named, std::size_
   const Regression explained = catalogue->with(others);
   auto candidates = catalogue->candidates(explained, {});
   if (!candidates) return candidates.error();
-  Rivals rivals;
+  CompetingCauses alternatives;
   for (const EffectCandidate& c : *candidates) {
     const std::string& name = c.signature.effect;
     const bool alias = std::any_of(chosen.aliases.begin(), chosen.aliases.end(),
@@ -39,20 +39,20 @@ Result<Rivals> rivals_of(const Inquiry& of, const Explanation& named, std::size_
         if (table[row].effect == own) at[row] = value;
       }
     }
-    Rival rival{alias ? name : own, {}};
+    CompetingCause alternative{alias ? name : own, {}};
     for (const auto& [row, value] : at) {
-      rival.overrides.emplace_back();
-      rival.overrides.back().set_parameter(static_cast<std::uint32_t>(row));
-      rival.overrides.back().set_value(value);
+      alternative.overrides.emplace_back();
+      alternative.overrides.back().set_parameter(static_cast<std::uint32_t>(row));
+      alternative.overrides.back().set_value(value);
     }
-    rivals.push_back(std::move(rival));
+    alternatives.push_back(std::move(alternative));
   }
-  return rivals;
+  return alternatives;
 }
 
 // "position 1.34 m": where a second one of a kind would be.
-std::string place_words(const Inquiry& of, const Signature& second,
-                        const std::vector<const char*>& keys) {
+std::string place_text(const DiagnosisRequest& of, const Signature& second,
+                       const std::vector<const char*>& keys) {
   Overrides at;
   for (const auto& [key, value] : second.fixed) at[of.table().row(key)] = value;
   std::string place;
@@ -68,13 +68,13 @@ std::string place_words(const Inquiry& of, const Signature& second,
 
 }  // namespace
 
-Status plan_next(const Inquiry& of, const Explanation& named, Selector* catalogue,
+Status plan_next(const DiagnosisRequest& of, const Explanation& named, Selector* catalogue,
                  Diagnosis* diagnosis) {
   for (std::size_t k = 0; k < named.chosen.size(); ++k) {
     if (named.chosen[k].aliases.empty()) continue;
-    const auto rivals = rivals_of(of, named, k, catalogue);
-    if (!rivals) return rivals.error();
-    auto next = next_experiments(of.farm, of.subject.experiments(of.problem), *rivals);
+    const auto alternatives = alternatives_of(of, named, k, catalogue);
+    if (!alternatives) return alternatives.error();
+    auto next = next_experiments(of.farm, of.subject.experiments(of.problem), *alternatives);
     if (!next && next.error().code == ErrorCode::kStopped) return next.error();
     if (!next) {
       diagnosis->cautions.push_back(
@@ -86,9 +86,9 @@ Status plan_next(const Inquiry& of, const Explanation& named, Selector* catalogu
   return {};
 }
 
-Result<std::vector<std::string>> second_places(const Inquiry& of, const Explanation& named,
+Result<std::vector<std::string>> second_places(const DiagnosisRequest& of, const Explanation& named,
                                                Selector* catalogue) {
-  std::vector<std::string> said;
+  std::vector<std::string> sentences;
   const Regression explained = explained_by(*catalogue, named);
   const auto is_named = [&](const std::string& name) {
     return std::any_of(named.chosen.begin(), named.chosen.end(),
@@ -96,7 +96,7 @@ Result<std::vector<std::string>> second_places(const Inquiry& of, const Explanat
   };
   for (const ChosenEffect& effect : named.chosen) {
     const std::string& name = effect.candidate.signature.effect;
-    const std::vector<const char*>& keys = of.subject.effects->row(name).told_by;
+    const std::vector<const char*>& keys = of.subject.effects->row(name).identified_by;
     if (keys.empty() || kind_of(name) != name) continue;
     const auto second = catalogue->again(explained, name);
     if (!second) return second.error();
@@ -106,14 +106,14 @@ Result<std::vector<std::string>> second_places(const Inquiry& of, const Explanat
     const std::vector<Leftover> left = leftovers(with_it, named.evidence->blocks);
     const bool all = left.empty() || left.front().log10_p >= of.subject.unknown_log10_p;
     const bool two = is_named(second_of(name)), room = !two && !second_of(name).empty();
-    said.push_back(std::string(two ? "A third " : "A second ") + name + " (" +
-                   place_words(of, second->signature, keys) + ") would explain " +
-                   std::to_string(std::lround(second->gain)) + " nats more of what is left" +
-                   (all ? ", and nothing would remain" : "") +
-                   (room ? "; that is too little, or too near the first, to name it."
-                         : std::string("; a model holds ") + (two ? "two." : "one.")));
+    sentences.push_back(std::string(two ? "A third " : "A second ") + name + " (" +
+                        place_text(of, second->signature, keys) + ") would explain " +
+                        std::to_string(std::lround(second->gain)) + " nats more of what is left" +
+                        (all ? ", and nothing would remain" : "") +
+                        (room ? "; that is too little, or too near the first, to name it."
+                              : std::string("; a model holds ") + (two ? "two." : "one.")));
   }
-  return said;
+  return sentences;
 }
 
 }  // namespace gapfarm::steps

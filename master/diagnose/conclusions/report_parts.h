@@ -15,10 +15,11 @@ struct ClosedShare {
   double share = 0, lo = 0, hi = 0;
 };
 // `gained`: nats of every trial.
-ClosedShare closed_share(const Inquiry& of, const Refit& refit, const std::vector<double>& gained);
+ClosedShare closed_share(const DiagnosisRequest& of, const Refit& refit,
+                         const std::vector<double>& gained);
 
 // Greatest gain first; each one's gap goes on from the one before.
-std::vector<NamedEffect> named_effects(const Inquiry& of, const Refit& refit);
+std::vector<NamedEffect> named_effects(const DiagnosisRequest& of, const Refit& refit);
 
 struct RootMeanSquare {
   double position_mm = 0;
@@ -30,46 +31,47 @@ RootMeanSquare root_mean_square(const std::vector<Eigen::Vector3d>& residuals);
 RootMeanSquare held_out_error(const NestedFit& nested, const std::vector<std::size_t>& folds);
 
 // Rows of every effect of the catalogue, also those that no mean shows.
-std::vector<Screened> complete_screening(const Inquiry& of, const Screening& screening,
+std::vector<Screened> complete_screening(const DiagnosisRequest& of, const Screening& screening,
                                          const Judgement& judged);
 
 // The values that models are left with; a model holds what the table accepts, and what a log asks
-// beyond that is said.
-void fill_values(const Inquiry& of, const Refit& refit, DiagnosisResult* result);
+// beyond that is reported.
+void fill_values(const DiagnosisRequest& of, const Refit& refit, DiagnosisResult* result);
 // The noise's rows of the table.
-void set_noise(const Inquiry& of, const NoiseEstimate& noise, Overrides* at);
+void set_noise(const DiagnosisRequest& of, const NoiseEstimate& noise, Overrides* at);
 
-std::vector<DiagnosedTrial> diagnosed_trials(const Inquiry& of, const Refit& refit);
+std::vector<DiagnosedTrial> diagnosed_trials(const DiagnosisRequest& of, const Refit& refit);
 // What was tuned, and of the named effects; once values are known.
-void fill_parameters(const Inquiry& of, const Refit& refit, DiagnosisResult* result);
-// Some drives once more from where they began, by both models.  One that does not end well is left
-// out: the picture can do without.
-Result<std::vector<ShownDrive>> shown_drives(const Inquiry& of, const DiagnosisResult& result);
+void fill_parameters(const DiagnosisRequest& of, const Refit& refit, DiagnosisResult* result);
+// Some drives once more from where they began, by both models.  One that does not end well is
+// omitted: the picture can do without.
+Result<std::vector<ShownDrive>> shown_drives(const DiagnosisRequest& of,
+                                             const DiagnosisResult& result);
 
-// A simulation is worth its while when it foretells trials better than their repeats do.
-Status compare_with_baselines(const Inquiry& of, const Refit& refit, Diagnosis* diagnosis);
+// A simulation is worth its while when it predicts trials better than their repeats do.
+Status compare_with_baselines(const DiagnosisRequest& of, const Refit& refit, Diagnosis* diagnosis);
 // An arena may have more seams, a floor more patches, than a model holds or than were clear enough:
 // a sentence each.
-Result<std::vector<std::string>> second_places(const Inquiry& of, const Explanation& named,
+Result<std::vector<std::string>> second_places(const DiagnosisRequest& of, const Explanation& named,
                                                Selector* catalogue);
 // Every named effect against its aliases, each at its best linear fit.
-Status plan_next(const Inquiry& of, const Explanation& named, Selector* catalogue,
+Status plan_next(const DiagnosisRequest& of, const Explanation& named, Selector* catalogue,
                  Diagnosis* diagnosis);
 
 // One sentence of all that what is left depends on, the clearest first; none where there is none.
 std::vector<std::string> leftover_caution(std::vector<Leftover> left, double unknown_log10_p);
 // What could not be looked for, a sentence each.
-std::vector<std::string> not_looked_for(const Inquiry& of);
-// What was left out of the simulation, a sentence a reason.
-std::vector<std::string> not_simulated(const Inquiry& of);
+std::vector<std::string> not_looked_for(const DiagnosisRequest& of);
+// What was held out of the simulation, a sentence a reason.
+std::vector<std::string> not_simulated(const DiagnosisRequest& of);
 
 // What is known so far, as a report, where a step could not go on.
-struct KnownSoFar {
+struct PartialResult {
   const Study* tuned = nullptr;  // null: not even measured
   const Screening* screening = nullptr;
   const Judgement* judged = nullptr;
 };
-DiagnosisResult give_up(const Inquiry& of, const KnownSoFar& known, const std::string& step,
-                        const Error& error);
+DiagnosisResult fail_with_partial_report(const DiagnosisRequest& of, const PartialResult& known,
+                                         const std::string& step, const Error& error);
 
 }  // namespace gapfarm::steps

@@ -13,15 +13,15 @@
 namespace gapfarm::steps {
 namespace {
 
-// What is told of an effect that no mean shows.
-struct Told {
+// What is reported of an effect that no mean shows.
+struct ScreenedSize {
   double gain = 0;
   std::string key;  // the value's
   double value = 0;
   std::string note;
 };
 
-Told told_of_spread(const SpreadRow* look, const Explanation& named) {
+ScreenedSize reported_of_spread(const SpreadRow* look, const Explanation& named) {
   for (const FoundSpread& found : named.spreads) {
     if (found.row != look) continue;
     const Estimate& first = found.fit.estimates.front();
@@ -30,16 +30,17 @@ Told told_of_spread(const SpreadRow* look, const Explanation& named) {
   return {0, "", 0, look->missing};
 }
 
-Told told_of(const Inquiry& of, const std::string& name, const Explanation& named) {
-  const auto note = [](std::string text) { return Told{0, "", 0, std::move(text)}; };
-  if (of.left_out(name)) return note("left out of the catalogue as asked");
-  if (of.predictor.left_out().count(name)) return note(of.predictor.left_out().at(name));
+ScreenedSize reported_of(const DiagnosisRequest& of, const std::string& name,
+                         const Explanation& named) {
+  const auto note = [](std::string text) { return ScreenedSize{0, "", 0, std::move(text)}; };
+  if (of.excluded(name)) return note("omitted from the catalogue as asked");
+  if (of.predictor.excluded().count(name)) return note(of.predictor.excluded().at(name));
   if (kind_of(name) != name) return note("a second one, looked for beside the first");
   if (name == kPatchEffect) return note("no disc of floor promises enough to be simulated");
   if (name == "slip_events") {
     return {named.slip.gain, "probability", named.slip.probability,
             named.slip.gain > 0 ? "by the tails of what is left"
-                                : "single drives do not stray as slips would make them"};
+                                : "single drives are no outliers as slips would make them"};
   }
   if (name == "pose_latency") {
     if (named.study().gaps.size() < kFewestGaps)
@@ -50,7 +51,7 @@ Told told_of(const Inquiry& of, const std::string& name, const Explanation& name
                                    : "readings of one resting pose agree"};
   }
   const SpreadRow* look = of.subject.effects->row(name).spread;
-  if (look != nullptr) return told_of_spread(look, named);
+  if (look != nullptr) return reported_of_spread(look, named);
   if (name == "pose_quantisation") {
     return {named.grid_m > 0 ? named.study().grid.nats : 0, "step", named.grid_m,
             named.grid_m > 0 ? "the positions lie on this grid" : "the positions lie on no grid"};
@@ -63,10 +64,10 @@ Told told_of(const Inquiry& of, const std::string& name, const Explanation& name
 
 }  // namespace
 
-std::vector<Screened> complete_screening(const Inquiry& of, const Screening& screening,
+std::vector<Screened> complete_screening(const DiagnosisRequest& of, const Screening& screening,
                                          const Judgement& judged) {
   std::vector<Screened> rows;
-  if (!judged.base_in_doubt) rows = screening.rows;
+  if (!judged.base_is_suspicious) rows = screening.rows;
   const std::vector<ChosenEffect>& chosen = judged.named.chosen;
   for (const Effect& effect : of.table().effects()) {
     const std::string& name = effect.name;
@@ -80,20 +81,20 @@ std::vector<Screened> complete_screening(const Inquiry& of, const Screening& scr
     Screened& row = rows.emplace_back();
     row.effect = name;
     row.note = "not looked for: no effect is to be named";
-    if (!judged.doubts.empty()) continue;
-    const Told told = told_of(of, name, judged.named);
-    row.note = told.note;
-    row.gain = std::max(0.0, told.gain);
-    if (!(told.gain > 0)) continue;
-    row.estimate =
-        told.key + " " +
-        of.table().format(of.table().row(name + "." + told.key), rounded_to_digits(told.value, 4));
+    if (!judged.warnings.empty()) continue;
+    const ScreenedSize screened = reported_of(of, name, judged.named);
+    row.note = screened.note;
+    row.gain = std::max(0.0, screened.gain);
+    if (!(screened.gain > 0)) continue;
+    row.estimate = screened.key + " " +
+                   of.table().format(of.table().row(name + "." + screened.key),
+                                     rounded_to_digits(screened.value, 4));
   }
   return rows;
 }
 
-std::vector<std::string> not_looked_for(const Inquiry& of) {
-  std::vector<std::string> said;
+std::vector<std::string> not_looked_for(const DiagnosisRequest& of) {
+  std::vector<std::string> sentences;
   std::string lacking;
   const std::span<const Effect> known = of.table().effects();
   for (const Effect& effect : of.problem.external ? srv1_effects() : std::span<const Effect>{}) {
@@ -102,22 +103,22 @@ std::vector<std::string> not_looked_for(const Inquiry& of) {
     if (!there) lacking += (lacking.empty() ? "" : ", ") + effect.name;
   }
   if (!lacking.empty()) {
-    said.push_back("Not looked for, since the program does not take what they need: " + lacking +
-                   ". It may declare more inputs, or parameters of its own.");
+    sentences.push_back("Not looked for, since the program does not take what they need: " +
+                        lacking + ". It may declare more inputs, or parameters of its own.");
   }
-  for (std::string& sentence : not_simulated(of)) said.push_back(std::move(sentence));
-  return said;
+  for (std::string& sentence : not_simulated(of)) sentences.push_back(std::move(sentence));
+  return sentences;
 }
 
-std::vector<std::string> not_simulated(const Inquiry& of) {
+std::vector<std::string> not_simulated(const DiagnosisRequest& of) {
   std::map<std::string, std::vector<std::string>> by_reason;
-  for (const auto& [what, why] : of.predictor.left_out()) by_reason[why].push_back(what);
-  std::vector<std::string> said;
+  for (const auto& [what, why] : of.predictor.excluded()) by_reason[why].push_back(what);
+  std::vector<std::string> sentences;
   for (const auto& [why, what] : by_reason) {
-    said.push_back("Left out, since " + std::string(what.size() > 1 ? "they" : "it") +
-                   " cannot be simulated: " + listed(what) + " (" + why + ").");
+    sentences.push_back("Omitted, since " + std::string(what.size() > 1 ? "they" : "it") +
+                        " cannot be simulated: " + listed(what) + " (" + why + ").");
   }
-  return said;
+  return sentences;
 }
 
 }  // namespace gapfarm::steps

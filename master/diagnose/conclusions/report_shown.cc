@@ -65,7 +65,7 @@ ParameterRow row_of(const Parameter& p, double before, double after) {
   return row;
 }
 
-// Places are told in the world, not in the log's own frame.
+// Places are reported in the world, not in the log's own frame.
 void to_world(double frame, ParameterRow* row) {
   for (double* value : {&row->after, &row->lower, &row->upper}) *value += frame;
   if (row->lo && row->hi) *row->lo += frame, *row->hi += frame;
@@ -130,7 +130,7 @@ void turn(double angle_rad, DiagnosedTrial* trial) {
 }
 
 // The values without anything random, as differences from the problem's.
-std::vector<v1::Override> without_chance(const Inquiry& of, ParameterValues values) {
+std::vector<v1::Override> without_chance(const DiagnosisRequest& of, ParameterValues values) {
   const ParameterTable& table = of.table();
   for (const NoiseRow& noise : {of.subject.drive_common, of.subject.drive_side,
                                 of.subject.pose_position, of.subject.pose_heading}) {
@@ -147,26 +147,26 @@ std::vector<v1::Override> without_chance(const Inquiry& of, ParameterValues valu
   return overrides;
 }
 
-// Rows of the table that are told of: noise, base, and named effects.
-std::set<std::size_t> told_rows(const Inquiry& of, const JointFit& fit,
-                                const std::vector<NamedEffect>& effects) {
-  std::set<std::size_t> told;
+// Rows of the table that are reported: noise, base, and named effects.
+std::set<std::size_t> reported_rows(const DiagnosisRequest& of, const JointFit& fit,
+                                    const std::vector<NamedEffect>& effects) {
+  std::set<std::size_t> reported;
   for (const NoiseRow& noise : {of.subject.drive_common, of.subject.drive_side,
                                 of.subject.pose_position, of.subject.pose_heading}) {
-    told.insert(noise.row);
+    reported.insert(noise.row);
   }
-  for (std::size_t k = 0; k < fit.base_parameters; ++k) told.insert(fit.parameters[k].row);
+  for (std::size_t k = 0; k < fit.base_parameters; ++k) reported.insert(fit.parameters[k].row);
   for (const NamedEffect& effect : effects) {
     for (std::size_t row = 0; row < of.table().size(); ++row) {
-      if (of.table()[row].effect == effect.name) told.insert(row);
+      if (of.table()[row].effect == effect.name) reported.insert(row);
     }
   }
-  return told;
+  return reported;
 }
 
 }  // namespace
 
-std::vector<DiagnosedTrial> diagnosed_trials(const Inquiry& of, const Refit& refit) {
+std::vector<DiagnosedTrial> diagnosed_trials(const DiagnosisRequest& of, const Refit& refit) {
   const Study& study = refit.judged.named.study();
   const NestedFit &tuned = refit.nested.front(), &last = refit.nested.back();
   const std::vector<Eigen::Matrix3d> tuned_cov = tuned.study.covariances();
@@ -204,12 +204,12 @@ std::vector<DiagnosedTrial> diagnosed_trials(const Inquiry& of, const Refit& ref
   return trials;
 }
 
-void fill_parameters(const Inquiry& of, const Refit& refit, DiagnosisResult* result) {
+void fill_parameters(const DiagnosisRequest& of, const Refit& refit, DiagnosisResult* result) {
   const ParameterTable& table = of.table();
   const JointFit& fit = refit.nested.back().fit;
   const Study& study = refit.nested.back().study;
   Diagnosis& d = result->diagnosis;
-  for (const std::size_t at : told_rows(of, fit, d.effects)) {
+  for (const std::size_t at : reported_rows(of, fit, d.effects)) {
     ParameterRow row = row_of(table[at], result->tuned[at], result->final_[at]);
     const auto& [lo, hi] = result->intervals[at];
     if (lo < hi) row.lo = lo, row.hi = hi;
@@ -234,9 +234,10 @@ void fill_parameters(const Inquiry& of, const Refit& refit, DiagnosisResult* res
   if (cov.size() > 0) d.correlations = strong_correlations(table, fit, cov);
 }
 
-Result<std::vector<ShownDrive>> shown_drives(const Inquiry& of, const DiagnosisResult& result) {
+Result<std::vector<ShownDrive>> shown_drives(const DiagnosisRequest& of,
+                                             const DiagnosisResult& result) {
   std::vector<ShownDrive> drives;
-  if (!of.subject.words.ends.empty()) return drives;  // of a scenario whose paths say nothing
+  if (!of.subject.labels.ends.empty()) return drives;  // of a scenario whose paths say nothing
   if (!of.has_paths()) return drives;
   drives = drives_to_show(result.diagnosis.trials);
   if (drives.empty()) return drives;

@@ -11,7 +11,7 @@ namespace gapfarm::steps {
 namespace {
 
 // Of what widens the distribution, into values of base and effects.
-void set_spreads(const Inquiry& of, const Refit& refit, Overrides* at) {
+void set_spreads(const DiagnosisRequest& of, const Refit& refit, Overrides* at) {
   const Explanation& named = refit.judged.named;
   const auto set = [&](const std::string& key, double value) {
     (*at)[of.table().row(key)] = value;
@@ -40,7 +40,7 @@ void set_spreads(const Inquiry& of, const Refit& refit, Overrides* at) {
     set("slip_events.loss", std::clamp(named.slip.loss, 0.0, 1.0));
     noise.drive_common = named.slip.noise.drive_common;
     noise.drive_side = named.slip.noise.drive_side;
-    // Without events in it the fitted speed has made up for those that were not left out.
+    // Without events in it the fitted speed has made up for those that were not omitted.
     if (const auto& speed = named.study().drive.speed) {
       (*at)[*speed] /= 1 - mean_loss_of_slips(named);
     }
@@ -48,18 +48,18 @@ void set_spreads(const Inquiry& of, const Refit& refit, Overrides* at) {
   set_noise(of, noise, at);
 }
 
-ParameterValues within_table(const Inquiry& of, const Overrides& at,
+ParameterValues within_table(const DiagnosisRequest& of, const Overrides& at,
                              std::vector<std::string>* cautions) {
   ParameterValues values = of.problem.values;
   for (const auto& [row, value] : at) {
     const Parameter& p = of.table()[row];
     values[row] = std::clamp(value, p.lower, p.upper);
     if (values[row] == value) continue;
-    const std::string said = p.key + " would be " + plain_number(value) +
-                             ", which is beyond its bounds: the models have " +
-                             of.table().format(row, values[row]) + ".";
-    if (std::find(cautions->begin(), cautions->end(), said) == cautions->end()) {
-      cautions->push_back(said);
+    const std::string claim = p.key + " would be " + plain_number(value) +
+                              ", which is beyond its bounds: the models have " +
+                              of.table().format(row, values[row]) + ".";
+    if (std::find(cautions->begin(), cautions->end(), claim) == cautions->end()) {
+      cautions->push_back(claim);
     }
   }
   return values;
@@ -67,7 +67,7 @@ ParameterValues within_table(const Inquiry& of, const Overrides& at,
 
 }  // namespace
 
-void set_noise(const Inquiry& of, const NoiseEstimate& noise, Overrides* at) {
+void set_noise(const DiagnosisRequest& of, const NoiseEstimate& noise, Overrides* at) {
   const DiagnosisSubject& subject = of.subject;
   const auto set = [&](const NoiseRow& to, double value) { (*at)[to.row] = value * to.unit; };
   set(subject.drive_common, noise.drive_common);
@@ -78,7 +78,7 @@ void set_noise(const Inquiry& of, const NoiseEstimate& noise, Overrides* at) {
   if (subject.pose_tail) set(*subject.pose_tail, noise.tails.reading);
 }
 
-void fill_values(const Inquiry& of, const Refit& refit, DiagnosisResult* result) {
+void fill_values(const DiagnosisRequest& of, const Refit& refit, DiagnosisResult* result) {
   const NestedFit &base = refit.nested.front(), &last = refit.nested.back();
   Overrides tuned = base.fit.at, final_ = refit.final_fit ? refit.final_fit->at : last.fit.at;
   set_noise(of, base.study.predictive_noise(), &tuned);

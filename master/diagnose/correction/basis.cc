@@ -103,12 +103,12 @@ void ResidualBasis::set_units() {
   unit_[0] = unit_[1] = std::max(unit_[0], unit_[1]);
   if (term_.by_drive) unit_ /= std::max(1e-6, median(drives));
   if (term_.frame == ResidualFrame::kMotion) {
-    std::vector<double> ways, turns;
+    std::vector<double> distances, turns;
     for (const Eigen::Matrix3d& motion : turned_) {
-      ways.push_back(std::hypot(motion(0, 0), motion(1, 1)));
+      distances.push_back(std::hypot(motion(0, 0), motion(1, 1)));
       turns.push_back(std::abs(motion(2, 2)));
     }
-    unit_.head<2>() /= std::max(1e-3, median(ways));
+    unit_.head<2>() /= std::max(1e-3, median(distances));
     unit_[2] /= std::max(1e-2, quantile(turns, 0.75));
   }
 }
@@ -174,7 +174,7 @@ void ResidualBasis::place_centres(const std::vector<Place>& among) {
   kernel_.diagonal().array() += kJitter;
 }
 
-// Bumps in a row, as narrow as there may be centres for, over the readings on the nearer side.
+// Bumps in a row, as narrow as there may be centres for, over the readings on the closer side.
 void ResidualBasis::place_edge(const std::vector<Place>& among, const Residuals& residuals,
                                const std::vector<bool>& seen) {
   const std::size_t row = term_.covariates.front();
@@ -210,7 +210,7 @@ ResidualBasis::Lesson ResidualBasis::lesson_of(std::size_t group, const Residual
     if (!learn[i]) continue;
     lesson.trials.push_back(i);
     lesson.whitened.push_back(data_.whiteners[i] * residuals[i]);
-    lesson.strays |= lesson.whitened.back().norm() > kFarthestPull;
+    lesson.outliers |= lesson.whitened.back().norm() > kFarthestPull;
     const Eigen::Matrix3d inner = axes_[i].transpose() * axes_[i];
     const Eigen::MatrixXd outer = features_[i] * features_[i].transpose();
     for (Eigen::Index a = 0; a < parts; ++a) {
@@ -229,11 +229,11 @@ Eigen::VectorXd ResidualBasis::pull_of(const Lesson& lesson, const Eigen::Matrix
   Eigen::VectorXd right = Eigen::VectorXd::Zero(parts * k);
   for (std::size_t l = 0; l < lesson.trials.size(); ++l) {
     const std::size_t i = lesson.trials[l];
-    const Eigen::Vector3d told = axes_[i] * (weights.transpose() * features_[i]);
-    Eigen::Vector3d left = lesson.whitened[l] - told;
+    const Eigen::Vector3d predicted = axes_[i] * (weights.transpose() * features_[i]);
+    Eigen::Vector3d left = lesson.whitened[l] - predicted;
     const double far = left.norm();
     if (far > kFarthestPull) left *= kFarthestPull / far;
-    const Eigen::Vector3d pull = axes_[i].transpose() * (told + left);
+    const Eigen::Vector3d pull = axes_[i].transpose() * (predicted + left);
     for (Eigen::Index a = 0; a < parts; ++a) right.segment(a * k, k) += pull[a] * features_[i];
   }
   return right;
@@ -247,8 +247,8 @@ Eigen::MatrixXd ResidualBasis::solve(const Lesson& lesson, double amplitude) con
     matrix.block(a * k, a * k, k, k) += kernel_ / (sd * sd);
   }
   Eigen::MatrixXd weights = Eigen::MatrixXd::Zero(k, 3);
-  for (int round = 0; round < (lesson.strays ? kRounds : 1); ++round) {
-    // Shifts are told in um and urad; scaled alike, metres and radians are solved alike.
+  for (int round = 0; round < (lesson.outliers ? kRounds : 1); ++round) {
+    // Shifts are reported in um and urad; scaled alike, metres and radians are solved alike.
     const Eigen::VectorXd solved = solve_symmetric(matrix, pull_of(lesson, weights));
     for (Eigen::Index a = 0; a < parts; ++a) weights.col(a) = solved.segment(a * k, k);
   }

@@ -48,7 +48,7 @@ class ResidualBasis {
     std::vector<std::size_t> trials;
     Residuals whitened;
     Eigen::MatrixXd matrix;
-    bool strays = false;  // some pull no harder than the farthest
+    bool outliers = false;  // some pull no harder than the farthest
   };
   std::vector<Place> places(const std::vector<bool>& seen) const;
   void place_lengths(const std::vector<Place>& among, const std::vector<double>& shares);

@@ -7,7 +7,7 @@
 namespace gapfarm {
 namespace {
 
-constexpr double kStraying = 0.02, kStrayScale = 5;
+constexpr double kOutlierShare = 0.02, kOutlierScale = 5;
 constexpr double kFarthestMiss = 3;  // standard deviations beyond which a trial pulls no harder
 constexpr int kMissRounds = 12;
 constexpr std::size_t kLeastCrossings = 4;
@@ -48,18 +48,18 @@ double gain_at(const std::vector<Crossing>& drives, double edge) {
   }
   double gain = 0;
   for (const auto& [c, beyond] : crossing) {
-    gain += straying_nats(c->whitened - beyond * (c->axes * shift)) - straying_nats(c->whitened);
+    gain += outlier_nats(c->whitened - beyond * (c->axes * shift)) - outlier_nats(c->whitened);
   }
   return gain;
 }
 
 }  // namespace
 
-double straying_nats(const Eigen::Vector3d& whitened) {
+double outlier_nats(const Eigen::Vector3d& whitened) {
   const double q = whitened.squaredNorm();
-  const double wide = kStraying / (kStrayScale * kStrayScale * kStrayScale);
-  return std::log((1 - kStraying) * std::exp(-q / 2) +
-                  wide * std::exp(-q / (2 * kStrayScale * kStrayScale)) + 1e-300);
+  const double wide = kOutlierShare / (kOutlierScale * kOutlierScale * kOutlierScale);
+  return std::log((1 - kOutlierShare) * std::exp(-q / 2) +
+                  wide * std::exp(-q / (2 * kOutlierScale * kOutlierScale)) + 1e-300);
 }
 
 std::optional<double> best_edge(const ResidualData& data, const Residuals& residuals,

@@ -11,9 +11,9 @@
 
 namespace gapfarm {
 
-// Nats of a whitened residual but for a constant: a trial in fifty may stray five times as far as
+// Nats of a whitened residual but for a constant: a trial in fifty may lie five times as far off as
 // the noise.
-double straying_nats(const Eigen::Vector3d& whitened);
+double outlier_nats(const Eigen::Vector3d& whitened);
 
 // The value of the covariate (of readings) that one shift of all readings beyond it explains most
 // with, of the `residuals` of the trials that are `seen`; nothing where none explains anything.

@@ -74,7 +74,7 @@ class FieldSearch {
     for (std::size_t i = 0; i < left->size(); ++i) (*left)[i] -= shifts[i];
   }
 
-  // Basis and amplitude of the next term; nothing where none surely gains.
+  // Basis and amplitude of the next term; nothing where none gains significantly.
   std::optional<std::pair<std::size_t, double>> best_next() const {
     std::optional<std::pair<std::size_t, double>> best;
     double most = 0;
@@ -84,16 +84,16 @@ class FieldSearch {
         const auto shifts = bases_[b].shifts(fold.left, fold.learn, kAmplitudes, fold.own);
         for (std::size_t i = 0; i < data_.size(); ++i) {
           if (!fold.own[i]) continue;
-          const double before = straying_nats(data_.whiteners[i] * fold.left[i]);
+          const double before = outlier_nats(data_.whiteners[i] * fold.left[i]);
           for (std::size_t a = 0; a < kAmplitudes.size(); ++a) {
-            const double after = straying_nats(data_.whiteners[i] * (fold.left[i] - shifts[a][i]));
+            const double after = outlier_nats(data_.whiteners[i] * (fold.left[i] - shifts[a][i]));
             gains[a].push_back(after - before);
           }
         }
       }
       for (std::size_t a = 0; a < kAmplitudes.size(); ++a) {
         const double gain = mean(gains[a]);
-        if (gain <= most || !surely_gains(gains[a])) continue;
+        if (gain <= most || !gains_significantly(gains[a])) continue;
         most = gain;
         best = {b, kAmplitudes[a]};
       }
@@ -111,7 +111,7 @@ class FieldSearch {
 
 }  // namespace
 
-bool surely_gains(const std::vector<double>& gains) {
+bool gains_significantly(const std::vector<double>& gains) {
   double sum = 0, squares = 0;
   for (const double g : gains) {
     sum += g;

@@ -37,7 +37,7 @@ struct ResidualFit {
 };
 
 // By paired scores: a mean gain that is not by chance, but for one case in twenty.
-bool surely_gains(const std::vector<double>& gains);
+bool gains_significantly(const std::vector<double>& gains);
 
 // Chosen and fitted by the trials that are `seen`.
 ResidualField fit_field(const ResidualData& data, const Residuals& residuals,

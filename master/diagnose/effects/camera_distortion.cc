@@ -25,10 +25,10 @@ extern const EffectDiagnosis kCameraDistortion = {
     .start = start_lens,
     .model_error = 0.03,
     .places = {{"x", 0}, {"y", 1}},
-    .words = {"The lens distorts radially with k1 = %1 about x = %2, y = %3 of the world",
-              {{"k1", 1, " 1/m^2"}, {"x", 1, " m"}, {"y", 1, " m"}}},
-    .short_words =
-        ShortWords{"k1", 1, "", "The camera's lens bends positions", nullptr, "Calibrate the lens"},
+    .phrases = {"The lens distorts radially with k1 = %1 about x = %2, y = %3 of the world",
+                {{"k1", 1, " 1/m^2"}, {"x", 1, " m"}, {"y", 1, " m"}}},
+    .short_phrases = ShortPhrases{"k1", 1, "", "The camera's lens bends positions", nullptr,
+                                  "Calibrate the lens"},
 };
 
 }  // namespace gapfarm

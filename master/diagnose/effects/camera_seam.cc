@@ -54,7 +54,7 @@ double seam_ambiguity(const Study& study, const Parameter& p, const Overrides& a
 }
 
 // Which camera saw a pose on the line is not known.
-bool strays_at_line(const Signature& chosen, const ResidualTrial& trial) {
+bool contaminated_at_line(const Signature& chosen, const ResidualTrial& trial) {
   const Eigen::Vector2d from(trial.X_WS.x, trial.X_WS.y), to(trial.X_WP.x, trial.X_WP.y);
   const int axis = chosen.fixed.at(chosen.effect + ".axis") == 0 ? 0 : 1;
   const double line = chosen.fixed.at(chosen.effect + ".position");
@@ -71,14 +71,14 @@ EffectDiagnosis first_seam() {
       .search_error = seam_search_error,
       .ambiguity = seam_ambiguity,
       .places = {{"position", -1}},
-      .told_by = {"axis", "position"},
+      .identified_by = {"axis", "position"},
       .are_two = are_two_seams,
-      .strays = strays_at_line,
-      .words = {"Beyond a seam at %a = %1 the poses are shifted by %2 in x and %3 in y",
-                {{"position", 1, " m"}, {"offset_x", 1000, " mm"}, {"offset_y", 1000, " mm"}}},
-      .short_words = ShortWords{"position", 1, " m", "Two cameras disagree at @ = %",
-                                "Two cameras disagree at @ = −%",
-                                "Calibrate the cameras against each other at the seam"},
+      .contaminates = contaminated_at_line,
+      .phrases = {"Beyond a seam at %a = %1 the poses are shifted by %2 in x and %3 in y",
+                  {{"position", 1, " m"}, {"offset_x", 1000, " mm"}, {"offset_y", 1000, " mm"}}},
+      .short_phrases = ShortPhrases{"position", 1, " m", "Two cameras disagree at @ = %",
+                                    "Two cameras disagree at @ = −%",
+                                    "Calibrate the cameras against each other at the seam"},
   };
 }
 

@@ -76,10 +76,10 @@ extern const EffectDiagnosis kFloorTilt = {
     .polar = Polar{"floor_tilt.angle", "floor_tilt.direction", 1, false},
     .model_error = 0.3,
     .direction_error_rad = 0.02,
-    .words = {"The floor falls by %1 toward %2",
-              {{"angle", 1000, " mrad"}, {"direction", kDegrees, " degrees"}}},
-    .short_words = ShortWords{"angle", 1000, " mrad", "The floor slopes by %", nullptr,
-                              "Level the floor", "direction"},
+    .phrases = {"The floor falls by %1 toward %2",
+                {{"angle", 1000, " mrad"}, {"direction", kDegrees, " degrees"}}},
+    .short_phrases = ShortPhrases{"angle", 1000, " mrad", "The floor slopes by %", nullptr,
+                                  "Level the floor", "direction"},
 };
 
 }  // namespace gapfarm

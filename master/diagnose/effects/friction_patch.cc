@@ -14,7 +14,7 @@ constexpr double kPatchPlace_m = 0.25;
 constexpr double kPatchRatio = 1;
 
 // At its edge a small error of the place is a large one of the motion.
-bool strays_at_edge(const Signature& chosen, const ResidualTrial& trial) {
+bool contaminated_at_edge(const Signature& chosen, const ResidualTrial& trial) {
   constexpr double kEdge_m = 0.1;
   const Eigen::Vector2d from(trial.X_WS.x, trial.X_WS.y), to(trial.X_WP.x, trial.X_WP.y);
   const Patch patch = patch_of(chosen);
@@ -49,16 +49,16 @@ EffectDiagnosis first_patch() {
       .effect = kPatchEffect,
       .search_error = patch_search_error,
       .places = {{"x", 0}, {"y", 1}},
-      .told_by = {"x", "y", "radius"},
+      .identified_by = {"x", "y", "radius"},
       .are_two = [](const Signature& a,
                     const Signature& b) { return are_two_patches(patch_of(a), patch_of(b)); },
       .saturates = "ratio",
-      .strays = strays_at_edge,
-      .words = {"A patch of floor around x = %2, y = %3 of the world, of radius %4 has %1 times "
-                "the friction",
-                {{"ratio", 1, ""}, {"x", 1, " m"}, {"y", 1, " m"}, {"radius", 1000, " mm"}}},
-      .short_words = ShortWords{"ratio", 1, "", "A patch of the floor has % times the friction",
-                                nullptr, "Look at the floor there"},
+      .contaminates = contaminated_at_edge,
+      .phrases = {"A patch of floor around x = %2, y = %3 of the world, of radius %4 has %1 times "
+                  "the friction",
+                  {{"ratio", 1, ""}, {"x", 1, " m"}, {"y", 1, " m"}, {"radius", 1000, " mm"}}},
+      .short_phrases = ShortPhrases{"ratio", 1, "", "A patch of the floor has % times the friction",
+                                    nullptr, "Look at the floor there"},
   };
 }
 

@@ -9,9 +9,9 @@ extern const EffectDiagnosis kMotorDeadband = {
     .family = &kReachFamily,
     .aliases = {"rolling_resistance"},
     .model_error = 0.1,
-    .words = {"Duty below %1 moves nothing and is lost above it", {{"duty", 1, ""}}},
-    .short_words = ShortWords{"duty", 100, " %", "Duty below % moves nothing", nullptr,
-                              "Add % of duty to every command"},
+    .phrases = {"Duty below %1 moves nothing and is lost above it", {{"duty", 1, ""}}},
+    .short_phrases = ShortPhrases{"duty", 100, " %", "Duty below % moves nothing", nullptr,
+                                  "Add % of duty to every command"},
 };
 
 }  // namespace gapfarm

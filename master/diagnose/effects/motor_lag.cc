@@ -7,11 +7,12 @@ extern const EffectDiagnosis kMotorLag = {
     .steps = {{"tau", 0.1, false}},
     .changes_reach = true,
     .family = &kReachFamily,
-    .aliases = {"timing_offset"},  // how hard the motors brake decides what lag leaves behind
+    .aliases = {"timing_offset"},  // how hard the motors brake decides what remains after lag
     .model_error = 0.4,
-    .words = {"The motors follow their duty with a lag of %1", {{"tau", 1000, " ms"}}},
-    .short_words = ShortWords{"tau", 1000, " ms", "The motors follow their duty with a lag of %",
-                              nullptr, "Give the simulated motors that lag"},
+    .phrases = {"The motors follow their duty with a lag of %1", {{"tau", 1000, " ms"}}},
+    .short_phrases =
+        ShortPhrases{"tau", 1000, " ms", "The motors follow their duty with a lag of %", nullptr,
+                     "Give the simulated motors that lag"},
 };
 
 }  // namespace gapfarm

@@ -4,14 +4,14 @@
 namespace gapfarm {
 namespace {
 
-bool strays_with_session(const ResidualTrial&) { return false; }
+bool contaminated_with_session(const ResidualTrial&) { return false; }
 
 const SpreadRow kSessionSpread = {
     .effect = "session_gain",
     .least_gain = 20,  // as of a second one of a kind
     .fit = fit_session_gains,
     .scores = scores_with_session_gains,
-    .strays = strays_with_session,
+    .contaminates = contaminated_with_session,
     .found = "by sessions that drive faster or slower as a whole",
     .missing = "no session drives faster or slower as a whole than others",
     .by_session = true,
@@ -21,10 +21,10 @@ const SpreadRow kSessionSpread = {
 
 extern const EffectDiagnosis kSessionGain = {
     .effect = "session_gain",
-    .words = {"Each session drives at a speed of its own, which differ by %1",
-              {{"spread", 100, " %"}}},
-    .short_words = ShortWords{"spread", 100, " %", "The sessions' speeds differ by %", nullptr,
-                              "Begin every session alike: charged, and on a clean floor"},
+    .phrases = {"Each session drives at a speed of its own, which differ by %1",
+                {{"spread", 100, " %"}}},
+    .short_phrases = ShortPhrases{"spread", 100, " %", "The sessions' speeds differ by %", nullptr,
+                                  "Begin every session alike: charged, and on a clean floor"},
     .spread = &kSessionSpread,
 };
 

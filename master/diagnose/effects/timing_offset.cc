@@ -9,10 +9,10 @@ extern const EffectDiagnosis kTimingOffset = {
     .family = &kReachFamily,
     .aliases = {"motor_lag"},
     .model_error = 0.06,
-    .words = {"The motors run longer than told by %1", {{"offset", 1000, " ms"}}},
-    .short_words =
-        ShortWords{"offset", 1000, " ms", "The motors run % longer than told",
-                   "The motors run % shorter than told", "Correct the commanded time by %"},
+    .phrases = {"The motors run longer than commanded by %1", {{"offset", 1000, " ms"}}},
+    .short_phrases =
+        ShortPhrases{"offset", 1000, " ms", "The motors run % longer than commanded",
+                     "The motors run % shorter than commanded", "Correct the commanded time by %"},
 };
 
 }  // namespace gapfarm

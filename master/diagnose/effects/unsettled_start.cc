@@ -14,7 +14,7 @@ namespace gapfarm {
 namespace {
 
 constexpr std::size_t kFewestStarts = 20;
-// What does as well within so many nats is not told apart.
+// What does as well within so many nats is not distinguished.
 constexpr double kClearer_nats = 4;
 constexpr double kTriedShares[] = {0.01, 0.02, 0.04, 0.06, 0.08, 0.1, 0.15, 0.2, 0.3, 0.5, 0.7};
 
@@ -53,7 +53,7 @@ std::vector<double> turned_ratios(const Study& study, const std::vector<Eigen::V
 
 double gained_by_turns(double share, double ratio) { return std::log(1 - share + share * ratio); }
 
-SpreadFit told(double gain, double share, double angle, double starts) {
+SpreadFit start_fit(double gain, double share, double angle, double starts) {
   const double half = kNormal90 * std::sqrt(share * (1 - share) / starts);
   const double most = std::min(1.0, 1.4 * share + half);
   return {gain,
@@ -62,8 +62,8 @@ SpreadFit told(double gain, double share, double angle, double starts) {
 }
 
 // A share of the starts after moves turned by up to an angle, against none.  No gain where fewer
-// than 20 trials follow a move, or fewer than that do not, since then nothing tells starts from
-// drives; nor where the same share of all trials does nearly as well: drives that stray whatever
+// than 20 trials follow a move, or fewer than that do not, since then nothing distinguishes starts
+// from drives; nor where the same share of all trials does nearly as well: outlier drives whatever
 // came before them are something else.
 SpreadFit fit_unsettled(const Study& study, const std::vector<Eigen::Vector3d>& residuals,
                         double outlier_share) {
@@ -82,7 +82,7 @@ SpreadFit fit_unsettled(const Study& study, const std::vector<Eigen::Vector3d>& 
         (follows_move(study.trials[i]) ? after_moves : others) += gained_by_turns(share, ratio[i]);
       }
       anywhere = std::max(anywhere, after_moves + others);
-      if (after_moves > best.gain) best = told(after_moves, share, angle, double(starts));
+      if (after_moves > best.gain) best = start_fit(after_moves, share, angle, double(starts));
     }
   }
   return best.gain < anywhere + kClearer_nats ? SpreadFit{} : best;
@@ -107,16 +107,17 @@ const SpreadRow kUnsettledSpread = {
     scores_with_unsettled,
     follows_move,
     "by drives that are turned after an unrecorded move",
-    "drives after an unrecorded move stray no more than others"};
+    "drives after an unrecorded move are outliers no more than others"};
 
 }  // namespace
 
 extern const EffectDiagnosis kUnsettledStart = {
     .effect = "unsettled_start",
-    .words = {"%1 of the starts after unrecorded moves were read in the hand, turned by up to %2",
-              {{"share", 100, " %"}, {"angle", kDegrees, " degrees"}}},
-    .short_words = ShortWords{"share", 100, " %", "% of the starts after moves were read too early",
-                              nullptr, "Let go of the robot before its pose is read"},
+    .phrases = {"%1 of the starts after unrecorded moves were read in the hand, turned by up to %2",
+                {{"share", 100, " %"}, {"angle", kDegrees, " degrees"}}},
+    .short_phrases =
+        ShortPhrases{"share", 100, " %", "% of the starts after moves were read too early", nullptr,
+                     "Let go of the robot before its pose is read"},
     .spread = &kUnsettledSpread,
 };
 

@@ -183,7 +183,7 @@ std::vector<CovariateBlock> covariate_blocks(const Study& study) {
   blocks.push_back(b.block("start heading, twice a turn", heading(2), commands));
   blocks.push_back(b.block("start heading, four times a turn", heading(4), commands));
   if (study.free_commands) {
-    // Arcs end in headings that the commands' names do not tell.
+    // Arcs end in headings that the commands' names do not show.
     const auto end_heading = [&](int h) {
       return std::vector<Values>{
           scaled([=](const ResidualTrial& t) { return std::cos(h * t.X_WP.theta); }),

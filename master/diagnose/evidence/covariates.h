@@ -1,4 +1,4 @@
-// Smooth dependences of the residuals on everything that a log tells, effect or not.  What the
+// Smooth dependences of the residuals on everything that a log shows, effect or not.  What the
 // named effects leave of them decides between "explained" and "unknown".
 #pragma once
 

@@ -102,7 +102,7 @@ LatencyFit fit_latency(const Study& study, std::span<const Eigen::Vector3d> end_
       late_reading_gaps(study.trials, {end_velocity.begin(), end_velocity.end()}, study.noise.pose);
   LatencyFit fit = fit_latency(gaps, end_velocity, study.noise.pose, study.size());
   if (fit.gain <= 0) return fit;
-  // Where no reading follows, only the trial's own end tells.
+  // Where no reading follows, only the trial's own end shows.
   std::vector<bool> followed(study.size(), false);
   for (const ReadingGap& g : gaps) followed[g.previous] = true;
   for (std::size_t i = 0; i < study.size(); ++i) {

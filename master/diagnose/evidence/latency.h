@@ -19,7 +19,7 @@ struct LatencyFit {
 };
 
 // Whichever of the two that follow the log's readings allow.  Of a trial that no reading follows
-// its own residual tells whether it was late.
+// its own residual shows whether it was late.
 LatencyFit fit_latency(const Study& study, std::span<const Eigen::Vector3d> end_velocity);
 
 // The later reading is of the robot at rest, so that a late one shows a gap of age times velocity.

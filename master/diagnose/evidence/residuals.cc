@@ -44,11 +44,11 @@ std::vector<ReadingGap> late_reading_gaps(const std::vector<ResidualTrial>& tria
     if (!context.previous) continue;
     const std::size_t before = *context.previous;
     const ReadingGap gap{i, before, local_difference(trials[before].X_WE, trials[i].X_WS)};
-    const Eigen::Vector3d way = end_velocity[before].cwiseQuotient(sd);
+    const Eigen::Vector3d per_second = end_velocity[before].cwiseQuotient(sd);
     const Eigen::Vector3d z = gap.gap.cwiseQuotient(sd);
-    const double age =
-        std::clamp(z.dot(way) / std::max(way.squaredNorm(), 1e-12), 0.0, kOldestReading_s);
-    const bool late = (z - age * way).cwiseAbs().maxCoeff() < kWithin;
+    const double age = std::clamp(z.dot(per_second) / std::max(per_second.squaredNorm(), 1e-12),
+                                  0.0, kOldestReading_s);
+    const bool late = (z - age * per_second).cwiseAbs().maxCoeff() < kWithin;
     if (!context.moved || late) gaps.push_back(gap);
   }
   return gaps;

@@ -38,7 +38,7 @@ struct ResidualTrial {
   Pose X_WS, X_WE;  // measured
   Pose X_WP;        // predicted measured end
   Eigen::Vector3d residual = Eigen::Vector3d::Zero();
-  // What readings that came late did to it: left out of the residual.
+  // What readings that came late did to it: omitted from the residual.
   Eigen::Vector3d late = Eigen::Vector3d::Zero();
   // Change of the predicted end for a unit change of each side's gain.
   Eigen::Vector3d left = Eigen::Vector3d::Zero();

@@ -14,7 +14,7 @@
 namespace gapfarm {
 namespace {
 
-constexpr std::size_t kFewestTrials = 10;  // of a session that tells anything
+constexpr std::size_t kFewestTrials = 10;  // of a session that shows anything
 constexpr double kFarSquared = 11.5;       // squared distance with 3 degrees of freedom: one in 110
 constexpr double kLeastSpread = 0.004, kMostSpread = 0.3, kSpreadStep = 1.08;
 constexpr int kReweightings = 3;
@@ -170,7 +170,7 @@ SpreadCurve curve_of(const SessionSums& sums) {
 
 // With the interval that holds nine tenths of the likelihood, equal steps of the logarithm alike:
 // for gains that are known it is chi-squared's.
-Estimate told_spread(const SpreadCurve& curve) {
+Estimate reported_spread(const SpreadCurve& curve) {
   std::vector<double> below;
   double sum = 0;
   for (const double nats : curve.nats) {
@@ -189,8 +189,8 @@ SpreadFit fit_session_gains(const Study& study, const std::vector<Eigen::Vector3
                             double) {
   if (study.sessions < 2) return {};
   const std::vector<std::size_t> trials = trials_of_sessions(study);
-  const auto tells = [](std::size_t count) { return count >= kFewestTrials; };
-  if (std::count_if(trials.begin(), trials.end(), tells) < 2) return {};
+  const auto is_informative = [](std::size_t count) { return count >= kFewestTrials; };
+  if (std::count_if(trials.begin(), trials.end(), is_informative) < 2) return {};
   const Eigen::MatrixXd common = common_gains(study);
   const Eigen::VectorXd gains = whitened_gains(study), data = study.whiten(residuals);
   AtSpread at = medians_of(study, common, gains, data);
@@ -204,7 +204,7 @@ SpreadFit fit_session_gains(const Study& study, const std::vector<Eigen::Vector3
   SpreadFit fit;
   fit.gain = at.nats - at_spread(sums, 0).nats;
   if (!(fit.gain > 0)) return {};
-  fit.estimates = {told_spread(curve)};
+  fit.estimates = {reported_spread(curve)};
   for (Eigen::Index s = 0; s < at.gain.size(); ++s) {
     const double half = kNormal90 * at.sd[s];
     fit.sessions.push_back({at.gain[s], at.gain[s] - half, at.gain[s] + half});
@@ -218,7 +218,7 @@ std::vector<double> scores_with_session_gains(const Study& study,
   const double spread = fit.estimates[0].value;
   const Eigen::MatrixXd common = common_gains(study);
   const Eigen::VectorXd gains = whitened_gains(study), data = study.whiten(residuals);
-  // What the log has in common counts as it is: a trial is foretold by the others' deviation.
+  // What the log has in common counts as it is: a trial is predicted by the others' deviation.
   const Eigen::MatrixXd none(common.rows(), 0);
   AtSpread at = medians_of(study, none, gains, data);
   const std::vector<double> weight = weights_at(study, none, gains, data, at);

@@ -1,6 +1,6 @@
 // An effect that widens the distribution of trials rather than moves its mean, as a row: how it is
 // looked for.  It is looked for before the effects on the mean, which do without what it does to
-// trials, and named when trials that no fit saw are clearly foretold better with it.
+// trials, and named when trials that no fit saw are clearly predicted better with it.
 #pragma once
 
 #include <Eigen/Core>
@@ -12,8 +12,9 @@
 namespace gapfarm {
 
 struct SpreadFit {
-  double gain = 0;                  // nats over all trials
-  std::vector<Estimate> estimates;  // of the effect's parameters, the first the one that is told
+  double gain = 0;  // nats over all trials
+  std::vector<Estimate>
+      estimates;  // of the effect's parameters, the first the one that is reported
   std::vector<SessionGain> sessions = {};  // of all sessions, of an effect that has one in each
 };
 
@@ -25,11 +26,12 @@ struct SpreadRow {
   // Log scores (nats) of every trial that misses its prediction so far, the effect foreseen.
   std::vector<double> (*scores)(const Study& study, const std::vector<Eigen::Vector3d>& residuals,
                                 const SpreadFit& fit, double outlier_share);
-  bool (*strays)(const ResidualTrial& trial);  // whether it may be one that the effect strikes
-  const char* found;                           // how screening says that it was seen, or not
+  bool (*contaminates)(
+      const ResidualTrial& trial);  // whether it may be one that the effect strikes
+  const char* found;                // how screening says that it was seen, or not
   const char* missing;
-  // Each session has a gain of its own, of which nothing that is told of means may know, rather
-  // than trials that tell nothing of means.
+  // Each session has a gain of its own, which no statement about means may use, rather
+  // than trials that show nothing of means.
   bool by_session = false;
 };
 

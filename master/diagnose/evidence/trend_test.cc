@@ -43,7 +43,7 @@ TrendTest trend_test(const Eigen::VectorXd& values, const Eigen::MatrixXd& colum
     return v - group_means(v, scale, groups);
   };
   const Eigen::VectorXd y = cut(values);
-  // Columns that hang on those before them, or on the means, are left out.
+  // Columns that hang on those before them, or on the means, are omitted.
   std::vector<Eigen::Index> kept;
   Eigen::MatrixXd basis(values.size(), columns.cols());
   Eigen::MatrixXd used(values.size(), columns.cols());

@@ -120,7 +120,7 @@ double within(const Parameter& row, double value) {
   return value - turn * std::floor((value - row.lower) / turn);
 }
 
-double way_between(const Parameter& row, double from, double to) {
+double scaled_step(const Parameter& row, double from, double to) {
   if (!goes_round(row)) return to - from;
   const double turn = row.upper - row.lower;
   return to - from - turn * std::round((to - from) / turn);
@@ -193,7 +193,7 @@ void step(const Problem& problem, const Study& study, const Eigen::MatrixXd& nui
   }
 }
 
-// Residuals that are larger than their noise tell as much less.
+// Residuals that are larger than their noise show as much less.
 double settled_within(const Study& study, double misfit) {
   return kSettled * std::max(1.0, misfit / static_cast<double>(3 * study.size()));
 }
@@ -222,7 +222,7 @@ Result<Moved> moved_on(Predictor& predictor, const Study& study, const Eigen::Ma
       FittedParameter& p = next.fit.parameters[k];
       const double last = fit.parameters[k].value;
       const Parameter& row = predictor.problem().table()[p.row];
-      next.fit.at[p.row] = p.value = within(row, last + way_between(row, last, p.value) / 2);
+      next.fit.at[p.row] = p.value = within(row, last + scaled_step(row, last, p.value) / 2);
     }
   }
   next = {fit, best};

@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::size_t kFreedRepeats = 4;  // trials of a cell that make its mean worth something
 constexpr double kFreeShare = 1.0 / 3.0;  // of the trials
-constexpr double kWayTrust = 1e-3;        // of the duties' word on the way, beside the ends'
+constexpr double kPathTrust = 1e-3;       // of the duties' word on the way, beside the ends'
 
 // A command seen along and across: both sides together, and against each other.
 struct Duties {
@@ -109,7 +109,7 @@ bool commands_are_free(std::span<const Cell> cells) {
   return static_cast<double>(few) > kFreeShare * static_cast<double>(trials);
 }
 
-Twist way_of(const Study& study, std::size_t trial) {
+Twist motion_of(const Study& study, std::size_t trial) {
   constexpr double kPi = std::numbers::pi;
   const ResidualTrial& t = study.trials[trial];
   const Pose X_SE = between(t.X_WS, t.X_WP);
@@ -120,25 +120,25 @@ Twist way_of(const Study& study, std::size_t trial) {
   v << std::sin(theta), std::cos(theta) - 1, 1 - std::cos(theta), std::sin(theta);
   v /= theta;
   const Duties duties = duties_of(study, trial);
-  const Eigen::Vector2d told(study.speed_m_s * duties.drive * duties.duration_s, 0);
-  const Eigen::Matrix2d normal = v.transpose() * v + kWayTrust * Eigen::Matrix2d::Identity();
-  const Eigen::Vector2d way =
-      normal.ldlt().solve(v.transpose() * Eigen::Vector2d(X_SE.x, X_SE.y) + kWayTrust * told);
-  return {way.x(), way.y(), theta};
+  const Eigen::Vector2d commanded(study.speed_m_s * duties.drive * duties.duration_s, 0);
+  const Eigen::Matrix2d normal = v.transpose() * v + kPathTrust * Eigen::Matrix2d::Identity();
+  const Eigen::Vector2d motion =
+      normal.ldlt().solve(v.transpose() * Eigen::Vector2d(X_SE.x, X_SE.y) + kPathTrust * commanded);
+  return {motion.x(), motion.y(), theta};
 }
 
 CarriedToEnd carried_to_end(const Study& study, std::size_t trial) {
   const ResidualTrial& t = study.trials[trial];
-  const Twist way = way_of(study, trial);
-  const int steps = 8 + static_cast<int>(4 * std::abs(way[2]));
+  const Twist motion = motion_of(study, trial);
+  const int steps = 8 + static_cast<int>(4 * std::abs(motion[2]));
   CarriedToEnd carried;
   carried.rate.setZero();
   Eigen::Vector2d rest = Eigen::Vector2d::Zero();  // of the way, from here to the end
   for (int k = steps; k-- > 0;) {
-    const double behind = way[2] * (1 - (k + 0.5) / steps);
+    const double behind = motion[2] * (1 - (k + 0.5) / steps);
     Eigen::Matrix2d axes;  // the robot's here, seen from the end's
     axes << std::cos(behind), std::sin(behind), -std::sin(behind), std::cos(behind);
-    const Eigen::Vector2d step = axes * way.head<2>() / steps;
+    const Eigen::Vector2d step = axes * motion.head<2>() / steps;
     rest += step / 2;
     carried.rate.topLeftCorner<2, 2>() += axes / steps;
     carried.rate.topRightCorner<2, 1>() += Eigen::Vector2d(-rest.y(), rest.x()) / steps;
@@ -176,7 +176,7 @@ std::vector<Eigen::VectorXd> smooth_misfits(const Study& study) {
       under_way, 2,
       [&](std::size_t i, const Duties& d) {
         const double straightness = 1 - d.bend();
-        return way_of(study, i)[2] * (0.003 + 0.03 * straightness * straightness);
+        return motion_of(study, i)[2] * (0.003 + 0.03 * straightness * straightness);
       },
       factors);
   for (const auto& carry : {at_start, at_end}) {

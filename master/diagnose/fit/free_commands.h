@@ -19,9 +19,9 @@ namespace gapfarm {
 bool commands_are_free(std::span<const Cell> cells);
 
 // The tuned motion of a trial from start to end as one screw, its turn not wrapped: several turns
-// are told by how the end's heading moves with the speed.  Where whole turns hide how far the robot
-// went, the duties say it.
-Twist way_of(const Study& study, std::size_t trial);
+// are found by how the end's heading moves with the speed.  Where whole turns hide how far the
+// robot went, the duties say it.
+Twist motion_of(const Study& study, std::size_t trial);
 
 // How a disturbance under way shows at the end, in the end's axes.
 struct CarriedToEnd {

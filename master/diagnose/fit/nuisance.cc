@@ -103,7 +103,7 @@ Result<Eigen::MatrixXd> nuisance_columns(Predictor& predictor, const Study& stud
     if (slope) {
       add_column(study, *slope, parameter.prior_sd, &columns);
     } else {
-      predictor.leave_out("retuning " + predictor.problem().table()[parameter.row].key);
+      predictor.exclude("retuning " + predictor.problem().table()[parameter.row].key);
     }
   }
   // Motors of some hundredths of a second are part of any robot.

@@ -57,7 +57,7 @@ Result<std::vector<std::vector<Eigen::Vector3d>>> probe_all(Predictor& predictor
     for (std::size_t i = 0; i < d.size(); ++i) d[i] -= below[i];
   }
   for (std::size_t k = 0; k < all.size(); ++k) {
-    if (all[k].empty()) predictor.leave_out(probes[k].effect);
+    if (all[k].empty()) predictor.exclude(probes[k].effect);
   }
   return all;
 }

@@ -39,7 +39,7 @@ class Regression {
   // Takes `columns` into the basis.
   void add(const Eigen::MatrixXd& columns);
 
-  // What is left of the data: one entry a row (prior rows left out).
+  // What is left of the data: one entry a row (prior rows omitted).
   Eigen::VectorXd left() const { return left_.head(rows_); }
   double left_squares() const { return left_.squaredNorm(); }
   // Degrees of freedom that the basis takes from each row.

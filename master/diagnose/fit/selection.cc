@@ -67,11 +67,11 @@ std::set<std::string> names_of(const std::vector<EffectCandidate>& chosen,
 
 }  // namespace
 
-// Whether there may be one in the table, and it is none that is there or left out.
+// Whether there may be one in the table, and it is none that is there or omitted.
 bool Selector::may_be_second(const std::string& second,
                              const std::set<std::string>& without) const {
   const std::span<const Effect> known = study_->table->effects();
-  return !without.count(second) && !left_out_.count(second) &&
+  return !without.count(second) && !excluded_.count(second) &&
          std::any_of(known.begin(), known.end(), [&](const Effect& e) { return e.name == second; });
 }
 
@@ -157,11 +157,11 @@ Regression Selector::with(const std::vector<const Signature*>& signatures) const
 
 Regression Selector::without(const std::vector<Signature>& first,
                              const std::vector<EffectCandidate>& chosen,
-                             std::size_t leave_out) const {
+                             std::size_t exclude) const {
   std::vector<const Signature*> all;
   for (const Signature& s : first) all.push_back(&s);
   for (std::size_t i = 0; i < chosen.size(); ++i) {
-    if (i != leave_out) all.push_back(&chosen[i].signature);
+    if (i != exclude) all.push_back(&chosen[i].signature);
   }
   return with(all);
 }

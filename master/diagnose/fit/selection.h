@@ -74,7 +74,7 @@ class Selector {
   void look_for_patches();
 
   // These are never offered, whatever the catalogue holds.
-  void leave_out(std::set<std::string> effects) { left_out_ = std::move(effects); }
+  void exclude(std::set<std::string> effects) { excluded_ = std::move(effects); }
 
   // The best signature of every effect, best first, beyond what `explained` holds.  Of what is in
   // `without` because it is among `beside`, a second one where there may be two.
@@ -115,7 +115,7 @@ class Selector {
                          std::map<std::string, EffectCandidate>* best) const;
   EffectCandidate refine_seam(const Regression& explained, EffectCandidate best) const;
   Regression without(const std::vector<Signature>& first,
-                     const std::vector<EffectCandidate>& chosen, std::size_t leave_out) const;
+                     const std::vector<EffectCandidate>& chosen, std::size_t exclude) const;
   double alias_cosine(const std::vector<Signature>& first,
                       const std::vector<EffectCandidate>& chosen, std::size_t i,
                       const EffectCandidate& other) const;
@@ -133,7 +133,7 @@ class Selector {
   const Study* study_;
   std::vector<Signature> catalogue_;
   Regression base_;
-  std::set<std::string> left_out_;
+  std::set<std::string> excluded_;
   PatchSearch patch_search_;  // empty: none
   std::vector<SelectionStep> steps_;
   double first_gain_ = 0;

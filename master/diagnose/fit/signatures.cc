@@ -86,7 +86,7 @@ Eigen::Vector2d middle_of(const Study& study) {
 }
 
 Result<std::vector<Signature>> signatures(Predictor& predictor, const Study& study,
-                                          const std::vector<std::string>& left_out) {
+                                          const std::vector<std::string>& excluded) {
   std::vector<Probe> probes;
   std::vector<std::size_t> first;  // probe of each row, and behind the last one
   for (const EffectDiagnosis* row : *study.subject->effects) {
@@ -124,7 +124,7 @@ Result<std::vector<Signature>> signatures(Predictor& predictor, const Study& stu
   const bool only_reach = one_condition(study);
   std::erase_if(found, [&](const Signature& s) {
     return (only_reach && study.subject->effects->row(s.effect).changes_reach) ||
-           std::find(left_out.begin(), left_out.end(), s.effect) != left_out.end();
+           std::find(excluded.begin(), excluded.end(), s.effect) != excluded.end();
   });
   return found;
 }
@@ -155,7 +155,7 @@ Result<std::vector<Signature>> patch_signatures(Predictor& predictor, const Stud
   if (!ends) return ends.error();
   std::vector<Signature> all;
   for (std::size_t k = 0; k < requests.size(); ++k) {
-    if (!(*ends)[k]) predictor.leave_out(std::string("some places of ") + kPatchEffect);
+    if (!(*ends)[k]) predictor.exclude(std::string("some places of ") + kPatchEffect);
     std::vector<Eigen::Vector3d> d(study.size(), Eigen::Vector3d::Zero());
     for (std::size_t j = 0; (*ends)[k] && j < requests[k].trials.size(); ++j) {
       const std::size_t i = requests[k].trials[j];

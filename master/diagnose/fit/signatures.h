@@ -29,9 +29,9 @@ struct Signature {
 // All of the catalogue but `left_out` and what cannot be simulated: by finite differences of
 // predictions, one batch of farm work.
 Result<std::vector<Signature>> signatures(Predictor& predictor, const Study& study,
-                                          const std::vector<std::string>& left_out);
+                                          const std::vector<std::string>& excluded);
 
-// Each column in three, one a kind of drive; those of nothing but zeros left out.
+// Each column in three, one a kind of drive; those of nothing but zeros omitted.
 Eigen::MatrixXd split_by_kind(const Study& study, const Eigen::MatrixXd& columns);
 
 // Which trials a disc is simulated in; it does nothing in the others.

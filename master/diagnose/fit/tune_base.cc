@@ -90,7 +90,7 @@ std::pair<double, double> tunable(const Parameter& p) {
 
 struct TuningStep {
   double length = 0;   // greatest change of a logarithm
-  bool of_all = true;  // no trial was left out
+  bool of_all = true;  // no trial was omitted
 };
 
 struct BaseNormal {

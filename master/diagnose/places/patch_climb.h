@@ -9,7 +9,7 @@
 
 namespace gapfarm {
 
-// One that can be simulated and told from none, for a robot `scale` times an SRV-1.
+// One that can be simulated and distinguished from none, for a robot `scale` times an SRV-1.
 Patch bounded_patch(Patch patch, double scale);
 
 // With what they gain, in their order.

@@ -17,10 +17,10 @@ constexpr int kSteps = 16;  // of a way
 // its way out of a patch, that is so from some ratio on.
 constexpr std::array<double, 8> kRatios = {0.1, 0.14, 0.2, 0.3, 0.45, 0.67, 1.6, 2.5};
 constexpr std::array<std::size_t, 3> kGridRatios = {2, 4, 7};  // of these
-// Lengths for an SRV-1; a larger robot tells discs as much larger apart.
+// Lengths for an SRV-1; a larger robot distinguishes discs as much larger.
 constexpr std::array<double, 6> kPatchRadii_m = {0.14, 0.20, 0.28, 0.38, 0.50, 0.65};
 constexpr double kPatchStep_m = 0.1;
-constexpr double kApart_m = 0.08;  // discs nearer than this, in all of x, y and radius, are one
+constexpr double kApart_m = 0.08;  // discs closer than this, in all of x, y and radius, are one
 constexpr Eigen::Index kFewestMarked = 30;  // rows, three a trial
 constexpr double kMostSteps = 20;           // of the grid, along each axis
 constexpr std::size_t kClimbs = 12;
@@ -55,16 +55,16 @@ PatchSketch::PatchSketch(const Problem& problem, const Study& study)
   speed_m_s_ = study.speed_m_s;
   for (std::size_t i = 0; i < study.size(); ++i) {
     const ResidualTrial& trial = study.trials[i];
-    Way& way = ways_.emplace_back();
-    const Twist whole = way_of(study, i);
-    way.step_s = study.cells[trial.cell].command.duration_s / kSteps;
-    way.step = whole / kSteps;
-    way.half = exp(Twist(way.step / 2));
-    way.whole = exp(way.step);
-    way.X_WE = trial.X_WS * exp(whole);
+    DrivenPath& driven = driven_.emplace_back();
+    const Twist whole = motion_of(study, i);
+    driven.step_s = study.cells[trial.cell].command.duration_s / kSteps;
+    driven.step = whole / kSteps;
+    driven.half = exp(Twist(driven.step / 2));
+    driven.whole = exp(driven.step);
+    driven.X_WE = trial.X_WS * exp(whole);
     for (int k = 0; k < kSteps; ++k) {
-      way.X_WB.push_back(trial.X_WS * exp(Twist(whole * k / kSteps)));
-      way.contacts.push_back(contacts_at(trial.X_WS * exp(Twist(whole * (k + 0.5) / kSteps))));
+      driven.X_WB.push_back(trial.X_WS * exp(Twist(whole * k / kSteps)));
+      driven.contacts.push_back(contacts_at(trial.X_WS * exp(Twist(whole * (k + 0.5) / kSteps))));
     }
   }
   for (double ratio : kRatios) shifts_.push_back(shifts(ratio));
@@ -164,29 +164,29 @@ PatchSketch::Contacts PatchSketch::contacts_at(const Pose& X_WB) const {
 }
 
 // Of the end, in the predicted end's axes.
-Eigen::Vector3d PatchSketch::shift_of(const Way& way, const Patch& patch,
+Eigen::Vector3d PatchSketch::shift_of(const DrivenPath& driven, const Patch& patch,
                                       const Shifts& shifts) const {
   std::size_t k = 0;
   while (k < kSteps) {
-    const unsigned set = inside(way.contacts[k], patch);
+    const unsigned set = inside(driven.contacts[k], patch);
     if (set != 0 && set != kAllInside) break;
     ++k;
   }
   if (k == kSteps) return Eigen::Vector3d::Zero();
-  Pose X_WB = way.X_WB[k];
+  Pose X_WB = driven.X_WB[k];
   for (; k < kSteps; ++k) {
-    const unsigned set = inside(contacts_at(X_WB * way.half), patch);
-    const Twist more = shifts[set] * way.step_s;
-    X_WB = X_WB * (set == 0 ? way.whole : exp(Twist(way.step + more)));
+    const unsigned set = inside(contacts_at(X_WB * driven.half), patch);
+    const Twist more = shifts[set] * driven.step_s;
+    X_WB = X_WB * (set == 0 ? driven.whole : exp(Twist(driven.step + more)));
   }
-  const Pose shift = between(way.X_WE, X_WB);
+  const Pose shift = between(driven.X_WE, X_WB);
   return {shift.x, shift.y, shift.theta};
 }
 
 Eigen::VectorXd PatchSketch::column(const Patch& patch, const std::vector<Shifts>& shifts) const {
   Eigen::VectorXd column = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(3 * study_.size()));
   for (std::size_t i = 0; i < study_.size(); ++i) {
-    const Eigen::Vector3d shift = shift_of(ways_[i], patch, shifts[study_.trials[i].cell]);
+    const Eigen::Vector3d shift = shift_of(driven_[i], patch, shifts[study_.trials[i].cell]);
     if (shift.isZero(0)) continue;
     column.segment<3>(static_cast<Eigen::Index>(3 * i)) = study_.whitener[i] * shift;
   }

@@ -39,7 +39,7 @@ class PatchSketch {
 
  private:
   using Contacts = std::array<Eigen::Vector2d, 4>;  // world, m
-  struct Way {                                      // that the base predicts of a trial
+  struct DrivenPath {                               // that the base predicts of a trial
     double step_s = 0;
     Twist step = Twist::Zero();
     Pose half, whole;  // exp() of half of it, and of it
@@ -49,7 +49,8 @@ class PatchSketch {
   };
   using Shifts = std::array<Eigen::Vector3d, 16>;  // of the twist, by the set of contacts inside
   Contacts contacts_at(const Pose& X_WB) const;
-  Eigen::Vector3d shift_of(const Way& way, const Patch& patch, const Shifts& shifts) const;
+  Eigen::Vector3d shift_of(const DrivenPath& driven, const Patch& patch,
+                           const Shifts& shifts) const;
   std::vector<Shifts> shifts(double ratio) const;  // by cell
   Eigen::VectorXd column(const Patch& patch, const std::vector<Shifts>& shifts) const;
   void lay_grid();
@@ -62,7 +63,7 @@ class PatchSketch {
   double lateral_ = 1;                       // over longitudinal friction
   double creep_ = 0;
   double speed_m_s_ = 0;
-  std::vector<Way> ways_;                    // by trial
+  std::vector<DrivenPath> driven_;           // by trial
   std::vector<std::vector<Shifts>> shifts_;  // of kRatios
   std::vector<Patch> grid_;
   Eigen::MatrixXd marks_;  // of the grid's discs

@@ -107,8 +107,8 @@ double seam_position(const Study& study, const Regression& others, const Signatu
   const Parameter& offset = (*study.table)[study.table->row(seam.effect + ".offset_x")];
   const double shifted = std::min(std::abs(coefficients[across_x ? 0 : 1]), offset.upper);
   const double reach = shifted + 4 * kFineSeamStep_m;
-  std::vector<Pose> ways;
-  for (const ResidualTrial& t : study.trials) ways.push_back(between(t.X_WS, t.X_WP));
+  std::vector<Pose> motions;
+  for (const ResidualTrial& t : study.trials) motions.push_back(between(t.X_WS, t.X_WP));
   const Eigen::VectorXd left = others.left();
   double best = about, least = INFINITY;
   for (double line = about - reach; line <= about + reach; line += kFineSeamStep_m) {
@@ -120,7 +120,7 @@ double seam_position(const Study& study, const Regression& others, const Signatu
         const Pose s = shift(start, line);
         start = {t.X_WS.x - s.x, t.X_WS.y - s.y, t.X_WS.theta};
       }
-      const Pose end = start * ways[i];
+      const Pose end = start * motions[i];
       const Pose s = shift(end, line);
       d.push_back(local_difference(t.X_WP, {end.x + s.x, end.y + s.y, end.theta}));
     }

@@ -35,7 +35,7 @@ Result<double> search_line(Predictor& predictor, const Study& study,
   if (!ends) return ends.error();
   double best = INFINITY, place = fit->at.at(row);
   JointFit tried = *fit;
-  // From the middle outward: of two equal places the nearer one.
+  // From the middle outward: of two equal places the closer one.
   for (int k = 0; k <= 2 * steps; ++k) {
     const int off = k % 2 == 0 ? k / 2 : -(k + 1) / 2;
     const auto at = static_cast<std::size_t>(steps + off);

@@ -21,19 +21,19 @@ constexpr double kMostPlaces = 40;  // along an axis
 constexpr double kPriorTrials = 5;  // with the log's own rate, in every group of drives
 constexpr double kFewestSlips = 3;  // in a place
 
-struct Way {
+struct DrivenLine {
   Eigen::Vector2d from, to;
 };
 
 // Where drives may pass through.
 struct Place {
-  std::function<bool(const Way&)> passed;
-  std::string words;
+  std::function<bool(const DrivenLine&)> passed;
+  std::string description;
 };
 
 // Expected slips of every trial if they fell anywhere.
 std::vector<double> expected(const Study& study, std::span<const double> slipped,
-                             const std::vector<bool>& tells) {
+                             const std::vector<bool>& informative) {
   std::map<std::pair<MotionKind, double>, std::pair<double, double>> groups;  // slips, trials
   const auto group_of = [&](std::size_t i) {
     const Cell& cell = study.cells[study.trials[i].cell];
@@ -41,7 +41,7 @@ std::vector<double> expected(const Study& study, std::span<const double> slipped
   };
   double slips = 0, trials = 0;
   for (std::size_t i = 0; i < study.size(); ++i) {
-    if (!tells[i]) continue;
+    if (!informative[i]) continue;
     auto& [own_slips, own_trials] = groups[group_of(i)];
     own_slips += slipped[i];
     own_trials += 1;
@@ -53,7 +53,8 @@ std::vector<double> expected(const Study& study, std::span<const double> slipped
   double sum = 0;
   for (std::size_t i = 0; i < study.size(); ++i) {
     const auto [own_slips, own_trials] = groups[group_of(i)];
-    all.push_back(tells[i] ? (own_slips + kPriorTrials * rate) / (own_trials + kPriorTrials) : 0);
+    all.push_back(informative[i] ? (own_slips + kPriorTrials * rate) / (own_trials + kPriorTrials)
+                                 : 0);
     sum += all.back();
   }
   for (double& e : all) e *= slips / std::max(sum, 1e-12);
@@ -67,27 +68,27 @@ std::string metres(double value) {
 }
 
 Place disc(const Eigen::Vector2d& centre, double radius_m) {
-  return {[=](const Way& way) {
-            return nearest_on_segment(centre, way.from, way.to).distance < radius_m;
+  return {[=](const DrivenLine& driven) {
+            return nearest_on_segment(centre, driven.from, driven.to).distance < radius_m;
           },
           "within " + metres(radius_m) + " m of (" + metres(centre.x()) + ", " +
               metres(centre.y()) + ")"};
 }
 
 Place line(int axis, double at_m) {
-  return {[=](const Way& way) {
-            return std::min(way.from[axis], way.to[axis]) < at_m + kAbout_m &&
-                   std::max(way.from[axis], way.to[axis]) > at_m - kAbout_m;
+  return {[=](const DrivenLine& driven) {
+            return std::min(driven.from[axis], driven.to[axis]) < at_m + kAbout_m &&
+                   std::max(driven.from[axis], driven.to[axis]) > at_m - kAbout_m;
           },
           std::string("across ") + (axis == 0 ? "x" : "y") + " = " + metres(at_m) + " m"};
 }
 
 // Discs and lines all over the box of the ways' starts.
-std::vector<Place> places(const std::vector<Way>& ways) {
+std::vector<Place> places(const std::vector<DrivenLine>& driven_lines) {
   Eigen::Vector2d low(INFINITY, INFINITY), high = -low;
-  for (const Way& way : ways) {
-    low = low.cwiseMin(way.from);
-    high = high.cwiseMax(way.from);
+  for (const DrivenLine& driven : driven_lines) {
+    low = low.cwiseMin(driven.from);
+    high = high.cwiseMax(driven.from);
   }
   const Eigen::Vector2d extent = high - low;
   std::vector<Place> all;
@@ -107,22 +108,22 @@ std::vector<Place> places(const std::vector<Way>& ways) {
 }  // namespace
 
 Gathering gathering_of_slips(const Study& study, std::span<const double> slipped,
-                             const std::vector<bool>& tells) {
-  const std::vector<double> chance = expected(study, slipped, tells);
-  std::vector<Way> ways;
+                             const std::vector<bool>& informative) {
+  const std::vector<double> chance = expected(study, slipped, informative);
+  std::vector<DrivenLine> driven_lines;
   double slips = 0;
   for (std::size_t i = 0; i < study.size(); ++i) {
     const ResidualTrial& t = study.trials[i];
-    ways.push_back({{t.X_WS.x, t.X_WS.y}, {t.X_WP.x, t.X_WP.y}});
-    if (tells[i]) slips += slipped[i];
+    driven_lines.push_back({{t.X_WS.x, t.X_WS.y}, {t.X_WP.x, t.X_WP.y}});
+    if (informative[i]) slips += slipped[i];
   }
   Gathering best;
-  for (const Place& place : places(ways)) {
+  for (const Place& place : places(driven_lines)) {
     double here = 0, expected_here = 0;
     std::vector<bool> passed(study.size());
     for (std::size_t i = 0; i < study.size(); ++i) {
-      passed[i] = place.passed(ways[i]);
-      if (!tells[i] || !passed[i]) continue;
+      passed[i] = place.passed(driven_lines[i]);
+      if (!informative[i] || !passed[i]) continue;
       here += slipped[i];
       expected_here += chance[i];
     }
@@ -130,7 +131,7 @@ Gathering gathering_of_slips(const Study& study, std::span<const double> slipped
     if (here < kFewestSlips || here <= expected_here || expected_here <= 0) continue;
     const double gain = here * std::log(here / expected_here) +
                         (rest > 0 ? rest * std::log(rest / expected_rest) : 0);
-    if (gain > best.gain) best = {gain, place.words, std::move(passed)};
+    if (gain > best.gain) best = {gain, place.description, std::move(passed)};
   }
   return best;
 }

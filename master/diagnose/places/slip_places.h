@@ -20,9 +20,10 @@ struct Gathering {
 inline constexpr double kLeastGathering = 10;
 
 // Scan for a place that drives pass through in which they slip more often than elsewhere: Kulldorff
-// (1997), Poisson.  `slipped`: probability that each trial did; trials of false `tells` do not
-// count.  Longer drives show slips better, so what is expected goes by kind and length of a drive.
+// (1997), Poisson.  `slipped`: probability that each trial did; trials of false `informative` do
+// not count.  Longer drives show slips better, so what is expected goes by kind and length of a
+// drive.
 Gathering gathering_of_slips(const Study& study, std::span<const double> slipped,
-                             const std::vector<bool>& tells);
+                             const std::vector<bool>& informative);
 
 }  // namespace gapfarm

@@ -19,7 +19,7 @@ namespace {
 constexpr double kOutlierSds = 3.2905;  // square root of the 0.999 quantile of chi2, 1 dof
 constexpr double kOutlierShare = 0.001;
 constexpr double kTrialsForCells = 4;  // a cell, on average, for cell means to be worth their cost
-constexpr std::size_t kFewestTold = 8;
+constexpr std::size_t kFewestShown = 8;
 constexpr double kClearMotion = 5;    // s.d.s of the end by which a unit gain must move it
 constexpr int kMostDependences = 12;  // dependences taken out of one component
 const char* const kComponents[] = {"x", "y", "theta"};
@@ -38,7 +38,7 @@ class Looker {
   Looker(std::span<const ResidualTrial> trials, std::span<const Eigen::Vector3d> residuals,
          std::span<const Eigen::Matrix3d> covariances, std::span<const Cell> cells,
          const WhereOptions& options)
-      : words_(options.words),
+      : argv_(options.labels),
         trials_(trials),
         residuals_(residuals),
         covariances_(covariances),
@@ -70,7 +70,7 @@ class Looker {
 
  private:
   std::string deviation(const Selection& s, double size, bool trend) const {
-    return words_.deviation(s.component, size, s.along_motion, trend);
+    return argv_.deviation(s.component, size, s.along_motion, trend);
   }
   double sd(std::size_t trial, int k) const { return std::sqrt(covariances_[trial](k, k)); }
   double path(std::size_t trial) const { return cells_[trials_[trial].cell].path; }
@@ -96,11 +96,11 @@ class Looker {
     std::vector<Selection> some;
     if (commands.size() > 1) some = {all, motion};
     for (const auto& [c, own] : commands) some.push_back(own);
-    std::erase_if(some, [](const Selection& s) { return s.trials.size() < kFewestTold; });
+    std::erase_if(some, [](const Selection& s) { return s.trials.size() < kFewestShown; });
     return some;
   }
 
-  // The clearest dependence of the component is told and taken out, then the next clearest.
+  // The clearest dependence of the component is reported and taken out, then the next clearest.
   void look_for_means(const std::vector<Selection>& selections, double level) {
     for (int round = 0; round < kMostDependences; ++round) {
       std::optional<Found> best;
@@ -120,7 +120,7 @@ class Looker {
         }
       }
       if (!best || corrected(best->test.p) > level) return;
-      tell(*best);
+      report(*best);
       const Selection& s = *best->selection;
       // With the part that the cells' means took: covariates are centred over all trials.
       const Eigen::VectorXd fitted =
@@ -160,7 +160,7 @@ class Looker {
     return v;
   }
 
-  // Holm's step-down: the rows already told are not looked at again.
+  // Holm's step-down: the rows already reported are not looked at again.
   double corrected(double p) const {
     return std::min(1.0, p * double(looks_ - std::min(looks_ - 1, rows_.size())));
   }
@@ -202,29 +202,29 @@ class Looker {
                      std::clamp(squares / excess_, 0.0, 1.0), corrected(p), std::move(text)});
   }
 
-  void tell(const Found& found) {
+  void report(const Found& found) {
     const Selection& s = *found.selection;
     if (found.covariate != nullptr) {
-      tell_trend(s, *found.covariate, found.test, view(s).scale);
+      report_trend(s, *found.covariate, found.test, view(s).scale);
       return;
     }
     const double mean = 1000 * found.test.coefficients[0] * (s.along_motion ? mean_motion(s) : 1.0);
     push(s, "bias", "", std::abs(mean), found.test.squares - 1, found.test.p,
-         words_.motions(s.command) + " " + deviation(s, mean, false) + " on average.");
+         argv_.motions(s.command) + " " + deviation(s, mean, false) + " on average.");
   }
 
-  void tell_trend(const Selection& s, const WhereCovariate& covariate, const TrendTest& test,
-                  const Eigen::VectorXd& scale) {
+  void report_trend(const Selection& s, const WhereCovariate& covariate, const TrendTest& test,
+                    const Eigen::VectorXd& scale) {
     const Eigen::VectorXd fitted = test.fitted.cwiseProduct(scale);
     const double size = 1000 * std::sqrt(fitted.squaredNorm() / double(fitted.size()));
     double slope = 1000 * test.coefficients[0] * covariate.unit;
     if (covariate.with_motion) slope *= mean_motion(s);
-    std::string text = words_.motions(s.command) + " ";
+    std::string text = argv_.motions(s.command) + " ";
     if (!covariate.each.empty()) {
       text += deviation(s, slope, true) + " " + covariate.each + ".";
     } else {
       text +=
-          "differ in " + words_.component(s.component) + " by " + amount_words(size, s.component) +
+          "differ in " + argv_.component(s.component) + " by " + amount_text(size, s.component) +
           " (s.d.) with the " +
           (covariate.name == "previous residual" ? "error of the trial before" : covariate.name) +
           ".";
@@ -308,22 +308,22 @@ class Looker {
       const auto count = std::count_if(single.begin(), single.end(), clear);
       const bool most = 2 * static_cast<std::size_t>(count) > single.size();
       if (several && clear(pooled) && (most || count == 0)) {
-        tell_scatter(pooled, p == &Scatter::p_spread);
+        report_scatter(pooled, p == &Scatter::p_spread);
         continue;
       }
       for (const Scatter& s : single) {
-        if (clear(s)) tell_scatter(s, p == &Scatter::p_spread);
+        if (clear(s)) report_scatter(s, p == &Scatter::p_spread);
       }
     }
   }
 
-  void tell_scatter(const Scatter& scatter, bool spread) {
+  void report_scatter(const Scatter& scatter, bool spread) {
     const Selection& s = scatter.selection;
-    const std::string what = words_.component(s.component);
+    const std::string what = argv_.component(s.component);
     if (!spread) {
       const std::string of = std::to_string(std::lround(scatter.count));
       push(s, "outliers", "", median(scatter.beyond), scatter.wild, scatter.p_outliers,
-           words_.motions(s.command) + ": " + std::to_string(scatter.beyond.size()) + " of " + of +
+           argv_.motions(s.command) + ": " + std::to_string(scatter.beyond.size()) + " of " + of +
                " are far off in " + what + ", where " +
                plain_number(kOutlierShare * scatter.count) + " would be by chance.");
       return;
@@ -332,19 +332,19 @@ class Looker {
     const double size =
         std::sqrt(scatter.variance / scatter.count) * std::sqrt(std::abs(ratio - 1));
     push(s, "spread", "", size, scatter.squares - scatter.freedom, scatter.p_spread,
-         words_.motions(s.command) + " scatter " + plain_number(std::sqrt(ratio)) +
+         argv_.motions(s.command) + " scatter " + plain_number(std::sqrt(ratio)) +
              " times as much in " + what + " as the noise allows (" +
-             amount_words(size, s.component) + (ratio > 1 ? " beyond it)." : " below it)."));
+             amount_text(size, s.component) + (ratio > 1 ? " beyond it)." : " below it)."));
   }
 
-  WhereWords words_;
+  WhereLabels argv_;
   std::span<const ResidualTrial> trials_;
   std::span<const Eigen::Vector3d> residuals_;
   std::span<const Eigen::Matrix3d> covariances_;
   std::span<const Cell> cells_;
   double excess_ = 1;
   std::vector<WhereCovariate> covariates_;
-  std::vector<Eigen::Vector3d> left_;   // residuals without what was told
+  std::vector<Eigen::Vector3d> left_;   // residuals without what was reported
   std::vector<Eigen::Vector3d> spent_;  // degrees of freedom that took
   std::size_t looks_ = 0;
   std::vector<Where> rows_;

@@ -14,17 +14,17 @@
 
 namespace gapfarm {
 
-struct WhereWords {
+struct WhereLabels {
   std::string (*motions)(const std::string& command) = motions_of;
-  std::string (*component)(int component) = component_words;
+  std::string (*component)(int component) = component_text;
   std::string (*deviation)(int component, double size, bool along_motion,
-                           bool trend) = deviation_words;
+                           bool trend) = deviation_text;
 };
 
 struct WhereOptions {
   double level = 0.01;    // greatest corrected p of a row
   std::size_t most = 12;  // rows
-  WhereWords words = {};
+  WhereLabels labels = {};
   std::vector<WhereCovariate> (*covariates)(std::span<const ResidualTrial> trials,
                                             std::span<const Eigen::Vector3d> residuals,
                                             std::span<const Cell> cells) = where_covariates;
@@ -39,14 +39,14 @@ struct WhereOptions {
 //   bias      the mean; F-test
 //   trend     against each covariate, beyond the means of the cells (of the commands for duration
 //             and level, and when the cells have fewer than four trials); F-test
-//   spread    the variance about the cells' means, outliers left out; chi2-test against 1
+//   spread    the variance about the cells' means, outliers omitted; chi2-test against 1
 //   outliers  values beyond the 0.999 quantile of chi2 with one degree of freedom, after scaling
 //             with a robust s.d. of at least 1; binomial tail
 //
-// Of each component the clearest bias or trend is told and taken out of the residuals, then the
-// next one is looked for, so one fact is told once, in the words that fit it best, and covariates
-// that vary together do not repeat each other.  Spread and outliers are of what is left.  p is
-// corrected for all looks by Holm's step-down: times the number of looks not yet told.
+// Of each component the clearest bias or trend is reported and taken out of the residuals, then the
+// next one is looked for, so one fact is reported once, in the words that fit it best, and
+// covariates that vary together do not repeat each other.  Spread and outliers are of what is left.
+// p is corrected for all looks by Holm's step-down: times the number of looks not yet reported.
 //
 // Effects of drive, floor and camera grow with the motion, so such trends are fitted as multiples
 // of Cell::path.  `size` is the absolute mean of a bias, the fitted s.d. of a trend, the s.d. in

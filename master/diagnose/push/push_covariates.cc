@@ -23,7 +23,7 @@ constexpr double kConditionMisfit[] = {0.02, 0.01, 0.01};
 // what repeats have in common of three logs by another simulator (scripts/foreign_pushes.sh, 57
 // degrees of freedom) has squares of 53, 57 and 64, and of 99 to 191 where nothing may be missed.
 constexpr double kSoundMisfit = 0.3;
-constexpr std::size_t kRepeats = 3;  // that a condition needs to be told from noise
+constexpr std::size_t kRepeats = 3;  // that a condition needs to be distinguished from noise
 constexpr double kFarArm = 2;        // gyration radii: beyond, the finger slips off
 
 double arm(const ResidualTrial& t) {

@@ -132,8 +132,9 @@ class Planner {
           " with the finger " + plain_number(std::abs(left_m) * kMillimetres) +
               " mm further to the " + (side > 0 ? "left" : "right"));
     }
-    for (const auto& [factor, words] : {std::pair{2.0, " twice as fast"}, {0.5, " half as fast"}}) {
-      add("speed", at_speed(trial, factor), words);
+    for (const auto& [factor, ending] :
+         {std::pair{2.0, " twice as fast"}, {0.5, " half as fast"}}) {
+      add("speed", at_speed(trial, factor), ending);
     }
   }
 

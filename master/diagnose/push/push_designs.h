@@ -1,4 +1,4 @@
-// Pushes that might part rival explanations.
+// Pushes that might part competing explanations.
 #pragma once
 
 #include "master/diagnose/conclusions/next_experiment.h"

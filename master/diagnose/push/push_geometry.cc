@@ -62,15 +62,15 @@ PushGeometry push_geometry(const Piece& piece, const Trial& trial, double finger
   Eigen::Vector2d touch = Eigen::Vector2d::Zero();
   double touch_s = 0;
   for (std::size_t i = 0; i + 1 < trial.tip.size() && !push.touched; ++i) {
-    const Eigen::Vector2d from = at(trial.tip[i]), way = at(trial.tip[i + 1]) - from;
-    const int steps = 1 + static_cast<int>(way.norm() / (kTouch_m / 2));
+    const Eigen::Vector2d from = at(trial.tip[i]), along = at(trial.tip[i + 1]) - from;
+    const int steps = 1 + static_cast<int>(along.norm() / (kTouch_m / 2));
     for (int k = 0; k <= steps && !push.touched; ++k) {
       const double share = static_cast<double>(k) / steps;
-      const Nearest here = nearest(corners, from + share * way);
+      const Nearest here = nearest(corners, from + share * along);
       if (here.distance_m > reach) continue;
       push.touched = true;
       push.along_edge = here.along_edge;
-      touch = from + share * way;
+      touch = from + share * along;
       touch_s = trial.tip[i].t_s + share * (trial.tip[i + 1].t_s - trial.tip[i].t_s);
     }
   }

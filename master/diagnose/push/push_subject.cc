@@ -38,13 +38,13 @@ DiagnosisSubject push_subject() {
              {"along_edge", "touch on its edge, half edges from its middle", "place of the touch"},
              {"middle_x", "start of the centroid along x, m", "start x"},
              {"middle_y", "start of the centroid along y, m", "start y"}};
-  s.words.ends =
+  s.labels.ends =
       "One picture a piece, seen from where each push began: x along the finger's way, y to its "
       "left. Every push is a condition of its own: the ellipses, which should hold nine in ten, "
       "are those of all its pushes together, and an error takes each push's own prediction away.";
-  s.words.residuals = "Measured minus predicted, along and across the push.";
-  s.words.x = "along the push";
-  s.words.y = "across the push";
+  s.labels.residuals = "Measured minus predicted, along and across the push.";
+  s.labels.x = "along the push";
+  s.labels.y = "across the push";
   return s;
 }
 

@@ -25,8 +25,8 @@ std::string push_component(int component) {
 }
 
 std::string push_deviation(int component, double size, bool along_motion, bool trend) {
-  if (along_motion) return deviation_words(component, size, along_motion, trend);
-  const std::string much = amount_words(size, component);
+  if (along_motion) return deviation_text(component, size, along_motion, trend);
+  const std::string much = amount_text(size, component);
   const std::string far = trend ? " farther" : " too far";
   if (component == 0) {
     return size > 0 ? "end " + much + far + " along the push"
@@ -139,62 +139,64 @@ bool one_speed(const PushVariety& v) { return v.fastest < 1.5 * v.slowest; }
 
 std::vector<Where> push_where(const Study& study, std::span<const Eigen::Vector3d> residuals,
                               const Problem& problem) {
-  std::vector<Eigen::Vector3d> told;
+  std::vector<Eigen::Vector3d> along_push;
   std::vector<Eigen::Matrix3d> covariances = study.covariances();
   for (std::size_t i = 0; i < study.size(); ++i) {
     const ResidualTrial& t = study.trials[i];
     const double turn_rad = t.X_WP.theta - t.push.direction_rad;
     const Pose along = Pose{0, 0, turn_rad} * Pose{residuals[i][0], residuals[i][1], 0};
-    told.emplace_back(along.x, along.y, residuals[i][2]);
+    along_push.emplace_back(along.x, along.y, residuals[i][2]);
     covariances[i] = rotate_covariance(covariances[i], turn_rad);
   }
   WhereOptions options;
-  options.words = {pushes_of, push_component, push_deviation};
+  options.labels = {pushes_of, push_component, push_deviation};
   options.covariates = covariates;
-  return where(study.trials, told, covariances, study.cells, problem, options);
+  return where(study.trials, along_push, covariances, study.cells, problem, options);
 }
 
 std::vector<std::string> push_cautions(const Study& study, const TrialLog& /*log*/) {
   const PushVariety v = variety(study);
   std::vector<std::string> text;
-  const auto say = [&](const std::string& sentence) { text.push_back(sentence); };
-  if (study.size() < kFewTrialsToTell) {
-    say("There " +
-        std::string(study.size() == 1 ? "is 1 push"
-                                      : "are " + std::to_string(study.size()) + " pushes") +
-        "; below " + std::to_string(kFewTrialsToTell) +
-        " only large effects show, and no claim is sure.");
+  const auto add_caution = [&](const std::string& sentence) { text.push_back(sentence); };
+  if (study.size() < kFewTrialsToJudge) {
+    add_caution("There " +
+                std::string(study.size() == 1 ? "is 1 push"
+                                              : "are " + std::to_string(study.size()) + " pushes") +
+                "; below " + std::to_string(kFewTrialsToJudge) +
+                " only large effects show, and no claim is sure.");
   }
   if (v.missed > 0) {
-    say(std::to_string(v.missed) + " of " + std::to_string(study.size()) +
-        " pushes do not touch their piece where the log has it; they say little.");
+    add_caution(std::to_string(v.missed) + " of " + std::to_string(study.size()) +
+                " pushes do not touch their piece where the log has it; they say little.");
   }
   if (v.typical_cell < kFewInPlace) {
-    say("Most pushes were done " +
-        (v.typical_cell <= 1 ? std::string("once")
-                             : "about " + plain_number(v.typical_cell) + " times") +
-        ", so what repeating one varies by is taken from what nothing smooth explains.");
+    add_caution("Most pushes were done " +
+                (v.typical_cell <= 1 ? std::string("once")
+                                     : "about " + plain_number(v.typical_cell) + " times") +
+                ", so what repeating one varies by is taken from what nothing smooth explains.");
   }
   if (v.directions < 4) {
-    say("The finger went in " + std::to_string(v.directions) +
-        (v.directions == 1 ? " direction" : " directions") +
-        " (of twelve): friction_anisotropy, table_tilt and camera_aspect need several.");
+    add_caution("The finger went in " + std::to_string(v.directions) +
+                (v.directions == 1 ? " direction" : " directions") +
+                " (of twelve): friction_anisotropy, table_tilt and camera_aspect need several.");
   }
   if (v.sides < 4) {
-    say("Pieces were pushed at " + std::to_string(v.sides) + (v.sides == 1 ? " side" : " sides") +
-        " (of twelve): com_offset, pressure_distribution and marker_offset need several.");
+    add_caution("Pieces were pushed at " + std::to_string(v.sides) +
+                (v.sides == 1 ? " side" : " sides") +
+                " (of twelve): com_offset, pressure_distribution and marker_offset need several.");
   }
   if (v.width_m < 0.3) {
-    say("All starts lie within " + plain_number(1000 * v.width_m) +
-        " mm: friction_patch and camera_distortion need several places.");
+    add_caution("All starts lie within " + plain_number(1000 * v.width_m) +
+                " mm: friction_patch and camera_distortion need several places.");
   }
   if (one_speed(v)) {
-    say("The finger always went equally fast: friction_speed hardly shows, and finger_compliance "
+    add_caution(
+        "The finger always went equally fast: friction_speed hardly shows, and finger_compliance "
         "looks like a smaller finger.");
   }
   if (study.sessions > 1 && study.sessions <= 8) {
-    say("Effects are taken to be alike in all " + std::to_string(study.sessions) +
-        " sessions; what changed between them shows as a dependence on the session.");
+    add_caution("Effects are taken to be alike in all " + std::to_string(study.sessions) +
+                " sessions; what changed between them shows as a dependence on the session.");
   }
   return text;
 }

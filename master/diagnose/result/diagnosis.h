@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "common/pose/pose.h"
-#include "common/residual/strays.h"
+#include "common/residual/outliers.h"
 #include "common/trials/trial.h"
 #include "master/diagnose/result/parameter_row.h"
 #include "master/io/log_checks/finding.h"
@@ -39,9 +39,10 @@ struct SessionGain {
 
 struct NamedEffect {
   std::string name;
-  std::vector<std::string> aliases;  // at most three effects that these data cannot tell from it
-  std::string alias_reason;          // one sentence; empty without aliases
-  double confidence = 0;             // that it, or one of its aliases, is there, [0, 1]
+  std::vector<std::string>
+      aliases;               // at most three effects that these data cannot distinguish from it
+  std::string alias_reason;  // one sentence; empty without aliases
+  double confidence = 0;     // that it, or one of its aliases, is there, [0, 1]
   std::vector<Estimate> parameters;
   // Mean log score lost against the floor, nats a trial, on trials that the fit did not see.
   double gap_before = 0;
@@ -103,13 +104,13 @@ struct SelectionRecord {
 
 // A smooth correction of what is left when nothing of the catalogue explains it; nobody's cause.
 struct FoundResidual {
-  Residual correction;  // places are the world's; empty: none surely helps
+  Residual correction;  // places are the world's; empty: none helps significantly
   // On trials that neither its choice nor its fit saw, nats a trial, with a 90 % interval.
   double gained = 0, gained_lo = 0, gained_hi = 0;
   double gap_before = 0, gap_after = 0;             // mean log score lost against the floor
   double closed = 0, closed_lo = 0, closed_hi = 0;  // share of the explainable gap
   std::string text;                                 // a sentence for a person
-  std::vector<double> chances;                      // of every trial to have strayed
+  std::vector<double> chances;                      // of every trial to be an outlier
 };
 
 // What of the catalogue comes nearest where it explains too little.
@@ -124,11 +125,11 @@ struct NearMiss {
 struct NextExperiment {
   std::string text;
   std::vector<std::string> separates;
-  std::uint64_t trials = 0;  // needed to tell them apart with 95 % power
+  std::uint64_t trials = 0;  // needed to distinguish them with 95 % power
 };
 
-// How the pictures tell of trials; empty: of commands that were driven.
-struct PictureWords {
+// How the pictures describe trials; empty: of commands that were driven.
+struct PictureLabels {
   std::string ends;       // a paragraph on the pictures of end poses
   std::string residuals;  // same of residuals
   std::string x, y;       // "along the push": components of a residual
@@ -169,7 +170,7 @@ struct ShownDrive {
 
 struct Diagnosis {
   Verdict verdict = Verdict::kNone;
-  std::string headline;               // the cause on one line, in plain words
+  std::string headline;               // the cause on one line, in plain language
   std::string action;                 // what to do about it, on one line
   std::vector<std::string> findings;  // the same at length, a sentence each
   std::vector<NamedEffect> effects;
@@ -192,7 +193,7 @@ struct Diagnosis {
   std::vector<ShownDrive> drives;
   std::vector<DiagnosedTrial> trials;
   std::vector<ShownCovariate> shown;
-  PictureWords words;
+  PictureLabels labels;
   // Label and value: files, hashes, counts, program, seeds, the run stores behind the numbers.
   std::vector<std::pair<std::string, std::string>> provenance;
   std::vector<std::pair<std::string, double>> timing_s;  // stage and wall seconds

@@ -5,7 +5,7 @@
 
 #include "common/json/json.h"
 #include "master/diagnose/result/json_fields.h"
-#include "master/io/log_checks/words.h"
+#include "master/io/log_checks/finding_text.h"
 
 namespace gapfarm {
 namespace {
@@ -24,7 +24,7 @@ const char* bound_name(BoundHit hit) {
   return hit == BoundHit::kNone ? "" : hit == BoundHit::kLower ? "lower" : "upper";
 }
 
-constexpr Severity kSeverities[] = {Severity::kNote, Severity::kDoubt, Severity::kUnusable};
+constexpr Severity kSeverities[] = {Severity::kNote, Severity::kWarning, Severity::kUnusable};
 
 // Every row of the file, in the order of its fields.
 constexpr auto kEstimate = [](auto& v, auto& e) {

@@ -33,7 +33,7 @@ nlohmann::ordered_json trials_json(const Diagnosis& diagnosis, int digits = 0);
 Result<std::vector<DiagnosedTrial>> parse_trials(const nlohmann::ordered_json& table,
                                                  const std::vector<ShownCovariate>& shown);
 
-// How the pictures tell of the trials, where not of driven commands; and back.
+// How the pictures describe the trials, where not of driven commands; and back.
 nlohmann::ordered_json pictures_json(const Diagnosis& diagnosis);
 Status read_pictures(const nlohmann::ordered_json& pictures, Diagnosis* diagnosis);
 

@@ -35,7 +35,7 @@ class Fields {
     convert(key, json_[key], field);
   }
 
-  // A field that an earlier version, or another program, may leave out.
+  // A field that an earlier version, or another program, may omit.
   template <class T>
   void later(const char* key, T& field) {
     if (json_.is_object() && json_.contains(key)) convert(key, json_[key], field);
@@ -45,7 +45,7 @@ class Fields {
   void if_any(const char* key, T& field) {
     later(key, field);
   }
-  // A value that is told by one of these names.
+  // A value that is reported by one of these names.
   template <class T, std::size_t n, class Name>
   void choice(const char* key, T& field, const T (&values)[n], const Name& name_of) {
     std::string found;

@@ -1,4 +1,4 @@
-// A parameter as a report tells it: before and after, with its interval and its bounds.
+// A parameter as a report shows it: before and after, with its interval and its bounds.
 #pragma once
 
 #include <optional>

@@ -30,7 +30,7 @@ Json term_json(const ResidualTerm& term) {
   for (const ResidualWeights& w : term.weights) {
     weights[w.command.empty() ? "all" : w.command] = rows_json(w.shifts);
   }
-  return {{"frame", residual_frame_words()[static_cast<std::size_t>(term.frame)]},
+  return {{"frame", residual_frame_names()[static_cast<std::size_t>(term.frame)]},
           {"by_drive", term.by_drive},
           {"covariates", std::move(covariates)},
           {"lengths", std::move(lengths)},
@@ -62,14 +62,14 @@ Status read_term(const Json& json, const std::string& path, ResidualTerm* term) 
   if (!error.empty()) return Error{error};
   const Error wrong{"diagnosis.json: " + path +
                     " is no term of a residual; was this written by gapfarm diagnose?"};
-  const std::vector<std::string>& words = residual_frame_words();
-  const auto at = std::find(words.begin(), words.end(), frame);
+  const std::vector<std::string>& names = residual_frame_names();
+  const auto at = std::find(names.begin(), names.end(), frame);
   const bool whole = json.contains("centres") && json.contains("lengths") &&
                      json["lengths"].is_array() && json.contains("weights") &&
                      json["weights"].is_object() && json.contains("by_drive") &&
                      json["by_drive"].is_boolean();
-  if (at == words.end() || !whole || !read_rows(json["centres"], &term->centres)) return wrong;
-  term->frame = static_cast<ResidualFrame>(at - words.begin());
+  if (at == names.end() || !whole || !read_rows(json["centres"], &term->centres)) return wrong;
+  term->frame = static_cast<ResidualFrame>(at - names.begin());
   term->by_drive = json["by_drive"];
   for (const Json& length : json["lengths"]) {
     if (!length.is_number()) return wrong;
@@ -90,29 +90,30 @@ Status read_term(const Json& json, const std::string& path, ResidualTerm* term) 
   return {};
 }
 
-Json strays_json(StrayDrives strays) {
-  Json json = {{"kind", stray_kind_words()[static_cast<std::size_t>(strays.kind)]}};
-  for (const auto& [key, value] : stray_values(strays)) json[key] = *value;
+Json outliers_json(OutlierDrives outliers) {
+  Json json = {{"kind", outlier_kind_names()[static_cast<std::size_t>(outliers.kind)]}};
+  for (const auto& [key, value] : outlier_values(outliers)) json[key] = *value;
   return json;
 }
 
-Status read_strays(const Json& json, StrayDrives* strays) {
+Status read_outliers(const Json& json, OutlierDrives* outliers) {
   std::string error, kind;
   Fields fields(json, "residual.strays", error);
   fields.field("kind", kind);
-  for (const auto& [key, value] : stray_values(*strays)) fields.field(key, *value);
+  for (const auto& [key, value] : outlier_values(*outliers)) fields.field(key, *value);
   if (!error.empty()) return Error{error};
-  const std::vector<std::string>& words = stray_kind_words();
-  const auto at = std::find(words.begin(), words.end(), kind);
-  if (at == words.end()) return Error{"diagnosis.json: residual.strays.kind is \"" + kind + "\""};
-  strays->kind = static_cast<StrayKind>(at - words.begin());
-  if (Status s = check_strays(*strays); !s) return Error{"diagnosis.json: " + s.error().message};
+  const std::vector<std::string>& names = outlier_kind_names();
+  const auto at = std::find(names.begin(), names.end(), kind);
+  if (at == names.end()) return Error{"diagnosis.json: residual.strays.kind is \"" + kind + "\""};
+  outliers->kind = static_cast<OutlierKind>(at - names.begin());
+  if (Status s = check_outliers(*outliers); !s)
+    return Error{"diagnosis.json: " + s.error().message};
   return {};
 }
 
-bool read_chances(const Json& strays, std::vector<double>* chances) {
-  if (!strays.contains("chances") || !strays["chances"].is_array()) return false;
-  for (const Json& chance : strays["chances"]) {
+bool read_chances(const Json& outliers, std::vector<double>* chances) {
+  if (!outliers.contains("chances") || !outliers["chances"].is_array()) return false;
+  for (const Json& chance : outliers["chances"]) {
     if (!chance.is_number() || !(chance >= 0 && chance <= 1)) return false;
     chances->push_back(chance);
   }
@@ -140,8 +141,8 @@ Json residual_json(const FoundResidual& residual) {
   for (const ResidualTerm& term : residual.correction.field) {
     json["terms"].push_back(term_json(term));
   }
-  if (residual.correction.strays) {
-    json["strays"] = strays_json(*residual.correction.strays);
+  if (residual.correction.outliers) {
+    json["strays"] = outliers_json(*residual.correction.outliers);
     json["strays"]["chances"] = residual.chances;
   }
   return json;
@@ -167,8 +168,8 @@ Status read_residual(const Json& json, std::optional<FoundResidual>* residual) {
     return Error{"diagnosis.json: " + s.error().message};
   }
   if (json.contains("strays")) {
-    StrayDrives& strays = found.correction.strays.emplace();
-    if (Status s = read_strays(json["strays"], &strays); !s) return s;
+    OutlierDrives& outliers = found.correction.outliers.emplace();
+    if (Status s = read_outliers(json["strays"], &outliers); !s) return s;
     if (!read_chances(json["strays"], &found.chances)) {
       return Error{"diagnosis.json: residual.strays.chances is no list of numbers in [0, 1]"};
     }

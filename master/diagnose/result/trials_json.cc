@@ -1,4 +1,4 @@
-// Trials as a table, drives with their paths, and how the pictures tell of both.
+// Trials as a table, drives with their paths, and how the pictures describe both.
 
 #include <cmath>
 #include <cstdio>
@@ -115,11 +115,11 @@ constexpr auto kShown = [](auto& v, auto& shown) {
   v.field("label", shown.label);
   v.field("matches", shown.matches);
 };
-constexpr auto kWords = [](auto& v, auto& words) {
-  v.field("ends", words.ends);
-  v.field("residuals", words.residuals);
-  v.field("x", words.x);
-  v.field("y", words.y);
+constexpr auto kLabels = [](auto& v, auto& labels) {
+  v.field("ends", labels.ends);
+  v.field("residuals", labels.residuals);
+  v.field("x", labels.x);
+  v.field("y", labels.y);
 };
 
 }  // namespace
@@ -222,7 +222,7 @@ Status read_drives(const Json& json, std::vector<ShownDrive>* drives) {
 }
 
 Json pictures_json(const Diagnosis& diagnosis) {
-  Json json = FieldWriter::written(diagnosis.words, kWords);
+  Json json = FieldWriter::written(diagnosis.labels, kLabels);
   json["shown"] = FieldWriter::list(diagnosis.shown, kShown);
   return json;
 }
@@ -230,7 +230,7 @@ Json pictures_json(const Diagnosis& diagnosis) {
 Status read_pictures(const Json& pictures, Diagnosis* diagnosis) {
   std::string error;
   Fields fields(pictures, "pictures", error);
-  kWords(fields, diagnosis->words);
+  kLabels(fields, diagnosis->labels);
   fields.list("shown", diagnosis->shown, kShown);
   return error.empty() ? Status{} : Error{error};
 }

@@ -66,7 +66,7 @@ DiagnosisResult unusable_result(const PreparedLog& log) {
     effect.text = f.text + " " + f.remedy;
     d.effects.push_back(std::move(effect));
   }
-  tell(drive_effect_diagnoses(), &d);
+  fill_conclusions(drive_effect_diagnoses(), &d);
   result.tuned = result.final_ = log.problem.values;
   result.intervals.assign(result.final_.size(), {1, 0});
   return result;

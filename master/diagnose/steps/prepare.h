@@ -1,4 +1,4 @@
-// The log as a diagnosis works on it, and what is said where it cannot.
+// The log as a diagnosis works on it, and what is reported where it cannot.
 #pragma once
 
 #include <Eigen/Core>

@@ -80,7 +80,7 @@ std::vector<infer::Start> corners(const infer::Space& own) {
   return starts;
 }
 
-Competition competition(const Inquiry& of, const Study& study) {
+Competition competition(const DiagnosisRequest& of, const Study& study) {
   Competition c;
   c.forward = [&of](const std::vector<PredictionRequest>& points) {
     return of.predictor.attempt(points);
@@ -91,7 +91,7 @@ Competition competition(const Inquiry& of, const Study& study) {
   const infer::Space base = base_space(study);
   c.base_coordinates = base.coordinates();
   for (const EffectDiagnosis* effect : *of.subject.effects) {
-    if (effect->searched.empty() || of.left_out(effect->effect)) continue;
+    if (effect->searched.empty() || of.excluded(effect->effect)) continue;
     infer::Hypothesis h;
     h.name = effect->effect;
     h.coordinates = coordinates_of(*effect, *study.table);
@@ -104,7 +104,7 @@ Competition competition(const Inquiry& of, const Study& study) {
 
 // The study by the noise that readings are configured to have: what the tuned base misses by must
 // not pass for noise.
-Result<Study> by_configured_noise(const Inquiry& of, Study study) {
+Result<Study> by_configured_noise(const DiagnosisRequest& of, Study study) {
   const auto configured = of.subject.make_study(of.problem, of.options.genes);
   if (!configured) return configured.error();
   study.trust.clear();
@@ -113,18 +113,18 @@ Result<Study> by_configured_noise(const Inquiry& of, Study study) {
 }
 
 // The base as the config has it, before anything was tuned.
-Overrides configured_base(const Inquiry& of, const Study& study) {
+Overrides configured_base(const DiagnosisRequest& of, const Study& study) {
   const auto configured = of.subject.make_study(of.problem, of.options.genes);
   return configured ? configured->base : study.base;
 }
 
 // What a contest's best has to gain, held out, beside what was explained before.
-bool enters(const Inquiry& of, const infer::Contender& best, double explained) {
+bool enters(const DiagnosisRequest& of, const infer::Contender& best, double explained) {
   return best.gain >= std::max(of.subject.least_gain, kLeastShare * explained) &&
          best.gain >= infer::kSureGain * best.gain_se;
 }
 
-// Hypotheses that predict as well as the best, as far as anybody can tell.
+// Hypotheses that predict as well as the best, as far as anybody can show.
 std::vector<Alias> aliases_of(const std::vector<infer::Hypothesis>& hypotheses,
                               const infer::Contest& contest) {
   const infer::Contender& best = contest.contenders.front();
@@ -146,7 +146,8 @@ struct Found {
   std::vector<Screened> rows;
 };
 
-std::string estimate_text(const Inquiry& of, const infer::Contender& c, const std::string& effect) {
+std::string estimate_text(const DiagnosisRequest& of, const infer::Contender& c,
+                          const std::string& effect) {
   const Overrides at = c.model.space.values(c.model.fit.u);
   std::string text;
   for (const auto& [row, value] : at) {
@@ -158,7 +159,7 @@ std::string estimate_text(const Inquiry& of, const infer::Contender& c, const st
   return text;
 }
 
-void add_rows(const Inquiry& of, const std::vector<infer::Hypothesis>& hypotheses,
+void add_rows(const DiagnosisRequest& of, const std::vector<infer::Hypothesis>& hypotheses,
               const infer::Contest& contest, std::vector<Screened>* rows) {
   for (const infer::Contender& contender : contest.contenders) {
     Screened row;
@@ -184,7 +185,7 @@ Result<infer::Model> refitted_without(const Competition& c, const infer::Model& 
 }
 
 // What later ones made worthless leaves again.
-Status drop_idle(const Inquiry& of, const Competition& c, Found* found) {
+Status drop_idle(const DiagnosisRequest& of, const Competition& c, Found* found) {
   for (std::size_t k = 0; k + 1 < found->chosen.size();) {
     std::size_t first = c.base_coordinates;
     const auto count = [&](std::size_t i) {
@@ -217,7 +218,7 @@ Result<infer::Model> base_alone(const Study& study, const Competition& c) {
 }
 
 // For who watches.
-void report_contest(const Inquiry& of, const std::vector<infer::Standing>& standings) {
+void report_contest(const DiagnosisRequest& of, const std::vector<infer::Standing>& standings) {
   if (!of.options.on_finding) return;
   Finding finding;
   finding.about = "the competition of hypotheses";
@@ -230,7 +231,7 @@ void report_contest(const Inquiry& of, const std::vector<infer::Standing>& stand
 }
 
 // Forward selection: the best of every contest joins the model that the next one adds to.
-Result<Found> select(const Inquiry& of, const Study& study, const Competition& c) {
+Result<Found> select(const DiagnosisRequest& of, const Study& study, const Competition& c) {
   auto base = base_alone(study, c);
   if (!base) return base.error();
   Found found{*base, *base, {}, {}};
@@ -264,7 +265,7 @@ Result<Found> select(const Inquiry& of, const Study& study, const Competition& c
 
 }  // namespace
 
-Result<Screening> compete(const Inquiry& of, const Evidence& measured) {
+Result<Screening> compete(const DiagnosisRequest& of, const Evidence& measured) {
   const auto configured = by_configured_noise(of, measured.study);
   if (!configured) return configured.error();
   const Competition c = competition(of, *configured);

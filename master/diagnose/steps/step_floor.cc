@@ -1,4 +1,4 @@
-// What a perfect prediction would score: the noise's tails, and what makes single trials stray.
+// What a perfect prediction would score: the noise's tails, and what makes single trials outliers.
 
 #include <algorithm>
 #include <cmath>
@@ -26,9 +26,9 @@ struct Tails {
 
 // What heavy tails do to single trials passes for neither structure nor for a wider Gaussian.  The
 // final fit says whether there are any: the tuned base's residuals may seem to have them because of
-// an effect.  Then every nested model is scored, and left behind, with the noise that best predicts
+// an effect.  Then every nested model is scored, and written, with the noise that best predicts
 // what it misses.  Whitening keeps the robust noise, which does not grow to hide structure.
-std::optional<Tails> tails_of(const Inquiry& of, const Evidence& evidence,
+std::optional<Tails> tails_of(const DiagnosisRequest& of, const Evidence& evidence,
                               const std::vector<NestedFit>& nested) {
   if (!of.subject.drive_tail || !of.subject.pose_tail) return std::nullopt;
   // Sessions' own gains would pass for tails.
@@ -56,7 +56,7 @@ std::optional<Tails> tails_of(const Inquiry& of, const Evidence& evidence,
   return tails;
 }
 
-std::vector<NestedFit> with_tails(const Inquiry& of, const Tails& tails,
+std::vector<NestedFit> with_tails(const DiagnosisRequest& of, const Tails& tails,
                                   std::vector<NestedFit> nested,
                                   const std::vector<std::size_t>& folds) {
   for (std::size_t k = 0; k < nested.size(); ++k) {
@@ -67,7 +67,7 @@ std::vector<NestedFit> with_tails(const Inquiry& of, const Tails& tails,
 }
 
 // The last of the nested fits, and slips foreseen.
-std::vector<double> scores_with_slips(const Inquiry& of, const Explanation& named,
+std::vector<double> scores_with_slips(const DiagnosisRequest& of, const Explanation& named,
                                       const NestedFit& last,
                                       const std::vector<std::size_t>& folds) {
   std::vector<double> scores;
@@ -79,8 +79,8 @@ std::vector<double> scores_with_slips(const Inquiry& of, const Explanation& name
   return scores;
 }
 
-Judgement straying_otherwise(Judgement judged, const std::string& effect,
-                             const char* what = "Single drives stray") {
+Judgement with_other_outliers(Judgement judged, const std::string& effect,
+                              const char* what = "Single drives are outliers") {
   const bool named = judged.named.names_anything() || judged.named.grid_m > 0;
   judged.verdict = named ? Verdict::kEffectAndUnknown : Verdict::kUnknown;
   judged.cautions.push_back(std::string(what) + ", but not as " + effect +
@@ -88,14 +88,14 @@ Judgement straying_otherwise(Judgement judged, const std::string& effect,
   return judged;
 }
 
-// They explain the scatter less well than a wider noise does: something else makes drives stray.
+// They explain the scatter less well than a wider noise does: something else makes drives outliers.
 Judgement without_slips(Judgement judged) {
   judged.named.slip = {};
-  return straying_otherwise(std::move(judged), "slips");
+  return with_other_outliers(std::move(judged), "slips");
 }
 
 // The last of the nested fits, and each effect on the spread foreseen; it is named for that alone.
-Judgement with_spreads_foreseen(const Inquiry& of, Judgement judged, const NestedFit& last,
+Judgement with_spreads_foreseen(const DiagnosisRequest& of, Judgement judged, const NestedFit& last,
                                 const std::vector<std::size_t>& folds) {
   std::vector<FoundSpread>& spreads = judged.named.spreads;
   if (spreads.empty()) return judged;
@@ -103,7 +103,7 @@ Judgement with_spreads_foreseen(const Inquiry& of, Judgement judged, const Neste
   const std::vector<Eigen::Vector3d> residuals = held_out_residuals(last.study, last.fit, folds);
   for (FoundSpread& found : spreads) {
     // What else was named was not yet explained when it was found.
-    // Held out, a session tells of the others' mean as well.
+    // Held out, a session follows the others' mean as well.
     SpreadFit beside =
         found.row->fit(last.study, found.row->by_session ? last.fit.residuals : residuals, share);
     if (beside.gain >= found.row->least_gain) found.fit = std::move(beside);
@@ -111,7 +111,7 @@ Judgement with_spreads_foreseen(const Inquiry& of, Judgement judged, const Neste
   }
   const SpreadRow* worthless = nullptr;
   std::erase_if(spreads, [&](const FoundSpread& found) {
-    // Where few trials are struck it is what each gains that tells, not how many do.
+    // Where few trials are struck it is what each gains that shows, not how many do.
     const double gained =
         (mean(found.scores) - mean(last.scores)) * static_cast<double>(found.scores.size());
     if (gained >= found.row->least_gain) return false;
@@ -120,14 +120,14 @@ Judgement with_spreads_foreseen(const Inquiry& of, Judgement judged, const Neste
     return true;
   });
   if (worthless == nullptr) return judged;
-  return straying_otherwise(
+  return with_other_outliers(
       std::move(judged), worthless->effect,
-      worthless->by_session ? "Sessions drive at other speeds" : "Single drives stray");
+      worthless->by_session ? "Sessions drive at other speeds" : "Single drives are outliers");
 }
 
 // Not worse than what was reached on trials that the fit did not see, and there is more to be had
 // where that still depends on something.
-double within_reach(const Inquiry& of, const Refit& refit) {
+double within_reach(const DiagnosisRequest& of, const Refit& refit) {
   const Judgement& judged = refit.judged;
   double reached = -INFINITY, more = 0;
   for (const NestedFit& n : refit.nested) reached = std::max(reached, mean(n.scores));
@@ -142,20 +142,20 @@ double within_reach(const Inquiry& of, const Refit& refit) {
 
 }  // namespace
 
-// An event's loss is uniform below the greatest; the trials left out are taken for the worst of
+// An event's loss is uniform below the greatest; the excluded trials are taken for the worst of
 // those with an event on either side.
 double mean_loss_of_slips(const Explanation& named) {
   const SlipFit& slip = named.slip;
   const std::vector<bool>& ignored = named.study().ignored;
   const double either = slip.probability * (2 - slip.probability);
-  const double left_out = static_cast<double>(std::count(ignored.begin(), ignored.end(), true));
+  const double excluded = static_cast<double>(std::count(ignored.begin(), ignored.end(), true));
   const double most =
       1 -
-      std::min(1.0, left_out / std::max(1.0, either * static_cast<double>(named.study().size())));
+      std::min(1.0, excluded / std::max(1.0, either * static_cast<double>(named.study().size())));
   return std::clamp(slip.probability * most * slip.loss * most / 2, 0.0, 0.5);
 }
 
-Refit with_floor(const Inquiry& of, Refit refit, const std::vector<std::size_t>& folds) {
+Refit with_floor(const DiagnosisRequest& of, Refit refit, const std::vector<std::size_t>& folds) {
   Judgement& judged = refit.judged;
   const auto slips = [&] { return judged.named.slip.gain > 0; };
   if (slips()) {
@@ -167,7 +167,8 @@ Refit with_floor(const Inquiry& of, Refit refit, const std::vector<std::size_t>&
   std::optional<Tails> tails = tails_of(of, *judged.named.evidence, refit.nested);
   if (tails) {
     auto tailed = with_tails(of, *tails, refit.nested, folds);
-    // Whatever else makes single drives stray has heavy tails, which tell of it better than slips.
+    // Whatever else makes single drives outliers has heavy tails, which explain it better than
+    // slips.
     if (slips() && !(mean(tailed.back().scores) > mean(refit.slip_scores))) {
       tails.reset();
     } else {

@@ -14,7 +14,7 @@ namespace {
 constexpr double kLeastQuantum_m = 4e-4;
 constexpr std::size_t kNearestAlone = 3;
 
-NearMiss near_miss(const Inquiry& of, std::vector<std::string> effects, double gain,
+NearMiss near_miss(const DiagnosisRequest& of, std::vector<std::string> effects, double gain,
                    const std::vector<Leftover>& left) {
   NearMiss miss{std::move(effects), gain, 0, "", ""};
   const bool several = miss.effects.size() > 1;
@@ -33,7 +33,7 @@ NearMiss near_miss(const Inquiry& of, std::vector<std::string> effects, double g
 }
 
 // Before anything is given up: what was chosen together, and the best alone.
-std::vector<NearMiss> nearest(const Inquiry& of, const Screening& screening, double nats,
+std::vector<NearMiss> nearest(const DiagnosisRequest& of, const Screening& screening, double nats,
                               const std::vector<Leftover>& left) {
   const Evidence& evidence = *screening.found.evidence;
   std::vector<NearMiss> nearest;
@@ -44,8 +44,8 @@ std::vector<NearMiss> nearest(const Inquiry& of, const Screening& screening, dou
   if (!together.empty()) nearest.push_back(near_miss(of, together, nats, left));
   for (std::size_t k = 0; k < std::min(kNearestAlone, screening.alone.size()); ++k) {
     const EffectCandidate& alone = screening.alone[k];
-    const bool told = together.size() == 1 && together.front() == alone.signature.effect;
-    if (!(alone.gain > 0) || told) continue;
+    const bool agrees = together.size() == 1 && together.front() == alone.signature.effect;
+    if (!(alone.gain > 0) || agrees) continue;
     Regression with = evidence.base;
     Eigen::MatrixXd columns = alone.signature.columns;
     evidence.study.drop_ignored(columns);
@@ -92,7 +92,7 @@ std::vector<Leftover> all_leftovers(const Explanation& explanation, const Regres
   return left;
 }
 
-Judgement judge_again(const Inquiry& of, const Selector& catalogue, Judgement judged) {
+Judgement judge_again(const DiagnosisRequest& of, const Selector& catalogue, Judgement judged) {
   Explanation& named = judged.named;
   const bool odd = !named.odd_readings.empty() || !named.odd_drives.empty();
   const double unknown = of.subject.unknown_log10_p;
@@ -123,12 +123,12 @@ Judgement judge_again(const Inquiry& of, const Selector& catalogue, Judgement ju
   return judged;
 }
 
-Result<Judgement> judge(const Inquiry& of, const Screening& screening) {
+Result<Judgement> judge(const DiagnosisRequest& of, const Screening& screening) {
   Judgement judged;
   judged.named = screening.found;
-  if (screening.doubt) {
-    judged.base_in_doubt = true;
-    return doubted(std::move(judged), *screening.doubt);
+  if (screening.warning) {
+    judged.base_is_suspicious = true;
+    return with_warning(std::move(judged), *screening.warning);
   }
   Explanation& named = judged.named;
   const Regression explained = explained_by(*screening.catalogue, named);
@@ -140,7 +140,7 @@ Result<Judgement> judge(const Inquiry& of, const Screening& screening) {
   for (const FoundSpread& found : named.spreads) nats += found.fit.gain;
   const bool on_grid =
       (of.subject.looks & kLooksForRounding) != 0 && named.study().grid.step_m > kLeastQuantum_m;
-  if (on_grid && !of.left_out("pose_quantisation")) named.grid_m = named.study().grid.step_m;
+  if (on_grid && !of.excluded("pose_quantisation")) named.grid_m = named.study().grid.step_m;
   const bool two = std::any_of(named.chosen.begin(), named.chosen.end(), [](const ChosenEffect& c) {
     return kind_of(c.candidate.signature.effect) != c.candidate.signature.effect;
   });

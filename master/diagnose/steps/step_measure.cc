@@ -6,7 +6,7 @@
 
 namespace gapfarm::steps {
 
-Result<Study> tune(const Inquiry& of) {
+Result<Study> tune(const DiagnosisRequest& of) {
   Result<Study> study = of.subject.make_study(of.problem, of.options.genes);
   if (!study) return study;
   const Status tuned = of.subject.tune(of.predictor, of.options.keep_base, &*study);
@@ -14,7 +14,7 @@ Result<Study> tune(const Inquiry& of) {
   return study;
 }
 
-Result<Evidence> evidence_of(const Inquiry& of, Study study) {
+Result<Evidence> evidence_of(const DiagnosisRequest& of, Study study) {
   auto nuisances = of.subject.nuisances(of.predictor, study);
   if (!nuisances) return nuisances.error();
   if (study.session_spread > 0) *nuisances = beside_sessions(study, *nuisances);
@@ -30,7 +30,7 @@ Eigen::MatrixXd beside_sessions(const Study& study, const Eigen::MatrixXd& nuisa
   return both;
 }
 
-Result<Evidence> measure(const Inquiry& of, const Study& tuned) {
+Result<Evidence> measure(const DiagnosisRequest& of, const Study& tuned) {
   auto evidence = evidence_of(of, tuned);
   // Twice where far trials are trusted less: again without what they drew to themselves.
   for (int round = 0; round < 2 && evidence; ++round) {

@@ -7,48 +7,49 @@
 #include <utility>
 #include <vector>
 
-#include "master/diagnose/correction/stray_fit.h"
+#include "master/diagnose/correction/outlier_fit.h"
 #include "master/diagnose/places/slip_places.h"
 #include "master/diagnose/steps/steps.h"
 
 namespace gapfarm::steps {
 
-// Squared distance beyond which a trial strays, with 3 degrees of freedom: one in 110.
+// Squared distance beyond which a trial is an outlier, with 3 degrees of freedom: one in 110.
 inline constexpr double kSlippedSquared = 11.5;
 inline constexpr int kMostRounds = 6;  // of a fit that does not settle; most need two
 
 // Base and hypotheses searched together, where the scenario has nothing else.
-Result<Screening> compete(const Inquiry& of, const Evidence& measured);
+Result<Screening> compete(const DiagnosisRequest& of, const Evidence& measured);
 
 // By paired scores: not by chance, but for one case in twenty.
 bool clearly_better(const std::vector<double>& scores, const std::vector<double>& others);
 
 // The study's nuisances and covariates by its present noise.
-Result<Evidence> evidence_of(const Inquiry& of, Study study);
+Result<Evidence> evidence_of(const DiagnosisRequest& of, Study study);
 // Nuisances, and before them what the gains of the study's sessions do.
 Eigen::MatrixXd beside_sessions(const Study& study, const Eigen::MatrixXd& nuisances);
 // The same without what these trials say.
 Explanation without(const Explanation& all, const std::vector<bool>& ignored);
 
 // Readings that came late are found and put right.
-Result<Explanation> look_for_late_readings(const Inquiry& of, Explanation so_far);
+Result<Explanation> look_for_late_readings(const DiagnosisRequest& of, Explanation partial);
 // Where paths were logged they say more of a lag than rest poses do, and have the last word.
-Result<Explanation> look_for_lag(const Inquiry& of, Explanation so_far);
-// Before any effect on the mean: trials that stray would pass for a patch of floor or a seam. Those
-// that are foretold better once the effect is foreseen tell nothing of means.
-Explanation look_for_spreads(const Inquiry& of, Explanation so_far, const Regression& explained);
+Result<Explanation> look_for_lag(const DiagnosisRequest& of, Explanation partial);
+// Before any effect on the mean: outlier trials would pass for a patch of floor or a seam. Those
+// that are predicted better once the effect is foreseen show nothing of means.
+Explanation look_for_spreads(const DiagnosisRequest& of, Explanation partial,
+                             const Regression& explained);
 // Whether each session has a gain of its own, of a spread that is clear from what is left of every
-// trial (m, m, rad); nothing that is told of means knows of them then.
-Explanation look_for_session_gains(const Inquiry& of, Explanation so_far,
+// trial (m, m, rad); no statement about means uses them then.
+Explanation look_for_session_gains(const DiagnosisRequest& of, Explanation partial,
                                    const std::vector<Eigen::Vector3d>& left);
 // Events that slow one side in some trials show as a tail along that side's derivative: a long one
 // when they are rare, a lopsided one when they are not.
-Explanation look_for_slips(const Inquiry& of, Explanation so_far, const Selector& catalogue,
-                           const Regression& explained);
+Explanation look_for_slips(const DiagnosisRequest& of, Explanation partial,
+                           const Selector& catalogue, const Regression& explained);
 
 // Where slips gather beside what acts everywhere, when what acted in a place `before` is gone from
 // the `rest`.  `catalogue` as it was before.
-std::optional<Gathering> gathering_beside(const Inquiry& of, const Explanation& before,
+std::optional<Gathering> gathering_beside(const DiagnosisRequest& of, const Explanation& before,
                                           const Selector& catalogue, const Explanation& rest);
 
 // What is left once all that was chosen is explained, and the nats that it took.
@@ -57,26 +58,27 @@ double explained_nats(const Selector& catalogue, const Regression& explained);
 
 std::vector<EffectCandidate> candidates_of(const std::vector<ChosenEffect>& chosen);
 // Base and these effects at their best linear fit.
-Overrides start_of(const Inquiry& of, const Selector& catalogue, const Explanation& so_far,
-                   const std::vector<EffectCandidate>& effects);
+Overrides start_of(const DiagnosisRequest& of, const Selector& catalogue,
+                   const Explanation& partial, const std::vector<EffectCandidate>& effects);
 // The effects fitted together, base and nuisances beside them to first order.
-Result<JointFit> estimate(const Inquiry& of, const Selector& catalogue, const Explanation& so_far,
-                          const std::vector<EffectCandidate>& effects, int rounds);
+Result<JointFit> estimate(const DiagnosisRequest& of, const Selector& catalogue,
+                          const Explanation& partial, const std::vector<EffectCandidate>& effects,
+                          int rounds);
 
 // What is left beside what is explained, also what repeats of a trial have in common.
 std::vector<Leftover> all_leftovers(const Explanation& explanation, const Regression& explained);
 // What the remaining effects leave at their estimates, where some were dropped.
-Judgement judge_again(const Inquiry& of, const Selector& catalogue, Judgement judged);
+Judgement judge_again(const DiagnosisRequest& of, const Selector& catalogue, Judgement judged);
 
 // Nothing is named any more; readings are as logged.
 Explanation naming_nothing(Explanation explanation);
 // Why nothing is to be named where tuning ended on the edge of what the scenario can be.
-SanityFinding on_bounds(const Inquiry& of, const Study& tuned);
+SanityFinding on_bounds(const DiagnosisRequest& of, const Study& tuned);
 // With its effects the model should predict about as well as its noise allows: why not to name any.
 std::optional<SanityFinding> missing_too_much(const Refit& refit);
-Judgement doubted(Judgement judged, SanityFinding finding);
+Judgement with_warning(Judgement judged, SanityFinding finding);
 // As if nothing had been looked for.
-Judgement base_doubted(const Inquiry& of, const Evidence& measured, Judgement judged);
+Judgement with_base_warning(const DiagnosisRequest& of, const Evidence& measured, Judgement judged);
 
 // A chosen effect that is to be dropped, and why.
 struct Worthless {
@@ -85,7 +87,7 @@ struct Worthless {
 };
 // Whether what was chosen, and is too little to be named, acts on all drives and explains more than
 // it leaves: effects of the right kind, or aliases of the right ones from where the base stands.
-bool draws_base(const Inquiry& of, const Judgement& judgement);
+bool draws_base(const DiagnosisRequest& of, const Judgement& judgement);
 // Trials that no fit saw are predicted no better with it than with what comes before it alone.
 // `perfect`: what a prediction scores that misses nothing, once that is known.  `put_last`: effects
 // that were of use beside all others; they are not asked again.
@@ -93,37 +95,38 @@ std::optional<Worthless> of_no_use(const Judgement& judged, const std::vector<Ne
                                    std::optional<double> perfect,
                                    const std::set<std::string>& put_last = {});
 // Its best size is none or more than there can be.
-std::optional<Worthless> at_its_bound(const Inquiry& of, const Explanation& named);
+std::optional<Worthless> at_its_bound(const DiagnosisRequest& of, const Explanation& named);
 Judgement dropped(Judgement judged, const Worthless& effect);
 
 // An effect that shifts single trials, such as a patch, passed for noise where it is not smooth:
 // what the fit leaves is measured as the tuned base's noise was.  Slips' noise came with them.
 Study study_beside(const Explanation& named, const JointFit& fit);
 // Of every trial, by the fits to the other folds.
-void score(const Inquiry& of, const std::vector<std::size_t>& folds, NestedFit* nested);
-// What a perfect prediction would score, with what makes single trials stray foreseen; what does
+void score(const DiagnosisRequest& of, const std::vector<std::size_t>& folds, NestedFit* nested);
+// What a perfect prediction would score, with what makes single trials outliers foreseen; what does
 // not help with that is dropped.
-Refit with_floor(const Inquiry& of, Refit refit, const std::vector<std::size_t>& folds);
+Refit with_floor(const DiagnosisRequest& of, Refit refit, const std::vector<std::size_t>& folds);
 
-// What is known of trials that may stray, one entry a trial.
-struct StrayLesson {
+// What is known of trials that may be outliers, one entry a trial.
+struct OutlierLesson {
   std::vector<Pose> ends;  // predicted
   // Measured ends less these, in their axes, by a fit to all trials and by fits to the other folds.
   Residuals residuals, unseen;
   std::vector<std::size_t> folds;
   std::vector<bool> learn;
 };
-struct ForetoldStrays {
-  StrayDrives strays;
+struct PredictedOutliers {
+  OutlierDrives outliers;
   NoiseEstimate noise;          // of all drives
-  std::vector<double> scores;   // of every trial, by what the other folds tell of strays
-  std::vector<double> chances;  // that it strayed
+  std::vector<double> scores;   // of every trial, by what the other folds show of outliers
+  std::vector<double> chances;  // that it was an outlier
 };
-// Whether a share of the drives strays in a way that has no name; nothing where hardly any does.
-std::optional<ForetoldStrays> look_astray(const Inquiry& of, const Study& study,
-                                          const StrayLesson& lesson);
+// Whether a share of the drives are outliers in a way that has no name; nothing where hardly any
+// does.
+std::optional<PredictedOutliers> look_for_outliers(const DiagnosisRequest& of, const Study& study,
+                                                   const OutlierLesson& lesson);
 // "7 % of drives end as if ..."
-std::string stray_words(const StrayDrives& strays);
+std::string outlier_text(const OutlierDrives& outliers);
 
 // Of a side's speed, over the trials that the fits learned from.
 double mean_loss_of_slips(const Explanation& named);

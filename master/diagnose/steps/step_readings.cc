@@ -16,7 +16,8 @@ constexpr double kLeastLagGain = 14;      // it stands for all samples of a path
 
 // Of every trial just before its motors stop, in the axes of its predicted end; none where that
 // cannot be simulated.
-Result<std::vector<Eigen::Vector3d>> end_velocities(const Inquiry& of, const Study& study) {
+Result<std::vector<Eigen::Vector3d>> end_velocities(const DiagnosisRequest& of,
+                                                    const Study& study) {
   constexpr double kStep_s = 0.02;
   Overrides shorter = study.base;
   shorter[of.table().row("timing_offset.offset")] = -kStep_s;
@@ -24,7 +25,7 @@ Result<std::vector<Eigen::Vector3d>> end_velocities(const Inquiry& of, const Stu
   if (!ends) return ends.error();
   std::vector<Eigen::Vector3d> velocity;
   if (!ends->front()) {
-    of.predictor.leave_out("pose_latency");
+    of.predictor.exclude("pose_latency");
     return velocity;
   }
   for (const Eigen::Vector3d& d : differences(study, *ends->front(), kStep_s)) {
@@ -35,7 +36,8 @@ Result<std::vector<Eigen::Vector3d>> end_velocities(const Inquiry& of, const Stu
 
 // The gap to the next reading counts from the stop of the motors, the parameter from rest: asks the
 // simulation how long before rest each command was where that gap begins.
-Result<double> latency_from_rest(const Inquiry& of, const Study& study, const LatencyFit& latency,
+Result<double> latency_from_rest(const DiagnosisRequest& of, const Study& study,
+                                 const LatencyFit& latency,
                                  const std::vector<Eigen::Vector3d>& velocity) {
   std::vector<CommandSpec> commands;
   for (const Cell& cell : study.cells) commands.push_back(cell.command);
@@ -47,10 +49,10 @@ Result<double> latency_from_rest(const Inquiry& of, const Study& study, const La
   std::vector<double> ages;
   for (std::size_t c = 0; c < commands.size(); ++c) {
     const std::vector<PathSample>& path = (*paths)[c];
-    const Eigen::Vector3d& way = *of_cell[c];
+    const Eigen::Vector3d& late_velocity = *of_cell[c];
     for (std::size_t k = path.size(); k-- > 0;) {
       const Eigen::Vector3d short_of = -local_difference(path.back().pose, path[k].pose);
-      if (way.dot(short_of) < latency.latency_s * way.squaredNorm()) continue;
+      if (late_velocity.dot(short_of) < latency.latency_s * late_velocity.squaredNorm()) continue;
       ages.push_back(path.back().t_s - path[k].t_s);
       break;
     }
@@ -59,51 +61,51 @@ Result<double> latency_from_rest(const Inquiry& of, const Study& study, const La
 }
 
 // Late readings make the motors look slow and the drive noisy, and so themselves less late.
-Result<Explanation> put_late_readings_right(const Inquiry& of, Explanation so_far,
+Result<Explanation> put_late_readings_right(const DiagnosisRequest& of, Explanation partial,
                                             std::vector<Eigen::Vector3d> velocity) {
-  const Study as_logged = so_far.study();
+  const Study as_logged = partial.study();
   for (int round = 0; round < kLatencyRounds; ++round) {
-    Study study = so_far.study();
-    const std::vector<Eigen::Vector3d> marks = late_marks(study, so_far.latency, velocity);
+    Study study = partial.study();
+    const std::vector<Eigen::Vector3d> marks = late_marks(study, partial.latency, velocity);
     for (std::size_t i = 0; i < study.size(); ++i) study.trials[i].late = marks[i];
     study.noise = as_logged.noise;
     if (Status s = of.subject.tune(of.predictor, of.options.keep_base, &study); !s)
       return s.error();
     auto measured = measure(of, study);
     if (!measured) return measured.error();
-    so_far.evidence = std::make_shared<const Evidence>(std::move(*measured));
-    auto faster = end_velocities(of, so_far.study());
+    partial.evidence = std::make_shared<const Evidence>(std::move(*measured));
+    auto faster = end_velocities(of, partial.study());
     if (!faster) return faster.error();
     if (faster->empty()) break;
     velocity = std::move(*faster);
-    so_far.latency = fit_latency(so_far.study(), velocity);
+    partial.latency = fit_latency(partial.study(), velocity);
   }
-  const auto from_rest = latency_from_rest(of, so_far.study(), so_far.latency, velocity);
+  const auto from_rest = latency_from_rest(of, partial.study(), partial.latency, velocity);
   if (!from_rest) return from_rest.error();
-  so_far.latency_from_rest_s = *from_rest;
-  so_far.as_logged = as_logged;
-  return so_far;
+  partial.latency_from_rest_s = *from_rest;
+  partial.as_logged = as_logged;
+  return partial;
 }
 
 }  // namespace
 
 // A late camera reads a pose before the motion has ended; the next reading shows it.
-Result<Explanation> look_for_late_readings(const Inquiry& of, Explanation so_far) {
-  const Study& study = so_far.study();
+Result<Explanation> look_for_late_readings(const DiagnosisRequest& of, Explanation partial) {
+  const Study& study = partial.study();
   if ((of.subject.looks & kLooksForLateReadings) == 0 || study.gaps.size() < kFewestGaps)
-    return so_far;
+    return partial;
   const auto velocity = end_velocities(of, study);
   if (!velocity) return velocity.error();
-  if (velocity->empty()) return so_far;
-  so_far.latency = fit_latency(study, *velocity);
-  if (so_far.latency.gain < kLeastLatencyGain) return so_far;
-  if (of.left_out("pose_latency")) {
-    so_far.odd_readings =
+  if (velocity->empty()) return partial;
+  partial.latency = fit_latency(study, *velocity);
+  if (partial.latency.gain < kLeastLatencyGain) return partial;
+  if (of.excluded("pose_latency")) {
+    partial.odd_readings =
         "Of some readings the next one says that the robot was still under way: nothing "
         "that could explain them was looked for.";
-    return so_far;
+    return partial;
   }
-  auto right = put_late_readings_right(of, std::move(so_far), *velocity);
+  auto right = put_late_readings_right(of, std::move(partial), *velocity);
   if (!right) return right;
   Signature s;
   s.effect = "pose_latency";
@@ -116,17 +118,17 @@ Result<Explanation> look_for_late_readings(const Inquiry& of, Explanation so_far
   return right;
 }
 
-Result<Explanation> look_for_lag(const Inquiry& of, Explanation so_far) {
-  if (!of.looks_for("motor_lag", kLooksForLag) || !of.has_paths()) return so_far;
-  auto lag = fit_path_lag(of.predictor, so_far.study());
+Result<Explanation> look_for_lag(const DiagnosisRequest& of, Explanation partial) {
+  if (!of.looks_for("motor_lag", kLooksForLag) || !of.has_paths()) return partial;
+  auto lag = fit_path_lag(of.predictor, partial.study());
   if (!lag && lag.error().code == ErrorCode::kSimulation) {
-    of.predictor.leave_out("motor_lag");
-    return so_far;
+    of.predictor.exclude("motor_lag");
+    return partial;
   }
   if (!lag) return lag.error();
-  so_far.lag = *lag;
-  if (so_far.lag.gain < kLeastLagGain) so_far.lag.gain = 0;
-  return so_far;
+  partial.lag = *lag;
+  if (partial.lag.gain < kLeastLagGain) partial.lag.gain = 0;
+  return partial;
 }
 
 }  // namespace gapfarm::steps

@@ -17,8 +17,9 @@ Eigen::MatrixXd no_nuisances(const Study& study) {
 }
 
 // `scored_in`: by its noise, where the fit had another.
-NestedFit nested_fit(const Inquiry& of, std::string name, JointFit fit, const Study& fitted_in,
-                     Study scored_in, const std::vector<std::size_t>& folds) {
+NestedFit nested_fit(const DiagnosisRequest& of, std::string name, JointFit fit,
+                     const Study& fitted_in, Study scored_in,
+                     const std::vector<std::size_t>& folds) {
   fit.jacobian = scored_in.rewhitened(fitted_in, fit.jacobian);
   NestedFit nested{
       std::move(name), of.predictor.tasks(fit.at), std::move(fit), std::move(scored_in), {}};
@@ -28,7 +29,7 @@ NestedFit nested_fit(const Inquiry& of, std::string name, JointFit fit, const St
 
 // The base alone, as it was logged and with late readings put right, then with one effect more at a
 // time.
-Result<std::vector<NestedFit>> nested_fits(const Inquiry& of, const Explanation& named,
+Result<std::vector<NestedFit>> nested_fits(const DiagnosisRequest& of, const Explanation& named,
                                            const std::vector<std::size_t>& folds) {
   const Study& study = named.study();
   const Eigen::MatrixXd none = no_nuisances(study);
@@ -74,16 +75,16 @@ Result<std::vector<NestedFit>> nested_fits(const Inquiry& of, const Explanation&
 // say, when a battery sags.  Their sizes come from beside the base that was fitted with them: from
 // where that fit ended, which can be simulated, since with this base and another fit's effects the
 // robot may fall over.
-Result<JointFit> estimate_beside(const Inquiry& of, const Explanation& named,
+Result<JointFit> estimate_beside(const DiagnosisRequest& of, const Explanation& named,
                                  const NestedFit& with_base) {
   return fit_jointly(of.predictor, named.study(), candidates_of(named.chosen), with_base.fit.at,
                      BaseParameters::kHeld, named.evidence->nuisances, kMostRounds);
 }
 
 // Where more is left than a name allows, what the catalogue does explain is named as no cause; the
-// model that is left behind has it all the same when trials left out are clearly better predicted
+// model that is written has it all the same when held-out trials are clearly better predicted
 // so.
-Result<Refit> with_correction(const Inquiry& of, const Screening& screening, Refit refit,
+Result<Refit> with_correction(const DiagnosisRequest& of, const Screening& screening, Refit refit,
                               const std::vector<std::size_t>& folds) {
   const Explanation& named = refit.judged.named;
   if (refit.judged.unnamed.empty() || of.options.keep_base) return refit;
@@ -110,7 +111,7 @@ Result<Refit> with_correction(const Inquiry& of, const Screening& screening, Ref
   refit.nested.push_back(std::move(corrected));
   refit.correction =
       "model.toml holds " + name +
-      " as a correction: trials left out are predicted better so, but too much is left to call it "
+      " as a correction: held-out trials are predicted better so, but too much is left to call it "
       "the cause.";
   refit.judged.cautions.push_back(refit.correction);
   return refit;
@@ -123,8 +124,8 @@ bool explains_bounds(const Refit& refit) {
          base_on_bounds(named.study(), refit.nested.back().fit.at).empty();
 }
 
-// The base alone is what is left to tell of.
-Result<Refit> naming_none(const Inquiry& of, const Evidence& measured, Refit refit,
+// The base alone is what is left to report.
+Result<Refit> naming_none(const DiagnosisRequest& of, const Evidence& measured, Refit refit,
                           std::optional<SanityFinding> missing,
                           const std::vector<std::size_t>& folds) {
   Judgement& judged = refit.judged;
@@ -133,8 +134,8 @@ Result<Refit> naming_none(const Inquiry& of, const Evidence& measured, Refit ref
   std::erase(judged.cautions, refit.correction);
   refit.correction.clear();
   const bool freed = judged.named.frees_base;
-  if (missing) judged = doubted(std::move(judged), std::move(*missing));
-  if (freed) judged = base_doubted(of, measured, std::move(judged));
+  if (missing) judged = with_warning(std::move(judged), std::move(*missing));
+  if (freed) judged = with_base_warning(of, measured, std::move(judged));
   auto nested = nested_fits(of, judged.named, folds);
   if (!nested) return nested.error();
   refit.nested = std::move(*nested);
@@ -149,8 +150,8 @@ void put_last(std::size_t effect, std::vector<ChosenEffect>* chosen, std::set<st
   std::rotate(at, at + 1, chosen->end());
 }
 
-// The values that are told, with the base that fits beside them: report and model say the same.
-Result<Refit> with_final_fit(const Inquiry& of, Refit refit) {
+// The reported values, with the base that fits beside them: report and model say the same.
+Result<Refit> with_final_fit(const DiagnosisRequest& of, Refit refit) {
   const Explanation& named = refit.judged.named;
   if (named.chosen.empty()) return refit;
   auto fit = fit_jointly(of.predictor, refit.nested.back().study, {}, named.estimates->at,
@@ -165,14 +166,14 @@ Result<Refit> with_final_fit(const Inquiry& of, Refit refit) {
 
 Study study_beside(const Explanation& named, const JointFit& fit) {
   Study study = named.study();
-  if (named.names_strays()) return study;
+  if (named.names_outliers()) return study;
   for (std::size_t i = 0; i < study.size(); ++i) study.trials[i].residual = fit.residuals[i];
   estimate_noise(Regression(named.evidence->nuisances, study.whitened_residuals()),
                  named.evidence->blocks, &study);
   return study;
 }
 
-void score(const Inquiry& of, const std::vector<std::size_t>& folds, NestedFit* nested) {
+void score(const DiagnosisRequest& of, const std::vector<std::size_t>& folds, NestedFit* nested) {
   const double share = of.outlier_share();
   std::vector<double> scores = held_out_scores(nested->study, nested->fit, folds, share);
   // The folds' fits are linear steps from this one: what they reach beyond it is not to be had.
@@ -180,8 +181,8 @@ void score(const Inquiry& of, const std::vector<std::size_t>& folds, NestedFit* 
   nested->scores = mean(own) < mean(scores) ? std::move(own) : std::move(scores);
 }
 
-Result<Refit> refit(const Inquiry& of, const Evidence& measured, const Screening& screening,
-                    const Judgement& judgement) {
+Result<Refit> refit(const DiagnosisRequest& of, const Evidence& measured,
+                    const Screening& screening, const Judgement& judgement) {
   Refit refit;
   refit.judged = judgement;
   Explanation& named = refit.judged.named;
@@ -191,7 +192,7 @@ Result<Refit> refit(const Inquiry& of, const Evidence& measured, const Screening
                         named.estimates ? 1 : 2);
     if (!fit) return fit.error();
     named.estimates = std::move(*fit);
-    tell_of_fit(of, *named.estimates);
+    emit_fit(of, *named.estimates);
   }
   const std::vector<std::size_t> folds = of.subject.folds(named.study());
   std::set<std::string> were_last;
@@ -199,7 +200,7 @@ Result<Refit> refit(const Inquiry& of, const Evidence& measured, const Screening
     auto nested = nested_fits(of, named, folds);
     if (!nested) return nested.error();
     refit.nested = std::move(*nested);
-    tell_of_gaps(of, refit.nested);
+    emit_gaps(of, refit.nested);
     auto idle = of_no_use(refit.judged, refit.nested, std::nullopt, were_last);
     std::optional<Worthless> worthless;
     if (!idle && !named.chosen.empty()) {

@@ -18,7 +18,7 @@ namespace {
 constexpr std::size_t kMostToFreeBase = 2;
 
 // Rows of the screening table, a candidate each.
-std::vector<Screened> screened(const Inquiry& of, const Evidence& evidence,
+std::vector<Screened> screened(const DiagnosisRequest& of, const Evidence& evidence,
                                const std::vector<EffectCandidate>& candidates) {
   const ParameterTable& table = of.table();
   std::vector<Eigen::VectorXd> explained;
@@ -60,7 +60,8 @@ std::vector<Screened> screened(const Inquiry& of, const Evidence& evidence,
 
 // The effects at their joint estimate, for a selection that goes on from there; no columns where
 // that cannot be simulated.
-Result<Relinearised> relinearised_at(const Inquiry& of, const Study& study, const JointFit& fit,
+Result<Relinearised> relinearised_at(const DiagnosisRequest& of, const Study& study,
+                                     const JointFit& fit,
                                      const std::vector<EffectCandidate>& effects) {
   const ParameterTable& table = of.table();
   std::vector<PredictionRequest> without;
@@ -99,7 +100,7 @@ Result<Relinearised> relinearised_at(const Inquiry& of, const Study& study, cons
 }
 
 // Chooses from the catalogue beside what is explained first.
-Result<Screening> choose(const Inquiry& of, Screening screening) {
+Result<Screening> choose(const DiagnosisRequest& of, Screening screening) {
   Explanation& found = screening.found;
   Selector& catalogue = *screening.catalogue;
   found.estimates.reset();
@@ -111,7 +112,7 @@ Result<Screening> choose(const Inquiry& of, Screening screening) {
     auto at_estimate = relinearised_at(of, found.study(), *fit, effects);
     if (!at_estimate || at_estimate->columns.empty()) return at_estimate;
     found.estimates = std::move(*fit);  // where the next estimate begins
-    tell_of_fit(of, *found.estimates);
+    emit_fit(of, *found.estimates);
     return at_estimate;
   };
   const bool to_free_base = found.frees_base && found.tuned_alone.empty();
@@ -122,24 +123,24 @@ Result<Screening> choose(const Inquiry& of, Screening screening) {
   return screening;
 }
 
-Result<Screening> search_catalogue(const Inquiry& of, Explanation found) {
-  std::vector<std::string> left_out = of.options.left_out;
-  if (found.lag.trials > 0) left_out.emplace_back("motor_lag");
+Result<Screening> search_catalogue(const DiagnosisRequest& of, Explanation found) {
+  std::vector<std::string> excluded = of.options.excluded;
+  if (found.lag.trials > 0) excluded.emplace_back("motor_lag");
   const Evidence& evidence = *found.evidence;
-  auto signatures = of.subject.signatures(of.predictor, evidence.study, left_out);
+  auto signatures = of.subject.signatures(of.predictor, evidence.study, excluded);
   if (!signatures) return signatures.error();
   for (Signature& s : *signatures) evidence.study.drop_ignored(s.columns);
   Screening screening;
   screening.catalogue = std::make_unique<Selector>(of.predictor, evidence.study,
                                                    std::move(*signatures), evidence.base);
   Selector& catalogue = *screening.catalogue;
-  catalogue.leave_out({of.options.left_out.begin(), of.options.left_out.end()});
-  if (!of.left_out(kPatchEffect)) catalogue.look_for_patches();
+  catalogue.exclude({of.options.excluded.begin(), of.options.excluded.end()});
+  if (!of.excluded(kPatchEffect)) catalogue.look_for_patches();
   found.chosen.clear();
   auto alone = catalogue.candidates(explained_by(catalogue, found), {});
   if (!alone) return alone.error();
   screening.rows = screened(of, evidence, *alone);
-  tell_of_candidates(of, *alone);
+  emit_candidates(of, *alone);
   screening.alone = std::move(*alone);
   screening.found = std::move(found);
   return choose(of, std::move(screening));
@@ -147,7 +148,7 @@ Result<Screening> search_catalogue(const Inquiry& of, Explanation found) {
 
 // A strong effect draws a base to its bounds, too; beside it the base comes back.  If not, nothing
 // stays chosen.
-Result<Screening> free_base(const Inquiry& of, Screening screening) {
+Result<Screening> free_base(const DiagnosisRequest& of, Screening screening) {
   Explanation& found = screening.found;
   if (found.chosen.empty()) return screening;
   const std::vector<EffectCandidate> effects = candidates_of(found.chosen);
@@ -165,7 +166,7 @@ Result<Screening> free_base(const Inquiry& of, Screening screening) {
 // Strong effects drew the base to themselves and passed for noise where they are not smooth: the
 // catalogue is gone through once more from the base that fits beside them, with the noise that they
 // leave.
-Result<Screening> search_again(const Inquiry& of, Explanation found) {
+Result<Screening> search_again(const DiagnosisRequest& of, Explanation found) {
   const JointFit& beside = *found.estimates;
   Study study = found.study();
   Regression left(found.evidence->nuisances, study.whiten(beside.residuals));
@@ -182,24 +183,24 @@ Result<Screening> search_again(const Inquiry& of, Explanation found) {
 }
 
 // Chooses again, without trials that are ignored by now.
-Result<Screening> choose_among_the_rest(const Inquiry& of, Screening screening) {
+Result<Screening> choose_among_the_rest(const DiagnosisRequest& of, Screening screening) {
   const Evidence& rest = *screening.found.evidence;
   screening.catalogue->recount(rest.study, rest.base);
   return choose(of, std::move(screening));
 }
 
-// Beside a strong effect on the mean nothing strays visibly; with it explained some may.
-Result<Screening> look_for_spreads_again(const Inquiry& of, Screening screening) {
+// Beside a strong effect on the mean no outliers visibly; with it explained some may.
+Result<Screening> look_for_spreads_again(const DiagnosisRequest& of, Screening screening) {
   Explanation& found = screening.found;
-  if (found.names_strays() || found.chosen.empty()) return screening;
+  if (found.names_outliers() || found.chosen.empty()) return screening;
   found = look_for_spreads(of, found, explained_by(*screening.catalogue, found));
-  if (!found.names_strays()) return screening;
+  if (!found.names_outliers()) return screening;
   return choose_among_the_rest(of, std::move(screening));
 }
 
 // Trials in which a side slipped pull on every mean: the effects are looked for again without them,
 // but for those that are kept (none: empty).
-Result<Screening> choose_without_slips(const Inquiry& of, Screening screening,
+Result<Screening> choose_without_slips(const DiagnosisRequest& of, Screening screening,
                                        const Regression& explained, const std::vector<bool>& kept) {
   Explanation& found = screening.found;
   const Eigen::VectorXd z = studentised(explained, 0.2);
@@ -214,7 +215,7 @@ Result<Screening> choose_without_slips(const Inquiry& of, Screening screening,
   return choose_among_the_rest(of, std::move(screening));
 }
 
-Result<Screening> look_for_slips_and_choose(const Inquiry& of, Screening screening) {
+Result<Screening> look_for_slips_and_choose(const DiagnosisRequest& of, Screening screening) {
   const Regression explained = explained_by(*screening.catalogue, screening.found);
   screening.found = look_for_slips(of, std::move(screening.found), *screening.catalogue, explained);
   if (!(screening.found.slip.gain > 0)) return screening;
@@ -222,7 +223,7 @@ Result<Screening> look_for_slips_and_choose(const Inquiry& of, Screening screeni
   const Selector all = *screening.catalogue;
   auto rest = choose_without_slips(of, std::move(screening), explained, {});
   if (!rest) return rest;
-  // A patch of floor moves single drives, too: it may have been left out with them.
+  // A patch of floor moves single drives, too: it may have been omitted with them.
   const auto gathering = gathering_beside(of, before, all, rest->found);
   if (!gathering) return rest;
   *rest->catalogue = all;
@@ -249,7 +250,7 @@ std::vector<Eigen::Vector3d> left_with_sessions(const Explanation& found) {
 }
 
 // Beside a strong effect on the mean sessions may seem alike; with it explained they may not be.
-Result<Screening> look_for_session_gains_again(const Inquiry& of, Screening screening) {
+Result<Screening> look_for_session_gains_again(const DiagnosisRequest& of, Screening screening) {
   Explanation& found = screening.found;
   if (found.names_session_gains() || found.chosen.empty()) return screening;
   found = look_for_session_gains(of, found, left_with_sessions(found));
@@ -257,7 +258,7 @@ Result<Screening> look_for_session_gains_again(const Inquiry& of, Screening scre
   return choose_among_the_rest(of, std::move(screening));
 }
 
-Result<Screening> look_beside_readings(const Inquiry& of, const Explanation& found) {
+Result<Screening> look_beside_readings(const DiagnosisRequest& of, const Explanation& found) {
   auto screening = search_catalogue(of, look_for_spreads(of, found, found.evidence->base));
   if (screening && found.frees_base) {
     screening = free_base(of, std::move(*screening));
@@ -274,7 +275,7 @@ Result<Screening> look_beside_readings(const Inquiry& of, const Explanation& fou
 }
 
 // Whether sessions differ beside what was chosen, too, as clearly as it takes to name that.
-bool sessions_still_differ(const Inquiry& of, const Explanation& found) {
+bool sessions_still_differ(const DiagnosisRequest& of, const Explanation& found) {
   for (const FoundSpread& spread : found.spreads) {
     if (!spread.row->by_session) continue;
     return found.chosen.empty() ||
@@ -286,8 +287,8 @@ bool sessions_still_differ(const Inquiry& of, const Explanation& found) {
 
 // Sessions that seem to differ are measured again with what they have of their own taken out; they
 // may do so because of something else that the catalogue holds.
-Result<Screening> look_for_all(const Inquiry& of, Explanation so_far) {
-  auto found = look_for_late_readings(of, std::move(so_far));
+Result<Screening> look_for_all(const DiagnosisRequest& of, Explanation partial) {
+  auto found = look_for_late_readings(of, std::move(partial));
   if (found) found = look_for_lag(of, std::move(*found));
   if (!found) return found.error();
   const Study& study = found->study();
@@ -323,36 +324,38 @@ double explained_nats(const Selector& catalogue, const Regression& explained) {
   return (catalogue.nothing_explained().left_squares() - explained.left_squares()) / 2;
 }
 
-Overrides start_of(const Inquiry& of, const Selector& catalogue, const Explanation& so_far,
-                   const std::vector<EffectCandidate>& effects) {
-  Overrides at = so_far.study().base;
+Overrides start_of(const DiagnosisRequest& of, const Selector& catalogue,
+                   const Explanation& partial, const std::vector<EffectCandidate>& effects) {
+  Overrides at = partial.study().base;
   for (std::size_t k = 0; k < effects.size(); ++k) {
     std::vector<const Signature*> others;
-    for (const Signature& s : so_far.first) others.push_back(&s);
+    for (const Signature& s : partial.first) others.push_back(&s);
     for (std::size_t j = 0; j < effects.size(); ++j) {
       if (j != k) others.push_back(&effects[j].signature);
     }
     const Regression explained = catalogue.with(others);
-    for (const auto& [key, value] : start_values(so_far.study(), explained, effects[k].signature)) {
+    for (const auto& [key, value] :
+         start_values(partial.study(), explained, effects[k].signature)) {
       at[of.table().row(key)] = value;
     }
   }
   return at;
 }
 
-Result<JointFit> estimate(const Inquiry& of, const Selector& catalogue, const Explanation& so_far,
-                          const std::vector<EffectCandidate>& effects, int rounds) {
-  const bool moves = of.subject.base_moves || so_far.frees_base;
-  Overrides start = start_of(of, catalogue, so_far, effects);
+Result<JointFit> estimate(const DiagnosisRequest& of, const Selector& catalogue,
+                          const Explanation& partial, const std::vector<EffectCandidate>& effects,
+                          int rounds) {
+  const bool moves = of.subject.base_moves || partial.frees_base;
+  Overrides start = start_of(of, catalogue, partial, effects);
   for (const EffectCandidate& effect : effects) {
-    for (const auto& [row, value] : so_far.estimates ? so_far.estimates->at : Overrides{}) {
+    for (const auto& [row, value] : partial.estimates ? partial.estimates->at : Overrides{}) {
       const std::string& belongs = of.table()[row].effect;
       if (belongs == effect.signature.effect || (belongs.empty() && moves)) start[row] = value;
     }
   }
   const BaseParameters base = moves ? BaseParameters::kFitted : BaseParameters::kHeld;
-  const Study& study = so_far.study();
-  const Eigen::MatrixXd& nuisances = so_far.evidence->nuisances;
+  const Study& study = partial.study();
+  const Eigen::MatrixXd& nuisances = partial.evidence->nuisances;
   auto fit = fit_jointly(of.predictor, study, effects, start, base, nuisances, rounds);
   if (!fit) return fit;
   const auto moved = move_seams(of.predictor, study, nuisances, &*fit);
@@ -361,7 +364,7 @@ Result<JointFit> estimate(const Inquiry& of, const Selector& catalogue, const Ex
   return fit_jointly(of.predictor, study, effects, fit->at, base, nuisances, rounds);
 }
 
-Result<Screening> screen(const Inquiry& of, const Evidence& measured, bool free_base) {
+Result<Screening> screen(const DiagnosisRequest& of, const Evidence& measured, bool free_base) {
   if (of.subject.signatures == nullptr) return compete(of, measured);
   Explanation nothing;
   nothing.evidence = std::make_shared<const Evidence>(measured);
@@ -374,7 +377,7 @@ Result<Screening> screen(const Inquiry& of, const Evidence& measured, bool free_
     Screening none;
     none.found = std::move(nothing);
     none.found.frees_base = false;
-    none.doubt = on_bounds(of, measured.study);
+    none.warning = on_bounds(of, measured.study);
     return none;
   }
   return screening;

@@ -33,10 +33,10 @@ std::vector<std::size_t> residual_folds(const Study& study) {
   return folds;
 }
 
-std::string percent_words(double share) { return plain_number(std::round(100 * share)) + " %"; }
+std::string percent_text(double share) { return plain_number(std::round(100 * share)) + " %"; }
 
 // "each command's shift by duration and greater duty, in the robot's axes"
-std::string term_words(const ResidualTerm& term) {
+std::string term_text(const ResidualTerm& term) {
   std::vector<std::string> labels;
   for (const std::size_t row : term.covariates) {
     labels.emplace_back(residual_covariates()[row].label);
@@ -64,16 +64,16 @@ ResidualField in_world(ResidualField field, const Eigen::Vector2d& origin) {
 
 std::string residual_sentence(const FoundResidual& found) {
   if (found.correction.empty()) {
-    return "Corrections of what is left were tried, smooth ones and of single drives that stray; "
-           "none surely helps on trials that no fit saw, so none is kept.";
+    return "Corrections of what is left were tried, smooth ones and of single outlier drives; "
+           "none helps significantly on trials that no fit saw, so none is kept.";
   }
   std::vector<std::string> terms;
-  for (const ResidualTerm& term : found.correction.field) terms.push_back(term_words(term));
-  if (found.correction.strays) terms.push_back(stray_words(*found.correction.strays));
+  for (const ResidualTerm& term : found.correction.field) terms.push_back(term_text(term));
+  if (found.correction.outliers) terms.push_back(outlier_text(*found.correction.outliers));
   std::string text;
   for (const std::string& term : terms) text += (text.empty() ? "" : "; ") + term;
-  return "A correction without a cause closes " + percent_words(found.closed) + " [" +
-         percent_words(found.closed_lo) + ", " + percent_words(found.closed_hi) +
+  return "A correction without a cause closes " + percent_text(found.closed) + " [" +
+         percent_text(found.closed_lo) + ", " + percent_text(found.closed_hi) +
          "] of the gap on trials that its fit did not see: " + text +
          ". model.toml has it as [residual].";
 }
@@ -84,18 +84,18 @@ struct TriedShape {
   Residual residual;  // empty: none helps
   std::vector<double> without_it, with_it;
   NoiseEstimate noise;  // of predictions beside it
-  // What the smooth part leaves, and of that what may stray.
+  // What the smooth part leaves, and of that what may lie far off.
   Study beside;
-  StrayLesson lesson;
-  std::vector<double> chances;  // of every trial to have strayed
+  OutlierLesson lesson;
+  std::vector<double> chances;  // of every trial to be an outlier
 };
 
 // What a smooth correction makes of scores and noise.
-void predict_beside(const Inquiry& of, const Refit& refit, const Residuals& after, Study* beside,
-                    TriedShape* tried) {
+void predict_beside(const DiagnosisRequest& of, const Refit& refit, const Residuals& after,
+                    Study* beside, TriedShape* tried) {
   const Explanation& named = refit.judged.named;
   const double share = of.outlier_share();
-  if (!named.names_strays()) {
+  if (!named.names_outliers()) {
     estimate_noise(Regression(named.evidence->nuisances, beside->whitened_residuals()),
                    named.evidence->blocks, beside);
   }
@@ -107,13 +107,13 @@ void predict_beside(const Inquiry& of, const Refit& refit, const Residuals& afte
   tried->noise = beside->predictive_noise();
 }
 
-// The smooth part's ends and what they leave; strays are looked for about them.
-StrayLesson lesson_about(const ResidualData& data, const JointFit& told, const ResidualFit& smooth,
-                         Residuals unseen) {
-  StrayLesson lesson{data.ends, told.residuals, std::move(unseen), data.fold, data.learn};
+// The smooth part's ends and what they leave; outliers are looked for about them.
+OutlierLesson lesson_about(const ResidualData& data, const JointFit& reported_fit,
+                           const ResidualFit& smooth, Residuals unseen) {
+  OutlierLesson lesson{data.ends, reported_fit.residuals, std::move(unseen), data.fold, data.learn};
   if (smooth.field.empty()) return lesson;
   for (std::size_t i = 0; i < data.size(); ++i) {
-    const Eigen::Vector3d& r = told.residuals[i];
+    const Eigen::Vector3d& r = reported_fit.residuals[i];
     lesson.ends[i] = corrected_end(smooth.field, data.facts[i], data.ends[i]);
     lesson.residuals[i] = local_difference(lesson.ends[i], data.ends[i] * Pose{r[0], r[1], r[2]});
   }
@@ -121,19 +121,19 @@ StrayLesson lesson_about(const ResidualData& data, const JointFit& told, const R
 }
 
 // Each model with the noise that it leaves.
-TriedShape try_shape(const Inquiry& of, const Refit& refit, std::size_t k) {
+TriedShape try_shape(const DiagnosisRequest& of, const Refit& refit, std::size_t k) {
   const JointFit& last = refit.nested[k].fit;
-  const JointFit& told = refit.final_fit ? *refit.final_fit : last;
+  const JointFit& reported_fit = refit.final_fit ? *refit.final_fit : last;
   const Study& study = refit.nested[k].study;
   const std::vector<std::size_t> folds = residual_folds(study);
   ResidualData data{logged_motions(of.problem),
-                    told.ends,
+                    reported_fit.ends,
                     study.whitener,
                     folds,
                     std::vector<bool>(study.size(), true),
                     study.free_commands};
   for (std::size_t i = 0; i < study.size(); ++i) data.learn[i] = !study.ignores(i);
-  const ResidualFit fit = fit_residual(data, told.residuals, [&](std::size_t fold) {
+  const ResidualFit fit = fit_residual(data, reported_fit.residuals, [&](std::size_t fold) {
     return left_without(study, last, folds, fold);
   });
   TriedShape tried;
@@ -149,25 +149,25 @@ TriedShape try_shape(const Inquiry& of, const Refit& refit, std::size_t k) {
   }
   tried.without_it = tried.with_it = scores_of(study, before, share);
   if (!fit.field.empty()) predict_beside(of, refit, after, &beside, &tried);
-  tried.lesson = lesson_about(data, told, fit, after);
+  tried.lesson = lesson_about(data, reported_fit, fit, after);
   tried.beside = std::move(beside);
   return tried;
 }
 
-TriedShape with_strays(const Inquiry& of, const Refit& refit, TriedShape tried) {
-  if (refit.judged.named.names_strays()) return tried;
-  auto astray = look_astray(of, tried.beside, tried.lesson);
-  if (!astray || !clearly_better(astray->scores, tried.with_it)) return tried;
-  tried.residual.strays = astray->strays;
-  tried.with_it = std::move(astray->scores);
-  tried.noise = astray->noise;
-  tried.chances = std::move(astray->chances);
+TriedShape with_outliers(const DiagnosisRequest& of, const Refit& refit, TriedShape tried) {
+  if (refit.judged.named.names_outliers()) return tried;
+  auto found_outliers = look_for_outliers(of, tried.beside, tried.lesson);
+  if (!found_outliers || !clearly_better(found_outliers->scores, tried.with_it)) return tried;
+  tried.residual.outliers = found_outliers->outliers;
+  tried.with_it = std::move(found_outliers->scores);
+  tried.noise = found_outliers->noise;
+  tried.chances = std::move(found_outliers->chances);
   return tried;
 }
 
 // Of a correction by effects that are no cause, the smooth one takes the place unless both together
 // predict clearly better.
-TriedShape best_shape(const Inquiry& of, const Refit& refit) {
+TriedShape best_shape(const DiagnosisRequest& of, const Refit& refit) {
   TriedShape tried = try_shape(of, refit, refit.nested.size() - 1);
   if (refit.correction.empty()) return tried;
   TriedShape alone = try_shape(of, refit, refit.nested.size() - 2);
@@ -178,17 +178,17 @@ TriedShape best_shape(const Inquiry& of, const Refit& refit) {
 
 }  // namespace
 
-Refit add_shape(const Inquiry& of, const Refit& refit) {
+Refit add_shape(const DiagnosisRequest& of, const Refit& refit) {
   Refit with = refit;
   const Verdict verdict = refit.judged.verdict;
   const bool unexplained = verdict == Verdict::kUnknown || verdict == Verdict::kEffectAndUnknown;
-  // A lag found in paths is in the model that is left behind, but not in these fits.
+  // A lag found in paths is in the model that is written, but not in these fits.
   const bool possible =
       scenario_form(of.problem.scenario).residual && refit.judged.named.lag.gain == 0;
   if (!unexplained || !possible) return with;
   FoundResidual& found = with.shape.emplace();
   found.text = residual_sentence(found);
-  const TriedShape tried = with_strays(of, refit, best_shape(of, refit));
+  const TriedShape tried = with_outliers(of, refit, best_shape(of, refit));
   if (tried.residual.empty() || !clearly_better(tried.with_it, refit.nested.back().scores))
     return with;
   const auto n = static_cast<double>(tried.with_it.size());
@@ -198,8 +198,8 @@ Refit add_shape(const Inquiry& of, const Refit& refit) {
   double squares = 0;
   for (const double g : gains) squares += (g - gained) * (g - gained);
   const double half = kNormal90 * std::sqrt(squares) / n;
-  // The noise that passed for the floor had the strays in it.
-  if (tried.residual.strays) with.floor = std::max(refit.floor, mean(tried.with_it));
+  // The noise that passed for the floor had the outliers in it.
+  if (tried.residual.outliers) with.floor = std::max(refit.floor, mean(tried.with_it));
   const ClosedShare closed = closed_share(of, with, gains);
   if (!(gained - half > 0 && closed.lo > 0)) {
     with.floor = refit.floor;
@@ -210,7 +210,7 @@ Refit add_shape(const Inquiry& of, const Refit& refit) {
     std::erase(with.judged.cautions, with.correction);
     with.correction.clear();
   }
-  found = {{in_world(tried.residual.field, of.frame_m), tried.residual.strays},
+  found = {{in_world(tried.residual.field, of.frame_m), tried.residual.outliers},
            gained,
            gained - half,
            gained + half,

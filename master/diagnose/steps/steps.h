@@ -1,5 +1,5 @@
 // The steps of diagnose(), and the values that they hand on.  None changes what it was given; each
-// asks the simulation through the inquiry alone.
+// asks the simulation through the request alone.
 #pragma once
 
 #include <Eigen/Core>
@@ -17,7 +17,7 @@
 #include "master/diagnose/evidence/spread_row.h"
 #include "master/diagnose/fit/estimate.h"
 #include "master/diagnose/fit/selection.h"
-#include "master/diagnose/steps/inquiry.h"
+#include "master/diagnose/steps/diagnosis_request.h"
 #include "master/diagnose/study.h"
 
 namespace gapfarm::steps {
@@ -44,19 +44,19 @@ struct Explanation {
   std::optional<Study> as_logged;  // where they were put right: the study before that
   PathLag lag;
   SlipFit slip;
-  std::vector<FoundSpread> spreads;  // what else makes trials stray
+  std::vector<FoundSpread> spreads;  // what else makes trials outliers
   double grid_m = 0;                 // of the positions, once it is named
   std::vector<ChosenEffect> chosen;
   std::optional<JointFit> estimates;  // of these, base held, beside nuisances
   Overrides searched_error;  // standard errors with the base free, where it was searched too
 
   std::string odd_readings;  // what readings show that no effect looked for explains
-  std::string odd_drives;    // the same of drives that stray in one place
+  std::string odd_drives;    // the same of outlier drives in one place
 
   const Study& study() const { return evidence->study; }
   bool names_a_spread() const { return slip.gain > 0 || !spreads.empty(); }
   bool names_session_gains() const { return study().session_spread > 0; }
-  bool names_strays() const {
+  bool names_outliers() const {
     return slip.gain > 0 || std::any_of(spreads.begin(), spreads.end(),
                                         [](const FoundSpread& s) { return !s.row->by_session; });
   }
@@ -68,11 +68,11 @@ struct Explanation {
 
 struct Screening {
   Explanation found;
-  std::vector<Screened> rows;           // of the table
-  std::vector<EffectCandidate> alone;   // of every effect, before anything was chosen
-  std::unique_ptr<Selector> catalogue;  // refers to the evidence
-  std::optional<SanityFinding> doubt;   // why nothing is to be looked for
-  std::optional<double> explained;      // nats, held out, where hypotheses competed
+  std::vector<Screened> rows;            // of the table
+  std::vector<EffectCandidate> alone;    // of every effect, before anything was chosen
+  std::unique_ptr<Selector> catalogue;   // refers to the evidence
+  std::optional<SanityFinding> warning;  // why nothing is to be looked for
+  std::optional<double> explained;       // nats, held out, where hypotheses competed
 };
 
 // What is to be believed of that.
@@ -86,8 +86,8 @@ struct Judgement {
   std::vector<ChosenEffect> unnamed;
   std::vector<NearMiss> nearest;
   std::vector<std::string> cautions;
-  std::vector<SanityFinding> doubts;  // with any, nothing is to be named
-  bool base_in_doubt = false;         // as if nothing had been looked for
+  std::vector<SanityFinding> warnings;  // with any, nothing is to be named
+  bool base_is_suspicious = false;      // as if nothing had been looked for
 };
 
 // A model fitted without nuisances, since this is what a user's predictions will come from.
@@ -106,50 +106,54 @@ struct Refit {
   std::vector<NestedFit> nested;
   std::vector<double> slip_scores;     // held out, of the last fit and slips
   double floor = 0;                    // what a perfect prediction would score
-  std::string correction;              // what is said of that; empty: there is none
-  std::optional<JointFit> final_fit;   // base and effects as they are told
+  std::string correction;              // what is reported of that; empty: there is none
+  std::optional<JointFit> final_fit;   // base and effects as they are reported
   std::optional<FoundResidual> shape;  // a smooth correction of what is unexplained
   Residual residual;                   // the same in the log's frame; empty: none helps
   std::optional<NoiseEstimate> noise;  // of predictions beside it
 };
 
 // A base that fits the log, or the problem's own.
-Result<Study> tune(const Inquiry& of);
+Result<Study> tune(const DiagnosisRequest& of);
 
 // The noise that no smooth function explains, and the log by it.
-Result<Evidence> measure(const Inquiry& of, const Study& tuned);
+Result<Evidence> measure(const DiagnosisRequest& of, const Study& tuned);
 
 // All that the catalogue offers, and what of it the log calls for.  `free_base`: see Explanation; a
 // base on its bounds is freed in any case.
-Result<Screening> screen(const Inquiry& of, const Evidence& measured, bool free_base = false);
+Result<Screening> screen(const DiagnosisRequest& of, const Evidence& measured,
+                         bool free_base = false);
 
 // Whether that explains enough to be named.
-Result<Judgement> judge(const Inquiry& of, const Screening& screening);
+Result<Judgement> judge(const DiagnosisRequest& of, const Screening& screening);
 
 // What is named, fitted with the base and scored on trials that no fit saw; what proves worthless
 // is dropped.
-Result<Refit> refit(const Inquiry& of, const Evidence& measured, const Screening& screening,
-                    const Judgement& judgement);
+Result<Refit> refit(const DiagnosisRequest& of, const Evidence& measured,
+                    const Screening& screening, const Judgement& judgement);
 
 // All that follows from looking once more where the first look ended with nothing.
-struct SecondLook {
+struct Reselection {
   Screening screening;
   Refit refit;
 };
 // Where what explains most was still too little to be named, looked for from the base that tuning
 // drew to it: the same with the base freed, where that explains everything; else nothing.
-Result<std::optional<SecondLook>> look_from_free_base(const Inquiry& of, const Evidence& measured,
-                                                      const Judgement& judgement);
+Result<std::optional<Reselection>> look_from_free_base(const DiagnosisRequest& of,
+                                                       const Evidence& measured,
+                                                       const Judgement& judgement);
 // Where all that was chosen was dropped again and something is left to explain: what the rest of
 // the catalogue explains, if that is everything; else nothing.
-Result<std::optional<SecondLook>> look_without_dropped(const Inquiry& of, const Evidence& measured,
-                                                       const Screening& screening,
-                                                       const Refit& refit);
+Result<std::optional<Reselection>> reselect_without_dropped(const DiagnosisRequest& of,
+                                                            const Evidence& measured,
+                                                            const Screening& screening,
+                                                            const Refit& refit);
 
-// Where something is unexplained: a smooth correction of it, if one surely helps.
-Refit add_shape(const Inquiry& of, const Refit& refit);
+// Where something is unexplained: a smooth correction of it, if one helps significantly.
+Refit add_shape(const DiagnosisRequest& of, const Refit& refit);
 
 // Figures, words, values and what to drive next.
-Result<DiagnosisResult> report(const Inquiry& of, const Screening& screening, const Refit& refit);
+Result<DiagnosisResult> report(const DiagnosisRequest& of, const Screening& screening,
+                               const Refit& refit);
 
 }  // namespace gapfarm::steps

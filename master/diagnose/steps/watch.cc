@@ -16,12 +16,12 @@ namespace {
 constexpr std::size_t kMostCandidates = 8;
 constexpr std::size_t kMostPlaces = 3;
 
-bool watched(const Inquiry& of) { return of.options.on_finding != nullptr; }
+bool watched(const DiagnosisRequest& of) { return of.options.on_finding != nullptr; }
 
 std::string three_digits(double value) { return plain_number(rounded_to_digits(value, 3)); }
 
 // "3.1 mm and 12 mrad": root mean squares over `count` trials.
-std::string misses_words(double position_squares, double heading_squares, std::size_t count) {
+std::string misses_text(double position_squares, double heading_squares, std::size_t count) {
   const double n = static_cast<double>(std::max<std::size_t>(count, 1));
   return three_digits(1e3 * std::sqrt(position_squares / n)) + " mm and " +
          three_digits(1e3 * std::sqrt(heading_squares / n)) + " mrad (root mean square)";
@@ -35,30 +35,30 @@ std::vector<Eigen::Vector3d> residuals_of(const Study& study) {
 
 }  // namespace
 
-void tell_of_base(const Inquiry& of, const Study& study) {
+void emit_base(const DiagnosisRequest& of, const Study& study) {
   if (!watched(of)) return;
   double position = 0, heading = 0;
   for (const ResidualTrial& trial : study.trials) {
     position += trial.residual.head<2>().squaredNorm();
     heading += trial.residual[2] * trial.residual[2];
   }
-  Finding told;
-  told.about = "the base model";
-  told.text = fmt::format("The base model, {} {} trials, misses their ends by {}.",
-                          of.options.keep_base ? "as it was given and held against" : "tuned on",
-                          study.size(), misses_words(position, heading, study.size()));
+  Finding finding;
+  finding.about = "the base model";
+  finding.text = fmt::format("The base model, {} {} trials, misses their ends by {}.",
+                             of.options.keep_base ? "as it was given and held against" : "tuned on",
+                             study.size(), misses_text(position, heading, study.size()));
   for (const std::size_t row : study.on_bounds) {
-    told.text += " " + of.table()[row].key + " ended on its bound.";
+    finding.text += " " + of.table()[row].key + " ended on its bound.";
   }
-  told.columns = {"parameter", "value"};
+  finding.columns = {"parameter", "value"};
   for (const auto& [row, value] : study.base) {
-    told.rows.emplace_back(of.table()[row].key,
-                           of.table().format(row, rounded_to_digits(value, 4)));
+    finding.rows.emplace_back(of.table()[row].key,
+                              of.table().format(row, rounded_to_digits(value, 4)));
   }
-  of.options.on_finding(std::move(told));
+  of.options.on_finding(std::move(finding));
 }
 
-void tell_of_noise(const Inquiry& of, const Study& study) {
+void emit_noise(const DiagnosisRequest& of, const Study& study) {
   if (!watched(of)) return;
   double position = 0, heading = 0;
   for (const Eigen::Matrix3d& cov : study.covariances()) {
@@ -68,21 +68,21 @@ void tell_of_noise(const Inquiry& of, const Study& study) {
   const std::vector<Eigen::Vector3d> residuals = residuals_of(study);
   const double share = of.outlier_share();
   const double gap = floor_score(study, share) - mean(scores_of(study, residuals, share));
-  Finding told;
-  told.about = "the noise";
-  told.text = fmt::format(
+  Finding finding;
+  finding.about = "the noise";
+  finding.text = fmt::format(
       "By chance alone ends would be missed by {}; beyond that, {} nats a trial are there to be "
       "explained.",
-      misses_words(position, heading, study.size()), three_digits(std::max(0.0, gap)));
-  told.columns = {"noise", "standard deviation"};
+      misses_text(position, heading, study.size()), three_digits(std::max(0.0, gap)));
+  finding.columns = {"noise", "standard deviation"};
   Overrides at;
   set_noise(of, study.noise, &at);
   for (const auto& [row, value] : at) {
     if (value == 0) continue;
-    told.rows.emplace_back(of.table()[row].key,
-                           of.table().format(row, rounded_to_digits(value, 3)));
+    finding.rows.emplace_back(of.table()[row].key,
+                              of.table().format(row, rounded_to_digits(value, 3)));
   }
-  of.options.on_finding(std::move(told));
+  of.options.on_finding(std::move(finding));
   const std::vector<Where> places = of.subject.where(study, residuals, of.problem);
   Finding lies{"where the gap lies", "", {}, {}};
   for (std::size_t i = 0; i < std::min(places.size(), kMostPlaces); ++i) {
@@ -92,49 +92,49 @@ void tell_of_noise(const Inquiry& of, const Study& study) {
   of.options.on_finding(std::move(lies));
 }
 
-void tell_of_readings(const Inquiry& of, const Explanation& found) {
+void emit_readings(const DiagnosisRequest& of, const Explanation& found) {
   if (!watched(of)) return;
-  Finding told{"readings and single drives", "", {}, {}};
+  Finding finding{"readings and single drives", "", {}, {}};
   if (found.latency.gain > 0 && !found.first.empty()) {
-    told.text += fmt::format("{} % of the poses were read late. ",
-                             plain_number(rounded_to_digits(100 * found.latency.share, 2)));
+    finding.text += fmt::format("{} % of the poses were read late. ",
+                                plain_number(rounded_to_digits(100 * found.latency.share, 2)));
   }
   if (found.lag.gain > 0)
-    told.text += "Paths show motors that lag by " + three_digits(found.lag.tau_s) + " s. ";
+    finding.text += "Paths show motors that lag by " + three_digits(found.lag.tau_s) + " s. ";
   if (found.slip.gain > 0) {
-    told.text += fmt::format("In {} % of the drives a side slips. ",
-                             plain_number(rounded_to_digits(100 * found.slip.probability, 2)));
+    finding.text += fmt::format("In {} % of the drives a side slips. ",
+                                plain_number(rounded_to_digits(100 * found.slip.probability, 2)));
   }
-  if (!found.odd_drives.empty()) told.text += found.odd_drives + " ";
-  if (told.text.empty()) return;
-  told.text.pop_back();
-  of.options.on_finding(std::move(told));
+  if (!found.odd_drives.empty()) finding.text += found.odd_drives + " ";
+  if (finding.text.empty()) return;
+  finding.text.pop_back();
+  of.options.on_finding(std::move(finding));
 }
 
-void tell_of_candidates(const Inquiry& of, const std::vector<EffectCandidate>& candidates) {
+void emit_candidates(const DiagnosisRequest& of, const std::vector<EffectCandidate>& candidates) {
   if (!watched(of) || candidates.empty()) return;
   std::vector<const EffectCandidate*> best;
   for (const EffectCandidate& c : candidates) best.push_back(&c);
   std::stable_sort(best.begin(), best.end(),
                    [](const auto* a, const auto* b) { return a->gain > b->gain; });
-  Finding told;
-  told.about = "what the catalogue offers";
-  told.text = fmt::format(
+  Finding finding;
+  finding.about = "what the catalogue offers";
+  finding.text = fmt::format(
       "Each of {} effects on its own; one is named from {} nats over all trials on, and what looks "
-      "alike is told apart by what comes next.",
+      "alike is distinguished by what comes next.",
       candidates.size(), plain_number(of.subject.least_gain));
-  told.columns = {"effect", "would gain, nats"};
+  finding.columns = {"effect", "would gain, nats"};
   for (std::size_t i = 0; i < std::min(best.size(), kMostCandidates); ++i) {
     if (best[i]->gain <= 0) break;
-    told.rows.emplace_back(best[i]->signature.effect, three_digits(best[i]->gain));
+    finding.rows.emplace_back(best[i]->signature.effect, three_digits(best[i]->gain));
   }
-  of.options.on_finding(std::move(told));
+  of.options.on_finding(std::move(finding));
 }
 
 // Sizes of the effects, as far as they have been fitted together.
-void tell_of_fit(const Inquiry& of, const JointFit& fit) {
+void emit_fit(const DiagnosisRequest& of, const JointFit& fit) {
   if (!watched(of)) return;
-  Finding told{"effects and their sizes", "", {"parameter", "value and standard error"}, {}};
+  Finding finding{"effects and their sizes", "", {"parameter", "value and standard error"}, {}};
   std::vector<std::string> names;
   for (const FittedParameter& fitted : fit.parameters) {
     const Parameter& row = of.table()[fitted.row];
@@ -143,64 +143,68 @@ void tell_of_fit(const Inquiry& of, const JointFit& fit) {
       names.push_back(row.effect);
     }
     const double value = fitted.value + of.frame_of(row.key, fit.at);
-    told.rows.emplace_back(row.key, of.table().format(fitted.row, rounded_to_digits(value, 4)) +
-                                        " ± " + three_digits(fitted.standard_error));
+    finding.rows.emplace_back(row.key, of.table().format(fitted.row, rounded_to_digits(value, 4)) +
+                                           " ± " + three_digits(fitted.standard_error));
   }
   if (names.empty()) return;
-  told.text = "Fitted together: " + listed(names) + ".";
-  of.options.on_finding(std::move(told));
+  finding.text = "Fitted together: " + listed(names) + ".";
+  of.options.on_finding(std::move(finding));
 }
 
-void tell_of_choice(const Inquiry& of, const Explanation& found, bool doubted) {
+void emit_choice(const DiagnosisRequest& of, const Explanation& found, bool has_warnings) {
   if (!watched(of)) return;
   std::vector<std::string> names;
   for (const ChosenEffect& c : found.chosen) names.push_back(c.candidate.signature.effect);
   for (const Signature& s : found.first) names.push_back(s.effect);
   if (found.lag.gain > 0) names.emplace_back("motor_lag");
   if (found.slip.gain > 0) names.emplace_back("slip_events");
-  Finding told{"what explains the gap", "", {}, {}};
-  told.text = doubted         ? "The base is in doubt, so nothing of the catalogue is looked for."
-              : names.empty() ? "Nothing of the catalogue explains more than chance does."
-                              : "Chosen from the catalogue so far: " + listed(names) + ".";
+  Finding finding{"what explains the gap", "", {}, {}};
+  finding.text = has_warnings
+                     ? "The base is in question, so nothing of the catalogue is looked for."
+                 : names.empty() ? "Nothing of the catalogue explains more than chance does."
+                                 : "Chosen from the catalogue so far: " + listed(names) + ".";
   for (const ChosenEffect& c : found.chosen) {
     for (const Alias& alias : c.aliases) {
-      told.text += " " + c.candidate.signature.effect + " is not told from " + alias.effect + ".";
+      finding.text +=
+          " " + c.candidate.signature.effect + " is not distinguished from " + alias.effect + ".";
     }
   }
-  of.options.on_finding(std::move(told));
+  of.options.on_finding(std::move(finding));
 }
 
-void tell_of_verdict(const Inquiry& of, const Judgement& judged) {
+void emit_verdict(const DiagnosisRequest& of, const Judgement& judged) {
   if (!watched(of)) return;
-  const bool doubted = !judged.doubts.empty();
-  tell_of_choice(of, judged.named, doubted);
-  Finding told{"what is left", "", {"what is left depends on", "log10 p"}, {}};
+  const bool has_warnings = !judged.warnings.empty();
+  emit_choice(of, judged.named, has_warnings);
+  Finding finding{"what is left", "", {"what is left depends on", "log10 p"}, {}};
   for (const Leftover& l : judged.left) {
     if (l.log10_p < of.subject.unknown_log10_p) {
-      told.rows.emplace_back(l.covariate, three_digits(l.log10_p));
+      finding.rows.emplace_back(l.covariate, three_digits(l.log10_p));
     }
   }
-  told.text = doubted || told.rows.empty()
-                  ? "Nothing is left that chance does not explain."
-                  : "Beside what was chosen the ends still depend on something, more than chance "
-                    "explains.";
-  if (doubted) told.text = "Not looked at: the base is in doubt.";
-  of.options.on_finding(std::move(told));
+  finding.text =
+      has_warnings || finding.rows.empty()
+          ? "Nothing is left that chance does not explain."
+          : "Beside what was chosen the ends still depend on something, more than chance "
+            "explains.";
+  if (has_warnings) finding.text = "Not looked at: the base is in question.";
+  of.options.on_finding(std::move(finding));
 }
 
 // On trials that the fits did not see.
-void tell_of_gaps(const Inquiry& of, const std::vector<NestedFit>& nested) {
+void emit_gaps(const DiagnosisRequest& of, const std::vector<NestedFit>& nested) {
   if (!watched(of)) return;
   const double perfect = floor_score(nested.back().study, of.outlier_share());
-  Finding told{"how far the gap closes", "", {"predicted with", "gap, nats a trial"}, {}};
+  Finding finding{"how far the gap closes", "", {"predicted with", "gap, nats a trial"}, {}};
   for (const NestedFit& n : nested) {
-    told.rows.emplace_back(n.name, three_digits(perfect - mean(n.scores)));
+    finding.rows.emplace_back(n.name, three_digits(perfect - mean(n.scores)));
   }
-  told.text = nested.size() == 1
-                  ? "No effect is left beside the base, which trials that a fit did not see miss "
-                    "by so much:"
-                  : "On trials that a fit did not see, one effect after the other:";
-  of.options.on_finding(std::move(told));
+  finding.text =
+      nested.size() == 1
+          ? "No effect is left beside the base, which trials that a fit did not see miss "
+            "by so much:"
+          : "On trials that a fit did not see, one effect after the other:";
+  of.options.on_finding(std::move(finding));
 }
 
 }  // namespace gapfarm::steps

@@ -92,7 +92,7 @@ std::vector<Child::Arm> Breeder::pick_arms(Stream& stream) const {
     arms.push_back({i, roulettes_[i].pick(stream)});
   }
   if (arms.size() == 2 && arms[0].index == 0 && arms[1].index == 0) {
-    // A clone tells nothing: one operator acts after all, crossover or mutation in proportion to
+    // A clone shows nothing: one operator acts after all, crossover or mutation in proportion to
     // how often each does.
     const double crossover = 1 - roulettes_[0].probabilities()[0];
     const double mutation = 1 - roulettes_[1].probabilities()[0];

@@ -72,7 +72,7 @@ class GeneticAlgorithm final : public Optimiser {
   Individual best_;
   Member best_member_;
   SeenGenomes seen_;
-  std::optional<Plan> plan_;  // asked, not yet told
+  std::optional<Plan> plan_;  // asked for, without scores yet
 };
 
 }  // namespace gapfarm

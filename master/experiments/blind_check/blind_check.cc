@@ -157,7 +157,7 @@ Status add_realised(const Config& config, const BlindCheckSettings& settings,
   std::vector<DiagnosedCase> diagnosed;
   std::vector<std::size_t> owner;
   for (std::size_t i = 0; i < cases.size(); ++i) {
-    if (!cases[i].promised && cases[i].truth.left_out.empty()) continue;
+    if (!cases[i].promised && cases[i].truth.excluded.empty()) continue;
     auto models = read_diagnosed_case(cases[i].truth, paths.diagnosis(cases[i].truth.id));
     if (!models) continue;
     diagnosed.push_back(std::move(*models));
@@ -177,8 +177,8 @@ Status add_realised(const Config& config, const BlindCheckSettings& settings,
 
 ScoredCase scored(const Truth& truth, const CheckPaths& paths) {
   ChildEnd end = read_outcome(paths.outcome(truth.id));
-  std::optional<Said> said = read_said(paths.diagnosis(truth.id), end);
-  return score_case(truth, end, std::move(said));
+  std::optional<Reported> reported = read_reported(paths.diagnosis(truth.id), end);
+  return score_case(truth, end, std::move(reported));
 }
 
 Status write_report(const BlindReport& report, const CheckPaths& paths) {
@@ -191,7 +191,7 @@ Status diagnose_blindly(const InHand& hand, const std::vector<Truth>& truths,
                         const CheckPaths& paths) {
   std::vector<OpenCase> open;
   for (const Truth& truth : truths) {
-    open.push_back({truth.id, paths.trials(truth.id), truth.left_out});
+    open.push_back({truth.id, paths.trials(truth.id), truth.excluded});
   }
   const PrivateMemory unreadable;
   const std::string key_path = key_path_of(settings);

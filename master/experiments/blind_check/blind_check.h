@@ -34,7 +34,7 @@ struct BlindCheckHooks {
                      double elapsed_s)>
       progress;
   std::function<void(const std::string& sentence)> note;
-  // Before the first diagnosis, with the truths sealed: whatever else would tell them has to go.
+  // Before the first diagnosis, with the truths sealed: whatever else would reveal them has to go.
   // May be empty.
   std::function<Status()> on_sealed;
   StopSource* stop = nullptr;  // not owned
@@ -43,7 +43,7 @@ struct BlindCheckHooks {
 struct DiagnoseSettings {
   // The program and its first arguments: {"/usr/bin/gapfarm", "diagnose"}.  Then come CONFIG,
   // --trials FILE, --out DIR, --workers N, --seed N and, when asked for, --model MODEL and
-  // --leave-out EFFECT.
+  // --exclude EFFECT.
   std::vector<std::string> command;
   std::string config_path;
   std::string model_path;      // empty: the diagnosis tunes the base itself

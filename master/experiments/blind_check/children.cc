@@ -37,7 +37,7 @@ Result<Child> start_job(const ChildJob& job) {
   const int log = open(job.log_path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
   if (log < 0) return Error{job.log_path + ": cannot be written: " + std::strerror(errno)};
   ChildSetup setup;
-  setup.words = job.argv;
+  setup.arguments = job.argv;
   setup.out = setup.err = log;
   setup.leads_group = true;
   const Result<pid_t> pid = start_child(setup);
@@ -118,7 +118,7 @@ class Crowd {
       }
       const Child child = children_[i];
       children_.erase(children_.begin() + static_cast<long>(i));
-      kill(-child.pid, SIGKILL);  // what it left behind
+      kill(-child.pid, SIGKILL);  // what is left of it
       close(child.pidfd);
       ++ended;
       const ChildEnd end = end_of(child, status, used, options_);

@@ -40,7 +40,7 @@ struct ChildrenOptions {
 
 // Runs all jobs in order; returns when the last has ended.  Every child leads a process group of
 // its own (a terminal's Ctrl-C does not reach it), inherits no descriptor, and dies with this
-// thread; a child beyond its limit is told to end, then made to, with all its group. Errors:
+// thread; a child beyond its limit is asked to end, then made to, with all its group. Errors:
 // kStopped, after the running children were ended (they are not reported); a program that
 // cannot be started.
 Status run_children(const std::vector<ChildJob>& jobs, const ChildrenOptions& options);

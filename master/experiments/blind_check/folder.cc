@@ -16,26 +16,27 @@ using Json = nlohmann::ordered_json;
 std::vector<std::string> diagnose_command(const OpenCase& open, std::size_t number,
                                           const CheckPaths& paths,
                                           const DiagnoseSettings& settings) {
-  std::vector<std::string> words = settings.command;
-  words.insert(words.end(),
-               {settings.config_path, "--trials", open.trials, "--out", paths.diagnosis(open.id),
-                "--workers", std::to_string(settings.workers), "--seed", std::to_string(number)});
+  std::vector<std::string> arguments = settings.command;
+  arguments.insert(
+      arguments.end(),
+      {settings.config_path, "--trials", open.trials, "--out", paths.diagnosis(open.id),
+       "--workers", std::to_string(settings.workers), "--seed", std::to_string(number)});
   // In a case's folder nothing lies but the case: its paths need no mark.
   const std::filesystem::path recorded =
       std::filesystem::path(open.trials).parent_path() / "paths.csv";
   std::error_code code;
   if (std::filesystem::exists(recorded, code)) {
-    words.insert(words.end(), {"--paths", recorded.string()});
+    arguments.insert(arguments.end(), {"--paths", recorded.string()});
   }
   if (!settings.model_path.empty()) {
-    words.insert(words.end(), {"--model", settings.model_path});
+    arguments.insert(arguments.end(), {"--model", settings.model_path});
   }
-  if (!open.left_out.empty()) {
+  if (!open.excluded.empty()) {
     // An effect that passes for another one is no stranger while the other one is there.
-    words.insert(words.end(), {"--leave-out", open.left_out});
-    for (const char* alias : effect_diagnosis(open.left_out).aliases) words.emplace_back(alias);
+    arguments.insert(arguments.end(), {"--exclude", open.excluded});
+    for (const char* alias : effect_diagnosis(open.excluded).aliases) arguments.emplace_back(alias);
   }
-  return words;
+  return arguments;
 }
 
 Status write_outcome(const ChildEnd& end, const std::string& path) {
@@ -147,13 +148,14 @@ ChildEnd read_outcome(const std::string& path) {
   return end;
 }
 
-std::optional<Said> read_said(const std::string& folder, ChildEnd& end) {
+std::optional<Reported> read_reported(const std::string& folder, ChildEnd& end) {
   if (end.state != ChildState::kDone) return std::nullopt;
   const std::string path = folder + "/diagnosis.json";
   const Result<std::string> text = read_text_file(path);
-  const Result<Said> said = text ? parse_said(*text, path) : Result<Said>(text.error());
-  if (said) return *said;
-  end.text = "left no readable diagnosis (" + said.error().message + ")";
+  const Result<Reported> reported =
+      text ? parse_reported(*text, path) : Result<Reported>(text.error());
+  if (reported) return *reported;
+  end.text = "left no readable diagnosis (" + reported.error().message + ")";
   return std::nullopt;
 }
 

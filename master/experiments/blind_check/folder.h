@@ -38,7 +38,7 @@ Result<CheckState> read_check_state(const std::string& path);
 struct OpenCase {
   std::string id;
   std::string trials;    // file
-  std::string left_out;  // effect; empty: none
+  std::string excluded;  // effect; empty: none
 };
 
 // Diagnoses the cases that have no outcome yet, each in its own process.
@@ -48,7 +48,7 @@ Status diagnose_cases(const std::vector<OpenCase>& cases, const CheckPaths& path
 // How a case's diagnosis ended; kFailed with a sentence when there is no outcome.
 ChildEnd read_outcome(const std::string& path);
 
-// What it said; none when it did not end well or left nothing readable, which `end` then tells.
-std::optional<Said> read_said(const std::string& folder, ChildEnd& end);
+// What it reported; none when it did not end well or left nothing readable, which `end` then shows.
+std::optional<Reported> read_reported(const std::string& folder, ChildEnd& end);
 
 }  // namespace gapfarm

@@ -13,17 +13,18 @@ namespace {
 
 using Family = std::set<std::string>;
 
-Family family_of(const SaidEffect& effect) {
+Family family_of(const ReportedEffect& effect) {
   Family family = {effect.name};
   const std::size_t count = std::min(effect.aliases.size(), kMaxAliases);
   family.insert(effect.aliases.begin(), effect.aliases.begin() + static_cast<long>(count));
   return family;
 }
 
-std::string names_of(const Said& said) {
+std::string names_of(const Reported& reported) {
   std::string text;
-  for (const SaidEffect& effect : said.effects) text += (text.empty() ? "" : "+") + effect.name;
-  return text.empty() ? said.verdict : said.verdict + " " + text;
+  for (const ReportedEffect& effect : reported.effects)
+    text += (text.empty() ? "" : "+") + effect.name;
+  return text.empty() ? reported.verdict : reported.verdict + " " + text;
 }
 
 std::string names_of(const Truth& truth) {
@@ -32,28 +33,28 @@ std::string names_of(const Truth& truth) {
   return text;
 }
 
-Judgement judge_effects(const Truth& truth, const Said& said) {
+Judgement judge_effects(const Truth& truth, const Reported& reported) {
   const std::string what = names_of(truth);
-  if (said.verdict != "effect" && said.verdict != "effect+unknown") {
-    return {false, what + "; said " + said.verdict};
+  if (reported.verdict != "effect" && reported.verdict != "effect+unknown") {
+    return {false, what + "; reported " + reported.verdict};
   }
   std::vector<Family> left;
-  for (const SaidEffect& effect : said.effects) left.push_back(family_of(effect));
+  for (const ReportedEffect& effect : reported.effects) left.push_back(family_of(effect));
   for (const TrueEffect& effect : truth.effects) {
     const auto hit = std::find_if(left.begin(), left.end(), [&](const Family& family) {
       return family.count(effect.name) > 0;
     });
     if (hit == left.end()) {
-      return {false, what + "; missed " + effect.name + ", said " + names_of(said)};
+      return {false, what + "; missed " + effect.name + ", reported " + names_of(reported)};
     }
     left.erase(hit);
   }
   if (truth.effects.size() == 1 &&
-      family_of(said.effects.front()).count(truth.effects.front().name) == 0) {
-    return {false, what + "; named after " + said.effects.front().name};
+      family_of(reported.effects.front()).count(truth.effects.front().name) == 0) {
+    return {false, what + "; named after " + reported.effects.front().name};
   }
-  if (!left.empty()) return {false, what + "; also said more: " + names_of(said)};
-  return {true, what + "; said " + names_of(said)};
+  if (!left.empty()) return {false, what + "; also reported more: " + names_of(reported)};
+  return {true, what + "; reported " + names_of(reported)};
 }
 
 // Strengths all neutral: places and directions mean nothing.
@@ -80,64 +81,65 @@ bool has_no_arrow(const std::string& effect) {
   return polar && polar->symmetry == 2;
 }
 
-// The same effect with its strength above neutral, as a diagnosis tells it.
-std::map<std::string, double> as_told(const TrueEffect& effect) {
-  std::map<std::string, double> told = effect.parameters;
-  if (!has_no_arrow(effect.name) || !told.count("direction")) return told;
-  const auto ratio = told.find("ratio"), stretch = told.find("stretch");
-  const bool across =
-      (ratio != told.end() && ratio->second < 1) || (stretch != told.end() && stretch->second < 0);
-  if (!across) return told;
-  if (ratio != told.end()) ratio->second = 1 / ratio->second;
-  if (stretch != told.end()) stretch->second = -stretch->second;
-  told["direction"] += std::numbers::pi / 2;
-  return told;
+// The same effect with its strength above neutral, as a diagnosis shows it.
+std::map<std::string, double> as_reported(const TrueEffect& effect) {
+  std::map<std::string, double> stated = effect.parameters;
+  if (!has_no_arrow(effect.name) || !stated.count("direction")) return stated;
+  const auto ratio = stated.find("ratio"), stretch = stated.find("stretch");
+  const bool across = (ratio != stated.end() && ratio->second < 1) ||
+                      (stretch != stated.end() && stretch->second < 0);
+  if (!across) return stated;
+  if (ratio != stated.end()) ratio->second = 1 / ratio->second;
+  if (stretch != stated.end()) stretch->second = -stretch->second;
+  stated["direction"] += std::numbers::pi / 2;
+  return stated;
 }
 
 }  // namespace
 
-Judgement judge(const Truth& truth, const Said& said) {
-  for (const SaidEffect& effect : said.effects) {
+Judgement judge(const Truth& truth, const Reported& reported) {
+  for (const ReportedEffect& effect : reported.effects) {
     if (effect.aliases.size() > kMaxAliases) {
       return {false, "more than " + std::to_string(kMaxAliases) + " aliases say nothing"};
     }
   }
   switch (truth.kind) {
     case CaseKind::kNull:
-      return {said.verdict == "none" && said.effects.empty(), "null; said " + names_of(said)};
+      return {reported.verdict == "none" && reported.effects.empty(),
+              "null; reported " + names_of(reported)};
     case CaseKind::kOutside:
-      return {
-          (said.verdict == "unknown" || said.verdict == "effect+unknown") && said.effects.empty(),
-          "outside the catalogue; said " + names_of(said)};
+      return {(reported.verdict == "unknown" || reported.verdict == "effect+unknown") &&
+                  reported.effects.empty(),
+              "outside the catalogue; reported " + names_of(reported)};
     case CaseKind::kSingle:
     case CaseKind::kPair:
       break;
   }
-  return judge_effects(truth, said);
+  return judge_effects(truth, reported);
 }
 
-std::string first_said(const Said& said) {
-  return said.effects.empty() ? said.verdict : said.effects.front().name;
+std::string first_reported(const Reported& reported) {
+  return reported.effects.empty() ? reported.verdict : reported.effects.front().name;
 }
 
-std::vector<Coverage> coverage_of(const Truth& truth, const Said& said) {
+std::vector<Coverage> coverage_of(const Truth& truth, const Reported& reported) {
   constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
   std::vector<Coverage> all;
   for (const TrueEffect& effect : truth.effects) {
-    const auto named = std::find_if(said.effects.begin(), said.effects.end(),
-                                    [&](const SaidEffect& s) { return s.name == effect.name; });
+    const auto named = std::find_if(reported.effects.begin(), reported.effects.end(),
+                                    [&](const ReportedEffect& s) { return s.name == effect.name; });
     const Effect* entry = catalogue_entry(effect.name);
-    if (named == said.effects.end() || !entry) continue;
+    if (named == reported.effects.end() || !entry) continue;
     const bool neutral = does_nothing(*entry, effect);
-    const std::map<std::string, double> told = as_told(effect);
+    const std::map<std::string, double> stated = as_reported(effect);
     for (std::size_t i = 0; i < entry->parameters.size(); ++i) {
       const EffectParameter& p = entry->parameters[i];
-      const auto value = told.find(p.key);
-      if (value == told.end() || !p.choices.empty()) continue;
+      const auto value = stated.find(p.key);
+      if (value == stated.end() || !p.choices.empty()) continue;
       if (neutral && i >= entry->strengths) continue;
       Coverage coverage{effect.name, p.key, value->second,       kNone,
                         kNone,       false, i < entry->strengths};
-      for (const SaidParameter& s : named->parameters) {
+      for (const ReportedParameter& s : named->parameters) {
         if (s.key != p.key) continue;
         coverage.lo = s.lo;
         coverage.hi = s.hi;
@@ -151,9 +153,9 @@ std::vector<Coverage> coverage_of(const Truth& truth, const Said& said) {
   return all;
 }
 
-double promised_shrinkage(const Said& said) {
+double promised_shrinkage(const Reported& reported) {
   double sum = 0;
-  for (const SaidEffect& effect : said.effects) sum += effect.closed;
+  for (const ReportedEffect& effect : reported.effects) sum += effect.closed;
   return sum;
 }
 

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "master/experiments/blind_check/cases/truth.h"
-#include "master/experiments/blind_check/said.h"
+#include "master/experiments/blind_check/reported.h"
 
 namespace gapfarm {
 
@@ -13,16 +13,16 @@ constexpr std::size_t kMaxAliases = 3;  // more say nothing
 
 struct Judgement {
   bool right = false;
-  std::string why;  // "floor_nap; said unknown"
+  std::string why;  // "floor_nap; reported unknown"
 };
 
 // A null must be called `none`; what the catalogue does not hold `unknown`, or `effect+unknown`
 // naming nothing; a single effect must be the first named or one of its aliases; of a pair both
 // must be named; and nothing else may be.
-Judgement judge(const Truth& truth, const Said& said);
+Judgement judge(const Truth& truth, const Reported& reported);
 
 // The first named effect, or the verdict when none is named.
-std::string first_said(const Said& said);
+std::string first_reported(const Reported& reported);
 
 // Whether the interval of one true parameter held it.
 struct Coverage {
@@ -36,13 +36,13 @@ struct Coverage {
 };
 
 // One entry a parameter of every true effect that was named by its own name: an alias has other
-// parameters.  Angles are compared on the circle.  Left out: choices (they have no interval) and
+// parameters.  Angles are compared on the circle.  Omitted: choices (they have no interval) and
 // what means nothing since the effect's strengths are neutral.
-std::vector<Coverage> coverage_of(const Truth& truth, const Said& said);
+std::vector<Coverage> coverage_of(const Truth& truth, const Reported& reported);
 
 // The share of the explainable gap that the diagnosis promises its effects close: the sum of
 // `closed`, NaN when an effect has none.  0 without effects.
-double promised_shrinkage(const Said& said);
+double promised_shrinkage(const Reported& reported);
 
 struct Rate {
   unsigned hits = 0;

@@ -87,12 +87,12 @@ Json rates_json(const std::map<std::string, Rate>& rates) {
   return json;
 }
 
-Json said_json(const Said& said) {
+Json reported_json(const Reported& reported) {
   Json effects = Json::array();
-  for (const SaidEffect& e : said.effects) {
+  for (const ReportedEffect& e : reported.effects) {
     effects.push_back({{"name", e.name}, {"aliases", e.aliases}});
   }
-  return {{"verdict", said.verdict}, {"effects", effects}};
+  return {{"verdict", reported.verdict}, {"effects", effects}};
 }
 
 Json case_json(const ScoredCase& c) {
@@ -100,7 +100,7 @@ Json case_json(const ScoredCase& c) {
                {"outcome", child_state_name(c.end.state)},
                {"wall_s", c.end.wall_s},
                {"cpu_s", c.end.cpu_s},
-               {"said", c.said ? said_json(*c.said) : Json()}};
+               {"said", c.reported ? reported_json(*c.reported) : Json()}};
   if (!c.end.text.empty()) json["outcome_text"] = c.end.text;
   if (!c.has_truth) return json;
   json["truth"] = parse_json(format_truth(c.truth));
@@ -176,16 +176,16 @@ std::string effects_markdown(const Tally& sum) {
 }
 
 std::string confusion_markdown(const Tally& sum) {
-  std::set<std::string> said;
+  std::set<std::string> reported;
   for (const auto& [truth, row] : sum.confusion) {
-    for (const auto& [name, count] : row) said.insert(name);
+    for (const auto& [name, count] : row) reported.insert(name);
   }
-  std::vector<std::string> head = {"truth \\ said first"};
-  head.insert(head.end(), said.begin(), said.end());
+  std::vector<std::string> head = {"truth \\ reported first"};
+  head.insert(head.end(), reported.begin(), reported.end());
   std::string text = table_head(head);
   for (const auto& [truth, row] : sum.confusion) {
     std::vector<std::string> cells = {truth};
-    for (const std::string& name : said) {
+    for (const std::string& name : reported) {
       const auto found = row.find(name);
       cells.push_back(found == row.end() ? "" : std::to_string(found->second));
     }
@@ -204,10 +204,10 @@ std::string effects_text(const Truth& truth) {
   return text.empty() ? "none" : text;
 }
 
-std::string said_text(const ScoredCase& c) {
-  if (!c.said) return c.end.text.empty() ? "no diagnosis" : c.end.text;
-  std::string text = c.said->verdict;
-  for (const SaidEffect& e : c.said->effects) {
+std::string reported_text(const ScoredCase& c) {
+  if (!c.reported) return c.end.text.empty() ? "no diagnosis" : c.end.text;
+  std::string text = c.reported->verdict;
+  for (const ReportedEffect& e : c.reported->effects) {
     text += " " + e.name;
     for (std::size_t i = 0; i < e.aliases.size(); ++i) text += (i ? ", " : " (or ") + e.aliases[i];
     if (!e.aliases.empty()) text += ")";
@@ -237,7 +237,7 @@ std::string cases_markdown(const std::vector<ScoredCase>& cases) {
     for (const Coverage& p : c.coverage) covered.add(p.covered);
     text +=
         row_of_cells({c.truth.id, c.has_truth ? case_kind_name(c.truth.kind) : "-", c.truth.level,
-                      c.has_truth ? effects_text(c.truth) : "-", said_text(c),
+                      c.has_truth ? effects_text(c.truth) : "-", reported_text(c),
                       !c.has_truth        ? "-"
                       : c.judgement.right ? "yes"
                                           : "NO",
@@ -291,8 +291,8 @@ std::string format_blind_markdown(const BlindReport& report) {
   for (const auto& [label, value] : report.provenance) text += "- " + label + ": `" + value + "`\n";
   text += "\n## Rates\n\n" + rates_markdown(sum);
   text += "\n## Single effects\n\n" + effects_markdown(sum);
-  text +=
-      "\n## Confusion\n\nTrue family against what was said first.\n\n" + confusion_markdown(sum);
+  text += "\n## Confusion\n\nTrue family against what was reported first.\n\n" +
+          confusion_markdown(sum);
   if (!report.out_of_reach.empty()) {
     text +=
         "\n## Out of reach\n\nNo strength within the catalogue's bounds is as large as wanted "
@@ -315,7 +315,7 @@ std::string format_blind_summary(const BlindReport& report) {
   for (const ScoredCase& c : report.cases) {
     if (c.has_truth && c.judgement.right) continue;
     text += (c.has_truth ? "WRONG " : "      ") + c.truth.id + ": " +
-            (c.has_truth ? c.judgement.why : said_text(c)) + "\n";
+            (c.has_truth ? c.judgement.why : reported_text(c)) + "\n";
   }
   return text;
 }

@@ -24,7 +24,7 @@ void add_kind(const ScoredCase& c, Tally& sum) {
   switch (c.truth.kind) {
     case CaseKind::kNull:
       sum.null_none.add(right);
-      sum.false_alarms.add(c.said && !c.said->effects.empty());
+      sum.false_alarms.add(c.reported && !c.reported->effects.empty());
       return;
     case CaseKind::kOutside:
       sum.outside_unknown.add(right);
@@ -40,7 +40,7 @@ void add_kind(const ScoredCase& c, Tally& sum) {
   }
   const std::string& name = c.truth.effects.front().name;
   sum.singles_right[c.truth.level].add(right);
-  sum.singles_first[c.truth.level].add(right && first_said(*c.said) == name);
+  sum.singles_first[c.truth.level].add(right && first_reported(*c.reported) == name);
   sum.by_effect[name][c.truth.level].add(right);
 }
 
@@ -58,19 +58,19 @@ std::optional<bool> closes_half(const FreshScores& scores, double least_gap) {
   return scores.corrected.value_or(scores.final_) - scores.tuned >= gap / 2;
 }
 
-ScoredCase score_case(const Truth& truth, const ChildEnd& end, std::optional<Said> said) {
+ScoredCase score_case(const Truth& truth, const ChildEnd& end, std::optional<Reported> reported) {
   ScoredCase scored;
   scored.truth = truth;
   scored.end = end;
-  scored.said = std::move(said);
-  if (!scored.said) {
+  scored.reported = std::move(reported);
+  if (!scored.reported) {
     scored.judgement = {false, "no diagnosis: it " + (end.text.empty() ? "left none" : end.text)};
     return scored;
   }
-  scored.judgement = judge(truth, *scored.said);
-  scored.coverage = coverage_of(truth, *scored.said);
-  const double promised = promised_shrinkage(*scored.said);
-  if (!scored.said->effects.empty() && std::isfinite(promised)) scored.promised = promised;
+  scored.judgement = judge(truth, *scored.reported);
+  scored.coverage = coverage_of(truth, *scored.reported);
+  const double promised = promised_shrinkage(*scored.reported);
+  if (!scored.reported->effects.empty() && std::isfinite(promised)) scored.promised = promised;
   return scored;
 }
 
@@ -79,9 +79,9 @@ Tally tally(const std::vector<ScoredCase>& cases) {
   for (const ScoredCase& c : cases) {
     if (!c.has_truth) continue;
     sum.right.add(c.judgement.right);
-    sum.failed.add(!c.said);
+    sum.failed.add(!c.reported);
     add_kind(c, sum);
-    ++sum.confusion[truth_family(c.truth)][c.said ? first_said(*c.said) : "failed"];
+    ++sum.confusion[truth_family(c.truth)][c.reported ? first_reported(*c.reported) : "failed"];
     for (const Coverage& coverage : c.coverage) {
       sum.covered.add(coverage.covered);
       (coverage.is_strength ? sum.strengths_covered : sum.places_covered).add(coverage.covered);

@@ -31,7 +31,7 @@ struct ScoredCase {
   Truth truth;  // foreign cases without a truth: the id alone
   bool has_truth = true;
   ChildEnd end;
-  std::optional<Said> said;  // none: the diagnosis failed
+  std::optional<Reported> reported;  // none: the diagnosis failed
   Judgement judgement;
   std::vector<Coverage> coverage;
   std::optional<double> promised;  // of named effects only
@@ -40,7 +40,7 @@ struct ScoredCase {
 };
 
 // Judges a case; a diagnosis that failed is wrong.
-ScoredCase score_case(const Truth& truth, const ChildEnd& end, std::optional<Said> said);
+ScoredCase score_case(const Truth& truth, const ChildEnd& end, std::optional<Reported> reported);
 
 constexpr double kPromiseTolerance = 0.1;
 
@@ -59,7 +59,7 @@ struct Tally {
   std::map<std::string, Rate> singles_first;  // by level; the true name itself came first
   std::map<std::string, std::map<std::string, Rate>> by_effect;  // effect, level
   std::map<std::string, Rate> covered_by_parameter;              // "floor_tilt.angle"
-  // True effect ("none", "outside", "pair") by what was said first ("failed" when nothing).
+  // True effect ("none", "outside", "pair") by what was reported first ("failed" when nothing).
   std::map<std::string, std::map<std::string, unsigned>> confusion;
 };
 

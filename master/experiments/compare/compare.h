@@ -42,7 +42,7 @@ using CompareScorer =
     std::function<Result<std::vector<Score>>(std::span<const CompareRequest> requests)>;
 
 // Runs all of them in step, so that a farm always has work.  Every run of a variant is the run that
-// `evolve` would make with that seed, but for its stop conditions.  `on_round` is told how many
+// `evolve` would make with that seed, but for its stop conditions.  `on_round` gets how many
 // evaluations of all are done.  Errors: of the optimisers' setup and of the scorer.
 Result<std::vector<ComparedRun>> compare(
     std::span<const Variant> variants, const CompareOptions& options, const CompareScorer& scorer,

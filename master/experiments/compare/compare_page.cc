@@ -38,7 +38,7 @@ LineChart convergence_chart(const ComparisonSummary& summary) {
     }
     chart.series.push_back(std::move(series));
   }
-  // A cost that nears zero is told apart on a log scale only.
+  // A cost that nears zero is distinguished on a log scale only.
   chart.log_y = positive;
   for (const Baseline& baseline : summary.baselines) {
     if (baseline.fitness) chart.levels.push_back({baseline.name, *baseline.fitness});

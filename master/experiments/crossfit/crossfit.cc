@@ -43,9 +43,9 @@ std::vector<Pose> mean_of_repeats(const TrialLog& log,
   return ends;
 }
 
-std::string joined(const std::vector<std::string>& words) {
+std::string joined(const std::vector<std::string>& tokens) {
   std::string text;
-  for (const std::string& word : words) text += (text.empty() ? "" : " ") + word;
+  for (const std::string& word : tokens) text += (text.empty() ? "" : " ") + word;
   return text;
 }
 

@@ -10,7 +10,7 @@
 
 namespace gapfarm {
 
-// Distances between where trials ended and where they were said to end.
+// Distances between where trials ended and where they were predicted to end.
 struct EndErrors {
   std::size_t trials = 0;
   double mean_m = 0;  // of end_error()

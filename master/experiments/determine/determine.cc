@@ -246,13 +246,13 @@ class Study {
                    std::to_string(terms(moving_.size()))};
     }
     Eigen::MatrixXd offsets(static_cast<Eigen::Index>(usable.size()), size());
-    Eigen::VectorXd told(offsets.rows());
+    Eigen::VectorXd outcomes(offsets.rows());
     for (Eigen::Index i = 0; i < offsets.rows(); ++i) {
       const Eigen::Index from = usable[static_cast<std::size_t>(i)];
       offsets.row(i) = design.offsets.row(from);
-      told[i] = values[static_cast<std::size_t>(from)];
+      outcomes[i] = values[static_cast<std::size_t>(from)];
     }
-    return fit(offsets, told, widths_);
+    return fit(offsets, outcomes, widths_);
   }
 
   void read_off(const Quadratic& quadratic) {

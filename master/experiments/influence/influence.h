@@ -76,7 +76,7 @@ Result<InfluenceReport> find_influence(Farm& farm, const Problem& problem,
                                        const InfluenceSettings& settings,
                                        const StageHooks& hooks = {});
 
-// Ranges in the table's own bounds of every base row (effects left out).
+// Ranges in the table's own bounds of every base row (effects omitted).
 std::vector<Gene> all_base_genes(const ParameterTable& table);
 
 // Text, CSV, and a page with bars.

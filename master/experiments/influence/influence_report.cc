@@ -101,7 +101,8 @@ std::string influence_page(const InfluenceReport& report, const ParameterTable& 
   page.heading("How far ahead paths can be compared");
   page.paragraph(
       "Tiny differences at the start grow with every collision. Beyond the horizon repeats of the "
-      "same run are as far apart as anything, and no parameter could be told from chance.");
+      "same run are as far apart as anything, and no parameter could be distinguished from "
+      "chance.");
   LineChart growth;
   growth.title = "Repeats of the standard";
   growth.x_title = "s compared";

@@ -154,17 +154,17 @@ bool Designer::stays(const TrialLog& log, std::size_t first, std::size_t count) 
 Result<std::vector<Chain>> Designer::choose() {
   const Sessions pool = draw(settings_.pool, settings_.seed);
   ASSIGN_OR_RETURN(const auto log, driven(pool));
-  ASSIGN_OR_RETURN(auto told, signals_of(log));
+  ASSIGN_OR_RETURN(auto shown_signals, signals_of(log));
   const auto trials = static_cast<double>(log.trials.size());
   std::vector<const Shift*> shifts;
   std::vector<double> scales;
-  for (const Shift& shift : told.shifts) {
-    const double all = information(shift.rows, told.nuisances);
+  for (const Shift& shift : shown_signals.shifts) {
+    const double all = information(shift.rows, shown_signals.nuisances);
     if (all <= 0) continue;
     shifts.push_back(&shift);
     scales.push_back(std::sqrt(kInformation * trials / (settings_.trials * all)));
   }
-  const Eigen::Index nuisances = told.nuisances.cols();
+  const Eigen::Index nuisances = shown_signals.nuisances.cols();
   std::vector<Chain> chains;  // that stay on the floor
   std::vector<Rows> candidates;
   Eigen::Index first = 0;
@@ -179,7 +179,7 @@ Result<std::vector<Chain>> Designer::choose() {
       candidate.col(static_cast<Eigen::Index>(k)) =
           scales[k] * shifts[k]->rows.segment(first, rows);
     }
-    candidate.rightCols(nuisances) = told.nuisances.middleRows(first, rows);
+    candidate.rightCols(nuisances) = shown_signals.nuisances.middleRows(first, rows);
     candidates.push_back(std::move(candidate));
     chains.push_back(std::move(chain));
     first += rows;
@@ -258,19 +258,19 @@ Result<DesignedPlan> design_plan(Farm& farm, const Config& config, const PlanSet
     return Error{"scenario " + config.problem.scenario +
                  " cannot be diagnosed, so there is nothing to plan for"};
   }
-  const auto say = [&](const std::string& what) {
+  const auto log_stage = [&](const std::string& what) {
     if (progress) progress(what);
   };
   DesignedPlan plan;
   Designer designer(farm, config, settings);
   RETURN_IF_ERROR(designer.choose_effects(&plan));
-  say("candidates");
+  log_stage("candidates");
   ASSIGN_OR_RETURN(const auto chains, designer.choose());
-  say("what the plan shows");
+  log_stage("what the plan shows");
   const SimulateSettings& simulate = config.simulate;
   ASSIGN_OR_RETURN(auto log, designer.driven(dealt(chains, simulate.sessions, simulate.pause_s)));
   ASSIGN_OR_RETURN(const auto planned, designer.signals_of(log));
-  say("what a random one shows");
+  log_stage("what a random one shows");
   ASSIGN_OR_RETURN(auto random, designer.driven(designer.draw(1, settings.seed + 1)));
   ASSIGN_OR_RETURN(const auto at_random, designer.signals_of(random));
   plan.seen = visibility(config.problem, planned);

@@ -1,5 +1,5 @@
-// What to drive so that a diagnosis can tell as many effects as possible from noise and from each
-// other.
+// What to drive so that a diagnosis can distinguish as many effects as possible from noise and from
+// each other.
 #pragma once
 
 #include <cstdint>
@@ -48,7 +48,7 @@ struct DesignedPlan {
 using PlanProgress = std::function<void(const std::string& what)>;
 
 // Draws `pool` times the chains that are wanted, as the config's [simulate] has them (levels,
-// durations, chain, arena), leaves out those that leave the arena, and takes those that tell most
+// durations, chain, arena), omits those that leave the arena, and takes those that show most
 // (selection.h) in that order: whoever stops early has driven the best of them.  Pure: the same for
 // one config, settings and build.  Errors: a scenario without a diagnosis; an unknown effect; too
 // few chains that stay in the arena; the farm's; a robot that does not drive.

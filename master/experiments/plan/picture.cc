@@ -37,9 +37,9 @@ View view_of(const TrialLog& log) {
 
 void draw_arrow(Svg& svg, SvgPoint from, SvgPoint to, const std::string& colour) {
   svg.line(from, to, {.stroke = colour, .stroke_width = 1.3, .opacity = 0.8});
-  const double way = std::hypot(to.x - from.x, to.y - from.y);
-  if (way < 4) return;
-  const double ux = (to.x - from.x) / way, uy = (to.y - from.y) / way;
+  const double length = std::hypot(to.x - from.x, to.y - from.y);
+  if (length < 4) return;
+  const double ux = (to.x - from.x) / length, uy = (to.y - from.y) / length;
   svg.polyline({{to.x - 5 * ux - 3 * uy, to.y - 5 * uy + 3 * ux},
                 to,
                 {to.x - 5 * ux + 3 * uy, to.y - 5 * uy - 3 * ux}},

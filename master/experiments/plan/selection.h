@@ -1,4 +1,5 @@
-// Which of many experiments to make, so that unknowns can be told from noise and from each other.
+// Which of many experiments to make, so that unknowns can be distinguished from noise and from each
+// other.
 #pragma once
 
 #include <Eigen/Core>

@@ -62,7 +62,7 @@ HeldOutGain interval_of(double mean, std::vector<double> drawn) {
 
 }  // namespace
 
-WindowFit fit_left_out(const WindowFitter& fitter, const std::vector<FitRow>& rows,
+WindowFit fit_held_out(const WindowFitter& fitter, const std::vector<FitRow>& rows,
                        const Eigen::VectorXd& start) {
   const auto blocks = static_cast<std::size_t>(fitter.windows().blocks);
   const std::vector<int> folds = folds_of(fitter.windows());

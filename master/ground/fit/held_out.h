@@ -1,4 +1,4 @@
-// Predictions of stretches of a log that were not fitted, and how surely one is better than
+// Predictions of stretches of a log that were not fitted, and how significantly one is better than
 // another.
 #pragma once
 
@@ -11,7 +11,7 @@ namespace gapfarm {
 
 // Nats of every window with the rows fitted to other blocks than its own (kFolds folds); no rows:
 // the file's values as they are.
-WindowFit fit_left_out(const WindowFitter& fitter, const std::vector<FitRow>& rows,
+WindowFit fit_held_out(const WindowFitter& fitter, const std::vector<FitRow>& rows,
                        const Eigen::VectorXd& start);
 
 // How often each block of a log counts, draw by draw.  Of n runs n less `spared` are drawn (of

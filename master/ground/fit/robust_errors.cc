@@ -15,14 +15,14 @@ namespace gapfarm {
 namespace {
 
 constexpr double kLeastScale = 1e-5;
-constexpr double kDimensions[] = {2, 1};  // of position and heading
-constexpr double kStrayShare = 0.25;      // of what windows of the commonest length cover
-constexpr double kEnoughWindows = 10;     // for a length to count in full
-constexpr double kMuchSharper = 0.5;      // of a scale
+constexpr double kDimensions[] = {2, 1};   // of position and heading
+constexpr double kRareLengthShare = 0.25;  // of what windows of the commonest length cover
+constexpr double kEnoughWindows = 10;      // for a length to count in full
+constexpr double kMuchSharper = 0.5;       // of a scale
 // What is a run's own (its floor, its way, how its clock stands) is in every part of it: runs are
 // not cut where these are left to fit to.
 constexpr std::size_t kEnoughRuns = 3;
-constexpr double kLeastPrecision = 1e-9;  // of a value that no window tells
+constexpr double kLeastPrecision = 1e-9;  // of a value that no window shows
 
 double part_of(const Eigen::Vector3d& end, int part) {
   return part == 0 ? end.head<2>().norm() : std::abs(end[2]);
@@ -107,7 +107,7 @@ std::vector<std::size_t> window_lengths(std::span<const double> durations_s) {
   for (const auto& [key, s] : covered_s) most_s = std::max(most_s, s);
   std::map<long, std::size_t> kept;
   for (const auto& [key, s] : covered_s) {
-    if (s >= kStrayShare * most_s) kept.try_emplace(key, kept.size());
+    if (s >= kRareLengthShare * most_s) kept.try_emplace(key, kept.size());
   }
   std::vector<std::size_t> lengths;
   for (const double s : durations_s) {
@@ -123,18 +123,18 @@ std::vector<std::size_t> window_lengths(std::span<const double> durations_s) {
 
 namespace {
 
-bool told_alike(const CommandedRun& a, const CommandedRun& b) {
+bool commanded_alike(const CommandedRun& a, const CommandedRun& b) {
   return std::ranges::equal(a.commands, b.commands, {}, &CommandRow::values, &CommandRow::values);
 }
 
-// Of each of these runs, where it is among what is left out: counted from 0 on, repeats alike.
+// Of each of these runs, where it is among what is held out: counted from 0 on, repeats alike.
 std::map<std::size_t, std::size_t> places_of(const std::map<std::size_t, std::array<double, 2>>& of,
                                              std::span<const CommandedRun> runs, bool repeats) {
   std::map<std::size_t, std::size_t> places;
   std::size_t count = 0;
   for (const auto& [run, span] : of) {
     const auto like = std::ranges::find_if(places, [&](const auto& known) {
-      return repeats && told_alike(runs[known.first], runs[run]);
+      return repeats && commanded_alike(runs[known.first], runs[run]);
     });
     places[run] = like == places.end() ? count++ : like->second;
   }
@@ -149,7 +149,7 @@ std::size_t count_of(const std::map<std::size_t, std::size_t>& places) {
 
 }  // namespace
 
-std::vector<std::size_t> left_out_stretches(std::span<const Trial> windows,
+std::vector<std::size_t> held_out_stretches(std::span<const Trial> windows,
                                             std::span<const CommandedRun> runs, std::size_t count) {
   const auto span_s = spans_of(windows);
   std::map<std::size_t, std::size_t> places = places_of(span_s, runs, true);
@@ -165,15 +165,15 @@ std::vector<std::size_t> left_out_stretches(std::span<const Trial> windows,
 namespace {
 
 // Of some windows' errors of position or heading.
-Unsure log_ratio(const WindowEnds& ends, const WindowEnds& rival,
+Unsure log_ratio(const WindowEnds& ends, const WindowEnds& baseline,
                  std::span<const std::size_t> windows, std::span<const std::size_t> parts,
                  int part) {
-  const auto without = [&](std::optional<std::size_t> left_out) {
+  const auto without = [&](std::optional<std::size_t> held_out) {
     std::vector<double> own, others;
     for (const std::size_t i : windows) {
-      if (left_out && parts[i] == *left_out) continue;
+      if (held_out && parts[i] == *held_out) continue;
       own.push_back(part_of(ends[i], part));
-      others.push_back(part_of(rival[i], part));
+      others.push_back(part_of(baseline[i], part));
     }
     return own.empty() ? 0 : log_middle(std::move(own)) - log_middle(std::move(others));
   };
@@ -245,12 +245,12 @@ double RobustErrors::nats(const WindowEnds& ends) const {
   return sum;
 }
 
-Unsure RobustErrors::gain(const WindowEnds& ends, const WindowEnds& rival,
+Unsure RobustErrors::gain(const WindowEnds& ends, const WindowEnds& baseline,
                           std::span<const std::size_t> parts) const {
   std::map<std::size_t, double> gains;  // of each part
   double sum = 0;
   for (std::size_t i = 0; i < ends.size(); ++i) {
-    const double nats = nats_of(i, ends[i]) - nats_of(i, rival[i]);
+    const double nats = nats_of(i, ends[i]) - nats_of(i, baseline[i]);
     gains[parts[i]] += nats;
     sum += nats;
   }
@@ -263,7 +263,7 @@ Unsure RobustErrors::gain(const WindowEnds& ends, const WindowEnds& rival,
 }
 
 std::vector<std::array<Unsure, 2>> RobustErrors::log_ratios(
-    const WindowEnds& ends, const WindowEnds& rival, std::span<const std::size_t> parts) const {
+    const WindowEnds& ends, const WindowEnds& baseline, std::span<const std::size_t> parts) const {
   std::vector<std::array<Unsure, 2>> all(lengths());
   for (std::size_t length = 0; length < lengths(); ++length) {
     std::vector<std::size_t> mine;
@@ -272,7 +272,7 @@ std::vector<std::array<Unsure, 2>> RobustErrors::log_ratios(
     }
     if (static_cast<double>(mine.size()) < kEnoughWindows) continue;
     for (int part = 0; part < 2; ++part) {
-      all[length][static_cast<std::size_t>(part)] = log_ratio(ends, rival, mine, parts, part);
+      all[length][static_cast<std::size_t>(part)] = log_ratio(ends, baseline, mine, parts, part);
     }
   }
   return all;
@@ -321,7 +321,7 @@ Eigen::VectorXd step_within_bounds(const NormalEquations& equations, const Eigen
   return to.cwiseMax(0).cwiseMin(1);  // sums are rounded
 }
 
-std::vector<Eigen::VectorXd> left_out_steps(const RobustErrors& errors, const WindowEnds& ends,
+std::vector<Eigen::VectorXd> held_out_steps(const RobustErrors& errors, const WindowEnds& ends,
                                             const WindowSlopes& slopes,
                                             const NormalEquations& prior,
                                             std::span<const std::size_t> stretches) {
@@ -344,15 +344,15 @@ std::vector<Eigen::VectorXd> left_out_steps(const RobustErrors& errors, const Wi
   return steps;
 }
 
-WindowEnds left_out_ends(const RobustErrors& errors, const WindowEnds& ends,
+WindowEnds held_out_ends(const RobustErrors& errors, const WindowEnds& ends,
                          const WindowSlopes& slopes, const NormalEquations& prior,
                          std::span<const std::size_t> stretches) {
-  const auto steps = left_out_steps(errors, ends, slopes, prior, stretches);
-  WindowEnds foretold;
+  const auto steps = held_out_steps(errors, ends, slopes, prior, stretches);
+  WindowEnds predicted;
   for (std::size_t i = 0; i < ends.size(); ++i) {
-    foretold.push_back(ends[i] - slopes[i] * steps[stretches[i]]);
+    predicted.push_back(ends[i] - slopes[i] * steps[stretches[i]]);
   }
-  return foretold;
+  return predicted;
 }
 
 }  // namespace gapfarm

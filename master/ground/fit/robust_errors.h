@@ -19,14 +19,14 @@ using WindowSlopes = std::vector<Eigen::MatrixXd>;  // of each end: 3 rows, a co
 // would weigh as much as hundreds.
 std::vector<std::size_t> window_lengths(std::span<const double> durations_s);
 
-// Of each window one of at most `count` stretches of the log that are left out in turn: whole runs,
+// Of each window one of at most `count` stretches of the log that are held out in turn: whole runs,
 // those in a row together and those with the same commands wherever they are, or of one or two runs
-// the log's time in equal parts.  What is alike (repeats, a floor) is left out together, or it
-// would be foretold by itself.  REQUIRES: trials that are windows of `runs`.
-std::vector<std::size_t> left_out_stretches(std::span<const Trial> windows,
+// the log's time in equal parts.  What is alike (repeats, a floor) is held out together, or it
+// would be predicted by itself.  REQUIRES: trials that are windows of `runs`.
+std::vector<std::size_t> held_out_stretches(std::span<const Trial> windows,
                                             std::span<const CommandedRun> runs, std::size_t count);
 
-// A value, and its standard error by leaving out parts of the log in turn.
+// A value, and its standard error by omitting parts of the log in turn.
 struct Unsure {
   double value = 0;
   double error = 0;
@@ -44,17 +44,17 @@ class RobustErrors {
   std::size_t windows() const { return length_.size(); }
   double nats(const WindowEnds& ends) const;
   double nats_of(std::size_t window, const Eigen::Vector3d& end) const;
-  // Nats a window over those of `rival`.  `parts`: of each window, the part of the log that it is
-  // in (left_out_stretches()): what a run has of its own is in all of it.
-  Unsure gain(const WindowEnds& ends, const WindowEnds& rival,
+  // Nats a window over those of `baseline`.  `parts`: of each window, the part of the log that it
+  // is in (left_out_stretches()): what a run has of its own is in all of it.
+  Unsure gain(const WindowEnds& ends, const WindowEnds& baseline,
               std::span<const std::size_t> parts) const;
-  // Of each length: how large errors of position and heading are beside those of `rival`, the
+  // Of each length: how large errors of position and heading are beside those of `baseline`, the
   // logarithm of the ratio of their middles; nothing where a length has only a few windows.  A
   // middle is the mean logarithm of the middle half, which jumps less than a median.
-  std::vector<std::array<Unsure, 2>> log_ratios(const WindowEnds& ends, const WindowEnds& rival,
+  std::vector<std::array<Unsure, 2>> log_ratios(const WindowEnds& ends, const WindowEnds& baseline,
                                                 std::span<const std::size_t> parts) const;
   // Where `ends` are met much more nearly than the scales say, these become those of `ends`: what
-  // strays shows only beside what does not.  Whether any did.
+  // outliers shows only beside what does not.  Whether any did.
   bool sharpen(const WindowEnds& ends);
   // Position and heading of each length count that much more than now.
   void emphasise(std::span<const std::array<double, 2>> factors);
@@ -85,14 +85,14 @@ Eigen::VectorXd step_within_bounds(const NormalEquations& equations, const Eigen
 
 // Of each stretch the step, to be taken off the values, that least squares makes of the others.
 // `prior` adds to the equations of every step.
-std::vector<Eigen::VectorXd> left_out_steps(const RobustErrors& errors, const WindowEnds& ends,
+std::vector<Eigen::VectorXd> held_out_steps(const RobustErrors& errors, const WindowEnds& ends,
                                             const WindowSlopes& slopes,
                                             const NormalEquations& prior,
                                             std::span<const std::size_t> stretches);
 
 // Ends that were not fitted to: each stretch is predicted by values after that step, to first
 // order.
-WindowEnds left_out_ends(const RobustErrors& errors, const WindowEnds& ends,
+WindowEnds held_out_ends(const RobustErrors& errors, const WindowEnds& ends,
                          const WindowSlopes& slopes, const NormalEquations& prior,
                          std::span<const std::size_t> stretches);
 

@@ -5,7 +5,7 @@
 
 #include "common/math/algebra.h"
 #include "common/score/kinematic_start.h"
-#include "master/ground/fit/kinematic_rival.h"
+#include "master/ground/fit/kinematic_baseline.h"
 #include "master/ground/fit/simulation_fit.h"
 
 namespace gapfarm {
@@ -13,8 +13,8 @@ namespace {
 
 constexpr int kMostRounds = 24;
 constexpr int kRaceRounds = 3;  // of every start, before the best go on
-// What windows of one run tell is less than their number says: how much more than one of them a
-// value's start counts is tried on stretches that were left out.
+// What windows of one run show is less than their number says: how much more than one of them a
+// value's start counts is tried on stretches that were held out.
 constexpr std::array<double, 6> kHolds = {1, 3, 10, 30, 100, 300};
 constexpr int kSharpenings = 4;
 constexpr double kFirmly = 1000;   // held where nothing slips
@@ -25,7 +25,7 @@ constexpr int kEmphases = 3;
 constexpr double kEmphasis = 4;  // power of the ratio
 constexpr double kMostLogRatio = 0.26;
 constexpr double kAsGood = 1.02;   // a ratio that is not worth climbing for
-constexpr std::size_t kLooks = 3;  // starts a gene that kinematics do not tell
+constexpr std::size_t kLooks = 3;  // starts a gene that kinematics do not show
 // What is left to find is mostly the noise: a search that has the windows' whole spread to roam in
 // trades ends for the noise's likelihood.
 constexpr double kFoundSpread = 0.1;  // of what the windows leave unsure
@@ -37,7 +37,7 @@ double emphasis_of(const Unsure& log_ratio) {
 
 }  // namespace
 
-// What kinematics tell is moved to suit the rest, by the slopes of the first climb.
+// What kinematics show is moved to suit the rest, by the slopes of the first climb.
 Status SimulationFit::settle(std::vector<std::optional<At>>* looks, const std::vector<Hold>& holds,
                              const Climb& first) {
   std::vector<Genome> genomes;
@@ -50,8 +50,8 @@ Status SimulationFit::settle(std::vector<std::optional<At>>* looks, const std::v
     const NormalEquations prior = prior_at(look->genome, holds[k]);
     equations.H += prior.H;
     equations.g += prior.g;
-    for (std::size_t j = 0; j < told_.size(); ++j) {
-      if (std::find(untold_.begin(), untold_.end(), told_[j]) == untold_.end()) continue;
+    for (std::size_t j = 0; j < fitted_rows_.size(); ++j) {
+      if (std::find(untold_.begin(), untold_.end(), fitted_rows_[j]) == untold_.end()) continue;
       const auto row = static_cast<Eigen::Index>(j);
       equations.H.row(row).setZero();
       equations.H.col(row).setZero();
@@ -92,23 +92,23 @@ Result<std::vector<Climb>> SimulationFit::other_climbs(const Climb& first) {
   return climbs;
 }
 
-WindowEnds SimulationFit::left_out(const Climb& climb, const Hold& hold) const {
-  return left_out_ends(*errors_, climb.at.ends, climb.slopes, prior_at(climb.at.genome, hold),
+WindowEnds SimulationFit::held_out(const Climb& climb, const Hold& hold) const {
+  return held_out_ends(*errors_, climb.at.ends, climb.slopes, prior_at(climb.at.genome, hold),
                        stretches_);
 }
 
 // The same by simulations at the values of every step: where contacts begin to slip the first order
 // promises what is not to be had.
-Result<WindowEnds> SimulationFit::simulated_left_out(const Climb& climb) {
-  const auto steps = left_out_steps(*errors_, climb.at.ends, climb.slopes,
+Result<WindowEnds> SimulationFit::simulated_held_out(const Climb& climb) {
+  const auto steps = held_out_steps(*errors_, climb.at.ends, climb.slopes,
                                     prior_at(climb.at.genome, climb.hold), stretches_);
   std::vector<Genome> genomes;
   for (const Eigen::VectorXd& step : steps) {
-    genomes.push_back(told_at(climb.at.genome, told_of(climb.at.genome) - step));
+    genomes.push_back(with_fitted_values(climb.at.genome, fitted_values(climb.at.genome) - step));
   }
   const auto there = look_at(genomes, {climb.hold});
   if (!there) return there.error();
-  WindowEnds ends = left_out(climb, climb.hold);
+  WindowEnds ends = held_out(climb, climb.hold);
   for (std::size_t i = 0; i < ends.size(); ++i) {
     const std::optional<At>& at = (*there)[stretches_[i]];
     if (at) ends[i] = at->ends[i];
@@ -116,11 +116,11 @@ Result<WindowEnds> SimulationFit::simulated_left_out(const Climb& climb) {
   return ends;
 }
 
-// What is better must be so surely: a standard error is taken off every gain.
-SimulationFit::Foretold SimulationFit::foretold(const WindowEnds& ends) const {
-  const Unsure gain = plain_->gain(ends, rival_, parts_);
-  Foretold of{gain.value, 0, gain.error - gain.value};
-  for (const auto& ratios : plain_->log_ratios(ends, rival_, parts_)) {
+// What is better must be so significantly: a standard error is taken off every gain.
+SimulationFit::Predicted SimulationFit::predicted(const WindowEnds& ends) const {
+  const Unsure gain = plain_->gain(ends, baseline_, parts_);
+  Predicted of{gain.value, 0, gain.error - gain.value};
+  for (const auto& ratios : plain_->log_ratios(ends, baseline_, parts_)) {
     for (const Unsure& ratio : ratios) {
       of.worst = std::max(of.worst, std::exp(ratio.value));
       of.cost += kWorseCosts * std::max(ratio.value + ratio.error, 0.0);
@@ -148,7 +148,7 @@ Result<std::optional<Climb>> SimulationFit::firm_climb() {
   return std::optional(std::move(climb));
 }
 
-// What foretells stretches that were left out best, held as firmly as is best for these.
+// What predicts stretches that were held out best, held as firmly as is best for these.
 Result<Climb> SimulationFit::best_of(std::vector<Climb> climbs) {
   const auto by_nats = [](const Climb& a, const Climb& b) { return a.at.nats > b.at.nats; };
   for (Climb& climb : climbs) {
@@ -185,13 +185,13 @@ Result<Climb> SimulationFit::best_of(std::vector<Climb> climbs) {
   return weigh_worse(*std::move(sharp));
 }
 
-// As firmly as foretells best what was left out; `cost` is that of it.
+// As firmly as predicts best what was held out; `cost` is that of it.
 Hold SimulationFit::best_hold(const Climb& climb, double* cost) const {
   Hold best = climb.hold;
   *cost = INFINITY;
   for (const double strength : kHolds) {
     const Hold hold{climb.hold.start, strength, climb.hold.untold};
-    const double own = foretold(left_out(climb, hold)).cost;
+    const double own = predicted(held_out(climb, hold)).cost;
     if (!(own < *cost)) continue;
     best = hold;
     *cost = own;
@@ -199,10 +199,10 @@ Hold SimulationFit::best_hold(const Climb& climb, double* cost) const {
   return best;
 }
 
-// Kinematics that leave much more than the simulation are no measure of which windows stray.
+// Kinematics that leave much more than the simulation are no measure of which windows lie far off.
 Result<Climb> SimulationFit::sharpen(Climb best) {
   for (int round = 0; round < kSharpenings && !best.slopes.empty(); ++round) {
-    const WindowEnds ends = left_out(best, best.hold);
+    const WindowEnds ends = held_out(best, best.hold);
     if (!plain_->sharpen(ends)) break;
     errors_->sharpen(ends);
     Climb next = best;
@@ -210,26 +210,26 @@ Result<Climb> SimulationFit::sharpen(Climb best) {
     double cost = INFINITY;
     next.hold = best_hold(next, &cost);
     if (Status s = climb_again(&next); !s) return s.error();
-    const double before = foretold(left_out(best, best.hold)).cost;
-    if (!(foretold(left_out(next, next.hold)).cost < before)) break;
+    const double before = predicted(held_out(best, best.hold)).cost;
+    if (!(predicted(held_out(next, next.hold)).cost < before)) break;
     best = std::move(next);
   }
   return best;
 }
 
-// What is foretold worse than by the kinematics counts more, as long as that helps.
+// What is predicted worse than by the kinematics counts more, as long as that helps.
 Result<Climb> SimulationFit::weigh_worse(Climb best) {
   for (int round = 0; round < kEmphases && !best.slopes.empty(); ++round) {
-    const WindowEnds ends = left_out(best, best.hold);
-    if (foretold(ends).worst <= kAsGood) break;
+    const WindowEnds ends = held_out(best, best.hold);
+    if (predicted(ends).worst <= kAsGood) break;
     std::vector<std::array<double, 2>> factors;
-    for (const auto& [position, heading] : plain_->log_ratios(ends, rival_, parts_)) {
+    for (const auto& [position, heading] : plain_->log_ratios(ends, baseline_, parts_)) {
       factors.push_back({emphasis_of(position), emphasis_of(heading)});
     }
     errors_->emphasise(factors);
     Climb next = best;
     if (Status s = climb_again(&next); !s) return s.error();
-    if (foretold(left_out(next, next.hold)).cost >= foretold(ends).cost) break;
+    if (predicted(held_out(next, next.hold)).cost >= predicted(ends).cost) break;
     best = std::move(next);
   }
   return best;
@@ -237,10 +237,10 @@ Result<Climb> SimulationFit::weigh_worse(Climb best) {
 
 // Against the kinematics, whose values in the simulation are `begin` or, without slip, stand firm.
 Status SimulationFit::judge(const Climb& best, const At& begin, SimulatedStart* found) {
-  const auto met = simulated_left_out(best);
+  const auto met = simulated_held_out(best);
   if (!met) return met.error();
-  const Foretold own = foretold(*met);
-  found->left_out_gain = own.gain;
+  const Predicted own = predicted(*met);
+  found->held_out_gain = own.gain;
   found->worst_ratio = own.worst;
   const WindowEnds ends = window_errors(problem_, kinematic_ends(problem_, kinematics_));
   auto firm = look_at({firm_}, {Hold{firm_}});
@@ -248,9 +248,9 @@ Status SimulationFit::judge(const Climb& best, const At& begin, SimulatedStart* 
   double least = own.cost;
   for (const At& at : {begin, firm->front().value_or(begin)}) {
     // What the simulation makes of the kinematics' values is nearly what they make of them.
-    WindowEnds foretells = rival_;
-    for (std::size_t i = 0; i < ends.size(); ++i) foretells[i] += at.ends[i] - ends[i];
-    const Foretold theirs = foretold(foretells);
+    WindowEnds predicts = baseline_;
+    for (std::size_t i = 0; i < ends.size(); ++i) predicts[i] += at.ends[i] - ends[i];
+    const Predicted theirs = predicted(predicts);
     if (theirs.cost >= least) continue;
     least = theirs.cost;
     found->kinematic = true;
@@ -267,14 +267,15 @@ Status SimulationFit::judge(const Climb& best, const At& begin, SimulatedStart* 
 void SimulationFit::take_spread(const Climb& climb, double widest, SimulatedStart* found) const {
   const auto n = static_cast<Eigen::Index>(start_.size());
   Eigen::MatrixXd precision = Eigen::MatrixXd::Identity(n, n) / (widest * widest);
-  for (std::size_t j = 0; j < told_.size(); ++j) {
-    for (std::size_t k = 0; k < told_.size(); ++k) {
-      precision(static_cast<Eigen::Index>(told_[j]), static_cast<Eigen::Index>(told_[k])) +=
+  for (std::size_t j = 0; j < fitted_rows_.size(); ++j) {
+    for (std::size_t k = 0; k < fitted_rows_.size(); ++k) {
+      precision(static_cast<Eigen::Index>(fitted_rows_[j]),
+                static_cast<Eigen::Index>(fitted_rows_[k])) +=
           climb.equations.H(static_cast<Eigen::Index>(j), static_cast<Eigen::Index>(k)) /
           (kFoundSpread * kFoundSpread);
     }
     if (!found->kinematic) continue;
-    const auto own = static_cast<Eigen::Index>(told_[j]);
+    const auto own = static_cast<Eigen::Index>(fitted_rows_[j]);
     precision(own, own) += 1 / (kHeldSpread * kHeldSpread);
   }
   const Eigen::MatrixXd spread = inverse_of_symmetric(precision);
@@ -290,7 +291,7 @@ Result<SimulatedStart> SimulationFit::run(double widest) {
   plain_.emplace(durations_s, window_errors(problem_, kinematic_ends(problem_, kinematics_)));
   errors_ = plain_;
   errors_->emphasise(std::vector<std::array<double, 2>>(errors_->lengths(), {1, kHeadingCounts}));
-  rival_ = kinematic_left_out(problem_, kinematics_, *plain_, stretches_);
+  baseline_ = kinematic_held_out(problem_, kinematics_, *plain_, stretches_);
   const ParameterValues values = kinematic_start(problem_, kinematics_);
   for (const Gene& gene : problem_.genes) {
     start_.push_back(encode_gene(problem_.table(), gene, values[gene.row]));
@@ -305,7 +306,7 @@ Result<SimulatedStart> SimulationFit::run(double widest) {
   SimulatedStart found;
   found.genome = start_;
   found.simulations = simulations_;
-  if (!first->front() || told_.empty()) return found;
+  if (!first->front() || fitted_rows_.empty()) return found;
   const At begin = *first->front();
   std::vector<Climb> climbs = {{begin, hold, {}, {}, {}, false}};
   if (Status s = step(&climbs.front()); !s) return s.error();

@@ -3,19 +3,19 @@
 #include <algorithm>
 #include <array>
 
-#include "master/ground/fit/kinematic_rival.h"
+#include "master/ground/fit/kinematic_baseline.h"
 
 namespace gapfarm {
 namespace {
 
 constexpr double kGeneStep = 0.01;     // to find slopes; contacts are noisy below
 constexpr double kEnoughNats = 1;      // less is within a standard error or so of the values
-constexpr double kLeastSecant = 3e-3;  // of a move from which slopes can be told
+constexpr double kLeastSecant = 3e-3;  // of a move from which slopes can be measured
 constexpr std::array<double, 2> kDampings = {0, 1};
 constexpr std::array<double, 3> kGreatDampings = {10, 100, 1000};
 constexpr std::size_t kStretches = 6;
-constexpr std::size_t kParts = 12;    // of the log, that tell how sure a gain is
-constexpr double kFreelyMoves = 0.3;  // of a gene's range, where the windows do not tell
+constexpr std::size_t kParts = 12;    // of the log, that show how sure a gain is
+constexpr double kFreelyMoves = 0.3;  // of a gene's range, where the windows do not show
 
 }  // namespace
 
@@ -23,14 +23,14 @@ SimulationFit::SimulationFit(Farm& farm, const Problem& problem)
     : farm_(farm),
       problem_(problem),
       hash_(farm.add_problem(to_proto(problem))),
-      stretches_(left_out_stretches(problem.log.trials, problem.runs, kStretches)),
-      parts_(left_out_stretches(problem.log.trials, problem.runs, kParts)) {
-  const std::vector<bool> kinematic = told_by_kinematics(problem);
+      stretches_(held_out_stretches(problem.log.trials, problem.runs, kStretches)),
+      parts_(held_out_stretches(problem.log.trials, problem.runs, kParts)) {
+  const std::vector<bool> kinematic = identified_by_kinematics(problem);
   for (std::size_t g = 0; g < problem.genes.size(); ++g) {
     const Parameter& row = problem.table()[problem.genes[g].row];
     const bool noise = row.key.find("_noise_") != std::string::npos;
     if (noise || row.kind != ParameterKind::kReal) continue;
-    told_.push_back(g);
+    fitted_rows_.push_back(g);
     if (!kinematic[g]) untold_.push_back(g);
   }
 }
@@ -70,7 +70,7 @@ double SimulationFit::strength_of(const Hold& hold, std::size_t gene) const {
 
 double SimulationFit::cost_of(const Genome& genome, const Hold& hold) const {
   double sum = 0;
-  for (const std::size_t g : told_) {
+  for (const std::size_t g : fitted_rows_) {
     const double moved = (genome[g] - hold.start[g]) / kFreelyMoves;
     sum += strength_of(hold, g) * moved * moved / 2;
   }
@@ -78,10 +78,10 @@ double SimulationFit::cost_of(const Genome& genome, const Hold& hold) const {
 }
 
 NormalEquations SimulationFit::prior_at(const Genome& genome, const Hold& hold) const {
-  const auto n = static_cast<Eigen::Index>(told_.size());
+  const auto n = static_cast<Eigen::Index>(fitted_rows_.size());
   NormalEquations prior{Eigen::MatrixXd::Zero(n, n), Eigen::VectorXd(n)};
-  for (std::size_t k = 0; k < told_.size(); ++k) {
-    const std::size_t gene = told_[k];
+  for (std::size_t k = 0; k < fitted_rows_.size(); ++k) {
+    const std::size_t gene = fitted_rows_[k];
     const auto row = static_cast<Eigen::Index>(k);
     prior.H(row, row) = strength_of(hold, gene) / (kFreelyMoves * kFreelyMoves);
     prior.g[row] = prior.H(row, row) * (genome[gene] - hold.start[gene]);
@@ -89,22 +89,23 @@ NormalEquations SimulationFit::prior_at(const Genome& genome, const Hold& hold) 
   return prior;
 }
 
-Eigen::VectorXd SimulationFit::told_of(const Genome& genome) const {
-  Eigen::VectorXd values(static_cast<Eigen::Index>(told_.size()));
-  for (std::size_t k = 0; k < told_.size(); ++k) {
-    values[static_cast<Eigen::Index>(k)] = genome[told_[k]];
+Eigen::VectorXd SimulationFit::fitted_values(const Genome& genome) const {
+  Eigen::VectorXd values(static_cast<Eigen::Index>(fitted_rows_.size()));
+  for (std::size_t k = 0; k < fitted_rows_.size(); ++k) {
+    values[static_cast<Eigen::Index>(k)] = genome[fitted_rows_[k]];
   }
   return values;
 }
 
 Genome SimulationFit::moved(const At& at, const NormalEquations& equations) const {
-  return told_at(at.genome, step_within_bounds(equations, told_of(at.genome)));
+  return with_fitted_values(at.genome, step_within_bounds(equations, fitted_values(at.genome)));
 }
 
-Genome SimulationFit::told_at(const Genome& genome, const Eigen::VectorXd& values) const {
+Genome SimulationFit::with_fitted_values(const Genome& genome,
+                                         const Eigen::VectorXd& values) const {
   Genome to = genome;
-  for (std::size_t k = 0; k < told_.size(); ++k) {
-    to[told_[k]] = std::clamp(values[static_cast<Eigen::Index>(k)], 0.0, 1.0);
+  for (std::size_t k = 0; k < fitted_rows_.size(); ++k) {
+    to[fitted_rows_[k]] = std::clamp(values[static_cast<Eigen::Index>(k)], 0.0, 1.0);
   }
   return to;
 }
@@ -120,7 +121,7 @@ Status SimulationFit::look_round(Climb* climb) {
   const At& at = climb->at;
   if (climb->sloped == at.genome) return {};
   std::vector<Genome> genomes;
-  for (const std::size_t gene : told_) {
+  for (const std::size_t gene : fitted_rows_) {
     genomes.push_back(at.genome);
     double& value = genomes.back()[gene];
     value += value + kGeneStep > 1 ? -kGeneStep : kGeneStep;
@@ -130,10 +131,11 @@ Status SimulationFit::look_round(Climb* climb) {
   climb->over = std::any_of(beside->begin(), beside->end(), [](const auto& b) { return !b; });
   if (climb->over) return {};
   climb->sloped = at.genome;
-  climb->slopes.assign(at.ends.size(), Eigen::MatrixXd(3, static_cast<Eigen::Index>(told_.size())));
-  for (std::size_t k = 0; k < told_.size(); ++k) {
+  climb->slopes.assign(at.ends.size(),
+                       Eigen::MatrixXd(3, static_cast<Eigen::Index>(fitted_rows_.size())));
+  for (std::size_t k = 0; k < fitted_rows_.size(); ++k) {
     const At& there = *(*beside)[k];
-    const double step = there.genome[told_[k]] - at.genome[told_[k]];
+    const double step = there.genome[fitted_rows_[k]] - at.genome[fitted_rows_[k]];
     for (std::size_t i = 0; i < at.ends.size(); ++i) {
       climb->slopes[i].col(static_cast<Eigen::Index>(k)) = (there.ends[i] - at.ends[i]) / step;
     }
@@ -143,7 +145,7 @@ Status SimulationFit::look_round(Climb* climb) {
 
 // Broyden's: so that they say what this move did.
 void SimulationFit::correct_slopes(const At& before, Climb* climb) const {
-  const Eigen::VectorXd move = told_of(climb->at.genome) - told_of(before.genome);
+  const Eigen::VectorXd move = fitted_values(climb->at.genome) - fitted_values(before.genome);
   if (move.norm() < kLeastSecant) return;
   for (std::size_t i = 0; i < climb->slopes.size(); ++i) {
     Eigen::MatrixXd& slopes = climb->slopes[i];
@@ -153,7 +155,8 @@ void SimulationFit::correct_slopes(const At& before, Climb* climb) const {
 }
 
 double SimulationFit::promised(const Climb& climb) const {
-  const Eigen::VectorXd move = told_of(moved(climb.at, climb.equations)) - told_of(climb.at.genome);
+  const Eigen::VectorXd move =
+      fitted_values(moved(climb.at, climb.equations)) - fitted_values(climb.at.genome);
   return -climb.equations.g.dot(move) - move.dot(climb.equations.H * move) / 2;
 }
 

@@ -45,8 +45,8 @@ class SimulationFit {
   Result<SimulatedStart> run(double widest);
 
  private:
-  // What is foretold of stretches that were left out, beside the kinematics.
-  struct Foretold {
+  // What is predicted of stretches that were held out, beside the kinematics.
+  struct Predicted {
     double gain = 0;   // nats a window
     double worst = 0;  // ratio of errors' middles, of position and heading at all lengths
     double cost = 0;   // the gain's negative, more where errors may be larger
@@ -64,15 +64,15 @@ class SimulationFit {
   Result<std::vector<Climb>> other_climbs(const Climb& first);
   Status settle(std::vector<std::optional<At>>* looks, const std::vector<Hold>& holds,
                 const Climb& first);
-  Eigen::VectorXd told_of(const Genome& genome) const;  // of told_, its values
+  Eigen::VectorXd fitted_values(const Genome& genome) const;  // of told_, its values
   Genome moved(const At& at, const NormalEquations& equations) const;
-  Genome told_at(const Genome& genome, const Eigen::VectorXd& values) const;
+  Genome with_fitted_values(const Genome& genome, const Eigen::VectorXd& values) const;
   double strength_of(const Hold& hold, std::size_t gene) const;
   double cost_of(const Genome& genome, const Hold& hold) const;
   NormalEquations prior_at(const Genome& genome, const Hold& hold) const;
-  WindowEnds left_out(const Climb& climb, const Hold& hold) const;
-  Result<WindowEnds> simulated_left_out(const Climb& climb);
-  Foretold foretold(const WindowEnds& ends) const;
+  WindowEnds held_out(const Climb& climb, const Hold& hold) const;
+  Result<WindowEnds> simulated_held_out(const Climb& climb);
+  Predicted predicted(const WindowEnds& ends) const;
   Status climb_again(Climb* climb);
   Result<std::optional<Climb>> firm_climb();
   Result<Climb> best_of(std::vector<Climb> climbs);
@@ -87,10 +87,10 @@ class SimulationFit {
   std::string hash_;
   Kinematics kinematics_;
   std::optional<RobustErrors> plain_, errors_;  // errors_: what is worse emphasised
-  WindowEnds rival_;                            // of the kinematics, left out
-  std::vector<std::size_t> told_;               // genes that move ends
+  WindowEnds baseline_;                         // of the kinematics, held out
+  std::vector<std::size_t> fitted_rows_;        // genes that move ends
   std::vector<std::size_t> untold_;             // those of them that kinematics have no word for
-  std::vector<std::size_t> stretches_;          // of each window, left out in turn
+  std::vector<std::size_t> stretches_;          // of each window, held out in turn
   std::vector<std::size_t> parts_;              // of each window, finer
   Genome start_;
   Genome firm_;  // the same without slip

@@ -43,14 +43,14 @@ void WindowFitter::shape_by_speed() {
   const auto here = residuals(rows, Eigen::VectorXd::Constant(1, 1.0));
   const auto faster = residuals(rows, Eigen::VectorXd::Constant(1, 1 + kFaster));
   const auto n = static_cast<std::size_t>(windows_.horizons);
-  std::vector<Eigen::Vector3d> ways(here.size());
+  std::vector<Eigen::Vector3d> shifts(here.size());
   std::vector<std::vector<double>> shares(n), rests(3 * n);
   for (std::size_t i = 0; i < here.size(); ++i) {
     const auto h = static_cast<std::size_t>(windows_.horizon[i]);
-    ways[i] = (faster[i] - here[i]) / kFaster;
-    const double share = ways[i].dot(here[i]) / std::max(ways[i].squaredNorm(), 1e-12);
+    shifts[i] = (faster[i] - here[i]) / kFaster;
+    const double share = shifts[i].dot(here[i]) / std::max(shifts[i].squaredNorm(), 1e-12);
     shares[h].push_back(std::abs(share));
-    const Eigen::Vector3d rest = here[i] - share * ways[i];
+    const Eigen::Vector3d rest = here[i] - share * shifts[i];
     for (std::size_t c = 0; c < 3; ++c) {
       rests[3 * h + c].push_back(std::abs(rest[static_cast<Eigen::Index>(c)]));
     }
@@ -62,7 +62,7 @@ void WindowFitter::shape_by_speed() {
     for (std::size_t c = 0; c < 3; ++c) {
       s[static_cast<Eigen::Index>(c)] = robust_deviation(&rests[3 * h + c]);
     }
-    const Eigen::Vector3d d = robust_deviation(&shares[h]) * ways[i].cwiseQuotient(s);
+    const Eigen::Vector3d d = robust_deviation(&shares[h]) * shifts[i].cwiseQuotient(s);
     // (1 + d d')^-1/2 in units of s.
     const double square = d.squaredNorm();
     Eigen::Matrix3d root = Eigen::Matrix3d::Identity();
@@ -100,11 +100,11 @@ std::vector<Eigen::Vector3d> WindowFitter::residuals(const std::vector<FitRow>& 
   return r;
 }
 
-std::vector<double> WindowFitter::uses(const std::vector<char>& left_out) const {
+std::vector<double> WindowFitter::uses(const std::vector<char>& held_out) const {
   std::vector<double> use(windows_.trials.size());
   for (std::size_t i = 0; i < use.size(); ++i) {
-    const bool out = !left_out.empty() && left_out[static_cast<std::size_t>(windows_.block[i])];
-    // Windows of several horizons tell of the same stretch.
+    const bool out = !held_out.empty() && held_out[static_cast<std::size_t>(windows_.block[i])];
+    // Windows of several horizons cover the same stretch.
     use[i] = out ? 0 : 1.0 / windows_.horizons;
   }
   return use;
@@ -264,30 +264,30 @@ bool WindowFitter::step(WindowFit* fit, const std::vector<double>& use, double* 
 }
 
 WindowFit WindowFitter::hold(const std::vector<FitRow>& rows, const Eigen::VectorXd& values,
-                             const std::vector<char>& left_out) const {
+                             const std::vector<char>& held_out) const {
   WindowFit fit;
   fit.rows = rows;
   fit.values = values;
   fit.residuals = residuals(rows, values);
-  const std::vector<double> use = uses(left_out);
+  const std::vector<double> use = uses(held_out);
   rescale(&fit, use);
   score(&fit, use);
   return fit;
 }
 
-WindowFit WindowFitter::fit(const std::vector<FitRow>& rows, const std::vector<char>& left_out,
+WindowFit WindowFitter::fit(const std::vector<FitRow>& rows, const std::vector<char>& held_out,
                             const Eigen::VectorXd& values, int rounds) const {
   Eigen::VectorXd start(static_cast<Eigen::Index>(rows.size()));
   for (std::size_t i = 0; i < rows.size(); ++i) {
     start[static_cast<Eigen::Index>(i)] = rows[i].row.nominal;
   }
   if (values.size() == start.size()) start = values;
-  const std::string key = memo_ != nullptr ? key_of(rows, left_out, start, rounds) : "";
+  const std::string key = memo_ != nullptr ? key_of(rows, held_out, start, rounds) : "";
   if (const auto kept = memo_ != nullptr ? memo_->find(key) : std::nullopt) {
-    return fit_from(rows, left_out, *kept);
+    return fit_from(rows, held_out, *kept);
   }
-  WindowFit fit = hold(rows, start, left_out);
-  const std::vector<double> use = uses(left_out);
+  WindowFit fit = hold(rows, start, held_out);
+  const std::vector<double> use = uses(held_out);
   for (int round = 0; round < rounds && !rows.empty(); ++round) {
     const double before = fit.objective;
     double damping = 1e-3;
@@ -301,14 +301,14 @@ WindowFit WindowFitter::fit(const std::vector<FitRow>& rows, const std::vector<c
   return fit;
 }
 
-WindowFit WindowFitter::fit_from(const std::vector<FitRow>& rows, const std::vector<char>& left_out,
+WindowFit WindowFitter::fit_from(const std::vector<FitRow>& rows, const std::vector<char>& held_out,
                                  const KeptFit& kept) const {
   WindowFit fit;
   fit.rows = rows;
   fit.values = kept.values;
   fit.scales = kept.scales;
   fit.residuals = residuals(rows, fit.values);
-  score(&fit, uses(left_out));
+  score(&fit, uses(held_out));
   return fit;
 }
 

@@ -20,14 +20,14 @@ struct WindowSet {
   std::vector<CommandedRun> runs;
   std::vector<Trial> trials;
   std::vector<int> horizon;  // of each trial
-  std::vector<int> block;    // of each trial: what is left out or resampled together
+  std::vector<int> block;    // of each trial: what is held out or resampled together
   int horizons = 0;
   int blocks = 0;
   std::vector<int> run_blocks;  // of each run: its first block; those of one run follow each other
 };
 
 // Blocks are runs, or stretches of them where there are fewer than ten.  Windows of robots with a
-// throttle begin afresh (common/recordings/afresh.h).  Errors: no window fits.
+// throttle restart (common/recordings/restart.h).  Errors: no window fits.
 Result<WindowSet> window_set(const GroundRobot& robot, const RunLog& log,
                              const WindowSettings& settings);
 
@@ -77,11 +77,11 @@ class WindowFitter {
   // Maximum over windows whose block is not in `left_out` (one flag a block; empty: none).
   // Starts at `values` where that has the size of `rows`, else at the rows' nominals; fewer rounds
   // do from near by.
-  WindowFit fit(const std::vector<FitRow>& rows, const std::vector<char>& left_out = {},
+  WindowFit fit(const std::vector<FitRow>& rows, const std::vector<char>& held_out = {},
                 const Eigen::VectorXd& values = {}, int rounds = 10) const;
   // The rows' values held, scales fitted.
   WindowFit hold(const std::vector<FitRow>& rows, const Eigen::VectorXd& values,
-                 const std::vector<char>& left_out = {}) const;
+                 const std::vector<char>& held_out = {}) const;
 
   // Of every window, 3 by rows: how its residuals change with the values of a fit.
   std::vector<Eigen::MatrixXd> slopes(const WindowFit& fit) const;
@@ -115,17 +115,17 @@ class WindowFitter {
                         const std::vector<double>& use, Eigen::MatrixXd* H,
                         Eigen::VectorXd* g) const;
   bool step(WindowFit* fit, const std::vector<double>& use, double* damping) const;
-  std::vector<double> uses(const std::vector<char>& left_out) const;
+  std::vector<double> uses(const std::vector<char>& held_out) const;
   // Of the prior of these rows, and how far from its middle the values are.
   Eigen::MatrixXd prior_precision(const std::vector<FitRow>& rows) const;
   Eigen::VectorXd from_middle(const std::vector<FitRow>& rows, const Eigen::VectorXd& values) const;
   double prior(const WindowFit& fit) const;
   // Of a row in the reference; -1: it is not there.
   Eigen::Index in_reference(const FitRow& row) const;
-  WindowFit fit_from(const std::vector<FitRow>& rows, const std::vector<char>& left_out,
+  WindowFit fit_from(const std::vector<FitRow>& rows, const std::vector<char>& held_out,
                      const KeptFit& kept) const;
   // A name for this very fit.
-  std::string key_of(const std::vector<FitRow>& rows, const std::vector<char>& left_out,
+  std::string key_of(const std::vector<FitRow>& rows, const std::vector<char>& held_out,
                      const Eigen::VectorXd& start, int rounds) const;
 
   void shape_by_speed();

@@ -41,7 +41,7 @@ std::string question_of(const GroundRobot& robot, const WindowSet& windows,
   return hasher.finish();
 }
 
-std::string WindowFitter::key_of(const std::vector<FitRow>& rows, const std::vector<char>& left_out,
+std::string WindowFitter::key_of(const std::vector<FitRow>& rows, const std::vector<char>& held_out,
                                  const Eigen::VectorXd& start, int rounds) const {
   Hasher hasher;
   hasher.add(question_).add(static_cast<std::uint64_t>(rounds));
@@ -49,7 +49,7 @@ std::string WindowFitter::key_of(const std::vector<FitRow>& rows, const std::vec
     hasher.add(rows[k].row.name).add(rows[k].row.nominal).add(rows[k].row.tolerance);
     hasher.add(std::uint64_t{rows[k].free}).add(start[static_cast<Eigen::Index>(k)]);
   }
-  hasher.add(std::string_view(left_out.data(), left_out.size()));
+  hasher.add(std::string_view(held_out.data(), held_out.size()));
   return hasher.finish();
 }
 

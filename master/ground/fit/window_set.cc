@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/recordings/afresh.h"
+#include "common/recordings/restart.h"
 #include "master/ground/fit/window_fit.h"
 
 namespace gapfarm {
@@ -24,17 +24,17 @@ bool alike(const std::vector<Trial>& a, std::size_t from_a, const std::vector<Tr
 Result<WindowSet> window_set(const GroundRobot& robot, const RunLog& log,
                              const WindowSettings& settings) {
   WindowSet set;
-  const bool afresh = robot.command == CommandKind::kThrottleSteering;
+  const bool restarts = robot.command == CommandKind::kThrottleSteering;
   std::vector<std::size_t> run_of;  // of each trial, in the log
   std::size_t last = 0;
   for (const double horizon : settings.horizons_s) {
     auto cut = cut_windows(log, {{horizon}, settings.run_in_s});
     if (!cut) continue;
-    if (!afresh && set.horizons > 0 && alike(set.trials, last, cut->log.trials)) continue;
+    if (!restarts && set.horizons > 0 && alike(set.trials, last, cut->log.trials)) continue;
     last = set.trials.size();
     for (const Trial& trial : cut->log.trials) run_of.push_back(*trial.run);
-    if (afresh) {
-      *cut = begin_afresh(log, std::move(*cut), settings.run_in_s, kMargin_s);
+    if (restarts) {
+      *cut = restart_at_measured_speed(log, std::move(*cut), settings.run_in_s, kMargin_s);
       for (Trial& trial : cut->log.trials) *trial.run += static_cast<std::uint32_t>(last);
       set.runs.insert(set.runs.end(), cut->runs.begin(), cut->runs.end());
     } else {

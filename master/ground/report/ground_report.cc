@@ -8,9 +8,9 @@
 
 #include "common/random/stream.h"
 #include "master/ground/fit/edge.h"
+#include "master/ground/report/ground_text.h"
 #include "master/ground/report/ground_verdict.h"
 #include "master/ground/report/ground_where.h"
-#include "master/ground/report/ground_words.h"
 #include "master/ground/run_clocks.h"
 #include "master/ground/tolerances.h"
 
@@ -33,7 +33,7 @@ class GroundReport {
         intervals_(fitter_.intervals(search.fit, options.seed)) {}
 
   Diagnosis write();
-  std::vector<SaidValue> said() const;
+  std::vector<ReportedValue> reported_values() const;
   const GroundFigures& figures_of() const { return figures_; }
 
  private:
@@ -87,7 +87,7 @@ NamedEffect GroundReport::effect_of(const GroundStep& step, std::size_t place) {
   const GroundHypothesis& h = search_.catalogue[step.chosen];
   NamedEffect effect;
   effect.name = h.name;
-  for (const std::size_t other : step.not_told_apart) {
+  for (const std::size_t other : step.not_distinguished) {
     add_alias(search_.catalogue[other].name, &effect);
   }
   for (const std::string& alias : h.aliases) add_alias(alias, &effect);
@@ -118,8 +118,8 @@ NamedEffect GroundReport::effect_of(const GroundStep& step, std::size_t place) {
   effect.closed_hi = closed.hi;
   // What was gained over what would just have been worth a name.
   effect.confidence = std::min(kAlmostSure, 1 - 0.5 * std::exp((kLeastGroundGain - step.gain) / 2));
-  effect.text = search_.reference ? words_of_change(robot_, h, effect) + "."
-                                  : words_of_value(robot_, h, effect);
+  effect.text = search_.reference ? text_of_change(robot_, h, effect) + "."
+                                  : text_of_value(robot_, h, effect);
   if (h.name == kFloorEdge) describe_floor_edge(fitter_, search_.fit, options_.seed, &effect);
   return effect;
 }
@@ -164,7 +164,7 @@ void GroundReport::readings() {
     const StaleFrames& s = search_.stale;
     add("stale_frames", {"pose_latency"}, {"share", s.share, s.lo, s.hi, "-"},
         fmt::format("{} of {} poses on the way, {:.1f} % [{:.1f}, {:.1f}], repeat the one before; "
-                    "they were left out.",
+                    "they were held out.",
                     s.repeats, s.frames, 100 * s.share, 100 * s.lo, 100 * s.hi),
         "Log a pose once, with the time at which it was measured.");
   }
@@ -312,7 +312,7 @@ void GroundReport::name_headline() {
                     "values are."
         : figures_.closable.lo > 0
             ? "Something is wrong that nothing of the catalogue explains alone."
-            : "Nothing is surely wrong, but these runs do not exclude it.";
+            : "Nothing is significantly wrong, but these runs do not exclude it.";
     if (!d_.findings.empty()) d_.headline += " " + d_.findings.front();
     return;
   }
@@ -332,8 +332,8 @@ void GroundReport::name_headline() {
   }
 }
 
-std::vector<SaidValue> GroundReport::said() const {
-  std::vector<SaidValue> values;
+std::vector<ReportedValue> GroundReport::reported_values() const {
+  std::vector<ReportedValue> values;
   for (std::size_t j = 0; j < search_.rows.size(); ++j) {
     const FitRow& row = search_.rows[j];
     const auto k = static_cast<Eigen::Index>(j);
@@ -367,7 +367,7 @@ GroundDiagnosis report_ground(const GroundRobot& robot, const GroundSearch& sear
                               const GroundDiagnoseOptions& options) {
   GroundReport report(robot, search, options);
   GroundDiagnosis result;
-  result.values = report.said();
+  result.values = report.reported_values();
   result.diagnosis = report.write();
   result.figures = report.figures_of();
   return result;

@@ -12,24 +12,24 @@
 namespace gapfarm {
 namespace {
 
-const SaidValue* said_value(const SaidValues& said, const std::string& name) {
-  for (const SaidValue& v : said.values) {
+const ReportedValue* reported_value(const ReportedValues& reported, const std::string& name) {
+  for (const ReportedValue& v : reported.values) {
     if (v.name == name) return &v;
   }
   return nullptr;
 }
 
 // A product of ratios that are 1 in the robot's file, times what the file has.
-RosValue product(const SaidValues& said, const std::string& key, double had,
+RosValue product(const ReportedValues& reported, const std::string& key, double had,
                  std::initializer_list<const char*> over,
                  std::initializer_list<const char*> under = {}) {
   RosValue row{key, had, had, {had, had}, false};
   double least = had, most = had;
   const auto take = [&](const char* name, bool divide) {
-    const SaidValue* v = said_value(said, name);
-    if (v == nullptr || !v->named || v->says <= 0 || v->interval.lower <= 0) return;
+    const ReportedValue* v = reported_value(reported, name);
+    if (v == nullptr || !v->named || v->reported <= 0 || v->interval.lower <= 0) return;
     row.known = true;
-    row.says = divide ? row.says / v->says : row.says * v->says;
+    row.reported = divide ? row.reported / v->reported : row.reported * v->reported;
     least = divide ? least / v->interval.upper : least * v->interval.lower;
     most = divide ? most / v->interval.lower : most * v->interval.upper;
   };
@@ -39,22 +39,22 @@ RosValue product(const SaidValues& said, const std::string& key, double had,
   return row;
 }
 
-std::string interval_words(const RosValue& row) {
-  return row.known ? fmt::format("{:.4g} [{:.4g}, {:.4g}]", row.says, row.interval.lower,
+std::string interval_text(const RosValue& row) {
+  return row.known ? fmt::format("{:.4g} [{:.4g}, {:.4g}]", row.reported, row.interval.lower,
                                  row.interval.upper)
                    : "as you have it";
 }
 
-std::string joined(const std::vector<std::string>& words) {
+std::string joined(const std::vector<std::string>& items) {
   std::string all;
-  for (const std::string& word : words) all += (all.empty() ? "" : ", ") + word;
+  for (const std::string& word : items) all += (all.empty() ? "" : ", ") + word;
   return all.empty() ? "its log" : all;
 }
 
 }  // namespace
 
-std::vector<RosValue> ros_values(const SaidValues& said) {
-  const GroundRobot& robot = said.given;
+std::vector<RosValue> ros_values(const ReportedValues& reported) {
+  const GroundRobot& robot = reported.given;
   const ControllerKinematics& k = robot.controller;
   double radius = 0;
   for (const RobotWheel& w : robot.wheels) {
@@ -67,8 +67,8 @@ std::vector<RosValue> ros_values(const SaidValues& said) {
       if (w.driven) arm = std::abs(w.x_m.value_or(0)) + std::abs(w.y_m.value_or(0));
     }
     arm = k.sum_of_robot_center_projection_m.value_or(arm);
-    return {product(said, "kinematics.wheels_radius", radius, {"travel", "ahead"}),
-            product(said, "kinematics.sum_of_robot_center_projection_on_X_Y_axis", arm,
+    return {product(reported, "kinematics.wheels_radius", radius, {"travel", "ahead"}),
+            product(reported, "kinematics.sum_of_robot_center_projection_on_X_Y_axis", arm,
                     {"travel", "ahead"}, {"turn"})};
   }
   if (robot.drive == DriveKind::kOmni) {
@@ -76,34 +76,34 @@ std::vector<RosValue> ros_values(const SaidValues& said) {
     for (const RobotWheel& w : robot.wheels) {
       arm = std::max(arm, std::hypot(w.x_m.value_or(0), w.y_m.value_or(0)));
     }
-    return {product(said, "wheel_radius", radius, {"travel", "ahead"}),
-            product(said, "robot_radius", k.robot_radius_m.value_or(arm), {"travel", "ahead"},
+    return {product(reported, "wheel_radius", radius, {"travel", "ahead"}),
+            product(reported, "robot_radius", k.robot_radius_m.value_or(arm), {"travel", "ahead"},
                     {"turn"})};
   }
   if (is_steered(robot)) {
-    std::vector<RosValue> rows = {
-        product(said, "wheelbase", k.wheelbase_m.value_or(0), {"wheelbase"}, {"steering_gain"})};
+    std::vector<RosValue> rows = {product(reported, "wheelbase", k.wheelbase_m.value_or(0),
+                                          {"wheelbase"}, {"steering_gain"})};
     if (!is_throttled(robot)) {
-      rows.push_back(product(said, "traction_wheels_radius", radius, {"ahead"}));
+      rows.push_back(product(reported, "traction_wheels_radius", radius, {"ahead"}));
     }
     return rows;
   }
-  return {
-      product(said, "wheel_separation_multiplier", k.wheel_separation_multiplier, {"separation"}),
-      product(said, "left_wheel_radius_multiplier", k.left_wheel_radius_multiplier,
-              {"travel", "left"}),
-      product(said, "right_wheel_radius_multiplier", k.right_wheel_radius_multiplier,
-              {"travel", "right"})};
+  return {product(reported, "wheel_separation_multiplier", k.wheel_separation_multiplier,
+                  {"separation"}),
+          product(reported, "left_wheel_radius_multiplier", k.left_wheel_radius_multiplier,
+                  {"travel", "left"}),
+          product(reported, "right_wheel_radius_multiplier", k.right_wheel_radius_multiplier,
+                  {"travel", "right"})};
 }
 
-std::vector<std::string> ros_remarks(const SaidValues& said) {
+std::vector<std::string> ros_remarks(const ReportedValues& reported) {
   struct Word {
     const char* name;
     const char* text;
     const char* unit;
   };
-  constexpr Word kWords[] = {
-      {"steering_offset", "trim of the steering: the wheels point this way when told straight",
+  constexpr Word kLabels[] = {
+      {"steering_offset", "trim of the steering: the wheels point this way when commanded straight",
        "rad"},
       {"delay", "from a command to its pose", "s"},
       {"lag", "first-order lag", "s"},
@@ -114,39 +114,40 @@ std::vector<std::string> ros_remarks(const SaidValues& said) {
       {"dead_band", "commands that move nothing", ""},
   };
   std::vector<std::string> remarks;
-  for (const Word& word : kWords) {
-    const SaidValue* v = said_value(said, word.name);
+  for (const Word& word : kLabels) {
+    const ReportedValue* v = reported_value(reported, word.name);
     if (v == nullptr || !v->named) continue;
     remarks.push_back(fmt::format("{}: {:.4g} [{:.4g}, {:.4g}] {}; you have {:.4g}", word.text,
-                                  v->says, v->interval.lower, v->interval.upper, word.unit,
+                                  v->reported, v->interval.lower, v->interval.upper, word.unit,
                                   v->had));
   }
   return remarks;
 }
 
-RosFriction ros_friction(const SaidValues& said) {
-  const GroundRobot& robot = said.given;
+RosFriction ros_friction(const ReportedValues& reported) {
+  const GroundRobot& robot = reported.given;
   RosFriction friction;
-  if (const SaidValue* grip = said_value(said, "grip"); grip != nullptr && grip->named) {
-    friction.across = std::exp(grip->says) / kGravity_m_s2;
+  if (const ReportedValue* grip = reported_value(reported, "grip");
+      grip != nullptr && grip->named) {
+    friction.across = std::exp(grip->reported) / kGravity_m_s2;
     friction.from = fmt::format("friction across {:.3g} [{:.3g}, {:.3g}], from how hard it corners",
                                 *friction.across, std::exp(grip->interval.lower) / kGravity_m_s2,
                                 std::exp(grip->interval.upper) / kGravity_m_s2);
     friction.along = friction.across;
     return friction;
   }
-  const SaidValue* turn = said_value(said, "separation");
+  const ReportedValue* turn = reported_value(reported, "separation");
   const double own = robot.controller.wheel_separation_multiplier;
   if (!skids(robot) || turn == nullptr || !turn->named || own < 1.01) return friction;
   const auto ratio = [&](double times) {
     return robot.friction_ratio * std::sqrt(std::max(0.0, own * times - 1) / (own - 1));
   };
   friction.along = robot.friction;
-  friction.across = robot.friction * ratio(turn->says);
+  friction.across = robot.friction * ratio(turn->reported);
   friction.from = fmt::format(
       "across over along {:.3g} [{:.3g}, {:.3g}], by four-point theory from how it turns; along "
       "as you have it",
-      ratio(turn->says), ratio(turn->interval.lower), ratio(turn->interval.upper));
+      ratio(turn->reported), ratio(turn->interval.lower), ratio(turn->interval.upper));
   return friction;
 }
 
@@ -154,7 +155,7 @@ std::string ros_table(const RosExport& data) {
   std::string text = fmt::format("{:<52} {:>10}   {}\n", "parameter of " + data.controller,
                                  "you have", "the log says (90 %)");
   for (const RosValue& row : data.values) {
-    text += fmt::format("{:<52} {:>10.4g}   {}\n", row.key, row.had, interval_words(row));
+    text += fmt::format("{:<52} {:>10.4g}   {}\n", row.key, row.had, interval_text(row));
   }
   for (const std::string& remark : data.remarks) text += "  " + remark + "\n";
   for (const RosWheel& wheel : data.wheels) {
@@ -177,7 +178,7 @@ std::string ros_yaml(const RosExport& data) {
                      data.controller + ":\n  ros__parameters:\n";
   for (const RosValue& row : data.values) {
     text += row.known ? fmt::format("    {}: {:.6g}  # [{:.4g}, {:.4g}]; you had {:.6g}\n", row.key,
-                                    row.says, row.interval.lower, row.interval.upper, row.had)
+                                    row.reported, row.interval.lower, row.interval.upper, row.had)
                       : fmt::format("    {}: {:.6g}  # as you have it: the log says no other\n",
                                     row.key, row.had);
   }

@@ -14,12 +14,12 @@ namespace gapfarm {
 struct RosValue {
   std::string key;  // "wheel_separation_multiplier"
   double had = 0;
-  double says = 0;
+  double reported = 0;
   Interval interval;
   bool known = false;  // the interval is of this log; else the value is the file's own
 };
 
-// Friction of the floor, where the log or the simulation tells it.
+// Friction of the floor, where the log or the simulation shows it.
 struct RosFriction {
   std::optional<double> along, across;  // none: the log does not show it
   std::string from;                     // "as simulated", "by four-point theory from ..."
@@ -41,11 +41,11 @@ struct RosExport {
 };
 
 // The controller's parameters by what a log says; names and values follow the drive.
-std::vector<RosValue> ros_values(const SaidValues& said);
+std::vector<RosValue> ros_values(const ReportedValues& reported);
 // What is off and has no parameter: a trim of the steering, a delay.
-std::vector<std::string> ros_remarks(const SaidValues& said);
-// Of the floor as far as the robot's motion tells: a car's grip, a skid-steer's multiplier.
-RosFriction ros_friction(const SaidValues& said);
+std::vector<std::string> ros_remarks(const ReportedValues& reported);
+// Of the floor as far as the robot's motion shows: a car's grip, a skid-steer's multiplier.
+RosFriction ros_friction(const ReportedValues& reported);
 
 // A table of what the user had and what the log says.
 std::string ros_table(const RosExport& data);

@@ -6,12 +6,12 @@
 
 namespace gapfarm {
 
-std::string format_values(const SaidValues& values) {
+std::string format_values(const ReportedValues& values) {
   nlohmann::ordered_json rows = nlohmann::ordered_json::array();
-  for (const SaidValue& v : values.values) {
+  for (const ReportedValue& v : values.values) {
     rows.push_back({{"name", v.name},
                     {"had", v.had},
-                    {"says", v.says},
+                    {"says", v.reported},
                     {"lo", v.interval.lower},
                     {"hi", v.interval.upper},
                     {"named", v.named}});
@@ -21,24 +21,24 @@ std::string format_values(const SaidValues& values) {
   return json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
 }
 
-Result<SaidValues> parse_values(const std::string& text, const std::string& path) {
+Result<ReportedValues> parse_values(const std::string& text, const std::string& path) {
   const auto json = nlohmann::json::parse(text, nullptr, false);
   const Error error{path + ": found no values of a ground robot's diagnosis; diagnose it again"};
   if (!json.is_object() || !json.contains("values") || !json.contains("robot")) return error;
   if (!json["robot"].is_string() || !json["values"].is_array()) return error;
   auto robot = parse_robot(json["robot"].get<std::string>(), path);
   if (!robot) return robot.error();
-  SaidValues values;
+  ReportedValues values;
   values.given = *std::move(robot);
   const auto number = [](const nlohmann::json& row, const char* key) {
     return row.contains(key) && row[key].is_number() ? row[key].get<double>() : 0.0;
   };
   for (const auto& row : json["values"]) {
     if (!row.is_object() || !row.contains("name") || !row["name"].is_string()) return error;
-    SaidValue v;
+    ReportedValue v;
     v.name = row["name"].get<std::string>();
     v.had = number(row, "had");
-    v.says = number(row, "says");
+    v.reported = number(row, "says");
     v.interval = {number(row, "lo"), number(row, "hi")};
     v.named = row.contains("named") && row["named"].is_boolean() && row["named"].get<bool>();
     values.values.push_back(std::move(v));

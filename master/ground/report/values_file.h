@@ -13,22 +13,22 @@
 namespace gapfarm {
 
 // A number of the kinematic model.
-struct SaidValue {
+struct ReportedValue {
   std::string name;  // "separation", "left", ...
   double had = 0;    // by the robot's file
-  double says = 0;
+  double reported = 0;
   Interval interval;   // 90 %
   bool named = false;  // the log says that it is another; else it is within what files are off by
 };
 
-struct SaidValues {
+struct ReportedValues {
   GroundRobot given;              // the robot as its file has it
   std::vector<std::string> logs;  // folders
-  std::vector<SaidValue> values;
+  std::vector<ReportedValue> values;
 };
 
-std::string format_values(const SaidValues& values);
+std::string format_values(const ReportedValues& values);
 // Errors: `path` names the text, which is no such file.
-Result<SaidValues> parse_values(const std::string& text, const std::string& path);
+Result<ReportedValues> parse_values(const std::string& text, const std::string& path);
 
 }  // namespace gapfarm

@@ -36,7 +36,7 @@ bool near(double angle_rad, double axis_rad) {
   return std::abs(wrap_angle(angle_rad - axis_rad)) < kNearAxis_rad;
 }
 
-// Mean cosine of how far the turns are from `rate` times what was told.
+// Mean cosine of how far the turns are from `rate` times the command.
 double agreement(const std::vector<DriveSample>& turns, double rate) {
   double sum = 0;
   for (const DriveSample& s : turns) sum += std::cos(s.turned_rad() - rate * s.turn_s);
@@ -65,7 +65,7 @@ Rate best_rate(const std::vector<DriveSample>& turns, double sign) {
 
 std::string evidence(const TravelFit& travel, int sense) {
   std::string text;
-  if (travel.tells()) {
+  if (travel.is_clear()) {
     const bool mirrored = travel.mirrored > travel.same;
     text = "Over " + std::to_string(travel.drives) +
            " straight drives the direction of travel follows the " +
@@ -138,7 +138,7 @@ std::optional<SanityFinding> turned_finding(const TravelFit& travel, int sense,
 
 }  // namespace
 
-bool TravelFit::tells() const {
+bool TravelFit::is_clear() const {
   return drives >= kFewestStraight && std::max(same, mirrored) > kGoodConcentration &&
          std::abs(same - mirrored) > kClearMargin;
 }
@@ -190,7 +190,7 @@ namespace {
 
 std::optional<SanityFinding> finding_of(const TravelFit& travel, int sense) {
   const std::string seen = evidence(travel, sense);
-  if (travel.tells()) {
+  if (travel.is_clear()) {
     if (travel.mirrored > travel.same) return mirrored_finding(travel, sense, seen);
     return turned_finding(travel, sense, seen);
   }
@@ -204,7 +204,7 @@ std::optional<SanityFinding> finding_of(const TravelFit& travel, int sense) {
 
 }  // namespace
 
-std::optional<SanityFinding> doubt_axes(const std::vector<DriveSample>& samples) {
+std::optional<SanityFinding> check_axes(const std::vector<DriveSample>& samples) {
   auto finding = finding_of(fit_travel(samples), sense_of_turns(samples));
   if (!finding) return finding;
   finding->names_an_effect = true;

@@ -1,5 +1,5 @@
 // Whether positions, headings and commands have the same sense: mirrored and swapped axes, headings
-// that count clockwise, sides told the wrong way round.
+// that count clockwise, sides reported the wrong way round.
 #pragma once
 
 #include <optional>
@@ -19,16 +19,16 @@ struct TravelFit {
   double offset_rad = 0;
   std::size_t drives = 0;
 
-  bool tells() const;  // one of them is clearly the better one, and good
+  bool is_clear() const;  // one of them is clearly the better one, and good
 };
 TravelFit fit_travel(const std::vector<DriveSample>& samples);
 
-// Which way headings change when the right side is told to run faster: +1 counter-clockwise, as it
-// should be, -1 clockwise; 0 where the log does not say, so also where turns by 200 degrees one way
-// cannot be told from 160 the other.
+// Which way headings change when the right side is commanded to run faster: +1 counter-clockwise,
+// as it should be, -1 clockwise; 0 where the log does not say, so also where turns by 200 degrees
+// one way cannot be distinguished from 160 the other.
 int sense_of_turns(const std::vector<DriveSample>& samples);
 
 // The one thing that is the wrong way round, named by Occam: none where all agree or nothing says.
-std::optional<SanityFinding> doubt_axes(const std::vector<DriveSample>& samples);
+std::optional<SanityFinding> check_axes(const std::vector<DriveSample>& samples);
 
 }  // namespace gapfarm

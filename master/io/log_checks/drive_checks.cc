@@ -29,31 +29,31 @@ double concentration(const std::vector<DriveSample>& samples, double factor) {
 
 }  // namespace
 
-bool doubt_motion(const std::vector<DriveSample>& samples, const DriveLimits& limits,
+bool check_motion(const std::vector<DriveSample>& samples, const DriveLimits& limits,
                   std::vector<SanityFinding>* findings) {
-  std::vector<double> ways, turns;
+  std::vector<double> driven_lengths, turns;
   for (const DriveSample& s : samples) {
     if (s.most_s <= 0) continue;
-    ways.push_back(s.distance_m() / s.most_s);
+    driven_lengths.push_back(s.distance_m() / s.most_s);
     turns.push_back(std::abs(s.turned_rad()));
   }
-  if (ways.empty()) {
+  if (driven_lengths.empty()) {
     findings->push_back({"no_motion", "Every command has duty 0 or lasts 0 s: nothing was driven.",
                          "Log drives; what noise standing still has is in the gaps between them."});
     return true;
   }
-  const double way = median(ways), turned = median(turns);
-  if (way > kStill * limits.slowest_m_s || turned > kStillTurn_rad) return false;
+  const double driven = median(driven_lengths), turned = median(turns);
+  if (driven > kStill * limits.slowest_m_s || turned > kStillTurn_rad) return false;
   findings->push_back({"no_motion",
-                       "The robot does not move: half of the " + std::to_string(ways.size()) +
-                           " commands end within " + few_digits(1000 * way) +
-                           " mm a second of full duty and " + few_digits(1000 * turned) +
-                           " mrad of where they began.",
+                       "The robot does not move: half of the " +
+                           std::to_string(driven_lengths.size()) + " commands end within " +
+                           few_digits(1000 * driven) + " mm a second of full duty and " +
+                           few_digits(1000 * turned) + " mrad of where they began.",
                        "Look whether the motors were on and the poses are the robot's."});
   return true;
 }
 
-bool doubt_speed(const std::vector<DriveSample>& samples, const DriveLimits& limits,
+bool check_speed(const std::vector<DriveSample>& samples, const DriveLimits& limits,
                  std::vector<SanityFinding>* findings) {
   const double speed = full_speed_of(samples);
   if (straight_samples(samples).size() < kFewestStraight || speed <= 0) return false;
@@ -81,7 +81,7 @@ bool doubt_speed(const std::vector<DriveSample>& samples, const DriveLimits& lim
   return true;
 }
 
-bool doubt_heading_unit(const std::vector<DriveSample>& samples,
+bool check_heading_unit(const std::vector<DriveSample>& samples,
                         std::vector<SanityFinding>* findings) {
   constexpr double kSmall_rad = 0.1;
   constexpr double kGood = 0.75, kBad = 0.6;
@@ -103,7 +103,7 @@ bool doubt_heading_unit(const std::vector<DriveSample>& samples,
   return true;
 }
 
-void doubt_turning(const std::vector<DriveSample>& samples, const DriveLimits& limits,
+void check_turning(const std::vector<DriveSample>& samples, const DriveLimits& limits,
                    std::vector<SanityFinding>* findings) {
   const double speed = full_speed_of(samples);
   if (straight_samples(samples).size() < kFewestStraight || limits.gauge_m <= 0) return;

@@ -1,4 +1,4 @@
-// Doubts about logs of drives.
+// Checks of logs of drives.
 #pragma once
 
 #include <vector>
@@ -15,17 +15,17 @@ struct DriveLimits {
   double gauge_m = 0;                       // between left and right contact
 };
 
-// Nothing was told to move, or nothing did.  Whether anything was found.
-bool doubt_motion(const std::vector<DriveSample>& samples, const DriveLimits& limits,
+// Nothing was commanded to move, or nothing did.  Whether anything was found.
+bool check_motion(const std::vector<DriveSample>& samples, const DriveLimits& limits,
                   std::vector<SanityFinding>* findings);
 // Lengths of another unit, or a robot that is faster or slower than the scenario's can be.
-bool doubt_speed(const std::vector<DriveSample>& samples, const DriveLimits& limits,
+bool check_speed(const std::vector<DriveSample>& samples, const DriveLimits& limits,
                  std::vector<SanityFinding>* findings);
 // Headings of another unit: small ones while the travel goes all ways.
-bool doubt_heading_unit(const std::vector<DriveSample>& samples,
+bool check_heading_unit(const std::vector<DriveSample>& samples,
                         std::vector<SanityFinding>* findings);
 // Turns faster than the sides' speeds and their distance allow without any slip.
-void doubt_turning(const std::vector<DriveSample>& samples, const DriveLimits& limits,
+void check_turning(const std::vector<DriveSample>& samples, const DriveLimits& limits,
                    std::vector<SanityFinding>* findings);
 
 }  // namespace gapfarm

@@ -1,4 +1,4 @@
-// Drives as doubt sees them: what was told, and between which readings the robot moved.
+// Drives as the checks see them: what was commanded, and between which readings the robot moved.
 #pragma once
 
 #include <cstddef>

@@ -1,4 +1,4 @@
-// What is wrong with a log or with its fit to a config, as a person would doubt it.
+// What is wrong with a log or with its fit to a config, as a person would question it.
 #pragma once
 
 #include <string>
@@ -8,8 +8,8 @@ namespace gapfarm {
 
 enum class Severity {
   kNote,      // worth knowing; a diagnosis goes on
-  kDoubt,     // nothing is named because of it
-  kUnusable,  // whatever a diagnosis said would be about this and not about the robot
+  kWarning,   // nothing is named because of it
+  kUnusable,  // whatever a diagnosis reported would be about this and not about the robot
 };
 
 struct SanityFinding {

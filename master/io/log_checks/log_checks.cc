@@ -19,7 +19,7 @@ constexpr std::array<LengthUnit, 5> kUnits = {{{"millimetres", 0.001},
                                                {"feet", 0.3048},
                                                {"kilometres", 1000}}};
 
-std::string row_words(const Trial& trial) {
+std::string row_text(const Trial& trial) {
   return "session " + trial.session + ", trial " + std::to_string(trial.trial);
 }
 
@@ -43,7 +43,7 @@ const LengthUnit* likely_unit(double logged, double lower_m, double upper_m, dou
   return best;
 }
 
-void doubt_count(const TrialLog& log, std::vector<SanityFinding>* findings) {
+void check_count(const TrialLog& log, std::vector<SanityFinding>* findings) {
   const std::size_t count = log.trials.size();
   if (count >= kFewestTrials) return;
   findings->push_back({"too_few_trials",
@@ -55,7 +55,7 @@ void doubt_count(const TrialLog& log, std::vector<SanityFinding>* findings) {
                            " trials, better 200, and repeat commands."});
 }
 
-void doubt_copies(const TrialLog& log, std::vector<SanityFinding>* findings) {
+void check_copies(const TrialLog& log, std::vector<SanityFinding>* findings) {
   using Key = std::tuple<double, double, double, double, double, double>;
   std::map<Key, const Trial*> seen;
   std::size_t copies = 0, moved = 0;
@@ -66,7 +66,7 @@ void doubt_copies(const TrialLog& log, std::vector<SanityFinding>* findings) {
     const Key key{t.X_WS.x, t.X_WS.y, t.X_WS.theta, t.X_WE.x, t.X_WE.y, t.X_WE.theta};
     const auto [first, fresh] = seen.try_emplace(key, &t);
     if (fresh) continue;
-    if (copies++ == 0) example = row_words(t) + " and " + row_words(*first->second);
+    if (copies++ == 0) example = row_text(t) + " and " + row_text(*first->second);
   }
   if (copies == 0) return;
   const bool many = static_cast<double>(copies) > kManyCopies * static_cast<double>(moved);
@@ -78,7 +78,7 @@ void doubt_copies(const TrialLog& log, std::vector<SanityFinding>* findings) {
                        many ? Severity::kUnusable : Severity::kNote});
 }
 
-void doubt_clock(const TrialLog& log, std::vector<SanityFinding>* findings) {
+void check_clock(const TrialLog& log, std::vector<SanityFinding>* findings) {
   std::map<std::string, double> last;
   std::size_t steps = 0, back = 0;
   std::string example;
@@ -88,7 +88,7 @@ void doubt_clock(const TrialLog& log, std::vector<SanityFinding>* findings) {
     if (fresh) continue;
     ++steps;
     if (*t.t_s < before->second && back++ == 0) {
-      example = row_words(t) + " begins at " + few_digits(*t.t_s) + " s, the one before it at " +
+      example = row_text(t) + " begins at " + few_digits(*t.t_s) + " s, the one before it at " +
                 few_digits(before->second) + " s";
     }
     before->second = *t.t_s;

@@ -1,4 +1,4 @@
-// Doubts about a log that do not depend on what moves.
+// Checks of a log that do not depend on what moves.
 #pragma once
 
 #include <string>
@@ -9,11 +9,11 @@
 
 namespace gapfarm {
 
-void doubt_count(const TrialLog& log, std::vector<SanityFinding>* findings);
+void check_count(const TrialLog& log, std::vector<SanityFinding>* findings);
 // Rows that repeat another one's poses to the last digit although something moved.
-void doubt_copies(const TrialLog& log, std::vector<SanityFinding>* findings);
+void check_copies(const TrialLog& log, std::vector<SanityFinding>* findings);
 // Times that run backward within a session.
-void doubt_clock(const TrialLog& log, std::vector<SanityFinding>* findings);
+void check_clock(const TrialLog& log, std::vector<SanityFinding>* findings);
 
 // "3.1 %", "0.25": few digits, no trailing zeros.
 std::string few_digits(double value);

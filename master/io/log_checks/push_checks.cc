@@ -24,7 +24,7 @@ double reach_of(const Piece& piece) {
 
 }  // namespace
 
-void doubt_pushes(const Problem& problem, std::vector<SanityFinding>* findings) {
+void check_pushes(const Problem& problem, std::vector<SanityFinding>* findings) {
   const double finger = problem.values[row_of(Push::kFingerRadius)];
   std::vector<double> moved, turned, distances, reaches;
   for (const Trial& t : problem.log.trials) {
@@ -52,7 +52,7 @@ void doubt_pushes(const Problem& problem, std::vector<SanityFinding>* findings) 
   const double nearest = median(distances), reach = median(reaches);
   if (nearest < kFar * reach) return;
   const LengthUnit* unit = likely_unit(nearest, 0, reach, reach / 2);
-  const std::string seen = "The finger comes no nearer to a piece's middle than " +
+  const std::string seen = "The finger comes no closer to a piece's middle than " +
                            few_digits(nearest) +
                            " m in half of the pushes, and the farthest corner "
                            "lies " +

@@ -1,4 +1,4 @@
-// Doubts about logs of pushes.
+// Checks of logs of pushes.
 #pragma once
 
 #include <vector>
@@ -9,6 +9,6 @@
 namespace gapfarm {
 
 // Nothing moved, or finger and pieces are not in one frame and unit.
-void doubt_pushes(const Problem& problem, std::vector<SanityFinding>* findings);
+void check_pushes(const Problem& problem, std::vector<SanityFinding>* findings);
 
 }  // namespace gapfarm

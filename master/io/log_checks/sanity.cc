@@ -15,7 +15,7 @@ constexpr double kMostImpossible = 0.05;  // of the trials
 constexpr double kTimesAsFar = 2;
 constexpr double kBeyond_m = 0.3;  // what a camera's seam or a late reading may add
 
-// Nobody says how fast and how wide a program's robot may be, so no log is doubted for it.
+// Nobody says how fast and how wide a program's robot may be, so no log is questioned for it.
 constexpr double kSlowestProgram_m_s = 0.005;
 
 bool has_drives(const Problem& problem) {
@@ -44,19 +44,19 @@ void note_impossible(const Problem& problem, std::vector<SanityFinding>* finding
 
 // Each only where the one before leaves it meaning: what does not move has no speed, and axes that
 // do not fit say nothing of turns.
-void doubt_drives(const Problem& problem, std::vector<SanityFinding>* findings) {
+void check_drives(const Problem& problem, std::vector<SanityFinding>* findings) {
   const std::vector<DriveSample> samples = drive_samples(problem);
   const DriveLimits limits = limits_of(problem);
-  if (doubt_motion(samples, limits, findings)) return;
-  bool doubted = doubt_speed(samples, limits, findings);
-  if (doubt_heading_unit(samples, findings)) {
-    doubted = true;
-  } else if (auto axes = doubt_axes(samples)) {
+  if (check_motion(samples, limits, findings)) return;
+  bool suspicious = check_speed(samples, limits, findings);
+  if (check_heading_unit(samples, findings)) {
+    suspicious = true;
+  } else if (auto axes = check_axes(samples)) {
     findings->push_back(std::move(*axes));
-    doubted = true;
+    suspicious = true;
   }
-  if (doubted) return;
-  doubt_turning(samples, limits, findings);
+  if (suspicious) return;
+  check_turning(samples, limits, findings);
   note_impossible(problem, findings);
 }
 
@@ -79,14 +79,14 @@ std::vector<std::size_t> impossible_trials(const Problem& problem) {
 std::vector<SanityFinding> check_sanity(const Problem& problem) {
   std::vector<SanityFinding> findings;
   if (problem.log.trials.empty()) return findings;
-  if (has_drives(problem)) doubt_drives(problem, &findings);
-  if (problem.scenario == "push") doubt_pushes(problem, &findings);
+  if (has_drives(problem)) check_drives(problem, &findings);
+  if (problem.scenario == "push") check_pushes(problem, &findings);
   for (SanityFinding& f : findings) f.names_an_effect |= f.name == "unit_error";
-  doubt_clock(problem.log, &findings);
+  check_clock(problem.log, &findings);
   const bool still = std::any_of(findings.begin(), findings.end(),
                                  [](const SanityFinding& f) { return f.name == "no_motion"; });
-  if (!still) doubt_copies(problem.log, &findings);
-  doubt_count(problem.log, &findings);
+  if (!still) check_copies(problem.log, &findings);
+  check_count(problem.log, &findings);
   std::stable_sort(findings.begin(), findings.end(),
                    [](const SanityFinding& a, const SanityFinding& b) {
                      return a.severity == Severity::kUnusable && b.severity == Severity::kNote;

@@ -1,4 +1,4 @@
-// What a careful person would doubt before simulating anything: units, axes, clocks, copies, too
+// What a careful person would check before simulating anything: units, axes, clocks, copies, too
 // little of everything, a robot that the scenario cannot be.
 #pragma once
 
@@ -19,7 +19,7 @@ std::vector<SanityFinding> check_sanity(const Problem& problem);
 
 // Trials of a log of drives that cannot be: the robot would have had to move at more than twice the
 // log's own speed and 30 cm beyond.  Ascending; empty where they are so many that the speed itself
-// is in doubt.
+// is in question.
 std::vector<std::size_t> impossible_trials(const Problem& problem);
 
 }  // namespace gapfarm

@@ -14,7 +14,7 @@ Result<Recording> read_mcap(ByteSource& source, const std::string& file);
 // rosbag2's SQLite files; `path` on disk.
 Result<Recording> read_db3(const std::string& path);
 
-// Any log, told by its content.
+// Any log, recognised by its content.
 Result<Recording> read_recording(const std::string& path);
 
 }  // namespace gapfarm

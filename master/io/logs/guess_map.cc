@@ -1,4 +1,4 @@
-// Columns told by their names, their types and the numbers in them.
+// Columns guessed by their names, their types and the numbers in them.
 #include <algorithm>
 #include <cctype>
 #include <cmath>

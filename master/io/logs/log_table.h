@@ -46,13 +46,13 @@ struct Recording {
   std::string format;  // "a CSV file with a header", for sentences
   std::vector<LogTable> tables;
   std::string robot_description;   // a URDF that was recorded with it; often empty
-  std::vector<std::string> notes;  // what was left out, and why
+  std::vector<std::string> notes;  // what was held out, and why
 };
 
 // Reads text logs: tables with a header (separated by commas, semicolons or tabs; decimal commas;
 // rows of units and of other names above the numbers; rostopic echo -p and PlotJuggler included),
-// ros2 topic echo --csv of the usual types, TUM, OptiTrack Motive.  Told by its content.  Errors
-// name file, line, what was found and expected; nothing is half-read.
+// ros2 topic echo --csv of the usual types, TUM, OptiTrack Motive.  Recognised by its content.
+// Errors name file, line, what was found and expected; nothing is half-read.
 Result<Recording> parse_text_log(std::string_view text, const std::string& file);
 
 }  // namespace gapfarm

@@ -231,7 +231,7 @@ class MessageDecoder {
     std::string text(bytes_.substr(at_, length));
     at_ += length;
     if (cdr_ && !text.empty() && text.back() == '\0') text.pop_back();
-    if (quiet_ == 0) content_.words[path] = std::move(text);
+    if (quiet_ == 0) content_.texts[path] = std::move(text);
     return true;
   }
 

@@ -16,7 +16,7 @@ enum class MessageWire { kRos1, kCdr };
 // What stands in one message, by path: "pose.position.x", "velocity[2]", "header.stamp" (s).
 struct MessageContent {
   std::vector<std::pair<std::string, double>> numbers;
-  std::map<std::string, std::string, std::less<>> words;
+  std::map<std::string, std::string, std::less<>> texts;
 };
 
 // A type with all types within it.

@@ -28,14 +28,14 @@ std::string_view first_line(std::string_view text) {
   return text.substr(0, text.find_first_of("\r\n"));
 }
 
-std::vector<std::string_view> words_of(std::string_view line) {
-  std::vector<std::string_view> words;
+std::vector<std::string_view> tokens_of(std::string_view line) {
+  std::vector<std::string_view> tokens;
   for (std::size_t at = line.find_first_not_of(" \t"); at != line.npos;) {
     const std::size_t end = std::min(line.find_first_of(" \t", at), line.size());
-    words.push_back(line.substr(at, end - at));
+    tokens.push_back(line.substr(at, end - at));
     at = line.find_first_not_of(" \t", end);
   }
-  return words;
+  return tokens;
 }
 
 // `t x y z qx qy qz qw`, blanks between, comments with '#'.
@@ -47,13 +47,13 @@ Result<Recording> parse_tum(std::string_view text, const std::string& file) {
     std::string_view line = text.substr(at, end - at);
     at = end + 1;
     if (!line.empty() && line.back() == '\r') line.remove_suffix(1);
-    const std::vector<std::string_view> words = words_of(line);
-    if (words.empty() || words[0][0] == '#') continue;
-    if (words.size() != 8) {
-      return text_error(file, {line_number + 1, 1}, std::to_string(words.size()) + " numbers",
+    const std::vector<std::string_view> tokens = tokens_of(line);
+    if (tokens.empty() || tokens[0][0] == '#') continue;
+    if (tokens.size() != 8) {
+      return text_error(file, {line_number + 1, 1}, std::to_string(tokens.size()) + " numbers",
                         "8 (t x y z qx qy qz qw)", "check the line");
     }
-    for (const std::string_view word : words) {
+    for (const std::string_view word : tokens) {
       const auto value = parse_double(word);
       if (!value || !std::isfinite(*value)) {
         return text_error(file, {line_number + 1, 1}, quoted_word(word), "a number",
@@ -318,8 +318,8 @@ bool looks_like_tum(std::string_view text) {
   }
   const std::string_view line = first_line(text);
   if (line.find(',') != line.npos) return false;
-  const auto words = words_of(line);
-  return words.size() == 8 && std::all_of(words.begin(), words.end(), [](std::string_view word) {
+  const auto tokens = tokens_of(line);
+  return tokens.size() == 8 && std::all_of(tokens.begin(), tokens.end(), [](std::string_view word) {
            return parse_double(word).has_value();
          });
 }

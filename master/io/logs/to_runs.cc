@@ -248,10 +248,11 @@ class Importer {
     std::vector<std::size_t> only_poses, others;
     for (std::size_t i = 0; i < recordings_.size(); ++i) {
       const bool poses = stretches_["poses"].count(i) != 0;
-      const bool told = stretches_["commands"].count(i) != 0 || stretches_["wheels"].count(i) != 0;
-      if (poses && told) whole.push_back({i});
-      if (poses && !told) only_poses.push_back(i);
-      if (!poses && told) others.push_back(i);
+      const bool commanded =
+          stretches_["commands"].count(i) != 0 || stretches_["wheels"].count(i) != 0;
+      if (poses && commanded) whole.push_back({i});
+      if (poses && !commanded) only_poses.push_back(i);
+      if (!poses && commanded) others.push_back(i);
     }
     if (only_poses.size() == 1) {
       // One log of poses, with commands and wheels in files of their own.

@@ -17,7 +17,7 @@ struct ImportedRuns {
 
 // Times in s from the first one, poses in m and rad about the world's upward axis, commands in SI.
 // Rows without a number where one is needed, poses whose quaternion is none and times that go back
-// are left out and counted.  Errors: no rows of poses or commands where the map has them, a column
+// are omitted and counted.  Errors: no rows of poses or commands where the map has them, a column
 // that is not there, rims' speeds in m/s without a wheel radius.
 Result<ImportedRuns> to_runs(const std::vector<Recording>& recordings, const LogMap& map);
 

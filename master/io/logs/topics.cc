@@ -60,8 +60,8 @@ Status Topics::add(const std::string& topic, const std::string& type, const Mess
   if (!content) return Error{"topic " + quoted_word(topic) + ": " + content.error().message};
   const std::string_view name = std::string_view(type).substr(type.rfind('/') + 1);
   if (name == "String") {
-    const auto data = content->words.find("data");
-    if (data != content->words.end() && topic.find("robot_description") != topic.npos) {
+    const auto data = content->texts.find("data");
+    if (data != content->texts.end() && topic.find("robot_description") != topic.npos) {
       recording_.robot_description = data->second;
     } else {
       skip(topic, type);
@@ -72,8 +72,8 @@ Status Topics::add(const std::string& topic, const std::string& type, const Mess
     std::string array, index;
     for (auto& [path, value] : content->numbers) {
       if (!element_of(path, array, index)) continue;
-      const auto joint = content->words.find("name[" + index + "]");
-      path = array + "." + (joint == content->words.end() ? index : joint->second);
+      const auto joint = content->texts.find("name[" + index + "]");
+      path = array + "." + (joint == content->texts.end() ? index : joint->second);
     }
   }
   if (name != "TFMessage") return put(topic, type, t_s, content->numbers);
@@ -83,8 +83,8 @@ Status Topics::add(const std::string& topic, const std::string& type, const Mess
     const std::size_t dot = path.find("].");
     if (dot == path.npos) continue;
     const std::string at = path.substr(0, dot + 1);
-    const auto child = content->words.find(at + ".child_frame_id");
-    const std::string frame = child == content->words.end() ? "" : child->second;
+    const auto child = content->texts.find(at + ".child_frame_id");
+    const std::string frame = child == content->texts.end() ? "" : child->second;
     frames[topic + ":" + frame].emplace_back(path.substr(dot + 2), value);
   }
   for (const auto& [frame, numbers] : frames) {

@@ -62,7 +62,7 @@ class Finder {
   }
 
   bool sounds_like_wheel(const UrdfJoint& joint) const {
-    return says(joint.name + " " + joint.child, {"wheel", "tire", "tyre", "whl"});
+    return contains_any(joint.name + " " + joint.child, {"wheel", "tire", "tyre", "whl"});
   }
 
   // A joint that turns without end about a level axis, under something round, named or driven.
@@ -88,7 +88,7 @@ class Finder {
 
   // Wheels that were fixed to draw them: where a controller names them, or nothing else rolls.
   void consider_fixed(const UrdfJoint& joint) {
-    if (says(joint.name + " " + joint.child, {"caster", "castor"})) return;
+    if (contains_any(joint.name + " " + joint.child, {"caster", "castor"})) return;
     const bool named = stated_.count(joint.name) != 0;
     if (!named && !(sounds_like_wheel(joint) && rolling_ == 0)) return;
     for (const ChassisWheel& other : chassis_.wheels) {
@@ -162,7 +162,7 @@ class Finder {
       const Eigen::Isometry3d& X_BL = poses_.find(above->child)->second;
       Eigen::Vector3d axis = X_BL.linear() * above->axis_J;
       const std::string names = above->name + " " + above->child + " " + wheel.joint->name;
-      const bool swivel_name = says(names, {"caster", "castor", "swivel"});
+      const bool swivel_name = contains_any(names, {"caster", "castor", "swivel"});
       // A swivel without an axis: nobody meant URDF's x.
       if (!above->axis_given && swivel_name) axis = Eigen::Vector3d::UnitZ();
       if (std::abs(axis.z()) < kUpright) continue;
@@ -176,20 +176,20 @@ class Finder {
       wheel.trail_m = trail.norm();
       const bool limited = above->type == "revolute" && above->lower_rad && above->upper_rad;
       const bool driven = driven_.count(above->name) != 0;
-      const bool steer_name = says(names, {"steer"});
+      const bool steer_name = contains_any(names, {"steer"});
       wheel.steered =
           driven || steer_name || (!swivel_name && (limited || wheel.trail_m < kCasterTrail));
       wheel.caster = !wheel.steered;
       return;
     }
     const std::string names = wheel.joint->name + " " + wheel.link->name;
-    if (!wheel.named && says(names, {"caster", "castor"})) wheel.caster = true;
+    if (!wheel.named && contains_any(names, {"caster", "castor"})) wheel.caster = true;
   }
 
   void find_floor() {
     for (const char* name : {"base_footprint", "footprint"}) {
       for (const auto& [link, pose] : poses_) {
-        if (!says(link, {name}) || chassis_.footprint_z_B_m) continue;
+        if (!contains_any(link, {name}) || chassis_.footprint_z_B_m) continue;
         chassis_.footprint_z_B_m = pose.translation().z();
         footprint_ = link;
       }
@@ -246,7 +246,7 @@ class Finder {
     if (names.empty()) return;
     const auto mm = [](double m) { return format_double(std::round(m * 1e4) / 10); };
     chassis_.remarks.push_back(
-        "no shape tells the radius of the wheels of " + names + "; their axles' height over " +
+        "no shape shows the radius of the wheels of " + names + "; their axles' height over " +
         chassis_.floor_from + ", " + mm(least) + (most - least > 5e-5 ? " to " + mm(most) : "") +
         " mm, was taken" +
         (guessed_floor_ ? " as if that lay on the floor: state the radius in the robot's table"
@@ -261,7 +261,7 @@ class Finder {
       // Without a radius the floor is unknown, and its own name must do.
       if (!wheel.radius_m && (wheel.named || sounds_like_wheel(*wheel.joint))) return false;
       if (sounds_like_wheel(*wheel.joint)) {
-        remark(*wheel.joint, "does not reach the floor and was left out");
+        remark(*wheel.joint, "does not reach the floor and was omitted");
       }
       return true;
     };
@@ -277,7 +277,7 @@ class Finder {
       if (wheel) continue;
       const UrdfJoint* above = model_.joint_above(link.name);
       if (above != nullptr && above->type != "fixed") continue;
-      const bool name = says(link.name, {"caster", "castor", "ball_wheel", "skid"});
+      const bool name = contains_any(link.name, {"caster", "castor", "ball_wheel", "skid"});
       for (const UrdfGeometry& shape : link.collisions) {
         if (shape.shape == UrdfShape::kMesh && !name) continue;
         const Eigen::Vector3d lowest = lowest_point(poses_.find(link.name)->second, shape);
@@ -322,11 +322,11 @@ class Finder {
 
 }  // namespace
 
-bool says(std::string_view text, std::initializer_list<std::string_view> words) {
+bool contains_any(std::string_view text, std::initializer_list<std::string_view> needles) {
   std::string lower(text);
   std::transform(lower.begin(), lower.end(), lower.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return std::any_of(words.begin(), words.end(),
+  return std::any_of(needles.begin(), needles.end(),
                      [&](std::string_view word) { return lower.find(word) != lower.npos; });
 }
 

@@ -1,4 +1,4 @@
-// Which links of a URDF are wheels, casters and steering: told by axes, shapes, the floor and what
+// Which links of a URDF are wheels, casters and steering: found by axes, shapes, the floor and what
 // controllers name, and only then by names.
 #pragma once
 
@@ -45,6 +45,6 @@ struct Chassis {
 Result<Chassis> find_chassis(const UrdfModel& model, const std::vector<DriveFacts>& facts);
 
 // Whether any of `words` stands in `text`, in any case.
-bool says(std::string_view text, std::initializer_list<std::string_view> words);
+bool contains_any(std::string_view text, std::initializer_list<std::string_view> needles);
 
 }  // namespace gapfarm

@@ -95,17 +95,17 @@ class Comparison {
   }
 
  private:
-  void say(std::string sentence) { reading_.disagreements.push_back(std::move(sentence)); }
+  void report(std::string sentence) { reading_.disagreements.push_back(std::move(sentence)); }
 
   void held_against(const DriveFacts& fact, const char* name, const std::optional<double>& urdf,
                     const std::string& from) {
     const StatedNumber* stated = fact.number(name);
     if (stated == nullptr || !urdf || !differ(stated->value, *urdf)) return;
     const bool diameter = stated->key.find("iameter") != stated->key.npos;
-    say(fact.place(stated->line) + ": " + stated->key + " " +
-        metres(diameter ? 2 * stated->value : stated->value) +
-        (diameter ? " (radius " + metres(stated->value) + ")" : "") + ", but the URDF says " +
-        metres(*urdf) + " (" + from + ")");
+    report(fact.place(stated->line) + ": " + stated->key + " " +
+           metres(diameter ? 2 * stated->value : stated->value) +
+           (diameter ? " (radius " + metres(stated->value) + ")" : "") + ", but the URDF says " +
+           metres(*urdf) + " (" + from + ")");
   }
 
   const RobotWheel* wheel_of(const std::string& joint) const {
@@ -121,17 +121,17 @@ class Comparison {
         const RobotWheel* wheel = wheel_of(joint);
         if (wheel == nullptr) {
           if (role != "steering" && !turns(joint)) {
-            say(fact.place(stated.line) + ": " + stated.key + " names '" + joint +
-                "', which is no wheel of the URDF");
+            report(fact.place(stated.line) + ": " + stated.key + " names '" + joint +
+                   "', which is no wheel of the URDF");
           }
           continue;
         }
         const bool left = role.find("left") != role.npos;
         const bool right = role.find("right") != role.npos;
         if ((left && *wheel->y_m < 0) || (right && *wheel->y_m > 0)) {
-          say(fact.place(stated.line) + ": " + stated.key + " names '" + joint +
-              "', which the URDF puts on the " + (left ? "right" : "left") +
-              ": the sides are swapped in one of them");
+          report(fact.place(stated.line) + ": " + stated.key + " names '" + joint +
+                 "', which the URDF puts on the " + (left ? "right" : "left") +
+                 ": the sides are swapped in one of them");
         }
       }
     }
@@ -149,14 +149,14 @@ class Comparison {
         for (std::size_t k = i + 1; k < facts_.size(); ++k) {
           const StatedNumber* b = facts_[k].number(name);
           if (b == nullptr || !differ(a.value, b->value)) continue;
-          say(facts_[i].place(a.line) + ": " + name + " " + format_double(a.value) + ", but " +
-              facts_[k].place(b->line) + " says " + format_double(b->value));
+          report(facts_[i].place(a.line) + ": " + name + " " + format_double(a.value) + ", but " +
+                 facts_[k].place(b->line) + " says " + format_double(b->value));
         }
       }
       if (facts_[i].drive.empty() || i == 0 || facts_[0].drive.empty()) continue;
       if (facts_[i].drive != facts_[0].drive) {
-        say(facts_[0].place(facts_[0].line) + ": a " + facts_[0].drive + " drive, but " +
-            facts_[i].place(facts_[i].line) + " says " + facts_[i].drive);
+        report(facts_[0].place(facts_[0].line) + ": a " + facts_[0].drive + " drive, but " +
+               facts_[i].place(facts_[i].line) + " says " + facts_[i].drive);
       }
     }
   }
@@ -174,8 +174,8 @@ class Comparison {
       if (!wheel.driven || !wheel.radius_m || guessed(wheel)) continue;
       if (first == nullptr) first = &wheel;
       if (differ(*first->radius_m, *wheel.radius_m)) {
-        say("wheel " + first->name + " has radius " + metres(*first->radius_m) + ", wheel " +
-            wheel.name + " " + metres(*wheel.radius_m));
+        report("wheel " + first->name + " has radius " + metres(*first->radius_m) + ", wheel " +
+               wheel.name + " " + metres(*wheel.radius_m));
       }
     }
     std::string backward;
@@ -265,29 +265,29 @@ void compare_facts(const std::vector<DriveFacts>& facts, RobotReading& reading) 
 std::vector<std::string> compare_readings(const RobotReading& a, const std::string& file_a,
                                           const RobotReading& b, const std::string& file_b) {
   std::vector<std::string> all;
-  const auto say = [&](const std::string& what, double x, double y, const char* unit) {
+  const auto report = [&](const std::string& what, double x, double y, const char* unit) {
     all.push_back(what + " is " + format_double(std::round(x * 1e5) / 1e5) + unit + " in " +
                   file_a + ", but " + format_double(std::round(y * 1e5) / 1e5) + unit + " in " +
                   file_b);
   };
   const double mass_a = a.robot.mass_kg.value_or(0), mass_b = b.robot.mass_kg.value_or(0);
   if (std::abs(mass_a - mass_b) > kShare * std::max(mass_a, mass_b)) {
-    say("the mass", mass_a, mass_b, " kg");
+    report("the mass", mass_a, mass_b, " kg");
   }
   const Measured m = measure(a), n = measure(b);
   if (m.radius && n.radius && differ(*m.radius, *n.radius)) {
-    say("the wheels' radius", *m.radius, *n.radius, " m");
+    report("the wheels' radius", *m.radius, *n.radius, " m");
   }
   if (m.separation && n.separation && differ(*m.separation, *n.separation)) {
-    say("the wheels' separation", *m.separation, *n.separation, " m");
+    report("the wheels' separation", *m.separation, *n.separation, " m");
   }
   if (m.wheelbase && n.wheelbase && differ(*m.wheelbase, *n.wheelbase)) {
-    say("the wheelbase", *m.wheelbase, *n.wheelbase, " m");
+    report("the wheelbase", *m.wheelbase, *n.wheelbase, " m");
   }
   if (a.robot.drive != b.robot.drive) {
-    all.push_back("the drive is " + drive_words()[static_cast<std::size_t>(a.robot.drive)] +
+    all.push_back("the drive is " + drive_names()[static_cast<std::size_t>(a.robot.drive)] +
                   " in " + file_a + ", but " +
-                  drive_words()[static_cast<std::size_t>(b.robot.drive)] + " in " + file_b);
+                  drive_names()[static_cast<std::size_t>(b.robot.drive)] + " in " + file_b);
   }
   return all;
 }
@@ -314,11 +314,12 @@ Result<RobotReading> understand_controllers(const std::vector<DriveFacts>& contr
       take_controller(controllers, reading);
       compare_facts(controllers, reading);
       // Only the first says what the robot is.
-      auto& said = reading.disagreements;
-      said.erase(std::remove_if(
-                     said.begin(), said.end(),
-                     [](const std::string& s) { return s.find("no wheel of the URDF") != s.npos; }),
-                 said.end());
+      auto& disagreements = reading.disagreements;
+      disagreements.erase(std::remove_if(disagreements.begin(), disagreements.end(),
+                                         [](const std::string& s) {
+                                           return s.find("no wheel of the URDF") != s.npos;
+                                         }),
+                          disagreements.end());
       return reading;
     }
   }

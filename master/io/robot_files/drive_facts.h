@@ -1,5 +1,5 @@
 // What a controller file or a simulator's plugin says about how a robot is driven, in the names of
-// ros2_controllers, whatever dialect it was said in.
+// ros2_controllers, whatever dialect it was written in.
 #pragma once
 
 #include <map>

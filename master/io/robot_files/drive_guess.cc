@@ -14,7 +14,7 @@ using std::numbers::pi;
 constexpr double kParallel = 0.985;  // cosine: 10 degrees
 
 bool mentions_mecanum(const UrdfModel& model) {
-  const auto mecanum = [](const std::string& text) { return says(text, {"mecanum"}); };
+  const auto mecanum = [](const std::string& text) { return contains_any(text, {"mecanum"}); };
   if (mecanum(model.name)) return true;
   for (const UrdfLink& link : model.links) {
     if (mecanum(link.name)) return true;
@@ -43,7 +43,7 @@ class Guess {
 
   Result<DriveGuess> run() {
     if (Status s = turn_forward(); !s) return s.error();
-    if (Status s = tell_drive(); !s) return s.error();
+    if (Status s = set_drive(); !s) return s.error();
     return std::move(guess_);
   }
 
@@ -88,11 +88,11 @@ class Guess {
     if (!guess_.parallel) return {};
     if (std::abs(first->axis_B.y()) >= 0.9) return {};
     guess_.forward_rad = std::atan2(-first->axis_B.x(), first->axis_B.y());
-    // Either way is across the axles; the sides' names decide, else the way nearer to x or y.
+    // Either way is across the axles; the sides' names decide, else the way closer to x or y.
     double left = 0;
     for (const ChassisWheel& wheel : chassis_.wheels) {
-      if (says(wheel.joint->name, {"left"})) left += across(wheel.centre_B_m);
-      if (says(wheel.joint->name, {"right"})) left -= across(wheel.centre_B_m);
+      if (contains_any(wheel.joint->name, {"left"})) left += across(wheel.centre_B_m);
+      if (contains_any(wheel.joint->name, {"right"})) left -= across(wheel.centre_B_m);
     }
     const bool turn = left != 0 ? left < 0 : std::sin(guess_.forward_rad) < 0;
     if (turn) guess_.forward_rad = wrap_angle(guess_.forward_rad + pi);
@@ -111,7 +111,7 @@ class Guess {
 
   void because(const std::string& sentence) { guess_.evidence.push_back(sentence); }
 
-  Status tell_drive() {
+  Status set_drive() {
     std::vector<const ChassisWheel*> steered, left, right;
     for (const ChassisWheel& wheel : chassis_.wheels) {
       if (wheel.steered) steered.push_back(&wheel);
@@ -123,7 +123,7 @@ class Guess {
     if (stated != nullptr) {
       because(stated->place(stated->line) + ": " + stated->type + " says " + stated->drive);
     }
-    if (!steered.empty()) return tell_steered(steered);
+    if (!steered.empty()) return set_steered(steered);
     const std::size_t driven = left.size() + right.size();
     if (!guess_.parallel) {
       guess_.drive = DriveKind::kOmni;
@@ -139,21 +139,21 @@ class Guess {
                         std::to_string(right.size()) + " on the right",
                     "name the driven wheels in a controller file (--controllers)");
     }
-    return tell_parallel(left.size(), stated);
+    return set_parallel(left.size(), stated);
   }
 
-  Status tell_parallel(std::size_t each_side, const DriveFacts* stated) {
+  Status set_parallel(std::size_t each_side, const DriveFacts* stated) {
     if (each_side == 1) {
       guess_.drive = DriveKind::kDifferential;
       return {};
     }
-    const std::string said = stated == nullptr ? "" : stated->drive;
-    const bool planar = said == "planar" || said == "omni";
-    if (each_side == 2 && (said == "mecanum" || planar || mentions_mecanum(model_))) {
+    const std::string drive_text = stated == nullptr ? "" : stated->drive;
+    const bool planar = drive_text == "planar" || drive_text == "omni";
+    if (each_side == 2 && (drive_text == "mecanum" || planar || mentions_mecanum(model_))) {
       guess_.drive = DriveKind::kMecanum;
-      because(said == "mecanum" ? "the controller is one of mecanum wheels"
-              : planar          ? "four parallel wheels that may move sideways"
-                                : "a name or mesh says mecanum");
+      because(drive_text == "mecanum" ? "the controller is one of mecanum wheels"
+              : planar                ? "four parallel wheels that may move sideways"
+                                      : "a name or mesh says mecanum");
       return {};
     }
     guess_.drive = DriveKind::kSkid;
@@ -165,7 +165,7 @@ class Guess {
     return {};
   }
 
-  Status tell_steered(const std::vector<const ChassisWheel*>& steered) {
+  Status set_steered(const std::vector<const ChassisWheel*>& steered) {
     std::string names;
     for (const ChassisWheel* wheel : steered) {
       const std::string& name = wheel->turning->name;

@@ -10,8 +10,8 @@
 namespace gapfarm {
 namespace {
 
-// What a log of free driving tells; rows that the robot's table does not have are left out.
-std::vector<std::string> told_by_driving(const GroundRobot& robot) {
+// What a log of free driving shows; rows that the robot's table does not have are omitted.
+std::vector<std::string> identified_by_driving(const GroundRobot& robot) {
   std::vector<std::string> keys;
   std::set<std::string> groups;
   for (const RobotWheel& w : robot.wheels) {
@@ -54,7 +54,7 @@ std::string toml_key(const std::string& key) {
 std::string search_of_driving(const GroundRobot& robot) {
   const GroundTable rows(robot);
   std::string text = "[genes]  # \"table\": half to twice what the robot's file says\n";
-  for (const std::string& key : told_by_driving(robot)) {
+  for (const std::string& key : identified_by_driving(robot)) {
     const auto row = rows.table().find(key);
     if (!row) continue;
     const Parameter& p = rows.table()[*row];
@@ -67,9 +67,9 @@ std::string search_of_driving(const GroundRobot& robot) {
          "[evolution]\nstop = { evaluations = 600 }\n";
 }
 
-std::string joined(const std::vector<std::string>& words, const char* around) {
+std::string joined(const std::vector<std::string>& texts, const char* around) {
   std::string text;
-  for (const std::string& word : words) {
+  for (const std::string& word : texts) {
     text += (text.empty() ? "" : ", ") + (around + word) + around;
   }
   return text;
@@ -77,19 +77,19 @@ std::string joined(const std::vector<std::string>& words, const char* around) {
 
 }  // namespace
 
-std::string config_of_robot(const GroundRobot& robot, const RobotConfigWords& words) {
+std::string config_of_robot(const GroundRobot& robot, const RobotConfigTexts& texts) {
   std::string text =
       "# A ground robot, fitted to logs of it driving (docs/ground.md), made of " +
-      joined(words.made_of, "") +
+      joined(texts.made_of, "") +
       ".\n"
       "# Lines with QUESTION are guesses; answer them, in the robot's file where they are about "
       "it,\n# then `gapfarm check` this file.\nscenario = \"ground\"\nseed = 1\n\n";
-  for (const std::string& sentence : words.questions) text += "# QUESTION: " + sentence + "\n";
-  text += "[robot]\nfile = \"" + words.robot + "\"\n\n[runs]\n";
-  if (words.runs.empty()) {
+  for (const std::string& sentence : texts.questions) text += "# QUESTION: " + sentence + "\n";
+  text += "[robot]\nfile = \"" + texts.robot + "\"\n\n[runs]\n";
+  if (texts.runs.empty()) {
     text += "# QUESTION: where are its runs?  `gapfarm import runs LOG --out drive` makes them.\n";
   }
-  text += "folders = [" + (words.runs.empty() ? "\"drive\"" : joined(words.runs, "\"")) +
+  text += "folders = [" + (texts.runs.empty() ? "\"drive\"" : joined(texts.runs, "\"")) +
           "]   # commands.csv and poses.csv in each\n\n";
   return text + search_of_driving(robot);
 }

@@ -82,7 +82,7 @@ class Picture {
   void heading(Svg& svg) const {
     const std::string name = r_.name.empty() ? "robot" : r_.name;
     svg.text({16, 24}, name, {16, kInk, SvgAnchor::kStart, true});
-    std::string line = "drive " + drive_words()[static_cast<std::size_t>(r_.drive)] +
+    std::string line = "drive " + drive_names()[static_cast<std::size_t>(r_.drive)] +
                        ", seen from above, ahead is up";
     if (reading_.robot.mass_kg) line += text(*reading_.robot.mass_kg, "; %.4g kg");
     svg.text({16, 44}, line, {12, kFaint});
@@ -176,9 +176,9 @@ class Picture {
   void legend(Svg& svg) const {
     const double y = height_ - 60;
     double x = 16;
-    const auto entry = [&](const std::string& paint, const char* words, double room) {
+    const auto entry = [&](const std::string& paint, const char* caption, double room) {
       svg.rectangle({x, y - 10}, 12, 12, {paint, kInk, 1, {}, 0.8});
-      svg.text({x + 18, y}, words, {11, kInk});
+      svg.text({x + 18, y}, caption, {11, kInk});
       x += room;
     };
     entry(kDriven, "driven", 74);

@@ -29,12 +29,12 @@ std::string padded(std::string text, std::size_t width) {
 
 std::string role(const RobotWheel& wheel) {
   if (wheel.kind == WheelKind::kCaster) return "caster";
-  std::string words = wheel.driven ? "driven" : "free";
-  if (wheel.steered) words += ", steered";
+  std::string description = wheel.driven ? "driven" : "free";
+  if (wheel.steered) description += ", steered";
   if (wheel.kind == WheelKind::kOmni || wheel.kind == WheelKind::kMecanum) {
-    words += ", " + wheel_words()[static_cast<std::size_t>(wheel.kind)];
+    description += ", " + wheel_names()[static_cast<std::size_t>(wheel.kind)];
   }
-  return words;
+  return description;
 }
 
 std::string source_text(const WheelSource& source) {
@@ -119,7 +119,7 @@ std::string controller_text(const ControllerKinematics& c) {
 }  // namespace
 
 std::string describe_robot(const RobotReading& reading, const GroundRobot& completed) {
-  const std::string drive = drive_words()[static_cast<std::size_t>(completed.drive)];
+  const std::string drive = drive_names()[static_cast<std::size_t>(completed.drive)];
   std::string text = (completed.name.empty() ? "the robot" : completed.name) + ": drive " + drive;
   for (std::size_t i = 0; i < reading.evidence.size(); ++i) {
     text += (i == 0 ? ", because " : "; ") + reading.evidence[i];
@@ -170,7 +170,7 @@ std::string describe_robot_json(const RobotReading& reading, const GroundRobot& 
     const RobotWheel& wheel = completed.wheels[i];
     const WheelSource source = source_of(reading, wheel.name);
     wheels.push_back({{"name", wheel.name},
-                      {"kind", wheel_words()[static_cast<std::size_t>(wheel.kind)]},
+                      {"kind", wheel_names()[static_cast<std::size_t>(wheel.kind)]},
                       {"driven", wheel.driven},
                       {"steered", wheel.steered},
                       {"x", optional(wheel.x_m)},
@@ -189,7 +189,7 @@ std::string describe_robot_json(const RobotReading& reading, const GroundRobot& 
                       {"mu2", optional(source.mu2)}});
   }
   const json out = {{"name", completed.name},
-                    {"drive", drive_words()[static_cast<std::size_t>(completed.drive)]},
+                    {"drive", drive_names()[static_cast<std::size_t>(completed.drive)]},
                     {"evidence", reading.evidence},
                     {"base_link", reading.base_link},
                     {"origin_in_base_link",

@@ -52,7 +52,7 @@ Result<RobotReading> understand_controllers(const std::vector<DriveFacts>& contr
 std::vector<double> standing_loads(const GroundRobot& robot);
 
 // Vertical forces on points that give way alike under a body of `weight_n` whose centre of mass
-// stands at `com`: least squares that keeps both torques, points that would pull left out.  Empty
+// stands at `com`: least squares that keeps both torques, points that would pull omitted.  Empty
 // when the body falls over.
 std::vector<double> wheel_loads(const std::vector<Eigen::Vector2d>& points,
                                 const Eigen::Vector2d& com, double weight_n);

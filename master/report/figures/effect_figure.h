@@ -26,8 +26,8 @@ struct EffectDrives {
 // An SVG with a panel a command: the drive without the effect dashed with a hollow end, with it
 // solid with a filled one, each with a stroke along its heading, and by how much the end differs.
 // The drives are seen from X_WS, heading along the world's x.  Directions, discs, lines and centres
-// among the effect's `values` (in the catalogue's order) are drawn too, told by their parameters'
-// names: direction; x, y and radius; position and axis; x, y.
+// among the effect's `values` (in the catalogue's order) are drawn too, recognised by their
+// parameters' names: direction; x, y and radius; position and axis; x, y.
 std::string effect_figure(const Effect& effect, std::span<const double> values, const Pose& X_WS,
                           std::span<const EffectDrives> drives);
 

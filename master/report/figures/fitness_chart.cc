@@ -71,14 +71,14 @@ void draw_axes(Svg& svg, const Scale& scale, const std::string& y_title) {
 }
 
 void draw_legend(Svg& svg) {
-  const SvgText words{.size = 12};
+  const SvgText style{.size = 12};
   svg.line({kLeft, 56}, {kLeft + 30, 56}, {.stroke = kBlue, .stroke_width = 2.4});
-  svg.text({kLeft + 37, 60}, "best", words);
+  svg.text({kLeft + 37, 60}, "best", style);
   svg.line({kLeft + 84, 56}, {kLeft + 114, 56},
            {.stroke = "#555555", .stroke_width = 1.6, .dash = "6 3.5"});
-  svg.text({kLeft + 121, 60}, "median", words);
+  svg.text({kLeft + 121, 60}, "median", style);
   svg.rectangle({kLeft + 184, 50}, 30, 12, {.fill = kBlue, .opacity = 0.12});
-  svg.text({kLeft + 221, 60}, "best to worst", words);
+  svg.text({kLeft + 221, 60}, "best to worst", style);
 }
 
 }  // namespace

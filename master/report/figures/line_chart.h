@@ -24,7 +24,7 @@ struct ChartLevel {  // a horizontal line
 struct LineChart {
   std::string title, x_title, y_title;
   bool log_x = false;
-  bool log_y = false;           // points at or below 0 are left out
+  bool log_y = false;           // points at or below 0 are omitted
   bool equal_axes = false;      // one unit of x is as long as one of y
   std::optional<double> y_top;  // what is above is cut off at the frame
   std::vector<ChartSeries> series;

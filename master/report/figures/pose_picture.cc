@@ -29,8 +29,8 @@ constexpr const char* kFaint = "#6b6b6b";
 constexpr const char* kGrid = "#e9e9e9";
 constexpr const char* kMeasured = "#555555";
 
-// Okabe and Ito's colours, told apart with every kind of colour vision; dashes and marks tell them
-// apart in grey.
+// Okabe and Ito's colours, distinguished with every kind of colour vision; dashes and marks
+// distinguish them in grey.
 struct CloudLook {
   const char* colour;
   const char* dash;
@@ -200,9 +200,9 @@ void draw_panel(Svg& svg, const PosePanel& panel, SvgPoint corner) {
 }
 
 void draw_legend(Svg& svg, const std::vector<PosePanel>& panels, SvgPoint place) {
-  const SvgText words{.size = 12, .colour = kInk};
+  const SvgText text_style{.size = 12, .colour = kInk};
   draw_measured_mark(svg, {place.x + 4, place.y}, 0.5);
-  svg.text({place.x + 22, place.y + 4}, "measured, tick along heading", words);
+  svg.text({place.x + 22, place.y + 4}, "measured, tick along heading", text_style);
   double x = place.x + 230;
   const PosePanel* fullest = &panels.front();
   for (const PosePanel& panel : panels) {
@@ -214,7 +214,7 @@ void draw_legend(Svg& svg, const std::vector<PosePanel>& panels, SvgPoint place)
              {.stroke = look.colour, .stroke_width = 2, .dash = look.dash});
     draw_mark(svg, {x + 18, place.y}, look);
     const std::string label = fullest->clouds[i].label + ", 90 % ellipse";
-    svg.text({x + 44, place.y + 4}, label, words);
+    svg.text({x + 44, place.y + 4}, label, text_style);
     x += 62 + 6.4 * static_cast<double>(label.size());
   }
 }
@@ -227,10 +227,10 @@ std::string pose_picture(const std::vector<PosePanel>& panels, const std::string
   const std::size_t rows = std::max<std::size_t>(1, (panels.size() + columns - 1) / columns);
   const double cell_width = kLeft + kPlot + kGap, cell_height = kTop + kPlot + kBottom;
   // Wide enough for the legend and the titles even with one panel.
-  const double words = std::max(kTitleWidth * static_cast<double>(title.size()),
-                                kSubtitleWidth * static_cast<double>(subtitle.size()));
+  const double text_style = std::max(kTitleWidth * static_cast<double>(title.size()),
+                                     kSubtitleWidth * static_cast<double>(subtitle.size()));
   const double width =
-      2 * kMargin + std::max({static_cast<double>(columns) * cell_width, kLegendWidth, words});
+      2 * kMargin + std::max({static_cast<double>(columns) * cell_width, kLegendWidth, text_style});
   Svg svg(width, kHeader + static_cast<double>(rows) * cell_height + kMargin);
   svg.text({kMargin, 30}, title, {.size = 19, .colour = kInk, .bold = true});
   svg.text({kMargin, 50}, subtitle, {.size = 12.5, .colour = kFaint});

@@ -30,7 +30,7 @@ function startCompared() {
         { kind: "line", ...line, width: 2, points: all.map(([x, y]) => [x, y]) },
         { kind: "points", style: line.style, shape: "dot", faint: 0.01, name: line.name, points: all },
       ]),
-      describe: ({ name, g }) => `${name}, generation ${g.generation}: best ${words(g.best, 6)}`,
+      describe: ({ name, g }) => `${name}, generation ${g.generation}: best ${numberText(g.best, 6)}`,
     }, `Best ${PAGE.fitness.name} by ${label}`, `${PAGE.fitness.higher_is_better ? "Higher" : "Lower"} is better.`, Boolean(chart.zoom));
   }
   redraws.push(draw);

@@ -113,15 +113,15 @@ function startDrives(trials) {
   if (!offered.length) return;
   const chooser = choice(controls, "Drive", offered.map((d, i) => [String(i), d.why]), draw);
   const select = controls.querySelector("select");
-  const said = controls.appendChild(document.createElement("p"));
-  said.className = "quiet";
+  const caption = controls.appendChild(document.createElement("p"));
+  caption.className = "quiet";
 
   function draw() {
     const drive = offered[Number(chooser())];
     const lines = driveLines(drive);
     const without = lines.filter((l) => !l.known).map((l) => MODEL_NAME[l.key] || l.key);
     const arcs = without.length ? `Faint: no path of ${without.join(", ")} was kept, an arc joins its start and end.` : "";
-    said.textContent = `${describeTrial(drive.trial)}.`;
+    caption.textContent = `${describeTrial(drive.trial)}.`;
     charts[0].show({ ...framed(wayLayers(drive, lines), ["ahead of the start, mm", "left of the start, mm"]), equal: true },
       "On the floor, from its start", arcs);
     charts[1].show(framed(headingLayers(drive, lines), ["time, s", "heading turned, degrees"]),

@@ -28,7 +28,7 @@ function startElite() {
       layers,
       describe: ({ line, i, k }) => {
         const { key, unit: its, lower, upper } = axes[i];
-        return `${k === 0 ? "The best, genome" : "Genome"} ${line.id}, ${words(line.fitness, 6)}${unit}: ${key} ${line.values[i]}${its ? ` ${its}` : ""}, of ${lower} to ${upper}`;
+        return `${k === 0 ? "The best, genome" : "Genome"} ${line.id}, ${numberText(line.fitness, 6)}${unit}: ${key} ${line.values[i]}${its ? ` ${its}` : ""}, of ${lower} to ${upper}`;
       },
     }, `The best ${lines.length} of the last generation`, `Orange and bold: the best. The ends of a row are the ends of what was searched.`, Boolean(chart.zoom));
   }

@@ -130,7 +130,7 @@ class Chart {
     this.wanted = spec;
     if (!keepZoom) this.zoom = null;
     this.title.textContent = title;
-    this.said = note;
+    this.noteText = note;
     this.draw();
   }
 
@@ -150,7 +150,7 @@ class Chart {
     this.marks = all.filter((p) => within(this.spec, p)).sort((a, b) => a[0] - b[0]);
     const outside = new Set(all.map((p) => p[2])).size - new Set(this.marks.map((p) => p[2])).size;
     const beyond = outside ? ` ${outside} beyond the frame${this.zoom ? "" : " (− shows them)"}.` : "";
-    this.note.textContent = this.said + beyond;
+    this.note.textContent = this.noteText + beyond;
     const keys = "Arrow keys step through the marks, plus and minus zoom, 0 shows all.";
     this.canvas.setAttribute("aria-label", `${this.title.textContent}. ${this.note.textContent} ${keys}`);
     this.select(null);

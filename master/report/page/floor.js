@@ -56,7 +56,7 @@ function seamLayers(frame) {
                   points: [point(min, found.lo), point(max, found.lo), point(max, found.hi), point(min, found.hi)] });
   }
   layers.push({ kind: "line", style: "place", width: 2.5, points: [point(min, at), point(max, at)], name: "seam" });
-  layers.push({ kind: "text", style: "place", text: `seam: ${acrossY ? "y" : "x"} = ${words(at)} m`, anchor: acrossY ? "end" : "start",
+  layers.push({ kind: "text", style: "place", text: `seam: ${acrossY ? "y" : "x"} = ${numberText(at)} m`, anchor: acrossY ? "end" : "start",
                 points: [acrossY ? [frame.x.max - 0.02 * (frame.x.max - frame.x.min), at] : [at, frame.y.min + 0.06 * (frame.y.max - frame.y.min)]] });
   return layers;
 }
@@ -77,7 +77,7 @@ function lensLayers(frame) {
     ...steps(frame.x).map((x) => along(frame.y).map((y) => seen(x, y))),
     ...steps(frame.y).map((y) => along(frame.x).map((x) => seen(x, y))),
   ];
-  const label = { kind: "text", style: "place", text: `lens, bent ${words(times)} times`, points: [[cx, cy]], anchor: "middle" };
+  const label = { kind: "text", style: "place", text: `lens, bent ${numberText(times)} times`, points: [[cx, cy]], anchor: "middle" };
   return [...lines.map((points) => ({ kind: "line", style: "place", points, width: 1, faint: true, name: "lens" })), label];
 }
 
@@ -87,7 +87,7 @@ function placeLayers(frame) {
   for (const name of ["friction_patch", "friction_patch_2"].filter((n) => named.has(n))) {
     const [x, y, r, ratio] = ["x", "y", "radius", "ratio"].map((k) => valueOf(`${name}.${k}`));
     layers.push({ kind: "area", style: "place", points: circle(x, y, r), name: "patch" });
-    layers.push({ kind: "text", style: "place", text: `patch: ${words(ratio, 2)} × the friction`, points: [[x, y]], anchor: "middle" });
+    layers.push({ kind: "text", style: "place", text: `patch: ${numberText(ratio, 2)} × the friction`, points: [[x, y]], anchor: "middle" });
   }
   if (named.has("camera_seam")) layers.push(...seamLayers(frame));
   if (named.has("camera_distortion")) layers.push(...lensLayers(frame));
@@ -118,10 +118,10 @@ function drawCorner(group, { box, toX }, times) {
     svgElement(group, "path", { d: `M${x} ${y - 4}v8m0 -4h${metres * perMetre}m0 -4v8`, stroke: ink, "stroke-width": 1.6, fill: "none" });
     svgElement(group, "text", { x: x + metres * perMetre + 6, y: y + 4, ...ground }, text);
   };
-  bar(length, `${words(length)} m of floor`, box.bottom - 12);
+  bar(length, `${numberText(length)} m of floor`, box.bottom - 12);
   if (!times) return;
   const error = roundBelow((box.right - box.left) / 6 / perMetre / times);
-  bar(error * times, `${words(1000 * error)} mm of error`, box.bottom - 30);
+  bar(error * times, `${numberText(1000 * error)} mm of error`, box.bottom - 30);
 }
 
 // --- the section ---
@@ -152,9 +152,9 @@ function floorLayers(some, model, measure, ends, shown, times) {
 
 function fillLegend(legend, ends, measure) {
   const text = (i) => {
-    if (i === 0) return `up to ${words(ends[0], 2)} ${measure.unit}`;
-    if (i === ends.length) return `over ${words(ends.at(-1), 2)} ${measure.unit}`;
-    return `${words(ends[i - 1], 2)} to ${words(ends[i], 2)}`;
+    if (i === 0) return `up to ${numberText(ends[0], 2)} ${measure.unit}`;
+    if (i === ends.length) return `over ${numberText(ends.at(-1), 2)} ${measure.unit}`;
+    return `${numberText(ends[i - 1], 2)} to ${numberText(ends[i], 2)}`;
   };
   legend.replaceChildren(...Array.from({ length: ends.length + 1 }, (_, i) => {
     const item = document.createElement("li");
@@ -196,7 +196,7 @@ function startFloor(trials) {
         overlay: (group, map) => drawCorner(group, map, visible.has("errors") ? times : 0),
         describe: describeTrial, picked: showDrive },
       `Errors of the ${MODEL_NAME[model()]} model on the floor`,
-      `${some.length} drives, from start to end${visible.has("errors") ? `; errors ${words(times)} times as long as they are` : ""}.`,
+      `${some.length} drives, from start to end${visible.has("errors") ? `; errors ${numberText(times)} times as long as they are` : ""}.`,
       keep === true,
     );
   }

@@ -17,14 +17,14 @@ function startOperators() {
   const chart = new Chart(parent, 0.4);
   chart.figure.classList.add("large");
   const key = document.getElementById("operator-key");
-  // Eight lines can be told apart, by colour and by dashes; the rest has no name of its own.
+  // Eight lines can be distinguished, by colour and by dashes; the rest has no name of its own.
   const looks = (i) => ({ style: LINE_STYLES[i % LINE_STYLES.length], dashed: i % 2 === 1 });
   function draw() {
     const { names, generations, probabilities } = PAGE.operators;
     if (!generations.length) return;
     key.replaceChildren(...names.map((name, i) => lineKey(name, looks(i).style, looks(i).dashed)));
     const most = Math.max(...probabilities.flat().filter(isNumber), 0.01);
-    const describe = ({ g, name, p }) => `generation ${g}: ${name} ${words(100 * p, 3)} %`;
+    const describe = ({ g, name, p }) => `generation ${g}: ${name} ${numberText(100 * p, 3)} %`;
     chart.show({
       x: { min: generations[0], max: Math.max(generations.at(-1), generations[0] + 1), label: "generation" },
       y: { min: 0, max: 105 * most, label: "probability, %" },
@@ -65,7 +65,7 @@ function drawGene(chart, gene) {
       { kind: "points", style: "tuned", shape: "dot", faint: 0.01, name: "best", points: best.map((v, k) => [middle[k], v, { g: generations[k], v }]) },
       ...[edges[0], edges.at(-1)].map((v) => ({ kind: "line", style: "quiet", dashed: true, name: "end of the range", points: [[generations[0], v], [to(generations.length - 1), v]] })),
     ],
-    describe: ({ g, v }) => `generation ${g}: best ${words(v, 5)}${tag ? ` ${unit}` : ""}`,
+    describe: ({ g, v }) => `generation ${g}: best ${numberText(v, 5)}${tag ? ` ${unit}` : ""}`,
   }, key, atEnd ? "▲ The best lies at an end of the range: widen it in [genes]." : "", Boolean(chart.zoom));
 }
 

@@ -4,7 +4,7 @@
 // page asks by itself.
 
 const LOOK_MS = 2000;
-const TOLD_LOOK_MS = 60000;  // while it is told
+const EVENT_LOOK_MS = 60000;  // while it is reported
 let lookNow = () => {};
 const redraws = [];  // of plots whose data may change
 
@@ -23,7 +23,7 @@ function putInPlace(element, html) {
 
 function startLive() {
   if (!PAGE.served) return;
-  const said = document.getElementById("live");
+  const line = document.getElementById("live");
   const shown = new Map();
   const sections = (page) => [...page.querySelectorAll("section")].map((s) => s.id).join(" ");
   const path = location.pathname;
@@ -32,10 +32,10 @@ function startLive() {
   let events = null;
   let looking = null;
 
-  function say(trouble) {
+  function show(trouble) {
     since = trouble ? since ?? new Date().toLocaleTimeString() : null;
     const text = trouble ? `${trouble} What stands here is from ${since} or before; it is asked again all the time.` : "";
-    if (said.textContent !== text) said.textContent = text;
+    if (line.textContent !== text) line.textContent = text;
   }
 
   function update(text) {
@@ -51,13 +51,13 @@ function startLive() {
     redraws.forEach((draw) => draw());
   }
 
-  // Why, from a page that tells it or in plain words; what stands here is kept.
+  // Why, from a page that shows it or in plain language; what stands here is kept.
   function refused(answer, text) {
     const isPage = (answer.headers.get("Content-Type") || "").startsWith("text/html");
     const why = isPage ? new DOMParser().parseFromString(text, "text/html").getElementById("why")?.textContent || "" : text;
     const shown = document.getElementById("why");
     if (shown) shown.textContent = why;
-    else say(`The server says: ${why.slice(0, 300).trim()}`);
+    else show(`The server says: ${why.slice(0, 300).trim()}`);
   }
 
   async function look() {
@@ -65,13 +65,13 @@ function startLive() {
       const answer = await fetch(location.href.split("#")[0], {
         cache: "no-store", headers: etag ? { "If-None-Match": etag } : {}, signal: AbortSignal.timeout(20000),
       });
-      if (answer.status === 304) return say("");
+      if (answer.status === 304) return show("");
       if (!answer.ok) return refused(answer, await answer.text());
       update(await answer.text());
       etag = answer.headers.get("ETag") || "";
-      say("");
+      show("");
     } catch {
-      say("The server does not answer; gapfarm serve starts it again.");
+      show("The server does not answer; gapfarm serve starts it again.");
     }
     document.documentElement.dataset.looked = String(Number(document.documentElement.dataset.looked || 0) + 1);
   }
@@ -94,7 +94,7 @@ function startLive() {
       if (events.readyState === EventSource.CLOSED) events = null;
     };
   }
-  const told = () => events?.readyState === EventSource.OPEN;
+  const listening = () => events?.readyState === EventSource.OPEN;
   document.addEventListener("visibilitychange", () => {
     if (document.hidden) {
       events?.close();
@@ -107,11 +107,11 @@ function startLive() {
 
   let asked = performance.now();
   const again = async () => {
-    if (performance.now() - asked >= (told() ? TOLD_LOOK_MS : LOOK_MS)) {
+    if (performance.now() - asked >= (listening() ? EVENT_LOOK_MS : LOOK_MS)) {
       await lookNow();
       asked = performance.now();
     }
-    document.documentElement.dataset.told = String(Boolean(told()));
+    document.documentElement.dataset.told = String(Boolean(listening()));
     setTimeout(again, LOOK_MS / 2);
   };
   listen();

@@ -48,8 +48,8 @@ if (PICTURES) {
     { key, label, matches: new RegExp(matches), of: (t) => t[key] })), ...plain);
 }
 
-const covariateOf = (words) => {
-  const lower = words.toLowerCase();
+const covariateOf = (text) => {
+  const lower = text.toLowerCase();
   return lower ? COVARIATES.find((c) => c.matches.test(lower)) : undefined;
 };
 
@@ -126,7 +126,7 @@ function turned([xx, xy, yy], angle) {
   ];
 }
 
-// The pose B of A's frame, in the frame that A's pose is told in.
+// The pose B of A's frame, in the frame that A's pose is reported in.
 function composed(a, b) {
   const [c, s] = [Math.cos(a.theta), Math.sin(a.theta)];
   return { x: a.x + c * b.x - s * b.y, y: a.y + s * b.x + c * b.y, theta: wrapped(a.theta + b.theta) };

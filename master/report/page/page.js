@@ -111,7 +111,7 @@ const pageTrials = readTrials();
 if (pageTrials.length) {
   startDrives(pageTrials);
   startFloor(pageTrials);
-  startStrays(pageTrials);
+  startOutliers(pageTrials);
   startPoses(pageTrials);
   startResiduals(pageTrials, PAGE.where || []);
 } else {

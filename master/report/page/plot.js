@@ -12,7 +12,7 @@
 //   { kind: "cells", style, cells: [[x0, y0, x1, y1, share]...] }     a density; share in [0, 1]
 //   { kind: "text", style, points: [[x, y]], text, anchor, below }
 // A style is the name of a colour of the page, "final" for --final.  On a log axis what is not
-// above 0 is left out.  A line of any length costs no more than four points a pixel.
+// above 0 is omitted.  A line of any length costs no more than four points a pixel.
 // overlay(group, { box, toX, toY }) may draw more, in px: what has to stay where it is on the screen.
 
 const MARK = { cross: 3, diamond: 3.6, dot: 2.4 };
@@ -24,7 +24,7 @@ const FONT = 'system-ui, -apple-system, "Segoe UI", Roboto, "DejaVu Sans", sans-
 const isNumber = (v) => typeof v === "number" && Number.isFinite(v);
 
 // Numbers for people: "1,230", "0.0412", "−3.2", "4.1 × 10⁻⁶"; never an exponent of a program.
-function words(value, digits = 3) {
+function numberText(value, digits = 3) {
   if (!isNumber(value)) return "–";
   const size = Math.abs(value);
   let text;
@@ -107,7 +107,7 @@ function logTicks(min, max, wanted) {
 function ticksOf(axis, wanted) {
   if (axis.ticks) return axis.ticks.filter(([v]) => v >= axis.min && v <= axis.max);
   const values = axis.log ? logTicks(axis.min, axis.max, wanted) : niceTicks(axis.min, axis.max, wanted);
-  return values.map((v) => [v, words(v, 6)]);
+  return values.map((v) => [v, numberText(v, 6)]);
 }
 
 // --- paths ---

@@ -15,17 +15,17 @@ const commandsOf = (trials) => {
 const commandName = (command) => command.replaceAll("_", " ");
 
 function describeTrial(trial) {
-  const r = (model, a) => words(1000 * trial[`${model}_residual_${a}`], 2);
+  const r = (model, a) => numberText(1000 * trial[`${model}_residual_${a}`], 2);
   const error = (model) => `${r(model, "x")}, ${r(model, "y")} mm, ${r(model, "theta")} mrad`;
   return (
     `${trial.session}, trial ${trial.trial}, ${commandName(trial.command)}` +
-    `${PICTURES ? "" : ` ${words(trial.duration_s)} s at ${words(trial.level)}`}${trial.held_out ? ", held out" : ""}: off by ${error("tuned")} (${MODEL_NAME.tuned}), ` +
+    `${PICTURES ? "" : ` ${numberText(trial.duration_s)} s at ${numberText(trial.level)}`}${trial.held_out ? ", held out" : ""}: off by ${error("tuned")} (${MODEL_NAME.tuned}), ` +
     `${error("final")} (${MODEL_NAME.final})`
   );
 }
 
 // A push is a condition of its own: there is no choosing among them.
-const conditionOf = (t) => (PICTURES ? "all" : `${words(t.duration_s)} s at duty ${words(t.level)}`);
+const conditionOf = (t) => (PICTURES ? "all" : `${numberText(t.duration_s)} s at duty ${numberText(t.level)}`);
 
 function drivenSpec(trials, shown) {
   const layers = [];
@@ -81,7 +81,7 @@ function headingSpec(trials, shown) {
     layers.push({ kind: "line", style: model, points: bars[model], width: 2.5, dashed: model === "tuned" });
   }
   const label = ({ group, middle }) =>
-    `${words(group[0].duration_s)} s · ${words(degrees(middle), 2)}°`;
+    `${numberText(group[0].duration_s)} s · ${numberText(degrees(middle), 2)}°`;
   return { layers, labels: ["heading about the mean of its row, mrad", ""],
            rows: rows.map((r, i) => [i, label(r)]) };
 }
@@ -111,8 +111,8 @@ function coverage(trials, [a, b]) {
   const share = (model) =>
     mean(trials.map((t) =>
       inside(t[`${model}_residual_${a}`], t[`${model}_residual_${b}`], block(t, model, a, b)) ? 100 : 0));
-  return `${trials.length} trials; inside their 90 % ellipse: ${MODEL_NAME.tuned} ${words(share("tuned"), 2)} %, ` +
-    `${MODEL_NAME.final} ${words(share("final"), 2)} %.`;
+  return `${trials.length} trials; inside their 90 % ellipse: ${MODEL_NAME.tuned} ${numberText(share("tuned"), 2)} %, ` +
+    `${MODEL_NAME.final} ${numberText(share("final"), 2)} %.`;
 }
 
 function startPoses(trials) {

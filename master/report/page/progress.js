@@ -45,7 +45,7 @@ function startProgress() {
           { kind: "line", style: "final", points: line("best"), width: 2.5, name: "best" },
           { kind: "points", style: "final", shape: "dot", points: marks, faint: known.length > 200 ? 0.01 : 0.6, name: "best" },
         ],
-        describe: (g) => `generation ${g.generation}, ${words(g.evaluations, 6)} evaluations: best ${words(g.best, 6)}, median ${words(g.median, 4)}, worst ${words(g.worst, 4)}` },
+        describe: (g) => `generation ${g.generation}, ${numberText(g.evaluations, 6)} evaluations: best ${numberText(g.best, 6)}, median ${numberText(g.median, 4)}, worst ${numberText(g.worst, 4)}` },
       `${fitness.name} by ${label}`,
       `Line: best; dashed: median; shaded: best to worst. ${fitness.higher_is_better ? "Higher" : "Lower"} is better.`,
       Boolean(chart.zoom),

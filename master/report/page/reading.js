@@ -1,5 +1,5 @@
 "use strict";
-// What helps to read a page: terms told where they stand, tables and texts to take away.
+// What helps to read a page: terms explained where they stand, tables and texts to take away.
 
 // --- terms: links into the glossary, whose entry shows beside the word ---
 
@@ -88,11 +88,11 @@ async function copyText(source) {
 function startCopies(root = document) {
   for (const button of root.querySelectorAll("button.copy")) {
     button.hidden = false;
-    const said = button.textContent;
+    const label = button.textContent;
     button.addEventListener("click", async () => {
       const done = await copyText(document.getElementById(button.dataset.of));
       button.textContent = done ? "Copied" : "Selected: copy it with Ctrl-C";
-      setTimeout(() => { button.textContent = said; }, 3000);
+      setTimeout(() => { button.textContent = label; }, 3000);
     });
   }
 }

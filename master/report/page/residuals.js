@@ -59,12 +59,12 @@ function startResiduals(trials, findings) {
   const controls = document.getElementById("residual-controls");
   const parent = document.getElementById("residual-plots");
   const panels = AXES.map(() => new Chart(parent, 0.8));
-  const telling = new Set(findings.map((w) => covariateOf(w.covariate)?.key));
+  const marked = new Set(findings.map((w) => covariateOf(w.covariate)?.key));
   const usable = COVARIATES.filter((c) => new Set(trials.map(c.of).filter(isNumber)).size > 1);
   const offered = usable.length ? usable : COVARIATES.slice(0, 1);
   const commands = commandsOf(trials);
   const against = choice(controls, "Against",
-    offered.map((c) => [c.key, c.label + (telling.has(c.key) ? " ◆ a finding" : "")]), draw);
+    offered.map((c) => [c.key, c.label + (marked.has(c.key) ? " ◆ a finding" : "")]), draw);
   const command = choice(controls, "Command", [["all", "all"], ...commands.map((c) => [c, commandName(c)])], draw);
   const shown = checks(controls, "Show", MODELS, draw);
 
@@ -74,8 +74,8 @@ function startResiduals(trials, findings) {
     AXES.forEach((component, i) => showResidual(panels[i], some, shown(), covariate, component));
   }
 
-  function aim(words, of) {
-    const covariate = covariateOf(words);
+  function aim(text, of) {
+    const covariate = covariateOf(text);
     if (covariate && offered.includes(covariate)) against.set(covariate.key);
     command.set(commands.includes(of) ? of : "all");
     draw();

@@ -41,8 +41,8 @@ const middleOf = (term) => term.covariates.map((_, j) => {
   return values[Math.floor(values.length / 2)];
 });
 
-// Shares are told in per cent, shifts in mm and mrad.
-const tellingOf = (term) => (term.frame === "motion" ? 100 : 1000);
+// Shares are reported in per cent, shifts in mm and mrad.
+const shownFactor = (term) => (term.frame === "motion" ? 100 : 1000);
 const unitOf = (term, part) => (term.frame === "motion" ? "%" : UNIT[part]);
 const shapePer = (term) => (term.by_drive ? "for a second at full duty" : "a trial");
 const shapeFrame = (term) => ({
@@ -75,12 +75,12 @@ function floorShape(term, weights) {
       .map(([px, py, dx, dy]) => [px, py, px + times * dx, py + times * dy]);
     if (arrows.length) layers.push({ kind: "arrows", style: `scale-${i}`, width: 1.6, head: 6, arrows, name: `shift times ${times}` });
   }
-  const colours = term.frame === "readings" ? "" : ` Colours: turned by up to ${words(tellingOf(term) * turns, 2)} ${unitOf(term, "theta")}.`;
+  const colours = term.frame === "readings" ? "" : ` Colours: turned by up to ${numberText(shownFactor(term) * turns, 2)} ${unitOf(term, "theta")}.`;
   const room = (axis) => ({ min: axis.min - 0.08 * (axis.max - axis.min), max: axis.max + 0.08 * (axis.max - axis.min) });
   return [{
     spec: { x: { ...room(x), label: SHAPE_LABEL.x }, y: { ...room(y), label: SHAPE_LABEL.y }, equal: true, layers },
     title: "Shift over the floor",
-    note: `Up to ${words(tellingOf(term) * longest, 2)} ${unitOf(term, "x")} ${shapePer(term)}, drawn ${times === 1 ? "to scale" : `${words(times, 2)} times as long`}; ${shapeFrame(term)}.${colours}`,
+    note: `Up to ${numberText(shownFactor(term) * longest, 2)} ${unitOf(term, "x")} ${shapePer(term)}, drawn ${times === 1 ? "to scale" : `${numberText(times, 2)} times as long`}; ${shapeFrame(term)}.${colours}`,
   }];
 }
 
@@ -99,9 +99,9 @@ function curveShape(term, weights) {
       if (term.covariates.length > 1) z[1] = second;
       const points = at.map((v) => {
         z[0] = v;
-        return [v, tellingOf(term) * shiftAt(term, weights, z)[c]];
+        return [v, shownFactor(term) * shiftAt(term, weights, z)[c]];
       });
-      const name = term.covariates.length > 1 ? `${SHAPE_LABEL[term.covariates[1]].split(",")[0]} ${words(second, 2)}` : "shift";
+      const name = term.covariates.length > 1 ? `${SHAPE_LABEL[term.covariates[1]].split(",")[0]} ${numberText(second, 2)}` : "shift";
       return { line: { kind: "line", style: kept.length > 1 ? `scale-${i}` : "final", width: 2.2, points, name }, name };
     });
     const values = lines.flatMap(({ line }) => line.points.map((p) => p[1]));
@@ -127,7 +127,7 @@ function startShape() {
   const which = choice(controls, "Term", terms.map((t, i) =>
     [String(i), `${i + 1}: by ${t.covariates.map((name) => SHAPE_LABEL[name].split(",")[0]).join(" and ")}`]), draw);
   const command = choice(controls, "Command",
-    distinctWords(terms.flatMap((t) => Object.keys(t.weights))).map((c) => [c, commandName(c)]), draw);
+    distinctLabels(terms.flatMap((t) => Object.keys(t.weights))).map((c) => [c, commandName(c)]), draw);
 
   function draw() {
     const term = terms[Number(which())];
@@ -146,4 +146,4 @@ function startShape() {
   draw();
 }
 
-const distinctWords = (list) => [...new Set(list)];
+const distinctLabels = (list) => [...new Set(list)];

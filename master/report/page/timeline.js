@@ -2,10 +2,10 @@
 // Of a run: which workers were there, who came, who went and who failed.
 
 const CAME = {
-  joined: { style: "final", shape: "dot", words: "joined" },
-  left: { style: "quiet", shape: "diamond", words: "left" },
-  failed: { style: "tuned", shape: "cross", words: "failed" },
-  master: { style: "place", shape: "diamond", words: "a master began or ended" },
+  joined: { style: "final", shape: "dot", label: "joined" },
+  left: { style: "quiet", shape: "diamond", label: "left" },
+  failed: { style: "tuned", shape: "cross", label: "failed" },
+  master: { style: "place", shape: "diamond", label: "a master began or ended" },
 };
 
 // Minutes or hours since the run began, whichever is easier to read.
@@ -42,7 +42,7 @@ function spanSpec(timeline) {
   const { spans } = timeline;
   const row = (i) => spans.length - 1 - i;
   const short = (name) => (name.length > 20 ? `…${name.slice(-19)}` : name);
-  const told = (s) => `${s.name}${s.host ? ` on ${s.host}` : ""}, for ${words((s.to - s.from) / 60)} min${s.end ? `, then it ${s.end}` : ""}`;
+  const describeStay = (s) => `${s.name}${s.host ? ` on ${s.host}` : ""}, for ${numberText((s.to - s.from) / 60)} min${s.end ? `, then it ${s.end}` : ""}`;
   return {
     x: axis,
     y: { min: -0.7, max: spans.length - 0.3, label: "", room: Math.min(150, 16 + 6.6 * Math.max(...spans.map(({ name }) => short(name).length))), ticks: spans.map(({ name }, i) => [row(i), short(name)]) },
@@ -51,7 +51,7 @@ function spanSpec(timeline) {
       { kind: "points", style: "final", shape: "dot", faint: 0.01, name: "there", points: spans.map((s, i) => [of(s.to), row(i), s]) },
       { kind: "points", style: "tuned", shape: "cross", name: "failed", points: spans.flatMap((s, i) => (s.end ? [[of(s.to), row(i), s]] : [])) },
     ],
-    describe: told,
+    describe: describeStay,
   };
 }
 

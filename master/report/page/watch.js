@@ -71,9 +71,9 @@ function startWatch() {
     return element(label, "input", { type: "number", min: 1, max: most, step: 1, name: title });
   };
   const what = PAGE.windows ? "Window" : "Trial";
-  const trial = number(what, PAGE.logged_trials + PAGE.kept_apart);
-  if (PAGE.kept_apart) {
-    element(controls, "span", { className: "quiet" }, `${PAGE.logged_trials + 1} to ${PAGE.logged_trials + PAGE.kept_apart}: kept apart`);
+  const trial = number(what, PAGE.logged_trials + PAGE.held_out);
+  if (PAGE.held_out) {
+    element(controls, "span", { className: "quiet" }, `${PAGE.logged_trials + 1} to ${PAGE.logged_trials + PAGE.held_out}: held out`);
   }
   const generation = number("Best of generation", PAGE.generations.at(-1)?.generation || 1);
   trial.value = address.get("trial") || 1;
@@ -82,7 +82,7 @@ function startWatch() {
   const show = element(controls, "button", { type: "button" }, "Show");
   const play = element(controls, "button", { type: "button", disabled: true }, "Play");
   const scrub = element(element(controls, "label", { className: "scrub" }, "Time "), "input", { type: "range", min: 0, max: 1000, value: 1000, disabled: true });
-  const said = document.getElementById("watch-said");
+  const caption = document.getElementById("watch-said");
   const chart = new Chart(parent, 0.7);
   chart.figure.classList.add("large");
   chart.figure.hidden = true;  // until there is a drive
@@ -90,10 +90,10 @@ function startWatch() {
 
   const time = () => (scrub.valueAsNumber / 1000) * end;
   const draw = () => {
-    scrub.setAttribute("aria-valuetext", `${words(time())} s of ${words(end)} s`);
+    scrub.setAttribute("aria-valuetext", `${numberText(time())} s of ${numberText(end)} s`);
     chart.figure.hidden = false;
-    chart.figure.classList.toggle("apart", drive.kept_apart);
-    chart.show(watchSpec(lines, time(), drive), `${drive.title}, at ${time().toFixed(2)} s of ${words(end)} s`, drive.note, true);
+    chart.figure.classList.toggle("apart", drive.held_out);
+    chart.show(watchSpec(lines, time(), drive), `${drive.title}, at ${time().toFixed(2)} s of ${numberText(end)} s`, drive.note, true);
   };
   const stop = () => {
     cancelAnimationFrame(frame);
@@ -116,7 +116,7 @@ function startWatch() {
   // `step`: a person asked for it.
   async function load(step) {
     stop();
-    said.textContent = "Asked for it; a simulation takes about a second.";
+    caption.textContent = "Asked for it; a simulation takes about a second.";
     const wanted = new URLSearchParams({ of: PAGE.run, trial: trial.value || "1" });
     if (generation.value) wanted.set("generation", generation.value);
     try {
@@ -127,14 +127,14 @@ function startWatch() {
       end = Math.max(...lines.map(({ path }) => path.at(-1)[0]));
       scrub.disabled = play.disabled = false;
       scrub.value = 1000;
-      said.textContent = drive.said;
+      caption.textContent = drive.said;
       chart.zoom = null;
       draw();
       address.set({ trial: wanted.get("trial"), generation: wanted.get("generation") }, step);
     } catch (error) {
-      said.textContent = `It cannot be shown: ${error.message}`;
+      caption.textContent = `It cannot be shown: ${error.message}`;
     }
-    parent.dataset.shown = said.textContent;
+    parent.dataset.shown = caption.textContent;
   }
 
   show.addEventListener("click", () => load(true));

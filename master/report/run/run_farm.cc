@@ -50,20 +50,20 @@ std::string log_html(const std::vector<std::string>& lines) {
   return R"(<div class="snippet log"><pre tabindex="0">)" + text + "</pre></div>";
 }
 
-constexpr const char* kTellsLittle =
-    "<p>Nothing that this store tells of: an older program wrote it, and the oldest kept no "
+constexpr const char* kLittleIsKnown =
+    "<p>Nothing that this store reports: an older program wrote it, and the oldest kept no "
     "account "
     "of such things.</p>";
 
 // Zeros of a store that has no place for other numbers are none.
-bool tells_little(const RunFarm& farm) {
+bool is_little_known(const RunFarm& farm) {
   return farm.timeline.counts.empty() &&
          std::all_of(farm.tally.begin(), farm.tally.end(),
                      [](const auto& entry) { return entry.second == "0"; });
 }
 
 std::string tally_html(const RunFarm& farm) {
-  if (tells_little(farm)) return kTellsLittle;
+  if (is_little_known(farm)) return kLittleIsKnown;
   std::string html = R"(<dl class="provenance">)";
   for (const auto& [label, value] : farm.tally) {
     html += "<div><dt>" + html_escaped(label) + "</dt><dd>" + html_escaped(value) + "</dd></div>";
@@ -75,7 +75,7 @@ std::string tally_html(const RunFarm& farm) {
 std::string timeline_html(const RunTimeline& timeline) {
   std::string html = "<h3>Who was there</h3>";
   if (timeline.counts.empty()) {
-    return html + "<p>The store tells nothing of it: it was written by an older program.</p>";
+    return html + "<p>The store shows nothing of it: it was written by an older program.</p>";
   }
   return html + R"(<div id="timeline-plot"></div>)" + kNoScript;
 }
@@ -86,13 +86,13 @@ std::string farm_section(const RunFarm& farm) {
   std::string html = R"(<section id="farm"><h2>Farm</h2><div id="farm-now" data-live>)" +
                      worker_table(farm) + "</div>" + timeline_html(farm.timeline) +
                      R"(<div id="farm-past" data-live><h3>Workers that failed</h3>)";
-  html += farm.failures.empty() ? std::string("<p>None that this store tells of.</p>")
+  html += farm.failures.empty() ? std::string("<p>None that this store reports.</p>")
                                 : list_of(farm.failures, "cautions");
   html += "<h3>What it coped with</h3>" + tally_html(farm);
   html += "<h3>What somebody should look at</h3>";
   html += !farm.incidents.empty() ? list_of(farm.incidents, "cautions")
-          : tells_little(farm)
-              ? std::string(kTellsLittle)
+          : is_little_known(farm)
+              ? std::string(kLittleIsKnown)
               : std::string("<p>Nothing: no task was given up, and no two answers differed.</p>");
   return html + "<h3>The end of its log</h3>" + log_html(farm.log) + "</div></section>\n";
 }

@@ -94,13 +94,13 @@ std::string score_table(const std::vector<ScoreRow>& rows, const std::string& co
       body);
 }
 
-std::string fitness_words(const RunReport& report) {
+std::string fitness_names(const RunReport& report) {
   return report.fitness + (report.unit.empty() || report.unit == "-" ? "" : ", " + report.unit);
 }
 
 std::string scores(const RunReport& report) {
   std::string html =
-      R"(<section id="scores"><h2>On trials )" + term("validation", "kept apart") + "</h2>";
+      R"(<section id="scores"><h2>On trials )" + term("validation", "held out") + "</h2>";
   const RunOutcome none;
   const RunOutcome& outcome = report.outcome ? *report.outcome : none;
   if (outcome.validation.empty()) {
@@ -108,7 +108,7 @@ std::string scores(const RunReport& report) {
         "<p>None were: [validation] in the config names files that evolution does not see. "
         "What stands above is of the trials that were evolved on.</p>";
   } else {
-    html += score_table(outcome.validation, fitness_words(report), "kept-apart");
+    html += score_table(outcome.validation, fitness_names(report), "kept-apart");
   }
   if (!outcome.baselines.empty()) {
     html += "<h3>" + term("baseline", "Without a simulation") + "</h3>" +
@@ -165,7 +165,7 @@ Json page_json(const RunReport& report) {
                {"run", report.name},
                {"windows", report.windows},
                {"logged_trials", report.trials},
-               {"kept_apart", report.served ? report.kept_apart : 0},
+               {"held_out", report.served ? report.held_out : 0},
                {"parameters", parameters_json(report.parameters)},
                {"effects", Json::array()},
                {"where", Json::array()}};
@@ -195,7 +195,7 @@ std::string run_html(const RunReport& report) {
   frame.places = {{"progress", "Fitness"}, {"parameters", "Parameters"}};
   if (!report.densities.empty()) frame.places.emplace_back("genes", "Genes");
   if (!report.elite.lines.empty()) frame.places.emplace_back("elite", "Elite");
-  frame.places.emplace_back("scores", "Kept apart");
+  frame.places.emplace_back("scores", "Held out");
   if (driven) {
     frame.places.emplace_back("floor", "Floor");
     frame.places.emplace_back("drives", "Drives");

@@ -38,7 +38,7 @@ std::string state_line(const RunFarm& farm) {
   for (const auto& [label, value] : farm.facts) {
     text += "; " + html_escaped(label) + " " + html_escaped(value);
   }
-  if (!farm.told.empty()) text += ". " + html_escaped(farm.told);
+  if (!farm.message.empty()) text += ". " + html_escaped(farm.message);
   return R"(<p id="state" class="state" data-live>)" + text + "</p>";
 }
 

@@ -29,7 +29,7 @@ struct RunGeneration {
   double wall_s = 0;              // same
 };
 
-// How well something foretells trials.
+// How well something predicts trials.
 struct ScoreRow {
   std::string name;
   std::optional<double> score;  // in the run's fitness, or nats a trial
@@ -39,7 +39,7 @@ struct ScoreRow {
 // What is worked out once, when evolution ends, and kept in the run store.
 struct RunOutcome {
   std::vector<DiagnosedTrial> trials;  // "tuned" is before, "final" after evolution
-  std::vector<ScoreRow> validation;    // on trials kept apart, in the run's fitness
+  std::vector<ScoreRow> validation;    // on trials held out, in the run's fitness
   std::vector<ScoreRow> baselines;     // without a simulation, nats a trial
 };
 std::string to_json(const RunOutcome& outcome);
@@ -89,7 +89,7 @@ struct RunElite {
   std::vector<Line> lines;
 };
 
-// Which workers were there, all masters of the run together.  Empty where the store does not tell.
+// Which workers were there, all masters of the run together.  Empty where the store does not show.
 struct RunTimeline {
   struct Count {
     double unix_s = 0;
@@ -112,10 +112,10 @@ struct RunTimeline {
   double end_unix_s = 0;    // the last that was heard of the run
 };
 
-// The farm as its master last told of it.
+// The farm as its master last reported it.
 struct RunFarm {
   std::string state;                                       // "running"
-  std::string told;                                        // what it waits for, or how it ended
+  std::string message;                                     // what it waits for, or how it ended
   std::vector<std::pair<std::string, std::string>> facts;  // "rate": "38.1 evaluations/s"
   // What it coped with, counted over all masters: "retries": "3".
   std::vector<std::pair<std::string, std::string>> tally;
@@ -150,10 +150,10 @@ struct RunReport {
   std::string without_looked_up;       // why there is none, when one was asked for
   RunElite elite;
   RunFarm farm;
-  std::size_t trials = 0;      // of the log
-  bool windows = false;        // trials are windows of runs
-  std::size_t kept_apart = 0;  // trials of [validation] that a server can play
-  bool served = false;         // by `gapfarm serve`: the page looks again while it is open
+  std::size_t trials = 0;    // of the log
+  bool windows = false;      // trials are windows of runs
+  std::size_t held_out = 0;  // trials of [validation] that a server can play
+  bool served = false;       // by `gapfarm serve`: the page looks again while it is open
   std::vector<std::pair<std::string, std::string>> provenance;
 };
 

@@ -10,7 +10,7 @@
 namespace gapfarm {
 namespace {
 
-TEST(Hash, TellsBoundariesAndBitsApart) {
+TEST(Hash, ReportsBoundariesAndBitsApart) {
   EXPECT_EQ(content_hash("abc"), content_hash("abc"));
   EXPECT_EQ(content_hash("abc").size(), 32u);
   EXPECT_NE(Hasher().add("ab").add("c").finish(), Hasher().add("a").add("bc").finish());

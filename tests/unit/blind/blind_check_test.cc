@@ -27,7 +27,7 @@ class BlindCheck : public ::testing::Test {
     settings_.design.sizes = {{"clear", 5}};
     settings_.design.nulls = 1;
     settings_.design.pairs = 1;
-    settings_.design.left_out = 1;
+    settings_.design.excluded = 1;
     settings_.diagnose.config_path = "small.toml";
     hooks_.start_farm = []() -> Result<std::unique_ptr<Farm>> {
       return std::unique_ptr<Farm>(std::make_unique<tests::WorkerFarm>());
@@ -70,11 +70,11 @@ constexpr const char* kAsymmetry =
     R"({"verdict": "effect", "effects": [{"name": "motor_asymmetry", "closed": 0.9,
         "parameters": {"ratio": {"value": 0, "lo": -1, "hi": 1}}}]})";
 
-TEST_F(BlindCheck, ScoresWhatTheDiagnosesSay) {
+TEST_F(BlindCheck, ScoresWhatTheDiagnosesReport) {
   fake_diagnose(kAsymmetry, "ls -a \"$(dirname $3)\" > $5/seen.txt");
   const auto report = run();
   ASSERT_TRUE(report.ok()) << report.error().message;
-  ASSERT_EQ(report->cases.size(), 5u);  // two singles, a null, a pair, a left-out effect
+  ASSERT_EQ(report->cases.size(), 5u);  // two singles, a null, a pair, a omitted effect
   const Tally sum = tally(report->cases);
   EXPECT_EQ(sum.right.hits, 1u);
   EXPECT_EQ(sum.false_alarms.hits, 1u);
@@ -99,14 +99,14 @@ TEST_F(BlindCheck, ScoresWhatTheDiagnosesSay) {
   EXPECT_TRUE(fs::exists(settings_.out + "/blind_check.json"));
   EXPECT_TRUE(fs::exists(settings_.out + "/blind_check.md"));
   EXPECT_FALSE(fs::exists(settings_.out + ".key"));
-  // The effect that is left out is told to its case alone.
-  const std::string told = *read_text_file(folder_ / "runs.txt");
-  EXPECT_EQ(told.find("--leave-out"), told.rfind("--leave-out"));
-  EXPECT_NE(told.find("--leave-out"), told.npos);
+  // The effect that is omitted is commanded to its case alone.
+  const std::string record = *read_text_file(folder_ / "runs.txt");
+  EXPECT_EQ(record.find("--exclude"), record.rfind("--exclude"));
+  EXPECT_NE(record.find("--exclude"), record.npos);
 }
 
 // What is promised is promised of named effects; what is used is the model with its [residual].
-TEST_F(BlindCheck, AnEffectThatWasLeftOutIsScoredWithItsResidual) {
+TEST_F(BlindCheck, AnEffectThatWasHeldOutIsScoredWithItsResidual) {
   Model model = *read_model(folder_ / "tuned.toml");
   ResidualTerm ahead;
   ahead.covariates = {4};  // duration
@@ -144,7 +144,7 @@ TEST_F(BlindCheck, TruthsAreSealedWhileDiagnosesRun) {
 
 TEST_F(BlindCheck, ACrashIsACountedOutcome) {
   fake_diagnose(kNone, "kill -SEGV $$");
-  settings_.design.pairs = settings_.design.left_out = 0;
+  settings_.design.pairs = settings_.design.excluded = 0;
   const auto report = run();
   ASSERT_TRUE(report.ok()) << report.error().message;
   const Tally sum = tally(report->cases);
@@ -189,7 +189,7 @@ TEST_F(BlindCheck, ResumesWithoutRunningFinishedCasesAgain) {
 TEST_F(BlindCheck, ResumeRefusesWhatWasTamperedWith) {
   fake_diagnose(kNone);
   settings_.design.effects = {"motor_asymmetry"};
-  settings_.design.pairs = settings_.design.left_out = 0;
+  settings_.design.pairs = settings_.design.excluded = 0;
   ASSERT_TRUE(run().ok());
   settings_.resume = true;
   const std::string seals = *read_text_file(settings_.out + "/seals.txt");

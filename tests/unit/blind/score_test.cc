@@ -127,7 +127,7 @@ Truth truth_of(const JudgeRow& row) {
   return truth;
 }
 
-std::string said_text(const JudgeRow& row) {
+std::string reported_text(const JudgeRow& row) {
   nlohmann::json effects = nlohmann::json::array();
   for (const Named& n : row.named) effects.push_back({{"name", n.name}, {"aliases", n.aliases}});
   return nlohmann::json{{"verdict", row.verdict}, {"effects", effects}}.dump();
@@ -135,9 +135,9 @@ std::string said_text(const JudgeRow& row) {
 
 TEST(Judge, KeepsTheRules) {
   for (const JudgeRow& row : judge_rows()) {
-    const auto said = parse_said(said_text(row), "diagnosis.json");
-    ASSERT_TRUE(said.ok()) << row.what;
-    EXPECT_EQ(judge(truth_of(row), *said).right, row.right) << row.what;
+    const auto reported = parse_reported(reported_text(row), "diagnosis.json");
+    ASSERT_TRUE(reported.ok()) << row.what;
+    EXPECT_EQ(judge(truth_of(row), *reported).right, row.right) << row.what;
   }
 }
 
@@ -151,14 +151,14 @@ TEST(Judge, AgreesWithTheReferenceScorer) {
   const tests::Folder folder;
   for (const JudgeRow& row : judge_rows()) {
     ASSERT_TRUE(write_file_atomically(folder / "t.json", format_truth(truth_of(row))).ok());
-    ASSERT_TRUE(write_file_atomically(folder / "d.json", said_text(row)).ok());
+    ASSERT_TRUE(write_file_atomically(folder / "d.json", reported_text(row)).ok());
     const std::string command = "python3 '" + scorer.string() + "' '" + (folder / "t.json") +
                                 "' '" + (folder / "d.json") + "' >/dev/null 2>&1";
     EXPECT_EQ(std::system(command.c_str()) == 0, row.right) << row.what;
   }
 }
 
-Said said_with(const std::string& effect, std::vector<SaidParameter> parameters) {
+Reported reported_with(const std::string& effect, std::vector<ReportedParameter> parameters) {
   return {"effect", {{effect, {}, 1, std::move(parameters), 0.8}}};
 }
 
@@ -168,8 +168,8 @@ TEST(Coverage, ComparesAnglesOnTheCircle) {
   truth.kind = CaseKind::kSingle;
   truth.effects = {{"floor_tilt", {{"angle", 0.05}, {"direction", -kPi + 0.1}}, 5}};
   const auto covered = [&](double lo, double hi) {
-    const auto all = coverage_of(
-        truth, said_with("floor_tilt", {{"angle", 0.05, 0.04, 0.06}, {"direction", 0, lo, hi}}));
+    const auto all = coverage_of(truth, reported_with("floor_tilt", {{"angle", 0.05, 0.04, 0.06},
+                                                                     {"direction", 0, lo, hi}}));
     EXPECT_EQ(all.size(), 2u);
     EXPECT_TRUE(all[0].covered);
     EXPECT_TRUE(all[0].is_strength);
@@ -193,14 +193,14 @@ TEST(Coverage, CountsMissingIntervalsAndSkipsWhatMeansNothing) {
                      {"position", 1},
                      {"axis", 1}},
                     5}};
-  auto all = coverage_of(truth, said_with("camera_seam", {{"offset_x", 0.01, 0.0, 0.02}}));
+  auto all = coverage_of(truth, reported_with("camera_seam", {{"offset_x", 0.01, 0.0, 0.02}}));
   EXPECT_EQ(all.size(), 5u);  // no interval of a choice
   EXPECT_TRUE(all[0].covered);
   EXPECT_FALSE(all[1].covered);
   EXPECT_TRUE(std::isnan(all[1].lo));
   truth.effects = {{"floor_tilt", {{"angle", 0}, {"direction", 1}}, 1}};
-  EXPECT_EQ(coverage_of(truth, said_with("floor_tilt", {})).size(), 1u);
-  EXPECT_TRUE(coverage_of(truth, said_with("floor_nap", {})).empty());
+  EXPECT_EQ(coverage_of(truth, reported_with("floor_tilt", {})).size(), 1u);
+  EXPECT_TRUE(coverage_of(truth, reported_with("floor_nap", {})).empty());
 }
 
 TEST(Wilson, MatchesTheClosedForm) {
@@ -214,16 +214,16 @@ TEST(Wilson, MatchesTheClosedForm) {
   EXPECT_EQ(wilson_interval({}).upper, 1);
 }
 
-TEST(Said, NamesWhatIsWrong) {
-  EXPECT_FALSE(parse_said("[]", "d").ok());
-  EXPECT_FALSE(parse_said(R"({"verdict": "maybe"})", "d").ok());
-  EXPECT_FALSE(parse_said(R"({"verdict": "effect", "effects": [{}]})", "d").ok());
-  const auto said = parse_said(R"({"verdict": "effect", "effects": [{"name": "backlash",
+TEST(Reported, NamesWhatIsWrong) {
+  EXPECT_FALSE(parse_reported("[]", "d").ok());
+  EXPECT_FALSE(parse_reported(R"({"verdict": "maybe"})", "d").ok());
+  EXPECT_FALSE(parse_reported(R"({"verdict": "effect", "effects": [{}]})", "d").ok());
+  const auto reported = parse_reported(R"({"verdict": "effect", "effects": [{"name": "backlash",
       "parameters": {"travel": {"value": 1, "lo": 0, "hi": 2}, "odd": {"value": "x"}}}]})",
-                               "d");
-  ASSERT_TRUE(said.ok());
-  EXPECT_EQ(said->effects[0].parameters.size(), 1u);
-  EXPECT_TRUE(std::isnan(promised_shrinkage(*said)));
+                                       "d");
+  ASSERT_TRUE(reported.ok());
+  EXPECT_EQ(reported->effects[0].parameters.size(), 1u);
+  EXPECT_TRUE(std::isnan(promised_shrinkage(*reported)));
 }
 
 TEST(Truths, ReadBackToTheBit) {
@@ -232,7 +232,7 @@ TEST(Truths, ReadBackToTheBit) {
   truth.kind = CaseKind::kOutside;
   truth.level = "clear";
   truth.effects = {{"camera_seam", {{"axis", 1}, {"offset_x", 0.1 + 0.2}}, 4.999}};
-  truth.left_out = "camera_seam";
+  truth.excluded = "camera_seam";
   truth.robot = {{"mass", 1.0 / 3}};
   truth.seed = ~std::uint64_t{0};
   const auto back = parse_truth(format_truth(truth), "t", "");
@@ -241,7 +241,7 @@ TEST(Truths, ReadBackToTheBit) {
   EXPECT_EQ(back->effects[0].parameters.at("offset_x"), 0.1 + 0.2);
 }
 
-TEST(Truths, OfOthersMayUseWords) {
+TEST(Truths, OfOthersMayUseText) {
   const auto truth = parse_truth(
       R"({"effects": {"camera_seam": {"axis": "y", "offset_x": 0.1}}, "answer": "effect"})", "t",
       "case3");

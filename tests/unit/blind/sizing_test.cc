@@ -137,7 +137,7 @@ TEST(Design, SizesAreWhatWasAskedForAndShuffled) {
   settings.sizes = {{"clear", 5}, {"subtle", 1.6}};
   settings.nulls = 2;
   settings.pairs = 1;
-  settings.left_out = 1;
+  settings.excluded = 1;
   settings.seed = 3;
   const auto design = draw_design(*planned, settings, farm);
   ASSERT_TRUE(design.ok()) << design.error().message;
@@ -148,7 +148,7 @@ TEST(Design, SizesAreWhatWasAskedForAndShuffled) {
     for (const TrueEffect& effect : truth.effects) {
       EXPECT_NEAR(effect.size, truth.level == "subtle" ? 1.6 : 5, 0.05) << effect.name;
     }
-    EXPECT_EQ(truth.left_out.empty(), truth.kind != CaseKind::kOutside);
+    EXPECT_EQ(truth.excluded.empty(), truth.kind != CaseKind::kOutside);
   }
   EXPECT_EQ(kinds[CaseKind::kNull], 2);
   const auto again = draw_design(*planned, settings, farm);
@@ -192,7 +192,7 @@ TEST(Design, SizesShowInSimulatedResiduals) {
   DesignSettings settings;
   settings.effects = {"marker_offset", "slip_events", "pose_latency", "pose_quantisation"};
   settings.sizes = {{"clear", 5}};
-  settings.nulls = settings.pairs = settings.left_out = 0;
+  settings.nulls = settings.pairs = settings.excluded = 0;
   const auto design = draw_design(*planned, settings, farm);
   ASSERT_TRUE(design.ok());
   EXPECT_EQ(design->cases.size(), 4u);
@@ -205,7 +205,7 @@ TEST(Design, SizesShowInSimulatedResiduals) {
   }
 }
 
-TEST(SizeLevel, WordsAndNumbers) {
+TEST(SizeLevel, TextAndNumbers) {
   EXPECT_EQ(size_level("clear")->size, 5);
   EXPECT_EQ(size_level("subtle")->size, 1.6);
   EXPECT_EQ(size_level("2.5")->size, 2.5);

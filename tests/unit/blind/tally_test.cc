@@ -21,7 +21,7 @@ Truth truth_of(const std::string& id, CaseKind kind, std::vector<std::string> ef
   return truth;
 }
 
-Said naming(const std::string& name, double closed = 0.9) {
+Reported naming(const std::string& name, double closed = 0.9) {
   return {"effect", {{name, {"motor_lag"}, 1, {{"travel", 1, 0.5, 1.5}}, closed}}};
 }
 
@@ -34,13 +34,14 @@ std::vector<ScoredCase> some_cases() {
   cases.push_back(
       score_case(truth_of("case002", CaseKind::kSingle, {"motor_lag"}), {}, naming("backlash")));
   cases.back().realised = 0.5;
-  cases.push_back(score_case(truth_of("case003", CaseKind::kNull, {}), {}, Said{"none", {}}));
+  cases.push_back(score_case(truth_of("case003", CaseKind::kNull, {}), {}, Reported{"none", {}}));
   cases.push_back(score_case(truth_of("case004", CaseKind::kNull, {}), {}, naming("backlash")));
-  cases.push_back(
-      score_case(truth_of("case005", CaseKind::kOutside, {"crosstalk"}), {}, Said{"unknown", {}}));
+  cases.push_back(score_case(truth_of("case005", CaseKind::kOutside, {"crosstalk"}), {},
+                             Reported{"unknown", {}}));
   ChildEnd crash{ChildState::kCrashed, 11, 1, "was killed by signal 11"};
   cases.push_back(score_case(truth_of("case006", CaseKind::kSingle, {"backlash"}), crash, {}));
-  ScoredCase foreign = score_case(truth_of("case007", CaseKind::kNull, {}), {}, Said{"none", {}});
+  ScoredCase foreign =
+      score_case(truth_of("case007", CaseKind::kNull, {}), {}, Reported{"none", {}});
   foreign.has_truth = false;
   cases.push_back(foreign);
   return cases;
@@ -76,8 +77,8 @@ TEST(Tally, HalfIsClosedByTheModelAsItIsUsed) {
   EXPECT_FALSE(closes_half({1.0, 1.0, 1.001, std::nullopt}).has_value());
 
   Truth truth = truth_of("case001", CaseKind::kOutside, {"backlash"});
-  truth.left_out = "backlash";
-  ScoredCase c = score_case(truth, {}, Said{"unknown", {}});
+  truth.excluded = "backlash";
+  ScoredCase c = score_case(truth, {}, Reported{"unknown", {}});
   EXPECT_EQ(tally({c}).outside_closed.total, 0u);
   c.fresh = FreshScores{1.0, 1.0, 2.0, 1.7};
   EXPECT_EQ(tally({c}).outside_closed.hits, 1u);
@@ -101,7 +102,8 @@ TEST(Tables, HoldRatesAndCases) {
   const std::string markdown = format_blind_markdown(report);
   EXPECT_THAT(markdown, HasSubstr("| backlash | clear | 2.5 |"));
   EXPECT_THAT(markdown, HasSubstr("| nulls called none | >= 95 % | 50 % [9, 91] | 1/2 |"));
-  EXPECT_THAT(format_blind_summary(report), HasSubstr("WRONG case004: null; said effect backlash"));
+  EXPECT_THAT(format_blind_summary(report),
+              HasSubstr("WRONG case004: null; reported effect backlash"));
 }
 
 }  // namespace

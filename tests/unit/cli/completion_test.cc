@@ -1,4 +1,4 @@
-// What shells are told may come next, and the manual page.
+// What shells are reported may come next, and the manual page.
 #include <gmock/gmock.h>
 #include <unistd.h>
 
@@ -8,7 +8,7 @@
 
 #include "common/usage/manual.h"
 #include "master/cli/app.h"
-#include "master/cli/next_words.h"
+#include "master/cli/completion_candidates.h"
 
 namespace gapfarm {
 namespace {
@@ -21,10 +21,11 @@ using testing::IsSupersetOf;
 using testing::Not;
 using testing::StartsWith;
 
-std::vector<std::string> after(const std::vector<std::string>& words) {
+std::vector<std::string> after(const std::vector<std::string>& arguments) {
   const std::unique_ptr<Program> program = make_program();
   std::vector<std::string> found;
-  for (const NextWord& next : next_words(*program->app, words)) found.push_back(next.word);
+  for (const CompletionCandidate& next : completion_candidates(*program->app, arguments))
+    found.push_back(next.word);
   return found;
 }
 
@@ -57,7 +58,7 @@ TEST(Completion, KnowsCommandsAndTheirOptions) {
 }
 
 TEST(Completion, KnowsEffectsAndParameters) {
-  EXPECT_THAT(after({"diagnose", "none.toml", "--leave-out", "camera_s"}),
+  EXPECT_THAT(after({"diagnose", "none.toml", "--exclude", "camera_s"}),
               ElementsAre("camera_seam", "camera_seam_2"));
   EXPECT_THAT(after({"simulate", "none.toml", "--set", "friction_patch."}),
               ElementsAre("friction_patch.radius=", "friction_patch.ratio=", "friction_patch.x=",
@@ -90,7 +91,7 @@ TEST_F(CompletionFiles, ModelsDiagnosesAndListsGoOnToo) {
 }
 
 // An option of a command, and whether something of all that lies around is offered for it.
-void expect_words(const CLI::App& app, const std::vector<std::string>& words) {
+void expect_candidates(const CLI::App& app, const std::vector<std::string>& arguments) {
   static const std::set<std::string> kFree = {
       // Columns and their values, numbers, addresses, names that are given here, shell commands.
       "--only",      "--train", "--test",           "--by",     "--per",       "--repeats",
@@ -101,7 +102,7 @@ void expect_words(const CLI::App& app, const std::vector<std::string>& words) {
     const std::string name = option->get_name(option->get_positional());
     const std::string type = option->get_type_name();
     if (option->get_items_expected_max() == 0 || option->get_group().empty()) continue;
-    std::vector<std::string> line = words;
+    std::vector<std::string> line = arguments;
     if (option->get_positional()) {
       line.insert(line.end(), positionals++, "x");
     } else {
@@ -114,9 +115,9 @@ void expect_words(const CLI::App& app, const std::vector<std::string>& words) {
     EXPECT_THAT(after(line), Not(IsEmpty())) << app.get_name() << " " << name << " " << type;
   }
   for (const CLI::App* sub : app.get_subcommands([](const CLI::App*) { return true; })) {
-    std::vector<std::string> deeper = words;
+    std::vector<std::string> deeper = arguments;
     deeper.push_back(sub->get_name());
-    expect_words(*sub, deeper);
+    expect_candidates(*sub, deeper);
   }
 }
 
@@ -124,7 +125,7 @@ TEST_F(CompletionFiles, EveryOptionThatTakesAWordOffersSome) {
   const auto before = std::filesystem::current_path();
   std::filesystem::current_path(folder_);
   const std::unique_ptr<Program> program = make_program();
-  expect_words(*program->app, {});
+  expect_candidates(*program->app, {});
   std::filesystem::current_path(before);
 }
 

@@ -26,10 +26,10 @@ class ConsoleTest : public testing::Test {
   std::FILE* err_ = std::tmpfile();
 };
 
-TEST_F(ConsoleTest, ShowsResultsAsWordsOrAsJson) {
-  Console words(out_, err_);
-  words.result("two trials\n", {{"trials", 2}});
-  EXPECT_EQ(words.end(0), 0);
+TEST_F(ConsoleTest, ShowsResultsAsTextOrAsJson) {
+  Console plain(out_, err_);
+  plain.result("two trials\n", {{"trials", 2}});
+  EXPECT_EQ(plain.end(0), 0);
   EXPECT_EQ(printed(), "two trials\n");
 }
 

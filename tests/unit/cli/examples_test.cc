@@ -14,8 +14,8 @@ using testing::HasSubstr;
 using testing::StartsWith;
 
 // The words of a shell line up to a comment or a pipe, quotes taken off.
-std::vector<std::string> words_of(const std::string& line) {
-  std::vector<std::string> words;
+std::vector<std::string> tokens_of(const std::string& line) {
+  std::vector<std::string> arguments;
   bool open = false;
   char quote = 0;
   for (const char c : line) {
@@ -23,7 +23,7 @@ std::vector<std::string> words_of(const std::string& line) {
       if (c == quote) {
         quote = 0;
       } else {
-        words.back() += c;
+        arguments.back() += c;
       }
       continue;
     }
@@ -32,15 +32,15 @@ std::vector<std::string> words_of(const std::string& line) {
       open = false;
       continue;
     }
-    if (!open) words.emplace_back();
+    if (!open) arguments.emplace_back();
     open = true;
     if (c == '\'' || c == '"') {
       quote = c;
     } else {
-      words.back() += c;
+      arguments.back() += c;
     }
   }
-  return words;
+  return arguments;
 }
 
 std::vector<std::string> examples_in(const std::string& footer) {
@@ -61,9 +61,9 @@ void check(const CLI::App& app, const std::string& command, bool leaf) {
     if (leaf) {
       EXPECT_THAT(example, StartsWith("  " + command)) << "not its own";
     }
-    std::vector<std::string> words = words_of(example);
-    words.erase(words.begin());
-    for (const std::string& word : words) {
+    std::vector<std::string> arguments = tokens_of(example);
+    arguments.erase(arguments.begin());
+    for (const std::string& word : arguments) {
       const bool shipped = word.rfind("configs/", 0) == 0;
       if (shipped) {
         EXPECT_TRUE(std::filesystem::exists(std::string(GAPFARM_SOURCE_DIR) + "/" + word)) << word;
@@ -71,7 +71,7 @@ void check(const CLI::App& app, const std::string& command, bool leaf) {
     }
     const std::unique_ptr<Program> program = make_program();
     try {
-      parse_words(*program, words);
+      parse_arguments(*program, arguments);
     } catch (const CLI::ParseError& error) {
       ADD_FAILURE() << example << "\n" << error.what();
     }

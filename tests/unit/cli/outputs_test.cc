@@ -21,18 +21,19 @@ Outputs forced() {
   return outputs;
 }
 
-std::string said(const Status& status) { return status ? "" : status.error().message; }
+std::string message_of(const Status& status) { return status ? "" : status.error().message; }
 
 TEST(Outputs, KeepsWhatIsThereWithoutForce) {
   TemporaryFolder folder;
   const std::string file = folder.write("predictions.csv", "measured");
   Outputs outputs;
-  EXPECT_THAT(said(outputs.plan(file)), HasSubstr("exists already; give another name, or --force"));
-  EXPECT_THAT(said(outputs.plan_in(folder.path(""), {"new.csv", "predictions.csv"})),
+  EXPECT_THAT(message_of(outputs.plan(file)),
+              HasSubstr("exists already; give another name, or --force"));
+  EXPECT_THAT(message_of(outputs.plan_in(folder.path(""), {"new.csv", "predictions.csv"})),
               HasSubstr("exists already"));
   Outputs replacing = forced();
-  ASSERT_EQ(said(replacing.plan(file)), "");
-  ASSERT_EQ(said(replacing.write(file, "new")), "");
+  ASSERT_EQ(message_of(replacing.plan(file)), "");
+  ASSERT_EQ(message_of(replacing.write(file, "new")), "");
   EXPECT_EQ(*read_text_file(file), "new");
 }
 
@@ -47,7 +48,7 @@ TEST(Outputs, NeverWritesWhatTheCommandReads) {
   Outputs outputs = forced();
   outputs.reads(trials);
   for (const char* name : {"log.csv", "link.csv", "hard.csv", "sub/../log.csv"}) {
-    EXPECT_THAT(said(outputs.plan(folder.path(name))), HasSubstr("is read by this command"))
+    EXPECT_THAT(message_of(outputs.plan(folder.path(name))), HasSubstr("is read by this command"))
         << name;
   }
 }
@@ -56,12 +57,12 @@ TEST(Outputs, FindsWhatCannotBeWrittenBeforeTheWork) {
   TemporaryFolder folder;
   folder.write("file", "");
   Outputs outputs;
-  EXPECT_THAT(said(outputs.plan("/proc/nowhere/out.csv")), HasSubstr("cannot be written"));
-  EXPECT_THAT(said(outputs.plan(folder.path("file/out.csv"))), HasSubstr("is no folder"));
-  EXPECT_THAT(said(outputs.plan(folder.path(""))), HasSubstr("is a folder, expected a file"));
-  EXPECT_EQ(said(outputs.plan(folder.path("new/folder/out.csv"))), "");
-  EXPECT_EQ(said(outputs.plan("-")), "");
-  EXPECT_EQ(said(outputs.plan("/dev/null")), "");
+  EXPECT_THAT(message_of(outputs.plan("/proc/nowhere/out.csv")), HasSubstr("cannot be written"));
+  EXPECT_THAT(message_of(outputs.plan(folder.path("file/out.csv"))), HasSubstr("is no folder"));
+  EXPECT_THAT(message_of(outputs.plan(folder.path(""))), HasSubstr("is a folder, expected a file"));
+  EXPECT_EQ(message_of(outputs.plan(folder.path("new/folder/out.csv"))), "");
+  EXPECT_EQ(message_of(outputs.plan("-")), "");
+  EXPECT_EQ(message_of(outputs.plan("/dev/null")), "");
   // Looking leaves nothing.
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path("")), {}), 1);
 }
@@ -70,20 +71,21 @@ TEST(Outputs, FindsWhatCannotBeWrittenBeforeTheWork) {
 TEST(Outputs, GivesEachItsOwnFile) {
   const TemporaryFolder folder;
   Outputs outputs;
-  ASSERT_EQ(said(outputs.plan(folder.path("a.toml"))), "");
-  EXPECT_THAT(said(outputs.plan(folder.path("./a.toml"))), HasSubstr("is to be written twice"));
-  EXPECT_EQ(said(outputs.plan(folder.path("b.toml"))), "");
-  EXPECT_EQ(said(outputs.plan("/dev/null")), "");
-  EXPECT_EQ(said(outputs.plan("/dev/null")), "");
+  ASSERT_EQ(message_of(outputs.plan(folder.path("a.toml"))), "");
+  EXPECT_THAT(message_of(outputs.plan(folder.path("./a.toml"))),
+              HasSubstr("is to be written twice"));
+  EXPECT_EQ(message_of(outputs.plan(folder.path("b.toml"))), "");
+  EXPECT_EQ(message_of(outputs.plan("/dev/null")), "");
+  EXPECT_EQ(message_of(outputs.plan("/dev/null")), "");
 }
 
 TEST(Outputs, KeepsWhatAppearsMeanwhile) {
   TemporaryFolder folder;
   const std::string file = folder.path("out.csv");
   Outputs outputs;
-  ASSERT_EQ(said(outputs.plan(file)), "");
+  ASSERT_EQ(message_of(outputs.plan(file)), "");
   folder.write("out.csv", "another's");
-  const std::string message = said(outputs.write(file, "ours"));
+  const std::string message = message_of(outputs.write(file, "ours"));
   EXPECT_THAT(message, HasSubstr("has appeared meanwhile and stays"));
   EXPECT_EQ(*read_text_file(file), "another's");
   EXPECT_EQ(*read_text_file(message.substr(message.rfind(' ') + 1)), "ours");
@@ -94,12 +96,13 @@ TEST(Outputs, DoesNotMixWhatFoldersAreFor) {
   folder.write("run/run.sqlite", "");
   folder.write("diagnosis/simulations.sqlite", "");
   const std::string run = folder.path("run"), diagnosis = folder.path("diagnosis");
-  EXPECT_THAT(said(check_folder(run, FolderKind::kDiagnosis)), HasSubstr("holds a run"));
-  EXPECT_THAT(said(check_folder(diagnosis, FolderKind::kRun)), HasSubstr("holds a diagnosis"));
-  EXPECT_EQ(said(check_folder(run, FolderKind::kRun)), "");
-  EXPECT_EQ(said(check_folder(diagnosis, FolderKind::kDiagnosis)), "");
-  EXPECT_EQ(said(check_folder(folder.path("none"), FolderKind::kRun)), "");
-  EXPECT_THAT(said(forced().plan_in(run, {"model.toml"})), HasSubstr("holds a run"));
+  EXPECT_THAT(message_of(check_folder(run, FolderKind::kDiagnosis)), HasSubstr("holds a run"));
+  EXPECT_THAT(message_of(check_folder(diagnosis, FolderKind::kRun)),
+              HasSubstr("holds a diagnosis"));
+  EXPECT_EQ(message_of(check_folder(run, FolderKind::kRun)), "");
+  EXPECT_EQ(message_of(check_folder(diagnosis, FolderKind::kDiagnosis)), "");
+  EXPECT_EQ(message_of(check_folder(folder.path("none"), FolderKind::kRun)), "");
+  EXPECT_THAT(message_of(forced().plan_in(run, {"model.toml"})), HasSubstr("holds a run"));
 }
 
 }  // namespace

@@ -1,6 +1,6 @@
 #include <gmock/gmock.h>
 
-#include "master/command/question_stamp.h"
+#include "master/command/provenance.h"
 #include "tests/unit/trials/trial_text.h"
 
 namespace gapfarm {
@@ -18,11 +18,11 @@ class Stamp : public testing::Test {
   void write() const { folder_.write(kStampFile, format_stamp(stamp_)); }
 
   TemporaryFolder folder_;
-  QuestionStamp stamp_{"diagnose",
-                       "0123",
-                       {{"seed", 1}, {"genes", {{"friction", {0.1, 1.0}}}}},
-                       {{"config", "a.toml"}, {"trials", {"x.csv", "y.csv"}}},
-                       "build"};
+  Provenance stamp_{"diagnose",
+                    "0123",
+                    {{"seed", 1}, {"genes", {{"friction", {0.1, 1.0}}}}},
+                    {{"config", "a.toml"}, {"trials", {"x.csv", "y.csv"}}},
+                    "build"};
 };
 
 TEST_F(Stamp, GoesOnWithTheSameQuestion) {
@@ -53,7 +53,7 @@ TEST_F(Stamp, ReplacesOtherOptionsWithForceAlone) {
   EXPECT_EQ(compared(true), "replaced");
 }
 
-TEST_F(Stamp, RefusesWhatDoesNotSayOfWhatItIs) {
+TEST_F(Stamp, RefusesWhatDoesNotReportOfWhatItIs) {
   folder_.write("result.json", "{}");
   EXPECT_THAT(compared(true), HasSubstr("do not say of what"));
 }

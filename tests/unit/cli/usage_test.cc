@@ -10,10 +10,10 @@ namespace {
 
 using testing::HasSubstr;
 
-std::string sentence_of(const std::vector<std::string>& words) {
+std::string sentence_of(const std::vector<std::string>& arguments) {
   const std::unique_ptr<Program> program = make_program();
   try {
-    parse_words(*program, words);
+    parse_arguments(*program, arguments);
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return "help";
     return usage_sentence(*program->app->get_subcommands().front(), error);
@@ -21,12 +21,12 @@ std::string sentence_of(const std::vector<std::string>& words) {
   return "no error";
 }
 
-TEST(Usage, SaysWhatWasFoundAndWhatWasExpected) {
+TEST(Usage, ReportsWhatWasFoundAndWhatWasExpected) {
   const std::vector<std::string> evolve = {"evolve", "c.toml", "--out", "x"};
   const auto with = [&](const std::string& option, const std::string& value) {
-    std::vector<std::string> words = evolve;
-    words.insert(words.end(), {option, value});
-    return sentence_of(words);
+    std::vector<std::string> arguments = evolve;
+    arguments.insert(arguments.end(), {option, value});
+    return sentence_of(arguments);
   };
   EXPECT_EQ(with("--workers", "abc"), "--workers is 'abc', expected a whole number from 0 to 4096");
   EXPECT_EQ(with("--workers", "5000"),

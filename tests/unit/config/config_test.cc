@@ -30,7 +30,7 @@ double value_of(const Config& config, const char* key) {
   return config.problem.values[config.problem.table().row(key)];
 }
 
-TEST(Config, LeftOutKeysKeepTheirDefaults) {
+TEST(Config, HeldOutKeysKeepTheirDefaults) {
   const Config config = config_of("");
   EXPECT_EQ(config.problem.scenario, "srv1");
   EXPECT_EQ(config.problem.values, srv1_table().nominal());
@@ -169,7 +169,7 @@ commands = ["forward", "turn_cw"]
   EXPECT_THAT(config.simulate.commands, ElementsAre("forward", "turn_cw"));
 }
 
-TEST(Config, PointsAtUnknownWordsAndSuggests) {
+TEST(Config, PointsAtUnknownTextAndSuggests) {
   EXPECT_EQ(error_of("[evolution]\n  populaton = 5\n"),
             "c.toml:2:3: unknown key 'populaton' in [evolution]; did you mean 'population'?");
   EXPECT_EQ(error_of("[evoluton]\n"),

@@ -118,7 +118,7 @@ TEST(Model, WritesUnitsAndOnlyEffectsThatAct) {
   EXPECT_THAT(text, Not(HasSubstr("[effects.motor_lag]")));
 }
 
-TEST(Model, IsToldFromAConfig) {
+TEST(Model, IsReportedFromAConfig) {
   EXPECT_TRUE(is_model(format_model(*nominal_model("srv1"))));
   EXPECT_FALSE(is_model("seed = 1\n"));
   EXPECT_FALSE(is_model("\x01"));
@@ -127,7 +127,7 @@ TEST(Model, IsToldFromAConfig) {
   EXPECT_THAT(model.error().message, HasSubstr("found no key 'model', expected a model"));
 }
 
-TEST(Model, BareValuesAndLeftOutRowsWillDo) {
+TEST(Model, BareValuesAndHeldOutRowsWillDo) {
   const auto model = parse_model("model = 1\n[parameters]\nmass = 0.4\n", "m.toml");
   ASSERT_TRUE(model.ok()) << model.error().message;
   EXPECT_EQ(model->values[row_of(Srv1::kMass)], 0.4);

@@ -121,7 +121,7 @@ TEST(Determine, LooksAsCloseAsTheLikelihoodIsSharp) {
   }
 }
 
-TEST(Determine, SaysWhenNothingCanBeReadOff) {
+TEST(Determine, ReportsWhenNothingCanBeReadOff) {
   const Problem problem = three_genes(50);
   const auto noise = [](const std::vector<Genome>& genomes) -> Result<std::vector<double>> {
     Stream stream({.run_seed = 3});
@@ -135,7 +135,7 @@ TEST(Determine, SaysWhenNothingCanBeReadOff) {
   EXPECT_THAT(determine_text(*report, problem.table()), HasSubstr("unclear"));
 }
 
-TEST(Determine, SaysWhenThePointIsNoMaximumOrAtABound) {
+TEST(Determine, ReportsWhenThePointIsNoMaximumOrAtABound) {
   const Problem problem = three_genes(50);
   const Eigen::Matrix3d information = 1e4 * Eigen::Matrix3d::Identity();
   const auto report =

@@ -97,7 +97,7 @@ TEST(FitLatency, FindsNoneInNoise) {
   }
 }
 
-TEST(FitLatency, SaysNothingWithoutNoiseOrGaps) {
+TEST(FitLatency, ReportsNothingWithoutNoiseOrGaps) {
   const Chains made = chains(1, 0.3, 0.12);
   EXPECT_EQ(fit_latency(made.gaps, made.end_velocity, {0, 0}, 600).gain, 0);
   const LatencyFit fit = fit_latency({}, made.end_velocity, kNoise, 600);

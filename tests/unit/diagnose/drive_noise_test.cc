@@ -10,7 +10,7 @@
 namespace gapfarm {
 namespace {
 
-// 600 trials tell the drive to about 6 %: ten logs together are to be right within 5 %, which is
+// 600 trials show the drive to about 6 %: ten logs together are to be right within 5 %, which is
 // 2.5 standard errors, and each alone within 20 %.
 void expect_recovered(const std::vector<double>& ratios) {
   double mean = 0;
@@ -58,7 +58,7 @@ TEST(RefitDriveNoise, StartsFromNothing) {
   EXPECT_NEAR(fit.drive_side / same.drive_side, 1, 0.03);
 }
 
-TEST(RefitDriveNoise, AFewStrayTrialsHardlyWidenIt) {
+TEST(RefitDriveNoise, AFewOutlierTrialsHardlyWidenIt) {
   Drawn d = draw(1);
   for (std::size_t i = 0; i < d.residuals.size(); i += 100) d.residuals[i] *= 50;
   const NoiseEstimate fit = refit_drive_noise(d.trials, d.residuals, kStart, false);
@@ -67,8 +67,8 @@ TEST(RefitDriveNoise, AFewStrayTrialsHardlyWidenIt) {
 }
 
 // Where every trial is put down by hand the readings' noise is unknown as well, and a fifth that
-// stray far would make it all vanish: the tail of free commands keeps it.
-TEST(RefitDriveNoise, ManyStrayTrialsDoNotMakeItVanish) {
+// lie far off far would make it all vanish: the tail of free commands keeps it.
+TEST(RefitDriveNoise, ManyOutlierTrialsDoNotMakeItVanish) {
   for (std::uint64_t seed = 0; seed < 5; ++seed) {
     Drawn d = draw(seed);
     for (std::size_t i = 0; i < d.residuals.size(); i += 5) d.residuals[i] *= 20;

@@ -59,7 +59,7 @@ std::vector<CommandSpec> mirrored_commands() {
   return commands;
 }
 
-TEST(FreeCommands, AreToldByHowFewTrialsRepeat) {
+TEST(FreeCommands, AreReportedByHowFewTrialsRepeat) {
   std::vector<Cell> cells(10);
   for (Cell& cell : cells) cell.trials = 1;
   EXPECT_TRUE(commands_are_free(cells));
@@ -76,9 +76,9 @@ TEST(FreeCommands, WaysKnowWholeTurns) {
                                              {"e", 0.3, -0.9, 3}, {"f", 0, 0, 1}};
   const Study study = drives(commands);
   for (std::size_t i = 0; i < commands.size(); ++i) {
-    EXPECT_LT((way_of(study, i) - twist_of(commands[i])).norm(), 2e-3) << commands[i].name;
+    EXPECT_LT((motion_of(study, i) - twist_of(commands[i])).norm(), 2e-3) << commands[i].name;
   }
-  EXPECT_GT(std::abs(way_of(study, 3)[2]), std::numbers::pi);
+  EXPECT_GT(std::abs(motion_of(study, 3)[2]), std::numbers::pi);
 }
 
 TEST(FreeCommands, DisturbancesAreCarriedToTheEnd) {
@@ -107,7 +107,7 @@ TEST(FreeCommands, MisfitsLeaveWhatBreaksASymmetry) {
     const ResidualTrial& t = study.trials[i];
     apart.push_back(t.right - t.left);
     both.push_back(t.right + t.left);
-    ahead.push_back(carried_to_end(study, i).rate.col(1) * std::abs(way_of(study, i)[2]));
+    ahead.push_back(carried_to_end(study, i).rate.col(1) * std::abs(motion_of(study, i)[2]));
   }
   double absorbed = 0;
   const std::vector<Eigen::VectorXd> misfits = smooth_misfits(study);
@@ -128,10 +128,10 @@ TEST(FreeCommands, MisfitsAreAHundredthOfTheMotion) {
   Eigen::VectorXd variance = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(3 * study.size()));
   for (const Eigen::VectorXd& misfit : smooth_misfits(study)) variance += misfit.cwiseAbs2();
   for (std::size_t i = 0; i < study.size(); ++i) {
-    const Twist way = way_of(study, i);
+    const Twist motion = motion_of(study, i);
     const double heading = 0.02 * std::sqrt(variance[static_cast<Eigen::Index>(3 * i + 2)]);
-    EXPECT_LT(heading, 0.012 + 0.04 * std::abs(way[2]));
-    EXPECT_GT(heading, 0.002 * std::abs(way[2]));
+    EXPECT_LT(heading, 0.012 + 0.04 * std::abs(motion[2]));
+    EXPECT_GT(heading, 0.002 * std::abs(motion[2]));
   }
 }
 

@@ -1,4 +1,4 @@
-// A farm that answers by plain kinematics, and fails where it is told to.
+// A farm that answers by plain kinematics, and fails where it is commanded to.
 #pragma once
 
 #include <cmath>
@@ -70,7 +70,7 @@ class KinematicFarm : public Farm {
   }
 
   // As the robot goes: at once, and at one speed.
-  static Twist way_of(const ParameterValues& values, double left, double right, double time_s) {
+  static Twist motion_of(const ParameterValues& values, double left, double right, double time_s) {
     const double speed = values[row_of(Srv1::kFullSpeed)];
     const double width = values[row_of(Srv1::kTrackGauge)] + values[row_of(Srv1::kContactLength)];
     return {speed * (left + right) / 2 * time_s, 0, speed * (right - left) / width * time_s};
@@ -81,7 +81,7 @@ class KinematicFarm : public Farm {
     for (double t = 0; t <= c.duration() + 1e-9; t += task.interval()) {
       v1::TraceSample* sample = to->add_samples();
       sample->set_t(t);
-      *sample->mutable_pose() = to_proto(exp(way_of(values, c.left(), c.right(), t)));
+      *sample->mutable_pose() = to_proto(exp(motion_of(values, c.left(), c.right(), t)));
     }
     to->set_rest_time(c.duration());
   }
@@ -92,7 +92,7 @@ class KinematicFarm : public Farm {
     for (const v1::PlannedTrial& planned : task.plan()) {
       Trial trial = from_proto(planned.trial());
       const CommandSpec c = resolved_command(trial, problem.commands);
-      trial.X_WE = trial.X_WS * exp(way_of(values, c.left, c.right, c.duration_s));
+      trial.X_WE = trial.X_WS * exp(motion_of(values, c.left, c.right, c.duration_s));
       *to->add_trials() = to_proto(trial);
     }
   }
@@ -104,7 +104,7 @@ class KinematicFarm : public Farm {
     v1::Predicted* predicted = to->add_predictions();
     predicted->set_trial(i);
     *predicted->mutable_end() =
-        to_proto(trial.X_WS * exp(way_of(values, c.left, c.right, c.duration_s)));
+        to_proto(trial.X_WS * exp(motion_of(values, c.left, c.right, c.duration_s)));
   }
 
   Fails fails_;

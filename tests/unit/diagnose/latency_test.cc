@@ -89,7 +89,7 @@ TEST(LateMarks, TakeAwayWhatLateReadingsLeft) {
     before.push_back(log.study.trials[i].residual);
     after.push_back(before.back() - marks[i]);
   }
-  // The last drives before the robot was moved have no next one that would tell.
+  // The last drives before the robot was moved have no next one that would show.
   EXPECT_GT(squares(log.study, before), 2.0 * 1200);
   EXPECT_LT(squares(log.study, after), 1.2 * 1200);
 }

@@ -76,8 +76,8 @@ Problem make_problem() {
   return problem;
 }
 
-Rival rival(const std::string& name, double value) {
-  Rival r{name, {}};
+CompetingCause alternative(const std::string& name, double value) {
+  CompetingCause r{name, {}};
   r.overrides.emplace_back();
   r.overrides.back().set_value(value);
   return r;
@@ -130,23 +130,25 @@ TEST(NextExperiments, ChooseTheCommandAndDurationThatPart) {
                ? 0.005 * s.strength * s.trial.duration() * s.trial.right() / 0.3
                : 0;
   });
-  const auto next = next_experiments(farm, plan_drives(make_problem()),
-                                     {rival("com_offset", 0), rival("marker_offset", 1)});
+  const auto next =
+      next_experiments(farm, plan_drives(make_problem()),
+                       {alternative("com_offset", 0), alternative("marker_offset", 1)});
   ASSERT_TRUE(next.ok()) << next.error().message;
   ASSERT_EQ(next->size(), 1u);  // no other command parts them
   const NextExperiment& best = next->front();
   EXPECT_EQ(best.trials, 11u);  // 5.41 / (1^2 / 2)
-  EXPECT_EQ(best.text,
-            "Drive turn_ccw for 2 s at full level from any start: 11 trials tell com_offset from "
-            "marker_offset.");
+  EXPECT_EQ(
+      best.text,
+      "Drive turn_ccw for 2 s at full level from any start: 11 trials distinguish com_offset from "
+      "marker_offset.");
   EXPECT_EQ(best.separates, (std::vector<std::string>{"com_offset", "marker_offset"}));
 }
 
 TEST(NextExperiments, OfferAnotherCommandWhenOnePartsThemAll) {
   FakeFarm farm(
       [](const Seen& s) { return s.strength * (s.trial.command() == "forward" ? 0.02 : 0.01); });
-  const auto next =
-      next_experiments(farm, plan_drives(make_problem()), {rival("a", 0), rival("b", 1)});
+  const auto next = next_experiments(farm, plan_drives(make_problem()),
+                                     {alternative("a", 0), alternative("b", 1)});
   ASSERT_TRUE(next.ok());
   ASSERT_EQ(next->size(), 2u);
   EXPECT_LT((*next)[0].trials, (*next)[1].trials);
@@ -155,11 +157,11 @@ TEST(NextExperiments, OfferAnotherCommandWhenOnePartsThemAll) {
   EXPECT_EQ((*next)[1].text.find("Drive forward "), std::string::npos) << (*next)[1].text;
 }
 
-TEST(NextExperiments, AskForHeadingsDirectionsAndLateDrivesWhereTheseTell) {
-  const Rivals rivals = {rival("a", 0), rival("b", 1)};
+TEST(NextExperiments, AskForHeadingsDirectionsAndLateDrivesWhereTheseReport) {
+  const CompetingCauses alternatives = {alternative("a", 0), alternative("b", 1)};
   FakeFarm tilt(
       [](const Seen& s) { return 0.008 * s.strength * std::cos(s.trial.start().theta() - 2.2); });
-  const auto headings = next_experiments(tilt, plan_drives(make_problem()), rivals);
+  const auto headings = next_experiments(tilt, plan_drives(make_problem()), alternatives);
   ASSERT_TRUE(headings.ok());
   EXPECT_NE(headings->front().text.find("from several headings and places"), std::string::npos);
   EXPECT_GE(headings->front().trials, 5u);
@@ -168,21 +170,22 @@ TEST(NextExperiments, AskForHeadingsDirectionsAndLateDrivesWhereTheseTell) {
     const bool reversed = s.before != nullptr && s.before->left() * s.trial.left() < 0;
     return reversed ? 0.02 * s.strength : 0;
   });
-  const auto reversing = next_experiments(backlash, plan_drives(make_problem()), rivals);
+  const auto reversing = next_experiments(backlash, plan_drives(make_problem()), alternatives);
   ASSERT_TRUE(reversing.ok());
   EXPECT_NE(reversing->front().text.find("straight after driving the opposite way"),
             std::string::npos);
 
   FakeFarm sag([](const Seen& s) { return s.strength * s.trial.t() / 60 * 0.0005; });
-  const auto late = next_experiments(sag, plan_drives(make_problem()), rivals);
+  const auto late = next_experiments(sag, plan_drives(make_problem()), alternatives);
   ASSERT_TRUE(late.ok());
   EXPECT_NE(late->front().text.find("20 minutes into a session"), std::string::npos);
 }
 
-TEST(NextExperiments, SayWhenNothingParts) {
+TEST(NextExperiments, ReportWhenNothingParts) {
   FakeFarm farm([](const Seen& s) { return s.strength >= 2 ? 0.02 : 0; });
-  const auto next = next_experiments(farm, plan_drives(make_problem()),
-                                     {rival("lag", 0), rival("timing", 1), rival("tilt", 2)});
+  const auto next =
+      next_experiments(farm, plan_drives(make_problem()),
+                       {alternative("lag", 0), alternative("timing", 1), alternative("tilt", 2)});
   ASSERT_TRUE(next.ok());
   ASSERT_EQ(next->size(), 2u);
   EXPECT_NE((*next)[0].text.find("lag from tilt and timing from tilt"), std::string::npos)
@@ -193,15 +196,16 @@ TEST(NextExperiments, SayWhenNothingParts) {
 
 TEST(NextExperiments, PassOnFaults) {
   FakeFarm farm([](const Seen&) { return 0.0; });
-  EXPECT_TRUE(next_experiments(farm, plan_drives(make_problem()), {rival("alone", 0)})->empty());
+  EXPECT_TRUE(
+      next_experiments(farm, plan_drives(make_problem()), {alternative("alone", 0)})->empty());
   farm.diverges_above = 0.5;
-  const auto dead =
-      next_experiments(farm, plan_drives(make_problem()), {rival("a", 0), rival("b", 1)});
+  const auto dead = next_experiments(farm, plan_drives(make_problem()),
+                                     {alternative("a", 0), alternative("b", 1)});
   ASSERT_FALSE(dead.ok());
   EXPECT_NE(dead.error().message.find("'b'"), std::string::npos);
   farm.broken = true;
-  const auto stopped =
-      next_experiments(farm, plan_drives(make_problem()), {rival("a", 0), rival("b", 1)});
+  const auto stopped = next_experiments(farm, plan_drives(make_problem()),
+                                        {alternative("a", 0), alternative("b", 1)});
   ASSERT_FALSE(stopped.ok());
   EXPECT_EQ(stopped.error().code, ErrorCode::kStopped);
 }

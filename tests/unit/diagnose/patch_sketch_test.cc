@@ -86,7 +86,7 @@ TEST_F(PatchSketchTest, OnlyDrivesOverTheRimAreMarked) {
 
 // What the sketch marks crosses the rim; where the robot is inside all along, or never, no contact
 // changes its friction.
-TEST_F(PatchSketchTest, TellsWhichDrivesCrossTheRim) {
+TEST_F(PatchSketchTest, ReportsWhichDrivesCrossTheRim) {
   Study study = study_;
   study.subject = diagnosis_subject(problem_);
   const Patch patch = {1, 1, 0.3, 0.4};

@@ -35,7 +35,7 @@ std::map<std::string, std::vector<const Design*>> by_group(const ExperimentPlan&
   return groups;
 }
 
-TEST(PlanPushes, EachWayChangesWhatItSaysAndNothingElse) {
+TEST(PlanPushes, EachWayChangesWhatItReportsAndNothingElse) {
   const Problem problem = pushes();
   const ExperimentPlan plan = plan_pushes(problem);
   EXPECT_TRUE(plan.problem.genes.empty());
@@ -65,7 +65,7 @@ TEST(PlanPushes, EachWayChangesWhatItSaysAndNothingElse) {
   EXPECT_EQ(groups.at("elsewhere").size(), 2u);  // the other corner of the starts, each
 }
 
-TEST(PlanPushes, SaysWhichPushAndHow) {
+TEST(PlanPushes, ReportsWhichPushAndHow) {
   const ExperimentPlan plan = plan_pushes(pushes());
   const auto groups = by_group(plan);
   EXPECT_EQ(groups.at("as it was")[0]->action(false), "Push square as in trial 7 of session s1");

@@ -14,7 +14,7 @@ namespace gapfarm {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
-TEST(PushGeometry, TellsTheTouchFromTheOutline) {
+TEST(PushGeometry, ReportsTheTouchFromTheOutline) {
   const PushGeometry push = push_geometry(square(), push_from_below(0.03), kFinger_m);
   ASSERT_TRUE(push.touched);
   EXPECT_NEAR(push.direction_rad, kPi / 2, 1e-9);
@@ -37,7 +37,7 @@ TEST(PushGeometry, MovesWithTheScene) {
   EXPECT_NEAR(there.along_edge, here.along_edge, 1e-6);
 }
 
-TEST(PushGeometry, SaysWhenTheFingerMisses) {
+TEST(PushGeometry, ReportsWhenTheFingerMisses) {
   EXPECT_FALSE(push_geometry(square(), push_from_below(0.1), kFinger_m).touched);
 }
 
@@ -104,7 +104,7 @@ TEST(DiagnosisSubjects, AreThoseWithACatalogue) {
   }
 }
 
-TEST(PushWords, TellOfEveryEffectOfTheCatalogue) {
+TEST(PushPhrases, ReportOfEveryEffectOfTheCatalogue) {
   for (const Effect& effect : push_effects()) {
     NamedEffect named;
     named.name = effect.name;

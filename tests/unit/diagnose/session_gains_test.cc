@@ -50,7 +50,7 @@ struct SessionLog {
   std::vector<Eigen::Vector3d> residuals;
 };
 
-TEST(SessionGains, TellEverySessionsOwn) {
+TEST(SessionGains, ReportEverySessionsOwn) {
   const std::vector<double> gains = {0.05, -0.02, 0.01, -0.06, 0.02};
   const SpreadFit fit = SessionLog(1, gains).fit();
   ASSERT_GT(fit.gain, 100);
@@ -86,7 +86,7 @@ TEST(SessionGains, AreNoBatteryThatSags) {
 
 TEST(SessionGains, AreNoOtherCommands) {
   SessionLog log(4, {0, 0});
-  // Turns are slower than is foretold, and the second session holds nothing else.
+  // Turns are slower than is predicted, and the second session holds nothing else.
   for (std::size_t i = 0; i < log.residuals.size(); ++i) {
     ResidualTrial& t = log.study.trials[i];
     if (t.command == 1) log.residuals[i] -= 0.05 * (t.left + t.right);
@@ -101,7 +101,7 @@ TEST(SessionGains, ComeFromNoFewSlips) {
   }
 }
 
-TEST(SessionGains, ForetellATrialByItsSession) {
+TEST(SessionGains, PredictATrialByItsSession) {
   const SessionLog log(5, {0.05, -0.02, 0.01, -0.06});
   const SpreadFit fit = log.fit();
   const std::vector<double> without = scores_of(log.study, log.residuals, kOutliers);

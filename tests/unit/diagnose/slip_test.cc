@@ -109,7 +109,7 @@ TEST(TrialsWithSlips, WithoutEventsItIsTheDensityOfOutliers) {
 }
 
 // A side that lost speed ends near where some event leads, a drive that was pushed aside does not.
-TEST(TrialsWithSlips, TellsSlipsFromOtherStrays) {
+TEST(TrialsWithSlips, ReportsSlipsFromOtherOutliers) {
   Drawn d = draw(2);
   const SlipFit fit{.gain = 1, .probability = 0.05, .loss = 0.5, .noise = kTruth};
   for (std::size_t i = 0; i < 60; ++i) {
@@ -146,11 +146,11 @@ TEST(TrialsWithSlips, ForeseenSlipsScoreHigher) {
   EXPECT_NEAR(mean(slipped), 0.19, 0.1);  // 1 - 0.9^2
 }
 
-// Drives that a side slipped in, as likely as they are told.
+// Drives that a side slipped in, as likely as they are reported.
 struct Scene {
   Study study;
   std::vector<double> slipped;
-  std::vector<bool> tells;
+  std::vector<bool> informative;
 };
 
 Scene scene(std::uint64_t seed) {
@@ -163,7 +163,7 @@ Scene scene(std::uint64_t seed) {
   }
   for (std::size_t i = 0; i < s.study.size(); ++i) s.study.trials[i].cell = i % 6;
   s.slipped.assign(s.study.size(), 0);
-  s.tells.assign(s.study.size(), true);
+  s.informative.assign(s.study.size(), true);
   return s;
 }
 
@@ -176,7 +176,7 @@ TEST(GatheringOfSlips, NoneWhereSlipsFallAnywhere) {
     for (std::size_t i = 0; i < s.slipped.size(); ++i) {
       s.slipped[i] = stream.bernoulli(0.1 * s.study.cells[i % 6].path) ? 1 : 0;
     }
-    most = std::max(most, gathering_of_slips(s.study, s.slipped, s.tells).gain);
+    most = std::max(most, gathering_of_slips(s.study, s.slipped, s.informative).gain);
   }
   EXPECT_LT(most, kLeastGathering);
   EXPECT_GT(most, 2);
@@ -188,18 +188,18 @@ TEST(GatheringOfSlips, FindsADisc) {
     const Pose& at = s.study.trials[i].X_WS;
     s.slipped[i] = std::hypot(at.x - 1.2, at.y - 0.8) < 0.2 && i % 4 != 0 ? 1 : i % 50 == 0;
   }
-  const Gathering found = gathering_of_slips(s.study, s.slipped, s.tells);
+  const Gathering found = gathering_of_slips(s.study, s.slipped, s.informative);
   EXPECT_GT(found.gain, kLeastGathering);
   double radius = 0, x = 0, y = 0;
   ASSERT_EQ(std::sscanf(found.where.c_str(), "within %lf m of (%lf, %lf)", &radius, &x, &y), 3)
       << found.where;
   EXPECT_LT(std::hypot(x - 1.2, y - 0.8), 0.2);
-  // Not among trials that something else made stray.
+  // Not among trials that something else made lie far off.
   for (std::size_t i = 0; i < s.slipped.size(); ++i) {
     const Pose& at = s.study.trials[i].X_WS;
-    if (std::hypot(at.x - 1.2, at.y - 0.8) < 0.2) s.tells[i] = false;
+    if (std::hypot(at.x - 1.2, at.y - 0.8) < 0.2) s.informative[i] = false;
   }
-  EXPECT_LT(gathering_of_slips(s.study, s.slipped, s.tells).gain, kLeastGathering);
+  EXPECT_LT(gathering_of_slips(s.study, s.slipped, s.informative).gain, kLeastGathering);
 }
 
 TEST(GatheringOfSlips, FindsALine) {
@@ -208,7 +208,7 @@ TEST(GatheringOfSlips, FindsALine) {
     const ResidualTrial& t = s.study.trials[i];
     if ((t.X_WS.y > 1) != (t.X_WP.y > 1)) s.slipped[i] = 0.9;
   }
-  const Gathering found = gathering_of_slips(s.study, s.slipped, s.tells);
+  const Gathering found = gathering_of_slips(s.study, s.slipped, s.informative);
   EXPECT_GT(found.gain, kLeastGathering);
   double y = 0;
   ASSERT_EQ(std::sscanf(found.where.c_str(), "across y = %lf", &y), 1) << found.where;
@@ -217,10 +217,10 @@ TEST(GatheringOfSlips, FindsALine) {
 
 TEST(GatheringOfSlips, NoSlipsGatherNowhere) {
   const Scene s = scene(1);
-  EXPECT_EQ(gathering_of_slips(s.study, s.slipped, s.tells).gain, 0);
+  EXPECT_EQ(gathering_of_slips(s.study, s.slipped, s.informative).gain, 0);
 }
 
-TEST(ResidualKurtosis, TellsTailsFromNone) {
+TEST(ResidualKurtosis, ReportsTailsFromNone) {
   Stream stream({.run_seed = 1});
   Eigen::VectorXd z(1800);
   for (double& v : z) v = stream.normal();

@@ -29,8 +29,8 @@ struct Driven {
       : farm(std::move(fails)), problem(kinematic_log(60)), predictor(farm, problem) {
     const std::size_t speed = row_of(Srv1::kFullSpeed);
     for (Trial& t : problem.log.trials) {
-      const Twist way = log(between(t.X_WS, t.X_WE));
-      t.X_WE = t.X_WS * exp(Twist(faster * way));
+      const Twist motion = log(between(t.X_WS, t.X_WE));
+      t.X_WE = t.X_WS * exp(Twist(faster * motion));
     }
     nominal_speed = problem.values[speed];
     study = make_study(problem, {}).value();
@@ -295,11 +295,11 @@ struct Measured : Driven {
 
   std::shared_ptr<const DiagnosisSubject> subject;
   DiagnoseOptions options;
-  steps::Inquiry of{farm, predictor, problem, *subject, options, {0, 0}};
+  steps::DiagnosisRequest of{farm, predictor, problem, *subject, options, {0, 0}};
   steps::Explanation found;
 };
 
-TEST(Steps, TrialsAreLeftOutOfACopy) {
+TEST(Steps, TrialsAreHeldOutOfACopy) {
   const Measured m;
   std::vector<bool> ignored(m.study.size(), false);
   ignored[0] = true;
@@ -324,16 +324,16 @@ TEST(Steps, WhereNothingIsNamedReadingsAreAsLogged) {
   EXPECT_NE(m.found.study().trials[0].residual, m.found.as_logged->trials[0].residual);
 }
 
-TEST(Steps, ABaseInDoubtHasNothingNamed) {
+TEST(Steps, ABaseInWarnOfHasNothingNamed) {
   Measured m;
   steps::Screening screening;
   screening.found = m.found;
-  screening.doubt = SanityFinding{"base_on_bounds", "", "", Severity::kDoubt};
+  screening.warning = SanityFinding{"base_on_bounds", "", "", Severity::kWarning};
   const auto judged = judge(m.of, screening);
   ASSERT_TRUE(judged.ok());
   EXPECT_EQ(judged->verdict, Verdict::kUnknown);
   EXPECT_TRUE(judged->named.chosen.empty());
-  EXPECT_EQ(judged->doubts.size(), 1u);
+  EXPECT_EQ(judged->warnings.size(), 1u);
   EXPECT_EQ(screening.found.chosen.size(), 1u);
 }
 
@@ -380,7 +380,7 @@ TEST(Steps, WhatHelpsNoUnseenTrialIsDropped) {
 }
 
 // More of a saturating strength would change nothing; seed 93's patch of 2.85 ended on 3.
-TEST(Steps, OnlyWhatCouldGrowIsDoubtedOnItsBound) {
+TEST(Steps, OnlyWhatCouldGrowIsQuestionedOnItsBound) {
   Measured m;
   const auto dropped_at = [&](const char* effect, const char* key, double value) {
     m.found.chosen.front().candidate.signature.effect = effect;

@@ -51,7 +51,7 @@ TEST(PredictiveNoise, FindsNoTailsInGaussianDrives) {
   EXPECT_LT(fit(d, true).nats, fit(d, false).nats + 8);
 }
 
-TEST(PredictiveNoise, APerfectPredictionScoresWhatIsSaid) {
+TEST(PredictiveNoise, APerfectPredictionScoresWhatIsReported) {
   NoiseEstimate known = kTruth;
   known.tails = {0.4, 0.3};
   double mean = 0;

@@ -54,7 +54,7 @@ TEST(Unsettled, FindsNoneInGaussianResiduals) {
   }
 }
 
-TEST(Unsettled, FindsNoneWhereAllDrivesStray) {
+TEST(Unsettled, FindsNoneWhereAllDrivesOutlier) {
   for (std::uint64_t seed = 0; seed < 3; ++seed) {
     EXPECT_EQ(Turned(seed, 0.1, 0.5, /*all=*/true).fit().gain, 0) << seed;
   }

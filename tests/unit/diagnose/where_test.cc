@@ -81,7 +81,7 @@ bool is_command(const Data& d, const ResidualTrial& t, const char* name) {
   return d.problem.commands[t.command].name == name;
 }
 
-TEST(Where, SaysNothingOfPureNoise) {
+TEST(Where, ReportsNothingOfPureNoise) {
   int alarms = 0;
   for (std::uint64_t seed = 0; seed < 100; ++seed)
     alarms += make_data(100 + seed).look().empty() ? 0 : 1;
@@ -89,7 +89,7 @@ TEST(Where, SaysNothingOfPureNoise) {
   EXPECT_LE(alarms, 4);  // one in a hundred is promised
 }
 
-TEST(Where, TellsTheBiasOfOneCommandInMillimetres) {
+TEST(Where, ReportsTheBiasOfOneCommandInMillimetres) {
   Data d = make_data(1);
   d.disturb([&](const ResidualTrial& t, Eigen::Vector3d& r) {
     if (is_command(d, t, "forward")) r[1] += 0.004;
@@ -105,7 +105,7 @@ TEST(Where, TellsTheBiasOfOneCommandInMillimetres) {
   EXPECT_EQ(rows.size(), 1u);
 }
 
-TEST(Where, SaysAFactOfAllCommandsOnce) {
+TEST(Where, ReportsAFactOfAllCommandsOnce) {
   Data d = make_data(2);
   d.disturb([](const ResidualTrial&, Eigen::Vector3d& r) { r[1] -= 0.002; });
   const std::vector<Where> rows = d.look();
@@ -131,7 +131,7 @@ TEST(Where, FindsTheTrendOfASaggingBatteryInEveryMotion) {
   }
 }
 
-TEST(Where, TellsTheHarmonicOfTheHeading) {
+TEST(Where, ReportsTheHarmonicOfTheHeading) {
   for (const int order : {1, 2, 4}) {
     Data d = make_data(4);
     d.disturb([&](const ResidualTrial& t, Eigen::Vector3d& r) {
@@ -147,7 +147,7 @@ TEST(Where, TellsTheHarmonicOfTheHeading) {
   }
 }
 
-TEST(Where, TellsSpreadFromOutliers) {
+TEST(Where, ReportsSpreadFromOutliers) {
   Data wide = make_data(5);
   wide.disturb([&](const ResidualTrial& t, Eigen::Vector3d& r) {
     if (is_command(wide, t, "turn_cw")) r[2] *= 2;
@@ -234,7 +234,7 @@ NamedEffect sag() {
   return e;
 }
 
-TEST(Findings, TellEffectsInPlainUnits) {
+TEST(Findings, ReportEffectsInPlainUnits) {
   EXPECT_EQ(effect_sentence(sag()),
             "The battery loses 0.35 % (0.31 to 0.4) of its speed a minute; adding that closes 88 % "
             "of the gap in log score.");
@@ -296,7 +296,7 @@ TEST(Findings, EveryEffectOfACatalogueHasARow) {
   }
 }
 
-TEST(Findings, TellAtLengthWhatTheHeadlineIsOf) {
+TEST(Findings, ReportAtLengthWhatTheHeadlineIsOf) {
   const auto text = [](const Diagnosis& d) { return listed(findings(d)); };
   Diagnosis d;
   EXPECT_NE(text(d).find("as well as its own noise allows"), std::string::npos);
@@ -335,7 +335,7 @@ TEST(Findings, AHeadlineIsALineAndAnAction) {
 }
 
 // Of which axis a place is.
-TEST(Findings, ASeamIsToldWithItsAxis) {
+TEST(Findings, ASeamIsReportedWithItsAxis) {
   NamedEffect seam;
   seam.name = "camera_seam";
   seam.parameters = {{"offset_x", -0.22, -0.3, -0.2, "m"},
@@ -349,20 +349,20 @@ TEST(Findings, ASeamIsToldWithItsAxis) {
   EXPECT_EQ(headline(d), "Two cameras disagree at y = 1.33 m.") << headline(d);
 }
 
-TEST(Findings, SayWhatThinDataCannotShow) {
+TEST(Findings, ReportWhatThinDataCannotShow) {
   Data rich = make_data(9);
   TrialLog log;
   log.trials.resize(600);
   for (Trial& t : log.trials) t.t_s = 1;
   log.trials[0].path.resize(1);
-  std::vector<std::string> words = cautions(rich.trials, rich.cells, log);
-  ASSERT_EQ(words.size(), 1u);  // one level
-  EXPECT_NE(words[0].find("one level"), std::string::npos);
+  std::vector<std::string> sentences = cautions(rich.trials, rich.cells, log);
+  ASSERT_EQ(sentences.size(), 1u);  // one level
+  EXPECT_NE(sentences[0].find("one level"), std::string::npos);
 
   std::vector<ResidualTrial> poor(5, rich.trials[0]);
   for (ResidualTrial& t : poor) t.context.moved = true;
-  words = cautions(poor, rich.cells, TrialLog{});
-  EXPECT_GE(words.size(), 9u);
+  sentences = cautions(poor, rich.cells, TrialLog{});
+  EXPECT_GE(sentences.size(), 9u);
   EXPECT_EQ(cautions({}, {}, TrialLog{}).size(), 1u);
 
   const LogVariety variety = log_variety(poor, rich.cells, TrialLog{});

@@ -35,7 +35,7 @@ std::vector<DrivenRun> drawn_runs(std::uint64_t first, int count, double heading
   return runs;
 }
 
-TEST(PathBand, HoldsTheShareOfWholePathsThatItSays) {
+TEST(PathBand, HoldsTheShareOfWholePathsThatItReports) {
   for (const double coverage : {0.5, 0.9}) {
     double inside = 0;
     for (std::uint64_t k = 0; k < 10; ++k) {

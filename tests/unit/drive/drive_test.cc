@@ -127,7 +127,7 @@ TEST_F(Drive, TheMinedModelSpreadsAsItsLogDoes) {
   EXPECT_THAT(band_csv(report), HasSubstr("simulation,1,0.5,"));
 }
 
-TEST(WaypointLog, TellsTargetsFromPoses) {
+TEST(WaypointLog, ReportsTargetsFromPoses) {
   const auto log = parse_waypoint_log(
       "23:59:59:000:000 [ SENT ] CAMPOSE 7 10 20 0.5 [ TO ] robot 7\n"
       "23:59:59:500:000 [ RECIEVED ] WAYPOINTS 7 2 100 0 200 50 [ FROM ] robot 7\n"

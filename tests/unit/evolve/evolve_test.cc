@@ -168,7 +168,7 @@ TEST_F(EvolveTest, ResumingFromAnyGenerationGivesTheSameDigests) {
   }
 }
 
-TEST_F(EvolveTest, DigestsIgnoreTimeAndTellSeedsApart) {
+TEST_F(EvolveTest, DigestsIgnoreTimeAndShowSeedsApart) {
   ASSERT_TRUE(go());
   const std::vector<std::string> whole = digests(sink_.records);
   ToyRun same(sphere(3), EvolutionSettings{}, 1), other(sphere(3), EvolutionSettings{}, 2);
@@ -180,7 +180,7 @@ TEST_F(EvolveTest, DigestsIgnoreTimeAndTellSeedsApart) {
   EXPECT_NE(digests(of_other.records).back(), whole.back());
 }
 
-TEST_F(EvolveTest, RecordsSayWhatHappened) {
+TEST_F(EvolveTest, RecordsReportWhatHappened) {
   ASSERT_TRUE(go().ok());
   std::uint64_t expected = 1;
   for (const GenerationRecord& record : sink_.records) {

@@ -108,7 +108,7 @@ TEST(Genetic, TheNominalGenomeIsBornFirst) {
   EXPECT_EQ(optimiser->ask()[3].genome, first[3].genome) << "asking twice asks the same";
 }
 
-TEST(Genetic, SetupErrorsSayWhatIsWrong) {
+TEST(Genetic, SetupErrorsReportWhatIsWrong) {
   const Toy toy = sphere(2);
   const ParameterTable table = toy.table();
   OptimiserSetup good;

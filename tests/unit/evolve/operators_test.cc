@@ -184,7 +184,7 @@ TEST(Selection, LinearRankingHasItsPressure) {
   EXPECT_TRUE(std::is_sorted(p.rbegin(), p.rend()));
 }
 
-TEST(Selection, PicksAsOftenAsItSays) {
+TEST(Selection, PicksAsOftenAsItReports) {
   for (SelectionKind kind : {SelectionKind::kTournament, SelectionKind::kRank}) {
     EvolutionSettings settings;
     settings.selection = kind;
@@ -272,7 +272,7 @@ TEST(SeenGenomes, KeepsTheLatest) {
   EXPECT_NE(seen.find({11.0}), nullptr);
 }
 
-TEST(Roulette, StartsAsTold) {
+TEST(Roulette, StartsAsReported) {
   const Roulette roulette({"a", "b", "c"}, {0.2, 0.3, 0.5}, 0.1, true);
   EXPECT_THAT(roulette.probabilities(),
               testing::Pointwise(testing::DoubleNear(1e-12), {0.2, 0.3, 0.5}));
@@ -319,7 +319,7 @@ TEST(Roulette, TooHighAFloorIsShared) {
   for (double p : roulette.probabilities()) EXPECT_NEAR(p, 1.0 / 3, 1e-12);
 }
 
-TEST(Roulette, PicksAsOftenAsItSays) {
+TEST(Roulette, PicksAsOftenAsItReports) {
   const Roulette roulette({"a", "b", "c"}, {0.2, 0, 0.8}, 0, false);
   Stream stream = draws(7);
   std::vector<int> counts(3), others(3);

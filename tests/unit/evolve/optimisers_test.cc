@@ -36,13 +36,13 @@ INSTANTIATE_TEST_SUITE_P(Kinds, EveryOptimiser,
                                          OptimiserKind::kDeSimplex, OptimiserKind::kRandom),
                          name_of);
 
-TEST(TableOfOptimisers, AgreesWithTheConfigsWords) {
+TEST(TableOfOptimisers, AgreesWithTheConfigsText) {
   std::vector<std::string> names;
   for (const OptimiserRow& row : optimisers()) {
     EXPECT_EQ(static_cast<std::size_t>(row.kind), names.size());
     names.emplace_back(row.name);
   }
-  EXPECT_EQ(names, optimiser_words());
+  EXPECT_EQ(names, optimiser_names());
 }
 
 // Median over seeds of the best cost after so many evaluations.

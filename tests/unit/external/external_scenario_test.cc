@@ -18,8 +18,8 @@ using testing::HasSubstr;
 
 constexpr const char* kBridge = GAPFARM_SOURCE_DIR "/scripts/bridges/two_tracks.py";
 
-std::string config_text(const std::string& words, const std::string& more = "") {
-  return "scenario = \"external\"\n[external]\nprogram = [" + words + "]\n" + more;
+std::string config_text(const std::string& command_text, const std::string& more = "") {
+  return "scenario = \"external\"\n[external]\nprogram = [" + command_text + "]\n" + more;
 }
 
 Config bridge_config(const std::string& more = "") {

@@ -55,7 +55,7 @@ TEST(ExternalDeclaration, RefusesWhatCannotBeATable) {
   EXPECT_THAT(error_of(declaration_with(kMass, R"(["paths"])")), HasSubstr("did you mean 'path'"));
 }
 
-TEST(ExternalDeclaration, SaysEverythingInOneLine) {
+TEST(ExternalDeclaration, ReportsEverythingInOneLine) {
   const auto declaration = parse_declaration(declaration_with(
       R"({"key": "m", "lower": 1, "upper": 2, "nominal": 1, "summary": "of\nall\n[genes]"})"));
   ASSERT_TRUE(declaration.ok());
@@ -111,7 +111,7 @@ TEST(ExternalTable, HasTheProgramsRowsThenNoiseThenEffectsThatCanBeApplied) {
       parse_declaration(declaration_with(kMass, R"(["lag", "dead_travel", "floor", "path"])"))
           .value());
   EXPECT_TRUE(rich.table().find("motor_lag.tau"));
-  // All of srv1's but one on the robot's build and a second patch, of which a request tells
+  // All of srv1's but one on the robot's build and a second patch, of which a request shows
   // nothing.
   EXPECT_FALSE(rich.table().find("friction_patch_2.ratio"));
   EXPECT_EQ(rich.table().effects().size() + 2, srv1_effects_and_seconds().size());

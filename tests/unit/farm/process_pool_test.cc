@@ -52,7 +52,7 @@ TEST(ProcessPool, StartsAgainWhatEndsAndGivesUpInTime) {
   EXPECT_EQ(replaced, (std::vector<std::string>{"p-1.1", "p-1.2"}));
 }
 
-TEST(ProcessPool, TellsHowAProcessEnded) {
+TEST(ProcessPool, ReportsHowAProcessEnded) {
   const auto cause_of = [](const std::string& script) {
     ProcessPool pool(shell(script));
     EXPECT_TRUE(pool.start(monotonic_seconds()).ok());

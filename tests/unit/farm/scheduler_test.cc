@@ -41,15 +41,15 @@ class Desk {
     return hello;
   }
 
-  void say(const std::string& peer, v1::Envelope envelope) {
+  void send(const std::string& peer, v1::Envelope envelope) {
     scheduler.on_message(peer, &envelope, now);
   }
-  void say_hello(const std::string& peer, const v1::Hello& words) {
+  void send_hello(const std::string& peer, const v1::Hello& greeting) {
     v1::Envelope envelope;
-    *envelope.mutable_hello() = words;
-    say(peer, envelope);
+    *envelope.mutable_hello() = greeting;
+    send(peer, envelope);
   }
-  void join(const std::string& name) { say_hello(name, hello(name)); }
+  void join(const std::string& name) { send_hello(name, hello(name)); }
 
   void answer(const std::string& peer, const v1::Job& job, std::uint64_t epoch = 7,
               v1::Outcome outcome = v1::OK) {
@@ -60,7 +60,7 @@ class Desk {
     result->set_epoch(epoch);
     result->mutable_result()->set_outcome(outcome);
     result->mutable_result()->set_echo(job.task().echo().payload());
-    say(peer, envelope);
+    send(peer, envelope);
   }
 
   // What goes out now, jobs apart.
@@ -120,15 +120,15 @@ TEST(Scheduler, SpreadsAShortBatchOverAllWorkers) {
   EXPECT_EQ(peers, (std::set<std::string>{"a", "b"}));
 }
 
-TEST(Scheduler, RefusesOtherBuildsAndNumericClassesAndSaysWhy) {
+TEST(Scheduler, RefusesOtherBuildsAndNumericClassesAndReportsWhy) {
   Desk desk;
   desk.join("a");
   v1::Hello other = Desk::hello("b");
   other.set_fingerprint("else");
-  desk.say_hello("b", other);
+  desk.send_hello("b", other);
   v1::Hello mixed = Desk::hello("c");
   mixed.set_numeric_class("other machine");
-  desk.say_hello("c", mixed);
+  desk.send_hello("c", mixed);
   desk.scheduler.on_other_protocol("d", 99);
   std::map<std::string, std::string> refusals;
   for (const Outgoing& out : desk.tick()) {
@@ -144,7 +144,7 @@ TEST(Scheduler, RefusesOtherBuildsAndNumericClassesAndSaysWhy) {
   tolerant.admittance.allow_mixed_numeric_classes = true;
   Desk mixed_desk(tolerant);
   mixed_desk.join("a");
-  mixed_desk.say_hello("c", mixed);
+  mixed_desk.send_hello("c", mixed);
   EXPECT_EQ(mixed_desk.scheduler.workers().size(), 2u);
 }
 
@@ -225,7 +225,7 @@ TEST(Scheduler, GivesToOthersWhatAWorkerAnsweredWithNonsense) {
   desk.answer("liar", lost[1], 7, v1::OUTCOME_UNSPECIFIED);
   v1::Envelope goodbye;
   goodbye.mutable_goodbye();
-  desk.say("liar", goodbye);
+  desk.send("liar", goodbye);
   desk.join("honest");
   for (const v1::Job& job : desk.jobs_for("honest")) desk.answer("honest", job);
   EXPECT_TRUE(desk.scheduler.finished());
@@ -300,7 +300,7 @@ TEST(Scheduler, NeverBlamesAJobForPoliteExits) {
     ASSERT_EQ(desk.jobs_for(name).size(), 1u);
     v1::Envelope goodbye;
     goodbye.mutable_goodbye();
-    desk.say(name, goodbye);
+    desk.send(name, goodbye);
     desk.scheduler.on_process_end({name, EndCause::kLeft, 7, 0, "exited with status 0"});
   }
   EXPECT_FALSE(desk.scheduler.finished());
@@ -316,7 +316,7 @@ TEST(Scheduler, AReturningWorkerKeepsWhatItStillHolds) {
   v1::Hello again = Desk::hello("a");
   again.set_epoch(7);
   again.add_attempts(jobs[0].attempt_id());
-  desk.say_hello("a on a new connection", again);
+  desk.send_hello("a on a new connection", again);
   const auto sent = desk.jobs_for("a on a new connection");
   ASSERT_EQ(sent.size(), 1u) << "the lost one only";
   EXPECT_EQ(sent[0].job_id(), jobs[1].job_id());
@@ -374,7 +374,7 @@ TEST(Scheduler, RefusesAWorkerWhoseAnswerIsNone) {
     result->mutable_result()->mutable_evaluate()->set_fitness(
         std::numeric_limits<double>::quiet_NaN());
   }
-  desk.say("liar", envelope);
+  desk.send("liar", envelope);
   EXPECT_EQ(desk.scheduler.workers().size(), 0u);
   desk.tick();
   desk.join("honest");

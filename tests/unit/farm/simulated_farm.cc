@@ -190,9 +190,9 @@ void SimulatedFarm::end_worker(const std::shared_ptr<Worker>& worker, EndCause c
   const bool local = chance(0.5);
   if (local) at(now_ + uniform(0, 0.1), [this, end] { scheduler_->on_process_end(end); });
   const bool own_doing = cause == EndCause::kCrashed || cause == EndCause::kHung;
-  const bool told = !local && (own_doing || chance(0.5));
+  const bool reported = !local && (own_doing || chance(0.5));
   at(now_ + uniform(0, 0.5),
-     [this, worker, told, end] { start_worker(worker->place, told ? end : WorkerEnd{}); });
+     [this, worker, reported, end] { start_worker(worker->place, reported ? end : WorkerEnd{}); });
 }
 
 void SimulatedFarm::step_master() {

@@ -26,7 +26,7 @@ struct FaultPlan {
   double delay_s = 0.002;   // mean of the exponential time a message takes; reorders
   unsigned deaths = 0;      // worker processes that end, at random times
   unsigned hangs = 0;       // workers that stop for a while and go on
-  unsigned drains = 0;      // workers that are told to finish what they have and go
+  unsigned drains = 0;      // workers that are commanded to finish what they have and go
   unsigned partitions = 0;  // workers cut off for a while
   unsigned master_pauses = 0;
   unsigned master_restarts = 0;

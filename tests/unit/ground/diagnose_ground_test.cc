@@ -37,7 +37,7 @@ TEST(DiagnoseGround, NamesNothingWhereTheFileIsRight) {
   }
 }
 
-TEST(DiagnoseGround, FindsTheWheelThatIsSmallerThanItsFileSays) {
+TEST(DiagnoseGround, FindsTheWheelThatIsSmallerThanItsFileReports) {
   const GroundRobot robot = robot_of(kDifferential);
   const GroundDiagnosis found = diagnosis_of(robot, driven(robot, off_by({"right"}, {0.96})));
   ASSERT_EQ(found.diagnosis.effects.size(), 1u) << found.diagnosis.headline;
@@ -50,18 +50,18 @@ TEST(DiagnoseGround, FindsTheWheelThatIsSmallerThanItsFileSays) {
   EXPECT_EQ(*found.corrected.wheel("left")->radius_m, 0.05);
 }
 
-TEST(DiagnoseGround, TellsWhoWatchesAndSaysTheSame) {
+TEST(DiagnoseGround, ReportsWhoWatchesAndReportsTheSame) {
   const GroundRobot robot = robot_of(kDifferential);
   const RunLog log = driven(robot, off_by({"right"}, {0.96}));
-  std::vector<Finding> told;
+  std::vector<Finding> emitted;
   GroundDiagnoseOptions options;
-  options.on_finding = [&](Finding finding) { told.push_back(std::move(finding)); };
+  options.on_finding = [&](Finding finding) { emitted.push_back(std::move(finding)); };
   const auto found = diagnose_ground(robot, log, options);
   ASSERT_TRUE(found.ok()) << found.error().message;
   EXPECT_EQ(found->diagnosis.headline, diagnosis_of(robot, log).diagnosis.headline);
   const auto about = [&](const std::string& what) {
     Finding last;
-    for (const Finding& f : told) last = f.about == what ? f : last;
+    for (const Finding& f : emitted) last = f.about == what ? f : last;
     return last;
   };
   EXPECT_NE(about("faults of the log").text.find("Nothing"), std::string::npos);
@@ -170,10 +170,10 @@ TEST(DiagnoseGround, FindsWhatIsTheWrongWayRoundBeforeAnyFit) {
   }
 }
 
-TEST(DiagnoseGround, LeavesOutWhatItIsToldTo) {
+TEST(DiagnoseGround, LeavesOutWhatItIsReportedTo) {
   const GroundRobot robot = robot_of(kDifferential);
   GroundDiagnoseOptions options;
-  options.left_out = {"wheel_radius", "motor_lagg"};
+  options.excluded = {"wheel_radius", "motor_lagg"};
   const auto result = diagnose_ground(robot, driven(robot, {}), options);
   ASSERT_FALSE(result.ok());
   EXPECT_NE(result.error().message.find("motor_lagg"), std::string::npos);

@@ -58,7 +58,7 @@ inline CommandRow row_at(const GroundRobot& robot, int run, int second, double p
 }
 
 // What a robot that is `truly` off its file logs: five runs on one clock, poses of 0.3 mm and
-// 1 mrad.  Runs of another `first` are told other things.
+// 1 mrad.  Runs of another `first` are reported other things.
 inline RunLog driven(const GroundRobot& robot, const Kinematics& truly, int first = 0,
                      double push = 1) {
   Stream stream({7, Purpose::kTest, static_cast<std::uint64_t>(first), 0, 0});
@@ -76,26 +76,26 @@ inline RunLog driven(const GroundRobot& robot, const Kinematics& truly, int firs
       run.commands.push_back(row);
     }
     commanded.commands = run.commands;
-    std::vector<Trial> ways;
+    std::vector<Trial> windows;
     for (int k = 1; k < 60; ++k) {
-      Trial way;
-      way.X_WS = {0.3 * r, -0.2, 1.1 * r};
-      way.run = 1;
-      way.t_s = began;
-      way.duration_s = 0.2 * k;
-      ways.push_back(way);
+      Trial window;
+      window.X_WS = {0.3 * r, -0.2, 1.1 * r};
+      window.run = 1;
+      window.t_s = began;
+      window.duration_s = 0.2 * k;
+      windows.push_back(window);
     }
     // The session's clock begins with the first run.
     CommandedRun session;
     session.commands = {{0, std::vector<double>(robot.channels.size())}};
     const std::vector<CommandedRun> runs = {session, commanded};
-    const std::vector<Pose> ends = kinematic_ends(robot, runs, ways, truly);
+    const std::vector<Pose> ends = kinematic_ends(robot, runs, windows, truly);
     for (std::size_t k = 0; k < ends.size(); ++k) {
       Pose X = ends[k];
       X.x += 3e-4 * stream.normal();
       X.y += 3e-4 * stream.normal();
       X.theta = wrap_angle(X.theta + 1e-3 * stream.normal());
-      run.poses.push_back({began + *ways[k].duration_s, X});
+      run.poses.push_back({began + *windows[k].duration_s, X});
     }
     log.runs.push_back(std::move(run));
   }

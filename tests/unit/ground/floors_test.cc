@@ -47,8 +47,8 @@ RunLog driven_on(const Floor& floor, double first_deg, std::uint64_t seed) {
   for (int r = 0; r < 12; ++r) {
     LoggedRun run;
     run.run = std::to_string(r);
-    const double way = (first_deg + 30 * r) * pi / 180;
-    const double v[2] = {0.1 * std::cos(way), 0.1 * std::sin(way)};
+    const double motion = (first_deg + 30 * r) * pi / 180;
+    const double v[2] = {0.1 * std::cos(motion), 0.1 * std::sin(motion)};
     CommandRow commanded{0, {}}, measured{0, {}};
     for (const RobotWheel& wheel : robot.wheels) {
       const double rad_s =
@@ -118,7 +118,7 @@ TEST(Floors, MotorsThatRunShortAreNoFloor) {
   expect_holds(found.effects[0].parameters.at(0), 0.75 / 0.95 - 1, 0.03);
 }
 
-// Weight behind the middle turns the robot though nobody told it to, each direction otherwise.
+// Weight behind the middle turns the robot though nobody reported it to, each direction otherwise.
 TEST(Floors, DirectionsAndDriftAreNoChange) {
   const Floor floor{0.6, {-0.015, 0.003}, 0.8, 0.15};
   const RunLog even = driven_on(floor, 0, 1), odd = driven_on(floor, 10, 2);
@@ -167,7 +167,7 @@ RunLog logged_on(const std::filesystem::path& data, const std::string& floor, in
   return std::move(runs->log);
 }
 
-TEST(Floors, ARealRobotsFloorsAreTold) {
+TEST(Floors, ARealRobotsFloorsAreReported) {
   const auto data = shared_data("ground/robotino");
   if (!data) GTEST_SKIP() << "no shared data beside the sources";
   const RunLog table = logged_on(*data, "table", 0);

@@ -10,7 +10,7 @@
 namespace gapfarm {
 namespace {
 
-TEST(Horizons, TellEveryWindowBesideTheMedians) {
+TEST(Horizons, ReportEveryWindowBesideTheMedians) {
   Problem problem = tests::ground_problem();
   const RunLog log{problem.ground->robot().channels,
                    {},
@@ -28,8 +28,8 @@ TEST(Horizons, TellEveryWindowBesideTheMedians) {
   const WindowRow& b = horizons->windows[windows + 1];
   EXPECT_EQ(a.run, "a");
   EXPECT_EQ(b.run, "b");
-  EXPECT_NEAR(a.duration_s, 11.45, 0.1);  // the run-in is left out
-  EXPECT_GT(a.way_m, b.way_m);
+  EXPECT_NEAR(a.duration_s, 11.45, 0.1);  // the run-in is omitted
+  EXPECT_GT(a.travel_m, b.travel_m);
   // The simulation drove them itself; a skid-steer's kinematics know no slip.
   for (const WindowRow& w : {a, b}) {
     EXPECT_LT(w.simulation.position_m, 0.01);
@@ -38,7 +38,7 @@ TEST(Horizons, TellEveryWindowBesideTheMedians) {
   // The median of two is their mean.
   EXPECT_NEAR(horizons->rows[1].kinematics.heading_rad,
               (a.kinematics.heading_rad + b.kinematics.heading_rad) / 2, 1e-12);
-  EXPECT_NEAR(horizons->rows[1].way_m, (a.way_m + b.way_m) / 2, 1e-12);
+  EXPECT_NEAR(horizons->rows[1].travel_m, (a.travel_m + b.travel_m) / 2, 1e-12);
 
   const std::string table = windows_csv(*horizons);
   EXPECT_EQ(std::count(table.begin(), table.end(), '\n'), static_cast<long>(windows + 3));

@@ -12,7 +12,7 @@
 namespace gapfarm {
 namespace {
 
-// A robot whose search may move all that tells how its wheels roll, and a run with a window.
+// A robot whose search may move all that shows how its wheels roll, and a run with a window.
 Problem rolling_problem(const std::string& file, const std::vector<std::string>& keys,
                         const std::vector<CommandRow>& commands) {
   Problem problem;
@@ -56,7 +56,7 @@ Kinematics changed(const Problem& problem, const std::vector<double>& gains) {
   return kinematics;
 }
 
-TEST(KinematicStart, ASkidSteerRollsInTheSimulationAsItsKinematicsSay) {
+TEST(KinematicStart, ASkidSteerRollsInTheSimulationAsItsKinematicsReport) {
   const Problem problem = rolling_problem(
       "drive = \"skid\"\ncommands = [\"left\", \"right\"]\nwheel_separation = 1.08\n"
       "wheel_radius = 0.3\nmass = 470.0\n",
@@ -67,7 +67,7 @@ TEST(KinematicStart, ASkidSteerRollsInTheSimulationAsItsKinematicsSay) {
   EXPECT_LT(std::abs(off[2]), 0.03);      // of 0.8 rad
 }
 
-TEST(KinematicStart, MecanumWheelsRollInTheSimulationAsTheirKinematicsSay) {
+TEST(KinematicStart, MecanumWheelsRollInTheSimulationAsTheirKinematicsReport) {
   const Problem problem = rolling_problem(
       "drive = \"mecanum\"\nwheelbase = 0.2\nwheel_separation = 0.2\nwheel_radius = 0.03\n"
       "commands = [\"front_left\", \"front_right\", \"rear_left\", \"rear_right\"]\n",

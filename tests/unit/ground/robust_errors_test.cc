@@ -68,44 +68,45 @@ double log_median_heading(const WindowEnds& ends) {
 
 // Of 40 windows a median jumps further than the middle that two predictions are compared by, and
 // the standard error says how far that jumps.
-TEST(RobustErrors, RatiosJumpLessThanMediansAndSayHowFar) {
+TEST(RobustErrors, RatiosJumpLessThanMediansAndReportHowFar) {
   const std::vector<double> durations_s(40, 5.0);
   std::vector<std::size_t> parts;
   for (std::size_t i = 0; i < 40; ++i) parts.push_back(i * 12 / 40);
   std::vector<double> ratios, medians;
-  double errors_told = 0;
+  double errors_reported = 0;
   const int logs = 200;
   for (int log = 0; log < logs; ++log) {
     const auto seed = static_cast<std::uint64_t>(2 * log);
-    const WindowEnds own = some_ends(40, 0.02, 10 + seed), rival = some_ends(40, 0.01, 11 + seed);
-    const RobustErrors errors(durations_s, rival);
-    const Unsure heading = errors.log_ratios(own, rival, parts).front()[1];
+    const WindowEnds own = some_ends(40, 0.02, 10 + seed),
+                     baseline = some_ends(40, 0.01, 11 + seed);
+    const RobustErrors errors(durations_s, baseline);
+    const Unsure heading = errors.log_ratios(own, baseline, parts).front()[1];
     ratios.push_back(heading.value);
-    errors_told += heading.error / logs;
-    medians.push_back(log_median_heading(own) - log_median_heading(rival));
+    errors_reported += heading.error / logs;
+    medians.push_back(log_median_heading(own) - log_median_heading(baseline));
   }
   double mean = 0;
   for (const double ratio : ratios) mean += ratio / logs;
   EXPECT_NEAR(mean, std::log(2.0), 0.05);
   EXPECT_LT(scatter(ratios), 0.93 * scatter(medians));
-  EXPECT_NEAR(errors_told / scatter(ratios), 1, 0.25);
+  EXPECT_NEAR(errors_reported / scatter(ratios), 1, 0.25);
 }
 
 TEST(RobustErrors, GainsAreAsSureAsTheyDoNotDifferFromPartToPart) {
   const std::vector<double> durations_s(60, 1.0);
   std::vector<std::size_t> parts;
   for (std::size_t i = 0; i < 60; ++i) parts.push_back(i / 5);
-  const WindowEnds rival = some_ends(60, 0.02, 1);
-  const RobustErrors errors(durations_s, rival);
-  WindowEnds nearer = rival, one_part = rival;
-  for (Eigen::Vector3d& end : nearer) end /= 2;
+  const WindowEnds baseline = some_ends(60, 0.02, 1);
+  const RobustErrors errors(durations_s, baseline);
+  WindowEnds closer = baseline, one_part = baseline;
+  for (Eigen::Vector3d& end : closer) end /= 2;
   for (std::size_t i = 0; i < 5; ++i) one_part[i] /= 100;
-  const Unsure everywhere = errors.gain(nearer, rival, parts);
+  const Unsure everywhere = errors.gain(closer, baseline, parts);
   EXPECT_GT(everywhere.value, 3 * everywhere.error);
-  const Unsure there = errors.gain(one_part, rival, parts);
+  const Unsure there = errors.gain(one_part, baseline, parts);
   EXPECT_GT(there.value, 0);
   EXPECT_NEAR(there.value, there.error, 0.1 * there.error);
-  EXPECT_EQ(errors.gain(rival, rival, parts).error, 0);
+  EXPECT_EQ(errors.gain(baseline, baseline, parts).error, 0);
 }
 
 // H = [[2, 1], [1, 2]]; freely the first value would go to 0.1 - 0.7.
@@ -125,7 +126,7 @@ TEST(StepWithinBounds, WhatStaysOnABoundIsMadeUpForByTheOthers) {
   EXPECT_NEAR(bounded[1], 0.5 - (0.5 - 0.1) / 2, 1e-6);
 }
 
-TEST(LeftOut, ValuesThatTellOnlyTheirOwnStretchAreSeenThrough) {
+TEST(HeldOut, ValuesThatReportOnlyTheirOwnStretchAreSeenThrough) {
   const std::size_t n = 240, count = 6;
   const std::vector<double> durations_s(n, 1.0);
   const WindowEnds measured = some_ends(n, 0.01);
@@ -147,14 +148,14 @@ TEST(LeftOut, ValuesThatTellOnlyTheirOwnStretchAreSeenThrough) {
   }
   const NormalEquations one{Eigen::MatrixXd::Zero(1, 1), Eigen::VectorXd::Zero(1)};
   const NormalEquations six{Eigen::MatrixXd::Zero(count, count), Eigen::VectorXd::Zero(count)};
-  const double alone = errors.nats(left_out_ends(errors, fitted, own, six, stretches));
-  const double together = errors.nats(left_out_ends(errors, fitted, shared, one, stretches));
-  EXPECT_NEAR(alone, errors.nats(fitted), 1e-3);  // what was left out tells nothing of itself
+  const double alone = errors.nats(held_out_ends(errors, fitted, own, six, stretches));
+  const double together = errors.nats(held_out_ends(errors, fitted, shared, one, stretches));
+  EXPECT_NEAR(alone, errors.nats(fitted), 1e-3);  // what was held out shows nothing of itself
   EXPECT_GT(together, alone + 50);
 }
 
-// A rival that leaves a metre does not tell which of some centimetres stray.
-TEST(RobustErrors, SharpenedTheyTellWhatStrays) {
+// An alternative that leaves a metre does not show which of some centimetres lie far off.
+TEST(RobustErrors, SharpenedTheyReportWhatOutliers) {
   const std::vector<double> durations_s(40, 2.0);
   const Eigen::Vector3d near(0.01, 0, 0.01), far(0.3, 0, 0.01);
   RobustErrors errors(durations_s, WindowEnds(40, Eigen::Vector3d(1, 0, 1)));
@@ -178,7 +179,7 @@ Trial window(std::uint32_t run, double t_s) {
 }
 
 // A run a command.
-std::vector<CommandedRun> told(std::initializer_list<double> commands) {
+std::vector<CommandedRun> commanded(std::initializer_list<double> commands) {
   std::vector<CommandedRun> runs;
   for (const double command : commands) {
     runs.push_back({});
@@ -187,32 +188,32 @@ std::vector<CommandedRun> told(std::initializer_list<double> commands) {
   return runs;
 }
 
-TEST(LeftOut, RepeatsOfACommandAreLeftOutTogether) {
+TEST(HeldOut, RepeatsOfACommandAreHeldOutTogether) {
   std::vector<Trial> windows;
   for (std::uint32_t k = 0; k < 8; ++k) windows.push_back(window(k, 5));
-  EXPECT_EQ(left_out_stretches(windows, told({1, 1, 2, 2, 1, 3, 3, 4}), 6),
+  EXPECT_EQ(held_out_stretches(windows, commanded({1, 1, 2, 2, 1, 3, 3, 4}), 6),
             (std::vector<std::size_t>{0, 0, 1, 1, 0, 2, 2, 3}));
   // More commands than stretches: some go together, none is cut.
-  EXPECT_EQ(left_out_stretches(windows, told({1, 1, 2, 2, 3, 3, 4, 4}), 3),
+  EXPECT_EQ(held_out_stretches(windows, commanded({1, 1, 2, 2, 3, 3, 4, 4}), 3),
             (std::vector<std::size_t>{0, 0, 0, 0, 1, 1, 2, 2}));
-  // One command all along: its runs are all that can be left out.
-  EXPECT_EQ(left_out_stretches(windows, told({1, 1, 1, 1, 1, 1, 1, 1}), 4),
+  // One command all along: its runs are all that can be omitted.
+  EXPECT_EQ(held_out_stretches(windows, commanded({1, 1, 1, 1, 1, 1, 1, 1}), 4),
             (std::vector<std::size_t>{0, 0, 1, 1, 2, 2, 3, 3}));
 }
 
-TEST(LeftOut, StretchesAreRunsInARowOrEqualTimes) {
+TEST(HeldOut, StretchesAreRunsInARowOrEqualTimes) {
   std::vector<Trial> many, one;
   for (std::uint32_t k = 0; k < 12; ++k) many.push_back(window(k, 5));
-  const std::vector<CommandedRun> differ = told({1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12});
-  const std::vector<std::size_t> pairs = left_out_stretches(many, differ, 6);
+  const std::vector<CommandedRun> differ = commanded({1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12});
+  const std::vector<std::size_t> pairs = held_out_stretches(many, differ, 6);
   for (std::size_t k = 0; k < 12; ++k) EXPECT_EQ(pairs[k], k / 2);
   // Three runs are three stretches, however long.
   std::vector<Trial> three;
   for (int k = 0; k < 30; ++k) three.push_back(window(k < 20 ? 0 : k < 25 ? 1 : 2, 100 + k));
-  const std::vector<std::size_t> runs = left_out_stretches(three, told({1, 2, 3}), 6);
+  const std::vector<std::size_t> runs = held_out_stretches(three, commanded({1, 2, 3}), 6);
   for (std::size_t k = 0; k < 30; ++k) EXPECT_EQ(runs[k], k < 20 ? 0 : k < 25 ? 1 : 2);
   for (int k = 0; k < 30; ++k) one.push_back(window(0, 100 + k));
-  const std::vector<std::size_t> times = left_out_stretches(one, told({1}), 3);
+  const std::vector<std::size_t> times = held_out_stretches(one, commanded({1}), 3);
   for (std::size_t k = 0; k < 30; ++k) EXPECT_EQ(times[k], k / 10);
 }
 

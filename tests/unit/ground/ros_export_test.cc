@@ -19,25 +19,25 @@ wheel_radius = 0.1
 wheel_separation_multiplier = 1.875
 )";
 
-SaidValues said_of(const char* robot, std::vector<SaidValue> values) {
+ReportedValues reported_of(const char* robot, std::vector<ReportedValue> values) {
   return {robot_of(robot), {"monday"}, std::move(values)};
 }
 
 TEST(RosExport, GivesMultipliersWithWhatTheUserHad) {
-  const SaidValues said = said_of(kHusky, {{"left", 1, 0.98, {0.97, 0.99}, true},
-                                           {"right", 1, 1.001, {0.99, 1.01}, false},
-                                           {"separation", 1, 0.8, {0.79, 0.82}, true}});
-  const auto values = ros_values(said);
+  const ReportedValues reported = reported_of(kHusky, {{"left", 1, 0.98, {0.97, 0.99}, true},
+                                                       {"right", 1, 1.001, {0.99, 1.01}, false},
+                                                       {"separation", 1, 0.8, {0.79, 0.82}, true}});
+  const auto values = ros_values(reported);
   ASSERT_EQ(values.size(), 3u);
   EXPECT_EQ(values[0].key, "wheel_separation_multiplier");
   EXPECT_DOUBLE_EQ(values[0].had, 1.875);
-  EXPECT_DOUBLE_EQ(values[0].says, 1.5);
+  EXPECT_DOUBLE_EQ(values[0].reported, 1.5);
   EXPECT_DOUBLE_EQ(values[0].interval.lower, 1.875 * 0.79);
-  EXPECT_DOUBLE_EQ(values[1].says, 0.98);
+  EXPECT_DOUBLE_EQ(values[1].reported, 0.98);
   // What the log does not say stays as the user has it.
   EXPECT_FALSE(values[2].known);
-  EXPECT_DOUBLE_EQ(values[2].says, 1);
-  RosExport data{"diagnosis", said.logs, "husky_velocity_controller", values, {}, {}, {}};
+  EXPECT_DOUBLE_EQ(values[2].reported, 1);
+  RosExport data{"diagnosis", reported.logs, "husky_velocity_controller", values, {}, {}, {}};
   const std::string yaml = ros_yaml(data);
   EXPECT_NE(yaml.find("husky_velocity_controller:\n  ros__parameters:\n"), std::string::npos);
   EXPECT_NE(yaml.find("wheel_separation_multiplier: 1.5  # [1.481, 1.537]; you had 1.875"),
@@ -48,8 +48,9 @@ TEST(RosExport, GivesMultipliersWithWhatTheUserHad) {
 }
 
 TEST(RosExport, TakesFrictionFromHowASkidSteerTurns) {
-  const SaidValues said = said_of(kHusky, {{"separation", 1, 1, {0.98, 1.02}, true}});
-  RosExport data{"diagnosis", said.logs, "c", ros_values(said), {}, ros_friction(said), {}};
+  const ReportedValues reported = reported_of(kHusky, {{"separation", 1, 1, {0.98, 1.02}, true}});
+  RosExport data{"diagnosis", reported.logs,          "c", ros_values(reported),
+                 {},          ros_friction(reported), {}};
   data.wheels = {{"front_left_wheel_link", 1.0, 1.0}};
   ASSERT_TRUE(data.friction.across.has_value());
   EXPECT_NEAR(*data.friction.across, *data.friction.along, 1e-9);  // as the file has it
@@ -59,31 +60,31 @@ TEST(RosExport, TakesFrictionFromHowASkidSteerTurns) {
   EXPECT_NE(ros_table(data).find("1 1"), std::string::npos);
 }
 
-TEST(RosExport, SpeaksOfCarsInTheirControllersWords) {
-  const SaidValues said =
-      said_of(kCar, {{"steering_gain", 1, 1.1, {1.08, 1.12}, true},
-                     {"steering_offset", 0, 0.02, {0.015, 0.025}, true},
-                     {"grip", 1.9, std::log(4.905), {std::log(4.5), std::log(5.5)}, true}});
-  const auto values = ros_values(said);
+TEST(RosExport, SpeaksOfCarsInTheirControllersText) {
+  const ReportedValues reported =
+      reported_of(kCar, {{"steering_gain", 1, 1.1, {1.08, 1.12}, true},
+                         {"steering_offset", 0, 0.02, {0.015, 0.025}, true},
+                         {"grip", 1.9, std::log(4.905), {std::log(4.5), std::log(5.5)}, true}});
+  const auto values = ros_values(reported);
   ASSERT_FALSE(values.empty());
   EXPECT_EQ(values[0].key, "wheelbase");
-  EXPECT_NEAR(values[0].says, 0.3 / 1.1, 1e-12);
+  EXPECT_NEAR(values[0].reported, 0.3 / 1.1, 1e-12);
   EXPECT_LT(values[0].interval.lower, values[0].interval.upper);
-  const auto remarks = ros_remarks(said);
+  const auto remarks = ros_remarks(reported);
   ASSERT_EQ(remarks.size(), 1u);
   EXPECT_NE(remarks[0].find("trim of the steering"), std::string::npos);
-  EXPECT_NEAR(*ros_friction(said).across, 0.5, 1e-9);
+  EXPECT_NEAR(*ros_friction(reported).across, 0.5, 1e-9);
 }
 
 TEST(RosExport, ReadsBackWhatADiagnosisLeft) {
-  const SaidValues said = said_of(kHusky, {{"separation", 1, 0.8, {0.79, 0.82}, true}});
-  const auto read = parse_values(format_values(said), "values.json");
+  const ReportedValues reported = reported_of(kHusky, {{"separation", 1, 0.8, {0.79, 0.82}, true}});
+  const auto read = parse_values(format_values(reported), "values.json");
   ASSERT_TRUE(read.ok()) << read.error().message;
-  EXPECT_EQ(format_robot(read->given), format_robot(said.given));
-  EXPECT_EQ(read->logs, said.logs);
+  EXPECT_EQ(format_robot(read->given), format_robot(reported.given));
+  EXPECT_EQ(read->logs, reported.logs);
   ASSERT_EQ(read->values.size(), 1u);
   EXPECT_EQ(read->values[0].name, "separation");
-  EXPECT_EQ(read->values[0].interval, said.values[0].interval);
+  EXPECT_EQ(read->values[0].interval, reported.values[0].interval);
   EXPECT_TRUE(read->values[0].named);
   for (const char* text : {"", "{", "[]", "{\"values\": 3, \"robot\": \"\"}"}) {
     EXPECT_FALSE(parse_values(text, "values.json").ok()) << text;

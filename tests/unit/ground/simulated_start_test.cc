@@ -43,7 +43,7 @@ TEST(SimulatedStart, FindsWhatKinematicsHaveNoWordFor) {
   const auto start = fit_by_simulation(farm, problem, 0.1);
   ASSERT_TRUE(start.ok()) << start.error().message;
   EXPECT_GT(start->gain, 1);
-  EXPECT_GT(start->left_out_gain, 1);
+  EXPECT_GT(start->held_out_gain, 1);
   EXPECT_FALSE(start->kinematic);
   EXPECT_NEAR(found_value(problem, *start, "wheels.left.radius"), 0.096, 2e-4);
   EXPECT_NEAR(found_value(problem, *start, "friction_ratio"), 1.25, 0.02);
@@ -64,7 +64,7 @@ TEST(SimulatedStart, KinematicsHaveNoWordForFriction) {
                           kGroundPositionNoise}) {
     search_for(&problem, key);
   }
-  EXPECT_EQ(told_by_kinematics(problem),
+  EXPECT_EQ(identified_by_kinematics(problem),
             (std::vector<bool>{true, false, true, false, true, false}));
 }
 

@@ -45,7 +45,7 @@ Kinematics cars_own(double grip_m_s2, double steering_offset_rad = 0.02) {
                 {std::log(grip_m_s2), 0.17, 1.1, steering_offset_rad, 0.1});
 }
 
-TEST(WhatChanged, SaysNothingOfAFileThatIsWrongWhereNothingChanged) {
+TEST(WhatChanged, ReportsNothingOfAFileThatIsWrongWhereNothingChanged) {
   const GroundRobot car = robot_of(kCar);
   const GroundDiagnosis same = changed(car, driven(car, cars_own(7)), driven(car, cars_own(7), 5));
   EXPECT_TRUE(same.diagnosis.effects.empty()) << same.diagnosis.headline;
@@ -57,7 +57,7 @@ TEST(WhatChanged, SaysNothingOfAFileThatIsWrongWhereNothingChanged) {
   EXPECT_TRUE(again.diagnosis.effects.empty()) << again.diagnosis.headline;
 }
 
-TEST(WhatChanged, TellsAnotherFloorFromOtherSteering) {
+TEST(WhatChanged, ReportsAnotherFloorFromOtherSteering) {
   const GroundRobot car = robot_of(kCar);
   const RunLog before = driven(car, cars_own(7));
   const GroundDiagnosis floor = changed(car, before, driven(car, cars_own(7 * 0.6), 5));
@@ -91,9 +91,9 @@ TEST(WhatChanged, LeavesHowTyresLetGoToTheTyres) {
   EXPECT_NEAR(floor.corrected.friction, 4 / 9.81, 0.03);
 }
 
-// Understeer that grows with speed whatever the curvature: a log of slow driving tells it, and a
+// Understeer that grows with speed whatever the curvature: a log of slow driving shows it, and a
 // fast one on the same floor is neither another floor nor other steering.
-TEST(WhatChanged, SaysNothingWhereOnlyTheSpeedIsAnother) {
+TEST(WhatChanged, ReportsNothingWhereOnlyTheSpeedIsAnother) {
   const GroundRobot car = robot_of(kCar);
   const Kinematics own = off_by({"understeer", "grip", "slip_angle"}, {0.1, std::log(60.0), 0.17});
   const GroundDiagnosis same = changed(car, driven(car, own, 0, 0.7), driven(car, own, 5, 1.4));
@@ -102,7 +102,7 @@ TEST(WhatChanged, SaysNothingWhereOnlyTheSpeedIsAnother) {
 }
 
 // What no row of the file says and both logs show is the robot's own.
-TEST(WhatChanged, SaysNothingOfWhatBothLogsShow) {
+TEST(WhatChanged, ReportsNothingOfWhatBothLogsShow) {
   const GroundRobot car = robot_of(kCar);
   const auto weaker = [](double to_the_left) {
     return off_by({"grip", "slip_angle", "steering_left"}, {std::log(7.0), 0.17, to_the_left});
@@ -122,7 +122,7 @@ TEST(WhatChanged, SaysNothingOfWhatBothLogsShow) {
 }
 
 // A long log is sure of a difference that next to nothing depends on.
-TEST(WhatChanged, SaysNothingOfWhatMovesNoEnd) {
+TEST(WhatChanged, ReportsNothingOfWhatMovesNoEnd) {
   const GroundRobot skid = robot_of(kSkid);
   const auto with_lag = [](double lag_s) { return off_by({"lag"}, {lag_s}); };
   const RunLog noisy = shaken(driven(skid, with_lag(0.1)), 0.03);

@@ -43,7 +43,7 @@ class RacquetballInfluence : public ::testing::Test {
   Config config_;
 };
 
-TEST_F(RacquetballInfluence, TellsWhatMattersFromWhatDoesNot) {
+TEST_F(RacquetballInfluence, ReportsWhatMattersFromWhatDoesNot) {
   // The ball meets nothing in flight that spins it or that sleep could stop.
   const auto report = find(
       "gravity = [5, 15]\nlaunch_speed = [10, 30]\nsleep_linear = [0, 1]\n"

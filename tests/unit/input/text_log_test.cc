@@ -152,7 +152,7 @@ TEST(TextLogs, RimSpeedsNeedARadius) {
   EXPECT_NEAR(runs->log.runs[0].commands[0].values[1], 4, 1e-12);
 }
 
-TEST(TextLogs, ErrorsSayWhatAndWhere) {
+TEST(TextLogs, ErrorsReportWhatAndWhere) {
   EXPECT_THAT(error_of(""), HasSubstr("empty"));
   EXPECT_THAT(error_of("t,x\n1,2,3\n"), StartsWith("f.csv:2:"));
   EXPECT_THAT(error_of("t,x,x\n1,2,3\n"), StartsWith("f.csv:1:5: found column 'x' again"));

@@ -120,7 +120,7 @@ TEST_F(Keys, MissingKeysNameTheCommandThatMakesThem) {
   EXPECT_THAT(worker_security(folder().path()).error().message, HasSubstr("gapfarm keys"));
 }
 
-TEST(LinkSecurity, NothingListensOpenlyUnlessToldTwice) {
+TEST(LinkSecurity, NothingListensOpenlyUnlessReportedTwice) {
   LinkSecurity security;
   EXPECT_TRUE(may_listen("ipc:///tmp/x", security).ok());
   EXPECT_THAT(may_listen("tcp://127.0.0.1:1", security).error().message, HasSubstr("keys"));
@@ -140,7 +140,7 @@ TEST(LinkSecurity, NothingListensOpenlyUnlessToldTwice) {
   EXPECT_TRUE(may_listen("tcp://0.0.0.0:1", security).ok());
 }
 
-TEST(LinkSecurity, AWorkerDoesNotConnectWithoutKeysUnlessTold) {
+TEST(LinkSecurity, AWorkerDoesNotConnectWithoutKeysUnlessReported) {
   EXPECT_FALSE(DealerSocket::connect("tcp://127.0.0.1:1").ok());
   SocketOptions options;
   options.security.own = make_key_pair("w");

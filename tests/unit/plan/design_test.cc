@@ -80,7 +80,7 @@ TEST_F(DesignTest, IsALogThatCanBeDriven) {
   EXPECT_EQ(moved, 12U);  // what `simulate --like` makes of it
 }
 
-TEST_F(DesignTest, StaysOnItsFloorOrSaysThatThereIsNoRoom) {
+TEST_F(DesignTest, StaysOnItsFloorOrReportsThatThereIsNoRoom) {
   Config c = config();
   const DesignedPlan plan = designed(settings());
   for (const Trial& trial : plan.log.trials) {
@@ -102,7 +102,7 @@ TEST_F(DesignTest, IsAFunctionOfItsSettings) {
   }
 }
 
-TEST_F(DesignTest, TellsWhatItCannotPlanFor) {
+TEST_F(DesignTest, ReportsWhatItCannotPlanFor) {
   PlanSettings s = settings();
   s.effects = {"slip_events", "motor_asymmetry"};
   const DesignedPlan plan = designed(s);

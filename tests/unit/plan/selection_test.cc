@@ -20,7 +20,7 @@ Rows row(std::initializer_list<double> values) {
   return r;
 }
 
-TEST(Select, TakesWhatTellsMostAndThenWhatIsNotKnownYet) {
+TEST(Select, TakesWhatReportsMostAndThenWhatIsNotKnownYet) {
   const std::vector<Rows> candidates = {row({1, 0}), row({3, 0}), row({0, 2}), row({2.9, 0})};
   // After 3 along the first unknown, 2.9 more of it says less than 2 along the other.
   EXPECT_THAT(select(candidates, 0, 3), ElementsAre(1, 2, 3));
@@ -51,16 +51,16 @@ TEST(Select, IsTheGreedyChoiceByDeterminants) {
   };
   const std::vector<std::size_t> chosen = select(candidates, 1, 5);
   for (std::size_t k = 0; k < chosen.size(); ++k) {
-    std::vector<std::size_t> so_far(chosen.begin(), chosen.begin() + static_cast<long>(k));
+    std::vector<std::size_t> partial(chosen.begin(), chosen.begin() + static_cast<long>(k));
     double best = -1;
     for (std::size_t c = 0; c < candidates.size(); ++c) {
-      if (std::count(so_far.begin(), so_far.end(), c) > 0) continue;
-      std::vector<std::size_t> with = so_far;
+      if (std::count(partial.begin(), partial.end(), c) > 0) continue;
+      std::vector<std::size_t> with = partial;
       with.push_back(c);
       best = std::max(best, merit(with));
     }
-    so_far.push_back(chosen[k]);
-    EXPECT_NEAR(merit(so_far), best, 1e-9) << k;
+    partial.push_back(chosen[k]);
+    EXPECT_NEAR(merit(partial), best, 1e-9) << k;
   }
 }
 

@@ -2,7 +2,7 @@
 
 #include <gmock/gmock.h>
 
-#include "common/progress/words.h"
+#include "common/progress/number_text.h"
 
 namespace gapfarm {
 namespace {
@@ -49,7 +49,7 @@ TEST(OverallProgress, RememberedStagesAreNoPaceForThoseToCome) {
   EXPECT_NEAR(*progress.at(50.1).time_left_s, 150, 1);
 }
 
-// Where only the stage knows how much it asks, earlier stages tell how long it may take.
+// Where only the stage knows how much it asks, earlier stages show how long it may take.
 TEST(OverallProgress, UncountedStagesGoByTheirUsualShares) {
   OverallProgress progress({{"a", 1, 0}, {"b", 6, 0}, {"c", 3, 0}});
   progress.begin("a", 0);
@@ -103,15 +103,15 @@ TEST(OverallProgress, AStageThatGoesOnHasMoreToDo) {
   EXPECT_DOUBLE_EQ(*view.time_left_s, 5);
 }
 
-TEST(OverallProgress, SaysStageShareRateAndTimeLeft) {
+TEST(OverallProgress, ReportsStageShareRateAndTimeLeft) {
   OverallProgress progress({{"tune", 1, 100}, {"screen", 3, 0}});
   progress.begin(0, 0);
   progress.answered(0, 50);
-  EXPECT_EQ(progress_words(progress.at(5)),
+  EXPECT_EQ(progress_line(progress.at(5)),
             "stage 1 of 2, tune: 50 of 100, 13 % done in all, 10/s, about 35 s left");
   OverallProgress single({{"evaluate", 1, 10}});
   single.begin(0, 0);
-  EXPECT_EQ(progress_words(single.at(0)), "evaluate: 0 of 10, 0 % done");
+  EXPECT_EQ(progress_line(single.at(0)), "evaluate: 0 of 10, 0 % done");
   EXPECT_EQ(progress_text("generation 1 of 60", 0, {}), "generation 1 of 60") << "no rate yet";
 }
 
@@ -124,7 +124,7 @@ TEST(LineCadence, OneAtOnceAndThenOneAMinute) {
   EXPECT_THAT(shown, testing::ElementsAre(0, 60, 120, 180));
 }
 
-TEST(Words, AShareIsWholeOnlyAtTheEnd) {
+TEST(Text, AShareIsWholeOnlyAtTheEnd) {
   EXPECT_EQ(format_share(0), "0 %");
   EXPECT_EQ(format_share(0.004), "0.4 %");
   EXPECT_EQ(format_share(0.999), "99 %");

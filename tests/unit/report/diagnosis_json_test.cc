@@ -87,7 +87,7 @@ TEST(DiagnosisJson, ReadsWhatFormatsAsksForAndNoMore) {
 }
 
 // Every error names the field and what was found.
-TEST(DiagnosisJson, SaysWhatIsWrong) {
+TEST(DiagnosisJson, ReportsWhatIsWrong) {
   const auto error_of = [](const std::string& pointer, const Json& value) {
     Json json = Json::parse(to_json(example_diagnosis()));
     json[Json::json_pointer(pointer)] = value;
@@ -123,18 +123,18 @@ ResidualTerm shape_over_the_floor() {
 
 TEST(DiagnosisJson, KeepsTheShapeOfWhatHasNoName) {
   Diagnosis d;
-  d.residual = FoundResidual{
-      {{shape_over_the_floor()}, StrayDrives{StrayKind::kShifted, 0.1, 0.02, 0.03, 0, 0.5, 0, 0}},
-      0.4,
-      0.3,
-      0.5,
-      0.7,
-      0.3,
-      0.6,
-      0.5,
-      0.7,
-      "so",
-      {0.25, 1}};
+  d.residual = FoundResidual{{{shape_over_the_floor()},
+                              OutlierDrives{OutlierKind::kShifted, 0.1, 0.02, 0.03, 0, 0.5, 0, 0}},
+                             0.4,
+                             0.3,
+                             0.5,
+                             0.7,
+                             0.3,
+                             0.6,
+                             0.5,
+                             0.7,
+                             "so",
+                             {0.25, 1}};
   d.nearest = {{{"camera_seam", "floor_tilt"}, 120, 44, "start place", "why"}};
   const auto back = parse_diagnosis(to_json(d));
   ASSERT_TRUE(back.ok()) << back.error().message;
@@ -142,7 +142,7 @@ TEST(DiagnosisJson, KeepsTheShapeOfWhatHasNoName) {
   ASSERT_TRUE(back->residual);
   EXPECT_EQ(back->residual->correction.field.at(0).frame, ResidualFrame::kMotion);
   EXPECT_EQ(back->residual->correction.field.at(0).weights.at(1).shifts(1, 2), -0.2);
-  EXPECT_EQ(back->residual->correction.strays, d.residual->correction.strays);
+  EXPECT_EQ(back->residual->correction.outliers, d.residual->correction.outliers);
   EXPECT_EQ(back->nearest.at(0).effects.at(1), "floor_tilt");
   Json json = Json::parse(to_json(d));
   json["residual"]["terms"][0]["centres"][1] = "x";

@@ -91,7 +91,7 @@ TEST(PosePicture, CountsWhatLiesFarAway) {
 }
 
 // With one panel the title once ran out of the picture, and the note over the panel's title.
-TEST(PosePicture, HasRoomForItsWords) {
+TEST(PosePicture, HasRoomForItsText) {
   const std::string title(98, 'm');
   PosePanel panel = example_panel("forward, 1 s", {0.25, 0, 0}, 1);
   const std::string svg = pose_picture({panel}, title);

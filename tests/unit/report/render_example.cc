@@ -54,11 +54,11 @@ int main(int argc, char** argv) {
   hostile.headline = hostile.trials.front().session = hostile.trials.front().command = attack;
   hostile.where = {{attack, attack, attack, attack, 1, 1, 1, attack}};
   hostile.provenance = {{attack, attack}};
-  Diagnosis strayed = null_diagnosis();
-  strayed.residual.emplace();
-  strayed.residual->correction.strays = {StrayKind::kLate, 0.2, 0.1, 0.2, 0, 0, 0, 0};
-  for (std::size_t i = 0; i < strayed.trials.size(); ++i) {
-    strayed.residual->chances.push_back(i % 5 == 0 ? 0.98 : 0.02);
+  Diagnosis with_outliers = null_diagnosis();
+  with_outliers.residual.emplace();
+  with_outliers.residual->correction.outliers = {OutlierKind::kLate, 0.2, 0.1, 0.2, 0, 0, 0, 0};
+  for (std::size_t i = 0; i < with_outliers.trials.size(); ++i) {
+    with_outliers.residual->chances.push_back(i % 5 == 0 ? 0.98 : 0.02);
   }
   Diagnosis empty;
   Diagnosis unusable;
@@ -68,7 +68,7 @@ int main(int argc, char** argv) {
   for (const auto& [name, diagnosis] : {std::pair{"example", example_diagnosis()},
                                         {"null", null_diagnosis()},
                                         {"hostile", hostile},
-                                        {"strayed", strayed},
+                                        {"strayed", with_outliers},
                                         {"empty", empty},
                                         {"unusable", unusable}}) {
     if (!write(folder + "/" + name + ".html", report_html(diagnosis))) {

@@ -123,16 +123,16 @@ TEST(ReportHtml, PolicyCoversWhatIsThere) {
   const std::regex policy("http-equiv=\"Content-Security-Policy\" content=\"([^\"]*)\"");
   std::smatch match;
   ASSERT_TRUE(std::regex_search(html, match, policy));
-  const std::string words = match[1];
-  EXPECT_THAT(words, HasSubstr("default-src 'none'"));
-  EXPECT_THAT(words, Not(HasSubstr("unsafe")));
+  const std::string label = match[1];
+  EXPECT_THAT(label, HasSubstr("default-src 'none'"));
+  EXPECT_THAT(label, Not(HasSubstr("unsafe")));
   std::size_t found = 0;
   for (const std::string tag : {"script", "style"}) {
     for (auto at = html.find("<" + tag + ">"); at != std::string::npos;
          at = html.find("<" + tag + ">", at + 1)) {
       const auto from = at + tag.size() + 2;
       const auto to = html.find("</" + tag + ">", from);
-      EXPECT_THAT(words, HasSubstr("'" + csp_hash(html.substr(from, to - from)) + "'"));
+      EXPECT_THAT(label, HasSubstr("'" + csp_hash(html.substr(from, to - from)) + "'"));
       ++found;
     }
   }
@@ -187,7 +187,7 @@ TEST(ReportHtml, TermsAreExplained) {
   }
 }
 
-TEST(ReportHtml, AnUnusableLogIsToldWithoutEmptyPlots) {
+TEST(ReportHtml, AnUnusableLogIsReportedWithoutEmptyPlots) {
   Diagnosis d;
   d.verdict = Verdict::kUnusable;
   d.headline = "Not usable as it is: left and right are exchanged.";

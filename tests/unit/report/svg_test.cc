@@ -15,7 +15,7 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-TEST(Svg, IsXmlWhateverTheWords) {
+TEST(Svg, IsXmlWhateverTheText) {
   Svg svg(100, 50);
   svg.text({1, 2}, "a < b & \"c\" > d\x01", {});
   svg.line({0, 0}, {std::nan(""), 1e300}, {.stroke = "#000000"});

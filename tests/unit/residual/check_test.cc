@@ -26,7 +26,7 @@ TEST(ResidualCheck, SoundOnesPass) {
   }
 }
 
-TEST(ResidualCheck, SaysWhatIsWrong) {
+TEST(ResidualCheck, ReportsWhatIsWrong) {
   const ResidualTerm sound = tests::heading_term();
   ResidualTerm term = sound;
   term.weights[1].command = "turn_cx";

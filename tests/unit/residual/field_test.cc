@@ -54,7 +54,7 @@ TEST(ResidualField, CommandsWithoutWeightsAreLeftAlone) {
 }
 
 // In the world's frame the shift does not turn with the robot; in the robot's it does.
-TEST(ResidualField, FramesSayWhatTurns) {
+TEST(ResidualField, FramesReportWhatTurns) {
   const LoggedMotion facts = drive({0.3, 0.3, 0});
   for (const double heading : {0.0, 1.0, -2.5}) {
     const Pose end{0.5, 0.4, heading};

@@ -87,7 +87,7 @@ TEST(ResidualFit, NoiseLeavesNothing) {
   EXPECT_LE(kept, 2);
 }
 
-// Readings on either side of the line are told from each other a few millimetres from it.
+// Readings on either side of the line are distinguished from each other a few millimetres from it.
 TEST(ResidualFit, AnEdgeIsAsSharpAsItsReadings) {
   const DrawnLog log = draw_log(5, 500, jumps);
   const ResidualField field = fit_log(log).field;
@@ -112,7 +112,7 @@ TEST(ResidualFit, ThereIsNoEdgeInNoise) {
 }
 
 // Trials that were seen do not say what they are worth: a field fitted to noise helps them.
-TEST(ResidualFit, AFoldDoesNotTellOfItself) {
+TEST(ResidualFit, AFoldDoesNotReportOfItself) {
   const DrawnLog log = draw_log(7, 300, slippery);
   DrawnLog changed = log;
   for (std::size_t i = 0; i < log.data.size(); ++i) {
@@ -125,7 +125,7 @@ TEST(ResidualFit, AFoldDoesNotTellOfItself) {
   }
 }
 
-// Turned and shifted as a whole, a log tells the same.
+// Turned and shifted as a whole, a log shows the same.
 TEST(ResidualFit, TheWorldMayBeTurnedAndShifted) {
   for (const auto field : {slippery, bent}) {
     const DrawnLog log = draw_log(8, 400, field);

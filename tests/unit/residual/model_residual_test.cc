@@ -14,7 +14,7 @@ Model model_with_residual() {
   Model model = *nominal_model("srv1");
   model.residual.field = {tests::heading_term(), tests::place_term(ResidualFrame::kReadings)};
   model.residual.field[0].weights[0].shifts(0, 0) = 0.1 + 0.2;
-  model.residual.strays = {StrayKind::kSide, 0.1 + 0.2, -0.5, 0.125, 0.01, 0, 0.25, 0.15};
+  model.residual.outliers = {OutlierKind::kSide, 0.1 + 0.2, -0.5, 0.125, 0.01, 0, 0.25, 0.15};
   return model;
 }
 
@@ -39,7 +39,7 @@ TEST(ModelResidual, ReadsBackToTheBit) {
   const auto again = parse_model(format_model(model), "m.toml");
   ASSERT_TRUE(again.ok()) << again.error().message;
   expect_equal(again->residual.field, model.residual.field);
-  EXPECT_EQ(again->residual.strays, model.residual.strays);
+  EXPECT_EQ(again->residual.outliers, model.residual.outliers);
   EXPECT_EQ(format_model(*again), format_model(model));
 }
 
@@ -48,14 +48,14 @@ TEST(ModelResidual, CrossesTheWire) {
   const auto again = from_proto(to_proto(problem));
   ASSERT_TRUE(again.ok()) << again.error().message;
   expect_equal(again->residual.field, problem.residual.field);
-  EXPECT_EQ(again->residual.strays, problem.residual.strays);
+  EXPECT_EQ(again->residual.outliers, problem.residual.outliers);
 }
 
 // Problems without one keep their hashes, and with them their stored answers.
 TEST(ModelResidual, WithoutOneTheBytesAreWhatTheyWere) {
   const Problem plain = problem_of(*nominal_model("srv1"));
   EXPECT_EQ(to_proto(plain).residual_size(), 0);
-  EXPECT_FALSE(to_proto(plain).has_strays());
+  EXPECT_FALSE(to_proto(plain).has_outliers());
   EXPECT_NE(problem_hash(to_proto(plain)),
             problem_hash(to_proto(problem_of(model_with_residual()))));
   EXPECT_EQ(format_model(*nominal_model("srv1")).find("residual"), std::string::npos);
@@ -88,23 +88,23 @@ TEST(ModelResidual, MistakesAreNamedWithTheirPlace) {
   EXPECT_THAT(message("scenario = \"srv1\"", "scenario = \"racquetball\""), HasSubstr("residual"));
 }
 
-TEST(ModelResidual, StraysStandAlone) {
+TEST(ModelResidual, OutliersStandAlone) {
   Model model = *nominal_model("srv1");
-  model.residual.strays = {StrayKind::kLate, 0.25, 0.2, 0.22, -0.05, 0, 0, 0};
+  model.residual.outliers = {OutlierKind::kLate, 0.25, 0.2, 0.22, -0.05, 0, 0, 0};
   const std::string text = format_model(model);
   const auto again = parse_model(text, "m.toml");
   ASSERT_TRUE(again.ok()) << again.error().message;
-  EXPECT_EQ(again->residual.strays, model.residual.strays);
+  EXPECT_EQ(again->residual.outliers, model.residual.outliers);
   EXPECT_EQ(format_model(*again), text);
   model.scenario = "racquetball";
   v1::Problem foreign = to_proto(problem_of(*nominal_model("racquetball")));
-  *foreign.mutable_strays() = to_proto(problem_of(*again)).strays();
+  *foreign.mutable_outliers() = to_proto(problem_of(*again)).outliers();
   EXPECT_THAT(from_proto(foreign).error().message, HasSubstr("takes no residual"));
   foreign = to_proto(problem_of(*again));
-  foreign.mutable_strays()->set_kind(17);
+  foreign.mutable_outliers()->set_kind(17);
   EXPECT_THAT(from_proto(foreign).error().message, HasSubstr("the same build"));
-  foreign.mutable_strays()->set_kind(1);
-  foreign.mutable_strays()->set_share(2);
+  foreign.mutable_outliers()->set_kind(1);
+  foreign.mutable_outliers()->set_share(2);
   EXPECT_THAT(from_proto(foreign).error().message, HasSubstr("share"));
 }
 

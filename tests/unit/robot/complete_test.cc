@@ -32,7 +32,7 @@ TEST(CompleteRobot, PlacesADifferentialDrivesWheelsAndPropsIt) {
   EXPECT_FALSE(robot.notes.empty());
 }
 
-TEST(CompleteRobot, PlacesASkidSteersAxlesWhereItsMultiplierSays) {
+TEST(CompleteRobot, PlacesASkidSteersAxlesWhereItsMultiplierReports) {
   GroundRobot robot = sides(DriveKind::kSkid);
   robot.controller.wheel_separation_multiplier = 1.81;
   ASSERT_TRUE(complete_robot(&robot).ok());

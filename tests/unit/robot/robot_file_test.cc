@@ -29,7 +29,7 @@ y = 0.01
 yaw = -0.02
 )";
 
-TEST(RobotFile, ReadsWhatItSays) {
+TEST(RobotFile, ReadsWhatItReports) {
   const auto robot = parse_robot(kSkid, "robot.toml");
   ASSERT_TRUE(robot.ok()) << robot.error().message;
   EXPECT_EQ(robot->drive, DriveKind::kSkid);

@@ -6,16 +6,16 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/recordings/afresh.h"
+#include "common/recordings/restart.h"
 
 namespace gapfarm {
 namespace {
 
 // Poses every `interval_s` of a robot on a circle at 0.5 m/s and 0.25 rad/s.
-LoggedRun circle(double lasts_s, double interval_s, double told = 1) {
+LoggedRun circle(double lasts_s, double interval_s, double commanded = 1) {
   LoggedRun run;
   run.run = "a";
-  run.commands = {{0, {told, told}}};
+  run.commands = {{0, {commanded, commanded}}};
   for (int i = 0; i * interval_s <= lasts_s; ++i) {
     const double t = i * interval_s;
     run.poses.push_back({t, exp(Twist(0.5 * t, 0, 0.25 * t))});
@@ -81,7 +81,7 @@ TEST(Windows, RarePosesMakeAWindowOfEveryWayBetweenTwo) {
   EXPECT_EQ(cut->log.trials.size(), 3u);
 }
 
-TEST(Windows, SayWhyThereAreNone) {
+TEST(Windows, ReportWhyThereAreNone) {
   const auto cut = cut_windows(log_of({circle(1, 0.1)}), {{5}, 0.5});
   ASSERT_FALSE(cut.ok());
   EXPECT_NE(cut.error().message.find("shorter horizons"), std::string::npos);
@@ -96,7 +96,7 @@ TEST(Windows, HeadingsUnwrapOnLoops) {
   }
 }
 
-TEST(Windows, BeginAfreshAtTheSpeedMeasuredThere) {
+TEST(Windows, BeginAgainAtTheSpeedMeasuredThere) {
   // Speeds up: x = t^2 / 2.
   LoggedRun run;
   run.run = "1";
@@ -108,11 +108,11 @@ TEST(Windows, BeginAfreshAtTheSpeedMeasuredThere) {
   const RunLog log{{"throttle", "steering"}, {}, {run, run}, {}};
   const auto cut = cut_windows(log, {{2}, 0.5});
   ASSERT_TRUE(cut.ok());
-  const WindowedRuns afresh = begin_afresh(log, *cut, 0.5, 1);
-  ASSERT_EQ(afresh.runs.size(), cut->log.trials.size());
-  for (std::size_t i = 0; i < afresh.runs.size(); ++i) {
-    const Trial& trial = afresh.log.trials[i];
-    const CommandedRun& own = afresh.runs[*trial.run];
+  const WindowedRuns restarts = restart_at_measured_speed(log, *cut, 0.5, 1);
+  ASSERT_EQ(restarts.runs.size(), cut->log.trials.size());
+  for (std::size_t i = 0; i < restarts.runs.size(); ++i) {
+    const Trial& trial = restarts.log.trials[i];
+    const CommandedRun& own = restarts.runs[*trial.run];
     EXPECT_EQ(*trial.run, i);
     EXPECT_EQ(trial.session, cut->log.trials[i].session);
     EXPECT_NEAR(own.start_s, std::max(0.0, *trial.t_s - 0.5), 1e-9);

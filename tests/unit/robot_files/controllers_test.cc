@@ -81,7 +81,7 @@ m:
   EXPECT_EQ(mecanum->drives[0].number("lx_plus_ly")->value, 0.3);
 }
 
-TEST(Controllers, ErrorsSayWhereAndWhat) {
+TEST(Controllers, ErrorsReportWhereAndWhat) {
   EXPECT_THAT(error_of("a: [1,\nb: 2\n"), StartsWith("c.yaml:"));
   EXPECT_THAT(error_of("- 1\n- 2\n"), HasSubstr("no YAML map"));
   EXPECT_THAT(error_of("js:\n  type: joint_state_broadcaster/JointStateBroadcaster\n"),

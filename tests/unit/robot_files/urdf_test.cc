@@ -45,7 +45,7 @@ TEST(Urdf, PosesTurnWithTheirParents) {
   EXPECT_TRUE(poses.at("c").linear().col(2).isApprox(Eigen::Vector3d(1, 0, 0), 1e-12));
 }
 
-TEST(Urdf, SaysWhatIsNoUrdf) {
+TEST(Urdf, ReportsWhatIsNoUrdf) {
   EXPECT_THAT(error_of("<sdf><model/></sdf>"), HasSubstr("SDF is not read"));
   EXPECT_THAT(error_of("<mujoco/>"), HasSubstr("MJCF"));
   EXPECT_THAT(error_of("left,right\n1,2\n"), StartsWith("r.urdf:1: "));

@@ -1,4 +1,4 @@
-// Who worked when, from what the store tells.
+// Who worked when, from what the store shows.
 #include "master/run/run_farm_history.h"
 
 #include <gmock/gmock.h>

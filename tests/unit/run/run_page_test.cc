@@ -107,15 +107,15 @@ TEST_F(RunPage, FindsAnyGenomeAndTheBestOfAnyGeneration) {
   EXPECT_EQ(report.farm.given_up[0].birth_id, kPopulation * 3 - 1);
 }
 
-TEST_F(RunPage, CountsTrialsKeptApartWhileTheirFileIsThere) {
+TEST_F(RunPage, CountsTrialsHeldOutWhileTheirFileIsThere) {
   make(1);
-  EXPECT_EQ(read().kept_apart, 120u);
+  EXPECT_EQ(read().held_out, 120u);
   fs::remove(folder_ / "apart.csv");
-  EXPECT_EQ(read().kept_apart, 0u);
+  EXPECT_EQ(read().held_out, 0u);
 }
 
 // A store without a place for what a farm copes with does not say that it was nothing.
-TEST_F(RunPage, TellsNoZerosThatNobodyCounted) {
+TEST_F(RunPage, ReportsNoZerosThatNobodyCounted) {
   fs::create_directory(run());
   {
     auto database = Database::open((run() / "run.sqlite").string(), Database::Mode::kCreate);

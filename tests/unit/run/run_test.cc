@@ -162,7 +162,7 @@ TEST_F(RunTest, StoppedItLeavesNothingAndGoesOnToTheSameGenerations) {
   EXPECT_EQ(digest(), digest("whole"));
 }
 
-TEST_F(RunTest, SaysInItsStoreWhyItFailedAndGoesOn) {
+TEST_F(RunTest, ReportsInItsStoreWhyItFailedAndGoesOn) {
   const Config asked = config();
   {
     RunStore store = begin(asked);
@@ -196,7 +196,7 @@ TEST_F(RunTest, IsNotFinishedWithoutItsReportAndLeavesItWhenItGoesOn) {
   EXPECT_TRUE(std::filesystem::is_regular_file(report));
 }
 
-TEST_F(RunTest, SaysInItsStoreWhyItFailedBeforeItsFirstGeneration) {
+TEST_F(RunTest, ReportsInItsStoreWhyItFailedBeforeItsFirstGeneration) {
   const Config asked = ground_config();
   RunStore store = begin(asked);
   ASSERT_EQ(progress().state, RunState::kRunning);
@@ -208,7 +208,7 @@ TEST_F(RunTest, SaysInItsStoreWhyItFailedBeforeItsFirstGeneration) {
   EXPECT_EQ(progress().stop_reason, "no worker can be had");
 }
 
-TEST_F(RunTest, SaysInItsStoreThatNoFarmCouldBeOpened) {
+TEST_F(RunTest, ReportsInItsStoreThatNoFarmCouldBeOpened) {
   const Config asked = config();
   RunStore store = begin(asked);
   Log log(LogOptions{"test", LogFormat::kText, LogLevel::kOff, ""});
@@ -229,7 +229,7 @@ TEST_F(RunTest, CountsWhatItGaveUpBeforeItWasStopped) {
   EXPECT_EQ(go_on().value().given_up, 1u);
 }
 
-TEST_F(RunTest, OpensNoFarmForTrialsKeptApartThatAreNotThere) {
+TEST_F(RunTest, OpensNoFarmForTrialsHeldOutThatAreNotThere) {
   const Config asked = config("[validation]\ntrials = [\"gone.csv\"]\n");
   RunStore store = begin(asked);
   Log log(LogOptions{"test", LogFormat::kText, LogLevel::kOff, ""});
@@ -244,12 +244,12 @@ TEST_F(RunTest, OpensNoFarmForTrialsKeptApartThatAreNotThere) {
   EXPECT_THAT(progress().stop_reason, HasSubstr("gone.csv"));
 }
 
-TEST_F(RunTest, HoldsItsBestAgainstTrialsKeptApart) {
+TEST_F(RunTest, HoldsItsBestAgainstTrialsHeldOut) {
   std::filesystem::copy_file(GAPFARM_SOURCE_DIR "/configs/demo/trials.csv", folder_ / "apart.csv");
   const Config asked = config("[validation]\ntrials = [\"apart.csv\"]\n");
   RunStore store = begin(asked);
   const RunSummary summary = go(store, asked).value();
-  EXPECT_EQ(summary.kept_apart, listener_.apart);
+  EXPECT_EQ(summary.held_out, listener_.apart);
   std::vector<std::string> names;
   for (const Validated& row : summary.validated) names.push_back(row.name);
   EXPECT_THAT(names, ElementsAre("the config's own values", "the best"));

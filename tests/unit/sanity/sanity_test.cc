@@ -1,4 +1,4 @@
-// Doubts about logs of drives that were drawn from plain kinematics and then spoiled in one way.
+// Checks of logs of drives that were drawn from plain kinematics and then spoiled in one way.
 #include "master/io/log_checks/sanity.h"
 
 #include <gtest/gtest.h>
@@ -8,7 +8,7 @@
 #include <numbers>
 
 #include "common/random/stream.h"
-#include "master/io/log_checks/words.h"
+#include "master/io/log_checks/finding_text.h"
 
 namespace gapfarm {
 namespace {
@@ -21,9 +21,9 @@ struct Robot {
 };
 
 Pose driven(const Robot& robot, const CommandSpec& c) {
-  const double way = robot.speed_m_s * (c.left + c.right) / 2 * c.duration_s;
+  const double travel = robot.speed_m_s * (c.left + c.right) / 2 * c.duration_s;
   const double turn = robot.turn_rad_s * (c.right - c.left) * c.duration_s;
-  return exp({way, 0, turn});
+  return exp({travel, 0, turn});
 }
 
 // All six commands at three levels and durations, from anywhere in an arena of 2 m.
@@ -67,7 +67,7 @@ std::string first_name(const Problem& problem) {
   return findings.empty() ? "" : findings.front().name;
 }
 
-TEST(Sanity, HasNoDoubtsAboutASoundLog) {
+TEST(Sanity, HasNoWarningsAboutASoundLog) {
   for (std::uint64_t seed : {1, 2, 3}) EXPECT_EQ(first_name(drawn_drives(200, {}, seed)), "");
 }
 
@@ -138,7 +138,7 @@ TEST(Sanity, NamesWhatIsTheWrongWayRound) {
   }
 }
 
-TEST(Sanity, SaysWhichUnitAndWhichAxis) {
+TEST(Sanity, ReportsWhichUnitAndWhichAxis) {
   const Problem log = drawn_drives(150);
   const auto text_of = [](const Problem& problem) {
     const SanityFinding f = check_sanity(problem).front();
@@ -161,7 +161,7 @@ TEST(Sanity, SwappedCommandsAreSwappedSides) {
 }
 
 // Where turns are small, none at all agrees with most of what is seen, either way round.
-TEST(Sanity, SmallTurnsTellTheirSense) {
+TEST(Sanity, SmallTurnsReportTheirSense) {
   for (const double rate : {0.6, 0.9, 1.2}) {
     Problem log = drawn_drives(200, {0.25, rate});
     EXPECT_EQ(first_name(log), "") << rate;
@@ -171,7 +171,7 @@ TEST(Sanity, SmallTurnsTellTheirSense) {
 }
 
 // Wild rows, a lens, an asymmetric motor: a diagnosis's business.
-TEST(Sanity, HasNoDoubtsAboutWhatTheCatalogueExplains) {
+TEST(Sanity, HasNoWarningsAboutWhatTheCatalogueExplains) {
   Problem log = drawn_drives(300);
   for (std::size_t i = 0; i < 300; i += 100) log.log.trials[i].X_WE.theta = 1;
   EXPECT_EQ(first_name(log), "");
@@ -198,7 +198,7 @@ TEST(Sanity, SetsAsideAFewImpossibleRows) {
   EXPECT_FALSE(any_unusable(findings));
 }
 
-TEST(Sanity, DoubtsWhatCannotSayAnything) {
+TEST(Sanity, WarningsWhatCannotReportAnything) {
   EXPECT_EQ(first_name(drawn_drives(39)), "too_few_trials");
   EXPECT_EQ(first_name(drawn_drives(1)), "too_few_trials");
   EXPECT_EQ(first_name(drawn_drives(40)), "");
@@ -209,7 +209,7 @@ TEST(Sanity, DoubtsWhatCannotSayAnything) {
   EXPECT_EQ(first_name(idle), "no_motion");
 }
 
-TEST(Sanity, DoubtsCopiesAndClocksThatRunBackward) {
+TEST(Sanity, WarningsCopiesAndClocksThatRunBackward) {
   Problem log = drawn_drives(100);
   Problem twice = log;
   for (Trial t : log.log.trials) {

@@ -47,7 +47,7 @@ TEST(Baselines, ScoreGaussianMotionsAsTheirDensityDoes) {
   const auto scores = baseline_scores(drawn(1200, 0, 1), drawn(600, 0, 2), kCommands);
   ASSERT_TRUE(scores.ok());
   ASSERT_EQ(scores->size(), 2u);
-  // -(3 log 2 pi + log det S + 3) / 2 on average; 600 trials tell it to 0.05.
+  // -(3 log 2 pi + log det S + 3) / 2 on average; 600 trials show it to 0.05.
   const double best = -0.5 * (3 * std::log(2 * M_PI) + 3) - std::log(0.01 * 0.005 * 0.03);
   for (const BaselineScores& b : *scores) EXPECT_NEAR(mean_of(b), best, 0.12) << b.name;
 }
@@ -71,7 +71,7 @@ TEST(Baselines, FollowHeavyTails) {
   EXPECT_GT(mean_of((*scores)[1]), mean_of((*scores)[0]) + 0.1);
 }
 
-TEST(Baselines, SayNothingOfCommandsWithTooFewTrials) {
+TEST(Baselines, ReportNothingOfCommandsWithTooFewTrials) {
   TrialLog train = drawn(40, 0, 5);
   std::erase_if(train.trials,
                 [n = 0](const Trial& t) mutable { return t.command == "turn_cw" && ++n > 5; });
@@ -105,7 +105,7 @@ TEST(Baselines, OfOtherFoldsDoNotKnowATrial) {
   EXPECT_EQ(parts.back(), 4u);
 }
 
-TEST(Baselines, ThatAreNotBeatenAreSaid) {
+TEST(Baselines, ThatAreNotBeatenAreReported) {
   const std::vector<BaselineScores> baselines = {{"constant motion", {6.0, 6.2}},
                                                  {"mined motion", {5.0, std::nullopt}}};
   const auto better = compare_with_baselines(baselines, std::vector<double>{7, 7});

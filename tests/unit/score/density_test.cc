@@ -81,34 +81,34 @@ TEST(Scores, TheTruthScoresBest) {
   const Eigen::Matrix3d truth = example_covariance();
   const Covariance3 S = factorised(truth);
   Eigen::Matrix3d uncorrelated = truth.diagonal().asDiagonal();
-  struct Rival {
+  struct Candidate {
     const char* name;
     Eigen::Vector3d shift;
     Eigen::Matrix3d covariance;
   };
-  const Rival rivals[] = {{"shifted", {0.008, 0, 0}, truth},
-                          {"turned", {0, 0, 0.02}, truth},
-                          {"wide", {0, 0, 0}, 1.7 * truth},
-                          {"narrow", {0, 0, 0}, 0.6 * truth},
-                          {"uncorrelated", {0, 0, 0}, uncorrelated}};
+  const Candidate candidates[] = {{"shifted", {0.008, 0, 0}, truth},
+                                  {"turned", {0, 0, 0.02}, truth},
+                                  {"wide", {0, 0, 0}, 1.7 * truth},
+                                  {"narrow", {0, 0, 0}, 0.6 * truth},
+                                  {"uncorrelated", {0, 0, 0}, uncorrelated}};
   constexpr int kDraws = 20000;
-  for (const Rival& rival : rivals) {
-    const Covariance3 R = factorised(rival.covariance);
+  for (const Candidate& candidate : candidates) {
+    const Covariance3 R = factorised(candidate.covariance);
     Stream draws({.run_seed = 3});
     double log_advantage = 0, energy_advantage = 0;
     for (int i = 0; i < kDraws; ++i) {
       const Eigen::Vector3d r = S.lower() * normal_vector(draws);
       log_advantage +=
-          log_predictive_density(r, S, 0) - log_predictive_density(r - rival.shift, R, 0);
+          log_predictive_density(r, S, 0) - log_predictive_density(r - candidate.shift, R, 0);
       if (i % 4 == 0) {
-        energy_advantage += gaussian_energy_score(r - rival.shift, rival.covariance) -
+        energy_advantage += gaussian_energy_score(r - candidate.shift, candidate.covariance) -
                             gaussian_energy_score(r, truth);
       }
     }
-    EXPECT_GT(log_advantage, 0) << rival.name;
+    EXPECT_GT(log_advantage, 0) << candidate.name;
     // The energy score hardly sees correlation; it must not prefer the wrong one by much.
-    if (std::string(rival.name) != "uncorrelated") {
-      EXPECT_GT(energy_advantage, 0) << rival.name;
+    if (std::string(candidate.name) != "uncorrelated") {
+      EXPECT_GT(energy_advantage, 0) << candidate.name;
     }
   }
 }

@@ -176,7 +176,7 @@ TEST_F(MotionModelTest, TurningTheWorldOrAddingLapsChangesNothing) {
   EXPECT_NEAR(plain.log_density(start, commands_[1], lap).value(), density, 1e-6);
 }
 
-TEST_F(MotionModelTest, SaysWhenTrialsAreTooFew) {
+TEST_F(MotionModelTest, ReportsWhenTrialsAreTooFew) {
   const MotionModel model = MotionModel::mine(log_of(40, 3), commands_).value();
   EXPECT_TRUE(model.predict({}, commands_[1]).ok());
   const auto few = model.predict({}, commands_[0]);

@@ -56,7 +56,7 @@ TEST(MannWhitney, IsSymmetricAndSeesNothingInTies) {
   EXPECT_EQ(mann_whitney(std::vector<double>{2, 2, 2}, std::vector<double>{2, 2}).p, 1);
 }
 
-TEST(MannWhitney, RejectsAsOftenAsItSays) {
+TEST(MannWhitney, RejectsAsOftenAsItReports) {
   int rejected = 0;
   for (std::uint64_t i = 0; i < 400; ++i) {
     Stream stream({.run_seed = i});

@@ -103,7 +103,7 @@ TEST(TailedDensity, SourcesAreAlike) {
 }
 
 // A proper score: on average over the truth no other tails do better, and a perfect prediction
-// scores what is said that it does.
+// scores what is reported that it does.
 TEST(TailedDensity, TheTruthScoresBest) {
   const Eigen::Matrix3d R = reading_covariance(), S = drive_covariance() + R;
   const NoiseTails truth{0.5, 0.1};

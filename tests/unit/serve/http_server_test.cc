@@ -36,16 +36,16 @@ class Client {
 
   bool connected() const { return connected_; }
   // Whether all of it was taken.
-  bool say(const std::string& bytes) const {
+  bool send_bytes(const std::string& bytes) const {
     return ::send(fd_, bytes.data(), bytes.size(), MSG_NOSIGNAL) ==
            static_cast<ssize_t>(bytes.size());
   }
-  void say_no_more() const { ::shutdown(fd_, SHUT_WR); }
-  // Until it has said `words`, or nothing more.
-  std::string hear_until(const std::string& words) const {
+  void end_sending() const { ::shutdown(fd_, SHUT_WR); }
+  // Until it has reported `words`, or nothing more.
+  std::string hear_until(const std::string& text) const {
     std::string all;
     char byte;
-    while (all.find(words) == all.npos && ::recv(fd_, &byte, 1, 0) == 1) all += byte;
+    while (all.find(text) == all.npos && ::recv(fd_, &byte, 1, 0) == 1) all += byte;
     return all;
   }
   // Until the other side has nothing more to say.
@@ -98,7 +98,7 @@ class Served : public testing::Test {
   std::string ask(const std::string& bytes) const {
     const Client client(server_->port());
     EXPECT_TRUE(client.connected());
-    client.say(bytes);
+    client.send_bytes(bytes);
     return client.hear();
   }
   std::string get(const std::string& target) const {
@@ -123,15 +123,15 @@ TEST_F(Served, AnswersWithPoliciesAndWithoutSharing) {
 
 TEST_F(Served, SpeaksHttpTwiceOnAConnection) {
   const Client client(server_->port());
-  client.say("GET /1 HTTP/1.1\r\nHost: localhost\r\n\r\n");
-  client.say("HEAD /2 HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n");
+  client.send_bytes("GET /1 HTTP/1.1\r\nHost: localhost\r\n\r\n");
+  client.send_bytes("HEAD /2 HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n");
   const std::string both = client.hear();
   EXPECT_THAT(both, HasSubstr("asked for /1"));
   EXPECT_THAT(both, testing::Not(HasSubstr("asked for /2")));  // only how long it would be
   EXPECT_THAT(both, HasSubstr("Content-Length: 13\r\n"));
 }
 
-TEST_F(Served, SaysThatNothingChanged) {
+TEST_F(Served, ReportsThatNothingChanged) {
   const std::string answer = ask(
       "GET / HTTP/1.1\r\nHost: localhost\r\nIf-None-Match: \"one\"\r\nConnection: close\r\n\r\n");
   EXPECT_THAT(answer, StartsWith("HTTP/1.1 304"));
@@ -172,8 +172,8 @@ TEST_F(Served, BearsManyMalformedRequests) {
       bytes[bits() % bytes.size()] = static_cast<char>(bits() % 256);
     }
     const Client client(server_->port());
-    client.say(bytes.substr(0, bits() % (bytes.size() + 1)));
-    client.say_no_more();
+    client.send_bytes(bytes.substr(0, bits() % (bytes.size() + 1)));
+    client.end_sending();
     if (i % 3 == 0) client.hear();  // the others hang up at once
   }
   still_answers();
@@ -190,7 +190,7 @@ TEST_F(Served, SilentClientsGiveWay) {
   for (int i = 0; i < 100; ++i) {
     silent.push_back(std::make_unique<Client>(server_->port()));
     ASSERT_TRUE(silent.back()->connected());
-    silent.back()->say("GET / HT");
+    silent.back()->send_bytes("GET / HT");
   }
   still_answers();
   EXPECT_EQ(silent.front()->hear(), "");  // closed: it would wait for ten minutes otherwise
@@ -202,20 +202,20 @@ TEST_F(Served, SlowClientsAreHungUpOn) {
   limits.time = std::chrono::milliseconds(50);
   start(limits);
   const Client client(server_->port());
-  client.say("GET / HTTP/1.1\r\nHo");
+  client.send_bytes("GET / HTTP/1.1\r\nHo");
   EXPECT_EQ(client.hear(), "");
   still_answers();
 }
 
 constexpr const char* kListen = "GET /events HTTP/1.1\r\nHost: localhost\r\n\r\n";
 
-TEST_F(Served, TellsOfWhatIsNew) {
+TEST_F(Served, ReportsOfWhatIsNew) {
   halt();
   HttpLimits limits;
   limits.watch_interval = std::chrono::milliseconds(5);
   start(limits);
   const Client client(server_->port());
-  client.say(kListen);
+  client.send_bytes(kListen);
   const std::string head = client.hear_until("data: state 1\n\n");
   EXPECT_THAT(head, StartsWith("HTTP/1.1 200 OK"));
   EXPECT_THAT(head, HasSubstr("text/event-stream"));
@@ -226,7 +226,7 @@ TEST_F(Served, TellsOfWhatIsNew) {
   still_answers();
 }
 
-TEST_F(Served, TellsSoManyAndRefusesTheNext) {
+TEST_F(Served, ReportsSoManyAndRefusesTheNext) {
   halt();
   HttpLimits limits;
   limits.streams = 2;
@@ -236,7 +236,7 @@ TEST_F(Served, TellsSoManyAndRefusesTheNext) {
   {
     const Client second(server_->port());
     for (const Client* client : {&first, &second}) {
-      client->say(kListen);
+      client->send_bytes(kListen);
       EXPECT_THAT(client->hear_until("state 1"), HasSubstr("state 1"));
     }
     EXPECT_THAT(ask(kListen), StartsWith("HTTP/1.1 503"));
@@ -244,7 +244,7 @@ TEST_F(Served, TellsSoManyAndRefusesTheNext) {
   // The one that left has made room, as soon as the server knows.
   for (std::string answer = "HTTP/1.1 503"; answer.starts_with("HTTP/1.1 503");) {
     const Client third(server_->port());
-    third.say(kListen);
+    third.send_bytes(kListen);
     answer = third.hear_until("state 1");
   }
   still_answers();
@@ -257,7 +257,7 @@ TEST_F(Served, StreamsGiveWayToNewConnections) {
   limits.connections = 4;
   start(limits);
   const Client stream(server_->port());
-  stream.say(kListen);
+  stream.send_bytes(kListen);
   stream.hear_until("state 1");
   std::vector<std::unique_ptr<Client>> silent;
   for (int i = 0; i < 20; ++i) silent.push_back(std::make_unique<Client>(server_->port()));
@@ -265,7 +265,7 @@ TEST_F(Served, StreamsGiveWayToNewConnections) {
   stream.hear();  // ends
 }
 
-TEST_F(Served, SaysWhenAPortIsTaken) {
+TEST_F(Served, ReportsWhenAPortIsTaken) {
   const auto second = HttpServer::listen(
       server_->port(), [](const HttpRequest&) { return plain_response(200, ""); });
   ASSERT_FALSE(second.ok());

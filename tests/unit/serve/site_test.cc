@@ -78,7 +78,7 @@ TEST_F(SiteTest, ListsFiltersAndSorts) {
   EXPECT_THAT(get("/?q=%3Cb%3Ex").body, Not(HasSubstr("<b>x")));
 }
 
-TEST_F(SiteTest, SaysThatNothingChangedUntilItDoes) {
+TEST_F(SiteTest, ReportsThatNothingChangedUntilItDoes) {
   RunStore store = make("run");
   const HttpResponse first = get(view("run"));
   EXPECT_EQ(first.status, 200u);
@@ -98,7 +98,7 @@ TEST_F(SiteTest, WhatTookLongIsGoodForLong) {
   EXPECT_EQ(get(view("run"), first.etag).status, 304u) << "half a second is good for fifty";
   now_s_ += 20;
   EXPECT_THAT(get(view("run"), first.etag).body, HasSubstr("made 2"));
-  // That a run has ended is told at once.
+  // That a run has ended is sent at once.
   Progress end;
   end.state = RunState::kFinished;
   ASSERT_TRUE(store.set_progress(end).ok());
@@ -106,7 +106,7 @@ TEST_F(SiteTest, WhatTookLongIsGoodForLong) {
   EXPECT_THAT(get(view("run"), first.etag).body, HasSubstr("made 3"));
 }
 
-TEST_F(SiteTest, EventsTellWhatThePageStandsAt) {
+TEST_F(SiteTest, EventsReportWhatThePageStandsAt) {
   RunStore store = make("run");
   const std::string of = percent_encoded((folder_ / "run").string());
   const HttpResponse stream = get("/events?at=/view&of=" + of);
@@ -134,11 +134,11 @@ TEST_F(SiteTest, WhatAFolderIsTakenForCountsToo) {
   found.kind = FoundWork::Kind::kDiagnosis;
   now_s += 1e6;
   const WorkEntry as_diagnosis = entries.now({found}).front();
-  EXPECT_EQ(as_diagnosis.told, "One motor is slower.");
+  EXPECT_EQ(as_diagnosis.status_text, "One motor is slower.");
   EXPECT_NE(as_diagnosis.stamp, as_command);
 }
 
-TEST_F(SiteTest, ADiagnosisAtWorkTellsWhatItHasFound) {
+TEST_F(SiteTest, ADiagnosisAtWorkReportsWhatItHasFound) {
   const std::filesystem::path d = folder_ / "d";
   std::filesystem::create_directories(d);
   auto answers = AnswerStore::open(answer_file(d), "build");
@@ -168,7 +168,7 @@ TEST_F(SiteTest, ADiagnosisAtWorkTellsWhatItHasFound) {
   EXPECT_THAT(get(view("d"), known).body, HasSubstr("A seam."));
 }
 
-TEST_F(SiteTest, SaysWhatCannotBeRead) {
+TEST_F(SiteTest, ReportsWhatCannotBeRead) {
   const RunStore sound = make("sound");
   make("foreign");
   make("damaged");
@@ -195,7 +195,7 @@ TEST_F(SiteTest, SaysWhatCannotBeRead) {
   set_database_patience_ms(60000);
 }
 
-TEST_F(SiteTest, APageThatCannotBeMadeSaysWhyAndLooksAgain) {
+TEST_F(SiteTest, APageThatCannotBeMadeReportsWhyAndLooksAgain) {
   const RunStore store = make("run");
   trouble_ = "run.sqlite: another program holds the file <b>";
   const HttpResponse page = get(view("run"));

@@ -191,15 +191,16 @@ TEST(DistributedPush, TheSenseOfRotationIsThatOfMasonsVote) {
         PushSettings settings = on_face(square_piece());
         settings.pressure = pressure;
         settings.finger_friction = 0.25;
-        const Eigen::Vector2d way = Eigen::Vector2d(aside, 1).normalized();
+        const Eigen::Vector2d push_direction = Eigen::Vector2d(aside, 1).normalized();
         const Eigen::Vector2d begin(x, touch_y - settings.finger_radius_m);
-        const Motion motion = on_face_pushed(settings, {{0, begin}, {1, begin + 0.002 * way}});
+        const Motion motion =
+            on_face_pushed(settings, {{0, begin}, {1, begin + 0.002 * push_direction}});
         // Which way a ray from the touch turns the piece about its centre.
         const auto vote = [&](const Eigen::Vector2d& ray) {
           return x * ray[1] - touch_y * ray[0] > 0 ? 1 : -1;
         };
         const double mu = settings.finger_friction;
-        const int votes = vote({-mu, 1}) + vote({mu, 1}) + vote(way);
+        const int votes = vote({-mu, 1}) + vote({mu, 1}) + vote(push_direction);
         EXPECT_EQ(motion.X_SE.theta > 0, votes > 0)
             << "pressure " << pressure << " x " << x << " aside " << aside << " turned "
             << motion.X_SE.theta;

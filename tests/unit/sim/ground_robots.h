@@ -45,11 +45,11 @@ inline GroundRobot twisted(GroundRobot robot) {
   return completed(robot);
 }
 
-// Where it is `duration_s` after it was told this, and was put down moving as `start`.
-inline Pose driven(const GroundRobot& robot, std::vector<double> told, double duration_s,
+// Where it is `duration_s` after it was reported this, and was put down moving as `start`.
+inline Pose driven(const GroundRobot& robot, std::vector<double> commanded, double duration_s,
                    const GroundWorld& world = {}, const BodyTwist& start = {}) {
   GroundSimulator simulator(robot, world);
-  const std::vector<CommandRow> rows = {{0, std::move(told)}};
+  const std::vector<CommandRow> rows = {{0, std::move(commanded)}};
   const std::vector<double> times = {duration_s};
   const GroundMotion motion = simulator.run(rows, {0, start}, times);
   EXPECT_EQ(motion.outcome, MotionOutcome::kOk);
@@ -57,9 +57,10 @@ inline Pose driven(const GroundRobot& robot, std::vector<double> told, double du
 }
 
 // The steady turn rate: over the second of two seconds.
-inline double turn_rate(const GroundRobot& robot, std::vector<double> told, double after_s = 1) {
+inline double turn_rate(const GroundRobot& robot, std::vector<double> commanded,
+                        double after_s = 1) {
   GroundSimulator simulator(robot, {});
-  const std::vector<CommandRow> rows = {{0, std::move(told)}};
+  const std::vector<CommandRow> rows = {{0, std::move(commanded)}};
   std::vector<double> times;
   for (int i = 0; i <= 20; ++i) times.push_back(after_s + 0.05 * i);
   const GroundMotion motion = simulator.run(rows, {}, times);

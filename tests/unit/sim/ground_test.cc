@@ -134,7 +134,7 @@ TEST(Ground, RollersOfAMecanumDriveDragAsideAndNotAhead) {
 
 // The diagonals contend for the turn where grips creep far below their limit: each has a say by
 // the load on it.
-TEST(Ground, TheDiagonalWithMoreOfTheLoadHasMoreOfASay) {
+TEST(Ground, TheDiagonalWithMoreOfTheLoadHasMoreOfAReport) {
   GroundRobot robot =
       ground_robot(DriveKind::kMecanum, {"front_left", "front_right", "rear_left", "rear_right"});
   robot.roller_drag = 0;
@@ -143,8 +143,9 @@ TEST(Ground, TheDiagonalWithMoreOfTheLoadHasMoreOfASay) {
     GroundWorld world;
     world.creep_speed_m_s = 0.5;
     world.cross_load = cross;
-    const std::vector<double> told = {-0.4, 0, 0, 0.4};  // 0.04 m/s of one diagonal's wheels
-    const double turned = driven(robot, told, 2, world).theta - driven(robot, told, 1, world).theta;
+    const std::vector<double> commanded = {-0.4, 0, 0, 0.4};  // 0.04 m/s of one diagonal's wheels
+    const double turned =
+        driven(robot, commanded, 2, world).theta - driven(robot, commanded, 1, world).theta;
     const double expected = (1 + cross) / 2 * 0.04 / (0.15 + 0.2);
     EXPECT_NEAR(turned, expected, 0.01 * expected) << cross;
   }

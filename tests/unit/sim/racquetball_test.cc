@@ -96,8 +96,8 @@ TEST(Racquetball, NeverExceedsItsMaximumVelocity) {
   s.maximum_velocity_m_s = 3;
   const BallFlight flight = fly_ball(s, 1, 0.1);
   for (std::size_t i = 1; i < flight.path.size(); ++i) {
-    const double way = (flight.path[i].position_m - flight.path[i - 1].position_m).norm();
-    EXPECT_LE(way, 0.3 + 0.1 * 9.81 / 1000 + 1e-9);
+    const double travel = (flight.path[i].position_m - flight.path[i - 1].position_m).norm();
+    EXPECT_LE(travel, 0.3 + 0.1 * 9.81 / 1000 + 1e-9);
   }
 }
 

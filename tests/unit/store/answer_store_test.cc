@@ -18,7 +18,7 @@ v1::Task echo(const std::string& payload) {
   return task;
 }
 
-// Answers with the payload, counts what it is asked, and stops when told to.
+// Answers with the payload, counts what it is asked, and stops when reported to.
 class EchoFarm : public Farm, public AnswerSource {
  public:
   std::string add_problem(const v1::Problem&) override { return "hash"; }

@@ -42,7 +42,7 @@ class CommandRecordTest : public StoreTest {
   }
 };
 
-TEST_F(CommandRecordTest, ALiveCommandIsWhatItSaid) {
+TEST_F(CommandRecordTest, ALiveCommandIsWhatItReported) {
   write(example());
   const auto lock = RunLock::take(folder_);
   ASSERT_TRUE(lock.ok());
@@ -67,7 +67,7 @@ TEST_F(CommandRecordTest, KeepsItsStagesAndWhatWasFoundInThem) {
   EXPECT_EQ(back.findings[0].found.columns, record.findings[0].found.columns);
   EXPECT_EQ(back.findings[0].found.rows, record.findings[0].found.rows);
   EXPECT_TRUE(back.findings[1].found.rows.empty());
-  // What another version wrote is left out, not believed.
+  // What another version wrote is omitted, not believed.
   auto json = to_json(record);
   json["findings"] = {1, {{"about", 3}, {"rows", {"x", {1, 2}}}}};
   json["plan"] = "none";

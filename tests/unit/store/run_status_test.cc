@@ -45,7 +45,7 @@ TEST_F(RunStatusTest, IsRunningWhileTheMasterHoldsTheLock) {
   EXPECT_EQ(now.progress.workers[0].finished, 40u);
 }
 
-TEST_F(RunStatusTest, TellsACrashFromAnEnd) {
+TEST_F(RunStatusTest, ReportsACrashFromAnEnd) {
   {
     Result<RunStore> store = RunStore::create(run(), example_info());
     ASSERT_TRUE(store->commit(example_generation(1)).ok());

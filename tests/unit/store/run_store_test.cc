@@ -184,7 +184,7 @@ TEST_F(RunStoreTest, BranchesFromAnEarlierGenerationAndKeepsTheTail) {
   EXPECT_FALSE(store.truncate_after(2).ok());
 }
 
-TEST_F(RunStoreTest, SaysWhatIsWrongWithAFile) {
+TEST_F(RunStoreTest, ReportsWhatIsWrongWithAFile) {
   write(file(), "this is not a database at all, not even close to one, however long it gets");
   EXPECT_THAT(RunReader::open(run()).error().message, HasSubstr("not a SQLite file"));
   EXPECT_THAT(RunStore::open(run()).error().message, HasSubstr("not a SQLite file"));

@@ -81,7 +81,7 @@ class StoreFaults : public StoreTest {
         SCOPED_TRACE((for_good ? "for good from " : "once at ") + fault);
         const State state = found();
         if (status) {
-          ASSERT_EQ(state, after) << "it said that all is well";
+          ASSERT_EQ(state, after) << "it reported that all is well";
         } else {
           ASSERT_THAT(state, AnyOf(before, after)) << status.error().message;
           ASSERT_THAT(status.error().message, HasSubstr(run().string())) << "names the place";

@@ -65,7 +65,7 @@ TEST(Bbautotune, PointsAtWhatIsWrong) {
 }
 
 // The public run of 171 trials ends like this, at its 16,384th byte.
-TEST(Bbautotune, LeavesOutALastLineThatBreaksOffAndSaysSo) {
+TEST(Bbautotune, LeavesOutALastLineThatBreaksOffAndReportsSo) {
   for (const char* part :
        {"80.0;34.0", "80", "80;34;", "80;34;-", "80;34;1;mov", "80;34;1;move(25.0, 0",
         "80;34;1;move(25, 0, 0)", "80;34;1;move(25, 0, 0);", "80;34;1;move(25, 0, 0);1;2;"}) {
@@ -73,7 +73,7 @@ TEST(Bbautotune, LeavesOutALastLineThatBreaksOffAndSaysSo) {
     ASSERT_TRUE(log.ok()) << log.error().message;
     EXPECT_EQ(log->trials.size(), 1u);
     ASSERT_EQ(log->notes.size(), 1u) << part;
-    EXPECT_THAT(log->notes[0], AllOf(StartsWith("run.dat:2:"), HasSubstr("was left out")));
+    EXPECT_THAT(log->notes[0], AllOf(StartsWith("run.dat:2:"), HasSubstr("was omitted")));
     // Anywhere else it is an error.
     EXPECT_THAT(error_of(kLine + part + "\n" + kLine), StartsWith("run1.dat:2:")) << part;
     EXPECT_THAT(error_of(std::string(part) + ";\n"), StartsWith("run1.dat:1:")) << part;

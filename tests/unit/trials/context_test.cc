@@ -64,7 +64,7 @@ TEST(TrialContext, FollowsTheSessionNotTheFile) {
   EXPECT_EQ(contexts[3].session_time_s, 30 + 1 + kAssumedPause_s);
 }
 
-TEST(TrialContext, TellsMovesFromNoiseAtEveryNoiseLevel) {
+TEST(TrialContext, ReportsMovesFromNoiseAtEveryNoiseLevel) {
   for (const int chain : {2, 4, 10}) {
     for (const double sigma_m : {0.0, 1e-4, 0.002, 0.005}) {
       for (const double sigma_rad : {0.0, 0.01, 0.03}) {

@@ -52,7 +52,7 @@ TEST(PushLog, WritesWhatItReads) {
   EXPECT_EQ(format_tips(*again), format_tips(*log));
 }
 
-TEST(PushLog, ErrorsSayWhereAndWhat) {
+TEST(PushLog, ErrorsReportWhereAndWhat) {
   EXPECT_THAT(error_of(kPushHeader + "\na,0,cube,0,0,0,1,0,0\n"),
               StartsWith("pushes.csv:2:5: found object 'cube', expected a piece of the config"));
   EXPECT_THAT(error_of(kPushHeader + "\na,0,square,0,zero,0,1,0,0\n"),

@@ -209,7 +209,7 @@ TEST(ReadPaths, AddsSamplesToTheirTrials) {
   ASSERT_EQ(log->trials[0].path.size(), 2u);
   EXPECT_EQ(log->trials[0].path[1].t_s, 0.1);
   EXPECT_EQ(log->trials[0].path[1].pose, (Pose{0.02, 0, 0.01}));
-  EXPECT_THAT(log->notes, ElementsAre("paths.csv:3:1: left out 1 path rows of trials that are not "
+  EXPECT_THAT(log->notes, ElementsAre("paths.csv:3:1: omitted 1 path rows of trials that are not "
                                       "in the log"));
 }
 
@@ -277,7 +277,7 @@ TEST(ReadTrials, NamesAllMissingColumnsAndThoseThatMayBeMeant) {
   EXPECT_THAT(message, HasSubstr("'Y', 'heading'; rename what is one of them"));
 }
 
-// The order of what is left counts, not that of rows which are left out.
+// The order of what is left counts, not that of rows which are omitted.
 TEST(ReadTrials, LeavesRowsWithMistakesOut) {
   const std::string text = kHeader +
                            "\ns1,0,,forward,,,,0,0,0,1,0,0\n"
@@ -295,8 +295,8 @@ TEST(ReadTrials, LeavesRowsWithMistakesOut) {
   EXPECT_EQ(log->trials[2].trial, 3);
   EXPECT_THAT(
       log->notes,
-      ElementsAre(StartsWith("left out: log.csv:3:"), StartsWith("left out: log.csv:5:"),
-                  StartsWith("left out: log.csv:6:"), "left out 3 rows with mistakes in all"));
+      ElementsAre(StartsWith("omitted: log.csv:3:"), StartsWith("omitted: log.csv:5:"),
+                  StartsWith("omitted: log.csv:6:"), "omitted 3 rows with mistakes in all"));
   const auto none =
       parse_trials(kHeader + "\ns1,0,,forward,,,,0,0,0,nan,0,0\n", "l", kCommands, options);
   ASSERT_FALSE(none.ok());
@@ -315,7 +315,7 @@ TEST(ReadFiles, NamesTheMistakesOfAllFiles) {
                                          HasSubstr("none.csv: no such file")));
 }
 
-TEST(ReadFiles, ReadsPathsThatSayWhoseTheyAreOrAreNamed) {
+TEST(ReadFiles, ReadsPathsThatReportWhoseTheyAreOrAreNamed) {
   TemporaryFolder folder;
   const std::vector<std::string> files = {folder.write("log.csv", kHeader + "\n" + kRow + "\n")};
   const std::string rows = "session,trial,t,x,y,theta\ns1,0,0,0,0,0\n";

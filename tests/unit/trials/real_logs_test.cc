@@ -72,7 +72,7 @@ TEST(RealLogs, TheSrv1RobotWasPutBackByHand) {
     if (turn > 1) {
       EXPECT_TRUE(contexts[i].moved);
     }
-    // A second look at a resting robot is off by a grid step at most.
+    // A reselection at a resting robot is off by a grid step at most.
     if (std::hypot(S.x - E.x, S.y - E.y) < 0.0101 && turn < 0.09) {
       EXPECT_FALSE(contexts[i].moved);
     }

@@ -182,21 +182,21 @@ TEST(EffectSignature, SlipEventsShortenAndTurnTheirShareOfTrials) {
 TEST(EffectSignature, SessionGainIsOneForAllDrivesOfASession) {
   constexpr double kSpread = 0.1;
   constexpr int n = 60;
-  const double way = end_of({}, driven("forward", 0.5)).x;
+  const double travel = end_of({}, driven("forward", 0.5)).x;
   double squares = 0;
   for (int session = 0; session < n; ++session) {
     const std::vector<Pose> ends = simulated_drives({{"session_gain.spread", kSpread}}, 3,
                                                     static_cast<std::uint64_t>(session));
     ASSERT_EQ(ends.size(), 3u);
     for (const Pose& end : ends) EXPECT_NEAR(end.x, ends.front().x, 1e-4);
-    const double gain = ends.front().x / way - 1;
+    const double gain = ends.front().x / travel - 1;
     squares += gain * gain / n;
   }
   EXPECT_NEAR(std::sqrt(squares), kSpread, 0.3 * kSpread);
 }
 
-// Nothing is known of a session that is foretold: the same mean, and a wider spread.
-TEST(EffectSignature, SessionGainWidensWhatIsForetold) {
+// Nothing is known of a session that is predicted: the same mean, and a wider spread.
+TEST(EffectSignature, SessionGainWidensWhatIsPredicted) {
   const NoiseSettings without = Srv1Robot(noiseless()).foreseen_noise();
   const NoiseSettings with = Srv1Robot(noiseless({{"session_gain.spread", 0.1}})).foreseen_noise();
   EXPECT_EQ(without.drive_common, 0);

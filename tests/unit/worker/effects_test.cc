@@ -143,7 +143,7 @@ TEST(DriveEffects, BranchesAreADistributionWithTheDrawsMean) {
   EXPECT_NEAR(drawn, left, 5 * 0.17 / std::sqrt(n));
 }
 
-TEST(DriveEffects, ActOnTheDriveAsTheCatalogueSays) {
+TEST(DriveEffects, ActOnTheDriveAsTheCatalogueReports) {
   ParameterValues values = srv1_table().nominal();
   const auto set = [&](const char* key, double v) { values[srv1_table().row(key)] = v; };
   set("motor_asymmetry.ratio", 0.04);

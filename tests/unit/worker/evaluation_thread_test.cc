@@ -15,46 +15,46 @@ std::vector<Work> echoes(std::uint64_t count) {
   return work;
 }
 
-struct Told {
+struct Taken {
   std::vector<std::uint64_t> attempts;
   int times = 0;
 };
 
-// Takes results as the service does: when there is something to be told.
-Told take_all(EvaluationThread& evaluation, std::size_t count) {
-  Told told;
-  while (told.attempts.size() < count) {
+// Takes results as the service does: when there is something to be reported.
+Taken take_all(EvaluationThread& evaluation, std::size_t count) {
+  Taken taken;
+  while (taken.attempts.size() < count) {
     pollfd polled{evaluation.fd(), POLLIN, 0};
     if (poll(&polled, 1, 60000) != 1) break;
-    ++told.times;
+    ++taken.times;
     for (const v1::JobResult& result : evaluation.take_finished()) {
-      told.attempts.push_back(result.attempt_id());
+      taken.attempts.push_back(result.attempt_id());
     }
   }
-  return told;
+  return taken;
 }
 
-TEST(EvaluationThread, TellsOfEveryResultInOrder) {
+TEST(EvaluationThread, ReportsOfEveryResultInOrder) {
   EvaluationThread evaluation;
   for (std::uint64_t count = 1; count < 10; ++count) {
     evaluation.give(echoes(count));
-    const Told told = take_all(evaluation, count);
-    ASSERT_EQ(told.attempts.size(), count);
-    for (std::uint64_t i = 0; i < count; ++i) EXPECT_EQ(told.attempts[i], i);
+    const Taken taken = take_all(evaluation, count);
+    ASSERT_EQ(taken.attempts.size(), count);
+    for (std::uint64_t i = 0; i < count; ++i) EXPECT_EQ(taken.attempts[i], i);
   }
   EXPECT_TRUE(evaluation.idle());
 }
 
-TEST(EvaluationThread, TellsOfShortTasksTogether) {
+TEST(EvaluationThread, ReportsOfShortTasksTogether) {
   EvaluationThread evaluation;
   evaluation.give(echoes(200));
-  const Told told = take_all(evaluation, 200);
-  EXPECT_EQ(told.attempts.size(), 200u);
-  EXPECT_LT(told.times, 100);
+  const Taken taken = take_all(evaluation, 200);
+  EXPECT_EQ(taken.attempts.size(), 200u);
+  EXPECT_LT(taken.times, 100);
 }
 
-// What was held back because more was to come is told when that is taken away.
-TEST(EvaluationThread, TellsOfWhatIsDoneWhenTheRestIsDropped) {
+// What was held back because more was to come is reported when that is taken away.
+TEST(EvaluationThread, ReportsOfWhatIsDoneWhenTheRestIsDropped) {
   EvaluationThread evaluation;
   for (int round = 0; round < 50; ++round) {
     evaluation.give(echoes(100));

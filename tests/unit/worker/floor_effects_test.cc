@@ -267,7 +267,7 @@ TEST(HeadingGrid, FewHeadingsFollowASmallTilt) {
 
 // A drag of half the weight all but takes a wide turn's grip: at some heading its outer tread
 // begins to slide, and the motion jumps.
-TEST(HeadingGrid, SaysWhenNoInterpolationWillDo) {
+TEST(HeadingGrid, ReportsWhenNoInterpolationWillDo) {
   Srv1Robot robot(noiseless(nap(0.5, 2.5)));
   ConditionGroup group;
   group.drive = driven("wide_ccw");

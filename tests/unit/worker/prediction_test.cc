@@ -75,7 +75,7 @@ TEST(Prediction, SharedConditionsMatchSimulatingEachTrial) {
 
 // A motion that was simulated for another view of the camera is not simulated again, and what is
 // predicted is the same to the bit.
-TEST(Prediction, MotionsThatOnlyTheViewTellsApartAreSimulatedOnce) {
+TEST(Prediction, MotionsThatOnlyTheViewReportsApartAreSimulatedOnce) {
   Problem problem = small_problem(12);
   value(problem, "floor_nap.strength") = 0.2;  // every trial by itself
   const auto seen_from = [&](const PreparedProblem* worker, double slope, StepCounter* steps) {

@@ -115,20 +115,20 @@ TEST(ResidualOfAWorker, SimulatedSessionsHaveIt) {
   EXPECT_NEAR(path[0].pose().y(), with.trials(0).start().y(), 1e-3);
 }
 
-// Each way is as wide as the drive that does not stray, and by its own spread wider.
-TEST(ResidualOfAWorker, StraysAreWaysOfTheirOwn) {
+// Each way is as wide as the drive that is no outlier, and by its own spread wider.
+TEST(ResidualOfAWorker, OutliersAreWaysOfTheirOwn) {
   Problem problem = small_problem(12);
   const v1::PredictResult plain = predictions_of(problem);
-  problem.residual.strays = {StrayKind::kLate, 0.3, 0.1, 0.3, 0, 0, 0, 0};
+  problem.residual.outliers = {OutlierKind::kLate, 0.3, 0.1, 0.3, 0, 0, 0, 0};
   const v1::PredictResult with = predictions_of(problem);
   const std::vector<LoggedMotion> facts = logged_motions(problem);
   for (int i = 0; i < plain.predictions_size(); ++i) {
     const v1::Predicted& before = plain.predictions(i);
     const Pose end = from_proto(before.end()), after = from_proto(with.predictions(i).end());
     Eigen::Vector3d mean = Eigen::Vector3d::Zero();
-    for (const StrayWay& way :
-         stray_ways(*problem.residual.strays, facts[static_cast<std::size_t>(i)], end)) {
-      mean += way.weight * local_difference(end, way.X_WE);
+    for (const OutlierMode& mode :
+         outlier_modes(*problem.residual.outliers, facts[static_cast<std::size_t>(i)], end)) {
+      mean += mode.weight * local_difference(end, mode.X_WE);
     }
     EXPECT_LT((local_difference(end, after) - mean).norm(), 0.1 * mean.norm()) << i;
     EXPECT_GT(with.predictions(i).cov(0) + with.predictions(i).cov(3),
@@ -136,8 +136,8 @@ TEST(ResidualOfAWorker, StraysAreWaysOfTheirOwn) {
   }
 }
 
-// Of many simulated drives as many stray as are said to, and only what is read of them.
-TEST(ResidualOfAWorker, SimulatedSessionsStray) {
+// Of many simulated drives as many lie far off as are reported to, and only what is read of them.
+TEST(ResidualOfAWorker, SimulatedSessionsOutlier) {
   Problem problem = quiet_problem();
   v1::Task task;
   constexpr int kDrives = 200;
@@ -151,20 +151,20 @@ TEST(ResidualOfAWorker, SimulatedSessionsStray) {
     return between(from_proto(trial.start()), from_proto(trial.end())).x;
   };
   const double whole = driven(answer_of(problem, task).simulate().trials(0));
-  problem.residual.strays = {StrayKind::kLate, 0.3, 0.4, 0.4, 0, 0, 0, 0};
+  problem.residual.outliers = {OutlierKind::kLate, 0.3, 0.4, 0.4, 0, 0, 0, 0};
   const v1::SimulateResult with = answer_of(problem, task).simulate();
   ASSERT_EQ(with.trials_size(), kDrives);
-  int astray = 0;
+  int outlier_count = 0;
   for (int i = 0; i < kDrives; ++i) {
-    const bool strays = driven(with.trials(i)) < 0.8 * whole;
-    astray += strays;
-    if (!strays || i + 1 == kDrives) continue;
+    const bool outliers = driven(with.trials(i)) < 0.8 * whole;
+    outlier_count += outliers;
+    if (!outliers || i + 1 == kDrives) continue;
     // The robot drove on, and the next start is read where it stopped.
     const Pose end = from_proto(with.trials(i).end()),
                next = from_proto(with.trials(i + 1).start());
     EXPECT_NEAR(between(end, next).x, 0.4 * whole, 0.05 * whole) << i;
   }
-  EXPECT_NEAR(astray, 0.3 * kDrives, 20);
+  EXPECT_NEAR(outlier_count, 0.3 * kDrives, 20);
 }
 
 TEST(ResidualOfAWorker, ATraceHasNoPlaceToLookAt) {

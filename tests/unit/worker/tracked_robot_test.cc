@@ -190,15 +190,15 @@ TEST(TrackedRobot, TenTimesTheSizeDrivesTenTimesTheWay) {
     for (const auto& [left, right] : {std::pair(1.0, 1.0), {-0.3, 0.3}, {1.0, 0.4}, {-1.0, -1.0}}) {
       const Pose a = traced_end(small, left, right, 1);
       const Pose b = traced_end(big, left, right, std::sqrt(10.0));
-      const double way = 10 * std::max(0.03, std::hypot(a.x, a.y));
-      EXPECT_NEAR(b.x, 10 * a.x, tolerance * way) << left << " " << right;
-      EXPECT_NEAR(b.y, 10 * a.y, tolerance * way) << left << " " << right;
+      const double travel = 10 * std::max(0.03, std::hypot(a.x, a.y));
+      EXPECT_NEAR(b.x, 10 * a.x, tolerance * travel) << left << " " << right;
+      EXPECT_NEAR(b.y, 10 * a.y, tolerance * travel) << left << " " << right;
       EXPECT_NEAR(wrap_angle(b.theta - a.theta), 0, tolerance * (0.3 + std::abs(a.theta)));
     }
   }
 }
 
-TEST(TrackedRobot, WhatTheFileSaysOfMotorsAndMarkerIsInTheEffects) {
+TEST(TrackedRobot, WhatTheFileReportsOfMotorsAndMarkerIsInTheEffects) {
   const std::string text =
       replaced(kBigRobot, "mass = 35.0", "mass = 35.0\nlag = 0.2\ndead_band = 0.05") +
       "[marker]\nx = 0.2\ny = -0.1\nyaw = 0.03\n";

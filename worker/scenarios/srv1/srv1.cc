@@ -74,10 +74,10 @@ bool patch_in_reach(const Floor& floor, const GroupMotion& motion, const Pose& X
   // samples of the way at the greatest speed, and half the patch's rim.
   constexpr double kRobotReach_m = 0.12;
   const Pose& end = motion.reference();
-  const double astray = std::hypot(X_SE.x - end.x, X_SE.y - end.y);
+  const double miss = std::hypot(X_SE.x - end.x, X_SE.y - end.y);
   return std::any_of(floor.patches.begin(), floor.patches.end(), [&](const FrictionDisc& disc) {
-    return disc.ratio != 1 && motion.distance_from_way({disc.x_m, disc.y_m}) <
-                                  disc.radius_m + kRobotReach_m * scale + astray;
+    return disc.ratio != 1 && motion.distance_from_path({disc.x_m, disc.y_m}) <
+                                  disc.radius_m + kRobotReach_m * scale + miss;
   });
 }
 
@@ -185,18 +185,18 @@ TrialPrediction Srv1Model::observe(const Srv1Robot& robot, const Views& views,
                                              robot.effects().start_turns(trial.context.moved));
   for (const GroupMotion::Branch& branch : motion.branches()) {
     const Pose X_SA = X_SE * branch.X_EA;
-    Alternative way;
-    way.cov = predictive_covariance(X_SA, motion.drive_cov(), noise);
+    Alternative alternative;
+    alternative.cov = predictive_covariance(X_SA, motion.drive_cov(), noise);
     if (!robot.noise().tails.gaussian()) {
-      way.reading_cov = predictive_covariance(X_SA, Eigen::Matrix3d::Zero(), noise);
+      alternative.reading_cov = predictive_covariance(X_SA, Eigen::Matrix3d::Zero(), noise);
     }
     for (const View& start : starts) {
       const Pose X_WE = start.pose * X_SE * branch.X_EA;
-      const Eigen::Matrix3d cov = rotate_covariance(way.cov, X_WE.theta);
+      const Eigen::Matrix3d cov = rotate_covariance(alternative.cov, X_WE.theta);
       for (const View& end : views.observed(X_WE, cov.diagonal().head<2>().cwiseSqrt())) {
-        way.weight = branch.weight * start.weight * end.weight;
-        way.X_WM = end.pose;
-        prediction.alternatives.push_back(way);
+        alternative.weight = branch.weight * start.weight * end.weight;
+        alternative.X_WM = end.pose;
+        prediction.alternatives.push_back(alternative);
       }
     }
   }
@@ -220,7 +220,7 @@ Prediction Srv1Model::predict(const ParameterValues& values, const PredictOption
   std::set<std::size_t> needed;
   for (std::uint32_t i : wanted) needed.insert(grouping.of_trial[i]);
 
-  const auto give_up = [&](v1::Outcome outcome, const ConditionGroup& group) {
+  const auto failed_group = [&](v1::Outcome outcome, const ConditionGroup& group) {
     prediction.outcome = outcome;
     prediction.message = "command " + problem_.commands[group.command].name;
     prediction.trials.clear();
@@ -235,7 +235,7 @@ Prediction Srv1Model::predict(const ParameterValues& values, const PredictOption
       group.heading_rad = robot.effects().recover(trials_[group.first_trial].X_WS).theta;
     }
     GroupResult result = simulate_group(robot, group, options, draws(robot, options, g));
-    if (result.outcome != v1::OK) return give_up(result.outcome, grouping.groups[g]);
+    if (result.outcome != v1::OK) return failed_group(result.outcome, grouping.groups[g]);
     const MotionFacts& f = result.motion.facts();
     MotionFacts& worst = prediction.facts[grouping.groups[g].command];
     worst = {std::max(worst.roll_rad, f.roll_rad), std::max(worst.pitch_rad, f.pitch_rad),
@@ -255,7 +255,8 @@ Prediction Srv1Model::predict(const ParameterValues& values, const PredictOption
     if (simulate_alone(robot, group, motion, situation, X_SE, problem_.treads().scale(),
                        options.headings)) {
       const Motion direct = robot.run(group.drive, situation, {});
-      if (direct.outcome != MotionOutcome::kOk) return give_up(to_outcome(direct.outcome), group);
+      if (direct.outcome != MotionOutcome::kOk)
+        return failed_group(to_outcome(direct.outcome), group);
       X_SE = motion.spread_end(direct.X_SE);
     }
     if (options.means_only) {

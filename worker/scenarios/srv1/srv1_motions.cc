@@ -50,9 +50,9 @@ Pose GroupMotion::spread_end(const Pose& X_SE) const {
   return X_SE * Pose{drive_shift_[0], drive_shift_[1], drive_shift_[2]};
 }
 
-double GroupMotion::distance_from_way(const Eigen::Vector2d& place) const {
+double GroupMotion::distance_from_path(const Eigen::Vector2d& place) const {
   double nearest = place.norm();  // from the start
-  for (const Eigen::Vector2d& p : way_) nearest = std::min(nearest, (place - p).norm());
+  for (const Eigen::Vector2d& p : driven_path_) nearest = std::min(nearest, (place - p).norm());
   return nearest;
 }
 
@@ -157,8 +157,9 @@ class GroupSimulation {
     to.push_back({reading.stale_share, between(result_.motion.reference_, X_SA)});
   }
 
-  void keep_way() {
-    for (const MotionSample& s : path_) result_.motion.way_.emplace_back(s.X_SB.x, s.X_SB.y);
+  void keep_path() {
+    for (const MotionSample& s : path_)
+      result_.motion.driven_path_.emplace_back(s.X_SB.x, s.X_SB.y);
   }
 
   GroupResult take() { return std::move(result_); }
@@ -209,7 +210,7 @@ GroupResult simulate_group(Srv1Robot& robot, const ConditionGroup& group,
   const Reading reading = effects.reading();
   const bool by_place = effects.motion_context() & kStartPlace;
   bool ok = simulation.reference(by_place || reading.stale_share != 0);
-  if (ok && by_place) simulation.keep_way();
+  if (ok && by_place) simulation.keep_path();
   if (ok && (effects.motion_context() & kStartHeading) && !group.few(options.headings)) {
     ok = simulation.headings(options.headings);
   }

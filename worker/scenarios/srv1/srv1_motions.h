@@ -56,7 +56,7 @@ class GroupMotion {
   Pose spread_end(const Pose& X_SE) const;
   // Distance (m) of a place in the start frame from where the turning centre goes.  Effects of
   // place only; apart from samples 20 ms apart.
-  double distance_from_way(const Eigen::Vector2d& place) const;
+  double distance_from_path(const Eigen::Vector2d& place) const;
 
  private:
   friend class GroupSimulation;
@@ -70,7 +70,7 @@ class GroupMotion {
   MotionFacts facts_;
   double heading_error_ = 0;
   bool better_alone_ = false;
-  std::vector<Eigen::Vector2d> way_;  // with effects of place only
+  std::vector<Eigen::Vector2d> driven_path_;  // with effects of place only
 };
 
 struct GroupResult {

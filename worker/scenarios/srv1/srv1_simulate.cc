@@ -79,11 +79,12 @@ class Session {
 
     const Pose X_WS = situation_.X_WR;
     const LoggedMotion facts = facts_of(trial, command, moved);
-    const Stray stray = strayed(facts, corrected(motion.X_SE, facts, &path), &path);
-    const Pose X_SR = stray.X_SR;
-    const Pose X_SE = stale ? pose_before_end(path, reading_.stale_age_s) : stray.X_SE;
+    const Outlier outlier = make_outlier(facts, corrected(motion.X_SE, facts, &path), &path);
+    const Pose X_SR = outlier.X_SR;
+    const Pose X_SE = stale ? pose_before_end(path, reading_.stale_age_s) : outlier.X_SE;
     trial.X_WS = measured(X_WS);
-    const double turn_rad = robot_.effects().draw_start_turn(moved, stream_) + stray.start_turn_rad;
+    const double turn_rad =
+        robot_.effects().draw_start_turn(moved, stream_) + outlier.start_turn_rad;
     if (turn_rad != 0) trial.X_WS.theta = wrap_angle(trial.X_WS.theta + turn_rad);
     trial.X_WE = measured(X_WS * X_SE);
     if (sampled) {
@@ -122,27 +123,28 @@ class Session {
   }
 
   // Where the robot is at the end and where it is read, and how far off its start's heading is.
-  struct Stray {
+  struct Outlier {
     Pose X_SR, X_SE;
     double start_turn_rad = 0;
   };
 
-  Stray strayed(const LoggedMotion& facts, const Pose& X_SR, std::vector<MotionSample>* path) {
-    const auto& strays = problem_.residual.strays;
-    Stray drawn{X_SR, X_SR, 0};
-    if (!strays || !may_stray(*strays, facts)) return drawn;
-    const bool astray = stream_.bernoulli(strays->share);
-    const double amount = strays->least + (strays->most - strays->least) * stream_.uniform();
+  Outlier make_outlier(const LoggedMotion& facts, const Pose& X_SR,
+                       std::vector<MotionSample>* path) {
+    const auto& outliers = problem_.residual.outliers;
+    Outlier drawn{X_SR, X_SR, 0};
+    if (!outliers || !may_be_outlier(*outliers, facts)) return drawn;
+    const bool is_outlier = stream_.bernoulli(outliers->share);
+    const double amount = outliers->least + (outliers->most - outliers->least) * stream_.uniform();
     const bool first = stream_.bernoulli(0.5);
-    if (strays->kind == StrayKind::kTurned) {
-      drawn.start_turn_rad = astray ? -amount : 0;
+    if (outliers->kind == OutlierKind::kTurned) {
+      drawn.start_turn_rad = is_outlier ? -amount : 0;
       return drawn;
     }
     const Pose X_WE = facts.X_WS * X_SR;
-    const Pose end =
-        astray ? stray_end(*strays, facts, X_WE, amount, first) : rest_end(*strays, facts, X_WE);
+    const Pose end = is_outlier ? outlier_end(*outliers, facts, X_WE, amount, first)
+                                : rest_end(*outliers, facts, X_WE);
     drawn.X_SE = between(facts.X_WS, end);
-    if (strays->kind == StrayKind::kSide) {
+    if (outliers->kind == OutlierKind::kSide) {
       drawn.X_SR = shifted(X_SR, local_difference(X_SR, drawn.X_SE), path);
     }
     return drawn;

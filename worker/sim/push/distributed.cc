@@ -36,7 +36,7 @@ class DistributedPush final : public PushSimulator::Engine {
   Motion run(std::span<const FingerSample> finger, const Floor& table,
              std::vector<MotionSample>* path, double interval_s) override {
     reset(table, Eigen::Vector3d::Zero());
-    return follow(FingerWay(finger), /*at_rest=*/table.tilt_rad == 0, path, interval_s);
+    return follow(FingerPath(finger), /*at_rest=*/table.tilt_rad == 0, path, interval_s);
   }
 
   Motion slide(const Eigen::Vector2d& velocity, double spin, const Floor& table,
@@ -44,12 +44,12 @@ class DistributedPush final : public PushSimulator::Engine {
     const Eigen::Vector2d at_centre = velocity + spin * Eigen::Vector2d(-centre_[1], centre_[0]);
     reset(table, {at_centre[0], at_centre[1], spin});
     const FingerSample nowhere[] = {{0, kNowhere}, {1e-9, kNowhere}};
-    return follow(FingerWay(nowhere), false, path, interval_s);
+    return follow(FingerPath(nowhere), false, path, interval_s);
   }
 
  private:
   void reset(const Floor& table, const Eigen::Vector3d& velocity);
-  Motion follow(const FingerWay& way, bool at_rest, std::vector<MotionSample>* path,
+  Motion follow(const FingerPath& finger_path, bool at_rest, std::vector<MotionSample>* path,
                 double interval_s);
   void advance(const Eigen::Vector2d& from, const Eigen::Vector2d& to, double dt);
   void place_points(const Pose& X_SM, double dt);
@@ -67,11 +67,11 @@ class DistributedPush final : public PushSimulator::Engine {
            std::abs(velocity_[2]) < kRestTurn_rad_s;
   }
   // The step from which on the finger may touch a piece that rests now; none: never.
-  std::optional<long> next_touch(const FingerWay& way, double t_s, double dt_s) const {
+  std::optional<long> next_touch(const FingerPath& finger_path, double t_s, double dt_s) const {
     const double reach = settings_.finger_radius_m + settings_.contact_margin_m + kNear_m;
-    const auto when = way.approach(t_s, centroid_pose(X_SM_), settings_.corners, reach);
+    const auto when = finger_path.approach(t_s, centroid_pose(X_SM_), settings_.corners, reach);
     if (!when) return std::nullopt;
-    return std::max(0L, static_cast<long>((*when - way.begin_s()) / dt_s));
+    return std::max(0L, static_cast<long>((*when - finger_path.begin_s()) / dt_s));
   }
 
   std::vector<FacePoint> face_;
@@ -184,10 +184,10 @@ MotionSample DistributedPush::state(double t_s) const {
   return sample;
 }
 
-Motion DistributedPush::follow(const FingerWay& way, bool at_rest, std::vector<MotionSample>* path,
-                               double interval_s) {
+Motion DistributedPush::follow(const FingerPath& finger_path, bool at_rest,
+                               std::vector<MotionSample>* path, double interval_s) {
   const double dt = 1 / (settings_.step_rate_hz * settings_.sub_steps);
-  const double begin = way.begin_s();
+  const double begin = finger_path.begin_s();
   PathRecorder recorder(path, interval_s);
   recorder.add(state(begin));
   Motion motion;
@@ -195,9 +195,9 @@ Motion DistributedPush::follow(const FingerWay& way, bool at_rest, std::vector<M
   double rest_s = at_rest ? kRestTime_s : 0;
   double t = begin, moved_until = begin;
   long steps = 0;
-  for (long k = 0; t < way.end_s() + kSettleLimit_s; ++k) {
+  for (long k = 0; t < finger_path.end_s() + kSettleLimit_s; ++k) {
     if (rest_s >= kRestTime_s) {
-      const auto touched = t < way.end_s() ? next_touch(way, t, dt) : std::nullopt;
+      const auto touched = t < finger_path.end_s() ? next_touch(finger_path, t, dt) : std::nullopt;
       if (!touched) {
         motion.outcome = MotionOutcome::kOk;
         break;
@@ -207,7 +207,7 @@ Motion DistributedPush::follow(const FingerWay& way, bool at_rest, std::vector<M
     }
     t = begin + static_cast<double>(k) * dt;
     const double next = begin + static_cast<double>(k + 1) * dt;
-    advance(way.at(t), way.at(next), dt);
+    advance(finger_path.at(t), finger_path.at(next), dt);
     t = next;
     ++steps;
     if (!is_sane({velocity_[0], velocity_[1], 0}, {0, 0, velocity_[2]})) {
@@ -220,7 +220,7 @@ Motion DistributedPush::follow(const FingerWay& way, bool at_rest, std::vector<M
   }
   motion.duration_s = static_cast<double>(steps) * dt;
   motion.X_SE = state(t).X_SB;
-  motion.rest_time_s = std::max(0.0, moved_until - way.end_s());
+  motion.rest_time_s = std::max(0.0, moved_until - finger_path.end_s());
   recorder.finish();
   return motion;
 }

@@ -32,10 +32,10 @@ class LimitSurface final : public PushSimulator::Engine {
 
   Motion run(std::span<const FingerSample> finger, const Floor& /*table*/,
              std::vector<MotionSample>* path, double interval_s) override {
-    const FingerWay way(finger);
+    const FingerPath finger_path(finger);
     PathRecorder recorder(path, interval_s);
     Pose X_SC;
-    recorder.add(state(way.begin_s(), X_SC));
+    recorder.add(state(finger_path.begin_s(), X_SC));
     for (std::size_t i = 1; i < finger.size(); ++i) {
       const FingerSample& a = finger[i - 1];
       const FingerSample& b = finger[i];
@@ -52,7 +52,7 @@ class LimitSurface final : public PushSimulator::Engine {
     recorder.finish();
     Motion motion;
     motion.X_SE = X_SC;
-    motion.duration_s = way.end_s() - way.begin_s();
+    motion.duration_s = finger_path.end_s() - finger_path.begin_s();
     return motion;
   }
 

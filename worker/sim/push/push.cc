@@ -26,7 +26,7 @@ std::vector<Eigen::Vector2d> support_corners(const PushSettings& settings) {
   return supports;
 }
 
-Eigen::Vector2d FingerWay::at(double t_s) const {
+Eigen::Vector2d FingerPath::at(double t_s) const {
   const auto after =
       std::upper_bound(samples_.begin(), samples_.end(), t_s,
                        [](double t, const FingerSample& sample) { return t < sample.t_s; });
@@ -36,9 +36,9 @@ Eigen::Vector2d FingerWay::at(double t_s) const {
   return a.p_SF + (t_s - a.t_s) / (after->t_s - a.t_s) * (after->p_SF - a.p_SF);
 }
 
-std::optional<double> FingerWay::approach(double t_s, const Pose& X_SC,
-                                          std::span<const Eigen::Vector2d> corners,
-                                          double reach_m) const {
+std::optional<double> FingerPath::approach(double t_s, const Pose& X_SC,
+                                           std::span<const Eigen::Vector2d> corners,
+                                           double reach_m) const {
   const double c = std::cos(X_SC.theta);
   const double s = std::sin(X_SC.theta);
   const auto clear = [&](const Eigen::Vector2d& p_SF) {

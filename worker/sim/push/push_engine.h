@@ -27,10 +27,10 @@ std::unique_ptr<PushSimulator::Engine> make_limit_surface(const PushSettings& se
 std::unique_ptr<PushSimulator::Engine> make_distributed_push(const PushSettings& settings);
 
 // The finger's way: straight between samples, standing still before and after.
-class FingerWay {
+class FingerPath {
  public:
   // REQUIRES: samples at increasing times that outlive this.
-  explicit FingerWay(std::span<const FingerSample> samples) : samples_(samples) {}
+  explicit FingerPath(std::span<const FingerSample> samples) : samples_(samples) {}
   Eigen::Vector2d at(double t_s) const;
   double begin_s() const { return samples_.front().t_s; }
   double end_s() const { return samples_.back().t_s; }

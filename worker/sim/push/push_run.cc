@@ -21,7 +21,7 @@ class BulletPush final : public PushSimulator::Engine {
   Motion run(std::span<const FingerSample> finger, const Floor& table,
              std::vector<MotionSample>* path, double interval_s) override {
     world_.reset(table, Eigen::Vector2d::Zero(), 0);
-    return follow(FingerWay(finger), /*at_rest=*/table.tilt_rad == 0, path, interval_s);
+    return follow(FingerPath(finger), /*at_rest=*/table.tilt_rad == 0, path, interval_s);
   }
 
   Motion slide(const Eigen::Vector2d& velocity, double spin, const Floor& table,
@@ -29,28 +29,28 @@ class BulletPush final : public PushSimulator::Engine {
     world_.reset(table, velocity, spin);
     const Eigen::Vector2d away(1e3, 1e3);
     const FingerSample nowhere[] = {{0, away}, {1e-9, away}};
-    return follow(FingerWay(nowhere), false, path, interval_s);
+    return follow(FingerPath(nowhere), false, path, interval_s);
   }
 
  private:
-  Motion follow(const FingerWay& way, bool at_rest, std::vector<MotionSample>* path,
+  Motion follow(const FingerPath& finger_path, bool at_rest, std::vector<MotionSample>* path,
                 double interval_s);
 
   // The step at which a piece that rests now is next touched, less the settling; none: never.
-  std::optional<long> next_touch(const FingerWay& way, double t_s, double dt_s) const {
+  std::optional<long> next_touch(const FingerPath& finger_path, double t_s, double dt_s) const {
     const double reach = settings_.finger_radius_m + settings_.contact_margin_m + kApproach_m;
-    const auto when = way.approach(t_s, world_.state(t_s).X_SB, settings_.corners, reach);
+    const auto when = finger_path.approach(t_s, world_.state(t_s).X_SB, settings_.corners, reach);
     if (!when) return std::nullopt;
-    return std::max(0L, static_cast<long>((*when - way.begin_s()) / dt_s) - kSettleSteps);
+    return std::max(0L, static_cast<long>((*when - finger_path.begin_s()) / dt_s) - kSettleSteps);
   }
 
   PushWorld world_;
 };
 
-Motion BulletPush::follow(const FingerWay& way, bool at_rest, std::vector<MotionSample>* path,
-                          double interval_s) {
+Motion BulletPush::follow(const FingerPath& finger_path, bool at_rest,
+                          std::vector<MotionSample>* path, double interval_s) {
   const double dt = 1 / (settings_.step_rate_hz * settings_.sub_steps);
-  const double begin = way.begin_s();
+  const double begin = finger_path.begin_s();
   PathRecorder recorder(path, interval_s);
   Motion motion;
   motion.outcome = MotionOutcome::kNeverRested;
@@ -60,9 +60,9 @@ Motion BulletPush::follow(const FingerWay& way, bool at_rest, std::vector<Motion
   double t = begin;
   double moved_until = begin;
   long steps = 0;
-  for (long k = 0; t < way.end_s() + kSettleLimit_s; ++k) {
+  for (long k = 0; t < finger_path.end_s() + kSettleLimit_s; ++k) {
     if (rest_s >= kRestTime_s) {
-      const auto touch = t < way.end_s() ? next_touch(way, t, dt) : std::nullopt;
+      const auto touch = t < finger_path.end_s() ? next_touch(finger_path, t, dt) : std::nullopt;
       if (!touch) {
         motion.outcome = MotionOutcome::kOk;
         break;
@@ -76,7 +76,7 @@ Motion BulletPush::follow(const FingerWay& way, bool at_rest, std::vector<Motion
     t = begin + static_cast<double>(k) * dt;
     const double next = begin + static_cast<double>(k + 1) * dt;
     const btTransform before = world_.metric_transform();
-    world_.step(way.at(t), way.at(next), dt);
+    world_.step(finger_path.at(t), finger_path.at(next), dt);
     ++steps;
     t = next;
     if (!is_sane(world_.metric_velocity(), world_.body().getAngularVelocity())) {
@@ -102,7 +102,7 @@ Motion BulletPush::follow(const FingerWay& way, bool at_rest, std::vector<Motion
   motion.max_pitch_rad = clamped_asin(max_pitch_sine);
   if (motion.outcome == MotionOutcome::kDiverged) return motion;
   motion.X_SE = world_.state(t).X_SB;
-  motion.rest_time_s = std::max(0.0, moved_until - way.end_s());
+  motion.rest_time_s = std::max(0.0, moved_until - finger_path.end_s());
   recorder.finish();
   return motion;
 }

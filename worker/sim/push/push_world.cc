@@ -11,7 +11,7 @@ namespace gapfarm {
 namespace {
 
 constexpr double kSupportRadius_m = 5e-4;
-// The finger is looked at when it is this near, and may come so much nearer in a step.
+// The finger is looked at when it is this near, and may come so much closer in a step.
 constexpr double kTouchRange_m = 2e-3;
 constexpr double kLeastFriction = 0.05;  // share that a falling friction keeps
 

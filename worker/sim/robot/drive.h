@@ -33,7 +33,7 @@ class SideMotion {
 
   SideDrive drive_;
   double duration_s_;
-  double stop_speed_m_s_ = 0;  // when the motors are told to stop
+  double stop_speed_m_s_ = 0;  // when the motors are commanded to stop
   double stop_travel_m_ = 0;
   double still_s_ = 0;
 };

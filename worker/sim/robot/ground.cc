@@ -11,7 +11,7 @@ using std::numbers::pi;
 
 // Rolling and swivelling have some drag; the projection needs a ratio above 0.
 constexpr double kLeastRatio = 1e-4;
-// A robot that neither is told to move nor moves is left alone until it is told to.
+// A robot that neither is commanded to move nor moves is left alone until it is commanded to.
 constexpr double kStillFor_s = 0.1;
 constexpr double kStillSpeed_m_s = 1e-4;
 constexpr double kStillTurn_rad_s = 1e-3;

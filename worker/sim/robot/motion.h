@@ -17,8 +17,8 @@ namespace gapfarm {
 enum class RobotModel { kTreads, kWheels };
 enum class WheelShape { kSphere, kCylinder, kBox, kHull };
 
-// Builds the world and the robot; changing any of it means a new simulator.  What is 0 here has to
-// be said: it is of the robot.
+// Builds the world and the robot; changing any of it means a new simulator.  What
+// is 0 here has to be stated: it is of the robot.
 struct SimSettings {
   RobotModel robot = RobotModel::kTreads;
   double mass_kg = 0;
@@ -57,7 +57,7 @@ struct SideDrive {
 
 struct DriveInput {
   SideDrive left, right;
-  double duration_s = 1;  // the motors run this long, then are told zero speed
+  double duration_s = 1;  // the motors run this long, then are commanded zero speed
 
   bool operator==(const DriveInput&) const = default;
 };

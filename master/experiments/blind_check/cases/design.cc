@@ -98,7 +98,7 @@ class Drafts {
     truth.level = level.name;
     truth.robot = draw_robot(problem_, stream);
     truth.seed = stream.bits() >> 1;  // leaves room for an offset
-    if (kind == CaseKind::kOutside) truth.left_out = problem_.table().effects()[effects[0]].name;
+    if (kind == CaseKind::kOutside) truth.excluded = problem_.table().effects()[effects[0]].name;
     cases.push_back(std::move(truth));
     for (std::size_t i = 0; i < effects.size(); ++i) {
       Stream draws({settings_.seed, Purpose::kSimulation, kDesignStream, index, i + 1});
@@ -133,7 +133,7 @@ void draft_cases(const DesignSettings& settings, const std::vector<std::size_t>&
     const std::size_t b = (a + 1 + stream.below(effects.size() - 1)) % effects.size();
     drafts.add(CaseKind::kPair, settings.sizes[0], {effects[a], effects[b]});
   }
-  for (unsigned i = 0; i < settings.left_out; ++i) {
+  for (unsigned i = 0; i < settings.excluded; ++i) {
     drafts.add(CaseKind::kOutside, settings.sizes[0], {effects[i % effects.size()]});
   }
 }
@@ -161,8 +161,8 @@ v1::Task predict_task(const Problem& planned, const Truth& truth) {
   return task;
 }
 
-void tell(const ParameterTable& table, const Arena& arena, const v1::TaskResult& result,
-          const v1::PredictResult& base, Sizing& sizing) {
+void record_size(const ParameterTable& table, const Arena& arena, const v1::TaskResult& result,
+                 const v1::PredictResult& base, Sizing& sizing) {
   const bool by_spread = !table.effects()[sizing.effect].moves_means();
   sizing.search.tell(result.outcome() == v1::OK ? size_of(base, result.predict(), by_spread)
                                                 : std::nullopt);
@@ -209,7 +209,7 @@ Status search_strengths(const Problem& planned, Drafts& drafts, Farm& farm,
     ASSIGN_OR_RETURN(const auto results, farm.run(hash, round));
     for (std::size_t i = 0; i < open.size(); ++i) {
       Sizing& sizing = drafts.sizings[open[i]];
-      tell(table, drafts.arena(), results[i], base[sizing.in_case].predict(), sizing);
+      record_size(table, drafts.arena(), results[i], base[sizing.in_case].predict(), sizing);
     }
   }
 }

@@ -24,11 +24,11 @@ Result<SizeLevel> size_level(const std::string& word);
 
 struct DesignSettings {
   std::vector<std::string> effects;  // empty: the whole catalogue
-  std::vector<SizeLevel> sizes;      // pairs and left-out effects have the first
+  std::vector<SizeLevel> sizes;      // pairs and excluded effects have the first
   unsigned per_effect = 1;           // cases an effect and size
   unsigned nulls = 60;
   unsigned pairs = 19;
-  unsigned left_out = 19;
+  unsigned excluded = 19;
   std::uint64_t seed = 1;
 };
 
@@ -40,7 +40,7 @@ struct OutOfReach {
 };
 
 struct BlindDesign {
-  std::vector<Truth> cases;  // shuffled: names tell nothing
+  std::vector<Truth> cases;  // shuffled: names show nothing
   std::vector<OutOfReach> out_of_reach;
 };
 

@@ -121,7 +121,7 @@ StrengthSearch::StrengthSearch(double target, double tolerance)
     : target_(target), tolerance_(tolerance), strength_(kFirstStrength) {}
 
 void StrengthSearch::tell(std::optional<double> size) {
-  ++told_;
+  ++evaluated_;
   const double log_strength = std::log(strength_);
   if (!size || !std::isfinite(*size)) {
     above_ = Point{log_strength, std::nullopt};
@@ -135,7 +135,7 @@ void StrengthSearch::tell(std::optional<double> size) {
     const Point point{log_strength, share > 1e-12 ? std::optional(std::log(share)) : std::nullopt};
     (share < 1 ? below_ : above_) = point;
   }
-  if (told_ >= kMostSteps || (below_ && !above_ && strength_ >= 1) ||
+  if (evaluated_ >= kMostSteps || (below_ && !above_ && strength_ >= 1) ||
       (above_ && !below_ && strength_ <= kLeastStrength)) {
     state_ = State::kOutOfReach;
     return;
@@ -151,7 +151,7 @@ void StrengthSearch::propose() {
     const double width = above_->log_strength - below_->log_strength;
     next = below_->log_strength + width / 2;
     // Every third step halves, so that a kink cannot hold the secants up.
-    if (below_->log_excess && above_->log_excess && told_ % 3 != 0) {
+    if (below_->log_excess && above_->log_excess && evaluated_ % 3 != 0) {
       const double lower = *below_->log_excess;
       next = below_->log_strength - lower * width / (*above_->log_excess - lower);
       next = std::clamp(next, below_->log_strength + 0.02 * width,

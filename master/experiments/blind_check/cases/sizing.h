@@ -66,7 +66,7 @@ class StrengthSearch {
   bool done() const { return state_ != State::kSearching; }
   bool found() const { return state_ == State::kFound; }
   double strength() const { return strength_; }  // to try next, or found
-  double size() const { return size_; }          // at the last strength told
+  double size() const { return size_; }          // at the last strength tried
   // No value: the simulation did not survive this strength, which is too much then.
   void tell(std::optional<double> size);
 
@@ -84,7 +84,7 @@ class StrengthSearch {
   double strength_;
   double size_ = 1;
   std::optional<Point> below_, above_;
-  unsigned told_ = 0;
+  unsigned evaluated_ = 0;
 };
 
 }  // namespace gapfarm

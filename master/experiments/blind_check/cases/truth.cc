@@ -10,9 +10,9 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-const std::vector<std::string>& kind_words() {
-  static const std::vector<std::string> words = {"null", "single", "pair", "outside"};
-  return words;
+const std::vector<std::string>& kind_names() {
+  static const std::vector<std::string> names = {"null", "single", "pair", "outside"};
+  return names;
 }
 
 // A number, or the word of a choice as its index.  None for anything else: an effect outside the
@@ -56,7 +56,7 @@ const Effect* catalogue_entry(const std::string& name) {
 }
 
 const char* case_kind_name(CaseKind kind) {
-  return kind_words()[static_cast<std::size_t>(kind)].c_str();
+  return kind_names()[static_cast<std::size_t>(kind)].c_str();
 }
 
 std::string answer_of(const Truth& truth) {
@@ -81,7 +81,7 @@ std::string format_truth(const Truth& truth) {
   }
   const Json json = {{"case", truth.id},          {"kind", case_kind_name(truth.kind)},
                      {"effects", effects},        {"size", sizes},
-                     {"level", truth.level},      {"left_out", truth.left_out},
+                     {"level", truth.level},      {"left_out", truth.excluded},
                      {"robot", truth.robot},      {"seed", truth.seed},
                      {"answer", answer_of(truth)}};
   return json_text(json, 1) + "\n";
@@ -113,8 +113,8 @@ Result<Truth> parse_truth(const std::string& text, const std::string& file, cons
   }
   const Json level = json.value("level", Json());
   if (level.is_string()) truth.level = level.get<std::string>();
-  const Json left_out = json.value("left_out", Json());
-  if (left_out.is_string()) truth.left_out = left_out.get<std::string>();
+  const Json excluded = json.value("left_out", Json());
+  if (excluded.is_string()) truth.excluded = excluded.get<std::string>();
   const Json seed = json.value("seed", Json());
   if (seed.is_number_unsigned()) truth.seed = seed.get<std::uint64_t>();
   const Json robot = json.value("robot", Json::object());

@@ -31,7 +31,7 @@ struct Truth {
   CaseKind kind = CaseKind::kNull;
   std::string level;  // of the sizes: "clear", "subtle"; may be empty
   std::vector<TrueEffect> effects;
-  std::string left_out;  // effect that the diagnosis does without; empty: none
+  std::string excluded;  // effect that the diagnosis does without; empty: none
   // Base parameters that are not the config's, by key of the parameter table.
   std::map<std::string, double> robot;
   std::uint64_t seed = 0;  // of plan and noise

@@ -14,7 +14,7 @@ std::optional<RoundShape> roundest(const std::vector<UrdfGeometry>& shapes,
     const bool ball = shape.shape == UrdfShape::kSphere;
     if (!ball && shape.shape != UrdfShape::kCylinder) continue;
     if (shape.radius_m <= 0) continue;
-    // A cylinder tells its axis; a ball only when there is none.
+    // A cylinder shows its axis; a ball only when there is none.
     const bool better =
         !best || (best->ball && !ball) || (best->ball == ball && shape.radius_m > best->radius_m);
     if (!better) continue;

@@ -58,7 +58,7 @@ void Reader::read_inertial(const XMLElement& element, UrdfLink& link) {
   }
   if (!unread.empty()) {
     note(inertial.line, "the mass of link " + quoted_word(link.name) + " holds the expression " +
-                            quoted_word(unread) + " and was left out; " + kExpand);
+                            quoted_word(unread) + " and was omitted; " + kExpand);
     return;
   }
   link.inertial = inertial;
@@ -96,7 +96,7 @@ void Reader::read_geometry(const XMLElement& element, std::vector<UrdfGeometry>&
       to.push_back(read);
     } else {
       note(read.line,
-           "a shape holds the expression " + quoted_word(unread) + " and was left out; " + kExpand);
+           "a shape holds the expression " + quoted_word(unread) + " and was omitted; " + kExpand);
     }
   }
 }

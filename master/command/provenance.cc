@@ -1,0 +1,93 @@
+#include "master/command/provenance.h"
+
+#include <filesystem>
+
+#include "common/base/try.h"
+#include "common/json/json.h"
+#include "common/trials/files.h"
+
+namespace gapfarm {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+std::string word(const Json& json, const char* key) {
+  return json.contains(key) && json[key].is_string() ? json[key].get<std::string>() : "";
+}
+
+Result<Provenance> read_stamp(const std::string& file) {
+  ASSIGN_OR_RETURN(const auto text, read_text_file(file));
+  const Json json = parse_json(text);
+  if (!json.is_object() || word(json, "problem").empty()) {
+    return Error{file + ": does not say what was asked; choose another --out"};
+  }
+  return Provenance{word(json, "command"), word(json, "problem"),
+                    json.value("options", Json::object()), json.value("about", Json::object()),
+                    word(json, "build")};
+}
+
+// "configs/srv1.toml, a.csv, b.csv".
+std::string listed_names(const Json& about) {
+  std::string text;
+  for (const auto& [key, value] : about.items()) {
+    for (const Json& entry : value.is_array() ? value : Json::array({value})) {
+      if (!entry.is_string()) continue;
+      text += (text.empty() ? "" : ", ") + entry.get<std::string>();
+    }
+  }
+  return text.empty() ? "another problem" : text;
+}
+
+// Names of the options that differ.
+std::string differing(const Json& a, const Json& b) {
+  std::string names;
+  for (const auto& [key, value] : b.items()) {
+    if (a.contains(key) && a[key] == value) continue;
+    names += (names.empty() ? "" : ", ") + key;
+  }
+  return names.empty() ? "options" : names;
+}
+
+}  // namespace
+
+std::string format_stamp(const Provenance& stamp) {
+  const Json json = {{"command", stamp.command},
+                     {"problem", stamp.problem},
+                     {"options", stamp.options},
+                     {"about", stamp.about},
+                     {"build", stamp.build}};
+  return json_text(json, 2) + "\n";
+}
+
+Result<FolderState> compare_stamp(const std::string& folder, const std::string& result,
+                                  const Provenance& stamp, bool force) {
+  std::error_code code;
+  const std::string file = (fs::path(folder) / kStampFile).string();
+  const bool finished = fs::exists(fs::path(folder) / result, code);
+  if (!fs::exists(file, code)) {
+    if (!finished) return FolderState::kNew;
+    return Error{folder + ": holds results that do not say of what; choose another --out"};
+  }
+  ASSIGN_OR_RETURN(const auto there, read_stamp(file));
+  const std::string of =
+      folder + ": holds what '" + there.command + "' found of " + listed_names(there.about);
+  if (there.command != stamp.command || there.problem != stamp.problem) {
+    return Error{of + ", and this is another question (" + listed_names(stamp.about) +
+                 "); choose another --out"};
+  }
+  if (there.options != stamp.options) {
+    // A mistake in the options found late leaves simulations, which are of use to any.
+    if (force || !finished) return FolderState::kReplaced;
+    return Error{of + " with other " + differing(there.options, stamp.options) +
+                 "; choose another --out, or --force to replace it"};
+  }
+  if (finished && there.build != stamp.build && !force) {
+    return Error{of +
+                 " by another build of gapfarm; choose another --out, or --force to replace "
+                 "it"};
+  }
+  return FolderState::kSame;
+}
+
+}  // namespace gapfarm

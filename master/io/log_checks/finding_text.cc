@@ -1,0 +1,43 @@
+#include "master/io/log_checks/finding_text.h"
+
+#include <map>
+
+namespace gapfarm {
+
+std::string finding_phrase(const SanityFinding& finding) {
+  static const std::map<std::string, std::string> phrases = {
+      {"axes_swapped", "x and y are swapped"},
+      {"axis_mirrored", "an axis is mirrored"},
+      {"heading_flipped", "headings count clockwise"},
+      {"heading_turned", "headings are counted from another axis"},
+      {"sides_swapped", "left and right are exchanged"},
+      {"direction_reversed", "the motors run backward"},
+      {"unit_error", "it is in another unit"},
+      {"robot_out_of_bounds", "this is no robot that the scenario can be"},
+      {"base_not_simulated", "the base model cannot be simulated"},
+      {"base_on_bounds", "the tuned base sits on its bounds"},
+      {"base_misses", "the tuned base misses by far more than the noise"},
+      {"unfinished", "a simulation failed on the way"},
+      {"no_motion", "nothing moved"},
+      {"too_few_trials", "there are too few trials"},
+      {"duplicates", "trials are repeated"},
+      {"clock_backward", "time runs backward"},
+      {"frames_apart", "finger and pieces are not in one frame"},
+      {"impossible_rows", "some rows cannot be"}};
+  const auto found = phrases.find(finding.name);
+  return found == phrases.end() ? finding.name : found->second;
+}
+
+const char* severity_name(Severity severity) {
+  switch (severity) {
+    case Severity::kNote:
+      return "note";
+    case Severity::kWarning:
+      return "doubt";
+    case Severity::kUnusable:
+      return "unusable";
+  }
+  return "note";
+}
+
+}  // namespace gapfarm
