@@ -10,7 +10,10 @@ const std::vector<std::string> kLocalNames = {"nelder_mead", "subplex", "bobyqa"
 
 const std::vector<std::string>& optimiser_names() {
   static const std::vector<std::string> names = {
-      "genetic", "differential_evolution", "cma_es", "local", "de_simplex", "random"};
+      "genetic",
+#define METHOD(name, file, Class, summary) #name,
+#include "common/config/methods.inc"
+  };
   return names;
 }
 

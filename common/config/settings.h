@@ -19,14 +19,11 @@ enum class MutationKind { kGaussian, kUniformReset };
 // mutation.
 enum class VariationOrder { kSeparate, kSequence };
 
-// Rows of master/evolve/optimisers.cc, in their order.
+// The genetic algorithm, then the rows of methods.inc.
 enum class OptimiserKind {
   kGenetic,
-  kDifferentialEvolution,
-  kCmaEs,
-  kLocal,
-  kDeSimplex,
-  kRandom,
+#define METHOD(name, file, Class, summary) k##Class,
+#include "common/config/methods.inc"
 };
 enum class LocalSearchKind { kNelderMead, kSubplex, kBobyqa, kCobyla };
 

@@ -1,5 +1,5 @@
-// What a subcommand is.  Adding one takes its file with a setup function, that function's
-// declaration here, and a row in the table of subcommands.cc.
+// What a command is.  Adding one takes a row in commands.inc and its file, which has its setup
+// function; a row without a file stops the build with the name of the file.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -24,31 +24,7 @@ struct Subcommand {
 
 std::span<const Subcommand> subcommands();
 
-SubcommandRun setup_blind_check(CLI::App& app);
-SubcommandRun setup_check(CLI::App& app);
-SubcommandRun setup_compare(CLI::App& app);
-SubcommandRun setup_completion(CLI::App& app);
-SubcommandRun setup_crossfit(CLI::App& app);
-SubcommandRun setup_determine(CLI::App& app);
-SubcommandRun setup_diagnose(CLI::App& app);
-SubcommandRun setup_drive(CLI::App& app);
-SubcommandRun setup_effects(CLI::App& app);
-SubcommandRun setup_evolve(CLI::App& app);
-SubcommandRun setup_export(CLI::App& app);
-SubcommandRun setup_horizons(CLI::App& app);
-SubcommandRun setup_import(CLI::App& app);
-SubcommandRun setup_influence(CLI::App& app);
-SubcommandRun setup_init(CLI::App& app);
-SubcommandRun setup_keys(CLI::App& app);
-SubcommandRun setup_plan(CLI::App& app);
-SubcommandRun setup_predict(CLI::App& app);
-SubcommandRun setup_replay(CLI::App& app);
-SubcommandRun setup_report(CLI::App& app);
-SubcommandRun setup_resume(CLI::App& app);
-SubcommandRun setup_robot(CLI::App& app);
-SubcommandRun setup_serve(CLI::App& app);
-SubcommandRun setup_simulate(CLI::App& app);
-SubcommandRun setup_stability(CLI::App& app);
-SubcommandRun setup_status(CLI::App& app);
+#define COMMAND(folder, file, name, summary, group) SubcommandRun setup_##file(CLI::App& app);
+#include "master/cli/commands.inc"
 
 }  // namespace gapfarm

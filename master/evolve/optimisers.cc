@@ -5,15 +5,18 @@
 
 #include "common/base/try.h"
 #include "master/evolve/genetic/genetic.h"
-#include "master/evolve/methods/cma_es.h"
-#include "master/evolve/methods/de_simplex.h"
-#include "master/evolve/methods/random_search.h"
 #include "master/evolve/methods/search_optimiser.h"
 
 namespace gapfarm {
+
+using MakeMethod = std::unique_ptr<SearchMethod>(const MethodSetup& setup);
+#define METHOD(name, file, Class, summary) MakeMethod make_method_##Class;
+#include "common/config/methods.inc"
+
 namespace {
 
-Result<std::unique_ptr<SearchOptimiser>> wrapped(const OptimiserSetup& setup, auto make_method) {
+Result<std::unique_ptr<SearchOptimiser>> wrapped(const OptimiserSetup& setup,
+                                                 MakeMethod& make_method) {
   if (setup.genes.empty()) {
     return Error{"there is nothing to evolve: no gene; give at least one parameter a search range"};
   }
@@ -33,24 +36,22 @@ Result<std::unique_ptr<SearchOptimiser>> wrapped(const OptimiserSetup& setup, au
   return std::make_unique<SearchOptimiser>(optimisers()[row].name, setup, make_method(method));
 }
 
-template <class Method>
+template <MakeMethod& make_method>
 Result<std::unique_ptr<Optimiser>> make(const OptimiserSetup& setup) {
-  ASSIGN_OR_RETURN(
-      auto made, wrapped(setup, [](const MethodSetup& m) { return std::make_unique<Method>(m); }));
+  ASSIGN_OR_RETURN(auto made, wrapped(setup, make_method));
   return std::unique_ptr<Optimiser>(std::move(made));
 }
 
-template <class Method>
+template <MakeMethod& make_method>
 Result<std::unique_ptr<Optimiser>> restore(const OptimiserSetup& setup, std::string_view state) {
-  ASSIGN_OR_RETURN(
-      auto made, wrapped(setup, [](const MethodSetup& m) { return std::make_unique<Method>(m); }));
+  ASSIGN_OR_RETURN(auto made, wrapped(setup, make_method));
   RETURN_IF_ERROR(made->restore(state));
   return std::unique_ptr<Optimiser>(std::move(made));
 }
 
-template <class Method>
+template <MakeMethod& make_method>
 constexpr OptimiserRow row(OptimiserKind kind, const char* name, const char* summary) {
-  return {kind, name, summary, make<Method>, restore<Method>};
+  return {kind, name, summary, make<make_method>, restore<make_method>};
 }
 
 const OptimiserRow& row_of(const OptimiserSetup& setup) {
@@ -65,13 +66,8 @@ std::span<const OptimiserRow> optimisers() {
   static constexpr std::array rows = {
       OptimiserRow{Kind::kGenetic, "genetic", "genetic algorithm with self-adapted operators",
                    make_genetic, restore_genetic},
-      row<DifferentialEvolution>(Kind::kDifferentialEvolution, "differential_evolution",
-                                 "DE/rand/1/bin"),
-      row<CmaEs>(Kind::kCmaEs, "cma_es", "CMA-ES, restarted with growing populations"),
-      row<LocalSearch>(Kind::kLocal, "local", "local search of NLopt, begun again at random"),
-      row<DeSimplex>(Kind::kDeSimplex, "de_simplex",
-                     "differential evolution, then a simplex from its best"),
-      row<RandomSearch>(Kind::kRandom, "random", "uniform draws, the baseline"),
+#define METHOD(name, file, Class, summary) row<make_method_##Class>(Kind::k##Class, #name, summary),
+#include "common/config/methods.inc"
   };
   return rows;
 }

@@ -112,11 +112,11 @@ Status check_alike(const std::vector<Variant>& variants) {
 
 void add_random_search(std::vector<Variant>& variants) {
   for (const Variant& variant : variants) {
-    if (variant.config.evolution.optimiser.kind == OptimiserKind::kRandom) return;
+    if (variant.config.evolution.optimiser.kind == OptimiserKind::kRandomSearch) return;
   }
   Variant random{"random search", variants.front().config};
   random.config.evolution.optimiser = {};
-  random.config.evolution.optimiser.kind = OptimiserKind::kRandom;
+  random.config.evolution.optimiser.kind = OptimiserKind::kRandomSearch;
   variants.push_back(std::move(random));
 }
 

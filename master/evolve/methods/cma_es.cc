@@ -219,4 +219,6 @@ Status CmaEs::restore(const v1::MethodState& message) {
   return {};
 }
 
+GAPFARM_METHOD(CmaEs)
+
 }  // namespace gapfarm

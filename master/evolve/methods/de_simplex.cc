@@ -58,4 +58,6 @@ Status DeSimplex::restore(const v1::MethodState& message) {
   return simplex_.restore(state.simplex());
 }
 
+GAPFARM_METHOD(DeSimplex)
+
 }  // namespace gapfarm

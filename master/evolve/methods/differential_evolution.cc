@@ -120,4 +120,6 @@ Status DifferentialEvolution::restore(const v1::MethodState& message) {
   return {};
 }
 
+GAPFARM_METHOD(DifferentialEvolution)
+
 }  // namespace gapfarm

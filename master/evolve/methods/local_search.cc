@@ -156,4 +156,6 @@ Status LocalSearch::restore(const v1::MethodState& message) {
   return {};
 }
 
+GAPFARM_METHOD(LocalSearch)
+
 }  // namespace gapfarm

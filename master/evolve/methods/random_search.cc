@@ -18,4 +18,6 @@ Status RandomSearch::restore(const v1::MethodState& message) {
   return {};
 }
 
+GAPFARM_METHOD(RandomSearch)
+
 }  // namespace gapfarm

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <functional>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -51,5 +52,11 @@ Genome placed(const GeneSpace& space, const Genome& proposed);
 
 // The error of restore().
 Error damaged_method_state(const std::string& method);
+
+// In a method's source: how the table of methods makes it.
+#define GAPFARM_METHOD(Class)                                                   \
+  std::unique_ptr<SearchMethod> make_method_##Class(const MethodSetup& setup) { \
+    return std::make_unique<Class>(setup);                                      \
+  }
 
 }  // namespace gapfarm

@@ -7,12 +7,10 @@
 
 namespace gapfarm {
 
-// ROS 1 bags 2.0 (wiki.ros.org/Bags/Format/2.0): chunks plain, bz2, lz4.
-Result<Recording> read_ros1_bag(ByteSource& source, const std::string& file);
-// MCAP (mcap.dev/spec): chunks plain, lz4, zstd; messages ros1 and cdr.
-Result<Recording> read_mcap(ByteSource& source, const std::string& file);
-// rosbag2's SQLite files; `path` on disk.
-Result<Recording> read_db3(const std::string& path);
+// One a row of formats.inc; errors name `path`.
+#define FORMAT(file, begins) \
+  Result<Recording> read_##file(ByteSource& source, const std::string& path);
+#include "master/io/logs/formats.inc"
 
 // Any log, recognised by its content.
 Result<Recording> read_recording(const std::string& path);

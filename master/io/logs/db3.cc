@@ -108,6 +108,6 @@ class Reader {
 
 }  // namespace
 
-Result<Recording> read_db3(const std::string& path) { return Reader(path).run(); }
+Result<Recording> read_db3(ByteSource&, const std::string& path) { return Reader(path).run(); }
 
 }  // namespace gapfarm

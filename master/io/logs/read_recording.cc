@@ -33,9 +33,9 @@ Result<Recording> read_recording(const std::string& path) {
   if (!source) return source.error();
   std::string head;
   source->read(0, std::min<std::uint64_t>(source->size(), 16), head);
-  if (head.rfind("#ROSBAG", 0) == 0) return read_ros1_bag(*source, path);
-  if (head.rfind("\x89MCAP", 0) == 0) return read_mcap(*source, path);
-  if (head.rfind("SQLite format 3", 0) == 0) return read_db3(path);
+#define FORMAT(file, begins) \
+  if (head.rfind(begins, 0) == 0) return read_##file(*source, path);
+#include "master/io/logs/formats.inc"
   const Result<std::string> text = read_text_file(path);
   if (!text) return text.error();
   return parse_text_log(*text, path);

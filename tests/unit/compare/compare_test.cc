@@ -163,7 +163,7 @@ TEST_F(ComparisonFile, MergesVariantsInTheFilesOrder) {
   EXPECT_EQ(zebra.evolution.selection, SelectionKind::kRank);
   EXPECT_EQ(zebra.evolution.population, 10U) << "what a variant omits is the base's";
   const Config& other = comparison->variants[1].config;
-  EXPECT_EQ(other.evolution.optimiser.kind, OptimiserKind::kRandom);
+  EXPECT_EQ(other.evolution.optimiser.kind, OptimiserKind::kRandomSearch);
   EXPECT_THAT(other.problem.genes, SizeIs(3));
 }
 

@@ -32,8 +32,8 @@ std::string name_of(const testing::TestParamInfo<OptimiserKind>& info) {
 INSTANTIATE_TEST_SUITE_P(Kinds, EveryOptimiser,
                          testing::Values(OptimiserKind::kGenetic,
                                          OptimiserKind::kDifferentialEvolution,
-                                         OptimiserKind::kCmaEs, OptimiserKind::kLocal,
-                                         OptimiserKind::kDeSimplex, OptimiserKind::kRandom),
+                                         OptimiserKind::kCmaEs, OptimiserKind::kLocalSearch,
+                                         OptimiserKind::kDeSimplex, OptimiserKind::kRandomSearch),
                          name_of);
 
 TEST(TableOfOptimisers, AgreesWithTheConfigsText) {
@@ -81,7 +81,7 @@ TEST(CmaEs, MinimaOnTheBoundsAreReached) {
   Toy toy;
   toy.rows.assign(4, toy_row(ParameterKind::kReal, 0, 2));
   toy.cost = [](const ParameterValues& x) { return x[0] + 3 * x[1] + (2 - x[2]) + x[3] * x[3]; };
-  for (const auto kind : {OptimiserKind::kCmaEs, OptimiserKind::kLocal}) {
+  for (const auto kind : {OptimiserKind::kCmaEs, OptimiserKind::kLocalSearch}) {
     EXPECT_LT(reached(toy, settings_for(kind), 2500), 1e-3);
   }
 }
@@ -108,12 +108,12 @@ TEST(CmaEs, BeginsAsWideAsItsStartIsUnsure) {
 TEST(LocalSearch, EveryAlgorithmConvergesOnASmoothFunction) {
   for (const auto kind : {LocalSearchKind::kNelderMead, LocalSearchKind::kSubplex,
                           LocalSearchKind::kBobyqa, LocalSearchKind::kCobyla}) {
-    EvolutionSettings settings = settings_for(OptimiserKind::kLocal);
+    EvolutionSettings settings = settings_for(OptimiserKind::kLocalSearch);
     settings.optimiser.local = kind;
     EXPECT_LT(reached(sphere(3), settings, 300), 1e-5) << static_cast<int>(kind);
   }
-  EXPECT_LT(reached(rosenbrock(2), settings_for(OptimiserKind::kLocal), 1500), 1e-8);
-  EvolutionSettings single = settings_for(OptimiserKind::kLocal);
+  EXPECT_LT(reached(rosenbrock(2), settings_for(OptimiserKind::kLocalSearch), 1500), 1e-8);
+  EvolutionSettings single = settings_for(OptimiserKind::kLocalSearch);
   single.optimiser.local = LocalSearchKind::kBobyqa;
   EXPECT_LT(reached(sphere(1), single, 100), 1e-5) << "one gene, which BOBYQA cannot do alone";
 }
@@ -133,7 +133,7 @@ TEST(DeSimplex, PolishesWhatDifferentialEvolutionFound) {
 }
 
 TEST(RandomSearch, IsUniform) {
-  ToyRun run(sphere(2), settings_for(OptimiserKind::kRandom), 4);
+  ToyRun run(sphere(2), settings_for(OptimiserKind::kRandomSearch), 4);
   double sum = 0;
   int count = 0;
   for (int i = 0; i < 50; ++i) {
@@ -231,9 +231,9 @@ TEST_P(EveryOptimiser, RefusesForeignAndDamagedStates) {
   OptimiserSetup other = run.setup();
   other.genes.pop_back();
   EXPECT_FALSE(restore_optimiser(other, state).ok());
-  if (GetParam() == OptimiserKind::kGenetic || GetParam() == OptimiserKind::kRandom) return;
+  if (GetParam() == OptimiserKind::kGenetic || GetParam() == OptimiserKind::kRandomSearch) return;
   other = run.setup();
-  other.settings.optimiser.kind = OptimiserKind::kRandom;
+  other.settings.optimiser.kind = OptimiserKind::kRandomSearch;
   EXPECT_THAT(restore_optimiser(other, state).error().message, testing::HasSubstr("\"random\""));
 }
 
