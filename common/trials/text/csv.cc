@@ -14,8 +14,7 @@ namespace gapfarm {
 namespace {
 
 constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
-// Logs print pi with six digits or so; what is rounded up past it is still pi.
-constexpr double kAngleTolerance = 1e-6;
+constexpr double kAngleTolerance = 1e-6;  // logs print pi with six digits or so, rounded up
 // An arena is metres wide; a greater number is a unit mistake that would upset every estimate.
 constexpr double kGreatestCoordinate = 1e4;
 
