@@ -114,7 +114,7 @@ Status LineProgram::start() {
   }
   if (pipe2(out, O_CLOEXEC) != 0) return failed(std::string("got no pipe: ") + strerror(errno));
   ChildSetup setup;
-  setup.argv = argv_;
+  setup.arguments = argv_;
   setup.folder = folder_;
   setup.in = in[1];
   setup.out = out[1];

@@ -16,7 +16,7 @@ constexpr int kKept = 3;
 
 // What the child needs, made before fork().
 struct Prepared {
-  std::vector<char*> text, environment;
+  std::vector<char*> arguments, environment;
   int null = -1;
   int reported = -1;  // where it writes what keeps it from starting
   pid_t parent = 0;
@@ -47,7 +47,7 @@ void pass(int fd, int null, int as) { dup2(fd < 0 ? null : fd, as); }
   errno = 0;
   if (setup.niceness != 0 && nice(setup.niceness) < 0) errno = 0;
   if (setup.folder.empty() || chdir(setup.folder.c_str()) == 0) {
-    execvpe(prepared.text[0], prepared.text.data(), prepared.environment.data());
+    execvpe(prepared.arguments[0], prepared.arguments.data(), prepared.environment.data());
   }
   const int error = errno;
   [[maybe_unused]] const ssize_t n = write(reported, &error, sizeof error);
@@ -65,9 +65,9 @@ std::vector<char*> pointers(const std::vector<std::string>& texts) {
 Result<pid_t> start_child(const ChildSetup& setup) {
   int reported[2];
   if (pipe2(reported, O_CLOEXEC) != 0) return Error{strerror(errno)};
-  Prepared prepared{pointers(setup.text), pointers(setup.environment),
+  Prepared prepared{pointers(setup.arguments), pointers(setup.environment),
                     open("/dev/null", O_RDWR | O_CLOEXEC), reported[1], getpid()};
-  prepared.text.push_back(nullptr);
+  prepared.arguments.push_back(nullptr);
   for (char** variable = environ; *variable != nullptr; ++variable) {
     prepared.environment.push_back(*variable);
   }

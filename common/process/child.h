@@ -13,7 +13,7 @@
 namespace gapfarm {
 
 struct ChildSetup {
-  std::vector<std::string> text;         // program and arguments; without a slash found by PATH
+  std::vector<std::string> arguments;    // program and arguments; without a slash found by PATH
   std::string folder;                    // where it is started; empty: here
   std::vector<std::string> environment;  // "NAME=value", beside this process's and before it
   int in = -1;                           // descriptors; -1: /dev/null
