@@ -268,7 +268,8 @@ void Catalogue::floors() {
   } else if (is_holonomic(robot_)) {
     value("floor", {"wheel_slip", "roller_drag"}, "how far the robot goes of its wheels' way",
           {row("traction")});
-    value("wheel_slip", {"wheel_radius", "speed_gain"}, "how far the wheels travel a turn",
+    // The same whichever way it goes, as wheels do that roll on something soft.
+    value("floor", {"wheel_slip", "wheel_radius"}, "how far the wheels travel a turn",
           {{"travel", 1, kSlipShare, "ratio", "-"}});
   }
 }

@@ -65,9 +65,8 @@ std::vector<KinematicRow> kinematic_rows(const GroundRobot& robot) {
   const Pose& X = robot.X_RM;
   rows.push_back({"lag", robot.motors.lag_s, kLag_s, "tau", "s", true});
   rows.push_back({"delay", robot.motors.delay_s, kDelay_s, "latency", "s"});
-  // A marker, and the weight, are on the robot.
-  rows.push_back({"marker_x", X.x, marker, "x", "m", false, reach});
-  rows.push_back({"marker_y", X.y, marker, "y", "m", false, reach});
+  rows.push_back({"marker_x", X.x, marker, "x", "m"});
+  rows.push_back({"marker_y", X.y, marker, "y", "m"});
   rows.push_back({"marker_yaw", X.theta, is_steered(robot) ? kCarMarkerYaw_rad : kMarkerYaw_rad,
                   "angle", "rad"});
   return rows;

@@ -8,6 +8,6 @@ rm -f "$build"/install/*.gz "$build"/install/gapfarm.bash
 cmake --install "$build" --prefix "$folder" >"$folder/log" 2>&1 || { cat "$folder/log"; exit 1; }
 "$folder/bin/gapfarm" --version
 for page in gapfarm gapfarm-worker; do
-  zcat "$folder/share/man/man1/$page.1.gz" | grep -q '^\.TH'
+  zcat "$folder/share/man/man1/$page.1.gz" | grep '^\.TH' >/dev/null  # -q would close the pipe early
 done
 grep -q gapfarm "$folder/share/bash-completion/completions/gapfarm"

@@ -118,6 +118,7 @@ void EvolutionOptions::declare(CLI::App& app) {
 
 int run_evolution(RunStore& store, const Config& config, const EvolutionOptions& options, Log& log,
                   CliContext& context) {
+  context.begun = true;  // a run folder was made or opened
   const std::string run = store.run().string();
   log.set({"run", run});
   // Without it the run goes on all the same.

@@ -198,7 +198,7 @@ WheelLoop measure_wheel_loop(const GroundRobot& robot, const RunLog& log, const 
   result.share = share;
   result.expected = expected;
   result.change = {"wheel_speed", change, change - wide, change + wide, "-"};
-  result.gain = change * change / 2 / (variance + kGainShare * kGainShare);
+  result.gain = change * change / 2 / (variance + kLoopShare * kLoopShare);
   return result;
 }
 
@@ -212,7 +212,7 @@ void report_wheel_loop(const WheelLoop& loop, bool against_reference, Diagnosis*
                 100 * loop.share, 100 * loop.expected, 100 * c.value, 100 * c.lo, 100 * c.hi)
           : fmt::format("the wheels run at {:.0f} % [{:.0f}, {:.0f}] of their set speed",
                         100 * loop.share, 100 * (1 + c.lo), 100 * (1 + c.hi));
-  if (loop.gain < kLeastGroundGain) {
+  if (loop.gain < kLeastChangeGain) {
     diagnosis->cautions.push_back(
         "From command to wheel nothing is off by more than a loop is by "
         "itself: " +
@@ -231,7 +231,7 @@ void report_wheel_loop(const WheelLoop& loop, bool against_reference, Diagnosis*
   effect.name = "wheel_loop";
   effect.aliases = {"payload", "battery_voltage", "motor_deadband"};
   effect.alias_reason = "Each makes the motors run short of what they are commanded to.";
-  effect.confidence = std::min(0.99, 1 - 0.5 * std::exp((kLeastGroundGain - loop.gain) / 2));
+  effect.confidence = std::min(0.99, 1 - 0.5 * std::exp((kLeastChangeGain - loop.gain) / 2));
   effect.parameters = {c};
   effect.text = "From command to wheel " + speeds + ".";
   diagnosis->effects.push_back(std::move(effect));

@@ -157,6 +157,8 @@ void GroundReport::readings() {
     effect.parameters = {std::move(estimate)};
     effect.text = std::move(text);
     d_.sanity.push_back({name, effect.text, remedy, Severity::kNote, true, effect.aliases});
+    // What was read is no answer to what changed.
+    if (search_.reference) return;
     d_.effects.push_back(std::move(effect));
     ++figures_.faults;
   };
@@ -351,7 +353,9 @@ Diagnosis GroundReport::write() {
   faults();
   readings();
   values();
+  const std::size_t values_named = d_.effects.size();
   if (search_.loop) report_wheel_loop(*search_.loop, search_.reference.has_value(), &d_);
+  figures_.faults += static_cast<int>(d_.effects.size() - values_named);
   figures();
   judge();
   clocks();

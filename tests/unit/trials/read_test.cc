@@ -163,7 +163,7 @@ TEST(ReadTrials, RefusesRowsOfAnotherWidthAndBrokenQuotes) {
               HasSubstr("2:34: found 12 fields, expected 13 as in the header"));
   EXPECT_THAT(error_of_row("s1,0,0,forward,1,1,1,0,0,0,0,25,0,0"), HasSubstr("2:35: found 14"));
   EXPECT_THAT(error_of_row("\"s1,0,0,forward"), HasSubstr("2:1: found an unclosed quote"));
-  EXPECT_THAT(error_of_row("\"s\"1,0"), HasSubstr("2:4: found '1', expected ','"));
+  EXPECT_THAT(error_of_row("\"s\"1,0"), HasSubstr("2:4: found '1', expected a separator"));
   EXPECT_THAT(error_of_row("\xE9t\xE9,0"), HasSubstr("2:1: found a byte that is not UTF-8"));
 }
 
