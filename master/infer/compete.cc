@@ -62,10 +62,7 @@ std::vector<std::uint32_t> within(const Scope& scope, const std::vector<std::uin
   return some;
 }
 
-// A base from which runners start, with its slopes.
-struct Anchor {
-  Fit fit;
-};
+using Anchor = Fit;  // of the base, with its slopes: runners start there
 
 class Search {
  public:
@@ -81,7 +78,7 @@ class Search {
 
  private:
   Fitter fitter(const Space& space) const {
-    return Fitter(scope_.forward, scope_.observations, space, {});
+    return Fitter(scope_.forward, scope_.observations, space);
   }
   Result<std::vector<Fit>> at_starts(const Hypothesis& h, const Fitter& fitter,
                                      const Anchor& anchor) const;
@@ -103,7 +100,7 @@ Result<std::vector<Anchor>> Search::anchors(const Eigen::VectorXd& base,
   for (Fit& fit : *at) {
     if (!std::isfinite(fit.score)) continue;
     if (Status s = fits.differentiate(&fit); !s) return s.error();
-    anchors.push_back({std::move(fit)});
+    anchors.push_back(std::move(fit));
   }
   return anchors;
 }
@@ -117,10 +114,10 @@ Result<std::vector<Fit>> Search::at_starts(const Hypothesis& h, const Fitter& fi
   for (const Start& start : h.starts) {
     std::vector<std::uint32_t> some = within(scope_, start.reach);
     if (some.empty() && !start.reach.empty()) continue;
-    points.push_back(joined(anchor.fit.u, own.from(start.at)));
+    points.push_back(joined(anchor.u, own.from(start.at)));
     reach.push_back(std::move(some));
   }
-  auto fits = fitter.starts(points, reach, anchor.fit.z);
+  auto fits = fitter.starts(points, reach, anchor.z);
   if (!fits) return fits;
   std::erase_if(*fits, [](const Fit& fit) { return !std::isfinite(fit.score); });
   std::stable_sort(fits->begin(), fits->end(),
@@ -128,9 +125,9 @@ Result<std::vector<Fit>> Search::at_starts(const Hypothesis& h, const Fitter& fi
   if (fits->size() > kStartsKept) fits->resize(kStartsKept);
   for (Fit& fit : *fits) {
     // Of the base's parameters the anchor's slopes will do until a step shows that they do not.
-    fit.slopes = anchor.fit.slopes;
-    fit.differences = anchor.fit.differences;
-    if (Status s = fitter.differentiate(&fit, anchor.fit.u.size()); !s) return s.error();
+    fit.slopes = anchor.slopes;
+    fit.differences = anchor.differences;
+    if (Status s = fitter.differentiate(&fit, anchor.u.size()); !s) return s.error();
     fit.fresh = false;
   }
   return fits;
@@ -138,18 +135,17 @@ Result<std::vector<Fit>> Search::at_starts(const Hypothesis& h, const Fitter& fi
 
 Result<Fit> Search::from_neutral(const Hypothesis& h, const Fitter& fitter,
                                  const Anchor& anchor) const {
-  Fit fit = anchor.fit;
-  fit.u = joined(anchor.fit.u, base_.only(h.coordinates).from({}));
+  Fit fit = anchor;
+  fit.u = joined(anchor.u, base_.only(h.coordinates).from({}));
   fit.settled = false;
   fit.damping = 0;
-  if (Status s = fitter.differentiate(&fit, anchor.fit.u.size()); !s) return s.error();
+  if (Status s = fitter.differentiate(&fit, anchor.u.size()); !s) return s.error();
   return fit;
 }
 
 const Anchor& best_of(const std::vector<Anchor>& anchors) {
-  return *std::max_element(anchors.begin(), anchors.end(), [](const Anchor& a, const Anchor& b) {
-    return a.fit.score < b.fit.score;
-  });
+  return *std::max_element(anchors.begin(), anchors.end(),
+                           [](const Anchor& a, const Anchor& b) { return a.score < b.score; });
 }
 
 Result<std::vector<Runner>> Search::line_up(const std::vector<Anchor>& anchors,
@@ -204,7 +200,7 @@ Status Search::run(int steps, std::vector<Runner>* runners) const {
 // its search found a better base.
 Result<Model> refitted_base(const Forward& forward, const Observations& observations, Model base,
                             const Runner& best) {
-  const Fitter fitter(forward, observations, base.space, {});
+  const Fitter fitter(forward, observations, base.space);
   auto fit = fitter.start(best.fit.u.head(base.fit.u.size()));
   if (!fit) return fit.error();
   if (Status s = fitter.improve(&*fit, kLongSearch); !s) return s.error();
@@ -241,7 +237,7 @@ PairedGain paired_gain(const std::vector<double>& with, const std::vector<double
 
 Result<Model> model_of(const Forward& forward, const Observations& observations, Space space,
                        Fit fit) {
-  const Fitter fitter(forward, observations, space, {});
+  const Fitter fitter(forward, observations, space);
   if (!fit.fresh || fit.slopes.size() == 0) {
     if (Status s = fitter.differentiate(&fit); !s) return s.error();
   }

@@ -54,18 +54,8 @@ double best_scale(const Eigen::VectorXd& z) {
   return scale;
 }
 
-Fitter::Fitter(const Forward& forward, const Observations& observations, Space space,
-               Overrides fixed)
-    : forward_(forward),
-      observations_(observations),
-      space_(std::move(space)),
-      fixed_(std::move(fixed)) {}
-
-Overrides Fitter::at(const Eigen::VectorXd& u) const {
-  Overrides all = fixed_;
-  for (const auto& [row, value] : space_.values(u)) all[row] = value;
-  return all;
-}
+Fitter::Fitter(const Forward& forward, const Observations& observations, Space space)
+    : forward_(forward), observations_(observations), space_(std::move(space)) {}
 
 Eigen::Vector3d Fitter::residual(std::size_t i, const Pose& end) const {
   return observations_.whitener[i] * local_difference(end, observations_.measured[i]);
@@ -90,7 +80,8 @@ Result<std::vector<Fit>> Fitter::starts(const std::vector<Eigen::VectorXd>& poin
                                         const Eigen::VectorXd& elsewhere) const {
   std::vector<PredictionRequest> requests;
   for (std::size_t k = 0; k < points.size(); ++k) {
-    requests.push_back({at(points[k]), reach.empty() ? std::vector<std::uint32_t>() : reach[k]});
+    requests.push_back(
+        {space_.values(points[k]), reach.empty() ? std::vector<std::uint32_t>() : reach[k]});
   }
   const auto ends = forward_(requests);
   if (!ends) return ends.error();
@@ -132,7 +123,7 @@ Status Fitter::differentiate(Fit* fit, Eigen::Index known) const {
     double step = fit->differences[k];
     if (u[k] + step > space_.upper()[k]) step = -step;
     u[k] += step;
-    requests.push_back({at(u), {}});
+    requests.push_back({space_.values(u), {}});
     moved.push_back(step);
   }
   const auto ends = forward_(requests);
@@ -208,14 +199,14 @@ Status Fitter::step(Fit* fit) const {
     if (!next) return next.error();
     const double gained = next->score - fit->score;
     if (gained > 0) {
-      next->trust = gained / promised;
-      next->damping = next->trust > kLeastTrust ? fit->damping / 10 : fit->damping;
+      const double trust = gained / promised;
+      next->damping = trust > kLeastTrust ? fit->damping / 10 : fit->damping;
       next->differences = fit->differences;
       // Broyden's correction: slopes of before that give what this step did.
       next->slopes = fit->slopes + (next->z - fit->z - fit->slopes * delta) * delta.transpose() /
                                        delta.squaredNorm();
       next->settled = gained < kSettledGain && fit->fresh;
-      const bool lied = next->trust < kLeastTrust || next->trust > kMostTrust;
+      const bool lied = trust < kLeastTrust || trust > kMostTrust;
       if (lied || gained < kSettledGain) next->slopes.resize(0, 0);
       *fit = std::move(*next);
       return {};

@@ -45,18 +45,13 @@ struct Fit {
   double scale = 1;             // of the noise, over what the whitener says
   double score = -INFINITY;     // robust, less what the prior costs, nats
   double damping = 0;
-  double trust = 1;  // realised over promised gain of the last step
   bool settled = false;
 };
 
 class Fitter {
  public:
-  // REQUIRES: all outlive it.  `fixed`: other parameters of every point.
-  Fitter(const Forward& forward, const Observations& observations, Space space, Overrides fixed);
-
-  const Space& space() const { return space_; }
-  // All parameters at a fit.
-  Overrides at(const Eigen::VectorXd& u) const;
+  // REQUIRES: both outlive it.
+  Fitter(const Forward& forward, const Observations& observations, Space space);
 
   // The score at a point; -infinity where it cannot be simulated.
   Result<Fit> start(const Eigen::VectorXd& u) const;
@@ -94,7 +89,6 @@ class Fitter {
   const Forward& forward_;
   const Observations& observations_;
   Space space_;
-  Overrides fixed_;
 };
 
 }  // namespace gapfarm::infer

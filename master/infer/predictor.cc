@@ -5,8 +5,8 @@
 #include <set>
 #include <tuple>
 
+#include "common/math/digits.h"
 #include "common/score/motion_model.h"
-#include "master/diagnose/conclusions/digits.h"
 
 namespace gapfarm {
 namespace {

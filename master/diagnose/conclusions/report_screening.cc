@@ -4,7 +4,7 @@
 #include <map>
 
 #include "common/effects/catalogue.h"
-#include "master/diagnose/conclusions/digits.h"
+#include "common/math/digits.h"
 #include "master/diagnose/conclusions/findings.h"
 #include "master/diagnose/conclusions/report_parts.h"
 #include "master/diagnose/evidence/distribution.h"

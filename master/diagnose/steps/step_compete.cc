@@ -4,8 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "common/math/digits.h"
 #include "common/math/laws.h"
-#include "master/diagnose/conclusions/digits.h"
 #include "master/diagnose/conclusions/findings.h"
 #include "master/diagnose/evidence/noise.h"
 #include "master/diagnose/steps/step_parts.h"
@@ -102,22 +102,6 @@ Competition competition(const DiagnosisRequest& of, const Study& study) {
   return c;
 }
 
-// The study by the noise that readings are configured to have: what the tuned base misses by must
-// not pass for noise.
-Result<Study> by_configured_noise(const DiagnosisRequest& of, Study study) {
-  const auto configured = of.subject.make_study(of.problem, of.options.genes);
-  if (!configured) return configured.error();
-  study.trust.clear();
-  study.use_noise(configured->noise);
-  return study;
-}
-
-// The base as the config has it, before anything was tuned.
-Overrides configured_base(const DiagnosisRequest& of, const Study& study) {
-  const auto configured = of.subject.make_study(of.problem, of.options.genes);
-  return configured ? configured->base : study.base;
-}
-
 // What a contest's best has to gain, held out, beside what was explained before.
 bool enters(const DiagnosisRequest& of, const infer::Contender& best, double explained) {
   return best.gain >= std::max(of.subject.least_gain, kLeastShare * explained) &&
@@ -177,7 +161,7 @@ Result<infer::Model> refitted_without(const Competition& c, const infer::Model& 
                                       std::size_t first, std::size_t count) {
   Eigen::VectorXd u = model.fit.u;
   infer::Space space = model.space.without(first, count, &u);
-  const infer::Fitter fitter(c.forward, c.observations, space, {});
+  const infer::Fitter fitter(c.forward, c.observations, space);
   auto fit = fitter.start(u);
   if (!fit) return fit.error();
   if (Status s = fitter.improve(&*fit, infer::kLongSearch); !s) return s.error();
@@ -210,7 +194,7 @@ Status drop_idle(const DiagnosisRequest& of, const Competition& c, Found* found)
 
 Result<infer::Model> base_alone(const Study& study, const Competition& c) {
   const infer::Space space = base_space(study);
-  const infer::Fitter fitter(c.forward, c.observations, space, {});
+  const infer::Fitter fitter(c.forward, c.observations, space);
   auto fit = fitter.start(space.from(study.base));
   if (!fit) return fit.error();
   if (Status s = fitter.improve(&*fit, infer::kLongSearch); !s) return s.error();
@@ -231,12 +215,14 @@ void report_contest(const DiagnosisRequest& of, const std::vector<infer::Standin
 }
 
 // Forward selection: the best of every contest joins the model that the next one adds to.
-Result<Found> select(const DiagnosisRequest& of, const Study& study, const Competition& c) {
+// `configured`: the base before anything was tuned.
+Result<Found> select(const DiagnosisRequest& of, const Study& study, const Overrides& configured,
+                     const Competition& c) {
   auto base = base_alone(study, c);
   if (!base) return base.error();
   Found found{*base, *base, {}, {}};
   infer::Terms terms;
-  terms.bases = {configured_base(of, study)};
+  terms.bases = {configured};
   std::vector<infer::Hypothesis> left = c.hypotheses;
   double explained = 0;
   while (found.chosen.size() < kMostEffects && !left.empty()) {
@@ -266,10 +252,15 @@ Result<Found> select(const DiagnosisRequest& of, const Study& study, const Compe
 }  // namespace
 
 Result<Screening> compete(const DiagnosisRequest& of, const Evidence& measured) {
-  const auto configured = by_configured_noise(of, measured.study);
+  const auto configured = of.subject.make_study(of.problem, of.options.genes);
   if (!configured) return configured.error();
-  const Competition c = competition(of, *configured);
-  auto found = select(of, *configured, c);
+  // By the noise that readings are configured to have: what the tuned base misses by must not pass
+  // for noise.
+  Study searched = measured.study;
+  searched.trust.clear();
+  searched.use_noise(configured->noise);
+  const Competition c = competition(of, searched);
+  auto found = select(of, searched, configured->base, c);
   if (!found) return found.error();
   // Everything from here on is about the point that explains the log.
   Study study = measured.study;
@@ -282,7 +273,7 @@ Result<Screening> compete(const DiagnosisRequest& of, const Evidence& measured) 
   Screening screening;
   screening.found.evidence = std::make_shared<const Evidence>(std::move(*evidence));
   screening.found.tuned_alone = found->base.space.values(found->base.fit.u);
-  const infer::Fitter fitter(c.forward, c.observations, found->model.space, {});
+  const infer::Fitter fitter(c.forward, c.observations, found->model.space);
   screening.found.searched_error =
       found->model.space.deviations(found->model.fit.u, fitter.covariance(found->model.fit));
   screening.rows = std::move(found->rows);

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "common/effects/catalogue.h"
-#include "master/diagnose/conclusions/digits.h"
+#include "common/math/digits.h"
 #include "master/diagnose/conclusions/findings.h"
 #include "master/diagnose/steps/step_parts.h"
 

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "common/math/digits.h"
 #include "common/score/logged_motions.h"
-#include "master/diagnose/conclusions/digits.h"
 #include "master/diagnose/conclusions/report_parts.h"
 #include "master/diagnose/steps/step_parts.h"
 

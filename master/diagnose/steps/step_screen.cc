@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/math/digits.h"
 #include "common/math/laws.h"
-#include "master/diagnose/conclusions/digits.h"
 #include "master/diagnose/evidence/noise.h"
 #include "master/diagnose/places/patch_places.h"
 #include "master/diagnose/steps/step_parts.h"

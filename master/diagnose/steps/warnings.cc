@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/math/digits.h"
 #include "common/math/statistics.h"
-#include "master/diagnose/conclusions/digits.h"
 #include "master/diagnose/conclusions/findings.h"
 #include "master/diagnose/correction/fit.h"
 #include "master/diagnose/steps/step_parts.h"

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/math/digits.h"
 #include "common/math/statistics.h"
-#include "master/diagnose/conclusions/digits.h"
 #include "master/diagnose/conclusions/findings.h"
 #include "master/diagnose/conclusions/report_parts.h"
 

@@ -47,6 +47,7 @@ std::string WindowFitter::key_of(const std::vector<FitRow>& rows, const std::vec
   hasher.add(question_).add(static_cast<std::uint64_t>(rounds));
   for (std::size_t k = 0; k < rows.size(); ++k) {
     hasher.add(rows[k].row.name).add(rows[k].row.nominal).add(rows[k].row.tolerance);
+    hasher.add(rows[k].row.farthest);
     hasher.add(std::uint64_t{rows[k].free}).add(start[static_cast<Eigen::Index>(k)]);
   }
   hasher.add(std::string_view(held_out.data(), held_out.size()));

@@ -1,8 +1,8 @@
 // A diagnosis that cannot go on as planned still ends with a report.
 #include <gtest/gtest.h>
 
+#include "common/math/digits.h"
 #include "master/diagnose/conclusions/confidence.h"
-#include "master/diagnose/conclusions/digits.h"
 #include "master/diagnose/conclusions/findings.h"
 #include "master/diagnose/conclusions/report_parts.h"
 #include "master/diagnose/diagnose.h"
