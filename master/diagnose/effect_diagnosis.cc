@@ -26,6 +26,11 @@ const EffectDiagnosis* EffectDiagnoses::find(std::string_view effect) const {
   return found == rows_.end() ? nullptr : *found;
 }
 
+std::size_t EffectDiagnoses::place_in_catalogue(std::string_view effect) const {
+  const auto is_it = [&](const EffectDiagnosis* row) { return row->effect == effect; };
+  return static_cast<std::size_t>(std::find_if(rows_.begin(), rows_.end(), is_it) - rows_.begin());
+}
+
 const EffectDiagnosis& EffectDiagnoses::row(std::string_view effect) const {
   static const EffectDiagnosis nothing = {.effect = ""};
   const EffectDiagnosis* found = find(effect);

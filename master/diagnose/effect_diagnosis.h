@@ -136,6 +136,7 @@ class EffectDiagnoses {
   auto end() const { return rows_.end(); }
   // Null where the effect has no row.
   const EffectDiagnosis* find(std::string_view effect) const;
+  std::size_t place_in_catalogue(std::string_view effect) const;  // size of it where it has none
   // A row of nothing where it has none.
   const EffectDiagnosis& row(std::string_view effect) const;
 

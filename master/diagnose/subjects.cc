@@ -32,42 +32,32 @@ PatchSearch sketched_patches(Predictor& predictor, const Study& study) {
       };
 }
 
-// How near and how far the robot's contacts come to a disc's centre, on the way that the base
-// predicts.
-struct Span {
-  double nearest = std::numeric_limits<double>::infinity(), farthest = 0;
-};
-
-Span span_of(const Pose& X_WS, const Twist& motion, const Footprint& footprint,
-             const Patch& patch) {
+// How near the robot's contacts come to a disc's centre, on the way that the base predicts.
+double nearest_to(const Patch& patch, const Pose& X_WS, const Twist& motion,
+                  const Footprint& footprint) {
   constexpr int kLooks = 16;
-  const auto contacts = footprint.contacts();
-  Span span;
+  double nearest = std::numeric_limits<double>::infinity();
   for (int k = 0; k <= kLooks; ++k) {
     const Pose X_WB = X_WS * exp(Twist(motion * k / kLooks));
-    for (const Eigen::Vector2d& contact : contacts) {
+    for (const Eigen::Vector2d& contact : footprint.contacts()) {
       const Pose at = X_WB * Pose{contact.x(), contact.y(), 0};
-      const double distance = std::hypot(at.x - patch[0], at.y - patch[1]);
-      span.nearest = std::min(span.nearest, distance);
-      span.farthest = std::max(span.farthest, distance);
+      nearest = std::min(nearest, std::hypot(at.x - patch[0], at.y - patch[1]));
     }
   }
-  return span;
+  return nearest;
 }
 
-std::vector<PatchReach> drive_patch_reach(const Problem& problem, const Study& study,
-                                          const Patch& patch) {
+std::vector<bool> touched_by_drives(const Problem& problem, const Study& study,
+                                    const Patch& patch) {
   constexpr double kSpare_m = 0.03;  // for a way that is none of one twist, and between its steps
   const double spare = kSpare_m * study.scale;
   const Footprint footprint = footprint_of(problem, study);
-  std::vector<PatchReach> reach;
+  std::vector<bool> touched;
   for (std::size_t i = 0; i < study.size(); ++i) {
-    const Span span = span_of(study.trials[i].X_WS, motion_of(study, i), footprint, patch);
-    const bool touched = span.nearest < patch[2] + spare;
-    const bool inside = span.farthest < patch[2] - spare;
-    reach.push_back(inside ? PatchReach::kInside : touched ? PatchReach::kRim : PatchReach::kNone);
+    touched.push_back(nearest_to(patch, study.trials[i].X_WS, motion_of(study, i), footprint) <
+                      patch[2] + spare);
   }
-  return reach;
+  return touched;
 }
 
 // A robot on two sides drives commands: srv1's, or one that a program of the user's simulates.
@@ -97,7 +87,7 @@ DiagnosisSubject drive_subject(const char* scenario, const ParameterTable& table
   };
   s.blocks = covariate_blocks;
   s.signatures = signatures;
-  s.patch_reach = drive_patch_reach;
+  s.touched_by = touched_by_drives;
   s.patches = sketched_patches;
   s.folds = folds_of;
   s.where = [](const Study& study, std::span<const Eigen::Vector3d> residuals,

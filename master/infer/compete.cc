@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "master/infer/scope.h"
 #include "master/infer/settings.h"
 
 namespace gapfarm::infer {
@@ -21,45 +22,11 @@ Eigen::VectorXd joined(const Eigen::VectorXd& base, const Eigen::VectorXd& own) 
   return u;
 }
 
-// What the simulation is asked of: all observations, or some of them.
-struct Scope {
-  Forward forward;
-  Observations observations;
-  std::vector<std::uint32_t> index;  // of each in the whole
-};
-
-Scope thinned(const Forward& forward, const Observations& all, std::uint32_t every) {
-  Scope some;
-  for (std::uint32_t i = 0; i < all.size(); i += every) {
-    some.index.push_back(i);
-    some.observations.measured.push_back(all.measured[i]);
-    some.observations.whitener.push_back(all.whitener[i]);
-    some.observations.fold.push_back(all.fold[i]);
-  }
-  if (every == 1) {
-    some.forward = forward;
-    return some;
-  }
-  some.forward = [&forward, index = some.index](const std::vector<PredictionRequest>& points) {
-    std::vector<PredictionRequest> whole = points;
-    for (PredictionRequest& request : whole) {
-      if (request.trials.empty())
-        request.trials = index;
-      else
-        for (std::uint32_t& trial : request.trials) trial = index[trial];
-    }
-    return forward(whole);
-  };
-  return some;
-}
-
-// Those of the whole that are in the scope, as it counts them.
-std::vector<std::uint32_t> within(const Scope& scope, const std::vector<std::uint32_t>& reach) {
-  std::vector<std::uint32_t> some;
-  for (std::uint32_t k = 0; k < scope.index.size(); ++k) {
-    if (std::binary_search(reach.begin(), reach.end(), scope.index[k])) some.push_back(k);
-  }
-  return some;
+// Every so manieth of them.
+std::vector<std::uint32_t> every(std::uint32_t step, std::size_t count) {
+  std::vector<std::uint32_t> index;
+  for (std::uint32_t i = 0; i < count; i += step) index.push_back(i);
+  return index;
 }
 
 using Anchor = Fit;  // of the base, with its slopes: runners start there
@@ -80,8 +47,7 @@ class Search {
   Fitter fitter(const Space& space) const {
     return Fitter(scope_.forward, scope_.observations, space);
   }
-  Result<std::vector<Fit>> at_starts(const Hypothesis& h, const Fitter& fitter,
-                                     const Anchor& anchor) const;
+  Result<std::vector<Runner>> at_starts(std::size_t hypothesis, const Anchor& anchor) const;
   Result<Fit> from_neutral(const Hypothesis& h, const Fitter& fitter, const Anchor& anchor) const;
 
   const Scope& scope_;
@@ -94,7 +60,7 @@ Result<std::vector<Anchor>> Search::anchors(const Eigen::VectorXd& base,
   const Fitter fits = fitter(base_);
   std::vector<Eigen::VectorXd> points = {base};
   for (const Overrides& other : others) points.push_back(base_.from(other));
-  auto at = fits.starts(points);
+  auto at = fits.starts(points, std::vector<Space>(points.size(), base_));
   if (!at) return at.error();
   std::vector<Anchor> anchors;
   for (Fit& fit : *at) {
@@ -106,31 +72,39 @@ Result<std::vector<Anchor>> Search::anchors(const Eigen::VectorXd& base,
 }
 
 // The best few; where a start reaches a part of the observations, the others are the anchor's.
-Result<std::vector<Fit>> Search::at_starts(const Hypothesis& h, const Fitter& fitter,
-                                           const Anchor& anchor) const {
-  const Space own = base_.only(h.coordinates);
+Result<std::vector<Runner>> Search::at_starts(std::size_t hypothesis, const Anchor& anchor) const {
+  const Hypothesis& h = hypotheses_[hypothesis];
+  const Space own = base_.only(h.coordinates), space = base_.with(h.coordinates);
   std::vector<std::vector<std::uint32_t>> reach;
   std::vector<Eigen::VectorXd> points;
+  std::vector<Space> spaces;
   for (const Start& start : h.starts) {
     std::vector<std::uint32_t> some = within(scope_, start.reach);
     if (some.empty() && !start.reach.empty()) continue;
     points.push_back(joined(anchor.u, own.from(start.at)));
+    spaces.push_back(space.holding(start.at));
     reach.push_back(std::move(some));
   }
-  auto fits = fitter.starts(points, reach, anchor.z);
-  if (!fits) return fits;
-  std::erase_if(*fits, [](const Fit& fit) { return !std::isfinite(fit.score); });
-  std::stable_sort(fits->begin(), fits->end(),
-                   [](const Fit& a, const Fit& b) { return a.score > b.score; });
-  if (fits->size() > kStartsKept) fits->resize(kStartsKept);
-  for (Fit& fit : *fits) {
-    // Of the base's parameters the anchor's slopes will do until a step shows that they do not.
-    fit.slopes = anchor.slopes;
-    fit.differences = anchor.differences;
-    if (Status s = fitter.differentiate(&fit, anchor.u.size()); !s) return s.error();
-    fit.fresh = false;
+  auto fits =
+      Fitter(scope_.forward, scope_.observations, space).starts(points, spaces, reach, anchor.z);
+  if (!fits) return fits.error();
+  std::vector<Runner> runners;
+  for (std::size_t k = 0; k < fits->size(); ++k) {
+    if (std::isfinite((*fits)[k].score))
+      runners.push_back({hypothesis, spaces[k], std::move((*fits)[k])});
   }
-  return fits;
+  std::stable_sort(runners.begin(), runners.end(),
+                   [](const Runner& a, const Runner& b) { return a.fit.score > b.fit.score; });
+  if (runners.size() > kStartsKept) runners.erase(runners.begin() + kStartsKept, runners.end());
+  for (Runner& runner : runners) {
+    // Of the base's parameters the anchor's slopes will do until a step shows that they do not.
+    runner.fit.slopes = anchor.slopes;
+    runner.fit.differences = anchor.differences;
+    if (Status s = fitter(runner.space).differentiate(&runner.fit, anchor.u.size()); !s)
+      return s.error();
+    runner.fit.fresh = false;
+  }
+  return runners;
 }
 
 Result<Fit> Search::from_neutral(const Hypothesis& h, const Fitter& fitter,
@@ -161,9 +135,9 @@ Result<std::vector<Runner>> Search::line_up(const std::vector<Anchor>& anchors,
       const bool best = &anchor == &best_of(anchors);
       if (!h.starts.empty() && (best || h.starts.size() <= kFewStarts) &&
           (everywhere || !h.from_neutral)) {
-        auto at = at_starts(h, fits, anchor);
+        auto at = at_starts(k, anchor);
         if (!at) return at.error();
-        for (Fit& fit : *at) runners.push_back({k, space, std::move(fit)});
+        for (Runner& runner : *at) runners.push_back(std::move(runner));
       }
       if (!h.from_neutral) continue;
       auto neutral = from_neutral(h, fits, anchor);
@@ -235,6 +209,15 @@ PairedGain paired_gain(const std::vector<double>& with, const std::vector<double
   return gain;
 }
 
+PairedGain gain_over(const Model& with, const Model& without, Eigen::Index common) {
+  PairedGain gain = paired_gain(with.held_out, without.held_out);
+  const auto price = [&](const Model& m) {
+    return 0.5 * m.space.prior().head(common).dot(m.fit.u.head(common).cwiseAbs2());
+  };
+  gain.sum += price(without) - price(with);
+  return gain;
+}
+
 Result<Model> model_of(const Forward& forward, const Observations& observations, Space space,
                        Fit fit) {
   const Fitter fitter(forward, observations, space);
@@ -255,10 +238,9 @@ Result<Contest> compete(const Forward& forward, const Observations& observations
     }
     if (on_standings) on_standings(standings);
   };
-  const std::uint32_t every =
-      terms.effort == Effort::kGlobal && observations.size() >= kManyObservations ? 2 : 1;
-  const Scope some = thinned(forward, observations, every);
-  const Scope all = thinned(forward, observations, 1);
+  const bool half = terms.effort == Effort::kGlobal && observations.size() >= kManyObservations;
+  const Scope some = scope_of(forward, observations, every(half ? 2 : 1, observations.size()));
+  const Scope all = scope_of(forward, observations, every(1, observations.size()));
   const Search first(some, base.space, hypotheses), whole(all, base.space, hypotheses);
   const auto anchors = first.anchors(base.fit.u, terms.bases);
   if (!anchors) return anchors.error();
@@ -271,7 +253,7 @@ Result<Contest> compete(const Forward& forward, const Observations& observations
     *runners = best_of_each(std::move(*runners), std::max(most, many / 2), many > 2 * most ? 2 : 1);
     if (runners->size() <= most) break;
   }
-  auto best = every == 1 ? std::move(runners) : whole.from(*runners);
+  auto best = half ? whole.from(*runners) : std::move(runners);
   if (!best) return best.error();
   if (Status s = whole.run(kMiddleSearch, &*best); !s) return s.error();
   report(*best);
@@ -287,11 +269,22 @@ Result<Contest> compete(const Forward& forward, const Observations& observations
   for (const Runner& leader : leaders) {
     auto model = model_of(forward, observations, leader.space, leader.fit);
     if (!model) return model.error();
-    const PairedGain gain = paired_gain(model->held_out, contest.base.held_out);
+    const Eigen::Index before = contest.base.fit.u.size();
+    PairedGain gain = gain_over(*model, contest.base, before);
+    // No more than in sample, less what a parameter gains by luck.
+    const double luck = 0.5 * static_cast<double>(model->fit.u.size() - before);
+    gain.sum = std::min(gain.sum, model->fit.score - contest.base.fit.score - luck);
     contest.contenders.push_back({leader.hypothesis, std::move(*model), gain.sum, gain.se});
   }
   std::stable_sort(contest.contenders.begin(), contest.contenders.end(),
                    [](const Contender& a, const Contender& b) { return a.gain > b.gain; });
+  // Nothing distinguishes those within what is no progress of a fit.
+  const auto equal = std::partition_point(
+      contest.contenders.begin(), contest.contenders.end(),
+      [&](const Contender& c) { return c.gain > contest.contenders.front().gain - kSettledGain; });
+  std::stable_sort(contest.contenders.begin(), equal, [](const Contender& a, const Contender& b) {
+    return a.hypothesis < b.hypothesis;
+  });
   return contest;
 }
 

@@ -40,13 +40,13 @@ Result<Model> model_of(const Forward& forward, const Observations& observations,
 struct Contender {
   std::size_t hypothesis = 0;
   Model model;
-  double gain = 0;     // held-out nats over all observations beyond the model it is added to
+  double gain = 0;     // nats over all observations beyond the model it is added to: gain_over()
   double gain_se = 0;  // its standard error, over observations
 };
 
 struct Contest {
   Model base;                         // refitted from where the best has it
-  std::vector<Contender> contenders;  // best first; those searched to the end, then the others
+  std::vector<Contender> contenders;  // best first; of equal ones the first of the hypotheses
 };
 
 // Whether every hypothesis is searched from afar, or from where it does nothing and as far as
@@ -78,5 +78,10 @@ struct PairedGain {
   double sum = 0, se = 0;
 };
 PairedGain paired_gain(const std::vector<double>& with, const std::vector<double>& without);
+
+// What a model predicts better of observations that no fit saw, and what its first `common`
+// coordinates, which both have, need no longer be away from their priors: nuisances that stand in
+// for a missing effect predict held-out observations well, but at a price.
+PairedGain gain_over(const Model& with, const Model& without, Eigen::Index common);
 
 }  // namespace gapfarm::infer

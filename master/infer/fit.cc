@@ -36,17 +36,18 @@ double robust_score(const Eigen::VectorXd& z, double scale) {
   return sum;
 }
 
-double best_scale(const Eigen::VectorXd& z) {
+double best_scale(const Eigen::VectorXd& z, double least, double most) {
   if (z.size() == 0) return 1;
   // The likelihood's own fixed point, which rises with every round (expectation, maximisation).
-  double scale = std::max(kLeastScale, std::sqrt(z.squaredNorm() / static_cast<double>(z.size())));
+  double scale =
+      std::clamp(std::sqrt(z.squaredNorm() / static_cast<double>(z.size())), least, most);
   for (int round = 0; round < 60; ++round) {
     double sum = 0;
     for (Eigen::Index i = 0; i < z.size() / 3; ++i) {
       const double squares = squares_of(z, i);
       sum += weight(squares, scale) * squares * scale * scale;
     }
-    const double next = std::max(kLeastScale, std::sqrt(sum / static_cast<double>(z.size())));
+    const double next = std::clamp(std::sqrt(sum / static_cast<double>(z.size())), least, most);
     const bool same = std::abs(next - scale) < 1e-4 * scale;
     scale = next;
     if (same) break;
@@ -69,19 +70,32 @@ Eigen::VectorXd Fitter::whitened(const std::vector<Pose>& ends) const {
   return z;
 }
 
+Eigen::VectorXd Fitter::beside(const Eigen::VectorXd& u) const {
+  Eigen::VectorXd sum = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(3 * observations_.size()));
+  Eigen::Index k = 0;
+  for (const Coordinate& c : space_.all()) {
+    if (c.kind == Coordinate::Kind::kColumn && u[k] != 0) {
+      sum -= u[k] * observations_.columns.col(static_cast<Eigen::Index>(c.row));
+    }
+    k += c.dimensions();
+  }
+  return sum;
+}
+
 void Fitter::judge(Eigen::VectorXd z, Fit* fit) const {
   fit->z = std::move(z);
-  fit->scale = best_scale(fit->z);
+  fit->scale = best_scale(fit->z, observations_.least_scale, observations_.most_scale);
   fit->score = robust_score(fit->z, fit->scale) - 0.5 * fit->u.cwiseAbs2().dot(space_.prior());
 }
 
 Result<std::vector<Fit>> Fitter::starts(const std::vector<Eigen::VectorXd>& points,
+                                        const std::vector<Space>& spaces,
                                         const std::vector<std::vector<std::uint32_t>>& reach,
                                         const Eigen::VectorXd& elsewhere) const {
   std::vector<PredictionRequest> requests;
   for (std::size_t k = 0; k < points.size(); ++k) {
     requests.push_back(
-        {space_.values(points[k]), reach.empty() ? std::vector<std::uint32_t>() : reach[k]});
+        {spaces[k].values(points[k]), reach.empty() ? std::vector<std::uint32_t>() : reach[k]});
   }
   const auto ends = forward_(requests);
   if (!ends) return ends.error();
@@ -91,12 +105,14 @@ Result<std::vector<Fit>> Fitter::starts(const std::vector<Eigen::VectorXd>& poin
     if (!(*ends)[k]) continue;
     const std::vector<std::uint32_t>& some = requests[k].trials;
     if (some.empty()) {
-      judge(whitened(*(*ends)[k]), &fits[k]);
+      judge(whitened(*(*ends)[k]) + beside(points[k]), &fits[k]);
       continue;
     }
     Eigen::VectorXd z = elsewhere;
+    const Eigen::VectorXd linear = beside(points[k]);
     for (std::size_t j = 0; j < some.size(); ++j) {
-      z.segment<3>(static_cast<Eigen::Index>(3 * some[j])) = residual(some[j], (*(*ends)[k])[j]);
+      const auto at = static_cast<Eigen::Index>(3 * some[j]);
+      z.segment<3>(at) = residual(some[j], (*(*ends)[k])[j]) + linear.segment<3>(at);
     }
     judge(std::move(z), &fits[k]);
   }
@@ -104,9 +120,20 @@ Result<std::vector<Fit>> Fitter::starts(const std::vector<Eigen::VectorXd>& poin
 }
 
 Result<Fit> Fitter::start(const Eigen::VectorXd& u) const {
-  auto fits = starts({u});
+  auto fits = starts({u}, {space_});
   if (!fits) return fits.error();
   return std::move(fits->front());
+}
+
+// Of every dimension; -1: it is a parameter's.
+std::vector<Eigen::Index> Fitter::columns_of_dimensions() const {
+  std::vector<Eigen::Index> columns;
+  for (const Coordinate& c : space_.all()) {
+    const bool is_column = c.kind == Coordinate::Kind::kColumn;
+    columns.insert(columns.end(), static_cast<std::size_t>(c.dimensions()),
+                   is_column ? static_cast<Eigen::Index>(c.row) : -1);
+  }
+  return columns;
 }
 
 Status Fitter::differentiate(Fit* fit, Eigen::Index known) const {
@@ -118,7 +145,11 @@ Status Fitter::differentiate(Fit* fit, Eigen::Index known) const {
   }
   std::vector<PredictionRequest> requests;
   std::vector<double> moved;
+  std::vector<Eigen::Index> dimension;  // of each request
+  const std::vector<Eigen::Index> column = columns_of_dimensions();
   for (Eigen::Index k = known; k < dimensions; ++k) {
+    if (column[static_cast<std::size_t>(k)] >= 0) continue;
+    dimension.push_back(k);
     Eigen::VectorXd u = fit->u;
     double step = fit->differences[k];
     if (u[k] + step > space_.upper()[k]) step = -step;
@@ -131,12 +162,17 @@ Status Fitter::differentiate(Fit* fit, Eigen::Index known) const {
   fit->slopes.conservativeResize(fit->z.size(), dimensions);
   fit->slopes.rightCols(dimensions - known).setZero();
   for (Eigen::Index k = known; k < dimensions; ++k) {
-    const auto j = static_cast<std::size_t>(k - known);
+    const Eigen::Index c = column[static_cast<std::size_t>(k)];
+    if (c >= 0) fit->slopes.col(k) = -observations_.columns.col(c);
+  }
+  const Eigen::VectorXd linear = beside(fit->u);
+  for (std::size_t j = 0; j < requests.size(); ++j) {
+    const Eigen::Index k = dimension[j];
     if (!(*ends)[j]) {
       fit->differences[k] /= 4;
       continue;
     }
-    const Eigen::VectorXd change = whitened(*(*ends)[j]) - fit->z;
+    const Eigen::VectorXd change = whitened(*(*ends)[j]) + linear - fit->z;
     fit->slopes.col(k) = change / moved[j];
     const double unit =
         std::sqrt(change.squaredNorm() / static_cast<double>(change.size())) / std::abs(moved[j]);
@@ -247,7 +283,7 @@ std::vector<double> Fitter::held_out(const Fit& fit) const {
     for (std::size_t k = 0; k < in_sample.size(); ++k) {
       seen.segment<3>(static_cast<Eigen::Index>(3 * k)) = z.segment<3>(3 * in_sample[k]);
     }
-    const double scale = best_scale(seen);
+    const double scale = best_scale(seen, observations_.least_scale, observations_.most_scale);
     for (std::size_t i = 0; i < observations_.size(); ++i) {
       if (observations_.fold[i] != f) continue;
       scores[i] = score_of(squares_of(z, static_cast<Eigen::Index>(i)), scale);

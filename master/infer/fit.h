@@ -10,6 +10,7 @@
 
 #include "common/base/result.h"
 #include "common/pose/pose.h"
+#include "master/infer/settings.h"
 #include "master/infer/space.h"
 
 namespace gapfarm::infer {
@@ -21,6 +22,11 @@ struct Observations {
   std::vector<Eigen::Matrix3d>
       whitener;                   // L^-1 of its covariance L L', in the predicted pose's axes
   std::vector<std::size_t> fold;  // from 0
+  // Of coordinates that are no parameters: what each adds to the whitened residuals, three rows an
+  // observation.
+  Eigen::MatrixXd columns = {};
+  // Between which the scale of the noise lies, over what the whitener says.
+  double least_scale = kLeastScale, most_scale = INFINITY;
 
   std::size_t size() const { return measured.size(); }
 };
@@ -33,8 +39,8 @@ using Forward = std::function<Result<std::vector<std::optional<std::vector<Pose>
 // Log density (nats, to a constant) of whitened residuals, three an observation, under Student's t
 // of that scale.
 double robust_score(const Eigen::VectorXd& z, double scale);
-// The scale that makes it greatest.
-double best_scale(const Eigen::VectorXd& z);
+// The scale between those that makes it greatest.
+double best_scale(const Eigen::VectorXd& z, double least = kLeastScale, double most = INFINITY);
 
 struct Fit {
   Eigen::VectorXd u;            // in the space's coordinates
@@ -55,9 +61,11 @@ class Fitter {
 
   // The score at a point; -infinity where it cannot be simulated.
   Result<Fit> start(const Eigen::VectorXd& u) const;
-  // The same of several, as one batch.  Where `reach` (ascending) is not empty, only those
-  // observations are simulated, and the others left as in `elsewhere`, whitened residuals.
+  // The same of several, each in a space of its own, as one batch.  Where `reach` (ascending) is
+  // not empty, only those observations are simulated, and the others left as in `elsewhere`,
+  // whitened residuals.
   Result<std::vector<Fit>> starts(const std::vector<Eigen::VectorXd>& points,
+                                  const std::vector<Space>& spaces,
                                   const std::vector<std::vector<std::uint32_t>>& reach = {},
                                   const Eigen::VectorXd& elsewhere = {}) const;
   // What the next step promises to gain, nats.  REQUIRES: slopes.
@@ -80,6 +88,9 @@ class Fitter {
   Normal normal(const Fit& fit, std::optional<std::size_t> without_fold) const;
   Eigen::Vector3d residual(std::size_t observation, const Pose& end) const;
   Eigen::VectorXd whitened(const std::vector<Pose>& ends) const;
+  // What the coordinates without a parameter add there.
+  Eigen::VectorXd beside(const Eigen::VectorXd& u) const;
+  std::vector<Eigen::Index> columns_of_dimensions() const;
   void judge(Eigen::VectorXd z, Fit* fit) const;
   // How far a step from there may go.
   Eigen::VectorXd least_step(const Eigen::VectorXd& u) const;

@@ -40,7 +40,11 @@ inline constexpr std::size_t kFewStarts = 16;
 inline constexpr int kMiddleSearch = 4, kLongSearch = 10;
 // Hypotheses that go on.
 inline constexpr std::size_t kLeaders = 5, kFinalists = 3;
-// Standard errors by which a gain, or a lead over an alternative, is no chance: one case in forty.
+// Standard errors by which a lead over an alternative, or a gain that is to stay, is no chance: one
+// case in forty.
 inline constexpr double kSureGain = 2;
+// The same for a gain to be considered at all: a few observations carry it otherwise.  Against
+// chance guards the least gain, which is calibrated on null logs over the whole catalogue.
+inline constexpr double kLeastSure = 1;
 
 }  // namespace gapfarm::infer

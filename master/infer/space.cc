@@ -18,17 +18,23 @@ double least_positive(const Parameter& row) {
 
 }  // namespace
 
-Space::Space(const ParameterTable& table, std::vector<Coordinate> coordinates)
-    : table_(&table), coordinates_(std::move(coordinates)) {
+Space::Space(const ParameterTable& table, std::vector<Coordinate> coordinates, Overrides constants)
+    : table_(&table), coordinates_(std::move(coordinates)), constants_(std::move(constants)) {
   for (const Coordinate& c : coordinates_) dimensions_ += c.dimensions();
   lower_ = Eigen::VectorXd::Constant(dimensions_, -INFINITY);
   upper_ = -lower_;
   prior_ = Eigen::VectorXd::Zero(dimensions_);
   Eigen::Index k = 0;
   for (const Coordinate& c : coordinates_) {
+    if (c.kind == Kind::kColumn) {
+      prior_[k++] = 1;
+      continue;
+    }
     const Parameter& row = table[c.row];
     if (c.has_prior) prior_.segment(k, c.dimensions()).setConstant(1 / std::pow(kPriorSizes, 2));
-    if (c.kind == Kind::kLinear) {
+    if (c.kind == Kind::kAngle) {
+      // no bounds
+    } else if (c.kind == Kind::kLinear) {
       lower_[k] = row.lower / c.size;
       upper_[k] = row.upper / c.size;
     } else if (c.kind == Kind::kLogarithm) {
@@ -51,7 +57,9 @@ Eigen::VectorXd Space::from(const Overrides& values) const {
   Eigen::VectorXd u(dimensions_);
   Eigen::Index k = 0;
   for (const Coordinate& c : coordinates_) {
-    if (c.kind == Kind::kLinear) {
+    if (c.kind == Kind::kColumn) {
+      u[k] = 0;
+    } else if (c.kind == Kind::kLinear || c.kind == Kind::kAngle) {
       u[k] = value(c.row) / c.size;
     } else if (c.kind == Kind::kLogarithm) {
       u[k] = std::log(std::max(value(c.row), least_positive((*table_)[c.row]))) / c.size;
@@ -67,13 +75,17 @@ Eigen::VectorXd Space::from(const Overrides& values) const {
 }
 
 Overrides Space::values(const Eigen::VectorXd& u) const {
-  Overrides values;
+  Overrides values = constants_;
   const auto put = [&](std::size_t row, double value) {
     values[row] = std::clamp(value, (*table_)[row].lower, (*table_)[row].upper);
   };
   Eigen::Index k = 0;
   for (const Coordinate& c : coordinates_) {
-    if (c.kind == Kind::kLinear) {
+    if (c.kind == Kind::kColumn) {
+      // no parameter
+    } else if (c.kind == Kind::kAngle) {
+      put(c.row, wrap_angle(u[k] * c.size));
+    } else if (c.kind == Kind::kLinear) {
       put(c.row, u[k] * c.size);
     } else if (c.kind == Kind::kLogarithm) {
       put(c.row, std::exp(u[k] * c.size));
@@ -108,10 +120,21 @@ Overrides Space::deviations(const Eigen::VectorXd& u, const Eigen::MatrixXd& cov
   return deviations;
 }
 
+Space Space::holding(const Overrides& constants) const {
+  Overrides all = constants;
+  all.insert(constants_.begin(), constants_.end());
+  for (const Coordinate& c : coordinates_) {
+    if (c.kind == Kind::kColumn) continue;
+    all.erase(c.row);
+    if (c.kind == Kind::kPolar) all.erase(c.direction_row);
+  }
+  return Space(*table_, coordinates_, std::move(all));
+}
+
 Space Space::with(const std::vector<Coordinate>& more) const {
   std::vector<Coordinate> all = coordinates_;
   all.insert(all.end(), more.begin(), more.end());
-  return Space(*table_, std::move(all));
+  return Space(*table_, std::move(all), constants_);
 }
 
 Space Space::without(std::size_t first, std::size_t count, Eigen::VectorXd* u) const {
@@ -128,7 +151,7 @@ Space Space::without(std::size_t first, std::size_t count, Eigen::VectorXd* u) c
     from += dimensions;
   }
   *u = kept.head(to);
-  return Space(*table_, std::move(rest));
+  return Space(*table_, std::move(rest), constants_);
 }
 
 }  // namespace gapfarm::infer

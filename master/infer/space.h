@@ -15,9 +15,11 @@
 namespace gapfarm::infer {
 
 struct Coordinate {
-  enum class Kind { kLinear, kLogarithm, kPolar };
+  // kAngle: goes round.  kColumn: no parameter, but a change of the predictions that is known to
+  // first order (Observations::columns), with a prior of standard deviation 1.
+  enum class Kind { kLinear, kAngle, kLogarithm, kPolar, kColumn };
   Kind kind = Kind::kLinear;
-  std::size_t row = 0;            // of the parameter table; kPolar: of the strength
+  std::size_t row = 0;            // of the parameter table; kPolar: of the strength; kColumn: which
   std::size_t direction_row = 0;  // kPolar
   double symmetry = 1;            // kPolar: how often the effect looks the same in a full turn
   bool of_ratio = false;          // kPolar: the strength is the logarithm of a ratio
@@ -30,7 +32,8 @@ struct Coordinate {
 class Space {
  public:
   // REQUIRES: the table outlives it.
-  Space(const ParameterTable& table, std::vector<Coordinate> coordinates);
+  // `constants`: rows that differ from their nominal value and are not searched.
+  Space(const ParameterTable& table, std::vector<Coordinate> coordinates, Overrides constants = {});
 
   Eigen::Index dimensions() const { return dimensions_; }
   // Rows that `values` lacks are at their nominal value.
@@ -50,12 +53,16 @@ class Space {
   std::size_t coordinates() const { return coordinates_.size(); }
   // These alone, of the same table.
   Space only(std::vector<Coordinate> coordinates) const {
-    return Space(*table_, std::move(coordinates));
+    return Space(*table_, std::move(coordinates), constants_);
   }
+  // The same with these rows held there.
+  Space holding(const Overrides& constants) const;
+  const std::vector<Coordinate>& all() const { return coordinates_; }
 
  private:
   const ParameterTable* table_;
   std::vector<Coordinate> coordinates_;
+  Overrides constants_;
   Eigen::Index dimensions_ = 0;
   Eigen::VectorXd lower_, upper_, prior_;
 };

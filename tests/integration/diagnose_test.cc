@@ -151,7 +151,7 @@ TEST_F(Diagnose, FindsASecondSeamWhereThereIsOne) {
   std::vector<std::string> two = one;
   two.insert(two.end(), {"camera_seam_2.offset_x=-0.02", "camera_seam_2.offset_y=0.05",
                          "camera_seam_2.position=0.9"});
-  simulate(240, two);
+  simulate(480, two);  // drives that cross the second line are few
   const Json both = diagnose();
   ASSERT_EQ(both["effects"].size(), 2u) << both["headline"];
   std::set<std::string> names, axes;

@@ -8,7 +8,7 @@
 
 #include "common/math/statistics.h"
 #include "master/diagnose/fit/free_commands.h"
-#include "master/diagnose/fit/selection.h"
+#include "master/diagnose/fit/proposals.h"
 
 namespace gapfarm {
 namespace {
@@ -243,28 +243,11 @@ std::vector<std::string> lacking(const LogVariety& v) {
   return lacks;
 }
 
-std::string alias_sentence(std::string_view effect, std::span<const AliasReason> aliases,
+std::string alias_sentence(const std::string& effect, const std::vector<std::string>& aliases,
                            std::span<const std::string> lacks) {
   if (aliases.empty()) return "";
-  std::vector<std::string> parallel, others;
-  double least = 1;
-  for (const AliasReason& alias : aliases) {
-    const bool alike = std::abs(alias.cosine) > kAliasCosine;
-    (alike ? parallel : others).push_back(alias.name);
-    if (alike) least = std::min(least, std::abs(alias.cosine));
-  }
-  std::string text;
-  if (!parallel.empty()) {
-    char cosine[16];
-    std::snprintf(cosine, sizeof cosine, "%.2f", std::floor(100 * least) / 100);
-    text = "In these data " + std::string(effect) + " and " + listed(parallel, "or") +
-           " change the end poses alike (|cos| " + (parallel.size() > 1 ? "at least " : "") +
-           cosine + " after retuning the base)";
-  }
-  if (!others.empty()) {
-    text += (text.empty() ? "In these data " : "; ") + listed(others, "or") +
-            " would explain about as much as " + std::string(effect) + " in another way";
-  }
+  std::string text = "In these data " + listed(aliases, "or") + " would explain about as much as " +
+                     effect + " in another way";
   if (!lacks.empty()) text += "; the log lacks " + listed(lacks);
   return text + ".";
 }

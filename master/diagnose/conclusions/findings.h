@@ -65,13 +65,8 @@ LogVariety log_variety(std::span<const ResidualTrial> trials, std::span<const Ce
 // What the log lacks and two effects would need to part: "several durations", ...
 std::vector<std::string> lacking(const LogVariety& variety);
 
-// An effect whose signature is parallel to another's in these data.
-struct AliasReason {
-  std::string name;
-  double cosine = 0;  // absolute, of what retuning the base leaves of both
-};
 // One sentence; empty without aliases.  `lacks`: what the log would need to part them.
-std::string alias_sentence(std::string_view effect, std::span<const AliasReason> aliases,
+std::string alias_sentence(const std::string& effect, const std::vector<std::string>& aliases,
                            std::span<const std::string> lacks);
 
 // What cannot be seen, or not be trusted, in data as thin as these; one sentence each.

@@ -57,8 +57,7 @@ void fill_judgement(const Judgement& judged, Diagnosis* d) {
 }
 
 void fill_steps(const Screening& screening, Diagnosis* d) {
-  if (screening.warning) return;
-  for (const SelectionStep& step : screening.catalogue->steps()) {
+  for (const SelectionStep& step : screening.steps) {
     d->steps.push_back({step.explained, step.offered});
   }
 }
@@ -141,11 +140,8 @@ Result<DiagnosisResult> report(const DiagnosisRequest& of, const Screening& scre
   append(leftover_caution(refit.judged.left, of.subject.unknown_log10_p), &d);
   fill_values(of, refit, &result);
   fill_where(of, refit, &d);
-  // What is simulated from here on joins a catalogue of its own.
-  std::optional<Selector> catalogue;
-  if (!named.chosen.empty()) catalogue = *screening.catalogue;
-  if (d.verdict == Verdict::kEffectAndUnknown && catalogue) {
-    const auto places = second_places(of, named, &*catalogue);
+  if (d.verdict == Verdict::kEffectAndUnknown && !named.chosen.empty()) {
+    const auto places = second_places(of, named, *screening.catalogue);
     if (!places) return places.error();
     append(*places, &d);
   }
@@ -163,8 +159,8 @@ Result<DiagnosisResult> report(const DiagnosisRequest& of, const Screening& scre
         plain_number(of.frame_m.x()) + " m, y = " + plain_number(of.frame_m.y()) +
         " m (its [frame]), and a seam's shift is the one there.");
   }
-  if (catalogue) {
-    if (Status s = plan_next(of, named, &*catalogue, &d); !s) return s.error();
+  if (!named.chosen.empty()) {
+    if (Status s = plan_next(of, named, *screening.catalogue, &d); !s) return s.error();
   }
   return result;
 }

@@ -73,13 +73,9 @@ NamedEffect named_mean(const DiagnosisRequest& of, const Refit& refit, std::size
   const ChosenEffect& chosen = named.chosen[k];
   NamedEffect effect;
   effect.name = chosen.candidate.signature.effect;
-  std::vector<AliasReason> reasons;
-  for (const Alias& alias : chosen.aliases) {
-    effect.aliases.push_back(alias.effect);
-    reasons.push_back({alias.effect, std::abs(alias.cosine)});
-  }
+  effect.aliases = chosen.aliases;
   effect.alias_reason =
-      alias_sentence(effect.name, reasons, of.subject.lacks(named.study(), of.problem.log));
+      alias_sentence(effect.name, effect.aliases, of.subject.lacks(named.study(), of.problem.log));
   effect.confidence = confidence_of(chosen.candidate.gain, of.subject.least_gain);
   for (const auto& [row, value] : named.estimates->at) {
     const Parameter& p = of.table()[row];

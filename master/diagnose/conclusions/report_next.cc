@@ -12,7 +12,7 @@ namespace {
 
 // A chosen effect and its aliases, each at its best linear fit beside the others.
 Result<CompetingCauses> alternatives_of(const DiagnosisRequest& of, const Explanation& named,
-                                        std::size_t k, Selector* catalogue) {
+                                        std::size_t k, const Proposals& catalogue) {
   const ParameterTable& table = of.table();
   const ChosenEffect& chosen = named.chosen[k];
   const std::string& own = chosen.candidate.signature.effect;
@@ -20,14 +20,14 @@ Result<CompetingCauses> alternatives_of(const DiagnosisRequest& of, const Explan
   for (std::size_t j = 0; j < named.chosen.size(); ++j) {
     if (j != k) others.push_back(&named.chosen[j].candidate.signature);
   }
-  const Regression explained = catalogue->with(others);
-  auto candidates = catalogue->candidates(explained, {});
+  const Regression explained = catalogue.with(others);
+  auto candidates = catalogue.candidates(explained, {});
   if (!candidates) return candidates.error();
   CompetingCauses alternatives;
   for (const EffectCandidate& c : *candidates) {
     const std::string& name = c.signature.effect;
-    const bool alias = std::any_of(chosen.aliases.begin(), chosen.aliases.end(),
-                                   [&](const Alias& a) { return a.effect == name; });
+    const bool alias =
+        std::find(chosen.aliases.begin(), chosen.aliases.end(), name) != chosen.aliases.end();
     if (!alias && name != kind_of(own)) continue;
     Overrides at = named.study().base;
     if (alias) {
@@ -68,7 +68,7 @@ std::string place_text(const DiagnosisRequest& of, const Signature& second,
 
 }  // namespace
 
-Status plan_next(const DiagnosisRequest& of, const Explanation& named, Selector* catalogue,
+Status plan_next(const DiagnosisRequest& of, const Explanation& named, const Proposals& catalogue,
                  Diagnosis* diagnosis) {
   for (std::size_t k = 0; k < named.chosen.size(); ++k) {
     if (named.chosen[k].aliases.empty()) continue;
@@ -87,9 +87,9 @@ Status plan_next(const DiagnosisRequest& of, const Explanation& named, Selector*
 }
 
 Result<std::vector<std::string>> second_places(const DiagnosisRequest& of, const Explanation& named,
-                                               Selector* catalogue) {
+                                               const Proposals& catalogue) {
   std::vector<std::string> sentences;
-  const Regression explained = explained_by(*catalogue, named);
+  const Regression explained = explained_by(catalogue, named);
   const auto is_named = [&](const std::string& name) {
     return std::any_of(named.chosen.begin(), named.chosen.end(),
                        [&](const ChosenEffect& c) { return c.candidate.signature.effect == name; });
@@ -98,7 +98,7 @@ Result<std::vector<std::string>> second_places(const DiagnosisRequest& of, const
     const std::string& name = effect.candidate.signature.effect;
     const std::vector<const char*>& keys = of.subject.effects->row(name).identified_by;
     if (keys.empty() || kind_of(name) != name) continue;
-    const auto second = catalogue->again(explained, name);
+    const auto second = catalogue.again(explained, name);
     if (!second) return second.error();
     if (second->gain < of.subject.least_gain) continue;
     Regression with_it = explained;

@@ -53,9 +53,9 @@ Status compare_with_baselines(const DiagnosisRequest& of, const Refit& refit, Di
 // An arena may have more seams, a floor more patches, than a model holds or than were clear enough:
 // a sentence each.
 Result<std::vector<std::string>> second_places(const DiagnosisRequest& of, const Explanation& named,
-                                               Selector* catalogue);
+                                               const Proposals& catalogue);
 // Every named effect against its aliases, each at its best linear fit.
-Status plan_next(const DiagnosisRequest& of, const Explanation& named, Selector* catalogue,
+Status plan_next(const DiagnosisRequest& of, const Explanation& named, const Proposals& catalogue,
                  Diagnosis* diagnosis);
 
 // One sentence of all that what is left depends on, the clearest first; none where there is none.

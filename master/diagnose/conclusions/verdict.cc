@@ -14,7 +14,9 @@ double leftover_scale(const Regression& explained) {
   for (double z : studentised(explained, 0.2)) {
     if (z != 0) squares.push_back(z * z);  // rows of ignored trials are
   }
-  return squares.empty() ? 1 : std::clamp(median(squares) / 0.455, 0.9, 1.4);
+  return squares.empty()
+             ? 1
+             : std::clamp(median(squares) / 0.455, kLeastLeftoverScale, kMostLeftoverScale);
 }
 
 std::vector<Leftover> leftovers(const Regression& explained,

@@ -20,6 +20,7 @@ struct Leftover {
 // Variance of what is left over the noise's, the degrees of freedom that were spent given back:
 // robust, and bounded since the noise was measured.
 double leftover_scale(const Regression& explained);
+inline constexpr double kLeastLeftoverScale = 0.9, kMostLeftoverScale = 1.4;
 
 // Most significant first.
 std::vector<Leftover> leftovers(const Regression& explained,

@@ -20,6 +20,7 @@ void start_lens(const EffectStart& at, std::map<std::string, double>* values) {
 
 extern const EffectDiagnosis kCameraDistortion = {
     .effect = "camera_distortion",
+    .searched = {{"k1", 0.05}, {"x", 0.1}, {"y", 0.1}},
     .probes = [](const Study& study) { return lens_probes(middle_of(study)); },
     .bends_view = true,
     .start = start_lens,

@@ -69,6 +69,7 @@ std::vector<Signature> nap_signatures(const Study& study, ProbedSlopes probe) {
 
 extern const EffectDiagnosis kFloorNap = {
     .effect = "floor_nap",
+    .searched = {{"strength", 0.1}, {"direction", 0.2}},
     .probes = nap_probes,
     .signatures = nap_signatures,
     .by_contact = true,

@@ -69,6 +69,7 @@ std::vector<Signature> tilt_signatures(const Study& study, ProbedSlopes slopes) 
 
 extern const EffectDiagnosis kFloorTilt = {
     .effect = "floor_tilt",
+    .searched = {{"angle", 0.03}},
     .probes = tilt_probes,
     .signatures = tilt_signatures,
     .by_contact = true,

@@ -47,6 +47,7 @@ namespace {
 EffectDiagnosis first_patch() {
   return {
       .effect = kPatchEffect,
+      .searched = {{"ratio", 0.4, true}, {"x", 0.05}, {"y", 0.05}, {"radius", 0.4, true}},
       .search_error = patch_search_error,
       .places = {{"x", 0}, {"y", 1}},
       .identified_by = {"x", "y", "radius"},

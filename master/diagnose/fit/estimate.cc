@@ -289,7 +289,9 @@ std::map<std::string, double> start_values(const Study& study, const Regression&
   const EffectDiagnosis& effect = study.subject->effects->row(signature.effect);
   const EffectStart at{study, others, signature, c};
   const ParameterTable& table = *study.table;
-  if (effect.polar) {
+  if (signature.whole) {
+    // All of them are known.
+  } else if (effect.polar) {
     start_polar(*effect.polar, at, &values);
   } else if (effect.start != nullptr) {
     effect.start(at, &values);

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "common/base/result.h"
+#include "master/diagnose/fit/proposals.h"
 #include "master/diagnose/fit/regression.h"
-#include "master/diagnose/fit/selection.h"
 
 namespace gapfarm {
 

@@ -130,8 +130,7 @@ Result<std::vector<Signature>> signatures(Predictor& predictor, const Study& stu
 }
 
 Result<std::vector<Signature>> patch_signatures(Predictor& predictor, const Study& study,
-                                                const std::vector<Patch>& places,
-                                                const PatchTrials& trials) {
+                                                const std::vector<Patch>& places) {
   std::vector<Pose> ends_without;
   for (const ResidualTrial& trial : study.trials) ends_without.push_back(trial.X_WP);
   const auto without = slope_point(predictor, study, study.base, ends_without);
@@ -140,9 +139,9 @@ Result<std::vector<Signature>> patch_signatures(Predictor& predictor, const Stud
   std::vector<std::map<std::string, double>> values;
   for (const Patch& place : places) {
     PredictionRequest request;
-    const auto reach = study.subject->patch_reach(predictor.problem(), study, place);
+    const std::vector<bool> touched = study.subject->touched_by(predictor.problem(), study, place);
     for (std::size_t i = 0; i < study.size(); ++i) {
-      if (trials(i, reach[i])) request.trials.push_back(static_cast<std::uint32_t>(i));
+      if (touched[i]) request.trials.push_back(static_cast<std::uint32_t>(i));
     }
     values.push_back(patch_values(place));
     request.at = without->at;
@@ -153,6 +152,9 @@ Result<std::vector<Signature>> patch_signatures(Predictor& predictor, const Stud
   }
   const auto ends = predictor.attempt(requests);
   if (!ends) return ends.error();
+  // Asked once, and not again and again, of a program that can simulate none.
+  const auto failed = [](const auto& simulated) { return !simulated; };
+  if (std::all_of(ends->begin(), ends->end(), failed)) predictor.exclude(kPatchEffect);
   std::vector<Signature> all;
   for (std::size_t k = 0; k < requests.size(); ++k) {
     if (!(*ends)[k]) predictor.exclude(std::string("some places of ") + kPatchEffect);

@@ -3,7 +3,6 @@
 
 #include <Eigen/Core>
 #include <cstddef>
-#include <functional>
 #include <map>
 #include <string>
 #include <vector>
@@ -34,14 +33,9 @@ Result<std::vector<Signature>> signatures(Predictor& predictor, const Study& stu
 // Each column in three, one a kind of drive; those of nothing but zeros omitted.
 Eigen::MatrixXd split_by_kind(const Study& study, const Eigen::MatrixXd& columns);
 
-// Which trials a disc is simulated in; it does nothing in the others.
-using PatchTrials = std::function<bool(std::size_t trial, PatchReach reach)>;
-inline bool touched_trials(std::size_t, PatchReach reach) { return reach != PatchReach::kNone; }
-
 // Discs of floor, simulated trial by trial.  One that cannot be simulated explains nothing.
 Result<std::vector<Signature>> patch_signatures(Predictor& predictor, const Study& study,
-                                                const std::vector<Patch>& places,
-                                                const PatchTrials& trials = touched_trials);
+                                                const std::vector<Patch>& places);
 
 // Middle of the start places along each axis.
 Eigen::Vector2d middle_of(const Study& study);

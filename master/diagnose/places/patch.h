@@ -23,10 +23,6 @@ inline bool are_two_patches(const Patch& a, const Patch& b) {
   return std::hypot(a[0] - b[0], a[1] - b[1]) >= kLeastShare * (a[2] + b[2]);
 }
 
-// What a disc may do to a trial: nothing, for it is never touched; little, for the robot is inside
-// all along and on one friction; or much.
-enum class PatchReach { kNone, kInside, kRim };
-
 // What is looked for: discs that promise to explain `least` squares or more, `most` of them, each
 // another one than `beside`.
 struct PatchWish {

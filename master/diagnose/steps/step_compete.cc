@@ -1,4 +1,5 @@
-// Base and hypotheses searched together: where slopes taken at the base lie.
+// Which hypotheses the log calls for: forward selection by held-out score, each contest's best
+// fitted together with all that was chosen before.
 
 #include <algorithm>
 #include <cmath>
@@ -8,127 +9,44 @@
 #include "common/math/laws.h"
 #include "master/diagnose/conclusions/findings.h"
 #include "master/diagnose/evidence/noise.h"
-#include "master/diagnose/steps/step_parts.h"
-#include "master/infer/compete.h"
+#include "master/diagnose/steps/competition.h"
+#include "master/diagnose/steps/watch.h"
 #include "master/infer/settings.h"
 
 namespace gapfarm::steps {
 namespace {
-
-using infer::Coordinate;
-
-// What is asked of a search for causes.
-struct Competition {
-  infer::Forward forward;
-  infer::Observations observations;
-  std::vector<infer::Hypothesis> hypotheses;
-  std::size_t base_coordinates = 0;
-};
-
-infer::Space base_space(const Study& study) {
-  std::vector<Coordinate> coordinates;
-  for (const BaseParameter& p : study.base_parameters) {
-    Coordinate c;
-    c.kind = Coordinate::Kind::kLogarithm;
-    c.row = p.row;
-    c.size = p.prior_log_sd / 2;
-    coordinates.push_back(c);
-  }
-  return infer::Space(*study.table, std::move(coordinates));
-}
-
-// A row of the effect, or one of the base's that only matters beside it.
-std::size_t searched_row(const EffectDiagnosis& effect, const SearchedSize& size,
-                         const ParameterTable& table) {
-  const auto own = table.find(std::string(effect.effect) + "." + size.key);
-  return own ? *own : table.row(size.key);
-}
-
-std::vector<Coordinate> coordinates_of(const EffectDiagnosis& effect, const ParameterTable& table) {
-  std::vector<Coordinate> coordinates;
-  for (const SearchedSize& size : effect.searched) {
-    Coordinate c;
-    c.row = searched_row(effect, size, table);
-    c.size = size.size;
-    c.has_prior =
-        std::none_of(effect.places.begin(), effect.places.end(),
-                     [&](const WorldPlace& p) { return std::string_view(p.key) == size.key; });
-    if (effect.polar) {
-      c.kind = Coordinate::Kind::kPolar;
-      c.direction_row = table.row(effect.polar->direction);
-      c.symmetry = effect.polar->symmetry;
-      c.of_ratio = effect.polar->ratio;
-    } else if (size.logarithm) {
-      c.kind = Coordinate::Kind::kLogarithm;
-    }
-    coordinates.push_back(c);
-  }
-  return coordinates;
-}
-
-// Two sizes to either side of nothing: every corner of the box, or four directions.
-std::vector<infer::Start> corners(const infer::Space& own) {
-  constexpr double kFar = 2;  // sizes
-  std::vector<infer::Start> starts;
-  const Eigen::VectorXd neutral = own.from({});
-  const auto dimensions = static_cast<unsigned>(own.dimensions());
-  for (unsigned corner = 0; corner < 1u << dimensions; ++corner) {
-    Eigen::VectorXd u = neutral;
-    for (unsigned k = 0; k < dimensions; ++k) u[k] += (corner >> k & 1u) != 0 ? kFar : -kFar;
-    starts.push_back({own.values(u.cwiseMax(own.lower()).cwiseMin(own.upper())), {}});
-  }
-  return starts;
-}
-
-Competition competition(const DiagnosisRequest& of, const Study& study) {
-  Competition c;
-  c.forward = [&of](const std::vector<PredictionRequest>& points) {
-    return of.predictor.attempt(points);
-  };
-  for (const ResidualTrial& t : study.trials) c.observations.measured.push_back(t.X_WE);
-  c.observations.whitener = study.whitener;
-  c.observations.fold = of.subject.folds(study);
-  const infer::Space base = base_space(study);
-  c.base_coordinates = base.coordinates();
-  for (const EffectDiagnosis* effect : *of.subject.effects) {
-    if (effect->searched.empty() || of.excluded(effect->effect)) continue;
-    infer::Hypothesis h;
-    h.name = effect->effect;
-    h.coordinates = coordinates_of(*effect, *study.table);
-    h.from_neutral = effect->proposals == nullptr;
-    h.starts = h.from_neutral ? corners(base.only(h.coordinates)) : effect->proposals(study);
-    c.hypotheses.push_back(std::move(h));
-  }
-  return c;
-}
-
-// What a contest's best has to gain, held out, beside what was explained before.
-bool enters(const DiagnosisRequest& of, const infer::Contender& best, double explained) {
-  return best.gain >= std::max(of.subject.least_gain, kLeastShare * explained) &&
-         best.gain >= infer::kSureGain * best.gain_se;
-}
-
-// Hypotheses that predict as well as the best, as far as anybody can show.
-std::vector<Alias> aliases_of(const std::vector<infer::Hypothesis>& hypotheses,
-                              const infer::Contest& contest) {
-  const infer::Contender& best = contest.contenders.front();
-  std::vector<Alias> aliases;
-  for (const infer::Contender& other : contest.contenders) {
-    if (other.hypothesis == best.hypothesis || aliases.size() == 3) continue;
-    const infer::PairedGain ahead = infer::paired_gain(best.model.held_out, other.model.held_out);
-    if (ahead.sum < infer::kSureGain * ahead.se && other.gain > best.gain / 2) {
-      aliases.push_back({hypotheses[other.hypothesis].name, 1});
-    }
-  }
-  return aliases;
-}
 
 struct Found {
   infer::Model base;  // alone
   infer::Model model;
   std::vector<ChosenEffect> chosen;
   std::vector<Screened> rows;
+  std::vector<SelectionStep> steps;
 };
+
+// Hypotheses that predict as well as the best, as far as anybody can show.
+std::vector<std::string> aliases_of(const DiagnosisRequest& of, const std::string& effect,
+                                    const std::vector<infer::Hypothesis>& hypotheses,
+                                    const infer::Contest& contest) {
+  const infer::Contender& best = contest.contenders.front();
+  std::vector<std::string> aliases;
+  for (const infer::Contender& other : contest.contenders) {
+    const std::string& name = hypotheses[other.hypothesis].name;
+    if (name == effect) continue;
+    const infer::PairedGain ahead =
+        infer::gain_over(best.model, other.model, contest.base.fit.u.size());
+    if (ahead.sum < infer::kSureGain * ahead.se && other.gain > best.gain / 2) {
+      aliases.push_back(name);
+    }
+  }
+  for (const char* constant : of.subject.effects->row(effect).aliases) {
+    if (std::find(aliases.begin(), aliases.end(), constant) == aliases.end()) {
+      aliases.emplace_back(constant);
+    }
+  }
+  if (aliases.size() > kMostAliases) aliases.resize(kMostAliases);
+  return aliases;
+}
 
 std::string estimate_text(const DiagnosisRequest& of, const infer::Contender& c,
                           const std::string& effect) {
@@ -156,51 +74,6 @@ void add_rows(const DiagnosisRequest& of, const std::vector<infer::Hypothesis>& 
   }
 }
 
-// A model without one of the effects that it holds, fitted anew.
-Result<infer::Model> refitted_without(const Competition& c, const infer::Model& model,
-                                      std::size_t first, std::size_t count) {
-  Eigen::VectorXd u = model.fit.u;
-  infer::Space space = model.space.without(first, count, &u);
-  const infer::Fitter fitter(c.forward, c.observations, space);
-  auto fit = fitter.start(u);
-  if (!fit) return fit.error();
-  if (Status s = fitter.improve(&*fit, infer::kLongSearch); !s) return s.error();
-  return infer::model_of(c.forward, c.observations, std::move(space), std::move(*fit));
-}
-
-// What later ones made worthless leaves again.
-Status drop_idle(const DiagnosisRequest& of, const Competition& c, Found* found) {
-  for (std::size_t k = 0; k + 1 < found->chosen.size();) {
-    std::size_t first = c.base_coordinates;
-    const auto count = [&](std::size_t i) {
-      const std::string& name = found->chosen[i].candidate.signature.effect;
-      return of.subject.effects->row(name).searched.size();
-    };
-    for (std::size_t i = 0; i < k; ++i) first += count(i);
-    auto without = refitted_without(c, found->model, first, count(k));
-    if (!without) return without.error();
-    const infer::PairedGain gain = infer::paired_gain(found->model.held_out, without->held_out);
-    const bool idle = gain.sum < of.subject.least_gain || gain.sum < infer::kSureGain * gain.se;
-    if (!idle) {
-      found->chosen[k].candidate.gain = gain.sum;
-      ++k;
-      continue;
-    }
-    found->model = std::move(*without);
-    found->chosen.erase(found->chosen.begin() + static_cast<std::ptrdiff_t>(k));
-  }
-  return {};
-}
-
-Result<infer::Model> base_alone(const Study& study, const Competition& c) {
-  const infer::Space space = base_space(study);
-  const infer::Fitter fitter(c.forward, c.observations, space);
-  auto fit = fitter.start(space.from(study.base));
-  if (!fit) return fit.error();
-  if (Status s = fitter.improve(&*fit, infer::kLongSearch); !s) return s.error();
-  return infer::model_of(c.forward, c.observations, space, std::move(*fit));
-}
-
 // For who watches.
 void report_contest(const DiagnosisRequest& of, const std::vector<infer::Standing>& standings) {
   if (!of.options.on_finding) return;
@@ -215,81 +88,263 @@ void report_contest(const DiagnosisRequest& of, const std::vector<infer::Standin
 }
 
 // Forward selection: the best of every contest joins the model that the next one adds to.
-// `configured`: the base before anything was tuned.
-Result<Found> select(const DiagnosisRequest& of, const Study& study, const Overrides& configured,
-                     const Competition& c) {
-  auto base = base_alone(study, c);
-  if (!base) return base.error();
-  Found found{*base, *base, {}, {}};
-  infer::Terms terms;
-  terms.bases = {configured};
-  std::vector<infer::Hypothesis> left = c.hypotheses;
-  double explained = 0;
-  while (found.chosen.size() < kMostEffects && !left.empty()) {
-    auto contest = infer::compete(
-        c.forward, c.observations, found.model, left, terms,
-        [&](const std::vector<infer::Standing>& standings) { report_contest(of, standings); });
-    if (!contest) return contest.error();
-    if (found.chosen.empty()) found.base = contest->base;
-    found.model = contest->base;
-    add_rows(of, left, *contest, &found.rows);
-    if (contest->contenders.empty() || !enters(of, contest->contenders.front(), explained)) break;
-    infer::Contender& best = contest->contenders.front();
-    explained += best.gain;
-    Signature mark;
-    mark.effect = left[best.hypothesis].name;
-    const Eigen::Index own = best.model.fit.u.size() - found.model.fit.u.size();
-    mark.columns = best.model.fit.slopes.rightCols(own);
-    found.chosen.push_back({{best.gain, std::move(mark)}, aliases_of(left, *contest)});
-    found.model = std::move(best.model);
-    left.erase(left.begin() + static_cast<std::ptrdiff_t>(best.hypothesis));
-    if (Status s = drop_idle(of, c, &found); !s) return s.error();
-    terms = {infer::Effort::kLocal, {}, std::max(of.subject.least_gain, kLeastShare * explained)};
+class Selection {
+ public:
+  // `marks`: null where every hypothesis is searched from afar.  `configured`: the base before
+  // anything was tuned.
+  Selection(const DiagnosisRequest& of, const Study& study, const Competition& competition,
+            const Proposals* marks, const std::vector<Signature>& first,
+            const Overrides& configured)
+      : of_(of), study_(study), competition_(competition), marks_(marks), first_(first) {
+    for (const Signature& s : first) not_these_.insert(s.effect);
+    if (marks != nullptr) terms_.effort = infer::Effort::kLocal;
+    if (of.subject.base_moves) terms_.bases = {configured};
   }
-  return found;
+
+  Result<Found> run() {
+    auto base = fitted(competition_.base(), competition_.base().from(study_.base));
+    if (!base) return base.error();
+    found_.emplace(Found{*base, *base, {}, {}, {}});
+    while (found_->chosen.size() < kMostEffects) {
+      const auto more = add_best();
+      if (!more) return more.error();
+      if (!*more) break;
+    }
+    std::stable_sort(found_->chosen.begin(), found_->chosen.end(),
+                     [](const ChosenEffect& a, const ChosenEffect& b) {
+                       return a.candidate.gain > b.candidate.gain;
+                     });
+    return std::move(*found_);
+  }
+
+ private:
+  Result<infer::Model> fitted(infer::Space space, const Eigen::VectorXd& from) const {
+    const infer::Fitter fitter(competition_.forward(), competition_.observations(), space);
+    auto fit = fitter.start(from);
+    if (!fit) return fit.error();
+    if (Status s = fitter.improve(&*fit, infer::kLongSearch); !s) return s.error();
+    return infer::model_of(competition_.forward(), competition_.observations(), std::move(space),
+                           std::move(*fit));
+  }
+
+  double explained() const {
+    double sum = 0;
+    for (const ChosenEffect& c : found_->chosen) sum += c.candidate.gain;
+    return sum;
+  }
+
+  std::size_t size_of(std::size_t chosen) const {
+    return competition_.coordinates_of(found_->chosen[chosen].candidate.signature.effect).size();
+  }
+
+  // What slopes promise beyond the present model.
+  Result<std::vector<infer::Hypothesis>> proposed() const {
+    const std::vector<EffectCandidate> chosen = candidates_of(found_->chosen);
+    std::set<std::string> without = not_these_;
+    for (const EffectCandidate& c : chosen) without.insert(c.signature.effect);
+    if (marks_ == nullptr) return competition_.of_rows(without);
+    Regression explained = marks_->nothing_explained();
+    explained.restart(competition_.unexplained(found_->model));
+    for (const Signature& s : first_) explained.add(s.columns);
+    for (const EffectCandidate& c : chosen) explained.add(c.signature.columns);
+    auto marks = marks_->candidates(explained, without, chosen);
+    if (!marks) return marks.error();
+    std::vector<infer::Hypothesis> hypotheses;
+    double best = 0;
+    for (const EffectCandidate& mark : *marks) {
+      if (mark.gain < kWorthSearchingShare * best) break;
+      // A search may do better than slopes say, but not by more than they are trusted for.
+      const double most = infer::kMostTrust * mark.gain;
+      if (most < least_gain_of(mark.signature.effect, study_, this->explained())) continue;
+      if (not_these_.count(mark.signature.effect)) continue;
+      if (!marks_->is_new(first_, chosen, mark, this->explained())) continue;
+      best = std::max(best, mark.gain);
+      hypotheses.push_back(competition_.of_mark(mark, explained));
+    }
+    std::stable_sort(hypotheses.begin(), hypotheses.end(), [&](const auto& a, const auto& b) {
+      return of_.subject.effects->place_in_catalogue(a.name) <
+             of_.subject.effects->place_in_catalogue(b.name);
+    });
+    return hypotheses;
+  }
+
+  bool enters(const infer::Contender& best, const std::string& name) const {
+    return best.gain >= least_gain_of(name, study_, explained()) &&
+           best.gain >= infer::kLeastSure * best.gain_se;
+  }
+
+  // Slopes of the chosen effects at the present model.
+  void use_slopes() {
+    Eigen::Index at = competition_.base().dimensions();
+    for (std::size_t k = 0; k < found_->chosen.size(); ++k) {
+      Signature& mark = found_->chosen[k].candidate.signature;
+      Eigen::Index own = 0;
+      for (const auto& c : competition_.coordinates_of(mark.effect)) own += c.dimensions();
+      mark.columns = competition_.in_all_trials(found_->model.fit.slopes.middleCols(at, own));
+      if (of_.subject.effects->row(mark.effect).by_contact) {
+        mark.columns = split_by_kind(study_, mark.columns);
+      }
+      mark.fixed = competition_.values_of(mark.effect, found_->model);
+      mark.whole = true;
+      at += own;
+    }
+  }
+
+  // What later ones made worthless leaves again.
+  Status drop_idle() {
+    std::size_t first = competition_.base().coordinates();
+    for (std::size_t k = 0; k + 1 < found_->chosen.size();) {
+      Eigen::VectorXd u = found_->model.fit.u;
+      infer::Space space = found_->model.space.without(first, size_of(k), &u);
+      auto without = fitted(std::move(space), u);
+      if (!without) return without.error();
+      const infer::PairedGain gain =
+          infer::gain_over(found_->model, *without, competition_.base().dimensions());
+      if (gain.sum >= of_.subject.least_gain && gain.sum >= infer::kSureGain * gain.se) {
+        found_->chosen[k].candidate.gain = gain.sum;
+        first += size_of(k++);
+        continue;
+      }
+      not_these_.insert(found_->chosen[k].candidate.signature.effect);
+      found_->model = std::move(*without);
+      found_->chosen.erase(found_->chosen.begin() + static_cast<std::ptrdiff_t>(k));
+    }
+    return {};
+  }
+
+  // One contest; false: nothing more enters.
+  Result<bool> add_best() {
+    const auto hypotheses = proposed();
+    if (!hypotheses) return hypotheses.error();
+    if (hypotheses->empty()) return false;
+    auto contest = infer::compete(
+        competition_.forward(), competition_.observations(), found_->model, *hypotheses, terms_,
+        [&](const std::vector<infer::Standing>& standings) { report_contest(of_, standings); });
+    if (!contest) return contest.error();
+    if (found_->chosen.empty()) found_->base = contest->base;
+    found_->model = contest->base;
+    add_rows(of_, *hypotheses, *contest, &found_->rows);
+    SelectionStep& step = found_->steps.emplace_back();
+    for (const ChosenEffect& c : found_->chosen) {
+      step.explained.push_back(c.candidate.signature.effect);
+    }
+    for (const infer::Contender& c : contest->contenders) {
+      step.offered.emplace_back((*hypotheses)[c.hypothesis].name, c.gain);
+    }
+    if (contest->contenders.empty()) return false;
+    infer::Contender& best = contest->contenders.front();
+    const std::string name = (*hypotheses)[best.hypothesis].name;
+    if (!enters(best, name)) return false;
+    ChosenEffect chosen;
+    chosen.candidate.gain = best.gain;
+    chosen.candidate.signature.effect = name;
+    chosen.aliases = aliases_of(of_, name, *hypotheses, *contest);
+    found_->chosen.push_back(std::move(chosen));
+    found_->model = std::move(best.model);
+    if (Status s = drop_idle(); !s) return s.error();
+    use_slopes();
+    terms_ = {
+        infer::Effort::kLocal, {}, std::max(of_.subject.least_gain, kLeastShare * explained())};
+    return true;
+  }
+
+  const DiagnosisRequest& of_;
+  const Study& study_;
+  const Competition& competition_;
+  const Proposals* marks_;
+  const std::vector<Signature>& first_;
+  std::set<std::string> not_these_;  // explained before anything else, or dropped
+  infer::Terms terms_;
+  std::optional<Found> found_;
+};
+
+// The chosen effects beside the base as it was tuned: data as if their predictions were linear.
+Status relinearise(const DiagnosisRequest& of, Screening* screening) {
+  Explanation& named = screening->found;
+  const std::vector<EffectCandidate> effects = candidates_of(named.chosen);
+  auto fit = estimate(of, *screening->catalogue, named, effects, 2);
+  if (!fit) return fit.error();
+  const auto there = relinearised_at(of, named.study(), *fit, effects);
+  if (!there) return there.error();
+  named.estimates = std::move(*fit);
+  emit_fit(of, *named.estimates);
+  if (there->columns.empty()) return {};
+  screening->catalogue->restart(there->data);
+  for (std::size_t k = 0; k < named.chosen.size(); ++k) {
+    named.chosen[k].candidate.signature.columns = there->columns[k];
+  }
+  return {};
 }
 
-}  // namespace
-
-Result<Screening> compete(const DiagnosisRequest& of, const Evidence& measured) {
-  const auto configured = of.subject.make_study(of.problem, of.options.genes);
-  if (!configured) return configured.error();
-  // By the noise that readings are configured to have: what the tuned base misses by must not pass
-  // for noise.
-  Study searched = measured.study;
-  searched.trust.clear();
-  searched.use_noise(configured->noise);
-  const Competition c = competition(of, searched);
-  auto found = select(of, searched, configured->base, c);
-  if (!found) return found.error();
-  // Everything from here on is about the point that explains the log.
-  Study study = measured.study;
-  study.base = found->model.space.values(found->model.fit.u);
-  if (Status s = of.subject.tune(of.predictor, /*keep=*/true, &study); !s) return s.error();
+// Everything from here on is about the point that explains the log.
+Status move_to(const DiagnosisRequest& of, const Found& found, const Competition& competition,
+               const Study& from, Screening* screening) {
+  Explanation& named = screening->found;
+  Study study = from;
+  named.tuned_alone = found.base.space.values(found.base.fit.u);
+  study.base = found.model.space.values(found.model.fit.u);
+  if (Status s = of.subject.tune(of.predictor, /*keep=*/true, &study); !s) return s;
   auto raw = evidence_of(of, std::move(study));
   if (!raw) return raw.error();
   auto evidence = measure(of, raw->study);
   if (!evidence) return evidence.error();
-  Screening screening;
-  screening.found.evidence = std::make_shared<const Evidence>(std::move(*evidence));
-  screening.found.tuned_alone = found->base.space.values(found->base.fit.u);
-  const infer::Fitter fitter(c.forward, c.observations, found->model.space);
-  screening.found.searched_error =
-      found->model.space.deviations(found->model.fit.u, fitter.covariance(found->model.fit));
-  screening.rows = std::move(found->rows);
-  screening.catalogue =
-      std::make_unique<Selector>(of.predictor, screening.found.study(), std::vector<Signature>(),
-                                 screening.found.evidence->base);
-  screening.explained = 0;
-  for (const ChosenEffect& e : found->chosen) *screening.explained += e.candidate.gain;
-  screening.found.chosen = std::move(found->chosen);
-  if (screening.found.chosen.empty()) return screening;
-  const Explanation& named = screening.found;
+  named.evidence = std::make_shared<const Evidence>(std::move(*evidence));
+  const infer::Fitter fitter(competition.forward(), competition.observations(), found.model.space);
+  named.searched_error =
+      found.model.space.deviations(found.model.fit.u, fitter.covariance(found.model.fit));
+  screening->catalogue = std::make_unique<Proposals>(
+      of.predictor, named.study(), std::vector<Signature>(), named.evidence->base);
+  screening->explained = 0;
+  for (const ChosenEffect& e : named.chosen) *screening->explained += e.candidate.gain;
+  if (named.chosen.empty()) return {};
   auto estimates =
       fit_jointly(of.predictor, named.study(), candidates_of(named.chosen), named.study().base,
                   BaseParameters::kFitted, named.evidence->nuisances, 1);
   if (!estimates) return estimates.error();
-  screening.found.estimates = std::move(*estimates);
+  named.estimates = std::move(*estimates);
+  return {};
+}
+
+}  // namespace
+
+Result<Screening> compete(const DiagnosisRequest& of, Explanation found) {
+  const Evidence& evidence = *found.evidence;
+  const auto configured = of.subject.make_study(of.problem, of.options.genes);
+  if (!configured) return configured.error();
+  Study study = evidence.study;
+  if (of.subject.base_moves) {
+    // By the noise that readings are configured to have: what the tuned base misses by must not
+    // pass for noise.
+    study.trust.clear();
+    study.use_noise(configured->noise);
+  }
+  const bool moves = of.subject.base_moves || (found.frees_base && found.tuned_alone.empty());
+  const Competition competition(of, study, evidence, found.first,
+                                moves ? BaseParameters::kFitted : BaseParameters::kHeld);
+  Screening screening;
+  if (of.subject.signatures != nullptr) {
+    auto marks = marks_of(of, found);
+    if (!marks) return marks.error();
+    screening.catalogue = std::move(*marks);
+    if (Status s = screen_alone(of, found, &screening); !s) return s.error();
+  }
+  Selection selection(of, study, competition, screening.catalogue.get(), found.first,
+                      configured->base);
+  auto selected = selection.run();
+  if (!selected) return selected.error();
+  if (screening.catalogue == nullptr) screening.rows = std::move(selected->rows);
+  screening.steps = std::move(selected->steps);
+  found.chosen = std::move(selected->chosen);
+  found.estimates.reset();
+  const std::shared_ptr<const Evidence> before = found.evidence;
+  screening.found = std::move(found);
+  if (moves) {
+    if (Status s = move_to(of, *selected, competition, before->study, &screening); !s) {
+      return s.error();
+    }
+  } else if (!screening.found.chosen.empty()) {
+    if (Status s = relinearise(of, &screening); !s) return s.error();
+  }
   return screening;
 }
 

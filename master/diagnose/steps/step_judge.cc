@@ -92,7 +92,7 @@ std::vector<Leftover> all_leftovers(const Explanation& explanation, const Regres
   return left;
 }
 
-Judgement judge_again(const DiagnosisRequest& of, const Selector& catalogue, Judgement judged) {
+Judgement judge_again(const DiagnosisRequest& of, const Proposals& catalogue, Judgement judged) {
   Explanation& named = judged.named;
   const bool odd = !named.odd_readings.empty() || !named.odd_drives.empty();
   const double unknown = of.subject.unknown_log10_p;

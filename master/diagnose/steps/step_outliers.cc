@@ -101,7 +101,7 @@ Explanation look_for_session_gains(const DiagnosisRequest& of, Explanation parti
 }
 
 Explanation look_for_slips(const DiagnosisRequest& of, Explanation partial,
-                           const Selector& catalogue, const Regression& explained) {
+                           const Proposals& catalogue, const Regression& explained) {
   if ((of.subject.looks & kLooksForSlips) == 0) return partial;
   const Study& study = partial.study();
   const std::vector<Eigen::Vector3d> left = study.unwhiten(studentised(explained, 0.2));
@@ -131,7 +131,7 @@ Explanation look_for_slips(const DiagnosisRequest& of, Explanation partial,
 }
 
 std::optional<Gathering> gathering_beside(const DiagnosisRequest& of, const Explanation& before,
-                                          const Selector& catalogue, const Explanation& rest) {
+                                          const Proposals& catalogue, const Explanation& rest) {
   const auto has_place = [&](const ChosenEffect& c) {
     return of.subject.effects->row(c.candidate.signature.effect).contaminates != nullptr;
   };

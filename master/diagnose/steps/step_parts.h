@@ -17,8 +17,21 @@ namespace gapfarm::steps {
 inline constexpr double kSlippedSquared = 11.5;
 inline constexpr int kMostRounds = 6;  // of a fit that does not settle; most need two
 
-// Base and hypotheses searched together, where the scenario has nothing else.
-Result<Screening> compete(const DiagnosisRequest& of, const Evidence& measured);
+// Hypotheses compete, beside what is explained already; what was chosen before is chosen anew.
+Result<Screening> compete(const DiagnosisRequest& of, Explanation found);
+// The catalogue's marks at the base of the evidence; REQUIRES: the scenario has them.
+Result<std::unique_ptr<Proposals>> marks_of(const DiagnosisRequest& of, const Explanation& found);
+// What each effect would explain before any is chosen: rows of the screening table.
+Status screen_alone(const DiagnosisRequest& of, const Explanation& found, Screening* screening);
+// The effects at their joint estimate, each one's contribution beside its slopes; no columns where
+// that cannot be simulated.
+struct Relinearised {
+  Eigen::VectorXd data;                  // whitened, as if the predictions were linear
+  std::vector<Eigen::MatrixXd> columns;  // one matrix an effect
+};
+Result<Relinearised> relinearised_at(const DiagnosisRequest& of, const Study& study,
+                                     const JointFit& fit,
+                                     const std::vector<EffectCandidate>& effects);
 
 // By paired scores: not by chance, but for one case in twenty.
 bool clearly_better(const std::vector<double>& scores, const std::vector<double>& others);
@@ -45,30 +58,30 @@ Explanation look_for_session_gains(const DiagnosisRequest& of, Explanation parti
 // Events that slow one side in some trials show as a tail along that side's derivative: a long one
 // when they are rare, a lopsided one when they are not.
 Explanation look_for_slips(const DiagnosisRequest& of, Explanation partial,
-                           const Selector& catalogue, const Regression& explained);
+                           const Proposals& catalogue, const Regression& explained);
 
 // Where slips gather beside what acts everywhere, when what acted in a place `before` is gone from
 // the `rest`.  `catalogue` as it was before.
 std::optional<Gathering> gathering_beside(const DiagnosisRequest& of, const Explanation& before,
-                                          const Selector& catalogue, const Explanation& rest);
+                                          const Proposals& catalogue, const Explanation& rest);
 
 // What is left once all that was chosen is explained, and the nats that it took.
-Regression explained_by(const Selector& catalogue, const Explanation& explanation);
-double explained_nats(const Selector& catalogue, const Regression& explained);
+Regression explained_by(const Proposals& catalogue, const Explanation& explanation);
+double explained_nats(const Proposals& catalogue, const Regression& explained);
 
 std::vector<EffectCandidate> candidates_of(const std::vector<ChosenEffect>& chosen);
 // Base and these effects at their best linear fit.
-Overrides start_of(const DiagnosisRequest& of, const Selector& catalogue,
+Overrides start_of(const DiagnosisRequest& of, const Proposals& catalogue,
                    const Explanation& partial, const std::vector<EffectCandidate>& effects);
 // The effects fitted together, base and nuisances beside them to first order.
-Result<JointFit> estimate(const DiagnosisRequest& of, const Selector& catalogue,
+Result<JointFit> estimate(const DiagnosisRequest& of, const Proposals& catalogue,
                           const Explanation& partial, const std::vector<EffectCandidate>& effects,
                           int rounds);
 
 // What is left beside what is explained, also what repeats of a trial have in common.
 std::vector<Leftover> all_leftovers(const Explanation& explanation, const Regression& explained);
 // What the remaining effects leave at their estimates, where some were dropped.
-Judgement judge_again(const DiagnosisRequest& of, const Selector& catalogue, Judgement judged);
+Judgement judge_again(const DiagnosisRequest& of, const Proposals& catalogue, Judgement judged);
 
 // Nothing is named any more; readings are as logged.
 Explanation naming_nothing(Explanation explanation);

@@ -13,10 +13,6 @@
 namespace gapfarm::steps {
 namespace {
 
-// What draws a base to its bounds is strong; beside it the base comes free, and all is looked for
-// again from there.
-constexpr std::size_t kMostToFreeBase = 2;
-
 // Rows of the screening table, a candidate each.
 std::vector<Screened> screened(const DiagnosisRequest& of, const Evidence& evidence,
                                const std::vector<EffectCandidate>& candidates) {
@@ -58,144 +54,13 @@ std::vector<Screened> screened(const DiagnosisRequest& of, const Evidence& evide
   return rows;
 }
 
-// The effects at their joint estimate, for a selection that goes on from there; no columns where
-// that cannot be simulated.
-Result<Relinearised> relinearised_at(const DiagnosisRequest& of, const Study& study,
-                                     const JointFit& fit,
-                                     const std::vector<EffectCandidate>& effects) {
-  const ParameterTable& table = of.table();
-  std::vector<PredictionRequest> without;
-  for (const EffectCandidate& effect : effects) {
-    without.push_back({fit.at, {}});
-    std::erase_if(without.back().at, [&](const auto& entry) {
-      return table[entry.first].effect == effect.signature.effect;
-    });
-  }
-  const auto ends = of.predictor.attempt(without);
-  if (!ends) return ends.error();
-  for (const auto& simulated : *ends) {
-    if (!simulated) return Relinearised{};
-  }
-  Relinearised at_estimate{study.whiten(fit.residuals), {}};
-  for (std::size_t k = 0; k < effects.size(); ++k) {
-    const std::string& name = effects[k].signature.effect;
-    std::vector<Eigen::Vector3d> contribution;
-    for (std::size_t i = 0; i < study.size(); ++i) {
-      contribution.push_back(local_difference((*(*ends)[k])[i], fit.ends[i]));
-    }
-    std::vector<Eigen::Index> own;
-    for (std::size_t p = 0; p < fit.parameters.size(); ++p) {
-      if (table[fit.parameters[p].row].effect == name) own.push_back(static_cast<Eigen::Index>(p));
-    }
-    Eigen::MatrixXd columns(at_estimate.data.size(), static_cast<Eigen::Index>(own.size()) + 1);
-    columns.col(0) = study.whiten(contribution);
-    columns.rightCols(columns.cols() - 1) = fit.jacobian(Eigen::all, own);
-    at_estimate.data += columns.col(0);
-    if (of.subject.effects->row(name).by_contact) columns = split_by_kind(study, columns);
-    study.drop_ignored(columns);
-    at_estimate.columns.push_back(std::move(columns));
-  }
-  study.drop_ignored(at_estimate.data);
-  return at_estimate;
-}
-
-// Chooses from the catalogue beside what is explained first.
-Result<Screening> choose(const DiagnosisRequest& of, Screening screening) {
-  Explanation& found = screening.found;
-  Selector& catalogue = *screening.catalogue;
-  found.estimates.reset();
-  const Relinearise relinearise =
-      [&](const std::vector<EffectCandidate>& effects) -> Result<Relinearised> {
-    auto fit = estimate(of, catalogue, found, effects, 2);
-    if (!fit && fit.error().code == ErrorCode::kSimulation) return Relinearised{};
-    if (!fit) return fit.error();
-    auto at_estimate = relinearised_at(of, found.study(), *fit, effects);
-    if (!at_estimate || at_estimate->columns.empty()) return at_estimate;
-    found.estimates = std::move(*fit);  // where the next estimate begins
-    emit_fit(of, *found.estimates);
-    return at_estimate;
-  };
-  const bool to_free_base = found.frees_base && found.tuned_alone.empty();
-  auto chosen = catalogue.select(found.first, found.first.empty() ? 0 : found.latency.gain,
-                                 relinearise, to_free_base ? kMostToFreeBase : kMostEffects);
-  if (!chosen) return chosen.error();
-  found.chosen = std::move(*chosen);
-  return screening;
-}
-
-Result<Screening> search_catalogue(const DiagnosisRequest& of, Explanation found) {
-  std::vector<std::string> excluded = of.options.excluded;
-  if (found.lag.trials > 0) excluded.emplace_back("motor_lag");
-  const Evidence& evidence = *found.evidence;
-  auto signatures = of.subject.signatures(of.predictor, evidence.study, excluded);
-  if (!signatures) return signatures.error();
-  for (Signature& s : *signatures) evidence.study.drop_ignored(s.columns);
-  Screening screening;
-  screening.catalogue = std::make_unique<Selector>(of.predictor, evidence.study,
-                                                   std::move(*signatures), evidence.base);
-  Selector& catalogue = *screening.catalogue;
-  catalogue.exclude({of.options.excluded.begin(), of.options.excluded.end()});
-  if (!of.excluded(kPatchEffect)) catalogue.look_for_patches();
-  found.chosen.clear();
-  auto alone = catalogue.candidates(explained_by(catalogue, found), {});
-  if (!alone) return alone.error();
-  screening.rows = screened(of, evidence, *alone);
-  emit_candidates(of, *alone);
-  screening.alone = std::move(*alone);
-  screening.found = std::move(found);
-  return choose(of, std::move(screening));
-}
-
-// A strong effect draws a base to its bounds, too; beside it the base comes back.  If not, nothing
-// stays chosen.
-Result<Screening> free_base(const DiagnosisRequest& of, Screening screening) {
-  Explanation& found = screening.found;
-  if (found.chosen.empty()) return screening;
-  const std::vector<EffectCandidate> effects = candidates_of(found.chosen);
-  const Eigen::MatrixXd none(static_cast<Eigen::Index>(3 * found.study().size()), 0);
-  const Overrides start =
-      found.estimates ? found.estimates->at : start_of(of, *screening.catalogue, found, effects);
-  auto fit = fit_jointly(of.predictor, found.study(), effects, start, BaseParameters::kFitted, none,
-                         kMostRounds);
-  if (!fit) return fit.error();
-  if (!base_on_bounds(found.study(), fit->at).empty()) found.chosen.clear();
-  found.estimates = std::move(*fit);
-  return screening;
-}
-
-// Strong effects drew the base to themselves and passed for noise where they are not smooth: the
-// catalogue is gone through once more from the base that fits beside them, with the noise that they
-// leave.
-Result<Screening> search_again(const DiagnosisRequest& of, Explanation found) {
-  const JointFit& beside = *found.estimates;
-  Study study = found.study();
-  Regression left(found.evidence->nuisances, study.whiten(beside.residuals));
-  left.add(beside.jacobian);
-  study.trust.clear();
-  estimate_noise(left, found.evidence->blocks, &study);
-  found.tuned_alone = study.base;
-  for (auto& [row, value] : study.base) value = beside.at.at(row);
-  if (Status s = of.subject.tune(of.predictor, /*keep=*/true, &study); !s) return s.error();
-  auto evidence = evidence_of(of, std::move(study));
-  if (!evidence) return evidence.error();
-  found.evidence = std::make_shared<const Evidence>(std::move(*evidence));
-  return search_catalogue(of, std::move(found));
-}
-
-// Chooses again, without trials that are ignored by now.
-Result<Screening> choose_among_the_rest(const DiagnosisRequest& of, Screening screening) {
-  const Evidence& rest = *screening.found.evidence;
-  screening.catalogue->recount(rest.study, rest.base);
-  return choose(of, std::move(screening));
-}
-
 // Beside a strong effect on the mean no outliers visibly; with it explained some may.
 Result<Screening> look_for_spreads_again(const DiagnosisRequest& of, Screening screening) {
   Explanation& found = screening.found;
   if (found.names_outliers() || found.chosen.empty()) return screening;
   found = look_for_spreads(of, found, explained_by(*screening.catalogue, found));
   if (!found.names_outliers()) return screening;
-  return choose_among_the_rest(of, std::move(screening));
+  return compete(of, std::move(found));
 }
 
 // Trials in which a side slipped pull on every mean: the effects are looked for again without them,
@@ -212,7 +77,7 @@ Result<Screening> choose_without_slips(const DiagnosisRequest& of, Screening scr
     if (slipped && (kept.empty() || !kept[i])) ignored[i] = true;
   }
   found = without(found, ignored);
-  return choose_among_the_rest(of, std::move(screening));
+  return compete(of, std::move(found));
 }
 
 Result<Screening> look_for_slips_and_choose(const DiagnosisRequest& of, Screening screening) {
@@ -220,7 +85,7 @@ Result<Screening> look_for_slips_and_choose(const DiagnosisRequest& of, Screenin
   screening.found = look_for_slips(of, std::move(screening.found), *screening.catalogue, explained);
   if (!(screening.found.slip.gain > 0)) return screening;
   const Explanation before = screening.found;
-  const Selector all = *screening.catalogue;
+  const Proposals all = *screening.catalogue;  // refers to the evidence of before
   auto rest = choose_without_slips(of, std::move(screening), explained, {});
   if (!rest) return rest;
   // A patch of floor moves single drives, too: it may have been omitted with them.
@@ -255,19 +120,35 @@ Result<Screening> look_for_session_gains_again(const DiagnosisRequest& of, Scree
   if (found.names_session_gains() || found.chosen.empty()) return screening;
   found = look_for_session_gains(of, found, left_with_sessions(found));
   if (!found.names_session_gains()) return screening;
-  return choose_among_the_rest(of, std::move(screening));
+  return compete(of, std::move(found));
+}
+
+bool base_is_on_bounds(const Explanation& found) {
+  return !base_on_bounds(found.study(), found.study().base).empty();
+}
+
+// What draws a base to its bounds is strong; beside it the base comes free, and hypotheses compete
+// once more from there, by the noise that these leave.
+Result<Screening> compete_from_free_base(const DiagnosisRequest& of, Explanation found) {
+  auto freed = compete(of, std::move(found));
+  if (!freed || freed->found.chosen.empty() || base_is_on_bounds(freed->found)) return freed;
+  found = std::move(freed->found);
+  Study study = found.study();
+  std::erase_if(study.base,
+                [&](const auto& entry) { return !of.table()[entry.first].effect.empty(); });
+  if (Status s = of.subject.tune(of.predictor, /*keep=*/true, &study); !s) return s.error();
+  auto evidence = evidence_of(of, std::move(study));
+  if (!evidence) return evidence.error();
+  found.evidence = std::make_shared<const Evidence>(std::move(*evidence));
+  found.searched_error.clear();
+  return compete(of, std::move(found));
 }
 
 Result<Screening> look_beside_readings(const DiagnosisRequest& of, const Explanation& found) {
-  auto screening = search_catalogue(of, look_for_spreads(of, found, found.evidence->base));
-  if (screening && found.frees_base) {
-    screening = free_base(of, std::move(*screening));
-    if (screening && screening->found.chosen.empty()) return screening;
-  }
-  if (!screening) return screening;
-  if ((of.subject.base_moves || found.frees_base) && screening->found.estimates) {
-    screening = search_again(of, screening->found);
-  }
+  Explanation beside = look_for_spreads(of, found, found.evidence->base);
+  auto screening = found.frees_base ? compete_from_free_base(of, std::move(beside))
+                                    : compete(of, std::move(beside));
+  if (screening && found.frees_base && base_is_on_bounds(screening->found)) return screening;
   if (screening) screening = look_for_spreads_again(of, std::move(*screening));
   if (screening) screening = look_for_session_gains_again(of, std::move(*screening));
   if (!screening) return screening;
@@ -307,24 +188,88 @@ Result<Screening> look_for_all(const DiagnosisRequest& of, Explanation partial) 
 
 }  // namespace
 
+Result<Relinearised> relinearised_at(const DiagnosisRequest& of, const Study& study,
+                                     const JointFit& fit,
+                                     const std::vector<EffectCandidate>& effects) {
+  const ParameterTable& table = of.table();
+  std::vector<PredictionRequest> without;
+  for (const EffectCandidate& effect : effects) {
+    without.push_back({fit.at, {}});
+    std::erase_if(without.back().at, [&](const auto& entry) {
+      return table[entry.first].effect == effect.signature.effect;
+    });
+  }
+  const auto ends = of.predictor.attempt(without);
+  if (!ends) return ends.error();
+  for (const auto& simulated : *ends) {
+    if (!simulated) return Relinearised{};
+  }
+  Relinearised at_estimate{study.whiten(fit.residuals), {}};
+  for (std::size_t k = 0; k < effects.size(); ++k) {
+    const std::string& name = effects[k].signature.effect;
+    std::vector<Eigen::Vector3d> contribution;
+    for (std::size_t i = 0; i < study.size(); ++i) {
+      contribution.push_back(local_difference((*(*ends)[k])[i], fit.ends[i]));
+    }
+    std::vector<Eigen::Index> own;
+    for (std::size_t p = 0; p < fit.parameters.size(); ++p) {
+      if (table[fit.parameters[p].row].effect == name) own.push_back(static_cast<Eigen::Index>(p));
+    }
+    Eigen::MatrixXd columns(at_estimate.data.size(), static_cast<Eigen::Index>(own.size()) + 1);
+    columns.col(0) = study.whiten(contribution);
+    columns.rightCols(columns.cols() - 1) = fit.jacobian(Eigen::all, own);
+    at_estimate.data += columns.col(0);
+    if (of.subject.effects->row(name).by_contact) columns = split_by_kind(study, columns);
+    study.drop_ignored(columns);
+    at_estimate.columns.push_back(std::move(columns));
+  }
+  study.drop_ignored(at_estimate.data);
+  return at_estimate;
+}
+
+Result<std::unique_ptr<Proposals>> marks_of(const DiagnosisRequest& of, const Explanation& found) {
+  std::vector<std::string> excluded = of.options.excluded;
+  if (found.lag.trials > 0) excluded.emplace_back("motor_lag");
+  const Evidence& evidence = *found.evidence;
+  auto signatures = of.subject.signatures(of.predictor, evidence.study, excluded);
+  if (!signatures) return signatures.error();
+  for (Signature& s : *signatures) evidence.study.drop_ignored(s.columns);
+  auto marks = std::make_unique<Proposals>(of.predictor, evidence.study, std::move(*signatures),
+                                           evidence.base);
+  marks->exclude({of.options.excluded.begin(), of.options.excluded.end()});
+  if (!of.excluded(kPatchEffect)) marks->look_for_patches();
+  return marks;
+}
+
+Status screen_alone(const DiagnosisRequest& of, const Explanation& found, Screening* screening) {
+  Explanation before = found;
+  before.chosen.clear();
+  auto alone = screening->catalogue->candidates(explained_by(*screening->catalogue, before), {});
+  if (!alone) return alone.error();
+  screening->rows = screened(of, *found.evidence, *alone);
+  emit_candidates(of, *alone);
+  screening->alone = std::move(*alone);
+  return {};
+}
+
 std::vector<EffectCandidate> candidates_of(const std::vector<ChosenEffect>& chosen) {
   std::vector<EffectCandidate> effects;
   for (const ChosenEffect& c : chosen) effects.push_back(c.candidate);
   return effects;
 }
 
-Regression explained_by(const Selector& catalogue, const Explanation& explanation) {
+Regression explained_by(const Proposals& catalogue, const Explanation& explanation) {
   std::vector<const Signature*> all;
   for (const Signature& s : explanation.first) all.push_back(&s);
   for (const ChosenEffect& c : explanation.chosen) all.push_back(&c.candidate.signature);
   return catalogue.with(all);
 }
 
-double explained_nats(const Selector& catalogue, const Regression& explained) {
+double explained_nats(const Proposals& catalogue, const Regression& explained) {
   return (catalogue.nothing_explained().left_squares() - explained.left_squares()) / 2;
 }
 
-Overrides start_of(const DiagnosisRequest& of, const Selector& catalogue,
+Overrides start_of(const DiagnosisRequest& of, const Proposals& catalogue,
                    const Explanation& partial, const std::vector<EffectCandidate>& effects) {
   Overrides at = partial.study().base;
   for (std::size_t k = 0; k < effects.size(); ++k) {
@@ -342,7 +287,7 @@ Overrides start_of(const DiagnosisRequest& of, const Selector& catalogue,
   return at;
 }
 
-Result<JointFit> estimate(const DiagnosisRequest& of, const Selector& catalogue,
+Result<JointFit> estimate(const DiagnosisRequest& of, const Proposals& catalogue,
                           const Explanation& partial, const std::vector<EffectCandidate>& effects,
                           int rounds) {
   const bool moves = of.subject.base_moves || partial.frees_base;
@@ -365,7 +310,6 @@ Result<JointFit> estimate(const DiagnosisRequest& of, const Selector& catalogue,
 }
 
 Result<Screening> screen(const DiagnosisRequest& of, const Evidence& measured, bool free_base) {
-  if (of.subject.signatures == nullptr) return compete(of, measured);
   Explanation nothing;
   nothing.evidence = std::make_shared<const Evidence>(measured);
   nothing.frees_base = free_base || !measured.study.on_bounds.empty();
@@ -373,7 +317,8 @@ Result<Screening> screen(const DiagnosisRequest& of, const Evidence& measured, b
   if (!nothing.frees_base) return screening;
   // A base on its bounds may be one that cannot be simulated with much of the catalogue.
   const bool fell = !screening && screening.error().code == ErrorCode::kSimulation;
-  if (fell || (screening && screening->found.chosen.empty())) {
+  if (fell ||
+      (screening && (screening->found.chosen.empty() || base_is_on_bounds(screening->found)))) {
     Screening none;
     none.found = std::move(nothing);
     none.found.frees_base = false;

@@ -16,7 +16,7 @@
 #include "master/diagnose/evidence/slip.h"
 #include "master/diagnose/evidence/spread_row.h"
 #include "master/diagnose/fit/estimate.h"
-#include "master/diagnose/fit/selection.h"
+#include "master/diagnose/fit/proposals.h"
 #include "master/diagnose/steps/diagnosis_request.h"
 #include "master/diagnose/study.h"
 
@@ -70,7 +70,8 @@ struct Screening {
   Explanation found;
   std::vector<Screened> rows;            // of the table
   std::vector<EffectCandidate> alone;    // of every effect, before anything was chosen
-  std::unique_ptr<Selector> catalogue;   // refers to the evidence
+  std::unique_ptr<Proposals> catalogue;  // refers to the evidence
+  std::vector<SelectionStep> steps;
   std::optional<SanityFinding> warning;  // why nothing is to be looked for
   std::optional<double> explained;       // nats, held out, where hypotheses competed
 };

@@ -164,9 +164,9 @@ void emit_choice(const DiagnosisRequest& of, const Explanation& found, bool has_
                  : names.empty() ? "Nothing of the catalogue explains more than chance does."
                                  : "Chosen from the catalogue so far: " + listed(names) + ".";
   for (const ChosenEffect& c : found.chosen) {
-    for (const Alias& alias : c.aliases) {
+    for (const std::string& alias : c.aliases) {
       finding.text +=
-          " " + c.candidate.signature.effect + " is not distinguished from " + alias.effect + ".";
+          " " + c.candidate.signature.effect + " is not distinguished from " + alias + ".";
     }
   }
   of.options.on_finding(std::move(finding));

@@ -4,7 +4,7 @@
 #include "common/random/stream.h"
 #include "master/diagnose/conclusions/findings.h"
 #include "master/diagnose/diagnose.h"
-#include "master/diagnose/fit/selection.h"
+#include "master/diagnose/fit/proposals.h"
 #include "master/diagnose/places/seam.h"
 #include "master/diagnose/subject.h"
 #include "tests/unit/diagnose/drawn_drives.h"
@@ -96,7 +96,7 @@ TEST(Outliers, NoLineIsOfferedWhereAllPositionsAreTurned) {
   KinematicFarm farm;
   Predictor predictor(farm, kinematic_log(12));
   const auto offered = [&](const Eigen::VectorXd& mark) {
-    Selector selector(predictor, study, {edge, middle}, Regression(nothing, noise + mark));
+    Proposals selector(predictor, study, {edge, middle}, Regression(nothing, noise + mark));
     const auto candidates = selector.candidates(selector.nothing_explained(), {});
     EXPECT_TRUE(candidates.ok());
     return candidates.ok() && !candidates->empty() && candidates->front().gain > 100;

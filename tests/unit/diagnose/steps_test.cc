@@ -10,7 +10,7 @@
 
 #include "master/diagnose/fit/estimate.h"
 #include "master/diagnose/fit/nuisance.h"
-#include "master/diagnose/fit/selection.h"
+#include "master/diagnose/fit/proposals.h"
 #include "master/diagnose/fit/signatures.h"
 #include "master/diagnose/steps/step_parts.h"
 #include "master/diagnose/subject.h"
@@ -189,19 +189,16 @@ TEST(StartValues, OfASlopeAreItsSizeAndDirection) {
   EXPECT_NEAR(values.at("floor_tilt.direction"), std::atan2(4, 3), 1e-6);
 }
 
-struct Selecting {
-  explicit Selecting(std::vector<Signature> catalogue, const Eigen::VectorXd& data)
+struct Proposing {
+  explicit Proposing(std::vector<Signature> catalogue, const Eigen::VectorXd& data)
       : study(plain_study(20)),
         problem(kinematic_log(20)),
         predictor(farm, problem),
         nuisances(beyond_nothing(20, data)),
-        selector(predictor, study, std::move(catalogue), nuisances) {}
+        proposals(predictor, study, std::move(catalogue), nuisances) {}
 
-  std::vector<ChosenEffect> chosen() {
-    const auto effects =
-        selector.select({}, 0, [](const auto&) { return Result<Relinearised>(Relinearised{}); });
-    EXPECT_TRUE(effects.ok());
-    return effects.ok() ? *effects : std::vector<ChosenEffect>{};
+  std::vector<EffectCandidate> best(const std::set<std::string>& without = {}) {
+    return proposals.candidates(nuisances, without).value();
   }
 
   Study study;
@@ -209,46 +206,32 @@ struct Selecting {
   Problem problem;
   Predictor predictor;
   Regression nuisances;
-  Selector selector;
+  Proposals proposals;
 };
 
-TEST(Selector, TakesWhatTheDataHoldAndNothingElse) {
+TEST(Proposals, AreTheBestOfEachEffectBestFirst) {
   const Eigen::VectorXd a = column(20, even), b = column(20, odd);
-  Selecting s({signature_of("motor_asymmetry", a), signature_of("heading_offset", b)}, 3 * a);
-  const std::vector<ChosenEffect> chosen = s.chosen();
-  ASSERT_EQ(chosen.size(), 1u);
-  EXPECT_EQ(chosen[0].candidate.signature.effect, "motor_asymmetry");
-  // Half the squares, less what luck gains.
-  EXPECT_NEAR(chosen[0].candidate.gain, 9 * 10 / 2.0 - 0.5, 1e-6);
-  EXPECT_TRUE(chosen[0].aliases.empty());
-}
-
-TEST(Selector, TakesTwoWhereBothAreThere) {
-  const Eigen::VectorXd a = column(20, even), b = column(20, odd);
-  Selecting s({signature_of("motor_asymmetry", a), signature_of("heading_offset", b)},
-              2 * a + 3 * b);
-  const std::vector<ChosenEffect> chosen = s.chosen();
-  ASSERT_EQ(chosen.size(), 2u);
-  EXPECT_EQ(chosen[0].candidate.signature.effect, "heading_offset");
-  EXPECT_EQ(chosen[1].candidate.signature.effect, "motor_asymmetry");
-}
-
-TEST(Selector, NamesWhatLooksTheSameAsAnAlias) {
-  const Eigen::VectorXd a = column(20, even), b = column(20, odd);
-  Selecting s({signature_of("motor_asymmetry", a), signature_of("heading_offset", a + 0.2 * b)},
+  Proposing s({signature_of("motor_asymmetry", a), signature_of("heading_offset", b),
+               signature_of("heading_offset", a + b)},
               3 * a);
-  const std::vector<ChosenEffect> chosen = s.chosen();
-  ASSERT_EQ(chosen.size(), 1u);
-  EXPECT_EQ(chosen[0].candidate.signature.effect, "motor_asymmetry");
-  ASSERT_EQ(chosen[0].aliases.size(), 1u);
-  EXPECT_EQ(chosen[0].aliases[0].effect, "heading_offset");
-  EXPECT_GT(chosen[0].aliases[0].cosine, kAliasCosine);
+  const std::vector<EffectCandidate> best = s.best();
+  ASSERT_EQ(best.size(), 2u);
+  EXPECT_EQ(best[0].signature.effect, "motor_asymmetry");
+  // Half the squares, less what luck gains.
+  EXPECT_NEAR(best[0].gain, 9 * 10 / 2.0 - 0.5, 1e-6);
+  EXPECT_NEAR(best[1].gain, 9 * 10 / 4.0 - 0.5, 1e-6) << "of two marks the better one";
+  EXPECT_EQ(s.best({"motor_asymmetry"}).size(), 1u);
 }
 
-TEST(Selector, TakesNothingFromNoise) {
+TEST(Proposals, AnEchoOfWhatIsChosenIsNotNew) {
   const Eigen::VectorXd a = column(20, even), b = column(20, odd);
-  Selecting s({signature_of("motor_asymmetry", a), signature_of("heading_offset", b)}, a + b);
-  EXPECT_TRUE(s.chosen().empty()) << "5 nats each are below what a name needs";
+  Proposing s({}, 3 * a + b);
+  const std::vector<EffectCandidate> chosen = {{45, signature_of("motor_asymmetry", a)}};
+  const EffectCandidate echo = {10, signature_of("heading_offset", a + 0.2 * b)};
+  const EffectCandidate other = {10, signature_of("heading_offset", b)};
+  EXPECT_FALSE(s.proposals.is_new({}, chosen, echo, 45));
+  EXPECT_TRUE(s.proposals.is_new({}, chosen, other, 45));
+  EXPECT_TRUE(s.proposals.is_new({}, chosen, echo, 39)) << "a quarter of all is no echo";
 }
 
 TEST(Signatures, OfKindsOfDriveAddUpToTheWhole) {

@@ -213,13 +213,6 @@ TEST(Digits, SmallValuesDoNotVanish) {
   EXPECT_EQ(rounded_to_digits(0, 3), 0);
 }
 
-TEST(AliasSentence, DoesNotCallAlikeWhatIsNot) {
-  const std::vector<AliasReason> aliases = {{"floor_nap", 0.004}};
-  const std::string text = alias_sentence("floor_tilt", aliases, {});
-  EXPECT_EQ(text.find("cos"), std::string::npos) << text;
-  EXPECT_NE(text.find("floor_nap would explain"), std::string::npos) << text;
-}
-
 TEST(EffectSentence, NamesTheAxisOfASeamAndWhatAShareMeans) {
   NamedEffect seam;
   seam.name = "camera_seam";

@@ -8,6 +8,7 @@
 
 #include "common/parameters/push.h"
 #include "common/random/stream.h"
+#include "master/infer/scope.h"
 
 namespace gapfarm::infer {
 namespace {
@@ -127,6 +128,63 @@ TEST(InferSpace, DeviationsAreThoseOfStrengthAndDirection) {
   const Overrides deviations = space.deviations(space.from(values), covariance);
   EXPECT_NEAR(deviations.at(row("table_tilt.angle")), 0.003, 1e-6);
   EXPECT_NEAR(deviations.at(row("table_tilt.direction")), 0.006 / 0.06, 1e-4);
+}
+
+TEST(InferSpace, AnAngleGoesRoundAndConstantsStay) {
+  Coordinate c;
+  c.kind = Coordinate::Kind::kAngle;
+  c.row = row("table_tilt.direction");
+  c.size = 0.2;
+  const Space space =
+      Space(push_table(), {c})
+          .holding({{row("table_tilt.angle"), 0.04}, {row("table_tilt.direction"), 1}});
+  Eigen::VectorXd u = space.from({{row("table_tilt.direction"), 3.0}});
+  EXPECT_NEAR(u[0], 15, 1e-9);
+  u[0] += 1;  // beyond half a turn
+  const Overrides values = space.values(u);
+  EXPECT_NEAR(values.at(row("table_tilt.direction")), 3.2 - 2 * std::numbers::pi, 1e-9);
+  EXPECT_EQ(values.at(row("table_tilt.angle")), 0.04);
+}
+
+// What a column may explain to first order no parameter has to.
+TEST(InferFit, AColumnTakesItsPartWithoutASimulation) {
+  std::size_t asked = 0;
+  const Forward f = remembering([&](const std::vector<PredictionRequest>& points) {
+    asked += points.size();
+    return forward()(points);
+  });
+  Observations o = observed({{row("finger_friction"), 0.2}});
+  o.columns = Eigen::MatrixXd::Zero(3 * kObservations, 1);
+  for (std::size_t i = 0; i < kObservations; ++i) {
+    const Pose end = end_of(i, {{row("finger_friction"), 0.2}});
+    o.columns(static_cast<Eigen::Index>(3 * i), 0) = std::cos(end.theta) / kNoise * 0.02;
+    o.columns(static_cast<Eigen::Index>(3 * i) + 1, 0) = -std::sin(end.theta) / kNoise * 0.02;
+    o.measured[i].x += 0.03;  // one and a half of the column
+  }
+  Coordinate column;
+  column.kind = Coordinate::Kind::kColumn;
+  const Space space(push_table(), {column}, {{row("finger_friction"), 0.2}});
+  const Fitter fitter(f, o, space);
+  Fit fit = fitter.start(Eigen::VectorXd::Zero(1)).value();
+  const double before = fit.score;
+  EXPECT_TRUE(fitter.improve(&fit, 10));
+  EXPECT_NEAR(fit.u[0], 1.5, 0.1);
+  EXPECT_GT(fit.score, before + 50);
+  EXPECT_EQ(asked, 1u);
+}
+
+TEST(InferScope, AsksForItsOwnAlone) {
+  const Forward f = forward();
+  const Observations o = observed({{row("finger_friction"), 0.4}});
+  const Scope some = scope_of(f, o, {3, 8, 50});
+  const Overrides at = {{row("finger_friction"), 0.7}};
+  const auto ends = some.forward({{at, {}}, {at, {2}}}).value();
+  ASSERT_EQ(ends[0]->size(), 3u);
+  EXPECT_EQ((*ends[0])[1].x, end_of(8, at).x);
+  ASSERT_EQ(ends[1]->size(), 1u);
+  EXPECT_EQ((*ends[1])[0].x, end_of(50, at).x);
+  EXPECT_EQ(some.observations.measured[2].y, o.measured[50].y);
+  EXPECT_EQ(within(some, {1, 8, 49, 50}), (std::vector<std::uint32_t>{1, 2}));
 }
 
 TEST(InferFit, FindsTheValueDespiteOutliers) {

@@ -1,0 +1,154 @@
+#include "master/diagnose/fit/proposals.h"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <map>
+#include <utility>
+
+#include "common/effects/catalogue.h"
+#include "master/diagnose/places/patch_places.h"
+#include "master/diagnose/places/seam.h"
+#include "master/diagnose/subject.h"
+
+namespace gapfarm {
+namespace {
+
+constexpr double kSecondAlias = 0.8;   // cosine beyond which a further effect is the first again,
+constexpr double kSecondShare = 0.25;  // unless it gains this share of all that is explained
+
+// A second one of a kind, for an error of the first's place or bend looks like one: of all that is
+// explained.
+constexpr double kSecondOfAKindShare = 0.05;
+
+double cosine(const Eigen::VectorXd& a, const Eigen::VectorXd& b) {
+  const double lengths = a.norm() * b.norm();
+  return lengths > 0 ? a.dot(b) / lengths : 0;
+}
+
+}  // namespace
+
+double least_gain_of(const std::string& effect, const Study& study, double explained) {
+  if (kind_of(effect) != effect) {
+    return std::max(kLeastSecondOfAKind, kSecondOfAKindShare * explained);
+  }
+  return std::max(study.subject->least_gain, kLeastShare * explained);
+}
+
+// Whether there may be one in the table, and it is none that is there or omitted.
+bool Proposals::may_be_second(const std::string& second,
+                              const std::set<std::string>& without) const {
+  const std::span<const Effect> known = study_->table->effects();
+  return !without.count(second) && !excluded_.count(second) &&
+         std::any_of(known.begin(), known.end(), [&](const Effect& e) { return e.name == second; });
+}
+
+// Empty: not at all.
+std::string Proposals::offered_as(const Signature& s, const std::set<std::string>& without,
+                                  const std::vector<EffectCandidate>& beside) const {
+  if (!without.count(s.effect)) return s.effect;
+  const std::string second = second_of(s.effect);
+  const auto are_two = study_->subject->effects->row(s.effect).are_two;
+  if (second.empty() || are_two == nullptr || !may_be_second(second, without)) return "";
+  for (const EffectCandidate& first : beside) {
+    if (first.signature.effect == s.effect && are_two(first.signature, s)) return second;
+  }
+  return "";
+}
+
+// Beside which a second one is to be looked for; none: it is not.
+std::optional<Patch> Proposals::first_patch(const std::set<std::string>& without,
+                                            const std::vector<EffectCandidate>& beside) const {
+  if (!without.count(kPatchEffect) || !may_be_second(second_of(kPatchEffect), without)) return {};
+  for (const EffectCandidate& first : beside) {
+    if (first.signature.effect == kPatchEffect) return patch_of(first.signature);
+  }
+  return {};
+}
+
+Result<std::vector<EffectCandidate>> Proposals::candidates(
+    const Regression& explained, const std::set<std::string>& without,
+    const std::vector<EffectCandidate>& beside) const {
+  std::map<std::string, EffectCandidate> best;
+  double most = 0;
+  const auto see = [&](const std::vector<Signature>& signatures) {
+    for (const Signature& s : signatures) {
+      const std::string name = offered_as(s, without, beside);
+      if (name.empty()) continue;
+      const double gain = net_gain(explained, s);
+      most = std::max(most, gain);
+      const auto [entry, fresh] = best.try_emplace(name, EffectCandidate{gain, s});
+      if (!fresh && gain > entry->second.gain) entry->second = {gain, s};
+    }
+  };
+  see(catalogue_);
+  const std::optional<Patch> first = first_patch(without, beside);
+  if (patch_search_ && (first || !without.count(kPatchEffect))) {
+    const auto discs = patches(explained, most, first);
+    if (!discs) return discs.error();
+    see(*discs);
+  }
+  for (auto& [effect, candidate] : best) {
+    if (candidate.gain + candidate.signature.penalty < kWorthSearching) continue;
+    if (candidate.gain < kWorthSearchingShare * most) continue;
+    if (is_seam(effect)) candidate = refine_seam(explained, candidate);
+  }
+  drop_linear_views(explained, &best);
+  for (auto& [effect, candidate] : best) {
+    if (candidate.signature.effect != effect)
+      candidate.signature = renamed(std::move(candidate.signature), effect);
+  }
+  std::vector<EffectCandidate> sorted;
+  for (auto& [effect, candidate] : best) sorted.push_back(std::move(candidate));
+  std::stable_sort(
+      sorted.begin(), sorted.end(),
+      [](const EffectCandidate& a, const EffectCandidate& b) { return a.gain > b.gain; });
+  return sorted;
+}
+
+Result<EffectCandidate> Proposals::again(const Regression& explained,
+                                         const std::string& effect) const {
+  std::set<std::string> others;
+  for (const Signature& s : catalogue_) others.insert(s.effect);
+  others.insert(kPatchEffect);  // joins the catalogue when it is looked for
+  others.erase(effect);
+  auto best = candidates(explained, others);
+  if (!best) return best.error();
+  return best->empty() ? EffectCandidate{} : std::move(best->front());
+}
+
+Regression Proposals::with(const std::vector<const Signature*>& signatures) const {
+  Regression r = base_;
+  for (const Signature* s : signatures) r.add(s->columns);
+  return r;
+}
+
+bool Proposals::is_new(const std::vector<Signature>& first,
+                       const std::vector<EffectCandidate>& chosen, const EffectCandidate& candidate,
+                       double explained) const {
+  const EffectDiagnoses& effects = *study_->subject->effects;
+  const EffectFamily* family = effects.row(candidate.signature.effect).family;
+  if (family != nullptr) {
+    double gained = 0;
+    for (const EffectCandidate& c : chosen) {
+      if (effects.row(c.signature.effect).family == family) gained += c.gain;
+    }
+    if (candidate.gain < family->share * gained) return false;
+  }
+  if (candidate.gain > kSecondShare * explained) return true;
+  for (std::size_t i = 0; i < chosen.size(); ++i) {
+    std::vector<const Signature*> others;
+    for (const Signature& s : first) others.push_back(&s);
+    for (std::size_t j = 0; j < chosen.size(); ++j) {
+      if (j != i) others.push_back(&chosen[j].signature);
+    }
+    const Regression r = with(others);
+    if (cosine(r.explained(chosen[i].signature.columns), r.explained(candidate.signature.columns)) >
+        kSecondAlias) {
+      return false;
+    }
+  }
+  return true;
+}
+
+}  // namespace gapfarm

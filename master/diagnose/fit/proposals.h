@@ -1,0 +1,111 @@
+// What each effect of the catalogue would explain to first order, and where a search of it begins.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "common/base/result.h"
+#include "master/diagnose/fit/regression.h"
+#include "master/diagnose/fit/signatures.h"
+#include "master/diagnose/places/patch.h"
+
+namespace gapfarm {
+
+// A further effect must also gain this share of what the others did: small systematic errors of
+// a strong effect's model look like weaker effects.
+inline constexpr double kLeastShare = 0.02;
+inline constexpr double kLeastSecondOfAKind = 20;  // nats
+inline constexpr double kAliasCosine = 0.9;
+inline constexpr std::size_t kMostEffects = 4, kMostAliases = 3;
+
+// That a mark is worth to be searched from: nats before the penalty, and of the best one's gain,
+// since no search makes up for less; its turn comes when the best is explained.
+inline constexpr double kWorthSearching = 8;
+inline constexpr double kWorthSearchingShare = 0.3;
+
+struct EffectCandidate {
+  double gain = 0;  // net of the signature's penalty, nats
+  Signature signature;
+};
+
+// What a signature gains beyond what is explained, less its penalty.
+double net_gain(const Regression& explained, const Signature& s);
+
+// What the catalogue offered at one step: effect and net gain, best first.
+struct SelectionStep {
+  std::vector<std::string> explained;  // effects named so far
+  std::vector<std::pair<std::string, double>> offered;
+};
+
+struct ChosenEffect {
+  EffectCandidate candidate;
+  std::vector<std::string> aliases;  // at most three, likeliest first
+};
+
+class Proposals {
+ public:
+  // REQUIRES: both outlive it.
+  Proposals(Predictor& predictor, const Study& study, std::vector<Signature> catalogue,
+            const Regression& nuisances)
+      : predictor_(&predictor),
+        study_(&study),
+        catalogue_(std::move(catalogue)),
+        base_(nuisances) {}
+
+  // From now on candidates() looks for friction patches, too, and for a second one beside a first.
+  void look_for_patches();
+
+  // These are never offered, whatever the catalogue holds.
+  void exclude(std::set<std::string> effects) { excluded_ = std::move(effects); }
+
+  // The best signature of every effect, best first, beyond what `explained` holds.  Of what is in
+  // `without` because it is among `beside`, a second one where there may be two.
+  Result<std::vector<EffectCandidate>> candidates(
+      const Regression& explained, const std::set<std::string>& without,
+      const std::vector<EffectCandidate>& beside = {}) const;
+
+  // The best signature of one effect, which may have been chosen once already: a second seam.
+  Result<EffectCandidate> again(const Regression& explained, const std::string& effect) const;
+
+  // Whether a candidate is no echo of what is chosen: an effect of the same family, or one with
+  // nearly the same mark, that gains little beside it.
+  bool is_new(const std::vector<Signature>& first, const std::vector<EffectCandidate>& chosen,
+              const EffectCandidate& candidate, double explained) const;
+
+  // Data that are as if the predictions of what was chosen were linear in its columns.
+  void restart(const Eigen::VectorXd& data) { base_.restart(data); }
+  // Only the nuisances are explained.
+  const Regression& nothing_explained() const { return base_; }
+  // The nuisances and these signatures.
+  Regression with(const std::vector<const Signature*>& signatures) const;
+  const std::vector<Signature>& catalogue() const { return catalogue_; }
+
+ private:
+  bool may_be_second(const std::string& second, const std::set<std::string>& without) const;
+  std::string offered_as(const Signature& s, const std::set<std::string>& without,
+                         const std::vector<EffectCandidate>& beside) const;
+  std::optional<Patch> first_patch(const std::set<std::string>& without,
+                                   const std::vector<EffectCandidate>& beside) const;
+  // That may gain a part of the most that anything else does.
+  Result<std::vector<Signature>> patches(const Regression& explained, double most_gain,
+                                         const std::optional<Patch>& beside) const;
+  void drop_linear_views(const Regression& explained,
+                         std::map<std::string, EffectCandidate>* best) const;
+  EffectCandidate refine_seam(const Regression& explained, EffectCandidate best) const;
+
+  Predictor* predictor_;
+  const Study* study_;
+  std::vector<Signature> catalogue_;
+  Regression base_;
+  std::set<std::string> excluded_;
+  PatchSearch patch_search_;  // empty: none
+};
+
+// The gain below which an effect is not named, where so much is explained.
+double least_gain_of(const std::string& effect, const Study& study, double explained);
+
+}  // namespace gapfarm

@@ -1,0 +1,205 @@
+#include "master/diagnose/steps/competition.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "master/diagnose/conclusions/verdict.h"
+
+namespace gapfarm::steps {
+namespace {
+
+using infer::Coordinate;
+
+// Standard deviation of what is explained before anything else, in standard deviations of the
+// noise: as good as none.
+constexpr double kAnySize = 100;
+
+infer::Space base_space(const Study& study, BaseParameters base, Eigen::Index columns) {
+  std::vector<Coordinate> coordinates;
+  for (Eigen::Index k = 0; k < columns; ++k) {
+    Coordinate& c = coordinates.emplace_back();
+    c.kind = Coordinate::Kind::kColumn;
+    c.row = static_cast<std::size_t>(k);
+  }
+  if (base == BaseParameters::kHeld) {
+    return infer::Space(*study.table, std::move(coordinates), study.base);
+  }
+  for (const BaseParameter& p : study.base_parameters) {
+    Coordinate& c = coordinates.emplace_back();
+    c.kind = Coordinate::Kind::kLogarithm;
+    c.row = p.row;
+    c.size = p.prior_log_sd / 2;
+  }
+  return infer::Space(*study.table, std::move(coordinates));
+}
+
+// A row of the effect, or one of the base's that only matters beside it.
+std::size_t searched_row(const EffectDiagnosis& effect, const SearchedSize& size,
+                         const ParameterTable& table) {
+  const auto own = table.find(std::string(effect.effect) + "." + size.key);
+  return own ? *own : table.row(size.key);
+}
+
+std::vector<SearchedSize> searched_of(const EffectDiagnosis& effect) {
+  if (!effect.searched.empty()) return effect.searched;
+  std::vector<SearchedSize> sizes;
+  for (const ProbedStep& step : effect.steps) sizes.push_back({step.key, step.size});
+  return sizes;
+}
+
+// Two sizes to either side of nothing: every corner of the box, or four directions.
+std::vector<infer::Start> corners(const infer::Space& own) {
+  constexpr double kFar = 2;  // sizes
+  std::vector<infer::Start> starts;
+  const Eigen::VectorXd neutral = own.from({});
+  const auto dimensions = static_cast<unsigned>(own.dimensions());
+  for (unsigned corner = 0; corner < 1u << dimensions; ++corner) {
+    Eigen::VectorXd u = neutral;
+    for (unsigned k = 0; k < dimensions; ++k) u[k] += (corner >> k & 1u) != 0 ? kFar : -kFar;
+    starts.push_back({own.values(u.cwiseMax(own.lower()).cwiseMin(own.upper())), {}});
+  }
+  return starts;
+}
+
+infer::Observations observations_of(const DiagnosisRequest& of, const Study& study) {
+  infer::Observations all;
+  for (const ResidualTrial& t : study.trials) all.measured.push_back(t.X_WE);
+  all.whitener = study.whitener;
+  all.fold = of.subject.folds(study);
+  return all;
+}
+
+std::vector<std::uint32_t> not_ignored(const Study& study) {
+  std::vector<std::uint32_t> index;
+  for (std::size_t i = 0; i < study.size(); ++i) {
+    if (!study.ignores(i)) index.push_back(static_cast<std::uint32_t>(i));
+  }
+  return index;
+}
+
+Eigen::MatrixXd columns_of(const Evidence& evidence, const std::vector<Signature>& first) {
+  std::vector<Eigen::VectorXd> columns;
+  for (const Signature& s : first) {
+    for (Eigen::Index k = 0; k < s.columns.cols(); ++k) {
+      const double norm = s.columns.col(k).norm();
+      if (norm > 0) columns.push_back(s.columns.col(k) * (kAnySize / norm));
+    }
+  }
+  Eigen::MatrixXd all(evidence.nuisances.rows(),
+                      evidence.nuisances.cols() + static_cast<Eigen::Index>(columns.size()));
+  all.leftCols(evidence.nuisances.cols()) = evidence.nuisances;
+  for (std::size_t k = 0; k < columns.size(); ++k) {
+    all.col(evidence.nuisances.cols() + static_cast<Eigen::Index>(k)) = columns[k];
+  }
+  return all;
+}
+
+}  // namespace
+
+Competition::Competition(const DiagnosisRequest& of, const Study& study, const Evidence& evidence,
+                         const std::vector<Signature>& first, BaseParameters base)
+    : of_(of),
+      study_(study),
+      all_(infer::remembering([&of](const std::vector<PredictionRequest>& points) {
+        return of.predictor.attempt(points);
+      })),
+      base_(*study.table, {}) {
+  infer::Observations all = observations_of(of, study);
+  // Where the base has to be searched anyway, nothing is known of it to first order; elsewhere the
+  // noise is known from what no smooth function explains.
+  if (!of.subject.base_moves) {
+    all.columns = columns_of(evidence, first);
+    all.least_scale = std::sqrt(kLeastLeftoverScale);
+    all.most_scale = std::sqrt(kMostLeftoverScale);
+  }
+  base_ = base_space(study, base, all.columns.cols());
+  scope_ = infer::scope_of(all_, all, not_ignored(study));
+}
+
+std::vector<Coordinate> Competition::coordinates_of(const std::string& name) const {
+  const ParameterTable& table = *study_.table;
+  const EffectDiagnosis& effect = of_.subject.effects->row(name);
+  std::vector<Coordinate> coordinates;
+  for (const SearchedSize& size : searched_of(effect)) {
+    Coordinate& c = coordinates.emplace_back();
+    c.row = searched_row(effect, size, table);
+    const Parameter& p = table[c.row];
+    c.size = size.size * (p.unit == "m" ? study_.scale : 1);
+    c.has_prior = !effect.searched.empty() &&
+                  std::none_of(effect.places.begin(), effect.places.end(), [&](const auto& place) {
+                    return std::string_view(place.key) == size.key;
+                  });
+    if (effect.polar) {
+      c.kind = Coordinate::Kind::kPolar;
+      c.direction_row = table.row(effect.polar->direction);
+      c.symmetry = effect.polar->symmetry;
+      c.of_ratio = effect.polar->ratio;
+    } else if (size.logarithm) {
+      c.kind = Coordinate::Kind::kLogarithm;
+    } else if (p.key.ends_with(".direction")) {
+      c.kind = Coordinate::Kind::kAngle;
+      c.has_prior = false;
+    }
+  }
+  return coordinates;
+}
+
+std::vector<infer::Hypothesis> Competition::of_rows(const std::set<std::string>& without) const {
+  std::vector<infer::Hypothesis> hypotheses;
+  for (const EffectDiagnosis* effect : *of_.subject.effects) {
+    if (effect->searched.empty() || without.count(effect->effect) || of_.excluded(effect->effect))
+      continue;
+    infer::Hypothesis& h = hypotheses.emplace_back();
+    h.name = effect->effect;
+    h.coordinates = coordinates_of(h.name);
+    h.from_neutral = effect->proposals == nullptr;
+    h.starts = h.from_neutral ? corners(base_.only(h.coordinates)) : effect->proposals(study_);
+  }
+  return hypotheses;
+}
+
+infer::Hypothesis Competition::of_mark(const EffectCandidate& mark,
+                                       const Regression& explained) const {
+  infer::Hypothesis h;
+  h.name = mark.signature.effect;
+  h.coordinates = coordinates_of(h.name);
+  h.from_neutral = false;
+  infer::Start& start = h.starts.emplace_back();
+  for (const auto& [key, value] : start_values(study_, explained, mark.signature)) {
+    start.at[of_.table().row(key)] = value;
+  }
+  if (!mark.signature.whole) return h;
+  // What has a place does nothing elsewhere.
+  for (std::uint32_t i = 0; i < study_.size(); ++i) {
+    if (!mark.signature.columns.middleRows<3>(3 * i).isZero(0)) start.reach.push_back(i);
+  }
+  return h;
+}
+
+std::map<std::string, double> Competition::values_of(const std::string& effect,
+                                                     const infer::Model& model) const {
+  std::map<std::string, double> values;
+  for (const auto& [row, value] : model.space.values(model.fit.u)) {
+    const Parameter& p = of_.table()[row];
+    if (p.effect == effect) values[p.key] = value;
+  }
+  return values;
+}
+
+Eigen::VectorXd Competition::unexplained(const infer::Model& model) const {
+  const Eigen::MatrixXd& columns = scope_.observations.columns;
+  return in_all_trials(model.fit.z + columns * model.fit.u.head(columns.cols()));
+}
+
+Eigen::MatrixXd Competition::in_all_trials(const Eigen::MatrixXd& rows) const {
+  Eigen::MatrixXd all =
+      Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(3 * study_.size()), rows.cols());
+  for (std::size_t k = 0; k < scope_.index.size(); ++k) {
+    all.middleRows<3>(static_cast<Eigen::Index>(3 * scope_.index[k])) =
+        rows.middleRows<3>(static_cast<Eigen::Index>(3 * k));
+  }
+  return all;
+}
+
+}  // namespace gapfarm::steps

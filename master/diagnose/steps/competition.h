@@ -1,0 +1,49 @@
+// A study as the competition of hypotheses sees it.
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "master/diagnose/steps/step_parts.h"
+#include "master/infer/compete.h"
+#include "master/infer/scope.h"
+
+namespace gapfarm::steps {
+
+// Of all trials that are not ignored.
+class Competition {
+ public:
+  // `base`: held where it was tuned, beside the nuisances to first order, or searched with the
+  // hypotheses.  REQUIRES: all outlive it.
+  Competition(const DiagnosisRequest& of, const Study& study, const Evidence& evidence,
+              const std::vector<Signature>& first, BaseParameters base);
+  Competition(const Competition&) = delete;
+  Competition& operator=(const Competition&) = delete;
+
+  const infer::Forward& forward() const { return scope_.forward; }
+  const infer::Observations& observations() const { return scope_.observations; }
+  const infer::Space& base() const { return base_; }
+  std::vector<infer::Coordinate> coordinates_of(const std::string& effect) const;
+
+  // Every effect of the catalogue that is searched whatever slopes say, but for these.
+  std::vector<infer::Hypothesis> of_rows(const std::set<std::string>& without) const;
+  // From where a first-order fit has its parameters.
+  infer::Hypothesis of_mark(const EffectCandidate& mark, const Regression& explained) const;
+  // The values of the effect's own parameters at a model.
+  std::map<std::string, double> values_of(const std::string& effect,
+                                          const infer::Model& model) const;
+  // Whitened rows of all trials, as if nothing were explained but by the model's parameters.
+  Eigen::VectorXd unexplained(const infer::Model& model) const;
+  // Rows of the observations as rows of all trials; zero in the others.
+  Eigen::MatrixXd in_all_trials(const Eigen::MatrixXd& rows) const;
+
+ private:
+  const DiagnosisRequest& of_;
+  const Study& study_;
+  infer::Forward all_;
+  infer::Scope scope_;
+  infer::Space base_;
+};
+
+}  // namespace gapfarm::steps
