@@ -44,6 +44,7 @@ struct Arguments {
   unsigned processes = std::max(1u, std::thread::hardware_concurrency());
   bool drain = false;
   double lifetime_s = 0;
+  double wait_limit_s = 0;
   ProcessLimits limits;
   bool allow_external = false;
   bool local = false;
@@ -80,6 +81,10 @@ void describe(CLI::App& app, Arguments* arguments) {
                "When asked to stop, finish all jobs in hand instead of only the one in work");
   app.add_option("--lifetime", arguments->lifetime_s,
                  "Be gone after so many seconds, and begin no job that would take longer")
+      ->check(CLI::PositiveNumber)
+      ->type_name("SECONDS");
+  app.add_option("--wait-limit", arguments->wait_limit_s,
+                 "Leave when there has been no master for so many seconds (default: wait for ever)")
       ->check(CLI::PositiveNumber)
       ->type_name("SECONDS");
   app.add_option("--progress-limit", arguments->limits.progress_s,
@@ -156,6 +161,7 @@ int work(const Arguments& arguments) {
     options.session.deadline_s = monotonic_seconds() + arguments.lifetime_s;
   }
   options.drain = arguments.drain;
+  options.wait_limit_s = arguments.wait_limit_s;
   options.announce = arguments.announce;
   const auto page = ProgressPage::inherit();
   if (!page) return complain(page.error(), 1);
@@ -193,6 +199,11 @@ int start_workers(const Arguments& arguments) {
   if (arguments.drain) options.arguments.push_back("--drain");
   if (arguments.allow_external) options.arguments.push_back("--allow-external");
   options.limits = arguments.limits;
+  if (arguments.wait_limit_s > 0) {
+    options.leaves_for_good = true;
+    options.arguments.insert(options.arguments.end(),
+                             {"--wait-limit", std::to_string(arguments.wait_limit_s)});
+  }
   if (arguments.lifetime_s > 0) options.deadline_s = monotonic_seconds() + arguments.lifetime_s;
   const Status status = supervise(options, stop);
   return status ? 0 : complain(status.error(), kExitRefused);

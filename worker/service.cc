@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdio>
+#include <optional>
 #include <random>
 #include <string>
 
@@ -51,6 +52,9 @@ class Service {
       if (now >= options_.session.deadline_s) {
         return leave(ServiceEnd::kStoppedNow, "its lifetime is over");
       }
+      if (waited_too_long(now) && evaluation_.idle()) {
+        return leave(ServiceEnd::kNoMaster, "no master for too long");
+      }
       if (may_leave()) {
         return stops_ > 0 ? leave(ServiceEnd::kStopped, "asked to stop")
                           : leave(ServiceEnd::kOutOfTime, "no lifetime left for another job");
@@ -81,6 +85,16 @@ class Service {
     if (const auto message = wait_.message(working, now)) {
       std::fprintf(stderr, "gapfarm-worker: %s\n", message->c_str());
     }
+  }
+
+  // A core that a cluster lends is given back when nobody needs it.
+  bool waited_too_long(double now) {
+    if (session_.state() == WorkerSession::State::kWorking)
+      without_since_.reset();
+    else if (!without_since_)
+      without_since_ = now;
+    return options_.wait_limit_s > 0 && without_since_ &&
+           now - *without_since_ > options_.wait_limit_s;
   }
 
   // Between the session and the evaluating thread.
@@ -120,6 +134,7 @@ class Service {
 
   const ServiceOptions& options_;
   unsigned stops_ = 0;
+  std::optional<double> without_since_;  // a master
   WorkerSession session_;
   DealerSocket& socket_;
   EvaluationThread& evaluation_;

@@ -20,12 +20,14 @@ struct ServiceOptions {
   bool local = false;
   // A stop request finishes all jobs in hand instead of the one in work.
   bool drain = false;
+  double wait_limit_s = 0;  // leaves when it has had no master for so long; 0: never
   // Says on stderr that it waits for a master, and for which; one of a supervisor's workers does.
   bool announce = false;
   WorkerProgress* progress = nullptr;  // shows that this thread answers; may be null
 };
 
 enum class ServiceEnd {
+  kNoMaster,    // for too long
   kStopped,     // by request, with the job in hand finished and its result sent
   kStoppedNow,  // by a second request, or at the deadline with a job still in work
   kOutOfTime,   // the session's deadline is near, and nothing is in work

@@ -36,6 +36,8 @@ ProcessPoolOptions pool_options(const SupervisorOptions& options) {
   pool.name_prefix = options.name;
   pool.failure_limit = {};
   pool.limits = options.limits;
+  // It would not find the time for a job, or a master, as the one before did not.
+  pool.replaces_leavers = !options.leaves_for_good && !std::isfinite(options.deadline_s);
   pool.arguments = [arguments = options.arguments, prefix = options.name,
                     parent = std::to_string(getpid()), deadline = options.deadline_s](
                        const std::string& name, const ProcessEnded* replaced) {
@@ -69,6 +71,7 @@ void wait_for(const ProcessPool& pool, const StopSource& stop, double timeout_s)
 Status supervise(const SupervisorOptions& options, StopSource& stop) {
   ProcessPool pool(pool_options(options));
   RETURN_IF_ERROR(pool.start(monotonic_seconds()));
+  const bool mortal = options.leaves_for_good || std::isfinite(options.deadline_s);
   unsigned stops = 0;
   std::string last_end;
   while (!pool.exhausted()) {
@@ -81,8 +84,6 @@ Status supervise(const SupervisorOptions& options, StopSource& stop) {
     const double now = monotonic_seconds();
     if (now >= options.deadline_s) pool.retire();
     for (const ProcessEnded& end : pool.reap(now)) {
-      // It will not find the time for a job, as the one before did not.
-      if (end.cause == EndCause::kLeft && std::isfinite(options.deadline_s)) pool.retire();
       if (stops > 0) continue;
       last_end = end.text;
       std::fprintf(stderr, "gapfarm-worker: %s%s\n", end.text.c_str(),
@@ -90,7 +91,7 @@ Status supervise(const SupervisorOptions& options, StopSource& stop) {
     }
     wait_for(pool, stop, std::clamp(pool.next_start() - now, 0.0, pool.look_interval()));
   }
-  if (stops > 0 || std::isfinite(options.deadline_s)) return {};
+  if (stops > 0 || mortal) return {};
   return Error{"no worker process can be kept alive: " + last_end};
 }
 

@@ -17,6 +17,7 @@ struct SupervisorOptions {
   std::vector<std::string> arguments;  // for every worker, beside --name and --parent
   unsigned processes = 1;
   ProcessLimits limits;
+  bool leaves_for_good = false;  // a worker that leaves unasked is not replaced: nor would it work
   // s of the monotonic clock, by which the workers have gone (they are asked to go, and none is
   // started again after it).
   double deadline_s = std::numeric_limits<double>::infinity();

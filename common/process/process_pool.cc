@@ -186,6 +186,7 @@ std::vector<ProcessEnded> ProcessPool::reap(double now) {
     int status = 0;
     if (place.pid != 0 && waitpid(place.pid, &status, WNOHANG) == place.pid) {
       ends.push_back(ended(place, status, now));
+      retired_ |= !options_.replaces_leavers && ends.back().cause == EndCause::kLeft;
     }
     if (place.pid != 0 || place.gave_up || retired_ || place.start_at > now) continue;
     place.start_at = now;

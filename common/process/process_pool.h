@@ -60,7 +60,8 @@ struct ProcessPoolOptions {
       arguments;
   // A place is given up after so many ends in a row without a confirm(); none: never.
   std::optional<unsigned> failure_limit = 3;
-  double healthy_s = 10;   // a child that lived so long counts as confirmed
+  bool replaces_leavers = true;  // false: once a child has left by itself, no other is started
+  double healthy_s = 10;         // a child that lived so long counts as confirmed
   double backoff_s = 0.1;  // before the second start in a row without a confirm(), then doubled
   double backoff_max_s = 30;
   ProcessLimits limits;

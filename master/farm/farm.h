@@ -8,6 +8,7 @@
 #include "common/base/result.h"
 #include "gapfarm/v1/problem.pb.h"
 #include "gapfarm/v1/task.pb.h"
+#include "master/farm/sites/fleet_status.h"
 
 namespace gapfarm {
 
@@ -39,6 +40,8 @@ class Farm {
       const std::function<void(const FarmProgress&)>& on_progress = {}) = 0;
 
   virtual std::vector<WorkerStatus> workers() const = 0;
+  // Those whose workers stand on clusters for it.
+  virtual std::vector<FleetStatus> fleets() const { return {}; }
   // Jobs given out a second time because their worker went.
   virtual std::uint64_t retries() const = 0;
 };

@@ -135,6 +135,10 @@ void Scheduler::on_message(const std::string& peer, v1::Envelope* envelope, doub
     on_hello(peer, envelope->hello(), now);
     return;
   }
+  if (envelope->has_fleet()) {
+    on_fleet(peer, envelope->fleet(), now);
+    return;
+  }
   WorkerRecord* worker = registry_.find_peer(peer);
   if (worker == nullptr) {
     // Given up for silence, or welcomed by an earlier life of the master.
@@ -193,8 +197,7 @@ void Scheduler::on_hello(const std::string& peer, const v1::Hello& hello, double
       keep_only(worker, std::vector<std::uint64_t>{}, kForever);
     }
   }
-  report(admission.returning ? FarmEvent::kReturned : FarmEvent::kJoined, worker.name,
-         (admission.returning ? "is back on " : "joined from ") + worker.host);
+  greet(worker, admission.returning, now);
   v1::Welcome* welcome = post(peer).mutable_welcome();
   welcome->set_epoch(options_.epoch);
   welcome->set_heartbeat_interval(options_.heartbeat_interval_s);
@@ -364,7 +367,10 @@ void Scheduler::on_tick(double now) {
   if (now - last_tick_ > options_.silence_limit_s / 2) registry_.forgive(now);
   last_tick_ = now;
   for (WorkerId id : registry_.silent_since(now, options_.silence_limit_s)) {
-    dismiss(*registry_.find(id), FarmEvent::kSilent, "was not heard of for too long");
+    WorkerRecord& worker = *registry_.find(id);
+    if (silenced_.size() > kDepartedKept) silenced_.clear();
+    silenced_[worker.name] = worker.last_heard;
+    dismiss(worker, FarmEvent::kSilent, "was not heard of for too long");
   }
   dispatch(now);
 }
@@ -372,6 +378,9 @@ void Scheduler::on_tick(double now) {
 void Scheduler::send_goodbye(const std::string& reason) {
   for (const auto& [id, worker] : registry_.all()) {
     post(worker->peer).mutable_goodbye()->set_reason(reason);
+  }
+  for (const std::string& peer : fleets_.peers()) {
+    post(peer).mutable_goodbye()->set_reason(reason);
   }
 }
 

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "master/farm/job_queue.h"
+#include "master/farm/sites/fleet_registry.h"
 #include "master/farm/worker_registry.h"
 
 namespace gapfarm {
@@ -117,7 +118,7 @@ class Scheduler {
   // Judges silence and gives out jobs.  Call when all messages that have arrived are handled: what
   // waits unread must not count as silence.
   void on_tick(double now);
-  // Informs every worker that this master leaves.
+  // Informs every worker and fleet that this master leaves.
   void send_goodbye(const std::string& reason);
 
   // To be sent by the caller, in order; cleared by it.
@@ -125,6 +126,7 @@ class Scheduler {
 
   const WorkerRegistry& workers() const { return registry_; }
   std::vector<WorkerStatus> worker_status() const { return registry_.status(last_tick_); }
+  std::vector<FleetStatus> fleet_status() const { return fleets_.status(last_tick_); }
   const SchedulerCounts& counts() const { return counts_; }
   // Answers that were compared with another worker's, and jobs given to a second worker because the
   // first took long.
@@ -135,6 +137,8 @@ class Scheduler {
 
  private:
   void on_hello(const std::string& peer, const v1::Hello& hello, double now);
+  void greet(const WorkerRecord& worker, bool returning, double now);
+  void on_fleet(const std::string& peer, const v1::Fleet& fleet, double now);
   void on_heartbeat(WorkerRecord& worker, const v1::Heartbeat& heartbeat, double now);
   // False: the worker is gone with it.
   bool on_result(WorkerRecord& worker, v1::JobResult* result, double now);
@@ -161,11 +165,14 @@ class Scheduler {
 
   SchedulerOptions options_;
   WorkerRegistry registry_;
+  FleetRegistry fleets_;
   JobQueue queue_;
   std::map<std::string, std::string> problems_;  // hash -> bytes
   std::deque<WorkerId> line_;                    // may take jobs
   // Workers that went, by name: how their processes ended may come out later.
   std::unordered_map<std::string, WorkerIdentityPtr> departed_;
+  // Workers that were dismissed for silence, by name: since when it lasted.
+  std::unordered_map<std::string, double> silenced_;
   struct Offered {
     WorkerIdentityPtr by;
     v1::Offer::Answer answer;

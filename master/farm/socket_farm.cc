@@ -221,6 +221,8 @@ void SocketFarm::watch_answers(AnswerWatcher watcher) {
 
 std::vector<WorkerStatus> SocketFarm::workers() const { return impl_->scheduler->worker_status(); }
 
+std::vector<FleetStatus> SocketFarm::fleets() const { return impl_->scheduler->fleet_status(); }
+
 std::uint64_t SocketFarm::retries() const { return impl_->scheduler->counts().retries; }
 
 const std::vector<std::string>& SocketFarm::endpoints() const { return impl_->endpoints; }

@@ -59,6 +59,7 @@ class SocketFarm : public Farm, public AnswerSource {
 
   void watch_answers(AnswerWatcher watcher) override;
   std::vector<WorkerStatus> workers() const override;
+  std::vector<FleetStatus> fleets() const override;
   std::uint64_t retries() const override;
 
   // As bound: ports are filled in.

@@ -116,6 +116,9 @@ FarmProgressWriter::FarmProgressWriter(RunStore& store, FarmOfRun& farm,
       watcher_(watcher),
       began_s_(clock.now_s()),
       wait_(farm.endpoints()) {
+  for (const std::string& endpoint : farm.endpoints()) {
+    if (last_.listen.empty() && endpoint.rfind("tcp://", 0) == 0) last_.listen = endpoint;
+  }
   if (!resumed) return;
   generation_ = resumed->generation;
   evaluations_of_others_ = resumed->evaluations;
@@ -191,6 +194,7 @@ void FarmProgressWriter::refresh(double now_s) {
   for (const WorkerStatus& w : workers) {
     last_.workers.push_back({w.name, w.host, w.state, w.jobs, w.finished, w.rate_per_s});
   }
+  last_.fleets = farm_.farm().fleets();
   last_.farm = farm_.tally();
   // The live row is a courtesy: a run goes on when it cannot be written, and a commit that cannot
   // be written stops it with the reason.

@@ -42,9 +42,21 @@ FarmTally& FarmTally::operator+=(const FarmTally& other) {
   return *this;
 }
 
-std::string FarmTally::to_json() const {
+std::string FarmTally::to_json(const std::vector<FleetStatus>& fleets,
+                               const std::string& listen) const {
   nlohmann::ordered_json json = nlohmann::ordered_json::object();
   for (const Row& row : kRows) json[row.key] = this->*row.count;
+  if (!listen.empty()) json["listen"] = listen;
+  for (const FleetStatus& f : fleets) {
+    json["fleets"].push_back({{"name", f.name},
+                              {"system", f.system},
+                              {"host", f.host},
+                              {"asked", f.wanted},
+                              {"queued", f.queued},
+                              {"running", f.running},
+                              {"lost", f.lost},
+                              {"why", f.why}});
+  }
   return json_text(json);
 }
 
@@ -59,6 +71,28 @@ FarmTally FarmTally::from_json(const std::string& text) {
     }
   }
   return tally;
+}
+
+void FarmTally::read_farm(const std::string& text, Progress* progress) {
+  progress->farm = from_json(text);
+  const auto json = parse_json(text);
+  if (!json.is_object()) return;
+  const auto word = [](const auto& object, const char* key) {
+    const auto found = object.find(key);
+    return found != object.end() && found->is_string() ? found->template get<std::string>() : "";
+  };
+  const auto count = [](const auto& object, const char* key) {
+    const auto found = object.find(key);
+    return found != object.end() && found->is_number_unsigned() ? found->template get<unsigned>()
+                                                                : 0u;
+  };
+  progress->listen = word(json, "listen");
+  for (const auto& f : json.value("fleets", nlohmann::ordered_json::array())) {
+    if (!f.is_object()) continue;
+    progress->fleets.push_back({word(f, "name"), word(f, "system"), word(f, "host"),
+                                count(f, "asked"), count(f, "queued"), count(f, "running"),
+                                count(f, "lost"), word(f, "why")});
+  }
 }
 
 const char* incident_name(IncidentKind kind) {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "common/problem/problem.h"
+#include "master/farm/sites/fleet_status.h"
 
 namespace gapfarm {
 
@@ -89,9 +90,12 @@ struct FarmTally {
   static const std::array<Row, 13> kRows;  // every count, by its name in the store and in status
 
   FarmTally& operator+=(const FarmTally& other);
-  // A JSON object, and back; what is no such object counts nothing.
-  std::string to_json() const;
+  // A JSON object, with what else is known of the farm; and back: what is no such object counts
+  // nothing.
+  std::string to_json(const std::vector<FleetStatus>& fleets = {},
+                      const std::string& listen = "") const;
   static FarmTally from_json(const std::string& text);
+  static void read_farm(const std::string& text, struct Progress* progress);
 };
 
 enum class IncidentKind {
@@ -132,6 +136,8 @@ struct Progress {
   std::optional<double> time_left_s;
   std::uint64_t done = 0, total = 0;  // tasks of the generation in work
   std::vector<StoredWorker> workers;
+  std::vector<FleetStatus> fleets;
+  std::string listen;  // for workers: its first tcp:// endpoint; empty: none
   FarmTally farm;
   // Set by the store:
   std::int64_t pid = 0;

@@ -187,7 +187,7 @@ Result<Progress> RunReader::progress() const {
             p.state = state_of(state);
             (p.state == RunState::kRunning ? p.waiting : p.stop_reason) = reason;
             p.workers = workers_of(parse_json(workers));
-            p.farm = FarmTally::from_json(farm);
+            FarmTally::read_farm(farm, &p);
             return p;
           }));
   return found.value_or(Progress());

@@ -85,6 +85,7 @@ Result<RunStatus> run_status(const RunReader& reader, double now_unix_s) {
     status.rate_per_s = status.wall_s > 0 ? evaluations / status.wall_s : 0;
     if (status.state == RunState::kFinished) status.time_left_s = 0;
     status.progress.workers.clear();
+    status.progress.fleets.clear();
   }
   return status;
 }
@@ -110,6 +111,8 @@ Json to_json(const RunStatus& status) {
   for (const FarmTally::Row& row : FarmTally::kRows) {
     farm[row.key] = status.progress.farm.*row.count;
   }
+  const auto fleets = parse_json(FarmTally().to_json(status.progress.fleets));
+  json["fleets"] = fleets.value("fleets", Json::array());
   json["fitness"] = status.info.fitness;
   json["fitness_unit"] = status.info.fitness_unit;
   json["higher_is_better"] = status.info.higher_is_better;

@@ -271,7 +271,8 @@ Status RunStore::set_progress(const Progress& progress) {
       "rate_per_s = ?, time_left_s = ?, done = ?, total = ?, workers = ?, epoch = ?, farm = ?",
       run_state_name(progress.state), running ? progress.waiting : progress.stop_reason, ::getpid(),
       host_name(), unix_now_s(), progress.rate_per_s, progress.time_left_s, progress.done,
-      progress.total, json_text(workers_json(progress.workers)), epoch_, farm.to_json());
+      progress.total, json_text(workers_json(progress.workers)), epoch_,
+      farm.to_json(progress.fleets, progress.listen));
 }
 
 Result<std::optional<Checkpoint>> RunStore::checkpoint(

@@ -72,13 +72,18 @@ start_master() {
   endpoint=$(sed -n 's/.*--connect \([^ ]*\).*/\1/p' "$T/master.log")
 }
 
-# Stops the run and compares it with one on local workers.
-compare_with_calm_run() {
-  local generation digest calm
+stop_master() {
   kill -TERM "$master"
   wait "$master"
   local exit_code=$?
   [[ $exit_code -eq 85 ]] || fail "the master ended with $exit_code"
+  master=''
+}
+
+# Stops the run, if that is to do, and compares it with one on local workers.
+compare_with_calm_run() {
+  local generation digest calm
+  [[ -z $master ]] || stop_master
   generation=$(status "$T/run" 's["generation"]')
   digest=$(status "$T/run" 's["digest"]')
   "$BIN/gapfarm" evolve "$T/run.toml" --out "$T/calm" --generations "$generation" --workers 2 \

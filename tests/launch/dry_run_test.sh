@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# --dry-run prints what would run, and runs nothing.
+# --dry-run prints what would be submitted, for every system, and runs nothing.
 #   dry_run_test.sh BIN ROOT
 set -u
 BIN=$1 ROOT=$2
@@ -7,31 +7,43 @@ source "$ROOT/tests/launch/common.sh"
 T=$(mktemp -d)
 trap clean_up EXIT
 mkdir "$T/path"
-for program in sbatch scancel squeue ssh; do
+for program in sbatch scancel squeue qsub qstat condor_submit kubectl ssh; do
   printf '#!/bin/sh\necho "$0 $*" >>%s/ran\n' "$T" >"$T/path/$program"
   chmod +x "$T/path/$program"
 done
 PATH=$T/path:$PATH
-slurm=$ROOT/scripts/launch/slurm.sh ssh=$ROOT/scripts/launch/ssh.sh
+cd "$ROOT" || exit 1
+"$BIN/gapfarm" keys make --keys "$T/keys" >/dev/null 2>&1 || fail 'no keys'
+# expect SYSTEM WANTED OPTIONS...
 expect() {
-  local wanted=$1
-  shift
-  local printed
-  printed=$("$@" --dry-run 2>&1) || fail "$* exited with $?: $printed"
-  [[ $printed == *"$wanted"* ]] || fail "$* printed: $printed"
+  local system=$1 wanted=$2 printed
+  shift 2
+  printed=$("$BIN/gapfarm" workers --on "$system" --connect tcp://m:1 --keys "$T/keys" --max 12 --dry-run "$@" 2>&1) ||
+    fail "$system exited with $?: $printed"
+  [[ $printed == *"$wanted"* ]] || fail "$system printed: $printed"
 }
-expect '--array=1-3 --cpus-per-task=2 --signal=B:USR1@60' "$slurm" workers --connect tcp://m:1 \
-  --workers 3 --cpus 2 --time 1:00:00 --bin "$BIN"
-expect '--lifetime 3570' "$slurm" workers --connect tcp://m:1 --time 1:00:00 --bin "$BIN"
-expect '--lifetime 86370' "$slurm" workers --connect tcp://m:1 --time 1-0:0:0 --bin "$BIN"
-expect 'scancel 47 48' "$slurm" stop 47 48 --bin "$BIN"
-expect 'slurm_master.sh' "$slurm" run --bin "$BIN" --dry-run -- evolve c.toml --out r
-for verb in start status stop logs; do
-  expect 'ConnectTimeout=10 b ' "$ssh" $verb a,b --connect tcp://m:1
-done
-printf 'one # first\n\ntwo\n' >"$T/hosts"
-expect ' two ' "$ssh" status "@$T/hosts"
+expect slurm '--array=0-5 --cpus-per-task=2' --workers-per-job 2
+expect slurm '--time=60' --wall-time 1:00:00
+expect slurm '--lifetime 3570' --wall-time 1:00:00
+expect slurm '--lifetime 86370' --wall-time 1-00:00:00
+expect slurm '--partition=short' -- --partition=short
+expect sge '-t 1-12 ' --wall-time 90
+expect sge 'h_rt=90' --wall-time 90
+expect sge '-pe smp 4' --workers-per-job 4
+expect pbs 'walltime=3600' --wall-time 3600
+expect condor 'queue 12'
+expect kube 'runAsNonRoot: true'
+expect kube 'activeDeadlineSeconds: 600' --wall-time 600
+expect ssh ' a sh ' --host a --host b
+expect local '--processes 1 --wait-limit 30'
+# No secret goes anywhere but by its file.
+printed=$("$BIN/gapfarm" workers --on slurm --connect tcp://m:1 --keys "$T/keys" --max 2 --dry-run 2>&1)
+[[ $printed == *"--keys $T/keys"* ]] || fail "no key folder: $printed"
+secret=$(sed -n 's/.*secret[^A-Za-z0-9]*//p' "$T/keys/worker.key" | head -n 1)
+[[ -z $secret || $printed != *"$secret"* ]] || fail 'a secret key is printed'
+printed=$("$BIN/gapfarm" submit --on slurm --keys "$T/keys" --max 8 --dry-run -- evolve c.toml --out r 2>&1) || fail "$printed"
+[[ $printed == *'--signal=B:USR1@60'* && $printed == *'scontrol requeue'* ]] || fail "submit printed: $printed"
+"$BIN/gapfarm" workers --on slurm --max 2 2>/dev/null && fail 'submitted without an endpoint'
+"$BIN/gapfarm" workers --on nowhere --max 2 --connect tcp://m:1 2>/dev/null && fail 'knew a system nowhere'
 [[ ! -e $T/ran ]] || fail "ran $(<"$T/ran")"
-"$ssh" start a 2>/dev/null && fail 'started without an endpoint'
-"$slurm" workers --bin "$BIN" 2>/dev/null && fail 'submitted without an endpoint'
 exit 0

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# scripts/launch/ssh.sh with three hosts: network namespaces with an sshd and a home folder each.
-# One is cut off in the middle of the run and comes back.
+# gapfarm workers --on ssh with three hosts: network namespaces with an sshd and a home folder each.
+# One lacks the program for a while; one is cut off in the middle of the run and comes back.
 #   ssh_test.sh BIN ROOT [SECONDS]    how long it is cut off, at least until the master has noticed
 set -u
 BIN=$1 ROOT=$2 CUT=${3:-0}
@@ -40,7 +40,7 @@ for i in 1 2 3; do
   ip -n "h$i" link set lo up
   ip -n "h$i" route add default via "10.77.$i.1"
   mkdir -p "$T/home$i/gapfarm/bin" "$T/home$i/.config/gapfarm"
-  # The third lacks the program, and is brought it.
+  # The third lacks the program at first.
   [[ $i == 3 ]] || ln -s "$BIN/gapfarm-worker" "$T/home$i/gapfarm/bin/gapfarm-worker"
   "$BIN/gapfarm" keys worker "h$i" --keys "$T/keys" --out "$T/home$i/.config/gapfarm/keys" \
     >/dev/null || fail "no keys for h$i"
@@ -67,40 +67,34 @@ Host *
   StrictHostKeyChecking no
   LogLevel ERROR
 TEXT
-launch() {
-  local verb=$1
-  shift
-  "$ROOT/scripts/launch/ssh.sh" "$verb" h1,h2,h3 --ssh-config "$T/ssh_config" "$@"
-}
-
 write_config
 start_master 10.77.0.1
 for i in 1 2 3; do
   wait_for "h$i answers" ssh -n -F "$T/ssh_config" -o BatchMode=yes "h$i" true
 done
-mkdir -p "$T/deb/DEBIAN" "$T/deb/usr/bin"
-cp "$BIN/gapfarm-worker" "$T/deb/usr/bin/"
-printf 'Package: gapfarm-worker\nVersion: 1\nArchitecture: all\nMaintainer: x\nDescription: x\n' \
-  >"$T/deb/DEBIAN/control"
-dpkg-deb -b "$T/deb" "$T/worker.deb" >/dev/null || fail 'no package'
-launch start --connect "$endpoint" --processes 1 && fail 'started where there is no program'
-launch start --connect "$endpoint" --processes 1 --package "$T/worker.deb" || fail start
-launch status || fail status
+"$BIN/gapfarm" workers --on ssh --host h1 --host h2 --host h3 --ssh-config "$T/ssh_config" --max 3 \
+  --connect "$endpoint" --keys "$T/keys" --look-every 2 2>"$T/workers.log" &
+fleet=$!
+started+=("$fleet")
 workers_are() {
   [[ $(status "$T/run" 'sum(w["state"] != "gone" for w in s["workers"])') == "$1" ]]
 }
-wait_for 'three workers have joined' workers_are 3
+wait_for 'two workers have joined' workers_are 2
+says() { grep -q -e "$1" "$T/workers.log"; }
+wait_for 'the log of h3 is shown' says 'gapfarm-worker: No such file or directory'
+ln -s "$BIN/gapfarm-worker" "$T/home3/gapfarm/bin/gapfarm-worker"
+wait_for 'h3 is tried again, and there are three' workers_are 3
 wait_for 'a generation is committed' committed "$T/run" 1
 ip link set gf2 down
 wait_for 'h2 is cut off, and missed' workers_are 2
 sleep "$CUT"
-launch status && fail 'status did not miss h2'
 ip link set gf2 up
 wait_for 'h2 is back' workers_are 3
 now=$(status "$T/run" 's["generation"]')
 wait_for 'two more generations are committed' committed "$T/run" $((now + 2))
 compare_with_calm_run
-launch logs --lines 3 || fail logs
-launch stop || fail stop
-launch status && fail 'status found workers that were stopped'
-exit 0
+wait_for "the fleet has ended" bash -c "! kill -0 $fleet"
+wait "$fleet" || fail "gapfarm workers ended with $?"
+left=$(pgrep -c gapfarm-worker)
+[[ $left -eq 0 ]] || fail "$left workers are left"
+cat "$T/workers.log"

@@ -5,6 +5,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "common/base/host.h"
 #include "common/base/try.h"
 #include "common/json/fields.h"
 #include "master/command/long_command.h"
@@ -67,6 +68,16 @@ Result<std::unique_ptr<FarmOfRun>> open_farm(const RunStore& store, const Config
   return farm_of_run(std::move(farm));
 }
 
+Result<std::unique_ptr<WorkersBeside>> start_beside(const EvolutionOptions& options,
+                                                    const std::vector<std::string>& endpoints) {
+  for (const std::string& endpoint : endpoints) {
+    if (endpoint.rfind("tcp://", 0) != 0) continue;
+    return WorkersBeside::start(options.fleet, reachable(endpoint, host_name()), options.farm.keys,
+                                options.farm.insecure);
+  }
+  return Error{"--workers-on needs an endpoint that workers reach; give --listen tcp://*:PORT"};
+}
+
 void add_validation(const RunSummary& summary, const Problem& problem, std::string& text,
                     Json& json) {
   if (summary.validated.empty()) return;
@@ -110,10 +121,21 @@ void show(const RunSummary& summary, const RunStore& store, const Problem& probl
 void EvolutionOptions::declare(CLI::App& app) {
   declare_overrides(overrides, app);
   farm.declare(app, true);
+  fleet.declare(app, "--workers-on");
   page.declare(app);
   declare_long_command(app);
   app.add_option("--shuffle", shuffle,
                  "Hand jobs out in an order shuffled by this seed; the results do not change");
+}
+
+Status EvolutionOptions::complete() {
+  if (fleet.system.empty()) return {};
+  RETURN_IF_ERROR(fleet.check());
+  if (farm.workers < 0) farm.workers = 0;
+  if (farm.listen.empty()) {
+    farm.listen = {fleet.system == "local" ? "tcp://127.0.0.1:*" : "tcp://*:*"};
+  }
+  return {};
 }
 
 int run_evolution(RunStore& store, const Config& config, const EvolutionOptions& options, Log& log,
@@ -128,10 +150,14 @@ int run_evolution(RunStore& store, const Config& config, const EvolutionOptions&
   log.copy_to(context.console.kept());
   OnConsole watcher(context.console);
   std::unique_ptr<PageAlong> page;
+  std::unique_ptr<WorkersBeside> beside;
   const auto farm = [&](const auto& keep) -> Result<std::unique_ptr<FarmOfRun>> {
     ASSIGN_OR_RETURN(auto opened, open_page(options.page, store.run(), context));
     page = std::move(opened);
-    return open_farm(store, config, options, log, keep, context);
+    auto made = open_farm(store, config, options, log, keep, context);
+    if (!made || options.fleet.system.empty()) return made;
+    ASSIGN_OR_RETURN(beside, start_beside(options, (*made)->endpoints()));
+    return made;
   };
   const auto summary = evolve_run(
       store, {config, config.problem, log, farm, [&] { return context.stop.requested(); }},

@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <optional>
 
+#include "master/cli/evolution/fleet_options.h"
 #include "master/command/inputs.h"
 #include "master/command/page_along.h"
 #include "master/run/overrides.h"
@@ -14,10 +15,13 @@ namespace gapfarm {
 struct EvolutionOptions {
   EvolutionOverrides overrides;
   FarmOptions farm;
+  FleetChoice fleet;
   PageOption page;
   std::optional<std::uint64_t> shuffle;
 
   void declare(CLI::App& app);
+  // What --workers-on makes of the farm's options.
+  Status complete();
 };
 
 // Evolves (evolve_run()) and shows what comes of it.  `config`: overrides applied.  Returns an

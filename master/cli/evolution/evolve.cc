@@ -40,7 +40,8 @@ Result<int> print_plan(const EvolveCommand& command, const Config& config, CliCo
                        command.options.farm, config.farm, context);
 }
 
-Result<int> run_evolve(const EvolveCommand& command, CliContext& context) {
+Result<int> run_evolve(EvolveCommand command, CliContext& context) {
+  RETURN_IF_ERROR(command.options.complete());
   const std::unique_ptr<Log> log = command.options.farm.log.open();
   const NotesGoTo notes(*log, context.console);
   ASSIGN_OR_RETURN(
@@ -85,7 +86,9 @@ SubcommandRun setup_evolve(CLI::App& app) {
       "  gapfarm evolve configs/demo.toml --out run/demo\n"
       "  gapfarm evolve configs/srv1.toml --trials monday.csv tuesday.csv --out run/srv1\n"
       "  gapfarm evolve configs/srv1.toml --trials log.csv --out run/big --workers 0 \\\n"
-      "      --listen tcp://0.0.0.0:5555     # then: gapfarm-worker --connect tcp://HOST:5555");
+      "      --listen tcp://0.0.0.0:5555     # then: gapfarm-worker --connect tcp://HOST:5555\n"
+      "  gapfarm evolve configs/srv1.toml --trials log.csv --out run/big --workers-on slurm \\\n"
+      "      --max 200 --wall-time 4:00:00   # workers as jobs of Slurm, as many as needed");
   return [command](CliContext& context) { return run_evolve(*command, context); };
 }
 

@@ -34,7 +34,8 @@ Result<int> print_resume(const ResumeCommand& command, CliContext& context) {
       command.options.farm, config.farm, context);
 }
 
-Result<int> run_resume(const ResumeCommand& command, CliContext& context) {
+Result<int> run_resume(ResumeCommand command, CliContext& context) {
+  RETURN_IF_ERROR(command.options.complete());
   if (context.dry_run) return print_resume(command, context);
   const std::unique_ptr<Log> log = command.options.farm.log.open();
   const NotesGoTo notes(*log, context.console);

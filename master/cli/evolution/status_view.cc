@@ -62,6 +62,17 @@ std::string worker_lines(const std::vector<StoredWorker>& workers, const Console
   return text;
 }
 
+std::string fleet_lines(const std::vector<FleetStatus>& fleets, const Console& console) {
+  std::string text;
+  for (const FleetStatus& f : fleets) {
+    text += label(console, "cluster") + printable(f.system) + ": " + std::to_string(f.wanted) +
+            " workers asked for, " + std::to_string(f.queued) + " queued, " +
+            std::to_string(f.running) + " running, " + std::to_string(f.lost) + " lost" +
+            (f.why.empty() ? "" : "; " + printable(f.why)) + "\n";
+  }
+  return text;
+}
+
 // What the farm coped with; nothing where there was nothing.
 std::string farm_line(const FarmTally& farm, const Console& console) {
   const std::pair<std::uint64_t, const char*> parts[] = {
@@ -172,7 +183,8 @@ std::string status_screen(const RunStatus& status, const std::string& run, const
             console.styled(" best by generation", "2");
   }
   text += "\n";
-  text += best_values(status, console) + worker_lines(status.progress.workers, console);
+  text += best_values(status, console) + worker_lines(status.progress.workers, console) +
+          fleet_lines(status.progress.fleets, console);
   if (status.state == RunState::kRunning && status.heartbeat_age_s > 5) {
     text += label(console, "heartbeat") + format_duration(status.heartbeat_age_s) + " ago\n";
   }

@@ -42,7 +42,7 @@ struct FleetLimits {
   unsigned min_workers = 0;
   unsigned max_workers = 1;
   unsigned workers_per_job = 1;
-  unsigned block = 1000;     // jobs in one submission (Slurm's MaxArraySize is 1001 by default)
+  unsigned block = ~0u;      // jobs in one submission
   bool avoids_nodes = true;  // a submission can exclude nodes
   // Workers that are not needed for so long go.  Half of the minute that a worker may idle after
   // the last task; longer than the pause between two generations.

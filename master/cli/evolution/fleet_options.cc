@@ -1,0 +1,236 @@
+#include "master/cli/evolution/fleet_options.h"
+
+#include <fcntl.h>
+#include <poll.h>
+#include <sys/wait.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <filesystem>
+
+#include "common/base/hash.h"
+#include "common/base/shipped.h"
+#include "common/base/try.h"
+#include "common/process/child.h"
+#include "common/process/process_pool.h"
+#include "common/trials/files.h"
+#include "master/farm/local_workers.h"
+
+namespace gapfarm {
+namespace {
+
+// A worker leaves so long before its job's time is up: closing takes a second, a task is not begun
+// that would not be done; a quarter of what is short.
+constexpr double kMostMargin_s = 30;
+// Longer than the fleet takes at most to take its jobs away (FleetLoopOptions::drain_limit_s).
+constexpr int kLeaveLimit_ms = 90000;
+
+std::string whole_path(const std::string& path) {
+  std::error_code code;
+  const auto whole = std::filesystem::absolute(path, code);
+  return code ? path : whole.string();
+}
+
+// Ten letters, which is what SGE shows of a name; the same for the same master and system, so that
+// a fleet that died is taken over by the next.
+std::string fleet_name(const std::string& endpoint, const std::string& system) {
+  return "gf" + content_hash(endpoint + "|" + system).substr(0, 8);
+}
+
+std::vector<std::string> worker_command(const FleetChoice& choice, const ClusterSite& site,
+                                        const std::string& program, const std::string& endpoint,
+                                        const std::string& keys, bool insecure, double wall_s,
+                                        double wait_limit_s) {
+  std::vector<std::string> command = {program, "--connect", endpoint};
+  if (insecure) {
+    command.push_back("--insecure");
+  } else {
+    const bool there = !choice.worker_keys.empty() || !site.keys.empty();
+    command.insert(command.end(), {"--keys", !choice.worker_keys.empty() ? choice.worker_keys
+                                             : there                     ? site.keys
+                                                                         : whole_path(keys)});
+  }
+  const auto seconds = [](double s) { return std::to_string(std::lround(s)); };
+  command.insert(command.end(), {"--processes", std::to_string(choice.workers_per_job),
+                                 "--wait-limit", seconds(wait_limit_s)});
+  if (wall_s > 0) {
+    const double margin = std::min(kMostMargin_s, wall_s / 4);
+    command.insert(command.end(), {"--lifetime", seconds(std::max(1.0, wall_s - margin))});
+  }
+  return command;
+}
+
+}  // namespace
+
+void FleetChoice::declare(CLI::App& app, const std::string& with) {
+  CLI::Option* on = app.add_option(with, system,
+                                   "Workers from slurm, sge, pbs, condor, kube, ssh or local: "
+                                   "configs/sites has a file for each")
+                        ->type_name("SYSTEM");
+  if (with == "--on") on->required();
+  app.add_option("--min", min_workers, "Workers to keep also when there is little to do");
+  app.add_option("--max", max_workers, "Workers at most")->check(CLI::Range(1, 1000000));
+  app.add_option("--site", site, "A site's own file in place of configs/sites/SYSTEM.toml")
+      ->type_name("FILE");
+  app.add_option("--workers-per-job", workers_per_job, "Worker processes, and cores, of a job")
+      ->check(CLI::Range(1, 4096));
+  app.add_option("--wall-time", wall_time, "Of each job: seconds, H:MM:SS or D-HH:MM:SS")
+      ->type_name("TIME");
+  app.add_option("--idle", idle_s, "Workers that are not needed for so many seconds go")
+      ->check(CLI::PositiveNumber);
+  app.add_option("--look-every", look_interval_s, "Seconds between two looks at the cluster")
+      ->check(CLI::PositiveNumber);
+  app.add_option("--block", block, "Jobs in one submission at most (default: the site's)")
+      ->check(CLI::Range(1, 100000));
+  app.add_option("--with", extra,
+                 "An option for the command that submits, --with=--partition=short; may repeat")
+      ->type_name("OPTION");
+  app.add_option("--host", hosts, "A host for workers (ssh); may repeat");
+  app.add_option("--ssh-config", ssh_config, "For ssh -F")->type_name("FILE");
+  app.add_option("--worker-program", worker, "gapfarm-worker as the nodes find it")
+      ->type_name("FILE");
+  app.add_option("--worker-keys", worker_keys, "Key folder as the nodes find it")
+      ->type_name("FOLDER");
+  app.add_option("--worker-logs", logs, "Folder of the jobs' output, which all nodes see")
+      ->type_name("FOLDER");
+}
+
+std::vector<std::string> FleetChoice::arguments() const {
+  std::vector<std::string> all = {
+      "--on", system, "--min", std::to_string(min_workers), "--max", std::to_string(max_workers)};
+  const auto add = [&](const char* name, const std::string& value) {
+    if (!value.empty()) all.insert(all.end(), {name, value});
+  };
+  add("--site", site);
+  add("--workers-per-job", std::to_string(workers_per_job));
+  add("--wall-time", wall_time);
+  add("--idle", std::to_string(idle_s));
+  if (look_interval_s > 0) add("--look-every", std::to_string(look_interval_s));
+  for (const std::string& host : hosts) add("--host", host);
+  add("--ssh-config", ssh_config);
+  add("--worker-program", worker);
+  add("--worker-keys", worker_keys);
+  add("--worker-logs", logs);
+  if (block > 0) add("--block", std::to_string(block));
+  for (const std::string& option : extra) all.push_back("--with=" + option);
+  return all;
+}
+
+Result<ClusterSite> FleetChoice::read_site() const {
+  const std::string path = shipped_file(site.empty() ? "configs/sites/" + system + ".toml" : site);
+  const Result<std::string> text = read_text_file(path);
+  if (!text) {
+    return Error{text.error().message +
+                 "; systems are slurm, sge, pbs, condor, kube, ssh and "
+                 "local, and --site FILE describes another"};
+  }
+  ASSIGN_OR_RETURN(ClusterSite read, parse_site(*text, path));
+  if (!hosts.empty()) read.hosts = hosts;
+  if (block > 0) read.block = block;
+  if (look_interval_s > 0) read.interval_s = look_interval_s;
+  if (read.jobs_per_host > 0 && read.hosts.empty()) {
+    return Error{"no hosts for workers; name them with --host, or `hosts` in a --site file"};
+  }
+  return read;
+}
+
+Status FleetChoice::check() const {
+  if (max_workers < std::max(min_workers, workers_per_job)) {
+    return Error{"--max " + std::to_string(max_workers) + " is less than --min or than the " +
+                 std::to_string(workers_per_job) + " workers of one job; give --max N"};
+  }
+  if (!wall_time.empty()) {
+    ASSIGN_OR_RETURN([[maybe_unused]] const double seconds, wall_time_s(wall_time));
+  }
+  ASSIGN_OR_RETURN([[maybe_unused]] const ClusterSite read, read_site());
+  return {};
+}
+
+Result<double> wall_time_s(const std::string& text) {
+  const Error wrong{"'" + text + "' is no wall time; give seconds, H:MM:SS or D-HH:MM:SS"};
+  const std::size_t dash = text.find('-');
+  double sum = 0;
+  unsigned parts = 0;
+  for (std::size_t at = 0; at <= text.size(); ++parts) {
+    std::size_t end = parts == 0 && dash != text.npos ? dash : text.find(':', at);
+    end = std::min(end, text.size());
+    unsigned value = 0;
+    const auto [rest, error] = std::from_chars(text.data() + at, text.data() + end, value);
+    if (error != std::errc() || rest != text.data() + end) return wrong;
+    sum = sum * (parts == 1 && dash != text.npos ? 24 : 60) + value;
+    at = end + 1;
+  }
+  const bool whole = dash == text.npos ? parts == 1 || parts == 3 : parts == 4;
+  if (!whole || sum < 1) return wrong;
+  return sum;
+}
+
+std::string reachable(const std::string& endpoint, const std::string& host) {
+  for (const std::string any : {"tcp://*:", "tcp://0.0.0.0:", "tcp://[::]:"}) {
+    if (endpoint.rfind(any, 0) == 0) return "tcp://" + host + ":" + endpoint.substr(any.size());
+  }
+  return endpoint;
+}
+
+Result<FleetLoopOptions> fleet_of(const FleetChoice& choice, const std::string& endpoint,
+                                  const std::string& keys, bool insecure) {
+  RETURN_IF_ERROR(choice.check());
+  ASSIGN_OR_RETURN(ClusterSite site, choice.read_site());
+  FleetLoopOptions options;
+  options.endpoint = endpoint;
+  if (insecure)
+    options.security.open = OpenLinks::kAnywhere;
+  else if (endpoint.rfind("tcp://", 0) == 0) {
+    ASSIGN_OR_RETURN(options.security, worker_security(keys));
+  }
+  FleetOptions& fleet = options.fleet;
+  if (!choice.wall_time.empty()) {
+    ASSIGN_OR_RETURN(fleet.wall_time_s, wall_time_s(choice.wall_time));
+  }
+  std::string program = choice.worker.empty() ? site.worker : choice.worker;
+  if (program.empty()) {
+    ASSIGN_OR_RETURN(program, find_worker_program());
+  }
+  fleet.name = fleet_name(endpoint, site.system);
+  fleet.worker = worker_command(choice, site, program, endpoint, keys, insecure, fleet.wall_time_s,
+                                options.wait_limit_s);
+  fleet.limits.min_workers = choice.min_workers;
+  fleet.limits.max_workers = choice.max_workers;
+  fleet.limits.workers_per_job = choice.workers_per_job;
+  fleet.limits.idle_s = choice.idle_s;
+  fleet.logs = whole_path(choice.logs);
+  fleet.extra = choice.extra;
+  if (!choice.ssh_config.empty()) fleet.ssh = {"-F", choice.ssh_config};
+  fleet.site = std::move(site);
+  return options;
+}
+
+Result<std::unique_ptr<WorkersBeside>> WorkersBeside::start(const FleetChoice& choice,
+                                                            const std::string& endpoint,
+                                                            const std::string& keys,
+                                                            bool insecure) {
+  ChildSetup setup;
+  setup.arguments = {executable_path(), "workers", "--connect", endpoint};
+  if (insecure)
+    setup.arguments.push_back("--insecure");
+  else
+    setup.arguments.insert(setup.arguments.end(), {"--keys", keys});
+  const auto fleet = choice.arguments();
+  setup.arguments.insert(setup.arguments.end(), fleet.begin(), fleet.end());
+  setup.death_signal = SIGTERM;
+  setup.leads_group = true;  // Ctrl-C is for the command, which ends this when it is done
+  const Result<pid_t> pid = start_child(setup);
+  if (!pid) return Error{"--workers-on " + choice.system + ": " + pid.error().message};
+  return std::unique_ptr<WorkersBeside>(new WorkersBeside(*pid));
+}
+
+WorkersBeside::~WorkersBeside() {
+  kill(pid_, SIGTERM);
+  for (int waited_ms = 0; waitpid(pid_, nullptr, WNOHANG) == 0; waited_ms += 20) {
+    if (waited_ms >= kLeaveLimit_ms) kill(pid_, SIGKILL);
+    poll(nullptr, 0, 20);
+  }
+}
+
+}  // namespace gapfarm

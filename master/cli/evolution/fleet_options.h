@@ -1,0 +1,64 @@
+// Workers from a cluster: the options of commands, and the fleet that they make.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "master/command/context.h"
+#include "master/farm/sites/fleet_loop.h"
+
+namespace gapfarm {
+
+struct FleetChoice {
+  std::string system;  // of configs/sites/SYSTEM.toml
+  std::string site;    // a file in its place
+  unsigned min_workers = 0, max_workers = 0;
+  unsigned workers_per_job = 1;
+  std::string wall_time;
+  double idle_s = FleetLimits().idle_s;
+  double look_interval_s = 0;  // 0: the site's
+  std::vector<std::string> hosts;
+  std::string ssh_config;
+  std::string worker;  // program on the nodes
+  std::string worker_keys;
+  std::string logs = "gapfarm-logs";
+  unsigned block = 0;              // jobs in one submission; 0: the site's
+  std::vector<std::string> extra;  // for the site's command
+
+  // `with`: "--on", or "--workers-on" of commands that do it beside their work.
+  void declare(CLI::App& app, const std::string& with);
+  // The options again, for a command line.
+  std::vector<std::string> arguments() const;
+  Result<ClusterSite> read_site() const;
+  // Errors: no --max, a wall time that is none, a site that cannot be read.
+  Status check() const;
+};
+
+// "90", "1:30:00" or "2-00:00:00", in seconds.
+Result<double> wall_time_s(const std::string& text);
+
+// The address that other machines reach a master at, by what it listens at on `host`.
+std::string reachable(const std::string& endpoint, const std::string& host);
+
+Result<FleetLoopOptions> fleet_of(const FleetChoice& choice, const std::string& endpoint,
+                                  const std::string& keys, bool insecure);
+
+// `gapfarm workers` as a child, while it lives.
+class WorkersBeside {
+ public:
+  static Result<std::unique_ptr<WorkersBeside>> start(const FleetChoice& choice,
+                                                      const std::string& endpoint,
+                                                      const std::string& keys, bool insecure);
+  // Waits until they are taken away.
+  ~WorkersBeside();
+  WorkersBeside(const WorkersBeside&) = delete;
+  WorkersBeside& operator=(const WorkersBeside&) = delete;
+
+ private:
+  explicit WorkersBeside(pid_t pid) : pid_(pid) {}
+  pid_t pid_;
+};
+
+}  // namespace gapfarm

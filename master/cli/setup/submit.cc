@@ -1,0 +1,163 @@
+// gapfarm submit: a run's master as a job of the cluster, with its workers as jobs beside it.
+#include <unistd.h>
+
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "common/base/try.h"
+#include "common/net/keys.h"
+#include "common/process/captured.h"
+#include "common/process/process_pool.h"
+#include "master/cli/subcommand.h"
+#include "master/cli/evolution/fleet_options.h"
+
+namespace gapfarm {
+namespace {
+
+constexpr double kSubmitLimit_s = 120;
+
+struct SubmitCommand {
+  FleetChoice fleet;
+  std::string keys = KeyFolder::default_path();
+  bool insecure = false;
+  bool dry_run = false;
+  std::string listen = "tcp://*:*";
+  std::string master_time;
+  unsigned notice_s = 60;
+  std::vector<std::string> evolve;
+};
+
+std::string quoted(const std::vector<std::string>& words) {
+  std::string text;
+  for (const std::string& word : words) text += (text.empty() ? "" : " ") + shell_quoted(word);
+  return text;
+}
+
+// The run's folder as a whole path, also in `words`.
+Result<std::string> run_of(std::vector<std::string>* words) {
+  for (std::size_t i = 0; i + 1 < words->size(); ++i) {
+    if ((*words)[i] != "--out") continue;
+    std::string& out = (*words)[i + 1];
+    out = std::filesystem::absolute(out).string();
+    return out;
+  }
+  return Error{"submit needs -- evolve CONFIG --out RUN"};
+}
+
+// TERM and USR1 (the time is nearly up) stop the run at a committed generation; after USR1 the job
+// is queued again and resumes it.  A cluster that queues it again itself sends TERM.
+std::string master_script(const std::string& run, const std::string& evolve,
+                          const std::string& resume, const std::string& requeue) {
+  return "#!/bin/sh\n"
+         "again= child=\n"
+         "trap 'again=yes; [ -z \"$child\" ] || kill -TERM \"$child\"' USR1 USR2\n"
+         "trap '[ -z \"$child\" ] || kill -TERM \"$child\"' TERM\n"
+         "cd " +
+         shell_quoted(std::filesystem::current_path().string()) +
+         " || exit 1\n"
+         "if [ -e " +
+         shell_quoted(run + "/run.sqlite") +
+         " ]; then\n"
+         "  (trap '' USR1 USR2; exec " +
+         resume +
+         ") &\n"
+         "else\n"
+         "  (trap '' USR1 USR2; exec " +
+         evolve +
+         ") &\n"
+         "fi\n"
+         "child=$!\n"
+         "while kill -0 \"$child\" 2>/dev/null; do wait \"$child\"; status=$?; done\n"
+         "if [ -n \"$again\" ] && [ \"$status\" -eq 85 ]; then " +
+         requeue +
+         "; fi\n"
+         "exit \"$status\"\n";
+}
+
+Result<int> run_submit(SubmitCommand command, CliContext& context) {
+  if (command.evolve.empty() || command.evolve.front() != "evolve") {
+    return Error{"submit needs -- evolve CONFIG --out RUN"};
+  }
+  RETURN_IF_ERROR(command.fleet.check());
+  ASSIGN_OR_RETURN(const std::string run, run_of(&command.evolve));
+  ASSIGN_OR_RETURN(const ClusterSite site, command.fleet.read_site());
+  if (site.master.empty()) {
+    return Error{site.system +
+                 " has no row for a master as a job; run the master yourself, with "
+                 "--workers-on " +
+                 site.system};
+  }
+  const std::string self = executable_path();
+  std::vector<std::string> farm = {"--listen", command.listen};
+  if (command.insecure)
+    farm.insert(farm.end(), {"--insecure", "--insecure-anywhere"});
+  else
+    farm.insert(farm.end(), {"--keys", std::filesystem::absolute(command.keys).string()});
+  std::vector<std::string> fleet = command.fleet.arguments();
+  fleet.front() = "--workers-on";
+  farm.insert(farm.end(), fleet.begin(), fleet.end());
+  std::vector<std::string> evolve = {self}, resume = {self, "resume", run};
+  evolve.insert(evolve.end(), command.evolve.begin(), command.evolve.end());
+  evolve.insert(evolve.end(), farm.begin(), farm.end());
+  resume.insert(resume.end(), farm.begin(), farm.end());
+  const std::string script = master_script(run, quoted(evolve), quoted(resume), site.requeue);
+
+  const std::string logs = std::filesystem::absolute(command.fleet.logs).string();
+  const std::string name = "gf-" + std::filesystem::path(run).filename().string();
+  SiteWords words = {{"name", {name}},
+                     {"logs", {logs}},
+                     {"notice", {std::to_string(command.notice_s)}},
+                     {"cores", {"1"}},
+                     {"wall", {}},
+                     {"several", {}},
+                     {"extra", command.fleet.extra}};
+  if (!command.master_time.empty()) {
+    ASSIGN_OR_RETURN(const double seconds, wall_time_s(command.master_time));
+    words["wall"] = wall_arguments(site, seconds);
+  }
+  const std::vector<std::string> submit = expand(site.master, words);
+  if (command.dry_run) {
+    const std::string text = quoted(submit) + " <<'EOF'\n" + script + "EOF\n";
+    context.console.result(text, {{"dry_run", true}, {"submission", text}});
+    return kExitDone;
+  }
+  context.begun = true;
+  std::error_code error;
+  std::filesystem::create_directories(logs, error);
+  if (error) return Error{"cannot make '" + logs + "' for logs: " + error.message()};
+  ChildSetup setup;
+  setup.arguments = submit;
+  ASSIGN_OR_RETURN(const Captured captured, run_captured(std::move(setup), script, kSubmitLimit_s));
+  if (!captured.succeeded()) return Error{submit.front() + ": " + captured.err + captured.out};
+  const std::string job = captured.out.substr(0, captured.out.find_first_of(" ;\n"));
+  context.console.result("job " + job + "; follow it with: gapfarm status " + run + " --watch\n",
+                         {{"job", job}, {"run", run}});
+  return kExitDone;
+}
+
+}  // namespace
+
+SubcommandRun setup_submit(CLI::App& app) {
+  auto command = std::make_shared<SubmitCommand>();
+  command->fleet.declare(app, "--on");
+  app.add_option("--keys", command->keys, "Key folder, on a file system that all nodes see")
+      ->type_name("FOLDER");
+  app.add_flag("--insecure", command->insecure, "No keys, on every network");
+  app.add_option("--listen", command->listen, "Where the master listens");
+  app.add_option("--master-time", command->master_time,
+                 "Wall time of the master's job: it is queued again and resumes the run")
+      ->type_name("TIME");
+  app.add_option("--notice", command->notice_s,
+                 "Seconds before the end of it at which the master stops");
+  app.add_flag("--dry-run", command->dry_run, "Print what would be submitted");
+  app.add_option("EVOLVE", command->evolve, "After --: evolve CONFIG --out RUN ...")->required();
+  app.footer(
+      "Examples:\n"
+      "  gapfarm submit --on slurm --max 200 --master-time 24:00:00 --wall-time 4:00:00 -- \\\n"
+      "      evolve configs/demo.toml --out run/demo\n"
+      "  gapfarm submit --on sge --max 20 --dry-run -- evolve configs/demo.toml --out run/demo");
+  return [command](CliContext& context) { return run_submit(*command, context); };
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,179 @@
+#include "master/farm/sites/site.h"
+
+#include <algorithm>
+#include <cmath>
+#include <regex>
+
+#include "common/base/try.h"
+#include "common/config/toml_section.h"
+
+namespace gapfarm {
+namespace {
+
+void read_strings(TomlSection& section, const char* key, std::vector<std::string>* to) {
+  if (auto found = section.strings(key)) *to = std::move(*found);
+}
+
+void read_pattern(TomlSection& section, const char* key, std::string* to) {
+  section.read(key, *to);
+  try {
+    const std::regex made(*to);
+  } catch (const std::regex_error& error) {
+    section.fail(key, std::string("is no pattern: ") + error.what());
+  }
+}
+
+// Whether one of `states` is `state`.
+bool among(const std::vector<std::string>& states, const std::string& state) {
+  return std::find(states.begin(), states.end(), state) != states.end();
+}
+
+}  // namespace
+
+Result<ClusterSite> parse_site(std::string_view text, const std::string& file) {
+  ASSIGN_OR_RETURN(const toml::table table, parse_toml(text, file));
+  TomlErrors errors(file);
+  TomlSection top(table, "", errors);
+  ClusterSite site;
+  top.read("system", site.system);
+  read_strings(top, "hosts", &site.hosts);
+  top.read("jobs_per_host", site.jobs_per_host, 0, 100000);
+  read_strings(top, "submit", &site.submit);
+  top.read("script", site.script);
+  top.read("script_a_job", site.script_a_job);
+  top.read("block", site.block, 1, 100000);
+  read_pattern(top, "submitted", &site.submitted);
+  top.read("ids", site.ids);
+  top.read("first_index", site.first_index, 0, 1);
+  read_pattern(top, "limit", &site.limit);
+  read_strings(top, "wall", &site.wall);
+  read_strings(top, "several", &site.several);
+  read_strings(top, "avoid", &site.avoid);
+  top.read("nodes_between", site.nodes_between);
+  read_strings(top, "list", &site.list);
+  read_pattern(top, "line", &site.line);
+  read_strings(top, "columns", &site.columns);
+  read_strings(top, "queued", &site.queued);
+  read_strings(top, "ended", &site.ended);
+  read_strings(top, "stuck", &site.stuck);
+  read_strings(top, "cancel", &site.cancel);
+  read_strings(top, "log", &site.log);
+  read_strings(top, "master", &site.master);
+  top.read("requeue", site.requeue);
+  top.read("worker", site.worker);
+  top.read("keys", site.keys);
+  top.read("interval", site.interval_s, 0.1, 3600, "s");
+  top.finish();
+  if (!errors.empty()) return errors.error();
+  for (const auto& [key, there] : {std::pair{"submit", !site.submit.empty()},
+                                   {"list", !site.list.empty()},
+                                   {"cancel", !site.cancel.empty()},
+                                   {"line", !site.line.empty()},
+                                   {"columns", !site.columns.empty()},
+                                   {"submitted", !site.submitted.empty()}}) {
+    if (!there) return Error{file + ": has no '" + key + "'; see configs/sites/slurm.toml"};
+  }
+  return site;
+}
+
+std::string expand(const std::string& text, const SiteWords& words) {
+  std::string out;
+  for (std::size_t at = 0; at < text.size();) {
+    const std::size_t end = text[at] == '{' ? text.find('}', at) : text.npos;
+    const auto found =
+        end == text.npos ? words.end() : words.find(text.substr(at + 1, end - at - 1));
+    if (found == words.end()) {
+      out += text[at++];
+      continue;
+    }
+    for (std::size_t i = 0; i < found->second.size(); ++i) {
+      out += (i > 0 ? "\n" : "") + found->second[i];
+    }
+    at = end + 1;
+  }
+  return out;
+}
+
+std::vector<std::string> expand(const std::vector<std::string>& command, const SiteWords& words) {
+  std::vector<std::string> all;
+  for (const std::string& argument : command) {
+    const bool alone = argument.size() > 2 && argument.front() == '{' && argument.back() == '}';
+    const auto found = alone ? words.find(argument.substr(1, argument.size() - 2)) : words.end();
+    if (found == words.end()) {
+      all.push_back(expand(argument, words));
+    } else {
+      all.insert(all.end(), found->second.begin(), found->second.end());
+    }
+  }
+  return all;
+}
+
+std::vector<std::string> wall_arguments(const ClusterSite& site, double seconds) {
+  if (seconds <= 0) return {};
+  return expand(site.wall, {{"seconds", {std::to_string(std::lround(seconds))}},
+                            {"minutes", {std::to_string(std::lround(std::ceil(seconds / 60)))}}});
+}
+
+std::vector<ListedJob> parse_list(const ClusterSite& site, const std::string& name,
+                                  const std::string& output) {
+  const std::regex pattern(site.line);
+  std::vector<ListedJob> jobs;
+  for (std::size_t at = 0; at < output.size();) {
+    const std::size_t end = std::min(output.find('\n', at), output.size());
+    const std::string line = output.substr(at, end - at);
+    at = end + 1;
+    std::smatch match;
+    if (!std::regex_search(line, match, pattern)) continue;
+    ListedJob job;
+    std::string task, named = name;
+    for (std::size_t i = 0; i < site.columns.size() && i + 1 < match.size(); ++i) {
+      const std::string& column = site.columns[i];
+      const std::string value = match[i + 1];
+      if (column == "id") job.id = value;
+      if (column == "task") task = value;
+      if (column == "state") job.state = value;
+      if (column == "node") job.node = value;
+      if (column == "reason") job.reason = value;
+      if (column == "name") named = value;
+    }
+    if (!task.empty()) job.id += "." + task;
+    if (named != name || job.id.empty() || among(site.ended, job.state)) continue;
+    if (among(site.queued, job.state)) job.standing = ListedJob::kQueued;
+    if (among(site.stuck, job.state)) job.standing = ListedJob::kStuck;
+    jobs.push_back(std::move(job));
+  }
+  return jobs;
+}
+
+std::vector<std::string> parse_submitted(const ClusterSite& site, unsigned count,
+                                         const std::string& output) {
+  const std::regex pattern(site.submitted);
+  std::vector<std::string> matched;
+  for (std::sregex_iterator one(output.begin(), output.end(), pattern), end; one != end; ++one) {
+    matched.push_back((*one)[1]);
+  }
+  if (site.ids.empty() || matched.empty()) return matched;
+  std::vector<std::string> ids;
+  for (unsigned i = 0; i < count; ++i) {
+    ids.push_back(expand(
+        site.ids, {{"0", {matched.front()}}, {"index", {std::to_string(site.first_index + i)}}}));
+  }
+  return ids;
+}
+
+bool is_site_limit(const ClusterSite& site, const std::string& output) {
+  return !site.limit.empty() && std::regex_search(output, std::regex(site.limit));
+}
+
+std::string shell_quoted(const std::string& word) {
+  const auto plain = [](char c) {
+    return std::isalnum(static_cast<unsigned char>(c)) ||
+           std::string("_-./:=@%+,").find(c) != std::string::npos;
+  };
+  if (!word.empty() && std::all_of(word.begin(), word.end(), plain)) return word;
+  std::string quoted = "'";
+  for (const char c : word) quoted += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return quoted + "'";
+}
+
+}  // namespace gapfarm
