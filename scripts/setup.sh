@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Installs the Debian 12 packages that gapfarm is built from.  Does nothing when all are there.
 #   scripts/setup.sh [--tests] [--boxes]
-# --tests: also what only the tests need (format, browser, Slurm, sshd).  --boxes: also what bare Debians and
+# --tests: also what only the tests need (format, browser, Slurm, Grid Engine, sshd).  --boxes: also what bare Debians and
 # containers are made with, for machines that let root make them; without it the tests that want them say so.
 set -euo pipefail
 
@@ -21,8 +21,9 @@ if [[ $wanted == *' --tests '* ]]; then
   packages+=(fish lintian zsh)  # shells that complete commands; what judges packages
   # A simulator by MuJoCo, and the Python package.
   packages+=(libmujoco-dev mypy python3-numpy python3-pandas python3-pytest)
-  # Farms over Slurm and ssh, and Kubernetes' types (tests/launch).
-  packages+=(iproute2 munge openssh-client openssh-server python3-kubernetes python3-yaml slurm-wlm)
+  # Farms over Slurm (with a database for its limits), Grid Engine and ssh, and Kubernetes' types (tests/launch).
+  packages+=(gridengine-client gridengine-exec gridengine-master iproute2 mariadb-client-core mariadb-server-core munge
+    openssh-client openssh-server python3-kubernetes python3-yaml slurm-wlm slurmdbd)
 fi
 if [[ $wanted == *' --boxes '* ]]; then
   packages+=(debootstrap podman)
@@ -45,5 +46,13 @@ if [[ $(id -u) -ne 0 ]]; then
 fi
 echo "setup: installing ${missing[*]}"
 "${as_root[@]}" apt-get update -qq
-"${as_root[@]}" env DEBIAN_FRONTEND=noninteractive \
-  apt-get install -y -qq --no-install-recommends "${missing[@]}"
+# Clusters are started by the tests that want them, and by nothing else.
+"${as_root[@]}" env DEBIAN_FRONTEND=noninteractive bash -c '
+  policy=/usr/sbin/policy-rc.d
+  if [[ ! -e $policy ]]; then
+    trap "rm -f $policy" EXIT
+    printf "#!/bin/sh\nexit 101\n" >$policy
+    chmod +x $policy
+  fi
+  echo "gridengine-common shared/gridengineconfig boolean false" | debconf-set-selections
+  apt-get install -y -qq --no-install-recommends "$@"' bash "${missing[@]}"

@@ -14,9 +14,9 @@ trap clean_up EXIT
 start_slurm
 write_config
 "$BIN/gapfarm" keys make --keys "$T/keys" >/dev/null 2>&1 || fail 'no keys'
-job=$("$BIN/gapfarm" submit --on slurm --keys "$T/keys" --max 2 --look-every 2 --worker-logs "$T/logs" -- \
-  evolve "$T/run.toml" --out "$T/run" --generations 60 2>"$T/submit.log") || fail 'submit'
-echo "job $job"
+job=$("$BIN/gapfarm" submit --on slurm --keys "$T/keys" --max 2 --look-every 2 --worker-logs "$T" -- \
+  evolve "$T/run.toml" --out "$T/run" --generations 12 2>"$T/submit.log") || fail 'submit'
+echo "$job"
 job=$(grep -o '[0-9]*' <<<"$job" | head -n 1)
 wait_for 'the master and its workers have committed a generation' committed "$T/run" 2
 scontrol requeue "$job" || fail requeue
@@ -27,7 +27,7 @@ finished() { [[ $(status "$T/run" 's["state"]') == finished ]]; }
 wait_for "the run goes on after generation $before to its end" finished
 gone() { [[ -z $(squeue --noheader 2>/dev/null) ]]; }
 wait_for 'no job is left' gone
-"$BIN/gapfarm" evolve "$T/run.toml" --out "$T/calm" --generations 60 --workers 2 2>"$T/calm.log" ||
+"$BIN/gapfarm" evolve "$T/run.toml" --out "$T/calm" --generations 12 --workers 2 2>"$T/calm.log" ||
   fail 'the calm run failed'
 digest=$(status "$T/run" 's["digest"]') calm=$(status "$T/calm" 's["digest"]')
 echo "digest $digest, undisturbed $calm"
