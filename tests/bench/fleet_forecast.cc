@@ -1,4 +1,5 @@
-// The autoscaler on a simulated cluster: figures a seed on stdout, the picture of docs/launching.md.
+// The autoscaler on a simulated cluster: figures a seed on stdout, the picture of
+// docs/launching.md.
 //   fleet_forecast --picture docs/pictures/autoscaler.svg
 #include <CLI/CLI.hpp>
 #include <algorithm>

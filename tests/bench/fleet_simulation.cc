@@ -31,7 +31,6 @@ struct ClusterJob {
   std::string node;
   bool joined = false, gone = false, ordered = false;
   unsigned busy = 0;  // workers with a task
-  bool seen_running = false;
 };
 
 class Cluster {
@@ -191,8 +190,7 @@ class Cluster {
       ++pending_;
     }
     lost_.erase(first, last);
-    ended_.push_back({std::to_string(index), job.node, job.seen_running ? now_s_ - job.since_s : 0,
-                      job.joined, job.ordered});
+    ended_.push_back({std::to_string(index), job.node, job.joined, job.ordered});
     give_out();
   }
 
@@ -207,7 +205,6 @@ class Cluster {
     for (std::size_t i = first_; i < jobs_.size(); ++i) {
       ClusterJob& job = jobs_[i];
       if (job.gone) continue;
-      job.seen_running |= job.state == JobState::kRunning;
       look.jobs.push_back({std::to_string(i), job.state, job.node, job.since_s, job.joined,
                            job.joined && job.busy == 0});
       (job.state == JobState::kQueued ? moment.queued : moment.running) += width();

@@ -9,8 +9,8 @@
 #include "common/net/keys.h"
 #include "common/process/captured.h"
 #include "common/process/process_pool.h"
-#include "master/cli/subcommand.h"
 #include "master/cli/evolution/fleet_options.h"
+#include "master/cli/subcommand.h"
 
 namespace gapfarm {
 namespace {
@@ -28,17 +28,17 @@ struct SubmitCommand {
   std::vector<std::string> evolve;
 };
 
-std::string quoted(const std::vector<std::string>& words) {
+std::string quoted(const std::vector<std::string>& values) {
   std::string text;
-  for (const std::string& word : words) text += (text.empty() ? "" : " ") + shell_quoted(word);
+  for (const std::string& word : values) text += (text.empty() ? "" : " ") + shell_quoted(word);
   return text;
 }
 
-// The run's folder as a whole path, also in `words`.
-Result<std::string> run_of(std::vector<std::string>* words) {
-  for (std::size_t i = 0; i + 1 < words->size(); ++i) {
-    if ((*words)[i] != "--out") continue;
-    std::string& out = (*words)[i + 1];
+// The run's folder as a whole path, also in `values`.
+Result<std::string> run_of(std::vector<std::string>* values) {
+  for (std::size_t i = 0; i + 1 < values->size(); ++i) {
+    if ((*values)[i] != "--out") continue;
+    std::string& out = (*values)[i + 1];
     out = std::filesystem::absolute(out).string();
     return out;
   }
@@ -105,18 +105,18 @@ Result<int> run_submit(SubmitCommand command, CliContext& context) {
 
   const std::string logs = std::filesystem::absolute(command.fleet.logs).string();
   const std::string name = "gf-" + std::filesystem::path(run).filename().string();
-  SiteWords words = {{"name", {name}},
-                     {"logs", {logs}},
-                     {"notice", {std::to_string(command.notice_s)}},
-                     {"cores", {"1"}},
-                     {"wall", {}},
-                     {"several", {}},
-                     {"extra", command.fleet.extra}};
+  SiteValues values = {{"name", {name}},
+                       {"logs", {logs}},
+                       {"notice", {std::to_string(command.notice_s)}},
+                       {"cores", {"1"}},
+                       {"wall", {}},
+                       {"several", {}},
+                       {"extra", command.fleet.extra}};
   if (!command.master_time.empty()) {
     ASSIGN_OR_RETURN(const double seconds, wall_time_s(command.master_time));
-    words["wall"] = wall_arguments(site, seconds);
+    values["wall"] = wall_arguments(site, seconds);
   }
-  const std::vector<std::string> submit = expand(site.master, words);
+  const std::vector<std::string> submit = expand(site.master, values);
   if (command.dry_run) {
     const std::string text = quoted(submit) + " <<'EOF'\n" + script + "EOF\n";
     context.console.result(text, {{"dry_run", true}, {"submission", text}});

@@ -5,8 +5,8 @@
 
 #include "common/base/try.h"
 #include "common/net/keys.h"
-#include "master/cli/subcommand.h"
 #include "master/cli/evolution/fleet_options.h"
+#include "master/cli/subcommand.h"
 #include "master/store/run_reader.h"
 
 namespace gapfarm {

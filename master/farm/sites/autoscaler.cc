@@ -7,9 +7,9 @@
 namespace gapfarm {
 namespace {
 
-// Quick ends in a row, wherever they were, after which the whole site waits: one may be a bad node,
-// and where a node cannot be named or avoided one is enough.
-constexpr unsigned kManyQuickEnds = 3;
+// Jobs in a row that ended before they joined, wherever they were, after which the whole site
+// waits: one may be a bad node, and where a node cannot be named or avoided one is enough.
+constexpr unsigned kManyFailures = 3;
 
 std::string seconds_text(double seconds) {
   char text[32];
@@ -74,14 +74,14 @@ void FleetMemory::learn(const FleetLook& look, const FleetLimits& limits, double
         strikes_.erase(strikes);
       }
     }
-    if (job.since_s >= last_quick_s_) quick_in_a_row_ = 0;
+    if (job.since_s >= last_failure_s_) failures_ = 0;
   }
   for (const EndedJob& end : look.ended) {
-    if (end.joined || end.ordered || end.lived_s >= limits.quick_s) continue;
-    last_quick_s_ = now_s;
+    if (end.joined || end.ordered) continue;
+    last_failure_s_ = now_s;
     const bool known = !end.node.empty() && limits.avoids_nodes;
     if (known) strike(end.node, limits, now_s);
-    if (++quick_in_a_row_ >= kManyQuickEnds || !known) strike("", limits, now_s);
+    if (++failures_ >= kManyFailures || !known) strike("", limits, now_s);
   }
 }
 
@@ -110,7 +110,7 @@ FleetDecision decide(const FleetLook& look, const FleetLimits& limits, double no
   const unsigned standing = static_cast<unsigned>(look.jobs.size());
   decision.wanted = standing;
   if (!look.unfinished || !look.listed) {
-    decision.why = look.listed ? "no master answers" : "the cluster does not tell its jobs";
+    decision.why = look.listed ? "no master answers" : "the cluster does not list its jobs";
     return decision;
   }
   decision.wanted = memory->demand(look, limits, now_s);

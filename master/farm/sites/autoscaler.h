@@ -26,14 +26,14 @@ struct FleetJob {
 struct EndedJob {
   std::string id;
   std::string node;
-  double lived_s = 0;    // seen running; 0: never
+
   bool joined = false;   // a worker of it had joined the master
   bool ordered = false;  // it was asked to go
 };
 
 struct FleetLook {
   std::optional<std::uint64_t> unfinished;  // tasks without an answer; none: no master answers
-  bool listed = true;                       // the cluster told its jobs; else `jobs` is old
+  bool listed = true;                       // the cluster listed its jobs; else `jobs` is old
   std::vector<FleetJob> jobs;
   std::vector<EndedJob> ended;  // since the last look
 };
@@ -47,9 +47,7 @@ struct FleetLimits {
   // Workers that are not needed for so long go.  Half of the minute that a worker may idle after
   // the last task; longer than the pause between two generations.
   double idle_s = 30;
-  // A job that ends sooner, before a worker of it joined, has failed where it ran.
-  double quick_s = 30;
-  double backoff_s = 30;  // after the first such end, then doubled
+  double backoff_s = 30;  // after a job that ended before a worker of it joined, then doubled
   double backoff_most_s = 3600;
   // A limit of the site that it showed by a refusal is tried again after so long: it may depend on
   // what else this user runs.
@@ -79,8 +77,8 @@ class FleetMemory {
   unsigned demand(const FleetLook& look, const FleetLimits& limits, double now_s);
 
   std::map<std::string, Strikes> strikes_;  // by node; "": the whole site
-  unsigned quick_in_a_row_ = 0;             // since a job last began that joined
-  double last_quick_s_ = 0;
+  unsigned failures_ = 0;                   // in a row, since a job last began that joined
+  double last_failure_s_ = 0;
   std::deque<std::pair<double, unsigned>> demand_;  // jobs wanted, lately: falling, by time
   std::optional<unsigned> site_limit_;
   double site_limit_until_s_ = 0;

@@ -17,9 +17,9 @@ std::string trimmed(std::string text) {
   return text;
 }
 
-std::string joined(const std::vector<std::string>& words, const std::string& between) {
+std::string joined(const std::vector<std::string>& values, const std::string& between) {
   std::string all;
-  for (const std::string& word : words) all += (all.empty() ? "" : between) + word;
+  for (const std::string& word : values) all += (all.empty() ? "" : between) + word;
   return all;
 }
 
@@ -28,12 +28,12 @@ std::string user_name() {
   return entry == nullptr ? std::to_string(geteuid()) : entry->pw_name;
 }
 
-// What a failed command said.
+// What a failed command printed.
 std::string complaint_of(const std::vector<std::string>& command, const Captured& captured) {
-  std::string said = trimmed(captured.err.empty() ? captured.out : captured.err);
-  if (captured.timed_out) said = "it did not answer in time";
-  if (said.empty()) said = "it " + end_text(captured.status);
-  return command.front() + ": " + said;
+  std::string output = trimmed(captured.err.empty() ? captured.out : captured.err);
+  if (captured.timed_out) output = "it did not answer in time";
+  if (output.empty()) output = "it " + end_text(captured.status);
+  return command.front() + ": " + output;
 }
 
 // The job of worker NAME-ID-PID-TAIL-PLACE.START of the fleet NAME.
@@ -53,25 +53,25 @@ Fleet::Fleet(FleetOptions options, Runner run, std::function<void(const std::str
   options_.limits.block = std::min(options_.limits.block, site.block);
 }
 
-SiteWords Fleet::words() const {
+SiteValues Fleet::values() const {
   const ClusterSite& site = options_.site;
-  SiteWords words;
+  SiteValues values;
   std::string worker;
   for (const std::string& word : options_.worker) {
     worker += (worker.empty() ? "" : " ") + shell_quoted(word);
   }
-  words["worker"] = {worker};
-  words["name"] = {options_.name};
-  words["cores"] = {std::to_string(options_.limits.workers_per_job)};
-  words["logs"] = {options_.logs};
-  words["extra"] = options_.extra;
-  words["ssh"] = options_.ssh;
-  words["user"] = {user_name()};
-  words["wall"] = wall_arguments(site, options_.wall_time_s);
-  words["avoid"] = {};
-  words["several"] = {};
-  if (options_.limits.workers_per_job > 1) words["several"] = expand(site.several, words);
-  return words;
+  values["worker"] = {worker};
+  values["name"] = {options_.name};
+  values["cores"] = {std::to_string(options_.limits.workers_per_job)};
+  values["logs"] = {options_.logs};
+  values["extra"] = options_.extra;
+  values["ssh"] = options_.ssh;
+  values["user"] = {user_name()};
+  values["wall"] = wall_arguments(site, options_.wall_time_s);
+  values["avoid"] = {};
+  values["several"] = {};
+  if (options_.limits.workers_per_job > 1) values["several"] = expand(site.several, values);
+  return values;
 }
 
 void Fleet::note_once(const std::string& text) {
@@ -82,17 +82,16 @@ void Fleet::note_once(const std::string& text) {
 
 std::string Fleet::last_lines(const Known& known) {
   if (options_.site.log.empty()) return "";
-  SiteWords named = words();
+  SiteValues named = values();
   named["id"] = {known.job.id};
   named["node"] = {known.job.node};
   const auto captured = run_(expand(options_.site.log, named), "");
   return captured && captured->succeeded() ? trimmed(captured->out) : "";
 }
 
-void Fleet::end(const Known& known, double now_s, std::vector<EndedJob>* ended) {
-  const bool ran = known.job.state != JobState::kQueued;
-  EndedJob end{known.job.id, known.job.node, ran ? now_s - known.job.since_s : 0, known.job.joined,
-               // Without a master workers leave by themselves.
+void Fleet::end(const Known& known, std::vector<EndedJob>* ended) {
+  // Without a master workers leave by themselves.
+  EndedJob end{known.job.id, known.job.node, known.job.joined,
                (known.ordered && !known.stuck) || !master_};
   if (!end.joined && !end.ordered) {
     ++lost_;
@@ -109,7 +108,7 @@ void Fleet::end(const Known& known, double now_s, std::vector<EndedJob>* ended) 
 }
 
 bool Fleet::list_from(const std::string& host, double now_s, std::vector<EndedJob>* ended) {
-  SiteWords named = words();
+  SiteValues named = values();
   named["node"] = {host};
   const auto command = expand(options_.site.list, named);
   const auto captured = run_(command, "");
@@ -133,7 +132,7 @@ bool Fleet::list_from(const std::string& host, double now_s, std::vector<EndedJo
       ++known;
       continue;
     }
-    end(one, now_s, ended);
+    end(one, ended);
     known = known_.erase(known);
   }
   for (const auto& [id, job] : listed) {
@@ -163,7 +162,7 @@ bool Fleet::list(double now_s, std::vector<EndedJob>* ended) {
   return any;
 }
 
-void Fleet::note_joined(const v1::Backlog& backlog) {
+void Fleet::hear(const v1::Backlog& backlog) {
   for (auto& [id, known] : known_) known.job.idle = known.job.joined;
   for (const v1::Backlog::Worker& worker : backlog.workers()) {
     const auto known = known_.find(job_of(options_.name, worker.name()));
@@ -185,7 +184,7 @@ void Fleet::cancel(const std::vector<Known*>& all) {
 
 void Fleet::cancel_some(const std::vector<Known*>& some) {
   if (some.empty()) return;
-  SiteWords named = words();
+  SiteValues named = values();
   for (Known* known : some) {
     known->ordered = true;
     known->job.state = JobState::kLeaving;
@@ -220,7 +219,7 @@ std::string Fleet::free_host(const std::vector<std::string>& avoided) const {
 bool Fleet::submit_block(unsigned count, const std::string& host, const FleetDecision& decision,
                          double now_s) {
   const ClusterSite& site = options_.site;
-  SiteWords named = words();
+  SiteValues named = values();
   named["count"] = {std::to_string(count)};
   named["last"] = {std::to_string(count - 1)};
   named["node"] = {host};
@@ -235,11 +234,11 @@ bool Fleet::submit_block(unsigned count, const std::string& host, const FleetDec
   }
   const auto standing = static_cast<unsigned>(known_.size());
   const auto captured = run_(command, script);
-  const std::string said = captured ? captured->out + captured->err : "";
+  const std::string output = captured ? captured->out + captured->err : "";
   const auto ids = captured && captured->succeeded() ? parse_submitted(site, count, captured->out)
                                                      : std::vector<std::string>();
   if (ids.empty()) {
-    if (captured && is_site_limit(site, said)) {
+    if (captured && is_site_limit(site, output)) {
       memory_.note_site_limit(count, standing, options_.limits, now_s);
       return false;
     }
@@ -283,7 +282,7 @@ void Fleet::look(const v1::Backlog* backlog, double now_s) {
   master_ = backlog != nullptr;
   look.listed = list(now_s, &look.ended);
   if (backlog != nullptr) {
-    note_joined(*backlog);
+    hear(*backlog);
     look.unfinished = backlog->unfinished();
   }
   std::vector<Known*> leave;
@@ -316,6 +315,7 @@ void Fleet::look(const v1::Backlog* backlog, double now_s) {
 
 bool Fleet::drain(double now_s) {
   std::vector<EndedJob> ended;
+  master_ = false;
   list(now_s, &ended);
   std::vector<Known*> leave;
   for (auto& [id, known] : known_) {
@@ -342,7 +342,7 @@ FleetStatus Fleet::status() const {
 
 std::string Fleet::submission_text(unsigned jobs) const {
   const ClusterSite& site = options_.site;
-  SiteWords named = words();
+  SiteValues named = values();
   const unsigned count = std::min(jobs, options_.limits.block);
   named["count"] = {std::to_string(count)};
   named["last"] = {std::to_string(count - 1)};

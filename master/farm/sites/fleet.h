@@ -33,6 +33,8 @@ class Fleet {
   // `note` is called with a sentence about something that happened, once for all of its kind.
   Fleet(FleetOptions options, Runner run, std::function<void(const std::string&)> note);
 
+  // Which workers have joined, also between two looks: a pre-empted job may live for seconds.
+  void hear(const v1::Backlog& backlog);
   // Asks the cluster what stands, and submits and takes away what the autoscaler wants.
   // `backlog`: null where no master answers.  Times are of one clock of the caller's.
   void look(const v1::Backlog* backlog, double now_s);
@@ -46,18 +48,17 @@ class Fleet {
  private:
   struct Known {
     FleetJob job;
-    std::string reason;    // why it waits, in the cluster's words
+    std::string reason;    // why it waits, in the cluster's values
     double asked_s = 0;    // submitted, or first seen
     bool listed = false;   // was once
     bool ordered = false;  // to go
     bool stuck = false;
   };
-  SiteWords words() const;
+  SiteValues values() const;
   // False: nothing was learned.
   bool list(double now_s, std::vector<EndedJob>* ended);
   bool list_from(const std::string& host, double now_s, std::vector<EndedJob>* ended);
-  void end(const Known& known, double now_s, std::vector<EndedJob>* ended);
-  void note_joined(const v1::Backlog& backlog);
+  void end(const Known& known, std::vector<EndedJob>* ended);
   void submit(const FleetDecision& decision, double now_s);
   // False: no further submission in this look.
   bool submit_block(unsigned count, const std::string& host, const FleetDecision& decision,

@@ -87,6 +87,7 @@ class Loop {
       if (!backlog_) next_look_s_ = now;
       backlog_ = std::move(*envelope.mutable_backlog());
       heard_s_ = now;
+      fleet_.hear(*backlog_);
     }
     const std::string trouble = socket_->take_trouble();
     if (!trouble.empty()) note_(trouble + "; trying again");

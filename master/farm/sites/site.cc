@@ -76,13 +76,13 @@ Result<ClusterSite> parse_site(std::string_view text, const std::string& file) {
   return site;
 }
 
-std::string expand(const std::string& text, const SiteWords& words) {
+std::string expand(const std::string& text, const SiteValues& values) {
   std::string out;
   for (std::size_t at = 0; at < text.size();) {
     const std::size_t end = text[at] == '{' ? text.find('}', at) : text.npos;
     const auto found =
-        end == text.npos ? words.end() : words.find(text.substr(at + 1, end - at - 1));
-    if (found == words.end()) {
+        end == text.npos ? values.end() : values.find(text.substr(at + 1, end - at - 1));
+    if (found == values.end()) {
       out += text[at++];
       continue;
     }
@@ -94,13 +94,13 @@ std::string expand(const std::string& text, const SiteWords& words) {
   return out;
 }
 
-std::vector<std::string> expand(const std::vector<std::string>& command, const SiteWords& words) {
+std::vector<std::string> expand(const std::vector<std::string>& command, const SiteValues& values) {
   std::vector<std::string> all;
   for (const std::string& argument : command) {
     const bool alone = argument.size() > 2 && argument.front() == '{' && argument.back() == '}';
-    const auto found = alone ? words.find(argument.substr(1, argument.size() - 2)) : words.end();
-    if (found == words.end()) {
-      all.push_back(expand(argument, words));
+    const auto found = alone ? values.find(argument.substr(1, argument.size() - 2)) : values.end();
+    if (found == values.end()) {
+      all.push_back(expand(argument, values));
     } else {
       all.insert(all.end(), found->second.begin(), found->second.end());
     }

@@ -11,8 +11,8 @@
 
 namespace gapfarm {
 
-// In commands and the script, {word} stands for a value; an argument that is only {word} may stand
-// for several or for none.
+// In commands and the script a {placeholder} stands for a value; an argument that is only one may
+// stand for several or for none.
 struct ClusterSite {
   std::string system;  // "slurm"
   // Where jobs are put by us and not by a scheduler.
@@ -51,15 +51,16 @@ struct ClusterSite {
 // Errors name the file's lines.
 Result<ClusterSite> parse_site(std::string_view text, const std::string& file);
 
-// What the words stand for.
-using SiteWords = std::map<std::string, std::vector<std::string>>;
+// What each {placeholder} stands for.
+using SiteValues = std::map<std::string, std::vector<std::string>>;
 
 // ClusterSite::wall for so many seconds; none for 0.
 std::vector<std::string> wall_arguments(const ClusterSite& site, double seconds);
 
-// Every {word} of `text` replaced; several values are lines of their own.  Unknown words stay.
-std::string expand(const std::string& text, const SiteWords& words);
-std::vector<std::string> expand(const std::vector<std::string>& command, const SiteWords& words);
+// Every {placeholder} of `text` replaced; several values are lines of their own.  Unknown ones
+// stay.
+std::string expand(const std::string& text, const SiteValues& values);
+std::vector<std::string> expand(const std::vector<std::string>& command, const SiteValues& values);
 
 struct ListedJob {
   std::string id, state, node, reason;

@@ -46,7 +46,7 @@ TEST(Autoscaler, AsksForNoMoreThanThereAreTasksAndForMinAtLeast) {
 TEST(Autoscaler, ReplacesWhatEnded) {
   FleetMemory memory;
   decide({100, true, jobs(4, JobState::kRunning, 0), {}}, up_to(4), 0, &memory);
-  const std::vector<EndedJob> ended = {{"3", "n3", 900, true, false}};
+  const std::vector<EndedJob> ended = {{"3", "n3", true, false}};
   EXPECT_EQ(
       decide({100, true, jobs(3, JobState::kRunning, 0), ended}, up_to(4), 900, &memory).submit,
       1u);
@@ -55,7 +55,7 @@ TEST(Autoscaler, ReplacesWhatEnded) {
 TEST(Autoscaler, PreEmptionIsNoFailure) {
   FleetMemory memory;
   for (int k = 0; k < 50; ++k) {
-    const std::vector<EndedJob> ended = {{"x", "n1", 20, true, false}};
+    const std::vector<EndedJob> ended = {{"x", "n1", true, false}};
     EXPECT_EQ(decide({100, true, {}, ended}, up_to(1), 20.0 * k, &memory).submit, 1u);
   }
 }
@@ -123,7 +123,7 @@ TEST(Autoscaler, ABadNodeIsAvoidedTwiceAsLongEveryTime) {
   const auto good = jobs(1, JobState::kRunning, 0);
   double now = 0, last_wait = 15;
   for (int k = 0; k < 5; ++k) {
-    const std::vector<EndedJob> ended = {{"b", "bad", 1, false, false}};
+    const std::vector<EndedJob> ended = {{"b", "bad", false, false}};
     auto decision = decide({100, true, good, ended}, limits, now, &memory);
     EXPECT_EQ(decision.avoid, std::vector<std::string>{"bad"});
     if (k < 2) {
@@ -141,7 +141,7 @@ TEST(Autoscaler, ABadNodeIsAvoidedTwiceAsLongEveryTime) {
   // One that joins there makes up for it.
   const std::vector<FleetJob> back = {{"c", JobState::kRunning, "bad", now + 1, true, false}};
   decide({100, true, back, {}}, limits, now + 2, &memory);
-  const std::vector<EndedJob> ended = {{"b", "bad", 1, false, false}};
+  const std::vector<EndedJob> ended = {{"b", "bad", false, false}};
   decide({100, true, good, ended}, limits, now + 3, &memory);
   EXPECT_TRUE(decide({100, true, good, {}}, limits, now + 34, &memory).avoid.empty());
 }
@@ -150,7 +150,7 @@ TEST(Autoscaler, WhereNoNodeCanBeAvoidedTheSiteWaits) {
   FleetMemory memory;
   FleetLimits limits = up_to(2);
   limits.avoids_nodes = false;
-  const std::vector<EndedJob> ended = {{"b", "", 1, false, false}};
+  const std::vector<EndedJob> ended = {{"b", "", false, false}};
   const auto decision = decide({100, true, {}, ended}, limits, 0, &memory);
   EXPECT_EQ(decision.submit, 0u);
   EXPECT_NE(decision.why.find("30 s"), std::string::npos) << decision.why;

@@ -91,7 +91,7 @@ TEST_F(FleetMessages, StatusHasWhatAFleetReportsWhileItReports) {
   EXPECT_TRUE(scheduler_.fleet_status().empty());
 }
 
-TEST_F(FleetMessages, AFleetIsToldThatTheRunIsOver) {
+TEST_F(FleetMessages, AFleetLearnsThatTheRunIsOver) {
   report("");
   scheduler_.send_goodbye("the run is over");
   const auto& out = scheduler_.outbox();

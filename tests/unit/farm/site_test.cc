@@ -37,11 +37,11 @@ TEST(Sites, EveryShippedFileIsWhole) {
   }
 }
 
-TEST(Sites, WordsAreReplacedAndLonelyOnesSplice) {
-  const SiteWords words = {{"a", {"1"}}, {"none", {}}, {"two", {"x", "y z"}}};
-  EXPECT_EQ(expand(std::vector<std::string>{"p{a}", "{none}", "{two}", "${HOME} {b}"}, words),
+TEST(Sites, PlaceholdersAreReplacedAndLonelyOnesSplice) {
+  const SiteValues values = {{"a", {"1"}}, {"none", {}}, {"two", {"x", "y z"}}};
+  EXPECT_EQ(expand(std::vector<std::string>{"p{a}", "{none}", "{two}", "${HOME} {b}"}, values),
             (std::vector<std::string>{"p1", "x", "y z", "${HOME} {b}"}));
-  EXPECT_EQ(expand("{two}\n{none}.", words), "x\ny z\n.");
+  EXPECT_EQ(expand("{two}\n{none}.", values), "x\ny z\n.");
   EXPECT_EQ(shell_quoted("it's"), "'it'\\''s'");
 }
 
