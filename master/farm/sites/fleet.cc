@@ -310,7 +310,10 @@ void Fleet::look(const v1::Backlog* backlog, double now_s) {
   if (!last_death_.empty() && decision.submit == 0 && !decision.why.empty()) {
     why_ += "; " + last_death_.substr(0, last_death_.find('\n'));
   }
-  if (!why_.empty() && backlog != nullptr && decision.wanted > known_.size()) note_once(why_);
+  // The seconds of a wait are for `status`.
+  const std::string kind = why_.substr(0, why_.find(';'));
+  if (!kind.empty() && kind != noted_why_ && decision.wanted > known_.size()) note_(why_);
+  noted_why_ = kind;
 }
 
 bool Fleet::drain(double now_s) {

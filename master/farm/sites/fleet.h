@@ -48,7 +48,7 @@ class Fleet {
  private:
   struct Known {
     FleetJob job;
-    std::string reason;    // why it waits, in the cluster's values
+    std::string reason;    // why it waits, in the cluster's terms
     double asked_s = 0;    // submitted, or first seen
     bool listed = false;   // was once
     bool ordered = false;  // to go
@@ -77,7 +77,7 @@ class Fleet {
   bool master_ = true;                  // answered at the last look
   unsigned wanted_ = 0;                 // jobs
   std::uint64_t lost_ = 0;
-  std::string why_, noted_, last_death_;
+  std::string why_, noted_, noted_why_, last_death_;
 };
 
 }  // namespace gapfarm
