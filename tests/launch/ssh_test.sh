@@ -81,7 +81,7 @@ workers_are() {
 }
 wait_for 'two workers have joined' workers_are 2
 says() { grep -q -e "$1" "$T/workers.log"; }
-wait_for 'the log of h3 is shown' says 'gapfarm-worker: No such file or directory'
+wait_for 'the log of h3 is shown' says 'No such file or directory'
 ln -s "$BIN/gapfarm-worker" "$T/home3/gapfarm/bin/gapfarm-worker"
 wait_for 'h3 is tried again, and there are three' workers_are 3
 wait_for 'a generation is committed' committed "$T/run" 1
