@@ -158,7 +158,9 @@ def main():
         # An output of one example must not be in the way of the next.
         line = re.sub(r"(--out|--config|--picture|--paths) (\S+)", lambda m: f"{m[1]} new{ran}/{Path(m[2]).name}", line)
         Path(f"new{ran}").mkdir()
-        words = line.split("|")[0] + (" --dry-run" if dry else "")
+        words = line.split("|")[0]
+        if dry:  # an option of the command's own, before what it hands on
+            words = words.replace(" -- ", " --dry-run -- ", 1) if " -- " in words else words + " --dry-run"
         ran += 1
         if any(part in line for part in ENDLESS):
             code, said = run_until_stopped(words)
