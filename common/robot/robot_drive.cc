@@ -167,11 +167,7 @@ double RobotDrive::throttle(double commanded, double dt_s, double yaw_rate_rad_s
 }
 
 // Every wheel of a steered robot on circles about one centre on the unsteered axle.
-void RobotDrive::place_on_curve(double speed_m_s) {
-  const double base = *robot_.controller.wheelbase_m;
-  const double slow = 1 + robot_.steering.understeer_s2_m2 * speed_m_s * speed_m_s;
-  curvature_ = std::tan(steering_rad_) / base / slow;
-  traction_m_s_ = speed_m_s;
+void RobotDrive::place_on_curve() {
   for (std::size_t i = 0; i < motions_.size(); ++i) {
     const RobotWheel& w = robot_.wheels[i];
     const double ahead = 1 - curvature_ * *w.y_m;
@@ -179,7 +175,7 @@ void RobotDrive::place_on_curve(double speed_m_s) {
     const double heading = w.steered ? std::atan2(aside, ahead) : 0.0;
     motions_[i].heading_rad = w.heading_rad + heading;
     motions_[i].speed_m_s =
-        w.driven ? speed_m_s * (w.steered ? std::hypot(ahead, aside) : ahead) : 0;
+        w.driven ? traction_m_s_ * (w.steered ? std::hypot(ahead, aside) : ahead) : 0;
   }
 }
 
@@ -208,6 +204,13 @@ double RobotDrive::follow(std::size_t i, double target, double dt_s) {
 }
 
 std::span<const WheelMotion> RobotDrive::advance(double t_s, double dt_s, double yaw_rate_rad_s) {
+  advance_motors(t_s, dt_s, yaw_rate_rad_s);
+  if (steered_) place_on_curve();
+  return motions_;
+}
+
+std::span<const WheelMotion> RobotDrive::advance_motors(double t_s, double dt_s,
+                                                        double yaw_rate_rad_s) {
   const std::vector<double>& commanded = track_.mean(t_s - robot_.motors.delay_s, dt_s);
   if (steered_) {
     double speed = 0;
@@ -228,7 +231,9 @@ std::span<const WheelMotion> RobotDrive::advance(double t_s, double dt_s, double
       if (driven != robot_.wheels.end() && driven->steered) speed *= std::cos(steering_rad_);
     }
     steer(wanted, dt_s);
-    place_on_curve(speed);
+    const double slow = 1 + robot_.steering.understeer_s2_m2 * speed * speed;
+    curvature_ = std::tan(steering_rad_) / *robot_.controller.wheelbase_m / slow;
+    traction_m_s_ = speed;
     fresh_ = false;
     stands_ = std::abs(speed) < kStandingSpeed_m_s;
     return motions_;

@@ -46,6 +46,8 @@ class RobotDrive {
   // Over [t_s, t_s + dt_s], one a wheel of the robot.  `yaw_rate_rad_s` is the robot's own.
   // REQUIRES: steps that follow one another.
   std::span<const WheelMotion> advance(double t_s, double dt_s, double yaw_rate_rad_s);
+  // The same without the wheels of a steered robot: its curvature() and traction_m_s() alone.
+  std::span<const WheelMotion> advance_motors(double t_s, double dt_s, double yaw_rate_rad_s);
 
   // Whether the wheels stand and are commanded to; and when the command differs.
   bool stands() const { return stands_; }
@@ -61,7 +63,7 @@ class RobotDrive {
   void twist_targets(double v, double omega, double vy);
   void steer(double wanted_rad, double dt_s);
   double throttle(double commanded, double dt_s, double yaw_rate_rad_s);
-  void place_on_curve(double speed_m_s);
+  void place_on_curve();
   double follow(std::size_t wheel, double target_m_s, double dt_s);
   double angle_of(double command) const;
   double dead(double value) const;

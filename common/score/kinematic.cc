@@ -323,7 +323,7 @@ std::map<double, Pose> path(const Body& body, const CommandedRun& run, double be
   const Pose X_MR = inverse(body.robot().X_RM);
   for (long step = 0; next < times.size(); ++step) {
     const double t = run.start_s + static_cast<double>(step) * kStep_s;
-    const auto wheels = drive.advance(t, kStep_s, omega);
+    const auto wheels = drive.advance_motors(t, kStep_s, omega);
     std::optional<Pose> X_WR;
     if (measured != nullptr) X_WR = body.unobserved(measured->at(t + kStep_s / 2)) * X_MR;
     const Twist v = body.velocity(wheels, drive, X_WR ? &*X_WR : nullptr);

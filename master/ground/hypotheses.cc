@@ -219,10 +219,12 @@ void Catalogue::motors() {
         {row("delay")});
   value("clock_drift", {"clock_offset"}, "the rate of one clock against the other",
         {{"drift", 0, 2e-5, "rate", "s/s"}});
-  if (robot_.measured) return;  // motors lie before what was measured
-  value(is_steered(robot_) ? "steering_lag" : "motor_lag", {"motor_lag"},
-        is_steered(robot_) ? "the lag of the steering" : "the lag of the wheels", {row("lag")});
   more("battery_sag", {}, "what the drive loses a minute", {{"sag", 0, 0.005, "rate", "1/min"}});
+  // Motors lie before what was measured, unless the file states them all the same.
+  if (!robot_.measured || robot_.motors.lag_s > 0) {
+    value(is_steered(robot_) ? "steering_lag" : "motor_lag", {"motor_lag"},
+          is_steered(robot_) ? "the lag of the steering" : "the lag of the wheels", {row("lag")});
+  }
   if (is_throttled(robot_)) {
     value("throttle_gain", {"payload", "battery_voltage"}, "the acceleration a unit of throttle",
           {{"power", 1, kPowerShare, "ratio", "-"}});
@@ -230,13 +232,15 @@ void Catalogue::motors() {
     value("rolling_resistance", {"drag"}, "the deceleration a m/s", {row("drag")});
     return;
   }
-  const double band = robot_.command == CommandKind::kWheelSpeeds ? 0.1 : 0.01;
-  more("motor_deadband", {}, "commands that move nothing",
-       {{"dead_band", robot_.motors.dead_band, band, "width", "of the command", true}});
-  const double ramp =
-      robot_.motors.acceleration_limit_m_s2 ? 1 / *robot_.motors.acceleration_limit_m_s2 : 0;
+  if (!robot_.measured) {
+    const double band = robot_.command == CommandKind::kWheelSpeeds ? 0.1 : 0.01;
+    more("motor_deadband", {}, "commands that move nothing",
+         {{"dead_band", robot_.motors.dead_band, band, "width", "of the command", true}});
+  }
+  const auto& limit = robot_.motors.acceleration_limit_m_s2;
+  if (robot_.measured && !limit) return;
   more("acceleration_limit", {"motor_lag"}, "the ramp of the wheels' speed",
-       {{"ramp", ramp, 0.03, "ramp", "s^2/m", true}});
+       {{"ramp", limit ? 1 / *limit : 0, 0.03, "ramp", "s^2/m", true}});
 }
 
 void Catalogue::marker() {
@@ -251,26 +255,32 @@ void Catalogue::tracker() {
   value("camera_aspect", {}, "the scale of y over that of x", {{"aspect", 1, 0.01, "ratio", "-"}});
 }
 
-// What another floor changes.
+// What another floor or another load changes.
 void Catalogue::floors() {
-  if (is_steered(robot_)) {
+  const KinematicRow travel{"travel", 1, kSlipShare, "ratio", "-"};
+  const char* slips = "how far the wheels travel a turn";
+  if (is_throttled(robot_) || is_steered(robot_)) {
     value("friction", {"friction_anisotropy"}, "friction across the wheels",
           {row("grip"), row("slip_angle"), row("grip_shape")});
+    if (!is_throttled(robot_))
+      value("floor", {"wheel_slip", "wheel_radius"}, slips, {row("ahead")});
   } else if (skids(robot_)) {
     value("friction_across", {"wheel_separation", "icr_track", "friction_anisotropy"},
           "how hard the floor makes it to turn (the separation of the sides, as they roll)",
           {row("separation")});
-    value("wheel_slip", {"wheel_radius", "speed_gain"}, "how far the wheels travel a turn",
-          {{"travel", 1, kSlipShare, "ratio", "-"}});
+    value("wheel_slip", {"wheel_radius", "speed_gain"}, slips, {travel});
     value("floor", {"wheel_slip", "friction_across"},
-          "how the wheels slip:", {{"travel", 1, kSlipShare, "ratio", "-"}, row("separation")});
+          "how the wheels slip:", {travel, row("separation")});
     all.back().price = kPriceOfAValue;
+    // Weight to one side or end moves the point that wheels skid about, and makes them hold more.
+    value("com_offset", {"payload", "marker_offset"}, "where the weight stands on the wheels:",
+          {row("marker_x"), row("marker_y"), row("separation")});
+    all.back().price = 2 * kPriceOfAValue;
   } else if (is_holonomic(robot_)) {
     value("floor", {"wheel_slip", "roller_drag"}, "how far the robot goes of its wheels' way",
           {row("traction")});
-    // The same whichever way it goes, as wheels do that roll on something soft.
-    value("floor", {"wheel_slip", "wheel_radius"}, "how far the wheels travel a turn",
-          {{"travel", 1, kSlipShare, "ratio", "-"}});
+  } else {
+    value("floor", {"wheel_slip", "wheel_radius"}, slips, {travel});
   }
 }
 
@@ -287,7 +297,13 @@ std::vector<GroundHypothesis> change_hypotheses(const GroundRobot& robot,
   catalogue.motors();
   catalogue.marker();
   catalogue.all.push_back(floor_edge());
-  // What turns or travels on another floor has the floor's name.
+  // What turns or travels on another floor has the floor's name; without a turn, omni wheels that
+  // are larger cannot be told from rollers that drag less.
+  if (is_holonomic(robot)) {
+    std::erase_if(catalogue.all, [](const GroundHypothesis& h) {
+      return !h.freed.empty() && h.freed[0].name == "travel";
+    });
+  }
   for (GroundHypothesis& h : catalogue.all) {
     for (GroundHypothesis& other : catalogue.all) {
       if (&h >= &other || h.freed.empty() || h.freed.size() != other.freed.size()) continue;

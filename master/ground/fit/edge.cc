@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "common/base/constants.h"
+#include "master/ground/fit/held_out.h"
 #include "master/ground/tolerances.h"
 
 namespace gapfarm {
@@ -56,12 +57,21 @@ std::vector<double> places_along(const WindowFitter& fitter, double angle) {
   return places;
 }
 
-// 90 % of some draws.
-Estimate drawn_estimate(const char* key, double value, std::vector<double> draws,
-                        const char* unit) {
+// 90 % of some draws; no less wide than a deviation with the folds' degrees of freedom.
+Estimate widened_estimate(const char* key, double value, std::vector<double> draws,
+                          double deviation, const char* unit) {
   std::sort(draws.begin(), draws.end());
   const std::size_t n = draws.size();
-  return {key, value, draws[n / 20], draws[n - 1 - n / 20], unit};
+  const double half = kFoldTail * deviation;
+  return {key, value, std::min(draws[n / 20], value - half),
+          std::max(draws[n - 1 - n / 20], value + half), unit};
+}
+
+// Of the mean of columns that each omit one part of the log in turn (the jackknife).
+Eigen::Vector3d jackknife_deviation(const Eigen::Matrix3Xd& parts) {
+  const auto n = static_cast<double>(parts.cols());
+  const Eigen::Vector3d mean = parts.rowwise().mean();
+  return ((parts.colwise() - mean).rowwise().squaredNorm() * (n - 1) / n).cwiseSqrt();
 }
 
 }  // namespace
@@ -117,7 +127,7 @@ Eigen::VectorXd scan_floor_edge(const WindowFitter& fitter, const WindowFit& fit
   Eigen::VectorXd best = values;
   double most = -std::numeric_limits<double>::infinity();
   for (std::size_t k = 0; k < std::min(kClimbed, lines.size()); ++k) {
-    const WindowFit climbed = fitter.fit(rows, {}, lines[k].second, 1);
+    const WindowFit climbed = fitter.fit(rows, {}, lines[k].second, 3);
     if (climbed.objective <= most || !parts_windows(fitter, climbed)) continue;
     most = climbed.objective;
     best = climbed.values;
@@ -152,18 +162,25 @@ void describe_floor_edge(const WindowFitter& fitter, const WindowFit& fit, std::
   const auto offset_of = [&](double a, double offset) {
     return (slower_beyond ? 1 : -1) * (offset - along_normal(middle, a));
   };
+  const auto line_of = [&](const Eigen::VectorXd& v) {
+    return Eigen::Vector3d(change_of(v[at.ratio]), offset_of(v[at.angle], v[at.offset]),
+                           angle + wrap_angle(v[at.angle] + turn - angle));
+  };
+  // Slopes at the line know the windows over it alone: what moves it more is that others are.
+  const std::vector<WindowFit> folds = fit_without_folds(fitter, fit.rows, fit.values);
+  Eigen::Matrix3Xd parts(3, kFolds);
+  for (int k = 0; k < kFolds; ++k)
+    parts.col(k) = line_of(folds[static_cast<std::size_t>(k)].values);
+  const Eigen::Vector3d line = line_of(fit.values), deviation = jackknife_deviation(parts);
   const Eigen::MatrixXd draws = fitter.draws(fit, seed);
-  std::vector<double> ratios, angles, offsets;
-  for (Eigen::Index d = 0; d < draws.cols(); ++d) {
-    ratios.push_back(change_of(draws(at.ratio, d)));
-    angles.push_back(angle + wrap_angle(draws(at.angle, d) + turn - angle));
-    offsets.push_back(offset_of(draws(at.angle, d), draws(at.offset, d)));
-  }
-  const Estimate ratio =
-      drawn_estimate("ratio", change_of(fit.values[at.ratio]), std::move(ratios), "-");
-  const Estimate offset = drawn_estimate(
-      "offset", offset_of(fit.values[at.angle], fit.values[at.offset]), std::move(offsets), "m");
-  const Estimate normal = drawn_estimate("angle", angle, std::move(angles), "rad");
+  const auto estimate = [&](const char* key, Eigen::Index row, const char* unit) {
+    std::vector<double> drawn;
+    for (const auto& values : draws.colwise()) drawn.push_back(line_of(values)[row]);
+    return widened_estimate(key, line[row], std::move(drawn), deviation[row], unit);
+  };
+  const Estimate ratio = estimate("ratio", 0, "-");
+  const Estimate offset = estimate("offset", 1, "m");
+  const Estimate normal = estimate("angle", 2, "rad");
   // The interval of the line's place is across it.
   const auto place = [&](const char* key, double from, double part) {
     const double ends[] = {from + offset.lo * part, from + offset.hi * part};

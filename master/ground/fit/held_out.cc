@@ -62,21 +62,29 @@ HeldOutGain interval_of(double mean, std::vector<double> drawn) {
 
 }  // namespace
 
+std::vector<WindowFit> fit_without_folds(const WindowFitter& fitter,
+                                         const std::vector<FitRow>& rows,
+                                         const Eigen::VectorXd& start) {
+  const std::vector<int> folds = folds_of(fitter.windows());
+  std::vector<WindowFit> parts;
+  for (int fold = 0; fold < kFolds; ++fold) {
+    std::vector<char> out(folds.size(), 0);
+    for (std::size_t b = 0; b < folds.size(); ++b) out[b] = folds[b] == fold;
+    parts.push_back(rows.empty() ? fitter.hold(rows, start, out) : fitter.fit(rows, out, start, 2));
+  }
+  return parts;
+}
+
 WindowFit fit_held_out(const WindowFitter& fitter, const std::vector<FitRow>& rows,
                        const Eigen::VectorXd& start) {
-  const auto blocks = static_cast<std::size_t>(fitter.windows().blocks);
   const std::vector<int> folds = folds_of(fitter.windows());
+  const std::vector<WindowFit> parts = fit_without_folds(fitter, rows, start);
   WindowFit whole = fitter.hold(rows, start);
-  for (int fold = 0; fold < kFolds; ++fold) {
-    std::vector<char> out(blocks, 0);
-    for (std::size_t b = 0; b < blocks; ++b) out[b] = folds[b] == fold;
-    const WindowFit part =
-        rows.empty() ? fitter.hold(rows, start, out) : fitter.fit(rows, out, start, 1);
-    for (std::size_t i = 0; i < whole.nats.size(); ++i) {
-      if (!out[static_cast<std::size_t>(fitter.windows().block[i])]) continue;
-      whole.nats[i] = part.nats[i];
-      whole.residuals[i] = part.residuals[i];
-    }
+  for (std::size_t i = 0; i < whole.nats.size(); ++i) {
+    const auto block = static_cast<std::size_t>(fitter.windows().block[i]);
+    const WindowFit& part = parts[static_cast<std::size_t>(folds[block])];
+    whole.nats[i] = part.nats[i];
+    whole.residuals[i] = part.residuals[i];
   }
   return whole;
 }

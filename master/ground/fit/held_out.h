@@ -9,8 +9,12 @@
 
 namespace gapfarm {
 
-// Nats of every window with the rows fitted to other blocks than its own (kFolds folds); no rows:
-// the file's values as they are.
+// The rows fitted to all but one of the folds, kFolds times; no rows: the file's values as they
+// are.
+std::vector<WindowFit> fit_without_folds(const WindowFitter& fitter,
+                                         const std::vector<FitRow>& rows,
+                                         const Eigen::VectorXd& start);
+// Nats of every window by the one of these that was not fitted to it.
 WindowFit fit_held_out(const WindowFitter& fitter, const std::vector<FitRow>& rows,
                        const Eigen::VectorXd& start);
 

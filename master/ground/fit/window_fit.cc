@@ -240,10 +240,11 @@ Eigen::VectorXd stepped(const WindowFit& fit, const Eigen::MatrixXd& H, const Ei
 
 }  // namespace
 
-bool WindowFitter::step(WindowFit* fit, const std::vector<double>& use, double* damping) const {
+bool WindowFitter::step(WindowFit* fit, const std::vector<Eigen::MatrixXd>& J,
+                        const std::vector<double>& use, double* damping) const {
   Eigen::MatrixXd H;
   Eigen::VectorXd g;
-  normal_equations(*fit, slopes(*fit), use, &H, &g);
+  normal_equations(*fit, J, use, &H, &g);
   for (int attempt = 0; attempt < 5; ++attempt) {
     Eigen::MatrixXd damped = H;
     damped.diagonal() *= 1 + *damping;
@@ -291,7 +292,8 @@ WindowFit WindowFitter::fit(const std::vector<FitRow>& rows, const std::vector<c
   for (int round = 0; round < rounds && !rows.empty(); ++round) {
     const double before = fit.objective;
     double damping = 1e-3;
-    for (int k = 0; k < kSteps && step(&fit, use, &damping); ++k) {
+    const std::vector<Eigen::MatrixXd> J = slopes(fit);  // what costs: one a round
+    for (int k = 0; k < kSteps && step(&fit, J, use, &damping); ++k) {
     }
     rescale(&fit, use);
     score(&fit, use);

@@ -114,7 +114,9 @@ class WindowFitter {
   void normal_equations(const WindowFit& fit, const std::vector<Eigen::MatrixXd>& J,
                         const std::vector<double>& use, Eigen::MatrixXd* H,
                         Eigen::VectorXd* g) const;
-  bool step(WindowFit* fit, const std::vector<double>& use, double* damping) const;
+  // With slopes of a fit nearby.
+  bool step(WindowFit* fit, const std::vector<Eigen::MatrixXd>& J, const std::vector<double>& use,
+            double* damping) const;
   std::vector<double> uses(const std::vector<char>& held_out) const;
   // Of the prior of these rows, and how far from its middle the values are.
   Eigen::MatrixXd prior_precision(const std::vector<FitRow>& rows) const;
