@@ -76,7 +76,8 @@ class Catalogue {
   }
   void value(const std::string& name, std::vector<std::string> aliases, const std::string& thing,
              std::vector<KinematicRow> freed) {
-    all.push_back({name, std::move(aliases), thing, std::move(freed), {}, 1, "", false});
+    const double price = kPriceOfAValue * (static_cast<double>(freed.size()) - 1);
+    all.push_back({name, std::move(aliases), thing, std::move(freed), {}, 1, "", false, price});
   }
   void more(const std::string& name, std::vector<std::string> aliases, const std::string& thing,
             std::vector<KinematicRow> freed) {
@@ -177,7 +178,6 @@ void Catalogue::sizes() {
           {row("traction")});
     value("com_offset", {"payload"}, "where the weight stands on the wheels",
           {row("load_x"), row("load_y")});
-    all.back().price = kPriceOfAValue;
     value("ahead_gain", {"roller_drag", "speed_gain"}, "travel ahead", {row("ahead")});
     value("aside_gain", {"roller_drag"}, "travel aside", {row("aside")});
     value("wheel_separation", {"robot_radius", "turn_gain"},
@@ -259,7 +259,7 @@ void Catalogue::tracker() {
 void Catalogue::floors() {
   const KinematicRow travel{"travel", 1, kSlipShare, "ratio", "-"};
   const char* slips = "how far the wheels travel a turn";
-  if (is_throttled(robot_) || is_steered(robot_)) {
+  if (is_steered(robot_)) {
     value("friction", {"friction_anisotropy"}, "friction across the wheels",
           {row("grip"), row("slip_angle"), row("grip_shape")});
     if (!is_throttled(robot_))
@@ -271,11 +271,10 @@ void Catalogue::floors() {
     value("wheel_slip", {"wheel_radius", "speed_gain"}, slips, {travel});
     value("floor", {"wheel_slip", "friction_across"},
           "how the wheels slip:", {travel, row("separation")});
-    all.back().price = kPriceOfAValue;
     // Weight to one side or end moves the point that wheels skid about, and makes them hold more.
-    value("com_offset", {"payload", "marker_offset"}, "where the weight stands on the wheels:",
+    value("com_offset", {"payload", "marker_offset"},
+          "where the weight stands, by what the robot turns about:",
           {row("marker_x"), row("marker_y"), row("separation")});
-    all.back().price = 2 * kPriceOfAValue;
   } else if (is_holonomic(robot_)) {
     value("floor", {"wheel_slip", "roller_drag"}, "how far the robot goes of its wheels' way",
           {row("traction")});

@@ -61,14 +61,14 @@ std::vector<KinematicRow> kinematic_rows(const GroundRobot& robot) {
             {"right", 1, radius, "ratio", "-"},
             {"separation", 1, separation, "ratio", "-"}};
   }
-  const double marker = (is_steered(robot) ? kCarMarkerShare : kMarkerShare) * wheel_reach_m(robot);
+  const bool car = robot.drive == DriveKind::kAckermann;
+  const double marker = (car ? kCarMarkerShare : kMarkerShare) * wheel_reach_m(robot);
   const Pose& X = robot.X_RM;
   rows.push_back({"lag", robot.motors.lag_s, kLag_s, "tau", "s", true});
   rows.push_back({"delay", robot.motors.delay_s, kDelay_s, "latency", "s"});
   rows.push_back({"marker_x", X.x, marker, "x", "m"});
   rows.push_back({"marker_y", X.y, marker, "y", "m"});
-  rows.push_back({"marker_yaw", X.theta, is_steered(robot) ? kCarMarkerYaw_rad : kMarkerYaw_rad,
-                  "angle", "rad"});
+  rows.push_back({"marker_yaw", X.theta, car ? kCarMarkerYaw_rad : kMarkerYaw_rad, "angle", "rad"});
   return rows;
 }
 

@@ -172,6 +172,29 @@ void name_candidate(const WindowSet& windows, const GroundWork& work,
   search->chain.push_back(chosen.held_out);
 }
 
+bool frees_part_of(const GroundHypothesis& part, const GroundHypothesis& whole) {
+  const auto is_in_whole = [&](const KinematicRow& row) {
+    return std::any_of(whole.freed.begin(), whole.freed.end(),
+                       [&](const KinematicRow& other) { return other.name == row.name; });
+  };
+  return part.freed.size() < whole.freed.size() &&
+         std::all_of(part.freed.begin(), part.freed.end(), is_in_whole);
+}
+
+// A candidate with some of the values of another one that gains no more over it than a model leaves
+// traces of is the simpler word for the same.
+const Candidate& simplest_of(const std::vector<GroundHypothesis>& catalogue,
+                             const std::vector<Candidate>& candidates, const Candidate& chosen) {
+  const Candidate* simplest = &chosen;
+  for (const Candidate& c : candidates) {
+    const bool part =
+        frees_part_of(catalogue[c.offer.hypothesis], catalogue[simplest->offer.hypothesis]);
+    const bool alike = (1 + kShareOfBestName) * c.offer.gain >= chosen.offer.gain;
+    if (part && alike && may_be_named(c.held_out_gain)) simplest = &c;
+  }
+  return *simplest;
+}
+
 // The best of the catalogue, when it is worth its name.
 bool take_step(const WindowFitter& fitter, const GroundWork& work, GroundSearch* search) {
   std::vector<std::pair<Offer, WindowFit>> tried;
@@ -219,7 +242,8 @@ bool take_step(const WindowFitter& fitter, const GroundWork& work, GroundSearch*
     if (!candidates.empty()) keep_if_best(search, std::move(candidates.front().held_out));
     return false;
   }
-  name_candidate(fitter.windows(), work, offers, candidates, *chosen, search);
+  name_candidate(fitter.windows(), work, offers, candidates,
+                 simplest_of(search->catalogue, candidates, *chosen), search);
   emit_steps(work, *search);
   return true;
 }

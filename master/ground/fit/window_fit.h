@@ -78,7 +78,7 @@ class WindowFitter {
   // Starts at `values` where that has the size of `rows`, else at the rows' nominals; fewer rounds
   // do from near by.
   WindowFit fit(const std::vector<FitRow>& rows, const std::vector<char>& held_out = {},
-                const Eigen::VectorXd& values = {}, int rounds = 10) const;
+                const Eigen::VectorXd& values = {}, int rounds = 40) const;
   // The rows' values held, scales fitted.
   WindowFit hold(const std::vector<FitRow>& rows, const Eigen::VectorXd& values,
                  const std::vector<char>& held_out = {}) const;

@@ -78,7 +78,6 @@ double own_value(const GroundRobot& robot, const KinematicRow& row) {
 const char* spoken(const KinematicRow& row) {
   if (row.name == "travel") return "their travel";
   if (row.name == "separation") return "their separation, as they roll,";
-  if (row.name == "marker_x") return "what it turns about,";
   if (row.name == "slip_angle") return "the rear's slip at the limit";
   return row.name == "grip" ? "" : row.key.c_str();
 }

@@ -3,9 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <cstdlib>
-#include <iostream>
-#include <map>
+#include <utility>
 
 #include "common/random/stream.h"
 #include "common/robot/robot_file.h"
@@ -19,6 +17,7 @@ constexpr const char* kTwoWheels = R"(drive = "differential"
 commands = ["left", "right"]
 wheel_separation = 0.3
 mass = 8.0
+lag = 0.15
 [wheels.left]
 radius = 0.05
 x = 0.0
@@ -38,6 +37,7 @@ commands = ["left", "right"]
 wheel_separation = 0.4
 wheelbase = 0.3
 mass = 12.0
+lag = 0.15
 [wheels.left]
 radius = 0.1
 [wheels.right]
@@ -49,17 +49,10 @@ wheelbase = 0.4
 wheel_separation = 0.3
 wheel_radius = 0.05
 mass = 10.0
+lag = 0.15
 )";
-constexpr const char* kSpeedCar = R"(drive = "ackermann"
-commands = ["speed", "steering"]
-wheelbase = 0.4
-wheel_separation = 0.3
-wheel_radius = 0.05
-mass = 10.0
-)";
-
 struct Change {
-  double friction = 0.7, ratio = 1, creep = 0.02, caster_drag = 0.02, mass = 1;
+  double friction = 0.7, ratio = 1, caster_drag = 0.02;
   double ahead_m = 0, left_m = 0;
 };
 
@@ -77,11 +70,10 @@ RunLog simulated(GroundRobot robot, const Change& at, std::uint64_t seed, double
   robot.friction = at.friction;
   robot.friction_ratio = at.ratio;
   robot.caster_drag = at.caster_drag;
-  *robot.mass_kg *= at.mass;
   *robot.com_x_m += at.ahead_m;
   *robot.com_y_m += at.left_m;
   GroundWorld world;
-  world.creep = at.creep;
+  world.creep = 0.02;
   for (int r = 0; r < 8; ++r) {
     LoggedRun run;
     run.run = std::to_string(r);
@@ -110,39 +102,65 @@ RunLog simulated(GroundRobot robot, const Change& at, std::uint64_t seed, double
   return log;
 }
 
-TEST(SimulatedFloors, Explore) {
-  const std::map<std::string, std::pair<const char*, double>> robots = {
-      {"differential", {kTwoWheels, 1}},
-      {"skid", {kFourWheels, 0.6}},
-      {"tricycle", {kThreeWheels, 3}},
-      {"car", {kSpeedCar, 3}}};
-  const std::map<std::string, Change> changes = {{"null", {}},
-                                                 {"friction", {0.3}},
-                                                 {"creep", {0.7, 1, 0.08}},
-                                                 {"ratio", {0.7, 0.6}},
-                                                 {"caster", {0.7, 1, 0.02, 0.3}},
-                                                 {"mass", {0.7, 1, 0.02, 0.02, 1.6}},
-                                                 {"ahead", {0.7, 1, 0.02, 0.02, 1, 0.05}},
-                                                 {"left", {0.7, 1, 0.02, 0.02, 1, 0, 0.05}}};
-  const char* only = std::getenv("ONLY");
-  for (const auto& [name, robot] : robots) {
-    if (only && name != only) continue;
-    const GroundRobot file = robot_from(robot.first);
-    const RunLog before = simulated(file, {}, 1, robot.second);
-    for (const auto& [what, change] : changes) {
-      const RunLog after = simulated(file, change, 2, robot.second);
-      GroundDiagnoseOptions options;
-      options.reference = before;
-      auto found = diagnose_ground(file, after, options);
-      std::cout << name << " " << what << ": "
-                << (found ? found->diagnosis.headline : found.error().message) << std::endl;
-      if (!found) continue;
-      for (const Screened& s : found->diagnosis.screening) {
-        if (s.gain > 6)
-          std::cout << "    " << s.effect << " " << s.gain << " " << s.estimate << "\n";
-      }
-    }
+// What changed between two logs of a robot, the second with other commands.
+Diagnosis changed(const char* text, double fast, const Change& change, std::uint64_t seed = 2) {
+  const GroundRobot file = robot_from(text);
+  GroundDiagnoseOptions options;
+  options.reference = simulated(file, {}, seed + 100, fast);
+  auto found = diagnose_ground(file, simulated(file, change, seed, fast), options);
+  EXPECT_TRUE(found.ok()) << found.error().message;
+  return found.ok() ? std::move(found->diagnosis) : Diagnosis{};
+}
+
+TEST(SimulatedFloors, NothingIsNamedWhereNothingChanged) {
+  for (const auto& [text, fast] :
+       {std::pair{kTwoWheels, 1.0}, std::pair{kFourWheels, 0.6}, std::pair{kThreeWheels, 3.0}}) {
+    const Diagnosis same = changed(text, fast, {}, 5);
+    EXPECT_TRUE(same.effects.empty()) << same.headline;
+    EXPECT_EQ(same.verdict, Verdict::kNone) << same.headline;
   }
+}
+
+// Wheels that are not asked for more than the floor holds roll as before: grip that is not used up
+// moves no end, and no name is given to it.
+TEST(SimulatedFloors, GripThatIsNotUsedUpIsNoChange) {
+  Change less;
+  less.friction = 0.4;
+  const Diagnosis same = changed(kTwoWheels, 1, less);
+  EXPECT_TRUE(same.effects.empty()) << same.headline;
+}
+
+TEST(SimulatedFloors, AFloorThatHoldsSkiddingWheelsLessIsNamed) {
+  Change smooth;
+  smooth.ratio = 0.6;
+  const Diagnosis found = changed(kFourWheels, 0.6, smooth);
+  ASSERT_EQ(found.effects.size(), 1u) << found.headline;
+  const NamedEffect& effect = found.effects.front();
+  EXPECT_EQ(effect.name, "friction_across") << found.headline;
+  // Four-point theory: 1 + (ratio 0.3 / 0.4)^2, from 1.5625 to 1.2025.
+  EXPECT_NEAR(effect.parameters.back().value, 1.2025 - 1.5625, 0.04);
+}
+
+TEST(SimulatedFloors, ACasterThatDragsMoreIsAFloor) {
+  Change rough;
+  rough.caster_drag = 0.6;
+  const Diagnosis found = changed(kTwoWheels, 1, rough);
+  ASSERT_EQ(found.effects.size(), 1u) << found.headline;
+  EXPECT_EQ(found.effects.front().name, "floor") << found.headline;
+  EXPECT_LT(found.effects.front().parameters.at(0).hi, 0);
+}
+
+TEST(SimulatedFloors, ALoadToOneSideOfSkiddingWheelsIsNamedAsOne) {
+  Change aside, ahead;
+  aside.left_m = 0.05;
+  ahead.ahead_m = 0.05;
+  const Diagnosis left = changed(kFourWheels, 0.6, aside);
+  ASSERT_EQ(left.effects.size(), 1u) << left.headline;
+  EXPECT_EQ(left.effects.front().name, "com_offset") << left.headline;
+  EXPECT_GT(left.effects.front().parameters.at(1).lo, 0.03) << left.headline;
+  const Diagnosis front = changed(kFourWheels, 0.6, ahead);
+  ASSERT_FALSE(front.effects.empty());
+  EXPECT_EQ(front.effects.front().name, "com_offset") << front.headline;
 }
 
 }  // namespace
