@@ -297,7 +297,7 @@ std::vector<GroundHypothesis> change_hypotheses(const GroundRobot& robot,
   catalogue.marker();
   catalogue.all.push_back(floor_edge());
   // What turns or travels on another floor has the floor's name; without a turn, omni wheels that
-  // are larger cannot be told from rollers that drag less.
+  // are larger cannot be distinguished from rollers that drag less.
   if (is_holonomic(robot)) {
     std::erase_if(catalogue.all, [](const GroundHypothesis& h) {
       return !h.freed.empty() && h.freed[0].name == "travel";

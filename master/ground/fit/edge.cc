@@ -127,7 +127,7 @@ Eigen::VectorXd scan_floor_edge(const WindowFitter& fitter, const WindowFit& fit
   Eigen::VectorXd best = values;
   double most = -std::numeric_limits<double>::infinity();
   for (std::size_t k = 0; k < std::min(kClimbed, lines.size()); ++k) {
-    const WindowFit climbed = fitter.fit(rows, {}, lines[k].second, 3);
+    const WindowFit climbed = fitter.fit(rows, {}, lines[k].second, 6);
     if (climbed.objective <= most || !parts_windows(fitter, climbed)) continue;
     most = climbed.objective;
     best = climbed.values;

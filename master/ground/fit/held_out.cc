@@ -70,7 +70,7 @@ std::vector<WindowFit> fit_without_folds(const WindowFitter& fitter,
   for (int fold = 0; fold < kFolds; ++fold) {
     std::vector<char> out(folds.size(), 0);
     for (std::size_t b = 0; b < folds.size(); ++b) out[b] = folds[b] == fold;
-    parts.push_back(rows.empty() ? fitter.hold(rows, start, out) : fitter.fit(rows, out, start, 2));
+    parts.push_back(rows.empty() ? fitter.hold(rows, start, out) : fitter.fit(rows, out, start, 6));
   }
   return parts;
 }
