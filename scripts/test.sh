@@ -44,7 +44,7 @@ if [[ -n "$sanitizers" ]]; then
   cmake --build --preset odr -- --quiet
   export GAPFARM_FARM_SCHEDULES=1000  # ten times as many went by above
   # The farm's threads and sockets; the rest of the program has one thread.
-  check tsan "test_farm test_farm_processes test_net gapfarm-fake-worker" --tests-regex \
+  check tsan "test_farm test_farm_processes gapfarm-fake-worker" --tests-regex \
     '^(Envelope|FaultSchedules|Farm|Keys|LinkSecurity|PrivateFolder|ProcessPool|Scheduler|Session|Stop)'
   check asan all --label-regex '^(unit|integration)$'
   for preset in asan tsan; do echo "$preset: $(summary "$preset" | head -1)"; done

@@ -4,8 +4,7 @@
 
 #include "tests/integration/run_program.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::blind_check_cli_test {
 
 using ::testing::HasSubstr;
 
@@ -52,5 +51,4 @@ TEST(BlindCheckCli, ForeignFolderWithoutCasesIsNamed) {
   EXPECT_THAT(finished.err, HasSubstr("nothing"));
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::blind_check_cli_test

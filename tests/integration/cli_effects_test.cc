@@ -7,8 +7,7 @@
 #include "common/effects/catalogue.h"
 #include "tests/integration/run_program.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::cli_effects_test {
 
 using ::testing::HasSubstr;
 
@@ -57,5 +56,4 @@ TEST(CliEffects, DrawsAPictureOfEach) {
   EXPECT_THAT(wrong.err, HasSubstr("none.toml"));
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::cli_effects_test

@@ -6,8 +6,7 @@
 #include "tests/integration/demo_config.h"
 #include "tests/integration/run_program.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::cli_overwrite_test {
 
 using testing::HasSubstr;
 using testing::Not;
@@ -160,5 +159,4 @@ TEST_F(Overwrite, ResultsAreOnStandardOutputInTextOrAsJson) {
               HasSubstr("--wrokers"));
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::cli_overwrite_test

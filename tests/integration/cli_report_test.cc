@@ -8,8 +8,7 @@
 #include "tests/integration/demo_config.h"
 #include "tests/integration/run_program.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::cli_report_test {
 
 using ::testing::HasSubstr;
 using ::testing::Not;
@@ -89,5 +88,4 @@ TEST_F(CliReport, ReportsWhatAFolderHoldsNot) {
   EXPECT_THAT(nothing.err, HasSubstr("neither a diagnosis.json nor a run.sqlite"));
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::cli_report_test

@@ -8,8 +8,7 @@
 #include "master/store/run_store.h"
 #include "tests/integration/run_program.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::cli_status_test {
 
 using ::testing::HasSubstr;
 using ::testing::Not;
@@ -141,5 +140,4 @@ TEST_F(CliStatus, ReportsWhatIsNotARun) {
   EXPECT_THAT(gapfarm_command({"status", run_}).err, HasSubstr("not a SQLite file"));
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::cli_status_test

@@ -6,8 +6,7 @@
 #include "tests/integration/demo_config.h"
 #include "tests/integration/run_program.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::cli_usage_test {
 
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
@@ -318,5 +317,4 @@ TEST_F(CliCheck, PointsAtWhatIsWrong) {
   EXPECT_EQ(gapfarm_command({"check", no_genes, "--trials", trials_}).exit_code, 2);
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::cli_usage_test

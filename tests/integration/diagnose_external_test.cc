@@ -7,8 +7,7 @@
 
 #include "tests/integration/diagnose_program.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::diagnose_external_test {
 
 using Json = nlohmann::json;
 
@@ -188,5 +187,4 @@ TEST_F(DiagnoseExternal, ALogOfMuJoCoIsDiagnosedByBulletAndTheOtherWayRound) {
                "ratio", 0.06, 0.02);
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::diagnose_external_test

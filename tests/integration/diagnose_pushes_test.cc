@@ -6,8 +6,7 @@
 
 #include "tests/integration/diagnose_program.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::diagnose_pushes_test {
 
 constexpr const char* kConfig = R"(scenario = "push"
 [parameters]
@@ -109,5 +108,4 @@ TEST_F(DiagnosePushes, OfAFewPushesNothingIsReported) {
   EXPECT_TRUE(d["effects"].empty());
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::diagnose_pushes_test

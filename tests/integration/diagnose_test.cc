@@ -10,8 +10,7 @@
 #include "tests/integration/diagnose_program.h"
 #include "tests/unit/trials/shared_data.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::diagnose_test {
 
 constexpr const char* kConfig = R"(scenario = "srv1"
 [parameters]
@@ -387,5 +386,4 @@ TEST_F(Diagnose, UnknownEffectToExcludeIsRefused) {
   EXPECT_NE(finished.err.find("did you mean 'battery_sag'?"), std::string::npos) << finished.err;
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::diagnose_test

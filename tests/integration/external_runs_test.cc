@@ -5,8 +5,7 @@
 
 #include "tests/integration/run_program.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::external_runs_test {
 
 using nlohmann::json;
 using ::testing::HasSubstr;
@@ -140,5 +139,4 @@ TEST_F(ExternalRuns, RubbishIsFoundBeforeTheRunBegins) {
   EXPECT_FALSE(std::filesystem::exists(folder_ / "run"));
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::external_runs_test

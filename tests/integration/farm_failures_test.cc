@@ -5,8 +5,7 @@
 
 #include "tests/integration/farm_fixture.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::farm_failures_test {
 
 using ::testing::HasSubstr;
 using ::testing::SizeIs;
@@ -169,5 +168,4 @@ TEST(FarmFailures, FinishedWorkIsHandedToTheNextMaster) {
   EXPECT_GE((*second)->counts().offered, 1u);
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::farm_failures_test

@@ -15,8 +15,7 @@
 #include "tests/integration/farm_fixture.h"
 #include "worker/service.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::farm_processes_test {
 
 class LocalFarm : public testing::TestWithParam<unsigned> {};
 
@@ -233,5 +232,4 @@ TEST(Farm, EndpointErrorsReportWhatToDo) {
   EXPECT_NE(message((*first)->endpoints().at(0)).find("another master"), std::string::npos);
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::farm_processes_test

@@ -11,8 +11,7 @@
 #include "tests/integration/run_program.h"
 #include "worker/evaluate.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::hostile_test {
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 constexpr bool kMemoryIsOurs = false;  // a sanitizer keeps what was freed
@@ -248,5 +247,4 @@ TEST_F(Hostile, ARunUnderAttackEndsAsIfNobodyHadBeenThere) {
   EXPECT_EQ(digest("hostile"), digest("calm"));
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::hostile_test

@@ -11,8 +11,7 @@
 #include "tests/integration/demo_config.h"
 #include "tests/integration/run_program.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::long_commands_test {
 
 using testing::AllOf;
 using testing::HasSubstr;
@@ -273,5 +272,4 @@ TEST_F(LongCommands, RunsWhatTheUserWantsAtTheEnd) {
                                    folder_ / "run" + "\n");
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::long_commands_test

@@ -16,8 +16,7 @@
 #include "tests/integration/demo_config.h"
 #include "tests/integration/run_program.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::observability_test {
 
 using nlohmann::json;
 using testing::HasSubstr;
@@ -184,5 +183,4 @@ TEST_F(Observability, AnIndividualIsReplayedToTheBit) {
   EXPECT_THAT(unknown.err, HasSubstr("999999"));
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::observability_test

@@ -11,8 +11,7 @@
 
 #include "tests/integration/run_program.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::quarantine_test {
 
 using nlohmann::json;
 using ::testing::HasSubstr;
@@ -150,5 +149,4 @@ TEST_F(Quarantine, AnAlarmNamesBothSides) {
   EXPECT_THAT(gapfarm_command({"status", run_}).out, HasSubstr("alarms      two answers"));
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::quarantine_test

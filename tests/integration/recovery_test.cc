@@ -10,8 +10,7 @@
 #include "tests/integration/run_program.h"
 #include "tests/unit/trials/shared_data.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::recovery_test {
 
 using ::testing::HasSubstr;
 
@@ -117,5 +116,4 @@ TEST_F(Recovery, ReachesTheRealForwardLog) {
   EXPECT_THAT(finished_.err, HasSubstr("run40.dat:172:15"));
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::recovery_test

@@ -13,8 +13,7 @@
 #include "tests/integration/demo_config.h"
 #include "tests/integration/run_program.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::run_folder_test {
 
 using ::testing::AllOf;
 using ::testing::HasSubstr;
@@ -193,5 +192,4 @@ TEST_F(RunFolder, ASecondMasterIsRefusedAndTheFirstGoesOn) {
   EXPECT_EQ(status(run_)["digest"], status(folder_ / "whole")["digest"]);
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::run_folder_test

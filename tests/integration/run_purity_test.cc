@@ -13,8 +13,7 @@
 #include "tests/integration/demo_config.h"
 #include "tests/integration/run_program.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::run_purity_test {
 
 using ::testing::ElementsAreArray;
 using ::testing::HasSubstr;
@@ -216,5 +215,4 @@ TEST_P(OptimiserPurity, HoldsForAnyNumberOfWorkersAndWhenKilled) {
               ElementsAreArray(one));
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::run_purity_test

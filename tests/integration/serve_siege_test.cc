@@ -18,8 +18,7 @@
 
 #include "tests/integration/run_program.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::serve_siege_test {
 
 using testing::HasSubstr;
 
@@ -169,5 +168,4 @@ TEST_F(Siege, PagesThatNobodyTakes) {
   expect_connected(std::to_string(connections) + " connections that take nothing");
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::serve_siege_test

@@ -16,8 +16,7 @@
 #include "tests/integration/demo_config.h"
 #include "tests/integration/run_program.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::soak_test {
 
 constexpr double kBetweenKills_s = 0.2;  // of workers, mean
 constexpr int kKilled = 128 + SIGKILL;
@@ -173,5 +172,4 @@ TEST_F(Soak, LeavesTheBytesOfAnUndisturbedRun) {
   std::printf("%ld generations; messages: %s", static_cast<long>(last), passed.out.c_str());
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::soak_test

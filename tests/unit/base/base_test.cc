@@ -7,8 +7,7 @@
 #include "common/base/result.h"
 #include "common/base/suggest.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::base_test {
 
 TEST(Hash, ReportsBoundariesAndBitsApart) {
   EXPECT_EQ(content_hash("abc"), content_hash("abc"));
@@ -34,5 +33,4 @@ TEST(Result, CarriesAValueOrAnError) {
   EXPECT_EQ(bad.error().message, "no");
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::base_test

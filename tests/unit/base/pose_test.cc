@@ -8,8 +8,7 @@
 #include "common/pose/segment.h"
 #include "common/random/stream.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::pose_test {
 
 Pose random_pose(Stream& stream) {
   return {stream.uniform(-2, 2), stream.uniform(-2, 2), stream.uniform(-3.1, 3.1)};
@@ -67,5 +66,4 @@ TEST(NearestOnSegment, IsTheFootOfThePerpendicularOrAnEnd) {
   EXPECT_DOUBLE_EQ(nearest_on_segment({4, 1}, from, from).distance, 3);
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::pose_test

@@ -6,8 +6,7 @@
 
 #include "common/random/stream.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::random_test {
 
 TEST(Stream, IsNamedByItsKeyAlone) {
   const StreamKey key{7, Purpose::kTest, 1, 2, 3};
@@ -53,5 +52,4 @@ TEST(Stream, PermutationsHoldEveryIndexOnce) {
   EXPECT_TRUE(stream.permutation(0).empty());
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::random_test

@@ -13,8 +13,7 @@
 #include "common/trials/read.h"
 #include "tests/unit/blind/worker_farm.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::blind_check_test {
 
 using ::testing::HasSubstr;
 namespace fs = std::filesystem;
@@ -230,5 +229,4 @@ TEST_F(BlindCheck, RunsOnForeignCases) {
   EXPECT_FALSE(run_foreign_check(folder_ / "nothing", "", settings_, hooks_).ok());
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::blind_check_test

@@ -9,8 +9,7 @@
 #include "master/farm/farm.h"
 #include "tests/unit/blind/worker_farm.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::children_test {
 
 class Children : public ::testing::Test {
  protected:
@@ -80,5 +79,4 @@ TEST_F(Children, AProgramThatIsNotThereIsAnError) {
   EXPECT_NE(status.error().message.find("/no/such/program"), std::string::npos);
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::children_test

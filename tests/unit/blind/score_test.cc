@@ -11,8 +11,7 @@
 #include "common/trials/files.h"
 #include "tests/unit/blind/worker_farm.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::score_test {
 
 struct Named {
   std::string name;
@@ -253,5 +252,4 @@ TEST(Truths, OfOthersMayUseText) {
   EXPECT_FALSE(parse_truth(R"({"effects": [], "answer": "none"})", "t", "").ok());
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::score_test

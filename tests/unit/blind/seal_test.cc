@@ -7,8 +7,7 @@
 #include "common/trials/files.h"
 #include "tests/unit/blind/worker_farm.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::seal_test {
 
 std::vector<SealedTruth> two_truths() {
   return {{"case001", random_salt(), "{\"answer\": \"none\"}"},
@@ -86,5 +85,4 @@ TEST(PrivateMemory, IsUndumpableWhileItLives) {
   EXPECT_EQ(::prctl(PR_GET_DUMPABLE), before);
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::seal_test

@@ -10,8 +10,7 @@
 #include "master/experiments/blind_check/cases/design.h"
 #include "tests/unit/blind/worker_farm.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::sizing_test {
 
 unsigned run_search(StrengthSearch& search,
                     const std::function<std::optional<double>(double)>& size) {
@@ -213,5 +212,4 @@ TEST(SizeLevel, TextAndNumbers) {
   EXPECT_FALSE(size_level("big").ok());
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::sizing_test

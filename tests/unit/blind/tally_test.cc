@@ -7,8 +7,7 @@
 
 #include "master/experiments/blind_check/tables.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::tally_test {
 
 using ::testing::HasSubstr;
 
@@ -106,5 +105,4 @@ TEST(Tables, HoldRatesAndCases) {
               HasSubstr("WRONG case004: null; reported effect backlash"));
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::tally_test

@@ -10,8 +10,7 @@
 #include "master/cli/app.h"
 #include "master/cli/completion_candidates.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::completion_test {
 
 using testing::Contains;
 using testing::ElementsAre;
@@ -159,5 +158,4 @@ TEST(ManualPage, HoldsEveryCommandAndNothingThatRoffWouldTakeForItsOwn) {
   EXPECT_THAT(page, Not(HasSubstr("--manual")));
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::completion_test

@@ -4,8 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::console_test {
 
 using Json = nlohmann::ordered_json;
 
@@ -53,5 +52,4 @@ TEST_F(ConsoleTest, ShowsNoErrorBehindAResult) {
   EXPECT_EQ(Json::parse(printed()), Json({{"same", false}}));
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::console_test

@@ -7,8 +7,7 @@
 
 #include "master/cli/app.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::examples_test {
 
 using testing::HasSubstr;
 using testing::StartsWith;
@@ -94,5 +93,4 @@ TEST(CliExamples, EveryCommandTakesJson) {
   }
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::examples_test

@@ -8,8 +8,7 @@
 #include "common/trials/files.h"
 #include "tests/unit/trials/trial_text.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::outputs_test {
 
 using testing::HasSubstr;
 
@@ -105,5 +104,4 @@ TEST(Outputs, DoesNotMixWhatFoldersAreFor) {
   EXPECT_THAT(message_of(forced().plan_in(run, {"model.toml"})), HasSubstr("holds a run"));
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::outputs_test

@@ -3,8 +3,7 @@
 #include "master/command/provenance.h"
 #include "tests/unit/trials/trial_text.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::stamp_test {
 
 using testing::HasSubstr;
 
@@ -67,5 +66,4 @@ TEST_F(Stamp, KeepsAnotherBuildsResult) {
   EXPECT_EQ(compared(true), "same");
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::stamp_test

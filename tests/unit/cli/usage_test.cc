@@ -5,8 +5,7 @@
 #include "common/base/suggest.h"
 #include "master/cli/app.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::usage_test {
 
 using testing::HasSubstr;
 
@@ -59,5 +58,4 @@ TEST(Suggest, CountsSwappedLettersAsOneSlip) {
   EXPECT_EQ(nearest_word("cheese", known), "");
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::usage_test

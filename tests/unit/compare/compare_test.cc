@@ -13,8 +13,7 @@
 #include "master/evolve/optimisers.h"
 #include "master/experiments/compare/summary.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::compare_test {
 
 using testing::HasSubstr;
 using testing::Not;
@@ -180,5 +179,4 @@ TEST_F(ComparisonFile, MistakesNameTheVariant) {
               HasSubstr("seeds"));
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::compare_test

@@ -7,8 +7,7 @@
 
 #include "common/trials/files.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::config_test {
 
 using testing::AllOf;
 using testing::ElementsAre;
@@ -298,5 +297,4 @@ TEST(Config, TheDocumentationIsTrue) {
   }
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::config_test

@@ -10,8 +10,7 @@
 #include "common/random/stream.h"
 #include "tests/unit/trials/trial_text.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::model_test {
 
 using testing::HasSubstr;
 using testing::StartsWith;
@@ -167,5 +166,4 @@ TEST(Model, IsNotWrittenWhenItWouldNotReadBack) {
   EXPECT_FALSE(std::filesystem::exists(folder.path("model.toml")));
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::model_test

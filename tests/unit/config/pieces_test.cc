@@ -5,8 +5,7 @@
 #include "common/config/config.h"
 #include "common/config/model.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::pieces_test {
 
 using testing::HasSubstr;
 
@@ -62,5 +61,4 @@ TEST(Pieces, AModelReadsBackAsItWas) {
   EXPECT_EQ(format_model(*again), format_model(model));
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::pieces_test

@@ -8,8 +8,7 @@
 #include "common/config/config.h"
 #include "common/random/stream.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::determine_test {
 
 using testing::HasSubstr;
 
@@ -157,5 +156,4 @@ TEST(Determine, RefusesWhatItCannotAnswer) {
   EXPECT_THAT(determine(problem, {0.5}, failing, {}).error().message, HasSubstr("nothing"));
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::determine_test

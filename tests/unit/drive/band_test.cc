@@ -9,8 +9,7 @@
 
 #include "common/random/stream.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::band_test {
 
 // A wavy line whose amplitude, drift and heading are drawn.
 DrivenRun drawn_run(std::uint64_t seed, double heading = 0) {
@@ -98,5 +97,4 @@ TEST(FloorPath, KeepsPointsApartAndTheEnd) {
   EXPECT_NEAR(points.back().x(), 0.1, 1e-12);
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::band_test

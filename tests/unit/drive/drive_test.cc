@@ -10,8 +10,7 @@
 #include "master/experiments/drive/drive_report.h"
 #include "tests/unit/blind/worker_farm.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::drive_drive_test {
 
 using ::testing::HasSubstr;
 
@@ -149,5 +148,4 @@ TEST(WaypointLog, ReportsTargetsFromPoses) {
   EXPECT_THAT(parse_waypoint_log("", "w.log").error().message, HasSubstr("WAYPOINTS"));
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::drive_drive_test

@@ -6,8 +6,7 @@
 #include "tests/unit/evolve/members_digest.h"
 #include "tests/unit/evolve/toy_problems.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::evolve_test {
 
 class FakeClock : public EvolveClock {
  public:
@@ -200,5 +199,4 @@ TEST_F(EvolveTest, AGenerationOfFailuresReachesNoTarget) {
   EXPECT_EQ(go().value().reason, StopReason::kGenerations);
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::evolve_test

@@ -11,8 +11,7 @@
 #include "tests/unit/evolve/members_digest.h"
 #include "tests/unit/evolve/toy_problems.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::genetic_test {
 
 EvolutionSettings settings_with(unsigned population = 40) {
   EvolutionSettings settings;
@@ -324,5 +323,4 @@ TEST(Noise, EveryReplicateIsFreshAndTheirNumberIsLimited) {
   }
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::genetic_test

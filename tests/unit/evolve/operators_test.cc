@@ -13,8 +13,7 @@
 #include "master/evolve/individual.h"
 #include "tests/unit/evolve/toy_problems.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::operators_test {
 
 constexpr int kLoops = 500;
 
@@ -332,5 +331,4 @@ TEST(Roulette, PicksAsOftenAsItReports) {
   EXPECT_EQ(others[0], 10000);
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::operators_test

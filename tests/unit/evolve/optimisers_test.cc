@@ -11,8 +11,7 @@
 #include "tests/unit/evolve/members_digest.h"
 #include "tests/unit/evolve/toy_problems.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::optimisers_test {
 
 EvolutionSettings settings_for(OptimiserKind kind) {
   EvolutionSettings settings;
@@ -237,5 +236,4 @@ TEST_P(EveryOptimiser, RefusesForeignAndDamagedStates) {
   EXPECT_THAT(restore_optimiser(other, state).error().message, testing::HasSubstr("\"random\""));
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::optimisers_test

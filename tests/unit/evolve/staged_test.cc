@@ -11,8 +11,7 @@
 #include "tests/unit/evolve/members_digest.h"
 #include "tests/unit/evolve/toy_problems.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::staged_test {
 
 using testing::HasSubstr;
 
@@ -135,5 +134,4 @@ TEST(StagePlan, IsReadFromTheConfigsText) {
               HasSubstr("evaluations"));
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::staged_test

@@ -2,8 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::time_left_test {
 
 EvolutionSettings to_generation(std::uint64_t generations) {
   EvolutionSettings settings;
@@ -51,5 +50,4 @@ TEST(TimeLeft, IsUntilTheFirstConditionThatCanBeForeseen) {
   EXPECT_EQ(time_left_s(settings, pace).value(), 0);
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::time_left_test

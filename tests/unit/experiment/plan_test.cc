@@ -6,8 +6,7 @@
 #include "master/farm/planned_trials.h"
 #include "tests/unit/worker/problems.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::plan_test {
 
 std::vector<Trial> drawn(const SimulateSettings& settings, std::uint64_t seed = 5) {
   std::vector<Trial> trials;
@@ -67,5 +66,4 @@ TEST(Plan, OneSeedIsOnePlan) {
   EXPECT_NE(drawn(settings)[7].left, drawn(settings, 6)[7].left);
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::plan_test

@@ -11,8 +11,7 @@
 #include "common/external/simulator.h"
 #include "worker/evaluate.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::external_scenario_test {
 
 using testing::HasSubstr;
 
@@ -174,5 +173,4 @@ TEST_F(ExternalScenario, DrivesByMujoco) {
   EXPECT_EQ(end(3).x, end(0).x);
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::external_scenario_test

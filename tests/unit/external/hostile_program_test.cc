@@ -6,8 +6,7 @@
 #include "common/external/simulator.h"
 #include "common/process/process_pool.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::hostile_program_test {
 
 using testing::AllOf;
 using testing::HasSubstr;
@@ -168,5 +167,4 @@ TEST(ExternalSimulator, RefusesOneThatDeclaresSomethingElseThanBefore) {
   EXPECT_THAT(result.error().message, HasSubstr("declares other things"));
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::hostile_program_test

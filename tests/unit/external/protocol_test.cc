@@ -8,8 +8,7 @@
 
 #include "common/parameters/genome.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::protocol_test {
 
 using testing::HasSubstr;
 
@@ -135,5 +134,4 @@ TEST(ExternalRequest, HoldsWhatTheProgramDeclaredAndNothingElse) {
   EXPECT_EQ(json["duration"], 2);
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::protocol_test

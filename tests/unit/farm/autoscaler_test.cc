@@ -4,8 +4,7 @@
 
 #include "tests/bench/fleet_simulation.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::autoscaler_test {
 
 std::vector<FleetJob> jobs(unsigned count, JobState state, double since_s, bool joined = true,
                            bool idle = false) {
@@ -183,5 +182,4 @@ TEST(Autoscaler, TenThousandWorkersCostLittleMoreThanAnOracle) {
   }
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::autoscaler_test

@@ -2,8 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::farm_model_test {
 
 // The machine repairman with exponential times, exactly: Erlang's formula for a finite source.
 double repairman_rate(unsigned machines, double working_s, double repair_s) {
@@ -103,5 +102,4 @@ TEST(FarmModel, AWindowHidesTheWayToTheMaster) {
   EXPECT_GT(before, 0.9);
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::farm_model_test

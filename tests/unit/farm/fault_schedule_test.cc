@@ -8,8 +8,7 @@
 
 #include "tests/unit/farm/simulated_farm.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::fault_schedule_test {
 
 using ::testing::HasSubstr;
 
@@ -147,5 +146,4 @@ TEST(FaultSchedules, AQuarantineNamesTheTaskAndThreeWorkers) {
   EXPECT_THAT(farm.alarms()[0].text, HasSubstr("host-1 hung"));
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::fault_schedule_test

@@ -7,8 +7,7 @@
 
 #include "master/farm/scheduler.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::fleet_messages_test {
 
 class FleetMessages : public testing::Test {
  protected:
@@ -147,5 +146,4 @@ TEST_F(FleetMessages, ASuspendedWorkersTasksGoToOthersAndItIsWelcomedBack) {
   EXPECT_EQ(scheduler_.workers().size(), 2u);
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::fleet_messages_test

@@ -2,8 +2,7 @@
 
 #include <gmock/gmock.h>
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::master_wait_test {
 
 using testing::HasSubstr;
 
@@ -31,5 +30,4 @@ TEST(MasterWait, ReportsComingAndGoing) {
   EXPECT_THAT(*wait.message(true, 1003), HasSubstr("working"));
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::master_wait_test

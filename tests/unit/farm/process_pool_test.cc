@@ -11,8 +11,7 @@
 #include "common/process/stop.h"
 #include "master/farm/local_workers.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::process_pool_test {
 
 ProcessPoolOptions shell(const std::string& script, std::vector<std::string>* replaced = nullptr) {
   ProcessPoolOptions options;
@@ -112,5 +111,4 @@ TEST(Stop, ASignalMakesTheDescriptorReadable) {
   EXPECT_EQ(poll(&polled, 1, 0), 0);
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::process_pool_test

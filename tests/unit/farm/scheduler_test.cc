@@ -10,8 +10,7 @@
 #include "common/net/envelope.h"
 #include "common/problem/problem.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::scheduler_test {
 
 std::vector<v1::Task> echo_tasks(std::size_t count) {
   std::vector<v1::Task> tasks(count);
@@ -382,5 +381,4 @@ TEST(Scheduler, RefusesAWorkerWhoseAnswerIsNone) {
   ASSERT_EQ(again.size(), 2u);
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::scheduler_test

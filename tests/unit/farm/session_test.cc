@@ -4,8 +4,7 @@
 
 #include "common/base/hash.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::session_test {
 
 WorkerSession welcomed(std::uint64_t epoch = 3) {
   SessionOptions options;
@@ -153,5 +152,4 @@ TEST(Session, ARefusalIsFinal) {
   EXPECT_TRUE(session.take_outbox().empty());
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::session_test

@@ -7,8 +7,7 @@
 
 #include "master/farm/sites/fleet.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::site_test {
 
 ClusterSite shipped_site(const std::string& system) {
   const std::string path = std::string(GAPFARM_SOURCE_DIR) + "/configs/sites/" + system + ".toml";
@@ -234,5 +233,4 @@ TEST(Fleets, ShowTheLogOfWhatDiedAtOnceAndBackOff) {
   EXPECT_GE(farm.fleet->status().lost, 4u);
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::site_test

@@ -15,8 +15,7 @@
 #include "tests/unit/worker/push_problem.h"
 #include "worker/evaluate.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::golden_test {
 
 // Of the functions that the simulation calls from the C library.
 std::string arithmetic_class() {
@@ -139,5 +138,4 @@ TEST(Golden, Pushes) { expect_stored("push", golden_with_effects(tests::push_pro
 TEST(Golden, Racquetball) { expect_stored("racquetball", golden(racquetball(), Asked::kPaths)); }
 TEST(Golden, Ground) { expect_stored("ground", golden(ground())); }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::golden_test

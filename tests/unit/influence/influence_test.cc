@@ -9,8 +9,7 @@
 #include "tests/unit/blind/worker_farm.h"
 #include "tests/unit/worker/push_problem.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::influence_test {
 
 using ::testing::HasSubstr;
 using ::testing::Not;
@@ -156,5 +155,4 @@ TEST(PushPaths, FollowEveryCornerOfEveryPush) {
   EXPECT_LT(*end_spread(*calmer), *spread / 3);
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::influence_test

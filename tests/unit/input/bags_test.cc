@@ -11,8 +11,7 @@
 #include "master/io/logs/decompress.h"
 #include "master/io/logs/to_runs.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::bags_test {
 
 namespace fs = std::filesystem;
 using testing::Contains;
@@ -110,5 +109,4 @@ TEST(RealBag, HoldsWhatAnotherReaderCounted) {
   EXPECT_NEAR(poses.at(poses.rows() - 1, 0), 1649348600.988, 0.1);
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::bags_test

@@ -10,8 +10,7 @@
 #include "common/trials/files.h"
 #include "master/io/logs/to_runs.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::tables_test {
 
 using testing::ElementsAre;
 using testing::HasSubstr;
@@ -147,5 +146,4 @@ TEST(Tables, WheelSpeedsAreReadBesideCommands) {
   EXPECT_FALSE(read_wheel_speeds(folder + "/wheels.csv", &*log));
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::tables_test

@@ -10,8 +10,7 @@
 #include "master/io/logs/bags.h"
 #include "master/io/logs/to_runs.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::text_log_test {
 
 using testing::Contains;
 using testing::ElementsAre;
@@ -198,5 +197,4 @@ TEST(RunFilesOfImports, AreReadAsTheyWereWritten) {
   EXPECT_NEAR(log->runs[0].commands[1].values[1], -0.2, 1e-9);
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::text_log_test

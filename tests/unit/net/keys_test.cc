@@ -11,8 +11,7 @@
 
 #include "common/net/socket.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::keys_test {
 
 namespace fs = std::filesystem;
 using testing::HasSubstr;
@@ -149,5 +148,4 @@ TEST(LinkSecurity, AWorkerDoesNotConnectWithoutKeysUnlessReported) {
   EXPECT_TRUE(DealerSocket::connect("tcp://127.0.0.1:1", options).ok());
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::keys_test

@@ -7,8 +7,7 @@
 #include "master/farm/planned_trials.h"
 #include "tests/unit/blind/worker_farm.h"
 
-namespace gapfarm::plan {
-namespace {
+namespace gapfarm::plan::design_test {
 
 class DesignTest : public ::testing::Test {
  protected:
@@ -129,5 +128,4 @@ TEST_F(DesignTest, SeesNoLagInRestPoses) {
   }
 }
 
-}  // namespace
-}  // namespace gapfarm::plan
+}  // namespace gapfarm::plan::design_test

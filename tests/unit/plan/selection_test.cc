@@ -8,8 +8,7 @@
 
 #include "common/random/stream.h"
 
-namespace gapfarm::plan {
-namespace {
+namespace gapfarm::plan::selection_test {
 
 using ::testing::ElementsAre;
 
@@ -94,5 +93,4 @@ TEST(Power, RisesFromTheLevelAndInverts) {
   EXPECT_EQ(noncentrality_for(0.01, 3.841, 1), 0);
 }
 
-}  // namespace
-}  // namespace gapfarm::plan
+}  // namespace gapfarm::plan::selection_test

@@ -4,8 +4,7 @@
 
 #include "common/progress/number_text.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::overall_progress_test {
 
 using testing::HasSubstr;
 using testing::Not;
@@ -132,5 +131,4 @@ TEST(Text, AShareIsWholeOnlyAtTheEnd) {
   EXPECT_EQ(format_duration(3725), "1 h 02 min");
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::overall_progress_test

@@ -2,8 +2,7 @@
 
 #include <gmock/gmock.h>
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::worker_wait_test {
 
 using testing::AllOf;
 using testing::HasSubstr;
@@ -27,5 +26,4 @@ TEST(WorkerWait, OwnWorkersHaveNoAddressToConnectTo) {
   EXPECT_THAT(*wait.message(0, 40), AllOf(HasSubstr("local workers"), Not(HasSubstr("--connect"))));
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::worker_wait_test

@@ -8,8 +8,7 @@
 
 #include "tests/unit/report/example_diagnosis.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::diagnosis_json_test {
 
 using ::testing::HasSubstr;
 using Json = nlohmann::ordered_json;
@@ -175,5 +174,4 @@ TEST(DiagnosisJson, ReplacesBytesThatAreNotText) {
   EXPECT_EQ(back->headline, "battery \xEF\xBF\xBD sag");
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::diagnosis_json_test

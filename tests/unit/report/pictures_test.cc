@@ -14,8 +14,7 @@
 #include "master/report/figures/fitness_chart.h"
 #include "master/report/figures/pose_picture.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::pictures_test {
 
 using ::testing::HasSubstr;
 using ::testing::Not;
@@ -134,5 +133,4 @@ TEST(FitnessChart, ShowsARunOfEitherSense) {
   parse(fitness_chart({{1, 2.0, 2.0, 2.0}}, "t", "f", "", true));
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::pictures_test

@@ -14,8 +14,7 @@
 #include "master/report/run/run_report.h"
 #include "tests/unit/report/example_diagnosis.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::report_html_test {
 
 using ::testing::HasSubstr;
 using ::testing::Not;
@@ -258,5 +257,4 @@ TEST(ReportHtml, StandsWhatIsNotANumber) {
   EXPECT_THAT(html, Not(HasSubstr(">nan")));
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::report_html_test

@@ -7,8 +7,7 @@
 #include <cmath>
 #include <sstream>
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::svg_test {
 
 using ::testing::DoubleNear;
 using ::testing::ElementsAre;
@@ -49,5 +48,4 @@ TEST(TickLabel, HasTheDigitsItNeeds) {
   EXPECT_EQ(tick_label(-1e-17, 0.1), "0");
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::svg_test

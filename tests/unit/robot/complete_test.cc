@@ -6,8 +6,7 @@
 
 #include "common/robot/robot.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::complete_test {
 
 GroundRobot sides(DriveKind drive) {
   GroundRobot robot;
@@ -68,5 +67,4 @@ TEST(CompleteRobot, RefusesAChannelThatTheRobotDoesNotHave) {
   EXPECT_NE(status.error().message.find("middle"), std::string::npos);
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::complete_test

@@ -5,8 +5,7 @@
 
 #include <cmath>
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::robot_drive_test {
 
 GroundRobot robot() {
   GroundRobot robot;
@@ -99,5 +98,4 @@ TEST(RobotDrive, AThrottleSettlesWhereItsForcesBalance) {
   EXPECT_NEAR(drive.curvature(), std::tan(0.21) / 0.17, 1e-9);
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::robot_drive_test

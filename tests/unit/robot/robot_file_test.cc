@@ -8,8 +8,7 @@
 #include "common/recordings/read.h"
 #include "common/trials/files.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::robot_file_test {
 
 constexpr const char* kSkid = R"(
 drive = "skid"
@@ -132,5 +131,4 @@ TEST_F(Runs, ARunWithoutCommandsIsRefused) {
   EXPECT_NE(log.error().message.find("'3'"), std::string::npos) << log.error().message;
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::robot_file_test

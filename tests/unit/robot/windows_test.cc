@@ -8,8 +8,7 @@
 
 #include "common/recordings/restart.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::windows_test {
 
 // Poses every `interval_s` of a robot on a circle at 0.5 m/s and 0.25 rad/s.
 LoggedRun circle(double lasts_s, double interval_s, double commanded = 1) {
@@ -124,5 +123,4 @@ TEST(Windows, BeginAgainAtTheSpeedMeasuredThere) {
   }
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::windows_test

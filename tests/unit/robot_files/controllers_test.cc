@@ -5,8 +5,7 @@
 
 #include "master/io/robot_files/understand.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::controllers_test {
 
 using testing::ElementsAre;
 using testing::HasSubstr;
@@ -100,5 +99,4 @@ TEST(Controllers, AliasesOfAliasesEnd) {
   EXPECT_THAT(error_of(bomb), HasSubstr("expected"));
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::controllers_test

@@ -9,8 +9,7 @@
 #include "common/trials/files.h"
 #include "master/io/robot_files/robot_text.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::real_files_test {
 
 namespace fs = std::filesystem;
 
@@ -85,5 +84,4 @@ TEST(RealUrdfs, SizesAreTheRobots) {
   }
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::real_files_test

@@ -9,8 +9,7 @@
 #include "master/io/robot_files/robot_text.h"
 #include "tests/unit/robot_files/sample_urdf.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::understand_test {
 
 using testing::Contains;
 using testing::DoubleNear;
@@ -306,5 +305,4 @@ TEST(RobotPicture, ShowsWheelsAndMass) {
   EXPECT_THAT(text, HasSubstr("joint 'left_wheel'"));
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::understand_test

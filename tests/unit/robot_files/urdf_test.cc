@@ -6,8 +6,7 @@
 #include "master/io/robot_files/urdf/xacro_text.h"
 #include "tests/unit/robot_files/sample_urdf.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::urdf_test {
 
 using testing::HasSubstr;
 using testing::StartsWith;
@@ -100,5 +99,4 @@ TEST(Urdf, PutsSimpleXacroInAndRefusesMacros) {
   EXPECT_THAT(error_of(robot_xml(body_link("${prefix}base"))), HasSubstr("xacro FILE >"));
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::urdf_test

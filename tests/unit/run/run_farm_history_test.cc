@@ -3,8 +3,7 @@
 
 #include <gmock/gmock.h>
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::run_farm_history_test {
 
 using testing::HasSubstr;
 
@@ -58,5 +57,4 @@ TEST(Timeline, StaysSmall) {
   EXPECT_TRUE(timeline.spans.empty());
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::run_farm_history_test

@@ -12,8 +12,7 @@
 #include "master/store/run_store.h"
 #include "tests/unit/run/config_of_run.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::run_page_test {
 
 namespace fs = std::filesystem;
 using testing::HasSubstr;
@@ -150,5 +149,4 @@ TEST_F(RunPage, ShowsWhatDetermineLeft) {
   EXPECT_THAT(page, testing::Not(testing::ContainsRegex(", 90 % [0-9]")));
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::run_page_test

@@ -12,8 +12,7 @@
 #include "tests/unit/run/config_of_run.h"
 #include "tests/unit/worker/ground_problem.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::run_test {
 
 using testing::ElementsAre;
 using testing::HasSubstr;
@@ -273,5 +272,4 @@ TEST(Overrides, OutrankWhatWasStoredAndComeBackFromJson) {
   EXPECT_EQ(EvolutionOverrides::from_json("[1]").generations, std::nullopt);
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::run_test

@@ -10,8 +10,7 @@
 #include "common/random/stream.h"
 #include "master/io/log_checks/finding_text.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::sanity_test {
 
 constexpr double kPi = std::numbers::pi;
 
@@ -244,5 +243,4 @@ TEST(Sanity, EveryFindingHasAPhrase) {
   }
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::sanity_test

@@ -4,8 +4,7 @@
 
 #include <cmath>
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::algebra_test {
 
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
@@ -50,5 +49,4 @@ TEST(Algebra, OrthonormalColumnsSpanTheirs) {
   EXPECT_LT((q * (q.transpose() * columns) - columns).norm(), 1e-12);
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::algebra_test

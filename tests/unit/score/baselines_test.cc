@@ -10,8 +10,7 @@
 #include "common/trials/read.h"
 #include "tests/unit/trials/shared_data.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::baselines_test {
 
 using ::testing::HasSubstr;
 
@@ -138,5 +137,4 @@ TEST(Baselines, ConstantMotionOfTheRealForwardLog) {
   EXPECT_NEAR(mean_of(baseline_scores(*b, *a, kCommands)->front()), 6.492, 0.005);
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::baselines_test

@@ -7,8 +7,7 @@
 
 #include "common/random/stream.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::bounded_minimum_test {
 
 struct BoxProblem {
   Eigen::MatrixXd a;
@@ -76,5 +75,4 @@ TEST(BoundedMinimum, WithoutBoundsItIsTheSolution) {
   EXPECT_LT((p.a * x - p.b).norm(), 1e-9 * (1 + p.b.norm()));
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::bounded_minimum_test

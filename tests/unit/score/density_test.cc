@@ -8,8 +8,7 @@
 
 #include "common/random/stream.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::density_test {
 
 Eigen::Matrix3d example_covariance() {
   Eigen::Matrix3d S;
@@ -163,5 +162,4 @@ TEST(EnergyScore, EnsembleApproachesTheGaussian) {
   EXPECT_NEAR(ensemble_energy_score({0, 0, 1}, {Eigen::Vector3d::Zero()}), kHeadingLength_m, 1e-15);
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::density_test

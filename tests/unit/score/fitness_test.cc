@@ -11,8 +11,7 @@
 #include "common/score/motion_model.h"
 #include "common/score/robust_distance.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::fitness_test {
 
 using std::numbers::pi;
 
@@ -198,5 +197,4 @@ TEST_F(MotionModelTest, GroupsByDutyAndDuration) {
   EXPECT_FALSE(MotionModel::mine({}, commands_).ok());
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::fitness_test

@@ -4,8 +4,7 @@
 
 #include <cmath>
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::laws_test {
 
 // Values of statistical tables.
 TEST(Laws, AgreeWithTables) {
@@ -55,5 +54,4 @@ TEST(Laws, InfinityIsALimit) {
   EXPECT_LE(normal_above(infinity), 1);
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::laws_test

@@ -9,8 +9,7 @@
 #include <numbers>
 #include <numeric>
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::mcd_test {
 
 Stream stream(std::uint64_t seed, Purpose purpose = Purpose::kTest) {
   return Stream({.run_seed = seed, .purpose = purpose});
@@ -209,5 +208,4 @@ TEST(RobustPose, HeadingsNearHalfATurnDoNotWrap) {
   EXPECT_NEAR(std::sqrt(zero.covariance(2, 2)), 0.1, 0.04);
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::mcd_test

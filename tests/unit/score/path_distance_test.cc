@@ -13,8 +13,7 @@
 #include "common/trials/text/csv.h"
 #include "tests/unit/trials/shared_data.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::path_distance_test {
 
 using Points = std::vector<PathPoint>;
 
@@ -169,5 +168,4 @@ TEST(PublishedPaths, AreReproduced) {
   EXPECT_EQ(files, 22);
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::path_distance_test

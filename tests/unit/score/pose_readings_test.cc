@@ -6,8 +6,7 @@
 
 #include "common/random/stream.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::pose_readings_test {
 
 double rounded(double value, double step) {
   return step > 0 ? step * std::round(value / step) : value;
@@ -115,5 +114,4 @@ TEST(StaleFrames, AreNoneOfSoundTracksOfRestingRobotsAndOfCoarseDigits) {
   EXPECT_EQ(count_stale({}, 0).share, 0);
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::pose_readings_test

@@ -5,8 +5,7 @@
 
 #include <cmath>
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::rank_tests_test {
 
 using testing::ElementsAre;
 
@@ -96,5 +95,4 @@ TEST(WilsonInterval, KnownValues) {
   EXPECT_NEAR(half.lower, 0.2993, 1e-4);
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::rank_tests_test

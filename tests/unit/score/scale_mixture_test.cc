@@ -8,8 +8,7 @@
 
 #include "common/score/density.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::scale_mixture_test {
 
 Eigen::Matrix3d drive_covariance() {
   Eigen::Matrix3d S;
@@ -147,5 +146,4 @@ TEST(TailScale, IsDrawnByItsWeight) {
   EXPECT_EQ(a.bits(), b.bits()) << "a Gaussian draws nothing";
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::scale_mixture_test

@@ -7,8 +7,7 @@
 #include <numbers>
 #include <numeric>
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::statistics_test {
 
 using testing::DoubleNear;
 using testing::ElementsAre;
@@ -88,5 +87,4 @@ TEST(Corrections, MatchHandComputedValues) {
   EXPECT_THAT(holm(std::vector<double>{0.9, 0.8}), ElementsAre(1, 1));
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::statistics_test

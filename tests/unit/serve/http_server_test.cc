@@ -13,8 +13,7 @@
 
 #include "common/process/stop.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::http_server_test {
 
 using testing::HasSubstr;
 using testing::StartsWith;
@@ -272,5 +271,4 @@ TEST_F(Served, ReportsWhenAPortIsTaken) {
   EXPECT_THAT(second.error().message, HasSubstr("choose another --port"));
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::http_server_test

@@ -2,8 +2,7 @@
 
 #include <gmock/gmock.h>
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::request_test {
 
 using testing::ElementsAre;
 
@@ -63,5 +62,4 @@ TEST(Refusal, LetsReadersOfThisMachineThrough) {
   EXPECT_EQ(refusal({"GET", "/%", "localhost", ""})->status, 400u);
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::request_test

@@ -10,8 +10,7 @@
 #include "master/store/command_record.h"
 #include "tests/unit/store/store_fixture.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::site_test {
 
 using testing::HasSubstr;
 using testing::Not;
@@ -228,5 +227,4 @@ TEST_F(SiteTest, FiguresHaveLabels) {
   EXPECT_THAT(text, HasSubstr("gapfarm_workers" + label + ",state=\"busy\"} 1\n"));
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::site_test

@@ -5,8 +5,7 @@
 
 #include "tests/unit/sim/sim_test_util.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::corners_test {
 
 constexpr int kDimensions = 12;
 constexpr int kShards = 8;
@@ -69,5 +68,4 @@ TEST_P(Corners, WheelsEndWithANamedOutcome) {
 
 INSTANTIATE_TEST_SUITE_P(Shards, Corners, testing::Range(0u, static_cast<unsigned>(kShards)));
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::corners_test

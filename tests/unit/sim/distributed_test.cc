@@ -7,8 +7,7 @@
 #include "worker/sim/push/face.h"
 #include "worker/sim/push/face_step.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::distributed_test {
 
 constexpr double kEarth_m_s2 = 9.81;
 
@@ -316,5 +315,4 @@ TEST(FaceStep, TakesFewIterationsAStep) {
   EXPECT_LT(step.iterations(), 50 * 6);
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::distributed_test

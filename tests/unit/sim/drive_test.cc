@@ -4,8 +4,7 @@
 
 #include <cmath>
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::sim_drive_test {
 
 TEST(SideMotion, WithoutLagTravelsAtSpeedUntilTheStop) {
   const SideMotion side({0.2, 0, 0}, 1.0);
@@ -59,5 +58,4 @@ TEST(SideMotion, MotorIsStillAfterTheStillTime) {
   EXPECT_LT(0.28 - side.travel(after), SideMotion::kStillSpeed_m_s * 0.2 * 1.001);
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::sim_drive_test

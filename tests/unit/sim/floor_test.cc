@@ -5,8 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::floor_test {
 
 using Eigen::Vector2d;
 
@@ -100,5 +99,4 @@ TEST(Floor, RatiosOfPatchesThatOverlapMultiply) {
   EXPECT_EQ(patch_factor(floor, 0.15, 0.3), 1);
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::floor_test

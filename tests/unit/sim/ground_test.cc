@@ -3,8 +3,7 @@
 
 #include "tests/unit/sim/ground_robots.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::sim_ground_test {
 
 using std::numbers::pi;
 using tests::completed;
@@ -264,5 +263,4 @@ TEST(Ground, StandingCostsNothingAndChangesNothing) {
   EXPECT_NEAR(motion.samples[1].X_SR.x, kV, 2 * kStart);
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::sim_ground_test

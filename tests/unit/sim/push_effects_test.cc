@@ -3,8 +3,7 @@
 
 #include "tests/unit/sim/push_test_util.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::push_effects_test {
 
 constexpr double kGravity = 9.81;
 
@@ -146,5 +145,4 @@ TEST_P(PushEffects, FingerComplianceAPieceStaysBehindByForceTimesCompliance) {
   EXPECT_NEAR(stiff - soft, settings.finger_compliance_m_n * force, 4e-4);
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::push_effects_test

@@ -9,8 +9,7 @@
 #include "worker/sim/push/outline.h"
 #include "worker/sim/push/push_world.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::push_test {
 
 constexpr double kGravity = 9.81;
 
@@ -226,5 +225,4 @@ TEST(LimitSurface, AgreesWithBulletOnASlowPush) {
   EXPECT_NEAR(bullet.X_SE.theta, surface.X_SE.theta, 0.15);
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::push_test

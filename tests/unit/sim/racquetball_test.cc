@@ -4,8 +4,7 @@
 
 #include <cmath>
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::racquetball_test {
 
 // Nothing that slows it down, and no hit before the far wall, 17 m away.
 RacquetballSettings free_flight() {
@@ -119,5 +118,4 @@ TEST(Racquetball, EveryShapeAndCornerStaysFinite) {
   }
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::racquetball_test

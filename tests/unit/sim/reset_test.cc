@@ -5,8 +5,7 @@
 
 #include "tests/unit/sim/sim_test_util.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::reset_test {
 
 struct Task {
   DriveInput drive;
@@ -82,5 +81,4 @@ INSTANTIATE_TEST_SUITE_P(Models, Reset, testing::Values(RobotModel::kTreads, Rob
                            return instance.param == RobotModel::kTreads ? "treads" : "wheels";
                          });
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::reset_test

@@ -8,8 +8,7 @@
 
 #include "tests/unit/sim/sim_test_util.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::smooth_test {
 
 struct Point {
   SimSettings settings = srv1_settings();
@@ -100,5 +99,4 @@ INSTANTIATE_TEST_SUITE_P(Axes, Smooth, testing::Range<std::size_t>(0, axes().siz
                            return std::string(axes()[instance.param].name);
                          });
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::smooth_test

@@ -2,8 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::step_plan_test {
 
 constexpr double kStep_s = 1.0 / 240;
 
@@ -42,5 +41,4 @@ TEST(StepPlan, DeadTravelLongerThanTheDriveIsNoEvent) {
   EXPECT_EQ(SideMotion({0.1, 0, 0.2}, 1).onset_time(), 0);
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::step_plan_test

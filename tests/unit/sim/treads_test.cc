@@ -5,8 +5,7 @@
 
 #include "tests/unit/sim/sim_test_util.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::treads_test {
 
 TEST(Treads, StraightDistanceIsSpeedTimesDuration) {
   // At a = mu g the body takes v / a to reach the treads' speed and as long to stop, so what is
@@ -342,5 +341,4 @@ TEST(Treads, PathStartsAtTheOriginAndEndsAtRest) {
       << "looking does not change the motion";
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::treads_test

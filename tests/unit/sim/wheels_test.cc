@@ -4,8 +4,7 @@
 
 #include "tests/unit/sim/sim_test_util.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::wheels_test {
 
 SimSettings wheels(WheelShape shape = WheelShape::kSphere) {
   SimSettings settings = srv1_settings();
@@ -77,5 +76,4 @@ TEST(Wheels, BrakedWheelsHoldOnASlope) {
   EXPECT_LT(distance_m(motion.X_SE, {}), 2e-3);
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::wheels_test

@@ -7,8 +7,7 @@
 #include "master/store/recorded_farm.h"
 #include "tests/unit/store/store_fixture.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::answer_store_test {
 
 using testing::HasSubstr;
 
@@ -174,5 +173,4 @@ TEST_F(AnswerStoreTest, FilesOfAnotherKindAreLeftAlone) {
   EXPECT_THAT(foreign.error().message, HasSubstr("another kind (application id 7"));
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::answer_store_test

@@ -10,8 +10,7 @@
 #include "master/store/run_lock.h"
 #include "tests/unit/store/store_fixture.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::command_record_test {
 
 using testing::HasSubstr;
 
@@ -117,5 +116,4 @@ TEST_F(CommandRecordTest, ForgettingTakesAnswersOutOfTheFileAndLeavesTheRecord) 
   EXPECT_NE(bytes.find("compared"), bytes.npos);
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::command_record_test

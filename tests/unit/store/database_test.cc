@@ -7,8 +7,7 @@
 
 #include "tests/unit/store/store_fixture.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::database_test {
 
 using ::testing::HasSubstr;
 
@@ -76,5 +75,4 @@ TEST_F(DatabaseTest, ChangesNothingThroughAQueryOnlyConnection) {
   EXPECT_FALSE(std::filesystem::exists(folder_ / "absent.sqlite"));
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::database_test

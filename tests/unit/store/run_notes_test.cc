@@ -4,8 +4,7 @@
 #include "master/store/run_reader.h"
 #include "tests/unit/store/store_fixture.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::run_notes_test {
 
 class RunNotesTest : public StoreTest {
  protected:
@@ -53,5 +52,4 @@ TEST_F(RunNotesTest, FindsAMemberByItsNumber) {
   EXPECT_TRUE(reader->given_up(10)->empty());
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::run_notes_test

@@ -8,8 +8,7 @@
 
 #include "tests/unit/store/store_fixture.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::run_status_test {
 
 using ::testing::HasSubstr;
 
@@ -113,5 +112,4 @@ TEST_F(RunStatusTest, JsonHasTheFieldsOfTheContract) {
   EXPECT_EQ(json["best"]["values"]["mass"], 0.35);
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::run_status_test

@@ -11,8 +11,7 @@
 #include "master/store/run_reader.h"
 #include "tests/unit/store/store_fixture.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::run_store_test {
 
 using ::testing::HasSubstr;
 
@@ -388,5 +387,4 @@ TEST(ReadableValues, NamesGenesAndChoices) {
   EXPECT_GT(mass.upper, mass.lower);
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::run_store_test

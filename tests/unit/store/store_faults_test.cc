@@ -12,8 +12,7 @@
 #include "tests/unit/store/io_faults.h"
 #include "tests/unit/store/store_fixture.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::store_faults_test {
 
 namespace fs = std::filesystem;
 using ::testing::AnyOf;
@@ -170,5 +169,4 @@ TEST_F(StoreFaults, AFullDiskIsCalledThat) {
   }
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::store_faults_test

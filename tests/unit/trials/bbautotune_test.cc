@@ -5,8 +5,7 @@
 
 #include "tests/unit/trials/trial_text.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::bbautotune_test {
 
 using testing::AllOf;
 using testing::HasSubstr;
@@ -81,5 +80,4 @@ TEST(Bbautotune, LeavesOutALastLineThatBreaksOffAndReportsSo) {
   EXPECT_THAT(error_of(kLine + "80.0;x"), StartsWith("run1.dat:2:6: found 'x', expected y"));
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::bbautotune_test

@@ -4,8 +4,7 @@
 
 #include "common/random/stream.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::context_test {
 
 Trial trial_of(const std::string& session, std::int64_t number, const Pose& start,
                const Pose& end) {
@@ -101,5 +100,4 @@ TEST(TrialContext, ToleranceStaysWithinItsLimits) {
   EXPECT_EQ(none.distance_m, 0.05);
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::context_test

@@ -8,8 +8,7 @@
 #include "tests/unit/trials/shared_data.h"
 #include "tests/unit/trials/trial_text.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::push_log_test {
 
 using testing::HasSubstr;
 using testing::StartsWith;
@@ -111,5 +110,4 @@ TEST(PushLog, ReadsThePublicLogs) {
   for (const Trial& trial : real->trials) EXPECT_GE(trial.tip.size(), 2u);
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::push_log_test

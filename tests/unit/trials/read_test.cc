@@ -8,8 +8,7 @@
 
 #include "tests/unit/trials/trial_text.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::read_test {
 
 using testing::ElementsAre;
 using testing::HasSubstr;
@@ -376,5 +375,4 @@ TEST(ReadFiles, RefusesWhatCannotBeOneLog) {
   EXPECT_THAT(error({folder.path("c")}), HasSubstr("is a folder, expected a file"));
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::read_test

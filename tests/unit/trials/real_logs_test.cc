@@ -14,8 +14,7 @@
 #include "tests/unit/trials/shared_data.h"
 #include "tests/unit/trials/trial_text.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::real_logs_test {
 
 std::vector<DrivenCommand> commands_of(const TrialLog& log) {
   std::vector<DrivenCommand> commands;
@@ -118,5 +117,4 @@ TEST(RealLogs, OtherExperimentsAreNamed) {
   }
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::real_logs_test

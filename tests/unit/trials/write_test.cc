@@ -15,8 +15,7 @@
 #include "common/trials/read.h"
 #include "tests/unit/trials/trial_text.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::write_test {
 
 using testing::HasSubstr;
 
@@ -163,5 +162,4 @@ TEST(WriteFile, WritesIntoPipesAndThroughLinksWithoutReplacingThem) {
   std::filesystem::remove_all(folder);
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::write_test

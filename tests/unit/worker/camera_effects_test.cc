@@ -8,8 +8,7 @@
 #include "tests/unit/worker/effect_util.h"
 #include "worker/evaluate.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::camera_effects_test {
 
 using tests::Changes;
 using tests::commands;
@@ -362,5 +361,4 @@ TEST(EffectSignature, PoseQuantisationAddsTheVarianceOfRounding) {
   }
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::camera_effects_test

@@ -4,8 +4,7 @@
 #include "tests/unit/worker/effect_util.h"
 #include "worker/scenarios/srv1/views.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::camera_seams_test {
 
 using tests::Changes;
 using tests::effects;
@@ -107,5 +106,4 @@ TEST(Views, WithoutASeamAreWhatIsObserved) {
   EXPECT_EQ(from[0].pose, lens.recover(X));
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::camera_seams_test

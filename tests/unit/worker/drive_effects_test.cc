@@ -8,8 +8,7 @@
 #include "tests/unit/worker/effect_util.h"
 #include "worker/evaluate.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::drive_effects_test {
 
 using tests::Changes;
 using tests::commands;
@@ -205,5 +204,4 @@ TEST(EffectSignature, SessionGainWidensWhatIsPredicted) {
             end_of({}, driven("forward")));
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::drive_effects_test

@@ -9,8 +9,7 @@
 
 #include "common/effects/catalogue.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::effect_docs_test {
 
 using ::testing::HasSubstr;
 
@@ -77,5 +76,4 @@ TEST(EffectDocs, EveryRowHasAPictureAndNoPictureIsLeftOver) {
   }
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::effect_docs_test

@@ -12,8 +12,7 @@
 #include "common/random/stream.h"
 #include "worker/effects/behaviour.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::effects_test {
 
 const std::vector<std::span<const Effect>>& catalogues() {
   static const std::vector<std::span<const Effect>> all = {srv1_effects(), push_effects()};
@@ -171,5 +170,4 @@ TEST(DriveEffects, ActOnTheDriveAsTheCatalogueReports) {
   EXPECT_EQ(drive.right.dead_travel_m, 0);
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::effects_test

@@ -7,8 +7,7 @@
 
 #include "tests/unit/worker/problems.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::evaluate_test {
 
 using tests::small_problem;
 
@@ -162,5 +161,4 @@ TEST(Evaluate, NumericClassIsAHash) {
   EXPECT_EQ(numeric_class(), numeric_class());
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::evaluate_test

@@ -3,8 +3,7 @@
 #include <gtest/gtest.h>
 #include <poll.h>
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::evaluation_thread_test {
 
 std::vector<Work> echoes(std::uint64_t count) {
   std::vector<Work> work(count);
@@ -63,5 +62,4 @@ TEST(EvaluationThread, ReportsOfWhatIsDoneWhenTheRestIsDropped) {
   }
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::evaluation_thread_test

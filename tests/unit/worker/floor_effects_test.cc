@@ -8,8 +8,7 @@
 #include "tests/unit/worker/effect_util.h"
 #include "worker/scenarios/srv1/srv1_motions.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::floor_effects_test {
 
 using tests::Changes;
 using tests::commands;
@@ -290,5 +289,4 @@ TEST(HeadingGrid, SimulatesNoMoreNodesThanTrials) {
   EXPECT_FALSE(simulate_group(smooth, group, means_only(), {}).motion.better_alone());
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::floor_effects_test

@@ -5,8 +5,7 @@
 #include "tests/unit/worker/ground_problem.h"
 #include "worker/evaluate.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::worker_ground_test {
 
 using tests::driven_run;
 using tests::ground_problem;
@@ -178,5 +177,4 @@ TEST(GroundScenario, FittedKinematicsHaveNoNegativeLag) {
   }
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::worker_ground_test

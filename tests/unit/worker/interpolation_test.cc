@@ -4,8 +4,7 @@
 
 #include <cmath>
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::interpolation_test {
 
 Eigen::Vector3d harmonics(double a) {
   return {1 + std::sin(a), std::cos(2 * a) - 0.3 * std::sin(3 * a), 0.2};
@@ -37,5 +36,4 @@ TEST(ChebyshevInterpolation, IsExactForPolynomialsBelowItsNodes) {
   }
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::interpolation_test

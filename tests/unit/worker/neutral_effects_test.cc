@@ -7,8 +7,7 @@
 #include "tests/unit/worker/effect_util.h"
 #include "worker/evaluate.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::neutral_effects_test {
 
 TEST(Settings, AtNominalParametersAreTheRobotsOwn) {
   const ParameterValues nominal = srv1_table().nominal();
@@ -134,5 +133,4 @@ TEST(NeutralEffects, HaveNoStepNextToThem) {
   }
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::neutral_effects_test

@@ -11,8 +11,7 @@
 #include "worker/scenarios/srv1/motion_memo.h"
 #include "worker/scenarios/srv1/srv1_robot.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::prediction_test {
 
 using tests::empty_problem;
 using tests::small_problem;
@@ -329,5 +328,4 @@ TEST(Simulate, TrialsOfAChainShareThePoseBetweenThem) {
   }
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::prediction_test

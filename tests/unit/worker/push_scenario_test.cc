@@ -5,8 +5,7 @@
 
 #include "tests/unit/worker/push_problem.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::push_scenario_test {
 
 using tests::end_of;
 using tests::predicted;
@@ -264,5 +263,4 @@ TEST(Piece, MomentsOfATriangleAreTheClosedForms) {
   EXPECT_NEAR(m[2], -0.15 * 0.15 / 36, 1e-15);
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::push_scenario_test

@@ -5,8 +5,7 @@
 #include "tests/unit/worker/problems.h"
 #include "worker/evaluate.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::residual_scenario_test {
 
 using tests::small_problem;
 
@@ -178,5 +177,4 @@ TEST(ResidualOfAWorker, ATraceHasNoPlaceToLookAt) {
   EXPECT_NE(result.message().find("residual"), std::string::npos) << result.message();
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::residual_scenario_test

@@ -12,8 +12,7 @@
 #include "tests/unit/worker/problems.h"
 #include "worker/evaluate.h"
 
-namespace gapfarm {
-namespace {
+namespace gapfarm::tracked_robot_test {
 
 using testing::HasSubstr;
 
@@ -258,5 +257,4 @@ TEST(TrackedRobot, OnlyItsScenarioTakesOne) {
   EXPECT_FALSE(from_proto(message).ok());
 }
 
-}  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::tracked_robot_test
