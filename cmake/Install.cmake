@@ -50,6 +50,9 @@ set(units lib/systemd/system)  # where Debian 12 looks, also below a prefix of o
 install(TARGETS gapfarm RUNTIME COMPONENT gapfarm)
 install(TARGETS gapfarm-worker RUNTIME COMPONENT gapfarm-worker)
 install(DIRECTORY configs DESTINATION ${data} COMPONENT gapfarm)
+# Programs of the build find them, too, from wherever they are called.
+file(MAKE_DIRECTORY ${CMAKE_BINARY_DIR}/share/gapfarm)
+file(CREATE_LINK ${PROJECT_SOURCE_DIR}/configs ${CMAKE_BINARY_DIR}/share/gapfarm/configs SYMBOLIC)
 install(DIRECTORY scripts/launch DESTINATION ${data} COMPONENT gapfarm USE_SOURCE_PERMISSIONS
         PATTERN systemd EXCLUDE)
 install(DIRECTORY scripts/bridges DESTINATION ${data}/scripts COMPONENT gapfarm

@@ -73,6 +73,12 @@ constexpr OptionTakes kOptionTakes[] = {
     {"--urdf", Takes::kFile},
     {"--controllers", Takes::kFile},
     {"--key", Takes::kFile},
+    {"--run", Takes::kRun},
+    {"--site", Takes::kFile},
+    {"--ssh-config", Takes::kFile},
+    {"--worker-program", Takes::kFile},
+    {"--worker-keys", Takes::kFolder},
+    {"--worker-logs", Takes::kFolder},
 };
 
 // Words that an option takes and no validator of its own lists.
@@ -87,6 +93,8 @@ const std::vector<OptionChoices>& option_choices() {
       {"--log-level", {"debug", "info", "warn", "error", "off"}},
       {"FORMAT", {"bbautotune", "runs"}},
       {"--sizes", {"clear", "subtle"}},
+      {"--on", {"slurm", "sge", "pbs", "condor", "kube", "ssh", "local"}},
+      {"--workers-on", {"slurm", "sge", "pbs", "condor", "kube", "ssh", "local"}},
   };
   return kTable;
 }

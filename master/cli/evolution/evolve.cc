@@ -85,10 +85,8 @@ SubcommandRun setup_evolve(CLI::App& app) {
       "Examples:\n"
       "  gapfarm evolve configs/demo.toml --out run/demo\n"
       "  gapfarm evolve configs/srv1.toml --trials monday.csv tuesday.csv --out run/srv1\n"
-      "  gapfarm evolve configs/srv1.toml --trials log.csv --out run/big --workers 0 \\\n"
-      "      --listen tcp://0.0.0.0:5555     # then: gapfarm-worker --connect tcp://HOST:5555\n"
-      "  gapfarm evolve configs/srv1.toml --trials log.csv --out run/big --workers-on slurm \\\n"
-      "      --max 200 --wall-time 4:00:00   # workers as jobs of Slurm, as many as needed");
+      "  gapfarm evolve configs/srv1.toml --out run/big --workers-on slurm --max 200 --wall-time "
+      "4:00:00");
   return [command](CliContext& context) { return run_evolve(*command, context); };
 }
 

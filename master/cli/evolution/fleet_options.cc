@@ -64,11 +64,16 @@ std::vector<std::string> worker_command(const FleetChoice& choice, const Cluster
 }  // namespace
 
 void FleetChoice::declare(CLI::App& app, const std::string& with) {
+  // Commands that have workers beside much else take them all and show the first alone.
+  const bool alone = with == "--on";
+  const std::string more = alone ? "" : " (`gapfarm workers --help`: their options)";
   CLI::Option* on = app.add_option(with, system,
                                    "Workers from slurm, sge, pbs, condor, kube, ssh or local: "
-                                   "configs/sites has a file for each")
+                                   "configs/sites has a file for each" +
+                                       more)
                         ->type_name("SYSTEM");
-  if (with == "--on") on->required();
+  if (alone) on->required();
+  if (!alone) app.option_defaults()->group("");
   app.add_option("--min", min_workers, "Workers to keep also when there is little to do");
   app.add_option("--max", max_workers, "Workers at most")->check(CLI::Range(1, 1000000));
   app.add_option("--site", site, "A site's own file in place of configs/sites/SYSTEM.toml")
@@ -94,6 +99,7 @@ void FleetChoice::declare(CLI::App& app, const std::string& with) {
       ->type_name("FOLDER");
   app.add_option("--worker-logs", logs, "Folder of the jobs' output, which all nodes see")
       ->type_name("FOLDER");
+  app.option_defaults()->group("Options");
 }
 
 std::vector<std::string> FleetChoice::arguments() const {

@@ -95,7 +95,8 @@ void expect_candidates(const CLI::App& app, const std::vector<std::string>& argu
       // Columns and their values, numbers, addresses, names that are given here, shell commands.
       "--only",      "--train", "--test",           "--by",     "--per",       "--repeats",
       "--waypoints", "--start", "--place",          "--listen", "--page-port", "WORDS",
-      "--name",      "NAME",    "--session-prefix", "--on-end"};
+      "--name",      "NAME",    "--session-prefix", "--on-end", "--wall-time", "--master-time",
+      "--connect",   "OPTIONS", "EVOLVE",           "--with",   "--host"};
   std::size_t positionals = 0;
   for (const CLI::Option* option : app.get_options()) {
     const std::string name = option->get_name(option->get_positional());
