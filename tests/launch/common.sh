@@ -92,3 +92,19 @@ compare_with_calm_run() {
   echo "$generation generations, digest $digest, undisturbed $calm"
   [[ -n $digest && $digest == "$calm" ]] || fail 'the digests differ'
 }
+
+# expect_taken_away SYSTEM: stops the run; all that $fleet started has to go, and at most four of it stood
+# at once ($T/standing).
+expect_taken_away() {
+  local system=$1 most ended=$SECONDS
+  stop_master
+  wait_for 'the workers have left' gone
+  wait_for 'the fleet has ended' bash -c "! kill -0 $fleet"
+  wait "$fleet" || fail "gapfarm workers ended with $?"
+  echo "nothing stands $((SECONDS - ended)) s after the run"
+  compare_with_calm_run
+  most=$(sort -n "$T/standing" | tail -n 1)
+  echo "at most $most jobs stood, of $(find "$T/logs" -name '*.log' | wc -l) in all"
+  [[ $most -le 4 ]] || fail "$most jobs stood"
+  grep -h -e "$system:" "$T/workers.log"
+}

@@ -82,16 +82,6 @@ why() { [[ $(status "$T/run" 's["fleets"][0]["why"]') == *'no more than 4 jobs'*
 wait_for 'status says why there are no more' why
 replaced() { [[ $(find "$T/logs" -name '*.log' | wc -l) -ge 8 ]]; }
 wait_for 'every one was replaced' replaced
-ended=$SECONDS
-stop_master
 gone() { [[ -z $(qstat -u root) ]]; }
-wait_for 'the workers have left' gone
-wait_for "the fleet has ended" bash -c "! kill -0 $fleet"
-wait "$fleet" || fail "gapfarm workers ended with $?"
-echo "nothing stands $((SECONDS - ended)) s after the run"
-compare_with_calm_run
-most=$(sort -n "$T/standing" | tail -n 1)
-echo "at most $most jobs stood, of $(find "$T/logs" -name '*.log' | wc -l) in all"
-[[ $most -le 4 ]] || fail "$most jobs stood"
-grep -h -e 'sge:' "$T/workers.log"
+expect_taken_away sge
 exit 0

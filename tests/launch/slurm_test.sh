@@ -30,16 +30,6 @@ status "$T/run" 's["fleets"]'
 # Each lives for nine seconds: eight more are two rounds of replacements.
 replaced() { [[ $(find "$T/logs" -name '*.log' | wc -l) -ge 12 ]]; }
 wait_for 'every one was replaced twice' replaced
-ended=$SECONDS
-stop_master
 gone() { [[ -z $(squeue --noheader 2>/dev/null) ]]; }
-wait_for 'the workers have left' gone
-wait_for "the fleet has ended" bash -c "! kill -0 $fleet"
-wait "$fleet" || fail "gapfarm workers ended with $?"
-echo "nothing stands $((SECONDS - ended)) s after the run"
-compare_with_calm_run
-most=$(sort -n "$T/standing" | tail -n 1)
-echo "at most $most jobs stood, of $(find "$T/logs" -name '*.log' | wc -l) in all"
-[[ $most -le 4 ]] || fail "$most jobs stood"
-grep -h -e 'slurm:' "$T/workers.log"
+expect_taken_away slurm
 exit 0

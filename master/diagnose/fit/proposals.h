@@ -82,7 +82,6 @@ class Proposals {
   const Regression& nothing_explained() const { return base_; }
   // The nuisances and these signatures.
   Regression with(const std::vector<const Signature*>& signatures) const;
-  const std::vector<Signature>& catalogue() const { return catalogue_; }
 
  private:
   bool may_be_second(const std::string& second, const std::set<std::string>& without) const;
