@@ -14,9 +14,9 @@
 namespace gapfarm {
 namespace {
 
-constexpr double kStep_s = 0.04;
-// Half of the way over which a wheel passes from one floor to the other: what touches the floor,
-// and what a tracker errs by; a hard step would have no slope to fit by.
+constexpr double kStep_s = 0.04;  // the longest
+// Half of the way over which a wheel passes from one floor to the other (what touches the floor and
+// what a tracker errs by): a hard step would have no slope.
 constexpr double kEdge_m = 0.02;
 
 bool steered(const GroundRobot& robot) {
@@ -115,7 +115,7 @@ class Body {
     return robot;
   }
 
-  // What a tracker with these scales reports of a pose.
+  // What a tracker with these scales reports.
   Pose observed(const Pose& X) const { return {scale_ * X.x, scale_ * aspect_ * X.y, X.theta}; }
   Pose unobserved(const Pose& X) const { return {X.x / scale_, X.y / scale_ / aspect_, X.theta}; }
 
@@ -318,20 +318,21 @@ std::map<double, Pose> path(const Body& body, const CommandedRun& run, double be
   std::vector<CommandRow> changed;
   RobotDrive drive(body.robot(), body.taken(run.commands, began_s, &changed), run.speed_m_s);
   Pose X;
-  double omega = run.turn_rad_s;
-  std::size_t next = 0;
+  double omega = run.turn_rad_s, t = run.start_s;
   const Pose X_MR = inverse(body.robot().X_RM);
-  for (long step = 0; next < times.size(); ++step) {
-    const double t = run.start_s + static_cast<double>(step) * kStep_s;
-    const auto wheels = drive.advance_motors(t, kStep_s, omega);
-    std::optional<Pose> X_WR;
-    if (measured != nullptr) X_WR = body.unobserved(measured->at(t + kStep_s / 2)) * X_MR;
-    const Twist v = body.velocity(wheels, drive, X_WR ? &*X_WR : nullptr);
-    omega = v[2];
-    for (; next < times.size() && times[next] < t + kStep_s; ++next) {
-      poses[times[next]] = X * exp(Twist((times[next] - t) * v));
+  for (const double asked : times) {
+    // A step ends where a pose is asked for: commands count by how long they lasted before it.
+    while (t < asked) {
+      const double dt = std::min(kStep_s, asked - t), end = std::min(t + kStep_s, asked);
+      const auto wheels = drive.advance_motors(t, dt, omega);
+      const Pose X_WR =
+          measured == nullptr ? Pose() : body.unobserved(measured->at(t + dt / 2)) * X_MR;
+      const Twist v = body.velocity(wheels, drive, measured != nullptr ? &X_WR : nullptr);
+      omega = v[2];
+      X = X * exp(Twist(dt * v));
+      t = end;
     }
-    X = X * exp(Twist(kStep_s * v));
+    poses[asked] = X;
   }
   return poses;
 }
