@@ -87,24 +87,10 @@ Result<DiagnosisResult> take_steps(const steps::DiagnosisRequest& of, Stages* st
   emit_verdict(of, *judgement);
 
   stages->begin(4);
-  auto again = guarded([&] { return steps::look_from_free_base(of, *measured, *judgement); });
-  if (!again) return end_with(again.error());
-  Result<steps::Refit> refit =
-      *again ? std::move((*again)->refit)
-             : guarded([&] { return steps::refit(of, *measured, *screening, *judgement); });
+  const Result<steps::Refit> refit =
+      guarded([&] { return steps::refit(of, *measured, *screening, *judgement); });
   if (!refit) return end_with(refit.error());
   known.judged = &refit->judged;
-  if (!*again) {
-    again =
-        guarded([&] { return steps::reselect_without_dropped(of, *measured, *screening, *refit); });
-    if (!again) return end_with(again.error());
-    if (*again) *refit = std::move((*again)->refit);
-  }
-  if (*again) {
-    known.screening = &(*again)->screening;
-    emit_choice(of, known.screening->found, false);
-    emit_verdict(of, *known.judged);
-  }
 
   stages->begin(5);
   auto result =

@@ -10,6 +10,7 @@
 #include "master/diagnose/conclusions/findings.h"
 #include "master/diagnose/evidence/noise.h"
 #include "master/diagnose/steps/competition.h"
+#include "master/diagnose/steps/step_parts.h"
 #include "master/diagnose/steps/watch.h"
 #include "master/infer/settings.h"
 
@@ -22,6 +23,7 @@ struct Found {
   std::vector<ChosenEffect> chosen;
   std::vector<Screened> rows;
   std::vector<SelectionStep> steps;
+  std::vector<NearMiss> refused;
 };
 
 // Hypotheses that predict as well as the best, as far as anybody can show.
@@ -104,7 +106,7 @@ class Selection {
   Result<Found> run() {
     auto base = fitted(competition_.base(), competition_.base().from(study_.base));
     if (!base) return base.error();
-    found_.emplace(Found{*base, *base, {}, {}, {}});
+    found_.emplace(Found{*base, *base, {}, {}, {}, {}});
     while (found_->chosen.size() < kMostEffects) {
       const auto more = add_best();
       if (!more) return more.error();
@@ -235,6 +237,11 @@ class Selection {
     infer::Contender& best = contest->contenders.front();
     const std::string name = (*hypotheses)[best.hypothesis].name;
     if (!enters(best, name)) return false;
+    if (auto why = at_its_bound(of_, name, best.model.space.values(best.model.fit.u))) {
+      found_->refused.push_back({{name}, best.gain, 0, "", std::move(*why)});
+      not_these_.insert(name);
+      return true;
+    }
     ChosenEffect chosen;
     chosen.candidate.gain = best.gain;
     chosen.candidate.signature.effect = name;
@@ -334,6 +341,7 @@ Result<Screening> compete(const DiagnosisRequest& of, Explanation found) {
   if (!selected) return selected.error();
   if (screening.catalogue == nullptr) screening.rows = std::move(selected->rows);
   screening.steps = std::move(selected->steps);
+  screening.refused = std::move(selected->refused);
   found.chosen = std::move(selected->chosen);
   found.estimates.reset();
   const std::shared_ptr<const Evidence> before = found.evidence;

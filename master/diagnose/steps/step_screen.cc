@@ -309,10 +309,10 @@ Result<JointFit> estimate(const DiagnosisRequest& of, const Proposals& catalogue
   return fit_jointly(of.predictor, study, effects, fit->at, base, nuisances, rounds);
 }
 
-Result<Screening> screen(const DiagnosisRequest& of, const Evidence& measured, bool free_base) {
+Result<Screening> screen(const DiagnosisRequest& of, const Evidence& measured) {
   Explanation nothing;
   nothing.evidence = std::make_shared<const Evidence>(measured);
-  nothing.frees_base = free_base || !measured.study.on_bounds.empty();
+  nothing.frees_base = !measured.study.on_bounds.empty();
   auto screening = look_for_all(of, nothing);
   if (!nothing.frees_base) return screening;
   // A base on its bounds may be one that cannot be simulated with much of the catalogue.

@@ -74,6 +74,7 @@ struct Screening {
   std::vector<SelectionStep> steps;
   std::optional<SanityFinding> warning;  // why nothing is to be looked for
   std::optional<double> explained;       // nats, held out, where hypotheses competed
+  std::vector<NearMiss> refused;         // at their bounds
 };
 
 // What is to be believed of that.
@@ -120,10 +121,8 @@ Result<Study> tune(const DiagnosisRequest& of);
 // The noise that no smooth function explains, and the log by it.
 Result<Evidence> measure(const DiagnosisRequest& of, const Study& tuned);
 
-// All that the catalogue offers, and what of it the log calls for.  `free_base`: see Explanation; a
-// base on its bounds is freed in any case.
-Result<Screening> screen(const DiagnosisRequest& of, const Evidence& measured,
-                         bool free_base = false);
+// All that the catalogue offers, and what of it the log calls for.
+Result<Screening> screen(const DiagnosisRequest& of, const Evidence& measured);
 
 // Whether that explains enough to be named.
 Result<Judgement> judge(const DiagnosisRequest& of, const Screening& screening);
@@ -132,23 +131,6 @@ Result<Judgement> judge(const DiagnosisRequest& of, const Screening& screening);
 // is dropped.
 Result<Refit> refit(const DiagnosisRequest& of, const Evidence& measured,
                     const Screening& screening, const Judgement& judgement);
-
-// All that follows from looking once more where the first look ended with nothing.
-struct Reselection {
-  Screening screening;
-  Refit refit;
-};
-// Where what explains most was still too little to be named, looked for from the base that tuning
-// drew to it: the same with the base freed, where that explains everything; else nothing.
-Result<std::optional<Reselection>> look_from_free_base(const DiagnosisRequest& of,
-                                                       const Evidence& measured,
-                                                       const Judgement& judgement);
-// Where all that was chosen was dropped again and something is left to explain: what the rest of
-// the catalogue explains, if that is everything; else nothing.
-Result<std::optional<Reselection>> reselect_without_dropped(const DiagnosisRequest& of,
-                                                            const Evidence& measured,
-                                                            const Screening& screening,
-                                                            const Refit& refit);
 
 // Where something is unexplained: a smooth correction of it, if one helps significantly.
 Refit add_shape(const DiagnosisRequest& of, const Refit& refit);

@@ -320,57 +320,12 @@ TEST(Steps, ABaseInWarnOfHasNothingNamed) {
   EXPECT_EQ(screening.found.chosen.size(), 1u);
 }
 
-// Seed 31's mass off its place beside a rolling resistance: a marker's offset explained most of it
-// from a base near its bounds, but not all.
-TEST(Steps, ABaseMayBeDrawnByWhatExplainsMostOfAll) {
-  const Measured m;
-  steps::Judgement judged;
-  judged.left = {{"command, level and duration", -80, 792}};
-  judged.unnamed = {{{898, signature_of("marker_offset", column(60, even))}, {}}};
-  EXPECT_TRUE(draws_base(m.of, judged));
-  judged.left[0].excess = 900;
-  EXPECT_FALSE(draws_base(m.of, judged));
-  judged.unnamed = {{{1200, signature_of("friction_patch", column(60, even))}, {}}};  // in a place
-  EXPECT_FALSE(draws_base(m.of, judged));
-}
-
-TEST(Steps, WhatHelpsNoUnseenTrialIsDropped) {
-  Measured m;
-  m.found.chosen.push_back({{20, signature_of("timing_offset", column(60, odd))}, {}});
-  steps::Judgement judged;
-  judged.named = m.found;
-  std::vector<steps::NestedFit> nested(3);
-  const auto scores = [](double all, double even_too) {
-    return std::vector<double>{all + even_too, all, all + even_too, all};
-  };
-  nested[0].scores = scores(0, 0);
-  nested[1].scores = scores(-0.5, 0.5);  // worse on the whole
-  nested[2].scores = scores(1, 0.5);
-  const auto worthless = of_no_use(judged, nested, std::nullopt);
-  ASSERT_TRUE(worthless);
-  EXPECT_EQ(worthless->effect, 0u);
-  // Beside all others it was of use: seed 31's aspect and turned marker, each of which showed only
-  // when the other was explained.
-  const std::string first = judged.named.chosen[0].candidate.signature.effect;
-  EXPECT_FALSE(of_no_use(judged, nested, std::nullopt, {first}));
-  EXPECT_TRUE(of_no_use(judged, nested, std::nullopt, {"timing_offset"}));
-  const steps::Judgement rest = dropped(judged, *worthless);
-  ASSERT_EQ(rest.named.chosen.size(), 1u);
-  EXPECT_EQ(rest.named.chosen[0].candidate.signature.effect, "timing_offset");
-  EXPECT_EQ(rest.nearest.size(), 1u);
-  nested[1].scores = scores(0.5, 0);
-  EXPECT_FALSE(of_no_use(judged, nested, std::nullopt));
-}
-
 // More of a saturating strength would change nothing; seed 93's patch of 2.85 ended on 3.
 TEST(Steps, OnlyWhatCouldGrowIsQuestionedOnItsBound) {
-  Measured m;
+  const Measured m;
   const auto dropped_at = [&](const char* effect, const char* key, double value) {
-    m.found.chosen.front().candidate.signature.effect = effect;
     const std::size_t row = *m.of.table().find(std::string(effect) + "." + key);
-    m.found.estimates.emplace();
-    m.found.estimates->parameters = {{.row = row, .value = value}};
-    return at_its_bound(m.of, m.found).has_value();
+    return at_its_bound(m.of, effect, {{row, value}}).has_value();
   };
   EXPECT_FALSE(dropped_at("friction_patch", "ratio", 3));
   EXPECT_FALSE(dropped_at("friction_patch", "ratio", 0.05));
