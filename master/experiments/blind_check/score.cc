@@ -38,12 +38,21 @@ Judgement judge_effects(const Truth& truth, const Reported& reported) {
   if (reported.verdict != "effect" && reported.verdict != "effect+unknown") {
     return {false, what + "; reported " + reported.verdict};
   }
-  std::vector<Family> left;
-  for (const ReportedEffect& effect : reported.effects) left.push_back(family_of(effect));
-  for (const TrueEffect& effect : truth.effects) {
-    const auto hit = std::find_if(left.begin(), left.end(), [&](const Family& family) {
-      return family.count(effect.name) > 0;
+  std::vector<ReportedEffect> left = reported.effects;
+  // By name first: one name may be another one's alias, and be there beside it.
+  const auto hit_by = [&](const TrueEffect& effect, bool by_alias) {
+    return std::find_if(left.begin(), left.end(), [&](const ReportedEffect& one) {
+      return by_alias ? family_of(one).count(effect.name) > 0 : one.name == effect.name;
     });
+  };
+  std::vector<TrueEffect> others;
+  for (const TrueEffect& effect : truth.effects) {
+    const auto hit = hit_by(effect, false);
+    if (hit == left.end()) others.push_back(effect);
+    if (hit != left.end()) left.erase(hit);
+  }
+  for (const TrueEffect& effect : others) {
+    const auto hit = hit_by(effect, true);
     if (hit == left.end()) {
       return {false, what + "; missed " + effect.name + ", reported " + names_of(reported)};
     }
