@@ -97,6 +97,7 @@ void emit_rest(const GroundWork& work, const GroundSearch& search) {
   finding.about = "what is left";
   GroundFigures figures;
   figures.closable = search.closable;
+  figures.best_of_all = search.best_of_all;
   finding.text = verdict_reason(figures);
   work.on_finding(std::move(finding));
 }

@@ -141,9 +141,11 @@ double mean_nats(const WindowFit& fit) {
   return sum / static_cast<double>(fit.nats.size());
 }
 
-void keep_if_best(GroundSearch* search, WindowFit held_out) {
+void keep_if_best(GroundSearch* search, WindowFit held_out, std::string what) {
   const bool first = search->best.nats.empty();
-  if (first || mean_nats(held_out) > mean_nats(search->best)) search->best = std::move(held_out);
+  if (!first && !(mean_nats(held_out) > mean_nats(search->best))) return;
+  search->best = std::move(held_out);
+  search->best_of_all = std::move(what);
 }
 
 void name_candidate(const WindowSet& windows, const GroundWork& work,
@@ -239,7 +241,10 @@ bool take_step(const WindowFitter& fitter, const GroundWork& work, GroundSearch*
            c.held_out_gain.mean >= kShareOfBestName * named;
   });
   if (chosen == candidates.end()) {
-    if (!candidates.empty()) keep_if_best(search, std::move(candidates.front().held_out));
+    if (!candidates.empty()) {
+      Candidate& best = candidates.front();
+      keep_if_best(search, std::move(best.held_out), search->catalogue[best.offer.hypothesis].name);
+    }
     return false;
   }
   name_candidate(fitter.windows(), work, offers, candidates,
@@ -297,9 +302,11 @@ void measure_rest(const WindowFitter& fitter, const GroundWork& work, GroundSear
   const WindowFit& before = search->reference ? moved : named;
   WindowFit best = before;
   std::swap(best, search->best);
-  if (!best.nats.empty()) keep_if_best(search, std::move(best));
-  keep_if_best(search, moved);
-  keep_if_best(search, fit_held_out(fitter, all, search->free_fit.values));
+  std::string what = "what is named";
+  std::swap(what, search->best_of_all);
+  if (!best.nats.empty()) keep_if_best(search, std::move(best), std::move(what));
+  keep_if_best(search, moved, "small moves of all values");
+  keep_if_best(search, fit_held_out(fitter, all, search->free_fit.values), "every value free");
   search->closable = held_out_gain(search->windows, search->best, before, work.seed);
 }
 

@@ -82,6 +82,7 @@ struct GroundSearch {
   // tolerances, the best of the catalogue that was not named, every value free.  `closable`: what
   // it gains over the chain's last; of a change, over values within what a robot changes by.
   WindowFit best;
+  std::string best_of_all;  // "floor_edge"
   HeldOutGain closable;
 };
 

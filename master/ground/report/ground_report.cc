@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <tuple>
 
 #include "common/random/stream.h"
@@ -47,9 +48,13 @@ class GroundReport {
   NamedEffect effect_of(const GroundStep& step, std::size_t place);
   void name_headline();
   void judge();
-  double sum(const std::vector<double>& nats) const;
-  double rms_mm(const WindowFit& fit) const;
-  double rms_mrad(const WindowFit& fit) const;
+  static double sum(const std::vector<double>& nats) {
+    return std::accumulate(nats.begin(), nats.end(), 0.0) / static_cast<double>(nats.size());
+  }
+  // Of components of the residuals, in thousandths.
+  double rms_of(const WindowFit& fit, Eigen::Index first, Eigen::Index count) const;
+  double rms_mm(const WindowFit& fit) const { return rms_of(fit, 0, 2); }
+  double rms_mrad(const WindowFit& fit) const { return rms_of(fit, 2, 1); }
 
   const GroundRobot& robot_;
   const GroundSearch& search_;
@@ -60,14 +65,11 @@ class GroundReport {
   Diagnosis d_;
 };
 
-double GroundReport::rms_mm(const WindowFit& fit) const {
+double GroundReport::rms_of(const WindowFit& fit, Eigen::Index first, Eigen::Index count) const {
   double sum = 0;
-  for (const Eigen::Vector3d& r : fitter_.raw_residuals(fit)) sum += r.head<2>().squaredNorm();
-  return 1e3 * std::sqrt(sum / static_cast<double>(fit.residuals.size()));
-}
-double GroundReport::rms_mrad(const WindowFit& fit) const {
-  double sum = 0;
-  for (const Eigen::Vector3d& r : fitter_.raw_residuals(fit)) sum += r[2] * r[2];
+  for (const Eigen::Vector3d& r : fitter_.raw_residuals(fit)) {
+    sum += r.segment(first, count).squaredNorm();
+  }
   return 1e3 * std::sqrt(sum / static_cast<double>(fit.residuals.size()));
 }
 
@@ -75,12 +77,6 @@ void add_alias(const std::string& name, NamedEffect* effect) {
   if (name == effect->name || effect->aliases.size() >= kMostAliases) return;
   const auto& have = effect->aliases;
   if (std::find(have.begin(), have.end(), name) == have.end()) effect->aliases.push_back(name);
-}
-
-double GroundReport::sum(const std::vector<double>& nats) const {
-  double sum = 0;
-  for (const double n : nats) sum += n;
-  return sum / static_cast<double>(nats.size());
 }
 
 NamedEffect GroundReport::effect_of(const GroundStep& step, std::size_t place) {
@@ -201,6 +197,11 @@ void GroundReport::figures() {
   if (search_.windows.blocks < 8) {
     d_.cautions.push_back("Few runs: intervals are from runs drawn again, and these are few.");
   }
+  if (search_.log.relative) {
+    d_.cautions.push_back(
+        "Poses are relative, each to the one before: nothing with a place or a direction in the "
+        "world can show (tilts, patches, edges); lengths are as the sensor's own scale has them.");
+  }
   if (robot_.measured && !search_.loop) {
     d_.cautions.push_back(
         "Wheel speeds were measured: what lies before them (dead time, ramps) "
@@ -211,6 +212,7 @@ void GroundReport::figures() {
 void GroundReport::judge() {
   figures_.faults += static_cast<int>(search_.faults.size());
   figures_.closable = search_.closable;
+  figures_.best_of_all = search_.best_of_all;
   d_.verdict = ground_verdict(figures_);
   d_.findings.push_back(verdict_reason(figures_));
   if (nothing_is_left(figures_)) return;

@@ -37,11 +37,12 @@ std::string verdict_reason(const GroundFigures& figures) {
         closes, kToleratedGap);
   }
   if (left.lo > 0) {
+    const std::string what = figures.best_of_all.empty() ? "" : ", " + figures.best_of_all + ",";
     return fmt::format(
-        "The best of what was tried closes another {} on stretches that were not fitted, and "
+        "The best of what was tried{} closes another {} on stretches that were not fitted, and "
         "{:.2g} (residuals 10 % smaller) is tolerated: something moves the robot that is not "
         "named.",
-        closes, kToleratedGap);
+        what, closes, kToleratedGap);
   }
   return fmt::format(
       "The best of what was tried would close another {} on stretches that were not fitted: these "

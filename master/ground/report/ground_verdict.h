@@ -17,6 +17,7 @@ struct GroundFigures {
   // What the best of everything that was tried (values that move within their tolerances, the best
   // of the catalogue, every value free) would still gain, held out.
   HeldOutGain closable;
+  std::string best_of_all = {};  // what that was: "floor_edge"
 };
 
 // Whether a value may be named: its gain's interval lies above 0.

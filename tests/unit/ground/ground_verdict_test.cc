@@ -49,7 +49,10 @@ TEST(GroundVerdict, AGainWhoseIntervalHoldsZeroIsNoName) {
 }
 
 TEST(GroundVerdict, ItsReasonHasItsFigures) {
-  EXPECT_NE(verdict_reason(left(1.6, 2.9, 4.2)).find("2.9 [1.6, 4.2]"), std::string::npos);
+  GroundFigures figures = left(1.6, 2.9, 4.2);
+  figures.best_of_all = "floor_edge";
+  EXPECT_NE(verdict_reason(figures).find("tried, floor_edge, closes another 2.9 [1.6, 4.2]"),
+            std::string::npos);
   EXPECT_NE(verdict_reason(left(-0.5, 0.2, 0.9)).find("log more runs"), std::string::npos);
   EXPECT_NE(verdict_reason(left(0, 0.1, 0.2)).find("within"), std::string::npos);
 }
