@@ -273,7 +273,8 @@ Result<Contest> compete(const Forward& forward, const Observations& observations
     PairedGain gain = gain_over(*model, contest.base, before);
     // No more than in sample, less what a parameter gains by luck.
     const double luck = 0.5 * static_cast<double>(model->fit.u.size() - before);
-    gain.sum = std::min(gain.sum, model->fit.score - contest.base.fit.score - luck);
+    gain.sum = std::min(gain.sum, model->fit.score - contest.base.fit.score - luck) -
+               hypotheses[leader.hypothesis].luck;
     contest.contenders.push_back({leader.hypothesis, std::move(*model), gain.sum, gain.se});
   }
   std::stable_sort(contest.contenders.begin(), contest.contenders.end(),
