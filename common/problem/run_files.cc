@@ -27,6 +27,7 @@ Result<RunLog> read_run_folders(std::span<const std::string> folders,
       RETURN_IF_ERROR(read_wheel_speeds(wheels.string(), &log));
     }
     all.wheel_channels = log.wheel_channels;
+    all.relative = all.relative || log.relative;
     for (LoggedRun& run : log.runs) {
       // Runs of two folders may bear one name.
       if (folders.size() > 1 && run.session.empty()) run.session = path.filename().string();

@@ -74,6 +74,34 @@ class RunTable {
   std::vector<RunKey> order_;
 };
 
+// Whether its poses are each in the axes of the one before.
+Result<bool> holds_increments(const std::string& path) {
+  const auto text = read_text_file(path);
+  if (!text) return text.error();
+  const auto head = parse_csv(std::string_view(*text).substr(0, text->find('\n')), path);
+  if (!head) return head.error();
+  return !head->empty() && std::any_of(head->front().fields.begin(), head->front().fields.end(),
+                                       [](const CsvField& f) { return f.text == "dx"; });
+}
+
+// Rows at the time of the one before are omitted, but for what they moved on.
+std::size_t add_poses(const std::vector<CommandRow>& rows, bool increments, LoggedRun* run) {
+  std::size_t repeated = 0;
+  Pose X_WM;
+  for (const CommandRow& row : rows) {
+    const Pose read{row.values[0], row.values[1], wrap_angle(row.values[2])};
+    // The first one's is from a pose that nobody has.
+    X_WM = !increments ? read : run->poses.empty() ? Pose() : X_WM * read;
+    if (run->poses.empty() || row.t_s > run->poses.back().t_s) {
+      run->poses.push_back({row.t_s, X_WM});
+    } else {
+      ++repeated;
+      if (increments) run->poses.back().X_WM = X_WM;
+    }
+  }
+  return repeated;
+}
+
 std::string name_of(const RunKey& key) {
   return key.first.empty() ? key.second : key.first + "/" + key.second;
 }
@@ -85,9 +113,13 @@ Result<RunLog> read_runs(const std::string& commands_path, const std::string& po
   const auto commands = RunTable::read(commands_path, channels, "a command log");
   if (!commands) return commands.error();
   static const std::vector<std::string> kPose = {"x", "y", "theta"};
-  const auto poses = RunTable::read(poses_path, kPose, "a pose log");
+  static const std::vector<std::string> kIncrement = {"dx", "dy", "dtheta"};
+  const auto increments = holds_increments(poses_path);
+  if (!increments) return increments.error();
+  const auto poses = RunTable::read(poses_path, *increments ? kIncrement : kPose, "a pose log");
   if (!poses) return poses.error();
   RunLog log;
+  log.relative = *increments;
   log.channels.assign(channels.begin(), channels.end());
   for (const RunKey& key : poses->order()) {
     if (!commands->has(key)) {
@@ -98,15 +130,8 @@ Result<RunLog> read_runs(const std::string& commands_path, const std::string& po
     run.session = key.first;
     run.run = key.second;
     run.commands = commands->of(key);
-    std::size_t repeated = 0;
-    for (const CommandRow& row : poses->of(key)) {
-      if (!run.poses.empty() && row.t_s <= run.poses.back().t_s) {
-        ++repeated;
-        continue;
-      }
-      run.poses.push_back({row.t_s, {row.values[0], row.values[1], wrap_angle(row.values[2])}});
-    }
-    if (repeated > 0) {
+    const std::size_t repeated = add_poses(poses->of(key), log.relative, &run);
+    if (repeated > 0 && !log.relative) {
       log.notes.push_back(poses_path + ": run " + quoted_word(name_of(key)) + ": " +
                           std::to_string(repeated) + " poses at the time of the one before");
     }

@@ -9,6 +9,8 @@
 
 namespace gapfarm {
 
+// Poses are x, y, theta of the world, or dx, dy, dtheta: each one in the axes of the one before, as
+// scan matching and visual odometry have them; these are chained.
 // `channels`: the columns of the commands that the robot takes, in its order; others are omitted.
 // Errors name file, line and column, what was found and what was expected: a column that is
 // missing, a number that is not one, times that go back within a run, a run with poses and no

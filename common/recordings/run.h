@@ -35,6 +35,9 @@ struct RunLog {
   std::vector<LoggedRun> runs;              // in driving order
   // What reading omitted and why, one sentence each; show them to the user.
   std::vector<std::string> notes;
+  // Each pose was measured against the one before it alone: places and directions of the world mean
+  // nothing, motions do.
+  bool relative = false;
 };
 
 }  // namespace gapfarm

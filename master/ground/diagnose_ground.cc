@@ -78,6 +78,7 @@ Result<GroundDiagnosis> diagnose_driven(const GroundRobot& file, const GroundRob
     question = std::move(*asked);
   }
   if (Status s = exclude(options.excluded, &question.catalogue); !s) return s.error();
+  question.catalogue = that_can_show(log, std::move(question.catalogue));
   const GroundWork work = {[&](const std::string& stage) { clock.begin(stage); },
                            options.on_progress,
                            options.stopped,

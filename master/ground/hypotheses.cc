@@ -253,6 +253,7 @@ void Catalogue::tracker() {
   value("pose_scale", {"unit_error", "camera_scale"}, "the scale of all positions",
         {{"pose_scale", 1, 0.01, "ratio", "-"}});
   value("camera_aspect", {}, "the scale of y over that of x", {{"aspect", 1, 0.01, "ratio", "-"}});
+  all.back().of_world = true;
 }
 
 // What another floor or another load changes.
@@ -325,6 +326,11 @@ std::vector<GroundHypothesis> ground_hypotheses(const GroundRobot& robot) {
   catalogue.tracker();
   catalogue.all.push_back(floor_edge());
   return std::move(catalogue.all);
+}
+
+std::vector<GroundHypothesis> that_can_show(const RunLog& log, std::vector<GroundHypothesis> all) {
+  if (log.relative) std::erase_if(all, [](const GroundHypothesis& h) { return h.of_world; });
+  return all;
 }
 
 double value_in_file(const GroundRobot& robot, const std::string& name) {

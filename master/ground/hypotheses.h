@@ -35,6 +35,7 @@ struct GroundHypothesis {
   std::string remedy;
   bool only_more = false;  // less than 0 has no meaning
   double price = 0;        // nats that it must gain more, having more values than others
+  bool of_world = false;   // acts in a place or along an axis of the world
 };
 
 // Standard deviation of a value that is wrong (kPlausibleErrors).
@@ -45,6 +46,10 @@ std::vector<KinematicRow> kinematic_rows(const GroundRobot& robot);
 
 // In the order in which equals are preferred: simple first.
 std::vector<GroundHypothesis> ground_hypotheses(const GroundRobot& robot);
+
+// Those that a log can show: of relative poses none that acts in a place or along an axis of the
+// world.
+std::vector<GroundHypothesis> that_can_show(const RunLog& log, std::vector<GroundHypothesis> all);
 
 // The same of what may change from one log of a robot to another.  Tolerances are what a robot
 // changes by when nobody touched it; tyres of cars, which slip sideways, have rows of their own.

@@ -63,7 +63,9 @@ std::optional<GroundFault> find_ground_fault(const GroundRobot& robot, const Run
 
 namespace {
 
+// Chained increments lie on no grid, whatever each was rounded to.
 PoseGrid grid_of(const RunLog& log) {
+  if (log.relative) return {};
   std::vector<Pose> all;
   for (const LoggedRun& run : log.runs) {
     for (const PoseRow& row : run.poses) all.push_back(row.X_WM);
@@ -73,6 +75,8 @@ PoseGrid grid_of(const RunLog& log) {
 
 // Frames that repeat the one before say where the robot was, not where it is: they go.
 void drop_stale_frames(GroundSearch* search) {
+  // An increment of nothing is a motion that was not seen: no later one shows it.
+  if (search->log.relative) return;
   std::vector<std::vector<Pose>> tracks;
   for (const LoggedRun& run : search->log.runs) {
     std::vector<Pose>& track = tracks.emplace_back();

@@ -120,7 +120,7 @@ Result<GroundQuestion> ask_what_changed(const GroundRobot& robot, const RunLog& 
     const GroundHypothesis& h = question.catalogue[fault->hypothesis];
     return Error{"the reference's log is wrong in " + h.thing + ". " + h.remedy};
   }
-  fit = with_traits(fitter, ground_hypotheses(robot), std::move(fit));
+  fit = with_traits(fitter, that_can_show(reference, ground_hypotheses(robot)), std::move(fit));
   question.reference = reference_of(fitter, fit, seed);
   for (std::size_t k = 0; k < question.rows.size(); ++k) {
     question.rows[k].nominal = fit.values[static_cast<Eigen::Index>(k)];

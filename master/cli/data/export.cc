@@ -154,6 +154,7 @@ Result<RosExport> export_of(const ExportCommand& command, Console& console) {
     ASSIGN_OR_RETURN(const auto read, parse_controllers(text, command.controllers));
     data.controller = read.drives.front().name;
   }
+  data.kinematics = reported_values.values.values;
   data.values = ros_values(reported_values.values);
   data.remarks = ros_remarks(reported_values.values);
   data.friction = reported_values.friction;
@@ -171,7 +172,17 @@ nlohmann::ordered_json export_json(const RosExport& data) {
                     {"hi", row.interval.upper},
                     {"known", row.known}});
   }
-  nlohmann::ordered_json json = {{"controller", data.controller}, {"values", rows}};
+  nlohmann::ordered_json kinematics = nlohmann::ordered_json::array();
+  for (const ReportedValue& v : data.kinematics) {
+    kinematics.push_back({{"name", v.name},
+                          {"had", v.had},
+                          {"says", v.reported},
+                          {"lo", v.interval.lower},
+                          {"hi", v.interval.upper},
+                          {"known", v.named}});
+  }
+  nlohmann::ordered_json json = {
+      {"controller", data.controller}, {"values", rows}, {"kinematics", kinematics}};
   if (data.friction.across) json["mu1"] = *data.friction.along;
   if (data.friction.across) json["mu2"] = *data.friction.across;
   return json;

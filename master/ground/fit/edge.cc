@@ -85,6 +85,7 @@ GroundHypothesis floor_edge() {
                 {"edge_offset", 0, 0.2, "offset", "m"},
                 {"edge_ratio", 1, 0.02, "ratio", "-"}};
   edge.price = kPriceOfAnEdge;
+  edge.of_world = true;
   return edge;
 }
 

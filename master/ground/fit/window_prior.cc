@@ -144,8 +144,9 @@ Eigen::MatrixX2d WindowFitter::intervals(const WindowFit& fit, std::uint64_t see
       row[static_cast<std::size_t>(d)] = drawn(k, d) - (a >= 0 ? reference_->draws(a, d) : 0);
     }
     std::sort(row.begin(), row.end());
-    bounds(k, 0) = row[kGroundDraws / 20];
-    bounds(k, 1) = row[kGroundDraws - 1 - kGroundDraws / 20];
+    // Where the draws lead away from the fit, it has not settled: it is no surer than that.
+    bounds(k, 0) = std::min(row[kGroundDraws / 20], fit.values[k]);
+    bounds(k, 1) = std::max(row[kGroundDraws - 1 - kGroundDraws / 20], fit.values[k]);
   }
   return bounds;
 }

@@ -38,6 +38,8 @@ struct RosExport {
   std::vector<std::string> remarks;  // what no controller has a word for
   RosFriction friction;
   std::vector<RosWheel> wheels;
+  // All that was fitted, by the kinematic model's names.
+  std::vector<ReportedValue> kinematics = {};
 };
 
 // The controller's parameters by what a log says; names and values follow the drive.

@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <set>
+#include <string_view>
 #include <tuple>
 
 #include "common/base/constants.h"
@@ -75,17 +77,19 @@ void write_table(const char* name, const TableMap& table, std::string& out) {
   if (table.wheel_radius_m > 0) {
     out += "wheel_radius = " + format_double(table.wheel_radius_m) + "\n";
   }
+  if (table.increments) out += "increments = true\n";
   for (const MappedColumn& c : table.columns) {
     const bool plain = c.role.find_first_not_of(
                            "abcdefghijklmnopqrstuvwxyz"
                            "ABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-") == c.role.npos;
-    out += (plain ? c.role : quoted(c.role)) + " = { column = " + quoted(c.column) +
+    const std::string role = table.intervals && c.role == "t" ? "dt" : c.role;
+    out += (plain ? role : quoted(role)) + " = { column = " + quoted(c.column) +
            (c.unit.empty() ? "" : ", unit = " + quoted(c.unit));
     for (const ColumnNumber& number : kNumbers) {
       if (c.*number.value == MappedColumn{}.*number.value) continue;
       out += std::string(", ") + number.key + " = " + format_double(c.*number.value);
     }
-    out += c.rate ? ", rate = true }\n" : " }\n";
+    out += c.rate ? ", rate = true }\n" : c.increment ? ", increment = true }\n" : " }\n";
   }
 }
 
@@ -102,11 +106,12 @@ class MapReader {
     static const std::vector<std::string> kUp = {"z", "y"};
     if (const auto up = section->choice("up", kUp)) map.up = kUp[*up];
     section->read("wheel_radius", map.wheel_radius_m, 1e-4, 100, "m");
+    section->read("increments", map.increments);
+    static const std::set<std::string_view> kOptions = {"source", "run",          "keep",
+                                                        "up",     "wheel_radius", "increments"};
     for (const auto& [key, node] : section->table()) {
       const std::string role(key.str());
-      const bool option = role == "source" || role == "run" || role == "keep" || role == "up" ||
-                          role == "wheel_radius";
-      if (option) continue;
+      if (kOptions.count(role) != 0) continue;
       read_column(*section, role, node, map);
     }
     // TOML's tables are sorted by name; channels keep the file's order.
@@ -115,13 +120,38 @@ class MapReader {
     for (const auto& [line, column, i] : places_) ordered.push_back(map.columns[i]);
     map.columns = std::move(ordered);
     places_.clear();
-    if (map.find("t") == nullptr) {
-      errors_.add(section->table().source().begin,
-                  section->name() + " has no t, expected the column of the times");
-    }
+    check_times(*section, map);
   }
 
  private:
+  void check_times(const TomlSection& section, TableMap& map) {
+    const auto refuse = [&](const std::string& text) {
+      errors_.add(section.table().source().begin, section.name() + text);
+    };
+    for (MappedColumn& c : map.columns) {
+      if (c.role != "dt" || map.find("t") != nullptr) continue;
+      map.intervals = true;
+      c.role = "t";
+    }
+    if (map.find("t") == nullptr) {
+      refuse(
+          " has no t, expected the column of the times (or dt, of the seconds since the row "
+          "before)");
+    }
+    const bool counts = std::any_of(map.columns.begin(), map.columns.end(),
+                                    [](const MappedColumn& c) { return c.rate; });
+    if (map.intervals && counts) {
+      refuse(
+          " has dt and a column with rate = true, expected increment = true with what the count "
+          "changed by, or t");
+    }
+    if (map.increments && !map.keep.empty()) {
+      refuse(
+          " has increments and keep, expected one of them: without its row an increment leads "
+          "nowhere");
+    }
+  }
+
   void read_column(TomlSection& section, const std::string& role, const toml::node& node,
                    TableMap& map) {
     MappedColumn column{role, "", ""};
@@ -135,6 +165,7 @@ class MapReader {
         inner->read(number.key, column.*number.value, number.lower, number.upper);
       }
       inner->read("rate", column.rate);
+      inner->read("increment", column.increment);
       inner->finish();
       if (column.scale == 0) {
         inner->fail("scale",

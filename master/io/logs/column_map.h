@@ -20,6 +20,7 @@ struct MappedColumn {
   double sign = 1;     // or -1: an axis or a motor that counts the other way
   double gear = 1;     // turns of a motor a turn of its wheel
   bool rate = false;   // the column counts (an encoder's position): its change a second is meant
+  bool increment = false;  // the column is what that count changed by since the row before
 };
 
 // Where one kind of rows comes from.
@@ -29,6 +30,8 @@ struct TableMap {
   std::string keep;      // column that is not zero where a row counts; empty: all rows count
   std::string up = "z";  // poses: the world's upward axis; Motive's is y
   double wheel_radius_m = 0;  // turns rims' m/s into rad/s; 0: not stated
+  bool increments = false;    // poses: each in the axes of the one before
+  bool intervals = false;     // column "t" is dt: how long the stretch is that the row is about
   std::vector<MappedColumn> columns;
 
   const MappedColumn* find(std::string_view role) const;

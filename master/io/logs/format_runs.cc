@@ -42,11 +42,16 @@ RunFiles format_runs(const RunLog& log) {
   RunFiles files;
   files.commands = format_commands(log.channels, log, &LoggedRun::commands);
   files.wheels = format_commands(log.wheel_channels, log, &LoggedRun::wheel_speeds);
-  files.poses = "run,t,x,y,theta\n";
+  files.poses = log.relative ? "run,t,dx,dy,dtheta\n" : "run,t,x,y,theta\n";
+  // Increments add up, and so does what is rounded off.
+  const int places = log.relative ? 9 : 6;
   for (const LoggedRun& run : log.runs) {
+    Pose before = run.poses.empty() ? Pose() : run.poses.front().X_WM;
     for (const PoseRow& row : run.poses) {
-      files.poses += csv_field(run.run) + "," + digits(row.t_s, 6) + "," + digits(row.X_WM.x, 6) +
-                     "," + digits(row.X_WM.y, 6) + "," + digits(row.X_WM.theta, 7) + "\n";
+      const Pose X = log.relative ? inverse(before) * row.X_WM : row.X_WM;
+      files.poses += csv_field(run.run) + "," + digits(row.t_s, 6) + "," + digits(X.x, places) +
+                     "," + digits(X.y, places) + "," + digits(X.theta, places + 1) + "\n";
+      before = row.X_WM;
     }
   }
   return files;

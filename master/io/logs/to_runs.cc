@@ -8,12 +8,10 @@
 
 #include "common/base/suggest.h"
 #include "common/trials/text/csv.h"
+#include "master/io/logs/row_values.h"
 
 namespace gapfarm {
 namespace {
-
-// A quaternion this far from unit length was not measured (Motive and TUM write zeros).
-constexpr double kUnitLength = 0.1;
 
 // Seconds since 1970 are 2e9; what is greater than this was never measured.
 constexpr double kGreatest = 1e12;
@@ -160,8 +158,6 @@ class Importer {
                      ", expected it for [" + kind.name + "]" + suggestion(*name, table.columns)};
       }
     }
-    const bool rates = std::any_of(map.columns.begin(), map.columns.end(),
-                                   [](const MappedColumn& c) { return c.rate; });
     std::map<std::string, std::vector<double>> before;  // of each run: its last row
     Tally& tally = tallies_[kind.name];
     for (std::size_t r = 0; r < table.rows(); ++r) {
@@ -176,29 +172,23 @@ class Importer {
       const bool whole = std::all_of(values.begin(), values.end(),
                                      [](double v) { return std::abs(v) < kGreatest; });
       if (!whole || (poses && !to_pose(map, values))) {
+        if (map.increments || map.intervals) return broken_chain(table, r, kind.name);
         ++tally.blank;
         continue;
       }
       const std::string name = run_name(table, run, r);
-      if (rates && !to_rates(map, before[name], values)) continue;
+      if (!at_its_time(map, poses, before[name], values)) continue;
       put(tally, stretches_[kind.name][recording][name], values);
     }
     used_.insert(table.source);
     return {};
   }
 
-  // The row before with its counts' rates up to this one; false where there is none.
-  static bool to_rates(const TableMap& map, std::vector<double>& before,
-                       std::vector<double>& values) {
-    const double dt = before.empty() ? 0 : values[0] - before[0];
-    if (dt < 0 || (dt == 0 && !before.empty())) return false;
-    std::vector<double> row = before;
-    for (std::size_t c = 0; c < row.size(); ++c) {
-      if (map.columns[c].rate) row[c] = (values[c] - before[c]) / dt;
-    }
-    before = values;
-    values = std::move(row);
-    return !values.empty();
+  static Error broken_chain(const LogTable& table, std::size_t row, const std::string& kind) {
+    return Error{table.source + ": found no number for [" + kind + "] in row " +
+                 std::to_string(row + 1) +
+                 ", expected one in every row, since each leads on from the row before; name what "
+                 "lies before and behind it apart by a column and say run = \"COLUMN\" in the map"};
   }
 
   static std::string run_name(const LogTable& table, const std::optional<std::size_t>& run,
@@ -219,28 +209,6 @@ class Importer {
   }
 
   double t_of(const std::vector<double>& values) const { return values[time_index_]; }
-
-  // {t, x, y, theta} out of the mapped columns; false where nothing was measured.
-  static bool to_pose(const TableMap& map, std::vector<double>& values) {
-    const auto value = [&](std::string_view role) {
-      for (std::size_t i = 0; i < map.columns.size(); ++i) {
-        if (map.columns[i].role == role) return values[i];
-      }
-      return 0.0;
-    };
-    const bool y_up = map.up == "y";
-    double theta = value("theta");
-    if (map.find("qw") != nullptr) {
-      double x = value("qx"), y = value("qy"), z = value("qz"), w = value("qw");
-      const double length = std::sqrt(x * x + y * y + z * z + w * w);
-      if (std::abs(length - 1) > kUnitLength) return false;
-      // With y up the floor's y is -z: turned about x, which keeps x.
-      if (y_up) std::tie(y, z) = std::pair(-z, y);
-      theta = std::atan2(2 * (w * z + x * y), w * w + x * x - y * y - z * z);
-    }
-    values = {value("t"), value("x"), y_up ? -value("z") : value("y"), wrap_angle(theta)};
-    return true;
-  }
 
   // Recordings that have both kinds are drives of their own; others are put together in order.
   std::vector<std::vector<std::size_t>> groups() {
@@ -268,6 +236,7 @@ class Importer {
 
   void assemble() {
     RunLog& log = out_.log;
+    log.relative = map_.poses.increments;
     for (const MappedColumn& c : map_.commands.columns) {
       if (c.role != "t") log.channels.push_back(c.role);
     }
@@ -318,9 +287,14 @@ class Importer {
                   std::vector<std::string>& order, const std::string& name) {
     if (std::find(order.begin(), order.end(), name) == order.end()) order.push_back(name);
     const std::string_view what = kind.name;
+    const bool increments = what == "poses" && kind.map->increments;
+    if (increments && kind.map->intervals) run.poses.push_back({0, {}});
     for (std::size_t i = 0; i < stretch.t_s.size(); ++i) {
       const std::vector<double>& row = stretch.rows[i];
-      if (what == "poses") run.poses.push_back({stretch.t_s[i], {row[0], row[1], row[2]}});
+      Pose X{row.size() < 3 ? 0 : row[0], row.size() < 3 ? 0 : row[1], row.size() < 3 ? 0 : row[2]};
+      // The first one's leads on from a pose that nobody has.
+      if (increments) X = run.poses.empty() ? Pose() : run.poses.back().X_WM * X;
+      if (what == "poses") run.poses.push_back({stretch.t_s[i], X});
       if (what == "commands") run.commands.push_back({stretch.t_s[i], row});
       if (what == "wheels") run.wheel_speeds.push_back({stretch.t_s[i], row});
     }

@@ -101,6 +101,46 @@ TEST(Tables, MapsScaleTurnGearAndDifferentiate) {
   EXPECT_NEAR(run.wheel_speeds[1].values[0], 200 * 0.01 / 4 / 0.5, 1e-9);
 }
 
+// What scan matching beside encoders writes: a row a stretch, all by what changed over it.
+TEST(Tables, IncrementsAreChainedFromWhereEachStretchBegins) {
+  const std::string columns =
+      "dl = { column = \"l\", increment = true }\ndr = { column = \"r\", increment = true }\n";
+  const std::string poses =
+      "increments = true\nx = \"x\"\ny = \"y\"\ntheta = { column = \"a\", unit = \"deg\" }\n";
+  const auto map =
+      parse_map("[poses]\ndt = \"dt\"\n" + poses + "[commands]\ndt = \"dt\"\n" + columns, "m.toml");
+  ASSERT_TRUE(map) << map.error().message;
+  EXPECT_EQ(format_map(*parse_map(format_map(*map), "m.toml")), format_map(*map));
+  const auto runs = to_runs({table_of("dt,l,r,x,y,a\n0.5,1,2,1,0,90\n0.25,1,1,1,0,90\n")}, *map);
+  ASSERT_TRUE(runs) << runs.error().message;
+  EXPECT_TRUE(runs->log.relative);
+  const LoggedRun& run = runs->log.runs.at(0);
+  ASSERT_EQ(run.poses.size(), 3u);
+  EXPECT_NEAR(run.poses[2].t_s, 0.75, 1e-12);
+  EXPECT_NEAR(run.poses[2].X_WM.x, 1, 1e-12);
+  EXPECT_NEAR(run.poses[2].X_WM.y, 1, 1e-12);
+  ASSERT_EQ(run.commands.size(), 2u);
+  EXPECT_EQ(run.commands[0].t_s, 0);
+  EXPECT_EQ(run.commands[1].t_s, 0.5);
+  EXPECT_THAT(run.commands[0].values, ElementsAre(2, 4));
+  EXPECT_THAT(run.commands[1].values, ElementsAre(4, 4));
+  // With times the first row is where it begins, and what it moved before nobody knows.
+  const auto timed =
+      parse_map("[poses]\nt = \"t\"\n" + poses + "[commands]\nt = \"t\"\n" + columns, "m.toml");
+  const auto same =
+      to_runs({table_of("t,l,r,x,y,a\n7,9,9,9,9,9\n7.5,1,2,1,0,90\n7.75,1,1,1,0,90\n")}, *timed);
+  ASSERT_TRUE(same) << same.error().message;
+  EXPECT_EQ(same->log.runs[0].commands[0].t_s, 7);
+  EXPECT_THAT(same->log.runs[0].commands[0].values, ElementsAre(2, 4));
+  EXPECT_NEAR(same->log.runs[0].poses[2].X_WM.y, 1, 1e-12);
+  // A row without its increment parts what lies before from what lies behind.
+  const auto broken = to_runs({table_of("dt,l,r,x,y,a\n1,1,1,1,0,0\n1,1,1,,0,0\n")}, *map);
+  ASSERT_FALSE(broken);
+  EXPECT_THAT(broken.error().message, HasSubstr("row 2"));
+  EXPECT_FALSE(parse_map("[poses]\ndt = \"dt\"\nkeep = \"k\"\n" + poses, "m.toml"));
+  EXPECT_FALSE(parse_map("[wheels]\ndt = \"dt\"\nl = { column = \"l\", rate = true }\n", "m.toml"));
+}
+
 TEST(Tables, ErrorsNamePlaceValueAndRemedy) {
   // Pixels are metres to nobody.
   const auto map =

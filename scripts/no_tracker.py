@@ -1,0 +1,132 @@
+#!/usr/bin/env python3
+"""What relative poses say of a robot, beside what the same runs' world poses say.
+
+    scripts/no_tracker.py SETS OUT [SET...]
+
+SETS holds folders with robot.toml and fit/, such as scripts/ground_sets.py makes of public logs. The
+world poses of each are thinned to 5 a second, as a laser scans, and every pose is replaced by its
+increment since the one before with noise (3 mm + 1 % of the way, 2 mrad + 1 % of the turn; Censi et
+al. 2013 print about these for scan matching); nothing else of the poses is kept. Both logs are
+imported, and the kinematics fitted to each (`gapfarm export ros`). The table of docs/ground.md is what
+this prints. BIN: where the programs are (build/release/bin).
+"""
+import json
+import math
+import os
+import pathlib
+import random
+import subprocess
+import sys
+
+import ground_sets
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+PROGRAM = pathlib.Path(os.environ.get("BIN", ROOT / "build/release/bin")) / "gapfarm"
+SETS = ["opti_diff", "mrclam_1", "drive_asphalt"]
+INTERVAL_S = 0.2
+# Values that are no ratios, and a thousandth of their unit.
+ADDED = {"marker_x": "mm", "marker_y": "mm", "marker_yaw": "mrad", "steering_offset": "mrad",
+         "delay": "ms", "lag": "ms", "load_x": "mm", "load_y": "mm"}
+SEED = 20261124
+
+
+def run(*command):
+    """Runs the program; its standard output, or the end of everything with what it said."""
+    done = subprocess.run([PROGRAM, *command], capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        sys.exit(f"gapfarm {' '.join(map(str, command))}\n{done.stdout}{done.stderr}")
+    return done.stdout
+
+
+def thinned(path):
+    """Poses of every run, at most one an interval; (run, t, x, y, theta)."""
+    kept = []
+    for row in ground_sets.numbers(path, 1):
+        if not kept or kept[-1][0] != row[0] or row[1] - kept[-1][1] >= INTERVAL_S - 1e-3:
+            kept.append(row)
+    return kept
+
+
+def increments(rows, seed):
+    """Each pose in the axes of the one before, with noise."""
+    draw = random.Random(seed)
+    out, before = [], None
+    for run_name, t, x, y, theta in rows:
+        d = [0.0, 0.0, 0.0]
+        if before and before[0] == run_name:
+            dx, dy = x - before[2], y - before[3]
+            c, s = math.cos(before[4]), math.sin(before[4])
+            turn = math.remainder(theta - before[4], 2 * math.pi)
+            way = math.hypot(dx, dy)
+            d = [c * dx + s * dy + draw.gauss(0, 0.003 + 0.01 * way),
+                 c * dy - s * dx + draw.gauss(0, 0.003 + 0.01 * way),
+                 turn + draw.gauss(0, 0.002 + 0.01 * abs(turn))]
+        out.append((run_name, t, *d))
+        before = (run_name, t, x, y, theta)
+    return out
+
+
+def write(folder, commands, head, rows):
+    """A run folder with these poses."""
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "commands.csv").write_text(commands, encoding="utf-8")
+    lines = [f"run,t,{head}"] + [f"{row[0]:g},{row[1]:.6f}," + ",".join(f"{v:.9f}" for v in row[2:])
+                                 for row in rows]
+    (folder / "poses.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def values_of(robot, runs, out):
+    """What the log says of each value: key, had, says, lo, hi, known."""
+    config = pathlib.Path(f"{out}.toml")
+    config.write_text(f"""scenario = "ground"
+[robot]
+file = "{robot.resolve()}"
+[runs]
+folders = ["{runs.resolve()}"]
+[parameters]
+step_rate = 60
+[genes]
+friction = "table"
+[evolution]
+population = 4
+seed_nominal = false
+stop = {{ generations = 1 }}
+""", encoding="utf-8")
+    subprocess.run(["rm", "-rf", out], check=True)
+    run("evolve", config, "--out", out)
+    return json.loads(run("export", "ros", out, "--json"))["kinematics"]
+
+
+def main():
+    """Prints the table."""
+    if len(sys.argv) < 3:
+        sys.exit(__doc__)
+    sets, out = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2])
+    print("| log | value | with world poses | with increments | apart | inside |")
+    print("|---|---|---|---|---|---|")
+    inside = all_values = 0
+    for name in sys.argv[3:] or SETS:
+        here, robot = out / name, sets / name / "robot.toml"
+        commands = (sets / name / "fit/commands.csv").read_text(encoding="utf-8")
+        rows = thinned(sets / name / "fit/poses.csv")
+        write(here / "world", commands, "x,y,theta", rows)
+        write(here / "relative", commands, "dx,dy,dtheta", increments(rows, f"{SEED} {name}"))
+        world, relative = (values_of(robot, here / kind, here / f"run_{kind}")
+                           for kind in ("world", "relative"))
+        for a, b in zip(world, relative):
+            if not (a["known"] and b["known"]):
+                continue
+            if a["name"] in ADDED:
+                text = f"{1000 * (b['says'] - a['says']):+.1f} {ADDED[a['name']]}"
+            else:
+                text = f"{100 * (b['says'] / a['says'] - 1):+.2f} %"
+            holds = b["lo"] <= a["says"] <= b["hi"]
+            inside += holds
+            all_values += 1
+            print(f"| {name} | `{a['name']}` | {a['says']:.4g} | {b['says']:.4g} [{b['lo']:.4g}, "
+                  f"{b['hi']:.4g}] | {text} | {'yes' if holds else 'no'} |")
+    print(f"\n{inside} of {all_values} values lie in the intervals of the increments.")
+
+
+if __name__ == "__main__":
+    main()
