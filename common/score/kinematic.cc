@@ -115,7 +115,6 @@ class Body {
     return robot;
   }
 
-  // What a tracker with these scales reports.
   Pose observed(const Pose& X) const { return {scale_ * X.x, scale_ * aspect_ * X.y, X.theta}; }
   Pose unobserved(const Pose& X) const { return {X.x / scale_, X.y / scale_ / aspect_, X.theta}; }
 
