@@ -375,12 +375,13 @@ void Scheduler::on_tick(double now) {
   dispatch(now);
 }
 
-void Scheduler::send_goodbye(const std::string& reason) {
-  for (const auto& [id, worker] : registry_.all()) {
-    post(worker->peer).mutable_goodbye()->set_reason(reason);
-  }
-  for (const std::string& peer : fleets_.peers()) {
-    post(peer).mutable_goodbye()->set_reason(reason);
+void Scheduler::send_goodbye(const std::string& reason, bool over) {
+  std::vector<std::string> peers = fleets_.peers();
+  for (const auto& [id, worker] : registry_.all()) peers.push_back(worker->peer);
+  for (const std::string& peer : peers) {
+    v1::Goodbye* goodbye = post(peer).mutable_goodbye();
+    goodbye->set_reason(reason);
+    goodbye->set_over(over);
   }
 }
 

@@ -119,7 +119,7 @@ class Scheduler {
   // waits unread must not count as silence.
   void on_tick(double now);
   // Informs every worker and fleet that this master leaves.
-  void send_goodbye(const std::string& reason);
+  void send_goodbye(const std::string& reason, bool over);
 
   // To be sent by the caller, in order; cleared by it.
   std::vector<Outgoing>& outbox() { return outbox_; }

@@ -55,6 +55,7 @@ struct SocketFarm::Impl {
   std::string last_trouble;                       // why workers do not come
   std::map<std::string, std::string> unsendable;  // problems by hash: what is wrong
   double next_reap = 0;
+  bool unanswered = false;  // what was asked last was stopped, or failed
 
   Status open();
   Status open_local();
@@ -174,7 +175,9 @@ Result<std::unique_ptr<SocketFarm>> SocketFarm::create(SocketFarmOptions options
 }
 
 SocketFarm::~SocketFarm() {
-  impl_->scheduler->send_goodbye("the run is over");
+  const bool stopped = impl_->options.stop != nullptr && impl_->options.stop->requested();
+  const bool over = !stopped && !impl_->unanswered;
+  impl_->scheduler->send_goodbye(over ? "the run is over" : "the run was stopped", over);
   pump(*impl_->socket, *impl_->scheduler, monotonic_seconds());
 }
 
@@ -207,7 +210,9 @@ Result<std::vector<v1::TaskResult>> SocketFarm::run(
                  "; split it"};
   }
   impl_->scheduler->start(problem_hash, tasks);
-  if (Status status = impl_->loop(on_progress); !status) {
+  const Status status = impl_->loop(on_progress);
+  impl_->unanswered = !status;
+  if (!status) {
     impl_->scheduler->abandon();
     pump(*impl_->socket, *impl_->scheduler, monotonic_seconds());
     return status.error();

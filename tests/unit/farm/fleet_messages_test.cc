@@ -105,7 +105,7 @@ TEST_F(FleetMessages, StatusHasWhatAFleetReportsWhileItReports) {
 
 TEST_F(FleetMessages, AFleetLearnsThatTheRunIsOver) {
   report("");
-  scheduler_.send_goodbye("the run is over");
+  scheduler_.send_goodbye("the run is over", true);
   const auto& out = scheduler_.outbox();
   EXPECT_TRUE(std::any_of(out.begin(), out.end(), [](const Outgoing& one) {
     return one.peer == "manager" && one.envelope.has_goodbye();
