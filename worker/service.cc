@@ -52,7 +52,7 @@ class Service {
         return leave(ServiceEnd::kStoppedNow, "its lifetime is over");
       }
       // A core that a cluster lends is given back when nobody needs it.
-      if (wait_.is_over(now) && evaluation_.idle()) return give_up();
+      if (wait_.is_over(now) && evaluation_.idle()) return stop_waiting();
       if (may_leave()) {
         return stops_ > 0 ? leave(ServiceEnd::kStopped, "asked to stop")
                           : leave(ServiceEnd::kOutOfTime, "no lifetime left for another job");
@@ -80,15 +80,15 @@ class Service {
   void announce(double now) {
     const bool working = session_.state() == WorkerSession::State::kWorking;
     const auto message = wait_.message(working, now);
-    if (message) say(*message);
+    if (message) print(*message);
   }
 
-  void say(const std::string& text) const {
+  void print(const std::string& text) const {
     if (options_.announce) std::fprintf(stderr, "gapfarm-worker: %s\n", text.c_str());
   }
 
-  ServiceEnd give_up() {
-    say(session_.over() ? "the master's work is done" : wait_.over());
+  ServiceEnd stop_waiting() {
+    print(session_.over() ? "the master's work is done" : wait_.over());
     return leave(session_.over() ? ServiceEnd::kOver : ServiceEnd::kNoMaster,
                  "no master for too long");
   }

@@ -57,6 +57,8 @@ void WorkerSession::on_message(v1::Envelope* envelope, double now) {
       reason_ = envelope->goodbye().reason();
       over_ = envelope->goodbye().over();
       drop_everything();
+      // A master waits for this: what a connection brings is lost when it ends unread.
+      outbox_.push_back(goodbye("the master has left"));
       break;
     default:
       break;  // a heartbeat says no more than that the master is there

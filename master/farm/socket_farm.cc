@@ -20,6 +20,8 @@ namespace {
 
 constexpr double kProgressInterval = 0.1;  // s
 constexpr double kReapInterval = 0.05;     // s, while messages keep the loop busy
+// As long as a socket's last messages may take to get out (SocketOptions::linger_s).
+constexpr double kFarewellLimit_s = 1;
 
 void complain(const FarmEvent& event) {
   switch (event.kind) {
@@ -178,7 +180,13 @@ SocketFarm::~SocketFarm() {
   const bool stopped = impl_->options.stop != nullptr && impl_->options.stop->requested();
   const bool over = !stopped && !impl_->unanswered;
   impl_->scheduler->send_goodbye(over ? "the run is over" : "the run was stopped", over);
-  pump(*impl_->socket, *impl_->scheduler, monotonic_seconds());
+  // A peer loses what it has not read when the connection ends, so that waits for their answers.
+  const double until = monotonic_seconds() + kFarewellLimit_s;
+  for (double now = 0; now < until; impl_->socket->wait({}, std::max(0.0, until - now))) {
+    now = monotonic_seconds();
+    pump(*impl_->socket, *impl_->scheduler, now);
+    if (impl_->scheduler->goodbye_is_answered()) break;
+  }
 }
 
 Status check_sendable(const v1::Problem& problem) {

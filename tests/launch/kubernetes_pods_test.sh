@@ -6,6 +6,7 @@ set -u
 BIN=$1 ROOT=$2
 source "$ROOT/tests/launch/common.sh"
 command -v podman >/dev/null || not_run 'podman is not installed (scripts/setup.sh --boxes)'
+command -v ip >/dev/null || not_run 'ip is not installed (scripts/setup.sh --tests)'
 [[ $(id -u) -eq 0 ]] || not_run 'namespaces want root'
 /usr/bin/python3 -c 'import yaml' 2>/dev/null || not_run 'python3-yaml is not installed (scripts/setup.sh --tests)'
 if [[ -z ${GAPFARM_INSIDE:-} ]]; then
@@ -39,8 +40,6 @@ default_ulimits = ["nofile=1024:1024", "nproc=1024:1024"]
 [engine]
 cgroup_manager = "cgroupfs"
 events_logger = "file"
-[network]
-network_backend = "netavark"
 TEXT
 pod info >/dev/null 2>&1 || storage+=(--storage-driver vfs)
 pod info >"$T/info.log" 2>&1 || not_run "podman: $(tail -n 1 "$T/info.log")"
@@ -60,7 +59,7 @@ said=$(pod run --rm --network host gapfarm:latest gapfarm-worker --version 2>&1)
 # What docs/launching.md has kubectl create.
 write_config
 sed -i 's|^trials = .*|trials = ["trials.csv"]|' "$T/run.toml"
-printf '[evolution.stop]\ngenerations = 40\n' >>"$T/run.toml"
+printf '[evolution.stop]\ngenerations = 1000000\n' >>"$T/run.toml"
 cp "$ROOT/configs/demo/trials.csv" "$T/trials.csv"
 "$BIN/gapfarm" keys make --keys "$T/keys" >/dev/null 2>&1 || fail 'no keys'
 # made KIND NAME FILE...: one with the files' texts (podman 4.3 mounts what a secret holds as it is, undecoded).
@@ -116,7 +115,9 @@ start gapfarm-worker-0 gapfarm-worker-1
 wait_for 'those killed and evicted are replaced' there "${#workers[@]}"
 pod pod stop -t 60 gapfarm-master >/dev/null 2>&1
 [[ $(exit_of gapfarm-master-master) -eq 85 ]] || fail 'the evicted master did not stop well'
-echo "the master is evicted at generation $(status "$run" 's["generation"]')"
+now=$(status "$run" 's["generation"]')
+echo "the master is evicted at generation $now"
+sed -i "s|gapfarm resume /run/gapfarm/r|& --generations $((now + 5))|" "$T/pods/gapfarm-master.yaml"
 start gapfarm-master
 again() { [[ $(status "$run" 's["epoch"]') -ge 2 ]]; }
 wait_for 'it resumes' again
@@ -131,7 +132,6 @@ for worker in "${workers[@]}"; do
   code=$(exit_of "$worker-worker")
   [[ $code -eq 0 ]] || { pod logs "$worker-worker"; fail "$worker ended with $code"; }
 done
-idle=$((SECONDS - ended))
-echo "all workers are complete; idle core seconds of each after the last task: at most $idle"
-((idle < 60)) || fail 'they idled for too long'
+echo 'all workers are complete'
+idle_seconds $((SECONDS - ended))
 passed=yes

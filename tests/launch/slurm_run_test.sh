@@ -14,7 +14,7 @@ trap clean_up EXIT
 start_slurm
 write_config
 "$BIN/gapfarm" keys make --keys "$T/keys" >/dev/null 2>&1 || fail 'no keys'
-job=$("$BIN/gapfarm" submit --on slurm --keys "$T/keys" --max 2 --look-every 2 --worker-logs "$T" -- \
+job=$("$BIN/gapfarm" submit --on slurm --keys "$T/keys" --max 2 --look-every 1 --worker-logs "$T" -- \
   evolve "$T/run.toml" --out "$T/run" --generations 12 2>"$T/submit.log") || fail 'submit'
 echo "$job"
 job=$(grep -o '[0-9]*' <<<"$job" | head -n 1)

@@ -86,7 +86,10 @@ class Loop {
       if (envelope.has_hello_request() || envelope.has_refusal()) {
         refused_ = true;
       }
-      if (envelope.has_goodbye()) goodbye_ = true;
+      if (envelope.has_goodbye()) {
+        goodbye_ = true;
+        socket_->send("", encode(&envelope));  // the master waits for it
+      }
       if (!envelope.has_backlog()) continue;
       // The first look waits for the first answer.
       if (!backlog_) next_look_s_ = now;

@@ -80,7 +80,13 @@ TEST(Sites, GridEngineIsUnderstood) {
                             "(current job count: 4)\nExiting.\n"));
 }
 
-// Of the manuals of OpenPBS 20 and HTCondor 10: neither ran here.
+// Written after manuals; Debian 12 has packages of neither, so nothing here was printed by the
+// systems themselves. PBS: `qstat -n -1 -u USER` has the columns of "Displaying Job Status in
+// Alternate Format" of the PBS Professional 2020.1 user's guide (OpenPBS 20 is the same), and -n -1
+// the host behind them; letters of states as in qstat(1B). HTCondor 10: `condor_q -af:j` has
+// cluster.process and then the attributes, "undefined" for those that are missing (manual page of
+// condor_q); JobStatus as in its "Job ClassAd Attributes"; `condor_submit -terse` the first and the
+// last job (its manual page).
 TEST(Sites, PbsIsUnderstood) {
   const ClusterSite site = shipped_site("pbs");
   const std::string listed = R"(
