@@ -117,10 +117,12 @@ pod pod stop -t 60 gapfarm-master >/dev/null 2>&1
 [[ $(exit_of gapfarm-master-master) -eq 85 ]] || fail 'the evicted master did not stop well'
 now=$(status "$run" 's["generation"]')
 echo "the master is evicted at generation $now"
-sed -i "s|gapfarm resume /run/gapfarm/r|& --generations $((now + 5))|" "$T/pods/gapfarm-master.yaml"
+# Its last life is long enough for all workers to find it: they try again every five seconds at most.
+sed -i "s|gapfarm resume /run/gapfarm/r|& --time $(status "$run" 'int(s["wall_s"]) + 20')|" "$T/pods/gapfarm-master.yaml"
 start gapfarm-master
 again() { [[ $(status "$run" 's["epoch"]') -ge 2 ]]; }
 wait_for 'it resumes' again
+wait_for 'all workers are back' there "${#workers[@]}"
 finished() { [[ $(status "$run" 's["state"]') == finished ]]; }
 wait_for 'the run is finished' finished
 ended=$SECONDS

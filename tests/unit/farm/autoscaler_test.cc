@@ -184,10 +184,9 @@ TEST(Autoscaler, TenThousandWorkersCostLittleMoreThanAnOracle) {
     EXPECT_LT(outcome.refusals, 100u);
     // A site's limit that is not known yet is found by bisection, which here takes a look a step.
     if (8 * scenario.site_limit < scenario.limits.max_workers) continue;
-    const auto full = std::find_if(outcome.moments.begin(), outcome.moments.end(),
-                                   [&](const FleetMoment& moment) {
-                                     return moment.queued + moment.running >= 10000;
-                                   });
+    const auto full = std::find_if(
+        outcome.moments.begin(), outcome.moments.end(),
+        [&](const FleetMoment& moment) { return moment.queued + moment.running >= 10000; });
     ASSERT_NE(full, outcome.moments.end());
     std::printf("  from none to all within %.0f s, looks every %.0f s\n", full->at_s,
                 scenario.look_interval_s);
