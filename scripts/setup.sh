@@ -26,7 +26,7 @@ if [[ $wanted == *' --tests '* ]]; then
     openssh-client openssh-server python3-kubernetes python3-yaml slurm-wlm slurmdbd)
 fi
 if [[ $wanted == *' --boxes '* ]]; then
-  packages+=(debootstrap podman)
+  packages+=(catatonit debootstrap podman)
 fi
 
 missing=()

@@ -33,7 +33,8 @@ constexpr const char* kExamples = R"(Examples:
 
 SIGTERM or Ctrl-C: finish the job in work (--drain: all in hand), then leave.  A second one: leave
 at once.
-Exit status: 0 stopped as asked, 2 wrong usage, 78 no master that would have this worker.)";
+Exit status: 0 stopped as asked or the master's work is done, 2 wrong usage, 69 no master for the
+--wait-limit, 78 no master that would have this worker.)";
 
 struct Arguments {
   std::string endpoint;
@@ -170,7 +171,8 @@ int work(const Arguments& arguments) {
   allow_external_programs(arguments.local || arguments.allow_external);
   EvaluationThread evaluation(options.progress);
   const Result<ServiceEnd> end = serve(options, evaluation, stop);
-  const int status = end ? 0 : complain(end.error(), kExitRefused);
+  int status = end ? 0 : complain(end.error(), kExitRefused);
+  if (end && *end == ServiceEnd::kNoMaster) status = kExitNoMaster;
   // The thread's destructor would wait for a job whose answer nobody wants.
   if (!evaluation.idle()) _exit(status);
   return status;
@@ -205,8 +207,8 @@ int start_workers(const Arguments& arguments) {
                              {"--wait-limit", std::to_string(arguments.wait_limit_s)});
   }
   if (arguments.lifetime_s > 0) options.deadline_s = monotonic_seconds() + arguments.lifetime_s;
-  const Status status = supervise(options, stop);
-  return status ? 0 : complain(status.error(), kExitRefused);
+  const Result<int> status = supervise(options, stop);
+  return status ? *status : complain(status.error(), kExitRefused);
 }
 
 }  // namespace

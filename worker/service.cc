@@ -5,15 +5,14 @@
 #include <algorithm>
 #include <array>
 #include <cstdio>
-#include <optional>
 #include <random>
 #include <string>
 
 #include "common/base/host.h"
 #include "common/base/try.h"
+#include "common/net/master_wait.h"
 #include "common/net/socket.h"
 #include "common/process/process_pool.h"
-#include "worker/master_wait.h"
 #include "worker/pump.h"
 
 namespace gapfarm {
@@ -31,7 +30,7 @@ class Service {
         socket_(socket),
         evaluation_(evaluation),
         stop_(stop),
-        wait_(options.endpoint) {}
+        wait_(options.endpoint, options.wait_limit_s) {}
 
   Result<ServiceEnd> run() {
     for (;;) {
@@ -52,9 +51,8 @@ class Service {
       if (now >= options_.session.deadline_s) {
         return leave(ServiceEnd::kStoppedNow, "its lifetime is over");
       }
-      if (waited_too_long(now) && evaluation_.idle()) {
-        return leave(ServiceEnd::kNoMaster, "no master for too long");
-      }
+      // A core that a cluster lends is given back when nobody needs it.
+      if (wait_.is_over(now) && evaluation_.idle()) return stop_waiting();
       if (may_leave()) {
         return stops_ > 0 ? leave(ServiceEnd::kStopped, "asked to stop")
                           : leave(ServiceEnd::kOutOfTime, "no lifetime left for another job");
@@ -80,21 +78,19 @@ class Service {
   }
 
   void announce(double now) {
-    if (!options_.announce) return;
     const bool working = session_.state() == WorkerSession::State::kWorking;
-    if (const auto message = wait_.message(working, now)) {
-      std::fprintf(stderr, "gapfarm-worker: %s\n", message->c_str());
-    }
+    const auto message = wait_.message(working, now);
+    if (message) print(*message);
   }
 
-  // A core that a cluster lends is given back when nobody needs it.
-  bool waited_too_long(double now) {
-    if (session_.state() == WorkerSession::State::kWorking)
-      without_since_.reset();
-    else if (!without_since_)
-      without_since_ = now;
-    return options_.wait_limit_s > 0 && without_since_ &&
-           now - *without_since_ > options_.wait_limit_s;
+  void print(const std::string& text) const {
+    if (options_.announce) std::fprintf(stderr, "gapfarm-worker: %s\n", text.c_str());
+  }
+
+  ServiceEnd stop_waiting() {
+    print(session_.over() ? "the master's work is done" : wait_.over());
+    return leave(session_.over() ? ServiceEnd::kOver : ServiceEnd::kNoMaster,
+                 "no master for too long");
   }
 
   // Between the session and the evaluating thread.
@@ -120,7 +116,7 @@ class Service {
            session_.state() != WorkerSession::State::kWorking || session_.in_hand() == 0;
   }
 
-  Result<ServiceEnd> leave(ServiceEnd end, const char* reason) {
+  ServiceEnd leave(ServiceEnd end, const char* reason) {
     v1::Envelope goodbye = session_.goodbye(reason);
     send(socket_, &goodbye);
     return end;
@@ -134,7 +130,6 @@ class Service {
 
   const ServiceOptions& options_;
   unsigned stops_ = 0;
-  std::optional<double> without_since_;  // a master
   WorkerSession session_;
   DealerSocket& socket_;
   EvaluationThread& evaluation_;

@@ -27,7 +27,8 @@ struct ServiceOptions {
 };
 
 enum class ServiceEnd {
-  kNoMaster,    // for too long
+  kNoMaster,    // for too long, though the last one may come back, or there never was one
+  kOver,        // the last master's work is done, and no other has come since
   kStopped,     // by request, with the job in hand finished and its result sent
   kStoppedNow,  // by a second request, or at the deadline with a job still in work
   kOutOfTime,   // the session's deadline is near, and nothing is in work

@@ -55,7 +55,10 @@ void WorkerSession::on_message(v1::Envelope* envelope, double now) {
     case v1::Envelope::kGoodbye:
       state_ = State::kDismissed;
       reason_ = envelope->goodbye().reason();
+      over_ = envelope->goodbye().over();
       drop_everything();
+      // A master waits for this: what a connection brings is lost when it ends unread.
+      outbox_.push_back(goodbye("the master has left"));
       break;
     default:
       break;  // a heartbeat says no more than that the master is there
@@ -71,6 +74,7 @@ void WorkerSession::on_other_protocol(std::uint32_t protocol) {
 void WorkerSession::on_welcome(const v1::Welcome& welcome, double now) {
   if (welcome.epoch() != epoch_) drop_everything();  // nobody waits for it under these ids
   epoch_ = welcome.epoch();
+  over_ = false;
   heartbeat_interval_ = std::clamp(welcome.heartbeat_interval(), 0.02, 60.0);
   silence_limit_ = std::max(welcome.silence_limit(), 2 * heartbeat_interval_);
   state_ = State::kWorking;

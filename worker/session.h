@@ -94,6 +94,8 @@ class WorkerSession {
 
   State state() const { return state_; }
   const std::string& reason() const { return reason_; }
+  // The last master has left with all of its work done.
+  bool over() const { return over_; }
   std::size_t in_hand() const { return in_hand_.size(); }
   double next_tick() const;
   void set_current_job_age(double age) { current_job_age_ = age; }
@@ -117,6 +119,7 @@ class WorkerSession {
   SessionOptions options_;
   State state_ = State::kGreeting;
   std::string reason_;
+  bool over_ = false;
   std::uint64_t epoch_ = 0;  // of the master; 0: never welcomed
   double heartbeat_interval_ = 1;
   double silence_limit_ = 10;

@@ -68,11 +68,12 @@ void wait_for(const ProcessPool& pool, const StopSource& stop, double timeout_s)
 
 }  // namespace
 
-Status supervise(const SupervisorOptions& options, StopSource& stop) {
+Result<int> supervise(const SupervisorOptions& options, StopSource& stop) {
   ProcessPool pool(pool_options(options));
   RETURN_IF_ERROR(pool.start(monotonic_seconds()));
   const bool mortal = options.leaves_for_good || std::isfinite(options.deadline_s);
   unsigned stops = 0;
+  bool no_master = false;
   std::string last_end;
   while (!pool.exhausted()) {
     if (stop.requests() != stops) {
@@ -86,12 +87,14 @@ Status supervise(const SupervisorOptions& options, StopSource& stop) {
     for (const ProcessEnded& end : pool.reap(now)) {
       if (stops > 0) continue;
       last_end = end.text;
+      no_master |= end.exit_status == kExitNoMaster;
       std::fprintf(stderr, "gapfarm-worker: %s%s\n", end.text.c_str(),
                    end.gave_up ? "; it is not started again" : "");
     }
     wait_for(pool, stop, std::clamp(pool.next_start() - now, 0.0, pool.look_interval()));
   }
-  if (stops > 0 || mortal) return {};
+  if (stops == 0 && no_master) return kExitNoMaster;
+  if (stops > 0 || mortal) return 0;
   return Error{"no worker process can be kept alive: " + last_end};
 }
 

@@ -25,8 +25,9 @@ struct SupervisorOptions {
 
 // Starts the workers, kills those that hang (see ProcessLimits) and starts them again when they
 // end; the new one reports to the master how the old one ended, so that a task that kills workers
-// is found out.  Passes a first and a second stop request on.  Returns when asked to stop and all
-// have ended; error: none could be kept alive.
-Status supervise(const SupervisorOptions& options, StopSource& stop);
+// is found out.  Passes a first and a second stop request on.  Returns when asked to stop, or all
+// have left by themselves: 0, or kExitNoMaster when one did for that; error: none could be kept
+// alive.
+Result<int> supervise(const SupervisorOptions& options, StopSource& stop);
 
 }  // namespace gapfarm

@@ -20,7 +20,10 @@ namespace gapfarm {
 namespace {
 
 EndCause cause_of(int status) {
-  if (WIFEXITED(status)) return WEXITSTATUS(status) == 0 ? EndCause::kLeft : EndCause::kCrashed;
+  if (WIFEXITED(status)) {
+    const int exited = WEXITSTATUS(status);
+    return exited == 0 || exited == kExitNoMaster ? EndCause::kLeft : EndCause::kCrashed;
+  }
   switch (WTERMSIG(status)) {
     case SIGTERM:
     case SIGINT:
@@ -108,6 +111,7 @@ ProcessEnded ProcessPool::ended(Place& place, int status, double now) {
   end.name = place.name;
   end.pid = place.pid;
   end.cause = place.verdict.value_or(cause_of(status));
+  end.exit_status = WIFEXITED(status) ? WEXITSTATUS(status) : 0;
   end.text = place.name + " (pid " + std::to_string(place.pid) + ") " + end_text(status);
   end.epoch = (*place.page)->epoch.load();
   end.attempt = (*place.page)->attempt.load();

@@ -16,7 +16,7 @@ namespace gapfarm {
 
 // How a process ended, as far as blame goes.
 enum class EndCause {
-  kLeft,     // exit status 0, or a signal that asks to leave: nobody's fault
+  kLeft,     // exit status 0 or kExitNoMaster, or a signal that asks to leave: nobody's fault
   kKilled,   // SIGKILL: from outside or out of memory
   kCrashed,  // any other signal or exit status
   kStuck,    // killed by its parent: it did not answer at all, which says nothing about its work
@@ -26,6 +26,8 @@ enum class EndCause {
 // Exit status of a child that starting again would not help: wrong usage, or refused for good.
 inline constexpr int kExitUsage = 2;
 inline constexpr int kExitRefused = 78;
+// No master for as long as it was to wait, and the last one had not said that its work was over.
+inline constexpr int kExitNoMaster = 69;
 
 // A reported failure without the line on how to repeat it.
 inline std::string first_line(const std::string& text) { return text.substr(0, text.find('\n')); }
@@ -39,6 +41,7 @@ struct ProcessEnded {
   std::uint64_t attempt = 0;
   // Of one that reported why it ended: a sentence, and perhaps a line on how to repeat it by hand.
   std::string failure;
+  int exit_status = 0;   // of one that exited by itself
   bool gave_up = false;  // its place stays empty
   std::string text;      // "local-1 (pid 42) was killed by signal 11 (Segmentation fault)"
 };

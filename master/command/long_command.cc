@@ -91,6 +91,7 @@ class LongCommand::Asked : public RecordedFarm {
   Asked(SocketFarm& farm, LongCommand& work)
       : RecordedFarm(farm, *work.answers_, &farm), work_(work), wait_(farm.endpoints()) {
     set_stage(work.stage_);
+    work.farm_here(farm);
     watch([this, &farm](const RecordedProgress& progress) {
       set_stage(work_.stage_);
       work_.on_progress(progress, farm, wait_);
@@ -283,6 +284,7 @@ void LongCommand::on_progress(const RecordedProgress& progress, const SocketFarm
                        now_.simulated - stage_began_.simulated);
   }
   workers_ = farm.workers();
+  fleets_ = farm.fleets();
   const auto there = std::count_if(workers_.begin(), workers_.end(), present);
   const std::string waiting =
       wait.message(static_cast<std::size_t>(there), steady_now_s()).value_or("");
@@ -291,7 +293,15 @@ void LongCommand::on_progress(const RecordedProgress& progress, const SocketFarm
   show(news);
 }
 
+void LongCommand::farm_here(const SocketFarm& farm) {
+  for (const std::string& endpoint : farm.endpoints()) {
+    if (record_.listen.empty() && endpoint.rfind("tcp://", 0) == 0) record_.listen = endpoint;
+  }
+}
+
 void LongCommand::farm_gone() {
+  record_.listen.clear();
+  fleets_.clear();
   before_ = now_;
   waiting_.clear();
   workers_.clear();
@@ -319,6 +329,7 @@ void LongCommand::write_record() {
   record_.remembered = view.remembered;
   record_.simulated = view.simulated;
   record_.waiting = waiting_;
+  record_.fleets = fleets_;
   record_.workers.clear();
   for (const WorkerStatus& w : workers_) {
     record_.workers.push_back({w.name, w.host, w.state, w.jobs, w.finished, w.rate_per_s});

@@ -131,6 +131,10 @@ void Scheduler::on_other_protocol(const std::string& peer, std::uint32_t protoco
 }
 
 void Scheduler::on_message(const std::string& peer, v1::Envelope* envelope, double now) {
+  if (leaving_) {
+    if (envelope->has_goodbye()) unanswered_.erase(peer);
+    return;
+  }
   if (envelope->has_hello()) {
     on_hello(peer, envelope->hello(), now);
     return;
@@ -319,6 +323,7 @@ void Scheduler::on_unsent(const std::vector<Outgoing>& messages) {
   // Whatever ended a worker, it was not the jobs that never reached it; so they leave its hands
   // before it is dismissed with what it holds.
   for (const Outgoing& message : messages) {
+    unanswered_.erase(message.peer);
     WorkerRecord* worker = registry_.find_peer(message.peer);
     if (worker == nullptr) continue;
     for (const v1::Job& job : message.envelope.batch().jobs()) {
@@ -375,12 +380,15 @@ void Scheduler::on_tick(double now) {
   dispatch(now);
 }
 
-void Scheduler::send_goodbye(const std::string& reason) {
-  for (const auto& [id, worker] : registry_.all()) {
-    post(worker->peer).mutable_goodbye()->set_reason(reason);
-  }
-  for (const std::string& peer : fleets_.peers()) {
-    post(peer).mutable_goodbye()->set_reason(reason);
+void Scheduler::send_goodbye(const std::string& reason, bool over) {
+  std::vector<std::string> peers = fleets_.peers();
+  for (const auto& [id, worker] : registry_.all()) peers.push_back(worker->peer);
+  leaving_ = true;
+  unanswered_.insert(peers.begin(), peers.end());
+  for (const std::string& peer : unanswered_) {
+    v1::Goodbye* goodbye = post(peer).mutable_goodbye();
+    goodbye->set_reason(reason);
+    goodbye->set_over(over);
   }
 }
 

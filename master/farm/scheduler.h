@@ -6,6 +6,7 @@
 #include <functional>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <unordered_map>
 #include <vector>
@@ -118,8 +119,10 @@ class Scheduler {
   // Judges silence and gives out jobs.  Call when all messages that have arrived are handled: what
   // waits unread must not count as silence.
   void on_tick(double now);
-  // Informs every worker and fleet that this master leaves.
-  void send_goodbye(const std::string& reason);
+  // Informs every worker and fleet that this master leaves; from then on only their answers count.
+  void send_goodbye(const std::string& reason, bool over);
+  // All have answered the goodbye, or are gone.
+  bool goodbye_is_answered() const { return unanswered_.empty(); }
 
   // To be sent by the caller, in order; cleared by it.
   std::vector<Outgoing>& outbox() { return outbox_; }
@@ -182,6 +185,8 @@ class Scheduler {
   std::vector<Outgoing> outbox_;
   SchedulerCounts counts_;
   double last_tick_ = -1;
+  bool leaving_ = false;
+  std::set<std::string> unanswered_;  // peers that have not answered the goodbye
 };
 
 }  // namespace gapfarm

@@ -20,6 +20,8 @@ namespace {
 
 constexpr double kProgressInterval = 0.1;  // s
 constexpr double kReapInterval = 0.05;     // s, while messages keep the loop busy
+// As long as a socket's last messages may take to get out (SocketOptions::linger_s).
+constexpr double kFarewellLimit_s = 1;
 
 void complain(const FarmEvent& event) {
   switch (event.kind) {
@@ -55,6 +57,7 @@ struct SocketFarm::Impl {
   std::string last_trouble;                       // why workers do not come
   std::map<std::string, std::string> unsendable;  // problems by hash: what is wrong
   double next_reap = 0;
+  bool unanswered = false;  // what was asked last was stopped, or failed
 
   Status open();
   Status open_local();
@@ -174,8 +177,16 @@ Result<std::unique_ptr<SocketFarm>> SocketFarm::create(SocketFarmOptions options
 }
 
 SocketFarm::~SocketFarm() {
-  impl_->scheduler->send_goodbye("the run is over");
-  pump(*impl_->socket, *impl_->scheduler, monotonic_seconds());
+  const bool stopped = impl_->options.stop != nullptr && impl_->options.stop->requested();
+  const bool over = !stopped && !impl_->unanswered;
+  impl_->scheduler->send_goodbye(over ? "the run is over" : "the run was stopped", over);
+  // A peer loses what it has not read when the connection ends, so that waits for their answers.
+  const double until = monotonic_seconds() + kFarewellLimit_s;
+  for (double now = 0; now < until; impl_->socket->wait({}, std::max(0.0, until - now))) {
+    now = monotonic_seconds();
+    pump(*impl_->socket, *impl_->scheduler, now);
+    if (impl_->scheduler->goodbye_is_answered()) break;
+  }
 }
 
 Status check_sendable(const v1::Problem& problem) {
@@ -207,7 +218,9 @@ Result<std::vector<v1::TaskResult>> SocketFarm::run(
                  "; split it"};
   }
   impl_->scheduler->start(problem_hash, tasks);
-  if (Status status = impl_->loop(on_progress); !status) {
+  const Status status = impl_->loop(on_progress);
+  impl_->unanswered = !status;
+  if (!status) {
     impl_->scheduler->abandon();
     pump(*impl_->socket, *impl_->scheduler, monotonic_seconds());
     return status.error();

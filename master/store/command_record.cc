@@ -38,6 +38,16 @@ constexpr auto kWorker = [](auto& v, auto& worker) {
   v.field("finished", worker.finished);
   v.field("rate_per_s", worker.rate_per_s);
 };
+constexpr auto kFleet = [](auto& v, auto& fleet) {
+  v.field("name", fleet.name);
+  v.field("system", fleet.system);
+  v.field("host", fleet.host);
+  v.field("asked", fleet.wanted);
+  v.field("queued", fleet.queued);
+  v.field("running", fleet.running);
+  v.field("lost", fleet.lost);
+  v.field("why", fleet.why);
+};
 constexpr auto kRecord = [](auto& v, auto& record) {
   v.field("command", record.command);
   v.field("state", record.state);
@@ -56,6 +66,8 @@ constexpr auto kRecord = [](auto& v, auto& record) {
   v.field("simulated", record.simulated);
   v.field("waiting", record.waiting);
   v.list("workers", record.workers, kWorker);
+  v.list("fleets", record.fleets, kFleet);
+  v.field("listen", record.listen);
   v.field("began", record.began_unix_s);
   v.field("heartbeat", record.heartbeat_unix_s);
   v.field("pid", record.pid);
@@ -90,6 +102,14 @@ std::vector<StoredWorker> workers_of(const Json& json) {
   return LenientFields::list<StoredWorker>(json, kWorker);
 }
 
+Json fleets_json(const std::vector<FleetStatus>& fleets) {
+  return FieldWriter::list(fleets, kFleet);
+}
+
+std::vector<FleetStatus> fleets_of(const Json& json) {
+  return LenientFields::list<FleetStatus>(json, kFleet);
+}
+
 Result<std::optional<CommandRecord>> command_status(const std::filesystem::path& folder,
                                                     double now_unix_s) {
   std::error_code ignored;
@@ -108,6 +128,7 @@ Result<std::optional<CommandRecord>> command_status(const std::filesystem::path&
     record.time_left_s.reset();
     if (record.state == "finished") record.time_left_s = 0;
     record.workers.clear();
+    record.fleets.clear();
     record.waiting.clear();
   }
   return std::optional<CommandRecord>(std::move(record));

@@ -5,7 +5,9 @@
 #include <numeric>
 
 #include "common/base/hash.h"
+#include "common/json/fields.h"
 #include "common/json/json.h"
+#include "master/store/run_status.h"
 
 namespace gapfarm {
 
@@ -47,16 +49,7 @@ std::string FarmTally::to_json(const std::vector<FleetStatus>& fleets,
   nlohmann::ordered_json json = nlohmann::ordered_json::object();
   for (const Row& row : kRows) json[row.key] = this->*row.count;
   if (!listen.empty()) json["listen"] = listen;
-  for (const FleetStatus& f : fleets) {
-    json["fleets"].push_back({{"name", f.name},
-                              {"system", f.system},
-                              {"host", f.host},
-                              {"asked", f.wanted},
-                              {"queued", f.queued},
-                              {"running", f.running},
-                              {"lost", f.lost},
-                              {"why", f.why}});
-  }
+  if (!fleets.empty()) json["fleets"] = fleets_json(fleets);
   return json_text(json);
 }
 
@@ -77,22 +70,8 @@ void FarmTally::read_farm(const std::string& text, Progress* progress) {
   progress->farm = from_json(text);
   const auto json = parse_json(text);
   if (!json.is_object()) return;
-  const auto word = [](const auto& object, const char* key) {
-    const auto found = object.find(key);
-    return found != object.end() && found->is_string() ? found->template get<std::string>() : "";
-  };
-  const auto count = [](const auto& object, const char* key) {
-    const auto found = object.find(key);
-    return found != object.end() && found->is_number_unsigned() ? found->template get<unsigned>()
-                                                                : 0u;
-  };
-  progress->listen = word(json, "listen");
-  for (const auto& f : json.value("fleets", nlohmann::ordered_json::array())) {
-    if (!f.is_object()) continue;
-    progress->fleets.push_back({word(f, "name"), word(f, "system"), word(f, "host"),
-                                count(f, "asked"), count(f, "queued"), count(f, "running"),
-                                count(f, "lost"), word(f, "why")});
-  }
+  LenientFields(json).field("listen", progress->listen);
+  progress->fleets = fleets_of(json.value("fleets", nlohmann::ordered_json()));
 }
 
 const char* incident_name(IncidentKind kind) {

@@ -111,8 +111,7 @@ Json to_json(const RunStatus& status) {
   for (const FarmTally::Row& row : FarmTally::kRows) {
     farm[row.key] = status.progress.farm.*row.count;
   }
-  const auto fleets = parse_json(FarmTally().to_json(status.progress.fleets));
-  json["fleets"] = fleets.value("fleets", Json::array());
+  json["fleets"] = fleets_json(status.progress.fleets);
   json["fitness"] = status.info.fitness;
   json["fitness_unit"] = status.info.fitness_unit;
   json["higher_is_better"] = status.info.higher_is_better;

@@ -40,6 +40,8 @@ Result<RunStatus> run_status(const RunReader& reader, double now_unix_s);
 nlohmann::ordered_json workers_json(const std::vector<StoredWorker>& workers);
 // What was written by hand or damaged reads as empty.
 std::vector<StoredWorker> workers_of(const nlohmann::ordered_json& json);
+nlohmann::ordered_json fleets_json(const std::vector<FleetStatus>& fleets);
+std::vector<FleetStatus> fleets_of(const nlohmann::ordered_json& json);
 nlohmann::ordered_json to_json(const RunStatus& status);
 
 }  // namespace gapfarm

@@ -93,6 +93,18 @@ compare_with_calm_run() {
   [[ -n $digest && $digest == "$calm" ]] || fail 'the digests differ'
 }
 
+# idle_seconds N: they are few enough.
+idle_seconds() {
+  echo "idle core seconds of a worker after the last task: at most $1"
+  (($1 < 60)) || fail 'workers idled for too long'
+}
+
+# filled BEGAN: what is printed when all workers have joined; looks and Slurm's and Grid Engine's cycles last a second
+# here, and test_farm holds the autoscaler to two cycles by a virtual clock.
+filled() {
+  awk -v began="$1" -v now="$EPOCHREALTIME" 'BEGIN { printf "from none to all that the site allows in %.1f s\n", now - began }'
+}
+
 # expect_taken_away SYSTEM: stops the run; all that $fleet started has to go, and at most four of it stood
 # at once ($T/standing).
 expect_taken_away() {
@@ -101,7 +113,7 @@ expect_taken_away() {
   wait_for 'the workers have left' gone
   wait_for 'the fleet has ended' bash -c "! kill -0 $fleet"
   wait "$fleet" || fail "gapfarm workers ended with $?"
-  echo "nothing stands $((SECONDS - ended)) s after the run"
+  idle_seconds $((SECONDS - ended))
   compare_with_calm_run
   most=$(sort -n "$T/standing" | tail -n 1)
   echo "at most $most jobs stood, of $(find "$T/logs" -name '*.log' | wc -l) in all"

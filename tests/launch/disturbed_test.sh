@@ -3,7 +3,7 @@
 # and again, and on one of the nodes workers die at once.  The run is the undisturbed one, and says what happened.
 #   disturbed_test.sh BIN ROOT [SUSPENDED_s PREEMPTED-EVERY_s]
 set -u
-BIN=$1 ROOT=$2 SUSPENDED=${3:-8} EVERY=${4:-4}
+BIN=$1 ROOT=$2 SUSPENDED=${3:-0} EVERY=${4:-0}
 source "$ROOT/tests/launch/common.sh"
 T=$(mktemp -d /tmp/gapfarm-fleet-XXXXXX)
 trap clean_up EXIT
@@ -45,14 +45,23 @@ print(*found[:3], sep='\n')
 sys.exit(not found)
 PY
 }
-preempted=0
+# Sets $one to a job that has joined, is not the suspended one and was not killed.
+another() {
+  for one in $(find "$HOME" -name '*.pid'); do
+    local id
+    id=$(basename "$one" .pid)
+    [[ " $name $killed " != *" $id "* ]] || continue
+    [[ $(status "$T/run" "any(w['state'] != 'gone' for w in s['workers'] if '-$id-' in w['name'])") != True ]] || return 0
+  done
+  return 1
+}
+killed='' preempted=0
 while ((SECONDS - since < SUSPENDED || preempted < 2)); do
   sleep "$EVERY"
-  one=$(find "$HOME" -name '*.pid' -not -name "$name.pid" | while read -r f; do
-    kill -0 "$(<"$f")" 2>/dev/null && echo "$f"; done | head -n 1)
-  [[ -n $one ]] || continue
+  wait_for 'another one works, and is pre-empted' another
   # shellcheck disable=SC2046
   kill -KILL $(pids "$one") && preempted=$((preempted + 1))
+  killed+=" $(basename "$one" .pid)"
 done
 echo "pre-empted $preempted times"
 # shellcheck disable=SC2046
@@ -70,7 +79,8 @@ ended=$SECONDS
 stop_master
 wait_for "the fleet has ended" bash -c "! kill -0 $fleet"
 wait "$fleet" || fail "gapfarm workers ended with $?"
-echo "nothing stands $((SECONDS - ended)) s after the run; $deaths notes of deaths"
+idle_seconds $((SECONDS - ended))
+echo "$deaths notes of deaths"
 compare_with_calm_run
 cat "$T/workers.log"
 left=$(pgrep -f -- "--connect $endpoint" | wc -l)

@@ -18,7 +18,9 @@ fi
 
 T=$(mktemp -d /tmp/gapfarm-sge-XXXXXX)
 chmod 755 "$T"
-trap clean_up EXIT
+# Asked to end, a qmaster takes seven seconds.
+sge=()
+trap 'kill -KILL "${sge[@]}"; wait "${sge[@]}"; clean_up' EXIT
 free_port() {
   /usr/bin/python3 -c 'import socket; s = socket.socket(); s.bind(("", 0)); print(s.getsockname()[1])'
 }
@@ -39,7 +41,7 @@ as_admin() { setpriv --reuid sgeadmin --regid sgeadmin --clear-groups "$@"; }
 as_admin /usr/share/gridengine/scripts/init_cluster "$SGE_ROOT" default /var/spool/gridengine/spooldb sgeadmin \
   >"$T/init.log" 2>&1 || fail 'no cell'
 sge_qmaster >"$T/qmaster.log" 2>&1 &
-started+=($!)
+sge+=($!)
 wait_for 'the qmaster answers' qconf -sconf
 {
   as_admin qconf -am root
@@ -64,7 +66,7 @@ wait_for 'the qmaster answers' qconf -sconf
   qconf -Mconf "$T/global"
 } >"$T/qconf.log" 2>&1
 sge_execd >"$T/execd.log" 2>&1 &
-started+=($!)
+sge+=($!)
 up() { qhost | grep -q "^$node .*lx-amd64 *[0-9]"; }
 wait_for 'the node is there' up
 
@@ -72,12 +74,14 @@ write_config
 start_master 127.0.0.1
 while sleep 0.2; do qstat -u root -g d 2>/dev/null | grep -c '^ *[0-9]'; done >"$T/standing" &
 started+=($!)
-"$BIN/gapfarm" workers --on sge --run "$T/run" --keys "$T/keys" --max 8 --wall-time 12 --look-every 2 --block 1 \
+began=$EPOCHREALTIME
+"$BIN/gapfarm" workers --on sge --run "$T/run" --keys "$T/keys" --max 8 --wall-time 8 --look-every 1 --block 1 \
   --worker-logs "$T/logs" 2>"$T/workers.log" &
 fleet=$!
 started+=("$fleet")
 workers_are() { [[ $(status "$T/run" 'sum(w["state"] != "gone" for w in s["workers"])') == "$1" ]]; }
 wait_for 'four workers have joined' workers_are 4
+filled "$began"
 why() { [[ $(status "$T/run" 's["fleets"][0]["why"]') == *'no more than 4 jobs'* ]]; }
 wait_for 'status says why there are no more' why
 replaced() { [[ $(find "$T/logs" -name '*.log' | wc -l) -ge 8 ]]; }

@@ -14,7 +14,8 @@ trap clean_up EXIT
 start_slurm
 write_config
 "$BIN/gapfarm" keys make --keys "$T/keys" >/dev/null 2>&1 || fail 'no keys'
-job=$("$BIN/gapfarm" submit --on slurm --keys "$T/keys" --max 2 --look-every 2 --worker-logs "$T" -- \
+# With a port of its own the master finds the workers of its first life again.
+job=$("$BIN/gapfarm" submit --on slurm --keys "$T/keys" --listen "tcp://*:$(free_port)" --max 2 --look-every 1 --worker-logs "$T" -- \
   evolve "$T/run.toml" --out "$T/run" --generations 12 2>"$T/submit.log") || fail 'submit'
 echo "$job"
 job=$(grep -o '[0-9]*' <<<"$job" | head -n 1)
@@ -26,7 +27,9 @@ wait_for 'the master is queued again and resumes' again
 finished() { [[ $(status "$T/run" 's["state"]') == finished ]]; }
 wait_for "the run goes on after generation $before to its end" finished
 gone() { [[ -z $(squeue --noheader 2>/dev/null) ]]; }
+ended=$SECONDS
 wait_for 'no job is left' gone
+idle_seconds $((SECONDS - ended))
 "$BIN/gapfarm" evolve "$T/run.toml" --out "$T/calm" --generations 12 --workers 2 2>"$T/calm.log" ||
   fail 'the calm run failed'
 digest=$(status "$T/run" 's["digest"]') calm=$(status "$T/calm" 's["digest"]')

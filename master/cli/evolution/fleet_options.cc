@@ -205,6 +205,7 @@ Result<FleetLoopOptions> fleet_of(const FleetChoice& choice, const std::string& 
   fleet.limits.max_workers = choice.max_workers;
   fleet.limits.workers_per_job = choice.workers_per_job;
   fleet.limits.idle_s = choice.idle_s;
+  fleet.limits.backoff_s = site.backoff_s;
   fleet.logs = whole_path(choice.logs);
   fleet.extra = choice.extra;
   if (!choice.ssh_config.empty()) fleet.ssh = {"-F", choice.ssh_config};

@@ -227,7 +227,7 @@ std::string command_screen(const CommandRecord& record, const std::string& folde
   for (const auto& [stage, found] : record.findings) {
     text += label(console, "so far") + printable(found.text) + "\n";
   }
-  text += worker_lines(record.workers, console);
+  text += worker_lines(record.workers, console) + fleet_lines(record.fleets, console);
   const double age_s = now_unix_s - record.heartbeat_unix_s;
   if (record.state == "running" && age_s > 5) {
     text += label(console, "heartbeat") + format_duration(age_s) + " ago\n";

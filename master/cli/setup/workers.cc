@@ -5,8 +5,11 @@
 
 #include "common/base/try.h"
 #include "common/net/keys.h"
+#include "common/process/process_pool.h"
 #include "master/cli/evolution/fleet_options.h"
 #include "master/cli/subcommand.h"
+#include "master/store/command_record.h"
+#include "master/store/run_lock.h"
 #include "master/store/run_reader.h"
 
 namespace gapfarm {
@@ -18,6 +21,7 @@ struct WorkersCommand {
   std::string keys = KeyFolder::default_path();
   bool insecure = false;
   bool dry_run = false;
+  double wait_limit_s = FleetLoopOptions().master_limit_s;
   std::vector<std::string> options;
 };
 
@@ -25,14 +29,22 @@ Result<std::string> endpoint_of(const WorkersCommand& command) {
   if (command.connect.empty() == command.run.empty()) {
     return Error{"give the master's address by --connect tcp://HOST:PORT, or its run by --run RUN"};
   }
-  if (command.run.empty()) return command.connect;
-  ASSIGN_OR_RETURN(const RunReader reader, RunReader::open(command.run));
+  const std::string& folder = command.run;
+  if (folder.empty()) return command.connect;
+  ASSIGN_OR_RETURN(const auto other, command_status(folder, unix_now_s()));
+  if (other && other->state == "running" && !other->listen.empty()) {
+    return reachable(other->listen, other->host);
+  }
+  if (other) {
+    return Error{folder + ": no master of it listens for workers now; run " + other->command +
+                 " with --listen tcp://*:5555"};
+  }
+  ASSIGN_OR_RETURN(const RunReader reader, RunReader::open(folder));
   ASSIGN_OR_RETURN(const Progress progress, reader.progress());
   if (progress.state == RunState::kRunning && !progress.listen.empty()) {
     return reachable(progress.listen, progress.host);
   }
-  return Error{command.run + ": no master of it listens for workers now; `gapfarm resume " +
-               command.run +
+  return Error{folder + ": no master of it listens for workers now; `gapfarm resume " + folder +
                " --listen tcp://*:5555`, or let it bring them itself with --workers-on"};
 }
 
@@ -40,8 +52,9 @@ Result<int> run_workers(WorkersCommand command, CliContext& context) {
   command.fleet.extra.insert(command.fleet.extra.end(), command.options.begin(),
                              command.options.end());
   ASSIGN_OR_RETURN(const std::string endpoint, endpoint_of(command));
-  ASSIGN_OR_RETURN(const FleetLoopOptions options,
+  ASSIGN_OR_RETURN(FleetLoopOptions options,
                    fleet_of(command.fleet, endpoint, command.keys, command.insecure));
+  options.master_limit_s = command.wait_limit_s;
   const FleetOptions& fleet = options.fleet;
   const Fleet planned(fleet, {}, {});
   const unsigned jobs = fleet.limits.max_workers / fleet.limits.workers_per_job;
@@ -65,10 +78,8 @@ Result<int> run_workers(WorkersCommand command, CliContext& context) {
   ASSIGN_OR_RETURN(const FleetEnd end, run_fleet(options, context.stop, [&](const auto& text) {
                      context.console.note(who + text);
                    }));
-  if (end == FleetEnd::kNoMaster) {
-    return Error{"no master came back at " + endpoint + "; nothing stands on the cluster any more"};
-  }
   context.console.note(who + "nothing stands on the cluster any more");
+  if (end == FleetEnd::kNoMaster) return kExitNoMaster;
   return end == FleetEnd::kStopped ? kExitSignalBase + context.stop.signal() : kExitDone;
 }
 
@@ -79,8 +90,14 @@ SubcommandRun setup_workers(CLI::App& app) {
   command->fleet.declare(app, "--on");
   app.add_option("--connect", command->connect, "The master: tcp://HOST:PORT")
       ->type_name("ENDPOINT");
-  app.add_option("--run", command->run, "The run whose master it is, in place of --connect")
+  app.add_option("--run", command->run,
+                 "The run, or folder of another command, whose master it is; in place of --connect")
       ->type_name("RUN");
+  app.add_option("--wait-limit", command->wait_limit_s,
+                 "Give up when no master has answered for so many seconds")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str()
+      ->type_name("SECONDS");
   app.add_option("--keys", command->keys, "Folder with worker.key and master.pub")
       ->type_name("FOLDER");
   app.add_flag("--insecure", command->insecure, "For a master that has no keys");
@@ -89,7 +106,9 @@ SubcommandRun setup_workers(CLI::App& app) {
                  "After --: options for the command that submits (sbatch, qsub, ...)");
   app.footer(
       "It asks the master how much there is to do, submits, replaces what ended, and takes away\n"
-      "what is not needed, and all of it when the run ends or this is stopped.\n\n"
+      "what is not needed, and all of it when the run ends or this is stopped.  Exit status 69: "
+      "no\n"
+      "master answered for the --wait-limit.\n\n"
       "Examples:\n"
       "  gapfarm workers --on slurm --max 200 --connect tcp://login1:5555 --wall-time 4:00:00\n"
       "  gapfarm workers --on slurm --max 64 --connect tcp://login1:5555 -- --partition=short\n"

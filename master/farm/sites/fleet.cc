@@ -193,7 +193,11 @@ void Fleet::cancel_some(const std::vector<Known*>& some) {
   named["node"] = {some.front()->job.node};
   const auto command = expand(options_.site.cancel, named);
   const auto captured = run_(command, "");
-  if (captured && captured->succeeded()) return;
+  const bool done = captured && captured->succeeded();
+  const bool again = std::any_of(some.begin(), some.end(), [](Known* one) { return one->refused; });
+  for (Known* known : some) known->refused = !done;
+  // One that has ended meanwhile makes it fail, too: the next look has those that still stand.
+  if (done || !again) return;
   note_once("cannot take away job " + some.front()->job.id + ": " +
             (captured ? complaint_of(command, *captured) : captured.error().message));
 }
@@ -287,7 +291,7 @@ void Fleet::look(const v1::Backlog* backlog, double now_s) {
   }
   std::vector<Known*> leave;
   for (auto& [id, known] : known_) {
-    if (known.stuck && !known.ordered) leave.push_back(&known);
+    if (known.refused || (known.stuck && !known.ordered)) leave.push_back(&known);
   }
   cancel(leave);
   leave.clear();
@@ -322,7 +326,7 @@ bool Fleet::drain(double now_s) {
   list(now_s, &ended);
   std::vector<Known*> leave;
   for (auto& [id, known] : known_) {
-    if (!known.ordered) leave.push_back(&known);
+    if (known.refused || !known.ordered) leave.push_back(&known);
   }
   cancel(leave);
   wanted_ = 0;

@@ -52,6 +52,7 @@ class Fleet {
     double asked_s = 0;    // submitted, or first seen
     bool listed = false;   // was once
     bool ordered = false;  // to go
+    bool refused = false;  // the command that was to take it away failed
     bool stuck = false;
   };
   SiteValues values() const;

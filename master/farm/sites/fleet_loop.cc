@@ -8,6 +8,7 @@
 #include "common/base/host.h"
 #include "common/base/try.h"
 #include "common/net/envelope.h"
+#include "common/net/master_wait.h"
 #include "common/net/socket.h"
 #include "common/process/process_pool.h"
 
@@ -31,13 +32,13 @@ class Loop {
             [this](const auto& command, const std::string& input) {
               return run_command(command, input);
             },
-            note) {}
+            note),
+        wait_(options.endpoint, options.master_limit_s) {}
 
   Result<FleetEnd> run() {
     SocketOptions links;
     links.security = options_.security;
     ASSIGN_OR_RETURN(socket_, DealerSocket::connect(options_.endpoint, links));
-    heard_s_ = monotonic_seconds();
     std::optional<FleetEnd> end;
     while (!end) {
       const double now = monotonic_seconds();
@@ -46,11 +47,15 @@ class Loop {
         return Error{"the master at " + options_.endpoint +
                      " is of another build and knows no fleets; use the same build"};
       }
+      if (const auto text = wait_.message(master_is_there(now), now)) note_(*text);
       report(now);
       if (now >= next_look_s_ && !goodbye_) look(now);
       if (goodbye_) end = FleetEnd::kMasterLeft;
       if (stop_.requested()) end = FleetEnd::kStopped;
-      if (now - heard_s_ > options_.master_limit_s) end = FleetEnd::kNoMaster;
+      if (wait_.is_over(now)) {
+        note_(wait_.over());
+        end = FleetEnd::kNoMaster;
+      }
       if (!end) sleep(now);
     }
     RETURN_IF_ERROR(take_away());
@@ -81,7 +86,10 @@ class Loop {
       if (envelope.has_hello_request() || envelope.has_refusal()) {
         refused_ = true;
       }
-      if (envelope.has_goodbye()) goodbye_ = true;
+      if (envelope.has_goodbye()) {
+        goodbye_ = true;
+        socket_->send("", encode(&envelope));  // the master waits for it
+      }
       if (!envelope.has_backlog()) continue;
       // The first look waits for the first answer.
       if (!backlog_) next_look_s_ = now;
@@ -114,13 +122,11 @@ class Loop {
     next_look_s_ = now + options_.fleet.site.interval_s;
     if (!backlog_) return;
     if (now - heard_s_ > options_.wait_limit_s) {
-      if (!away_)
-        note_("no master answers at " + options_.endpoint + "; its workers are taken away");
+      if (!away_) note_("the workers are taken away, for want of a master");
       away_ = true;
       fleet_.drain(now);
       return;
     }
-    if (away_) note_("the master at " + options_.endpoint + " is back");
     away_ = false;
     fleet_.look(master_is_there(now) ? &*backlog_ : nullptr, now);
     next_report_s_ = now;  // what has changed is reported at once
@@ -149,6 +155,7 @@ class Loop {
   const std::function<void(const std::string&)>& note_;
   Fleet fleet_;
   std::unique_ptr<DealerSocket> socket_;
+  MasterWait wait_;
   std::optional<v1::Backlog> backlog_;  // the last
   double heard_s_ = 0, next_report_s_ = 0, next_look_s_ = 0;
   bool goodbye_ = false, away_ = false, refused_ = false;

@@ -15,7 +15,8 @@ struct FleetLoopOptions {
   std::string endpoint;  // the master's
   LinkSecurity security;
   // Without a master for so long, jobs are taken away (their workers leave by themselves, too), and
-  // the fleet waits for the next; after `master_limit_s` it ends.
+  // the fleet waits for the next; after `master_limit_s` it ends.  A master that is moved to
+  // another machine has had the time to start there by then.
   double wait_limit_s = 30;
   double master_limit_s = 600;
   // Taking away may take so long.

@@ -63,6 +63,7 @@ Result<ClusterSite> parse_site(std::string_view text, const std::string& file) {
   top.read("worker", site.worker);
   top.read("keys", site.keys);
   top.read("interval", site.interval_s, 0.1, 3600, "s");
+  top.read("backoff", site.backoff_s, 0.1, 3600, "s");
   top.finish();
   if (!errors.empty()) return errors.error();
   for (const auto& [key, there] : {std::pair{"submit", !site.submit.empty()},

@@ -46,6 +46,7 @@ struct ClusterSite {
 
   std::string worker, keys;  // defaults on the nodes; empty: as here
   double interval_s = 15;    // between two looks
+  double backoff_s = 30;     // FleetLimits::backoff_s
 };
 
 // Errors name the file's lines.

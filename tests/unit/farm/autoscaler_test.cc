@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cstdio>
+
 #include "tests/bench/fleet_simulation.h"
 
 namespace gapfarm::autoscaler_test {
@@ -179,6 +182,15 @@ TEST(Autoscaler, TenThousandWorkersCostLittleMoreThanAnOracle) {
     EXPECT_LE(outcome.span_s, 1.15 * kept_span_s);
     EXPECT_LT(outcome.idle_after_s, 60);
     EXPECT_LT(outcome.refusals, 100u);
+    // A site's limit that is not known yet is found by bisection, which here takes a look a step.
+    if (8 * scenario.site_limit < scenario.limits.max_workers) continue;
+    const auto full = std::find_if(
+        outcome.moments.begin(), outcome.moments.end(),
+        [&](const FleetMoment& moment) { return moment.queued + moment.running >= 10000; });
+    ASSERT_NE(full, outcome.moments.end());
+    std::printf("  from none to all within %.0f s, looks every %.0f s\n", full->at_s,
+                scenario.look_interval_s);
+    EXPECT_LE(full->at_s, 2 * scenario.look_interval_s);
   }
 }
 

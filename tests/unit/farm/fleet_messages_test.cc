@@ -103,13 +103,25 @@ TEST_F(FleetMessages, StatusHasWhatAFleetReportsWhileItReports) {
   EXPECT_TRUE(scheduler_.fleet_status().empty());
 }
 
-TEST_F(FleetMessages, AFleetLearnsThatTheRunIsOver) {
+TEST_F(FleetMessages, FleetsAndWorkersLearnThatTheRunIsOverAndTheMasterThatTheyKnow) {
   report("");
-  scheduler_.send_goodbye("the run is over");
-  const auto& out = scheduler_.outbox();
-  EXPECT_TRUE(std::any_of(out.begin(), out.end(), [](const Outgoing& one) {
-    return one.peer == "manager" && one.envelope.has_goodbye();
-  }));
+  join("worker");
+  join("gone");
+  tick(0.1);
+  EXPECT_TRUE(scheduler_.goodbye_is_answered());
+  scheduler_.send_goodbye("the run is over", true);
+  std::vector<Outgoing> out;
+  out.swap(scheduler_.outbox());
+  ASSERT_EQ(out.size(), 3u);
+  for (const Outgoing& one : out) EXPECT_TRUE(one.envelope.goodbye().over()) << one.peer;
+  beat("worker");  // was on its way: no answer
+  v1::Envelope goodbye;
+  goodbye.mutable_goodbye();
+  scheduler_.on_message("manager", &goodbye, now_);
+  scheduler_.on_unsent({{"gone", goodbye}});
+  EXPECT_FALSE(scheduler_.goodbye_is_answered());
+  scheduler_.on_message("worker", &goodbye, now_);
+  EXPECT_TRUE(scheduler_.goodbye_is_answered());
 }
 
 TEST_F(FleetMessages, AReportWithoutANameIsRefused) {

@@ -80,7 +80,13 @@ TEST(Sites, GridEngineIsUnderstood) {
                             "(current job count: 4)\nExiting.\n"));
 }
 
-// Of the manuals of OpenPBS 20 and HTCondor 10: neither ran here.
+// Written after manuals; Debian 12 has packages of neither, so nothing here was printed by the
+// systems themselves. PBS: `qstat -n -1 -u USER` has the columns of "Displaying Job Status in
+// Alternate Format" of the PBS Professional 2020.1 user's guide (OpenPBS 20 is the same), and -n -1
+// the host behind them; letters of states as in qstat(1B). HTCondor 10: `condor_q -af:j` has
+// cluster.process and then the attributes, "undefined" for those that are missing (manual page of
+// condor_q); JobStatus as in its "Job ClassAd Attributes"; `condor_submit -terse` the first and the
+// last job (its manual page).
 TEST(Sites, PbsIsUnderstood) {
   const ClusterSite site = shipped_site("pbs");
   const std::string listed = R"(
@@ -169,6 +175,10 @@ class PretendedCluster {
         jobs[std::to_string(last) + "_" + std::to_string(i)] = "RUNNING";
       }
       out.out = std::to_string(last) + "\n";
+    } else if (command[0] == "scancel" && deaf > 0) {
+      --deaf;
+      out.status = 256;
+      out.err = "scancel: error: Unable to contact slurm controller";
     } else if (command[0] == "scancel") {
       for (std::size_t i = 1; i < command.size(); ++i) jobs.erase(command[i]);
     } else if (command[0] == "tail") {
@@ -181,6 +191,7 @@ class PretendedCluster {
   std::map<std::string, std::string> jobs;
   std::size_t most = 0;
   unsigned submissions = 0, last = 100;
+  unsigned deaf = 0;  // to so many requests to take jobs away
 };
 
 struct PretendedFleet {
@@ -218,6 +229,19 @@ TEST(Fleets, KeepToTheSitesLimitAndReplaceWhatEnds) {
   EXPECT_EQ(farm.fleet->status().lost, 0u);
   EXPECT_FALSE(farm.fleet->drain(140));
   EXPECT_TRUE(farm.fleet->drain(160));
+  EXPECT_TRUE(farm.cluster.jobs.empty());
+}
+
+TEST(Fleets, TakeJobsAwayUntilTheyAreGoneAndComplainTheSecondTime) {
+  PretendedFleet farm(3);
+  farm.look(0, 100);
+  farm.cluster.deaf = 2;
+  EXPECT_FALSE(farm.fleet->drain(10));
+  EXPECT_EQ(farm.notes.find("cannot take away"), std::string::npos) << farm.notes;
+  EXPECT_FALSE(farm.fleet->drain(11));
+  EXPECT_NE(farm.notes.find("Unable to contact"), std::string::npos) << farm.notes;
+  EXPECT_FALSE(farm.fleet->drain(12));
+  EXPECT_TRUE(farm.fleet->drain(13));
   EXPECT_TRUE(farm.cluster.jobs.empty());
 }
 
