@@ -2,8 +2,8 @@
 # Builds and runs all tests.
 #   scripts/test.sh [--sanitizers]
 # --sanitizers: also the unit and integration tests under AddressSanitizer with UBSan, and what has
-# threads under ThreadSanitizer (about as long again, twice); and both programs linked with the types
-# of all their files held against one another (-Wodr).
+# threads under ThreadSanitizer (about as long again, twice); the benchmarks are built, and both
+# programs linked with the types of all their files held against one another (-Wodr).
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -40,6 +40,7 @@ export TSAN_OPTIONS=halt_on_error=1:suppressions=$PWD/tests/tsan.supp
 check ci all
 if [[ -n "$sanitizers" ]]; then
   echo "== odr: build ($SECONDS s so far)"
+  cmake --build --preset ci --target benchmarks -- --quiet  # which no test runs
   cmake --preset odr >/dev/null
   cmake --build --preset odr -- --quiet
   export GAPFARM_FARM_SCHEDULES=1000  # ten times as many went by above

@@ -1,7 +1,6 @@
 #include "common/score/density.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cassert>
 #include <cmath>
@@ -9,6 +8,7 @@
 #include <numbers>
 #include <sstream>
 
+#include "common/math/algebra.h"
 #include "common/math/normal.h"
 
 namespace gapfarm {
@@ -77,10 +77,9 @@ double expected_norm(const Eigen::Ref<const Eigen::VectorXd>& mean,
                      const Eigen::Ref<const Eigen::MatrixXd>& covariance) {
   const double mean_square = mean.squaredNorm() + covariance.trace();
   if (!(mean_square > 0)) return 0;
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(covariance);
-  const Eigen::ArrayXd variances = solver.eigenvalues().cwiseMax(0).array() / mean_square;
-  const Eigen::ArrayXd squares =
-      (solver.eigenvectors().transpose() * mean).array().square() / mean_square;
+  const SymmetricAxes axes = axes_of_symmetric(covariance);
+  const Eigen::ArrayXd variances = axes.values.cwiseMax(0).array() / mean_square;
+  const Eigen::ArrayXd squares = (axes.vectors.transpose() * mean).array().square() / mean_square;
 
   // With Q of mean 1 and t = e^u the integrand (1 - E exp(-t Q)) e^(-u/2) falls like e^(-|u|/2) on
   // both sides and is analytic in a strip, so the trapezoid rule converges exponentially; its tails

@@ -1,8 +1,149 @@
 #include "master/evolve/evolve.h"
 
-#include "master/evolve/generation_record.h"
+#include <algorithm>
+#include <sstream>
+
+#include "common/score/kinematic_start.h"
 
 namespace gapfarm {
+namespace {
+
+// Of so many when `done` of them took `wall_s`.
+std::optional<double> at_this_pace(double left, double done, double wall_s) {
+  if (done <= 0) return std::nullopt;
+  return std::max(0.0, left) * wall_s / done;
+}
+
+template <class... Parts>
+std::pair<StopReason, std::string> because(StopReason reason, const Parts&... parts) {
+  std::ostringstream text;
+  (text << ... << parts);
+  return {reason, text.str()};
+}
+
+}  // namespace
+
+std::optional<double> time_left_s(const EvolutionSettings& settings, const Pace& pace) {
+  const auto generations =
+      static_cast<double>(settings.generations) - static_cast<double>(pace.generation) - pace.share;
+  std::optional<double> left = at_this_pace(
+      generations, static_cast<double>(pace.generations_here) + pace.share, pace.wall_here_s);
+  const auto sooner = [&](std::optional<double> other) {
+    if (other) left = std::min(left.value_or(*other), *other);
+  };
+  if (settings.evaluations) {
+    sooner(at_this_pace(
+        static_cast<double>(*settings.evaluations) - static_cast<double>(pace.evaluations),
+        static_cast<double>(pace.evaluations_here), pace.wall_here_s));
+  }
+  if (settings.time_s) sooner(std::max(0.0, *settings.time_s - pace.wall_s));
+  return left;
+}
+
+OptimiserSetup optimiser_setup(const EvolutionSettings& settings, const Problem& problem,
+                               std::uint64_t seed) {
+  OptimiserSetup setup;
+  setup.settings = settings;
+  setup.table = &problem.table();
+  setup.genes = problem.genes;
+  setup.run_seed = seed;
+  setup.noisy =
+      problem.spread.kind == SpreadKind::kSampled && !compares_means(problem.fitness.kind);
+  // Where kinematics show a value, no generation need look for it.
+  const ParameterValues start = settings.seed_nominal ? kinematic_start(problem) : problem.values;
+  for (const Gene& gene : setup.genes) {
+    setup.nominal.push_back(encode_gene(*setup.table, gene, start[gene.row]));
+  }
+  return setup;
+}
+
+v1::Task evaluation_task(const Candidate& candidate, std::uint64_t run_seed) {
+  v1::Task task;
+  v1::EvaluateTask* evaluate = task.mutable_evaluate();
+  evaluate->mutable_point()->mutable_genome()->Assign(candidate.genome.begin(),
+                                                      candidate.genome.end());
+  evaluate->mutable_stream()->set_run_seed(run_seed);
+  evaluate->mutable_stream()->set_birth_id(candidate.birth_id);
+  evaluate->mutable_stream()->set_replicate(candidate.replicate);
+  return task;
+}
+
+Result<Score> score_of(const v1::TaskResult& result, FitnessKind kind) {
+  if (result.outcome() == v1::INVALID_REQUEST) {
+    return Error{"a worker refused the evaluation: " + result.message()};
+  }
+  const bool ok = result.outcome() == v1::OK;
+  return Score{result.outcome(), ok ? cost_of_fitness(kind, result.evaluate().fitness()) : 0};
+}
+
+double cost_of_fitness(FitnessKind kind, double fitness) {
+  return higher_is_better(kind) ? -fitness : fitness;
+}
+
+double fitness_of_cost(FitnessKind kind, double cost) {
+  return higher_is_better(kind) ? -cost : cost;
+}
+
+std::optional<std::pair<StopReason, std::string>> reason_to_stop(const Optimiser& optimiser,
+                                                                 const EvolveOptions& options,
+                                                                 double wall_s, bool requested) {
+  const EvolutionSettings& s = options.settings;
+  const std::uint64_t generation = optimiser.generation();
+  if (requested) {
+    return because(StopReason::kRequested, "stopped by request after generation ", generation);
+  }
+  if (s.target_fitness && generation > 0 && optimiser.best().outcome == v1::OK &&
+      optimiser.best().cost <= cost_of_fitness(options.fitness, *s.target_fitness)) {
+    return because(StopReason::kTargetFitness, "reached a ", fitness_name(options.fitness), " of ",
+                   fitness_of_cost(options.fitness, optimiser.best().cost), ", the target was ",
+                   *s.target_fitness);
+  }
+  if (generation >= s.generations) {
+    return because(StopReason::kGenerations, "completed ", generation, " of ", s.generations,
+                   " generations");
+  }
+  if (s.evaluations && optimiser.evaluations() >= *s.evaluations) {
+    // A generation is always finished.
+    return because(StopReason::kEvaluations, "used ", optimiser.evaluations(),
+                   " evaluations, the limit was ", *s.evaluations);
+  }
+  if (s.time_s && wall_s >= *s.time_s) {
+    return because(StopReason::kTime, "used the ", *s.time_s, " s allowed");
+  }
+  const std::uint64_t idle = generation - optimiser.last_improvement();
+  if (s.stagnation_generations && generation > 0 && idle >= *s.stagnation_generations) {
+    return because(StopReason::kStagnation, "no improvement for ", idle, " generations");
+  }
+  return std::nullopt;
+}
+
+GenerationRecord record_generation(const Optimiser& optimiser) {
+  GenerationRecord record;
+  record.generation = optimiser.generation();
+  record.members = optimiser.members();
+  record.diversity = optimiser.diversity();
+  record.operator_probabilities = optimiser.operator_probabilities();
+  record.evaluations = optimiser.evaluations();
+  record.optimiser_state = optimiser.state();
+  return record;
+}
+
+EvolveSummary summarise(const Optimiser& optimiser,
+                        const std::pair<StopReason, std::string>& reason, double wall_s) {
+  EvolveSummary summary;
+  summary.reason = reason.first;
+  summary.text = reason.second;
+  summary.generations = optimiser.generation();
+  summary.evaluations = optimiser.evaluations();
+  summary.wall_s = wall_s;
+  if (optimiser.generation() > 0) summary.best = optimiser.best();
+  return summary;
+}
+
+Error wrong_count(std::size_t candidates, std::size_t scores) {
+  return Error{"asked for " + std::to_string(candidates) + " scores, but got " +
+               std::to_string(scores)};
+}
 
 Result<EvolveSummary> evolve(Optimiser& optimiser, EvaluationBackend& backend, GenerationSink& sink,
                              const EvolveClock& clock, const EvolveOptions& options,

@@ -3,6 +3,7 @@
 // Inside the loop a cost is lower-is-better; fitness has the problem's own sense.
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <optional>
 #include <span>
@@ -11,6 +12,7 @@
 
 #include "common/base/result.h"
 #include "common/config/settings.h"
+#include "common/problem/problem.h"
 #include "master/evolve/optimiser.h"
 
 namespace gapfarm {
@@ -88,5 +90,44 @@ std::optional<std::pair<StopReason, std::string>> reason_to_stop(const Optimiser
 Result<EvolveSummary> evolve(Optimiser& optimiser, EvaluationBackend& backend, GenerationSink& sink,
                              const EvolveClock& clock, const EvolveOptions& options,
                              const std::function<bool()>& stop_requested = {});
+
+// The steps of evolve() that look at the optimiser without driving it.
+
+// Everything but the wall time.
+GenerationRecord record_generation(const Optimiser& optimiser);
+
+EvolveSummary summarise(const Optimiser& optimiser,
+                        const std::pair<StopReason, std::string>& reason, double wall_s);
+
+Error wrong_count(std::size_t candidates, std::size_t scores);
+
+// Between the optimisers and the workers: a problem to an optimiser, candidates to tasks, results
+// to scores.
+
+// What a run's optimiser is made from.
+OptimiserSetup optimiser_setup(const EvolutionSettings& settings, const Problem& problem,
+                               std::uint64_t seed);
+
+v1::Task evaluation_task(const Candidate& candidate, std::uint64_t run_seed);
+
+// Error: a worker refused the evaluation.
+Result<Score> score_of(const v1::TaskResult& result, FitnessKind kind);
+
+// How long a run will still take.
+
+// What a run did, in all and since its present master started.
+struct Pace {
+  std::uint64_t generation = 0;   // committed, of the run
+  std::uint64_t evaluations = 0;  // of the run, with those of the generation in work
+  double wall_s = 0;              // of the run
+  double share = 0;               // of the generation in work that is done, [0, 1]
+  std::uint64_t generations_here = 0;
+  std::uint64_t evaluations_here = 0;
+  double wall_here_s = 0;
+};
+
+// Until the first of the stop conditions that can be foreseen (generations, evaluations, time), at
+// the mean pace of the present master.  None while there is nothing to go by.
+std::optional<double> time_left_s(const EvolutionSettings& settings, const Pace& pace);
 
 }  // namespace gapfarm

@@ -2,11 +2,11 @@
 #pragma once
 
 #include <cstdint>
-#include <memory>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "common/config/settings.h"
 #include "common/parameters/genome.h"
 #include "gapfarm/v1/task.pb.h"
 
@@ -63,6 +63,18 @@ class Optimiser {
   // Everything ask() and tell() depend on; restoring it continues bit for bit.
   // REQUIRES: every ask() has had its tell().
   virtual std::string state() const = 0;
+};
+
+// What every optimiser is made from.
+struct OptimiserSetup {
+  EvolutionSettings settings;
+  const ParameterTable* table = nullptr;  // outlives the optimiser
+  std::vector<Gene> genes;
+  Genome nominal;  // of the config's own values; empty: unknown
+  // How unsure that genome is: a covariance in gene units, row by row; empty: unknown.
+  std::vector<double> spread;
+  std::uint64_t run_seed = 0;
+  bool noisy = false;  // scores differ between replicates (SpreadKind::kSampled)
 };
 
 }  // namespace gapfarm

@@ -3,12 +3,10 @@
 
 #include <memory>
 #include <span>
-#include <string>
 #include <string_view>
 
 #include "common/base/result.h"
 #include "master/evolve/optimiser.h"
-#include "master/evolve/setup.h"
 
 namespace gapfarm {
 

@@ -1,7 +1,6 @@
 #include "master/evolve/staged.h"
 
 #include <cassert>
-#include <cmath>
 
 #include "common/base/try.h"
 #include "gapfarm/v1/record.pb.h"

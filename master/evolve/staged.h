@@ -7,7 +7,6 @@
 
 #include "common/config/stages.h"
 #include "master/evolve/optimiser.h"
-#include "master/evolve/setup.h"
 
 namespace gapfarm {
 

@@ -178,7 +178,6 @@ std::string amount_text(const GapPart& part, const GapSplit& split) {
 
 // Rows in the order of the cause of most interest: effects, unexplained, floor.
 std::string parts_table(const std::vector<GapSplit>& splits) {
-  std::string rows;
   const auto& parts = splits.front().parts;
   std::vector<std::pair<const GapPart*, int>> order;
   int effect = 0;
@@ -187,29 +186,28 @@ std::string parts_table(const std::vector<GapSplit>& splits) {
   }
   order.emplace_back(&parts[1], 0);
   order.emplace_back(&parts[0], 0);
+  std::vector<HtmlRow> rows;
   for (const auto& [part, number] : order) {
     const Look l = look(*part, number);
-    rows += fmt::format(
-        R"(<tr><th scope="row"><svg class="swatch" aria-hidden="true"><rect class="part {}" width="100%" height="100%"/>)"
-        R"(<text class="badge" x="50%" y="50%">{}</text></svg>{}</th>)",
-        l.css_class, l.badge, html_escaped(part->label));
+    rows.push_back(
+        {fmt::format(
+             R"(<svg class="swatch" aria-hidden="true"><rect class="part {}" width="100%" height="100%"/>)"
+             R"(<text class="badge" x="50%" y="50%">{}</text></svg>{})",
+             l.css_class, l.badge, html_escaped(part->label)),
+         {}});
     for (const GapSplit& split : splits) {
       const GapPart* same = find_part(split, *part);
-      const UnitLabels w = labels_of(split.unit);
-      rows += fmt::format(R"(<td class="number" data-label="{}">{}</td>)", w.unit,
-                          same ? amount_text(*same, split) : "with the others");
+      rows.back().cells.push_back(same ? amount_text(*same, split) : "with the others");
     }
-    rows += "</tr>";
   }
-  rows += R"(<tr class="sum"><th scope="row">tuned model, in all</th>)";
-  for (const GapSplit& split : splits) {
-    rows += fmt::format(R"(<td class="number" data-label="{}">{}</td>)", labels_of(split.unit).unit,
-                        number_text(split.tuned));
-  }
-  return R"(<table class="parts" data-file="gap"><caption class="unseen">The gap by cause</caption><thead><tr><th scope="col">part</th>)"
-         R"(<th scope="col" class="number">nats a trial</th><th scope="col" class="number">position, mm</th>)"
-         R"(<th scope="col" class="number">heading, mrad</th></tr></thead><tbody>)" +
-         rows + "</tr></tbody></table>";
+  rows.push_back({"tuned model, in all", {}, "sum"});
+  for (const GapSplit& split : splits) rows.back().cells.push_back(number_text(split.tuned));
+  return html_table("parts", "gap", "The gap by cause",
+                    {{"part"},
+                     {"nats a trial", "number", "nats"},
+                     {"position, mm", "number", "mm"},
+                     {"heading, mrad", "number", "mrad"}},
+                    rows);
 }
 
 }  // namespace

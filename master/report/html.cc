@@ -110,6 +110,41 @@ std::string p_text(double p) {
   return p < 1e-4 ? "< 0.0001" : fmt::format("{:.2g}", p);
 }
 
+std::string html_table(std::string_view css, std::string_view file, std::string_view caption,
+                       const std::vector<HtmlColumn>& columns, const std::vector<HtmlRow>& rows) {
+  std::string html = fmt::format(
+      R"(<table class="{}" data-file="{}"><caption class="unseen">{}</caption><thead><tr>)", css,
+      html_escaped(file), html_escaped(caption));
+  for (const HtmlColumn& column : columns) {
+    html +=
+        fmt::format(R"(<th scope="col"{}>{}</th>)",
+                    column.css.rfind("number", 0) == 0 ? R"( class="number")" : "", column.head);
+  }
+  html += "</tr></thead><tbody>";
+  for (const HtmlRow& row : rows) {
+    html += row.css.empty() ? "<tr>" : fmt::format(R"(<tr class="{}">)", row.css);
+    html += R"(<th scope="row">)" + row.head + "</th>";
+    for (std::size_t i = 0; i < row.cells.size(); ++i) {
+      const HtmlColumn& column = columns[i + 1];
+      const std::string& cell = row.cells[i];
+      // Where rows become cards, cells without content are omitted.
+      html += fmt::format(R"(<td class="{}{}" data-label="{}">{}</td>)", column.css,
+                          cell.empty() || cell == "–" ? " empty" : "",
+                          column.label.empty() ? column.head : column.label, cell);
+    }
+    html += "</tr>";
+  }
+  return html + "</tbody></table>";
+}
+
+std::string html_definitions(const std::vector<std::pair<std::string, std::string>>& rows) {
+  std::string html = R"(<dl class="provenance">)";
+  for (const auto& [label, value] : rows) {
+    html += "<div><dt>" + html_escaped(label) + "</dt><dd>" + html_escaped(value) + "</dd></div>";
+  }
+  return html + "</dl>";
+}
+
 std::string csp_hash(std::string_view content) {
   std::array<unsigned char, crypto_hash_sha256_BYTES> digest;
   crypto_hash_sha256(digest.data(), reinterpret_cast<const unsigned char*>(content.data()),

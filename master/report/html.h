@@ -26,6 +26,28 @@ std::string percent_text(double share);
 // "0.03", "< 0.0001".
 std::string p_text(double p);
 
+// A column of a page's table.  Where rows become cards, on a narrow screen, each cell shows the
+// column's label: its head, unless that has markup.
+struct HtmlColumn {
+  std::string head;
+  std::string css = {};  // of its cells; the head of "number ..." is aligned alike
+  std::string label = {};
+};
+
+struct HtmlRow {
+  std::string head;  // of the row: its first cell
+  std::vector<std::string> cells;
+  std::string css = {};
+};
+
+// `css`: "cards" becomes cards on a narrow screen, "parts" and "plain" do not.  `file`: what a copy
+// of the table is called; `caption` is for screen readers.  Heads and cells are HTML.
+std::string html_table(std::string_view css, std::string_view file, std::string_view caption,
+                       const std::vector<HtmlColumn>& columns, const std::vector<HtmlRow>& rows);
+
+// A list of labels with their values, both text.
+std::string html_definitions(const std::vector<std::pair<std::string, std::string>>& rows);
+
 // "sha256-<base64>", as a content security policy names an inline script or style.
 std::string csp_hash(std::string_view content);
 

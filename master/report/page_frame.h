@@ -3,6 +3,7 @@
 
 #include <nlohmann/json_fwd.hpp>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -36,5 +37,26 @@ std::string floor_section();
 std::string drives_section(std::string_view tuned, std::string_view final_);
 // Any trial, played; of pages that a server shows.  `what`: "drive", "push" or "window".
 std::string watch_section(std::string_view what);
+
+// A self-contained HTML page of text, tables and SVG pictures, without scripts.
+class PlainPage {
+ public:
+  explicit PlainPage(std::string title) : title_(std::move(title)) {}
+
+  void heading(std::string_view content);
+  void paragraph(std::string_view content);
+  // Columns after the first are aligned to the right.
+  void table(const std::vector<std::string>& header,
+             const std::vector<std::vector<std::string>>& rows);
+  // `svg` as Svg::finish() gives it; `words` describe it to those who cannot see it.
+  void picture(std::string_view svg, std::string_view content);
+
+  // The whole file, UTF-8; the same calls give the same bytes.
+  std::string finish() const;
+
+ private:
+  std::string title_;
+  std::string body_;
+};
 
 }  // namespace gapfarm

@@ -2,9 +2,6 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include <algorithm>
-#include <cmath>
-
 #include "master/report/glossary.h"
 #include "master/report/html.h"
 
@@ -14,13 +11,6 @@ namespace {
 std::string value_with_unit(double value, const std::string& unit) {
   const std::string text = number_text(value, 4);
   return unit.empty() || unit == "-" ? text : text + " " + html_escaped(unit);
-}
-
-std::string parameter_cell(std::string_view label, const std::string& html,
-                           const char* css_class = "") {
-  // Where rows become cards, on a narrow screen, cells without content are omitted.
-  const char* empty = html.empty() || html == "–" ? " empty" : "";
-  return fmt::format(R"(<td class="{}{}" data-label="{}">{}</td>)", css_class, empty, label, html);
 }
 
 // Between its bounds: where the value lies, with its interval.
@@ -44,31 +34,20 @@ std::string remarks(const ParameterRow& row) {
   return html;
 }
 
-std::string row_html(const ParameterRow& row, const ParameterColumns& columns) {
+HtmlRow parameter_row(const ParameterRow& row) {
   const std::string after =
       row.choice.empty() ? value_with_unit(row.after, row.unit) : html_escaped(row.choice);
   const std::string between =
       row.choice.empty() ? number_text(row.lower) + " to " + number_text(row.upper) : "";
-  return fmt::format(R"(<tr><th scope="row"><code>{}</code><small>{}</small></th>)",
-                     html_escaped(row.key), html_escaped(row.summary)) +
-         parameter_cell(columns.before.shown,
-                        row.before ? value_with_unit(*row.before, row.unit) : "–", "number") +
-         parameter_cell(columns.after.shown, "<strong>" + after + "</strong>", "number") +
-         parameter_cell(
-             columns.interval.shown,
-             row.lo && row.hi ? number_text(*row.lo, 4) + " to " + number_text(*row.hi, 4) : "–",
-             "number") +
-         parameter_cell("searched between", bounds_svg(row) + "<small>" + between + "</small>",
-                        "between") +
-         parameter_cell("remarks", remarks(row)) + "</tr>";
+  return {
+      "<code>" + html_escaped(row.key) + "</code><small>" + html_escaped(row.summary) + "</small>",
+      {row.before ? value_with_unit(*row.before, row.unit) : "–", "<strong>" + after + "</strong>",
+       row.lo && row.hi ? number_text(*row.lo, 4) + " to " + number_text(*row.hi, 4) : "–",
+       bounds_svg(row) + "<small>" + between + "</small>", remarks(row)}};
 }
 
-std::string plain_head(const std::string& html, const char* css_class = "") {
-  return fmt::format(R"(<th scope="col" class="{}">{}</th>)", css_class, html);
-}
-
-std::string column_head(const TermColumn& column) {
-  return plain_head(term(column.term, column.shown), "number");
+HtmlColumn number_column(const TermColumn& column) {
+  return {term(column.term, column.shown), "number", std::string(column.shown)};
 }
 
 std::string warnings(const std::vector<ParameterRow>& rows) {
@@ -140,13 +119,16 @@ std::string parameters_section(const std::vector<ParameterRow>& rows,
            "<p>None were kept with this file: make it again with this program.</p></section>\n";
   }
   html += warnings(rows);
-  std::string body;
-  for (const ParameterRow& row : rows) body += row_html(row, columns);
-  html +=
-      R"(<table class="cards parameters" data-file="parameters"><caption class="unseen">Parameters</caption><thead><tr>)" +
-      plain_head("parameter") + column_head(columns.before) + column_head(columns.after) +
-      column_head(columns.interval) + plain_head(term("bound", "searched between")) +
-      plain_head("remarks") + "</tr></thead><tbody>" + body + "</tbody></table>";
+  std::vector<HtmlRow> lines;
+  for (const ParameterRow& row : rows) lines.push_back(parameter_row(row));
+  html += html_table("cards parameters", "parameters", "Parameters",
+                     {{"parameter"},
+                      number_column(columns.before),
+                      number_column(columns.after),
+                      number_column(columns.interval),
+                      {term("bound", "searched between"), "between", "searched between"},
+                      {"remarks"}},
+                     lines);
   html += correlations_html(correlations);
   return html +
          R"(<h3>For your config</h3><p>Paste it in place of the same keys; )"

@@ -7,20 +7,9 @@
 
 #include "common/problem/problem.h"
 #include "common/score/fitness.h"
+#include "common/trials/text/csv.h"
 
 namespace gapfarm {
-namespace {
-
-// A field that a spreadsheet reads back as it is.
-std::string quoted(const std::string& field) {
-  if (field.find_first_of(",\"\r\n") == std::string::npos) return field;
-  std::string text = "\"";
-  for (char c : field) text += c == '"' ? std::string("\"\"") : std::string(1, c);
-  return text + "\"";
-}
-
-}  // namespace
-
 Eigen::Matrix3d local_covariance(const v1::Predicted& p) {
   assert(p.cov_size() == 6);
   Eigen::Matrix3d cov;
@@ -46,7 +35,7 @@ std::string format_predictions(const TrialLog& log, std::span<const PredictedTri
   for (std::size_t i = 0; i < predictions.size(); ++i) {
     const PredictedTrial& p = predictions[i];
     const Eigen::Matrix3d& c = p.covariance;
-    text += fmt::format("{},{},{},{},{},{},{},{},{},{},{},{}\n", quoted(log.trials[i].session),
+    text += fmt::format("{},{},{},{},{},{},{},{},{},{},{},{}\n", csv_field(log.trials[i].session),
                         log.trials[i].trial, p.X_WE.x, p.X_WE.y, p.X_WE.theta, c(0, 0), c(0, 1),
                         c(0, 2), c(1, 1), c(1, 2), c(2, 2), p.log_score);
   }

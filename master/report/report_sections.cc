@@ -59,12 +59,6 @@ std::string tile(const std::string& title, const GapFigures& figures, bool chang
       term("floor", "floor"), number_text(figures.floor));
 }
 
-std::string cell(const char* label, const std::string& html, const char* css_class = "") {
-  // Where rows become cards, on a narrow screen, cells without content are omitted.
-  const char* empty = html.empty() || html == "–" ? " empty" : "";
-  return fmt::format(R"(<td class="{}{}" data-label="{}">{}</td>)", css_class, empty, label, html);
-}
-
 // A bar with its number.
 std::string meter(double share, const char* css_class, const std::string& number) {
   return R"(<span class="meter">)" + bar_svg(share, css_class) + "<span>" + number +
@@ -75,15 +69,6 @@ std::string meter(double share, const char* css_class, const std::string& number
 std::string share_text(double share) {
   if (std::isfinite(share) && share < 0.005) return "under 1 %";
   return meter(share, "fill", percent_text(share));
-}
-
-std::string heads(std::initializer_list<std::pair<std::string, bool>> columns) {
-  std::string html = "<thead><tr>";
-  for (const auto& [title, is_number] : columns) {
-    html +=
-        fmt::format(R"(<th scope="col"{}>{}</th>)", is_number ? R"( class="number")" : "", title);
-  }
-  return html + "</tr></thead>";
 }
 
 std::string with_unit(double value, const std::string& unit) {
@@ -166,7 +151,7 @@ std::string standing(const Diagnosis& diagnosis, const std::string& effect) {
   return "";
 }
 
-std::string screened_row(const Diagnosis& diagnosis, const Screened& s, double largest) {
+HtmlRow screened_row(const Diagnosis& diagnosis, const Screened& s, double largest) {
   const bool named = is_named(diagnosis, s.effect);
   std::string held_out = "–";
   if (s.held_out) {
@@ -178,14 +163,11 @@ std::string screened_row(const Diagnosis& diagnosis, const Screened& s, double l
     note =
         "<span>looks like " + names(s.alias_set) + (note.empty() ? "" : "<br>") + note + "</span>";
   }
-  return fmt::format(R"(<tr class="{}"><th scope="row"><code>{}</code>{}</th>)",
-                     named ? "named" : "", html_escaped(s.effect), standing(diagnosis, s.effect)) +
-         cell("gain, nats",
-              meter(largest > 0 ? s.gain / largest : 0, named ? "fill-named" : "fill",
-                    number_text(s.gain)),
-              "number with-bar") +
-         cell("p", p_text(s.p), "number") + cell("held out, nats a trial", held_out, "number") +
-         cell("best strength", html_escaped(s.estimate)) + cell("remarks", note) + "</tr>";
+  return {"<code>" + html_escaped(s.effect) + "</code>" + standing(diagnosis, s.effect),
+          {meter(largest > 0 ? s.gain / largest : 0, named ? "fill-named" : "fill",
+                 number_text(s.gain)),
+           p_text(s.p), held_out, html_escaped(s.estimate), note},
+          named ? "named" : ""};
 }
 
 }  // namespace
@@ -233,32 +215,27 @@ std::string sanity_section(const Diagnosis& diagnosis) {
 }
 
 std::string where_table(const std::vector<Where>& findings, const char* caption, const char* file) {
-  std::string rows;
+  std::vector<HtmlRow> rows;
   for (const Where& w : findings) {
     const char* unit = w.component == "theta" ? "mrad" : "mm";
-    const std::string covariate = w.covariate.empty() ? "–" : html_escaped(w.covariate);
-    rows +=
-        R"(<tr><th scope="row">)" + html_escaped(w.text) +
-        fmt::format(
-            R"(<button type="button" class="show" hidden data-command="{}" data-component="{}" data-covariate="{}">Show in the plots</button></th>)",
-            html_escaped(w.command), html_escaped(w.component), html_escaped(w.covariate)) +
-        cell("command", html_escaped(w.command)) +
-        cell("part", html_escaped(w.component + " " + w.kind)) + cell("depends on", covariate) +
-        cell("size", number_text(w.size, 2) + " " + unit, "number") +
-        cell("share", share_text(w.share), "number with-bar") + cell("p", p_text(w.p), "number") +
-        "</tr>";
+    rows.push_back(
+        {html_escaped(w.text) +
+             fmt::format(
+                 R"(<button type="button" class="show" hidden data-command="{}" data-component="{}" data-covariate="{}">Show in the plots</button>)",
+                 html_escaped(w.command), html_escaped(w.component), html_escaped(w.covariate)),
+         {html_escaped(w.command), html_escaped(w.component + " " + w.kind),
+          w.covariate.empty() ? "–" : html_escaped(w.covariate),
+          number_text(w.size, 2) + " " + unit, share_text(w.share), p_text(w.p)}});
   }
-  return fmt::format(
-             R"(<table class="cards findings" data-file="{}"><caption class="unseen">{}</caption>)",
-             file, caption) +
-         heads({{"finding", false},
-                {"command", false},
-                {term("trend", "part"), false},
-                {"depends on", false},
-                {"size", true},
-                {term("share", "share of the gap"), true},
-                {term("p", "p, corrected"), true}}) +
-         "<tbody>" + rows + "</tbody></table>";
+  return html_table("cards findings", file, caption,
+                    {{"finding"},
+                     {"command"},
+                     {term("trend", "part"), "", "part"},
+                     {"depends on"},
+                     {"size", "number"},
+                     {term("share", "share of the gap"), "number with-bar", "share"},
+                     {term("p", "p, corrected"), "number", "p"}},
+                    rows);
 }
 
 std::string screening_section(const Diagnosis& diagnosis) {
@@ -273,19 +250,21 @@ std::string screening_section(const Diagnosis& diagnosis) {
   const auto key = [](const Screened* s) { return std::isfinite(s->gain) ? s->gain : -1e300; };
   std::stable_sort(order.begin(), order.end(),
                    [&](const auto* a, const auto* b) { return key(a) > key(b); });
-  std::string rows;
-  for (const Screened* s : order) rows += screened_row(diagnosis, *s, largest);
+  std::vector<HtmlRow> rows;
+  for (const Screened* s : order) rows.push_back(screened_row(diagnosis, *s, largest));
   return R"(<section id="screening"><h2>Which effect: the whole catalogue</h2><p>What each effect could add to the )"
          R"(tuned model once everything that retuning absorbs is taken out. The p-value is against that effect's own luck )"
-         R"(on data with nothing to find. Effects that look alike leave parallel traces in these data.</p>)"
-         R"(<table class="cards screening" data-file="catalogue"><caption class="unseen">Screening of the catalogue</caption>)" +
-         heads({{"effect", false},
-                {term("gain", "gain, nats in all"), true},
-                {"p", true},
-                {term("held-out", "held out") + ", " + term("nat", "nats a trial"), true},
-                {"best strength", false},
-                {"remarks", false}}) +
-         "<tbody>" + rows + "</tbody></table></section>";
+         R"(on data with nothing to find. Effects that look alike leave parallel traces in these data.</p>)" +
+         html_table("cards screening", "catalogue", "Screening of the catalogue",
+                    {{"effect"},
+                     {term("gain", "gain, nats in all"), "number with-bar", "gain, nats"},
+                     {"p", "number"},
+                     {term("held-out", "held out") + ", " + term("nat", "nats a trial"), "number",
+                      "held out, nats a trial"},
+                     {"best strength"},
+                     {"remarks"}},
+                    rows) +
+         "</section>";
 }
 
 std::string shrinkage_section(const Diagnosis& diagnosis) {
@@ -334,21 +313,15 @@ std::string cautions_section(const Diagnosis& diagnosis) {
 
 std::string provenance_section(const Diagnosis& diagnosis) {
   std::string html = R"(<section id="provenance"><h2>What went in</h2>)";
-  if (!diagnosis.provenance.empty()) {
-    html += R"(<dl class="provenance">)";
-    for (const auto& [label, value] : diagnosis.provenance) {
-      html += "<div><dt>" + html_escaped(label) + "</dt><dd>" + html_escaped(value) + "</dd></div>";
-    }
-    html += "</dl>";
-  }
+  if (!diagnosis.provenance.empty()) html += html_definitions(diagnosis.provenance);
   double total = 0;
   for (const auto& [stage, seconds] : diagnosis.timing_s) {
     if (std::isfinite(seconds)) total += seconds;
   }
   if (total > 0) {
     html +=
-        R"(<h3>Time</h3><table class="plain timing"><caption class="unseen">Wall time by stage</caption>)" +
-        heads({{"stage", false}, {"share", false}, {"s", true}}) + "<tbody>";
+        R"(<h3>Time</h3><table class="plain timing"><caption class="unseen">Wall time by stage</caption>)"
+        R"(<thead><tr><th scope="col">stage</th><th scope="col">share</th><th scope="col" class="number">s</th></tr></thead><tbody>)";
     for (const auto& [stage, seconds] : diagnosis.timing_s) {
       html +=
           fmt::format(R"(<tr><th scope="row">{}</th><td>{}</td><td class="number">{}</td></tr>)",

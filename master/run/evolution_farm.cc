@@ -1,10 +1,7 @@
 #include "master/run/evolution_farm.h"
 
-#include <algorithm>
-
 #include "common/base/try.h"
 #include "common/progress/number_text.h"
-#include "master/evolve/evaluation.h"
 
 namespace gapfarm {
 namespace {

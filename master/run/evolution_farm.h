@@ -5,18 +5,32 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
+#include "common/base/result.h"
 #include "common/log/log.h"
 #include "common/problem/problem.h"
 #include "common/progress/worker_wait.h"
+#include "common/trials/trial.h"
 #include "master/evolve/evolve.h"
-#include "master/evolve/time_left.h"
 #include "master/farm/socket_farm.h"
-#include "master/run/run_watcher.h"
 #include "master/store/run_store.h"
 
 namespace gapfarm {
+
+// What those who watch a run hear while it goes on.
+class RunWatcher {
+ public:
+  virtual ~RunWatcher() = default;
+  virtual void note(std::string_view) {}
+  // The run goes on all the same.
+  virtual void error(const Error&) {}
+  // In place of the last one; `news`: it is not just more of the same.  Empty: there is none now.
+  virtual void progress(std::string_view, bool /*news*/) {}
+  // A log that the run takes beside its own.
+  virtual void read(const TrialLog&) {}
+};
 
 // A farm with what a run keeps of it.
 class FarmOfRun {

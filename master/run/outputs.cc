@@ -2,12 +2,10 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "common/base/build_info.h"
 #include "common/base/try.h"
 #include "common/config/model.h"
 #include "common/trials/files.h"
-#include "master/report/figures/fitness_chart.h"
-#include "master/report/figures/pose_panels.h"
+#include "master/report/figures/line_chart.h"
 #include "master/report/figures/pose_picture.h"
 #include "master/run/baseline_notes.h"
 #include "master/run/run_page.h"

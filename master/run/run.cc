@@ -6,7 +6,6 @@
 #include <cmath>
 
 #include "common/base/try.h"
-#include "master/evolve/evaluation.h"
 #include "master/evolve/optimisers.h"
 #include "master/evolve/staged.h"
 #include "master/ground/fit/simulated_start.h"

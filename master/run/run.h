@@ -4,13 +4,15 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
+#include "common/base/result.h"
 #include "common/config/settings.h"
 #include "common/log/log.h"
+#include "common/trials/trial.h"
 #include "master/evolve/evolve.h"
 #include "master/run/evolution_farm.h"
-#include "master/run/run_watcher.h"
 #include "master/run/validation.h"
 #include "master/store/run_store.h"
 

@@ -1,12 +1,11 @@
 // A run's page, from its store alone.
 #pragma once
 
-#include <filesystem>
 #include <vector>
 
 #include "common/base/result.h"
 #include "common/problem/problem.h"
-#include "master/report/figures/pose_panels.h"
+#include "master/report/figures/pose_picture.h"
 #include "master/report/run/run_report.h"
 #include "master/run/validation.h"
 #include "master/store/records.h"

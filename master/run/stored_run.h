@@ -1,8 +1,6 @@
 // A run as its store has it: what it was asked, and what came of it so far.
 #pragma once
 
-#include <string>
-
 #include "common/base/result.h"
 #include "common/config/model.h"
 #include "common/config/settings.h"

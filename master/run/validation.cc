@@ -7,7 +7,7 @@
 #include "common/config/config.h"
 #include "common/problem/run_files.h"
 #include "common/trials/read.h"
-#include "master/evolve/evaluation.h"
+#include "master/evolve/evolve.h"
 
 namespace gapfarm {
 

@@ -1,7 +1,7 @@
 // gapfarm-fault-proxy: between a master and its workers, it drops, doubles, delays and reorders
 // messages.  Which ones follows from the seed and the order in which messages arrive.
-#include <CLI/CLI.hpp>
 #include <cstdio>
+#include <cstdlib>
 #include <functional>
 #include <map>
 #include <memory>
@@ -25,8 +25,8 @@ constexpr double kLongestReorder = 0.1;
 struct Options {
   std::string listen;   // for the workers
   std::string connect;  // to the master
-  std::uint64_t seed = 1;
-  double share = 0.1;  // of the messages are disturbed
+  std::uint64_t seed;
+  double share;  // of the messages are disturbed
 };
 
 struct Counts {
@@ -185,14 +185,17 @@ class Proxy {
 }  // namespace gapfarm
 
 int main(int argc, char** argv) {
-  CLI::App app("Disturbs what a master and its workers say to each other.", "gapfarm-fault-proxy");
-  gapfarm::Options options;
-  app.add_option("--listen", options.listen, "Endpoint for the workers")->required();
-  app.add_option("--connect", options.connect, "Endpoint of the master")->required();
-  app.add_option("--seed", options.seed);
-  app.add_option("--share", options.share, "Of the messages that are disturbed")
-      ->check(CLI::Range(0.0, 1.0));
-  CLI11_PARSE(app, argc, argv);
+  std::map<std::string, std::string> given = {{"--seed", "1"}, {"--share", "0.1"}};
+  for (int i = 1; i + 1 < argc; i += 2) given[argv[i]] = argv[i + 1];
+  gapfarm::Options options{given["--listen"], given["--connect"],
+                           std::strtoull(given["--seed"].c_str(), nullptr, 10),
+                           std::strtod(given["--share"].c_str(), nullptr)};
+  if (given.size() != 4 || options.listen.empty() || options.connect.empty()) {
+    std::fprintf(stderr,
+                 "usage: gapfarm-fault-proxy --listen WORKERS --connect MASTER [--seed N] "
+                 "[--share OF_THE_MESSAGES]\n");
+    return 2;
+  }
   gapfarm::StopSource stop;
   const gapfarm::StopOnSignals signals(&stop);
   gapfarm::Proxy proxy(options);

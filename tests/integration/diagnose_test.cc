@@ -143,7 +143,7 @@ TEST_F(Diagnose, FindsALagInPathsAndNoneWithoutOne) {
 TEST_F(Diagnose, FindsASecondSeamWhereThereIsOne) {
   const std::vector<std::string> one = {"camera_seam.offset_x=0.06", "camera_seam.offset_y=-0.03",
                                         "camera_seam.position=1.1", "camera_seam.axis=1"};
-  simulate(240, one);
+  simulate(160, one);
   const Json alone = diagnose();  // the few drives that end on the line may stay unexplained
   ASSERT_EQ(alone["effects"].size(), 1u) << alone["headline"];
   EXPECT_EQ(alone["effects"][0]["name"], "camera_seam");
@@ -247,12 +247,12 @@ TEST_F(Diagnose, WhatOutliersWithoutANameIsPredictedAllTheSame) {
 
 // Both make single drives are outliers: slips anywhere, a patch where it lies.
 TEST_F(Diagnose, SlipsAreNamedButNotForWhatLiesInOnePlace) {
-  simulate(200, {"slip_events.probability=0.15", "slip_events.loss=0.35"});
+  simulate(140, {"slip_events.probability=0.15", "slip_events.loss=0.35"});
   const Json slips = diagnose();
   ASSERT_EQ(slips["effects"].size(), 1u) << slips["headline"];
   EXPECT_EQ(slips["effects"][0]["name"], "slip_events");
   EXPECT_GT(slips["effects"][0]["closed"].get<double>(), 0.8);
-  simulate(200, {"friction_patch.ratio=0.15", "friction_patch.x=1", "friction_patch.y=1",
+  simulate(140, {"friction_patch.ratio=0.15", "friction_patch.x=1", "friction_patch.y=1",
                  "friction_patch.radius=0.25"});
   const Json patch = diagnose({"--exclude", "friction_patch"});
   EXPECT_EQ(patch["verdict"], "unknown") << patch["headline"];
@@ -268,7 +268,7 @@ TEST_F(Diagnose, OfAFewTrialsNothingIsReported) {
 
 // In a map whose origin is kilometres away places are found as near to it.
 TEST_F(Diagnose, ReportsTheSameWhereverTheLogLies) {
-  simulate(200, {"friction_patch.ratio=0.2", "friction_patch.x=1", "friction_patch.y=1",
+  simulate(140, {"friction_patch.ratio=0.2", "friction_patch.x=1", "friction_patch.y=1",
                  "friction_patch.radius=0.3"});
   const Json near = diagnose();
   const std::string log = move_log(folder_ / "trials.csv", folder_ / "far.csv", 5000, -3000);

@@ -6,13 +6,12 @@
 #include <set>
 
 #include "common/base/try.h"
-#include "common/config/config.h"
 #include "common/problem/run_files.h"
 #include "common/trials/context.h"
 #include "master/cli/subcommand.h"
 #include "master/command/inputs.h"
 #include "master/diagnose/result/diagnosis_json.h"
-#include "master/evolve/evaluation.h"
+#include "master/evolve/evolve.h"
 #include "master/ground/diagnose_ground.h"
 #include "master/io/log_checks/finding_text.h"
 #include "master/io/log_checks/sanity.h"

@@ -10,13 +10,13 @@
 
 #include "common/base/try.h"
 #include "common/config/config.h"
-#include "common/trials/shifted.h"
+#include "common/trials/select.h"
 #include "master/cli/subcommand.h"
 #include "master/command/inputs.h"
 #include "master/command/long_command.h"
 #include "master/command/outputs.h"
 #include "master/command/run_model.h"
-#include "master/evolve/evaluation.h"
+#include "master/evolve/evolve.h"
 
 namespace gapfarm {
 namespace {

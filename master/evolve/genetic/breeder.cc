@@ -1,9 +1,6 @@
 #include "master/evolve/genetic/breeder.h"
 
-#include <algorithm>
 #include <cassert>
-
-#include "master/evolve/genetic/variation.h"
 
 namespace gapfarm {
 namespace {

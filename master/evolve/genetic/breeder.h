@@ -5,8 +5,7 @@
 
 #include "common/config/settings.h"
 #include "master/evolve/gene_space.h"
-#include "master/evolve/genetic/roulette.h"
-#include "master/evolve/genetic/selection.h"
+#include "master/evolve/genetic/variation.h"
 #include "master/evolve/individual.h"
 
 namespace gapfarm {

@@ -13,7 +13,6 @@
 
 #include "common/base/result.h"
 #include "master/evolve/optimiser.h"
-#include "master/evolve/setup.h"
 
 namespace gapfarm {
 

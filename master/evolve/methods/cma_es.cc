@@ -1,6 +1,5 @@
 #include "master/evolve/methods/cma_es.h"
 
-#include <Eigen/Core>
 #include <algorithm>
 #include <cassert>
 #include <cmath>

@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "common/base/try.h"
-#include "master/evolve/individual_state.h"
+#include "master/evolve/individual.h"
 
 namespace gapfarm {
 namespace {

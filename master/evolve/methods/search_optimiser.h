@@ -13,7 +13,7 @@
 #include <string>
 
 #include "master/evolve/methods/search_method.h"
-#include "master/evolve/setup.h"
+#include "master/evolve/optimiser.h"
 
 namespace gapfarm {
 

@@ -8,7 +8,6 @@
 
 #include "common/json/fields.h"
 #include "common/json/json.h"
-#include "common/trials/text/csv.h"
 
 namespace gapfarm {
 namespace {

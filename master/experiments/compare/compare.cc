@@ -4,7 +4,6 @@
 #include <memory>
 
 #include "common/base/try.h"
-#include "master/evolve/evaluation.h"
 #include "master/evolve/optimisers.h"
 #include "master/evolve/staged.h"
 

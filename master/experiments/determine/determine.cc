@@ -2,7 +2,6 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <iterator>

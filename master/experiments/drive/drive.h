@@ -4,7 +4,6 @@
 #include <Eigen/Core>
 #include <memory>
 #include <span>
-#include <string>
 #include <vector>
 
 #include "common/score/constant_velocity.h"

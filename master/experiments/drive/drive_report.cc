@@ -2,12 +2,9 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include <cmath>
-
 #include "common/math/statistics.h"
 #include "master/report/figures/line_chart.h"
-#include "master/report/html.h"
-#include "master/report/plain_page.h"
+#include "master/report/page_frame.h"
 
 namespace gapfarm {
 namespace {

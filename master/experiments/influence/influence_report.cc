@@ -6,7 +6,7 @@
 #include "master/experiments/influence/influence.h"
 #include "master/report/figures/line_chart.h"
 #include "master/report/html.h"
-#include "master/report/plain_page.h"
+#include "master/report/page_frame.h"
 
 namespace gapfarm {
 namespace {

@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "common/base/try.h"
-#include "master/evolve/evaluation.h"
+#include "master/evolve/evolve.h"
 #include "master/evolve/optimisers.h"
 
 namespace gapfarm {

@@ -9,7 +9,6 @@
 #include "common/trials/text/csv.h"
 #include "master/io/robot_files/compare_facts.h"
 #include "master/io/robot_files/drive_guess.h"
-#include "master/io/robot_files/urdf/masses.h"
 #include "master/io/robot_files/urdf/shapes.h"
 
 namespace gapfarm {

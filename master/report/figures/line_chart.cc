@@ -65,11 +65,12 @@ Frame frame_of(const LineChart& chart) {
   frame.x.logarithmic = chart.log_x;
   frame.y.logarithmic = chart.log_y;
   bool first = true;
+  const double least = chart.y_least.value_or(-HUGE_VAL), most = chart.y_most.value_or(HUGE_VAL);
   const auto include = [&](const std::vector<SvgPoint>& points) {
     for (const SvgPoint& point : points) {
       if (!frame.x.shows(point.x) || !frame.y.shows(point.y)) continue;
       frame.x.include(point.x, first);
-      frame.y.include(chart.y_top ? std::min(point.y, *chart.y_top) : point.y, first);
+      frame.y.include(std::clamp(point.y, least, most), first);
       first = false;
     }
   };
@@ -79,7 +80,7 @@ Frame frame_of(const LineChart& chart) {
     include(series.upper);
   }
   for (const ChartLevel& level : chart.levels) {
-    if (frame.y.shows(level.y) && !first && (!chart.y_top || level.y <= *chart.y_top)) {
+    if (frame.y.shows(level.y) && !first && level.y >= least && level.y <= most) {
       frame.y.include(level.y, false);
     }
   }
@@ -113,7 +114,7 @@ void draw_axes(Svg& svg, const Frame& frame, const LineChart& chart) {
   }
   for (const double tick : xs) {
     const double x = kLeft + frame.width * frame.x.share(tick);
-    if (x < kLeft || x > kWidth - kRight) continue;
+    if (x < kLeft || x > kWidth - kRight || (chart.whole_x && tick != std::floor(tick))) continue;
     svg.line({x, bottom}, {x, bottom + 5}, {.stroke = "#b5b5b5"});
     svg.text({x, bottom + 18}, frame.x.label(tick, xs), middle);
   }
@@ -187,6 +188,41 @@ std::string line_chart(const LineChart& chart) {
              {.size = 12});
   }
   return svg.finish();
+}
+
+std::string fitness_chart(const std::vector<FitnessPoint>& points, const std::string& title,
+                          const std::string& fitness, const std::string& unit,
+                          bool higher_is_better) {
+  LineChart chart;
+  chart.title = title;
+  chart.x_title = "generation";
+  chart.y_title = fitness + (unit.empty() || unit == "-" ? "" : " (" + unit + ")") +
+                  (higher_is_better ? ", higher is better" : ", lower is better");
+  chart.whole_x = true;
+  ChartSeries best{.name = "best, and down to the worst", .line = {}, .lower = {}, .upper = {}};
+  ChartSeries median{.name = "median", .line = {}, .lower = {}, .upper = {}};
+  std::vector<double> medians;
+  for (const FitnessPoint& point : points) {
+    if (!point.best || !point.median || !point.worst) continue;
+    const auto x = static_cast<double>(point.generation);
+    best.line.push_back({x, *point.best});
+    best.lower.push_back({x, *point.worst});
+    median.line.push_back({x, *point.median});
+    medians.push_back(*point.median);
+  }
+  best.upper = best.line;
+  if (!medians.empty()) {
+    // Toward the bad side: nine tenths of the medians.
+    std::sort(medians.begin(), medians.end());
+    const std::size_t tenth = medians.size() / 10;
+    if (higher_is_better) {
+      chart.y_least = medians[tenth];
+    } else {
+      chart.y_most = medians[medians.size() - 1 - tenth];
+    }
+  }
+  chart.series = {best, median};
+  return line_chart(chart);
 }
 
 std::string bar_chart(const std::string& title, const std::string& x_title,

@@ -1,6 +1,7 @@
 // Lines with bands over a common axis, as SVG.
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -24,9 +25,10 @@ struct ChartLevel {  // a horizontal line
 struct LineChart {
   std::string title, x_title, y_title;
   bool log_x = false;
-  bool log_y = false;           // points at or below 0 are omitted
-  bool equal_axes = false;      // one unit of x is as long as one of y
-  std::optional<double> y_top;  // what is above is cut off at the frame
+  bool log_y = false;                     // points at or below 0 are omitted
+  bool equal_axes = false;                // one unit of x is as long as one of y
+  bool whole_x = false;                   // no ticks between integers
+  std::optional<double> y_least, y_most;  // what is beyond is cut off at the frame
   std::vector<ChartSeries> series;
   std::vector<ChartLevel> levels;
 };
@@ -35,6 +37,17 @@ struct LineChart {
 std::string series_colour(std::size_t i);
 
 std::string line_chart(const LineChart& chart);
+
+struct FitnessPoint {
+  std::uint64_t generation = 0;
+  std::optional<double> best, median, worst;  // none: no individual of the generation was OK
+};
+
+// Fitness by generation: best over the band from best to worst, and median.  The scale follows the
+// best and the bulk of the medians; what is worse is cut off at the frame.
+std::string fitness_chart(const std::vector<FitnessPoint>& points, const std::string& title,
+                          const std::string& fitness, const std::string& unit,
+                          bool higher_is_better);
 
 struct ChartBar {
   std::string name;

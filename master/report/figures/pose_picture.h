@@ -6,6 +6,8 @@
 #include <vector>
 
 #include "common/pose/pose.h"
+#include "common/problem/problem.h"
+#include "gapfarm/v1/task.pb.h"
 
 namespace gapfarm {
 
@@ -31,5 +33,15 @@ inline constexpr std::size_t kPoseCloudStyles = 3;
 // beyond it are counted in a corner.  Shapes and line styles differ as well as colours.
 std::string pose_picture(const std::vector<PosePanel>& panels, const std::string& title,
                          const std::string& subtitle = "");
+
+// From predictions of a log to the panels of pose_picture().
+struct PredictionOfLog {
+  std::string label;
+  v1::PredictResult prediction;  // one a trial of the problem's log, in its order, with covariances
+};
+
+// One panel a command: its trials at the duties and duration that the log has most of.
+std::vector<PosePanel> pose_panels(const Problem& problem,
+                                   const std::vector<PredictionOfLog>& predictions);
 
 }  // namespace gapfarm

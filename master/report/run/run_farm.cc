@@ -13,24 +13,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-std::string worker_cell(const char* label, const std::string& text, bool is_number) {
-  return fmt::format(R"(<td data-label="{}"{}>{}</td>)", label,
-                     is_number ? R"( class="number")" : "", html_escaped(text));
-}
-
-std::string worker_rows(const std::vector<RunWorker>& workers) {
-  std::string rows;
-  for (const RunWorker& w : workers) {
-    rows += R"(<tr><th scope="row">)" + html_escaped(w.name) + "</th>" +
-            worker_cell("host", w.host, false) + worker_cell("state", w.state, false) +
-            worker_cell("jobs in hand", std::to_string(w.jobs), true) +
-            worker_cell("finished", number_text(static_cast<double>(w.finished), 9), true) +
-            worker_cell("jobs/s", number_text(w.rate_per_s), true) +
-            worker_cell("last failure", w.failure.empty() ? "–" : w.failure, false) + "</tr>";
-  }
-  return rows;
-}
-
 std::string list_of(const std::vector<std::string>& lines, const char* css_class) {
   std::string html = fmt::format(R"(<ul class="{}">)", css_class);
   for (const std::string& line : lines) html += "<li>" + html_escaped(line) + "</li>";
@@ -39,8 +21,22 @@ std::string list_of(const std::vector<std::string>& lines, const char* css_class
 
 std::string worker_table(const RunFarm& farm) {
   if (farm.workers.empty()) return "<p>No worker has been heard of by this run's last master.</p>";
-  return R"(<table class="cards" data-file="workers"><caption class="unseen">Workers</caption><thead><tr><th scope="col">worker</th><th scope="col">host</th><th scope="col">state</th><th scope="col" class="number">jobs in hand</th><th scope="col" class="number">finished</th><th scope="col" class="number">jobs/s</th><th scope="col">last failure</th></tr></thead><tbody>)" +
-         worker_rows(farm.workers) + "</tbody></table>";
+  std::vector<HtmlRow> rows;
+  for (const RunWorker& w : farm.workers) {
+    rows.push_back({html_escaped(w.name),
+                    {html_escaped(w.host), html_escaped(w.state), std::to_string(w.jobs),
+                     number_text(static_cast<double>(w.finished), 9), number_text(w.rate_per_s),
+                     w.failure.empty() ? "–" : html_escaped(w.failure)}});
+  }
+  return html_table("cards", "workers", "Workers",
+                    {{"worker"},
+                     {"host"},
+                     {"state"},
+                     {"jobs in hand", "number"},
+                     {"finished", "number"},
+                     {"jobs/s", "number"},
+                     {"last failure"}},
+                    rows);
 }
 
 std::string log_html(const std::vector<std::string>& lines) {
@@ -64,11 +60,7 @@ bool is_little_known(const RunFarm& farm) {
 
 std::string tally_html(const RunFarm& farm) {
   if (is_little_known(farm)) return kLittleIsKnown;
-  std::string html = R"(<dl class="provenance">)";
-  for (const auto& [label, value] : farm.tally) {
-    html += "<div><dt>" + html_escaped(label) + "</dt><dd>" + html_escaped(value) + "</dd></div>";
-  }
-  return html + "</dl>";
+  return html_definitions(farm.tally);
 }
 
 // The plots are kept outside of what is put in its place: they draw themselves again.

@@ -4,7 +4,9 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "common/json/json.h"
 #include "master/diagnose/result/diagnosis_json.h"
+#include "master/diagnose/result/json_fields.h"
 #include "master/report/glossary.h"
 #include "master/report/html.h"
 #include "master/report/page_frame.h"
@@ -14,6 +16,17 @@
 
 namespace gapfarm {
 namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr int kVersion = 1;
+
+constexpr auto kScore = [](auto& v, auto& row) {
+  v.field("name", row.name);
+  v.if_any("score", row.score);
+  v.if_any("position_mm", row.position_mm);
+  v.if_any("heading_mrad", row.heading_mrad);
+};
 
 using Json = nlohmann::ordered_json;
 
@@ -64,34 +77,23 @@ std::string summary(const RunReport& report) {
   return html + "</dl></section>\n";
 }
 
-std::string score_cell(const std::optional<double>& value, const char* label) {
-  return fmt::format(R"(<td class="number" data-label="{}">{}</td>)", label,
-                     value ? number_text(*value, 5) : "–");
-}
-
 std::string score_table(const std::vector<ScoreRow>& rows, const std::string& column,
                         const char* file) {
   const bool errors = std::any_of(rows.begin(), rows.end(), [](const ScoreRow& row) {
     return row.position_mm || row.heading_mrad;
   });
-  std::string body;
+  std::vector<HtmlColumn> columns = {{""}, {html_escaped(column), "number", "score"}};
+  if (errors)
+    columns.insert(columns.end(), {{"position, mm", "number"}, {"heading, mrad", "number"}});
+  std::vector<HtmlRow> lines;
   for (const ScoreRow& row : rows) {
-    body += R"(<tr><th scope="row">)" + html_escaped(row.name) + "</th>" +
-            score_cell(row.score, "score");
-    if (errors) {
-      body += score_cell(row.position_mm, "position, mm") +
-              score_cell(row.heading_mrad, "heading, mrad");
+    lines.push_back({html_escaped(row.name), {}});
+    for (const auto& value : {row.score, row.position_mm, row.heading_mrad}) {
+      if (lines.back().cells.size() + 1 == columns.size()) break;
+      lines.back().cells.push_back(value ? number_text(*value, 5) : "–");
     }
-    body += "</tr>";
   }
-  return fmt::format(
-      R"(<table class="parts" data-file="{}"><caption class="unseen">{}</caption><thead><tr><th scope="col"></th>)"
-      R"(<th scope="col" class="number">{}</th>{}</tr></thead><tbody>{}</tbody></table>)",
-      file, file, html_escaped(column),
-      errors ? R"(<th scope="col" class="number">position, mm</th>)"
-               R"(<th scope="col" class="number">heading, mrad</th>)"
-             : "",
-      body);
+  return html_table("parts", file, file, columns, lines);
 }
 
 std::string fitness_names(const RunReport& report) {
@@ -124,14 +126,6 @@ std::string progress(const RunReport& report) {
   return R"(<section id="progress"><h2>Fitness by )" + term("generation", "generation") +
          R"(</h2><div class="controls" id="progress-controls"></div><div id="progress-plot"></div>)" +
          kNoScript + "</section>\n";
-}
-
-std::string provenance(const RunReport& report) {
-  std::string html = R"(<section id="provenance"><h2>What went in</h2><dl class="provenance">)";
-  for (const auto& [label, value] : report.provenance) {
-    html += "<div><dt>" + html_escaped(label) + "</dt><dd>" + html_escaped(value) + "</dd></div>";
-  }
-  return html + "</dl></section>\n";
 }
 
 std::string pose_sections() {
@@ -185,6 +179,34 @@ Json page_json(const RunReport& report) {
 
 }  // namespace
 
+std::string to_json(const RunOutcome& outcome) {
+  Diagnosis table;
+  table.trials = outcome.trials;
+  const Json json = {{"version", kVersion},
+                     {"validation", FieldWriter::list(outcome.validation, kScore)},
+                     {"baselines", FieldWriter::list(outcome.baselines, kScore)},
+                     {"trials", trials_json(table)}};
+  return json_text(json);
+}
+
+Result<RunOutcome> parse_run_outcome(const std::string& text) {
+  const Json json = parse_json(text);
+  if (json.is_discarded() || !json.is_object() || json.value("version", 0) != kVersion ||
+      !json.contains("trials")) {
+    return Error{"the run's outcome cannot be read; was it kept by another program?"};
+  }
+  RunOutcome outcome;
+  std::string error;
+  Fields root(json, "", error);
+  root.list("validation", outcome.validation, kScore);
+  root.list("baselines", outcome.baselines, kScore);
+  if (!error.empty()) return Error{error};
+  auto trials = parse_trials(json["trials"], {});
+  if (!trials) return trials.error();
+  outcome.trials = std::move(*trials);
+  return outcome;
+}
+
 std::string run_html(const RunReport& report) {
   const bool poses = report.outcome && !report.outcome->trials.empty();
   const bool driven = poses && !report.pieces;
@@ -222,7 +244,8 @@ std::string run_html(const RunReport& report) {
   if (watched) body += watch_section(report.windows ? "window" : report.pieces ? "push" : "drive");
   body += genomes_section(report);
   if (farmed) body += farm_section(report.farm);
-  body += provenance(report) + glossary_section(run_terms());
+  body += R"(<section id="provenance"><h2>What went in</h2>)" +
+          html_definitions(report.provenance) + "</section>\n" + glossary_section(run_terms());
   Diagnosis table;
   if (report.outcome) table.trials = report.outcome->trials;
   return framed_page(frame, page_json(report), trials_json(table, kRunPlotDigits));

@@ -79,34 +79,32 @@ namespace {
 // With a button that copies it, where there are scripts.
 std::string replay_cell(const std::string& run, std::uint64_t birth_id, const char* where) {
   return fmt::format(
-      R"(<td data-label="again"><code id="replay-{1}-{2}">gapfarm replay {0} --genome {2}</code> <button type="button" class="copy" data-of="replay-{1}-{2}" aria-label="Copy the command for genome {2}" hidden>Copy</button></td>)",
+      R"(<code id="replay-{1}-{2}">gapfarm replay {0} --genome {2}</code> <button type="button" class="copy" data-of="replay-{1}-{2}" aria-label="Copy the command for genome {2}" hidden>Copy</button>)",
       html_escaped(run), where, birth_id);
-}
-
-std::string genome_rows(const RunReport& report, const std::vector<RunGenome>& genomes,
-                        const char* where) {
-  std::string rows;
-  for (const RunGenome& g : genomes) {
-    std::string parents;
-    for (const std::uint64_t p : g.parents)
-      parents += (parents.empty() ? "" : ", ") + std::to_string(p);
-    rows +=
-        fmt::format(
-            R"(<tr><th scope="row">{}</th><td class="number" data-label="generation">{}</td><td class="number" data-label="{}">{}</td><td data-label="made by">{}</td><td data-label="of">{}</td>)",
-            g.birth_id, g.generation, html_escaped(report.fitness),
-            g.fitness ? number_text(*g.fitness, 7) : html_escaped(g.outcome),
-            html_escaped(g.operators), parents.empty() ? "–" : parents) +
-        replay_cell(report.name, g.birth_id, where) + "</tr>";
-  }
-  return rows;
 }
 
 std::string genome_table(const RunReport& report, const std::vector<RunGenome>& genomes,
                          const char* where, const char* caption) {
   const std::string unit = report.unit.empty() || report.unit == "-" ? "" : ", " + report.unit;
-  return fmt::format(
-      R"(<table class="cards" data-file="{}"><caption class="unseen">{}</caption><thead><tr><th scope="col">genome</th><th scope="col" class="number">generation</th><th scope="col" class="number">{}</th><th scope="col">made by</th><th scope="col">of</th><th scope="col">evaluate it again, to the bit</th></tr></thead><tbody>{}</tbody></table>)",
-      where, caption, html_escaped(report.fitness + unit), genome_rows(report, genomes, where));
+  std::vector<HtmlRow> rows;
+  for (const RunGenome& g : genomes) {
+    std::string parents;
+    for (const std::uint64_t p : g.parents)
+      parents += (parents.empty() ? "" : ", ") + std::to_string(p);
+    rows.push_back({std::to_string(g.birth_id),
+                    {std::to_string(g.generation),
+                     g.fitness ? number_text(*g.fitness, 7) : html_escaped(g.outcome),
+                     html_escaped(g.operators), parents.empty() ? "–" : parents,
+                     replay_cell(report.name, g.birth_id, where)}});
+  }
+  return html_table("cards", where, caption,
+                    {{"genome"},
+                     {"generation", "number"},
+                     {html_escaped(report.fitness + unit), "number", html_escaped(report.fitness)},
+                     {"made by"},
+                     {"of"},
+                     {"evaluate it again, to the bit", "", "again"}},
+                    rows);
 }
 
 // Without scripts a server answers it, too.

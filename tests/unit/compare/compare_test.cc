@@ -9,7 +9,7 @@
 
 #include "common/config/config.h"
 #include "common/trials/files.h"
-#include "master/evolve/evaluation.h"
+#include "master/evolve/evolve.h"
 #include "master/evolve/optimisers.h"
 #include "master/experiments/compare/summary.h"
 
@@ -122,8 +122,8 @@ TEST(Summary, CountsWhatTheTargetTook) {
 
   s.baselines = {{"constant velocity", 0.7}, {"nothing", std::nullopt}};
   EXPECT_THAT(comparison_text(s), HasSubstr("constant velocity"));
-  EXPECT_THAT(summary_csv(s), HasSubstr("\"fast & <good>\",3,0.2"));
-  EXPECT_THAT(runs_csv(s, runs), HasSubstr("\"slow\",3,100,2,\n"));
+  EXPECT_THAT(summary_csv(s), HasSubstr("fast & <good>,3,0.2"));
+  EXPECT_THAT(runs_csv(s, runs), HasSubstr("slow,3,100,2,\n"));
   const std::string page = comparison_page(s, "Test", {{"file", "<b>.toml"}});
   EXPECT_THAT(page, HasSubstr("fast &amp; &lt;good&gt;"));
   EXPECT_THAT(page, Not(HasSubstr("<script")));

@@ -8,7 +8,7 @@
 #include "common/random/stream.h"
 #include "master/diagnose/evidence/latency.h"
 
-namespace gapfarm {
+namespace gapfarm::distribution_test {
 namespace {
 
 constexpr PoseNoise kNoise{0.0015, 0.008};
@@ -106,4 +106,4 @@ TEST(FitLatency, ReportsNothingWithoutNoiseOrGaps) {
 }
 
 }  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::distribution_test

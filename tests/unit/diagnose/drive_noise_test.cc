@@ -7,7 +7,7 @@
 
 #include "tests/unit/diagnose/drawn_drives.h"
 
-namespace gapfarm {
+namespace gapfarm::drive_noise_test {
 namespace {
 
 // 600 trials show the drive to about 6 %: ten logs together are to be right within 5 %, which is
@@ -85,4 +85,4 @@ TEST(RefitDriveNoise, ManyOutlierTrialsDoNotMakeItVanish) {
 }
 
 }  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::drive_noise_test

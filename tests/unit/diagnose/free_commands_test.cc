@@ -8,7 +8,7 @@
 
 #include "common/random/stream.h"
 
-namespace gapfarm {
+namespace gapfarm::free_commands_test {
 namespace {
 
 constexpr double kSpeed_m_s = 0.28, kGauge_m = 0.16;
@@ -147,4 +147,4 @@ TEST(FreeCommands, EveryTrialIsOfOneClass) {
 }
 
 }  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::free_commands_test

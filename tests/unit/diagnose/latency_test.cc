@@ -7,7 +7,7 @@
 #include "common/random/stream.h"
 #include "master/diagnose/subject.h"
 
-namespace gapfarm {
+namespace gapfarm::latency_test {
 namespace {
 
 // 400 drives of 0.25 m, each from where the one before was read to have ended; every twentieth time
@@ -95,4 +95,4 @@ TEST(LateMarks, TakeAwayWhatLateReadingsLeft) {
 }
 
 }  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::latency_test

@@ -7,7 +7,7 @@
 #include "common/random/stream.h"
 #include "master/diagnose/drive_designs.h"
 
-namespace gapfarm {
+namespace gapfarm::next_experiment_test {
 namespace {
 
 constexpr double kSd = 0.01;
@@ -211,4 +211,4 @@ TEST(NextExperiments, PassOnFaults) {
 }
 
 }  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::next_experiment_test

@@ -10,7 +10,7 @@
 #include "tests/unit/diagnose/drawn_drives.h"
 #include "tests/unit/diagnose/kinematic_farm.h"
 
-namespace gapfarm {
+namespace gapfarm::outliers_test {
 namespace {
 
 constexpr std::size_t kChain = 6;
@@ -106,4 +106,4 @@ TEST(Outliers, NoLineIsOfferedWhereAllPositionsAreTurned) {
 }
 
 }  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::outliers_test

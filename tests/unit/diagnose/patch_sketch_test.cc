@@ -11,7 +11,7 @@
 #include "master/diagnose/subject.h"
 #include "tests/unit/worker/problems.h"
 
-namespace gapfarm {
+namespace gapfarm::patch_sketch_test {
 namespace {
 
 constexpr double kSpeed_m_s = 0.28;
@@ -168,4 +168,4 @@ TEST(Patches, OneOnTheRimOfAnotherIsNotASecond) {
 }
 
 }  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::patch_sketch_test

@@ -8,7 +8,7 @@
 #include "master/diagnose/push/push_geometry.h"
 #include "tests/unit/diagnose/drawn_pushes.h"
 
-namespace gapfarm {
+namespace gapfarm::push_designs_test {
 namespace {
 
 Trial push(double aside, const Pose& X_WS) {
@@ -86,4 +86,4 @@ TEST(PlanPushes, LeavesOutPushesThatMiss) {
 }
 
 }  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::push_designs_test

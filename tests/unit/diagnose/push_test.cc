@@ -10,7 +10,7 @@
 #include "master/diagnose/push/push_subject.h"
 #include "tests/unit/diagnose/drawn_pushes.h"
 
-namespace gapfarm {
+namespace gapfarm::push_test {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
@@ -175,4 +175,4 @@ TEST(PushStudy, TunesOneShapeFactorAPieceAndWhatTheConfigSearches) {
 }
 
 }  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::push_test

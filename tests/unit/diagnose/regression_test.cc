@@ -8,7 +8,7 @@
 #include "master/diagnose/conclusions/verdict.h"
 #include "master/diagnose/fit/nuisance.h"
 
-namespace gapfarm {
+namespace gapfarm::regression_test {
 namespace {
 
 Eigen::MatrixXd random_matrix(Stream& stream, Eigen::Index rows, Eigen::Index columns) {
@@ -98,4 +98,4 @@ TEST(Nuisances, RespectSymmetry) {
 }
 
 }  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::regression_test

@@ -10,7 +10,7 @@
 #include "master/diagnose/subject.h"
 #include "tests/unit/diagnose/drawn_drives.h"
 
-namespace gapfarm {
+namespace gapfarm::session_gains_test {
 namespace {
 
 constexpr double kOutliers = 0.005;
@@ -129,4 +129,4 @@ TEST(SessionGains, LeaveColumnsToTheSessionsAlone) {
 }
 
 }  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::session_gains_test

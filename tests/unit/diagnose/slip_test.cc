@@ -14,7 +14,7 @@
 #include "master/diagnose/places/slip_places.h"
 #include "tests/unit/diagnose/drawn_drives.h"
 
-namespace gapfarm {
+namespace gapfarm::slip_test {
 namespace {
 
 TEST(FitSlip, FindsEvents) {
@@ -231,4 +231,4 @@ TEST(ResidualKurtosis, ReportsTailsFromNone) {
 }
 
 }  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::slip_test

@@ -16,7 +16,7 @@
 #include "master/diagnose/subject.h"
 #include "tests/unit/diagnose/kinematic_farm.h"
 
-namespace gapfarm {
+namespace gapfarm::steps_test {
 namespace {
 
 Eigen::MatrixXd no_columns(const Study& study) {
@@ -335,4 +335,4 @@ TEST(Steps, OnlyWhatCouldGrowIsQuestionedOnItsBound) {
 }
 
 }  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::steps_test

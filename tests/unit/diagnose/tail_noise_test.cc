@@ -7,7 +7,7 @@
 #include "master/diagnose/subject.h"
 #include "tests/unit/diagnose/drawn_drives.h"
 
-namespace gapfarm {
+namespace gapfarm::tail_noise_test {
 namespace {
 
 // The drawn drives with a scale of its own for each one's drive and readings.
@@ -67,4 +67,4 @@ TEST(PredictiveNoise, APerfectPredictionScoresWhatIsReported) {
 }
 
 }  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::tail_noise_test

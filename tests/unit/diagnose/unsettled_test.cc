@@ -8,7 +8,7 @@
 #include "master/diagnose/subject.h"
 #include "tests/unit/diagnose/drawn_drives.h"
 
-namespace gapfarm {
+namespace gapfarm::unsettled_test {
 namespace {
 
 constexpr double kOutliers = 0.005;
@@ -92,4 +92,4 @@ TEST(Report, WhatIsLeftIsOneCautionTheClearestFirst) {
 }
 
 }  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::unsettled_test

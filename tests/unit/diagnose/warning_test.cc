@@ -14,7 +14,7 @@
 #include "master/diagnose/subject.h"
 #include "tests/unit/diagnose/kinematic_farm.h"
 
-namespace gapfarm {
+namespace gapfarm::warning_test {
 namespace {
 
 Problem moved(Problem problem, double dx, double dy) {
@@ -231,4 +231,4 @@ TEST(EffectSentence, NamesTheAxisOfASeamAndWhatAShareMeans) {
 }
 
 }  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::warning_test

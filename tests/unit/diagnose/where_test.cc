@@ -15,7 +15,7 @@
 #include "master/diagnose/evidence/spread_row.h"
 #include "master/diagnose/evidence/trend_test.h"
 
-namespace gapfarm {
+namespace gapfarm::where_test {
 namespace {
 
 constexpr double kSdPosition = 0.003;
@@ -375,4 +375,4 @@ TEST(Findings, ReportWhatThinDataCannotShow) {
 }
 
 }  // namespace
-}  // namespace gapfarm
+}  // namespace gapfarm::where_test

@@ -7,8 +7,6 @@
 #include <numeric>
 #include <set>
 
-#include "master/evolve/genetic/roulette.h"
-#include "master/evolve/genetic/selection.h"
 #include "master/evolve/genetic/variation.h"
 #include "master/evolve/individual.h"
 #include "tests/unit/evolve/toy_problems.h"

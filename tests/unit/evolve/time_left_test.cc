@@ -1,6 +1,6 @@
-#include "master/evolve/time_left.h"
-
 #include <gtest/gtest.h>
+
+#include "master/evolve/evolve.h"
 
 namespace gapfarm::time_left_test {
 

@@ -11,7 +11,7 @@
 #include <sstream>
 
 #include "common/random/stream.h"
-#include "master/report/figures/fitness_chart.h"
+#include "master/report/figures/line_chart.h"
 #include "master/report/figures/pose_picture.h"
 
 namespace gapfarm::pictures_test {

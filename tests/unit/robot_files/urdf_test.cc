@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "master/io/robot_files/urdf/xacro_text.h"
+#include "master/io/robot_files/urdf/xml_reader.h"
 #include "tests/unit/robot_files/sample_urdf.h"
 
 namespace gapfarm::urdf_test {

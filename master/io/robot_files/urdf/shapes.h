@@ -1,9 +1,9 @@
 // Geometry of a URDF's links: what is round, where it touches the floor, how it looks from above.
 #pragma once
 
-#include <array>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "master/io/robot_files/urdf/urdf.h"
 
@@ -31,5 +31,16 @@ Eigen::Vector3d lowest_point(const Eigen::Isometry3d& X_BL, const UrdfGeometry& 
 
 // The shape's outline from above, anticlockwise; empty for a mesh.
 std::vector<Eigen::Vector2d> outline(const Eigen::Isometry3d& X_BL, const UrdfGeometry& shape);
+
+// Mass, centre of mass and yaw inertia of everything that a URDF weighs.
+struct MassSum {
+  double mass_kg = 0;
+  Eigen::Vector3d com_B_m = Eigen::Vector3d::Zero();
+  double yaw_inertia_kgm2 = 0;  // about the vertical through the centre of mass
+  std::vector<std::string> remarks;
+};
+
+// All joints at zero.
+MassSum sum_masses(const UrdfModel& model, const LinkPoses& poses);
 
 }  // namespace gapfarm

@@ -1,6 +1,5 @@
 #include "master/io/robot_files/urdf/urdf.h"
 
-#include <algorithm>
 #include <set>
 
 #include "common/base/suggest.h"

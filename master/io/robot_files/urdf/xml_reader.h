@@ -4,14 +4,27 @@
 #include <tinyxml2.h>
 
 #include <Eigen/Geometry>
+#include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "common/base/result.h"
-#include "master/io/robot_files/urdf/xacro_text.h"
 
 namespace gapfarm {
+
+// The few xacro expressions that files called .urdf still hold: ${name}, $(arg name),
+// $(optenv NAME default).
+
+// Values by name; of properties and arguments alike.
+using XacroNames = std::map<std::string, std::string, std::less<>>;
+
+// `text` with every expression that `names` and defaults settle put in; the others stay.
+std::string expand_xacro(std::string_view text, const XacroNames& names);
+
+// Whether an expression is left.
+bool has_xacro(std::string_view text);
 
 class XmlReader {
  public:
