@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <utility>
 
 #include "common/math/algebra.h"
@@ -17,59 +16,43 @@ constexpr double kFirstDifference = 0.2;  // of a coordinate
 constexpr double kLeastDifference = 0.01, kMostDifference = 1.5;
 constexpr double kLeastDamping = 1e-3;
 
-double weight(double squares, const Noise& noise) {
-  return (noise.tail + 3) / (noise.tail * noise.scale * noise.scale + squares);
+double weight(double squares, double scale) {
+  return (kTail + 3) / (kTail * scale * scale + squares);
 }
 
-double score_of(double squares, const Noise& noise) {
-  const double tail = noise.tail, variance = tail * noise.scale * noise.scale;
-  return std::lgamma((tail + 3) / 2) - std::lgamma(tail / 2) -
-         1.5 * std::log(std::numbers::pi * variance) -
-         (tail + 3) / 2 * std::log1p(squares / variance);
+double score_of(double squares, double scale) {
+  return -3 * std::log(scale) - (kTail + 3) / 2 * std::log1p(squares / (kTail * scale * scale));
 }
 
 double squares_of(const Eigen::VectorXd& z, Eigen::Index i) {
   return z.segment<3>(3 * i).squaredNorm();
 }
 
-// The likelihood's own fixed point, which rises with every round (expectation, maximisation).
-Noise with_best_scale(const Eigen::VectorXd& z, Noise noise, double least, double most) {
+}  // namespace
+
+double robust_score(const Eigen::VectorXd& z, double scale) {
+  double sum = 0;
+  for (Eigen::Index i = 0; i < z.size() / 3; ++i) sum += score_of(squares_of(z, i), scale);
+  return sum;
+}
+
+double best_scale(const Eigen::VectorXd& z, double least, double most) {
+  if (z.size() == 0) return 1;
+  // The likelihood's own fixed point, which rises with every round (expectation, maximisation).
+  double scale =
+      std::clamp(std::sqrt(z.squaredNorm() / static_cast<double>(z.size())), least, most);
   for (int round = 0; round < 60; ++round) {
     double sum = 0;
     for (Eigen::Index i = 0; i < z.size() / 3; ++i) {
       const double squares = squares_of(z, i);
-      sum += weight(squares, noise) * squares;
+      sum += weight(squares, scale) * squares * scale * scale;
     }
-    const double before = noise.scale;
-    noise.scale *= std::sqrt(sum / static_cast<double>(z.size()));
-    noise.scale = std::clamp(noise.scale, least, most);
-    if (std::abs(noise.scale - before) < 1e-4 * before) break;
+    const double next = std::clamp(std::sqrt(sum / static_cast<double>(z.size())), least, most);
+    const bool same = std::abs(next - scale) < 1e-4 * scale;
+    scale = next;
+    if (same) break;
   }
-  return noise;
-}
-
-}  // namespace
-
-double robust_score(const Eigen::VectorXd& z, const Noise& noise) {
-  double sum = 0;
-  for (Eigen::Index i = 0; i < z.size() / 3; ++i) sum += score_of(squares_of(z, i), noise);
-  return sum;
-}
-
-Noise best_noise(const Eigen::VectorXd& z, double least, double most) {
-  if (z.size() == 0) return {};
-  const double all = std::sqrt(z.squaredNorm() / static_cast<double>(z.size()));
-  Noise noise{std::clamp(all, least, most)}, best;
-  double most_score = -INFINITY;
-  for (const double tail : kTails) {
-    noise.tail = tail;
-    noise = with_best_scale(z, noise, least, most);
-    const double score = robust_score(z, noise);
-    if (!(score > most_score)) break;
-    most_score = score;
-    best = noise;
-  }
-  return best;
+  return scale;
 }
 
 Fitter::Fitter(const Forward& forward, const Observations& observations, Space space)
@@ -101,8 +84,8 @@ Eigen::VectorXd Fitter::beside(const Eigen::VectorXd& u) const {
 
 void Fitter::judge(Eigen::VectorXd z, Fit* fit) const {
   fit->z = std::move(z);
-  fit->noise = best_noise(fit->z, observations_.least_scale, observations_.most_scale);
-  fit->score = robust_score(fit->z, fit->noise) - 0.5 * fit->u.cwiseAbs2().dot(space_.prior());
+  fit->scale = best_scale(fit->z, observations_.least_scale, observations_.most_scale);
+  fit->score = robust_score(fit->z, fit->scale) - 0.5 * fit->u.cwiseAbs2().dot(space_.prior());
 }
 
 Result<std::vector<Fit>> Fitter::starts(const std::vector<Eigen::VectorXd>& points,
@@ -193,7 +176,7 @@ Status Fitter::differentiate(Fit* fit, Eigen::Index known) const {
     fit->slopes.col(k) = change / moved[j];
     const double unit =
         std::sqrt(change.squaredNorm() / static_cast<double>(change.size())) / std::abs(moved[j]);
-    const double good = kGoodMove * fit->noise.scale / std::max(unit, 1e-9);
+    const double good = kGoodMove * fit->scale / std::max(unit, 1e-9);
     fit->differences[k] = std::clamp(good, kLeastDifference, kMostDifference);
   }
   fit->fresh = true;
@@ -206,7 +189,7 @@ Fitter::Normal Fitter::normal(const Fit& fit, std::optional<std::size_t> without
   for (std::size_t i = 0; i < observations_.size(); ++i) {
     if (without_fold && observations_.fold[i] == *without_fold) continue;
     const auto at = static_cast<Eigen::Index>(i);
-    const double w = weight(squares_of(fit.z, at), fit.noise);
+    const double w = weight(squares_of(fit.z, at), fit.scale);
     const auto rows = fit.slopes.middleRows<3>(3 * at);
     normal.matrix += w * rows.transpose() * rows;
     normal.right -= w * rows.transpose() * fit.z.segment<3>(3 * at);
@@ -300,10 +283,10 @@ std::vector<double> Fitter::held_out(const Fit& fit) const {
     for (std::size_t k = 0; k < in_sample.size(); ++k) {
       seen.segment<3>(static_cast<Eigen::Index>(3 * k)) = z.segment<3>(3 * in_sample[k]);
     }
-    const Noise noise = best_noise(seen, observations_.least_scale, observations_.most_scale);
+    const double scale = best_scale(seen, observations_.least_scale, observations_.most_scale);
     for (std::size_t i = 0; i < observations_.size(); ++i) {
       if (observations_.fold[i] != f) continue;
-      scores[i] = score_of(squares_of(z, static_cast<Eigen::Index>(i)), noise);
+      scores[i] = score_of(squares_of(z, static_cast<Eigen::Index>(i)), scale);
     }
   }
   return scores;

@@ -36,15 +36,11 @@ struct Observations {
 using Forward = std::function<Result<std::vector<std::optional<std::vector<Pose>>>>(
     const std::vector<PredictionRequest>& points)>;
 
-// Student's t: its scale, over what the whitener says, and degrees of freedom.
-struct Noise {
-  double scale = 1;
-  double tail = kTails[0];
-};
-// Log density (nats) of whitened residuals, three an observation.
-double robust_score(const Eigen::VectorXd& z, const Noise& noise);
-// That which makes it greatest, of kTails and scales between those.
-Noise best_noise(const Eigen::VectorXd& z, double least = kLeastScale, double most = INFINITY);
+// Log density (nats, to a constant) of whitened residuals, three an observation, under Student's t
+// of that scale.
+double robust_score(const Eigen::VectorXd& z, double scale);
+// The scale between those that makes it greatest.
+double best_scale(const Eigen::VectorXd& z, double least = kLeastScale, double most = INFINITY);
 
 struct Fit {
   Eigen::VectorXd u;            // in the space's coordinates
@@ -52,8 +48,8 @@ struct Fit {
   Eigen::MatrixXd slopes;       // of z; empty: not known
   bool fresh = false;           // slopes are of this very point
   Eigen::VectorXd differences;  // that slopes were taken over, and will be next
-  Noise noise;
-  double score = -INFINITY;  // robust, less what the prior costs, nats
+  double scale = 1;             // of the noise, over what the whitener says
+  double score = -INFINITY;     // robust, less what the prior costs, nats
   double damping = 0;
   bool settled = false;
 };

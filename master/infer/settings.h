@@ -6,11 +6,10 @@
 
 namespace gapfarm::infer {
 
-// Degrees of freedom of Student's t by which trials are scored, fitted as the scale is (Lange,
-// Little and Taylor 1989): from three, the heaviest whose variance is finite, since a piece that
-// slides off the finger in the simulation alone is no measure of the rest, to as good as Gaussian.
-// Held at three, a patch that strikes six drives of 240 gains 28 nats of the 390 that it has.
-inline constexpr double kTails[] = {3, 6, 12, 30, 1000};
+// Degrees of freedom of Student's t by which trials are scored: three, the heaviest whose variance
+// is finite, since a piece that slides off the finger in the simulation alone is no measure of
+// the rest (Lange, Little and Taylor 1989 advise 3 to 5).
+inline constexpr double kTail = 3;
 // The least scale of the noise, over what the readings are known to have: noise below it would be a
 // fit to chance.
 inline constexpr double kLeastScale = 0.2;

@@ -192,7 +192,7 @@ TEST(InferFit, FindsTheValueDespiteOutliers) {
   const Observations o = observed({{row("finger_friction"), 0.6}}, /*outliers=*/true);
   const Model base = base_of(f, o);
   EXPECT_NEAR(base.space.values(base.fit.u).at(row("finger_friction")), 0.6, 0.01);
-  EXPECT_LT(base.fit.noise.scale, 2);
+  EXPECT_LT(base.fit.scale, 2);
 }
 
 TEST(InferCompete, NamesWhatActsWithItsSize) {
@@ -218,7 +218,7 @@ TEST(InferCompete, NothingIsGainedWhereNothingActs) {
   const Observations o = observed({{row("finger_friction"), 0.6}});
   const auto contest = compete(f, o, base_of(f, o), {offset(), tilt()}, {}, nullptr);
   ASSERT_TRUE(contest) << contest.error().message;
-  EXPECT_NEAR(contest->base.fit.noise.scale, 1, 0.25);
+  EXPECT_NEAR(contest->base.fit.scale, 1, 0.25);
   for (const Contender& c : contest->contenders) EXPECT_LT(c.gain, kLeastPromise);
 }
 
