@@ -61,7 +61,7 @@ done
 echo "it runs with: podman run ${way[*]}"
 
 "$BIN/gapfarm" keys make --keys "$T/keys" >/dev/null 2>&1
-owner=$(pod run --rm "${way[@]}" --entrypoint /usr/bin/id gapfarm -u)
+owner=$(pod run --rm "${way[@]}" --network host --entrypoint /usr/bin/id gapfarm -u)
 mkdir -m 700 "$T/theirs"
 install -m 600 "$T/keys/worker.key" "$T/keys/master.pub" "$T/theirs"
 chmod 755 "$T"
