@@ -92,6 +92,37 @@ std::vector<Leftover> all_leftovers(const Explanation& explanation, const Regres
   return left;
 }
 
+Judgement judge_again(const DiagnosisRequest& of, const Proposals& catalogue, Judgement judged) {
+  Explanation& named = judged.named;
+  const bool odd = !named.odd_readings.empty() || !named.odd_drives.empty();
+  const double unknown = of.subject.unknown_log10_p;
+  if (named.chosen.empty()) {
+    const bool others = named.names_anything() || named.grid_m > 0;
+    named.estimates.reset();
+    const Regression left = explained_by(catalogue, named);
+    judged.left = all_leftovers(named, left);
+    judged.scale = leftover_scale(left);
+    judged.verdict = judge_verdict(others, explained_nats(catalogue, left), judged.left, unknown);
+    if (odd && judged.verdict == Verdict::kNone) judged.verdict = Verdict::kUnknown;
+    if (others && (odd || judged.verdict == Verdict::kUnknown)) {
+      judged.verdict = Verdict::kEffectAndUnknown;
+    }
+    return judged;
+  }
+  const Study& study = named.study();
+  Eigen::VectorXd residuals = study.whiten(named.estimates->residuals);
+  Eigen::MatrixXd slopes = named.estimates->jacobian;
+  study.drop_ignored(residuals);
+  study.drop_ignored(slopes);
+  Regression left(named.evidence->nuisances, residuals);
+  left.add(slopes);
+  judged.left = all_leftovers(named, left);
+  judged.scale = leftover_scale(left);
+  judged.verdict = judge_verdict(true, explained_nats(catalogue, left), judged.left, unknown);
+  if (odd || judged.verdict == Verdict::kUnknown) judged.verdict = Verdict::kEffectAndUnknown;
+  return judged;
+}
+
 Result<Judgement> judge(const DiagnosisRequest& of, const Screening& screening) {
   Judgement judged;
   judged.named = screening.found;

@@ -80,6 +80,9 @@ Result<JointFit> estimate(const DiagnosisRequest& of, const Proposals& catalogue
 
 // What is left beside what is explained, also what repeats of a trial have in common.
 std::vector<Leftover> all_leftovers(const Explanation& explanation, const Regression& explained);
+// What the remaining effects leave at their estimates, where some were dropped.
+Judgement judge_again(const DiagnosisRequest& of, const Proposals& catalogue, Judgement judged);
+
 // Nothing is named any more; readings are as logged.
 Explanation naming_nothing(Explanation explanation);
 // Why nothing is to be named where tuning ended on the edge of what the scenario can be.
@@ -90,6 +93,18 @@ Judgement with_warning(Judgement judged, SanityFinding finding);
 // As if nothing had been looked for.
 Judgement with_base_warning(const DiagnosisRequest& of, const Evidence& measured, Judgement judged);
 
+// A chosen effect that is to be dropped, and why.
+struct Worthless {
+  std::size_t effect = 0;
+  std::string why;
+};
+// Trials that no fit saw are predicted no better with it than with what comes before it alone.
+// `perfect`: what a prediction scores that misses nothing, once that is known.  `put_last`: effects
+// that were of use beside all others; they are not asked again.
+std::optional<Worthless> of_no_use(const Judgement& judged, const std::vector<NestedFit>& nested,
+                                   std::optional<double> perfect,
+                                   const std::set<std::string>& put_last = {});
+Judgement dropped(Judgement judged, const Worthless& effect);
 // Why an effect of these values is no cause: its best size is more than there can be.
 std::optional<std::string> at_its_bound(const DiagnosisRequest& of, const std::string& effect,
                                         const Overrides& at);

@@ -142,6 +142,14 @@ Result<Refit> naming_none(const DiagnosisRequest& of, const Evidence& measured, 
   return with_floor(of, std::move(refit), folds);
 }
 
+// Beside a gap of something else a prediction misses either way, and what explains the rest shows
+// only when that is explained: an effect has to be of no use beside all others.
+void put_last(std::size_t effect, std::vector<ChosenEffect>* chosen, std::set<std::string>* names) {
+  names->insert((*chosen)[effect].candidate.signature.effect);
+  const auto at = chosen->begin() + static_cast<std::ptrdiff_t>(effect);
+  std::rotate(at, at + 1, chosen->end());
+}
+
 // The reported values, with the base that fits beside them: report and model say the same.
 Result<Refit> with_final_fit(const DiagnosisRequest& of, Refit refit) {
   const Explanation& named = refit.judged.named;
@@ -178,7 +186,8 @@ Result<Refit> refit(const DiagnosisRequest& of, const Evidence& measured,
   Refit refit;
   refit.judged = judgement;
   Explanation& named = refit.judged.named;
-  if (!named.chosen.empty()) {
+  const std::size_t found = named.chosen.size();
+  if (found > 0) {
     auto fit = estimate(of, *screening.catalogue, named, candidates_of(named.chosen),
                         named.estimates ? 1 : 2);
     if (!fit) return fit.error();
@@ -186,18 +195,34 @@ Result<Refit> refit(const DiagnosisRequest& of, const Evidence& measured,
     emit_fit(of, *named.estimates);
   }
   const std::vector<std::size_t> folds = of.subject.folds(named.study());
-  auto nested = nested_fits(of, named, folds);
-  if (!nested) return nested.error();
-  refit.nested = std::move(*nested);
-  emit_gaps(of, refit.nested);
-  if (!named.chosen.empty()) {
-    auto fit = estimate_beside(of, named, refit.nested.back());
-    if (!fit) return fit.error();
-    named.estimates = std::move(*fit);
+  std::set<std::string> were_last;
+  for (;;) {
+    auto nested = nested_fits(of, named, folds);
+    if (!nested) return nested.error();
+    refit.nested = std::move(*nested);
+    emit_gaps(of, refit.nested);
+    auto idle = of_no_use(refit.judged, refit.nested, std::nullopt, were_last);
+    if (!idle) {
+      if (!named.chosen.empty()) {
+        auto fit = estimate_beside(of, named, refit.nested.back());
+        if (!fit) return fit.error();
+        named.estimates = std::move(*fit);
+      }
+      if (named.chosen.size() < found) {
+        refit.judged = judge_again(of, *screening.catalogue, std::move(refit.judged));
+      }
+      auto corrected = with_correction(of, screening, std::move(refit), folds);
+      if (!corrected) return corrected;
+      refit = with_floor(of, std::move(*corrected), folds);
+      idle = of_no_use(refit.judged, refit.nested, refit.floor, were_last);
+    }
+    if (!idle) break;
+    if (idle->effect + 1 < named.chosen.size()) {
+      put_last(idle->effect, &named.chosen, &were_last);
+      continue;
+    }
+    refit.judged = dropped(std::move(refit.judged), *idle);
   }
-  auto corrected = with_correction(of, screening, std::move(refit), folds);
-  if (!corrected) return corrected;
-  refit = with_floor(of, std::move(*corrected), folds);
   const auto missing = missing_too_much(refit);
   if (missing || (named.frees_base && !explains_bounds(refit))) {
     return naming_none(of, measured, std::move(refit), missing, folds);

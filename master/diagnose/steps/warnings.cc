@@ -108,6 +108,42 @@ std::optional<SanityFinding> missing_too_much(const Refit& refit) {
       "Check robot, units and commands of the config against the log.", Severity::kWarning};
 }
 
+// The worst goes first: of two that are alike, the one after it may look worthless because of it.
+// What closes next to nothing has to do so without a warning: beside a large gap a few nats are to
+// be had by anything.  How much it closes is known only by the noise's own tails.
+std::optional<Worthless> of_no_use(const Judgement& judged, const std::vector<NestedFit>& nested,
+                                   std::optional<double> perfect,
+                                   const std::set<std::string>& put_last) {
+  const std::size_t before = judged.named.as_logged ? 1 : 0;
+  const double gap =
+      perfect ? std::max(*perfect, mean(nested.back().scores)) - mean(nested.front().scores) : 0;
+  std::optional<std::size_t> worst;
+  double least = INFINITY;
+  for (std::size_t k = judged.named.chosen.size(); k-- > 0;) {
+    const bool last = k + 1 == judged.named.chosen.size();
+    if (!last && put_last.count(judged.named.chosen[k].candidate.signature.effect)) continue;
+    const std::vector<double>&with = nested[before + k + 1].scores,
+          &without_it = nested[before + k].scores;
+    const double gain = mean(with) - mean(without_it);
+    if (gain > 0 && (gain > kLittleClosed * gap || clearly_better(with, without_it))) continue;
+    if (gain < least) worst = k;
+    least = std::min(least, gain);
+  }
+  if (!worst) return std::nullopt;
+  return Worthless{*worst,
+                   " seemed to explain some of it, too, but trials that the fit "
+                   "did not see are predicted no better with it."};
+}
+
+Judgement dropped(Judgement judged, const Worthless& effect) {
+  const auto gone = judged.named.chosen.begin() + static_cast<std::ptrdiff_t>(effect.effect);
+  const std::string& name = gone->candidate.signature.effect;
+  judged.cautions.push_back(name + effect.why);
+  judged.nearest.push_back({{name}, gone->candidate.gain, 0, "", name + effect.why});
+  judged.named.chosen.erase(gone);
+  return judged;
+}
+
 std::optional<std::string> at_its_bound(const DiagnosisRequest& of, const std::string& effect,
                                         const Overrides& at) {
   for (const auto& [index, value] : at) {

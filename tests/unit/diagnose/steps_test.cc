@@ -320,6 +320,34 @@ TEST(Steps, ABaseInWarnOfHasNothingNamed) {
   EXPECT_EQ(screening.found.chosen.size(), 1u);
 }
 
+TEST(Steps, WhatHelpsNoUnseenTrialIsDropped) {
+  Measured m;
+  m.found.chosen.push_back({{20, signature_of("timing_offset", column(60, odd))}, {}});
+  steps::Judgement judged;
+  judged.named = m.found;
+  std::vector<steps::NestedFit> nested(3);
+  const auto scores = [](double all, double even_too) {
+    return std::vector<double>{all + even_too, all, all + even_too, all};
+  };
+  nested[0].scores = scores(0, 0);
+  nested[1].scores = scores(-0.5, 0.5);  // worse on the whole
+  nested[2].scores = scores(1, 0.5);
+  const auto worthless = of_no_use(judged, nested, std::nullopt);
+  ASSERT_TRUE(worthless);
+  EXPECT_EQ(worthless->effect, 0u);
+  // Beside all others it was of use: seed 31's aspect and turned marker, each of which showed only
+  // when the other was explained.
+  const std::string first = judged.named.chosen[0].candidate.signature.effect;
+  EXPECT_FALSE(of_no_use(judged, nested, std::nullopt, {first}));
+  EXPECT_TRUE(of_no_use(judged, nested, std::nullopt, {"timing_offset"}));
+  const steps::Judgement rest = dropped(judged, *worthless);
+  ASSERT_EQ(rest.named.chosen.size(), 1u);
+  EXPECT_EQ(rest.named.chosen[0].candidate.signature.effect, "timing_offset");
+  EXPECT_EQ(rest.nearest.size(), 1u);
+  nested[1].scores = scores(0.5, 0);
+  EXPECT_FALSE(of_no_use(judged, nested, std::nullopt));
+}
+
 // More of a saturating strength would change nothing; seed 93's patch of 2.85 ended on 3.
 TEST(Steps, OnlyWhatCouldGrowIsQuestionedOnItsBound) {
   const Measured m;
