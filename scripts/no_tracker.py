@@ -114,8 +114,6 @@ def main():
         world, relative = (values_of(robot, here / kind, here / f"run_{kind}")
                            for kind in ("world", "relative"))
         for a, b in zip(world, relative):
-            if not (a["known"] and b["known"]):
-                continue
             if a["name"] in ADDED:
                 text = f"{1000 * (b['says'] - a['says']):+.1f} {ADDED[a['name']]}"
             else:

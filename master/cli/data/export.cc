@@ -172,17 +172,9 @@ nlohmann::ordered_json export_json(const RosExport& data) {
                     {"hi", row.interval.upper},
                     {"known", row.known}});
   }
-  nlohmann::ordered_json kinematics = nlohmann::ordered_json::array();
-  for (const ReportedValue& v : data.kinematics) {
-    kinematics.push_back({{"name", v.name},
-                          {"had", v.had},
-                          {"says", v.reported},
-                          {"lo", v.interval.lower},
-                          {"hi", v.interval.upper},
-                          {"known", v.named}});
-  }
-  nlohmann::ordered_json json = {
-      {"controller", data.controller}, {"values", rows}, {"kinematics", kinematics}};
+  nlohmann::ordered_json json = {{"controller", data.controller},
+                                 {"values", rows},
+                                 {"kinematics", values_json(data.kinematics)}};
   if (data.friction.across) json["mu1"] = *data.friction.along;
   if (data.friction.across) json["mu2"] = *data.friction.across;
   return json;

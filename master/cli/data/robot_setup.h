@@ -41,10 +41,9 @@ bool names_a_robot(const std::vector<std::string>& arguments);
 Result<int> run_init_robot(const std::vector<std::string>& arguments, const std::string& out,
                            Outputs& outputs, CliContext& context);
 
-// A robot out of the files that its user has.
-
-// URDFs, robot.tomls, and controller files among them (.yaml, .yml) or in `controllers`: the first
-// robot; what others say differently is added to its disagreements.  Errors name the file.
+// A robot out of the files that its user has: URDFs, robot.tomls, and controller files among them
+// (.yaml, .yml) or in `controllers`: the first robot; what others say differently is added to its
+// disagreements.  Errors name the file.
 Result<RobotReading> read_robot_files(const std::vector<std::string>& files,
                                       std::vector<std::string> controllers);
 

@@ -6,9 +6,9 @@
 
 namespace gapfarm {
 
-std::string format_values(const ReportedValues& values) {
+nlohmann::ordered_json values_json(const std::vector<ReportedValue>& values) {
   nlohmann::ordered_json rows = nlohmann::ordered_json::array();
-  for (const ReportedValue& v : values.values) {
+  for (const ReportedValue& v : values) {
     rows.push_back({{"name", v.name},
                     {"had", v.had},
                     {"says", v.reported},
@@ -16,8 +16,13 @@ std::string format_values(const ReportedValues& values) {
                     {"hi", v.interval.upper},
                     {"named", v.named}});
   }
-  const nlohmann::ordered_json json = {
-      {"logs", values.logs}, {"values", rows}, {"robot", format_robot(values.given)}};
+  return rows;
+}
+
+std::string format_values(const ReportedValues& values) {
+  const nlohmann::ordered_json json = {{"logs", values.logs},
+                                       {"values", values_json(values.values)},
+                                       {"robot", format_robot(values.given)}};
   return json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
 }
 

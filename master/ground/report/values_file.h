@@ -2,7 +2,7 @@
 // and for gapfarm export.
 #pragma once
 
-#include <optional>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 
@@ -27,6 +27,8 @@ struct ReportedValues {
   std::vector<ReportedValue> values;
 };
 
+// A list of {name, had, says, lo, hi, named}.
+nlohmann::ordered_json values_json(const std::vector<ReportedValue>& values);
 std::string format_values(const ReportedValues& values);
 // Errors: `path` names the text, which is no such file.
 Result<ReportedValues> parse_values(const std::string& text, const std::string& path);
