@@ -31,7 +31,7 @@ void read_top(TomlSection& top, Config& config) {
   }
 }
 
-// [robot] and [runs].  False when there is no robot to go on with.
+// [robot].  False when there is no robot to go on with.
 bool read_robot_section(TomlSection& top, Config& config) {
   const ScenarioForm& form = scenario_form(config.problem.scenario);
   auto section = top.section("robot");
@@ -51,16 +51,18 @@ bool read_robot_section(TomlSection& top, Config& config) {
     top.errors().add(section->table().source().begin, known.error().message);
     return false;
   }
-  if (!form.robot) return true;
+  return true;
+}
+
+void read_runs_section(TomlSection& top, Config& config) {
   auto runs = top.section("runs");
-  if (!runs) return true;
+  if (!runs) return;
   for (const std::string& folder : runs->strings("folders").value_or(std::vector<std::string>())) {
     config.trial_files.push_back(beside(config.path, folder));
   }
   if (auto horizons = runs->numbers("horizons", 0, 1e5, "s")) config.windows.horizons_s = *horizons;
   runs->read("run_in", config.windows.run_in_s, 0, 1e3, "s");
   runs->finish();
-  return true;
 }
 
 }  // namespace
@@ -94,6 +96,7 @@ Result<Config> parse_config(std::string_view text, const std::string& path,
   Problem& problem = config.problem;
   const ScenarioForm& form = scenario_form(problem.scenario);
   if ((form.robot || form.other_robot) && !read_robot_section(top, config)) return errors.error();
+  if (form.windows) read_runs_section(top, config);
   if (form.program && !read_external_section(top, config.path, start, problem)) {
     return errors.error();
   }

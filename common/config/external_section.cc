@@ -1,6 +1,7 @@
 #include <filesystem>
 
 #include "common/config/sections.h"
+#include "common/problem/external_problem.h"
 
 namespace gapfarm {
 
@@ -13,9 +14,9 @@ bool read_external_section(TomlSection& top, const std::string& config_path,
     return false;
   };
   if (!section) {
-    return fail(
-        "scenario external needs its program:\n  [external]\n"
-        "  program = [\"python3\", \"simulator.py\"]");
+    return fail("scenario " + problem.scenario +
+                " needs its program:\n  [external]\n"
+                "  program = [\"python3\", \"simulator.py\"]");
   }
   ExternalCommand command;
   command.argv = section->strings("program").value_or(std::vector<std::string>());
@@ -33,6 +34,7 @@ bool read_external_section(TomlSection& top, const std::string& config_path,
   if (!introduction) return fail(introduction.error().message);
   auto program = make_external_program(std::move(command), *introduction);
   if (!program) return fail(program.error().message);
+  if (Status s = check_program(**program, problem); !s) return fail(s.error().message);
   problem.external = std::move(*program);
   return true;
 }

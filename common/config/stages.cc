@@ -72,7 +72,7 @@ Result<StagePlan> read_stages(const Config& config) {
     StageReader(config, errors).read(*node, plan.stages);
   }
   if (auto validation = top.section("validation")) {
-    if (const auto files = validation->strings(config.problem.ground ? "folders" : "trials")) {
+    if (const auto files = validation->strings(config.problem.windows() ? "folders" : "trials")) {
       const std::filesystem::path folder = std::filesystem::path(config.path).parent_path();
       for (const std::string& file : *files) {
         plan.validation_files.push_back((folder / file).lexically_normal().string());

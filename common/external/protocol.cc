@@ -117,6 +117,16 @@ Json to_json(const ExternalFloor& f) {
           {"patch_ratio", f.patch_ratio}};
 }
 
+Json parameters_json(const ExternalDeclaration& declaration, const std::vector<double>& values) {
+  Json parameters = Json::object();
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const Parameter& p = declaration.parameters[i];
+    Json& value = parameters[p.key] = values[i];
+    if (p.kind == ParameterKind::kInteger) value = std::llround(values[i]);
+  }
+  return parameters;
+}
+
 // `count` finite numbers, or none.
 std::vector<double> numbers(const Json& json, std::size_t count) {
   std::vector<double> values;
@@ -126,6 +136,29 @@ std::vector<double> numbers(const Json& json, std::size_t count) {
     values.push_back(value.get<double>());
   }
   return values;
+}
+
+// The answer to question `id`; says whether it diverged.
+template <class Answer>
+Result<Json> read_answer(const std::string& line, std::uint64_t id, Answer* answer) {
+  ASSIGN_OR_RETURN(const Json json, read_object(line, "did not answer with a JSON object"));
+  const auto own = json.find("id");
+  if (own == json.end() || *own != Json(id)) {
+    return wrong("answered another question than " + std::to_string(id), line);
+  }
+  const std::string outcome = word_of(json, "outcome");
+  if (!outcome.empty() && outcome != "ok" && outcome != "diverged") {
+    return wrong("ended with an outcome other than ok or diverged", line);
+  }
+  answer->diverged = outcome == "diverged";
+  answer->message = word_of(json, "message");
+  return json;
+}
+
+bool has_null(const Json& given) {
+  return given.is_null() || std::any_of(given.begin(), given.end(), [](const Json& value) {
+           return value.is_null() || (value.is_array() && has_null(value));
+         });
 }
 
 }  // namespace
@@ -152,6 +185,9 @@ Result<ExternalDeclaration> parse_declaration(const std::string& line) {
     ASSIGN_OR_RETURN(const Parameter parameter, read_parameter(row));
     declaration.parameters.push_back(parameter);
   }
+  for (const Json& channel : json.value("channels", Json::array())) {
+    declaration.channels.push_back(channel.is_string() ? channel.get<std::string>() : "");
+  }
   RETURN_IF_ERROR(check_declaration(declaration));
   ASSIGN_OR_RETURN(const auto inputs, read_inputs(json));
   declaration.inputs = inputs;
@@ -171,14 +207,8 @@ Result<std::shared_ptr<const ExternalProgram>> make_external_program(ExternalCom
 
 std::string request_line(const ExternalRequest& request) {
   const unsigned inputs = request.declaration->inputs;
-  Json parameters = Json::object();
-  for (std::size_t i = 0; i < request.values.size(); ++i) {
-    const Parameter& p = request.declaration->parameters[i];
-    Json& value = parameters[p.key] = request.values[i];
-    if (p.kind == ParameterKind::kInteger) value = std::llround(request.values[i]);
-  }
   Json json = {{"id", request.id},
-               {"parameters", std::move(parameters)},
+               {"parameters", parameters_json(*request.declaration, request.values)},
                {"left", to_json(request.left, inputs)},
                {"right", to_json(request.right, inputs)},
                {"duration", request.duration_s}};
@@ -188,23 +218,12 @@ std::string request_line(const ExternalRequest& request) {
 }
 
 Result<ExternalAnswer> parse_answer(const std::string& line, const ExternalRequest& request) {
-  ASSIGN_OR_RETURN(const Json read, read_object(line, "did not answer with a JSON object"));
-  const Json& json = read;
-  const auto id = json.find("id");
-  if (id == json.end() || *id != Json(request.id)) {
-    return wrong("answered another question than " + std::to_string(request.id), line);
-  }
   ExternalAnswer answer;
-  if (const std::string outcome = word_of(json, "outcome"); !outcome.empty() && outcome != "ok") {
-    if (outcome != "diverged")
-      return wrong("ended with an outcome other than ok or diverged", line);
-    answer.diverged = true;
-    answer.message = word_of(json, "message");
-    return answer;
-  }
+  ASSIGN_OR_RETURN(const Json read, read_answer(line, request.id, &answer));
+  const Json& json = read;
+  if (answer.diverged) return answer;
   const Json given = json.value("pose", Json::array());
-  if (given.is_null() ||
-      std::any_of(given.begin(), given.end(), [](const Json& value) { return value.is_null(); })) {
+  if (has_null(given)) {
     answer.diverged = true;
     answer.message = "it answered a pose of null";
     return answer;
@@ -225,6 +244,42 @@ Result<ExternalAnswer> parse_answer(const std::string& line, const ExternalReque
   }
   if (answer.path.empty()) return wrong("was asked for a path and answered none", line);
   return answer;
+}
+
+std::string request_line(const ExternalRunRequest& request) {
+  Json commands = Json::array();
+  for (const CommandRow& row : request.commands) {
+    Json& to = commands.emplace_back(Json::array({row.t_s}));
+    for (const double value : row.values) to.push_back(value);
+  }
+  return json_text(
+      Json{{"id", request.id},
+           {"parameters", parameters_json(*request.declaration, request.values)},
+           {"start",
+            {{"t", request.start_s}, {"speed", request.speed_m_s}, {"turn", request.turn_rad_s}}},
+           {"commands", std::move(commands)},
+           {"times", Json(std::vector<double>(request.times_s.begin(), request.times_s.end()))}});
+}
+
+Result<ExternalRunAnswer> parse_answer(const std::string& line, const ExternalRunRequest& request) {
+  ExternalRunAnswer answer;
+  ASSIGN_OR_RETURN(const Json json, read_answer(line, request.id, &answer));
+  if (answer.diverged) return answer;
+  const Json given = json.value("poses", Json::array());
+  if (has_null(given)) {
+    answer.diverged = true;
+    answer.message = "it answered a pose of null";
+    return answer;
+  }
+  for (const Json& row : given) {
+    const std::vector<double> pose = numbers(row, 3);
+    if (pose.empty()) return wrong("answered poses that are no list of finite [x, y, theta]", line);
+    answer.poses.push_back({pose[0], pose[1], wrap_angle(pose[2])});
+  }
+  if (answer.poses.size() == request.times_s.size()) return answer;
+  return wrong("answered " + std::to_string(answer.poses.size()) + " poses, was asked for " +
+                   std::to_string(request.times_s.size()),
+               line);
 }
 
 }  // namespace gapfarm

@@ -4,12 +4,14 @@
 
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "common/base/result.h"
 #include "common/parameters/external.h"
 #include "common/pose/pose.h"
+#include "common/recordings/run.h"
 
 namespace gapfarm {
 
@@ -39,6 +41,17 @@ struct ExternalRequest {
   ExternalFloor floor;
 };
 
+// The commands of a run, in the frame of its first pose.
+struct ExternalRunRequest {
+  std::uint64_t id = 0;
+  const ExternalDeclaration* declaration = nullptr;
+  std::vector<double> values;  // one a declared parameter
+  double start_s = 0;          // on the commands' clock, and how fast it is then
+  double speed_m_s = 0, turn_rad_s = 0;
+  std::vector<CommandRow> commands;
+  std::span<const double> times_s;  // at which poses are wanted; ascending, none before the start
+};
+
 struct ExternalSample {
   double t_s = 0;
   Pose X_SB;
@@ -50,6 +63,12 @@ struct ExternalAnswer {
   Pose X_SE;
   std::vector<ExternalSample> path;
   double rest_time_s = 0;
+};
+
+struct ExternalRunAnswer {
+  bool diverged = false;
+  std::string message;      // of a simulation that did
+  std::vector<Pose> poses;  // one a time
 };
 
 // The line that begins a conversation; the program answers with what it declares.
@@ -73,5 +92,8 @@ std::string request_line(const ExternalRequest& request);
 // Errors: no JSON, the answer to another question, no pose, numbers that are not finite, a path
 // that was asked for and is not there.
 Result<ExternalAnswer> parse_answer(const std::string& line, const ExternalRequest& request);
+std::string request_line(const ExternalRunRequest& request);
+// Errors: as above; not a pose a time.
+Result<ExternalRunAnswer> parse_answer(const std::string& line, const ExternalRunRequest& request);
 
 }  // namespace gapfarm

@@ -44,8 +44,8 @@ Result<std::string> ExternalSimulator::introduce() {
   return introduction_;
 }
 
-Result<ExternalAnswer> ExternalSimulator::simulate(ExternalRequest& request,
-                                                   const std::string& declared) {
+template <class Answer, class Request>
+Result<Answer> ExternalSimulator::ask(Request& request, const std::string& declared) {
   ASSIGN_OR_RETURN(const std::string introduction, introduce());
   if (introduction != declared) {
     program_.kill();
@@ -60,10 +60,13 @@ Result<ExternalAnswer> ExternalSimulator::simulate(ExternalRequest& request,
   };
   const Result<std::string> line = program_.ask(question);
   if (!line) return failed(line.error().message);
-  Result<ExternalAnswer> answer = parse_answer(*line, request);
+  Result<Answer> answer = parse_answer(*line, request);
   if (answer) return answer;
   program_.kill();
   return failed("external program '" + program_.name() + "' " + answer.error().message);
 }
+
+template Result<ExternalAnswer> ExternalSimulator::ask(ExternalRequest&, const std::string&);
+template Result<ExternalRunAnswer> ExternalSimulator::ask(ExternalRunRequest&, const std::string&);
 
 }  // namespace gapfarm

@@ -27,9 +27,17 @@ class ExternalSimulator {
   // `declared`: the line that the problem was made with; a program that now declares something else
   // is an error.  Sets the request's id.  Errors name the program and what it did, then in a second
   // line how to ask it the same by hand, and leave it dead: the next question starts it again.
-  Result<ExternalAnswer> simulate(ExternalRequest& request, const std::string& declared);
+  Result<ExternalAnswer> simulate(ExternalRequest& request, const std::string& declared) {
+    return ask<ExternalAnswer>(request, declared);
+  }
+  Result<ExternalRunAnswer> simulate(ExternalRunRequest& request, const std::string& declared) {
+    return ask<ExternalRunAnswer>(request, declared);
+  }
 
  private:
+  template <class Answer, class Request>
+  Result<Answer> ask(Request& request, const std::string& declared);
+
   LineProgram program_;
   std::string introduction_;  // of the running program
   std::uint64_t asked_ = 0;

@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
+
+#include "common/parameters/ground.h"
 
 namespace gapfarm {
 namespace {
@@ -30,6 +33,40 @@ std::vector<Parameter> noise_rows() {
   return rows;
 }
 
+constexpr double kReach_m = 0.3;  // of a laboratory's robot: scales the noise that is assumed
+
+// Around a program that follows the commands of runs.
+std::vector<Parameter> run_rows() {
+  using enum ParameterKind;
+  using enum ParameterScale;
+  const Parameter rows[] = {
+      {"delay",
+       "s",
+       kReal,
+       kLinear,
+       -1,
+       1,
+       0,
+       "from a command to when the program gets it",
+       {},
+       ""},
+      {"marker.x", "m", kReal, kLinear, -1, 1, 0, "the tracked point, ahead", {}, ""},
+      {"marker.y", "m", kReal, kLinear, -1, 1, 0, "the tracked point, to the left", {}, ""},
+      {"marker.yaw",
+       "rad",
+       kReal,
+       kLinear,
+       -M_PI,
+       M_PI,
+       0,
+       "heading of the tracked point",
+       {},
+       ""}};
+  std::vector<Parameter> all(std::begin(rows), std::end(rows));
+  for (const Parameter& noise : window_noise_rows(kReach_m)) all.push_back(noise);
+  return all;
+}
+
 bool can_be_applied(const Effect& effect, unsigned inputs) {
   for (const char* name : kOfTheBuild) {
     if (effect.kind() == name) return false;
@@ -50,21 +87,21 @@ bool is_key(const std::string& key) {
   return !key.empty() && key.size() <= 64 && std::all_of(key.begin(), key.end(), bare);
 }
 
-bool is_taken(const std::string& key) {
-  for (const Srv1 row : kNoiseRows) {
-    if (srv1_table()[row_of(row)].key == key) return true;
+bool is_taken(const std::string& key, bool runs) {
+  for (const Parameter& row : runs ? run_rows() : noise_rows()) {
+    if (row.key == key) return true;
   }
   const std::span<const Effect> known = srv1_effects_and_seconds();
   return std::any_of(known.begin(), known.end(),
                      [&](const Effect& effect) { return effect.name == key; });
 }
 
-Status check_row(const Parameter& p) {
+Status check_row(const Parameter& p, bool runs) {
   const auto wrong = [&](const std::string& what) {
     return Error{"parameter '" + p.key + "' " + what};
   };
   if (!is_key(p.key)) return wrong("needs a key of 1 to 64 letters, digits and _");
-  if (is_taken(p.key)) return wrong("has a name that gapfarm uses itself; choose another");
+  if (is_taken(p.key, runs)) return wrong("has a name that gapfarm uses itself; choose another");
   if (!std::isfinite(p.lower) || !std::isfinite(p.upper) || !(p.lower < p.upper)) {
     return wrong("needs finite bounds, lower below upper");
   }
@@ -90,11 +127,18 @@ Status check_row(const Parameter& p) {
 Status check_declaration(const ExternalDeclaration& declaration) {
   const auto& rows = declaration.parameters;
   for (std::size_t i = 0; i < rows.size(); ++i) {
-    if (Status s = check_row(rows[i]); !s) return s;
+    if (Status s = check_row(rows[i], !declaration.channels.empty()); !s) return s;
     for (std::size_t k = 0; k < i; ++k) {
       if (rows[k].key == rows[i].key) {
         return Error{"parameter '" + rows[i].key + "' is declared twice"};
       }
+    }
+  }
+  std::set<std::string> channels;
+  for (const std::string& channel : declaration.channels) {
+    if (!is_key(channel) || !channels.insert(channel).second) {
+      return Error{"channel '" + channel +
+                   "' needs a name of its own of 1 to 64 letters, digits and _"};
     }
   }
   return {};
@@ -103,15 +147,21 @@ Status check_declaration(const ExternalDeclaration& declaration) {
 ExternalTable::ExternalTable(ExternalDeclaration declaration)
     : declaration_(std::move(declaration)) {
   std::vector<Parameter> rows = declaration_.parameters;
-  for (const Parameter& row : noise_rows()) rows.push_back(row);
+  const bool runs = !declaration_.channels.empty();
+  for (const Parameter& row : runs ? run_rows() : noise_rows()) rows.push_back(row);
   for (const Effect& effect : srv1_effects_and_seconds()) {
-    if (can_be_applied(effect, declaration_.inputs)) effects_.push_back(effect);
+    if (!runs && can_be_applied(effect, declaration_.inputs)) effects_.push_back(effect);
   }
   table_ = std::make_unique<ParameterTable>(std::move(rows), effects_);
 }
 
 const ParameterTable& external_table() {
   static const ParameterTable table(noise_rows(), {});
+  return table;
+}
+
+const ParameterTable& external_runs_table() {
+  static const ParameterTable table(run_rows(), {});
   return table;
 }
 

@@ -1,5 +1,5 @@
-// The parameter table of scenario `external`: the program's own rows, the noise of drives and
-// readings, and the effects that can be applied around what the program takes in.
+// The parameter table of scenarios `external` and `external_runs`: the program's own rows, the
+// noise of drives and readings, and what can be applied around what the program takes in.
 #pragma once
 
 #include <memory>
@@ -33,6 +33,8 @@ struct ExternalDeclaration {
   std::string name;
   std::vector<Parameter> parameters;
   unsigned inputs = 0;  // of ExternalInput
+  // Of the commands of a run, as commands.csv calls them; none: it drives from rest to rest.
+  std::vector<std::string> channels = {};
 };
 
 // How it is started.
@@ -53,7 +55,7 @@ class ExternalTable {
 
   const ExternalDeclaration& declaration() const { return declaration_; }
   const ParameterTable& table() const { return *table_; }
-  // The first rows are the declaration's, in its order; these follow.
+  // The first rows are the declaration's, in its order; of a program without channels these follow.
   std::size_t drive_noise_common() const { return declaration_.parameters.size(); }
   std::size_t drive_noise_side() const { return drive_noise_common() + 1; }
   std::size_t pose_noise_position() const { return drive_noise_common() + 2; }
@@ -69,10 +71,11 @@ class ExternalTable {
 
 // Errors name the parameter: no key, a key that is taken or no TOML bare key, bounds that are
 // empty, not finite or do not hold the nominal value, a log scale that reaches 0, an integer with
-// bounds that are not whole or a log scale.
+// bounds that are not whole or a log scale; or the channel: no name, or a name twice.
 Status check_declaration(const ExternalDeclaration& declaration);
 
-// What a problem without a program has: noise, and nothing that moves.
+// What problems without a program have: noise, and nothing that moves.
 const ParameterTable& external_table();
+const ParameterTable& external_runs_table();
 
 }  // namespace gapfarm

@@ -291,15 +291,10 @@ void Rows::marker() {
 }
 
 void Rows::noise() {
-  const double far = reach();
-  add(kGroundTravelNoise, "m/sqrt(m)", 1e-5, far, 0.05 * far,
-      "standard deviation of the way after a metre of it; grows with its root", {}, kLog);
-  add(kGroundTurnNoise, "rad/sqrt(m)", 1e-5, 1, 0.05,
-      "standard deviation of the heading after a metre of the wheels' way", {}, kLog);
-  add(kGroundPositionNoise, "m", 1e-5, far, 0.02 * far, "standard deviation of a measured x and y",
-      {}, kLog);
-  add(kGroundHeadingNoise, "rad", 1e-5, 0.5, 0.01, "standard deviation of a measured heading", {},
-      kLog);
+  for (Parameter& row : window_noise_rows(reach())) {
+    rows.push_back(std::move(row));
+    puts.emplace_back();
+  }
 }
 
 void Rows::world() {
@@ -332,6 +327,20 @@ GroundRobot GroundTable::robot_at(const ParameterValues& values) const {
     if (put_[row] && values[row] != table()[row].nominal) put_[row](robot, values[row]);
   }
   return robot;
+}
+
+std::vector<Parameter> window_noise_rows(double far_m) {
+  const auto row = [](const char* key, const char* unit, double upper, double nominal,
+                      const char* summary) {
+    return Parameter{key, unit, kReal, kLog, 1e-5, upper, nominal, summary, {}, ""};
+  };
+  return {row(kGroundTravelNoise, "m/sqrt(m)", far_m, 0.05 * far_m,
+              "standard deviation of the way after a metre of it; grows with its root"),
+          row(kGroundTurnNoise, "rad/sqrt(m)", 1, 0.05,
+              "standard deviation of the heading after a metre of the wheels' way"),
+          row(kGroundPositionNoise, "m", far_m, 0.02 * far_m,
+              "standard deviation of a measured x and y"),
+          row(kGroundHeadingNoise, "rad", 0.5, 0.01, "standard deviation of a measured heading")};
 }
 
 const ParameterTable& ground_table() {

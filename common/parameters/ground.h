@@ -39,6 +39,9 @@ inline constexpr const char* kGroundTurnNoise = "drive_noise_turn";
 inline constexpr const char* kGroundPositionNoise = "pose_noise_position";
 inline constexpr const char* kGroundHeadingNoise = "pose_noise_heading";
 
+// The noise of windows of runs, in that order; `far_m` is the robot's reach.
+std::vector<Parameter> window_noise_rows(double far_m);
+
 // Of a differential drive: what a problem without a robot has.
 const ParameterTable& ground_table();
 

@@ -11,6 +11,16 @@ void write_external(const Problem& problem, v1::Problem* message) {
   to->set_introduction(problem.external->introduction);
 }
 
+Status check_program(const ExternalProgram& program, const Problem& problem) {
+  const bool follows = !program.table.declaration().channels.empty();
+  if (follows == problem.windows()) return {};
+  return Error{"external program '" + program.command.argv[0] +
+               (follows ? "' declares channels, so it follows runs: say scenario = "
+                          "\"external_runs\""
+                        : "' declares no channels (\"channels\": [\"forward\", \"turn\"], say), "
+                          "which scenario external_runs needs")};
+}
+
 Status read_external(const v1::Problem& message, Problem* problem) {
   const bool wanted = scenario_form(problem->scenario).program;
   if (wanted != message.has_external()) {
@@ -26,6 +36,9 @@ Status read_external(const v1::Problem& message, Problem* problem) {
   }
   auto program = make_external_program(std::move(command), from.introduction());
   if (!program) return Error{"problem: " + program.error().message};
+  if (Status s = check_program(**program, *problem); !s) {
+    return Error{"problem: " + s.error().message};
+  }
   problem->external = std::move(*program);
   return {};
 }

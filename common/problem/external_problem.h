@@ -6,7 +6,10 @@
 namespace gapfarm {
 
 void write_external(const Problem& problem, v1::Problem* message);
-// Errors: a scenario that has no program and one that lacks it, a declaration that is none.
+// Errors: a program that follows runs in a scenario without them, or the other way round.
+Status check_program(const ExternalProgram& program, const Problem& problem);
+// Errors: check_program()'s, a scenario that has no program and one that lacks it, a declaration
+// that is none.
 Status read_external(const v1::Problem& message, Problem* problem);
 
 }  // namespace gapfarm

@@ -21,11 +21,13 @@ std::vector<CommandSpec> racquetball_commands() { return {{"serve", 1, 1, 5}}; }
 // Windows bring their own durations and commands.
 std::vector<CommandSpec> ground_commands() { return {{kWindowCommand, 0, 0, 0}}; }
 
-constexpr ScenarioForm kForms[] = {{"srv1", srv1_commands, false, false, false, true, true},
-                                   {"push", no_commands, true},
-                                   {"racquetball", racquetball_commands},
-                                   {"ground", ground_commands, false, true},
-                                   {"external", srv1_commands, false, false, true}};
+constexpr ScenarioForm kForms[] = {
+    {"srv1", srv1_commands, false, false, false, true, true},
+    {"push", no_commands, true},
+    {"racquetball", racquetball_commands},
+    {.name = "ground", .commands = ground_commands, .robot = true, .windows = true},
+    {"external", srv1_commands, false, false, true},
+    {.name = "external_runs", .commands = ground_commands, .program = true, .windows = true}};
 
 }  // namespace
 
@@ -92,6 +94,12 @@ ParameterValues Problem::values_of(const Genome& genome) const {
   if (!genome.empty()) decode(table(), genes, genome, all);
   return all;
 }
+
+std::span<const std::string> Problem::channels() const {
+  return external ? external->table.declaration().channels : ground->robot().channels;
+}
+
+bool Problem::windows() const { return scenario_form(scenario).windows; }
 
 const CommandSpec& Problem::command(std::string_view name) const {
   for (const CommandSpec& spec : commands) {

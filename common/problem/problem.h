@@ -3,6 +3,7 @@
 #pragma once
 
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -73,9 +74,9 @@ struct Problem {
   std::string robot_file;
   std::shared_ptr<const TrackedTable> tracked;
   std::shared_ptr<const GroundTable> ground;
-  // Scenario `ground` only: the runs of which `log` is windows.
+  // Where the scenario's form has windows: the runs of which `log` is windows.
   std::vector<CommandedRun> runs;
-  // Scenario `external` only: the program that simulates.
+  // Where the scenario's form has one: the program that simulates.
   std::shared_ptr<const ExternalProgram> external;
   // Where the scenario's form has drives alone: a correction of where they end.
   Residual residual;
@@ -90,6 +91,9 @@ struct Problem {
   Status set_robot(const std::string& text, const std::string& path);
   // The problem's values with the genes of `genome` put in; an empty genome changes nothing.
   ParameterValues values_of(const Genome& genome) const;
+  // Of the commands of its runs.  REQUIRES: the scenario's form has windows.
+  std::span<const std::string> channels() const;
+  bool windows() const;
   // REQUIRES: the command exists.
   const CommandSpec& command(std::string_view name) const;
   // REQUIRES: the scenario's form has pieces and one of this name.
@@ -103,7 +107,7 @@ struct ScenarioForm {
   std::vector<CommandSpec> (*commands)();
   // Trials name pieces of the config and come with the way of a finger.
   bool pieces = false;
-  // There is a robot's file, and trials are windows of runs.
+  // There is a robot's file.
   bool robot = false;
   // A program of the user's simulates.
   bool program = false;
@@ -111,6 +115,8 @@ struct ScenarioForm {
   bool residual = false;
   // There may be a robot's file, of another robot than the scenario's own.
   bool other_robot = false;
+  // Trials are windows of runs.
+  bool windows = false;
 };
 // REQUIRES: a scenario that has a parameter table.
 const ScenarioForm& scenario_form(std::string_view scenario);

@@ -40,12 +40,15 @@ Result<RunLog> read_run_folders(std::span<const std::string> folders,
 
 Status read_problem_runs(std::span<const std::string> folders, const WindowSettings& windows,
                          Problem* problem) {
-  ASSIGN_OR_RETURN(const auto all, read_run_folders(folders, problem->ground->robot().channels));
+  ASSIGN_OR_RETURN(const auto all, read_run_folders(folders, problem->channels()));
   ASSIGN_OR_RETURN(auto cut, cut_windows(all, windows));
-  if (problem->ground->robot().command == CommandKind::kThrottleSteering) {
-    cut = restart_at_measured_speed(all, std::move(cut), windows.run_in_s, kWindowMargin_s);
+  if (problem->ground) {
+    const GroundRobot& robot = problem->ground->robot();
+    if (robot.command == CommandKind::kThrottleSteering) {
+      cut = restart_at_measured_speed(all, std::move(cut), windows.run_in_s, kWindowMargin_s);
+    }
+    cut.log.notes.insert(cut.log.notes.end(), robot.notes.begin(), robot.notes.end());
   }
-  for (const std::string& note : problem->ground->robot().notes) cut.log.notes.push_back(note);
   problem->runs = std::move(cut.runs);
   problem->log = std::move(cut.log);
   const Result<Problem> sound = from_proto(to_proto(*problem));

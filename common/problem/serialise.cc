@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <string>
 
 #include "common/base/hash.h"
@@ -147,33 +148,31 @@ Status check_tip(const Trial& trial, bool wanted, const std::string& where) {
                  " s, expected up to 120 s; t is in s");
 }
 
-// A robot and its commands, where the scenario has them.
-Status read_runs(const v1::Problem& message, Problem* problem) {
+// A robot, where the scenario has one.
+Status read_robot(const v1::Problem& message, Problem* problem) {
   const ScenarioForm& form = scenario_form(problem->scenario);
-  if (!form.robot && (message.runs_size() > 0 || (!message.robot().empty() && !form.other_robot))) {
-    return invalid("scenario '" + problem->scenario + "' has neither robot nor runs");
-  }
-  if (form.robot && message.robot().empty()) return invalid("scenario 'ground' needs a robot");
+  if (message.robot().empty() && form.robot) return invalid("scenario 'ground' needs a robot");
   if (message.robot().empty()) return {};
-  const Status known = problem->set_robot(message.robot(), "robot");
-  if (!known) return invalid(known.error().message);
+  if (!form.robot && !form.other_robot) return invalid(problem->scenario + " has no robot");
+  if (Status s = problem->set_robot(message.robot(), "robot"); !s)
+    return invalid(s.error().message);
   problem->values.clear();
-  if (!form.robot) return {};
-  const std::size_t channels = problem->ground->robot().channels.size();
+  return {};
+}
+
+// Runs of commands, where the scenario has them.  REQUIRES: robot and program are read.
+Status read_runs(const v1::Problem& message, Problem* problem) {
+  if (message.runs_size() == 0) return {};
+  if (!problem->windows()) return invalid("scenario '" + problem->scenario + "' has no runs");
+  const auto channels = static_cast<int>(problem->channels().size());
   for (const v1::Run& run : message.runs()) {
     CommandedRun to{run.start(), run.speed(), run.turn(), {}};
-    if (static_cast<std::size_t>(run.values_size()) != run.t().size() * channels) {
-      return invalid("a run with half a command");
-    }
+    if (run.values_size() != run.t_size() * channels) return invalid("a run with half a command");
     double sum = to.start_s + to.speed_m_s + to.turn_rad_s;
     for (int i = 0; i < run.t_size(); ++i) {
-      CommandRow row{run.t(i), {}};
-      for (std::size_t c = 0; c < channels; ++c) {
-        row.values.push_back(
-            run.values(static_cast<int>(static_cast<std::size_t>(i) * channels + c)));
-        sum += row.values.back();
-      }
-      sum += row.t_s;
+      const double* values = run.values().data() + i * channels;
+      CommandRow row{run.t(i), {values, values + channels}};
+      sum = std::accumulate(values, values + channels, sum + row.t_s);
       if (i > 0 && row.t_s < run.t(i - 1)) return invalid("a run whose times go back");
       to.commands.push_back(std::move(row));
     }
@@ -185,7 +184,7 @@ Status read_runs(const v1::Problem& message, Problem* problem) {
 
 // A window lies in a run and after its start.
 Status check_window(const Trial& trial, const Problem& problem, const std::string& where) {
-  if (!scenario_form(problem.scenario).robot) {
+  if (!problem.windows()) {
     return trial.run ? Status(invalid(where + ": is a window of a run")) : Status();
   }
   if (!trial.run || *trial.run >= problem.runs.size() || !trial.t_s || !trial.duration_s) {
@@ -362,8 +361,9 @@ Result<Problem> from_proto(const v1::Problem& message) {
   Problem problem;
   problem.scenario = message.scenario();
   if (auto table = parameter_table(problem.scenario); !table) return table.error();
-  if (Status s = read_runs(message, &problem); !s) return s.error();
+  if (Status s = read_robot(message, &problem); !s) return s.error();
   if (Status s = read_external(message, &problem); !s) return s.error();
+  if (Status s = read_runs(message, &problem); !s) return s.error();
   if (Status s = read_values(message, &problem); !s) return s.error();
   if (Status s = read_commands(message, &problem); !s) return s.error();
   if (Status s = read_pieces(message, &problem); !s) return s.error();

@@ -19,13 +19,13 @@ Result<Config> read_config_and_trials(const std::string& config_path, const Tria
   if (!config) return config.error();
   if (!trials.files.empty()) config->trial_files = trials.files;
   if (config->trial_files.empty()) {
-    const bool runs = scenario_form(config->problem.scenario).robot;
+    const bool runs = config->problem.windows();
     return Error{config_path + (runs ? ": names no runs; add [runs] with folders = [\"FOLDER\"] or "
                                        "give --trials FOLDER"
                                      : ": names no trial files; add them to the config or give "
                                        "--trials FILE")};
   }
-  if (scenario_form(config->problem.scenario).robot) {
+  if (config->problem.windows()) {
     const Status read = read_problem_runs(config->trial_files, config->windows, &config->problem);
     if (!read) return read.error();
     return config;

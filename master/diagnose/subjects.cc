@@ -118,7 +118,7 @@ DiagnosisSubject srv1_subject() {
 
 std::shared_ptr<const DiagnosisSubject> diagnosis_subject(const Problem& problem) {
   // A program has rows of its own, so its subject is its problem's.
-  if (problem.external) {
+  if (problem.external && !problem.windows()) {
     return std::make_shared<const DiagnosisSubject>(drive_subject("external", problem.table()));
   }
   static const std::array<std::shared_ptr<const DiagnosisSubject>, 2> subjects = {

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <span>
 
+#include "common/base/try.h"
 #include "common/recordings/restart.h"
 #include "common/score/fitness.h"
 #include "common/trials/text/csv.h"
@@ -112,6 +113,10 @@ std::string ratio_cell(const DrawnRatio& drawn) {
                      (*drawn.interval)[1]);
 }
 
+const char* baseline_of(const Horizons& horizons) {
+  return horizons.kinematics.names.empty() ? "constant velocity" : "kinematics";
+}
+
 std::string significantly_apart(const Horizons& horizons) {
   int below = 0, above = 0, untold = 0, all = 0;
   for (const HorizonRow& row : horizons.rows) {
@@ -124,10 +129,10 @@ std::string significantly_apart(const Horizons& horizons) {
     }
   }
   return fmt::format(
-      "of {} medians {} significantly below the kinematics', {} significantly above (90 % "
-      "intervals of their "
-      "ratio, by drawing runs again){}\n",
-      all, below, above, untold > 0 ? fmt::format("; {} of too few windows", untold) : "");
+      "of {} medians {} significantly below those of {}, {} significantly above (90 % intervals of "
+      "their ratio, by drawing runs again){}\n",
+      all, below, baseline_of(horizons), above,
+      untold > 0 ? fmt::format("; {} of too few windows", untold) : "");
 }
 
 }  // namespace
@@ -140,7 +145,8 @@ Result<Horizons> measure_horizons(Farm& farm, const Problem& fitted, const Param
   asked.log = {};
   std::vector<Tiles> tiles;
   std::vector<std::size_t> run_of;  // of each window, in the log
-  const bool restarts = fitted.ground->robot().command == CommandKind::kThrottleSteering;
+  const bool restarts =
+      fitted.ground && fitted.ground->robot().command == CommandKind::kThrottleSteering;
   asked.runs.clear();
   for (const double horizon : windows.horizons_s) {
     auto cut = cut_windows(runs, {{horizon}, windows.run_in_s});
@@ -167,21 +173,23 @@ Result<Horizons> measure_horizons(Farm& farm, const Problem& fitted, const Param
     return Error{"the simulation ended with " + v1::Outcome_Name(result.outcome()) + " (" +
                  result.message() + ")"};
   }
-  auto kinematics = fit_kinematics(fitted);
-  if (!kinematics) return kinematics.error();
   Horizons horizons;
-  horizons.kinematics = *kinematics;
-  const std::vector<Pose> kinematic = kinematic_ends(asked, *kinematics);
+  std::vector<Pose> kinematic;
+  if (fitted.ground) {
+    ASSIGN_OR_RETURN(horizons.kinematics, fit_kinematics(fitted));
+    kinematic = kinematic_ends(asked, horizons.kinematics);
+  }
   for (const Tiles& t : tiles) {
     double log_score = 0;
     for (std::size_t i = t.first; i < t.first + t.count; ++i) {
       const v1::Predicted& simulated = result.predict().predictions(static_cast<int>(i));
       const Trial& trial = asked.log.trials[i];
       const LoggedRun& run = runs.runs[run_of[i]];
+      const WindowError constant = error_of(constant_end(run, trial), trial);
       horizons.windows.push_back(
           {t.horizon_s, run.session, run.run, *trial.t_s, *trial.duration_s, travel_of(run, trial),
-           error_of(from_proto(simulated.end()), trial), error_of(kinematic[i], trial),
-           error_of(constant_end(run, trial), trial)});
+           error_of(from_proto(simulated.end()), trial),
+           kinematic.empty() ? constant : error_of(kinematic[i], trial), constant});
       log_score += simulated.log_score() / static_cast<double>(t.count);
     }
     horizons.rows.push_back(row_of(std::span(horizons.windows).subspan(t.first, t.count),
@@ -192,23 +200,29 @@ Result<Horizons> measure_horizons(Farm& farm, const Problem& fitted, const Param
 }
 
 std::string format_horizons(const Horizons& horizons) {
+  const bool kinematics = !horizons.kinematics.names.empty();
+  std::string heads = fmt::format("{:^34}|", "simulation");
+  if (kinematics) heads += fmt::format("{:^34}|", "fitted kinematics");
   std::string text = "Medians over windows: mm, mrad, and of each a metre of way\n";
-  text += fmt::format("{:>7} {:>7} {:>6} |{:^34}|{:^34}|{:^34}| {:>9} |{:^44}\n", "horizon",
-                      "windows", "way m", "simulation", "fitted kinematics", "constant velocity",
-                      "nats", "simulation over kinematics");
+  text += fmt::format("{:>7} {:>7} {:>6} |{}{:^34}| {:>9} |{:^44}\n", "horizon", "windows", "way m",
+                      heads, "constant velocity", "nats",
+                      fmt::format("simulation over {}", baseline_of(horizons)));
   text += fmt::format("{:>7} {:>7} {:>6} |", "s", "", "");
-  for (int i = 0; i < 3; ++i) {
+  for (int i = 0; i < (kinematics ? 3 : 2); ++i) {
     text += fmt::format(" {:>8} {:>8} {:>7} {:>7} |", "mm", "mrad", "mm/m", "mrad/m");
   }
   text += fmt::format(" {:>9} | {:>20}  {:>20}\n", "", "mm", "mrad");
   for (const HorizonRow& row : horizons.rows) {
     const std::string name = row.horizon_s > 0 ? fmt::format("{:g}", row.horizon_s) : "whole";
     text += fmt::format("{:>7} {:>7} {:>6.2f} |", name, row.windows, row.travel_m) +
-            cells(row.simulation) + cells(row.kinematics) + cells(row.constant_velocity) +
+            cells(row.simulation) + (kinematics ? cells(row.kinematics) : "") +
+            cells(row.constant_velocity) +
             fmt::format(" {:>9.3f} | {:>20}  {:>20}\n", row.log_score, ratio_cell(row.position),
                         ratio_cell(row.heading));
   }
-  text += significantly_apart(horizons) + "kinematics:";
+  text += significantly_apart(horizons);
+  if (!kinematics) return text;
+  text += "kinematics:";
   for (std::size_t i = 0; i < horizons.kinematics.names.size(); ++i) {
     text += fmt::format(" {} {:.4g}", horizons.kinematics.names[i],
                         horizons.kinematics.values[static_cast<Eigen::Index>(i)]);

@@ -28,6 +28,7 @@ struct WindowError {
   double heading_rad = 0;
 };
 
+// Where there are no kinematics, their error is constant velocity's.
 struct WindowRow {
   double horizon_s = 0;  // 0: a whole run
   std::string session, run;
@@ -46,7 +47,8 @@ struct HorizonRow {
 };
 
 struct Horizons {
-  Kinematics kinematics;  // fitted to the fitted windows
+  Kinematics
+      kinematics;  // fitted to the fitted windows; without names where there is no robot file
   std::vector<HorizonRow> rows;
   std::vector<WindowRow> windows;  // horizon by horizon, in driving order
 };

@@ -179,7 +179,7 @@ Result<std::optional<Problem>> held_out_of(const RunInfo& info, const Problem& p
   config.path = info.config_path;
   config.text = info.config_text;
   config.problem = problem;
-  if (problem.ground) {
+  if (problem.windows()) {
     ASSIGN_OR_RETURN(const auto read,
                      parse_config(info.config_text, info.config_path, start_no_program));
     config.windows = read.windows;
@@ -218,7 +218,7 @@ Result<RunReport> read_run_report(const RunQuestion& question) {
   RETURN_IF_ERROR(add_history(reader, problem, generations, question, &report));
   const auto apart = held_out_of(info, problem);
   if (apart && *apart) report.held_out = (*apart)->log.trials.size();
-  report.windows = problem.ground != nullptr;
+  report.windows = problem.windows();
   report.headline = headline(report);
   report.action = action(report, info);
   report.provenance = {

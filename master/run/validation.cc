@@ -23,7 +23,7 @@ Result<std::optional<Problem>> read_validation(const StagePlan& plan, const Conf
     }
   }
   Problem apart = config.problem;
-  if (apart.ground) {
+  if (apart.windows()) {
     const Status read = read_problem_runs(plan.validation_files, config.windows, &apart);
     if (!read) return read.error();
     return std::optional<Problem>(std::move(apart));

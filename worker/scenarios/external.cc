@@ -1,12 +1,14 @@
 #include "worker/scenarios/external.h"
 
 #include <algorithm>
+#include <cmath>
 #include <exception>
 #include <string>
 
 #include "common/external/simulator.h"
 #include "common/process/process_pool.h"
 #include "worker/scenarios/srv1/srv1.h"
+#include "worker/scenarios/windows.h"
 
 namespace gapfarm {
 namespace {
@@ -93,12 +95,67 @@ class ExternalVehicle final : public Vehicle {
   ExternalRequest request_;
 };
 
-// Commands and effects are those of srv1; what fails is this worker's failure and nobody's motion.
+// Follows the commands of runs; its poses are those of its own origin.
+class ExternalRuns final : public WindowModel {
+ public:
+  explicit ExternalRuns(const Problem& problem)
+      : WindowModel(problem), simulator_(shared_simulator(problem.external->command)) {}
+
+ private:
+  WindowRobot robot_at(const ParameterValues& values,
+                       const PredictOptions& options) const override {
+    const ExternalDeclaration& declaration = problem_.external->table.declaration();
+    ExternalRunRequest request;
+    request.declaration = &declaration;
+    request.values.assign(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(
+                                                               declaration.parameters.size()));
+    const double delay_s = at(values, "delay");
+    const auto run = [this, request, delay_s, steps = options.steps](
+                         std::span<const CommandRow> commands, const GroundStart& start,
+                         std::span<const double> times) mutable {
+      request.start_s = start.t_s;
+      request.speed_m_s = start.twist.vx_m_s;
+      request.turn_rad_s = start.twist.omega_rad_s;
+      request.commands.assign(commands.begin(), commands.end());
+      for (CommandRow& row : request.commands) row.t_s += delay_s;
+      request.times_s = times;
+      const Result<ExternalRunAnswer> answer =
+          simulator_->simulate(request, problem_.external->introduction);
+      if (!answer) throw ExternalFailure(answer.error().message);
+      count_step(steps);
+      return motion_of(*answer, start, times);
+    };
+    return {{at(values, "marker.x"), at(values, "marker.y"), at(values, "marker.yaw")}, run};
+  }
+
+  // Its way stands in for that of wheels, which it does not answer.
+  static GroundMotion motion_of(const ExternalRunAnswer& answer, const GroundStart& start,
+                                std::span<const double> times) {
+    GroundMotion motion;
+    motion.outcome = answer.diverged ? MotionOutcome::kDiverged : MotionOutcome::kOk;
+    Pose before;
+    double travel_m = 0;
+    for (std::size_t k = 0; k < answer.poses.size(); ++k) {
+      const Pose& X_SR = answer.poses[k];
+      travel_m += std::hypot(X_SR.x - before.x, X_SR.y - before.y);
+      motion.samples.push_back({times[k], X_SR, travel_m});
+      before = X_SR;
+    }
+    if (!times.empty()) motion.simulated_s = times.back() - start.t_s;
+    return motion;
+  }
+
+  std::shared_ptr<ExternalSimulator> simulator_;
+};
+
+// What fails is this worker's failure and nobody's motion.
 class ExternalModel final : public ScenarioModel {
  public:
+  // Commands and effects of one from rest to rest are those of srv1.
   explicit ExternalModel(const Problem& problem)
       : keeps_program_(shared_simulator(problem.external->command)),
-        model_(prepare_srv1(problem)) {}
+        model_(problem.windows() ? std::make_unique<ExternalRuns>(problem)
+                                 : prepare_srv1(problem)) {}
 
   Prediction predict(const ParameterValues& values, const PredictOptions& options) const override {
     Prediction prediction;

@@ -1,4 +1,5 @@
-// Scenario `external`: commands driven by a program of the user's (docs/external.md).
+// Scenarios `external` and `external_runs`: a program of the user's drives commands, or follows
+// runs (docs/external.md).
 #pragma once
 
 #include <memory>

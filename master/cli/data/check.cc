@@ -85,6 +85,7 @@ std::size_t piece_of(const Problem& problem, const Trial& trial) {
 
 // Trials that differ in nothing that the enabled effects look at share one condition.
 std::size_t count_conditions(const Problem& problem, unsigned context) {
+  if (problem.windows()) return problem.runs.size();
   std::vector<DrivenCommand> driven;
   for (const Trial& trial : problem.log.trials) {
     const CommandSpec& spec = problem.command(trial.command);
@@ -117,7 +118,9 @@ std::size_t count_conditions(const Problem& problem, unsigned context) {
 // What is the wrong way round in a ground robot's runs.
 std::vector<SanityFinding> warnings(const Config& config) {
   const Problem& problem = config.problem;
-  if (!problem.ground) return check_sanity(problem);
+  if (!problem.ground) {
+    return problem.windows() ? std::vector<SanityFinding>() : check_sanity(problem);
+  }
   const GroundRobot robot = problem.ground->robot_at(problem.values);
   const auto runs = read_run_folders(config.trial_files, robot.channels);
   return runs ? check_ground_log(robot, *runs) : std::vector<SanityFinding>();

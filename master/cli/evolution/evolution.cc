@@ -82,7 +82,7 @@ void add_validation(const RunSummary& summary, const Problem& problem, std::stri
                     Json& json) {
   if (summary.validated.empty()) return;
   text += fmt::format("validation on {} {} held out, {}:\n", summary.held_out,
-                      problem.ground ? "windows" : "trials", fitness_name(problem.fitness.kind));
+                      problem.windows() ? "windows" : "trials", fitness_name(problem.fitness.kind));
   for (const Validated& row : summary.validated) {
     text += fmt::format("  {:<24} {}\n", row.name,
                         row.fitness ? fmt::format("{:.6g}", *row.fitness) : "does not end well");

@@ -61,13 +61,13 @@ Result<int> run_horizons(HorizonsCommand& command, CliContext& context) {
   Console& console = context.console;
   RETURN_IF_ERROR(command.outputs.plan({command.picture, command.out}));
   ASSIGN_OR_RETURN(const auto fitted, open_fitted(command.source, console));
-  if (!fitted.problem.ground) {
+  if (!fitted.problem.windows()) {
     return Error{command.source + ": scenario " + fitted.problem.scenario +
                  " has no runs to cut into windows; gapfarm predict compares its trials"};
   }
   ASSIGN_OR_RETURN(const auto runs,
                    read_run_folders(command.runs.empty() ? fitted.folders : command.runs,
-                                    fitted.problem.ground->robot().channels));
+                                    fitted.problem.channels()));
   for (const std::string& note : runs.notes) console.note(note);
   if (context.dry_run) {
     return print_dry_run("measure horizons of " + command.source,
@@ -90,8 +90,9 @@ Result<int> run_horizons(HorizonsCommand& command, CliContext& context) {
 
 SubcommandRun setup_horizons(CLI::App& app) {
   auto command = std::make_shared<HorizonsCommand>();
-  app.add_option("RUN|CONFIG", command->source,
-                 "A finished run, or a config for its own values, of scenario ground")
+  app.add_option(
+         "RUN|CONFIG", command->source,
+         "A finished run, or a config for its own values, of scenario ground or external_runs")
       ->required();
   app.add_option("--trials", command->runs,
                  "Folders with commands.csv and poses.csv (default: those that were fitted to)");
@@ -105,7 +106,7 @@ SubcommandRun setup_horizons(CLI::App& app) {
   declare_long_command(app);
   app.footer(
       "Beside the simulation stand the robot's own kinematics, fitted to the same windows by least "
-      "squares,\nand constant velocity.\n\n"
+      "squares,\nand constant velocity. A program of yours has the latter alone.\n\n"
       "Examples:\n"
       "  gapfarm horizons run/warthog --trials held_out --picture paths.svg\n"
       "  gapfarm horizons warthog.toml --horizons 1 10");

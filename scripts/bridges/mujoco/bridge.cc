@@ -1,5 +1,6 @@
 // A simulator for gapfarm by MuJoCo (docs/external.md): a two-wheeler with ball casters.
 //   c++ -std=c++20 -O2 bridge.cc -lmujoco -o bridge && ./bridge two_wheeler.xml
+// With --runs it follows the velocity commands of logged runs instead of single commands from rest.
 #include <mujoco/mujoco.h>
 
 #include <algorithm>
@@ -32,6 +33,21 @@ Json declaration() {
             parameter("track", "m", 0.04, 0.3, 0.1, true, "wheel to wheel"),
             parameter("friction", "-", 0.05, 2, 0.8, true, "of wheels and floor"),
             parameter("chassis_mass", "kg", 0.05, 2, 0.3, true, "without wheels")}}};
+}
+
+Json declaration_of_runs() {
+  return {
+      {"gapfarm", 1},
+      {"name", "two-wheeler in MuJoCo, following runs"},
+      {"channels", {"v", "omega"}},
+      {"parameters",
+       {parameter("left_gain", "-", 0.5, 1.5, 1, false, "of the left wheel's speed"),
+        parameter("right_gain", "-", 0.5, 1.5, 1, false, "of the right wheel's speed"),
+        parameter("track", "m", 0.04, 1, 0.1, true, "wheel to wheel"),
+        parameter("believed_track", "m", 0.04, 1, 0.1, true, "what the controller takes it for"),
+        parameter("lag", "s", 0.001, 1, 0.05, true, "time constant of the wheels' speeds"),
+        parameter("friction", "-", 0.05, 2, 0.8, true, "of wheels and floor"),
+        parameter("chassis_mass", "kg", 0.05, 20, 0.3, true, "without wheels")}}};
 }
 
 class TwoWheeler {
@@ -79,12 +95,51 @@ class TwoWheeler {
             {"rest", std::max(0.0, d_->time - begun - duration)}};
   }
 
+  // Begins at rest, whatever the run does: [runs] run_in has the first window begin later.
+  Json follow(const Json& task) {
+    const Json& p = task["parameters"];
+    build(p);
+    mj_resetData(m_, d_);
+    while (d_->time < kSettle_s) mj_step(m_, d_);
+    const double start = task["start"]["t"], begun = d_->time;
+    const double origin[3] = {d_->qpos[0], d_->qpos[1], heading()};
+    const double keep = std::exp(-m_->opt.timestep / p["lag"].get<double>());
+    const double half = p["believed_track"].get<double>() / 2;
+    const double gain[2] = {p["left_gain"], p["right_gain"]};
+    const Json& commands = task["commands"];
+    double speed[2] = {0, 0}, v = 0, omega = 0;
+    std::size_t row = 0;
+    Json poses = Json::array();
+    for (const Json& wanted : task["times"]) {
+      for (; d_->time - begun < wanted.get<double>() - start; mj_step(m_, d_)) {
+        for (; row < commands.size() && commands[row][0] <= start + d_->time - begun; ++row) {
+          v = commands[row][1];
+          omega = commands[row][2];
+        }
+        for (int side = 0; side < 2; ++side) {
+          const double goal = gain[side] * (v + (side == 0 ? -1 : 1) * omega * half);
+          speed[side] = goal + (speed[side] - goal) * keep;
+          d_->ctrl[side] = speed[side] / kWheelRadius_m;
+        }
+      }
+      Json pose = sample(0, origin);
+      pose.erase(0);
+      for (const Json& number : pose) {
+        if (!std::isfinite(number.get<double>())) {
+          return {{"id", task["id"]}, {"outcome", "diverged"}, {"message", "not finite"}};
+        }
+      }
+      poses.push_back(std::move(pose));
+    }
+    return {{"id", task["id"]}, {"poses", std::move(poses)}};
+  }
+
  private:
   int body(const char* name) const { return mj_name2id(m_, mjOBJ_BODY, name); }
   int geom(const char* name) const { return mj_name2id(m_, mjOBJ_GEOM, name); }
 
   void build(const Json& p) {
-    full_speed_ = p["full_speed"];
+    full_speed_ = p.value("full_speed", 1.0);
     m_->body_pos[3 * body("left") + 1] = p["track"].get<double>() / 2;
     m_->body_pos[3 * body("right") + 1] = -p["track"].get<double>() / 2;
     for (const char* name : {"floor", "left", "right"}) {
@@ -131,16 +186,21 @@ class TwoWheeler {
 }  // namespace
 
 int main(int argc, char** argv) {
+  const bool runs = argc == 3 && std::string(argv[2]) == "--runs";
   char error[1000] = "";
-  mjModel* model = argc == 2 ? mj_loadXML(argv[1], nullptr, error, sizeof error) : nullptr;
+  mjModel* model = argc == 2 || runs ? mj_loadXML(argv[1], nullptr, error, sizeof error) : nullptr;
   if (model == nullptr) {
-    std::cerr << "bridge: expected a model file: " << error << "\n";
+    std::cerr << "bridge: expected a model file, and --runs or nothing: " << error << "\n";
     return 2;
   }
   TwoWheeler robot(model);
   for (std::string line; std::getline(std::cin, line);) {
     const Json task = Json::parse(line);
-    std::cout << (task.contains("id") ? robot.drive(task) : declaration()) << std::endl;
+    const bool asked = task.contains("id");
+    std::cout << (runs    ? asked ? robot.follow(task) : declaration_of_runs()
+                     : asked ? robot.drive(task)
+                          : declaration())
+              << std::endl;
   }
   return 0;
 }
