@@ -4,6 +4,7 @@
 // recognising what was scored before and remembering the best are SearchOptimiser's.
 #pragma once
 
+#include <cmath>
 #include <functional>
 #include <memory>
 #include <span>
@@ -46,8 +47,11 @@ class SearchMethod {
   virtual Status restore(const v1::MethodState& message) = 0;
 };
 
-// Mirrored into [0, 1] gene by gene, as if mirrors stood at both ends, then snapped.  A function
-// seen through it has no bounds and no jump at them.
+// Into [0, 1] as if mirrors stood at both ends.
+inline double mirrored(double gene) { return std::abs(std::remainder(gene, 2)); }
+
+// Mirrored gene by gene, then snapped.  A function seen through it has no bounds and no jump at
+// them.
 Genome placed(const GeneSpace& space, const Genome& proposed);
 
 // The error of restore().
