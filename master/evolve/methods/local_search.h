@@ -32,6 +32,7 @@ class LocalSearch final : public SearchMethod {
   // Begins at `start`, known to stand at `standing`.
   void begin(const Genome& start, const Standing& standing);
   bool converged() const { return converged_; }
+  const Genome& best() const { return best_; }
 
  private:
   class Run;

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -24,6 +25,8 @@ struct MethodSetup {
   GeneSpace space;
   Genome start;                // where to begin; empty: anywhere
   std::vector<double> spread;  // of the start, a covariance row by row; empty: unknown
+  bool noisy = false;          // scores differ between replicates
+  std::optional<std::uint64_t> evaluations = {};  // when the run ends; none: unknown
 };
 
 // The stream of a generation's k-th proposal.
@@ -41,6 +44,7 @@ class SearchMethod {
   virtual unsigned origin() const = 0;  // of the next proposals
   // For the run store's table of operators: step sizes, phases.
   virtual std::vector<NamedNumber> figures() const { return {}; }
+  virtual std::string reason() const { return {}; }  // as Optimiser::reason()
 
   virtual void save(v1::MethodState& message) const = 0;
   // Error: the message is not one that save() made for this setup.
