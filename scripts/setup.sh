@@ -1,8 +1,9 @@
 #!/usr/bin/env bash
 # Installs the Debian 12 packages that gapfarm is built from.  Does nothing when all are there.
-#   scripts/setup.sh [--tests] [--boxes]
+#   scripts/setup.sh [--tests] [--boxes] [--bench]
 # --tests: also what only the tests need (format, browser, Slurm, Grid Engine, sshd).  --boxes: also what bare Debians and
 # containers are made with, for machines that let root make them; without it the tests that want them say so.
+# --bench: also what searches are compared with (scripts/compare_searches.sh).
 set -euo pipefail
 
 packages=(
@@ -27,6 +28,9 @@ if [[ $wanted == *' --tests '* ]]; then
 fi
 if [[ $wanted == *' --boxes '* ]]; then
   packages+=(catatonit debootstrap podman)
+fi
+if [[ $wanted == *' --bench '* ]]; then
+  packages+=(libpagmo-dev)
 fi
 
 missing=()

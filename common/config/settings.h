@@ -33,10 +33,11 @@ struct OptimiserSettings {
   // Individuals a generation; none: as the method has it (30 for differential evolution, 4 + 3 ln n
   // for CMA-ES over n genes, the evolution's population for random search).
   std::optional<unsigned> population;
-  double differential_weight = 0.8;  // F of DE/rand/1/bin (Storn and Price 1997)
-  double crossover_rate = 0.9;       // CR of the same
-  double sigma = 0.3;                // CMA-ES: first s.d., share of a gene's range
-  unsigned iterations = 100;         // de_simplex: of differential evolution before the simplex
+  // F and CR of DE/rand/1/bin (0.8 and 0.9 when the other is given); neither: they adapt
+  // themselves.
+  std::optional<double> differential_weight, crossover_rate;
+  double sigma = 0.3;         // CMA-ES: first s.d., share of a gene's range
+  unsigned iterations = 100;  // de_simplex: of differential evolution before the simplex
   LocalSearchKind local = LocalSearchKind::kNelderMead;
   double step = 0.1;               // local search: first step, share of a gene's range
   unsigned local_evaluations = 0;  // of one local search; 0: 100 a gene

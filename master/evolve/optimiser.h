@@ -59,6 +59,8 @@ class Optimiser {
   // Mean distance of the members' genes from their mean, in [0, 1].
   virtual double diversity() const = 0;
   virtual std::vector<NamedNumber> operator_probabilities() const = 0;
+  // For the log: what searches and why, where the optimiser chose it; else empty.
+  virtual std::string reason() const { return {}; }
 
   // Everything ask() and tell() depend on; restoring it continues bit for bit.
   // REQUIRES: every ask() has had its tell().

@@ -28,10 +28,13 @@ Result<std::unique_ptr<SearchOptimiser>> wrapped(const OptimiserSetup& setup,
     return Error{"the spread of the first genome is not one of its genes"};
   }
   const EvolutionSettings& settings = setup.settings;
-  const MethodSetup method{settings.optimiser, settings.population,
+  const MethodSetup method{settings.optimiser,
+                           settings.population,
                            GeneSpace(*setup.table, setup.genes),
                            settings.seed_nominal ? setup.nominal : Genome{},
-                           settings.seed_nominal ? setup.spread : std::vector<double>{}};
+                           settings.seed_nominal ? setup.spread : std::vector<double>{},
+                           setup.noisy,
+                           settings.evaluations};
   const auto row = static_cast<std::size_t>(settings.optimiser.kind);
   return std::make_unique<SearchOptimiser>(optimisers()[row].name, setup, make_method(method));
 }

@@ -79,6 +79,7 @@ class StagedOptimiser final : public Optimiser {
   std::uint64_t last_improvement() const override { return last_improvement_; }
   const Member& best() const override { return best_; }
   double diversity() const override { return inner_->diversity(); }
+  std::string reason() const override { return inner_->reason(); }
   std::vector<NamedNumber> operator_probabilities() const override {
     std::vector<NamedNumber> all = inner_->operator_probabilities();
     all.push_back({"stage", static_cast<double>(stage_ + 1)});

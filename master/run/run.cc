@@ -132,6 +132,7 @@ Result<RunSummary> evolve_run(RunStore& store, const RunRequest& request, RunWat
     last.farm = (*farm)->tally();
     return stopped_by(store, optimiser.error(), last);
   }
+  if (const std::string reason = (*optimiser)->reason(); !reason.empty()) watcher.note(reason);
 
   const SteadyClock clock;
   FarmProgressWriter progress(store, **farm, request.config.evolution, inputs->checkpoint, clock,

@@ -10,11 +10,14 @@
 namespace gapfarm {
 namespace {
 
-constexpr double kLeastStep_share = 1e-11;
+// Less decides nothing in a simulation, and a restart may.
+constexpr double kLeastStep_share = 1e-7;
 constexpr double kFlatCost = 1e-12;
 // Above this doubling stops: a generation would outlast most runs.
 constexpr std::size_t kLargestPopulation = 1024;
 constexpr double kLevelDeviation = 0.2;
+// A narrower gene is not mirrored before it is learned from.
+constexpr double kNarrow_share = 0.05;
 
 struct Axes {
   Eigen::MatrixXd directions;
@@ -53,10 +56,13 @@ void CmaEs::begin(Eigen::VectorXd mean) {
   anywhere_ = false;
 }
 
+unsigned CmaEs::default_population(std::size_t genes) {
+  return static_cast<unsigned>(4 + std::floor(3 * std::log(static_cast<double>(genes))));
+}
+
 std::size_t CmaEs::population() const {
-  const double n = static_cast<double>(setup_.space.size());
-  const auto standard = static_cast<std::size_t>(4 + std::floor(3 * std::log(n)));
-  const std::size_t base = setup_.settings.population.value_or(static_cast<unsigned>(standard));
+  const std::size_t base =
+      setup_.settings.population.value_or(default_population(setup_.space.size()));
   return std::max(base,
                   std::min(base << std::min<std::uint64_t>(restarts_, 20), kLargestPopulation));
 }
@@ -65,18 +71,25 @@ CmaEs::Weights CmaEs::weights() const {
   const double n = static_cast<double>(setup_.space.size());
   const auto lambda = static_cast<double>(population());
   Weights w;
-  w.of_rank.resize(static_cast<Eigen::Index>(population() / 2));
+  w.of_rank.resize(static_cast<Eigen::Index>(population()));
   for (Eigen::Index i = 0; i < w.of_rank.size(); ++i) {
     w.of_rank[i] = std::log((lambda + 1) / 2) - std::log(static_cast<double>(i + 1));
   }
-  w.of_rank /= w.of_rank.sum();
-  w.mu_eff = 1 / w.of_rank.squaredNorm();
+  const auto parents = static_cast<Eigen::Index>(population() / 2);
+  auto best = w.of_rank.head(parents);
+  auto worst = w.of_rank.tail(w.of_rank.size() - parents);
+  best /= best.sum();
+  w.mu_eff = 1 / best.squaredNorm();
   w.c_sigma = (w.mu_eff + 2) / (n + w.mu_eff + 5);
   w.d_sigma = 1 + 2 * std::max(0.0, std::sqrt((w.mu_eff - 1) / (n + 1)) - 1) + w.c_sigma;
   w.c_c = (4 + w.mu_eff / n) / (n + 4 + 2 * w.mu_eff / n);
   w.c_1 = 2 / ((n + 1.3) * (n + 1.3) + w.mu_eff);
   w.c_mu = std::min(1 - w.c_1,
                     2 * (0.25 + w.mu_eff + 1 / w.mu_eff - 2) / ((n + 2) * (n + 2) + w.mu_eff));
+  worst /= -worst.sum();
+  const double repelled = 1 / worst.squaredNorm();
+  worst *= std::min(
+      {1 + w.c_1 / w.c_mu, 1 + 2 * repelled / (repelled + 2), (1 - w.c_1 - w.c_mu) / (n * w.c_mu)});
   w.chi_n = std::sqrt(n) * (1 - 1 / (4 * n) + 1 / (21 * n * n));
   return w;
 }
@@ -88,14 +101,28 @@ std::vector<Genome> CmaEs::propose(const StreamOf& stream_of) const {
     mean = to_vector(setup_.space.random(stream));
   }
   const Axes axes = axes_of(covariance_);
+  const bool with_mean = generation_ == 0 && (anywhere_ || !setup_.start.empty());
   std::vector<Genome> proposed;
-  if (generation_ == 0 && (anywhere_ || !setup_.start.empty())) proposed.push_back(to_genome(mean));
+  std::vector<Eigen::VectorXd> directions;  // of the draws, orthogonal to one another
   while (proposed.size() < population()) {
+    if (with_mean && proposed.empty()) {
+      proposed.push_back(to_genome(mean));
+      continue;
+    }
     Stream stream = stream_of(proposed.size());
     Eigen::VectorXd draw(mean.size());
     for (double& number : draw) number = stream.normal();
-    proposed.push_back(
-        to_genome(mean + sigma_ * (axes.directions * axes.deviations.cwiseProduct(draw))));
+    const double length = draw.norm();
+    if (std::ssize(directions) == mean.size()) directions.clear();
+    for (const Eigen::VectorXd& direction : directions) draw -= draw.dot(direction) * direction;
+    directions.push_back(draw.normalized());
+    const Eigen::VectorXd step = axes.directions * axes.deviations.cwiseProduct(directions.back());
+    proposed.push_back(to_genome(mean + sigma_ * length * step));
+    for (std::size_t gene = 0; gene < setup_.space.size(); ++gene) {
+      const auto i = static_cast<Eigen::Index>(gene);
+      if (sigma_ * std::sqrt(covariance_(i, i)) < kNarrow_share) continue;
+      proposed.back()[gene] = mirrored(proposed.back()[gene]);
+    }
   }
   return proposed;
 }
@@ -108,9 +135,8 @@ void CmaEs::learn(std::span<const Genome> proposed, std::span<const Standing> st
   std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
     return better(standings[a], standings[b]);
   });
-  const auto parents = static_cast<Eigen::Index>(population() / 2);
-  Eigen::MatrixXd steps(mean_.size(), parents);
-  for (Eigen::Index i = 0; i < parents; ++i) {
+  Eigen::MatrixXd steps(mean_.size(), static_cast<Eigen::Index>(population()));
+  for (Eigen::Index i = 0; i < steps.cols(); ++i) {
     steps.col(i) = (to_vector(proposed[order[static_cast<std::size_t>(i)]]) - mean_) / sigma_;
   }
   adapt(steps);
@@ -137,7 +163,8 @@ void CmaEs::adapt(const Eigen::MatrixXd& steps) {
   const Weights w = weights();
   const double n = static_cast<double>(mean_.size());
   const Axes axes = axes_of(covariance_);
-  const Eigen::VectorXd step = steps * w.of_rank;
+  const Eigen::Index parents = steps.cols() / 2;
+  const Eigen::VectorXd step = steps.leftCols(parents) * w.of_rank.head(parents);
   mean_ += sigma_ * step;
   const Eigen::VectorXd whitened =
       axes.directions * (axes.directions.transpose() * step).cwiseQuotient(axes.deviations);
@@ -149,14 +176,17 @@ void CmaEs::adapt(const Eigen::MatrixXd& steps) {
   path_c_ *= 1 - w.c_c;
   if (calm) path_c_ += std::sqrt(w.c_c * (2 - w.c_c) * w.mu_eff) * step;
   const double lost = calm ? 0 : w.c_c * (2 - w.c_c);
-  covariance_ = (1 - w.c_1 - w.c_mu + w.c_1 * lost) * covariance_ +
+  Eigen::VectorXd weights = w.of_rank;
+  for (Eigen::Index i = parents; i < weights.size(); ++i) {
+    const double length =
+        (axes.directions.transpose() * steps.col(i)).cwiseQuotient(axes.deviations).squaredNorm();
+    weights[i] *= n / std::max(length, 1e-30);
+  }
+  covariance_ = (1 - w.c_1 - w.c_mu * w.of_rank.sum() + w.c_1 * lost) * covariance_ +
                 w.c_1 * path_c_ * path_c_.transpose() +
-                w.c_mu * steps * w.of_rank.asDiagonal() * steps.transpose();
+                w.c_mu * steps * weights.asDiagonal() * steps.transpose();
   covariance_ = (covariance_ + covariance_.transpose().eval()) / 2;
   sigma_ *= std::exp(std::min(1.0, w.c_sigma / w.d_sigma * (path_sigma_.norm() / w.chi_n - 1)));
-  // Wider than the range a Gaussian is uniform after the mirrors: more says nothing.
-  const double widest = std::sqrt(covariance_.diagonal().maxCoeff());
-  sigma_ = std::min(sigma_, 1 / widest);
 }
 
 void CmaEs::keep_levels_alive() {

@@ -1,10 +1,13 @@
-// CMA-ES: the covariance matrix adaptation evolution strategy with rank-one and rank-mu updates
-// and cumulative step-size adaptation (Hansen, arXiv:1604.00772, with its default constants and
-// positive weights), restarted with twice the population when it has converged (IPOP; Auger and
-// Hansen, CEC 2005).
+// CMA-ES: the covariance matrix adaptation evolution strategy with active rank-one and rank-mu
+// updates and cumulative step-size adaptation (Hansen, arXiv:1604.00772, with its default
+// constants), its draws orthogonal (Wang, Emmerich and Baeck, Evolutionary Computation 27, 2019),
+// restarted with twice the population when it has converged (IPOP; Auger and Hansen, CEC 2005).
 //
-// It moves in an unbounded space that mirrors fold into [0, 1] (see placed()).  The s.d. of a gene
-// with levels never falls below a fifth of a level, so that it does not freeze between two.
+// What is drawn beyond [0, 1] is scored where mirrors put it (see placed()).  While steps are wide
+// it is also learned from there: else the method sees a function that repeats beyond each mirror,
+// and most draws fall there.  Narrow ones are learned from as drawn: at a minimum on a bound all
+// mirrored steps point inward, and the step size would run away.  The s.d. of a gene with levels
+// never falls below a fifth of a level, so that it does not freeze between two.
 #pragma once
 
 #include <Eigen/Core>
@@ -17,6 +20,8 @@ class CmaEs final : public SearchMethod {
  public:
   explicit CmaEs(const MethodSetup& setup);
 
+  static unsigned default_population(std::size_t genes);
+
   std::vector<Genome> propose(const StreamOf& stream_of) const override;
   void learn(std::span<const Genome> proposed, std::span<const Standing> standings) override;
   unsigned origin() const override { return kSampled; }
@@ -26,7 +31,7 @@ class CmaEs final : public SearchMethod {
 
  private:
   struct Weights {
-    Eigen::VectorXd of_rank;  // mu positive ones that sum to 1
+    Eigen::VectorXd of_rank;  // the better half's positive, with sum 1; the others' negative
     double mu_eff = 0, c_sigma = 0, d_sigma = 0, c_c = 0, c_1 = 0, c_mu = 0, chi_n = 0;
   };
   Weights weights() const;

@@ -6,6 +6,13 @@
 
 namespace gapfarm {
 
+// As the hybrid was described: differential evolution does not adapt itself.
+MethodSetup DeSimplex::with_fixed_rates(MethodSetup setup) {
+  std::optional<double>& weight = setup.settings.differential_weight;
+  if (!weight) weight = DifferentialEvolution::kWeight;
+  return setup;
+}
+
 const SearchMethod& DeSimplex::current() const {
   if (polishing_) return simplex_;
   return differential_;

@@ -9,8 +9,10 @@ namespace gapfarm {
 
 class DeSimplex final : public SearchMethod {
  public:
-  explicit DeSimplex(const MethodSetup& setup)
-      : setup_(setup), differential_(setup), simplex_(setup, false) {}
+  explicit DeSimplex(MethodSetup setup)
+      : setup_(with_fixed_rates(std::move(setup))),
+        differential_(setup_),
+        simplex_(setup_, false) {}
 
   std::vector<Genome> propose(const StreamOf& stream_of) const override;
   void learn(std::span<const Genome> proposed, std::span<const Standing> standings) override;
@@ -20,6 +22,7 @@ class DeSimplex final : public SearchMethod {
   Status restore(const v1::MethodState& message) override;
 
  private:
+  static MethodSetup with_fixed_rates(MethodSetup setup);
   const SearchMethod& current() const;
 
   MethodSetup setup_;

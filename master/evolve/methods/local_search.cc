@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cassert>
+#include <condition_variable>
+#include <mutex>
+#include <thread>
 
 namespace gapfarm {
 namespace {
@@ -12,21 +15,74 @@ constexpr std::size_t kEvaluationsPerGene = 100;
 constexpr std::array kAlgorithms = {nlopt::LN_NELDERMEAD, nlopt::LN_SBPLX, nlopt::LN_BOBYQA,
                                     nlopt::LN_COBYLA};
 
-// What NLopt's callback reads and leaves.
-struct Replay {
-  const std::vector<double>* costs = nullptr;
-  std::size_t asked = 0;
-  std::vector<double> unknown;  // the first point without a cost
-};
-
-double replay(const std::vector<double>& x, std::vector<double>&, void* data) {
-  auto& state = *static_cast<Replay*>(data);
-  if (state.asked < state.costs->size()) return (*state.costs)[state.asked++];
-  state.unknown = x;
-  throw nlopt::forced_stop();
-}
-
 }  // namespace
+
+// NLopt at work in a thread of its own.  It and its owner take turns.
+class LocalSearch::Run {
+ public:
+  Run(nlopt::opt search, std::vector<double> start)
+      : search_(std::move(search)), x_(std::move(start)) {
+    search_.set_min_objective(ask, this);
+    thread_ = std::thread([this] { optimise(); });
+    std::unique_lock lock(mutex_);
+    passed_.wait(lock, [&] { return !its_turn_; });
+  }
+  ~Run() {
+    cancelled_ = true;
+    if (!ended_) pass_turn(true);
+    thread_.join();
+  }
+
+  std::size_t given() const { return given_; }
+  bool ended() const { return ended_; }
+  const std::vector<double>& point() const { return point_; }  // whose cost is to be given
+
+  // REQUIRES: !ended().
+  void give(double cost) {
+    cost_ = cost;
+    ++given_;
+    pass_turn(true);
+  }
+
+ private:
+  static double ask(const std::vector<double>& x, std::vector<double>&, void* data) {
+    Run& run = *static_cast<Run*>(data);
+    run.point_ = x;
+    if (!run.cancelled_) run.pass_turn(false);
+    if (run.cancelled_) throw nlopt::forced_stop();
+    return run.cost_;
+  }
+
+  void optimise() {
+    double least = 0;
+    try {
+      search_.optimize(x_, least);
+    } catch (const std::exception&) {
+      // Cancelled, limited by rounding, or NLopt's general failure: the simplex has collapsed, say.
+    }
+    const std::lock_guard lock(mutex_);
+    ended_ = true;
+    its_turn_ = false;
+    passed_.notify_all();
+  }
+
+  void pass_turn(bool to_search) {
+    std::unique_lock lock(mutex_);
+    its_turn_ = to_search;
+    passed_.notify_all();
+    passed_.wait(lock, [&] { return its_turn_ != to_search; });
+  }
+
+  nlopt::opt search_;
+  std::vector<double> x_, point_;
+  double cost_ = 0;
+  std::size_t given_ = 0;
+  bool ended_ = false, cancelled_ = false;
+  std::mutex mutex_;
+  std::condition_variable passed_;
+  bool its_turn_ = true;
+  std::thread thread_;
+};
 
 LocalSearch::LocalSearch(const MethodSetup& setup, bool restarts)
     : setup_(setup), restarts_(restarts), start_(setup.start) {
@@ -38,6 +94,8 @@ LocalSearch::LocalSearch(const MethodSetup& setup, bool restarts)
   }
 }
 
+LocalSearch::~LocalSearch() = default;
+
 nlopt::algorithm LocalSearch::algorithm() const {
   const nlopt::algorithm wanted = kAlgorithms[static_cast<std::size_t>(setup_.settings.local)];
   // BOBYQA's quadratic model needs two dimensions at least.
@@ -48,6 +106,7 @@ void LocalSearch::begin(const Genome& start, const Standing& standing) {
   start_ = start;
   best_ = start;
   costs_.clear();
+  run_.reset();
   converged_ = false;
   add_cost(standing);
   best_cost_ = costs_.front();
@@ -55,8 +114,15 @@ void LocalSearch::begin(const Genome& start, const Standing& standing) {
 
 // Where NLopt wants to look next; none when it is content.
 std::optional<Genome> LocalSearch::next_point() const {
-  Replay state;
-  state.costs = &costs_;
+  if (!run_) run_ = begin_run();
+  while (run_->given() < costs_.size() && !run_->ended()) run_->give(costs_[run_->given()]);
+  if (run_->ended()) return std::nullopt;
+  Genome point = start_;
+  for (std::size_t i = 0; i < moving_.size(); ++i) point[moving_[i]] = run_->point()[i];
+  return point;
+}
+
+std::unique_ptr<LocalSearch::Run> LocalSearch::begin_run() const {
   nlopt::opt search(algorithm(), static_cast<unsigned>(moving_.size()));
   search.set_lower_bounds(0);
   search.set_upper_bounds(1);
@@ -66,23 +132,9 @@ std::optional<Genome> LocalSearch::next_point() const {
                                 ? setup_.settings.local_evaluations
                                 : kEvaluationsPerGene * moving_.size();
   search.set_maxeval(static_cast<int>(limit));
-  search.set_min_objective(replay, &state);
-  std::vector<double> x;
-  for (const std::size_t gene : moving_) x.push_back(start_[gene]);
-  double least = 0;
-  try {
-    search.optimize(x, least);
-  } catch (const nlopt::forced_stop&) {
-    if (!state.unknown.empty()) {
-      Genome point = start_;
-      for (std::size_t i = 0; i < moving_.size(); ++i) point[moving_[i]] = state.unknown[i];
-      return point;
-    }
-  } catch (const nlopt::roundoff_limited&) {
-  } catch (const std::runtime_error&) {
-    // NLopt's general failure: the simplex has collapsed, say.
-  }
-  return std::nullopt;
+  std::vector<double> start;
+  for (const std::size_t gene : moving_) start.push_back(start_[gene]);
+  return std::make_unique<Run>(search, std::move(start));
 }
 
 std::vector<Genome> LocalSearch::propose(const StreamOf& stream_of) const {
@@ -123,6 +175,7 @@ void LocalSearch::learn(std::span<const Genome> proposed, std::span<const Standi
   }
   start_.clear();
   costs_.clear();
+  run_.reset();
 }
 
 std::vector<NamedNumber> LocalSearch::figures() const {

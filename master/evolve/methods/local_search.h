@@ -2,8 +2,9 @@
 // to be asked.
 //
 // NLopt's local algorithms are deterministic, so what one asks for next follows from the costs so
-// far.  Every proposal runs the algorithm anew over the costs that are known, up to the first point
-// that is not.  The costs are all there is to save, and a resumed search cannot differ.
+// far.  The algorithm runs in a thread of its own, which waits for a cost whenever it needs one,
+// and a search that is resumed gives it those that are known.  The costs are all there is to save,
+// and a resumed search cannot differ.
 //
 // Only real genes move; the others keep the start's levels, unless there are no reals.
 #pragma once
@@ -19,6 +20,7 @@ class LocalSearch final : public SearchMethod {
   // `restarts`: begin again at a random point when a search has converged; without, propose() asks
   // for its last best point from then on.
   explicit LocalSearch(const MethodSetup& setup, bool restarts = true);
+  ~LocalSearch() override;
 
   std::vector<Genome> propose(const StreamOf& stream_of) const override;
   void learn(std::span<const Genome> proposed, std::span<const Standing> standings) override;
@@ -30,8 +32,11 @@ class LocalSearch final : public SearchMethod {
   // Begins at `start`, known to stand at `standing`.
   void begin(const Genome& start, const Standing& standing);
   bool converged() const { return converged_; }
+  const Genome& best() const { return best_; }
 
  private:
+  class Run;
+  std::unique_ptr<Run> begin_run() const;
   std::optional<Genome> next_point() const;
   void add_cost(const Standing& standing);
   nlopt::algorithm algorithm() const;
@@ -45,6 +50,8 @@ class LocalSearch final : public SearchMethod {
   double best_cost_ = 0;
   std::uint64_t searches_ = 0;  // completed
   bool converged_ = false;
+
+  mutable std::unique_ptr<Run> run_;  // of the search at work; none: not begun here
 };
 
 }  // namespace gapfarm

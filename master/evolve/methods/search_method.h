@@ -4,8 +4,10 @@
 // recognising what was scored before and remembering the best are SearchOptimiser's.
 #pragma once
 
+#include <cmath>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -23,6 +25,8 @@ struct MethodSetup {
   GeneSpace space;
   Genome start;                // where to begin; empty: anywhere
   std::vector<double> spread;  // of the start, a covariance row by row; empty: unknown
+  bool noisy = false;          // scores differ between replicates
+  std::optional<std::uint64_t> evaluations = {};  // when the run ends; none: unknown
 };
 
 // The stream of a generation's k-th proposal.
@@ -40,14 +44,18 @@ class SearchMethod {
   virtual unsigned origin() const = 0;  // of the next proposals
   // For the run store's table of operators: step sizes, phases.
   virtual std::vector<NamedNumber> figures() const { return {}; }
+  virtual std::string reason() const { return {}; }  // as Optimiser::reason()
 
   virtual void save(v1::MethodState& message) const = 0;
   // Error: the message is not one that save() made for this setup.
   virtual Status restore(const v1::MethodState& message) = 0;
 };
 
-// Mirrored into [0, 1] gene by gene, as if mirrors stood at both ends, then snapped.  A function
-// seen through it has no bounds and no jump at them.
+// Into [0, 1] as if mirrors stood at both ends.
+inline double mirrored(double gene) { return std::abs(std::remainder(gene, 2)); }
+
+// Mirrored gene by gene, then snapped.  A function seen through it has no bounds and no jump at
+// them.
 Genome placed(const GeneSpace& space, const Genome& proposed);
 
 // The error of restore().

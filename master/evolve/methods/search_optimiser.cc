@@ -13,7 +13,7 @@ namespace gapfarm {
 Genome placed(const GeneSpace& space, const Genome& proposed) {
   Genome genome(proposed.size());
   for (std::size_t gene = 0; gene < genome.size(); ++gene) {
-    const double inside = std::abs(std::remainder(proposed[gene], 2));
+    const double inside = mirrored(proposed[gene]);
     genome[gene] = space.snapped(gene, std::isfinite(inside) ? inside : 0.5);
   }
   return genome;

@@ -32,6 +32,7 @@ class SearchOptimiser final : public Optimiser {
   const Member& best() const override;
   double diversity() const override { return diversity_of(round_); }
   std::vector<NamedNumber> operator_probabilities() const override { return method_->figures(); }
+  std::string reason() const override { return method_->reason(); }
   std::string state() const override;
 
   // Errors: a state of another kind or of other genes, or damaged.
