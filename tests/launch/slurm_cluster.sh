@@ -82,6 +82,7 @@ MpiDefault=none
 SelectType=select/cons_tres
 SelectTypeParameters=CR_CPU
 SchedulerParameters=sched_interval=1,sched_min_interval=0,batch_sched_delay=1
+SlurmctldDebug=debug
 ReturnToService=2
 KillWait=5
 MailProg=/bin/true
