@@ -23,6 +23,10 @@ clean_up() {
   rm -rf "$T"
 }
 
+free_port() {
+  /usr/bin/python3 -c 'import socket; s = socket.socket(); s.bind(("", 0)); print(s.getsockname()[1])'
+}
+
 # wait_for WHAT COMMAND...: until it succeeds; a minute is far beyond what anything here takes.
 wait_for() {
   local what=$1 deadline=$((SECONDS + 60))

@@ -22,9 +22,6 @@ interval=4  # of the scheduler, s
 # Asked to end, a qmaster takes seven seconds.
 sge=()
 trap 'kill -KILL "${sge[@]}"; wait "${sge[@]}"; clean_up' EXIT
-free_port() {
-  /usr/bin/python3 -c 'import socket; s = socket.socket(); s.bind(("", 0)); print(s.getsockname()[1])'
-}
 node=$(hostname)
 printf '127.0.0.1 %s localhost\n' "$node" >"$T/hosts"
 mount --bind "$T/hosts" /etc/hosts

@@ -11,10 +11,6 @@ slurm_needs() {
   mountpoint -q /sys/fs/cgroup || not_run 'slurmd wants /sys/fs/cgroup mounted'
 }
 
-free_port() {
-  /usr/bin/python3 -c 'import socket; s = socket.socket(); s.bind(("", 0)); print(s.getsockname()[1])'
-}
-
 # A database for slurmdbd in $T/sql.
 start_database() {
   mkdir -m 755 "$T/sql"
