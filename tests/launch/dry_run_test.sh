@@ -32,6 +32,7 @@ expect sge 'h_rt=90' --wall-time 90
 expect sge '-pe smp 4' --workers-per-job 4
 expect pbs 'walltime=3600' --wall-time 3600
 expect condor 'queue 12'
+expect condor '+ProjectName = "robots"' -- '+ProjectName = "robots"'
 expect kube 'runAsNonRoot: true'
 expect kube 'activeDeadlineSeconds: 600' --wall-time 600
 expect ssh ' a sh ' --host a --host b
@@ -41,8 +42,17 @@ printed=$("$BIN/gapfarm" workers --on slurm --connect tcp://m:1 --keys "$T/keys"
 [[ $printed == *"--keys $T/keys"* ]] || fail "no key folder: $printed"
 secret=$(sed -n 's/.*secret[^A-Za-z0-9]*//p' "$T/keys/worker.key" | head -n 1)
 [[ -z $secret || $printed != *"$secret"* ]] || fail 'a secret key is printed'
-printed=$("$BIN/gapfarm" submit --on slurm --keys "$T/keys" --max 8 --dry-run -- evolve c.toml --out r 2>&1) || fail "$printed"
-[[ $printed == *'--signal=B:USR1@60'* && $printed == *'scontrol requeue'* ]] || fail "submit printed: $printed"
+# expect_submit SYSTEM WANTED...
+expect_submit() {
+  local system=$1 wanted printed
+  shift
+  printed=$("$BIN/gapfarm" submit --on "$system" --keys "$T/keys" --max 8 --dry-run -- evolve c.toml --out r 2>&1) ||
+    fail "$printed"
+  for wanted in "$@"; do [[ $printed == *"$wanted"* ]] || fail "submit printed: $printed"; done
+}
+expect_submit slurm '--signal=B:USR1@60' 'scontrol requeue' '--workers-on slurm'
+expect_submit sge '-notify' 'exit 99' '--workers-on sge'
+expect_submit pbs '-r y' 'qrerun' '--workers-on pbs'
 "$BIN/gapfarm" workers --on slurm --max 2 2>/dev/null && fail 'submitted without an endpoint'
 "$BIN/gapfarm" workers --on nowhere --max 2 --connect tcp://m:1 2>/dev/null && fail 'knew a system nowhere'
 [[ ! -e $T/ran ]] || fail "ran $(<"$T/ran")"

@@ -3,7 +3,8 @@
 
 Every object of the base, of what kustomize makes of the overlay (where kubectl is there) and of kube.toml must
 deserialise into its type of the Kubernetes client (which checks what is required), may have no key that the type
-does not know, and runs nothing as root, with a root file system that can be written, or without limits."""
+does not know, and runs nothing as root, with capabilities or a root file system that can be written, or without
+requests and limits.  Every Job is probed and has a disruption budget."""
 import json
 import pathlib
 import re
@@ -82,9 +83,22 @@ def unsafe(value, where):
         own = container.get('securityContext', {})
         if not own.get('readOnlyRootFilesystem') or own.get('allowPrivilegeEscalation', True):
             found.append(f'{where}: {container["name"]} may write its root or gain privileges')
-        if container in spec['containers'] and not container.get('resources', {}).get('limits'):
-            found.append(f'{where}: {container["name"]} has no limits')
+        if own.get('capabilities') != {'drop': ['ALL']}:
+            found.append(f'{where}: {container["name"]} has capabilities')
+        if container not in spec['containers']:
+            continue
+        if set(container.get('resources', {})) != {'requests', 'limits'}:
+            found.append(f'{where}: {container["name"]} has no requests or no limits')
+        if value['kind'] == 'Job' and 'livenessProbe' not in container:
+            found.append(f'{where}: {container["name"]} is not probed')
     return found
+
+
+def without_budget(values, name):
+    """Jobs whose pods no disruption budget selects."""
+    budgets = [v['spec']['selector']['matchLabels'] for v in values if v['kind'] == 'PodDisruptionBudget']
+    return [f'{name}: Job {job["metadata"]["name"]} has no disruption budget' for job in values
+            if job['kind'] == 'Job' and job['spec']['template']['metadata']['labels'] not in budgets]
 
 
 def sources(folder):
@@ -110,7 +124,9 @@ def main(folder):
     failures = []
     objects = 0
     for name, text in sources(pathlib.Path(folder)):
-        for value in yaml.safe_load_all(text):
+        values = list(yaml.safe_load_all(text))
+        failures += without_budget(values, name)
+        for value in values:
             objects += 1
             where = f'{name}: {value["kind"]} {value["metadata"].get("name", "")}'
             kind = TYPES[value['apiVersion'], value['kind']]

@@ -18,12 +18,10 @@ fi
 
 T=$(mktemp -d /tmp/gapfarm-sge-XXXXXX)
 chmod 755 "$T"
+interval=4  # of the scheduler, s
 # Asked to end, a qmaster takes seven seconds.
 sge=()
 trap 'kill -KILL "${sge[@]}"; wait "${sge[@]}"; clean_up' EXIT
-free_port() {
-  /usr/bin/python3 -c 'import socket; s = socket.socket(); s.bind(("", 0)); print(s.getsockname()[1])'
-}
 node=$(hostname)
 printf '127.0.0.1 %s localhost\n' "$node" >"$T/hosts"
 mount --bind "$T/hosts" /etc/hosts
@@ -60,9 +58,9 @@ wait_for 'the qmaster answers' qconf -sconf
     for key in rt cpu fsize data stack core rss vmem; do printf 's_%s INFINITY\nh_%s INFINITY\n' $key $key; done
   } >"$T/queue"
   qconf -Aq "$T/queue"
-  qconf -ssconf | sed 's/^\(schedule_interval\) .*/\1 0:0:1/; s/^\(flush_[a-z]*_sec\) .*/\1 1/' >"$T/scheduler"
+  qconf -ssconf | sed "s/^\(schedule_interval\) .*/\1 0:0:$interval/; s/^\(flush_[a-z]*_sec\) .*/\1 1/" >"$T/scheduler"
   qconf -Msconf "$T/scheduler"
-  qconf -sconf global | sed 's/^\(min_[ug]id\) .*/\1 0/; s/^\(max_u_jobs\) .*/\1 4/' >"$T/global"
+  qconf -sconf global | sed 's/^\(min_[ug]id\) .*/\1 0/; s/^\(max_u_jobs\) .*/\1 4/; s/ flush_time=[0-9:]*/ flush_time=0:0:0/' >"$T/global"
   qconf -Mconf "$T/global"
 } >"$T/qconf.log" 2>&1
 sge_execd >"$T/execd.log" 2>&1 &
@@ -74,18 +72,20 @@ write_config
 start_master 127.0.0.1
 while sleep 0.2; do qstat -u root -g d 2>/dev/null | grep -c '^ *[0-9]'; done >"$T/standing" &
 started+=($!)
-began=$EPOCHREALTIME
 "$BIN/gapfarm" workers --on sge --run "$T/run" --keys "$T/keys" --max 8 --wall-time 8 --look-every 1 --block 1 \
   --worker-logs "$T/logs" 2>"$T/workers.log" &
 fleet=$!
 started+=("$fleet")
 workers_are() { [[ $(status "$T/run" 'sum(w["state"] != "gone" for w in s["workers"])') == "$1" ]]; }
 wait_for 'four workers have joined' workers_are 4
-filled "$began"
 why() { [[ $(status "$T/run" 's["fleets"][0]["why"]') == *'no more than 4 jobs'* ]]; }
 wait_for 'status says why there are no more' why
 replaced() { [[ $(find "$T/logs" -name '*.log' | wc -l) -ge 8 ]]; }
 wait_for 'every one was replaced' replaced
 gone() { [[ -z $(qstat -u root) ]]; }
 expect_taken_away sge
+# Of the accounting file (sge_accounting(5)) the times of submission and start, in s.
+filled "$(grep -v '^#' "$T/cell/common/accounting" | sort -t : -k 10n,10 | awk -F : -v cycle=$interval '
+  NR == 1 || $9 < asked { asked = $9 }
+  NR == 4 { print int(($10 - asked + cycle - 1) / cycle); exit }')"
 exit 0

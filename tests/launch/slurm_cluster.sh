@@ -11,10 +11,6 @@ slurm_needs() {
   mountpoint -q /sys/fs/cgroup || not_run 'slurmd wants /sys/fs/cgroup mounted'
 }
 
-free_port() {
-  /usr/bin/python3 -c 'import socket; s = socket.socket(); s.bind(("", 0)); print(s.getsockname()[1])'
-}
-
 # A database for slurmdbd in $T/sql.
 start_database() {
   mkdir -m 755 "$T/sql"
@@ -82,6 +78,7 @@ MpiDefault=none
 SelectType=select/cons_tres
 SelectTypeParameters=CR_CPU
 SchedulerParameters=sched_interval=1,sched_min_interval=0,batch_sched_delay=1
+SlurmctldDebug=debug
 ReturnToService=2
 KillWait=5
 MailProg=/bin/true

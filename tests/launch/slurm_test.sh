@@ -18,14 +18,15 @@ start_master 127.0.0.1
 # What stands, five times a second.
 while sleep 0.2; do squeue --noheader --array --format=%i 2>/dev/null | wc -l; done >"$T/standing" &
 started+=($!)
-began=$EPOCHREALTIME
 "$BIN/gapfarm" workers --on slurm --run "$T/run" --keys "$T/keys" --max 8 --wall-time 8 --look-every 1 \
   --worker-logs "$T/logs" 2>"$T/workers.log" &
 fleet=$!
 started+=("$fleet")
 workers_are() { [[ $(status "$T/run" 'sum(w["state"] != "gone" for w in s["workers"])') == "$1" ]]; }
 wait_for 'four workers have joined' workers_are 4
-filled "$began"
+filled "$(awk '/_slurm_rpc_submit_batch_job: JobId=/ { asked = 1 }
+  asked && /sched: Running job scheduler/ { ++cycles }
+  /sched: Allocate JobId=/ && ++begun == 4 { print cycles; exit }' "$T/slurmctld.log")"
 why() { [[ $(status "$T/run" 's["fleets"][0]["why"]') == *'no more than 4 jobs'* ]]; }
 wait_for 'status says why there are no more' why
 status "$T/run" 's["fleets"]'

@@ -45,6 +45,8 @@ void FleetMemory::strike(const std::string& node, const FleetLimits& limits, dou
 }
 
 void FleetMemory::note_accepted(unsigned jobs, unsigned standing) {
+  stood_ = std::max(stood_, standing + jobs);
+  refused_fewer_ = false;
   step_ = site_limit_ && step_ < ~0u / 2 ? 2 * step_ : ~0u;
   if (growth_ == 0 || standing + jobs < *site_limit_) return;
   growth_ *= 2;
@@ -54,7 +56,11 @@ void FleetMemory::note_accepted(unsigned jobs, unsigned standing) {
 void FleetMemory::note_site_limit(unsigned jobs, unsigned standing, const FleetLimits& limits,
                                   double now_s) {
   // Of n more one at least was too much.
-  site_limit_ = standing + jobs - 1;
+  const unsigned room = standing + jobs - 1;
+  refused_fewer_ = room < stood_ && !refused_fewer_;
+  if (refused_fewer_) return note_failure(limits, now_s);
+  stood_ = std::min(stood_, room);
+  site_limit_ = room;
   site_limit_until_s_ = now_s + limits.limit_memory_s;
   step_ = std::max(1u, jobs / 2);
   growth_ = 0;

@@ -58,6 +58,8 @@ struct FleetLimits {
 class FleetMemory {
  public:
   // The site took, or refused for its limit on jobs, a submission of `jobs` while `standing` stood.
+  // Refused once with fewer than stood before, the site waits as after a failure: HTCondor counts
+  // jobs for a while that it lists no more.
   void note_accepted(unsigned jobs, unsigned standing);
   void note_site_limit(unsigned jobs, unsigned standing, const FleetLimits& limits, double now_s);
   // A submission failed for another reason.
@@ -82,8 +84,10 @@ class FleetMemory {
   std::deque<std::pair<double, unsigned>> demand_;  // jobs wanted, lately: falling, by time
   std::optional<unsigned> site_limit_;
   double site_limit_until_s_ = 0;
-  unsigned step_ = ~0u;  // jobs that the next submission tries
-  unsigned growth_ = 0;  // of the limit while it is tried again; 0: it is not
+  unsigned step_ = ~0u;         // jobs that the next submission tries
+  unsigned growth_ = 0;         // of the limit while it is tried again; 0: it is not
+  unsigned stood_ = 0;          // most jobs that the site has taken at once
+  bool refused_fewer_ = false;  // the last submission was refused with fewer
 };
 
 struct FleetDecision {

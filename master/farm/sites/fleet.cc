@@ -98,8 +98,9 @@ void Fleet::end(const Known& known, std::vector<EndedJob>* ended) {
     const std::string lines = last_lines(known);
     last_death_ = "job " + end.id + (end.node.empty() ? "" : " on " + end.node) +
                   " ended before its worker joined the master" +
-                  (lines.empty() ? "; its log is empty: see what the cluster says of it"
-                                 : "; the end of its log:\n  " + lines);
+                  (!lines.empty()          ? "; the end of its log:\n  " + lines
+                   : !known.reason.empty() ? "; the cluster's reason: " + known.reason
+                                           : "; its log is empty: see what the cluster says of it");
     note_once(last_death_ +
               "\n  try the same command by hand where it ran: `gapfarm workers ... "
               "--dry-run` prints it");

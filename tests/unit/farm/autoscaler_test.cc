@@ -119,6 +119,23 @@ TEST(Autoscaler, FindsTheSitesLimitByFewRefusalsAndTriesAgainLater) {
       1u);
 }
 
+// HTCondor's schedd counts jobs for a while that it lists no more.
+TEST(Autoscaler, OneRefusalOfFewerJobsThanOnceStoodIsNoLimit) {
+  FleetMemory memory;
+  const FleetLimits limits = up_to(4);
+  memory.note_accepted(4, 0);
+  memory.note_site_limit(1, 0, limits, 100);
+  EXPECT_EQ(memory.site_limit(), std::nullopt);
+  EXPECT_EQ(decide({100, true, {}, {}}, limits, 101, &memory).submit, 0u);
+  EXPECT_EQ(decide({100, true, {}, {}}, limits, 131, &memory).submit, 4u);
+  memory.note_accepted(1, 0);
+  memory.note_site_limit(3, 1, limits, 140);
+  EXPECT_EQ(memory.site_limit(), std::nullopt);
+  // Refused again, for what else this user runs, that is the limit.
+  memory.note_site_limit(3, 1, limits, 180);
+  EXPECT_EQ(memory.site_limit(), 3u);
+}
+
 TEST(Autoscaler, ABadNodeIsAvoidedTwiceAsLongEveryTime) {
   FleetMemory memory;
   const FleetLimits limits = up_to(2);

@@ -80,13 +80,10 @@ TEST(Sites, GridEngineIsUnderstood) {
                             "(current job count: 4)\nExiting.\n"));
 }
 
-// Written after manuals; Debian 12 has packages of neither, so nothing here was printed by the
-// systems themselves. PBS: `qstat -n -1 -u USER` has the columns of "Displaying Job Status in
-// Alternate Format" of the PBS Professional 2020.1 user's guide (OpenPBS 20 is the same), and -n -1
-// the host behind them; letters of states as in qstat(1B). HTCondor 10: `condor_q -af:j` has
-// cluster.process and then the attributes, "undefined" for those that are missing (manual page of
-// condor_q); JobStatus as in its "Job ClassAd Attributes"; `condor_submit -terse` the first and the
-// last job (its manual page).
+// Written after the manual, not printed by a PBS, of which Debian has no package: `qstat -n -1 -u
+// USER` has the columns of "Displaying Job Status in Alternate Format" of the PBS Professional
+// 2020.1 user's guide (OpenPBS 20 is the same), and -n -1 the host behind them; letters of states
+// as in qstat(1B).
 TEST(Sites, PbsIsUnderstood) {
   const ClusterSite site = shipped_site("pbs");
   const std::string listed = R"(
@@ -110,17 +107,27 @@ Job ID          Username Queue    Jobname    SessID NDS TSK Memory Time  S Time
       is_site_limit(site, "qsub: would exceed complex's per-user limit of jobs in 'Q' state\n"));
 }
 
+// Printed by HTCondor 23.9.6 of Debian 13, of one machine, with MAX_JOBS_PER_OWNER = 4.
 TEST(Sites, CondorIsUnderstood) {
   const ClusterSite site = shipped_site("condor");
+  EXPECT_EQ(parse_submitted(site, 3, "24.0 - 24.2\n"),
+            (std::vector<std::string>{"24.0", "24.1", "24.2"}));
   EXPECT_EQ(ids_of(parse_list(site, "gf01234567",
-                              "12.0 2 slot1_1@node-1.example.org undefined\n"
-                              "12.1 1 undefined undefined\n12.2 4 undefined undefined\n"
-                              "12.3 5 undefined Error from slot1@node-2: cannot execute\n"
-                              "12.4 7 slot2@node-1.example.org undefined\n")),
-            "12.0 runs node-1.example.org\n12.1 queued \n12.3 stuck \n"
-            "12.4 runs node-1.example.org\n");
-  EXPECT_EQ(parse_submitted(site, 3, "12.0 - 12.2\n"),
-            (std::vector<std::string>{"12.0", "12.1", "12.2"}));
+                              "24.0 1 undefined undefined\n24.1 1 undefined undefined\n")),
+            "24.0 queued \n24.1 queued \n");
+  const auto jobs =
+      parse_list(site, "gf01234567",
+                 "24.0 7 slot1_1@localhost.vm undefined\n"
+                 "24.1 2 slot1_2@localhost.vm undefined\n"
+                 "25.0 5 undefined Error from slot1_4@localhost.vm: Failed to "
+                 "execute '/home/farm/none': (errno=2: 'No such file or directory')\n");
+  EXPECT_EQ(ids_of(jobs), "24.0 runs localhost.vm\n24.1 runs localhost.vm\n25.0 stuck \n");
+  ASSERT_EQ(jobs.size(), 3u);
+  EXPECT_EQ(jobs[0].reason, "");
+  EXPECT_EQ(jobs[2].reason.rfind("Error from slot1_4@localhost.vm: Failed to execute", 0), 0u);
+  EXPECT_TRUE(is_site_limit(site,
+                            "\nERROR: Failed to create proc\n"
+                            "Number of submitted jobs would exceed MAX_JOBS_PER_OWNER\n"));
 }
 
 TEST(Sites, KubernetesIsUnderstood) {
@@ -255,6 +262,27 @@ TEST(Fleets, ShowTheLogOfWhatDiedAtOnceAndBackOff) {
   // After 30, 60, 120, ... s.
   EXPECT_LE(farm.cluster.submissions, 9u);
   EXPECT_GE(farm.fleet->status().lost, 4u);
+}
+
+TEST(Fleets, ReportTheClustersReasonForAJobThatIsStuck) {
+  PretendedFleet farm(1);
+  farm.options.site = shipped_site("condor");
+  std::string listed = "25.0 5 undefined Error from slot1_4@localhost.vm: Failed to execute\n";
+  Fleet fleet(
+      farm.options,
+      [&](const std::vector<std::string>& command, const std::string&) {
+        Captured out;
+        if (command[0] == "condor_q") out.out = listed;
+        if (command[0] == "condor_rm") listed.clear();
+        return Result<Captured>(out);
+      },
+      [&](const std::string& note) { farm.notes += note + "\n"; });
+  v1::Backlog backlog;
+  for (double now = 0; now < 3; ++now) fleet.look(&backlog, now);
+  EXPECT_NE(farm.notes.find("job 25.0 ended before its worker joined the master; the cluster's "
+                            "reason: Error from slot1_4@localhost.vm"),
+            std::string::npos)
+      << farm.notes;
 }
 
 }  // namespace gapfarm::site_test
