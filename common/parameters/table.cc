@@ -36,11 +36,9 @@ struct ScenarioTable {
   const char* scenario;
   const ParameterTable& (*table)();
 };
-constexpr ScenarioTable kScenarioTables[] = {{"srv1", srv1_table},
-                                             {"push", push_table},
-                                             {"racquetball", racquetball_table},
-                                             {"ground", ground_table},
-                                             {"external", external_table}};
+constexpr ScenarioTable kScenarioTables[] = {
+    {"srv1", srv1_table},     {"push", push_table},         {"racquetball", racquetball_table},
+    {"ground", ground_table}, {"external", external_table}, {"objective", external_table}};
 
 Parameter effect_parameter(const Effect& effect, const EffectParameter& p) {
   return {effect.name + "." + p.key,

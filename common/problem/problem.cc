@@ -21,15 +21,23 @@ std::vector<CommandSpec> racquetball_commands() { return {{"serve", 1, 1, 5}}; }
 // Windows bring their own durations and commands.
 std::vector<CommandSpec> ground_commands() { return {{kWindowCommand, 0, 0, 0}}; }
 
-constexpr ScenarioForm kForms[] = {{"srv1", srv1_commands, false, false, false, true, true},
-                                   {"push", no_commands, true},
-                                   {"racquetball", racquetball_commands},
-                                   {"ground", ground_commands, false, true},
-                                   {"external", srv1_commands, false, false, true}};
+constexpr ScenarioForm kForms[] = {
+    {"srv1", srv1_commands, false, false, false, true, true},
+    {"push", no_commands, true},
+    {"racquetball", racquetball_commands},
+    {"ground", ground_commands, false, true},
+    {"external", srv1_commands, false, false, true},
+    {.name = "objective", .commands = no_commands, .program = true, .objective = true}};
 
 }  // namespace
 
-bool higher_is_better(FitnessKind kind) { return kind == FitnessKind::kLogScore; }
+bool higher_is_better(FitnessKind kind) {
+  return kind == FitnessKind::kLogScore || kind == FitnessKind::kGreatestValue;
+}
+
+bool is_value(FitnessKind kind) {
+  return kind == FitnessKind::kLeastValue || kind == FitnessKind::kGreatestValue;
+}
 
 bool compares_means(FitnessKind kind) {
   return kind == FitnessKind::kRobustMahalanobis || kind == FitnessKind::kCornerDistance;
@@ -45,6 +53,9 @@ const char* fitness_name(FitnessKind kind) {
       return "energy_score";
     case FitnessKind::kCornerDistance:
       return "corner_distance";
+    case FitnessKind::kLeastValue:
+    case FitnessKind::kGreatestValue:
+      return "value";
   }
   return "?";
 }
@@ -54,6 +65,8 @@ const char* fitness_unit(FitnessKind kind) {
     case FitnessKind::kLogScore:
       return "nats/trial";
     case FitnessKind::kRobustMahalanobis:
+    case FitnessKind::kLeastValue:
+    case FitnessKind::kGreatestValue:
       return "-";
     case FitnessKind::kEnergyScore:
     case FitnessKind::kCornerDistance:

@@ -28,7 +28,14 @@ struct CommandSpec {
   double duration_s = 1;
 };
 
-enum class FitnessKind { kLogScore, kRobustMahalanobis, kEnergyScore, kCornerDistance };
+enum class FitnessKind {
+  kLogScore,
+  kRobustMahalanobis,
+  kEnergyScore,
+  kCornerDistance,
+  kLeastValue,  // scenario `objective` has these two, and no other scenario has them
+  kGreatestValue
+};
 
 inline constexpr double kMostOutliers = 0.5;
 
@@ -44,6 +51,8 @@ struct FitnessSettings {
 
 // Whether a greater fitness is the better one.
 bool higher_is_better(FitnessKind kind);
+// Whether it is an objective's own value.
+bool is_value(FitnessKind kind);
 // Whether it compares one nominal motion a trial; spread would only cost time.
 bool compares_means(FitnessKind kind);
 const char* fitness_name(FitnessKind kind);
@@ -75,7 +84,7 @@ struct Problem {
   std::shared_ptr<const GroundTable> ground;
   // Scenario `ground` only: the runs of which `log` is windows.
   std::vector<CommandedRun> runs;
-  // Scenario `external` only: the program that simulates.
+  // Scenarios `external` and `objective` only: the program that answers.
   std::shared_ptr<const ExternalProgram> external;
   // Where the scenario's form has drives alone: a correction of where they end.
   Residual residual;
@@ -105,12 +114,14 @@ struct ScenarioForm {
   bool pieces = false;
   // There is a robot's file, and trials are windows of runs.
   bool robot = false;
-  // A program of the user's simulates.
+  // A program of the user's answers.
   bool program = false;
   // Drives that may be corrected by a Residual.
   bool residual = false;
   // There may be a robot's file, of another robot than the scenario's own.
   bool other_robot = false;
+  // Nothing moves: values go in and a number comes out; there are neither commands nor trials.
+  bool objective = false;
 };
 // REQUIRES: a scenario that has a parameter table.
 const ScenarioForm& scenario_form(std::string_view scenario);
