@@ -72,8 +72,8 @@ std::string failures_among(const Problem& problem, const std::vector<v1::Task>& 
   if (failed == 0) return {};
   const std::string& why = results[last].message();
   return std::to_string(failed) + " of " + std::to_string(results.size()) +
-         " evaluations failed: " + task_label(tasks[last]) + " diverged" +
-         (why.empty() ? "" : ": " + why) + "; " + point_settings(problem, tasks[last]);
+         " evaluations failed: " + task_label(tasks[last]) + ": " +
+         (why.empty() ? "diverged" : why) + "; " + point_settings(problem, tasks[last]);
 }
 
 class OverSockets : public FarmOfRun {

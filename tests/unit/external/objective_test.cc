@@ -133,7 +133,7 @@ Result<Config> config_of(const std::string& more, const std::string& parameters 
       "objective.toml", start_program);
 }
 
-TEST(ObjectiveConfig, SearchesEverythingUnlessItIsTold) {
+TEST(ObjectiveConfig, SearchesEverythingByDefault) {
   const auto all = config_of("direction = \"maximise\"\nnoisy = true\n");
   ASSERT_TRUE(all.ok()) << all.error().message;
   const Problem& problem = all->problem;
