@@ -96,6 +96,7 @@ Result<ParameterValues> values_at(const Problem& problem, const v1::Point& point
 
 v1::TaskResult run(const Prepared& p, const ParameterValues& values, const v1::EvaluateTask& task,
                    StepCounter* steps) {
+  if (p.scenario().can & kEvaluates) return p.model().evaluate(values, task, steps);
   PredictOptions options;
   options.stream = task.stream();
   options.steps = steps;
@@ -210,7 +211,7 @@ v1::TaskResult echo(const v1::EchoTask& task, StepCounter* steps) {
 }
 
 template <class T>
-v1::TaskResult at_point(const Prepared& prepared, ScenarioCan needed, const T& task,
+v1::TaskResult at_point(const Prepared& prepared, unsigned needed, const T& task,
                         StepCounter* steps) {
   if ((prepared.scenario().can & needed) == 0) return invalid(prepared.scenario().lacks);
   const auto values = values_at(prepared.problem(), task.point());
@@ -223,7 +224,7 @@ v1::TaskResult dispatch(const Prepared* prepared, const v1::Task& task, StepCoun
   if (prepared == nullptr) return invalid("the task needs a problem");
   switch (task.kind_case()) {
     case v1::Task::kEvaluate:
-      return at_point(*prepared, kPredicts, task.evaluate(), steps);
+      return at_point(*prepared, kPredicts | kEvaluates, task.evaluate(), steps);
     case v1::Task::kPredict:
       return at_point(*prepared, kPredicts, task.predict(), steps);
     case v1::Task::kSimulate:

@@ -144,6 +144,9 @@ Result<v1::EvaluateResult> fitness_of(const Problem& problem, const FitnessRefer
     case FitnessKind::kCornerDistance:
       result.set_fitness(mean_corner_distance(problem, prediction));
       break;
+    case FitnessKind::kLeastValue:
+    case FitnessKind::kGreatestValue:
+      return Error{"the fitness is a value, and what was simulated are trials"};
     case FitnessKind::kRobustMahalanobis: {
       ASSIGN_OR_RETURN(const auto score, robust_score(problem, reference, prediction));
       result.set_fitness(score.fitness);

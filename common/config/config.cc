@@ -28,6 +28,9 @@ void read_top(TomlSection& top, Config& config) {
       if (file.empty()) top.fail("trials", "trials names an empty file, expected paths");
       config.trial_files.push_back(beside(config.path, file));
     }
+    if (scenario_form(config.problem.scenario).objective) {
+      top.fail("trials", "scenario objective has no trials; its program has what it needs");
+    }
   }
 }
 
@@ -63,6 +66,24 @@ void read_runs_section(TomlSection& top, Config& config) {
   if (auto horizons = runs->numbers("horizons", 0, 1e5, "s")) config.windows.horizons_s = *horizons;
   runs->read("run_in", config.windows.run_in_s, 0, 1e3, "s");
   runs->finish();
+}
+
+// What only scenarios have in which something moves.
+void read_motions(TomlSection& top, const ScenarioForm& form, Config& config) {
+  Problem& problem = config.problem;
+  read_effects(top, problem.table(), problem.values);
+  read_pieces(top, form, problem.pieces, problem.commands);
+  if (!form.pieces) read_commands(top, problem.commands);
+  read_fitness(top, problem.fitness);
+  read_spread(top, problem.spread);
+  read_simulate(top, problem.commands, config.simulate);
+  top.find("validation");  // as [[stages]]
+}
+
+void search_everything(const ParameterTable& table, std::vector<Gene>& genes) {
+  for (std::size_t row = 0; row < table.size(); ++row) {
+    genes.push_back({row, table[row].lower, table[row].upper, table[row].scale});
+  }
 }
 
 }  // namespace
@@ -104,19 +125,16 @@ Result<Config> parse_config(std::string_view text, const std::string& path,
   problem.values = problem.tracked ? problem.tracked->values() : table.nominal();
   problem.commands = default_commands(problem.scenario);
   read_parameters(top, table, problem.values);
-  read_effects(top, table, problem.values);
   read_genes(top, table, problem.genes);
-  read_pieces(top, form, problem.pieces, problem.commands);
-  if (!form.pieces) read_commands(top, problem.commands);
-  read_fitness(top, problem.fitness);
-  read_spread(top, problem.spread);
+  if (form.objective) {
+    if (problem.genes.empty()) search_everything(table, problem.genes);
+  } else {
+    read_motions(top, form, config);
+  }
   read_evolution(top, config.evolution);
   read_optimiser(top, config.evolution.optimiser);
   read_farm(top, config.farm);
-  read_simulate(top, problem.commands, config.simulate);
-  // Read by those who look at them: read_stages().
-  top.find("stages");
-  top.find("validation");
+  top.find("stages");  // read by those who look at them: read_stages()
   top.finish();
   if (!errors.empty()) return errors.error();
   return config;
@@ -127,6 +145,14 @@ Result<Config> read_config(const std::string& path) {
   auto text = read_text_file(file);
   if (!text.ok()) return text.error();
   return parse_config(*text, file, start_program);
+}
+
+Status check_moves(const std::string& scenario, const std::string& path) {
+  if (!scenario_form(scenario).objective) return {};
+  return Error{path +
+               ": scenario objective has values and a number, and no trials or motions, which this "
+               "command is about; it can be checked, evolved, resumed, compared and replayed, and "
+               "shown by status, serve and report"};
 }
 
 Status check_evolvable(const Config& config) {

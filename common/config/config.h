@@ -28,4 +28,7 @@ Result<Config> read_config(const std::string& path);
 // What evolving needs beyond a config that reads: at least one gene.
 Status check_evolvable(const Config& config);
 
+// An error where the scenario is `objective`, for what needs trials or motions; `path` names it.
+Status check_moves(const std::string& scenario, const std::string& path);
+
 }  // namespace gapfarm

@@ -5,36 +5,50 @@
 
 namespace gapfarm {
 
+void read_objective(TomlSection& section, FitnessSettings& fitness, SpreadSettings& spread) {
+  static const std::vector<std::string> kDirections = {"minimise", "maximise", "minimize",
+                                                       "maximize"};
+  const bool greatest = section.choice("direction", kDirections).value_or(0) % 2 == 1;
+  fitness.kind = greatest ? FitnessKind::kGreatestValue : FitnessKind::kLeastValue;
+  if (section.boolean("noisy").value_or(false)) spread.kind = SpreadKind::kSampled;
+}
+
 bool read_external_section(TomlSection& top, const std::string& config_path,
                            const ProgramStarter& start, Problem& problem) {
-  auto section = top.section("external");
+  const std::string& scenario = problem.scenario;
+  const bool objective = scenario_form(scenario).objective;
+  const std::string example =
+      std::string("[\"python3\", \"") + (objective ? "objective.py" : "simulator.py") + "\"]";
+  auto section = top.section(scenario);
   const auto fail = [&](const std::string& sentence) {
     top.errors().add(section ? section->table().source().begin : top.table().source().begin,
                      sentence);
     return false;
   };
   if (!section) {
-    return fail("scenario " + problem.scenario +
-                " needs its program:\n  [external]\n"
-                "  program = [\"python3\", \"simulator.py\"]");
+    return fail("scenario " + scenario + " needs its program:\n  [" + scenario +
+                "]\n  program = " + example);
   }
   ExternalCommand command;
   command.argv = section->strings("program").value_or(std::vector<std::string>());
   section->read("answer_limit", command.answer_limit_s, 1e-3, 1e6, "s");
+  if (objective) read_objective(*section, problem.fitness, problem.spread);
   section->finish();
   if (command.argv.empty() || command.argv[0].empty()) {
-    return fail(
-        "[external] program names no program, expected words such as "
-        "[\"python3\", \"simulator.py\"]");
+    return fail("[" + scenario + "] program names no program, expected words such as " + example);
   }
   std::error_code ignored;
   command.folder =
       std::filesystem::absolute(config_path, ignored).lexically_normal().parent_path().string();
   const Result<std::string> introduction = start(command);
   if (!introduction) return fail(introduction.error().message);
-  auto program = make_external_program(std::move(command), *introduction);
+  auto program = make_external_program(std::move(command), *introduction, objective);
   if (!program) return fail(program.error().message);
   if (Status s = check_program(**program, problem); !s) return fail(s.error().message);
+  if (objective && (*program)->table.table().size() == 0) {
+    return fail("external program '" + (*program)->command.argv[0] +
+                "' declares no parameters, so there is nothing to search");
+  }
   problem.external = std::move(*program);
   return true;
 }

@@ -141,15 +141,17 @@ void read_origin(TomlSection& top, Model& model) {
 Status read_model_program(TomlSection& top, Model& model) {
   ExternalCommand command;
   std::string introduction;
-  if (auto section = top.section("external")) {
+  const bool objective = scenario_form(model.scenario).objective;
+  if (auto section = top.section(model.scenario)) {
     command.argv = section->strings("program").value_or(std::vector<std::string>());
     section->read("folder", command.folder);
     section->read("answer_limit", command.answer_limit_s, 1e-3, 1e6, "s");
     section->read("introduction", introduction);
+    if (objective) read_objective(*section, model.fitness, model.spread);
     section->finish();
   }
   ASSIGN_OR_RETURN(auto program,
-                   make_external_program(std::move(command), std::move(introduction)));
+                   make_external_program(std::move(command), std::move(introduction), objective));
   model.external = std::move(program);
   model.values = model.table().nominal();
   return {};

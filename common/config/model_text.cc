@@ -42,16 +42,18 @@ std::string entry(const Model& model, std::size_t row, const std::string& key) {
     text += ", lo = " + toml_number(model.intervals[row]->lower) +
             ", hi = " + toml_number(model.intervals[row]->upper);
   }
-  return text + " }  # " + parameter.summary + "\n";
+  return text + " }" + (parameter.summary.empty() ? "" : "  # " + parameter.summary) + "\n";
 }
 
 bool is_noise(const Parameter& row) { return row.key.find("_noise_") != std::string::npos; }
 
 std::string base_section(const Model& model, const char* name, bool noise) {
+  const bool objective = scenario_form(model.scenario).objective;  // whose rows are its own
+  if (objective && noise) return "";
   std::string text = std::string("\n[") + name + "]\n";
   const ParameterTable& table = model.table();
   for (std::size_t row = 0; row < table.size(); ++row) {
-    if (!table[row].effect.empty() || is_noise(table[row]) != noise) continue;
+    if (!table[row].effect.empty() || (!objective && is_noise(table[row])) != noise) continue;
     text += entry(model, row, table[row].key);
   }
   return text;
@@ -92,9 +94,15 @@ std::string program_section(const Model& model) {
   for (const std::string& word : command.argv) {
     argv += (argv.empty() ? "" : ", ") + toml_string(word);
   }
-  return "\n[external]\nprogram = [" + argv + "]\nfolder = " + toml_string(command.folder) +
+  const std::string objective =
+      std::string("\ndirection = ") +
+      (higher_is_better(model.fitness.kind) ? "\"maximise\"" : "\"minimise\"") +
+      (model.spread.kind == SpreadKind::kSampled ? "\nnoisy = true" : "");
+  return "\n[" + model.scenario + "]\nprogram = [" + argv +
+         "]\nfolder = " + toml_string(command.folder) +
          "\nanswer_limit = " + toml_number(command.answer_limit_s) +
-         "\nintroduction = " + toml_string(model.external->introduction) + "\n";
+         "\nintroduction = " + toml_string(model.external->introduction) +
+         (scenario_form(model.scenario).objective ? objective : "") + "\n";
 }
 
 std::string piece_sections(const Model& model) {
@@ -128,6 +136,9 @@ std::string command_sections(const Model& model) {
 
 std::string score_sections(const Model& model) {
   const FitnessSettings& fitness = model.fitness;
+  if (is_value(fitness.kind)) {
+    return model.score ? "\n[fitness]\nvalue = " + toml_number(*model.score) + "\n" : "";
+  }
   std::string text = std::string("\n[fitness]\nkind = ") + toml_string(fitness_name(fitness.kind));
   if (model.score) text += "\nvalue = " + toml_number(*model.score);
   text += "\noutlier_share = " + toml_number(fitness.outlier_share) +
@@ -169,13 +180,14 @@ std::string origin_sections(const Model& model) {
 }  // namespace
 
 std::string format_model(const Model& model) {
-  return "# A gapfarm model: 'gapfarm predict' and 'gapfarm simulate' take it.\nmodel = 1\n"
-         "scenario = " +
-         toml_string(model.scenario) + "\nkind = " + toml_string(model.kind) + "\n" +
-         robot_text(model) + program_section(model) + base_section(model, "parameters", false) +
-         base_section(model, "noise", true) + effect_sections(model) + frame_section(model) +
-         residual_section(model) + command_sections(model) + score_sections(model) +
-         origin_sections(model);
+  const bool objective = scenario_form(model.scenario).objective;
+  return std::string("# A gapfarm model") +
+         (objective ? "" : ": 'gapfarm predict' and 'gapfarm simulate' take it") +
+         ".\nmodel = 1\nscenario = " + toml_string(model.scenario) +
+         "\nkind = " + toml_string(model.kind) + "\n" + robot_text(model) + program_section(model) +
+         base_section(model, "parameters", false) + base_section(model, "noise", true) +
+         effect_sections(model) + frame_section(model) + residual_section(model) +
+         command_sections(model) + score_sections(model) + origin_sections(model);
 }
 
 Status check_model(const Model& model) {

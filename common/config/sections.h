@@ -7,9 +7,12 @@
 
 namespace gapfarm {
 
-// [external].  False when there is no program to go on with.
+// [external] or [objective].  False when there is no program to go on with.
 bool read_external_section(TomlSection& top, const std::string& config_path,
                            const ProgramStarter& start, Problem& problem);
+
+// direction and noisy of [objective], in configs and models.
+void read_objective(TomlSection& section, FitnessSettings& fitness, SpreadSettings& spread);
 
 // Each reads its section of `top` (when it is there) into the settings and reports what is wrong.
 void read_parameters(TomlSection& top, const ParameterTable& table, ParameterValues& values);

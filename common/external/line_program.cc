@@ -133,9 +133,11 @@ bool LineProgram::wait_for(int fd, short events, double until) const {
   for (;;) {
     const double left = until - clock_();
     pollfd one{fd, events, 0};
-    const int ready = poll(&one, 1, left > 0 ? static_cast<int>(std::ceil(left * 1e3)) : 0);
+    const int ready =
+        poll(&one, 1, left > 0 ? static_cast<int>(std::ceil(std::min(left, 1.0) * 1e3)) : 0);
     if (ready > 0) return true;
     if (ready == 0 && left <= 0) return false;
+    if (waiting_) waiting_();
   }
 }
 

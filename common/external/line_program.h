@@ -4,7 +4,9 @@
 #include <sys/types.h>
 
 #include <cstddef>
+#include <functional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "common/base/result.h"
@@ -34,6 +36,9 @@ class LineProgram {
   // more than a line may hold, or sent something before it was asked.  After an error it is dead.
   Result<std::string> ask(const std::string& line);
 
+  // Called about once a second of waiting for it.
+  void while_waiting(std::function<void()> call) { waiting_ = std::move(call); }
+
   bool running() const { return pid_ > 0; }
   std::string name() const;  // its words, as typed
   // What asks it these lines in a shell.
@@ -53,6 +58,7 @@ class LineProgram {
   std::string folder_;
   LineLimits limits_;
   Clock clock_;
+  std::function<void()> waiting_;
   pid_t pid_ = 0;
   int to_ = -1;
   int from_ = -1;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <regex>
 
@@ -24,20 +25,25 @@ Error wrong(const std::string& what, const std::string& line) {
   return Error{what + ": '" + shown + (line.size() > kShown ? "...'" : "'")};
 }
 
-// Python's json and others print what JSON does not have.
-Result<Json> read_object(const std::string& line, const std::string& what) {
+// Python's json and others print what JSON does not have.  `not_a_number`: where to put the first
+// such word, with null in its place; null: that is an error.
+Result<Json> read_object(const std::string& line, const std::string& what,
+                         std::string* not_a_number = nullptr) {
   Json json = parse_json(line);
   if (json.is_object()) return json;
   static const std::regex kNotNumbers("-?\\b(NaN|Infinity|nan|inf)\\b");
   std::smatch found;
-  if (std::regex_search(line, found, kNotNumbers) &&
-      parse_json(std::regex_replace(line, kNotNumbers, "null")).is_object()) {
+  if (!std::regex_search(line, found, kNotNumbers)) return wrong(what, line);
+  json = parse_json(std::regex_replace(line, kNotNumbers, "null"));
+  if (!json.is_object()) return wrong(what, line);
+  if (not_a_number == nullptr) {
     return wrong("printed " + found.str() +
                      ", which is no number in JSON: print null for a pose "
                      "that a simulation does not have",
                  line);
   }
-  return wrong(what, line);
+  *not_a_number = found.str();
+  return json;
 }
 
 std::string word_of(const Json& json, const char* key) {
@@ -74,15 +80,69 @@ Result<unsigned> read_inputs(const Json& json) {
 
 // A key that is not known would be ignored without a word.
 Status check_keys(const Json& json, const std::string& parameter) {
-  static const std::vector<std::string> kKeys = {"key",     "unit", "lower",   "upper",
-                                                 "nominal", "log",  "integer", "summary"};
+  static const std::vector<std::string> kKeys = {"key", "unit",    "lower",   "upper", "nominal",
+                                                 "log", "integer", "choices", "when",  "summary"};
   for (const auto& [key, value] : json.items()) {
     if (std::find(kKeys.begin(), kKeys.end(), key) != kKeys.end()) continue;
     return Error{"declares parameter '" + parameter + "' with the unknown key '" + key + "'" +
                  suggestion(key, kKeys) +
-                 "; known: key, unit, lower, upper, nominal, log, integer, summary"};
+                 "; known: key, unit, lower, upper, nominal, log, integer, choices, when, summary"};
   }
   return {};
+}
+
+// The index of a word, or NaN.
+double choice_of(const Parameter& p, const Json& word) {
+  const auto at = std::find(p.choices.begin(), p.choices.end(), word);
+  return at == p.choices.end() ? NAN : static_cast<double>(at - p.choices.begin());
+}
+
+Status read_choices(const Json& json, Parameter* p) {
+  const Json& given = json["choices"];
+  const auto wrong = [&](const char* what) {
+    return Error{"parameter '" + p->key + "' has choices " + what};
+  };
+  if (!given.is_array() || given.size() < 2 ||
+      !std::all_of(given.begin(), given.end(), [](const Json& word) { return word.is_string(); })) {
+    return wrong("that are no list of two or more strings");
+  }
+  for (const char* key : {"lower", "upper", "log", "integer"}) {
+    if (json.contains(key)) return wrong("and bounds or a scale; omit one of the two");
+  }
+  for (const Json& word : given) p->choices.push_back(word.get<std::string>());
+  p->kind = ParameterKind::kChoice;
+  p->upper = static_cast<double>(given.size() - 1);
+  p->nominal = json.contains("nominal") ? choice_of(*p, json["nominal"]) : 0;
+  return {};
+}
+
+// {"key": value, ...} or {"key": [value, ...], ...} of parameters before this one.
+Result<std::vector<ExternalCondition>> read_conditions(const Json& json,
+                                                       const std::vector<Parameter>& before) {
+  std::vector<ExternalCondition> conditions;
+  const Json when = json.value("when", Json::object());
+  if (!when.is_object()) {
+    return Error{"parameter '" + word_of(json, "key") + "' has a \"when\" that is no object"};
+  }
+  for (const auto& [key, given] : when.items()) {
+    const auto wrong = [&](const std::string& what) {
+      return Error{"parameter '" + word_of(json, "key") + "' depends on '" + key + "', " + what};
+    };
+    const auto on = std::find_if(before.begin(), before.end(),
+                                 [&](const Parameter& p) { return p.key == key; });
+    if (on == before.end()) return wrong("which is not declared before it");
+    if (on->kind == ParameterKind::kReal) return wrong("which is neither choices nor an integer");
+    ExternalCondition& one = conditions.emplace_back();
+    one.row = static_cast<std::size_t>(on - before.begin());
+    for (const Json& value : given.is_array() ? given : Json::array({given})) {
+      const bool number = on->kind == ParameterKind::kInteger && value.is_number();
+      one.values.push_back(number ? value.get<double>() : choice_of(*on, value));
+      if (!(one.values.back() >= on->lower && one.values.back() <= on->upper)) {
+        return wrong("which is never " + json_text(value));
+      }
+    }
+  }
+  return conditions;
 }
 
 Result<Parameter> read_parameter(const Json& json) {
@@ -93,6 +153,10 @@ Result<Parameter> read_parameter(const Json& json) {
   p.unit = word_of(json, "unit");
   if (p.unit.empty()) p.unit = "-";
   p.summary = word_of(json, "summary");
+  if (json.contains("choices")) {
+    RETURN_IF_ERROR(read_choices(json, &p));
+    return p;
+  }
   p.lower = number_of(json, "lower", NAN);
   p.upper = number_of(json, "upper", NAN);
   p.nominal = number_of(json, "nominal", NAN);
@@ -117,12 +181,19 @@ Json to_json(const ExternalFloor& f) {
           {"patch_ratio", f.patch_ratio}};
 }
 
+// What stands for the value at a row's place.
+Json to_json(const Parameter& p, double value) {
+  if (p.kind == ParameterKind::kChoice) return p.choices[static_cast<std::size_t>(value)];
+  if (p.kind == ParameterKind::kInteger) return std::llround(value);
+  return value;
+}
+
 Json parameters_json(const ExternalDeclaration& declaration, const std::vector<double>& values) {
+  const std::vector<bool> present = declaration.present(values);
   Json parameters = Json::object();
   for (std::size_t i = 0; i < values.size(); ++i) {
     const Parameter& p = declaration.parameters[i];
-    Json& value = parameters[p.key] = values[i];
-    if (p.kind == ParameterKind::kInteger) value = std::llround(values[i]);
+    if (present[i]) parameters[p.key] = to_json(p, values[i]);
   }
   return parameters;
 }
@@ -138,20 +209,23 @@ std::vector<double> numbers(const Json& json, std::size_t count) {
   return values;
 }
 
-// The answer to question `id`; says whether it diverged.
+// The answer to question `id`; says whether it ended with the outcome `bad`.  `not_a_number`: as
+// read_object().
 template <class Answer>
-Result<Json> read_answer(const std::string& line, std::uint64_t id, Answer* answer) {
-  ASSIGN_OR_RETURN(const Json json, read_object(line, "did not answer with a JSON object"));
+Result<Json> read_answer(const std::string& line, std::uint64_t id, const std::string& bad,
+                         std::string* not_a_number, Answer* answer) {
+  ASSIGN_OR_RETURN(const Json json,
+                   read_object(line, "did not answer with a JSON object", not_a_number));
   const auto own = json.find("id");
   if (own == json.end() || *own != Json(id)) {
     return wrong("answered another question than " + std::to_string(id), line);
   }
   const std::string outcome = word_of(json, "outcome");
-  if (!outcome.empty() && outcome != "ok" && outcome != "diverged") {
-    return wrong("ended with an outcome other than ok or diverged", line);
+  answer->diverged = outcome == "diverged" || outcome == bad;
+  if (!answer->diverged && !outcome.empty() && outcome != "ok") {
+    return wrong("ended with an outcome other than ok or " + bad, line);
   }
-  answer->diverged = outcome == "diverged";
-  answer->message = word_of(json, "message");
+  if (answer->diverged) answer->message = word_of(json, "message");
   return json;
 }
 
@@ -161,11 +235,40 @@ bool has_null(const Json& given) {
          });
 }
 
+// An objective's answer; what is not finite is null here.
+Result<ExternalAnswer> read_value(const Json& json, const std::string& not_a_number,
+                                  const std::string& line) {
+  ExternalAnswer answer;
+  answer.message = word_of(json, "notes");
+  const auto without_value = [&](const std::string& why) {
+    answer.diverged = true;
+    answer.message = not_a_number.empty()
+                         ? why
+                         : "it printed " + not_a_number +
+                               ", which is no number in JSON: print null where there is no value";
+    return answer;
+  };
+  const Json violations = json.value("violations", Json::array());
+  if (!violations.is_array()) return wrong("answered violations that are no list", line);
+  for (const Json& violation : violations) {
+    if (violation.is_null()) return without_value("it answered a violation of null");
+    if (!violation.is_number()) return wrong("answered a violation that is no number", line);
+    answer.violation += std::max(0.0, violation.get<double>());
+    answer.violation = std::min(answer.violation, std::numeric_limits<double>::max());
+  }
+  const Json value = json.value("value", Json("none"));
+  if (answer.violation > 0) return answer;
+  if (value.is_null()) return without_value("it answered a value of null");
+  if (!value.is_number()) return wrong("did not answer with \"value\": a number", line);
+  answer.value = value.get<double>();
+  return answer;
+}
+
 }  // namespace
 
 std::string hello_line() { return json_text(Json{{"gapfarm", kExternalProtocol}}); }
 
-Result<ExternalDeclaration> parse_declaration(const std::string& line) {
+Result<ExternalDeclaration> parse_declaration(const std::string& line, bool objective) {
   ASSIGN_OR_RETURN(const Json read,
                    read_object(line, "does not introduce itself with a JSON object"));
   const Json& json = read;
@@ -176,6 +279,7 @@ Result<ExternalDeclaration> parse_declaration(const std::string& line) {
   }
   ExternalDeclaration declaration;
   declaration.name = word_of(json, "name");
+  declaration.objective = objective;
   const Json rows = json.value("parameters", Json::array());
   if (!rows.is_array() ||
       !std::all_of(rows.begin(), rows.end(), [](const Json& row) { return row.is_object(); })) {
@@ -183,6 +287,8 @@ Result<ExternalDeclaration> parse_declaration(const std::string& line) {
   }
   for (const Json& row : rows) {
     ASSIGN_OR_RETURN(const Parameter parameter, read_parameter(row));
+    ASSIGN_OR_RETURN(auto conditions, read_conditions(row, declaration.parameters));
+    declaration.when.push_back(std::move(conditions));
     declaration.parameters.push_back(parameter);
   }
   for (const Json& channel : json.value("channels", Json::array())) {
@@ -195,9 +301,10 @@ Result<ExternalDeclaration> parse_declaration(const std::string& line) {
 }
 
 Result<std::shared_ptr<const ExternalProgram>> make_external_program(ExternalCommand command,
-                                                                     std::string introduction) {
+                                                                     std::string introduction,
+                                                                     bool objective) {
   if (command.argv.empty()) return Error{"the external program has no name"};
-  auto declaration = parse_declaration(introduction);
+  auto declaration = parse_declaration(introduction, objective);
   if (!declaration) {
     return Error{"external program '" + command.argv[0] + "' " + declaration.error().message};
   }
@@ -208,20 +315,28 @@ Result<std::shared_ptr<const ExternalProgram>> make_external_program(ExternalCom
 std::string request_line(const ExternalRequest& request) {
   const unsigned inputs = request.declaration->inputs;
   Json json = {{"id", request.id},
-               {"parameters", parameters_json(*request.declaration, request.values)},
-               {"left", to_json(request.left, inputs)},
-               {"right", to_json(request.right, inputs)},
-               {"duration", request.duration_s}};
+               {"parameters", parameters_json(*request.declaration, request.values)}};
+  if (request.declaration->objective) {
+    json["seed"] = request.seed;
+    return json_text(json);
+  }
+  json["left"] = to_json(request.left, inputs);
+  json["right"] = to_json(request.right, inputs);
+  json["duration"] = request.duration_s;
   if (inputs & kExternalPath) json["interval"] = request.interval_s;
   if (inputs & kExternalFloor) json["floor"] = to_json(request.floor);
   return json_text(json);
 }
 
 Result<ExternalAnswer> parse_answer(const std::string& line, const ExternalRequest& request) {
+  const bool objective = request.declaration->objective;
+  std::string not_a_number;
   ExternalAnswer answer;
-  ASSIGN_OR_RETURN(const Json read, read_answer(line, request.id, &answer));
+  ASSIGN_OR_RETURN(const Json read, read_answer(line, request.id, objective ? "failed" : "diverged",
+                                                objective ? &not_a_number : nullptr, &answer));
   const Json& json = read;
   if (answer.diverged) return answer;
+  if (objective) return read_value(json, not_a_number, line);
   const Json given = json.value("pose", Json::array());
   if (has_null(given)) {
     answer.diverged = true;
@@ -263,7 +378,7 @@ std::string request_line(const ExternalRunRequest& request) {
 
 Result<ExternalRunAnswer> parse_answer(const std::string& line, const ExternalRunRequest& request) {
   ExternalRunAnswer answer;
-  ASSIGN_OR_RETURN(const Json json, read_answer(line, request.id, &answer));
+  ASSIGN_OR_RETURN(const Json json, read_answer(line, request.id, "diverged", nullptr, &answer));
   if (answer.diverged) return answer;
   const Json given = json.value("poses", Json::array());
   if (has_null(given)) {

@@ -1,9 +1,10 @@
-// What gapfarm and a simulator of the user's say to one another: a line of JSON each way
-// (docs/external.md).
+// What gapfarm and a simulator or an objective of the user's say to one another: a line of JSON
+// each way (docs/external.md, docs/objective.md).
 #pragma once
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -30,7 +31,8 @@ struct ExternalFloor {
   double patch_x_m = 0, patch_y_m = 0, patch_radius_m = 0, patch_ratio = 1;
 };
 
-// One command from rest to rest, in the start frame (x ahead, y left).
+// One command from rest to rest, in the start frame (x ahead, y left); of an objective only the
+// values and the seed count.
 struct ExternalRequest {
   std::uint64_t id = 0;
   const ExternalDeclaration* declaration = nullptr;  // says what the program takes
@@ -39,6 +41,7 @@ struct ExternalRequest {
   double duration_s = 0;
   double interval_s = 0;  // between the poses of the path; 0: none wanted
   ExternalFloor floor;
+  std::uint32_t seed = 0;
 };
 
 // The commands of a run, in the frame of its first pose.
@@ -58,11 +61,14 @@ struct ExternalSample {
 };
 
 struct ExternalAnswer {
-  bool diverged = false;
-  std::string message;  // of a simulation that did
+  bool diverged = false;  // or an objective that has no value
+  std::string message;    // why it did; an objective's notes
   Pose X_SE;
   std::vector<ExternalSample> path;
   double rest_time_s = 0;
+  // Of an objective.
+  double value = 0;
+  double violation = 0;  // sum of the positive violations; more than 0: the value does not count
 };
 
 struct ExternalRunAnswer {
@@ -74,8 +80,8 @@ struct ExternalRunAnswer {
 // The line that begins a conversation; the program answers with what it declares.
 std::string hello_line();
 // Errors: no JSON, another version of the protocol, a parameter that check_declaration() refuses,
-// an input that is none.
-Result<ExternalDeclaration> parse_declaration(const std::string& line);
+// an input that is none, a condition on no earlier whole number or choice.
+Result<ExternalDeclaration> parse_declaration(const std::string& line, bool objective = false);
 
 // A program as a problem has it: how it is started, what it reported of itself, the table of that.
 struct ExternalProgram {
@@ -86,11 +92,13 @@ struct ExternalProgram {
 
 // Errors: no words, parse_declaration()'s.
 Result<std::shared_ptr<const ExternalProgram>> make_external_program(ExternalCommand command,
-                                                                     std::string introduction);
+                                                                     std::string introduction,
+                                                                     bool objective);
 
 std::string request_line(const ExternalRequest& request);
 // Errors: no JSON, the answer to another question, no pose, numbers that are not finite, a path
-// that was asked for and is not there.
+// that was asked for and is not there.  An objective's number that is not finite is no error: it
+// has no value.
 Result<ExternalAnswer> parse_answer(const std::string& line, const ExternalRequest& request);
 std::string request_line(const ExternalRunRequest& request);
 // Errors: as above; not a pose a time.

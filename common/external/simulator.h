@@ -1,7 +1,9 @@
 // A simulator of the user's, asked for one motion at a time.
 #pragma once
 
+#include <functional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "common/base/result.h"
@@ -23,6 +25,8 @@ class ExternalSimulator {
   // The line in which it introduces itself; starts it if it does not run.  Errors: LineProgram's
   // and parse_declaration()'s.
   Result<std::string> introduce();
+
+  void while_waiting(std::function<void()> call) { program_.while_waiting(std::move(call)); }
 
   // `declared`: the line that the problem was made with; a program that now declares something else
   // is an error.  Sets the request's id.  Errors name the program and what it did, then in a second

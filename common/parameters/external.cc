@@ -96,6 +96,20 @@ bool is_taken(const std::string& key, bool runs) {
                      [&](const Effect& effect) { return effect.name == key; });
 }
 
+template <class Wrong>
+Status check_choices(const std::vector<std::string>& choices, const Wrong& wrong) {
+  for (const std::string& word : choices) {
+    const bool plain = std::none_of(word.begin(), word.end(), [](char c) {
+      return static_cast<unsigned char>(c) < ' ' || c == 127;
+    });
+    if (word.empty() || !plain) return wrong("has a choice that is empty or no plain text");
+    if (std::count(choices.begin(), choices.end(), word) > 1) {
+      return wrong("has the choice '" + word + "' twice");
+    }
+  }
+  return {};
+}
+
 Status check_row(const Parameter& p, bool runs) {
   const auto wrong = [&](const std::string& what) {
     return Error{"parameter '" + p.key + "' " + what};
@@ -111,6 +125,7 @@ Status check_row(const Parameter& p, bool runs) {
   if (p.scale == ParameterScale::kLog && !(p.lower > 0)) {
     return wrong("has a log scale, so its lower bound must be more than 0");
   }
+  if (p.kind == ParameterKind::kChoice) return check_choices(p.choices, wrong);
   if (p.kind != ParameterKind::kInteger) return {};
   if (p.lower != std::floor(p.lower) || p.upper != std::floor(p.upper) ||
       p.nominal != std::floor(p.nominal)) {
@@ -144,9 +159,24 @@ Status check_declaration(const ExternalDeclaration& declaration) {
   return {};
 }
 
+std::vector<bool> ExternalDeclaration::present(const ParameterValues& values) const {
+  std::vector<bool> there(parameters.size(), true);
+  for (std::size_t i = 0; i < when.size(); ++i) {
+    there[i] = std::all_of(when[i].begin(), when[i].end(), [&](const ExternalCondition& c) {
+      return there[c.row] &&
+             std::find(c.values.begin(), c.values.end(), values[c.row]) != c.values.end();
+    });
+  }
+  return there;
+}
+
 ExternalTable::ExternalTable(ExternalDeclaration declaration)
     : declaration_(std::move(declaration)) {
   std::vector<Parameter> rows = declaration_.parameters;
+  if (declaration_.objective) {
+    table_ = std::make_unique<ParameterTable>(std::move(rows), effects_);
+    return;
+  }
   const bool runs = !declaration_.channels.empty();
   for (const Parameter& row : runs ? run_rows() : noise_rows()) rows.push_back(row);
   for (const Effect& effect : srv1_effects_and_seconds()) {

@@ -1,5 +1,6 @@
-// The parameter table of scenarios `external` and `external_runs`: the program's own rows, the
-// noise of drives and readings, and what can be applied around what the program takes in.
+// The parameter tables of a user's program.  Scenario `external`: its own rows, the noise of drives
+// and readings, and the effects that can be applied around what it takes in; `external_runs`: what
+// can be applied around runs in their place.  Scenario `objective`: its own rows.
 #pragma once
 
 #include <memory>
@@ -28,20 +29,32 @@ inline constexpr ExternalInputWord kExternalInputNames[] = {{"lag", kExternalLag
                                                             {"floor", kExternalFloor},
                                                             {"path", kExternalPath}};
 
+// One that a parameter depends on, and the values at which the parameter is there.
+struct ExternalCondition {
+  std::size_t row = 0;  // of an earlier parameter
+  std::vector<double> values;
+};
+
 // What a program says of itself.
 struct ExternalDeclaration {
   std::string name;
   std::vector<Parameter> parameters;
   unsigned inputs = 0;  // of ExternalInput
+  // One list a parameter, all of which must hold for it to be there; or none at all.
+  std::vector<std::vector<ExternalCondition>> when;
+  bool objective = false;  // answers a number and moves nothing
   // Of the commands of a run, as commands.csv calls them; none: it drives from rest to rest.
   std::vector<std::string> channels = {};
+
+  // Which of the parameters are there at `values`, of which there is one a parameter at least.
+  std::vector<bool> present(const ParameterValues& values) const;
 };
 
 // How it is started.
 struct ExternalCommand {
   std::vector<std::string> argv;  // program and arguments, found by PATH
   std::string folder;             // where it is started
-  double answer_limit_s = 60;     // for one motion
+  double answer_limit_s = 60;     // for one answer
 
   bool operator==(const ExternalCommand&) const = default;
 };
@@ -55,7 +68,8 @@ class ExternalTable {
 
   const ExternalDeclaration& declaration() const { return declaration_; }
   const ParameterTable& table() const { return *table_; }
-  // The first rows are the declaration's, in its order; of a program without channels these follow.
+  // The first rows are the declaration's, in its order; these follow, but of an objective and of a
+  // program with channels.
   std::size_t drive_noise_common() const { return declaration_.parameters.size(); }
   std::size_t drive_noise_side() const { return drive_noise_common() + 1; }
   std::size_t pose_noise_position() const { return drive_noise_common() + 2; }
@@ -71,7 +85,8 @@ class ExternalTable {
 
 // Errors name the parameter: no key, a key that is taken or no TOML bare key, bounds that are
 // empty, not finite or do not hold the nominal value, a log scale that reaches 0, an integer with
-// bounds that are not whole or a log scale; or the channel: no name, or a name twice.
+// bounds that are not whole or a log scale, choices that are empty, equal or no plain text; or the
+// channel: no name, or a name twice.
 Status check_declaration(const ExternalDeclaration& declaration);
 
 // What problems without a program have: noise, and nothing that moves.

@@ -36,9 +36,13 @@ struct ScenarioTable {
   const char* scenario;
   const ParameterTable& (*table)();
 };
-constexpr ScenarioTable kScenarioTables[] = {
-    {"srv1", srv1_table},     {"push", push_table},         {"racquetball", racquetball_table},
-    {"ground", ground_table}, {"external", external_table}, {"external_runs", external_runs_table}};
+constexpr ScenarioTable kScenarioTables[] = {{"srv1", srv1_table},
+                                             {"push", push_table},
+                                             {"racquetball", racquetball_table},
+                                             {"ground", ground_table},
+                                             {"external", external_table},
+                                             {"external_runs", external_runs_table},
+                                             {"objective", external_table}};
 
 Parameter effect_parameter(const Effect& effect, const EffectParameter& p) {
   return {effect.name + "." + p.key,

@@ -22,6 +22,12 @@ Status check_program(const ExternalProgram& program, const Problem& problem) {
 }
 
 Status read_external(const v1::Problem& message, Problem* problem) {
+  const bool objective = scenario_form(problem->scenario).objective;
+  const bool value = is_value(static_cast<FitnessKind>(message.fitness().kind()));
+  if (objective != value || (objective && message.commands_size() > 0)) {
+    return Error{"problem: scenario '" + problem->scenario + "' has no " +
+                 (objective == value ? "commands" : "fitness of that kind")};
+  }
   const bool wanted = scenario_form(problem->scenario).program;
   if (wanted != message.has_external()) {
     return Error{"problem: scenario '" + problem->scenario + "' " + (wanted ? "needs" : "has no") +
@@ -34,7 +40,7 @@ Status read_external(const v1::Problem& message, Problem* problem) {
   if (!(command.answer_limit_s > 0 && command.answer_limit_s <= 1e6)) {
     return Error{"problem: an external program's answer limit must be in (0, 1000000] s"};
   }
-  auto program = make_external_program(std::move(command), from.introduction());
+  auto program = make_external_program(std::move(command), from.introduction(), objective);
   if (!program) return Error{"problem: " + program.error().message};
   if (Status s = check_program(**program, *problem); !s) {
     return Error{"problem: " + s.error().message};

@@ -1,4 +1,5 @@
-// The program of scenario `external` as a part of a problem's message.  Internal to common/problem.
+// The program of scenario `external` or `objective` as a part of a problem's message.  Internal to
+// common/problem.
 #pragma once
 
 #include "common/problem/problem.h"

@@ -27,11 +27,18 @@ constexpr ScenarioForm kForms[] = {
     {"racquetball", racquetball_commands},
     {.name = "ground", .commands = ground_commands, .robot = true, .windows = true},
     {"external", srv1_commands, false, false, true},
-    {.name = "external_runs", .commands = ground_commands, .program = true, .windows = true}};
+    {.name = "external_runs", .commands = ground_commands, .program = true, .windows = true},
+    {.name = "objective", .commands = no_commands, .program = true, .objective = true}};
 
 }  // namespace
 
-bool higher_is_better(FitnessKind kind) { return kind == FitnessKind::kLogScore; }
+bool higher_is_better(FitnessKind kind) {
+  return kind == FitnessKind::kLogScore || kind == FitnessKind::kGreatestValue;
+}
+
+bool is_value(FitnessKind kind) {
+  return kind == FitnessKind::kLeastValue || kind == FitnessKind::kGreatestValue;
+}
 
 bool compares_means(FitnessKind kind) {
   return kind == FitnessKind::kRobustMahalanobis || kind == FitnessKind::kCornerDistance;
@@ -47,6 +54,9 @@ const char* fitness_name(FitnessKind kind) {
       return "energy_score";
     case FitnessKind::kCornerDistance:
       return "corner_distance";
+    case FitnessKind::kLeastValue:
+    case FitnessKind::kGreatestValue:
+      return "value";
   }
   return "?";
 }
@@ -56,6 +66,8 @@ const char* fitness_unit(FitnessKind kind) {
     case FitnessKind::kLogScore:
       return "nats/trial";
     case FitnessKind::kRobustMahalanobis:
+    case FitnessKind::kLeastValue:
+    case FitnessKind::kGreatestValue:
       return "-";
     case FitnessKind::kEnergyScore:
     case FitnessKind::kCornerDistance:

@@ -29,7 +29,14 @@ struct CommandSpec {
   double duration_s = 1;
 };
 
-enum class FitnessKind { kLogScore, kRobustMahalanobis, kEnergyScore, kCornerDistance };
+enum class FitnessKind {
+  kLogScore,
+  kRobustMahalanobis,
+  kEnergyScore,
+  kCornerDistance,
+  kLeastValue,  // scenario `objective` has these two, and no other scenario has them
+  kGreatestValue
+};
 
 inline constexpr double kMostOutliers = 0.5;
 
@@ -45,6 +52,8 @@ struct FitnessSettings {
 
 // Whether a greater fitness is the better one.
 bool higher_is_better(FitnessKind kind);
+// Whether it is an objective's own value.
+bool is_value(FitnessKind kind);
 // Whether it compares one nominal motion a trial; spread would only cost time.
 bool compares_means(FitnessKind kind);
 const char* fitness_name(FitnessKind kind);
@@ -76,7 +85,7 @@ struct Problem {
   std::shared_ptr<const GroundTable> ground;
   // Where the scenario's form has windows: the runs of which `log` is windows.
   std::vector<CommandedRun> runs;
-  // Where the scenario's form has one: the program that simulates.
+  // Where the scenario's form has one: the program that answers.
   std::shared_ptr<const ExternalProgram> external;
   // Where the scenario's form has drives alone: a correction of where they end.
   Residual residual;
@@ -109,7 +118,7 @@ struct ScenarioForm {
   bool pieces = false;
   // There is a robot's file.
   bool robot = false;
-  // A program of the user's simulates.
+  // A program of the user's answers.
   bool program = false;
   // Drives that may be corrected by a Residual.
   bool residual = false;
@@ -117,6 +126,8 @@ struct ScenarioForm {
   bool other_robot = false;
   // Trials are windows of runs.
   bool windows = false;
+  // Nothing moves: values go in and a number comes out; there are neither commands nor trials.
+  bool objective = false;
 };
 // REQUIRES: a scenario that has a parameter table.
 const ScenarioForm& scenario_form(std::string_view scenario);

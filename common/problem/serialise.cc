@@ -208,8 +208,8 @@ Status read_commands(const v1::Problem& message, Problem* problem) {
     }
     problem->commands.push_back({c.name(), c.left(), c.right(), c.duration()});
   }
-  if (problem->commands.empty()) return invalid("no commands");
-  return {};
+  if (!problem->commands.empty() || scenario_form(problem->scenario).objective) return {};
+  return invalid("no commands");
 }
 
 Status read_trials(const v1::Problem& message, Problem* problem) {

@@ -17,6 +17,13 @@ namespace gapfarm {
 Result<Config> read_config_and_trials(const std::string& config_path, const TrialOptions& trials) {
   Result<Config> config = read_config(config_path);
   if (!config) return config.error();
+  if (trials.needed) {
+    RETURN_IF_ERROR(check_moves(config->problem.scenario, config_path));
+  }
+  if (scenario_form(config->problem.scenario).objective) {
+    if (trials.files.empty()) return config;
+    return Error{config_path + ": scenario objective has no trials; omit --trials"};
+  }
   if (!trials.files.empty()) config->trial_files = trials.files;
   if (config->trial_files.empty()) {
     const bool runs = config->problem.windows();
@@ -45,9 +52,11 @@ Result<Source> read_source(const std::string& named) {
   ASSIGN_OR_RETURN(const std::string text, read_text_file(path));
   if (!is_model(text)) {
     ASSIGN_OR_RETURN(auto config, parse_config(text, path, start_program));
+    RETURN_IF_ERROR(check_moves(config.problem.scenario, path));
     return Source{std::move(config)};
   }
   ASSIGN_OR_RETURN(const Model model, parse_model(text, path));
+  RETURN_IF_ERROR(check_moves(model.scenario, path));
   Source source{{}, model.frame_x_m, model.frame_y_m};
   source.config.problem = problem_of(model);
   return source;

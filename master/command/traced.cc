@@ -23,6 +23,7 @@ void TracedCommands::declare(CLI::App& app) {
 Result<Config> TracedCommands::open(const std::string& path, TraceSettings* to) const {
   Result<Config> config = read_config(path);
   if (!config) return config.error();
+  RETURN_IF_ERROR(check_moves(config->problem.scenario, path));
   to->seed = config->seed;
   to->interval_s = interval_s;
   RETURN_IF_ERROR(choose(config->problem.commands, to));

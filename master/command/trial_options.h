@@ -17,6 +17,7 @@ class Console;
 struct TrialOptions {
   std::vector<std::string> files;
   ReadOptions read;
+  bool needed = true;  // false: scenario objective, which has none, is taken too
 
   // --trials, with this help, and declare_reading().
   CLI::Option* declare(CLI::App& app,

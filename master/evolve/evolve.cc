@@ -72,6 +72,7 @@ Result<Score> score_of(const v1::TaskResult& result, FitnessKind kind) {
   if (result.outcome() == v1::INVALID_REQUEST) {
     return Error{"a worker refused the evaluation: " + result.message()};
   }
+  if (result.outcome() == v1::INFEASIBLE) return Score{v1::INFEASIBLE, result.evaluate().penalty()};
   const bool ok = result.outcome() == v1::OK;
   return Score{result.outcome(), ok ? cost_of_fitness(kind, result.evaluate().fitness()) : 0};
 }

@@ -17,9 +17,12 @@ Standing standing_of(std::uint32_t outcome, double cost, double m2, std::uint32_
 }
 
 int outcome_rank(v1::Outcome outcome) {
-  return outcome == v1::OUTCOME_UNSPECIFIED ? std::numeric_limits<int>::max()
-                                            : static_cast<int>(outcome);
+  if (outcome == v1::OUTCOME_UNSPECIFIED) return std::numeric_limits<int>::max();
+  if (outcome == v1::OK || outcome == v1::INFEASIBLE) return outcome == v1::OK ? -2 : -1;
+  return static_cast<int>(outcome);
 }
+
+bool has_cost(v1::Outcome outcome) { return outcome_rank(outcome) < 0; }
 
 }  // namespace
 
@@ -97,12 +100,14 @@ std::string origin_name(unsigned origin) {
 }
 
 void Standing::add(const Score& score) {
-  const bool usable = score.outcome == v1::OK && std::isfinite(score.cost);
-  const v1::Outcome counted = score.outcome == v1::OK && !usable ? v1::DIVERGED : score.outcome;
-  if (scores == 0 || outcome_rank(counted) > outcome_rank(outcome)) outcome = counted;
+  const bool broken = has_cost(score.outcome) && !std::isfinite(score.cost);
+  const v1::Outcome counted = broken ? v1::DIVERGED : score.outcome;
+  const bool worse = scores == 0 || outcome_rank(counted) > outcome_rank(outcome);
+  if (worse) outcome = counted;
   ++scores;
   if (outcome != v1::OK) {
-    cost = 0;
+    const double before = worse ? 0 : cost;
+    cost = counted == v1::INFEASIBLE && outcome == counted ? std::max(before, score.cost) : before;
     m2 = 0;
     return;
   }
@@ -113,7 +118,7 @@ void Standing::add(const Score& score) {
 
 bool better(const Standing& a, const Standing& b) {
   if (a.outcome != b.outcome) return outcome_rank(a.outcome) < outcome_rank(b.outcome);
-  return a.outcome == v1::OK && a.cost < b.cost;
+  return has_cost(a.outcome) && a.cost < b.cost;
 }
 
 void sort_best_first(std::vector<Individual>& individuals) {

@@ -32,16 +32,16 @@ std::string origin_name(unsigned origin);  // "blend+gaussian"
 // What is known of a genome's cost.
 struct Standing {
   v1::Outcome outcome = v1::OUTCOME_UNSPECIFIED;  // the worst of its scores
-  double cost = 0;                                // mean over its OK scores
+  double cost = 0;                                // mean over OK scores; INFEASIBLE: the greatest
   double m2 = 0;                                  // sum of their squared deviations
   unsigned scores = 0;
 
-  // Takes one more score.  An OK score whose cost is not finite counts as DIVERGED.
+  // Takes one more score.  One with a cost that is not finite counts as DIVERGED.
   void add(const Score& score);
 };
 
-// OK by cost, then the other outcomes in the enum's order, unspecified last.  A strict weak order:
-// no NaN gets here.
+// OK by cost, then INFEASIBLE by cost, then the other outcomes in the enum's order, unspecified
+// last. A strict weak order: no NaN gets here.
 bool better(const Standing& a, const Standing& b);
 
 struct Individual {

@@ -19,8 +19,9 @@ struct Candidate {
   Genome genome;
 };
 
-// The answer to a candidate.  `cost` is lower-is-better and meaningful only when `outcome` is OK;
-// any other outcome ranks behind every OK, in the enum's order.
+// The answer to a candidate.  `cost` is lower-is-better and meaningful only when `outcome` is OK,
+// and where it is INFEASIBLE, which ranks behind every OK: by how much constraints are violated
+// (Deb 2000).  Any other outcome ranks behind these, in the enum's order.
 struct Score {
   v1::Outcome outcome = v1::OUTCOME_UNSPECIFIED;
   double cost = 0;

@@ -4,14 +4,14 @@
 
 #include "common/base/try.h"
 #include "gapfarm/v1/record.pb.h"
+#include "master/evolve/individual.h"
 #include "master/evolve/optimisers.h"
 
 namespace gapfarm {
 namespace {
 
 bool better(const Member& a, const Member& b) {
-  if ((a.outcome == v1::OK) != (b.outcome == v1::OK)) return a.outcome == v1::OK;
-  return a.outcome == v1::OK && a.cost < b.cost;
+  return better(Standing{a.outcome, a.cost, 0, a.scores}, Standing{b.outcome, b.cost, 0, b.scores});
 }
 
 class StagedOptimiser final : public Optimiser {

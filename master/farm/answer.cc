@@ -8,10 +8,11 @@ bool answers(const v1::Task& task, const v1::TaskResult& result) {
   const v1::Outcome outcome = result.outcome();
   if (outcome == v1::OUTCOME_UNSPECIFIED || !v1::Outcome_IsValid(outcome)) return false;
   if (outcome == v1::WORKER_FAILED) return false;  // the master's own word
-  if (outcome != v1::OK) return true;
+  if (outcome != v1::OK && outcome != v1::INFEASIBLE) return true;
   switch (task.kind_case()) {
     case v1::Task::kEvaluate:
-      return result.has_evaluate() && std::isfinite(result.evaluate().fitness());
+      return result.has_evaluate() && std::isfinite(result.evaluate().fitness()) &&
+             std::isfinite(result.evaluate().penalty());
     case v1::Task::kPredict:
       return result.has_predict();
     case v1::Task::kSimulate:

@@ -85,7 +85,10 @@ std::string Scheduler::values_of_task(const v1::Task& task) const {
   if (bytes == problems_.end() || !message.ParseFromString(bytes->second)) return {};
   const auto problem = from_proto(message);
   const std::string settings = problem ? point_settings(*problem, task) : "";
-  return settings.empty() ? "" : "; its values, for `gapfarm simulate CONFIG`: " + settings;
+  if (settings.empty()) return "";
+  const bool simulated = !scenario_form(problem->scenario).objective;
+  return std::string("; its values") + (simulated ? ", for `gapfarm simulate CONFIG`: " : ": ") +
+         settings;
 }
 
 std::vector<v1::TaskResult> Scheduler::finish() {

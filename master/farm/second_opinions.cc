@@ -28,7 +28,12 @@ std::uint64_t number_of(const v1::StreamKey& stream) {
 }  // namespace
 
 TakenAnswer taken_answer(const v1::Task& task, const v1::TaskResult& result, WorkerIdentityPtr by) {
-  return {task_label(task), content_hash(result.SerializeAsString()), std::move(by)};
+  if (result.outcome() != v1::OK || result.message().empty()) {
+    return {task_label(task), content_hash(result.SerializeAsString()), std::move(by)};
+  }
+  v1::TaskResult without_notes = result;  // they may be of the clock
+  without_notes.clear_message();
+  return {task_label(task), content_hash(without_notes.SerializeAsString()), std::move(by)};
 }
 
 bool chosen_for_audit(const v1::Task& task, std::uint64_t job, double share) {

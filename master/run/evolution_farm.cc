@@ -1,12 +1,14 @@
 #include "master/run/evolution_farm.h"
 
 #include "common/base/try.h"
+#include "common/problem/question.h"
 #include "common/progress/number_text.h"
 
 namespace gapfarm {
 namespace {
 
 constexpr unsigned kMostAlarms = 100;
+constexpr unsigned kMostFailureNotes = 100;
 constexpr std::size_t kMostWorkerEvents = 20000;  // of a master
 constexpr double kWriteInterval_s = 1;            // each costs a disk write
 
@@ -56,6 +58,22 @@ const char* coming_or_going(FarmEvent::Kind kind) {
     default:
       return nullptr;
   }
+}
+
+// The last of what a user's program had no answer to, and how many there are; else empty.
+std::string failures_among(const Problem& problem, const std::vector<v1::Task>& tasks,
+                           const std::vector<v1::TaskResult>& results) {
+  std::size_t failed = 0, last = 0;
+  for (std::size_t i = 0; i < results.size(); ++i) {
+    if (results[i].outcome() != v1::DIVERGED) continue;
+    ++failed;
+    last = i;
+  }
+  if (failed == 0) return {};
+  const std::string& why = results[last].message();
+  return std::to_string(failed) + " of " + std::to_string(results.size()) +
+         " evaluations failed: " + task_label(tasks[last]) + ": " +
+         (why.empty() ? "diverged" : why) + "; " + point_settings(problem, tasks[last]);
 }
 
 class OverSockets : public FarmOfRun {
@@ -149,9 +167,22 @@ void FarmProgressWriter::on_generation(const GenerationRecord& record, std::opti
     log_->set({"generation", record.generation});
     std::vector<LogField> fields = {{"evaluations", record.evaluations}};
     if (best) fields.push_back({"best", *best});
+    if (!record.members.empty() && record.members.front().outcome == v1::INFEASIBLE) {
+      fields.push_back({"violation", record.members.front().cost});
+    }
     log_->write(LogLevel::kInfo, "generation committed", fields);
   }
   refresh(clock_.now_s());
+}
+
+void FarmProgressWriter::on_failures(const std::string& text) {
+  if (failures_++ == 0) {
+    watcher_.note(text);
+  } else if (log_ != nullptr) {
+    log_->write(LogLevel::kInfo, text);
+  }
+  if (failures_ > kMostFailureNotes) return;
+  if (Status s = store_.add_incident(IncidentKind::kFailure, text); !s) watcher_.error(s.error());
 }
 
 std::string FarmProgressWriter::message(const Pace& pace) const {
@@ -200,7 +231,7 @@ void FarmProgressWriter::refresh(double now_s) {
 
 FarmBackend::FarmBackend(Farm& farm, const Problem& problem, std::uint64_t seed,
                          FarmProgressWriter& progress)
-    : farm_(farm), fitness_(problem.fitness.kind), seed_(seed), progress_(progress) {
+    : farm_(farm), problem_(problem), seed_(seed), progress_(progress) {
   problem_hash_ = farm.add_problem(to_proto(problem));
 }
 
@@ -212,9 +243,13 @@ Result<std::vector<Score>> FarmBackend::evaluate(std::span<const Candidate> cand
   ASSIGN_OR_RETURN(const auto results, farm_.run(problem_hash_, tasks, [&](const FarmProgress& p) {
     progress_.on_progress(p);
   }));
+  if (problem_.external) {
+    const std::string failures = failures_among(problem_, tasks, results);
+    if (!failures.empty()) progress_.on_failures(failures);
+  }
   std::vector<Score> scores;
   for (const v1::TaskResult& result : results) {
-    ASSIGN_OR_RETURN(const Score score, score_of(result, fitness_));
+    ASSIGN_OR_RETURN(const Score score, score_of(result, problem_.fitness.kind));
     scores.push_back(score);
   }
   return scores;

@@ -76,6 +76,8 @@ class FarmProgressWriter {
 
   void on_progress(const FarmProgress& progress);
   void on_generation(const GenerationRecord& record, std::optional<double> best);
+  // Evaluations of the generation in work that a user's program had no answer to, in a sentence.
+  void on_failures(const std::string& text);
   // As last shown, with the farm's counts as they are now.
   Progress now() const;
   // Where generations also go, and what is written when the live row is; neither is owned.
@@ -101,6 +103,7 @@ class FarmProgressWriter {
   Progress last_;
   Log* log_ = nullptr;
   FarmEventKeeper* events_ = nullptr;
+  unsigned failures_ = 0;  // generations with some
   WorkerWait wait_;
 };
 
@@ -112,7 +115,7 @@ class FarmBackend : public EvaluationBackend {
 
  private:
   Farm& farm_;
-  FitnessKind fitness_;
+  const Problem& problem_;
   std::uint64_t seed_;
   FarmProgressWriter& progress_;
   std::string problem_hash_;

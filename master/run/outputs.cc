@@ -88,12 +88,19 @@ Status write_page(const RunStore& store) {
 
 }  // namespace
 
+std::vector<std::string> output_files(const Problem& problem) {
+  if (is_value(problem.fitness.kind)) return {"model.toml", "report.html", "fitness.svg"};
+  return {"model.toml", "report.html", "poses.svg", "fitness.svg"};
+}
+
 Status write_outputs(RunStore& store, const Problem& problem, const Config& config,
                      const EvolveSummary& summary, Farm& farm,
                      const std::vector<Validated>& validated) {
   const Model model = model_of(store, problem, config, summary);
   RETURN_IF_ERROR(write_model(model, (store.run() / "model.toml").string()));
-  RETURN_IF_ERROR(write_poses(store, problem, summary, farm, validated));
+  if (!is_value(problem.fitness.kind)) {
+    RETURN_IF_ERROR(write_poses(store, problem, summary, farm, validated));
+  }
   RETURN_IF_ERROR(write_fitness(store));
   return write_page(store);
 }

@@ -1,6 +1,7 @@
 // The files that a finished evolution writes to its run folder.
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "common/config/settings.h"
@@ -11,8 +12,8 @@
 
 namespace gapfarm {
 
-inline constexpr const char* kOutputFiles[] = {"model.toml", "report.html", "poses.svg",
-                                               "fitness.svg"};
+// Their names.
+std::vector<std::string> output_files(const Problem& problem);
 
 // `validated`: what is known of trials held out.  REQUIRES: a best member whose outcome is OK.
 Status write_outputs(RunStore& store, const Problem& problem, const Config& config,

@@ -75,6 +75,14 @@ Result<std::unique_ptr<Optimiser>> optimiser_of(const RunInputs& inputs, const R
   return stages.empty() ? restore_optimiser(setup, state) : restore_staged(setup, stages, state);
 }
 
+// What a run without a best to leave has to say.
+std::string without_best(const EvolveSummary& evolved) {
+  if (!evolved.best || evolved.best->outcome == v1::OK) return {};
+  if (evolved.best->outcome != v1::INFEASIBLE) return "; no evaluation ended well";
+  return fmt::format("; nothing feasible was found, violations sum to {:.6g} at least",
+                     evolved.best->cost);
+}
+
 Status write_end(RunStore& store, Progress progress, RunState state, const std::string& reason) {
   progress.state = state;
   progress.stop_reason = reason;
@@ -107,7 +115,8 @@ Status leave_model(RunStore& store, const RunRequest& run, const RunInputs& inpu
   if (!left) return left;
   ASSIGN_OR_RETURN(const auto beside, baseline_note_of_run(run.problem, best, farm));
   if (!beside.empty()) watcher.note(beside);
-  for (const char* name : kOutputFiles) summary.files.push_back((store.run() / name).string());
+  for (const std::string& name : output_files(run.problem))
+    summary.files.push_back((store.run() / name).string());
   return {};
 }
 
@@ -150,6 +159,7 @@ Result<RunSummary> evolve_run(RunStore& store, const RunRequest& request, RunWat
   if (!evolved) return stopped_by(store, evolved.error(), progress.now());
   RunSummary summary;
   summary.evolved = *std::move(evolved);
+  summary.evolved.text += without_best(summary.evolved);
   const RunState state = summary.stopped() ? RunState::kStopped : RunState::kFinished;
   RETURN_IF_ERROR(write_end(store, progress.now(), state, summary.evolved.text));
   if (summary.stopped()) return summary;

@@ -110,6 +110,10 @@ std::string action(const RunReport& report, const RunInfo& info) {
   return "Ask what is missing: gapfarm diagnose " + info.config_path + " --out DIAGNOSIS";
 }
 
+std::string program_text(const Problem& problem) {
+  return fmt::format("{}", fmt::join(problem.external->command.argv, " "));
+}
+
 std::string headline(const RunReport& report) {
   if (report.generations.empty()) return "No generation was completed yet.";
   const RunGeneration& last = report.generations.back();
@@ -213,8 +217,11 @@ Result<RunReport> read_run_report(const RunQuestion& question) {
     report.parameters = parameter_rows(problem, individuals, *best);
     add_determined(run / kDeterminedFile, &report.parameters);
   }
-  ASSIGN_OR_RETURN(auto outcome, stored_outcome(reader, last, &report));
-  report.outcome = std::move(outcome);
+  report.objective = is_value(problem.fitness.kind);
+  if (!report.objective) {
+    ASSIGN_OR_RETURN(auto outcome, stored_outcome(reader, last, &report));
+    report.outcome = std::move(outcome);
+  }
   RETURN_IF_ERROR(add_history(reader, problem, generations, question, &report));
   const auto apart = held_out_of(info, problem);
   if (apart && *apart) report.held_out = (*apart)->log.trials.size();
@@ -222,9 +229,14 @@ Result<RunReport> read_run_report(const RunQuestion& question) {
   report.headline = headline(report);
   report.action = action(report, info);
   report.provenance = {
-      {"config", info.config_path},   {"trials", std::to_string(problem.log.trials.size())},
-      {"problem", info.problem_hash}, {"seed", std::to_string(info.seed)},
-      {"begun", info.created},        {"program", info.program_version + ", " + info.fingerprint}};
+      {"config", info.config_path},
+      report.objective
+          ? std::pair<std::string, std::string>("objective", program_text(problem))
+          : std::pair<std::string, std::string>("trials", std::to_string(report.trials)),
+      {"problem", info.problem_hash},
+      {"seed", std::to_string(info.seed)},
+      {"begun", info.created},
+      {"program", info.program_version + ", " + info.fingerprint}};
   if (!generations.empty()) {
     const StoredGeneration& g = generations.back();
     report.provenance.emplace_back("digest", g.digest);

@@ -75,6 +75,7 @@ void FarmTally::read_farm(const std::string& text, Progress* progress) {
 }
 
 const char* incident_name(IncidentKind kind) {
+  if (kind == IncidentKind::kFailure) return "failure";
   return kind == IncidentKind::kAlarm ? "alarm" : "quarantine";
 }
 

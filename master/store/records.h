@@ -101,6 +101,7 @@ struct FarmTally {
 enum class IncidentKind {
   kQuarantine,  // a task was given up: it ended too many workers
   kAlarm,       // two workers answered one task differently
+  kFailure,     // a user's program had no answer: the last of a generation's evaluations
 };
 
 // One thing that somebody should look at.
@@ -110,7 +111,7 @@ struct Incident {
   double unix_s = 0;
   std::string text;  // a sentence that names tasks, workers and hosts
 };
-const char* incident_name(IncidentKind kind);  // "quarantine", "alarm"
+const char* incident_name(IncidentKind kind);  // "quarantine", "alarm", "failure"
 
 // A worker that came or went, or a master.
 struct StoredWorkerEvent {

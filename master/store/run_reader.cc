@@ -152,8 +152,8 @@ Result<std::vector<Incident>> RunReader::incidents() const {
                           Incident incident;
                           std::string kind;
                           row.read_all(incident.generation, kind, incident.unix_s, incident.text);
-                          if (kind == incident_name(IncidentKind::kAlarm)) {
-                            incident.kind = IncidentKind::kAlarm;
+                          for (const auto known : {IncidentKind::kAlarm, IncidentKind::kFailure}) {
+                            if (kind == incident_name(known)) incident.kind = known;
                           }
                           return incident;
                         });

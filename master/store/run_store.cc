@@ -55,9 +55,9 @@ std::string operator_json(const StoredGeneration& generation) {
 }
 
 // Alarms stay: they are about machines, not about generations.
-std::string forget_quarantines(std::uint64_t from) {
-  return std::string("DELETE FROM incidents WHERE kind = '") +
-         incident_name(IncidentKind::kQuarantine) + "' AND generation >= " + std::to_string(from);
+std::string forget_incidents(std::uint64_t from) {
+  return std::string("DELETE FROM incidents WHERE kind != '") +
+         incident_name(IncidentKind::kAlarm) + "' AND generation >= " + std::to_string(from);
 }
 
 // A path in `run` that is not taken: run.generation-41.sqlite, run.generation-41.2.sqlite, ...
@@ -203,7 +203,7 @@ Status RunStore::begin_epoch() {
       {unix_now_s(), "master", "", host_name(), "master " + std::to_string(epoch_) + " begins"}};
   if (epoch_ > 1) events.insert(events.begin(), end_before_);
   ASSIGN_OR_RETURN(SqlTransaction transaction, SqlTransaction::begin(database_));
-  RETURN_IF_ERROR(database_.exec(forget_quarantines(next_generation()), "write the run store"));
+  RETURN_IF_ERROR(database_.exec(forget_incidents(next_generation()), "write the run store"));
   RETURN_IF_ERROR(insert_worker_events(events));
   RETURN_IF_ERROR(set_progress({}));
   return transaction.commit();
@@ -313,7 +313,7 @@ Result<fs::path> RunStore::truncate_after(std::uint64_t generation) {
   RETURN_IF_ERROR(
       database_.exec("DELETE FROM generations WHERE generation > " + std::to_string(generation) +
                          "; DELETE FROM documents WHERE generation > " +
-                         std::to_string(generation) + "; " + forget_quarantines(generation + 1),
+                         std::to_string(generation) + "; " + forget_incidents(generation + 1),
                      "forget the generations after " + std::to_string(generation)));
   RETURN_IF_ERROR(transaction.commit());
   last_generation_ = generation;

@@ -169,6 +169,32 @@ def test_the_notebook_runs(tmp_path, monkeypatch):
     assert row.lo < 0.05 < row.hi and row.unit == "-"
 
 
+def test_the_objective_of_its_page_evolves(tmp_path, monkeypatch):
+    """The Python program and the config of docs/objective.md, as a user would copy them."""
+    page = (ROOT / "docs" / "objective.md").read_text()
+    for fence, file in (("python", "train.py"), ("toml", "train.toml")):
+        (tmp_path / file).write_text(page.split(f"```{fence}\n")[1].split("```")[0])
+    monkeypatch.setenv("PYTHONPATH", str(ROOT / "python"))
+    words = ("--generations", "8", "--workers", "2")
+    run = gapfarm.evolve(tmp_path / "train.toml", tmp_path / "run", *words)
+    assert run.status()["best_fitness"] < 1e-4 and run.model is not None
+    assert set(run.individuals().method) <= {"sgd", "adam"}
+
+
+def test_what_an_objective_cannot_answer_is_a_failed_evaluation(capsys):
+    def answer(given):
+        return gapfarm.objective.answer(given, {"x": 1.0}, 7)
+
+    assert answer(lambda parameters, seed: np.float64(parameters["x"] + seed)) == {"value": 8.0, "violations": []}
+    full = {"value": 2, "violations": (np.float32(0.5), -1), "notes": "as it came"}
+    assert json.loads(json.dumps(answer(lambda *_: full))) == {**full, "violations": [0.5, -1]}
+    assert answer(lambda *_: float("nan")) == {"outcome": "failed", "message": "its value is nan"}
+    assert answer(lambda *_: {"value": 1, "violations": [np.inf]})["message"] == "its violation is inf"
+    assert answer(lambda *_: 1 / 0)["message"] == "ZeroDivisionError: division by zero"
+    assert "Traceback" in capsys.readouterr().err
+    assert answer(lambda *_: "rubbish")["outcome"] == "failed"
+
+
 def test_paths_come_with_a_simulated_log(run):
     words = ("--sessions", "1", "--trials", "4", "--workers", "1")
     trials, paths = run.model.simulate_paths(*words, interval=0.1, seed=3)

@@ -5,8 +5,7 @@
 #include <exception>
 #include <string>
 
-#include "common/external/simulator.h"
-#include "common/process/process_pool.h"
+#include "worker/scenarios/program.h"
 #include "worker/scenarios/srv1/srv1.h"
 #include "worker/scenarios/windows.h"
 
@@ -21,23 +20,6 @@ class ExternalFailure : public std::exception {
  private:
   std::string message_;
 };
-
-// Problems of one program share the process: it is started once, and costs what it costs.  One a
-// thread, because its answers are in the order of what it is asked.
-std::shared_ptr<ExternalSimulator> shared_simulator(const ExternalCommand& command) {
-  struct Started {
-    ExternalCommand command;
-    std::weak_ptr<ExternalSimulator> simulator;
-  };
-  static thread_local std::vector<Started> all;
-  std::erase_if(all, [](const Started& one) { return one.simulator.expired(); });
-  for (const Started& one : all) {
-    if (one.command == command) return one.simulator.lock();
-  }
-  auto simulator = std::make_shared<ExternalSimulator>(command, monotonic_seconds);
-  all.push_back({command, simulator});
-  return simulator;
-}
 
 ExternalSide external_side(const SideDrive& side) {
   return {side.speed_m_s, side.lag_s, side.dead_travel_m};
@@ -73,10 +55,8 @@ class ExternalVehicle final : public Vehicle {
       throw ExternalFailure("external program '" + request_.declaration->name +
                             "' does not declare the input \"path\": there are only end poses");
     }
-    const Result<ExternalAnswer> answer =
-        simulator_->simulate(request_, problem_.external->introduction);
+    const auto answer = ask_program(*simulator_, request_, *problem_.external, steps_);
     if (!answer) throw ExternalFailure(answer.error().message);
-    count_step(steps_);
     Motion motion;
     motion.outcome = answer->diverged ? MotionOutcome::kDiverged : MotionOutcome::kOk;
     motion.X_SE = answer->X_SE;
@@ -159,8 +139,9 @@ class ExternalModel final : public ScenarioModel {
 
   Prediction predict(const ParameterValues& values, const PredictOptions& options) const override {
     Prediction prediction;
-    if (!may_start(&prediction.message)) {
-      prediction.outcome = v1::INVALID_REQUEST;
+    if (const auto refusal = refuse_to_start()) {
+      prediction.outcome = refusal->outcome();
+      prediction.message = refusal->message();
       return prediction;
     }
     try {
@@ -183,22 +164,10 @@ class ExternalModel final : public ScenarioModel {
   }
 
  private:
-  static bool may_start(std::string* why) {
-    if (external_programs_allowed()) return true;
-    *why =
-        "this worker starts no programs that a master names; start it with --allow-external, and "
-        "only for a master that you trust with its machine";
-    return false;
-  }
-
   template <class Work>
   static v1::TaskResult guarded(const Work& work) {
+    if (auto refusal = refuse_to_start()) return *refusal;
     v1::TaskResult result;
-    if (std::string why; !may_start(&why)) {
-      result.set_outcome(v1::INVALID_REQUEST);
-      result.set_message(why);
-      return result;
-    }
     try {
       return work();
     } catch (const ExternalFailure& failure) {

@@ -65,6 +65,11 @@ class ScenarioModel {
  public:
   virtual ~ScenarioModel() = default;
   virtual Prediction predict(const ParameterValues&, const PredictOptions&) const { return {}; }
+  // Instead of a prediction that is scored.
+  virtual v1::TaskResult evaluate(const ParameterValues&, const v1::EvaluateTask&,
+                                  StepCounter*) const {
+    return {};
+  }
   virtual v1::TaskResult simulate(const ParameterValues&, const v1::SimulateTask&,
                                   StepCounter*) const {
     return {};
@@ -74,7 +79,7 @@ class ScenarioModel {
   }
 };
 
-enum ScenarioCan : unsigned { kPredicts = 1, kSimulates = 2, kTraces = 4 };
+enum ScenarioCan : unsigned { kPredicts = 1, kSimulates = 2, kTraces = 4, kEvaluates = 8 };
 
 struct Scenario {
   const char* name;

@@ -2,6 +2,7 @@
 
 #include "worker/scenarios/external.h"
 #include "worker/scenarios/ground.h"
+#include "worker/scenarios/objective.h"
 #include "worker/scenarios/push/push.h"
 #include "worker/scenarios/racquetball.h"
 #include "worker/scenarios/scenario.h"
@@ -25,6 +26,10 @@ std::span<const Scenario> scenarios() {
       Scenario{"external", "commands driven by a program of the user's", prepare_external},
       Scenario{"external_runs", "runs followed by a program of the user's", prepare_external,
                kPredicts, kFollowsRuns},
+      Scenario{"objective", "a number that a program of the user's makes of values",
+               prepare_objective, kEvaluates,
+               "scenario objective has values and a number: nothing moves that could be predicted, "
+               "logged or traced"},
       Scenario{"racquetball", "ball in a closed court, struck by a paddle", prepare_racquetball,
                kTraces,
                "scenario racquetball has paths and no trials: nothing can be predicted or logged; "

@@ -34,6 +34,7 @@ struct Summary {
   std::size_t conditions = 0;
   std::vector<std::string> effects;  // enabled: not neutral, or searched
   double evaluation_s = 0;           // on one worker here, as measured
+  v1::TaskResult evaluated;          // the config's own values
   std::vector<SanityFinding> sanity;
 };
 
@@ -43,21 +44,23 @@ std::uint64_t most_evaluations(const Config& config) {
   return config.evolution.evaluations ? std::min(all, *config.evolution.evaluations) : all;
 }
 
-// Seconds that one worker takes for the config's own values, once it knows the problem.
-Result<double> measure_evaluation(const Config& config, CliContext& context) {
+// The config's own values by one worker, and the seconds that takes once it knows the problem.
+Status measure_evaluation(const Config& config, CliContext& context, Summary* summary) {
   FarmOptions options;
   options.workers = 1;
   ASSIGN_OR_RETURN(auto farm, start_farm(options, {}, context));
   const std::string hash = farm->add_problem(to_proto(config.problem));
-  double last_s = 0;
-  // The first one brings the problem to the worker.
+  // The first one brings the problem to the worker, which is nothing beside a long one.
+  constexpr double kLong_s = 1;
   for (unsigned replicate = 0; replicate < 2; ++replicate) {
     const double began_s = steady_now_s();
     ASSIGN_OR_RETURN(const auto results,
                      farm->run(hash, {evaluation_task({0, replicate, {}}, config.seed)}));
-    last_s = steady_now_s() - began_s;
+    summary->evaluation_s = steady_now_s() - began_s;
+    summary->evaluated = results.front();
+    if (summary->evaluation_s > kLong_s) break;
   }
-  return last_s;
+  return {};
 }
 
 // Effects that are on in the config's own values or that a gene may turn on.
@@ -142,13 +145,19 @@ Summary summarise(const Config& config) {
     context |= effect.context;
     summary.effects.push_back(effect.name);
   }
+  if (is_value(problem.fitness.kind)) return summary;
   summary.conditions = count_conditions(problem, context);
   summary.sanity = warnings(config);
   return summary;
 }
 
 Json to_json(const Config& config, const Summary& summary, unsigned workers) {
-  Json genes = Json::array();
+  Json genes = Json::array(),
+       evaluated = {{"outcome", v1::Outcome_Name(summary.evaluated.outcome())},
+                    {"message", summary.evaluated.message()}};
+  if (summary.evaluated.outcome() == v1::OK) {
+    evaluated["fitness"] = summary.evaluated.evaluate().fitness();
+  }
   for (const Gene& gene : config.problem.genes) {
     const Parameter& row = config.problem.table()[gene.row];
     genes.push_back({{"parameter", row.key},
@@ -166,6 +175,7 @@ Json to_json(const Config& config, const Summary& summary, unsigned workers) {
           {"commands", summary.commands},
           {"conditions", summary.conditions},
           {"evaluation_s", summary.evaluation_s},
+          {"evaluated", evaluated},
           {"most_evaluations", most_evaluations(config)},
           {"effects", summary.effects},
           {"genes", genes},
@@ -176,7 +186,24 @@ Json to_json(const Config& config, const Summary& summary, unsigned workers) {
           {"sanity", sanity_json(summary.sanity)}};
 }
 
-std::string standing(const std::vector<SanityFinding>& findings) {
+// Of an objective, at the config's own values.
+std::string value_text(const Summary& summary) {
+  const v1::TaskResult& result = summary.evaluated;
+  const std::string more = result.message().empty() ? "" : "; " + result.message();
+  switch (result.outcome()) {
+    case v1::OK:
+      return format_number(result.evaluate().fitness(), 10) + " at the config's own values" + more;
+    case v1::INFEASIBLE:
+      return "none that counts: violations sum to " +
+             format_number(result.evaluate().penalty(), 10) + " at the config's own values" + more;
+    default:
+      return "none at the config's own values, the evaluation failed" + more;
+  }
+}
+
+std::string standing(const Summary& summary) {
+  if (summary.evaluated.outcome() == v1::WORKER_FAILED) return "readable, but the program failed";
+  const std::vector<SanityFinding>& findings = summary.sanity;
   for (const SanityFinding& f : findings) {
     if (f.severity == Severity::kUnusable) return "readable, but " + finding_phrase(f);
   }
@@ -188,15 +215,48 @@ std::string robot_name(const Problem& problem) {
   return name.empty() ? "the file of [robot]" : name;
 }
 
+// What is searched, how, and what that costs.
+std::string search_text(const Config& config, const Summary& summary, unsigned workers) {
+  const Problem& problem = config.problem;
+  std::string text = "\ngenes        " + std::to_string(problem.genes.size()) + "\n";
+  for (const Gene& gene : problem.genes) {
+    const Parameter& row = problem.table()[gene.row];
+    text += "             " + row.key + " in [" + problem.table().format(gene.row, gene.lower) +
+            ", " + problem.table().format(gene.row, gene.upper) + "]" +
+            (gene.scale == ParameterScale::kLog ? ", log scale" : "") + "\n";
+  }
+  text += "evolution    " + std::to_string(config.evolution.population) + " individuals, at most " +
+          std::to_string(config.evolution.generations) + " generations, seed " +
+          std::to_string(config.seed) + "\n";
+  const auto most = most_evaluations(config);
+  const double all_s = summary.evaluation_s * static_cast<double>(most);
+  const double one_s = summary.evaluation_s;
+  text += "cost         " + (one_s < 1 ? format_number(one_s, 2) + " s" : format_duration(one_s)) +
+          " an evaluation (one, measured here); " + std::to_string(most) + " of them about " +
+          format_duration(all_s / std::max(1u, workers)) + " on " + std::to_string(workers) +
+          " workers like it\n";
+  text += "farm         " + std::to_string(workers) + " local workers";
+  if (config.farm.listen) text += ", and remote ones at " + *config.farm.listen;
+  text += "\nproblem      " + problem_hash(to_proto(problem)) + "\n";
+  return text;
+}
+
 std::string describe(const Config& config, const Summary& summary, unsigned workers) {
   const Problem& problem = config.problem;
-  std::string text = config.path + ": " + standing(summary.sanity) + "\n";
+  std::string text = config.path + ": " + standing(summary) + "\n";
   for (const SanityFinding& f : summary.sanity) {
     text += std::string(f.severity == Severity::kUnusable ? "doubt" : "note ") + "        " +
             f.name + ": " + f.text + " " + f.remedy + "\n";
   }
-  // The first row of every other table is the model that is simulated.
   text += "scenario     " + problem.scenario + ", ";
+  if (is_value(problem.fitness.kind)) {
+    text += problem.external->table.declaration().name + "\nvalue        " + value_text(summary) +
+            (higher_is_better(problem.fitness.kind) ? "\ndirection    higher"
+                                                    : "\ndirection    lower") +
+            " is better";
+    return text + search_text(config, summary, workers);
+  }
+  // The first row of every other table is the model that is simulated.
   if (problem.ground) {
     text += drive_names()[static_cast<std::size_t>(problem.ground->robot().drive)] + "\n";
   } else {
@@ -218,26 +278,7 @@ std::string describe(const Config& config, const Summary& summary, unsigned work
   }
   text += "\nfitness      " + std::string(fitness_name(problem.fitness.kind)) +
           (higher_is_better(problem.fitness.kind) ? ", higher is better" : ", lower is better");
-  text += "\ngenes        " + std::to_string(problem.genes.size()) + "\n";
-  for (const Gene& gene : problem.genes) {
-    const Parameter& row = problem.table()[gene.row];
-    text += "             " + row.key + " in [" + problem.table().format(gene.row, gene.lower) +
-            ", " + problem.table().format(gene.row, gene.upper) + "]" +
-            (gene.scale == ParameterScale::kLog ? ", log scale" : "") + "\n";
-  }
-  text += "evolution    " + std::to_string(config.evolution.population) + " individuals, at most " +
-          std::to_string(config.evolution.generations) + " generations, seed " +
-          std::to_string(config.seed) + "\n";
-  const auto most = most_evaluations(config);
-  const double all_s = summary.evaluation_s * static_cast<double>(most);
-  text += "cost         " + format_duration(summary.evaluation_s) +
-          " an evaluation (one, measured here); " + std::to_string(most) + " of them about " +
-          format_duration(all_s / std::max(1u, workers)) + " on " + std::to_string(workers) +
-          " workers like it\n";
-  text += "farm         " + std::to_string(workers) + " local workers";
-  if (config.farm.listen) text += ", and remote ones at " + *config.farm.listen;
-  text += "\nproblem      " + problem_hash(to_proto(problem)) + "\n";
-  return text;
+  return text + search_text(config, summary, workers);
 }
 
 Result<int> run_check(const CheckOptions& options, CliContext& context) {
@@ -246,10 +287,9 @@ Result<int> run_check(const CheckOptions& options, CliContext& context) {
                    open_config(options.config, options.trials, console, check_runnable));
   const unsigned workers = local_workers({}, config.farm);
   Summary summary = summarise(config);
-  ASSIGN_OR_RETURN(const auto measured, measure_evaluation(config, context));
-  summary.evaluation_s = measured;
+  RETURN_IF_ERROR(measure_evaluation(config, context, &summary));
   console.result(describe(config, summary, workers), to_json(config, summary, workers));
-  return kExitDone;
+  return summary.evaluated.outcome() == v1::WORKER_FAILED ? kExitQuarantined : kExitDone;
 }
 
 }  // namespace
@@ -258,6 +298,7 @@ SubcommandRun setup_check(CLI::App& app) {
   auto options = std::make_shared<CheckOptions>();
   app.add_option("CONFIG", options->config, "Config file (TOML)")->required();
   options->trials.declare(app);
+  options->trials.needed = false;
   app.footer(
       "Examples:\n"
       "  gapfarm check configs/demo.toml\n"

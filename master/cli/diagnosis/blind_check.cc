@@ -54,6 +54,7 @@ Result<DesignSettings> design_of(const BlindCheckOptions& options, const Config&
 Result<Config> config_of(const BlindCheckOptions& options, SessionPlans& plan, Console& console) {
   Result<Config> config = read_config(options.config);
   if (!config) return config;
+  RETURN_IF_ERROR(check_moves(config->problem.scenario, options.config));
   if (options.seed) config->seed = *options.seed;
   SimulateSettings& simulate = config->simulate;
   if (options.trials) {

@@ -194,6 +194,7 @@ Result<Config> figure_config(const EffectsOptions& options) {
   } else {
     Result<Config> read = read_config(options.config);
     if (!read) return read;
+    RETURN_IF_ERROR(check_moves(read->problem.scenario, options.config));
     config = std::move(*read);
   }
   Problem& problem = config.problem;

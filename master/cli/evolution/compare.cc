@@ -74,6 +74,7 @@ Status read_trials(const TrialOptions& given, std::vector<Variant>& variants, Co
   const Variant* before = nullptr;
   for (Variant& variant : variants) {
     Config& config = variant.config;
+    if (scenario_form(config.problem.scenario).objective && given.files.empty()) continue;
     if (!given.files.empty()) config.trial_files = given.files;
     if (config.trial_files.empty()) {
       return Error{config.path + ": no trials; name them in the config or with --trials"};
@@ -102,6 +103,10 @@ Status check_alike(const std::vector<Variant>& variants) {
                    variants.front().name + "\", so their fitness cannot be compared"};
     };
     if (problem.scenario != first.scenario) return refuse("scenario");
+    const auto program = [](const Problem& p) {
+      return p.external ? p.external->command.argv : std::vector<std::string>();
+    };
+    if (program(problem) != program(first)) return refuse("program");
     if (problem.fitness.kind != first.fitness.kind) return refuse("fitness");
     if (variant.config.trial_files != variants.front().config.trial_files) return refuse("log");
     RETURN_IF_ERROR(check_evolvable(variant.config));
@@ -210,10 +215,15 @@ Result<int> run_compare(CompareCommand& command, CliContext& context) {
                    compare(inputs.variants, inputs.options, farm_scorer(*asked, inputs.variants)));
   ComparisonSummary summary =
       summarise_comparison(inputs.variants, runs, inputs.options, inputs.target);
-  const auto constant = constant_velocity_fitness(first.problem);
-  if (!constant) context.console.note("no constant-velocity baseline: " + constant.error().message);
-  summary.baselines = {{"constant velocity", constant ? std::optional(*constant) : std::nullopt},
-                       as_written};
+  summary.baselines = {as_written};
+  if (!is_value(first.problem.fitness.kind)) {
+    const auto constant = constant_velocity_fitness(first.problem);
+    if (!constant)
+      context.console.note("no constant-velocity baseline: " + constant.error().message);
+    summary.baselines.insert(
+        summary.baselines.begin(),
+        {"constant velocity", constant ? std::optional(*constant) : std::nullopt});
+  }
   RETURN_IF_ERROR(write_all(command, inputs, summary, runs));
   context.console.result(comparison_text(summary), to_json(summary));
   context.console.note("wrote: " + (std::filesystem::path(command.out) / "compare.html").string() +

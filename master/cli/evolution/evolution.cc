@@ -169,7 +169,12 @@ int run_evolution(RunStore& store, const Config& config, const EvolutionOptions&
     context.console.note("continue with: gapfarm resume " + run);
     return kExitResumable;
   }
-  if (summary->given_up == 0) return kExitDone;
+  if (summary->given_up == 0) {
+    const auto& best = summary->evolved.best;
+    if (!best || best->outcome == v1::OK) return kExitDone;
+    context.console.note("there is no model; what happened: gapfarm status " + run);
+    return kExitFailed;
+  }
   context.console.note(fmt::format(
       "{} given up; which and why: gapfarm status {}",
       summary->given_up == 1 ? "1 task was" : std::to_string(summary->given_up) + " tasks were",

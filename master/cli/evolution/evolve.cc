@@ -23,11 +23,19 @@ struct EvolveCommand {
   EvolutionOptions options;
 };
 
+std::string what_evolves(const Problem& problem) {
+  const std::string parameters = std::to_string(problem.genes.size()) + " parameters ";
+  if (is_value(problem.fitness.kind)) {
+    return parameters + "to the " +
+           (higher_is_better(problem.fitness.kind) ? "greatest value" : "least value");
+  }
+  return parameters + "on " + std::to_string(problem.log.trials.size()) + " trials";
+}
+
 Result<int> print_plan(const EvolveCommand& command, const Config& config, CliContext& context) {
   const std::size_t genes = config.problem.genes.size(), trials = config.problem.log.trials.size();
-  const std::string would = "evolve " + std::to_string(genes) + " parameters on " +
-                            std::to_string(trials) + " trials into " + command.out + ", seed " +
-                            std::to_string(config.seed) + ", population " +
+  const std::string would = "evolve " + what_evolves(config.problem) + " into " + command.out +
+                            ", seed " + std::to_string(config.seed) + ", population " +
                             std::to_string(config.evolution.population) + ", at most " +
                             std::to_string(config.evolution.generations) + " generations";
   return print_dry_run(would,
@@ -58,9 +66,8 @@ Result<int> run_evolve(EvolveCommand command, CliContext& context) {
   const bool folder_was_there = std::filesystem::exists(command.out, ignored);
   ASSIGN_OR_RETURN(RunStore store,
                    RunStore::create(command.out, run_info(config, command.options.overrides)));
-  context.console.note(command.out + ": evolving " + std::to_string(config.problem.genes.size()) +
-                       " parameters on " + std::to_string(config.problem.log.trials.size()) +
-                       " trials, seed " + std::to_string(config.seed));
+  context.console.note(command.out + ": evolving " + what_evolves(config.problem) + ", seed " +
+                       std::to_string(config.seed));
   const int code = run_evolution(store, config, command.options, *log, context);
   // What failed before its first generation is not to be in the way of the next attempt.
   const auto checkpoint = store.checkpoint();
@@ -78,6 +85,7 @@ SubcommandRun setup_evolve(CLI::App& app) {
   auto command = std::make_shared<EvolveCommand>();
   app.add_option("CONFIG", command->config, "Config file (TOML)")->required();
   command->trials.declare(app);
+  command->trials.needed = false;
   app.add_option("--out", command->out, "Run folder to make")->required();
   app.add_option("--seed", command->seed, "In place of the config's");
   command->options.declare(app);

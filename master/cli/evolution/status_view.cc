@@ -113,6 +113,10 @@ std::string trouble(const RunStatus& status, const Console& console) {
             (status.quarantined == 1 ? " task\n" : " tasks\n") +
             incident_lines(status, IncidentKind::kQuarantine, console);
   }
+  const std::string failures = incident_lines(status, IncidentKind::kFailure, console);
+  if (!failures.empty()) {
+    text += label(console, "failed") + "evaluations that the program had no value for\n" + failures;
+  }
   const std::string alarms = incident_lines(status, IncidentKind::kAlarm, console);
   if (!alarms.empty()) {
     text += label(console, "alarms") +
@@ -174,6 +178,9 @@ std::string status_screen(const RunStatus& status, const std::string& run, const
   text += "\n" + label(console, "fitness") + status.info.fitness;
   if (status.info.fitness_unit != "-") text += " (" + status.info.fitness_unit + ")";
   text += status.info.higher_is_better ? ", higher is better" : ", lower is better";
+  if (status.best_individual && status.best_individual->outcome == "INFEASIBLE") {
+    text += "; nothing feasible was found yet";
+  }
   if (status.generation > 0) {
     text += "\n" + label(console, "") + "best " + format_number(status.best) + ", mean " +
             format_number(status.mean) + ", worst " + format_number(status.worst);

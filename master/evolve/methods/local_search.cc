@@ -153,9 +153,14 @@ void LocalSearch::add_cost(const Standing& standing) {
     costs_.push_back(standing.cost);
     return;
   }
+  if (standing.outcome == v1::INFEASIBLE) {
+    // Beyond any cost, yet in the order of the violations.
+    costs_.push_back(1e30 * (1 + standing.cost / (1 + standing.cost)));
+    return;
+  }
   double worst = 0;
   for (double cost : costs_) worst = std::max(worst, cost);
-  costs_.push_back(2 * worst + 1);
+  costs_.push_back(std::min(2 * worst + 1, 1e60));
 }
 
 void LocalSearch::learn(std::span<const Genome> proposed, std::span<const Standing> standings) {

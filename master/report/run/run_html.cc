@@ -66,7 +66,10 @@ std::string summary(const RunReport& report) {
   }
   if (!report.farm.state.empty()) html += state_line(report.farm);
   if (!report.outcome || report.outcome->trials.empty()) {
-    return html + "<p>" + html_escaped(report.without_outcome) + "</p></section>\n";
+    if (!report.without_outcome.empty()) {
+      html += "<p>" + html_escaped(report.without_outcome) + "</p>";
+    }
+    return html + "</section>\n";
   }
   const Errors before = errors_of(report.outcome->trials, false);
   const Errors after = errors_of(report.outcome->trials, true);
@@ -101,6 +104,7 @@ std::string fitness_names(const RunReport& report) {
 }
 
 std::string scores(const RunReport& report) {
+  if (report.objective) return "";
   std::string html =
       R"(<section id="scores"><h2>On trials )" + term("validation", "held out") + "</h2>";
   const RunOutcome none;
@@ -217,7 +221,7 @@ std::string run_html(const RunReport& report) {
   frame.places = {{"progress", "Fitness"}, {"parameters", "Parameters"}};
   if (!report.densities.empty()) frame.places.emplace_back("genes", "Genes");
   if (!report.elite.lines.empty()) frame.places.emplace_back("elite", "Elite");
-  frame.places.emplace_back("scores", "Held out");
+  if (!report.objective) frame.places.emplace_back("scores", "Held out");
   if (driven) {
     frame.places.emplace_back("floor", "Floor");
     frame.places.emplace_back("drives", "Drives");
@@ -227,7 +231,7 @@ std::string run_html(const RunReport& report) {
     frame.places.emplace_back("residuals", "Residuals");
   }
   const bool farmed = !report.farm.state.empty();
-  const bool watched = report.served && !report.genomes.empty();
+  const bool watched = report.served && !report.genomes.empty() && !report.objective;
   if (watched) frame.places.emplace_back("watch", "Watch");
   if (!report.genomes.empty()) frame.places.emplace_back("genomes", "Genomes");
   if (farmed) frame.places.emplace_back("farm", "Farm");

@@ -138,6 +138,7 @@ struct RunReport {
   std::vector<ParameterRow> parameters;  // interval: the last generation's middle nine tenths
   std::optional<RunOutcome> outcome;
   std::string without_outcome;  // why there is none
+  bool objective = false;       // there are values and a number, and no trials
   bool pieces = false;          // the trials are pushes of pieces
   std::vector<std::string> operators;
   // [probability_generations][operators]: of some generations, in order.

@@ -230,6 +230,7 @@ TEST(Ranking, OutcomesFollowTheEnumAndNaNIsDivergence) {
     return s;
   };
   const Standing order[] = {standing(v1::OK, -3),           standing(v1::OK, 1e300),
+                            standing(v1::INFEASIBLE, 0.5),  standing(v1::INFEASIBLE, 2),
                             standing(v1::DIVERGED, -1e9),   standing(v1::FELL_OVER, 0),
                             standing(v1::NEVER_RESTED, 0),  standing(v1::INVALID_REQUEST, 0),
                             standing(v1::WORKER_FAILED, 0), standing(v1::OUTCOME_UNSPECIFIED, 0)};
@@ -250,6 +251,9 @@ TEST(Standing, IsTheMeanOfItsScoresAndTheWorstOfItsOutcomes) {
   EXPECT_EQ(standing.scores, 3U);
   EXPECT_NEAR(standing.cost, 4, 1e-12);
   EXPECT_NEAR(standing.m2, 18, 1e-12);
+  for (double violation : {0.5, 2.0, 1.0}) standing.add({v1::INFEASIBLE, violation});
+  EXPECT_EQ(standing.outcome, v1::INFEASIBLE);
+  EXPECT_EQ(standing.cost, 2) << "of violations the greatest";
   standing.add({v1::FELL_OVER, 0});
   standing.add({v1::OK, 1});
   EXPECT_EQ(standing.outcome, v1::FELL_OVER);

@@ -1,0 +1,52 @@
+"""A Python function as the program of scenario ``objective`` (docs/objective.md).  Needs nothing but Python."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import sys
+import traceback
+from typing import Any, Callable, Mapping, Sequence
+
+Function = Callable[[Mapping[str, Any], int], Any]
+
+
+def answer(function: Function, parameters: Mapping[str, Any], seed: int) -> "dict[str, Any]":
+    """What the protocol answers for ``function(parameters, seed)``, without the id.
+
+    The function returns a number, or a mapping with ``value``, and perhaps ``violations`` (a list,
+    above 0: violated) and ``notes`` (a text).  What it raises, and a value that is not finite,
+    is a failed evaluation with its message; the traceback goes to stderr.
+    """
+    try:
+        given = function(parameters, seed)
+        reply: "dict[str, Any]" = dict(given) if isinstance(given, Mapping) else {"value": given}
+        if reply.get("value") is not None:
+            reply["value"] = float(reply["value"])
+        reply["violations"] = [float(violation) for violation in reply.get("violations", [])]
+    except Exception as error:  # noqa: BLE001 - whatever a user's function raises
+        traceback.print_exc()
+        return {"outcome": "failed", "message": f"{type(error).__name__}: {error}"}
+    for name, numbers in (("value", [reply.get("value")]), ("violation", reply["violations"])):
+        bad = [n for n in numbers if n is not None and not math.isfinite(n)]
+        if bad:
+            return {"outcome": "failed", "message": f"its {name} is {bad[0]}"}
+    return reply
+
+
+def serve(function: Function, parameters: Sequence[Mapping[str, Any]], name: str = "") -> None:
+    """Answers gapfarm's questions with ``function`` until there are no more.
+
+    ``parameters`` is declared as it is: a mapping each with ``key``, ``lower``, ``upper``, ``nominal``, or ``choices``.
+    What the function prints goes to stderr, also from libraries below Python.
+    """
+    answers = os.fdopen(os.dup(1), "w")
+    os.dup2(2, 1)
+    for line in sys.stdin:
+        asked = json.loads(line)
+        if "id" in asked:
+            reply = {"id": asked["id"], **answer(function, asked["parameters"], asked["seed"])}
+        else:
+            reply = {"gapfarm": 1, "name": name or function.__name__, "parameters": list(parameters)}
+        print(json.dumps(reply), file=answers, flush=True)

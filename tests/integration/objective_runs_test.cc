@@ -1,0 +1,249 @@
+// Runs whose fitness is the number that a program of a user's returns.
+#include <gmock/gmock.h>
+#include <signal.h>
+
+#include <nlohmann/json.hpp>
+
+#include "tests/integration/run_program.h"
+
+namespace gapfarm::objective_runs_test {
+
+using nlohmann::json;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+// A bowl whose least value, 0, is at x = 0.25, n = 3 and the right side, where `bend` is there.
+// `misbehave` is Python that may change `answer`.
+std::string bowl(const std::string& misbehave) {
+  return "import json, os, sys\n"
+         "for line in sys.stdin:\n"
+         "    task = json.loads(line)\n"
+         "    if 'id' not in task:\n"
+         "        print(json.dumps({'gapfarm': 1, 'name': 'bowl', 'parameters': [\n"
+         "            {'key': 'x', 'lower': -1, 'upper': 1, 'nominal': 0.9},\n"
+         "            {'key': 'n', 'lower': 0, 'upper': 4, 'nominal': 1, 'integer': True},\n"
+         "            {'key': 'side', 'choices': ['left', 'right']},\n"
+         "            {'key': 'bend', 'lower': 0, 'upper': 1, 'nominal': 0.5,\n"
+         "             'when': {'side': 'right', 'n': [2, 3]}}]}), flush=True)\n"
+         "        continue\n"
+         "    p = task['parameters']\n"
+         "    x, n, side, sign = p['x'], p['n'], p['side'], 1\n"
+         "    assert ('bend' in p) == (side == 'right' and n in (2, 3)), p\n"
+         "    value = (x - 0.25) * (x - 0.25) + abs(n - 3) + (side == 'left')\n"
+         "    answer = {'id': task['id'], 'value': value}\n" +
+         misbehave + "    print(json.dumps(answer), flush=True)\n";
+}
+
+class ObjectiveRuns : public ::testing::Test {
+ protected:
+  std::string config(const std::string& misbehave, const std::string& objective = "",
+                     const std::string& more = "") const {
+    folder_.write("bowl.py", bowl(misbehave));
+    return folder_.write("run.toml",
+                         "scenario = \"objective\"\n[objective]\n"
+                         "program = [\"python3\", \"bowl.py\"]\n" +
+                             objective + "[evolution]\npopulation = 8\n" + more);
+  }
+  Finished evolve(const std::string& config, const std::string& run, const std::string& generations,
+                  const std::string& workers = "2") const {
+    return gapfarm_command({"evolve", config, "--out", folder_ / run, "--generations", generations,
+                            "--workers", workers});
+  }
+  json status(const std::string& run) const {
+    return json::parse(gapfarm_command({"status", folder_ / run, "--json"}).out);
+  }
+  std::string screen(const std::string& run) const {
+    return gapfarm_command({"status", folder_ / run}).out;
+  }
+
+  const TemporaryFolder folder_;
+};
+
+TEST_F(ObjectiveRuns, FindTheLeastValueAndLeaveItsModel) {
+  const Finished finished = evolve(config(""), "run", "40");
+  ASSERT_EQ(finished.exit_code, 0) << finished.err;
+  EXPECT_THAT(finished.err, HasSubstr("evolving 4 parameters to the least value"));
+  const json found = status("run");
+  EXPECT_LT(found["best_fitness"], 1e-3);
+  EXPECT_GE(found["best_fitness"], 0);
+  EXPECT_FALSE(found["higher_is_better"]);
+  EXPECT_EQ(found["best"]["values"]["n"], 3);
+  EXPECT_EQ(found["best"]["values"]["side"], "right");
+  const std::string model = text_of(folder_.path() / "run" / "model.toml");
+  EXPECT_THAT(model, AllOf(HasSubstr("direction = \"minimise\""), HasSubstr("side = { value = "),
+                           Not(HasSubstr("trials take"))));
+  EXPECT_THAT(text_of(folder_.path() / "run" / "report.html"), HasSubstr("Best value "));
+  EXPECT_FALSE(std::filesystem::exists(folder_.path() / "run" / "poses.svg"));
+  EXPECT_EQ(gapfarm_command({"report", folder_ / "run", "--out", folder_ / "page.html"}).exit_code,
+            0);
+  const std::string birth = std::to_string(found["best"]["birth_id"].get<std::uint64_t>());
+  const Finished again = gapfarm_command({"replay", folder_ / "run", "--genome", birth});
+  EXPECT_THAT(again.out, HasSubstr("the same to the bit")) << again.err;
+}
+
+TEST_F(ObjectiveRuns, MaximiseIsMinimiseWithTheOtherSign) {
+  ASSERT_EQ(evolve(config(""), "least", "6").exit_code, 0);
+  ASSERT_EQ(evolve(config("    answer['value'] = -value\n", "direction = \"maximize\"\n"),
+                   "greatest", "6")
+                .exit_code,
+            0);
+  const json least = status("least"), greatest = status("greatest");
+  EXPECT_EQ(greatest["best"]["values"], least["best"]["values"]);
+  EXPECT_EQ(greatest["best_fitness"].get<double>(), -least["best_fitness"].get<double>());
+  EXPECT_TRUE(greatest["higher_is_better"]);
+}
+
+TEST_F(ObjectiveRuns, NumberOfWorkersAndKillsChangeNothing) {
+  // The seed counts: noise that is drawn from it, and scores of elites that are means.
+  const std::string file =
+      config("    answer['value'] += task['seed'] * 1e-12\n", "noisy = true\n");
+  ASSERT_EQ(evolve(file, "one", "6", "1").exit_code, 0);
+  ASSERT_EQ(evolve(file, "two", "6", "2").exit_code, 0);
+  EXPECT_EQ(status("one")["digest"], status("two")["digest"]);
+  // Killed by its own objective in the middle of a generation.
+  config(
+      "    answer['value'] += task['seed'] * 1e-12\n"
+      "    if os.path.exists('master') and value < 0.5:\n"
+      "        os.kill(int(open('master').read()), 9)\n"
+      "        os.remove('master')\n",
+      "noisy = true\n");
+  RunningProgram killed("gapfarm", {"evolve", file, "--out", folder_ / "killed", "--generations",
+                                    "6", "--workers", "2"});
+  folder_.write("master", std::to_string(killed.pid()));
+  EXPECT_EQ(killed.wait().exit_code, 128 + SIGKILL);
+  const Finished resumed = gapfarm_command({"resume", folder_ / "killed", "--workers", "2"});
+  EXPECT_EQ(resumed.exit_code, 0) << resumed.err;
+  EXPECT_EQ(status("killed")["digest"], status("one")["digest"]);
+}
+
+TEST_F(ObjectiveRuns, WhatCrashesHangsOrPrintsRubbishIsNamedAndTheRunGoesOn) {
+  const struct {
+    const char *name, *misbehave, *named;
+  } kinds[] = {
+      {"crash", "    if n == 4: os._exit(9)\n", "ended with status 9"},
+      {"hang", "    if n == 4: os.read(os.pipe()[0], 1)\n", "did not answer within 1 s"},
+      {"rubbish", "    if n == 4: print('bang', flush=True)\n",
+       "did not answer with a JSON object: 'bang'"},
+      {"nothing", "    if n == 4: del answer['value']\n",
+       "did not answer with \"value\": a number"},
+  };
+  for (const auto& kind : kinds) {
+    const Finished finished = evolve(config(kind.misbehave, "answer_limit = 1\n"), kind.name, "2");
+    EXPECT_EQ(finished.exit_code, 3) << kind.name << finished.err;
+    EXPECT_EQ(status(kind.name)["generation"], 2) << kind.name;
+    const std::string log = text_of(folder_.path() / kind.name / "log.txt");
+    for (const std::string& kept : {screen(kind.name), log}) {
+      EXPECT_THAT(kept, AllOf(HasSubstr(kind.named), HasSubstr("--set n="))) << kind.name;
+    }
+  }
+}
+
+TEST_F(ObjectiveRuns, AFailedEvaluationIsNoErrorAndItsMessageStays) {
+  const struct {
+    const char *name, *misbehave, *named;
+  } kinds[] = {
+      {"nan", "    if n > 2: answer['value'] = float('nan')\n",
+       "it printed NaN, which is no number"},
+      {"null", "    if n > 2: answer['value'] = None\n", "it answered a value of null"},
+      {"failed",
+       "    if n > 2: answer = {'id': task['id'], 'outcome': 'failed', 'message': 'no mesh'}\n",
+       ": no mesh; --set x="},
+  };
+  for (const auto& kind : kinds) {
+    const Finished finished = evolve(config(kind.misbehave), kind.name, "3");
+    EXPECT_EQ(finished.exit_code, 0) << kind.name << finished.err;
+    EXPECT_EQ(status(kind.name)["quarantined"], 0) << kind.name;
+    const std::string log = text_of(folder_.path() / kind.name / "log.txt");
+    for (const std::string& kept : {finished.err, screen(kind.name), log}) {
+      EXPECT_THAT(kept, AllOf(HasSubstr(kind.named), HasSubstr("--set n="))) << kind.name;
+    }
+  }
+}
+
+TEST_F(ObjectiveRuns, WhenNothingEndsWellTheRunSaysSo) {
+  const Finished finished = evolve(config("    answer['value'] = None\n"), "run", "2");
+  EXPECT_EQ(finished.exit_code, 1) << finished.err;
+  EXPECT_THAT(finished.out, HasSubstr("no evaluation ended well"));
+  EXPECT_THAT(screen("run"), HasSubstr("no evaluation ended well"));
+  EXPECT_FALSE(std::filesystem::exists(folder_.path() / "run" / "model.toml"));
+}
+
+TEST_F(ObjectiveRuns, TheBestIsFeasible) {
+  // The least value would be outside; the best inside lies on the edge.
+  const std::string inside = "    answer['violations'] = [x - 0.1, -1]\n";
+  ASSERT_EQ(evolve(config(inside), "run", "40").exit_code, 0);
+  const json found = status("run");
+  EXPECT_LE(found["best"]["values"]["x"], 0.1);
+  EXPECT_NEAR(found["best_fitness"], 0.15 * 0.15, 2e-3);
+  const Finished none =
+      evolve(config("    answer = {'id': task['id'], 'violations': [x + 2]}\n"), "none", "20");
+  EXPECT_EQ(none.exit_code, 1) << none.err;
+  EXPECT_THAT(none.out, HasSubstr("nothing feasible was found, violations sum to 1.0"));
+  EXPECT_THAT(screen("none"), HasSubstr("nothing feasible was found"));
+}
+
+TEST_F(ObjectiveRuns, EverySearchHasThem) {
+  for (const char* method : {"cma_es", "differential_evolution", "local", "de_simplex"}) {
+    const std::string file =
+        config("    answer['violations'] = [0.2 - x]\n    if n == 4: answer['value'] = None\n", "",
+               "[evolution.stop]\nevaluations = 300\n[optimiser]\nkind = \"" + std::string(method) +
+                   "\"\n");
+    const Finished finished = evolve(file, method, "1000");
+    ASSERT_EQ(finished.exit_code, 0) << method << finished.err;
+    EXPECT_GE(status(method)["best"]["values"]["x"], 0.2) << method;
+  }
+}
+
+TEST_F(ObjectiveRuns, CheckEvaluatesOnceAndCompareNeedsNoTrials) {
+  const std::string file = config("    answer['notes'] = 'as it came'\n");
+  const Finished checked = gapfarm_command({"check", file});
+  EXPECT_EQ(checked.exit_code, 0) << checked.err;
+  EXPECT_THAT(checked.out,
+              AllOf(HasSubstr("value        3.4225 at the config's own values; as it came"),
+                    HasSubstr("lower is better"), HasSubstr("an evaluation")));
+  const Finished compared = gapfarm_command({"compare", file, "--seeds", "2", "--evaluations", "30",
+                                             "--out", folder_ / "compared", "--workers", "2"});
+  EXPECT_EQ(compared.exit_code, 0) << compared.err;
+  EXPECT_THAT(compared.out, HasSubstr("random search"));
+  EXPECT_EQ(gapfarm_command({"check", config("    os._exit(1)\n")}).exit_code, 3);
+}
+
+TEST_F(ObjectiveRuns, WhatNeedsTrialsRefusesInOneSentence) {
+  const std::string file = config(""), run = folder_ / "run", out = folder_ / "out";
+  ASSERT_EQ(evolve(file, "run", "1").exit_code, 0);
+  const std::vector<std::vector<std::string>> commands = {
+      {"diagnose", file, "--out", out},
+      {"crossfit", file},
+      {"determine", file, "--model", run, "--out", out},
+      {"horizons", file},
+      {"predict", run, "--trials", file},
+      {"simulate", file, "--out", out},
+      {"simulate", run + "/model.toml", "--out", out},
+      {"drive", run, "--out", out},
+      {"influence", file, "--out", out},
+      {"stability", file, "--out", out},
+      {"plan", file, "--out", out},
+      {"blind-check", file, "--out", out},
+  };
+  for (const auto& command : commands) {
+    const Finished finished = gapfarm_command(command);
+    EXPECT_EQ(finished.exit_code, 2) << command[0] << finished.err;
+    EXPECT_THAT(finished.err, HasSubstr("scenario objective has values and a number"))
+        << command[0];
+  }
+  const Finished trials = gapfarm_command({"evolve", file, "--trials", file, "--out", out});
+  EXPECT_EQ(trials.exit_code, 2);
+  EXPECT_THAT(trials.err, HasSubstr("has no trials; omit --trials"));
+}
+
+TEST_F(ObjectiveRuns, TheExampleFindsTheEndOfTheValley) {
+  const Finished finished = gapfarm_command({"evolve", GAPFARM_SOURCE_DIR "/configs/objective.toml",
+                                             "--out", folder_ / "run", "--workers", "2"});
+  ASSERT_EQ(finished.exit_code, 0) << finished.err;
+  const json found = status("run");
+  EXPECT_LT(found["best_fitness"], 1e-6);
+  EXPECT_NEAR(found["best"]["values"]["x"], 1, 1e-3);
+}
+
+}  // namespace gapfarm::objective_runs_test

@@ -1,0 +1,40 @@
+#include "worker/scenarios/program.h"
+
+#include "common/process/process_pool.h"
+
+namespace gapfarm {
+
+std::shared_ptr<ExternalSimulator> shared_simulator(const ExternalCommand& command) {
+  struct Started {
+    ExternalCommand command;
+    std::weak_ptr<ExternalSimulator> simulator;
+  };
+  static thread_local std::vector<Started> all;
+  std::erase_if(all, [](const Started& one) { return one.simulator.expired(); });
+  for (const Started& one : all) {
+    if (one.command == command) return one.simulator.lock();
+  }
+  auto simulator = std::make_shared<ExternalSimulator>(command, monotonic_seconds);
+  all.push_back({command, simulator});
+  return simulator;
+}
+
+std::optional<v1::TaskResult> refuse_to_start() {
+  if (external_programs_allowed()) return std::nullopt;
+  v1::TaskResult refusal;
+  refusal.set_outcome(v1::INVALID_REQUEST);
+  refusal.set_message(
+      "this worker starts no programs that a master names; start it with --allow-external, and "
+      "only for a master that you trust with its machine");
+  return refusal;
+}
+
+Result<ExternalAnswer> ask_program(ExternalSimulator& simulator, ExternalRequest& request,
+                                   const ExternalProgram& program, StepCounter* steps) {
+  simulator.while_waiting([steps] { count_step(steps); });
+  Result<ExternalAnswer> answer = simulator.simulate(request, program.introduction);
+  count_step(steps);
+  return answer;
+}
+
+}  // namespace gapfarm
