@@ -103,6 +103,7 @@ std::string action(const RunReport& report, const RunInfo& info) {
     if (bound_hit(row) == BoundHit::kNone) continue;
     return "Widen the range of " + row.key + " in [genes]: the best value lies at its end.";
   }
+  if (report.objective) return "gapfarm resume " + report.name + " --generations N searches on.";
   if (!report.outcome) return "gapfarm resume " + report.name + " goes on.";
   if (report.outcome->validation.empty()) {
     return "Judge it on trials that it has not seen: gapfarm predict RUN --trials OTHER.csv";

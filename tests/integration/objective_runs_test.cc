@@ -104,9 +104,9 @@ TEST_F(ObjectiveRuns, NumberOfWorkersAndKillsChangeNothing) {
   // Killed by its own objective in the middle of a generation.
   config(
       "    answer['value'] += task['seed'] * 1e-12\n"
-      "    if os.path.exists('master') and value < 0.5:\n"
-      "        os.kill(int(open('master').read()), 9)\n"
-      "        os.remove('master')\n",
+      "    if os.path.exists('master') and task['id'] >= 8:\n"
+      "        os.rename('master', 'taken')\n"  // first: this process dies with its worker
+      "        os.kill(int(open('taken').read()), 9)\n",
       "noisy = true\n");
   RunningProgram killed("gapfarm", {"evolve", file, "--out", folder_ / "killed", "--generations",
                                     "6", "--workers", "2"});
