@@ -8,14 +8,6 @@
 namespace gapfarm {
 namespace {
 
-Eigen::VectorXd nominals(const std::vector<FitRow>& rows) {
-  Eigen::VectorXd values(static_cast<Eigen::Index>(rows.size()));
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    values[static_cast<Eigen::Index>(i)] = rows[i].row.nominal;
-  }
-  return values;
-}
-
 std::vector<FitRow> held_rows(const GroundQuestion& question) {
   std::vector<FitRow> rows;
   for (const KinematicRow& row : question.rows) rows.push_back({row, false});

@@ -1,7 +1,10 @@
 #include "master/ground/reference.h"
 
 #include <algorithm>
+#include <cmath>
+#include <numbers>
 #include <optional>
+#include <set>
 #include <utility>
 
 #include "common/random/stream.h"
@@ -13,6 +16,12 @@ namespace {
 
 // How far off a file may be of which nothing is asked, in what a robot changes by by itself.
 constexpr double kFarOff = 20;
+// How little a value may be off that no log shows: of its tolerance.
+constexpr double kHeld = 1e-6;
+constexpr double kUnshown = 0.7;  // of the prior's deviation: a log that leaves more says nothing
+// Headings of the tracked point that a fit begins at, and for how many rounds each is followed.
+constexpr int kTurns = 8;
+constexpr int kScanRounds = 3;
 
 // A grip that was never reached has no upper end that shows, and none below that does not: half of
 // how far it may fall, in its logarithm, before the log would be two nats less likely.
@@ -51,8 +60,9 @@ WindowFit with_traits(const WindowFitter& fitter, const std::vector<GroundHypoth
       if (rows.size() == fit.rows.size()) continue;
       if (h.name == kFloorEdge) values = scan_floor_edge(fitter, fit, rows, values);
       for (std::size_t k = 0; k < rows.size(); ++k) {
-        rows[k].free = k >= fit.rows.size() && h.name == kFloorEdge;  // a line is anywhere
-        if (k >= fit.rows.size()) rows[k].row.tolerance *= kFarOff;
+        const bool fresh = k >= fit.rows.size();
+        rows[k].free = fresh ? h.name == kFloorEdge : fit.rows[k].free;  // a line is anywhere
+        if (fresh) rows[k].row.tolerance *= kFarOff;
       }
       if (fitter.promise(fit, slopes, rows, values) < kLeastPromise) continue;
       WindowFit with = fitter.fit(rows, {}, values);
@@ -68,6 +78,46 @@ WindowFit with_traits(const WindowFitter& fitter, const std::vector<GroundHypoth
   return fit;
 }
 
+// Far wider than what a file is off by; of increments all that may plausibly be wrong, but for when
+// wheels turned, where they were measured with them.
+std::vector<FitRow> open_rows(const GroundRobot& robot, const std::vector<KinematicRow>& rows,
+                              const RunLog& log) {
+  const bool together = log.relative && robot.measured && shares_a_clock(log);
+  std::vector<FitRow> open;
+  for (const KinematicRow& row : rows) {
+    const bool held = together && (row.name == "lag" || row.name == "delay");
+    open.push_back({row, log.relative && !held});
+    open.back().row.tolerance *= held ? kHeld : kFarOff;
+  }
+  return open;
+}
+
+std::vector<FitRow> begun_at(std::vector<FitRow> rows, const Eigen::VectorXd& values) {
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    rows[k].row.nominal = values[static_cast<Eigen::Index>(k)];
+  }
+  return rows;
+}
+
+// Values from where slopes lead on, whichever way the tracked point heads: of a sensor that was put
+// in sideways or backward none leads there from the file's.
+Eigen::VectorXd scan_marker(const WindowFitter& fitter, const std::vector<FitRow>& rows) {
+  std::optional<WindowFit> best;
+  for (int turn = 0; turn < kTurns; ++turn) {
+    std::vector<FitRow> turned = rows;
+    for (FitRow& row : turned) {
+      if (row.row.name == "marker_yaw") row.row.nominal += 2 * std::numbers::pi * turn / kTurns;
+    }
+    WindowFit fit = fitter.fit(turned, {}, {}, kScanRounds);
+    if (!best || fit.objective > best->objective) best = std::move(fit);
+  }
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    double& value = best->values[static_cast<Eigen::Index>(k)];
+    value = rows[k].row.name == "marker_yaw" ? wrap_angle(value) : rows[k].row.nominal;
+  }
+  return best->values;
+}
+
 GroundReference reference_of(const WindowFitter& fitter, const WindowFit& fit, std::uint64_t seed) {
   GroundReference reference;
   for (const FitRow& row : fit.rows) reference.names.push_back(row.row.name);
@@ -80,6 +130,13 @@ GroundReference reference_of(const WindowFitter& fitter, const WindowFit& fit, s
     for (double& off : reference.draws.row(static_cast<Eigen::Index>(k))) {
       off += unsure * stream.normal();
     }
+  }
+  for (std::size_t k = 0; k < fit.rows.size(); ++k) {
+    const auto draws = reference.draws.row(static_cast<Eigen::Index>(k));
+    const double deviation = draws.norm() / std::sqrt(static_cast<double>(draws.size()));
+    const FitRow& row = fit.rows[k];
+    reference.shown.push_back(deviation > kHeld * row.row.tolerance &&
+                              (!row.free || deviation < kUnshown * plausible_error(row.row)));
   }
   reference.covariance =
       reference.draws * reference.draws.transpose() / static_cast<double>(reference.draws.cols());
@@ -94,6 +151,15 @@ std::optional<double> value_in(const GroundReference& reference, const std::stri
 
 }  // namespace
 
+bool shares_a_clock(const RunLog& log) {
+  return std::all_of(log.runs.begin(), log.runs.end(), [](const LoggedRun& run) {
+    std::set<double> times;
+    for (const CommandRow& row : run.commands) times.insert(row.t_s);
+    return !run.poses.empty() && std::all_of(run.poses.begin(), run.poses.end() - 1,
+                                             [&](const PoseRow& p) { return times.count(p.t_s); });
+  });
+}
+
 Result<GroundQuestion> ask_what_changed(const GroundRobot& robot, const RunLog& reference,
                                         const WindowSettings& settings, std::uint64_t seed,
                                         FitMemo* memo) {
@@ -102,19 +168,11 @@ Result<GroundQuestion> ask_what_changed(const GroundRobot& robot, const RunLog& 
   question.catalogue = change_hypotheses(robot, question.rows);
   const auto windows = window_set(robot, reference, settings);
   if (!windows) return Error{"the reference: " + windows.error().message};
-  std::vector<FitRow> rows;
-  Eigen::VectorXd values(static_cast<Eigen::Index>(question.rows.size()));
-  for (const KinematicRow& row : question.rows) {
-    values[static_cast<Eigen::Index>(rows.size())] = row.nominal;
-    rows.push_back({row, false});
-    rows.back().row.tolerance *= kFarOff;
-  }
   const WindowFitter fitter(robot, *windows, nullptr, memo);
-  values = scan_delay(fitter, rows, values);
-  for (std::size_t k = 0; k < rows.size(); ++k) {
-    rows[k].row.nominal = values[static_cast<Eigen::Index>(k)];
-  }
-  WindowFit fit = fitter.fit(rows, {}, values);
+  std::vector<FitRow> rows = open_rows(robot, question.rows, reference);
+  rows = begun_at(rows, scan_delay(fitter, rows, nominals(rows)));
+  if (reference.relative) rows = begun_at(rows, scan_marker(fitter, rows));
+  WindowFit fit = fitter.fit(rows, {}, nominals(rows));
   if (const auto fault = find_ground_fault(robot, reference, question, settings);
       fault && fault->objective > fit.objective) {
     const GroundHypothesis& h = question.catalogue[fault->hypothesis];

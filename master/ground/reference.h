@@ -16,4 +16,8 @@ Result<GroundQuestion> ask_what_changed(const GroundRobot& robot, const RunLog& 
                                         const WindowSettings& settings, std::uint64_t seed,
                                         FitMemo* memo);
 
+// Whether every pose of a run ends a stretch that one of its commands is about, as rows have it
+// that hold both.
+bool shares_a_clock(const RunLog& log);
+
 }  // namespace gapfarm

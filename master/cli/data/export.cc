@@ -1,4 +1,4 @@
-// gapfarm export ros RUN|DIAGNOSIS: what a log says, in the words of its user's own files.
+// gapfarm export ros CONFIG|RUN|DIAGNOSIS: what a log says, in the words of its user's own files.
 #include <algorithm>
 #include <filesystem>
 #include <memory>
@@ -33,17 +33,31 @@ struct ExportCommand {
 };
 
 constexpr double kLow = 0.05, kHigh = 0.95;
+constexpr double kEachRow_s = 1e-3;  // a horizon that every way between two poses is longer than
 
-// Every value of the robot's kinematics by the log that a run was fitted to.
-Result<ReportedValues> values_of_run(const Problem& problem, const Model& model, Console& console) {
-  ReportedValues reported_values;
-  reported_values.given = problem.ground->robot();
-  reported_values.logs = model.data.files;
+struct Reported {
+  ReportedValues values;
+  RosFriction friction;
+  Eigen::MatrixXd covariance;  // of the values; of a fit
+};
+
+// Every value of the robot's kinematics by a log.
+Result<Reported> fitted_values(const GroundRobot& robot, const std::vector<std::string>& folders,
+                               Console& console) {
+  Reported fitted;
+  ReportedValues& reported_values = fitted.values;
+  reported_values.given = robot;
+  reported_values.logs = folders;
   ASSIGN_OR_RETURN(const auto log,
                    read_run_folders(reported_values.logs, reported_values.given.channels));
-  console.note("fitting the robot's kinematics to the log of the run, for intervals");
+  console.note("fitting the robot's kinematics to the log");
+  // Increments err each by itself: a window of several knows nothing that they do not, unless
+  // wheels were read at other times.
+  const bool together = log.relative && shares_a_clock(log);
+  const WindowSettings windows =
+      together ? WindowSettings{{kEachRow_s}, 0.5} : WindowSettings{{0.5, 2, 5}, 0.5};
   ASSIGN_OR_RETURN(const auto asked,
-                   ask_what_changed(reported_values.given, log, {{0.5, 2, 5}, 0.5}, 1, nullptr));
+                   ask_what_changed(reported_values.given, log, windows, 1, nullptr));
   const GroundReference& fit = *asked.reference;
   for (std::size_t k = 0; k < fit.names.size(); ++k) {
     const auto i = static_cast<Eigen::Index>(k);
@@ -59,9 +73,10 @@ Result<ReportedValues> values_of_run(const Problem& problem, const Model& model,
                                       value_in_file(reported_values.given, fit.names[k]),
                                       fit.values[i],
                                       {at(kLow), at(kHigh)},
-                                      true});
+                                      fit.shown[k] != 0});
   }
-  return reported_values;
+  fitted.covariance = fit.covariance;
+  return fitted;
 }
 
 // Friction as the run has it, where the run searched for it.
@@ -78,10 +93,11 @@ RosFriction simulated_friction(const Problem& problem, const Model& model) {
   return friction;
 }
 
-struct Reported {
-  ReportedValues values;
-  RosFriction friction;
-};
+Status check_ground(const Problem& problem, const std::string& source) {
+  if (problem.ground) return {};
+  return Error{source + ": scenario " + problem.scenario +
+               " has no robot file whose values could go back; only ground robots have"};
+}
 
 Result<Reported> read_source_of_export(const std::string& source, Console& console) {
   const fs::path values = fs::path(source) / "values.json";
@@ -90,23 +106,29 @@ Result<Reported> read_source_of_export(const std::string& source, Console& conso
     ASSIGN_OR_RETURN(const auto text, read_text_file(values.string()));
     ASSIGN_OR_RETURN(auto reported_values, parse_values(text, values.string()));
     const RosFriction friction = ros_friction(reported_values);
-    return Reported{std::move(reported_values), friction};
+    return Reported{std::move(reported_values), friction, {}};
+  }
+  if (fs::is_regular_file(source, ignored)) {
+    ASSIGN_OR_RETURN(const auto config,
+                     open_config(source, {}, console, [](Config&) { return Status(); }));
+    RETURN_IF_ERROR(check_ground(config.problem, source));
+    const GroundRobot robot = config.problem.ground->robot_at(config.problem.values);
+    ASSIGN_OR_RETURN(auto fitted, fitted_values(robot, config.trial_files, console));
+    fitted.friction = ros_friction(fitted.values);
+    return fitted;
   }
   const auto reader = RunReader::open(source);
   if (!reader) {
-    return Error{source + ": neither the diagnosis of a ground robot nor a run (" +
+    return Error{source + ": neither a config nor the diagnosis of a ground robot nor a run (" +
                  reader.error().message + ")"};
   }
   ASSIGN_OR_RETURN(const auto problem, stored_problem(*reader));
-  if (!problem.ground) {
-    return Error{source + ": scenario " + problem.scenario +
-                 " has no robot file whose values could go back; only ground robots have"};
-  }
+  RETURN_IF_ERROR(check_ground(problem, source));
   ASSIGN_OR_RETURN(const auto model, read_model_of(source, console));
-  ASSIGN_OR_RETURN(auto reported_values, values_of_run(problem, model, console));
-  RosFriction friction = simulated_friction(problem, model);
-  if (!friction.across) friction = ros_friction(reported_values);
-  return Reported{std::move(reported_values), friction};
+  ASSIGN_OR_RETURN(auto fitted, fitted_values(problem.ground->robot(), model.data.files, console));
+  fitted.friction = simulated_friction(problem, model);
+  if (!fitted.friction.across) fitted.friction = ros_friction(fitted.values);
+  return fitted;
 }
 
 std::string usual_controller(DriveKind drive) {
@@ -155,6 +177,8 @@ Result<RosExport> export_of(const ExportCommand& command, Console& console) {
     data.controller = read.drives.front().name;
   }
   data.kinematics = reported_values.values.values;
+  data.sizes = robot_sizes(reported_values.values);
+  data.covariance = reported_values.covariance;
   data.values = ros_values(reported_values.values);
   data.remarks = ros_remarks(reported_values.values);
   data.friction = reported_values.friction;
@@ -162,9 +186,9 @@ Result<RosExport> export_of(const ExportCommand& command, Console& console) {
   return data;
 }
 
-nlohmann::ordered_json export_json(const RosExport& data) {
+nlohmann::ordered_json rows_json(const std::vector<RosValue>& values) {
   nlohmann::ordered_json rows = nlohmann::ordered_json::array();
-  for (const RosValue& row : data.values) {
+  for (const RosValue& row : values) {
     rows.push_back({{"key", row.key},
                     {"had", row.had},
                     {"says", row.reported},
@@ -172,9 +196,19 @@ nlohmann::ordered_json export_json(const RosExport& data) {
                     {"hi", row.interval.upper},
                     {"known", row.known}});
   }
+  return rows;
+}
+
+nlohmann::ordered_json export_json(const RosExport& data) {
   nlohmann::ordered_json json = {{"controller", data.controller},
-                                 {"values", rows},
+                                 {"values", rows_json(data.values)},
+                                 {"robot", rows_json(data.sizes)},
                                  {"kinematics", values_json(data.kinematics)}};
+  nlohmann::ordered_json covariance = nlohmann::ordered_json::array();
+  for (const auto& row : data.covariance.rowwise()) {
+    covariance.push_back(std::vector<double>(row.begin(), row.end()));
+  }
+  if (!covariance.empty()) json["covariance"] = covariance;
   if (data.friction.across) json["mu1"] = *data.friction.along;
   if (data.friction.across) json["mu2"] = *data.friction.across;
   return json;
@@ -212,7 +246,9 @@ SubcommandRun setup_export(CLI::App& app) {
   app.add_option("TOOLS", command->format, "ros: controllers.yaml and <gazebo> tags")
       ->required()
       ->check(CLI::IsMember({"ros"}));
-  app.add_option("RUN|DIAGNOSIS", command->source, "Of a ground robot")->required();
+  app.add_option("CONFIG|RUN|DIAGNOSIS", command->source,
+                 "Of a ground robot: a config's log is fitted to, a run's was")
+      ->required();
   app.add_option("--controllers", command->controllers,
                  "Your controller file: its controller's name is taken");
   app.add_option("--urdf", command->urdf, "Your URDF: its wheels' links and friction are taken");

@@ -31,6 +31,14 @@ double window_nats(double residual, double scale) {
   return constant - std::log(scale) - (kWindowTail + 1) / 2 * std::log1p(z * z / kWindowTail);
 }
 
+Eigen::VectorXd nominals(const std::vector<FitRow>& rows) {
+  Eigen::VectorXd values(static_cast<Eigen::Index>(rows.size()));
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    values[static_cast<Eigen::Index>(i)] = rows[i].row.nominal;
+  }
+  return values;
+}
+
 WindowFitter::WindowFitter(const GroundRobot& robot, const WindowSet& windows,
                            const GroundReference* reference, FitMemo* memo)
     : robot_(robot), windows_(windows), reference_(reference), memo_(memo) {
@@ -278,11 +286,8 @@ WindowFit WindowFitter::hold(const std::vector<FitRow>& rows, const Eigen::Vecto
 
 WindowFit WindowFitter::fit(const std::vector<FitRow>& rows, const std::vector<char>& held_out,
                             const Eigen::VectorXd& values, int rounds) const {
-  Eigen::VectorXd start(static_cast<Eigen::Index>(rows.size()));
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    start[static_cast<Eigen::Index>(i)] = rows[i].row.nominal;
-  }
-  if (values.size() == start.size()) start = values;
+  const Eigen::VectorXd start =
+      values.size() == static_cast<Eigen::Index>(rows.size()) ? values : nominals(rows);
   const std::string key = memo_ != nullptr ? key_of(rows, held_out, start, rounds) : "";
   if (const auto kept = memo_ != nullptr ? memo_->find(key) : std::nullopt) {
     return fit_from(rows, held_out, *kept);

@@ -36,11 +36,15 @@ struct FitRow {
   bool free = false;  // held by plausible_error() in place of the tolerance
 };
 
+// Where they stand as long as no log has its say.
+Eigen::VectorXd nominals(const std::vector<FitRow>& rows);
+
 // What a fit to another log says of the values, and how sure that is.
 struct GroundReference {
   std::vector<std::string> names;
-  Eigen::VectorXd values;  // hold where they are not among the rows of a fit
-  Eigen::MatrixXd draws;   // a column each: how far off the values may be, all at once
+  Eigen::VectorXd values;        // hold where they are not among the rows of a fit
+  Eigen::MatrixXd draws;         // a column each: how far off the values may be, all at once
+  std::vector<char> shown = {};  // of each: whether its log knows it better than its prior
   Eigen::MatrixXd covariance;
 };
 
@@ -92,6 +96,7 @@ class WindowFitter {
 
   // Values by runs drawn with replacement and blocks of them, one Gauss-Newton step each, a column
   // a draw: what differs from run to run (a clock's offset) is no surer for a run that is long.
+  // Free values that no window shows scatter as their priors do.
   Eigen::MatrixXd draws(const WindowFit& fit, std::uint64_t seed) const;
   // 90 % intervals of them; a row of (lo, hi) for each of the fit's.  With a reference: of how far
   // they are from it, which is not sure either, beside its values.
@@ -124,6 +129,7 @@ class WindowFitter {
   double prior(const WindowFit& fit) const;
   // Of a row in the reference; -1: it is not there.
   Eigen::Index in_reference(const FitRow& row) const;
+  std::vector<Eigen::Vector3d> curvature_shares(const WindowFit& fit) const;
   WindowFit fit_from(const std::vector<FitRow>& rows, const std::vector<char>& held_out,
                      const KeptFit& kept) const;
   // A name for this very fit.

@@ -2,15 +2,19 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <cmath>
 
 #include "common/base/hash.h"
 #include "common/math/algebra.h"
+#include "common/random/stream.h"
 #include "common/robot/robot_file.h"
 #include "master/ground/fit/held_out.h"
 #include "master/ground/tolerances.h"
 
 namespace gapfarm {
 namespace {
+
+constexpr double kLeastCurvature = 0.3;  // of the weights; of Student's own residuals 0.71
 
 void add_pose(const Pose& X, Hasher* hasher) { hasher->add(X.x).add(X.y).add(X.theta); }
 
@@ -96,6 +100,27 @@ double WindowFitter::prior(const WindowFit& fit) const {
   return -away.dot(prior_precision(fit.rows) * away) / 2;
 }
 
+// Of every horizon and component: the mean curvature of the windows' log density over their mean
+// weight.  Weights are held while one step is made, and residuals' weights fall as they grow: a
+// step by weights alone would stop short of where a drawn log has its values.
+std::vector<Eigen::Vector3d> WindowFitter::curvature_shares(const WindowFit& fit) const {
+  const auto n = static_cast<std::size_t>(windows_.horizons);
+  std::vector<Eigen::Vector3d> weights(n, Eigen::Vector3d::Zero()), curvatures = weights;
+  for (std::size_t i = 0; i < fit.residuals.size(); ++i) {
+    const auto h = static_cast<std::size_t>(windows_.horizon[i]);
+    for (Eigen::Index c = 0; c < 3; ++c) {
+      const double s = fit.scales[h][c], squares = std::pow(fit.residuals[i][c] / s, 2);
+      const double weight = window_weight(fit.residuals[i][c], s);
+      weights[h][c] += weight;
+      curvatures[h][c] += weight * (kWindowTail - squares) / (kWindowTail + squares);
+    }
+  }
+  for (std::size_t h = 0; h < n; ++h) {
+    curvatures[h] = curvatures[h].cwiseQuotient(weights[h]).cwiseMax(kLeastCurvature);
+  }
+  return curvatures;
+}
+
 Eigen::MatrixXd WindowFitter::draws(const WindowFit& fit, std::uint64_t seed) const {
   const Eigen::Index n = fit.values.size();
   const auto blocks = static_cast<std::size_t>(windows_.blocks);
@@ -103,12 +128,14 @@ Eigen::MatrixXd WindowFitter::draws(const WindowFit& fit, std::uint64_t seed) co
   const std::vector<Eigen::MatrixXd> J = slopes(fit);
   std::vector<Eigen::MatrixXd> H(blocks, Eigen::MatrixXd::Zero(n, n));
   std::vector<Eigen::VectorXd> g(blocks, Eigen::VectorXd::Zero(n));
+  const std::vector<Eigen::Vector3d> curvature = curvature_shares(fit);
   for (std::size_t i = 0; i < use.size(); ++i) {
     const auto b = static_cast<std::size_t>(windows_.block[i]);
-    const Eigen::Vector3d& s = fit.scales[static_cast<std::size_t>(windows_.horizon[i])];
+    const auto h = static_cast<std::size_t>(windows_.horizon[i]);
+    const Eigen::Vector3d& s = fit.scales[h];
     for (Eigen::Index c = 0; c < 3; ++c) {
       const double w = use[i] * window_weight(fit.residuals[i][c], s[c]);
-      H[b] += w * J[i].row(c).transpose() * J[i].row(c);
+      H[b] += w * curvature[h][c] * J[i].row(c).transpose() * J[i].row(c);
       g[b] += w * J[i].row(c).transpose() * fit.residuals[i][c];
     }
   }
@@ -116,11 +143,14 @@ Eigen::MatrixXd WindowFitter::draws(const WindowFit& fit, std::uint64_t seed) co
   const Eigen::VectorXd away = from_middle(fit.rows, fit.values);
   const std::vector<std::vector<double>> all_times = draw_blocks(windows_, seed, 1);
   Eigen::MatrixXd drawn(n, kGroundDraws);
+  Stream stream({seed, Purpose::kStatistics, 4, 0, 0});
   for (int d = 0; d < kGroundDraws; ++d) {
     Eigen::VectorXd from = away;
-    for (Eigen::Index k = 0; k < n && reference_ != nullptr; ++k) {
-      const Eigen::Index a = in_reference(fit.rows[static_cast<std::size_t>(k)]);
+    for (Eigen::Index k = 0; k < n; ++k) {
+      const FitRow& row = fit.rows[static_cast<std::size_t>(k)];
+      const Eigen::Index a = in_reference(row);
       if (a >= 0) from[k] -= reference_->draws(a, d);
+      if (a < 0 && row.free) from[k] -= stream.normal() / std::sqrt(P(k, k));
     }
     Eigen::MatrixXd A = P;
     Eigen::VectorXd b = P * from;

@@ -7,7 +7,10 @@
 namespace gapfarm {
 namespace {
 
-constexpr int kLeastBlocks = 10;  // fewer runs than this are cut into stretches
+constexpr std::size_t kLeastBlocks = 10;  // fewer runs than this are cut into stretches
+// The same of increments, which know of nothing that lasts: tens of stretches say better how far
+// values scatter.
+constexpr std::size_t kLeastRelativeBlocks = 30;
 constexpr double kMargin_s = 11;  // of commands round a window: clocks may be 10 s apart
 
 bool alike(const std::vector<Trial>& a, std::size_t from_a, const std::vector<Trial>& b) {
@@ -58,10 +61,12 @@ Result<WindowSet> window_set(const GroundRobot& robot, const RunLog& log,
   // Stretches of one length, none over two runs.
   std::vector<int>& first = set.run_blocks;
   first.resize(log.runs.size());
-  const bool few = log.runs.size() < kLeastBlocks;
+  const std::size_t least = log.relative ? kLeastRelativeBlocks : kLeastBlocks;
+  const bool few = log.runs.size() < least;
   for (std::size_t i = 0; i < log.runs.size(); ++i) {
     first[i] = set.blocks;
-    const double pieces = few ? std::ceil(kLeastBlocks * length[i] / std::max(all, 1e-9)) : 1;
+    const double pieces =
+        few ? std::ceil(static_cast<double>(least) * length[i] / std::max(all, 1e-9)) : 1;
     set.blocks += std::max(1, static_cast<int>(pieces));
   }
   for (std::size_t i = 0; i < set.trials.size(); ++i) {

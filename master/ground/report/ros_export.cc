@@ -39,9 +39,10 @@ RosValue product(const ReportedValues& reported, const std::string& key, double 
   return row;
 }
 
-std::string interval_text(const RosValue& row) {
+std::string interval_text(const RosValue& row, bool fitted) {
   return row.known ? fmt::format("{:.4g} [{:.4g}, {:.4g}]", row.reported, row.interval.lower,
                                  row.interval.upper)
+         : fitted  ? "this log does not show it"
                    : "as you have it";
 }
 
@@ -94,6 +95,29 @@ std::vector<RosValue> ros_values(const ReportedValues& reported) {
                   {"travel", "left"}),
           product(reported, "right_wheel_radius_multiplier", k.right_wheel_radius_multiplier,
                   {"travel", "right"})};
+}
+
+std::vector<RosValue> robot_sizes(const ReportedValues& reported) {
+  std::vector<RosValue> rows;
+  for (const WheelSide side : {WheelSide::kLeft, WheelSide::kRight}) {
+    const bool left = side == WheelSide::kLeft;
+    for (const RobotWheel& w : reported.given.wheels) {
+      if (!w.driven || w.side != side || !w.radius_m) continue;
+      const std::string key = std::string("wheels.") + (left ? "left" : "right") + ".radius";
+      rows.push_back(product(reported, key, *w.radius_m, {"travel", left ? "left" : "right"}));
+      break;
+    }
+  }
+  if (const auto& separation = reported.given.controller.wheel_separation_m; separation) {
+    rows.push_back(product(reported, "wheel_separation", *separation, {"separation"}));
+  }
+  for (const auto& [key, name] : {std::pair{"marker.x", "marker_x"},
+                                  {"marker.y", "marker_y"},
+                                  {"marker.yaw", "marker_yaw"}}) {
+    const ReportedValue* v = reported_value(reported, name);
+    if (v != nullptr) rows.push_back({key, v->had, v->reported, v->interval, v->named});
+  }
+  return rows;
 }
 
 std::vector<std::string> ros_remarks(const ReportedValues& reported) {
@@ -154,8 +178,12 @@ RosFriction ros_friction(const ReportedValues& reported) {
 std::string ros_table(const RosExport& data) {
   std::string text = fmt::format("{:<52} {:>10}   {}\n", "parameter of " + data.controller,
                                  "you have", "the log says (90 %)");
-  for (const RosValue& row : data.values) {
-    text += fmt::format("{:<52} {:>10.4g}   {}\n", row.key, row.had, interval_text(row));
+  for (const auto* rows : {&data.values, &data.sizes}) {
+    if (rows == &data.sizes && !rows->empty()) text += "of robot.toml, m and rad\n";
+    for (const RosValue& row : *rows) {
+      text += fmt::format("{:<52} {:>10.4g}   {}\n", row.key, row.had,
+                          interval_text(row, data.covariance.size() > 0));
+    }
   }
   for (const std::string& remark : data.remarks) text += "  " + remark + "\n";
   for (const RosWheel& wheel : data.wheels) {

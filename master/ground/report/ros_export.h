@@ -2,6 +2,7 @@
 // ros2_controllers, and friction tags of Gazebo.
 #pragma once
 
+#include <Eigen/Core>
 #include <optional>
 #include <string>
 #include <vector>
@@ -38,12 +39,17 @@ struct RosExport {
   std::vector<std::string> remarks;  // what no controller has a word for
   RosFriction friction;
   std::vector<RosWheel> wheels;
-  // All that was fitted, by the kinematic model's names.
+  // All that was fitted, by the kinematic model's names, and its covariance (of a fit; else empty).
   std::vector<ReportedValue> kinematics = {};
+  Eigen::MatrixXd covariance = {};
+  std::vector<RosValue> sizes = {};
 };
 
 // The controller's parameters by what a log says; names and values follow the drive.
 std::vector<RosValue> ros_values(const ReportedValues& reported);
+// The robot's sizes in the words of robot.toml, m and rad: wheels of robots with two sides, their
+// separation, the marker (without a tracker: the sensor).
+std::vector<RosValue> robot_sizes(const ReportedValues& reported);
 // What is off and has no parameter: a trim of the steering, a delay.
 std::vector<std::string> ros_remarks(const ReportedValues& reported);
 // Of the floor as far as the robot's motion shows: a car's grip, a skid-steer's multiplier.
