@@ -1,12 +1,11 @@
-#include "worker/scenarios/external.h"
-
 #include <algorithm>
 #include <exception>
 #include <string>
 
 #include "common/external/simulator.h"
 #include "common/process/process_pool.h"
-#include "worker/scenarios/srv1/srv1.h"
+#include "worker/scenarios/scenarios.h"
+#include "worker/scenarios/srv1/motion_memo.h"
 
 namespace gapfarm {
 namespace {

@@ -1,4 +1,4 @@
-#include "worker/scenarios/ground.h"
+#include "worker/sim/robot/ground.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,7 +6,7 @@
 
 #include "common/score/fitness.h"
 #include "worker/scenarios/outcome.h"
-#include "worker/sim/robot/ground.h"
+#include "worker/scenarios/scenarios.h"
 
 namespace gapfarm {
 namespace {

@@ -1,11 +1,7 @@
 #include <array>
 
-#include "worker/scenarios/external.h"
-#include "worker/scenarios/ground.h"
-#include "worker/scenarios/push/push.h"
-#include "worker/scenarios/racquetball.h"
 #include "worker/scenarios/scenario.h"
-#include "worker/scenarios/srv1/srv1.h"
+#include "worker/scenarios/scenarios.h"
 
 namespace gapfarm {
 
@@ -13,10 +9,9 @@ std::span<const Scenario> scenarios() {
   static constexpr std::array rows = {
       Scenario{"srv1", "tracked robot, six atomic commands", prepare_srv1},
       Scenario{"push", "flat pieces pushed across a table by a finger", prepare_push},
-      Scenario{
-          "ground", "any robot on wheels or tracks, from its file", prepare_ground, kPredicts,
-          "scenario ground follows logged commands: there are no commands of its own to plan or "
-          "trace; use gapfarm predict"},
+      Scenario{"ground", "any robot on wheels or tracks, from its file", prepare_ground, kPredicts,
+               "scenario ground follows logged commands: there are no commands of its own to plan "
+               "or trace; use gapfarm predict"},
       Scenario{"external", "commands driven by a program of the user's", prepare_external},
       Scenario{"racquetball", "ball in a closed court, struck by a paddle", prepare_racquetball,
                kTraces,

@@ -192,9 +192,8 @@ Result<Config> figure_config(const EffectsOptions& options) {
     config.problem.values = config.problem.table().nominal();
     config.problem.commands = default_commands(config.problem.scenario);
   } else {
-    Result<Config> read = read_config(options.config);
-    if (!read) return read;
-    config = std::move(*read);
+    ASSIGN_OR_RETURN(auto read, read_config(options.config));
+    config = std::move(read);
   }
   Problem& problem = config.problem;
   problem.log = {};
