@@ -9,7 +9,7 @@
 #include "common/base/hash.h"
 #include "common/base/try.h"
 #include "common/score/fitness.h"
-#include "common/score/logged_motions.h"
+#include "common/score/motion_model.h"
 #include "worker/fitness.h"
 #include "worker/scenarios/scenario.h"
 

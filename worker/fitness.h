@@ -6,8 +6,8 @@
 
 #include "common/base/result.h"
 #include "common/problem/problem.h"
+#include "common/score/fitness.h"
 #include "common/score/motion_model.h"
-#include "common/score/robust_distance.h"
 #include "gapfarm/v1/task.pb.h"
 #include "worker/scenarios/scenario.h"
 

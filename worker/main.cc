@@ -8,11 +8,9 @@
 #include <thread>
 
 #include "common/base/build_info.h"
-#include "common/base/host.h"
 #include "common/external/simulator.h"
 #include "common/net/keys.h"
 #include "common/process/process_pool.h"
-#include "common/usage/manual.h"
 #include "common/usage/usage.h"
 #include "worker/evaluate.h"
 #include "worker/service.h"

@@ -1,7 +1,7 @@
 // Moves messages between a transport and the worker's session.
 #pragma once
 
-#include "common/net/transport.h"
+#include "common/net/envelope.h"
 #include "worker/session.h"
 
 namespace gapfarm {

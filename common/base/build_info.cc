@@ -1,5 +1,9 @@
 #include "common/base/build_info.h"
 
+#include <unistd.h>
+
+#include <filesystem>
+
 #include "gapfarm_fingerprint.h"
 
 namespace gapfarm {
@@ -14,6 +18,21 @@ std::string build_summary(const char* program) {
   const BuildInfo& b = build_info();
   return std::string(program) + " " + b.version + " (build " + b.fingerprint + ", " + b.compiler +
          ", Bullet " + b.bullet + " double, " + b.build_type + ")";
+}
+
+std::string host_name() {
+  char name[256] = {};
+  return gethostname(name, sizeof name - 1) == 0 ? name : "unknown";
+}
+
+std::string shipped_file(const std::string& path) {
+  namespace fs = std::filesystem;
+  std::error_code error;
+  if (path.empty() || fs::path(path).is_absolute() || fs::exists(path, error)) return path;
+  const fs::path program = fs::read_symlink("/proc/self/exe", error);
+  if (error) return path;
+  const fs::path shipped = program.parent_path().parent_path() / "share/gapfarm" / path;
+  return fs::is_regular_file(shipped, error) ? shipped.string() : path;
 }
 
 }  // namespace gapfarm

@@ -18,4 +18,11 @@ const BuildInfo& build_info();
 // One line for --version and logs.
 std::string build_summary(const char* program);
 
+// "unknown" where it has no name.
+std::string host_name();
+
+// `path`; when it is relative, nothing is there, and share/gapfarm beside the program's folder has
+// a file of that name ("configs/demo.toml"), that one.
+std::string shipped_file(const std::string& path);
+
 }  // namespace gapfarm

@@ -2,7 +2,7 @@
 
 #include <filesystem>
 
-#include "common/base/shipped.h"
+#include "common/base/build_info.h"
 #include "common/base/suggest.h"
 #include "common/config/sections.h"
 #include "common/external/simulator.h"

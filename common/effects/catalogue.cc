@@ -1,14 +1,61 @@
 #include "common/effects/catalogue.h"
 
 #include <algorithm>
-
-#include "common/effects/rows.h"
+#include <numbers>
+#include <string>
+#include <utility>
+#include <vector>
 
 namespace gapfarm {
 namespace {
 
+// What rows are written with.
+EffectParameter real(const char* key, const char* unit, double neutral, double lower, double upper,
+                     const char* summary) {
+  return {key, unit, neutral, lower, upper, summary, {}};
+}
+
+// Any direction of the plane, or `most` to either side.
+EffectParameter direction(const char* summary, double most = std::numbers::pi) {
+  return real("direction", "rad", 0, -most, most, summary);
+}
+
+EffectParameter choice(const char* key, std::vector<std::string> choices, const char* summary) {
+  const auto last = static_cast<double>(choices.size() - 1);
+  return {key, "-", 0, 0, last, summary, std::move(choices)};
+}
+
+Effect effect(EffectStage stage, const char* name, unsigned context, const char* summary,
+              std::vector<EffectParameter> parameters, std::size_t strengths) {
+  return {name, stage, context, summary, std::move(parameters), strengths};
+}
+Effect drive(const char* name, unsigned context, const char* summary,
+             std::vector<EffectParameter> parameters, std::size_t strengths = 1) {
+  return effect(EffectStage::kDrive, name, context, summary, std::move(parameters), strengths);
+}
+Effect floor(const char* name, unsigned context, const char* summary,
+             std::vector<EffectParameter> parameters, std::size_t strengths = 1) {
+  return effect(EffectStage::kFloor, name, context, summary, std::move(parameters), strengths);
+}
+Effect camera(const char* name, unsigned context, const char* summary,
+              std::vector<EffectParameter> parameters, std::size_t strengths = 1) {
+  return effect(EffectStage::kCamera, name, context, summary, std::move(parameters), strengths);
+}
+
+Effect in_spread(Effect effect) {
+  effect.shows = EffectShows::kSpread;
+  return effect;
+}
+Effect of_the_robot(Effect effect) {
+  effect.of_the_robot = true;
+  return effect;
+}
+Effect by_chance(Effect effect) {
+  effect.shows = EffectShows::kChance;
+  return effect;
+}
+
 std::vector<Effect> build_catalogue() {
-  using namespace effect_rows;  // NOLINT: what follows is rows
   return {
       drive("motor_asymmetry", kNoContext, "right side faster than left by this share",
             {real("ratio", "-", 0, -0.3, 0.3, "share by which the right side is faster")}),
@@ -78,19 +125,17 @@ std::vector<Effect> build_catalogue() {
 
 // Rows are stored by their number, so what came after second seams stands after them.
 std::vector<Effect> build_younger() {
-  using namespace effect_rows;  // NOLINT: what follows is rows
   return {
       by_chance(
           camera("unsettled_start", kUnrecordedMove,
-                 "in a share of the trials after an unrecorded move the start was read "
-                 "before the hand let go",
+                 "in a share of the trials after an unrecorded move the start was read before the "
+                 "hand let go",
                  {real("share", "-", 0, 0, 1, "of the trials that follow an unrecorded move"),
                   real("angle", "rad", 0.3, 0, 1.6, "by up to which the start's heading is off")})),
   };
 }
 
 std::vector<Effect> build_youngest() {
-  using namespace effect_rows;  // NOLINT: what follows is rows
   return {
       in_spread(drive("session_gain", kNoContext, "each session drives faster or slower as a whole",
                       {real("spread", "-", 0, 0, 0.3, "standard deviation of a session's gain")})),
@@ -112,6 +157,50 @@ std::vector<Effect> joined(std::initializer_list<std::vector<Effect>> parts) {
   std::vector<Effect> all;
   for (const std::vector<Effect>& part : parts) all.insert(all.end(), part.begin(), part.end());
   return all;
+}
+
+std::vector<Effect> build_push_catalogue() {
+  return {
+      floor("friction_anisotropy", kStartHeading,
+            "the table's friction differs along and across its grain",
+            {real("ratio", "-", 1, 0.3, 3, "friction across over friction along the grain"),
+             direction("of the grain, world frame", std::numbers::pi / 2)}),
+      floor("friction_speed", kNoContext, "friction with the table changes with the sliding speed",
+            {real("slope", "s/m", 0, -5, 20, "share of friction gained a m/s")}),
+      floor("friction_patch", kStartHeading | kStartPlace, "a disc of table with another friction",
+            {real("ratio", "-", 1, 0.05, 3, "friction inside over friction outside"),
+             real("x", "m", 0, -2, 2, "centre, world frame"),
+             real("y", "m", 0, -2, 2, "centre, world frame"),
+             real("radius", "m", 0.05, 0, 2, "of the disc")}),
+      floor("table_tilt", kStartHeading, "the table falls away toward a direction",
+            {real("angle", "rad", 0, 0, 0.3, "slope"), direction("downhill, world frame")}),
+      floor("com_offset", kNoContext,
+            "centre of mass, and the support under it, away from the centroid",
+            {real("x", "m", 0, -0.03, 0.03, "in the piece's frame"),
+             real("y", "m", 0, -0.03, 0.03, "in the piece's frame")},
+            2),
+      floor("pressure_distribution", kNoContext,
+            "the support plate is drawn out along one direction of the piece",
+            {real("stretch", "-", 0, -0.8, 0.8, "log of its length over its width"),
+             direction("of the length, in the piece's frame", std::numbers::pi / 2)}),
+      drive("finger_compliance", kNoContext,
+            "the finger gives way to the force that the piece presses it with",
+            {real("compliance", "m/N", 0, 0, 0.02, "yield a newton")}),
+      camera("placement_bias", kNoContext, "pieces start beside where the log says",
+             {real("x", "m", 0, -0.03, 0.03, "true start less the logged one, world frame"),
+              real("y", "m", 0, -0.03, 0.03, "same"), real("angle", "rad", 0, -0.3, 0.3, "same")},
+             3),
+      camera("camera_aspect", kStartHeading | kStartPlace, "the camera's y scale over its x scale",
+             {real("ratio", "-", 1, 0.5, 2, "y scale over x scale")}),
+      camera("camera_distortion", kStartHeading | kStartPlace, "radial distortion about a centre",
+             {real("k1", "1/m^2", 0, -0.5, 0.5, "logged radius is r (1 + k1 r^2)"),
+              real("x", "m", 0, -2, 2, "centre, world frame"),
+              real("y", "m", 0, -2, 2, "centre, world frame")}),
+      camera("marker_offset", kNoContext, "the marker is not where the outline says",
+             {real("x", "m", 0, -0.05, 0.05, "in the piece's frame"),
+              real("y", "m", 0, -0.05, 0.05, "in the piece's frame")},
+             2),
+  };
 }
 
 }  // namespace
@@ -145,6 +234,11 @@ std::string second_of(const std::string& effect) {
     if (e.repeats == effect) return e.name;
   }
   return "";
+}
+
+std::span<const Effect> push_effects() {
+  static const std::vector<Effect> catalogue = build_push_catalogue();
+  return catalogue;
 }
 
 }  // namespace gapfarm

@@ -41,4 +41,7 @@ double beta_quantile(double a, double b, double share);
 // Logarithm of the gamma function of x > 0.
 double log_gamma(double x);
 
+inline constexpr double kNormal90 = 1.645;  // half a 90 % interval, in standard deviations
+inline constexpr double kLogTwoPi = 1.8378770664093454836;  // ln(2 pi)
+
 }  // namespace gapfarm

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "common/base/result.h"
+#include "common/net/envelope.h"
 #include "common/net/keys.h"
-#include "common/net/transport.h"
 
 namespace gapfarm {
 

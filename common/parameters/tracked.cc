@@ -171,8 +171,7 @@ Status check_treads(const GroundRobot& robot) {
     return Error{
         "trials from rest (scenario \"srv1\") take two like treads, \"left\" and \"right\", that "
         "mirror one another with x = 0; what differs between the sides is reported by [effects] of "
-        "the "
-        "config (motor_asymmetry, com_offset)"};
+        "the config (motor_asymmetry, com_offset)"};
   }
   if (!(*left.contact_length_m > 0)) return Error{"a tread's contact_length must be more than 0 m"};
   return {};
@@ -191,8 +190,8 @@ Status check_tracked(const GroundRobot& robot) {
   const RobotMotors& m = robot.motors;
   if (!m.full_speed_rad_s) {
     return Error{
-        "trials from rest need the speed at full duty: state full_surface_speed, in m/s of "
-        "a tread"};
+        "trials from rest need the speed at full duty: state full_surface_speed, in m/s of a "
+        "tread"};
   }
   const double speed = *m.full_speed_rad_s * *robot.wheel("left")->radius_m;
   if (!(speed <= kFastest_m_s)) {
@@ -201,8 +200,8 @@ Status check_tracked(const GroundRobot& robot) {
   }
   if (m.acceleration_limit_m_s2 || m.command_timeout_s) {
     return Error{
-        "trials from rest know neither acceleration_limit nor cmd_vel_timeout; leave them "
-        "out and state lag, or use scenario = \"ground\""};
+        "trials from rest know neither acceleration_limit nor cmd_vel_timeout; leave them out and "
+        "state lag, or use scenario = \"ground\""};
   }
   return {};
 }

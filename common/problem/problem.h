@@ -9,7 +9,6 @@
 
 #include "common/base/result.h"
 #include "common/external/protocol.h"
-#include "common/parameters/genome.h"
 #include "common/parameters/ground.h"
 #include "common/parameters/table.h"
 #include "common/parameters/tracked.h"

@@ -4,7 +4,7 @@
 
 #include "common/base/try.h"
 #include "common/recordings/read.h"
-#include "common/recordings/restart.h"
+#include "common/recordings/windows.h"
 
 namespace gapfarm {
 

@@ -5,6 +5,7 @@
 #include <sys/types.h>
 #include <unistd.h>
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -32,5 +33,22 @@ Result<pid_t> start_child(const ChildSetup& setup);
 
 // Of a status of waitpid(): "exited with status 3", "was killed by signal 9 (Killed)".
 std::string end_text(int status);
+
+struct Captured {
+  int status = 0;  // of waitpid()
+  bool timed_out = false;
+  std::string out, err;
+
+  bool succeeded() const { return !timed_out && status == 0; }
+};
+
+// Returns when `fd` is readable or `timeout_s` is over, or earlier.
+using FdWaiter = std::function<void(int fd, double timeout_s)>;
+
+// Runs it with `input` on its standard input, and kills it after `timeout_s`.  setup.in, .out and
+// .err are not looked at.  `wait` (may be empty) is for whoever has other things to wait for, too.
+// Error: what kept it from starting.
+Result<Captured> run_captured(ChildSetup setup, const std::string& input, double timeout_s,
+                              const FdWaiter& wait = {});
 
 }  // namespace gapfarm

@@ -7,6 +7,7 @@
 // measured pose.  Windows of one horizon share no stretch, and so no pose but their joint.
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "common/base/result.h"
@@ -44,5 +45,21 @@ inline constexpr const char* kWindowCommand = "drive";
 // Errors: a log without runs, no window at all (the message says how long the runs are and how
 // dense the poses).
 Result<WindowedRuns> cut_windows(const RunLog& log, const WindowSettings& settings);
+
+// Trial::session of a run's windows.
+inline std::string session_of(const LoggedRun& run) {
+  return run.session.empty() ? run.run : run.session + "/" + run.run;
+}
+
+// Where the command is a throttle, errors of speed add up over a run; a window of its end would
+// depend on its beginning.  Gives each window a run of its own, which begins `run_in_s` before it
+// at the speed of the poses round there, with the commands from `margin_s` before its start to as
+// long after its end.  Trial::run says which of these; a trial's session remains its logged run.
+// REQUIRES: windows that were cut from this log.
+WindowedRuns restart_at_measured_speed(const RunLog& log, WindowedRuns windows, double run_in_s,
+                                       double margin_s);
+
+// As much as the delay may be searched for, and a second.
+inline constexpr double kWindowMargin_s = 2;
 
 }  // namespace gapfarm

@@ -1,8 +1,79 @@
 #include "common/robot/robot.h"
 
 #include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <utility>
 
 namespace gapfarm {
+namespace {
+
+std::string number(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.4g", value);
+  return text;
+}
+
+Status check_channels(const GroundRobot& robot) {
+  const auto& c = robot.channels;
+  const auto has = [&](const char* name) { return std::find(c.begin(), c.end(), name) != c.end(); };
+  if (c.empty()) return Error{"commands name no channels"};
+  switch (robot.command) {
+    case CommandKind::kDuties:
+    case CommandKind::kWheelSpeeds:
+      for (const std::string& name : c) {
+        const bool side = name == "left" || name == "right";
+        if (!side && robot.wheel(name) == nullptr) {
+          return Error{"channel \"" + name + "\" is neither left nor right nor a wheel's name"};
+        }
+      }
+      return {};
+    case CommandKind::kTwist:
+      if (has("v") && has("omega")) return {};
+      return Error{"twist commands need the channels v and omega"};
+    case CommandKind::kThrottleSteering:
+      if (has("throttle") && has("steering")) return {};
+      return Error{"throttle_steering commands need the channels throttle and steering"};
+    case CommandKind::kSpeedSteering:
+      if (has("speed") && has("steering")) return {};
+      return Error{"speed_steering commands need the channels speed and steering"};
+  }
+  return {};
+}
+
+// What a robot's file may say of its sizes; some of them follow from others.
+Status check_sizes(const GroundRobot& robot) {
+  const auto within = [](const std::string& what, double value, double lower, double upper,
+                         const char* unit) -> Status {
+    if (value >= lower && value <= upper) return {};
+    return Error{what + " is " + number(value) + " " + unit + ", expected " + number(lower) +
+                 " to " + number(upper) + " " + unit};
+  };
+  constexpr double kFar_m = 50;
+  for (const RobotWheel& w : robot.wheels) {
+    const std::string wheel = " of wheel \"" + w.name + "\"";
+    if (Status s = within("the radius" + wheel, w.radius_m.value_or(0), 1e-4, 10, "m"); !s)
+      return s;
+    if (Status s = within("x" + wheel, w.x_m.value_or(0), -kFar_m, kFar_m, "m"); !s) return s;
+    if (Status s = within("y" + wheel, w.y_m.value_or(0), -kFar_m, kFar_m, "m"); !s) return s;
+    const double length_m = w.contact_length_m.value_or(0);
+    if (Status s = within("the contact length" + wheel, length_m, 0, kFar_m, "m"); !s) return s;
+  }
+  const ControllerKinematics& k = robot.controller;
+  constexpr std::pair<const char*, std::optional<double> ControllerKinematics::*> kSizes[] = {
+      {"wheel_separation", &ControllerKinematics::wheel_separation_m},
+      {"wheelbase", &ControllerKinematics::wheelbase_m},
+      {"traction_track_width", &ControllerKinematics::traction_track_width_m}};
+  for (const auto& [what, size] : kSizes) {
+    if (!(k.*size)) continue;
+    if (Status s = within(what, *(k.*size), 1e-3, kFar_m, "m"); !s) return s;
+  }
+  const double inertia = robot.yaw_inertia_kg_m2.value_or(0);
+  if (Status s = within("yaw_inertia", inertia, 1e-8, 1e8, "kg m^2"); !s) return s;
+  return within("the height of the centre of mass", robot.com_z_m.value_or(0), 1e-4, kFar_m, "m");
+}
+
+}  // namespace
 
 std::span<const std::string> drive_names() {
   static const std::vector<std::string> names = {"differential", "skid",      "tracked", "omni",
@@ -30,6 +101,21 @@ const RobotWheel* GroundRobot::wheel(std::string_view wanted) const {
   const auto found = std::find_if(wheels.begin(), wheels.end(),
                                   [&](const RobotWheel& w) { return w.name == wanted; });
   return found == wheels.end() ? nullptr : &*found;
+}
+
+Status check_robot(const GroundRobot& robot) {
+  const auto positive = [](const std::string& what, double value) -> Status {
+    if (std::isfinite(value) && value > 0) return {};
+    return Error{what + " is " + number(value) + ", expected more than 0"};
+  };
+  if (Status s = check_sizes(robot); !s) return s;
+  if (!robot.com_x_m || !robot.com_y_m) return Error{"the centre of mass needs x and y in m"};
+  if (Status s = positive("mass", robot.mass_kg.value_or(0)); !s) return s;
+  if (Status s = positive("friction", robot.friction); !s) return s;
+  if (Status s = positive("friction_ratio", robot.friction_ratio); !s) return s;
+  if (Status s = check_channels(robot); !s) return s;
+  if (!(robot.motors.lag_s >= 0)) return Error{"lag is below 0 s"};
+  return {};
 }
 
 }  // namespace gapfarm

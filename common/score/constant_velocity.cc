@@ -5,7 +5,6 @@
 #include "common/math/statistics.h"
 #include "common/score/fitness.h"
 #include "common/score/motion_model.h"
-#include "common/score/robust_distance.h"
 
 namespace gapfarm {
 namespace {

@@ -9,7 +9,7 @@
 #include <sstream>
 
 #include "common/math/algebra.h"
-#include "common/math/normal.h"
+#include "common/math/laws.h"
 
 namespace gapfarm {
 namespace {

@@ -6,6 +6,7 @@
 
 #include "common/score/density.h"
 #include "common/score/fitness.h"
+#include "common/trials/context.h"
 
 namespace gapfarm {
 namespace {
@@ -100,6 +101,24 @@ Result<double> MotionModel::log_density(const Pose& X_WS, const CommandSpec& com
   const Eigen::Vector3d residual(end.x - motion.mean.x, end.y - motion.mean.y,
                                  wrap_angle(end.theta - motion.mean.theta));
   return log_predictive_density(residual, *covariance, outlier_share);
+}
+
+std::vector<LoggedMotion> logged_motions(const Problem& problem) {
+  std::vector<DrivenCommand> driven;
+  for (const Trial& trial : problem.log.trials) {
+    const CommandSpec c = resolved_command(trial, problem.commands);
+    driven.push_back({c.left, c.right, c.duration_s});
+  }
+  const std::vector<TrialContext> contexts = trial_contexts(problem.log, driven);
+  std::vector<LoggedMotion> facts;
+  for (std::size_t i = 0; i < driven.size(); ++i) {
+    const Trial& trial = problem.log.trials[i];
+    const TrialContext& context = contexts[i];
+    facts.push_back({trial.command, trial.X_WS, driven[i].left, driven[i].right,
+                     driven[i].duration_s, context.session_time_s, context.last_left,
+                     context.last_right, context.moved});
+  }
+  return facts;
 }
 
 }  // namespace gapfarm

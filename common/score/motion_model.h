@@ -61,4 +61,7 @@ class MotionModel {
   std::size_t least_trials_ = 0;
 };
 
+// REQUIRES: a scenario of drives, and trials of its commands.
+std::vector<LoggedMotion> logged_motions(const Problem& problem);
+
 }  // namespace gapfarm

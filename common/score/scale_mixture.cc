@@ -5,7 +5,7 @@
 #include <cassert>
 #include <cmath>
 
-#include "common/math/normal.h"
+#include "common/math/laws.h"
 #include "common/score/density.h"
 
 namespace gapfarm {

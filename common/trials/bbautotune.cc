@@ -83,8 +83,8 @@ class LineReader {
     if (error_ || (arguments[0] == 25 && arguments[1] == 0 && arguments[2] == 0)) return;
     error_ = text_error(file_, {line_, begin + 1}, quoted_word(text_.substr(begin, at_ - begin)),
                         "move(25, 0, 0)",
-                        "only the command forward is known in this format; write other commands "
-                        "as a trials.csv (docs/formats.md)");
+                        "only the command forward is known in this format; write other commands as "
+                        "a trials.csv (docs/formats.md)");
   }
 
   void expect_end() {

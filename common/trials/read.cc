@@ -10,7 +10,6 @@
 #include "common/trials/format.h"
 #include "common/trials/mark.h"
 #include "common/trials/text/mistakes.h"
-#include "common/trials/text/samples.h"
 #include "common/trials/text/trial_parser.h"
 
 namespace gapfarm {
@@ -182,10 +181,10 @@ Status join(std::vector<Part> parts, TrialLog& log) {
       const TrialKey key{trial.session, trial.trial};
       const auto [at, is_new] = file_of.emplace(key, part.file);
       if (!is_new) {
-        return Error{part.file + ": found " + key_text(key) + " again, first in " + at->second +
-                     ", expected each (session, trial) once; name a file once, and give different "
-                     "runs different session names, or let --session-prefix put the files' names "
-                     "before them"};
+        return Error{
+            part.file + ": found " + key_text(key) + " again, first in " + at->second +
+            ", expected each (session, trial) once; name a file once, and give different runs "
+            "different session names, or let --session-prefix put the files' names before them"};
       }
       const auto [owner, first] = session_file.emplace(trial.session, part.file);
       split = split || (!first && owner->second != part.file);

@@ -21,4 +21,7 @@ Result<TrialColumnReader> trial_column_reader(const TrialLog& log, const std::st
 // without '=', a column that the log does not have, nothing left.
 Result<TrialLog> select_trials(const TrialLog& log, std::span<const std::string> filters);
 
+// The log with everything in it moved along the world's axes, m.
+TrialLog shifted(TrialLog log, double dx_m, double dy_m);
+
 }  // namespace gapfarm

@@ -10,4 +10,15 @@ namespace gapfarm {
 // The sentence for an error that parsing `app`, or a subcommand of it, ended with.
 std::string usage_sentence(const CLI::App& app, const CLI::ParseError& error);
 
+// "gapfarm evolve [OPTIONS] CONFIG": what is typed for `app`, REQUIRES: its name begins with
+// `words`.
+std::string synopsis(const CLI::App& app, const std::string& invocation);
+
+// A page of section 1 for man(7): name, options, every command with its own, examples.  `version`
+// is "gapfarm 0.1.0".
+std::string manual_page(const CLI::App& app, const std::string& version);
+
+// --manual, which no help shows: prints the page, as --version prints the version.
+void add_manual_flag(CLI::App& app, const std::string& version);
+
 }  // namespace gapfarm

@@ -1,12 +1,64 @@
 #include "master/cli/app.h"
 
+#include <signal.h>
+#include <unistd.h>
+
 #include <algorithm>
+#include <atomic>
+#include <cassert>
+#include <cerrno>
+#include <iostream>
 
 #include "common/base/build_info.h"
-#include "common/usage/manual.h"
+#include "common/base/suggest.h"
+#include "common/process/stop.h"
+#include "common/usage/usage.h"
+#include "master/cli/subcommand.h"
+#include "master/command/inputs.h"
+#include "master/command/long_command.h"
 
 namespace gapfarm {
 namespace {
+
+// While it lives, the first SIGINT or SIGTERM goes to `stop` (a flag and a descriptor to poll), and
+// a second one ends the process at once with 128 + signal.  At most one at a time.
+class UserInterrupts {
+ public:
+  explicit UserInterrupts(StopSource* stop);
+  ~UserInterrupts();
+  UserInterrupts(const UserInterrupts&) = delete;
+  UserInterrupts& operator=(const UserInterrupts&) = delete;
+};
+
+// A handler takes no argument, so the one instance that signals go to has to be global.
+std::atomic<StopSource*> target{nullptr};
+
+void handle(int signal) {
+  const int saved_errno = errno;
+  StopSource* stop = target.load();
+  if (!stop || stop->requested()) _exit(128 + signal);
+  stop->request(signal);
+  errno = saved_errno;
+}
+
+void install(void (*handler)(int)) {
+  struct sigaction action = {};
+  sigemptyset(&action.sa_mask);
+  action.sa_handler = handler;  // without SA_RESTART, so that blocking calls return
+  sigaction(SIGINT, &action, nullptr);
+  sigaction(SIGTERM, &action, nullptr);
+}
+
+UserInterrupts::UserInterrupts(StopSource* stop) {
+  assert(target.load() == nullptr);
+  target.store(stop);
+  install(handle);
+}
+
+UserInterrupts::~UserInterrupts() {
+  install(SIG_DFL);
+  target.store(nullptr);
+}
 
 constexpr const char* kExamples =
     "Examples:\n"
@@ -24,6 +76,52 @@ void declare_json(CLI::App& app, bool* json) {
   const std::vector<CLI::App*> inner = app.get_subcommands({});
   for (CLI::App* sub : inner) declare_json(*sub, json);
   if (inner.empty()) app.add_flag("--json", *json, "Print results, or the error, as JSON");
+}
+
+bool is_option(const std::string& word) { return word.size() > 1 && word[0] == '-'; }
+
+// What `word` may have meant: an option of `app`, or one of its subcommands.
+std::string did_you_mean(const CLI::App& app, const std::string& word) {
+  std::vector<std::string> known;
+  if (is_option(word)) {
+    for (const CLI::Option* option : app.get_options()) {
+      for (const std::string& name : option->get_lnames()) known.push_back("--" + name);
+    }
+    return suggestion(word.substr(0, word.find('=')), known);
+  }
+  for (const CLI::App* sub : app.get_subcommands({})) known.push_back(sub->get_name());
+  return known.empty() ? "" : suggestion(word, known);
+}
+
+// The innermost subcommand that was understood, and its words: "keys make".
+const CLI::App& innermost(const CLI::App& app, std::string* arguments) {
+  const CLI::App* at = &app;
+  while (!at->get_subcommands().empty()) {
+    at = at->get_subcommands().front();
+    *arguments += at->get_name() + " ";
+  }
+  return *at;
+}
+
+// Answers a command line that was not understood, and --help and --version.
+int answer_parse_error(const CLI::App& app, const CLI::ParseError& error, Console& console) {
+  if (error.get_exit_code() == 0) return app.exit(error);  // --help, --version
+  std::string command;
+  const CLI::App& at = innermost(app, &command);
+  const std::vector<std::string> unknown = app.remaining(true);
+  if (!unknown.empty()) {
+    const std::string& word = unknown.front();
+    const bool is_command = &at == &app && !is_option(word);
+    console.error({(is_command ? "unknown command '" : "did not expect '") + word + "'" +
+                   did_you_mean(at, word)});
+  } else if (&at == &app) {
+    std::cerr << app.help();
+    return kExitBadUsage;
+  } else {
+    console.error({usage_sentence(at, error)});
+  }
+  console.note("See `gapfarm " + command + "--help`.");
+  return kExitBadUsage;
 }
 
 }  // namespace
@@ -55,6 +153,41 @@ void parse_arguments(Program& program, std::vector<std::string> arguments) {
   }
   std::reverse(arguments.begin(), arguments.end());  // as CLI11 wants them
   program.app->parse(std::move(arguments));
+}
+
+int run_arguments(const std::vector<std::string>& arguments) {
+  const std::unique_ptr<Program> program = make_program();
+  Console console;
+  try {
+    parse_arguments(*program, arguments);
+  } catch (const CLI::ParseError& error) {
+    // What was not understood may be before the flag.
+    if (std::find(arguments.begin(), arguments.end(), "--json") != arguments.end())
+      console.use_json();
+    return console.end(answer_parse_error(*program->app, error, console));
+  }
+  if (program->json) console.use_json();
+  StopSource stop;
+  const UserInterrupts interrupts(&stop);
+  CliContext context{console, stop};
+  for (std::size_t i = 0; i < program->runs.size(); ++i) {
+    const char* name = subcommands()[i].name;
+    if (!program->app->got_subcommand(name)) continue;
+    context.dry_run = is_dry_run(*program->app->get_subcommand(name));
+    const Result<int> ended = program->runs[i](context);
+    const int exit_code = console.end(ended ? *ended : failed(ended.error(), context));
+    conclude_command(*program->app->get_subcommand(name), exit_code, context);
+    return exit_code;
+  }
+  return kExitBadUsage;
+}
+
+std::span<const Subcommand> subcommands() {
+  static constexpr Subcommand kTable[] = {
+#define COMMAND(folder, file, name, summary, group) {name, summary, group, setup_##file},
+#include "master/cli/commands.inc"
+  };
+  return kTable;
 }
 
 }  // namespace gapfarm

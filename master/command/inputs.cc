@@ -1,18 +1,40 @@
 #include "master/command/inputs.h"
 
 #include <algorithm>
+#include <filesystem>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <thread>
 
-#include "common/base/shipped.h"
+#include "common/base/build_info.h"
 #include "common/base/try.h"
 #include "common/config/config.h"
 #include "common/problem/run_files.h"
 #include "common/trials/files.h"
 #include "common/trials/read.h"
+#include "master/command/console.h"
 #include "master/command/long_command.h"
+#include "master/store/schema.h"
 
 namespace gapfarm {
+namespace {
+
+constexpr std::size_t kMostFilesShown = 12;
+
+LogLevel level_of(FarmEvent::Kind kind) {
+  switch (kind) {
+    case FarmEvent::kJoined:
+    case FarmEvent::kReturned:
+    case FarmEvent::kLeft:
+      return LogLevel::kInfo;
+    case FarmEvent::kQuarantined:
+      return LogLevel::kError;
+    default:
+      return LogLevel::kWarn;
+  }
+}
+
+}  // namespace
 
 Result<Config> read_config_and_trials(const std::string& config_path, const TrialOptions& trials) {
   Result<Config> config = read_config(config_path);
@@ -27,10 +49,10 @@ Result<Config> read_config_and_trials(const std::string& config_path, const Tria
   if (!trials.files.empty()) config->trial_files = trials.files;
   if (config->trial_files.empty()) {
     const bool runs = config->problem.windows();
-    return Error{config_path + (runs ? ": names no runs; add [runs] with folders = [\"FOLDER\"] or "
-                                       "give --trials FOLDER"
-                                     : ": names no trial files; add them to the config or give "
-                                       "--trials FILE")};
+    return Error{
+        config_path +
+        (runs ? ": names no runs; add [runs] with folders = [\"FOLDER\"] or give --trials FOLDER"
+              : ": names no trial files; add them to the config or give --trials FILE")};
   }
   if (config->problem.windows()) {
     const Status read = read_problem_runs(config->trial_files, config->windows, &config->problem);
@@ -189,6 +211,145 @@ int failed(const Error& error, CliContext& context) {
   }
   context.console.error(error);
   return kExitFailed;
+}
+
+CLI::Option* TrialOptions::declare(CLI::App& app, const std::string& help) {
+  CLI::Option* option = app.add_option("--trials", files, help)->type_name("FILE");
+  declare_reading(app);
+  return option;
+}
+
+void TrialOptions::declare_reading(CLI::App& app) {
+  app.add_option("--paths", read.paths,
+                 "Recorded paths of the trials, whatever they say of whose they are (default: a "
+                 "paths.csv beside a log that says it belongs to it)")
+      ->type_name("FILE");
+  app.add_flag("--skip-invalid", read.skip_invalid,
+               "Leave rows with mistakes out of the logs, and report which");
+  app.add_flag("--session-prefix", read.name_sessions,
+               "Put each log's file name before its sessions' names, for recorders that call them "
+               "alike every day");
+}
+
+void show_notes(const TrialLog& log, Console& console) {
+  for (const std::string& note : log.notes) console.note(note);
+  if (log.files.empty()) return;
+  std::string text = "read ";
+  for (std::size_t i = 0; i < log.files.size() && i < kMostFilesShown; ++i) {
+    text += (i > 0 ? ", " : "") + log.files[i];
+  }
+  if (log.files.size() > kMostFilesShown) {
+    text += " and " + std::to_string(log.files.size() - kMostFilesShown) + " files more";
+  }
+  console.note(text);
+}
+namespace {
+
+Result<Model> find_model(const std::string& run_or_model, Console& console) {
+  namespace fs = std::filesystem;
+  const fs::path path(run_or_model);
+  std::error_code ignored;
+  if (!fs::is_directory(path, ignored)) return read_model(run_or_model);
+  const fs::path file = path / "model.toml";
+  std::optional<Model> left;
+  if (fs::exists(file, ignored)) {
+    ASSIGN_OR_RETURN(auto model, read_model(file.string()));
+    left = std::move(model);
+  }
+  if (!fs::exists(run_store_file(path), ignored)) {
+    if (left) return *std::move(left);
+    return Error{run_or_model +
+                 ": has neither a model.toml nor a run in it; give a model file or the folder of a "
+                 "run or a diagnosis"};
+  }
+  ASSIGN_OR_RETURN(const RunReader run, RunReader::open(path));
+  // A finished run that was resumed has gone on from what it left.
+  ASSIGN_OR_RETURN(const auto generations, run.generations());
+  const std::uint64_t reached = generations.empty() ? 0 : generations.back().generation;
+  if (left && left->origin.generation >= reached) return *std::move(left);
+  Result<Model> model = current_best(run);
+  if (!model) return model;
+  console.note(run_or_model + ": this run is not finished; taking its best so far, " +
+               run.info().fitness + " " + format_number(model->score) + " of generation " +
+               std::to_string(model->origin.generation));
+  return model;
+}
+
+void LogFlags::declare(CLI::App& app) {
+  static const std::map<std::string, LogFormat> kFormats = {{"text", LogFormat::kText},
+                                                            {"json", LogFormat::kJson}};
+  static const std::map<std::string, LogLevel> kLevels = {{"debug", LogLevel::kDebug},
+                                                          {"info", LogLevel::kInfo},
+                                                          {"warn", LogLevel::kWarn},
+                                                          {"error", LogLevel::kError},
+                                                          {"off", LogLevel::kOff}};
+  app.add_option("--log-format", format, "Of what goes to stderr: text or json, a line each")
+      ->transform(CLI::CheckedTransformer(kFormats).description(""))
+      ->type_name("FORMAT");
+  app.add_option("--log-level", level,
+                 "debug (every job), info, warn, error or off (default: warn; info for json)")
+      ->transform(CLI::CheckedTransformer(kLevels).description(""))
+      ->type_name("LEVEL");
+}
+
+std::unique_ptr<Log> LogFlags::open() const {
+  LogOptions options;
+  options.program = "gapfarm";
+  options.format = format;
+  options.level = level.value_or(format == LogFormat::kJson ? LogLevel::kInfo : LogLevel::kWarn);
+  return std::make_unique<Log>(options);
+}
+
+void report_to(Log& log, SocketFarmOptions& options) {
+  options.on_event = [&log](const FarmEvent& event) {
+    std::vector<LogField> fields;
+    if (!event.worker.empty()) fields.push_back({"worker", event.worker});
+    if (!event.host.empty()) fields.push_back({"host", event.host});
+    log.write(level_of(event.kind), event.text, fields);
+  };
+  if (!log.wants(LogLevel::kDebug)) return;
+  options.on_job = [&log](const JobEvent& event) {
+    log.write(LogLevel::kDebug, event.answered ? "job answered" : "job given out",
+              {{"job", event.job},
+               {"attempt", event.attempt},
+               {"worker", event.worker},
+               {"host", event.host}});
+  };
+}
+
+void report_to(Console& console, SocketFarmOptions& options) {
+  options.on_event = [&console](const FarmEvent& event) {
+    const std::string text =
+        (event.worker.empty() ? std::string() : "worker " + event.worker + ": ") + event.text;
+    // Not what the command fails with: it may go on.
+    if (level_of(event.kind) != LogLevel::kInfo) return console.note("gapfarm: " + text);
+    if (console.kept() != nullptr) console.kept()->write(LogLevel::kInfo, text);
+  };
+}
+
+}  // namespace
+
+Status check_same_robot(const Model& model, const std::string& path, const Config& config,
+                        const std::string& config_path) {
+  if (model.scenario == config.problem.scenario && model.robot_file == config.problem.robot_file) {
+    return {};
+  }
+  return Error{path + ": is a model of another scenario or robot than " + config_path +
+               "; give the config that it was made with"};
+}
+
+Status check_no_residual(const Model& model, const std::string& path, const std::string& user) {
+  if (model.residual.empty()) return {};
+  return Error{path +
+               ": the model has a [residual], a correction of trials' ends by their places, "
+               "headings and times, which " +
+               user + " does not take along; leave that section out of a copy, or give tuned.toml"};
+}
+
+Result<Model> read_model_of(const std::string& run_or_model, Console& console) {
+  ASSIGN_OR_RETURN(Model model, find_model(run_or_model, console));
+  RETURN_IF_ERROR(check_moves(model.scenario, run_or_model));
+  return model;
 }
 
 }  // namespace gapfarm

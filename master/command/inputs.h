@@ -1,24 +1,74 @@
 // What several subcommands read and start in the same way.
 #pragma once
 
+#include <CLI/CLI.hpp>
 #include <functional>
 #include <memory>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "common/base/result.h"
+#include "common/config/config.h"
 #include "common/config/model.h"
 #include "common/config/settings.h"
+#include "common/log/log.h"
 #include "common/net/keys.h"
+#include "common/problem/problem.h"
 #include "common/problem/run_files.h"
+#include "common/trials/read.h"
+#include "master/command/console.h"
 #include "master/command/context.h"
-#include "master/command/farm_log.h"
-#include "master/command/trial_options.h"
 #include "master/farm/socket_farm.h"
+#include "master/run/stored_run.h"
 
 namespace gapfarm {
+
+struct LogFlags {
+  LogFormat format = LogFormat::kText;
+  std::optional<LogLevel> level;  // none: warnings as text, info as JSON
+
+  void declare(CLI::App& app);
+  std::unique_ptr<Log> open() const;
+};
+
+// While it lives, the console's notes and errors are lines of a log that is not for people.
+class NotesGoTo {
+ public:
+  NotesGoTo(Log& log, Console& console) : console_(console) {
+    if (log.format() == LogFormat::kJson) console_.use(&log);
+  }
+  ~NotesGoTo() { console_.use(nullptr); }
+  NotesGoTo(const NotesGoTo&) = delete;
+  NotesGoTo& operator=(const NotesGoTo&) = delete;
+
+ private:
+  Console& console_;
+};
+
+// Lets `options` report events, and single jobs at level debug, to `log`, which outlives the farm.
+void report_to(Log& log, SocketFarmOptions& options);
+// Lets `options` report what went wrong to the user, and all events to the console's kept file.
+void report_to(Console& console, SocketFarmOptions& options);
+
+class Console;
+
+struct TrialOptions {
+  std::vector<std::string> files;
+  ReadOptions read;
+  bool needed = true;  // false: scenario objective, which has none, is taken too
+
+  // --trials, with this help, and declare_reading().
+  CLI::Option* declare(CLI::App& app,
+                       const std::string& help = "Trial logs in place of the config's");
+  // --paths, --skip-invalid and --session-prefix, for logs that another option names.
+  void declare_reading(CLI::App& app);
+};
+
+// What the readers omitted from a log and which files they read, to stderr.
+void show_notes(const TrialLog& log, Console& console);
 
 // A config with its trials read: those given, else the config's own.  Errors: neither names any
 // file, and whatever reading either finds.
@@ -79,5 +129,16 @@ Result<RecordedWork> start_recorded(const FarmOptions& options, const FarmSettin
 // work begins.  After a signal kExitResumable, with a sentence how to go on, where the command
 // keeps what it simulates (LongCommand), else 130 or 143; without one kExitFailed.
 int failed(const Error& error, CliContext& context);
+
+// A model file, or the model of a run's or a diagnosis's folder: its model.toml, or, where a run
+// has gone further than that says or left none, its best so far, of which a note shows.
+Result<Model> read_model_of(const std::string& run_or_model, Console& console);
+
+// An error where the model is one of another scenario or robot than the config's.
+Status check_same_robot(const Model& model, const std::string& path, const Config& config,
+                        const std::string& config_path);
+
+// An error where the model has a [residual], which `user` ("drive") cannot take along.
+Status check_no_residual(const Model& model, const std::string& path, const std::string& user);
 
 }  // namespace gapfarm

@@ -9,7 +9,6 @@
 
 #include "common/base/build_info.h"
 #include "common/base/hash.h"
-#include "common/base/host.h"
 #include "common/base/try.h"
 #include "common/json/json.h"
 #include "common/trials/files.h"

@@ -10,12 +10,10 @@
 
 #include "common/base/result.h"
 #include "common/progress/overall_progress.h"
-#include "common/progress/worker_wait.h"
 #include "master/command/console.h"
 #include "master/farm/socket_farm.h"
 #include "master/store/answer_store.h"
 #include "master/store/command_record.h"
-#include "master/store/recorded_farm.h"
 #include "master/store/run_lock.h"
 
 namespace gapfarm {

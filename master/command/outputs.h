@@ -6,7 +6,10 @@
 #include <vector>
 
 #include "common/base/result.h"
+#include "common/config/settings.h"
 #include "common/trials/trial.h"
+#include "master/command/inputs.h"
+#include "master/experiments/influence/paths.h"
 
 namespace gapfarm {
 
@@ -58,6 +61,21 @@ class Outputs {
   bool force_ = false;
   std::vector<std::string> inputs_;
   std::vector<Planned> planned_;
+};
+
+struct TracedCommands {
+  std::vector<std::string> names;  // empty: all
+  double interval_s = 0.02;
+  TrialOptions trials;  // where commands are pieces
+  std::vector<std::string> only;
+
+  void declare(CLI::App& app);
+  // The config, and in `to` what of it is traced: its commands, or the pushes of a log where the
+  // commands are pieces.  Errors: of reading either, a name that is no command, nothing to trace.
+  Result<Config> open(const std::string& path, TraceSettings* to) const;
+
+ private:
+  Status choose(const std::vector<CommandSpec>& known, TraceSettings* to) const;
 };
 
 }  // namespace gapfarm

@@ -84,8 +84,7 @@ Result<FolderState> compare_stamp(const std::string& folder, const std::string& 
   }
   if (finished && there.build != stamp.build && !force) {
     return Error{of +
-                 " by another build of gapfarm; choose another --out, or --force to replace "
-                 "it"};
+                 " by another build of gapfarm; choose another --out, or --force to replace it"};
   }
   return FolderState::kSame;
 }

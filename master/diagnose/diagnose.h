@@ -15,6 +15,7 @@
 #include "master/diagnose/result/diagnosis.h"
 #include "master/farm/farm.h"
 #include "master/infer/predictor.h"
+#include "master/io/log_checks/finding.h"
 
 namespace gapfarm {
 
@@ -64,5 +65,20 @@ struct DiagnosisResult {
 // empty log, an effect to omit that the catalogue does not have, the farm's.
 Result<DiagnosisResult> diagnose(Farm& farm, const Problem& problem,
                                  const DiagnoseOptions& options);
+
+// A log and config in the log's own frame, without rows that cannot be.
+struct PreparedLog {
+  Problem problem;
+  // World position of that frame's origin, whole metres: (0, 0) for a log near the world's origin,
+  // else its middle, so that places stay within the parameters' bounds wherever a map begins.
+  double frame_x_m = 0, frame_y_m = 0;
+  std::vector<SanityFinding> sanity;
+};
+// `frame_m`: what it has to be, where that is known.
+PreparedLog prepare_log(const Problem& problem,
+                        const std::optional<Eigen::Vector2d>& frame_m = std::nullopt);
+
+// The answer where a log cannot be used, without any simulation.
+DiagnosisResult unusable_result(const PreparedLog& log);
 
 }  // namespace gapfarm

@@ -2,21 +2,50 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstddef>
 #include <map>
+#include <numbers>
 #include <optional>
 #include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "common/math/laws.h"
 #include "common/parameters/table.h"
-#include "master/diagnose/effect_phrases.h"
-#include "master/diagnose/fit/probes.h"
 #include "master/diagnose/fit/regression.h"
 #include "master/diagnose/fit/signatures.h"
+#include "master/diagnose/fit/slopes.h"
+#include "master/diagnose/study.h"
 #include "master/infer/compete.h"
 
 namespace gapfarm {
+
+inline constexpr double kDegrees = 180 / std::numbers::pi;  // of a radian
+
+// How a parameter is reported: the words around its value in a unit that people use.
+struct ShownParameter {
+  const char* key;
+  double factor;
+  const char* unit;
+};
+
+struct EffectPhrases {
+  // %1, %2, ...: the tellings' values with their intervals; %a: a seam's axis.  Null: none.
+  const char* sentence = nullptr;
+  std::vector<ShownParameter> parameters = {};
+};
+
+// On one line.  %: the size of the parameter; @: the choice of the effect that is no number ("y").
+struct ShortPhrases {
+  const char* key;  // whose size is reported
+  double factor;
+  const char* unit;
+  const char* cause;
+  const char* opposite;  // where the value is negative; null: the same
+  const char* remedy;
+  const char* toward = nullptr;  // key of a direction that is reported, too
+};
 
 struct SpreadRow;
 
@@ -159,5 +188,11 @@ EffectDiagnosis second_of_a_kind(EffectDiagnosis first, const char* effect, cons
 
 // Strength and direction from the cosine's and sine's coefficients.
 void start_polar(const Polar& polar, const EffectStart& at, std::map<std::string, double>* values);
+
+// Standard deviation, in the unit of table row `row`, of what the fit's linearisation cannot see:
+// that another simulation of the same effect gives it another size, and that places are searched.
+// `at` holds the effect's values; the effect gained `gain` nats.
+double error_beyond_fit(const Study& study, const ParameterTable& table, std::size_t row,
+                        const Overrides& at, double gain);
 
 }  // namespace gapfarm

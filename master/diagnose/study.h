@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstddef>
 #include <memory>
 #include <optional>
 #include <span>
@@ -9,12 +10,41 @@
 #include <vector>
 
 #include "common/base/result.h"
+#include "common/problem/problem.h"
 #include "common/score/pose_readings.h"
-#include "master/diagnose/drive_base.h"
 #include "master/diagnose/evidence/residuals.h"
 #include "master/infer/predictor.h"
 
 namespace gapfarm {
+
+// A base parameter that tuning moves, with a weak prior on the logarithm of its value: the data
+// cannot distinguish some of them, and the prior keeps those where the config had them.
+struct BaseParameter {
+  std::size_t row = 0;
+  double prior_log_sd = 1;
+};
+
+// A parameter of which no effect may claim what another value would do.
+struct RetunedParameter {
+  std::size_t row = 0;
+  // Standard deviation of the prior: of its logarithm where `unit` is 0, else in such units.
+  double prior_sd = 1;
+  double unit = 0;
+};
+
+struct DriveBase {
+  std::vector<BaseParameter> tuned;
+  std::vector<std::size_t> kept;  // others with a value in Study::base
+  std::vector<RetunedParameter> retuned;
+  // Row of the speed at full duty.  Of a program's parameters tune_base() finds it, if there is
+  // one.
+  std::optional<std::size_t> speed;
+  std::optional<std::size_t> mass_height;
+};
+
+// Of srv1, or of what the problem's program declares: of that, `genes` are tuned whose values are
+// positive, all such parameters where the config searches none of the program's.
+DriveBase drive_base(const Problem& problem, std::span<const Gene> genes);
 
 // A parameter that retuning may move, with a prior on the logarithm of its value, and the change of
 // every trial's end for a change of that logarithm, in the axes of the base's ends.
@@ -86,5 +116,11 @@ std::vector<std::size_t> base_on_bounds(const Study& study, const Overrides& at)
 // the base's ends, divided by `scale`.
 std::vector<Eigen::Vector3d> differences(const Study& study, const std::vector<Pose>& ends,
                                          double scale);
+
+// Whether a drive sticks: Coulomb treads then give way to no small force, real ones creep in
+// proportion to it.
+inline bool is_straight(const Study& study, std::size_t trial) {
+  return study.cells[study.trials[trial].cell].kind == MotionKind::kStraight;
+}
 
 }  // namespace gapfarm

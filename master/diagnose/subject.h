@@ -105,4 +105,8 @@ struct DiagnosisSubject {
 // Null where the problem's scenario cannot be diagnosed.
 std::shared_ptr<const DiagnosisSubject> diagnosis_subject(const Problem& problem);
 
+// Each command for 0.5, 1 and 2 s at half and full level: from several headings and places within
+// the log's own, straight after driving the opposite way, and late in a session.
+ExperimentPlan plan_drives(const Problem& problem);
+
 }  // namespace gapfarm

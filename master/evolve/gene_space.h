@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "common/parameters/genome.h"
+#include "common/parameters/table.h"
 #include "common/random/stream.h"
 
 namespace gapfarm {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "common/config/settings.h"
-#include "common/parameters/genome.h"
+#include "common/parameters/table.h"
 #include "gapfarm/v1/task.pb.h"
 
 namespace gapfarm {

@@ -2,7 +2,11 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <functional>
+#include <map>
+#include <memory>
+#include <string>
 
 #include "gapfarm/v1/task.pb.h"
 
@@ -18,5 +22,19 @@ class AnswerSource {
   // Empty: nobody.
   virtual void watch_answers(AnswerWatcher watcher) = 0;
 };
+
+using WorkerId = std::uint64_t;
+
+struct WorkerIdentity {
+  WorkerId id = 0;
+  std::string name;  // its own, unique: a process that replaces it has another
+  std::string host;
+  std::string numeric_class;
+};
+
+// How many workers each host has.
+using HostCounts = std::map<std::string, unsigned>;
+
+using WorkerIdentityPtr = std::shared_ptr<const WorkerIdentity>;
 
 }  // namespace gapfarm

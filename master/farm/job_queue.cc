@@ -8,10 +8,36 @@
 #include <utility>
 
 #include "common/problem/question.h"
-#include "master/farm/answer.h"
+#include "gapfarm/v1/task.pb.h"
 
 namespace gapfarm {
 namespace {
+
+// False for what an honest worker never sends: no outcome, an OK of another kind than the task's,
+// or a fitness that is no finite number.
+bool answers(const v1::Task& task, const v1::TaskResult& result);
+
+bool answers(const v1::Task& task, const v1::TaskResult& result) {
+  const v1::Outcome outcome = result.outcome();
+  if (outcome == v1::OUTCOME_UNSPECIFIED || !v1::Outcome_IsValid(outcome)) return false;
+  if (outcome == v1::WORKER_FAILED) return false;  // the master's own word
+  if (outcome != v1::OK && outcome != v1::INFEASIBLE) return true;
+  switch (task.kind_case()) {
+    case v1::Task::kEvaluate:
+      return result.has_evaluate() && std::isfinite(result.evaluate().fitness()) &&
+             std::isfinite(result.evaluate().penalty());
+    case v1::Task::kPredict:
+      return result.has_predict();
+    case v1::Task::kSimulate:
+      return result.has_simulate();
+    case v1::Task::kTrace:
+      return result.has_trace();
+    case v1::Task::kEcho:
+      return result.kind_case() == v1::TaskResult::kEcho;
+    default:
+      return true;
+  }
+}
 
 // Attempts of audits are numbered with the others, but belong to no job of the batch.
 constexpr std::size_t kNoJob = static_cast<std::size_t>(-1);

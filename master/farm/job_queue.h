@@ -14,7 +14,6 @@
 #include "gapfarm/v1/farm.pb.h"
 #include "master/farm/answer_watch.h"
 #include "master/farm/second_opinions.h"
-#include "master/farm/worker_identity.h"
 
 namespace gapfarm {
 

@@ -1,7 +1,7 @@
 // Moves messages between a transport and the scheduler.
 #pragma once
 
-#include "common/net/transport.h"
+#include "common/net/envelope.h"
 #include "master/farm/scheduler.h"
 
 namespace gapfarm {

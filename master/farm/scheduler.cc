@@ -1,7 +1,6 @@
 #include "master/farm/scheduler.h"
 
 #include <algorithm>
-#include <cassert>
 #include <cmath>
 #include <limits>
 

@@ -6,11 +6,13 @@
 #include <chrono>
 
 #include "common/base/guarded.h"
+#include "common/base/try.h"
 #include "master/ground/reference.h"
 #include "master/ground/report/ground_report.h"
+#include "master/ground/report/ground_text.h"
+#include "master/ground/tolerances.h"
 
 namespace gapfarm {
-
 namespace {
 
 // How long each stage took.
@@ -72,10 +74,9 @@ Result<GroundDiagnosis> diagnose_driven(const GroundRobot& file, const GroundRob
   GroundQuestion question = ask_what_is_wrong(robot);
   if (options.reference) {
     clock.begin(kGroundStages[0].name);
-    auto asked =
-        ask_what_changed(robot, *options.reference, options.windows, options.seed, options.memo);
-    if (!asked) return asked.error();
-    question = std::move(*asked);
+    ASSIGN_OR_RETURN(auto asked, ask_what_changed(robot, *options.reference, options.windows,
+                                                  options.seed, options.memo));
+    question = std::move(asked);
   }
   if (Status s = exclude(options.excluded, &question.catalogue); !s) return s.error();
   question.catalogue = that_can_show(log, std::move(question.catalogue));
@@ -85,18 +86,36 @@ Result<GroundDiagnosis> diagnose_driven(const GroundRobot& file, const GroundRob
                            options.memo,
                            options.on_finding,
                            options.seed};
-  auto search = search_ground(robot, log, options.windows, question, work);
-  if (!search) return search.error();
-  search->loop = loop;
+  ASSIGN_OR_RETURN(auto search, search_ground(robot, log, options.windows, question, work));
+  search.loop = loop;
   clock.begin(std::end(kGroundStages)[-1].name);
-  GroundDiagnosis result = report_ground(robot, *search, options);
-  Kinematics chosen = chosen_values(*search);
+  GroundDiagnosis result = report_ground(robot, search, options);
+  Kinematics chosen = chosen_values(search);
   if (loop) leave_motors_out(&chosen);
   result.corrected = robot_with(file, chosen);
   clock.begin("");
   result.diagnosis.timing_s = std::move(clock.timing_s);
   return result;
 }
+
+constexpr std::size_t kMostOffersReported = 6;
+
+std::string things_of(const GroundSearch& search, const std::vector<std::size_t>& hypotheses) {
+  std::string text;
+  for (const std::size_t h : hypotheses) {
+    text += (text.empty() ? "" : ", ") + search.catalogue[h].thing;
+  }
+  return text;
+}
+
+// Faults of the log are looked for before.
+std::size_t to_try(const GroundSearch& search) {
+  return static_cast<std::size_t>(
+      std::count_if(search.catalogue.begin(), search.catalogue.end(),
+                    [](const GroundHypothesis& h) { return !h.put_right; }));
+}
+
+std::string nats_text(double nats) { return fmt::format("{:.1f}", nats); }
 
 }  // namespace
 
@@ -119,12 +138,82 @@ std::vector<SanityFinding> check_ground_log(const GroundRobot& robot, const RunL
   const auto fault = find_ground_fault(robot, log, question, {{2}, 0.5});
   if (!fault) return {};
   const GroundHypothesis& h = question.catalogue[fault->hypothesis];
-  return {
-      {h.name,
-       fmt::format("With {} put right, what the robot's file expects is {:.1f} times as near to "
-                   "what was measured.",
-                   h.thing, fault->shrinks),
-       h.remedy, Severity::kWarning, true, h.aliases}};
+  return {{h.name,
+           fmt::format("With {} put right, what the robot's file expects is {:.1f} times as near "
+                       "to what was measured.",
+                       h.thing, fault->shrinks),
+           h.remedy, Severity::kWarning, true, h.aliases}};
+}
+
+void emit_faults(const GroundWork& work, const GroundSearch& search) {
+  if (!work.on_finding) return;
+  Finding finding;
+  finding.about = "faults of the log";
+  finding.text =
+      search.faults.empty()
+          ? "Nothing of the log is the wrong way round or in another unit."
+          : "With this put right, the log is far closer to what the robot's file expects: " +
+                things_of(search, search.faults) + ".";
+  finding.text +=
+      fmt::format(" {} windows of {} stretches are held against the robot's kinematics.",
+                  search.windows.trials.size(), search.windows.blocks);
+  work.on_finding(std::move(finding));
+}
+
+void emit_offers(const GroundWork& work, const GroundSearch& search,
+                 const std::vector<std::pair<Offer, WindowFit>>& tried) {
+  if (!work.on_finding) return;
+  std::vector<const Offer*> best;
+  for (const auto& [offer, fit] : tried) best.push_back(&offer);
+  std::stable_sort(best.begin(), best.end(),
+                   [](const Offer* a, const Offer* b) { return a->gain > b->gain; });
+  // Most change nothing of what stands there.
+  if (best.size() > kMostOffersReported &&
+      best[kMostOffersReported - 1]->gain >= tried.back().first.gain &&
+      tried.size() < to_try(search)) {
+    return;
+  }
+  Finding finding;
+  finding.about = "what the catalogue offers";
+  finding.text = fmt::format("{} of {} values tried{}; one is named from {:g} nats on.",
+                             tried.size(), to_try(search),
+                             search.steps.empty() ? "" : " beside what is named", kLeastGroundGain);
+  finding.columns = {"value", "would gain, nats"};
+  for (std::size_t i = 0; i < std::min(best.size(), kMostOffersReported); ++i) {
+    if (best[i]->gain <= 0) continue;
+    finding.rows.emplace_back(search.catalogue[best[i]->hypothesis].thing,
+                              nats_text(best[i]->gain));
+  }
+  work.on_finding(std::move(finding));
+}
+
+void emit_steps(const GroundWork& work, const GroundSearch& search) {
+  if (!work.on_finding) return;
+  Finding finding;
+  finding.about = "what is named so far";
+  finding.columns = {"value", "gains, nats"};
+  for (const GroundStep& step : search.steps) {
+    finding.rows.emplace_back(search.catalogue[step.chosen].thing, nats_text(step.gain));
+  }
+  finding.text = search.steps.empty() ? "Nothing of the catalogue is worth a name so far."
+                                      : "Better on stretches that were held out, too:";
+  for (const GroundStep& step : search.steps) {
+    if (step.not_distinguished.empty()) continue;
+    finding.text += " " + search.catalogue[step.chosen].thing + " is not distinguished from " +
+                    things_of(search, step.not_distinguished) + ".";
+  }
+  work.on_finding(std::move(finding));
+}
+
+void emit_rest(const GroundWork& work, const GroundSearch& search) {
+  if (!work.on_finding) return;
+  Finding finding;
+  finding.about = "what is left";
+  GroundFigures figures;
+  figures.closable = search.closable;
+  figures.best_of_all = search.best_of_all;
+  finding.text = verdict_reason(figures);
+  work.on_finding(std::move(finding));
 }
 
 }  // namespace gapfarm

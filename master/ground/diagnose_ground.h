@@ -6,6 +6,7 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "common/base/result.h"
@@ -13,8 +14,8 @@
 #include "common/recordings/windows.h"
 #include "common/robot/robot.h"
 #include "master/diagnose/result/diagnosis.h"
-#include "master/ground/report/ground_verdict.h"
-#include "master/ground/report/values_file.h"
+#include "master/ground/report/ground_text.h"
+#include "master/ground/report/ros_export.h"
 #include "master/ground/search.h"
 
 namespace gapfarm {
@@ -57,5 +58,12 @@ Result<GroundDiagnosis> diagnose_ground(const GroundRobot& robot, const RunLog& 
 
 // What a log has the wrong way round or in another unit, in seconds, nothing fitted.
 std::vector<SanityFinding> check_ground_log(const GroundRobot& robot, const RunLog& log);
+
+void emit_faults(const GroundWork& work, const GroundSearch& search);
+// Of the step in work, as far as it has come.
+void emit_offers(const GroundWork& work, const GroundSearch& search,
+                 const std::vector<std::pair<Offer, WindowFit>>& tried);
+void emit_steps(const GroundWork& work, const GroundSearch& search);
+void emit_rest(const GroundWork& work, const GroundSearch& search);
 
 }  // namespace gapfarm

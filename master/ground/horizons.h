@@ -2,6 +2,10 @@
 // kinematics and constant velocity.
 #pragma once
 
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -10,9 +14,20 @@
 #include "common/recordings/run.h"
 #include "common/score/kinematic.h"
 #include "master/farm/farm.h"
-#include "master/ground/drawn_ratio.h"
 
 namespace gapfarm {
+
+// Of two medians over the same windows.
+struct DrawnRatio {
+  double ratio = 1;
+  std::optional<std::array<double, 2>> interval;  // 90 %; none where too few windows show
+};
+
+// `run` of each window, in driving order; the interval is by drawing runs again, one less than
+// there are, or, of fewer than ten runs, tenths of the windows within them. REQUIRES: as many
+// errors of either, and runs.
+DrawnRatio drawn_ratio(std::span<const double> own, std::span<const double> baseline,
+                       std::span<const std::size_t> run, std::uint64_t seed);
 
 // Medians over windows.
 struct WindowErrors {

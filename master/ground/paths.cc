@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/recordings/session.h"
+#include "common/base/try.h"
 #include "common/recordings/windows.h"
 #include "common/svg/svg.h"
 
@@ -20,11 +20,10 @@ constexpr double kPanel = 300, kPad = 34, kLegend = 46;
 
 // Trials that all begin with their run and end further and further on.
 Status put_stretches(const RunLog& runs, Problem* to, DrivenPaths* paths) {
-  const auto whole = cut_windows(runs, {{0}, 0});
-  if (!whole) return whole.error();
-  to->runs = whole->runs;
+  ASSIGN_OR_RETURN(const auto whole, cut_windows(runs, {{0}, 0}));
+  to->runs = whole.runs;
   to->log = {};
-  for (const Trial& run : whole->log.trials) {
+  for (const Trial& run : whole.log.trials) {
     const LoggedRun& logged = runs.runs[*run.run];
     DrivenPath path{run.session, {run.X_WS}, {run.X_WS}, {run.X_WS}};
     double last_s = *run.t_s;
@@ -47,9 +46,8 @@ Status put_stretches(const RunLog& runs, Problem* to, DrivenPaths* paths) {
 Result<std::vector<Pose>> simulated_ends(Farm& farm, const Problem& problem) {
   v1::Task task;
   task.mutable_predict();
-  const auto results = farm.run(farm.add_problem(to_proto(problem)), {task});
-  if (!results) return results.error();
-  const v1::TaskResult& result = results->front();
+  ASSIGN_OR_RETURN(const auto results, farm.run(farm.add_problem(to_proto(problem)), {task}));
+  const v1::TaskResult& result = results.front();
   if (result.outcome() != v1::OK) {
     return Error{"the simulation ended with " + v1::Outcome_Name(result.outcome()) + " (" +
                  result.message() + ")"};
@@ -168,10 +166,9 @@ Result<std::vector<SimulatedWindow>> simulate_window(Farm& farm, const Problem& 
     predict.set_means_only(true);
     predict.mutable_point()->mutable_genome()->Add(genomes[g].begin(), genomes[g].end());
   }
-  const auto results = farm.run(farm.add_problem(to_proto(asked)), tasks);
-  if (!results) return results.error();
+  ASSIGN_OR_RETURN(const auto results, farm.run(farm.add_problem(to_proto(asked)), tasks));
   std::vector<SimulatedWindow> windows;
-  for (const v1::TaskResult& result : *results) {
+  for (const v1::TaskResult& result : results) {
     SimulatedWindow& to = windows.emplace_back();
     if (result.outcome() != v1::OK) {
       to.failed = v1::Outcome_Name(result.outcome());

@@ -4,9 +4,9 @@
 #include <cmath>
 #include <utility>
 
+#include "master/ground/diagnose_ground.h"
 #include "master/ground/fit/edge.h"
-#include "master/ground/partial_result.h"
-#include "master/ground/report/ground_verdict.h"
+#include "master/ground/report/ground_text.h"
 #include "master/ground/tolerances.h"
 
 namespace gapfarm {

@@ -122,4 +122,17 @@ Eigen::VectorXd scan_delay(const WindowFitter& fitter, const std::vector<FitRow>
 std::vector<FitRow> with_freed(std::vector<FitRow> rows, const GroundHypothesis& hypothesis,
                                Eigen::VectorXd* values);
 
+// Whether the runs of a log share a clock: each log may have its own offset between what commands
+// and what measures.
+
+struct RunClock {
+  std::size_t run = 0;  // in the log
+  double delay_s = 0;   // from command to pose, its own
+};
+
+// The clocks of two to nine runs, where they are significantly apart: where each run has its own,
+// the windows are by so much better explained than by one for all.  More runs than these are drawn
+// again as they are, and stand for themselves.
+std::optional<std::vector<RunClock>> clocks_apart(const WindowFitter& fitter, const WindowFit& fit);
+
 }  // namespace gapfarm

@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "common/math/algebra.h"
-#include "common/math/bounded_minimum.h"
 #include "master/infer/settings.h"
 
 namespace gapfarm::infer {

@@ -1,5 +1,5 @@
 # cmake -DOUT=x.cc "-DSTYLES=a.css|b.css" "-DSCRIPTS=a.js|b.js" -P embed.cmake
-# Writes a C++ source with the files as string literals (master/report/assets.h).
+# Writes a C++ source with the files as string literals (master/report/page_frame.h).
 function(literals list variable names)
   set(text "")
   string(REPLACE "|" ";" files "${list}")
@@ -18,7 +18,7 @@ endfunction()
 literals("${STYLES}" styles kStyles)
 literals("${SCRIPTS}" scripts kScripts)
 file(WRITE ${OUT}
-"#include \"master/report/assets.h\"
+"#include \"master/report/page_frame.h\"
 
 namespace gapfarm {
 namespace {

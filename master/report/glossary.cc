@@ -52,8 +52,8 @@ constexpr Entry kEntries[] = {
      "heading, counter-clockwise."},
     {"trend", "trend, bias, spread",
      "How a residual depends on something. A bias is the same for all trials, a trend grows or "
-     "turns with what it depends on, a spread scatters more (or less) than the model says. "
-     "“theta trend” is a heading that does so."},
+     "turns with what it depends on, a spread scatters more (or less) than the model says. “theta "
+     "trend” is a heading that does so."},
     {"share", "share of the gap", "How much of the gap this alone accounts for."},
     {"p", "p, corrected",
      "How often chance alone would show as much, of all that was looked at. Below 0.01: hardly "

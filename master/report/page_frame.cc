@@ -6,7 +6,6 @@
 #include <span>
 
 #include "common/json/json.h"
-#include "master/report/assets.h"
 #include "master/report/html.h"
 
 namespace gapfarm {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -58,5 +59,9 @@ class PlainPage {
   std::string title_;
   std::string body_;
 };
+
+// Contents of the style sheets and scripts, in the order in which a page needs them.
+std::span<const std::string_view> page_styles();
+std::span<const std::string_view> page_scripts();
 
 }  // namespace gapfarm

@@ -59,8 +59,7 @@ std::string warnings(const std::vector<ParameterRow>& rows) {
   if (keys.empty()) return "";
   return "<p class=\"caution-box\">▲ At a bound: " + keys +
          ". The search wanted to go on: widen the range where it makes sense, and trust the rest "
-         "of "
-         "the page less until it does not.</p>";
+         "of the page less until it does not.</p>";
 }
 
 std::string correlations_html(const std::vector<ParameterCorrelation>& correlations) {

@@ -1,9 +1,13 @@
 #include "master/report/report_html.h"
 
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "master/diagnose/result/diagnosis_json.h"
-#include "master/report/gap_split.h"
 #include "master/report/glossary.h"
 #include "master/report/html.h"
 #include "master/report/page_frame.h"
@@ -85,6 +89,204 @@ std::string shape_section(const Diagnosis& diagnosis) {
   return html + "</section>\n";
 }
 
+constexpr std::array<GapUnit, 3> kUnits = {GapUnit::kNats, GapUnit::kMillimetres,
+                                           GapUnit::kMilliradians};
+constexpr double kLeastScaleNats = 0.2;
+constexpr int kHatchCount = 5;  // as many as the page defines
+
+const GapFigures& figures(const Diagnosis& diagnosis, GapUnit unit) {
+  switch (unit) {
+    case GapUnit::kNats:
+      return diagnosis.gap;
+    case GapUnit::kMillimetres:
+      return diagnosis.position_mm;
+    case GapUnit::kMilliradians:
+      return diagnosis.heading_mrad;
+  }
+  return diagnosis.gap;
+}
+
+std::optional<double> level_after(const NamedEffect& effect, GapUnit unit) {
+  switch (unit) {
+    case GapUnit::kNats:
+      return effect.gap_after;
+    case GapUnit::kMillimetres:
+      return effect.position_mm_after;
+    case GapUnit::kMilliradians:
+      return effect.heading_mrad_after;
+  }
+  return std::nullopt;
+}
+
+struct UnitLabels {
+  const char* title;
+  const char* unit;
+};
+
+UnitLabels labels_of(GapUnit unit) {
+  switch (unit) {
+    case GapUnit::kNats:
+      return {"Log score lost a trial", "nats"};
+    case GapUnit::kMillimetres:
+      return {"Position, root mean square", "mm"};
+    case GapUnit::kMilliradians:
+      return {"Heading, root mean square", "mrad"};
+  }
+  return {"", ""};
+}
+
+// Class and badge of a part; effects count from 1.
+struct Look {
+  std::string css_class;
+  std::string badge;
+};
+
+Look look(const GapPart& part, int effect) {
+  switch (part.kind) {
+    case GapPart::Kind::kFloor:
+      return {"part-floor", "F"};
+    case GapPart::Kind::kUnexplained:
+      return {"part-unexplained", "?"};
+    case GapPart::Kind::kEffect:
+      break;
+  }
+  return {fmt::format("part-effect-{}", (effect - 1) % kHatchCount + 1), std::to_string(effect)};
+}
+
+// A stretch of a bar.
+struct Stretch {
+  double length = 0;
+  Look look;
+  std::string label;
+};
+
+double above_zero(double amount) { return std::isfinite(amount) ? std::max(amount, 0.0) : 0; }
+
+// The parts of one bar, which add up to the tuned gap before and to the final one after.  What an
+// effect made worse was not there before and is afterwards.
+std::vector<Stretch> stretches(const GapSplit& split, bool before) {
+  double worse = 0;
+  for (const GapPart& part : split.parts) {
+    if (part.kind == GapPart::Kind::kEffect) worse += above_zero(-part.amount);
+  }
+  if (split.parts.size() == 2) worse = 0;
+  std::vector<Stretch> list;
+  int effect = 0;
+  for (const GapPart& part : split.parts) {
+    const bool is_effect = part.kind == GapPart::Kind::kEffect;
+    if (is_effect) ++effect;
+    const double amount =
+        part.kind == GapPart::Kind::kUnexplained ? part.amount - worse : part.amount;
+    const Look own = look(part, effect);
+    if (!is_effect || before) list.push_back({above_zero(amount), own, part.label});
+    if (is_effect && !before) {
+      list.push_back({above_zero(-part.amount),
+                      {"part-worse", "+" + own.badge},
+                      part.label + " made it worse"});
+    }
+  }
+  return list;
+}
+
+double drawn_total(const GapSplit& split, bool before) {
+  double total = 0;
+  for (const Stretch& stretch : stretches(split, before)) total += stretch.length;
+  return total;
+}
+
+// One stacked bar; its parts also stand in the table below, so it is hidden from screen readers.
+std::string stacked_bar(const GapSplit& split, bool before, double scale) {
+  std::string svg =
+      R"(<svg class="stack" aria-hidden="true"><rect class="track" width="100%" height="100%"/>)";
+  double at = 0;
+  for (const Stretch& stretch : stretches(split, before)) {
+    const double width = scale > 0 ? 100 * stretch.length / scale : 0;
+    if (width <= 0) continue;
+    svg += fmt::format(
+        R"(<svg x="{:.3f}%" width="{:.3f}%"><rect class="part {}" width="100%" height="100%"/>)",
+        at, width, stretch.look.css_class);
+    // A name is drawn where the bar is certainly wide enough for it, a badge where that fits.
+    const double share = width / 100;
+    const auto middle = [&](const char* css_class, const std::string& label) {
+      svg += fmt::format(R"(<text class="{}" x="50%" y="50%">{}</text>)", css_class, label);
+    };
+    if (share > 0.03 + 0.0135 * static_cast<double>(stretch.label.size())) {
+      middle("wide", html_escaped(stretch.label));
+      middle("narrow", stretch.look.badge);
+    } else if (share > 0.05) {
+      middle("badge", stretch.look.badge);
+    }
+    svg += "</svg>";
+    at += width;
+  }
+  return svg + "</svg>";
+}
+
+std::string bars(const GapSplit& split) {
+  // A gap of next to nothing shall not fill the bar.
+  const double least = split.unit == GapUnit::kNats ? kLeastScaleNats : 0;
+  const double scale = std::max({drawn_total(split, true), drawn_total(split, false), least});
+  const UnitLabels w = labels_of(split.unit);
+  return fmt::format(
+      R"(<div class="split"><h3>{}</h3>)"
+      R"(<div class="split-row"><span class="split-name">before</span>{}<span class="split-value">{} {}</span></div>)"
+      R"(<div class="split-row"><span class="split-name">after</span>{}<span class="split-value">{} {}</span></div></div>)",
+      w.title, stacked_bar(split, true, scale), number_text(split.tuned), w.unit,
+      stacked_bar(split, false, scale), number_text(split.final_), w.unit);
+}
+
+const GapPart* find_part(const GapSplit& split, const GapPart& like) {
+  for (const GapPart& part : split.parts) {
+    if (part.kind == like.kind && part.label == like.label) return &part;
+  }
+  return nullptr;
+}
+
+// With what a sign other than the usual one means.
+std::string amount_text(const GapPart& part, const GapSplit& split) {
+  const std::string text = number_text(part.amount);
+  if (!(part.amount < 0)) return text;
+  if (part.kind == GapPart::Kind::kEffect) {
+    return text + R"( <small class="worse">▲ worse</small>)";
+  }
+  const bool little = std::abs(part.amount) < 0.1 * std::abs(split.tuned);
+  return text + (little ? " <small>within the floor</small>" : " <small>below the floor</small>");
+}
+
+// Rows in the order of the cause of most interest: effects, unexplained, floor.
+std::string parts_table(const std::vector<GapSplit>& splits) {
+  const auto& parts = splits.front().parts;
+  std::vector<std::pair<const GapPart*, int>> order;
+  int effect = 0;
+  for (const GapPart& part : parts) {
+    if (part.kind == GapPart::Kind::kEffect) order.emplace_back(&part, ++effect);
+  }
+  order.emplace_back(&parts[1], 0);
+  order.emplace_back(&parts[0], 0);
+  std::vector<HtmlRow> rows;
+  for (const auto& [part, number] : order) {
+    const Look l = look(*part, number);
+    rows.push_back(
+        {fmt::format(
+             R"(<svg class="swatch" aria-hidden="true"><rect class="part {}" width="100%" height="100%"/>)"
+             R"(<text class="badge" x="50%" y="50%">{}</text></svg>{})",
+             l.css_class, l.badge, html_escaped(part->label)),
+         {}});
+    for (const GapSplit& split : splits) {
+      const GapPart* same = find_part(split, *part);
+      rows.back().cells.push_back(same ? amount_text(*same, split) : "with the others");
+    }
+  }
+  rows.push_back({"tuned model, in all", {}, "sum"});
+  for (const GapSplit& split : splits) rows.back().cells.push_back(number_text(split.tuned));
+  return html_table("parts", "gap", "The gap by cause",
+                    {{"part"},
+                     {"nats a trial", "number", "nats"},
+                     {"position, mm", "number", "mm"},
+                     {"heading, mrad", "number", "mrad"}},
+                    rows);
+}
+
 }  // namespace
 
 std::string report_html(const Diagnosis& diagnosis, bool served) {
@@ -139,6 +341,50 @@ std::string report_html(const Diagnosis& diagnosis, bool served) {
   body += provenance_section(diagnosis);
   body += glossary_section(diagnosis_terms());
   return framed_page(frame, page, trials);
+}
+
+GapSplit split_gap(const Diagnosis& diagnosis, GapUnit unit) {
+  const GapFigures& f = figures(diagnosis, unit);
+  GapSplit split{unit, f.tuned, f.final_, {}};
+  split.parts.push_back({GapPart::Kind::kFloor, "floor (repeats of a trial)", f.floor});
+  split.parts.push_back({GapPart::Kind::kUnexplained, "unexplained", f.final_ - f.floor});
+  const auto& effects = diagnosis.effects;
+  if (effects.empty()) {
+    split.parts[1].amount = f.tuned - f.floor;
+    return split;
+  }
+  bool measured = true;
+  for (std::size_t i = 0; i + 1 < effects.size(); ++i) {
+    const auto level = level_after(effects[i], unit);
+    measured = measured && level && std::isfinite(*level);
+  }
+  if (!measured) {
+    split.parts.push_back({GapPart::Kind::kEffect, "effects together", f.tuned - f.final_});
+    return split;
+  }
+  double level = f.tuned;
+  for (std::size_t i = 0; i < effects.size(); ++i) {
+    const double after = i + 1 == effects.size() ? f.final_ : *level_after(effects[i], unit);
+    split.parts.push_back({GapPart::Kind::kEffect, effects[i].name, level - after});
+    level = after;
+  }
+  return split;
+}
+
+std::string gap_split_html(const Diagnosis& diagnosis) {
+  std::vector<GapSplit> splits;
+  std::string html;
+  for (const GapUnit unit : kUnits) {
+    splits.push_back(split_gap(diagnosis, unit));
+    html += bars(splits.back());
+  }
+  return R"(<figure class="gap-split"><div class="splits">)" + html + "</div><figcaption>" +
+         "Before: the tuned base model. After: with the named effects. An effect's part is how "
+         "much the gap fell when it was added, in the order found, on " +
+         term("held-out", "trials that the fit did not see") +
+         "; one that made it worse lengthens the bar after. The " + term("floor", "floor") +
+         " is what repeating a trial in reality varies by; the log score is counted from it, in " +
+         term("nat", "nats a trial") + ".</figcaption></figure>" + parts_table(splits);
 }
 
 }  // namespace gapfarm

@@ -11,7 +11,7 @@
 #include "common/base/result.h"
 #include "common/log/log.h"
 #include "common/problem/problem.h"
-#include "common/progress/worker_wait.h"
+#include "common/progress/overall_progress.h"
 #include "common/trials/trial.h"
 #include "master/evolve/evolve.h"
 #include "master/farm/socket_farm.h"

@@ -3,20 +3,40 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "common/base/result.h"
 #include "common/config/settings.h"
+#include "common/config/stages.h"
 #include "common/log/log.h"
+#include "common/problem/problem.h"
 #include "common/trials/trial.h"
 #include "master/evolve/evolve.h"
+#include "master/farm/farm.h"
 #include "master/run/evolution_farm.h"
-#include "master/run/validation.h"
 #include "master/store/run_store.h"
 
 namespace gapfarm {
+
+struct Validated {
+  std::string name;  // "the config's own values", "after stage 1", "the best"
+  std::optional<double> fitness;
+};
+
+// The problem with what [validation] holds out in place of its trials; none when it names none.
+// Errors: of reading, a file or folder that is among those evolved on.
+Result<std::optional<Problem>> read_validation(const StagePlan& plan, const Config& config);
+
+// What a run needs of its config.  Errors of check_evolvable(), read_stages() and
+// read_validation().
+Status check_runnable(const Config& config);
+
+// Fitness on what was held out of the problem's own values, each stage's result and the best.
+Result<std::vector<Validated>> validate(Farm& farm, const Problem& apart,
+                                        const std::vector<Genome>& stages, const Genome& best);
 
 struct RunRequest {
   const Config& config;  // overrides applied; its log may be empty

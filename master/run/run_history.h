@@ -14,4 +14,12 @@ Status add_history(const RunReader& reader, const Problem& problem,
                    const std::vector<StoredGeneration>& generations, const RunQuestion& question,
                    RunReport* report);
 
+// Who came and went.  `alive`: the run's last master is still there.
+RunTimeline timeline_of(const std::vector<StoredWorkerEvent>& events, double heartbeat_unix_s,
+                        bool alive);
+
+// Workers, their timeline and failures, tallies, what was given up, the end of the log.  Errors: of
+// reading the store.
+Status add_farm(const RunReader& reader, RunReport* report);
+
 }  // namespace gapfarm

@@ -4,11 +4,15 @@
 #include <vector>
 
 #include "common/base/result.h"
+#include "common/config/settings.h"
 #include "common/problem/problem.h"
+#include "master/evolve/evolve.h"
+#include "master/farm/farm.h"
 #include "master/report/figures/pose_picture.h"
 #include "master/report/run/run_report.h"
-#include "master/run/validation.h"
+#include "master/run/run.h"
 #include "master/store/records.h"
+#include "master/store/run_store.h"
 
 namespace gapfarm {
 
@@ -30,5 +34,13 @@ Result<std::optional<Problem>> held_out_of(const RunInfo& info, const Problem& p
 
 // Beside a run: what `gapfarm determine --out` wrote of it.
 inline constexpr const char* kDeterminedFile = "determined.csv";
+
+// The names of what write_outputs() writes.
+std::vector<std::string> output_files(const Problem& problem);
+
+// `validated`: what is known of trials held out.  REQUIRES: a best member whose outcome is OK.
+Status write_outputs(RunStore& store, const Problem& problem, const Config& config,
+                     const EvolveSummary& summary, Farm& farm,
+                     const std::vector<Validated>& validated);
 
 }  // namespace gapfarm

@@ -1,13 +1,30 @@
 // A run as its store has it: what it was asked, and what came of it so far.
 #pragma once
 
+#include <cstdint>
+#include <optional>
+#include <string>
+
 #include "common/base/result.h"
 #include "common/config/model.h"
 #include "common/config/settings.h"
-#include "master/run/overrides.h"
 #include "master/store/run_reader.h"
 
 namespace gapfarm {
+
+struct EvolutionOverrides {
+  std::optional<std::uint64_t> generations;
+  std::optional<std::uint64_t> evaluations;
+  std::optional<double> time_s;
+  std::optional<double> target_fitness;
+  std::optional<unsigned> population;
+
+  void apply(EvolutionSettings& settings) const;
+  // Those of `later` where it has them.
+  void merge(const EvolutionOverrides& later);
+  std::string to_json() const;
+  static EvolutionOverrides from_json(const std::string& text);
+};
 
 // What a new run of a config keeps, `overrides` applied to it.
 RunInfo run_info(const Config& config, const EvolutionOverrides& overrides);

@@ -10,7 +10,6 @@
 #include "master/report/glossary.h"
 #include "master/report/html.h"
 #include "master/report/page_frame.h"
-#include "master/serve/page_parts.h"
 #include "master/serve/pages.h"
 #include "master/store/answer_store.h"
 

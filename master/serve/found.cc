@@ -6,7 +6,7 @@
 #include "common/json/json.h"
 #include "common/problem/problem.h"
 #include "common/trials/files.h"
-#include "master/store/run_status.h"
+#include "master/store/run_reader.h"
 #include "master/store/schema.h"
 
 namespace gapfarm {

@@ -146,8 +146,8 @@ class Connection : public std::enable_shared_from_this<Connection> {
     if (parser_->get().method() == http::verb::head) return write(plain_response(200, ""), false);
     if (streams_ >= limits_.streams) {
       return write(plain_response(503,
-                                  "Too many pages are open for each to hear what is "
-                                  "new; this one has to ask by itself."),
+                                  "Too many pages are open for each to hear what is new; this one "
+                                  "has to ask by itself."),
                    false);
     }
     ++streams_;

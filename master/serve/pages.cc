@@ -13,7 +13,6 @@
 #include "master/report/html.h"
 #include "master/report/page_frame.h"
 #include "master/report/run/run_live.h"
-#include "master/serve/page_parts.h"
 #include "master/serve/request.h"
 
 namespace gapfarm {
@@ -216,8 +215,8 @@ std::string list_page(std::vector<WorkEntry> entries, const ListView& view,
       html_escaped(where));
   if (all == 0) {
     frame.body +=
-        "<p>There is nothing yet: <code>gapfarm evolve configs/demo.toml --out run/demo"
-        "</code> makes a run. This page shows it by itself.</p>";
+        "<p>There is nothing yet: <code>gapfarm evolve configs/demo.toml --out run/demo</code> "
+        "makes a run. This page shows it by itself.</p>";
   }
   frame.body += filter_form(view) + R"(<form action="/compare"><div id="entries" data-live>)";
   if (!entries.empty()) {
@@ -276,6 +275,20 @@ std::string compare_page(std::span<const RunReport> runs) {
       comparison_table(runs) + "</div></section>\n" +
       glossary_section({"nat", "generation", "bound"});
   return framed_page(frame, page, no_trials_json());
+}
+
+nlohmann::ordered_json plain_page_json() {
+  return {{"models", nlohmann::ordered_json::object()}, {"served", true}, {"without_trials", ""}};
+}
+
+nlohmann::ordered_json no_trials_json() {
+  const auto none = nlohmann::ordered_json::array();
+  return {{"columns", none}, {"rows", none}};
+}
+
+std::string list_cell(const char* label, const std::string& html, bool is_number) {
+  return fmt::format(R"(<td data-label="{}" class="{}{}">{}</td>)", label,
+                     is_number ? "number" : "", html.empty() ? " empty" : "", html);
 }
 
 }  // namespace gapfarm

@@ -1,6 +1,7 @@
 // The pages that a server makes by itself.  The others are those that commands write.
 #pragma once
 
+#include <nlohmann/json_fwd.hpp>
 #include <span>
 #include <string>
 #include <vector>
@@ -35,5 +36,12 @@ std::string metrics_text(const std::vector<WorkEntry>& entries, double now_unix_
 
 // "2026-11-22 02:41 UTC"; a dash for 0.
 std::string utc_text(double unix_s);
+
+// The data of a page that has no plots, and of one without trials.
+nlohmann::ordered_json plain_page_json();
+nlohmann::ordered_json no_trials_json();
+
+// Where rows become cards, on a narrow screen, cells without content are omitted.
+std::string list_cell(const char* label, const std::string& html, bool is_number = false);
 
 }  // namespace gapfarm

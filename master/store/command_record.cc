@@ -2,13 +2,13 @@
 
 #include <nlohmann/json.hpp>
 
-#include "common/base/host.h"
+#include "common/base/build_info.h"
 #include "common/base/try.h"
 #include "common/json/fields.h"
 #include "common/json/json.h"
 #include "master/store/answer_store.h"
 #include "master/store/run_lock.h"
-#include "master/store/run_status.h"
+#include "master/store/run_reader.h"
 
 namespace gapfarm {
 namespace {

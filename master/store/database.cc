@@ -3,8 +3,6 @@
 #include <sqlite3.h>
 
 #include <atomic>
-#include <cerrno>
-#include <cmath>
 #include <cstring>
 
 #include "common/base/try.h"
@@ -20,8 +18,8 @@ const char* remedy(int code) {
     case SQLITE_NOTADB:
       return "it is not a SQLite file; give the folder of a gapfarm run";
     case SQLITE_CORRUPT:
-      return "the file is damaged; restore a copy, or save what is left with "
-             "`sqlite3 run.sqlite .recover`";
+      return "the file is damaged; restore a copy, or save what is left with `sqlite3 run.sqlite "
+             ".recover`";
     case SQLITE_BUSY:
     case SQLITE_LOCKED:
       return "another program holds the file; close it and try again";

@@ -7,7 +7,7 @@
 #include "common/base/hash.h"
 #include "common/json/fields.h"
 #include "common/json/json.h"
-#include "master/store/run_status.h"
+#include "master/store/run_reader.h"
 
 namespace gapfarm {
 

@@ -9,7 +9,7 @@
 #include <fstream>
 #include <utility>
 
-#include "common/base/host.h"
+#include "common/base/build_info.h"
 
 namespace gapfarm {
 namespace {

@@ -10,10 +10,9 @@
 #include <system_error>
 
 #include "common/base/build_info.h"
-#include "common/base/host.h"
 #include "common/base/try.h"
 #include "common/json/json.h"
-#include "master/store/run_status.h"
+#include "master/store/run_reader.h"
 #include "master/store/schema.h"
 
 namespace gapfarm {
@@ -74,10 +73,9 @@ Status create_tables(Database& database, const RunInfo& info) {
   ASSIGN_OR_RETURN(SqlTransaction transaction, SqlTransaction::begin(database));
   RETURN_IF_ERROR(create_run_tables(database));
   RETURN_IF_ERROR(insert_run_info(database, info));
-  RETURN_IF_ERROR(
-      database.exec("INSERT INTO progress VALUES (1, 'stopped', '', 0, '', 0, 0, NULL, "
-                    "0, 0, '[]', 0, '{}')",
-                    "create the run store"));
+  RETURN_IF_ERROR(database.exec(
+      "INSERT INTO progress VALUES (1, 'stopped', '', 0, '', 0, 0, NULL, 0, 0, '[]', 0, '{}')",
+      "create the run store"));
   return transaction.commit();
 }
 
@@ -145,10 +143,10 @@ Result<RunStore> RunStore::open(const fs::path& run) {
   const fs::path file = run / "run.sqlite";
   std::error_code missing;
   if (!fs::exists(file, missing)) {
-    return Error{run.string() +
-                 ": holds no run (there is no run.sqlite); start one with "
-                 "`gapfarm evolve CONFIG --out " +
-                 run.string() + "`"};
+    return Error{
+        run.string() +
+        ": holds no run (there is no run.sqlite); start one with `gapfarm evolve CONFIG --out " +
+        run.string() + "`"};
   }
   ASSIGN_OR_RETURN(RunLock lock, RunLock::take(run));
   // Looked at before anything may be written to it: it could be another program's file.
@@ -280,8 +278,8 @@ Result<std::optional<Checkpoint>> RunStore::checkpoint(
   auto found = database_.row(
       "read a checkpoint",
       "SELECT generation, evaluations, optimiser_state, digest, (SELECT sum(wall_s) FROM "
-      "generations AS g WHERE g.generation <= generations.generation) FROM generations WHERE "
-      "?1 IS NULL OR generation = ?1 ORDER BY generation DESC LIMIT 1",
+      "generations AS g WHERE g.generation <= generations.generation) FROM generations WHERE ?1 IS "
+      "NULL OR generation = ?1 ORDER BY generation DESC LIMIT 1",
       [](const SqlStatement& row) {
         Checkpoint c;
         row.read_all(c.generation, c.evaluations, SqlBlob{c.optimiser_state}, c.digest, c.wall_s);
@@ -319,6 +317,33 @@ Result<fs::path> RunStore::truncate_after(std::uint64_t generation) {
   last_generation_ = generation;
   digest_ = kept->digest;
   return backup;
+}
+
+Status RunStore::add_incident(IncidentKind kind, const std::string& text) {
+  return database_.run("write down what happened", "INSERT INTO incidents VALUES (?, ?, ?, ?)",
+                       next_generation(), incident_name(kind), unix_now_s(), text);
+}
+
+Status RunStore::add_worker_events(const std::vector<StoredWorkerEvent>& events) {
+  if (events.empty()) return {};
+  ASSIGN_OR_RETURN(SqlTransaction transaction, SqlTransaction::begin(database_));
+  RETURN_IF_ERROR(insert_worker_events(events));
+  return transaction.commit();
+}
+
+Status RunStore::insert_worker_events(const std::vector<StoredWorkerEvent>& events) {
+  ASSIGN_OR_RETURN(SqlStatement insert,
+                   database_.prepare("INSERT INTO worker_events VALUES (?, ?, ?, ?, ?)",
+                                     "write down who came and went"));
+  for (const StoredWorkerEvent& e : events) {
+    RETURN_IF_ERROR(insert.bind_all(e.unix_s, e.kind, e.worker, e.host, e.text).run());
+  }
+  return {};
+}
+
+Status RunStore::keep_document(const std::string& name, const std::string& json) {
+  return database_.run("keep " + name, "INSERT OR REPLACE INTO documents VALUES (?, ?, ?)", name,
+                       last_generation_.value_or(0), json);
 }
 
 }  // namespace gapfarm

@@ -1,7 +1,7 @@
 // What one evaluation costs, and what it grows with: trials, conditions, genome.
 #include <benchmark/benchmark.h>
 
-#include "common/parameters/genome.h"
+#include "common/parameters/table.h"
 #include "tests/unit/worker/problems.h"
 #include "worker/evaluate.h"
 

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "common/parameters/genome.h"
+#include "common/parameters/table.h"
 #include "worker/evaluate.h"
 #include "worker/sim/robot/ground.h"
 

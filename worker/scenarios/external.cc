@@ -1,12 +1,11 @@
-#include "worker/scenarios/external.h"
-
 #include <algorithm>
 #include <cmath>
 #include <exception>
 #include <string>
 
 #include "worker/scenarios/program.h"
-#include "worker/scenarios/srv1/srv1.h"
+#include "worker/scenarios/scenarios.h"
+#include "worker/scenarios/srv1/motion_memo.h"
 #include "worker/scenarios/windows.h"
 
 namespace gapfarm {

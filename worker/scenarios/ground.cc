@@ -1,7 +1,8 @@
-#include "worker/scenarios/ground.h"
+#include "worker/sim/robot/ground.h"
 
 #include <memory>
 
+#include "worker/scenarios/scenarios.h"
 #include "worker/scenarios/windows.h"
 
 namespace gapfarm {

@@ -1,7 +1,6 @@
-#include "worker/scenarios/objective.h"
-
 #include "common/random/stream.h"
 #include "worker/scenarios/program.h"
+#include "worker/scenarios/scenarios.h"
 
 namespace gapfarm {
 namespace {

@@ -1,8 +1,8 @@
-#include "worker/scenarios/racquetball.h"
-
 #include "common/parameters/racquetball.h"
+
 #include "common/random/stream.h"
-#include "worker/scenarios/put.h"
+#include "worker/scenarios/outcome.h"
+#include "worker/scenarios/scenarios.h"
 #include "worker/sim/racquetball.h"
 
 namespace gapfarm {

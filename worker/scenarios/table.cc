@@ -1,12 +1,7 @@
 #include <array>
 
-#include "worker/scenarios/external.h"
-#include "worker/scenarios/ground.h"
-#include "worker/scenarios/objective.h"
-#include "worker/scenarios/push/push.h"
-#include "worker/scenarios/racquetball.h"
 #include "worker/scenarios/scenario.h"
-#include "worker/scenarios/srv1/srv1.h"
+#include "worker/scenarios/scenarios.h"
 
 namespace gapfarm {
 namespace {

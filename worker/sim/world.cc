@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "worker/sim/floor.h"
+#include "worker/sim/patches.h"
 
 namespace gapfarm {
 namespace {

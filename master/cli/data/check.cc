@@ -13,9 +13,9 @@
 #include "master/diagnose/result/diagnosis_json.h"
 #include "master/evolve/evolve.h"
 #include "master/ground/diagnose_ground.h"
-#include "master/io/log_checks/finding_text.h"
+#include "master/io/log_checks/finding.h"
 #include "master/io/log_checks/sanity.h"
-#include "master/run/validation.h"
+#include "master/run/run.h"
 
 namespace gapfarm {
 namespace {

@@ -3,7 +3,6 @@
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <set>
 
 #include "common/base/try.h"
 #include "common/problem/run_files.h"
@@ -11,7 +10,6 @@
 #include "master/cli/subcommand.h"
 #include "master/command/inputs.h"
 #include "master/command/outputs.h"
-#include "master/command/run_model.h"
 #include "master/ground/reference.h"
 #include "master/ground/report/ros_export.h"
 #include "master/io/robot_files/controllers.h"

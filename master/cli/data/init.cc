@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -190,10 +189,9 @@ Result<int> run_init(InitOptions& options, CliContext& context) {
 
 SubcommandRun setup_init(CLI::App& app) {
   auto options = std::make_shared<InitOptions>();
-  app.add_option(
-         "LOG|URDF", options->trials.files,
-         "Trial logs of a robot on two sides; or a robot's URDF, with its controller YAML and "
-         "folders of its runs")
+  app.add_option("LOG|URDF", options->trials.files,
+                 "Trial logs of a robot on two sides; or a robot's URDF, with its controller YAML "
+                 "and folders of its runs")
       ->required();
   app.add_option("--out", options->out, "Config to write; - for stdout")->capture_default_str();
   options->trials.declare_reading(app);

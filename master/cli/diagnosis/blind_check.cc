@@ -261,10 +261,9 @@ SubcommandRun setup_blind_check(CLI::App& app) {
   app.add_option("--key", options->key,
                  "Keep the truths' key in this file, outside the folder, so that even a killed "
                  "check can be resumed (default: OUT.key, written when stopped)");
-  app.add_flag(
-      "--resume", options->resume,
-      "Go on with the check in the folder as it was asked, whatever is asked now, or judge "
-      "a finished one again; the same command goes on by itself");
+  app.add_flag("--resume", options->resume,
+               "Go on with the check in the folder as it was asked, whatever is asked now, or "
+               "judge a finished one again; the same command goes on by itself");
   app.add_flag("--strengths", options->strengths,
                "Only report which strengths would be needed for every effect to be that large");
   declare_long_command(app);

@@ -20,7 +20,6 @@
 #include "master/command/outputs.h"
 #include "master/command/page_along.h"
 #include "master/command/provenance.h"
-#include "master/command/run_model.h"
 #include "master/diagnose/result/diagnosis_json.h"
 #include "master/report/report_html.h"
 

@@ -192,10 +192,9 @@ Result<Config> figure_config(const EffectsOptions& options) {
     config.problem.values = config.problem.table().nominal();
     config.problem.commands = default_commands(config.problem.scenario);
   } else {
-    Result<Config> read = read_config(options.config);
-    if (!read) return read;
-    RETURN_IF_ERROR(check_moves(read->problem.scenario, options.config));
-    config = std::move(*read);
+    ASSIGN_OR_RETURN(auto read, read_config(options.config));
+    RETURN_IF_ERROR(check_moves(read.problem.scenario, options.config));
+    config = std::move(read);
   }
   Problem& problem = config.problem;
   problem.log = {};

@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "common/base/try.h"
-#include "common/trials/shifted.h"
+#include "common/trials/select.h"
 #include "common/trials/write.h"
 #include "master/cli/subcommand.h"
 #include "master/command/inputs.h"
@@ -66,8 +66,8 @@ Status apply_options(PlanOptions& options, Config& config) {
   if (!options.durations.empty()) s.durations_s = options.durations;
   if (options.settings.trials < s.sessions * std::max(1U, s.chain)) {
     return Error{
-        fmt::format("{} trials are fewer than one chain of {} in each of {} sessions; ask "
-                    "for more --trials, or fewer --sessions or a shorter --chain",
+        fmt::format("{} trials are fewer than one chain of {} in each of {} sessions; ask for more "
+                    "--trials, or fewer --sessions or a shorter --chain",
                     options.settings.trials, s.chain, s.sessions)};
   }
   std::string name;
@@ -109,8 +109,7 @@ std::string table_text(const plan::DesignedPlan& plan) {
   list(plan.without_shift, ": could not be simulated with this robot");
   text +=
       "Sizes are distances from neutral; -: not within the catalogue's bounds. What does not show "
-      "in "
-      "poses at rest (motor_lag) needs paths: log them too.\n";
+      "in poses at rest (motor_lag) needs paths: log them too.\n";
   return text;
 }
 
@@ -173,10 +172,9 @@ Result<int> run_plan(PlanOptions& options, CliContext& context) {
   json["out"] = options.out;
   json["trials"] = plan.log.trials.size();
   context.console.result(
-      table_text(plan) +
-          fmt::format("{}: {} trials to drive, in this order; x1, y1, theta1 are where the model "
-                      "says the robot stops\n",
-                      options.out, plan.log.trials.size()),
+      table_text(plan) + fmt::format("{}: {} trials to drive, in this order; x1, y1, theta1 are "
+                                     "where the model says the robot stops\n",
+                                     options.out, plan.log.trials.size()),
       json);
   return kExitDone;
 }

@@ -5,7 +5,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
-#include "common/base/host.h"
+#include "common/base/build_info.h"
 #include "common/base/try.h"
 #include "common/json/fields.h"
 #include "master/command/long_command.h"

@@ -7,7 +7,7 @@
 #include "master/cli/evolution/fleet_options.h"
 #include "master/command/inputs.h"
 #include "master/command/page_along.h"
-#include "master/run/overrides.h"
+#include "master/run/stored_run.h"
 #include "master/store/run_store.h"
 
 namespace gapfarm {

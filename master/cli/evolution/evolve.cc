@@ -9,8 +9,8 @@
 #include "master/cli/subcommand.h"
 #include "master/command/long_command.h"
 #include "master/command/outputs.h"
+#include "master/run/run.h"
 #include "master/run/stored_run.h"
-#include "master/run/validation.h"
 
 namespace gapfarm {
 namespace {

@@ -9,8 +9,8 @@
 #include <cmath>
 #include <filesystem>
 
+#include "common/base/build_info.h"
 #include "common/base/hash.h"
-#include "common/base/shipped.h"
 #include "common/base/try.h"
 #include "common/process/child.h"
 #include "common/process/process_pool.h"
@@ -128,8 +128,8 @@ Result<ClusterSite> FleetChoice::read_site() const {
   const Result<std::string> text = read_text_file(path);
   if (!text) {
     return Error{text.error().message +
-                 "; systems are slurm, sge, pbs, condor, kube, ssh and "
-                 "local, and --site FILE describes another"};
+                 "; systems are slurm, sge, pbs, condor, kube, ssh and local, and --site FILE "
+                 "describes another"};
   }
   ASSIGN_OR_RETURN(ClusterSite read, parse_site(*text, path));
   if (!hosts.empty()) read.hosts = hosts;

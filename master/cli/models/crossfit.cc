@@ -186,9 +186,9 @@ SubcommandRun setup_crossfit(CLI::App& app) {
   app.add_option("--repeats", options->repeats,
                  "Columns that make a condition: trials alike in them repeat one another");
   app.add_option("--sweep", options->sweeps, "Vary these parameters alone around what was tuned");
-  app.add_option("--evaluations", options->evaluations,
-                 "Stop each fit after the generation in which so many are reached, in place of the "
-                 "config's");
+  app.add_option(
+      "--evaluations", options->evaluations,
+      "Stop each fit after the generation in which so many are reached, in place of the config's");
   app.add_option("--seed", options->seed, "In place of the config's");
   options->keep.declare(app);
   options->farm.declare(app, false);

@@ -15,7 +15,6 @@
 #include "master/command/inputs.h"
 #include "master/command/long_command.h"
 #include "master/command/outputs.h"
-#include "master/command/run_model.h"
 #include "master/evolve/evolve.h"
 
 namespace gapfarm {
@@ -131,8 +130,8 @@ Result<int> run_determine(DetermineCommand& command, CliContext& context) {
   }
   if (!report.reliable) {
     context.console.note(
-        "warning: the likelihood about this model is no hill whose width could be "
-        "measured; is it the best of its run?");
+        "warning: the likelihood about this model is no hill whose width could be measured; is it "
+        "the best of its run?");
   } else if (!loose.empty()) {
     context.console.note("warning: these data do not determine " + loose +
                          "; other values explain the log as well, so do not read them as measured");

@@ -16,7 +16,6 @@
 #include "master/command/inputs.h"
 #include "master/command/long_command.h"
 #include "master/command/outputs.h"
-#include "master/command/run_model.h"
 #include "master/experiments/drive/drive_report.h"
 
 namespace gapfarm {

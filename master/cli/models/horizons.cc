@@ -10,7 +10,6 @@
 #include "master/cli/subcommand.h"
 #include "master/command/inputs.h"
 #include "master/command/outputs.h"
-#include "master/command/run_model.h"
 #include "master/ground/paths.h"
 #include "master/store/run_reader.h"
 

@@ -14,7 +14,6 @@
 #include "master/command/inputs.h"
 #include "master/command/long_command.h"
 #include "master/command/outputs.h"
-#include "master/command/traced.h"
 
 namespace gapfarm {
 namespace {

@@ -14,12 +14,11 @@
 #include "common/score/fitness.h"
 #include "common/score/motion_model.h"
 #include "common/trials/read.h"
-#include "common/trials/shifted.h"
+#include "common/trials/select.h"
 #include "master/cli/subcommand.h"
 #include "master/command/inputs.h"
 #include "master/command/long_command.h"
 #include "master/command/outputs.h"
-#include "master/command/run_model.h"
 #include "master/report/prediction_table.h"
 #include "master/run/baseline_notes.h"
 
@@ -193,9 +192,9 @@ SubcommandRun setup_predict(CLI::App& app) {
   app.add_option("RUN|MODEL", options->model, "Run folder or model.toml");
   options->trials.declare(app, "Trial logs to predict")->required();
   app.add_option("--out", options->out, "CSV to write; - for stdout");
-  app.add_option("--mined", options->mined,
-                 "Predict by the motion model mined from these logs, P(M' | M, u), in place of a "
-                 "simulation");
+  app.add_option(
+      "--mined", options->mined,
+      "Predict by the motion model mined from these logs, P(M' | M, u), in place of a simulation");
   options->outputs.declare(app);
   options->keep.declare(app);
   options->farm.declare(app, false);

@@ -7,7 +7,7 @@
 #include "common/config/config.h"
 #include "common/trials/files.h"
 #include "common/trials/read.h"
-#include "common/trials/shifted.h"
+#include "common/trials/select.h"
 #include "common/trials/write.h"
 #include "master/cli/models/parameter_options.h"
 #include "master/cli/subcommand.h"

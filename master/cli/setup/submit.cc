@@ -7,7 +7,7 @@
 
 #include "common/base/try.h"
 #include "common/net/keys.h"
-#include "common/process/captured.h"
+#include "common/process/child.h"
 #include "common/process/process_pool.h"
 #include "master/cli/evolution/fleet_options.h"
 #include "master/cli/subcommand.h"
@@ -84,8 +84,7 @@ Result<int> run_submit(SubmitCommand command, CliContext& context) {
   ASSIGN_OR_RETURN(const ClusterSite site, command.fleet.read_site());
   if (site.master.empty()) {
     return Error{site.system +
-                 " has no row for a master as a job; run the master yourself, with "
-                 "--workers-on " +
+                 " has no row for a master as a job; run the master yourself, with --workers-on " +
                  site.system};
   }
   const std::string self = executable_path();

@@ -6,7 +6,9 @@
 #include <numbers>
 #include <set>
 
+#include "common/math/laws.h"
 #include "common/math/statistics.h"
+#include "master/diagnose/evidence/noise.h"
 #include "master/diagnose/fit/free_commands.h"
 #include "master/diagnose/fit/proposals.h"
 
@@ -276,8 +278,8 @@ std::vector<std::string> cautions(std::span<const ResidualTrial> trials,
   }
   if (v.sessions == 1) {
     text.emplace_back(
-        "All trials are of one session: what would differ in another session cannot "
-        "be seen, and held-out trials are from the same one.");
+        "All trials are of one session: what would differ in another session cannot be seen, and "
+        "held-out trials are from the same one.");
   }
   if (v.commands == 1) {
     text.push_back(
@@ -286,13 +288,13 @@ std::vector<std::string> cautions(std::span<const ResidualTrial> trials,
   }
   if (v.durations == 1) {
     text.emplace_back(
-        "Every command lasts equally long: motor_lag, timing_offset and backlash look "
-        "like another speed.");
+        "Every command lasts equally long: motor_lag, timing_offset and backlash look like another "
+        "speed.");
   }
   if (v.levels == 1) {
     text.emplace_back(
-        "Every command runs at one level: motor_deadband and rolling_resistance look "
-        "like another speed.");
+        "Every command runs at one level: motor_deadband and rolling_resistance look like another "
+        "speed.");
   }
   if (v.headings < 4) {
     text.push_back("All trials start in " + counted(v.headings, "direction", "directions") +
@@ -304,23 +306,60 @@ std::vector<std::string> cautions(std::span<const ResidualTrial> trials,
   }
   if (v.followers == 0) {
     text.emplace_back(
-        "No trial starts where the one before ended: backlash, a stale start pose and "
-        "the noise of one reading cannot be seen.");
+        "No trial starts where the one before ended: backlash, a stale start pose and the noise of "
+        "one reading cannot be seen.");
   }
   if (!v.times) {
     text.emplace_back(
-        "The log has no times; they were guessed from the order of the trials, so the "
-        "rate of battery_sag is rough.");
+        "The log has no times; they were guessed from the order of the trials, so the rate of "
+        "battery_sag is rough.");
   } else if (v.longest_min < 3) {
     text.push_back("The longest session lasts " + plain_number(v.longest_min) +
                    " minutes: battery_sag needs longer ones.");
   }
   if (!v.paths) {
     text.emplace_back(
-        "Start and end poses only: what happens on the way (motor_lag, the moment at "
-        "which a pose was read) shows only by where the robot ends.");
+        "Start and end poses only: what happens on the way (motor_lag, the moment at which a pose "
+        "was read) shows only by where the robot ends.");
   }
   return text;
+}
+
+double leftover_scale(const Regression& explained) {
+  std::vector<double> squares;
+  for (double z : studentised(explained, 0.2)) {
+    if (z != 0) squares.push_back(z * z);  // rows of ignored trials are
+  }
+  return squares.empty()
+             ? 1
+             : std::clamp(median(squares) / 0.455, kLeastLeftoverScale, kMostLeftoverScale);
+}
+
+std::vector<Leftover> leftovers(const Regression& explained,
+                                const std::vector<CovariateBlock>& blocks) {
+  const double scale = leftover_scale(explained);
+  std::vector<Leftover> all;
+  for (const CovariateBlock& block : blocks) {
+    const Gain gain = block.expected > 0 ? explained.gain_beyond(block.columns, block.expected)
+                                         : explained.gain(block.columns);
+    if (gain.dimensions == 0) continue;
+    const double p = chi_squared_above(gain.dimensions, gain.squares / scale);
+    all.push_back({block.name, std::log10(std::max(p, 1e-300)),
+                   std::max(0.0, (gain.squares - gain.dimensions * scale) / 2)});
+  }
+  std::stable_sort(all.begin(), all.end(),
+                   [](const Leftover& a, const Leftover& b) { return a.log10_p < b.log10_p; });
+  return all;
+}
+
+Verdict judge_verdict(bool named, double explained_nats, const std::vector<Leftover>& left,
+                      double unknown_log10_p, double wrong_share) {
+  const bool unknown = !left.empty() && left.front().log10_p < unknown_log10_p;
+  if (!unknown) return named ? Verdict::kEffect : Verdict::kNone;
+  if (!named || left.front().excess > wrong_share * std::max(explained_nats, 1.0)) {
+    return Verdict::kUnknown;
+  }
+  return Verdict::kEffectAndUnknown;
 }
 
 }  // namespace gapfarm

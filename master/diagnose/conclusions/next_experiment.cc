@@ -8,6 +8,7 @@
 #include <set>
 #include <utility>
 
+#include "common/base/try.h"
 #include "common/score/fitness.h"
 #include "master/diagnose/conclusions/findings.h"
 
@@ -63,13 +64,12 @@ Result<std::vector<Predictions>> predict(Farm& farm, const ExperimentPlan& plan,
     }
   }
   const std::string hash = farm.add_problem(to_proto(plan.problem));
-  const auto results = farm.run(hash, tasks);
-  if (!results) return results.error();
+  ASSIGN_OR_RETURN(const auto results, farm.run(hash, tasks));
   std::vector<Predictions> all(alternatives.size(), Predictions(plan.problem.log.trials.size()));
   std::vector<bool> survived(alternatives.size(), false);
   std::string last;
-  for (std::size_t i = 0; i < results->size(); ++i) {
-    const v1::TaskResult& result = (*results)[i];
+  for (std::size_t i = 0; i < results.size(); ++i) {
+    const v1::TaskResult& result = results[i];
     if (result.outcome() != v1::OK) {
       last = v1::Outcome_Name(result.outcome()) + " (" + result.message() + ")";
       continue;  // that group cannot distinguish this alternative from another
@@ -223,8 +223,7 @@ Result<std::vector<NextExperiment>> next_experiments(Farm& farm, const Experimen
                                                      const NextExperimentOptions& options) {
   std::vector<NextExperiment> next;
   if (alternatives.size() < 2 || plan.designs.empty() || options.sentences == 0) return next;
-  const auto predictions = predict(farm, plan, alternatives);
-  if (!predictions) return predictions.error();
+  ASSIGN_OR_RETURN(const auto predictions, predict(farm, plan, alternatives));
   std::vector<Pair> pairs;
   for (std::size_t a = 0; a < alternatives.size(); ++a) {
     for (std::size_t b = a + 1; b < alternatives.size(); ++b) pairs.emplace_back(a, b);
@@ -235,9 +234,8 @@ Result<std::vector<NextExperiment>> next_experiments(Farm& farm, const Experimen
   const auto unused = [&](const Design& d) { return !used.contains(d.group); };
   while (next.size() < options.sentences) {
     const bool again = open.empty();  // all are parted: offer another group
-    const auto choice = again
-                            ? best_design(plan, *predictions, pairs, options.most_trials, unused)
-                            : best_design(plan, *predictions, open, options.most_trials, anything);
+    const auto choice = again ? best_design(plan, predictions, pairs, options.most_trials, unused)
+                              : best_design(plan, predictions, open, options.most_trials, anything);
     if (!choice) {
       if (!again) next.push_back(hopeless(open, plan, alternatives, options.most_trials));
       break;

@@ -5,11 +5,14 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/base/try.h"
+#include "common/effects/catalogue.h"
 #include "common/math/statistics.h"
 #include "common/score/baselines.h"
 #include "master/diagnose/conclusions/findings.h"
 #include "master/diagnose/conclusions/headline.h"
 #include "master/diagnose/conclusions/report_parts.h"
+#include "master/diagnose/steps/step_parts.h"
 
 namespace gapfarm::steps {
 namespace {
@@ -70,6 +73,61 @@ DiagnosisResult begun(const DiagnosisRequest& of) {
   return result;
 }
 
+// A chosen effect and its aliases, each at its best linear fit beside the others.
+Result<CompetingCauses> alternatives_of(const DiagnosisRequest& of, const Explanation& named,
+                                        std::size_t k, const Proposals& catalogue) {
+  const ParameterTable& table = of.table();
+  const ChosenEffect& chosen = named.chosen[k];
+  const std::string& own = chosen.candidate.signature.effect;
+  std::vector<const Signature*> others;
+  for (std::size_t j = 0; j < named.chosen.size(); ++j) {
+    if (j != k) others.push_back(&named.chosen[j].candidate.signature);
+  }
+  const Regression explained = catalogue.with(others);
+  ASSIGN_OR_RETURN(auto candidates, catalogue.candidates(explained, {}));
+  CompetingCauses alternatives;
+  for (const EffectCandidate& c : candidates) {
+    const std::string& name = c.signature.effect;
+    const bool alias =
+        std::find(chosen.aliases.begin(), chosen.aliases.end(), name) != chosen.aliases.end();
+    if (!alias && name != kind_of(own)) continue;
+    Overrides at = named.study().base;
+    if (alias) {
+      for (const auto& [key, value] : start_values(named.study(), explained, c.signature)) {
+        at[table.row(key)] = value;
+      }
+    } else {
+      for (const auto& [row, value] : named.estimates->at) {
+        if (table[row].effect == own) at[row] = value;
+      }
+    }
+    CompetingCause alternative{alias ? name : own, {}};
+    for (const auto& [row, value] : at) {
+      alternative.overrides.emplace_back();
+      alternative.overrides.back().set_parameter(static_cast<std::uint32_t>(row));
+      alternative.overrides.back().set_value(value);
+    }
+    alternatives.push_back(std::move(alternative));
+  }
+  return alternatives;
+}
+
+// "position 1.34 m": where a second one of a kind would be.
+std::string place_text(const DiagnosisRequest& of, const Signature& second,
+                       const std::vector<const char*>& keys) {
+  Overrides at;
+  for (const auto& [key, value] : second.fixed) at[of.table().row(key)] = value;
+  std::string place;
+  for (const char* key : keys) {
+    const std::size_t row = of.table().row(second.effect + "." + key);
+    const std::string& full = of.table()[row].key;
+    const double value = second.fixed.at(full) + of.frame_of(full, at);
+    place += std::string(place.empty() ? "" : ", ") + key + " " +
+             of.table().format(row, std::round(value * 1e3) / 1e3);
+  }
+  return place;
+}
+
 }  // namespace
 
 std::vector<std::string> leftover_caution(std::vector<Leftover> left, double unknown_log10_p) {
@@ -86,14 +144,13 @@ std::vector<std::string> leftover_caution(std::vector<Leftover> left, double unk
 Status compare_with_baselines(const DiagnosisRequest& of, const Refit& refit, Diagnosis* d) {
   if (scenario_form(of.problem.scenario).pieces) return {};
   const Explanation& named = refit.judged.named;
-  const auto baselines =
-      crossfitted_baselines(of.problem.log, of.problem.commands, of.subject.folds(named.study()));
-  if (!baselines) return baselines.error();
-  const auto by_tuned = gapfarm::compare_with_baselines(*baselines, refit.nested.front().scores);
+  ASSIGN_OR_RETURN(const auto baselines, crossfitted_baselines(of.problem.log, of.problem.commands,
+                                                               of.subject.folds(named.study())));
+  const auto by_tuned = gapfarm::compare_with_baselines(baselines, refit.nested.front().scores);
   const auto by_model = gapfarm::compare_with_baselines(
-      *baselines, named.slip.gain > 0     ? refit.slip_scores
-                  : named.spreads.empty() ? refit.nested.back().scores
-                                          : named.spreads.back().scores);
+      baselines, named.slip.gain > 0     ? refit.slip_scores
+                 : named.spreads.empty() ? refit.nested.back().scores
+                                         : named.spreads.back().scores);
   if (by_model.empty()) {
     d->provenance.emplace_back("without a simulation",
                                "no command is driven often enough to be learned from by itself");
@@ -105,10 +162,10 @@ Status compare_with_baselines(const DiagnosisRequest& of, const Refit& refit, Di
         fmt::format("{:.3f} nats a trial on {} held-out trials; tuned base {:.3f}, model {:.3f}",
                     model.baseline, model.trials, tuned.model, model.model));
     if (!model.beaten()) {
-      d->cautions.push_back(fmt::format(
-          "The simulation does not beat {}, which needs none: {:.3f} nats a trial against {:.3f} "
-          "on {} held-out trials.",
-          model.name, model.model, model.baseline, model.trials));
+      d->cautions.push_back(
+          fmt::format("The simulation does not beat {}, which needs none: {:.3f} nats a trial "
+                      "against {:.3f} on {} held-out trials.",
+                      model.name, model.model, model.baseline, model.trials));
     } else if (!tuned.beaten()) {
       d->cautions.push_back(
           fmt::format("The tuned base alone does not beat {}, which needs no simulation: {:.3f} "
@@ -141,9 +198,8 @@ Result<DiagnosisResult> report(const DiagnosisRequest& of, const Screening& scre
   fill_values(of, refit, &result);
   fill_where(of, refit, &d);
   if (d.verdict == Verdict::kEffectAndUnknown && !named.chosen.empty()) {
-    const auto places = second_places(of, named, *screening.catalogue);
-    if (!places) return places.error();
-    append(*places, &d);
+    ASSIGN_OR_RETURN(const auto places, second_places(of, named, *screening.catalogue));
+    append(places, &d);
   }
   append(of.subject.cautions(named.study(), of.problem.log), &d);
   fill_parameters(of, refit, &result);
@@ -154,8 +210,7 @@ Result<DiagnosisResult> report(const DiagnosisRequest& of, const Screening& scre
   append(not_looked_for(of), &d);
   if (of.frame_m.x() != 0 || of.frame_m.y() != 0) {
     d.cautions.push_back(
-        "The log lies far from the world's origin: model.toml counts places from x "
-        "= " +
+        "The log lies far from the world's origin: model.toml counts places from x = " +
         plain_number(of.frame_m.x()) + " m, y = " + plain_number(of.frame_m.y()) +
         " m (its [frame]), and a seam's shift is the one there.");
   }
@@ -176,13 +231,13 @@ DiagnosisResult fail_with_partial_report(const DiagnosisRequest& of, const Parti
   if (known.judged != nullptr) fill_judgement(*known.judged, &d);
   const bool base = known.tuned == nullptr;
   d.verdict = base ? Verdict::kUnusable : Verdict::kUnknown;
-  d.sanity.insert(d.sanity.begin(),
-                  {base ? "base_not_simulated" : "unfinished",
-                   "While it was to " + step + ": " + error.message + ".",
-                   base ? "Give the config values at which the robot moves and comes to rest."
-                        : "Bring [parameters] closer to the robot; --exclude NAME goes on "
-                          "without an effect.",
-                   base ? Severity::kUnusable : Severity::kWarning});
+  d.sanity.insert(
+      d.sanity.begin(),
+      {base ? "base_not_simulated" : "unfinished",
+       "While it was to " + step + ": " + error.message + ".",
+       base ? "Give the config values at which the robot moves and comes to rest."
+            : "Bring [parameters] closer to the robot; --exclude NAME goes on without an effect.",
+       base ? Severity::kUnusable : Severity::kWarning});
   append(not_simulated(of), &d);
   result.tuned = of.problem.values;
   if (!base) {
@@ -191,6 +246,53 @@ DiagnosisResult fail_with_partial_report(const DiagnosisRequest& of, const Parti
   result.final_ = result.tuned;
   result.intervals.assign(of.problem.values.size(), {1, 0});
   return result;
+}
+
+Status plan_next(const DiagnosisRequest& of, const Explanation& named, const Proposals& catalogue,
+                 Diagnosis* diagnosis) {
+  for (std::size_t k = 0; k < named.chosen.size(); ++k) {
+    if (named.chosen[k].aliases.empty()) continue;
+    ASSIGN_OR_RETURN(const auto alternatives, alternatives_of(of, named, k, catalogue));
+    auto next = next_experiments(of.farm, of.subject.experiments(of.problem), alternatives);
+    if (!next && next.error().code == ErrorCode::kStopped) return next.error();
+    if (!next) {
+      diagnosis->cautions.push_back(
+          "What to drive next could not be planned: " + next.error().message + ".");
+      continue;
+    }
+    diagnosis->next.insert(diagnosis->next.end(), next->begin(), next->end());
+  }
+  return {};
+}
+
+Result<std::vector<std::string>> second_places(const DiagnosisRequest& of, const Explanation& named,
+                                               const Proposals& catalogue) {
+  std::vector<std::string> sentences;
+  const Regression explained = explained_by(catalogue, named);
+  const auto is_named = [&](const std::string& name) {
+    return std::any_of(named.chosen.begin(), named.chosen.end(),
+                       [&](const ChosenEffect& c) { return c.candidate.signature.effect == name; });
+  };
+  for (const ChosenEffect& effect : named.chosen) {
+    const std::string& name = effect.candidate.signature.effect;
+    const std::vector<const char*>& keys = of.subject.effects->row(name).identified_by;
+    if (keys.empty() || kind_of(name) != name) continue;
+    const auto second = catalogue.again(explained, name);
+    if (!second) return second.error();
+    if (second->gain < of.subject.least_gain) continue;
+    Regression with_it = explained;
+    with_it.add(second->signature.columns);
+    const std::vector<Leftover> left = leftovers(with_it, named.evidence->blocks);
+    const bool all = left.empty() || left.front().log10_p >= of.subject.unknown_log10_p;
+    const bool two = is_named(second_of(name)), room = !two && !second_of(name).empty();
+    sentences.push_back(std::string(two ? "A third " : "A second ") + name + " (" +
+                        place_text(of, second->signature, keys) + ") would explain " +
+                        std::to_string(std::lround(second->gain)) + " nats more of what is left" +
+                        (all ? ", and nothing would remain" : "") +
+                        (room ? "; that is too little, or too near the first, to name it."
+                              : std::string("; a model holds ") + (two ? "two." : "one.")));
+  }
+  return sentences;
 }
 
 }  // namespace gapfarm::steps

@@ -5,10 +5,10 @@
 
 #include "common/math/statistics.h"
 #include "common/random/stream.h"
-#include "master/diagnose/conclusions/confidence.h"
 #include "master/diagnose/conclusions/findings.h"
+#include "master/diagnose/conclusions/headline.h"
 #include "master/diagnose/conclusions/report_parts.h"
-#include "master/diagnose/fit/intervals.h"
+#include "master/diagnose/effect_diagnosis.h"
 #include "master/diagnose/places/seam.h"
 
 namespace gapfarm::steps {

@@ -5,9 +5,10 @@
 #include <limits>
 #include <set>
 
+#include "common/base/try.h"
 #include "common/math/algebra.h"
 #include "master/diagnose/conclusions/report_parts.h"
-#include "master/diagnose/fit/intervals.h"
+#include "master/diagnose/effect_diagnosis.h"
 #include "master/farm/planned_trials.h"
 
 namespace gapfarm::steps {
@@ -252,14 +253,14 @@ Result<std::vector<ShownDrive>> shown_drives(const DiagnosisRequest& of,
       tasks.push_back(simulate_tasks({{planned}}, overrides, of.options.seed, kShownInterval_s)[0]);
     }
   }
-  const auto results = of.farm.run(of.farm.add_problem(to_proto(of.problem)), tasks);
-  if (!results) return results.error();
-  for (std::size_t k = 0; k < results->size(); ++k) {
+  ASSIGN_OR_RETURN(const auto results,
+                   of.farm.run(of.farm.add_problem(to_proto(of.problem)), tasks));
+  for (std::size_t k = 0; k < results.size(); ++k) {
     ShownDrive& drive = drives[k % drives.size()];
     const Trial& logged = of.problem.log.trials[drive.trial];
     drive.measured = shown_path(logged.path, logged.X_WS);
-    if ((*results)[k].outcome() != v1::OK) continue;
-    const Trial simulated = from_proto((*results)[k].simulate().trials(0));
+    if (results[k].outcome() != v1::OK) continue;
+    const Trial simulated = from_proto(results[k].simulate().trials(0));
     (k < drives.size() ? drive.tuned : drive.final_) = shown_path(simulated.path, simulated.X_WS);
   }
   return drives;

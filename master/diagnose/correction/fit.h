@@ -9,6 +9,7 @@
 #include <Eigen/Core>
 #include <cstddef>
 #include <functional>
+#include <optional>
 #include <vector>
 
 #include "common/residual/field.h"
@@ -47,5 +48,17 @@ ResidualField fit_field(const ResidualData& data, const Residuals& residuals,
 // fold, from residuals of a model that was fitted without it, too: `without(fold)`.
 ResidualFit fit_residual(const ResidualData& data, const Residuals& residuals,
                          const std::function<Residuals(std::size_t fold)>& without);
+
+// Where readings jump: a line along x or y beyond which all of them are shifted alike, as two
+// cameras' pictures do where they meet, or a floor that has a threshold.
+
+// Nats of a whitened residual but for a constant: a trial in fifty may lie five times as far off as
+// the noise.
+double outlier_nats(const Eigen::Vector3d& whitened);
+
+// The value of the covariate (of readings) that one shift of all readings beyond it explains most
+// with, of the `residuals` of the trials that are `seen`; nothing where none explains anything.
+std::optional<double> best_edge(const ResidualData& data, const Residuals& residuals,
+                                const std::vector<bool>& seen, std::size_t covariate);
 
 }  // namespace gapfarm

@@ -2,7 +2,6 @@
 #include <cmath>
 
 #include "master/diagnose/effect_diagnosis.h"
-#include "master/diagnose/fit/intervals.h"
 #include "master/diagnose/places/seam.h"
 
 namespace gapfarm {

@@ -3,7 +3,6 @@
 #include <numbers>
 
 #include "master/diagnose/effect_diagnosis.h"
-#include "master/diagnose/effects/drive_kinds.h"
 
 namespace gapfarm {
 namespace {

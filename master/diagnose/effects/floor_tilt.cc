@@ -1,8 +1,6 @@
 #include <numbers>
-#include <optional>
 
 #include "master/diagnose/effect_diagnosis.h"
-#include "master/diagnose/effects/drive_kinds.h"
 
 namespace gapfarm {
 namespace {

@@ -3,7 +3,7 @@
 
 #include "common/pose/segment.h"
 #include "master/diagnose/effect_diagnosis.h"
-#include "master/diagnose/places/patch_places.h"
+#include "master/diagnose/fit/signatures.h"
 
 namespace gapfarm {
 namespace {
@@ -66,9 +66,9 @@ EffectDiagnosis first_patch() {
 }  // namespace
 
 extern const EffectDiagnosis kFrictionPatch = first_patch();
-extern const EffectDiagnosis kFrictionPatch2 = second_of_a_kind(
-    first_patch(), "friction_patch_2",
-    "A second patch of floor around x = %2, y = %3 of the world, of radius %4 has %1 times the "
-    "friction");
+extern const EffectDiagnosis kFrictionPatch2 =
+    second_of_a_kind(first_patch(), "friction_patch_2",
+                     "A second patch of floor around x = %2, y = %3 of the world, of radius %4 has "
+                     "%1 times the friction");
 
 }  // namespace gapfarm

@@ -1,5 +1,4 @@
 #include "master/diagnose/effect_diagnosis.h"
-#include "master/diagnose/effects/drive_kinds.h"
 
 namespace gapfarm {
 namespace {

@@ -2,13 +2,11 @@
 // them, and only their heading, with what turns with it, is off.
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "common/effects/start_turns.h"
 #include "master/diagnose/effect_diagnosis.h"
-#include "master/diagnose/evidence/spread_row.h"
+#include "master/diagnose/evidence/session_gains.h"
 #include "master/diagnose/fit/estimate.h"
-#include "master/diagnose/fit/intervals.h"
 
 namespace gapfarm {
 namespace {

@@ -5,7 +5,7 @@
 #include <functional>
 
 #include "master/diagnose/fit/free_commands.h"
-#include "master/diagnose/fit/probes.h"
+#include "master/diagnose/fit/slopes.h"
 
 namespace gapfarm {
 namespace {

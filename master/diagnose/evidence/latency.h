@@ -2,11 +2,14 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstddef>
 #include <span>
 #include <vector>
 
+#include "common/base/result.h"
 #include "master/diagnose/evidence/residuals.h"
 #include "master/diagnose/study.h"
+#include "master/infer/predictor.h"
 
 namespace gapfarm {
 
@@ -39,5 +42,17 @@ LatencyFit fit_shared_latency(const Study& study, std::span<const Eigen::Vector3
 // trials and, where readings are shared, to the trials that start there.
 std::vector<Eigen::Vector3d> late_marks(const Study& study, const LatencyFit& fit,
                                         std::span<const Eigen::Vector3d> end_velocity);
+
+struct PathLag {
+  double gain = 0;   // nats over all trials with paths; 0: no paths, or no lag in them
+  double tau_s = 0;  // motor_lag.tau
+  double standard_error_s = 0;
+  std::size_t trials = 0;  // with paths
+};
+
+// Compares every path sample with the simulated path at the same time, with and without lag.  What
+// a trial's own start reading and its own speed of either side explain is taken out of both first,
+// trial by trial, so that only the course in time counts.  Errors: the farm's.
+Result<PathLag> fit_path_lag(Predictor& predictor, const Study& study);
 
 }  // namespace gapfarm

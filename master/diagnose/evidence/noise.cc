@@ -2,10 +2,14 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <nlopt.hpp>
+#include <numeric>
+#include <vector>
 
 #include "common/math/statistics.h"
-#include "master/diagnose/evidence/drive_noise.h"
+#include "common/score/scale_mixture.h"
 #include "master/diagnose/subject.h"
 
 namespace gapfarm {
@@ -14,6 +18,117 @@ namespace {
 constexpr double kClearlyThere = 4.5;  // standard deviations of a chi-square
 constexpr double kLeastDriveNoise = 2e-3;
 constexpr double kMedianChiSquare1 = 0.455;
+
+constexpr double kMostDeviation = 0.3;
+constexpr double kMostPosition_m = 0.1;
+// Half a degree of freedom more than the Cauchy's, which has no core worth the name.
+constexpr double kMostTail = 0.9;
+constexpr double kFirstTail = 0.35;
+constexpr double kCore = 0.7;  // a heavy-tailed core over the Gaussian that covers both
+constexpr double kNoDensity = -1e3;
+constexpr unsigned kFloorDraws = 16;  // a trial: of 500 trials the mean is known to 0.02
+
+struct TailLikelihood {
+  std::span<const ResidualTrial> trials;
+  std::span<const Eigen::Vector3d> residuals;
+  const DiagnosisSubject& subject;
+  double outlier_share;
+
+  // Logarithms of both drives' and the readings' noise, then both tails or nothing.
+  static NoiseEstimate at(const double* x, unsigned count) {
+    NoiseEstimate noise;
+    noise.drive_common = std::exp(x[0]);
+    noise.drive_side = std::exp(x[1]);
+    noise.pose = {std::exp(x[2]), std::exp(x[3])};
+    if (count > 4) noise.tails = {x[4], x[5]};
+    return noise;
+  }
+
+  double nats(const NoiseEstimate& noise) const {
+    const std::vector<double> scores =
+        predictive_scores(trials, residuals, noise, subject, outlier_share);
+    return std::accumulate(scores.begin(), scores.end(), 0.0);
+  }
+};
+
+// The nearest hill's top.
+NoiseFit climb(const TailLikelihood& likelihood, const NoiseEstimate& from, bool tails) {
+  const auto first = [](double value, double unknown, double most) {
+    return std::log(std::clamp(value > 0 ? value : unknown, kLeastDeviation, most));
+  };
+  std::vector<double> x = {first(from.drive_common, 0.01, kMostDeviation),
+                           first(from.drive_side, 0.01, kMostDeviation),
+                           first(from.pose.position_m, 0.0015, kMostPosition_m),
+                           first(from.pose.heading_rad, 0.008, kMostDeviation)};
+  std::vector<double> lower(4, std::log(kLeastDeviation)),
+      upper = {std::log(kMostDeviation), std::log(kMostDeviation), std::log(kMostPosition_m),
+               std::log(kMostDeviation)},
+      step(4, 0.3);
+  if (tails) {
+    x.insert(x.end(), {kFirstTail, kFirstTail});
+    lower.insert(lower.end(), {0, 0});
+    upper.insert(upper.end(), {kMostTail, kMostTail});
+    step.insert(step.end(), {0.15, 0.15});
+  }
+  // A simplex that has shrunk begins once more.
+  for (int round = 0; round < 2; ++round) {
+    nlopt::opt search(nlopt::LN_NELDERMEAD, static_cast<unsigned>(x.size()));
+    search.set_max_objective(
+        [](unsigned n, const double* at, double*, void* self) {
+          return static_cast<const TailLikelihood*>(self)->nats(TailLikelihood::at(at, n));
+        },
+        const_cast<TailLikelihood*>(&likelihood));
+    search.set_lower_bounds(lower);
+    search.set_upper_bounds(upper);
+    search.set_initial_step(step);
+    search.set_xtol_abs(0.01);
+    search.set_ftol_abs(0.05);
+    search.set_maxeval(tails ? 250 : 150);
+    double value = 0;
+    try {
+      search.optimize(x, value);
+    } catch (const std::exception&) {
+      // Roundoff stops the search where nothing is left to gain; x holds the best point so far.
+    }
+  }
+  NoiseFit fit{TailLikelihood::at(x.data(), static_cast<unsigned>(x.size())), 0};
+  fit.nats = likelihood.nats(fit.noise);
+  return fit;
+}
+
+constexpr double kMost = 0.5;
+constexpr double kTailFromSquared = 14;  // chi-square with 3 degrees of freedom: one in 340
+
+struct Likelihood {
+  std::span<const ResidualTrial> trials;
+  std::span<const Eigen::Vector3d> residuals;
+  NoiseEstimate start;
+  bool fit_pose;
+  CovarianceOf covariance;
+  double tail;
+
+  NoiseEstimate at(const std::vector<double>& log_values) const {
+    NoiseEstimate noise = start;
+    noise.drive_common = std::exp(log_values[0]);
+    noise.drive_side = std::exp(log_values[1]);
+    if (fit_pose) noise.pose = {std::exp(log_values[2]), std::exp(log_values[3])};
+    return noise;
+  }
+
+  double negative(const NoiseEstimate& noise) const {
+    double sum = 0;
+    for (std::size_t i = 0; i < trials.size(); ++i) {
+      const Eigen::Matrix3d cov = covariance(trials[i], noise);
+      const double d2 = residuals[i].dot(cov.inverse() * residuals[i]);
+      const double bounded =
+          d2 > kTailFromSquared
+              ? kTailFromSquared + tail * std::log1p((d2 - kTailFromSquared) / tail)
+              : d2;
+      sum += 0.5 * (std::log(cov.determinant()) + bounded);
+    }
+    return sum;
+  }
+};
 
 }  // namespace
 
@@ -69,6 +184,96 @@ std::vector<Eigen::Vector3d> estimate_noise(const Regression& nuisances,
   if (study->subject->farthest > 0) bound_far_trials(residuals, study->subject->farthest, study);
   study->use_noise(noise);
   return residuals;
+}
+
+NoiseFit fit_predictive_noise(std::span<const ResidualTrial> trials,
+                              std::span<const Eigen::Vector3d> residuals,
+                              const NoiseEstimate& start, const DiagnosisSubject& subject,
+                              double outlier_share, bool tails) {
+  const TailLikelihood likelihood{trials, residuals, subject, outlier_share};
+  NoiseEstimate core = start;
+  if (tails) {
+    core.drive_common *= kCore;
+    core.drive_side *= kCore;
+    core.pose = {kCore * core.pose.position_m, kCore * core.pose.heading_rad};
+  }
+  // What turns a robot may be one side's drive or the reading of its heading: two hills.
+  double turn = 0;
+  for (const ResidualTrial& t : trials) turn += std::hypot(t.left[2], t.right[2]);
+  turn /= static_cast<double>(trials.size());
+  NoiseEstimate driven = core;
+  driven.drive_side =
+      std::hypot(core.drive_side, std::sqrt(2.0) * core.pose.heading_rad / std::max(turn, 1e-3));
+  driven.pose.heading_rad /= 4;
+  const NoiseFit by_readings = climb(likelihood, core, tails);
+  const NoiseFit by_drives = climb(likelihood, driven, tails);
+  return by_drives.nats > by_readings.nats ? by_drives : by_readings;
+}
+
+std::vector<double> predictive_scores(std::span<const ResidualTrial> trials,
+                                      std::span<const Eigen::Vector3d> residuals,
+                                      const NoiseEstimate& noise, const DiagnosisSubject& subject,
+                                      double outlier_share) {
+  const TailedDensity density(noise.tails);
+  std::vector<double> scores;
+  for (std::size_t i = 0; i < trials.size(); ++i) {
+    const Eigen::Matrix3d reading = noise.tails.gaussian()
+                                        ? Eigen::Matrix3d::Zero().eval()
+                                        : reading_covariance(trials[i], noise.pose);
+    const auto score = density.log_density(residuals[i], subject.covariance(trials[i], noise),
+                                           reading, outlier_share);
+    scores.push_back(score ? *score : kNoDensity);
+  }
+  return scores;
+}
+
+double perfect_score(std::span<const ResidualTrial> trials, const NoiseEstimate& noise,
+                     const DiagnosisSubject& subject, double outlier_share) {
+  const TailedDensity density(noise.tails);
+  Stream stream({.purpose = Purpose::kStatistics, .birth_id = 11});
+  double sum = 0;
+  for (std::size_t i = 0; i < trials.size(); ++i) {
+    const auto score = expected_log_density(
+        density, noise.tails, subject.covariance(trials[i], noise),
+        reading_covariance(trials[i], noise.pose), outlier_share, kFloorDraws, stream);
+    sum += score ? *score : kNoDensity;
+  }
+  return sum / static_cast<double>(trials.size());
+}
+
+NoiseEstimate refit_drive_noise(std::span<const ResidualTrial> trials,
+                                std::span<const Eigen::Vector3d> residuals,
+                                const NoiseEstimate& start, bool fit_pose, CovarianceOf covariance,
+                                double tail) {
+  const Likelihood likelihood{trials, residuals, start, fit_pose, covariance, tail};
+  // An unknown value (0) begins at that of a small tracked robot under a good camera.
+  const auto first = [](double value, double unknown) {
+    return std::log(std::clamp(value > 0 ? value : unknown, kLeastDeviation, kMost));
+  };
+  std::vector<double> x = {first(start.drive_common, 0.01), first(start.drive_side, 0.01)};
+  if (fit_pose) {
+    x.push_back(first(start.pose.position_m, 0.0015));
+    x.push_back(first(start.pose.heading_rad, 0.008));
+  }
+  nlopt::opt search(nlopt::LN_NELDERMEAD, static_cast<unsigned>(x.size()));
+  search.set_min_objective(
+      [](unsigned n, const double* at, double*, void* self) {
+        const auto* l = static_cast<const Likelihood*>(self);
+        return l->negative(l->at(std::vector<double>(at, at + n)));
+      },
+      const_cast<Likelihood*>(&likelihood));
+  search.set_lower_bounds(std::vector<double>(x.size(), std::log(kLeastDeviation)));
+  search.set_upper_bounds(std::vector<double>(x.size(), std::log(kMost)));
+  search.set_initial_step(0.3);
+  search.set_xtol_abs(0.005);
+  search.set_maxeval(300);
+  double value = 0;
+  try {
+    search.optimize(x, value);
+  } catch (const std::exception&) {
+    // Roundoff stops the search where nothing is left to gain; x holds the best point so far.
+  }
+  return likelihood.at(x);
 }
 
 }  // namespace gapfarm

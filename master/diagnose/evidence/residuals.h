@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <cstddef>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -11,6 +12,7 @@
 #include "common/score/fitness.h"
 #include "common/score/scale_mixture.h"
 #include "common/trials/context.h"
+#include "common/trials/trial.h"
 #include "master/diagnose/push/push_geometry.h"
 
 namespace gapfarm {
@@ -80,5 +82,15 @@ inline constexpr double kOldestReading_s = 0.5;
 std::vector<ReadingGap> late_reading_gaps(const std::vector<ResidualTrial>& trials,
                                           const std::vector<Eigen::Vector3d>& end_velocity,
                                           const PoseNoise& noise);
+
+// Fewer readings of resting poses show nothing of the readings.
+inline constexpr std::size_t kFewestGaps = 20;
+
+// Noise of one reading, from two readings of one pose: the gaps' standard deviation over sqrt(2),
+// or its estimate from the median where their tails are heavy, as late readings make them.  Kept
+// above 0.1 mm and 1 mrad, and on a grid above `quantum_m` / sqrt(12).  {0, 0} says that the gaps
+// do not show: fewer than kFewestGaps, or most exactly zero because the log shares readings between
+// trials. The noise is then to be had from residuals (refit_drive_noise() with fit_pose).
+PoseNoise reading_noise(std::span<const ReadingGap> gaps, double quantum_m);
 
 }  // namespace gapfarm

@@ -3,12 +3,11 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
-#include <optional>
 
 #include "common/math/statistics.h"
-#include "master/diagnose/evidence/tail_noise.h"
+#include "master/diagnose/effect_diagnosis.h"
+#include "master/diagnose/evidence/noise.h"
 #include "master/diagnose/fit/free_commands.h"
-#include "master/diagnose/fit/intervals.h"
 #include "master/diagnose/subject.h"
 
 namespace gapfarm {

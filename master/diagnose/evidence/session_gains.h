@@ -4,10 +4,44 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "master/diagnose/evidence/spread_row.h"
+#include "master/diagnose/result/diagnosis.h"
 #include "master/diagnose/study.h"
 
 namespace gapfarm {
+
+// An effect that widens the distribution of trials rather than moves its mean, as a row: how it is
+// looked for.  It is looked for before the effects on the mean, which do without what it does to
+// trials, and named when trials that no fit saw are clearly predicted better with it.
+
+struct SpreadFit {
+  double gain = 0;  // nats over all trials
+  std::vector<Estimate>
+      estimates;  // of the effect's parameters, the first the one that is reported
+  std::vector<SessionGain> sessions = {};  // of all sessions, of an effect that has one in each
+};
+
+struct SpreadRow {
+  const char* effect;
+  double least_gain;  // nats; below it the search finds nothing
+  SpreadFit (*fit)(const Study& study, const std::vector<Eigen::Vector3d>& residuals,
+                   double outlier_share);
+  // Log scores (nats) of every trial that misses its prediction so far, the effect foreseen.
+  std::vector<double> (*scores)(const Study& study, const std::vector<Eigen::Vector3d>& residuals,
+                                const SpreadFit& fit, double outlier_share);
+  bool (*contaminates)(
+      const ResidualTrial& trial);  // whether it may be one that the effect strikes
+  const char* found;                // how screening says that it was seen, or not
+  const char* missing;
+  // Each session has a gain of its own, which no statement about means may use, rather
+  // than trials that show nothing of means.
+  bool by_session = false;
+};
+
+struct FoundSpread {
+  const SpreadRow* row;
+  SpreadFit fit;
+  std::vector<double> scores;  // held out, one a trial, of the last fit and the effect
+};
 
 // The sessions' gains are drawn from a Gaussian about the base's speed.  Its standard deviation is
 // the one of greatest restricted likelihood (Patterson and Thompson 1971), and the gain is what

@@ -3,9 +3,11 @@
 
 #include <Eigen/Core>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "master/diagnose/evidence/residuals.h"
+#include "master/diagnose/study.h"
 
 namespace gapfarm {
 
@@ -38,5 +40,22 @@ std::vector<SlipTrial> trials_with_slips(std::span<const ResidualTrial> trials,
 
 // Mean fourth power over squared mean square: 3 for a Gaussian, and where there is nothing.
 double residual_kurtosis(const Eigen::VectorXd& whitened);
+
+struct Gathering {
+  double gain = 0;           // nats, of the best place over slips that fall anywhere
+  std::string where;         // in words: a disc, or a line that the drives cross
+  std::vector<bool> passed;  // whether each trial's drive went there
+};
+
+// A gain that slips which fall anywhere reach in less than one of 500 logs: the best of about 500
+// places that differ, twice a gain being a chi-square with one degree of freedom.
+inline constexpr double kLeastGathering = 10;
+
+// Scan for a place that drives pass through in which they slip more often than elsewhere: Kulldorff
+// (1997), Poisson.  `slipped`: probability that each trial did; trials of false `informative` do
+// not count.  Longer drives show slips better, so what is expected goes by kind and length of a
+// drive.
+Gathering gathering_of_slips(const Study& study, std::span<const double> slipped,
+                             const std::vector<bool>& informative);
 
 }  // namespace gapfarm

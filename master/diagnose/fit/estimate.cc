@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/base/try.h"
 #include "common/math/algebra.h"
-#include "common/math/bounded_minimum.h"
 #include "common/score/density.h"
-#include "master/diagnose/evidence/tail_noise.h"
+#include "master/diagnose/evidence/noise.h"
 #include "master/diagnose/fit/slopes.h"
 #include "master/diagnose/places/seam.h"
 #include "master/diagnose/subject.h"
@@ -82,10 +82,9 @@ Status rescale(Predictor& predictor, const Study& study, const SlopePoint& from,
     of.push_back(k);
   }
   if (again.empty()) return {};
-  auto better = slopes_at(predictor, from, again);
-  if (!better) return better.error();
+  ASSIGN_OR_RETURN(auto better, slopes_at(predictor, from, again));
   for (std::size_t j = 0; j < of.size(); ++j) {
-    if ((*better)[j]) (*slopes)[of[j]] = std::move((*better)[j]);
+    if (better[j]) (*slopes)[of[j]] = std::move(better[j]);
   }
   return {};
 }
@@ -99,14 +98,12 @@ Status differentiate(Predictor& predictor, const Study& study, JointFit* fit) {
   fit->jacobian.setZero(static_cast<Eigen::Index>(3 * study.size()),
                         static_cast<Eigen::Index>(fit->parameters.size()));
   if (requests.empty()) return {};
-  const auto from = slope_point(predictor, study, fit->at, fit->ends);
-  if (!from) return from.error();
-  auto slopes = slopes_at(predictor, *from, requests);
-  if (!slopes) return slopes.error();
-  if (Status s = rescale(predictor, study, *from, requests, &*slopes); !s) return s;
-  for (std::size_t k = 0; k < slopes->size(); ++k) {
-    if (!(*slopes)[k]) continue;
-    fit->jacobian.col(static_cast<Eigen::Index>(k)) = study.whiten(*(*slopes)[k]);
+  ASSIGN_OR_RETURN(const auto from, slope_point(predictor, study, fit->at, fit->ends));
+  ASSIGN_OR_RETURN(auto slopes, slopes_at(predictor, from, requests));
+  if (Status s = rescale(predictor, study, from, requests, &slopes); !s) return s;
+  for (std::size_t k = 0; k < slopes.size(); ++k) {
+    if (!slopes[k]) continue;
+    fit->jacobian.col(static_cast<Eigen::Index>(k)) = study.whiten(*slopes[k]);
   }
   return {};
 }
@@ -319,11 +316,10 @@ Result<JointFit> fit_jointly(Predictor& predictor, const Study& study,
   if (fit.parameters.empty()) return fit;
   double best = misfit_of(study, fit, nuisances);
   for (int round = 0; round < rounds; ++round) {
-    auto moved = moved_on(predictor, study, nuisances, best, fit);
-    if (!moved) return moved.error();
-    const bool settled = moved->misfit > best - settled_within(study, best);
-    best = moved->misfit;
-    fit = std::move(moved->fit);
+    ASSIGN_OR_RETURN(auto moved, moved_on(predictor, study, nuisances, best, fit));
+    const bool settled = moved.misfit > best - settled_within(study, best);
+    best = moved.misfit;
+    fit = std::move(moved.fit);
     // So near, the derivatives of before will do.
     if (settled) break;
     if (Status s = differentiate(predictor, study, &fit); !s) return s.error();

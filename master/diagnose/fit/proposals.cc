@@ -1,13 +1,13 @@
 #include "master/diagnose/fit/proposals.h"
 
 #include <algorithm>
-#include <cmath>
 #include <iterator>
 #include <map>
 #include <utility>
 
+#include "common/base/try.h"
 #include "common/effects/catalogue.h"
-#include "master/diagnose/places/patch_places.h"
+#include "master/diagnose/fit/signatures.h"
 #include "master/diagnose/places/seam.h"
 #include "master/diagnose/subject.h"
 
@@ -84,9 +84,8 @@ Result<std::vector<EffectCandidate>> Proposals::candidates(
   see(catalogue_);
   const std::optional<Patch> first = first_patch(without, beside);
   if (patch_search_ && (first || !without.count(kPatchEffect))) {
-    const auto discs = patches(explained, most, first);
-    if (!discs) return discs.error();
-    see(*discs);
+    ASSIGN_OR_RETURN(const auto discs, patches(explained, most, first));
+    see(discs);
   }
   for (auto& [effect, candidate] : best) {
     if (candidate.gain + candidate.signature.penalty < kWorthSearching) continue;
@@ -112,9 +111,8 @@ Result<EffectCandidate> Proposals::again(const Regression& explained,
   for (const Signature& s : catalogue_) others.insert(s.effect);
   others.insert(kPatchEffect);  // joins the catalogue when it is looked for
   others.erase(effect);
-  auto best = candidates(explained, others);
-  if (!best) return best.error();
-  return best->empty() ? EffectCandidate{} : std::move(best->front());
+  ASSIGN_OR_RETURN(auto best, candidates(explained, others));
+  return best.empty() ? EffectCandidate{} : std::move(best.front());
 }
 
 Regression Proposals::with(const std::vector<const Signature*>& signatures) const {

@@ -1,14 +1,11 @@
 #include "master/diagnose/fit/signatures.h"
 
 #include <algorithm>
-#include <array>
-#include <cmath>
 #include <iterator>
 
+#include "common/base/try.h"
 #include "master/diagnose/effect_diagnosis.h"
-#include "master/diagnose/fit/probes.h"
 #include "master/diagnose/fit/slopes.h"
-#include "master/diagnose/places/patch_places.h"
 #include "master/diagnose/subject.h"
 
 namespace gapfarm {
@@ -95,8 +92,7 @@ Result<std::vector<Signature>> signatures(Predictor& predictor, const Study& stu
     for (Probe& probe : probes_of(*row, study)) probes.push_back(std::move(probe));
   }
   first.push_back(probes.size());
-  const auto probed = probe_all(predictor, study, probes);
-  if (!probed) return probed.error();
+  ASSIGN_OR_RETURN(const auto probed, probe_all(predictor, study, probes));
 
   std::vector<Signature> found, marks;
   std::size_t k = 0;
@@ -107,7 +103,7 @@ Result<std::vector<Signature>> signatures(Predictor& predictor, const Study& stu
       std::vector<Signature> all = row->marks(study);
       std::move(all.begin(), all.end(), std::back_inserter(marks));
     }
-    const ProbedSlopes slopes = ProbedSlopes(*probed).subspan(from, count);
+    const ProbedSlopes slopes = ProbedSlopes(probed).subspan(from, count);
     if (slopes.empty() ||
         std::any_of(slopes.begin(), slopes.end(), [](const auto& d) { return d.empty(); })) {
       continue;
@@ -133,8 +129,7 @@ Result<std::vector<Signature>> patch_signatures(Predictor& predictor, const Stud
                                                 const std::vector<Patch>& places) {
   std::vector<Pose> ends_without;
   for (const ResidualTrial& trial : study.trials) ends_without.push_back(trial.X_WP);
-  const auto without = slope_point(predictor, study, study.base, ends_without);
-  if (!without) return without.error();
+  ASSIGN_OR_RETURN(const auto without, slope_point(predictor, study, study.base, ends_without));
   std::vector<PredictionRequest> requests;
   std::vector<std::map<std::string, double>> values;
   for (const Patch& place : places) {
@@ -144,8 +139,8 @@ Result<std::vector<Signature>> patch_signatures(Predictor& predictor, const Stud
       if (touched[i]) request.trials.push_back(static_cast<std::uint32_t>(i));
     }
     values.push_back(patch_values(place));
-    request.at = without->at;
-    request.headings = without->headings;
+    request.at = without.at;
+    request.headings = without.headings;
     for (const auto& [key, value] : values.back()) request.at[study.table->row(key)] = value;
     if (request.trials.empty()) request.trials.push_back(0);
     requests.push_back(std::move(request));
@@ -161,7 +156,7 @@ Result<std::vector<Signature>> patch_signatures(Predictor& predictor, const Stud
     std::vector<Eigen::Vector3d> d(study.size(), Eigen::Vector3d::Zero());
     for (std::size_t j = 0; (*ends)[k] && j < requests[k].trials.size(); ++j) {
       const std::size_t i = requests[k].trials[j];
-      d[i] = local_difference(without->ends[i], (*(*ends)[k])[j]);
+      d[i] = local_difference(without.ends[i], (*(*ends)[k])[j]);
     }
     Signature s;
     s.effect = kPatchEffect;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "common/base/result.h"
+#include "common/parameters/table.h"
 #include "master/diagnose/places/patch.h"
 #include "master/diagnose/study.h"
 
@@ -39,5 +40,14 @@ Result<std::vector<Signature>> patch_signatures(Predictor& predictor, const Stud
 
 // Middle of the start places along each axis.
 Eigen::Vector2d middle_of(const Study& study);
+
+inline constexpr char kPatchEffect[] = "friction_patch";
+
+// The disc that a signature of the effect is of, and its parameters.
+Patch patch_of(const Signature& signature);
+std::map<std::string, double> patch_values(const Patch& patch);
+
+// EffectDiagnosis::search_error of a patch.
+double patch_search_error(const Parameter& p, double value, double gain);
 
 }  // namespace gapfarm

@@ -2,7 +2,9 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <map>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "common/base/result.h"
@@ -43,5 +45,30 @@ Result<std::vector<std::optional<Slope>>> slopes_at(Predictor& predictor, const 
 std::optional<Slope> central_slope(const std::vector<Pose>& middle,
                                    const std::optional<std::vector<Pose>>& up,
                                    const std::optional<std::vector<Pose>>& down, double step);
+
+// One finite difference: parameters at `plus`, less those at `minus` (empty: neutral).
+struct Probe {
+  std::string effect;
+  std::map<std::string, double> plus, minus;
+  double scale = 1;
+};
+
+// Of camera_distortion: its strength about the middle of the trials, and where its centre lies, to
+// first order along x and y.
+std::vector<Probe> lens_probes(const Eigen::Vector2d& middle);
+
+// The tuned base with some table keys' values put in.
+Overrides base_with(const Predictor& predictor, const Study& study,
+                    const std::map<std::string, double>& values);
+
+// Differences of the ends over each probe's scale, in the axes of the base's ends: one batch of
+// farm work.  Where one of two sides cannot be simulated, the other one counts twice; a probe
+// without any is empty.
+Result<std::vector<std::vector<Eigen::Vector3d>>> probe_all(Predictor& predictor,
+                                                            const Study& study,
+                                                            const std::vector<Probe>& probes);
+
+// Columns side by side.  REQUIRES: at least one, all of one length.
+Eigen::MatrixXd stack(const std::vector<Eigen::VectorXd>& columns);
 
 }  // namespace gapfarm

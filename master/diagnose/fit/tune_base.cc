@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/base/try.h"
 #include "common/math/algebra.h"
 #include "common/math/statistics.h"
 #include "master/diagnose/fit/free_commands.h"
-#include "master/diagnose/fit/nuisance.h"
 #include "master/diagnose/fit/slopes.h"
 #include "master/diagnose/study.h"
 
@@ -212,14 +212,13 @@ Result<std::vector<Slope>> base_slopes(Predictor& predictor,
   for (const BaseParameter& p : parameters) {
     steps.push_back({p.row, kRelativeStep * study.base.at(p.row)});
   }
-  const auto found = slopes_at(predictor, {study.base, ends}, steps);
-  if (!found) return found.error();
+  ASSIGN_OR_RETURN(const auto found, slopes_at(predictor, {study.base, ends}, steps));
   std::vector<Slope> slopes;
   for (std::size_t k = 0; k < parameters.size(); ++k) {
     Slope& slope = slopes.emplace_back(study.size(), Eigen::Vector3d::Zero());
     const double a_log = steps[k].step / std::log1p(kRelativeStep);
-    for (std::size_t i = 0; (*found)[k] && i < study.size(); ++i) {
-      slope[i] = a_log * (*(*found)[k])[i];
+    for (std::size_t i = 0; found[k] && i < study.size(); ++i) {
+      slope[i] = a_log * (*found[k])[i];
     }
   }
   return slopes;
@@ -307,24 +306,22 @@ Result<Slope> both_sides(Predictor& predictor, const std::vector<Slope>& slopes,
 // The tuned base's ends and derivatives.
 Status settle(Predictor& predictor, const std::vector<Pose>& ends, Study* study) {
   set_predictions(ends, study);
-  const auto turned = predictor.attempt({{with_asymmetry(predictor, *study, kGainStep), {}},
-                                         {with_asymmetry(predictor, *study, -kGainStep), {}}});
-  if (!turned) return turned.error();
-  const auto apart = central_slope(ends, (*turned)[0], (*turned)[1], kGainStep);
+  ASSIGN_OR_RETURN(const auto turned,
+                   predictor.attempt({{with_asymmetry(predictor, *study, kGainStep), {}},
+                                      {with_asymmetry(predictor, *study, -kGainStep), {}}}));
+  const auto apart = central_slope(ends, turned[0], turned[1], kGainStep);
   std::optional<Slope> both;
   if (predictor.problem().external) {
-    const auto slopes = base_slopes(predictor, study->drive.tuned, ends, *study);
-    if (!slopes) return slopes.error();
-    auto found = both_sides(predictor, *slopes, ends, study);
-    if (!found) return found.error();
-    both = std::move(*found);
+    ASSIGN_OR_RETURN(const auto slopes, base_slopes(predictor, study->drive.tuned, ends, *study));
+    ASSIGN_OR_RETURN(auto found, both_sides(predictor, slopes, ends, study));
+    both = std::move(found);
   } else {
     const std::size_t speed = *study->drive.speed;
     study->speed_m_s = study->base.at(speed);
-    const auto moved = predictor.attempt({{scaled(study->base, speed, 1 + kGainStep), {}},
-                                          {scaled(study->base, speed, 1 - kGainStep), {}}});
-    if (!moved) return moved.error();
-    both = central_slope(ends, (*moved)[0], (*moved)[1], kGainStep);
+    ASSIGN_OR_RETURN(const auto moved,
+                     predictor.attempt({{scaled(study->base, speed, 1 + kGainStep), {}},
+                                        {scaled(study->base, speed, 1 - kGainStep), {}}}));
+    both = central_slope(ends, moved[0], moved[1], kGainStep);
   }
   if (!both || !apart) return predictor.failed("the base model's sides cannot be moved by 2 %");
   for (std::size_t i = 0; i < study->size(); ++i) set_gains((*both)[i], (*apart)[i], i, study);
@@ -351,29 +348,25 @@ Status tune_base(Predictor& predictor, bool keep, Study* study) {
   for (const std::size_t row : study->drive.kept) study->base[row] = problem.values[row];
   Overrides simulated;  // the last base that could be
   for (int round = 0; !keep && !parameters.empty() && round < kTuningRounds; ++round) {
-    auto ends = predict_base(predictor, simulated, study);
-    if (!ends) return ends.error();
+    ASSIGN_OR_RETURN(auto ends, predict_base(predictor, simulated, study));
     simulated = study->base;
-    set_predictions(*ends, study);
-    const auto slopes = base_slopes(predictor, parameters, *ends, *study);
-    if (!slopes) return slopes.error();
-    const auto both = both_sides(predictor, *slopes, *ends, study);
-    if (!both) return both.error();
+    set_predictions(ends, study);
+    ASSIGN_OR_RETURN(const auto slopes, base_slopes(predictor, parameters, ends, *study));
+    ASSIGN_OR_RETURN(const auto both, both_sides(predictor, slopes, ends, study));
     if (study->free_commands) {
       const auto turned = predictor.attempt({{with_asymmetry(predictor, *study, kGainStep), {}}});
       if (!turned) return turned.error();
       if (!turned->front()) return predictor.failed("the base model's sides cannot be parted");
       const Slope apart = differences(*study, *turned->front(), kGainStep);
-      for (std::size_t i = 0; i < study->size(); ++i) set_gains((*both)[i], apart[i], i, study);
+      for (std::size_t i = 0; i < study->size(); ++i) set_gains(both[i], apart[i], i, study);
     }
     study->use_noise(study->noise);
-    const TuningStep taken = tuning_step(problem, parameters, *slopes, *both, round, study);
+    const TuningStep taken = tuning_step(problem, parameters, slopes, both, round, study);
     if (taken.of_all && taken.length < 1e-3) break;
   }
-  const auto ends = predict_base(predictor, simulated, study);
-  if (!ends) return ends.error();
+  ASSIGN_OR_RETURN(const auto ends, predict_base(predictor, simulated, study));
   if (!keep) study->on_bounds = base_on_bounds(*study, study->base);
-  return settle(predictor, *ends, study);
+  return settle(predictor, ends, study);
 }
 
 }  // namespace gapfarm

@@ -69,4 +69,16 @@ class PatchSketch {
   Eigen::MatrixXd marks_;  // of the grid's discs
 };
 
+struct Footprint {
+  double length_m = 0, gauge_m = 0;
+  double friction_ratio = 1;  // lateral over longitudinal
+  double creep = 0;           // slip speed over tread speed
+
+  // Left front, left rear, right front, right rear; body axes, m.
+  std::array<Eigen::Vector2d, 4> contacts() const;
+};
+
+// With the study's base.
+Footprint footprint_of(const Problem& problem, const Study& study);
+
 }  // namespace gapfarm

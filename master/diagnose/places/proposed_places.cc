@@ -6,8 +6,9 @@
 #include <map>
 #include <optional>
 
+#include "common/base/try.h"
 #include "master/diagnose/fit/proposals.h"
-#include "master/diagnose/places/patch_places.h"
+#include "master/diagnose/fit/signatures.h"
 #include "master/diagnose/places/seam.h"
 #include "master/diagnose/subject.h"
 
@@ -82,10 +83,9 @@ Result<std::vector<Signature>> Proposals::patches(const Regression& explained, d
   if (predictor_->excluded().count(kPatchEffect) > 0) return std::vector<Signature>();
   const double worth =
       std::max(beside ? kLeastSecondOfAKind : kWorthSketched, kWorthSearchingShare * most_gain);
-  const auto places = patch_search_(explained, {kMostSketched, 2 * worth, beside});
-  if (!places) return places.error();
+  ASSIGN_OR_RETURN(const auto places, patch_search_(explained, {kMostSketched, 2 * worth, beside}));
   std::vector<Patch> discs;
-  for (const auto& [x, y, radius, ratio] : *places) {
+  for (const auto& [x, y, radius, ratio] : places) {
     for (const double power : kRatioPowers) {
       discs.push_back(bounded_patch({x, y, radius, std::pow(ratio, power)}, study_->scale));
     }

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
-#include <functional>
 #include <map>
 #include <optional>
 #include <set>
@@ -11,7 +10,7 @@
 
 #include "common/math/laws.h"
 #include "common/math/statistics.h"
-#include "master/diagnose/evidence/trend_test.h"
+#include "master/diagnose/places/where_covariates.h"
 
 namespace gapfarm {
 namespace {

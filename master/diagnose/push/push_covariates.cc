@@ -2,8 +2,9 @@
 #include <cmath>
 #include <functional>
 
+#include "common/base/try.h"
 #include "common/parameters/push.h"
-#include "master/diagnose/fit/probes.h"
+#include "master/diagnose/fit/slopes.h"
 #include "master/diagnose/push/push_subject.h"
 
 namespace gapfarm {
@@ -154,10 +155,10 @@ Result<Eigen::MatrixXd> push_nuisances(Predictor& predictor, Study& study) {
     columns.push_back(retuned.parameter.prior_log_sd * study.whiten(retuned.slopes));
   }
   constexpr double kMargin_m = 5e-4;
-  const auto margin =
-      probe_all(predictor, study, {{"", {{"contact_margin", kMargin_m}}, {}, kMargin_m}});
-  if (!margin) return margin.error();
-  columns.push_back(kOutline_m * study.whiten(margin->front()));
+  ASSIGN_OR_RETURN(
+      const auto margin,
+      probe_all(predictor, study, {{"", {{"contact_margin", kMargin_m}}, {}, kMargin_m}}));
+  columns.push_back(kOutline_m * study.whiten(margin.front()));
   // Alike for a push and its mirror image: along it even in the arm, across it and in turn odd.
   for (int component = 0; component < 3; ++component) {
     for (int power = component == 0 ? 0 : 1; power <= 3; power += 2) {

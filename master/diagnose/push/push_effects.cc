@@ -1,5 +1,10 @@
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "common/pose/segment.h"
 #include "master/diagnose/effect_diagnosis.h"
-#include "master/diagnose/places/patch_places.h"
+#include "master/diagnose/fit/signatures.h"
 #include "master/diagnose/push/push_subject.h"
 
 namespace gapfarm {
@@ -14,8 +19,7 @@ std::vector<EffectDiagnosis> pushed_rows() {
        .searched = {{"ratio", 0.2}},
        .polar = Polar{"friction_anisotropy.ratio", "friction_anisotropy.direction", 2, true},
        .phrases =
-           {"Friction across the table's grain is %1 times that along it, and the grain runs "
-            "at %2",
+           {"Friction across the table's grain is %1 times that along it, and the grain runs at %2",
             {{"ratio", 1, ""}, {"direction", kDegrees, " degrees"}}}},
       {.effect = "friction_speed",
        .searched = {{"slope", 2}},
@@ -43,18 +47,16 @@ std::vector<EffectDiagnosis> pushed_rows() {
       {.effect = "pressure_distribution",
        .searched = {{"stretch", 0.15}},
        .polar = Polar{"pressure_distribution.stretch", "pressure_distribution.direction", 2, false},
-       .phrases =
-           {"The support under the piece is drawn out by %1 (logarithm of its length over its "
-            "width) at %2 in the piece",
-            {{"stretch", 1, ""}, {"direction", kDegrees, " degrees"}}}},
+       .phrases = {"The support under the piece is drawn out by %1 (logarithm of its length over "
+                   "its width) at %2 in the piece",
+                   {{"stretch", 1, ""}, {"direction", kDegrees, " degrees"}}}},
       {.effect = "finger_compliance",
        .searched = {{"compliance", 0.001}},
        .phrases = {"The finger gives way by %1 to every newton", {{"compliance", 1000, " mm"}}}},
       {.effect = "placement_bias",
        .searched = {{"x", 0.002}, {"y", 0.002}, {"angle", 0.02}},
        .phrases =
-           {"Pieces truly start %1 along x and %2 along y from where the log says, turned by "
-            "%3",
+           {"Pieces truly start %1 along x and %2 along y from where the log says, turned by %3",
             {{"x", 1000, " mm"}, {"y", 1000, " mm"}, {"angle", 1000, " mrad"}}}},
       {.effect = "marker_offset",
        .searched = {{"x", 0.003}, {"y", 0.003}},
@@ -76,6 +78,37 @@ std::vector<EffectDiagnosis> pushed_rows() {
   };
 }
 
+constexpr double kPatchSpacing = 0.75;  // of the radius: a disc anywhere is overlapped by half
+constexpr std::size_t kMostPatches = 150;
+
+// Centres of discs over everything that pieces slide across, no more than there is time for.
+std::vector<Patch> patch_grid(const Study& study, double radius_m) {
+  double spacing = kPatchSpacing * radius_m;
+  for (;; spacing *= 1.2) {
+    std::vector<std::pair<long, long>> places;
+    for (const ResidualTrial& t : study.trials) {
+      for (const Pose& X : {t.X_WS, t.X_WP}) {
+        const Eigen::Vector2d p = transform(X, t.push.p_RC);
+        for (int k = 0; k < 4; ++k) {  // the piece's own extent
+          const double dx = (k % 2 == 0 ? 1 : -1) * t.push.gyration_m;
+          const double dy = (k < 2 ? 1 : -1) * t.push.gyration_m;
+          places.emplace_back(std::lround((p.x() + dx) / spacing),
+                              std::lround((p.y() + dy) / spacing));
+        }
+      }
+    }
+    std::sort(places.begin(), places.end());
+    places.erase(std::unique(places.begin(), places.end()), places.end());
+    if (places.size() > kMostPatches) continue;
+    std::vector<Patch> patches;
+    for (const auto& [x, y] : places) {
+      patches.push_back({static_cast<double>(x) * spacing, static_cast<double>(y) * spacing,
+                         std::max(radius_m, spacing / kPatchSpacing), 1});
+    }
+    return patches;
+  }
+}
+
 }  // namespace
 
 const EffectDiagnoses& push_effect_diagnoses() {
@@ -86,6 +119,53 @@ const EffectDiagnoses& push_effect_diagnoses() {
     return each;
   }());
   return all;
+}
+
+bool piece_crosses(const ResidualTrial& trial, const Patch& patch) {
+  constexpr double kExtent = 2.4;  // gyration radii: the farthest corner of a slender triangle
+  const OnSegment nearest =
+      nearest_on_segment({patch[0], patch[1]}, transform(trial.X_WS, trial.push.p_RC),
+                         transform(trial.X_WP, trial.push.p_RC));
+  return nearest.distance < patch[2] + kExtent * trial.push.gyration_m;
+}
+
+std::vector<infer::Start> push_patch_starts(const Study& study) {
+  constexpr double kRadius_m = 0.06, kRatios[] = {0.45, 2};
+  const ParameterTable& table = *study.table;
+  std::vector<infer::Start> starts;
+  for (Patch place : patch_grid(study, kRadius_m)) {
+    infer::Start start;
+    for (std::size_t i = 0; i < study.size(); ++i) {
+      if (piece_crosses(study.trials[i], place)) {
+        start.reach.push_back(static_cast<std::uint32_t>(i));
+      }
+    }
+    if (start.reach.empty()) continue;
+    for (const double ratio : kRatios) {
+      place[3] = ratio;
+      start.at.clear();
+      const char* const keys[] = {"x", "y", "radius", "ratio"};
+      for (std::size_t k = 0; k < 4; ++k) {
+        start.at[table.row(std::string(kPatchEffect) + "." + keys[k])] = place[k];
+      }
+      starts.push_back(start);
+    }
+  }
+  return starts;
+}
+
+std::vector<infer::Start> push_lens_starts(const Study& study) {
+  constexpr double kBend_m2 = 0.1;
+  const Eigen::Vector2d middle = middle_of(study);
+  const ParameterTable& table = *study.table;
+  std::vector<infer::Start> starts;
+  for (const double k1 : {kBend_m2, -kBend_m2}) {
+    starts.push_back({{{table.row("camera_distortion.k1"), k1},
+                       {table.row("camera_distortion.x"), middle.x()},
+                       {table.row("camera_distortion.y"), middle.y()}},
+                      {}});
+  }
+  return starts;
 }
 
 }  // namespace gapfarm

@@ -5,6 +5,7 @@
 #include <set>
 #include <span>
 
+#include "common/base/try.h"
 #include "common/parameters/push.h"
 #include "common/score/motion_model.h"
 #include "master/diagnose/fit/estimate.h"
@@ -104,15 +105,14 @@ Status measure_spread(Predictor& predictor, Study* study) {
       requests.back().at[table.row(keys[k])] = sign * steps[k];
     }
   }
-  const auto ends = predictor.attempt(requests);
-  if (!ends) return ends.error();
+  ASSIGN_OR_RETURN(const auto ends, predictor.attempt(requests));
   for (std::size_t i = 0; i < study->size(); ++i) {
     ResidualTrial& t = study->trials[i];
     t.spread.position.setZero();
     t.spread.heading.setZero();
     for (int k = 0; k < 3; ++k) {
-      const auto& above = (*ends)[static_cast<std::size_t>(2 * k)];
-      const auto& below = (*ends)[static_cast<std::size_t>(2 * k + 1)];
+      const auto& above = ends[static_cast<std::size_t>(2 * k)];
+      const auto& below = ends[static_cast<std::size_t>(2 * k + 1)];
       Eigen::Vector3d up = Eigen::Vector3d::Zero(), down = up;
       if (above) up = local_difference(t.X_WP, (*above)[i]);
       if (below) down = local_difference(t.X_WP, (*below)[i]);
@@ -152,12 +152,11 @@ Status measure_retuning(Predictor& predictor, Study* study) {
     }
     steps.push_back(std::log(up / down));
   }
-  const auto ends = predictor.attempt(requests);
-  if (!ends) return ends.error();
+  ASSIGN_OR_RETURN(const auto ends, predictor.attempt(requests));
   study->retuned.clear();
   for (std::size_t k = 0; k < parameters.size(); ++k) {
-    const auto& above = (*ends)[2 * k];
-    const auto& below = (*ends)[2 * k + 1];
+    const auto& above = ends[2 * k];
+    const auto& below = ends[2 * k + 1];
     if (!above || !below) continue;
     RetunedPush& retuned = study->retuned.emplace_back();
     retuned.parameter = parameters[k];
@@ -210,8 +209,7 @@ Status start_from_grid(Predictor& predictor, Study* study) {
       requests.push_back(some);
     }
   }
-  const auto ends = predictor.attempt(requests);
-  if (!ends) return ends.error();
+  ASSIGN_OR_RETURN(const auto ends, predictor.attempt(requests));
   double least = INFINITY;
   for (std::size_t f = 0; f < frictions.size(); ++f) {
     std::map<std::size_t, std::vector<double>> costs;  // by piece: of each factor
@@ -220,7 +218,7 @@ Status start_from_grid(Predictor& predictor, Study* study) {
         const ResidualTrial& t = study->trials[some.trials[j]];
         std::vector<double>& own = costs[t.command];
         own.resize(factors.size());
-        const auto& simulated = (*ends)[f * factors.size() + s];
+        const auto& simulated = ends[f * factors.size() + s];
         own[s] += simulated ? coarse_cost(t, (*simulated)[j]) : kNotSimulated;
       }
     }
@@ -317,17 +315,15 @@ Status tune_push_base(Predictor& predictor, bool keep, Study* study) {
   }
   // Twice: how a start's noise spreads depends on the base, which is fitted to what it leaves.
   for (int round = 0; round < 2; ++round) {
-    auto ends = predictor.ends({{study->base, {}}});
-    if (!ends) return ends.error();
-    set_ends(ends->front(), study);
+    ASSIGN_OR_RETURN(auto ends, predictor.ends({{study->base, {}}}));
+    set_ends(ends.front(), study);
     if (Status s = measure_spread(predictor, study); !s) return s;
     study->use_noise(study->noise);
     if (keep || round == 1) break;
     const Eigen::MatrixXd none(static_cast<Eigen::Index>(3 * study->size()), 0);
-    auto fit = fit_jointly(predictor, *study, {}, study->base, BaseParameters::kFitted, none,
-                           kPushTuningRounds);
-    if (!fit) return fit.error();
-    study->base = fit->at;
+    ASSIGN_OR_RETURN(auto fit, fit_jointly(predictor, *study, {}, study->base,
+                                           BaseParameters::kFitted, none, kPushTuningRounds));
+    study->base = fit.at;
   }
   return measure_retuning(predictor, study);
 }

@@ -43,17 +43,12 @@ std::vector<WhereCovariate> covariates(std::span<const ResidualTrial> trials,
   std::vector<WhereCovariate> all;
   const auto add = [&](const std::string& name, double unit, const std::string& each,
                        const std::vector<std::function<double(const ResidualTrial&)>>& of) {
-    WhereCovariate covariate{name, {}, false, false, unit, each};
-    covariate.columns.resize(static_cast<Eigen::Index>(trials.size()),
-                             static_cast<Eigen::Index>(of.size()));
-    for (std::size_t i = 0; i < trials.size(); ++i) {
-      for (std::size_t k = 0; k < of.size(); ++k) {
-        covariate.columns(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k)) =
-            trials[i].push.touched ? of[k](trials[i]) : 0;
-      }
-    }
-    covariate.columns.rowwise() -= covariate.columns.colwise().mean().eval();
-    all.push_back(std::move(covariate));
+    const auto values = [&](std::size_t i) {
+      std::vector<double> row;
+      for (const auto& f : of) row.push_back(trials[i].push.touched ? f(trials[i]) : 0);
+      return row;
+    };
+    add_covariate({name, {}, false, false, unit, each}, trials.size(), values, &all);
   };
   using T = const ResidualTrial&;
   add("contact offset", 0.01, "with every 10 mm that the centroid lies farther left of the push",

@@ -5,7 +5,7 @@
 
 #include "common/json/json.h"
 #include "master/diagnose/result/json_fields.h"
-#include "master/io/log_checks/finding_text.h"
+#include "master/io/log_checks/finding.h"
 
 namespace gapfarm {
 namespace {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <utility>
 
-#include "master/diagnose/conclusions/verdict.h"
+#include "master/diagnose/conclusions/findings.h"
 
 namespace gapfarm::steps {
 namespace {

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "common/base/try.h"
 #include "common/math/digits.h"
 #include "common/math/laws.h"
 #include "master/diagnose/conclusions/findings.h"
@@ -104,13 +105,11 @@ class Selection {
   }
 
   Result<Found> run() {
-    auto base = fitted(competition_.base(), competition_.base().from(study_.base));
-    if (!base) return base.error();
-    found_.emplace(Found{*base, *base, {}, {}, {}, {}});
+    ASSIGN_OR_RETURN(auto base, fitted(competition_.base(), competition_.base().from(study_.base)));
+    found_.emplace(Found{base, base, {}, {}, {}, {}});
     while (found_->chosen.size() < kMostEffects) {
-      const auto more = add_best();
-      if (!more) return more.error();
-      if (!*more) break;
+      ASSIGN_OR_RETURN(const auto more, add_best());
+      if (!more) break;
     }
     std::stable_sort(found_->chosen.begin(), found_->chosen.end(),
                      [](const ChosenEffect& a, const ChosenEffect& b) {
@@ -122,11 +121,10 @@ class Selection {
  private:
   Result<infer::Model> fitted(infer::Space space, const Eigen::VectorXd& from) const {
     const infer::Fitter fitter(competition_.forward(), competition_.observations(), space);
-    auto fit = fitter.start(from);
-    if (!fit) return fit.error();
-    if (Status s = fitter.improve(&*fit, infer::kLongSearch); !s) return s.error();
+    ASSIGN_OR_RETURN(auto fit, fitter.start(from));
+    if (Status s = fitter.improve(&fit, infer::kLongSearch); !s) return s.error();
     return infer::model_of(competition_.forward(), competition_.observations(), std::move(space),
-                           std::move(*fit));
+                           std::move(fit));
   }
 
   double explained() const {
@@ -149,11 +147,10 @@ class Selection {
     explained.restart(competition_.unexplained(found_->model));
     for (const Signature& s : first_) explained.add(s.columns);
     for (const EffectCandidate& c : chosen) explained.add(c.signature.columns);
-    auto marks = marks_->candidates(explained, without, chosen);
-    if (!marks) return marks.error();
+    ASSIGN_OR_RETURN(auto marks, marks_->candidates(explained, without, chosen));
     std::vector<infer::Hypothesis> hypotheses;
     double best = 0;
-    for (const EffectCandidate& mark : *marks) {
+    for (const EffectCandidate& mark : marks) {
       if (mark.gain < kWorthSearchingShare * best) break;
       // A search may do better than slopes say, but not by more than they are trusted for.
       const double most = infer::kMostTrust * mark.gain;
@@ -198,17 +195,16 @@ class Selection {
     for (std::size_t k = 0; k + 1 < found_->chosen.size();) {
       Eigen::VectorXd u = found_->model.fit.u;
       infer::Space space = found_->model.space.without(first, size_of(k), &u);
-      auto without = fitted(std::move(space), u);
-      if (!without) return without.error();
+      ASSIGN_OR_RETURN(auto without, fitted(std::move(space), u));
       const infer::PairedGain gain =
-          infer::gain_over(found_->model, *without, competition_.base().dimensions());
+          infer::gain_over(found_->model, without, competition_.base().dimensions());
       if (gain.sum >= of_.subject.least_gain && gain.sum >= infer::kSureGain * gain.se) {
         found_->chosen[k].candidate.gain = gain.sum;
         first += size_of(k++);
         continue;
       }
       not_these_.insert(found_->chosen[k].candidate.signature.effect);
-      found_->model = std::move(*without);
+      found_->model = std::move(without);
       found_->chosen.erase(found_->chosen.begin() + static_cast<std::ptrdiff_t>(k));
     }
     return {};
@@ -269,11 +265,10 @@ class Selection {
 Status relinearise(const DiagnosisRequest& of, Screening* screening) {
   Explanation& named = screening->found;
   const std::vector<EffectCandidate> effects = candidates_of(named.chosen);
-  auto fit = estimate(of, *screening->catalogue, named, effects, 2);
-  if (!fit) return fit.error();
-  const auto there = relinearised_at(of, named.study(), *fit, effects);
+  ASSIGN_OR_RETURN(auto fit, estimate(of, *screening->catalogue, named, effects, 2));
+  const auto there = relinearised_at(of, named.study(), fit, effects);
   if (!there) return there.error();
-  named.estimates = std::move(*fit);
+  named.estimates = std::move(fit);
   emit_fit(of, *named.estimates);
   if (there->columns.empty()) return {};
   screening->catalogue->restart(there->data);
@@ -291,9 +286,8 @@ Status move_to(const DiagnosisRequest& of, const Found& found, const Competition
   named.tuned_alone = found.base.space.values(found.base.fit.u);
   study.base = found.model.space.values(found.model.fit.u);
   if (Status s = of.subject.tune(of.predictor, /*keep=*/true, &study); !s) return s;
-  auto raw = evidence_of(of, std::move(study));
-  if (!raw) return raw.error();
-  auto evidence = measure(of, raw->study);
+  ASSIGN_OR_RETURN(auto raw, evidence_of(of, std::move(study)));
+  auto evidence = measure(of, raw.study);
   if (!evidence) return evidence.error();
   named.evidence = std::make_shared<const Evidence>(std::move(*evidence));
   const infer::Fitter fitter(competition.forward(), competition.observations(), found.model.space);
@@ -330,24 +324,22 @@ Result<Screening> compete(const DiagnosisRequest& of, Explanation found) {
                                 moves ? BaseParameters::kFitted : BaseParameters::kHeld);
   Screening screening;
   if (of.subject.signatures != nullptr) {
-    auto marks = marks_of(of, found);
-    if (!marks) return marks.error();
-    screening.catalogue = std::move(*marks);
+    ASSIGN_OR_RETURN(auto marks, marks_of(of, found));
+    screening.catalogue = std::move(marks);
     if (Status s = screen_alone(of, found, &screening); !s) return s.error();
   }
   Selection selection(of, study, competition, screening.catalogue.get(), found.first,
                       configured->base);
-  auto selected = selection.run();
-  if (!selected) return selected.error();
-  if (screening.catalogue == nullptr) screening.rows = std::move(selected->rows);
-  screening.steps = std::move(selected->steps);
-  screening.refused = std::move(selected->refused);
-  found.chosen = std::move(selected->chosen);
+  ASSIGN_OR_RETURN(auto selected, selection.run());
+  if (screening.catalogue == nullptr) screening.rows = std::move(selected.rows);
+  screening.steps = std::move(selected.steps);
+  screening.refused = std::move(selected.refused);
+  found.chosen = std::move(selected.chosen);
   found.estimates.reset();
   const std::shared_ptr<const Evidence> before = found.evidence;
   screening.found = std::move(found);
   if (moves) {
-    if (Status s = move_to(of, *selected, competition, before->study, &screening); !s) {
+    if (Status s = move_to(of, selected, competition, before->study, &screening); !s) {
       return s.error();
     }
   } else if (!screening.found.chosen.empty()) {

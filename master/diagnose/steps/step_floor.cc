@@ -5,7 +5,6 @@
 
 #include "common/math/statistics.h"
 #include "master/diagnose/evidence/noise.h"
-#include "master/diagnose/evidence/tail_noise.h"
 #include "master/diagnose/steps/step_parts.h"
 
 namespace gapfarm::steps {

@@ -5,7 +5,9 @@
 
 #include "common/effects/catalogue.h"
 #include "common/math/digits.h"
+#include "common/math/statistics.h"
 #include "master/diagnose/conclusions/findings.h"
+#include "master/diagnose/correction/fit.h"
 #include "master/diagnose/steps/step_parts.h"
 
 namespace gapfarm::steps {
@@ -67,6 +69,25 @@ Verdict with_oddities(Verdict verdict, const Explanation& found) {
                   : Verdict::kUnknown;
   }
   return verdict;
+}
+
+// A parameter within this share of its range from an end sits there.
+constexpr double kAtBound = 1e-3;
+// Nats a trial: the worst of 11 practice logs and of the real forward log keep 0.2 with their
+// effects.
+constexpr double kMostMissed = 3;
+constexpr double kLittleClosed = 0.02;  // of the gap
+
+bool at_bound(const EffectDiagnoses& effects, const Parameter& row, double value) {
+  if (row.kind != ParameterKind::kReal || place_of(effects, row) != nullptr) return false;
+  if (row.key.ends_with(".direction")) return false;
+  const char* saturating = effects.row(row.effect).saturates;
+  if (saturating != nullptr && row.key == row.effect + "." + saturating) return false;
+  // What cannot be negative counts by its logarithm: a twentieth of the friction is far from none.
+  const bool ratio = row.lower > 0;
+  const auto at = [&](double x) { return ratio ? std::log(x) : x; };
+  const double near = kAtBound * (at(row.upper) - at(row.lower));
+  return at(value) <= at(row.lower) + near || at(value) >= at(row.upper) - near;
 }
 
 }  // namespace
@@ -165,6 +186,128 @@ Result<Judgement> judge(const DiagnosisRequest& of, const Screening& screening) 
     named = naming_nothing(std::move(named));
   }
   return judged;
+}
+
+bool clearly_better(const std::vector<double>& scores, const std::vector<double>& others) {
+  std::vector<double> gains = scores;
+  for (std::size_t i = 0; i < gains.size(); ++i) gains[i] -= others[i];
+  return gains_significantly(gains);
+}
+
+Explanation naming_nothing(Explanation explanation) {
+  explanation.first.clear();
+  explanation.chosen.clear();
+  explanation.slip = {};
+  explanation.spreads.clear();
+  explanation.lag = {};
+  explanation.grid_m = 0;
+  if (!explanation.as_logged) return explanation;
+  Evidence as_logged = *explanation.evidence;
+  as_logged.study = std::move(*explanation.as_logged);
+  explanation.evidence = std::make_shared<const Evidence>(std::move(as_logged));
+  explanation.as_logged.reset();
+  return explanation;
+}
+
+// Tuning that ends on a bound would have gone on: another robot, or another log than the config's.
+SanityFinding on_bounds(const DiagnosisRequest& of, const Study& tuned) {
+  std::vector<std::string> where;
+  for (std::size_t row : tuned.on_bounds) {
+    const Parameter& p = of.table()[row];
+    where.push_back(p.key + " " + of.table().format(row, rounded_to_digits(tuned.base.at(row), 3)) +
+                    " (from " + of.table().format(row, p.lower) + " to " +
+                    of.table().format(row, p.upper) + ")");
+  }
+  return {"base_on_bounds",
+          "Tuning the base ended on the edge of what scenario " + of.problem.scenario +
+              " can be: " + listed(where) +
+              ". A robot that needs such values is probably not one of this kind, so whatever the "
+              "catalogue explained would be its being another one.",
+          "Check what the config says of the robot and of duties and durations that the log leaves "
+          "empty, or use a scenario that can be this robot.",
+          Severity::kWarning};
+}
+
+Judgement with_warning(Judgement judged, SanityFinding finding) {
+  judged.named = naming_nothing(std::move(judged.named));
+  judged.verdict = Verdict::kUnknown;
+  judged.warnings.insert(judged.warnings.begin(), std::move(finding));
+  return judged;
+}
+
+Judgement with_base_warning(const DiagnosisRequest& of, const Evidence& measured,
+                            Judgement judged) {
+  judged.named.evidence = std::make_shared<const Evidence>(measured);
+  judged.named.as_logged.reset();
+  judged.named.tuned_alone.clear();
+  judged.named.frees_base = false;
+  judged.nearest.clear();
+  judged.base_is_suspicious = true;
+  return with_warning(std::move(judged), on_bounds(of, measured.study));
+}
+
+std::optional<SanityFinding> missing_too_much(const Refit& refit) {
+  const Judgement& judged = refit.judged;
+  // Means alone predict no session's gain.
+  const bool by_session = judged.named.names_session_gains() && !judged.named.spreads.empty();
+  const double gap = refit.floor - mean(by_session ? judged.named.spreads.back().scores
+                                                   : refit.nested.back().scores);
+  if (!judged.warnings.empty() || !(gap > kMostMissed)) return std::nullopt;
+  if (!judged.named.names_anything() && judged.verdict != Verdict::kNone) return std::nullopt;
+  return SanityFinding{"base_misses",
+                       "Even with everything that the catalogue offers the model loses " +
+                           plain_number(rounded_to_digits(gap, 3)) +
+                           " nats a trial against its own noise: it is not this robot's, and what "
+                           "fits such a gap best need not be a cause.",
+                       "Check robot, units and commands of the config against the log.",
+                       Severity::kWarning};
+}
+
+// The worst goes first: of two that are alike, the one after it may look worthless because of it.
+// What closes next to nothing has to do so without a warning: beside a large gap a few nats are to
+// be had by anything.  How much it closes is known only by the noise's own tails.
+std::optional<Worthless> of_no_use(const Judgement& judged, const std::vector<NestedFit>& nested,
+                                   std::optional<double> perfect,
+                                   const std::set<std::string>& put_last) {
+  const std::size_t before = judged.named.as_logged ? 1 : 0;
+  const double gap =
+      perfect ? std::max(*perfect, mean(nested.back().scores)) - mean(nested.front().scores) : 0;
+  std::optional<std::size_t> worst;
+  double least = INFINITY;
+  for (std::size_t k = judged.named.chosen.size(); k-- > 0;) {
+    const bool last = k + 1 == judged.named.chosen.size();
+    if (!last && put_last.count(judged.named.chosen[k].candidate.signature.effect)) continue;
+    const std::vector<double>&with = nested[before + k + 1].scores,
+          &without_it = nested[before + k].scores;
+    const double gain = mean(with) - mean(without_it);
+    if (gain > 0 && (gain > kLittleClosed * gap || clearly_better(with, without_it))) continue;
+    if (gain < least) worst = k;
+    least = std::min(least, gain);
+  }
+  if (!worst) return std::nullopt;
+  return Worthless{*worst,
+                   " seemed to explain some of it, too, but trials that the fit did not see are "
+                   "predicted no better with it."};
+}
+
+Judgement dropped(Judgement judged, const Worthless& effect) {
+  const auto gone = judged.named.chosen.begin() + static_cast<std::ptrdiff_t>(effect.effect);
+  const std::string& name = gone->candidate.signature.effect;
+  judged.cautions.push_back(name + effect.why);
+  judged.nearest.push_back({{name}, gone->candidate.gain, 0, "", name + effect.why});
+  judged.named.chosen.erase(gone);
+  return judged;
+}
+
+std::optional<std::string> at_its_bound(const DiagnosisRequest& of, const std::string& effect,
+                                        const Overrides& at) {
+  for (const auto& [index, value] : at) {
+    const Parameter& row = of.table()[index];
+    if (row.effect != effect || !at_bound(*of.subject.effects, row, value)) continue;
+    return effect + " explains some of it only at the edge of what it can be (" + row.key + " = " +
+           of.table().format(index, rounded_to_digits(value, 4)) + "), so it is not the cause.";
+  }
+  return std::nullopt;
 }
 
 }  // namespace gapfarm::steps

@@ -1,10 +1,96 @@
 // The base, the noise and the evidence that later steps look at.
 
+#include <algorithm>
+#include <span>
+
+#include "common/base/try.h"
+#include "common/math/statistics.h"
 #include "master/diagnose/evidence/noise.h"
+#include "master/diagnose/evidence/residuals.h"
 #include "master/diagnose/evidence/session_gains.h"
 #include "master/diagnose/steps/step_parts.h"
 
 namespace gapfarm::steps {
+namespace {
+
+constexpr int kLatencyRounds = 4;
+constexpr double kPathInterval_s = 0.005;
+constexpr double kLeastLatencyGain = 14;  // nats; the share and the age are searched on a grid
+constexpr double kLeastLagGain = 14;      // it stands for all samples of a path, which go together
+
+// Of every trial just before its motors stop, in the axes of its predicted end; none where that
+// cannot be simulated.
+Result<std::vector<Eigen::Vector3d>> end_velocities(const DiagnosisRequest& of,
+                                                    const Study& study) {
+  constexpr double kStep_s = 0.02;
+  Overrides shorter = study.base;
+  shorter[of.table().row("timing_offset.offset")] = -kStep_s;
+  const auto ends = of.predictor.attempt({{shorter, {}}});
+  if (!ends) return ends.error();
+  std::vector<Eigen::Vector3d> velocity;
+  if (!ends->front()) {
+    of.predictor.exclude("pose_latency");
+    return velocity;
+  }
+  for (const Eigen::Vector3d& d : differences(study, *ends->front(), kStep_s)) {
+    velocity.push_back(-d);
+  }
+  return velocity;
+}
+
+// The gap to the next reading counts from the stop of the motors, the parameter from rest: asks the
+// simulation how long before rest each command was where that gap begins.
+Result<double> latency_from_rest(const DiagnosisRequest& of, const Study& study,
+                                 const LatencyFit& latency,
+                                 const std::vector<Eigen::Vector3d>& velocity) {
+  std::vector<CommandSpec> commands;
+  for (const Cell& cell : study.cells) commands.push_back(cell.command);
+  const auto paths = of.predictor.paths(study.base, commands, kPathInterval_s);
+  if (!paths && paths.error().code == ErrorCode::kSimulation) return latency.latency_s;
+  if (!paths) return paths.error();
+  std::vector<const Eigen::Vector3d*> of_cell(study.cells.size());
+  for (std::size_t i = 0; i < study.size(); ++i) of_cell[study.trials[i].cell] = &velocity[i];
+  std::vector<double> ages;
+  for (std::size_t c = 0; c < commands.size(); ++c) {
+    const std::vector<PathSample>& path = (*paths)[c];
+    const Eigen::Vector3d& late_velocity = *of_cell[c];
+    for (std::size_t k = path.size(); k-- > 0;) {
+      const Eigen::Vector3d short_of = -local_difference(path.back().pose, path[k].pose);
+      if (late_velocity.dot(short_of) < latency.latency_s * late_velocity.squaredNorm()) continue;
+      ages.push_back(path.back().t_s - path[k].t_s);
+      break;
+    }
+  }
+  return ages.empty() ? latency.latency_s : median(ages);
+}
+
+// Late readings make the motors look slow and the drive noisy, and so themselves less late.
+Result<Explanation> put_late_readings_right(const DiagnosisRequest& of, Explanation partial,
+                                            std::vector<Eigen::Vector3d> velocity) {
+  const Study as_logged = partial.study();
+  for (int round = 0; round < kLatencyRounds; ++round) {
+    Study study = partial.study();
+    const std::vector<Eigen::Vector3d> marks = late_marks(study, partial.latency, velocity);
+    for (std::size_t i = 0; i < study.size(); ++i) study.trials[i].late = marks[i];
+    study.noise = as_logged.noise;
+    if (Status s = of.subject.tune(of.predictor, of.options.keep_base, &study); !s)
+      return s.error();
+    ASSIGN_OR_RETURN(auto measured, measure(of, study));
+    partial.evidence = std::make_shared<const Evidence>(std::move(measured));
+    auto faster = end_velocities(of, partial.study());
+    if (!faster) return faster.error();
+    if (faster->empty()) break;
+    velocity = std::move(*faster);
+    partial.latency = fit_latency(partial.study(), velocity);
+  }
+  ASSIGN_OR_RETURN(const auto from_rest,
+                   latency_from_rest(of, partial.study(), partial.latency, velocity));
+  partial.latency_from_rest_s = from_rest;
+  partial.as_logged = as_logged;
+  return partial;
+}
+
+}  // namespace
 
 Result<Study> tune(const DiagnosisRequest& of) {
   Result<Study> study = of.subject.make_study(of.problem, of.options.genes);
@@ -57,6 +143,73 @@ Explanation without(const Explanation& all, const std::vector<bool>& ignored) {
   rest.evidence = std::make_shared<const Evidence>(
       Evidence{std::move(study), std::move(nuisances), std::move(blocks), std::move(base)});
   return rest;
+}
+
+bool DiagnosisRequest::excluded(const std::string& effect) const {
+  const std::span<const Effect> known = table().effects();
+  return std::find(options.excluded.begin(), options.excluded.end(), effect) !=
+             options.excluded.end() ||
+         std::none_of(known.begin(), known.end(),
+                      [&](const Effect& e) { return e.name == effect; });
+}
+
+bool DiagnosisRequest::looks_for(const std::string& effect, Looks look) const {
+  return (subject.looks & look) != 0 && !excluded(effect);
+}
+
+bool DiagnosisRequest::has_paths() const {
+  return !problem.external || (problem.external->table.declaration().inputs & kExternalPath) != 0;
+}
+
+double DiagnosisRequest::frame_of(const std::string& key, const Overrides& at) const {
+  const Parameter& p = table()[table().row(key)];
+  const WorldPlace* place = place_of(*subject.effects, p);
+  if (place == nullptr) return 0;
+  if (place->axis >= 0) return frame_m[place->axis];
+  const auto axis = at.find(table().row(p.effect + ".axis"));
+  return axis != at.end() && axis->second != 0 ? frame_m.y() : frame_m.x();
+}
+
+// A late camera reads a pose before the motion has ended; the next reading shows it.
+Result<Explanation> look_for_late_readings(const DiagnosisRequest& of, Explanation partial) {
+  const Study& study = partial.study();
+  if ((of.subject.looks & kLooksForLateReadings) == 0 || study.gaps.size() < kFewestGaps)
+    return partial;
+  const auto velocity = end_velocities(of, study);
+  if (!velocity) return velocity.error();
+  if (velocity->empty()) return partial;
+  partial.latency = fit_latency(study, *velocity);
+  if (partial.latency.gain < kLeastLatencyGain) return partial;
+  if (of.excluded("pose_latency")) {
+    partial.odd_readings =
+        "Of some readings the next one says that the robot was still under way: nothing that could "
+        "explain them was looked for.";
+    return partial;
+  }
+  auto right = put_late_readings_right(of, std::move(partial), *velocity);
+  if (!right) return right;
+  Signature s;
+  s.effect = "pose_latency";
+  std::vector<Eigen::Vector3d> late;
+  for (const ResidualTrial& t : right->study().trials) late.push_back(t.late);
+  s.columns = right->study().whiten(late);
+  s.fixed = {{"pose_latency.share", right->latency.share},
+             {"pose_latency.latency", right->latency_from_rest_s}};
+  right->first.push_back(std::move(s));
+  return right;
+}
+
+Result<Explanation> look_for_lag(const DiagnosisRequest& of, Explanation partial) {
+  if (!of.looks_for("motor_lag", kLooksForLag) || !of.has_paths()) return partial;
+  auto lag = fit_path_lag(of.predictor, partial.study());
+  if (!lag && lag.error().code == ErrorCode::kSimulation) {
+    of.predictor.exclude("motor_lag");
+    return partial;
+  }
+  if (!lag) return lag.error();
+  partial.lag = *lag;
+  if (partial.lag.gain < kLeastLagGain) partial.lag.gain = 0;
+  return partial;
 }
 
 }  // namespace gapfarm::steps

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "master/diagnose/correction/outlier_fit.h"
-#include "master/diagnose/places/slip_places.h"
+#include "master/diagnose/evidence/slip.h"
 #include "master/diagnose/steps/steps.h"
 
 namespace gapfarm::steps {

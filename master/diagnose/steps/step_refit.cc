@@ -4,6 +4,7 @@
 #include <cmath>
 #include <set>
 
+#include "common/base/try.h"
 #include "common/math/statistics.h"
 #include "master/diagnose/evidence/noise.h"
 #include "master/diagnose/steps/step_parts.h"
@@ -37,10 +38,9 @@ Result<std::vector<NestedFit>> nested_fits(const DiagnosisRequest& of, const Exp
   std::vector<NestedFit> nested;
   if (named.as_logged) {
     const Study& logged = *named.as_logged;
-    auto fit = fit_jointly(of.predictor, logged, {}, logged.base, BaseParameters::kFitted, none,
-                           base_rounds);
-    if (!fit) return fit.error();
-    nested.push_back(nested_fit(of, "the tuned base", std::move(*fit), logged, logged, folds));
+    ASSIGN_OR_RETURN(auto fit, fit_jointly(of.predictor, logged, {}, logged.base,
+                                           BaseParameters::kFitted, none, base_rounds));
+    nested.push_back(nested_fit(of, "the tuned base", std::move(fit), logged, logged, folds));
   }
   std::set<std::string> names;
   std::vector<EffectCandidate> effects;
@@ -57,16 +57,16 @@ Result<std::vector<NestedFit>> nested_fits(const DiagnosisRequest& of, const Exp
       if (!alone && (effect.empty() || names.count(effect))) start[row] = value;
     }
     const Study& fitted_in = alone ? study : beside;
-    auto fit = fit_jointly(of.predictor, fitted_in, effects, start, BaseParameters::kFitted, none,
-                           alone ? base_rounds : kMostRounds);
-    if (!fit) return fit.error();
+    ASSIGN_OR_RETURN(auto fit,
+                     fit_jointly(of.predictor, fitted_in, effects, start, BaseParameters::kFitted,
+                                 none, alone ? base_rounds : kMostRounds));
     std::string name =
         named.as_logged ? "the tuned base, late readings put right" : "the tuned base";
     for (std::size_t k = 0; k < effects.size(); ++k) {
       name += (k == 0 ? ", " : " and ") + effects[k].signature.effect;
     }
-    Study scored_in = alone ? study : study_beside(named, *fit);
-    nested.push_back(nested_fit(of, name, std::move(*fit), fitted_in, std::move(scored_in), folds));
+    Study scored_in = alone ? study : study_beside(named, fit);
+    nested.push_back(nested_fit(of, name, std::move(fit), fitted_in, std::move(scored_in), folds));
   }
   return nested;
 }
@@ -109,10 +109,9 @@ Result<Refit> with_correction(const DiagnosisRequest& of, const Screening& scree
                                    study, std::move(scored_in), folds);
   if (!clearly_better(corrected.scores, refit.nested.back().scores)) return refit;
   refit.nested.push_back(std::move(corrected));
-  refit.correction =
-      "model.toml holds " + name +
-      " as a correction: held-out trials are predicted better so, but too much is left to call it "
-      "the cause.";
+  refit.correction = "model.toml holds " + name +
+                     " as a correction: held-out trials are predicted better so, but too much is "
+                     "left to call it the cause.";
   refit.judged.cautions.push_back(refit.correction);
   return refit;
 }
@@ -188,10 +187,9 @@ Result<Refit> refit(const DiagnosisRequest& of, const Evidence& measured,
   Explanation& named = refit.judged.named;
   const std::size_t found = named.chosen.size();
   if (found > 0) {
-    auto fit = estimate(of, *screening.catalogue, named, candidates_of(named.chosen),
-                        named.estimates ? 1 : 2);
-    if (!fit) return fit.error();
-    named.estimates = std::move(*fit);
+    ASSIGN_OR_RETURN(auto fit, estimate(of, *screening.catalogue, named,
+                                        candidates_of(named.chosen), named.estimates ? 1 : 2));
+    named.estimates = std::move(fit);
     emit_fit(of, *named.estimates);
   }
   const std::vector<std::size_t> folds = of.subject.folds(named.study());
@@ -204,16 +202,14 @@ Result<Refit> refit(const DiagnosisRequest& of, const Evidence& measured,
     auto idle = of_no_use(refit.judged, refit.nested, std::nullopt, were_last);
     if (!idle) {
       if (!named.chosen.empty()) {
-        auto fit = estimate_beside(of, named, refit.nested.back());
-        if (!fit) return fit.error();
-        named.estimates = std::move(*fit);
+        ASSIGN_OR_RETURN(auto fit, estimate_beside(of, named, refit.nested.back()));
+        named.estimates = std::move(fit);
       }
       if (named.chosen.size() < found) {
         refit.judged = judge_again(of, *screening.catalogue, std::move(refit.judged));
       }
-      auto corrected = with_correction(of, screening, std::move(refit), folds);
-      if (!corrected) return corrected;
-      refit = with_floor(of, std::move(*corrected), folds);
+      ASSIGN_OR_RETURN(auto corrected, with_correction(of, screening, std::move(refit), folds));
+      refit = with_floor(of, std::move(corrected), folds);
       idle = of_no_use(refit.judged, refit.nested, refit.floor, were_last);
     }
     if (!idle) break;

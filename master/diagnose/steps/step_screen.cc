@@ -3,10 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/base/try.h"
 #include "common/math/digits.h"
 #include "common/math/laws.h"
 #include "master/diagnose/evidence/noise.h"
-#include "master/diagnose/places/patch_places.h"
+#include "master/diagnose/fit/signatures.h"
 #include "master/diagnose/steps/step_parts.h"
 #include "master/diagnose/steps/watch.h"
 
@@ -176,9 +177,8 @@ Result<Screening> look_for_all(const DiagnosisRequest& of, Explanation partial) 
   Explanation differ =
       look_for_session_gains(of, *found, study.unwhiten(study.whitened_residuals()));
   if (!differ.names_session_gains()) return look_beside_readings(of, *found);
-  auto measured = measure(of, differ.study());
-  if (!measured) return measured.error();
-  differ.evidence = std::make_shared<const Evidence>(std::move(*measured));
+  ASSIGN_OR_RETURN(auto measured, measure(of, differ.study()));
+  differ.evidence = std::make_shared<const Evidence>(std::move(measured));
   auto screening = look_beside_readings(of, differ);
   if (screening && !sessions_still_differ(of, screening->found)) {
     return look_beside_readings(of, *found);
@@ -231,10 +231,9 @@ Result<std::unique_ptr<Proposals>> marks_of(const DiagnosisRequest& of, const Ex
   std::vector<std::string> excluded = of.options.excluded;
   if (found.lag.trials > 0) excluded.emplace_back("motor_lag");
   const Evidence& evidence = *found.evidence;
-  auto signatures = of.subject.signatures(of.predictor, evidence.study, excluded);
-  if (!signatures) return signatures.error();
-  for (Signature& s : *signatures) evidence.study.drop_ignored(s.columns);
-  auto marks = std::make_unique<Proposals>(of.predictor, evidence.study, std::move(*signatures),
+  ASSIGN_OR_RETURN(auto signatures, of.subject.signatures(of.predictor, evidence.study, excluded));
+  for (Signature& s : signatures) evidence.study.drop_ignored(s.columns);
+  auto marks = std::make_unique<Proposals>(of.predictor, evidence.study, std::move(signatures),
                                            evidence.base);
   marks->exclude({of.options.excluded.begin(), of.options.excluded.end()});
   if (!of.excluded(kPatchEffect)) marks->look_for_patches();
@@ -303,9 +302,8 @@ Result<JointFit> estimate(const DiagnosisRequest& of, const Proposals& catalogue
   const Eigen::MatrixXd& nuisances = partial.evidence->nuisances;
   auto fit = fit_jointly(of.predictor, study, effects, start, base, nuisances, rounds);
   if (!fit) return fit;
-  const auto moved = move_seams(of.predictor, study, nuisances, &*fit);
-  if (!moved) return moved.error();
-  if (!*moved) return fit;
+  ASSIGN_OR_RETURN(const auto moved, move_seams(of.predictor, study, nuisances, &*fit));
+  if (!moved) return fit;
   return fit_jointly(of.predictor, study, effects, fit->at, base, nuisances, rounds);
 }
 

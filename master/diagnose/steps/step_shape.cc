@@ -4,13 +4,12 @@
 #include <cmath>
 
 #include "common/math/statistics.h"
-#include "common/score/logged_motions.h"
+#include "common/score/motion_model.h"
 #include "master/diagnose/conclusions/findings.h"
 #include "master/diagnose/conclusions/report_parts.h"
 #include "master/diagnose/correction/fit.h"
+#include "master/diagnose/effect_diagnosis.h"
 #include "master/diagnose/evidence/noise.h"
-#include "master/diagnose/evidence/tail_noise.h"
-#include "master/diagnose/fit/intervals.h"
 #include "master/diagnose/steps/step_parts.h"
 
 namespace gapfarm::steps {
@@ -64,8 +63,8 @@ ResidualField in_world(ResidualField field, const Eigen::Vector2d& origin) {
 
 std::string residual_sentence(const FoundResidual& found) {
   if (found.correction.empty()) {
-    return "Corrections of what is left were tried, smooth ones and of single outlier drives; "
-           "none helps significantly on trials that no fit saw, so none is kept.";
+    return "Corrections of what is left were tried, smooth ones and of single outlier drives; none "
+           "helps significantly on trials that no fit saw, so none is kept.";
   }
   std::vector<std::string> terms;
   for (const ResidualTerm& term : found.correction.field) terms.push_back(term_text(term));

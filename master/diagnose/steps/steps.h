@@ -9,18 +9,38 @@
 #include <string>
 #include <vector>
 
-#include "master/diagnose/conclusions/verdict.h"
+#include "master/diagnose/conclusions/findings.h"
+#include "master/diagnose/diagnose.h"
 #include "master/diagnose/evidence/covariates.h"
 #include "master/diagnose/evidence/latency.h"
-#include "master/diagnose/evidence/path_lag.h"
+#include "master/diagnose/evidence/session_gains.h"
 #include "master/diagnose/evidence/slip.h"
-#include "master/diagnose/evidence/spread_row.h"
 #include "master/diagnose/fit/estimate.h"
 #include "master/diagnose/fit/proposals.h"
-#include "master/diagnose/steps/diagnosis_request.h"
 #include "master/diagnose/study.h"
+#include "master/diagnose/subject.h"
+#include "master/infer/predictor.h"
 
 namespace gapfarm::steps {
+
+struct DiagnosisRequest {
+  Farm& farm;
+  Predictor& predictor;
+  const Problem& problem;  // its log in its own frame
+  const DiagnosisSubject& subject;
+  const DiagnoseOptions& options;
+  Eigen::Vector2d frame_m;  // of the log in the world
+
+  const ParameterTable& table() const { return problem.table(); }
+  double outlier_share() const { return problem.fitness.outlier_share; }
+  // As asked, or because the scenario's table has no such effect.
+  bool excluded(const std::string& effect) const;
+  bool looks_for(const std::string& effect, Looks look) const;
+  // Whether there are poses on the way to be had: some programs answer where a drive ends alone.
+  bool has_paths() const;
+  // Of a table key that is a place along a world axis: how far the log's frame lies along it.
+  double frame_of(const std::string& key, const Overrides& at) const;
+};
 
 // A log beside the tuned base, whitened by its noise, with what no effect may claim.
 struct Evidence {

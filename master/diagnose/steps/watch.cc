@@ -185,8 +185,7 @@ void emit_verdict(const DiagnosisRequest& of, const Judgement& judged) {
   finding.text =
       has_warnings || finding.rows.empty()
           ? "Nothing is left that chance does not explain."
-          : "Beside what was chosen the ends still depend on something, more than chance "
-            "explains.";
+          : "Beside what was chosen the ends still depend on something, more than chance explains.";
   if (has_warnings) finding.text = "Not looked at: the base is in question.";
   of.options.on_finding(std::move(finding));
 }
@@ -199,11 +198,10 @@ void emit_gaps(const DiagnosisRequest& of, const std::vector<NestedFit>& nested)
   for (const NestedFit& n : nested) {
     finding.rows.emplace_back(n.name, three_digits(perfect - mean(n.scores)));
   }
-  finding.text =
-      nested.size() == 1
-          ? "No effect is left beside the base, which trials that a fit did not see miss "
-            "by so much:"
-          : "On trials that a fit did not see, one effect after the other:";
+  finding.text = nested.size() == 1
+                     ? "No effect is left beside the base, which trials that a fit did not see "
+                       "miss by so much:"
+                     : "On trials that a fit did not see, one effect after the other:";
   of.options.on_finding(std::move(finding));
 }
 

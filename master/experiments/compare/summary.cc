@@ -1,8 +1,15 @@
 #include "master/experiments/compare/summary.h"
 
+#include <spdlog/fmt/fmt.h>
+
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+
+#include "common/trials/text/csv.h"
+#include "master/report/figures/line_chart.h"
+#include "master/report/html.h"
+#include "master/report/page_frame.h"
 
 namespace gapfarm {
 namespace {
@@ -93,6 +100,90 @@ void add_ranks(const std::vector<std::vector<double>>& blocks, ComparisonSummary
   }
 }
 
+std::string range_text(double lower, double upper) {
+  return number_text(lower) + " to " + number_text(upper);
+}
+
+LineChart convergence_chart(const ComparisonSummary& summary) {
+  LineChart chart;
+  chart.title = "Best so far: median over seeds, band between the quartiles";
+  chart.x_title = "evaluations";
+  chart.y_title =
+      summary.fitness + (summary.higher_is_better ? ", higher is better" : ", lower is better");
+  chart.log_x = true;
+  bool positive = !summary.higher_is_better;
+  std::vector<double> starts;
+  for (const VariantSummary& v : summary.variants) {
+    ChartSeries series;
+    series.name = v.name;
+    for (const ConvergencePoint& point : v.convergence) {
+      if (!point.median) continue;
+      const auto x = static_cast<double>(point.evaluations);
+      series.line.push_back({x, *point.median});
+      series.lower.push_back({x, point.quartiles.lower});
+      series.upper.push_back({x, point.quartiles.upper});
+      positive = positive && point.quartiles.lower > 0;
+    }
+    chart.series.push_back(std::move(series));
+  }
+  // A cost that nears zero is distinguished on a log scale only.
+  chart.log_y = positive;
+  for (const Baseline& baseline : summary.baselines) {
+    if (baseline.fitness) chart.levels.push_back({baseline.name, *baseline.fitness});
+  }
+  if (summary.target) chart.levels.push_back({"target", *summary.target});
+  return chart;
+}
+
+void add_results(const ComparisonSummary& summary, PlainPage& page) {
+  std::vector<std::string> header = {"variant", "median", "95 % of it", "mean rank"};
+  if (summary.target) {
+    header.insert(header.end(),
+                  {"success", "95 % of it", "median to target", "expected to target"});
+  }
+  std::vector<std::vector<std::string>> rows;
+  for (const VariantSummary& v : summary.variants) {
+    rows.push_back({v.name, number_text(v.median), range_text(v.median_95.lower, v.median_95.upper),
+                    number_text(v.mean_rank)});
+    if (!summary.target) continue;
+    const auto count = [](const std::optional<double>& value) {
+      return value ? number_text(std::round(*value), 4) : std::string("–");
+    };
+    rows.back().insert(rows.back().end(), {fmt::format("{} of {}", v.successes, summary.seeds),
+                                           percent_text(v.success_95.lower) + " to " +
+                                               percent_text(v.success_95.upper),
+                                           count(v.median_to_target), count(v.expected_to_target)});
+  }
+  for (const Baseline& baseline : summary.baselines) {
+    rows.push_back({baseline.name, baseline.fitness ? number_text(*baseline.fitness) : "–"});
+    rows.back().resize(header.size());
+  }
+  page.table(header, rows);
+}
+
+void add_ranks(const ComparisonSummary& summary, PlainPage& page) {
+  if (summary.variants.size() < 2) return;
+  page.heading("Which differences are more than luck");
+  page.paragraph(
+      fmt::format("Friedman's test over seeds asks whether all variants are alike: chi-square {}, "
+                  "p = {}. The table holds Mann-Whitney p-values of the final fitness of two "
+                  "variants, adjusted by Holm for the number of pairs.",
+                  number_text(summary.all.statistic), p_text(summary.all.p)));
+  std::vector<std::string> header = {""};
+  std::vector<std::vector<std::string>> rows;
+  for (std::size_t a = 0; a < summary.variants.size(); ++a) {
+    header.push_back(summary.variants[a].name);
+    rows.push_back({summary.variants[a].name});
+    for (std::size_t b = 0; b < summary.variants.size(); ++b) {
+      rows.back().push_back(a == b ? "" : p_text(summary.pair_p[a][b]));
+    }
+  }
+  page.table(header, rows);
+}
+
+std::string number(double value) { return std::isfinite(value) ? fmt::format("{}", value) : ""; }
+std::string number(const std::optional<double>& value) { return value ? number(*value) : ""; }
+
 }  // namespace
 
 std::optional<std::uint64_t> evaluations_to(const ComparedRun& run, double target,
@@ -147,6 +238,116 @@ ComparisonSummary summarise_comparison(std::span<const Variant> variants,
   }
   add_ranks(blocks, &summary);
   return summary;
+}
+
+std::string comparison_page(const ComparisonSummary& summary, const std::string& title,
+                            const std::vector<std::pair<std::string, std::string>>& provenance) {
+  PlainPage page(title);
+  page.paragraph(
+      fmt::format("{} variants, {} seeds each, {} evaluations a run. Fitness: {}, {} is better.",
+                  summary.variants.size(), summary.seeds, summary.evaluations, summary.fitness,
+                  summary.higher_is_better ? "higher" : "lower"));
+  const LineChart chart = convergence_chart(summary);
+  page.picture(line_chart(chart), chart.title);
+  page.heading(fmt::format("After {} evaluations", summary.evaluations));
+  add_results(summary, page);
+  if (summary.target) {
+    page.paragraph(
+        fmt::format("Target: {}. Expected to target: evaluations that all runs spent until they "
+                    "reached it or ended, divided by the number of runs that reached it.",
+                    number_text(*summary.target, 4)));
+  }
+  add_ranks(summary, page);
+  page.heading("Inputs");
+  std::vector<std::vector<std::string>> rows;
+  for (const auto& [key, value] : provenance) rows.push_back({key, value});
+  page.table({"", ""}, rows);
+  return page.finish();
+}
+
+std::string comparison_text(const ComparisonSummary& summary) {
+  std::size_t width = 20;
+  for (const VariantSummary& v : summary.variants) width = std::max(width, v.name.size());
+  std::string text = fmt::format("{:<{}}  {:>10}  {:>22}  {:>5}", summary.fitness, width, "median",
+                                 "95 % of the median", "rank");
+  if (summary.target) text += fmt::format("  {:>9}  {:>9}  {:>9}", "success", "median to", "ERT");
+  text += "\n";
+  for (const VariantSummary& v : summary.variants) {
+    text += fmt::format("{:<{}}  {:>10.4g}  {:>22}  {:>5.2f}", v.name, width, v.median,
+                        fmt::format("{:.4g} to {:.4g}", v.median_95.lower, v.median_95.upper),
+                        v.mean_rank);
+    if (summary.target) {
+      const auto whole = [](const std::optional<double>& value) {
+        return value ? fmt::format("{:.0f}", *value) : std::string("-");
+      };
+      text += fmt::format("  {:>9}  {:>9}  {:>9}", fmt::format("{}/{}", v.successes, summary.seeds),
+                          whole(v.median_to_target), whole(v.expected_to_target));
+    }
+    text += "\n";
+  }
+  for (const Baseline& baseline : summary.baselines) {
+    text += fmt::format("{:<{}}  {:>10}\n", baseline.name, width,
+                        baseline.fitness ? fmt::format("{:.4g}", *baseline.fitness) : "-");
+  }
+  if (summary.variants.size() > 1) {
+    text += fmt::format("all alike? Friedman over seeds: chi-square {:.3g}, p = {:.2g}\n",
+                        summary.all.statistic, summary.all.p);
+  }
+  return text;
+}
+
+std::string summary_csv(const ComparisonSummary& summary) {
+  std::string text =
+      "variant,runs,median,median_low_95,median_high_95,mean_rank,successes,success_low_95,success_"
+      "high_95,median_evaluations_to_target,expected_evaluations_to_target";
+  for (const VariantSummary& v : summary.variants) text += "," + csv_field("p_holm " + v.name);
+  text += "\n";
+  for (std::size_t i = 0; i < summary.variants.size(); ++i) {
+    const VariantSummary& v = summary.variants[i];
+    text += fmt::format("{},{},{},{},{},{},", csv_field(v.name), summary.seeds, number(v.median),
+                        number(v.median_95.lower), number(v.median_95.upper), v.mean_rank);
+    if (summary.target) {
+      text += fmt::format("{},{},{},{},{}", v.successes, v.success_95.lower, v.success_95.upper,
+                          number(v.median_to_target), number(v.expected_to_target));
+    } else {
+      text += ",,,,";
+    }
+    for (const double p : summary.pair_p[i]) text += "," + number(p);
+    text += "\n";
+  }
+  const std::string blanks(9 + summary.variants.size(), ',');
+  for (const Baseline& baseline : summary.baselines) {
+    text += csv_field(baseline.name) + ",," + number(baseline.fitness) + blanks.substr(1) + "\n";
+  }
+  return text;
+}
+
+std::string runs_csv(const ComparisonSummary& summary, const std::vector<ComparedRun>& runs) {
+  std::string text = "variant,seed,evaluations,best,evaluations_to_target\n";
+  for (const ComparedRun& run : runs) {
+    const auto reached = summary.target
+                             ? evaluations_to(run, *summary.target, summary.higher_is_better)
+                             : std::nullopt;
+    text += fmt::format("{},{},{},{},{}\n", csv_field(summary.variants[run.variant].name), run.seed,
+                        run.evaluations,
+                        run.improvements.empty() ? "" : number(run.improvements.back().fitness),
+                        reached ? std::to_string(*reached) : "");
+  }
+  return text;
+}
+
+std::string convergence_csv(const ComparisonSummary& summary) {
+  std::string text =
+      "variant,evaluations,median,median_low_95,median_high_95,quartile_1,quartile_3\n";
+  for (const VariantSummary& v : summary.variants) {
+    for (const ConvergencePoint& point : v.convergence) {
+      if (!point.median) continue;
+      text += fmt::format("{},{},{},{},{},{},{}\n", csv_field(v.name), point.evaluations,
+                          *point.median, point.median_95.lower, point.median_95.upper,
+                          point.quartiles.lower, point.quartiles.upper);
+    }
+  }
+  return text;
 }
 
 }  // namespace gapfarm

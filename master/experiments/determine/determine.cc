@@ -326,8 +326,7 @@ std::string determine_text(const DetermineReport& report, const ParameterTable& 
         "the likelihood rises beyond the box: the model is not at its maximum, evolve further\n";
   }
   text += fmt::format(
-      "{} evaluations, {} failed; the simulation scatters by {:.2g} nats about the "
-      "quadratic\n",
+      "{} evaluations, {} failed; the simulation scatters by {:.2g} nats about the quadratic\n",
       report.evaluations, report.failures, report.roughness);
   return text;
 }

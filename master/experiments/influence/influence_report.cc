@@ -57,8 +57,7 @@ std::vector<ChartBar> bars_of(const InfluenceReport& report, const ParameterTabl
 std::string influence_text(const InfluenceReport& report, const ParameterTable& table) {
   std::string text = fmt::format(
       "paths are compared over the first {:.3g} s, where repeats of the standard are {:.3g} m "
-      "apart "
-      "(95 %: {})\n\n{:<24} {:>9} {:>20} {:>9} {:>8}   {:>9} {:>20} {:>9} {:>8}\n",
+      "apart (95 %: {})\n\n{:<24} {:>9} {:>20} {:>9} {:>8}   {:>9} {:>20} {:>9} {:>8}\n",
       report.horizon_s, report.repeat_distance, interval_text(report.repeat_95), "alone: m further",
       "median", "95 %", "at", "p", "Morris", "95 %", "sigma", "p");
   for (const FactorInfluence& f : report.factors) {
@@ -74,9 +73,9 @@ std::string influence_text(const InfluenceReport& report, const ParameterTable& 
 
 std::string influence_csv(const InfluenceReport& report, const ParameterTable& table) {
   std::string text =
-      "parameter,lower,upper,alone_value,alone_distance_m,alone_low_95,alone_high_95,alone_p,"
-      "alone_influential,alone_failures,morris_mean_m,morris_low_95,morris_high_95,morris_sigma_m,"
-      "morris_p,morris_influential,morris_failures,repeat_distance_m,horizon_s\n";
+      "parameter,lower,upper,alone_value,alone_distance_m,alone_low_95,alone_high_95,alone_p,alone_"
+      "influential,alone_failures,morris_mean_m,morris_low_95,morris_high_95,morris_sigma_m,morris_"
+      "p,morris_influential,morris_failures,repeat_distance_m,horizon_s\n";
   for (const FactorInfluence& f : report.factors) {
     text += fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n",
                         table[f.gene.row].key, f.gene.lower, f.gene.upper, f.alone.value,
@@ -95,8 +94,7 @@ std::string influence_page(const InfluenceReport& report, const ParameterTable& 
   page.paragraph(fmt::format(
       "Distances between paths ({}) over the first {} s. A parameter counts as influential when it "
       "moves the path further than repeating the run does: Mann-Whitney test, adjusted by Holm "
-      "over "
-      "the parameters, level {}.",
+      "over the parameters, level {}.",
       path_distances()[settings.distance].name, number_text(report.horizon_s), settings.alpha));
   page.heading("How far ahead paths can be compared");
   page.paragraph(

@@ -7,7 +7,7 @@
 #include "common/base/suggest.h"
 #include "common/base/try.h"
 #include "master/diagnose/subject.h"
-#include "master/experiments/plan/selection.h"
+#include "master/experiments/plan/visibility.h"
 #include "master/farm/planned_trials.h"
 
 namespace gapfarm::plan {
@@ -99,8 +99,8 @@ Status Designer::choose_effects(DesignedPlan* plan) {
   }
   if (effects_.empty()) {
     return Error{
-        "none of these effects moves where a trial ends, so no plan shows them better "
-        "than another; name others with --effects"};
+        "none of these effects moves where a trial ends, so no plan shows them better than "
+        "another; name others with --effects"};
   }
   std::sort(effects_.begin(), effects_.end());
   effects_.erase(std::unique(effects_.begin(), effects_.end()), effects_.end());
@@ -187,12 +187,11 @@ Result<std::vector<Chain>> Designer::choose() {
   std::vector<Chain> chosen;
   const std::size_t wanted = (settings_.trials + chain() - 1) / chain();
   if (chains.size() < wanted) {
-    return Error{"only " + std::to_string(chains.size()) + " of " +
-                 std::to_string(wanted * settings_.pool) + " chains of " + std::to_string(chain()) +
-                 " drives stay on a floor of " + std::to_string(config_.simulate.arena_m) +
-                 " m, and " + std::to_string(wanted) +
-                 " are wanted; give more --place, a shorter --chain or --durations, or a greater "
-                 "--pool"};
+    return Error{
+        "only " + std::to_string(chains.size()) + " of " + std::to_string(wanted * settings_.pool) +
+        " chains of " + std::to_string(chain()) + " drives stay on a floor of " +
+        std::to_string(config_.simulate.arena_m) + " m, and " + std::to_string(wanted) +
+        " are wanted; give more --place, a shorter --chain or --durations, or a greater --pool"};
   }
   for (const std::size_t c : select(candidates, nuisances, wanted)) chosen.push_back(chains[c]);
   return chosen;

@@ -1,18 +1,52 @@
 #include "master/experiments/plan/visibility.h"
 
+#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <map>
 
 #include "common/base/try.h"
+#include "common/math/laws.h"
 #include "common/math/statistics.h"
 #include "common/random/stream.h"
 #include "master/diagnose/subject.h"
-#include "master/experiments/plan/selection.h"
 #include "master/infer/predictor.h"
 
 namespace gapfarm::plan {
 namespace {
+
+// log det(I + X'X) as rows are added to X.
+class LogDeterminant {
+ public:
+  explicit LogDeterminant(Eigen::Index unknowns)
+      : inverse_(Eigen::MatrixXd::Identity(unknowns, unknowns)) {}
+
+  // What `rows` would add: log det(I + R M^-1 R').
+  double gain(const Eigen::Ref<const Rows>& rows) const {
+    const Eigen::LLT<Eigen::MatrixXd> lower(inner(rows));
+    return 2 * lower.matrixLLT().diagonal().array().log().sum();
+  }
+
+  void add(const Eigen::Ref<const Rows>& rows) {
+    const Eigen::MatrixXd right = rows * inverse_;
+    inverse_ -= right.transpose() * inner(rows).llt().solve(right);
+  }
+
+ private:
+  Eigen::MatrixXd inner(const Eigen::Ref<const Rows>& rows) const {
+    return Eigen::MatrixXd::Identity(rows.rows(), rows.rows()) + rows * inverse_ * rows.transpose();
+  }
+
+  Eigen::MatrixXd inverse_;  // of I + X'X
+};
+
+// (I + Z Z')^-1 v
+Eigen::VectorXd beyond(const Eigen::VectorXd& v, const Eigen::MatrixXd& nuisances) {
+  if (nuisances.cols() == 0) return v;
+  const Eigen::MatrixXd inner = Eigen::MatrixXd::Identity(nuisances.cols(), nuisances.cols()) +
+                                nuisances.transpose() * nuisances;
+  return v - nuisances * inner.llt().solve(nuisances.transpose() * v);
+}
 
 constexpr double kPower = 0.9;
 constexpr int kMostHalvings = 4;  // where the robot cannot be simulated at the first strength
@@ -214,6 +248,51 @@ double mean_power(const Problem& problem, const Signals& signals,
     }
   }
   return count == 0 ? 0 : sum / static_cast<double>(count);
+}
+
+std::vector<std::size_t> select(const std::vector<Rows>& candidates, Eigen::Index nuisances,
+                                std::size_t wanted) {
+  std::vector<std::size_t> chosen;
+  if (candidates.empty()) return chosen;
+  LogDeterminant all(candidates.front().cols()), allowed(nuisances);
+  std::vector<bool> taken(candidates.size());
+  while (chosen.size() < std::min(wanted, candidates.size())) {
+    std::size_t best = candidates.size();
+    double most = 0;
+    for (std::size_t c = 0; c < candidates.size(); ++c) {
+      if (taken[c]) continue;
+      const double gain =
+          all.gain(candidates[c]) - allowed.gain(candidates[c].rightCols(nuisances));
+      if (best < candidates.size() && gain <= most) continue;
+      best = c;
+      most = gain;
+    }
+    taken[best] = true;
+    chosen.push_back(best);
+    all.add(candidates[best]);
+    allowed.add(candidates[best].rightCols(nuisances));
+  }
+  return chosen;
+}
+
+double information(const Eigen::VectorXd& shift, const Eigen::MatrixXd& nuisances) {
+  return std::max(0.0, shift.dot(beyond(shift, nuisances)));
+}
+
+double likeness(const Eigen::VectorXd& a, const Eigen::VectorXd& b,
+                const Eigen::MatrixXd& nuisances) {
+  const double lengths = information(a, nuisances) * information(b, nuisances);
+  return lengths > 0 ? std::clamp(a.dot(beyond(b, nuisances)) / std::sqrt(lengths), -1.0, 1.0) : 0;
+}
+
+double chance_of_exceeding(double threshold, double freedom, double noncentrality) {
+  return noncentrality <= 0 ? chi_squared_above(freedom, threshold)
+                            : noncentral_chi_squared_above(freedom, noncentrality, threshold);
+}
+
+double noncentrality_for(double power, double threshold, double freedom) {
+  if (chance_of_exceeding(threshold, freedom, 0) >= power) return 0;
+  return noncentrality_of(freedom, threshold, power);
 }
 
 }  // namespace gapfarm::plan

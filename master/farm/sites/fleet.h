@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "common/process/captured.h"
+#include "common/process/child.h"
 #include "gapfarm/v1/farm.pb.h"
 #include "master/farm/sites/autoscaler.h"
 #include "master/farm/sites/fleet_status.h"

@@ -5,7 +5,7 @@
 #include <memory>
 #include <optional>
 
-#include "common/base/host.h"
+#include "common/base/build_info.h"
 #include "common/base/try.h"
 #include "common/net/envelope.h"
 #include "common/net/master_wait.h"

@@ -7,7 +7,6 @@
 #include <set>
 
 #include "common/math/algebra.h"
-#include "common/math/bounded_minimum.h"
 #include "common/math/statistics.h"
 #include "master/ground/fit/window_prior.h"
 

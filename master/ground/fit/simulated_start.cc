@@ -1,11 +1,13 @@
+#include "master/ground/fit/simulated_start.h"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <optional>
 
+#include "common/base/try.h"
 #include "common/math/algebra.h"
 #include "common/score/kinematic_start.h"
-#include "master/ground/fit/kinematic_baseline.h"
 #include "master/ground/fit/simulation_fit.h"
 
 namespace gapfarm {
@@ -62,11 +64,10 @@ Status SimulationFit::settle(std::vector<std::optional<At>>* looks, const std::v
     whose.push_back(k);
     held.push_back(holds[k]);
   }
-  auto settled = look_at(genomes, held);
-  if (!settled) return settled.error();
+  ASSIGN_OR_RETURN(auto settled, look_at(genomes, held));
   for (std::size_t j = 0; j < whose.size(); ++j) {
     std::optional<At>& look = (*looks)[whose[j]];
-    if ((*settled)[j] && (*settled)[j]->nats > look->nats) look = std::move((*settled)[j]);
+    if (settled[j] && settled[j]->nats > look->nats) look = std::move(settled[j]);
   }
   return {};
 }
@@ -77,13 +78,12 @@ Result<std::vector<Climb>> SimulationFit::other_climbs(const Climb& first) {
   const auto starts = spread_starts(start_, untold_, kLooks * untold_.size());
   std::vector<Hold> holds;
   for (const Genome& start : starts) holds.push_back({start, 1});
-  auto looks = look_at(starts, holds);
-  if (!looks) return looks.error();
+  ASSIGN_OR_RETURN(auto looks, look_at(starts, holds));
   for (int round = 0; round < 2; ++round) {
-    if (Status s = settle(&*looks, holds, first); !s) return s.error();
+    if (Status s = settle(&looks, holds, first); !s) return s.error();
   }
-  for (std::size_t k = 0; k < looks->size(); ++k) {
-    std::optional<At>& look = (*looks)[k];
+  for (std::size_t k = 0; k < looks.size(); ++k) {
+    std::optional<At>& look = looks[k];
     if (look) climbs.push_back({std::move(*look), holds[k], {}, {}, {}, false});
   }
   std::stable_sort(climbs.begin(), climbs.end(),
@@ -106,11 +106,10 @@ Result<WindowEnds> SimulationFit::simulated_held_out(const Climb& climb) {
   for (const Eigen::VectorXd& step : steps) {
     genomes.push_back(with_fitted_values(climb.at.genome, fitted_values(climb.at.genome) - step));
   }
-  const auto there = look_at(genomes, {climb.hold});
-  if (!there) return there.error();
+  ASSIGN_OR_RETURN(const auto there, look_at(genomes, {climb.hold}));
   WindowEnds ends = held_out(climb, climb.hold);
   for (std::size_t i = 0; i < ends.size(); ++i) {
-    const std::optional<At>& at = (*there)[stretches_[i]];
+    const std::optional<At>& at = there[stretches_[i]];
     if (at) ends[i] = at->ends[i];
   }
   return ends;
@@ -237,16 +236,14 @@ Result<Climb> SimulationFit::weigh_worse(Climb best) {
 
 // Against the kinematics, whose values in the simulation are `begin` or, without slip, stand firm.
 Status SimulationFit::judge(const Climb& best, const At& begin, SimulatedStart* found) {
-  const auto met = simulated_held_out(best);
-  if (!met) return met.error();
-  const Predicted own = predicted(*met);
+  ASSIGN_OR_RETURN(const auto met, simulated_held_out(best));
+  const Predicted own = predicted(met);
   found->held_out_gain = own.gain;
   found->worst_ratio = own.worst;
   const WindowEnds ends = window_errors(problem_, kinematic_ends(problem_, kinematics_));
-  auto firm = look_at({firm_}, {Hold{firm_}});
-  if (!firm) return firm.error();
+  ASSIGN_OR_RETURN(auto firm, look_at({firm_}, {Hold{firm_}}));
   double least = own.cost;
-  for (const At& at : {begin, firm->front().value_or(begin)}) {
+  for (const At& at : {begin, firm.front().value_or(begin)}) {
     // What the simulation makes of the kinematics' values is nearly what they make of them.
     WindowEnds predicts = baseline_;
     for (std::size_t i = 0; i < ends.size(); ++i) predicts[i] += at.ends[i] - ends[i];
@@ -283,9 +280,8 @@ void SimulationFit::take_spread(const Climb& climb, double widest, SimulatedStar
 }
 
 Result<SimulatedStart> SimulationFit::run(double widest) {
-  const auto kinematics = fit_kinematics(problem_);
-  if (!kinematics) return kinematics.error();
-  kinematics_ = *kinematics;
+  ASSIGN_OR_RETURN(const auto kinematics, fit_kinematics(problem_));
+  kinematics_ = kinematics;
   std::vector<double> durations_s;
   for (const Trial& trial : problem_.log.trials) durations_s.push_back(*trial.duration_s);
   plain_.emplace(durations_s, window_errors(problem_, kinematic_ends(problem_, kinematics_)));
@@ -312,20 +308,39 @@ Result<SimulatedStart> SimulationFit::run(double widest) {
   if (Status s = step(&climbs.front()); !s) return s.error();
   found.simulations = simulations_;
   if (climbs.front().slopes.empty()) return found;
-  auto others = other_climbs(climbs.front());
-  if (!others) return others.error();
-  for (Climb& climb : *others) climbs.push_back(std::move(climb));
+  ASSIGN_OR_RETURN(auto others, other_climbs(climbs.front()));
+  for (Climb& climb : others) climbs.push_back(std::move(climb));
   found.starts = climbs.size();
-  const auto best = best_of(std::move(climbs));
-  if (!best) return best.error();
-  if (Status s = judge(*best, begin, &found); !s) return s.error();
+  ASSIGN_OR_RETURN(const auto best, best_of(std::move(climbs)));
+  if (Status s = judge(best, begin, &found); !s) return s.error();
   found.simulations = simulations_;
-  take_spread(*best, widest, &found);
+  take_spread(best, widest, &found);
   return found;
 }
 
 Result<SimulatedStart> fit_by_simulation(Farm& farm, const Problem& problem, double widest) {
   return SimulationFit(farm, problem).run(widest);
+}
+
+std::vector<Genome> spread_starts(const Genome& middle, std::span<const std::size_t> free,
+                                  std::size_t count) {
+  constexpr double kReach = 0.3;  // of a gene's range, either way
+  // The root of x^(d+1) = x + 1: its powers fill d dimensions most evenly (Roberts 2018).
+  double root = 1.5;
+  for (int k = 0; k < 60; ++k) {
+    root = std::pow(1 + root, 1 / (static_cast<double>(free.size()) + 1));
+  }
+  std::vector<Genome> starts(count, middle);
+  for (std::size_t k = 0; k < count; ++k) {
+    for (std::size_t d = 0; d < free.size(); ++d) {
+      const double turn =
+          0.5 + static_cast<double>(k + 1) * std::pow(root, -static_cast<double>(d + 1));
+      double& value = starts[k][free[d]];
+      value = std::abs(value + kReach * (2 * (turn - std::floor(turn)) - 1));  // bounds reflect
+      if (value > 1) value = 2 - value;
+    }
+  }
+  return starts;
 }
 
 }  // namespace gapfarm

@@ -2,8 +2,9 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
-#include "master/ground/fit/kinematic_baseline.h"
+#include "common/base/try.h"
 
 namespace gapfarm {
 namespace {
@@ -16,6 +17,20 @@ constexpr std::array<double, 3> kGreatDampings = {10, 100, 1000};
 constexpr std::size_t kStretches = 6;
 constexpr std::size_t kParts = 12;    // of the log, that show how sure a gain is
 constexpr double kFreelyMoves = 0.3;  // of a gene's range, where the windows do not show
+
+constexpr double kKinematicsFreely = 1;  // of gains, m, s, rad: far more than windows leave
+
+WindowSlopes slopes_of(const Problem& problem, const Kinematics& at, const WindowEnds& ends) {
+  WindowSlopes slopes(ends.size(), Eigen::MatrixXd(3, at.values.size()));
+  for (Eigen::Index k = 0; k < at.values.size(); ++k) {
+    Kinematics moved = at;
+    const double step = 1e-4 * std::max(1.0, std::abs(at.values[k]));
+    moved.values[k] += step;
+    const WindowEnds there = window_errors(problem, kinematic_ends(problem, moved));
+    for (std::size_t i = 0; i < ends.size(); ++i) slopes[i].col(k) = (there[i] - ends[i]) / step;
+  }
+  return slopes;
+}
 
 }  // namespace
 
@@ -44,11 +59,10 @@ Result<std::vector<std::optional<At>>> SimulationFit::look_at(const std::vector<
     predict->set_means_only(true);
   }
   simulations_ += tasks.size();
-  const auto results = farm_.run(hash_, tasks);
-  if (!results) return results.error();
+  ASSIGN_OR_RETURN(const auto results, farm_.run(hash_, tasks));
   std::vector<std::optional<At>> all;
   for (std::size_t k = 0; k < genomes.size(); ++k) {
-    const v1::TaskResult& result = (*results)[k];
+    const v1::TaskResult& result = results[k];
     all.emplace_back();
     if (result.outcome() != v1::OK) continue;
     std::vector<Pose> ends;
@@ -126,15 +140,14 @@ Status SimulationFit::look_round(Climb* climb) {
     double& value = genomes.back()[gene];
     value += value + kGeneStep > 1 ? -kGeneStep : kGeneStep;
   }
-  const auto beside = look_at(genomes, {climb->hold});
-  if (!beside) return beside.error();
-  climb->over = std::any_of(beside->begin(), beside->end(), [](const auto& b) { return !b; });
+  ASSIGN_OR_RETURN(const auto beside, look_at(genomes, {climb->hold}));
+  climb->over = std::any_of(beside.begin(), beside.end(), [](const auto& b) { return !b; });
   if (climb->over) return {};
   climb->sloped = at.genome;
   climb->slopes.assign(at.ends.size(),
                        Eigen::MatrixXd(3, static_cast<Eigen::Index>(fitted_rows_.size())));
   for (std::size_t k = 0; k < fitted_rows_.size(); ++k) {
-    const At& there = *(*beside)[k];
+    const At& there = *beside[k];
     const double step = there.genome[fitted_rows_[k]] - at.genome[fitted_rows_[k]];
     for (std::size_t i = 0; i < at.ends.size(); ++i) {
       climb->slopes[i].col(static_cast<Eigen::Index>(k)) = (there.ends[i] - at.ends[i]) / step;
@@ -168,10 +181,9 @@ Result<double> SimulationFit::try_steps(Climb* climb, std::span<const double> da
     damped.H.diagonal() *= 1 + damping;
     genomes.push_back(moved(climb->at, damped));
   }
-  auto tried = look_at(genomes, {climb->hold});
-  if (!tried) return tried.error();
+  ASSIGN_OR_RETURN(auto tried, look_at(genomes, {climb->hold}));
   const At before = climb->at;
-  for (std::optional<At>& there : *tried) {
+  for (std::optional<At>& there : tried) {
     if (there && there->nats > climb->at.nats) climb->at = std::move(*there);
   }
   correct_slopes(before, climb);
@@ -183,9 +195,8 @@ Result<double> SimulationFit::try_steps(Climb* climb, std::span<const double> da
 Status SimulationFit::step(Climb* climb) {
   if (!climb->slopes.empty() && climb->sloped != climb->at.genome) {
     make_equations(climb);
-    const auto gained = try_steps(climb, kDampings);
-    if (!gained) return gained.error();
-    if (*gained >= kEnoughNats) return {};
+    ASSIGN_OR_RETURN(const auto gained, try_steps(climb, kDampings));
+    if (gained >= kEnoughNats) return {};
   }
   if (Status s = look_round(climb); !s || climb->over) return s;
   make_equations(climb);
@@ -202,6 +213,24 @@ Status SimulationFit::climb_on(Climb* climb, int rounds) {
     if (Status s = step(climb); !s) return s;
   }
   return {};
+}
+
+WindowEnds window_errors(const Problem& problem, const std::vector<Pose>& predicted) {
+  WindowEnds ends;
+  for (std::size_t i = 0; i < predicted.size(); ++i) {
+    ends.push_back(local_difference(predicted[i], problem.log.trials[i].X_WE));
+  }
+  return ends;
+}
+
+WindowEnds kinematic_held_out(const Problem& problem, const Kinematics& fitted,
+                              const RobustErrors& errors, std::span<const std::size_t> stretches) {
+  const WindowEnds ends = window_errors(problem, kinematic_ends(problem, fitted));
+  const auto n = fitted.values.size();
+  const NormalEquations freely{
+      Eigen::MatrixXd::Identity(n, n) / (kKinematicsFreely * kKinematicsFreely),
+      Eigen::VectorXd::Zero(n)};
+  return held_out_ends(errors, ends, slopes_of(problem, fitted, ends), freely, stretches);
 }
 
 }  // namespace gapfarm

@@ -207,16 +207,14 @@ void report_wheel_loop(const WheelLoop& loop, bool against_reference, Diagnosis*
   const std::string speeds =
       against_reference
           ? fmt::format(
-                "the wheels run at {:.0f} % of their set speed, where the reference's loop "
-                "would at {:.0f} % ({:+.0f} % [{:+.0f}, {:+.0f}])",
+                "the wheels run at {:.0f} % of their set speed, where the reference's loop would "
+                "at {:.0f} % ({:+.0f} % [{:+.0f}, {:+.0f}])",
                 100 * loop.share, 100 * loop.expected, 100 * c.value, 100 * c.lo, 100 * c.hi)
           : fmt::format("the wheels run at {:.0f} % [{:.0f}, {:.0f}] of their set speed",
                         100 * loop.share, 100 * (1 + c.lo), 100 * (1 + c.hi));
   if (loop.gain < kLeastChangeGain) {
     diagnosis->cautions.push_back(
-        "From command to wheel nothing is off by more than a loop is by "
-        "itself: " +
-        speeds + ".");
+        "From command to wheel nothing is off by more than a loop is by itself: " + speeds + ".");
     return;
   }
   static const std::set<std::string> kFloors = {"floor", "wheel_slip", "friction_across"};

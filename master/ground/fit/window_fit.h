@@ -27,7 +27,7 @@ struct WindowSet {
 };
 
 // Blocks are runs, or stretches of them where there are fewer than ten.  Windows of robots with a
-// throttle restart (common/recordings/restart.h).  Errors: no window fits.
+// throttle restart (common/recordings/windows.h).  Errors: no window fits.
 Result<WindowSet> window_set(const GroundRobot& robot, const RunLog& log,
                              const WindowSettings& settings);
 

@@ -5,14 +5,11 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
-#include <tuple>
 
 #include "common/random/stream.h"
 #include "master/ground/fit/edge.h"
 #include "master/ground/report/ground_text.h"
-#include "master/ground/report/ground_verdict.h"
-#include "master/ground/report/ground_where.h"
-#include "master/ground/run_clocks.h"
+#include "master/ground/search.h"
 #include "master/ground/tolerances.h"
 
 namespace gapfarm {
@@ -134,8 +131,7 @@ void GroundReport::faults() {
     const double shrinks = std::exp(effect.gap_before / 3);
     effect.text = fmt::format(
         "The log is wrong in {}: put right, what the robot's file expects is {:.1f} times as near "
-        "to "
-        "what was measured. {}",
+        "to what was measured. {}",
         h.thing, shrinks, h.remedy);
     d_.sanity.push_back({h.name, effect.text, h.remedy, Severity::kNote, true, effect.aliases});
     d_.effects.push_back(std::move(effect));
@@ -204,8 +200,7 @@ void GroundReport::figures() {
   }
   if (robot_.measured && !search_.loop) {
     d_.cautions.push_back(
-        "Wheel speeds were measured: what lies before them (dead time, ramps) "
-        "cannot show.");
+        "Wheel speeds were measured: what lies before them (dead time, ramps) cannot show.");
   }
 }
 
@@ -231,10 +226,9 @@ void GroundReport::clocks() {
     runs += fmt::format("{}{:+.2f} s in run {}", runs.empty() ? "" : ", ", clock.delay_s,
                         search_.log.runs[clock.run].run);
   }
-  d_.cautions.push_back(
-      "The runs' clocks are apart: from command to pose it takes " + runs +
-      ". Each log's commands and poses need one clock; how late they are on the whole is no surer "
-      "than that.");
+  d_.cautions.push_back("The runs' clocks are apart: from command to pose it takes " + runs +
+                        ". Each log's commands and poses need one clock; how late they are on the "
+                        "whole is no surer than that.");
 }
 
 void GroundReport::screening() {

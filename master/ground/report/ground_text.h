@@ -2,8 +2,10 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "master/diagnose/result/diagnosis.h"
+#include "master/ground/fit/held_out.h"
 #include "master/ground/search.h"
 
 namespace gapfarm {
@@ -20,5 +22,43 @@ std::string text_of_value(const GroundRobot& robot, const GroundHypothesis& h,
 // "Friction across the wheels fell by 38 % [33, 43], from 0.71 to 0.44", without a full stop.
 std::string text_of_change(const GroundRobot& robot, const GroundHypothesis& h,
                            const NamedEffect& effect);
+
+// The verdict of a ground robot's diagnosis: a function of the figures that the report prints, and
+// of nothing else.
+
+struct GroundFigures {
+  int faults = 0;  // of the log, put right
+  std::vector<HeldOutGain>
+      named;  // of each name of a value, held out, in the order in which they were added
+  // What the best of everything that was tried (values that move within their tolerances, the best
+  // of the catalogue, every value free) would still gain, held out.
+  HeldOutGain closable;
+  std::string best_of_all = {};  // what that was: "floor_edge"
+};
+
+// Whether a value may be named: its gain's interval lies above 0.
+bool may_be_named(const HeldOutGain& gain);
+
+// Whether what is left lies within kToleratedGap, all of its interval.
+bool nothing_is_left(const GroundFigures& figures);
+
+// REQUIRES: every gain of `named` may be named.
+//   named or faults, nothing left     effect
+//   named or faults, something left   effect+unknown
+//   neither, nothing left             none
+//   neither, something left           unknown
+Verdict ground_verdict(const GroundFigures& figures);
+
+// What a verdict without names rests on, one sentence.
+std::string verdict_reason(const GroundFigures& figures);
+
+// One finding a component that holds a quarter of what could still be closed or more, largest
+// first: at which horizon it is largest, and from when on in the log, where one half holds it.
+std::vector<Where> where_left(const WindowFitter& fitter, const GroundSearch& search,
+                              const std::vector<double>& horizons_s);
+
+// Values that would move most, each more than two of its tolerances, were all of them free; empty:
+// none.  "separation by -3.1 %, lag by +0.05 s".
+std::string values_that_would_move(const GroundSearch& search);
 
 }  // namespace gapfarm

@@ -30,4 +30,10 @@ inline bool any_unusable(const std::vector<SanityFinding>& findings) {
   return false;
 }
 
+// "left and right are exchanged": what a finding means, for a headline.
+std::string finding_phrase(const SanityFinding& finding);
+
+// "unusable", "doubt", "note".
+const char* severity_name(Severity severity);
+
 }  // namespace gapfarm

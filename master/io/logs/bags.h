@@ -2,10 +2,49 @@
 // say what they left.  Errors: "FILE:BYTE: found ..., expected ...; remedy"; nothing is half-read.
 #pragma once
 
-#include "master/io/logs/byte_source.h"
+#include <cstdint>
+#include <fstream>
+#include <string>
+#include <string_view>
+
+#include "common/base/result.h"
 #include "master/io/logs/log_table.h"
 
 namespace gapfarm {
+
+class ByteSource {
+ public:
+  virtual ~ByteSource() = default;
+  virtual std::uint64_t size() const = 0;
+  // Exactly `count` bytes at `offset` into `to`; false where the file ends before.
+  virtual bool read(std::uint64_t offset, std::size_t count, std::string& to) = 0;
+};
+
+class MemorySource : public ByteSource {
+ public:
+  explicit MemorySource(std::string_view bytes) : bytes_(bytes) {}
+  std::uint64_t size() const override { return bytes_.size(); }
+  bool read(std::uint64_t offset, std::size_t count, std::string& to) override {
+    if (offset > bytes_.size() || bytes_.size() - offset < count) return false;
+    to.assign(bytes_.substr(offset, count));
+    return true;
+  }
+
+ private:
+  std::string_view bytes_;
+};
+
+class FileSource : public ByteSource {
+ public:
+  static Result<FileSource> open(const std::string& path);
+  std::uint64_t size() const override { return size_; }
+  bool read(std::uint64_t offset, std::size_t count, std::string& to) override;
+
+ private:
+  FileSource() = default;
+  std::ifstream file_;
+  std::uint64_t size_ = 0;
+};
 
 // One a row of formats.inc; errors name `path`.
 #define FORMAT(file, begins) \

@@ -1,16 +1,18 @@
 #include "master/io/logs/column_map.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numbers>
 #include <set>
 #include <string_view>
 #include <tuple>
+#include <utility>
 
 #include "common/base/constants.h"
 #include "common/base/suggest.h"
+#include "common/base/try.h"
 #include "common/config/toml_section.h"
+#include "common/pose/pose.h"
 #include "common/trials/text/csv.h"
 
 namespace gapfarm {
@@ -79,9 +81,9 @@ void write_table(const char* name, const TableMap& table, std::string& out) {
   }
   if (table.increments) out += "increments = true\n";
   for (const MappedColumn& c : table.columns) {
-    const bool plain = c.role.find_first_not_of(
-                           "abcdefghijklmnopqrstuvwxyz"
-                           "ABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-") == c.role.npos;
+    const bool plain =
+        c.role.find_first_not_of(
+            "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-") == c.role.npos;
     const std::string role = table.intervals && c.role == "t" ? "dt" : c.role;
     out += (plain ? role : quoted(role)) + " = { column = " + quoted(c.column) +
            (c.unit.empty() ? "" : ", unit = " + quoted(c.unit));
@@ -169,8 +171,8 @@ class MapReader {
       inner->finish();
       if (column.scale == 0) {
         inner->fail("scale",
-                    "found 0, expected what one of the column is in the unit; a column "
-                    "that counts the other way has sign = -1");
+                    "found 0, expected what one of the column is in the unit; a column that counts "
+                    "the other way has sign = -1");
       }
       if (std::abs(column.sign) != 1) {
         inner->fail("sign", "found " + format_double(column.sign) + ", expected 1 or -1");
@@ -191,6 +193,9 @@ class MapReader {
   TomlErrors& errors_;
   std::vector<std::tuple<unsigned, unsigned, std::size_t>> places_;  // of map.columns
 };
+
+// A quaternion this far from unit length was not measured (Motive and TUM write zeros).
+constexpr double kUnitLength = 0.1;
 
 }  // namespace
 
@@ -227,10 +232,9 @@ std::string format_map(const LogMap& map) {
 }
 
 Result<LogMap> parse_map(std::string_view text, const std::string& file) {
-  const Result<toml::table> table = parse_toml(text, file);
-  if (!table) return table.error();
+  ASSIGN_OR_RETURN(const auto table, parse_toml(text, file));
   TomlErrors errors(file);
-  TomlSection root(*table, "", errors);
+  TomlSection root(table, "", errors);
   LogMap map;
   MapReader reader(errors);
   reader.read(root, "poses", map.poses);
@@ -243,11 +247,56 @@ Result<LogMap> parse_map(std::string_view text, const std::string& file) {
                                      p.find("qz") != nullptr && p.find("qw") != nullptr);
   const bool level = p.find("x") != nullptr && (p.find("y") != nullptr || p.find("z") != nullptr);
   if (!p.columns.empty() && (!level || !heading)) {
-    errors.add(table->get("poses")->source().begin,
+    errors.add(table.get("poses")->source().begin,
                "[poses] needs x, y and theta, or x, y and qx, qy, qz, qw");
   }
   if (!errors.empty()) return errors.error();
   return map;
+}
+
+bool to_pose(const TableMap& map, std::vector<double>& values) {
+  const auto value = [&](std::string_view role) {
+    for (std::size_t i = 0; i < map.columns.size(); ++i) {
+      if (map.columns[i].role == role) return values[i];
+    }
+    return 0.0;
+  };
+  const bool y_up = map.up == "y";
+  double theta = value("theta");
+  if (map.find("qw") != nullptr) {
+    double x = value("qx"), y = value("qy"), z = value("qz"), w = value("qw");
+    const double length = std::sqrt(x * x + y * y + z * z + w * w);
+    if (std::abs(length - 1) > kUnitLength) return false;
+    // With y up the floor's y is -z: turned about x, which keeps x.
+    if (y_up) std::tie(y, z) = std::pair(-z, y);
+    theta = std::atan2(2 * (w * z + x * y), w * w + x * x - y * y - z * z);
+  }
+  values = {value("t"), value("x"), y_up ? -value("z") : value("y"), wrap_angle(theta)};
+  return true;
+}
+
+bool at_its_time(const TableMap& map, bool poses, std::vector<double>& before,
+                 std::vector<double>& values) {
+  const auto any = [&](bool MappedColumn::*kind) {
+    return std::any_of(map.columns.begin(), map.columns.end(),
+                       [&](const MappedColumn& c) { return c.*kind; });
+  };
+  const bool rates = any(&MappedColumn::rate), increments = any(&MappedColumn::increment);
+  const double last = before.empty() ? 0 : before[0];
+  if (map.intervals) values[0] += last;  // the end of its stretch
+  if (!map.intervals && !rates && !increments) return true;
+  const bool begins = before.empty() && !map.intervals;
+  const double dt = values[0] - last;
+  if (!begins && !(dt >= 0 && (dt > 0 || poses))) return false;
+  std::vector<double> row = rates ? before : values;
+  for (std::size_t c = 0; c < row.size() && !begins; ++c) {
+    if (map.columns[c].rate) row[c] = (values[c] - before[c]) / dt;
+    if (map.columns[c].increment) row[c] = values[c] / dt;
+  }
+  if (!poses && !row.empty()) row[0] = last;
+  before = values;
+  values = std::move(row);
+  return !begins;
 }
 
 }  // namespace gapfarm

@@ -3,6 +3,7 @@
 #include <map>
 #include <memory>
 
+#include "common/base/try.h"
 #include "common/trials/text/csv.h"
 #include "master/io/logs/bags.h"
 #include "master/io/logs/topics.h"
@@ -55,45 +56,44 @@ class Reader {
   }
 
   Status read_topics() {
-    Result<Statement> rows = prepare("SELECT id, name, type, serialization_format FROM topics");
-    if (!rows) return rows.error();
+    ASSIGN_OR_RETURN(auto rows, prepare("SELECT id, name, type, serialization_format FROM topics"));
     int code = SQLITE_ROW;
-    while ((code = sqlite3_step(rows->get())) == SQLITE_ROW) {
-      Topic topic{text_of(rows->get(), 1), text_of(rows->get(), 2), nullptr};
-      if (serves_ground_robots(topic.type) && text_of(rows->get(), 3) == "cdr") {
+    while ((code = sqlite3_step(rows.get())) == SQLITE_ROW) {
+      Topic topic{text_of(rows.get(), 1), text_of(rows.get(), 2), nullptr};
+      if (serves_ground_robots(topic.type) && text_of(rows.get(), 3) == "cdr") {
         // Another package's type of the same name is left.
         Result<MessageSchema> schema = MessageSchema::known(topic.type);
         if (schema) topic.schema = std::make_unique<MessageSchema>(*std::move(schema));
       }
-      by_id_.emplace(sqlite3_column_int64(rows->get(), 0), std::move(topic));
+      by_id_.emplace(sqlite3_column_int64(rows.get(), 0), std::move(topic));
     }
     if (code != SQLITE_DONE) return broken();
     return {};
   }
 
   Status read_messages() {
-    Result<Statement> rows =
-        prepare("SELECT topic_id, timestamp, data, id FROM messages ORDER BY timestamp, id");
-    if (!rows) return rows.error();
+    ASSIGN_OR_RETURN(
+        auto rows,
+        prepare("SELECT topic_id, timestamp, data, id FROM messages ORDER BY timestamp, id"));
     int code = SQLITE_ROW;
-    while ((code = sqlite3_step(rows->get())) == SQLITE_ROW) {
-      const auto found = by_id_.find(sqlite3_column_int64(rows->get(), 0));
+    while ((code = sqlite3_step(rows.get())) == SQLITE_ROW) {
+      const auto found = by_id_.find(sqlite3_column_int64(rows.get(), 0));
       if (found == by_id_.end()) return broken();
       const Topic& topic = found->second;
       if (topic.schema == nullptr) {
         topics_.skip(topic.name, topic.type);
         continue;
       }
-      const sqlite3_int64 ns = sqlite3_column_int64(rows->get(), 1);
+      const sqlite3_int64 ns = sqlite3_column_int64(rows.get(), 1);
       const double t =
           static_cast<double>(ns / 1'000'000'000) + 1e-9 * static_cast<double>(ns % 1'000'000'000);
-      const auto* data = static_cast<const char*>(sqlite3_column_blob(rows->get(), 2));
-      const auto size = static_cast<std::size_t>(sqlite3_column_bytes(rows->get(), 2));
+      const auto* data = static_cast<const char*>(sqlite3_column_blob(rows.get(), 2));
+      const auto size = static_cast<std::size_t>(sqlite3_column_bytes(rows.get(), 2));
       const std::string_view bytes(data == nullptr ? "" : data, data == nullptr ? 0 : size);
       if (Status s =
               topics_.add(topic.name, topic.type, *topic.schema, MessageWire::kCdr, t, bytes);
           !s) {
-        return Error{path_ + ":1: message " + text_of(rows->get(), 3) + ": " + s.error().message};
+        return Error{path_ + ":1: message " + text_of(rows.get(), 3) + ": " + s.error().message};
       }
     }
     if (code != SQLITE_DONE) return broken();

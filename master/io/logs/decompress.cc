@@ -4,8 +4,6 @@
 #include <lz4frame.h>
 #include <zstd.h>
 
-#include <algorithm>
-
 #include "common/trials/text/csv.h"
 
 namespace gapfarm {

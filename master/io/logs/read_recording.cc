@@ -1,9 +1,46 @@
+#include <cstdio>
 #include <filesystem>
 
+#include "common/base/try.h"
 #include "common/trials/files.h"
+#include "common/trials/text/csv.h"
 #include "master/io/logs/bags.h"
+#include "master/io/logs/to_runs.h"
 
 namespace gapfarm {
+namespace {
+
+// Nanoseconds of a clock, micrometres of a pose: more digits are noise.
+std::string digits(double value, int decimals) {
+  char text[48];
+  std::snprintf(text, sizeof text, "%.*f", decimals, value);
+  std::string out = text;
+  while (out.find('.') != out.npos && (out.back() == '0' || out.back() == '.')) {
+    const bool point = out.back() == '.';
+    out.pop_back();
+    if (point) break;
+  }
+  return out == "-0" ? "0" : out;
+}
+
+std::string format_commands(const std::vector<std::string>& channels, const RunLog& log,
+                            std::vector<CommandRow> LoggedRun::*rows) {
+  std::string out = "run,t";
+  for (const std::string& channel : channels) out += "," + csv_field(channel);
+  out += "\n";
+  bool any = false;
+  for (const LoggedRun& run : log.runs) {
+    for (const CommandRow& row : run.*rows) {
+      out += csv_field(run.run) + "," + digits(row.t_s, 6);
+      for (const double value : row.values) out += "," + digits(value, 9);
+      out += "\n";
+      any = true;
+    }
+  }
+  return any ? out : "";
+}
+
+}  // namespace
 
 Result<FileSource> FileSource::open(const std::string& path) {
   std::error_code code;
@@ -29,16 +66,33 @@ bool FileSource::read(std::uint64_t offset, std::size_t count, std::string& to) 
 }
 
 Result<Recording> read_recording(const std::string& path) {
-  Result<FileSource> source = FileSource::open(path);
-  if (!source) return source.error();
+  ASSIGN_OR_RETURN(auto source, FileSource::open(path));
   std::string head;
-  source->read(0, std::min<std::uint64_t>(source->size(), 16), head);
+  source.read(0, std::min<std::uint64_t>(source.size(), 16), head);
 #define FORMAT(file, begins) \
-  if (head.rfind(begins, 0) == 0) return read_##file(*source, path);
+  if (head.rfind(begins, 0) == 0) return read_##file(source, path);
 #include "master/io/logs/formats.inc"
-  const Result<std::string> text = read_text_file(path);
-  if (!text) return text.error();
-  return parse_text_log(*text, path);
+  ASSIGN_OR_RETURN(const auto text, read_text_file(path));
+  return parse_text_log(text, path);
+}
+
+RunFiles format_runs(const RunLog& log) {
+  RunFiles files;
+  files.commands = format_commands(log.channels, log, &LoggedRun::commands);
+  files.wheels = format_commands(log.wheel_channels, log, &LoggedRun::wheel_speeds);
+  files.poses = log.relative ? "run,t,dx,dy,dtheta\n" : "run,t,x,y,theta\n";
+  // Increments add up, and so does what is rounded off.
+  const int places = log.relative ? 9 : 6;
+  for (const LoggedRun& run : log.runs) {
+    Pose before = run.poses.empty() ? Pose() : run.poses.front().X_WM;
+    for (const PoseRow& row : run.poses) {
+      const Pose X = log.relative ? inverse(before) * row.X_WM : row.X_WM;
+      files.poses += csv_field(run.run) + "," + digits(row.t_s, 6) + "," + digits(X.x, places) +
+                     "," + digits(X.y, places) + "," + digits(X.theta, places + 1) + "\n";
+      before = row.X_WM;
+    }
+  }
+  return files;
 }
 
 }  // namespace gapfarm

@@ -1,7 +1,7 @@
 #include <algorithm>
-#include <cctype>
 #include <limits>
 
+#include "common/base/try.h"
 #include "common/trials/dialect.h"
 #include "common/trials/format.h"
 #include "common/trials/text/csv.h"
@@ -176,8 +176,8 @@ Result<Recording> parse_unnamed(const std::vector<CsvRow>& rows, const std::stri
   Recording recording{file, "a CSV file without a header", {std::move(table)}, "", {}};
   recording.notes.push_back(file + ": has no header; its columns are column_1 to column_" +
                             std::to_string(width) +
-                            ", and a map must say what they are (of a Twist, ros2 topic echo "
-                            "--csv writes no times: record a bag)");
+                            ", and a map must say what they are (of a Twist, ros2 topic echo --csv "
+                            "writes no times: record a bag)");
   return recording;
 }
 
@@ -266,9 +266,8 @@ Status check_decimals(const std::vector<CsvRow>& rows, std::size_t first, char s
 Result<Recording> parse_headed(std::vector<CsvRow> rows, const std::string& file, char separator) {
   drop_empty_last(&rows);
   const TableHead head = read_head(rows, separator);
-  const auto names = column_names(head, file);
-  if (!names) return names.error();
-  LogTable table{file, "", "csv", *names, {}};
+  ASSIGN_OR_RETURN(const auto names, column_names(head, file));
+  LogTable table{file, "", "csv", names, {}};
   for (const CsvField& field : head.titles) table.titles.push_back(field.text);
   table.units = head.units;
   if (Status s = check_decimals(rows, head.rows, separator, file); !s) return s.error();

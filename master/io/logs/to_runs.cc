@@ -7,8 +7,9 @@
 #include <set>
 
 #include "common/base/suggest.h"
+#include "common/base/try.h"
 #include "common/trials/text/csv.h"
-#include "master/io/logs/row_values.h"
+#include "master/io/logs/column_map.h"
 
 namespace gapfarm {
 namespace {
@@ -145,9 +146,8 @@ class Importer {
     std::vector<Line> lines;
     for (const MappedColumn& c : map.columns) {
       at.push_back(*table.find(c.column));
-      const Result<Line> line = line_of(table, map, c, poses);
-      if (!line) return line.error();
-      lines.push_back(*line);
+      ASSIGN_OR_RETURN(const auto line, line_of(table, map, c, poses));
+      lines.push_back(line);
     }
     std::optional<std::size_t> run, keep;
     for (const auto& [name, to] : {std::pair{&map.run, &run}, {&map.keep, &keep}}) {

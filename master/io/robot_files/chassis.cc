@@ -6,7 +6,7 @@
 #include <set>
 
 #include "common/trials/text/csv.h"
-#include "master/io/robot_files/urdf/shapes.h"
+#include "master/io/robot_files/urdf/urdf.h"
 
 namespace gapfarm {
 namespace {
@@ -303,10 +303,10 @@ class Finder {
   Error no_wheels() const {
     std::size_t moving = 0;
     for (const UrdfJoint& joint : model_.joints) moving += joint.type != "fixed" ? 1 : 0;
-    return Error{model_.file + ":1: found no wheels (" + std::to_string(moving) +
-                 " joints move, none of them turns without end about a level axis near the floor), "
-                 "expected a robot that drives; give the URDF with its base, or describe the "
-                 "robot in TOML"};
+    return Error{
+        model_.file + ":1: found no wheels (" + std::to_string(moving) +
+        " joints move, none of them turns without end about a level axis near the floor), expected "
+        "a robot that drives; give the URDF with its base, or describe the robot in TOML"};
   }
 
   const UrdfModel& model_;

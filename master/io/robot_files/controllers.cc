@@ -162,8 +162,8 @@ Result<ControllerFile> parse_controllers(std::string_view text, const std::strin
     const YAML::Node root = YAML::Load(std::string(text));
     if (!root.IsMap()) {
       return Error{file +
-                   ":1: found no YAML map, expected controllers by name; give the file that "
-                   "the controller manager loads"};
+                   ":1: found no YAML map, expected controllers by name; give the file that the "
+                   "controller manager loads"};
     }
     return YamlReader(file).read(root);
   } catch (const YAML::Exception& error) {

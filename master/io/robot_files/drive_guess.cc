@@ -80,8 +80,7 @@ class Guess {
                       "name the driven wheels in a controller file (--controllers)");
       }
       return refuse(std::to_string(turned) +
-                        " wheels that all hang on steering joints (a swerve "
-                        "drive, as '" +
+                        " wheels that all hang on steering joints (a swerve drive, as '" +
                         chassis_.wheels[0].turning->name + "')",
                     "gapfarm does not simulate drives that turn every wheel");
     }

@@ -6,10 +6,11 @@
 #include <numbers>
 #include <set>
 
+#include "common/base/try.h"
 #include "common/trials/text/csv.h"
 #include "master/io/robot_files/compare_facts.h"
 #include "master/io/robot_files/drive_guess.h"
-#include "master/io/robot_files/urdf/shapes.h"
+#include "master/io/robot_files/urdf/urdf.h"
 
 namespace gapfarm {
 namespace {
@@ -48,12 +49,11 @@ class Understanding {
     }
     for (const std::string& remark : chassis_.remarks) reading_.remarks.push_back(remark);
     mark_driven();
-    const Result<DriveGuess> guess = guess_drive(model_, chassis_, facts_);
-    if (!guess) return guess.error();
-    robot().drive = guess->drive;
-    forward_ = guess->forward_rad;
-    reading_.evidence = guess->evidence;
-    for (const std::string& remark : guess->remarks) reading_.remarks.push_back(remark);
+    ASSIGN_OR_RETURN(const auto guess, guess_drive(model_, chassis_, facts_));
+    robot().drive = guess.drive;
+    forward_ = guess.forward_rad;
+    reading_.evidence = guess.evidence;
+    for (const std::string& remark : guess.remarks) reading_.remarks.push_back(remark);
     place_wheels();
     name_wheels();
     read_masses();

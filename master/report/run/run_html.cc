@@ -111,8 +111,8 @@ std::string scores(const RunReport& report) {
   const RunOutcome& outcome = report.outcome ? *report.outcome : none;
   if (outcome.validation.empty()) {
     html +=
-        "<p>None were: [validation] in the config names files that evolution does not see. "
-        "What stands above is of the trials that were evolved on.</p>";
+        "<p>None were: [validation] in the config names files that evolution does not see. What "
+        "stands above is of the trials that were evolved on.</p>";
   } else {
     html += score_table(outcome.validation, fitness_names(report), "kept-apart");
   }

@@ -6,7 +6,7 @@
 #include <fstream>
 #include <set>
 
-#include "common/usage/manual.h"
+#include "common/usage/usage.h"
 #include "master/cli/app.h"
 #include "master/cli/completion_candidates.h"
 

@@ -1,5 +1,3 @@
-#include "master/diagnose/evidence/distribution.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -7,6 +5,7 @@
 
 #include "common/random/stream.h"
 #include "master/diagnose/evidence/latency.h"
+#include "master/diagnose/evidence/residuals.h"
 
 namespace gapfarm::distribution_test {
 namespace {

@@ -1,10 +1,9 @@
-#include "master/diagnose/evidence/drive_noise.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <vector>
 
+#include "master/diagnose/evidence/noise.h"
 #include "tests/unit/diagnose/drawn_drives.h"
 
 namespace gapfarm::drive_noise_test {

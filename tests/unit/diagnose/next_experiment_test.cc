@@ -5,7 +5,7 @@
 #include <numbers>
 
 #include "common/random/stream.h"
-#include "master/diagnose/drive_designs.h"
+#include "master/diagnose/subject.h"
 
 namespace gapfarm::next_experiment_test {
 namespace {

@@ -1,11 +1,10 @@
-#include "master/diagnose/push/push_designs.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <map>
 
 #include "master/diagnose/push/push_geometry.h"
+#include "master/diagnose/push/push_subject.h"
 #include "tests/unit/diagnose/drawn_pushes.h"
 
 namespace gapfarm::push_designs_test {

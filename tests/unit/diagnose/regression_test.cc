@@ -5,8 +5,8 @@
 #include <cmath>
 
 #include "common/random/stream.h"
-#include "master/diagnose/conclusions/verdict.h"
-#include "master/diagnose/fit/nuisance.h"
+#include "master/diagnose/conclusions/findings.h"
+#include "master/diagnose/fit/free_commands.h"
 
 namespace gapfarm::regression_test {
 namespace {

@@ -10,8 +10,7 @@
 
 #include "common/math/statistics.h"
 #include "common/score/density.h"
-#include "master/diagnose/evidence/drive_noise.h"
-#include "master/diagnose/places/slip_places.h"
+#include "master/diagnose/evidence/noise.h"
 #include "tests/unit/diagnose/drawn_drives.h"
 
 namespace gapfarm::slip_test {

@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "master/diagnose/fit/estimate.h"
-#include "master/diagnose/fit/nuisance.h"
+#include "master/diagnose/fit/free_commands.h"
 #include "master/diagnose/fit/proposals.h"
 #include "master/diagnose/fit/signatures.h"
 #include "master/diagnose/steps/step_parts.h"

@@ -1,9 +1,8 @@
-#include "master/diagnose/evidence/tail_noise.h"
-
 #include <gtest/gtest.h>
 
 #include <numeric>
 
+#include "master/diagnose/evidence/noise.h"
 #include "master/diagnose/subject.h"
 #include "tests/unit/diagnose/drawn_drives.h"
 

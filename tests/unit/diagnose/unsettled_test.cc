@@ -3,7 +3,7 @@
 #include <numeric>
 
 #include "master/diagnose/conclusions/report_parts.h"
-#include "master/diagnose/evidence/spread_row.h"
+#include "master/diagnose/evidence/session_gains.h"
 #include "master/diagnose/fit/estimate.h"
 #include "master/diagnose/subject.h"
 #include "tests/unit/diagnose/drawn_drives.h"

@@ -2,15 +2,13 @@
 #include <gtest/gtest.h>
 
 #include "common/math/digits.h"
-#include "master/diagnose/conclusions/confidence.h"
 #include "master/diagnose/conclusions/findings.h"
+#include "master/diagnose/conclusions/headline.h"
 #include "master/diagnose/conclusions/report_parts.h"
 #include "master/diagnose/diagnose.h"
 #include "master/diagnose/fit/estimate.h"
-#include "master/diagnose/fit/probes.h"
 #include "master/diagnose/fit/slopes.h"
 #include "master/diagnose/result/diagnosis_json.h"
-#include "master/diagnose/steps/prepare.h"
 #include "master/diagnose/subject.h"
 #include "tests/unit/diagnose/kinematic_farm.h"
 

@@ -12,8 +12,8 @@
 #include "common/random/stream.h"
 #include "master/diagnose/conclusions/findings.h"
 #include "master/diagnose/conclusions/headline.h"
-#include "master/diagnose/evidence/spread_row.h"
-#include "master/diagnose/evidence/trend_test.h"
+#include "master/diagnose/evidence/session_gains.h"
+#include "master/diagnose/places/where_covariates.h"
 
 namespace gapfarm::where_test {
 namespace {

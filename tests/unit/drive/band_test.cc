@@ -1,5 +1,3 @@
-#include "master/experiments/drive/band.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -8,6 +6,7 @@
 #include <numbers>
 
 #include "common/random/stream.h"
+#include "master/experiments/drive/drive_report.h"
 
 namespace gapfarm::band_test {
 

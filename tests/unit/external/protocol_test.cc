@@ -6,7 +6,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "common/parameters/genome.h"
+#include "common/parameters/table.h"
 
 namespace gapfarm::protocol_test {
 

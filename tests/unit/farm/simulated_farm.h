@@ -14,7 +14,7 @@
 #include <string>
 #include <vector>
 
-#include "common/net/transport.h"
+#include "common/net/envelope.h"
 #include "master/farm/pump.h"
 #include "worker/pump.h"
 

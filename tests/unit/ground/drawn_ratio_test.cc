@@ -1,10 +1,9 @@
-#include "master/ground/drawn_ratio.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 
 #include "common/random/stream.h"
+#include "master/ground/horizons.h"
 
 namespace gapfarm {
 namespace {

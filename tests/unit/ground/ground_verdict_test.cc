@@ -1,9 +1,8 @@
-#include "master/ground/report/ground_verdict.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 
+#include "master/ground/report/ground_text.h"
 #include "master/ground/tolerances.h"
 
 namespace gapfarm {

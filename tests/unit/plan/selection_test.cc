@@ -1,5 +1,3 @@
-#include "master/experiments/plan/selection.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -7,6 +5,7 @@
 #include <cmath>
 
 #include "common/random/stream.h"
+#include "master/experiments/plan/visibility.h"
 
 namespace gapfarm::plan::selection_test {
 

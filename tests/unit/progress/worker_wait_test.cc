@@ -1,6 +1,6 @@
-#include "common/progress/worker_wait.h"
-
 #include <gmock/gmock.h>
+
+#include "common/progress/overall_progress.h"
 
 namespace gapfarm::worker_wait_test {
 

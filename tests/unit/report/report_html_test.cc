@@ -7,9 +7,8 @@
 #include <regex>
 
 #include "common/config/config.h"
-#include "master/report/assets.h"
-#include "master/report/gap_split.h"
 #include "master/report/html.h"
+#include "master/report/page_frame.h"
 #include "master/report/parameters_section.h"
 #include "master/report/run/run_report.h"
 #include "tests/unit/report/example_diagnosis.h"

@@ -2,7 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include "master/diagnose/correction/edge.h"
 #include "tests/unit/residual/fields.h"
 
 namespace gapfarm {

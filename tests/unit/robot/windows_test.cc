@@ -6,8 +6,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/recordings/restart.h"
-
 namespace gapfarm::windows_test {
 
 // Poses every `interval_s` of a robot on a circle at 0.5 m/s and 0.25 rad/s.

@@ -1,7 +1,7 @@
 // Who worked when, from what the store shows.
-#include "master/run/run_farm_history.h"
-
 #include <gmock/gmock.h>
+
+#include "master/run/run_history.h"
 
 namespace gapfarm::run_farm_history_test {
 

@@ -8,7 +8,7 @@
 #include <numbers>
 
 #include "common/random/stream.h"
-#include "master/io/log_checks/finding_text.h"
+#include "master/io/log_checks/finding.h"
 
 namespace gapfarm::sanity_test {
 

@@ -1,10 +1,9 @@
-#include "common/math/bounded_minimum.h"
-
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
 #include <cmath>
 
+#include "common/math/algebra.h"
 #include "common/random/stream.h"
 
 namespace gapfarm::bounded_minimum_test {

@@ -9,7 +9,6 @@
 
 #include "common/random/stream.h"
 #include "common/score/motion_model.h"
-#include "common/score/robust_distance.h"
 
 namespace gapfarm::fitness_test {
 

@@ -4,7 +4,6 @@
 #include <numbers>
 
 #include "tests/unit/sim/push_test_util.h"
-#include "worker/sim/push/face.h"
 #include "worker/sim/push/face_step.h"
 
 namespace gapfarm::distributed_test {

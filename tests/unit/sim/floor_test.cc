@@ -1,9 +1,9 @@
-#include "worker/sim/floor.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <numbers>
+
+#include "worker/sim/patches.h"
 
 namespace gapfarm::floor_test {
 

@@ -1,6 +1,6 @@
-#include "worker/sim/robot/step_plan.h"
-
 #include <gtest/gtest.h>
+
+#include "worker/sim/robot/drive.h"
 
 namespace gapfarm::step_plan_test {
 

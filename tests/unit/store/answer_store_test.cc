@@ -4,7 +4,6 @@
 
 #include <fstream>
 
-#include "master/store/recorded_farm.h"
 #include "tests/unit/store/store_fixture.h"
 
 namespace gapfarm::answer_store_test {

@@ -5,7 +5,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "common/base/host.h"
+#include "common/base/build_info.h"
 #include "master/store/answer_store.h"
 #include "master/store/run_lock.h"
 #include "tests/unit/store/store_fixture.h"

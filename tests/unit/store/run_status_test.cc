@@ -1,11 +1,10 @@
-#include "master/store/run_status.h"
-
 #include <gmock/gmock.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <nlohmann/json.hpp>
 
+#include "master/store/run_reader.h"
 #include "tests/unit/store/store_fixture.h"
 
 namespace gapfarm::run_status_test {

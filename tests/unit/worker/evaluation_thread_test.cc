@@ -1,7 +1,7 @@
-#include "worker/evaluation_thread.h"
-
 #include <gtest/gtest.h>
 #include <poll.h>
+
+#include "worker/service.h"
 
 namespace gapfarm::evaluation_thread_test {
 

@@ -1,8 +1,8 @@
-#include "worker/scenarios/srv1/interpolation.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
+
+#include "worker/scenarios/srv1/srv1_motions.h"
 
 namespace gapfarm::interpolation_test {
 

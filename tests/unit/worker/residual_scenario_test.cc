@@ -1,7 +1,7 @@
 // A model's [residual] in what a worker answers.
 #include <gtest/gtest.h>
 
-#include "common/score/logged_motions.h"
+#include "common/score/motion_model.h"
 #include "tests/unit/worker/problems.h"
 #include "worker/evaluate.h"
 

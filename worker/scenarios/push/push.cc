@@ -1,15 +1,272 @@
-#include "worker/scenarios/push/push.h"
+#include "common/parameters/push.h"
 
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <span>
+#include <vector>
 
+#include "common/problem/problem.h"
 #include "common/random/stream.h"
-#include "worker/scenarios/push/push_piece.h"
-#include "worker/scenarios/push/push_simulate.h"
+#include "common/score/fitness.h"
+#include "gapfarm/v1/task.pb.h"
+#include "worker/effects/behaviour.h"
+#include "worker/scenarios/outcome.h"
+#include "worker/scenarios/scenarios.h"
+#include "worker/sim/push/push.h"
+#include "worker/sim/step_counter.h"
 
 namespace gapfarm {
 namespace {
+
+struct PushNoise {
+  double slide = 0;       // s.d. of the end position over the distance slid
+  double turn_rad_m = 0;  // s.d. of the end heading over the distance slid
+  PoseNoise pose;         // of a reading
+};
+
+// Poses with R are the true ones of the frame that the log follows.
+class PushedPiece {
+ public:
+  PushedPiece(const Piece& piece, std::size_t index, const ParameterValues& values);
+
+  const Piece& piece() const { return piece_; }
+  // The true start of a piece logged there, what is logged of a true pose, and of a true start.
+  Pose start_of(const Pose& X_WM) const;
+  Pose observe(const Pose& X_WR) const;
+  Pose logged_start(const Pose& X_WR) const { return effects_.unplace(X_WR); }
+
+  struct Push {
+    v1::Outcome outcome = v1::OK;
+    Pose X_WE;
+    double slid_m = 0;  // from the centroid's start to its end
+    Motion motion;
+  };
+  // `path` receives true poses of the log's frame in the world.
+  Push push(const Pose& X_WR, std::span<const TipSample> tip,
+            std::vector<PathSample>* path = nullptr, double interval_s = 0);
+
+  double simulated_s() const { return simulated_s_; }
+  unsigned runs() const { return runs_; }
+
+ private:
+  const Piece& piece_;
+  ActiveEffects effects_;
+  double camera_scale_;  // logged lengths over true ones
+  Pose X_RC_;            // centroid in the log's frame
+  PushSimulator simulator_;
+  double simulated_s_ = 0;
+  unsigned runs_ = 0;
+};
+
+double at(const ParameterValues& values, Push row) { return values[row_of(row)]; }
+
+// The piece's own value, if it has one, else that of all.
+double own_or(std::size_t index, Push first_own, Push of_all, const ParameterValues& values) {
+  const double own = index < kOwnShapeFactors ? values[row_of(first_own) + index] : 0.0;
+  return own > 0 ? own : at(values, of_all);
+}
+
+PushNoise push_noise(const ParameterValues& values) {
+  return {at(values, Push::kPushNoiseSlide),
+          at(values, Push::kPushNoiseTurn),
+          {at(values, Push::kPoseNoisePosition), at(values, Push::kPoseNoiseHeading)}};
+}
+
+// `index`: of the piece in the problem, for a shape factor of its own.
+PushSettings push_settings(const Piece& piece, std::size_t index, const ParameterValues& values,
+                           const ActiveEffects& effects) {
+  PushSettings s;
+#define ROW(name, row)
+#define SETTING(name, member, row) put(at(values, Push::name), s.member);
+#include "common/parameters/push_rows.inc"
+  const Eigen::Vector2d middle = centroid(piece);
+  for (const Eigen::Vector2d& corner : piece.corners) s.corners.push_back(corner - middle);
+  s.thickness_m = piece.thickness_m;
+  s.mass_kg = piece.mass_kg * at(values, Push::kMassFactor);
+  const Eigen::Vector3d moments = second_moments(piece);
+  s.gyration_m2 = moments[0] + moments[1];
+  s.shape_factor = own_or(index, Push::kShapeFactor1, Push::kShapeFactor, values);
+  s.pressure = own_or(index, Push::kPressure1, Push::kPressure, values);
+  effects.push(s);
+  return s;
+}
+
+PushedPiece::PushedPiece(const Piece& piece, std::size_t index, const ParameterValues& values)
+    : piece_(piece),
+      effects_(push_table(), values),
+      camera_scale_(at(values, gapfarm::Push::kCameraScale)),
+      X_RC_{centroid(piece)[0], centroid(piece)[1], 0},
+      simulator_(push_settings(piece, index, values, effects_)) {}
+
+Pose PushedPiece::start_of(const Pose& X_WM) const {
+  return effects_.place(
+      effects_.recover({X_WM.x / camera_scale_, X_WM.y / camera_scale_, X_WM.theta}));
+}
+
+Pose PushedPiece::observe(const Pose& X_WR) const {
+  const Pose X_WM = effects_.observe(X_WR);
+  return {X_WM.x * camera_scale_, X_WM.y * camera_scale_, X_WM.theta};
+}
+
+PushedPiece::Push PushedPiece::push(const Pose& X_WR, std::span<const TipSample> tip,
+                                    std::vector<PathSample>* path, double interval_s) {
+  const Pose X_WS = X_WR * X_RC_;
+  std::vector<FingerSample> finger;
+  for (const TipSample& sample : tip) {
+    const Pose p_SF = between(X_WS, {sample.x, sample.y, 0});
+    finger.push_back({sample.t_s, {p_SF.x, p_SF.y}});
+  }
+  Floor table;
+  Situation situation;
+  situation.X_WR = X_WS;
+  effects_.floor(situation, table);
+  std::vector<MotionSample> samples;
+  Push push;
+  push.motion = simulator_.run(finger, table, path ? &samples : nullptr, interval_s);
+  push.outcome = to_outcome(push.motion.outcome);
+  push.slid_m = std::hypot(push.motion.X_SE.x, push.motion.X_SE.y);
+  const Pose X_CR = inverse(X_RC_);
+  push.X_WE = X_WS * push.motion.X_SE * X_CR;
+  if (path) {
+    path->clear();
+    for (const MotionSample& s : samples) path->push_back({s.t_s, X_WS * s.X_SB * X_CR});
+  }
+  simulated_s_ += push.motion.duration_s;
+  ++runs_;
+  return push;
+}
+
+// The pushes of a plan.  Every piece is put down where its trial begins, whatever happened before;
+// it is logged there and at its end with the effects and the noise of both readings.  A trial
+// without a finger's way is an invalid request.
+v1::TaskResult simulate_pushes(const Problem& problem, const ParameterValues& values,
+                               const v1::SimulateTask& task, StepCounter* steps);
+
+// The true way of the piece in the push of `task.trial`, from where the log has its start; noisy:
+// from beside it by a reading's noise.
+v1::TaskResult trace_push(const Problem& problem, const ParameterValues& values,
+                          const v1::TraceTask& task, StepCounter* steps);
+
+class PushSession {
+ public:
+  PushSession(const Problem& problem, const ParameterValues& values, const v1::SimulateTask& task,
+              StepCounter* steps)
+      : problem_(problem),
+        values_(values),
+        task_(task),
+        steps_(steps),
+        noise_(push_noise(values)) {}
+
+  v1::TaskResult run() {
+    v1::TaskResult result;
+    result.set_outcome(v1::OK);
+    for (int i = 0; i < task_.plan_size(); ++i) {
+      const v1::Outcome outcome = trial(i, result.mutable_simulate()->add_trials());
+      if (outcome == v1::OK) continue;
+      const v1::Trial& t = task_.plan(i).trial();
+      result.set_outcome(outcome);
+      result.set_message("trial " + std::to_string(t.trial()) + ", piece " + t.command() +
+                         (outcome == v1::INVALID_REQUEST ? ": there is no finger's way" : ""));
+      break;
+    }
+    double simulated_s = 0;
+    for (const auto& [name, piece] : pieces_) simulated_s += piece.simulated_s();
+    result.set_simulated(simulated_s);
+    return result;
+  }
+
+ private:
+  PushedPiece& pushed(const std::string& name) {
+    const auto found = pieces_.find(name);
+    if (found != pieces_.end()) return found->second;
+    const Piece& piece = problem_.piece(name);
+    const auto index = static_cast<std::size_t>(&piece - problem_.pieces.data());
+    return pieces_.try_emplace(name, piece, index, values_).first->second;
+  }
+
+  v1::Outcome trial(int i, v1::Trial* logged) {
+    Trial trial = from_proto(task_.plan(i).trial());
+    if (trial.tip.size() < 2) return v1::INVALID_REQUEST;
+    // A stream of its own for every trial, so that a plan's first trials do not depend on its rest.
+    Stream stream({task_.stream().run_seed(), Purpose::kSimulation, task_.stream().generation(),
+                   task_.stream().birth_id(), static_cast<std::uint64_t>(i)});
+    PushedPiece& piece = pushed(trial.command);
+    const bool sampled = task_.path_interval() > 0;
+    std::vector<PathSample> path;
+    const Pose X_WR = trial.X_WS;
+    PushedPiece::Push push =
+        piece.push(X_WR, trial.tip, sampled ? &path : nullptr, task_.path_interval());
+    count_step(steps_);
+    if (push.outcome != v1::OK) return push.outcome;
+    const double aside = noise_.slide * push.slid_m;
+    const double turned = noise_.turn_rad_m * push.slid_m;
+    const double dx = aside * stream.normal();
+    const double dy = aside * stream.normal();
+    push.X_WE = push.X_WE * Pose{dx, dy, turned * stream.normal()};
+    trial.X_WS = measured(piece, piece.logged_start(X_WR), stream);
+    trial.X_WE = measured(piece, push.X_WE, stream);
+    for (const PathSample& s : path) {
+      trial.path.push_back({s.t_s, measured(piece, s.pose, stream)});
+    }
+    *logged = to_proto(trial);
+    return v1::OK;
+  }
+
+  Pose measured(const PushedPiece& piece, const Pose& X_WR, Stream& stream) const {
+    const Pose X_WM = piece.observe(X_WR);
+    const double x = X_WM.x + noise_.pose.position_m * stream.normal();
+    const double y = X_WM.y + noise_.pose.position_m * stream.normal();
+    return {x, y, wrap_angle(X_WM.theta + noise_.pose.heading_rad * stream.normal())};
+  }
+
+  const Problem& problem_;
+  const ParameterValues& values_;
+  const v1::SimulateTask& task_;
+  StepCounter* steps_;
+  PushNoise noise_;
+  std::map<std::string, PushedPiece> pieces_;
+};
+
+v1::TaskResult simulate_pushes(const Problem& problem, const ParameterValues& values,
+                               const v1::SimulateTask& task, StepCounter* steps) {
+  return PushSession(problem, values, task, steps).run();
+}
+
+v1::TaskResult trace_push(const Problem& problem, const ParameterValues& values,
+                          const v1::TraceTask& task, StepCounter* steps) {
+  v1::TaskResult result;
+  if (task.trial() >= problem.log.trials.size()) {
+    result.set_outcome(v1::INVALID_REQUEST);
+    result.set_message("trial " + std::to_string(task.trial()) +
+                       " is to be traced, and the log has " +
+                       std::to_string(problem.log.trials.size()) + " pushes");
+    return result;
+  }
+  const Trial& trial = problem.log.trials[task.trial()];
+  const Piece& piece = problem.piece(trial.command);
+  PushedPiece pushed(piece, static_cast<std::size_t>(&piece - problem.pieces.data()), values);
+  Pose X_WR = pushed.start_of(trial.X_WS);
+  if (task.noisy()) {
+    const PushNoise noise = push_noise(values);
+    Stream stream({task.stream().run_seed(), Purpose::kSimulation, task.stream().generation(),
+                   task.stream().birth_id(), task.stream().replicate()});
+    const double x = noise.pose.position_m * stream.normal();
+    const double y = noise.pose.position_m * stream.normal();
+    X_WR = X_WR * Pose{x, y, noise.pose.heading_rad * stream.normal()};
+  }
+  std::vector<PathSample> path;
+  const PushedPiece::Push push = pushed.push(X_WR, trial.tip, &path, task.interval());
+  count_step(steps);
+  result.set_outcome(push.outcome);
+  result.set_simulated(pushed.simulated_s());
+  for (const PathSample& s : path) {
+    v1::TraceSample* sample = result.mutable_trace()->add_samples();
+    sample->set_t(s.t_s);
+    *sample->mutable_pose() = to_proto(s.pose);
+  }
+  return result;
+}
 
 using Offsets = std::vector<Eigen::Vector3d>;
 

@@ -1,5 +1,3 @@
-#include "worker/scenarios/srv1/srv1.h"
-
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -9,8 +7,9 @@
 #include "common/score/fitness.h"
 #include "common/score/motion_model.h"
 #include "common/trials/context.h"
+#include "worker/scenarios/scenarios.h"
 #include "worker/scenarios/srv1/srv1_motions.h"
-#include "worker/scenarios/srv1/srv1_simulate.h"
+#include "worker/scenarios/srv1/srv1_robot.h"
 #include "worker/scenarios/srv1/views.h"
 
 namespace gapfarm {

@@ -8,6 +8,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <span>
 #include <vector>
 
 #include "worker/scenarios/scenario.h"
@@ -85,5 +86,20 @@ GroupResult simulate_group(Srv1Robot& robot, const ConditionGroup& group,
 
 // A situation that no patch of floor reaches.
 Situation reference_situation(const ConditionGroup& group);
+
+// Equally spaced headings 2 pi k / n, k = 0..n-1.  REQUIRES: n even.
+std::vector<double> heading_nodes(std::size_t n);
+
+// Trigonometric interpolation through values at heading_nodes(n): exact for harmonics below n/2.
+// The values may hold every `stride`-th node only.
+Eigen::Vector3d interpolate_heading(std::span<const Eigen::Vector3d> values, double heading_rad,
+                                    std::size_t stride = 1);
+
+// Chebyshev-Lobatto nodes on [lower, upper].  REQUIRES: n >= 2.
+std::vector<double> chebyshev_nodes(double lower, double upper, std::size_t n);
+
+// Polynomial through values at chebyshev_nodes (barycentric form, Berrut and Trefethen 2004).
+Eigen::Vector3d interpolate_chebyshev(std::span<const double> nodes,
+                                      std::span<const Eigen::Vector3d> values, double at);
 
 }  // namespace gapfarm

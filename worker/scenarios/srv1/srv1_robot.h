@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "common/parameters/table.h"
+#include "common/problem/problem.h"
 #include "common/score/fitness.h"
 #include "common/score/scale_mixture.h"
 #include "common/trials/context.h"
@@ -12,8 +13,8 @@
 #include "worker/effects/behaviour.h"
 #include "worker/scenarios/outcome.h"
 #include "worker/scenarios/srv1/motion_memo.h"
-#include "worker/scenarios/srv1/vehicle.h"
 #include "worker/sim/robot/simulator.h"
+#include "worker/sim/step_counter.h"
 
 namespace gapfarm {
 
@@ -74,5 +75,17 @@ SimSettings sim_settings(const RobotSize& size, const ParameterValues& values,
 // Pose `age_s` before the end of a path sampled from the start to rest, by interpolation; before
 // the first sample the robot stood at the first.
 Pose pose_before_end(const std::vector<MotionSample>& path, double age_s);
+
+// Driving a planned session trial by trial, as the real robot would be: every draw of noise is
+// simulated, and every pose is read through the camera.
+
+// Trials start where the one before ended, or at the plan's pose after an unrecorded move.  The
+// result holds measured start and end poses, and paths when the task asks for them.
+v1::TaskResult simulate_session(const Problem& problem, const ParameterValues& values,
+                                const v1::SimulateTask& task, StepCounter* steps = nullptr);
+
+// The motion of one command from (0, 0, 0): nominal, or with one draw of drive noise.
+v1::TaskResult trace_command(const Problem& problem, const ParameterValues& values,
+                             const v1::TraceTask& task, StepCounter* steps = nullptr);
 
 }  // namespace gapfarm

@@ -5,9 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "worker/sim/floor.h"
 #include "worker/sim/observe.h"
-#include "worker/sim/push/face.h"
+#include "worker/sim/patches.h"
 #include "worker/sim/push/face_step.h"
 #include "worker/sim/push/outline.h"
 #include "worker/sim/push/push_engine.h"

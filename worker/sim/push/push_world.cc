@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "worker/sim/floor.h"
 #include "worker/sim/observe.h"
+#include "worker/sim/patches.h"
 #include "worker/sim/push/outline.h"
 
 namespace gapfarm {

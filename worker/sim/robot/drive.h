@@ -3,6 +3,8 @@
 // continuous in every parameter whatever the step is, also when the motors stop within a step.
 #pragma once
 
+#include <array>
+
 #include "worker/sim/robot/motion.h"
 
 namespace gapfarm {
@@ -36,6 +38,30 @@ class SideMotion {
   double stop_speed_m_s_ = 0;  // when the motors are commanded to stop
   double stop_travel_m_ = 0;
   double still_s_ = 0;
+};
+
+// Steps of the rate's length, but for a shorter one before each event (the motors stop, a tread
+// with dead travel begins to move), so that events fall between two steps.  Sliding friction does
+// not feel how fast the surface is, so an event within a step would be rounded to a whole step, and
+// the end pose would be a staircase over duration and dead travel.
+class StepPlan {
+ public:
+  StepPlan(double step_s, const SideMotion& left, const SideMotion& right, double duration_s);
+
+  // Goes on to the next step; start and length hold for it until the next call.
+  void advance();
+  double start_s() const { return start_s_; }
+  double end_s() const { return start_s_ + length_s_; }
+  double length_s() const { return length_s_; }
+
+ private:
+  double step_s_;
+  std::array<double, 3> events_;  // ascending
+  std::size_t next_event_ = 0;
+  double phase_start_s_ = 0;  // the last event
+  long step_ = 0;             // steps begun since then
+  double start_s_ = 0;
+  double length_s_ = 0;
 };
 
 }  // namespace gapfarm

@@ -5,7 +5,6 @@
 
 #include "worker/sim/observe.h"
 #include "worker/sim/robot/drive.h"
-#include "worker/sim/robot/step_plan.h"
 #include "worker/sim/world.h"
 
 namespace gapfarm {

@@ -1,9 +1,16 @@
 #include "master/io/robot_files/urdf/urdf.h"
 
+#include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
 #include <set>
 
+#include "common/base/constants.h"
 #include "common/base/suggest.h"
+#include "common/math/algebra.h"
 #include "common/trials/text/csv.h"
+#include "master/io/robot_files/understand.h"
 #include "master/io/robot_files/urdf/urdf_xml.h"
 
 namespace gapfarm {
@@ -54,6 +61,83 @@ Status check_tree(UrdfModel& model) {
   return {};
 }
 
+std::optional<RoundShape> roundest(const std::vector<UrdfGeometry>& shapes,
+                                   const Eigen::Isometry3d& X_BL) {
+  std::optional<RoundShape> best;
+  for (const UrdfGeometry& shape : shapes) {
+    const bool ball = shape.shape == UrdfShape::kSphere;
+    if (!ball && shape.shape != UrdfShape::kCylinder) continue;
+    if (shape.radius_m <= 0) continue;
+    // A cylinder shows its axis; a ball only when there is none.
+    const bool better =
+        !best || (best->ball && !ball) || (best->ball == ball && shape.radius_m > best->radius_m);
+    if (!better) continue;
+    const Eigen::Isometry3d X_BG = X_BL * shape.X_LG;
+    RoundShape round;
+    round.radius_m = shape.radius_m;
+    if (!ball) round.width_m = shape.length_m;
+    round.axis_B = X_BG.linear().col(2);
+    round.centre_B_m = X_BG.translation();
+    round.ball = ball;
+    round.from = std::string(ball ? "sphere" : "cylinder") + ", line " + std::to_string(shape.line);
+    best = round;
+  }
+  return best;
+}
+
+// Corners of what bounds the shape, in B; a cylinder's rims as sixteen points each.
+std::vector<Eigen::Vector3d> hull_points(const Eigen::Isometry3d& X_BL, const UrdfGeometry& shape) {
+  constexpr int kRim = 16;
+  std::vector<Eigen::Vector3d> points;
+  const Eigen::Isometry3d X_BG = X_BL * shape.X_LG;
+  if (shape.shape == UrdfShape::kBox) {
+    for (int corner = 0; corner < 8; ++corner) {
+      const Eigen::Vector3d sign(corner & 1 ? 1 : -1, corner & 2 ? 1 : -1, corner & 4 ? 1 : -1);
+      points.push_back(X_BG * Eigen::Vector3d(0.5 * sign.cwiseProduct(shape.size_m)));
+    }
+  } else if (shape.shape == UrdfShape::kCylinder) {
+    for (int i = 0; i < 2 * kRim; ++i) {
+      const double angle = 2 * std::numbers::pi * (i / 2) / kRim;
+      points.push_back(X_BG * Eigen::Vector3d(shape.radius_m * std::cos(angle),
+                                              shape.radius_m * std::sin(angle),
+                                              (i % 2 ? 0.5 : -0.5) * shape.length_m));
+    }
+  } else if (shape.shape == UrdfShape::kSphere) {
+    for (int i = 0; i < kRim; ++i) {
+      const double angle = 2 * std::numbers::pi * i / kRim;
+      points.push_back(X_BG.translation() +
+                       shape.radius_m * Eigen::Vector3d(std::cos(angle), std::sin(angle), 0));
+    }
+    points.push_back(X_BG.translation() - shape.radius_m * Eigen::Vector3d::UnitZ());
+  }
+  return points;
+}
+
+double cross(const Eigen::Vector2d& o, const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
+  return (a - o).x() * (b - o).y() - (a - o).y() * (b - o).x();
+}
+
+// Andrew's monotone chain.
+std::vector<Eigen::Vector2d> convex_hull(std::vector<Eigen::Vector2d> points) {
+  std::sort(points.begin(), points.end(), [](const auto& a, const auto& b) {
+    return a.x() != b.x() ? a.x() < b.x() : a.y() < b.y();
+  });
+  if (points.size() < 3) return points;
+  std::vector<Eigen::Vector2d> hull;
+  for (int pass = 0; pass < 2; ++pass) {
+    const std::size_t start = hull.size();
+    for (const Eigen::Vector2d& point : points) {
+      while (hull.size() >= start + 2 && cross(hull[hull.size() - 2], hull.back(), point) <= 0) {
+        hull.pop_back();
+      }
+      hull.push_back(point);
+    }
+    hull.pop_back();
+    std::reverse(points.begin(), points.end());
+  }
+  return hull;
+}
+
 }  // namespace
 
 const UrdfLink* UrdfModel::find_link(std::string_view wanted) const {
@@ -85,10 +169,10 @@ Result<UrdfModel> parse_urdf(std::string_view text, const std::string& file) {
   }
   if (Status status = check_tree(*model); !status) return status.error();
   if (link_poses(*model).size() != model->links.size()) {
-    return Error{at_line(file, 1) +
-                 "found links that hang on one another in a circle, expected all of them to hang "
-                 "on " +
-                 quoted_word(model->root)};
+    return Error{
+        at_line(file, 1) +
+        "found links that hang on one another in a circle, expected all of them to hang on " +
+        quoted_word(model->root)};
   }
   return model;
 }
@@ -109,6 +193,112 @@ std::map<std::string, Eigen::Isometry3d, std::less<>> link_poses(const UrdfModel
     }
   }
   return poses;
+}
+
+MassSum sum_masses(const UrdfModel& model, const LinkPoses& poses) {
+  MassSum sum;
+  Eigen::Vector3d moment = Eigen::Vector3d::Zero();
+  std::string weightless;
+  for (const UrdfLink& link : model.links) {
+    if (!link.inertial) {
+      if (!link.collisions.empty())
+        weightless += (weightless.empty() ? "'" : ", '") + link.name + "'";
+      continue;
+    }
+    sum.mass_kg += link.inertial->mass_kg;
+    moment += link.inertial->mass_kg * (poses.find(link.name)->second * link.inertial->p_LC_m);
+  }
+  if (sum.mass_kg <= 0) return sum;
+  sum.com_B_m = moment / sum.mass_kg;
+  for (const UrdfLink& link : model.links) {
+    if (!link.inertial || link.inertial->mass_kg <= 0) continue;
+    const Eigen::Isometry3d& X_BL = poses.find(link.name)->second;
+    const Eigen::Vector3d from = X_BL * link.inertial->p_LC_m - sum.com_B_m;
+    const Eigen::Matrix3d I_B = X_BL.linear() * link.inertial->I_C_kgm2 * X_BL.linear().transpose();
+    sum.yaw_inertia_kgm2 += I_B(2, 2) + link.inertial->mass_kg * from.head<2>().squaredNorm();
+  }
+  if (!weightless.empty()) {
+    sum.remarks.push_back("links with a shape but without a mass: " + weightless);
+  }
+  return sum;
+}
+
+std::vector<double> standing_loads(const GroundRobot& robot) {
+  if (!robot.mass_kg) return {};
+  std::vector<Eigen::Vector2d> points;
+  for (const RobotWheel& wheel : robot.wheels) {
+    points.emplace_back(wheel.x_m.value_or(0), wheel.y_m.value_or(0));
+  }
+  const Eigen::Vector2d com(robot.com_x_m.value_or(0), robot.com_y_m.value_or(0));
+  return wheel_loads(points, com, kGravity_m_s2 * *robot.mass_kg);
+}
+
+std::vector<double> wheel_loads(const std::vector<Eigen::Vector2d>& points,
+                                const Eigen::Vector2d& com, double weight_n) {
+  const auto n = points.size();
+  std::vector<bool> carries(n, true);
+  // Each round drops the point that would pull most; at most all of them.
+  for (std::size_t round = 0; round < n; ++round) {
+    // Alike springs under a rigid plate: load = a + b x + c y, with sums of loads and torques
+    // given.
+    Eigen::Matrix3d A = Eigen::Matrix3d::Zero();
+    for (std::size_t i = 0; i < n; ++i) {
+      if (!carries[i]) continue;
+      const Eigen::Vector3d row(1, points[i].x() - com.x(), points[i].y() - com.y());
+      A += row * row.transpose();
+    }
+    const Eigen::Vector3d sums(weight_n, 0, 0);
+    // Points on a line leave a direction free; the least solution is the even one.
+    const Eigen::Vector3d plate = pseudo_inverse(A) * sums;
+    if ((A * plate - sums).norm() > 1e-6 * weight_n) return {};
+    std::vector<double> loads(n, 0);
+    std::size_t worst = n;
+    for (std::size_t i = 0; i < n; ++i) {
+      if (!carries[i]) continue;
+      loads[i] = plate.dot(Eigen::Vector3d(1, points[i].x() - com.x(), points[i].y() - com.y()));
+      if (loads[i] < -1e-9 * weight_n && (worst == n || loads[i] < loads[worst])) worst = i;
+    }
+    if (worst == n) return loads;
+    carries[worst] = false;
+  }
+  return {};
+}
+
+std::optional<RoundShape> round_shape(const UrdfModel& model, const UrdfLink& link,
+                                      const LinkPoses& poses) {
+  const auto of = [&](const UrdfLink& l) {
+    const Eigen::Isometry3d& X_BL = poses.find(l.name)->second;
+    auto round = roundest(l.collisions, X_BL);
+    return round ? round : roundest(l.visuals, X_BL);
+  };
+  if (auto round = of(link)) return round;
+  for (const UrdfJoint& joint : model.joints) {
+    if (joint.parent != link.name || joint.type != "fixed") continue;
+    if (auto round = of(*model.find_link(joint.child))) return round;
+  }
+  return {};
+}
+
+Eigen::Vector3d lowest_point(const Eigen::Isometry3d& X_BL, const UrdfGeometry& shape) {
+  const std::vector<Eigen::Vector3d> points = hull_points(X_BL, shape);
+  if (points.empty()) return (X_BL * shape.X_LG).translation();
+  double lowest = points.front().z();
+  for (const Eigen::Vector3d& point : points) lowest = std::min(lowest, point.z());
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  int count = 0;
+  for (const Eigen::Vector3d& point : points) {
+    // Right angles are written as 1.57: a face that leans by that still lies on the floor.
+    if (point.z() > lowest + 2e-4) continue;
+    sum += point;
+    ++count;
+  }
+  return sum / count;
+}
+
+std::vector<Eigen::Vector2d> outline(const Eigen::Isometry3d& X_BL, const UrdfGeometry& shape) {
+  std::vector<Eigen::Vector2d> flat;
+  for (const Eigen::Vector3d& point : hull_points(X_BL, shape)) flat.push_back(point.head<2>());
+  return convex_hull(std::move(flat));
 }
 
 }  // namespace gapfarm

@@ -231,9 +231,9 @@ void Reader::read_prefixes(const XMLElement& element, std::set<std::string>& dec
   const std::string_view name = element.Name();
   const std::size_t colon = name.find(':');
   if (colon != name.npos && declared.emplace(name.substr(0, colon)).second) {
-    note(element.GetLineNum(), "the prefix of <" + std::string(name) +
-                                   "> is declared nowhere (xmlns): strict readers refuse the "
-                                   "file; it was read over");
+    note(element.GetLineNum(),
+         "the prefix of <" + std::string(name) +
+             "> is declared nowhere (xmlns): strict readers refuse the file; it was read over");
   }
   for (const XMLElement* child = element.FirstChildElement(); child != nullptr && depth < 64;
        child = child->NextSiblingElement()) {

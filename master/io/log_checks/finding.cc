@@ -1,4 +1,4 @@
-#include "master/io/log_checks/finding_text.h"
+#include "master/io/log_checks/finding.h"
 
 #include <map>
 
