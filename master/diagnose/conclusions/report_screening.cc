@@ -62,10 +62,8 @@ ScreenedSize reported_of(const DiagnosisRequest& of, const std::string& name,
   return note("cannot be seen in this log: one level and one duration make it another full speed");
 }
 
-}  // namespace
-
-std::vector<Screened> complete_screening(const DiagnosisRequest& of, const Screening& screening,
-                                         const Judgement& judged) {
+std::vector<Screened> complete_rows(const DiagnosisRequest& of, const Screening& screening,
+                                    const Judgement& judged) {
   std::vector<Screened> rows;
   if (!judged.base_is_suspicious) rows = screening.rows;
   const std::vector<ChosenEffect>& chosen = judged.named.chosen;
@@ -89,6 +87,21 @@ std::vector<Screened> complete_screening(const DiagnosisRequest& of, const Scree
     row.estimate = screened.key + " " +
                    of.table().format(of.table().row(name + "." + screened.key),
                                      rounded_to_digits(screened.value, 4));
+  }
+  return rows;
+}
+
+}  // namespace
+
+std::vector<Screened> complete_screening(const DiagnosisRequest& of, const Screening& screening,
+                                         const Judgement& judged) {
+  std::vector<Screened> rows = complete_rows(of, screening, judged);
+  for (Screened& row : rows) {
+    const auto sizes = screening.detectable.find(row.effect);
+    const bool named = std::any_of(
+        judged.named.chosen.begin(), judged.named.chosen.end(),
+        [&](const ChosenEffect& c) { return c.candidate.signature.effect == row.effect; });
+    if (sizes != screening.detectable.end() && !named) row.detectable_from = sizes->second;
   }
   return rows;
 }

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/math/laws.h"
+#include "master/infer/certificate.h"
 
 namespace gapfarm::plan {
 namespace {
@@ -34,14 +34,6 @@ class LogDeterminant {
   Eigen::MatrixXd inverse_;  // of I + X'X
 };
 
-// (I + Z Z')^-1 v
-Eigen::VectorXd beyond(const Eigen::VectorXd& v, const Eigen::MatrixXd& nuisances) {
-  if (nuisances.cols() == 0) return v;
-  const Eigen::MatrixXd inner = Eigen::MatrixXd::Identity(nuisances.cols(), nuisances.cols()) +
-                                nuisances.transpose() * nuisances;
-  return v - nuisances * inner.llt().solve(nuisances.transpose() * v);
-}
-
 }  // namespace
 
 std::vector<std::size_t> select(const std::vector<Rows>& candidates, Eigen::Index nuisances,
@@ -70,23 +62,15 @@ std::vector<std::size_t> select(const std::vector<Rows>& candidates, Eigen::Inde
 }
 
 double information(const Eigen::VectorXd& shift, const Eigen::MatrixXd& nuisances) {
-  return std::max(0.0, shift.dot(beyond(shift, nuisances)));
+  return std::max(0.0, infer::information(shift, nuisances)(0, 0));
 }
 
 double likeness(const Eigen::VectorXd& a, const Eigen::VectorXd& b,
                 const Eigen::MatrixXd& nuisances) {
   const double lengths = information(a, nuisances) * information(b, nuisances);
-  return lengths > 0 ? std::clamp(a.dot(beyond(b, nuisances)) / std::sqrt(lengths), -1.0, 1.0) : 0;
-}
-
-double chance_of_exceeding(double threshold, double freedom, double noncentrality) {
-  return noncentrality <= 0 ? chi_squared_above(freedom, threshold)
-                            : noncentral_chi_squared_above(freedom, noncentrality, threshold);
-}
-
-double noncentrality_for(double power, double threshold, double freedom) {
-  if (chance_of_exceeding(threshold, freedom, 0) >= power) return 0;
-  return noncentrality_of(freedom, threshold, power);
+  return lengths > 0
+             ? std::clamp(a.dot(infer::beyond(b, nuisances).col(0)) / std::sqrt(lengths), -1.0, 1.0)
+             : 0;
 }
 
 }  // namespace gapfarm::plan

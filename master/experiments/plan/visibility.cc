@@ -9,6 +9,7 @@
 #include "common/random/stream.h"
 #include "master/diagnose/subject.h"
 #include "master/experiments/plan/selection.h"
+#include "master/infer/certificate.h"
 #include "master/infer/predictor.h"
 
 namespace gapfarm::plan {
@@ -176,8 +177,8 @@ std::vector<Visibility> visibility(const Problem& problem, const Signals& signal
   const ParameterTable& table = problem.table();
   std::vector<Visibility> all;
   for (const auto& [effect, shifts] : by_effect(signals)) {
-    const double wanted =
-        noncentrality_for(kPower, threshold_of(problem, effect), freedom_of(problem, effect));
+    const double wanted = infer::noncentrality_for(kPower, threshold_of(problem, effect),
+                                                   freedom_of(problem, effect));
     std::vector<double> strengths, sizes;
     for (const Shift* shift : shifts) {
       const double now = information(shift->rows, signals.nuisances);
@@ -208,8 +209,9 @@ double mean_power(const Problem& problem, const Signals& signals,
     if (wanted == at.end() || wanted->strength > 1) continue;
     for (const Shift* shift : shifts) {
       const double times = wanted->strength / shift->strength;
-      sum += chance_of_exceeding(threshold_of(problem, effect), freedom_of(problem, effect),
-                                 times * times * information(shift->rows, signals.nuisances));
+      sum +=
+          infer::chance_of_exceeding(threshold_of(problem, effect), freedom_of(problem, effect),
+                                     times * times * information(shift->rows, signals.nuisances));
       ++count;
     }
   }

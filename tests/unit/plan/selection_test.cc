@@ -7,9 +7,11 @@
 #include <cmath>
 
 #include "common/random/stream.h"
+#include "master/infer/certificate.h"
 
 namespace gapfarm::plan::selection_test {
 
+using infer::chance_of_exceeding, infer::noncentrality_for;
 using ::testing::ElementsAre;
 
 Rows row(std::initializer_list<double> values) {
