@@ -36,6 +36,7 @@ constexpr OptionTakes kOptionTakes[] = {
     {"CONFIG|MODEL", Takes::kConfig},
     {"RUN|MODEL", Takes::kModel},
     {"RUN|CONFIG", Takes::kModel},
+    {"CONFIG|RUN|DIAGNOSIS", Takes::kModel},
     {"RUN|DIAGNOSIS", Takes::kRun},
     {"MODEL", Takes::kModel},
     {"DIAGNOSIS", Takes::kDiagnosis},

@@ -163,10 +163,15 @@ HtmlRow screened_row(const Diagnosis& diagnosis, const Screened& s, double large
     note =
         "<span>looks like " + names(s.alias_set) + (note.empty() ? "" : "<br>") + note + "</span>";
   }
+  std::string from;
+  for (const auto& [key, size] : s.detectable_from) {
+    from += (from.empty() ? "" : ", ") + key + " " + number_text(size);
+  }
   return {"<code>" + html_escaped(s.effect) + "</code>" + standing(diagnosis, s.effect),
           {meter(largest > 0 ? s.gain / largest : 0, named ? "fill-named" : "fill",
                  number_text(s.gain)),
-           p_text(s.p), held_out, html_escaped(s.estimate), note},
+           p_text(s.p), held_out, html_escaped(s.estimate), from.empty() ? "–" : html_escaped(from),
+           note},
           named ? "named" : ""};
 }
 
@@ -254,7 +259,8 @@ std::string screening_section(const Diagnosis& diagnosis) {
   for (const Screened* s : order) rows.push_back(screened_row(diagnosis, *s, largest));
   return R"(<section id="screening"><h2>Which effect: the whole catalogue</h2><p>What each effect could add to the )"
          R"(tuned model once everything that retuning absorbs is taken out. The p-value is against that effect's own luck )"
-         R"(on data with nothing to find. Effects that look alike leave parallel traces in these data.</p>)" +
+         R"(on data with nothing to find. Effects that look alike leave parallel traces in these data. From the sizes in the last but )"
+         R"(one column on, each alone, this log would name an effect with 95 % power, by slopes at the fit.</p>)" +
          html_table("cards screening", "catalogue", "Screening of the catalogue",
                     {{"effect"},
                      {term("gain", "gain, nats in all"), "number with-bar", "gain, nats"},
@@ -262,6 +268,7 @@ std::string screening_section(const Diagnosis& diagnosis) {
                      {term("held-out", "held out") + ", " + term("nat", "nats a trial"), "number",
                       "held out, nats a trial"},
                      {"best strength"},
+                     {"would be named from"},
                      {"remarks"}},
                     rows) +
          "</section>";

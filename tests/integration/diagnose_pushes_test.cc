@@ -83,6 +83,12 @@ TEST_F(DiagnosePushes, ReportNoneWhenNothingIsMissing) {
   const Json d = diagnose(50, {});
   EXPECT_EQ(d["verdict"], "none") << d["headline"];
   EXPECT_TRUE(d["effects"].empty());
+  for (const Json& row : d["screening"]) {
+    if (row["effect"] != "com_offset") continue;
+    // 8 mm is named elsewhere.
+    EXPECT_GT(row["detectable_from"]["y"], 0.0005);
+    EXPECT_LT(row["detectable_from"]["y"], 0.008);
+  }
 }
 
 // Seed 137 of scripts/foreign_pushes.sh: a disc of table seemed to explain more than the lens, but

@@ -88,6 +88,17 @@ TEST_F(Diagnose, NamesAnEffectWithAnIntervalAndClosesTheGap) {
   EXPECT_GT(ratio["hi"], 0.048);
   EXPECT_GT(d["effects"][0]["closed"], 0.7);
   EXPECT_LT(d["gap"]["final"], d["gap"]["tuned"]);
+  // No surer than its log can be, and not much less; what it would have named, and from which size.
+  EXPECT_GT(ratio["bound"], 0);
+  EXPECT_GT(ratio["width_over_bound"], 0.95);
+  EXPECT_LT(ratio["width_over_bound"], 3);
+  for (const Json& row : d["screening"]) {
+    const Json& from = row["detectable_from"];
+    EXPECT_TRUE(row["effect"] != "motor_asymmetry" || from.empty());
+    if (row["effect"] != "floor_tilt") continue;
+    EXPECT_GT(from["angle"], 0.002);
+    EXPECT_LT(from["angle"], 0.1);
+  }
   // The model wrote predicts the log that it was made for.
   const Finished predicted = gapfarm_command(
       {"predict", folder_ / "d/model.toml", "--trials", folder_ / "trials.csv", "--out", "-"});

@@ -58,6 +58,9 @@ std::string diagnosis_summary(const Diagnosis& d) {
       const std::string key =
           p.key == "position" && !e.axis.empty() ? p.key + " along " + e.axis : p.key;
       text += fmt::format(", {} {:.4g} [{:.4g}, {:.4g}] {}", key, p.value, p.lo, p.hi, p.unit);
+      if (p.bound) {
+        text += fmt::format(" (bound {:.3g}, {:.1f} times as wide)", *p.bound, *p.width_over_bound);
+      }
     }
     for (std::size_t i = 0; i < e.aliases.size(); ++i) {
       text += (i == 0 ? "; not distinguished from " : ", ") + e.aliases[i];
@@ -69,6 +72,19 @@ std::string diagnosis_summary(const Diagnosis& d) {
       "{:.1f} final, {:.1f} and {:.1f} at the floor\n",
       d.gap.tuned, d.gap.final_, d.position_mm.tuned, d.heading_mrad.tuned, d.position_mm.final_,
       d.heading_mrad.final_, d.position_mm.floor, d.heading_mrad.floor);
+  std::string detectable;
+  for (const Screened& s : d.screening) {
+    for (std::size_t i = 0; i < s.detectable_from.size(); ++i) {
+      const auto& [key, size] = s.detectable_from[i];
+      detectable += (i > 0                ? ", "
+                     : detectable.empty() ? s.effect + " "
+                                          : "; " + s.effect + " ") +
+                    fmt::format("{} {:.3g}", key, size);
+    }
+  }
+  if (!detectable.empty()) {
+    text += "  would have been named (95 %, by slopes at the fit) from: " + detectable + "\n";
+  }
   for (const std::string& caution : d.cautions) text += "  note: " + caution + "\n";
   return text;
 }

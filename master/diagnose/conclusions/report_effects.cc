@@ -10,6 +10,7 @@
 #include "master/diagnose/conclusions/report_parts.h"
 #include "master/diagnose/effect_diagnosis.h"
 #include "master/diagnose/places/seam.h"
+#include "master/infer/certificate.h"
 
 namespace gapfarm::steps {
 namespace {
@@ -38,6 +39,26 @@ void set_closed(const ClosedShare& closed, NamedEffect* effect) {
   effect->closed_hi = closed.hi;
 }
 
+// Of a fitted row, beside the others and the nuisances; none where the slopes say nothing.
+std::optional<double> bound_of(const Judgement& judged, std::size_t row) {
+  const JointFit& fit = *judged.named.estimates;
+  const Study& study = judged.named.study();
+  Eigen::MatrixXd slopes = fit.jacobian;
+  study.drop_ignored(slopes);
+  Eigen::MatrixXd information = infer::information(slopes, judged.named.evidence->nuisances);
+  for (std::size_t k = 0; k < fit.base_parameters; ++k) {
+    const BaseParameter& p = study.base_parameters[k];
+    const auto i = static_cast<Eigen::Index>(k);
+    information(i, i) += 1 / std::pow(p.prior_log_sd * study.base.at(p.row), 2);
+  }
+  const Eigen::VectorXd least = infer::least_deviations(information);
+  for (std::size_t k = 0; k < fit.parameters.size(); ++k) {
+    const double bound = least[static_cast<Eigen::Index>(k)] * std::sqrt(judged.scale);
+    if (fit.parameters[k].row == row && std::isfinite(bound)) return bound;
+  }
+  return {};
+}
+
 // One row of the table with what the fit and what lies beyond it leave open.
 Estimate reported_estimate(const DiagnosisRequest& of, const Judgement& judged,
                            const ChosenEffect& chosen, std::size_t row, double value) {
@@ -62,6 +83,8 @@ Estimate reported_estimate(const DiagnosisRequest& of, const Judgement& judged,
     e.lo = std::max(e.lo, p.lower);
     e.hi = std::min(e.hi, p.upper);
   }
+  e.bound = bound_of(judged, row);
+  if (e.bound) e.width_over_bound = half / kNormal90 / *e.bound;
   const double frame = of.frame_of(p.key, estimates.at);
   for (double* bound : {&e.value, &e.lo, &e.hi}) *bound += frame;
   return e;

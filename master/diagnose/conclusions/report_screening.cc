@@ -119,10 +119,8 @@ ParameterValues within_table(const DiagnosisRequest& of, const Overrides& at,
   return values;
 }
 
-}  // namespace
-
-std::vector<Screened> complete_screening(const DiagnosisRequest& of, const Screening& screening,
-                                         const Judgement& judged) {
+std::vector<Screened> complete_rows(const DiagnosisRequest& of, const Screening& screening,
+                                    const Judgement& judged) {
   std::vector<Screened> rows;
   if (!judged.base_is_suspicious) rows = screening.rows;
   const std::vector<ChosenEffect>& chosen = judged.named.chosen;
@@ -146,6 +144,21 @@ std::vector<Screened> complete_screening(const DiagnosisRequest& of, const Scree
     row.estimate = screened.key + " " +
                    of.table().format(of.table().row(name + "." + screened.key),
                                      rounded_to_digits(screened.value, 4));
+  }
+  return rows;
+}
+
+}  // namespace
+
+std::vector<Screened> complete_screening(const DiagnosisRequest& of, const Screening& screening,
+                                         const Judgement& judged) {
+  std::vector<Screened> rows = complete_rows(of, screening, judged);
+  for (Screened& row : rows) {
+    const auto sizes = screening.detectable.find(row.effect);
+    const bool named = std::any_of(
+        judged.named.chosen.begin(), judged.named.chosen.end(),
+        [&](const ChosenEffect& c) { return c.candidate.signature.effect == row.effect; });
+    if (sizes != screening.detectable.end() && !named) row.detectable_from = sizes->second;
   }
   return rows;
 }

@@ -281,7 +281,11 @@ std::map<std::string, double> start_values(const Study& study, const Regression&
   const Eigen::MatrixXd normal = columns.transpose() * columns;
   Eigen::MatrixXd ridged = normal;
   ridged.diagonal() *= 1 + 1e-6;
-  const Eigen::VectorXd c = solve_symmetric(ridged, columns.transpose() * data);
+  return values_at(study, others, signature, solve_symmetric(ridged, columns.transpose() * data));
+}
+
+std::map<std::string, double> values_at(const Study& study, const Regression& others,
+                                        const Signature& signature, const Eigen::VectorXd& c) {
   std::map<std::string, double> values = signature.fixed;
   const EffectDiagnosis& effect = study.subject->effects->row(signature.effect);
   const EffectStart at{study, others, signature, c};

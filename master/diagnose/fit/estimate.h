@@ -48,6 +48,11 @@ Result<bool> move_seams(Predictor& predictor, const Study& study, const Eigen::M
 std::map<std::string, double> start_values(const Study& study, const Regression& others,
                                            const Signature& signature);
 
+// The same where the columns' coefficients are these.
+std::map<std::string, double> values_at(const Study& study, const Regression& others,
+                                        const Signature& signature,
+                                        const Eigen::VectorXd& coefficients);
+
 // Log scores (nats) of every trial that misses its prediction so far.
 std::vector<double> scores_of(const Study& study, const std::vector<Eigen::Vector3d>& residuals,
                               double outlier_share);

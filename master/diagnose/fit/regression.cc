@@ -91,6 +91,11 @@ double Regression::gain_within(const Eigen::VectorXd& column, double least, doub
   return c * (2 * product - c * own);
 }
 
+Eigen::MatrixXd Regression::information(const Eigen::MatrixXd& columns) const {
+  const Eigen::MatrixXd held = basis_.topRows(rows_).transpose() * columns;
+  return columns.transpose() * columns - held.transpose() * held;
+}
+
 double Regression::own_squares(const Eigen::VectorXd& column) const {
   return column.squaredNorm() - (basis_.topRows(rows_).transpose() * column).squaredNorm();
 }

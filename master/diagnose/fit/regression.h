@@ -30,6 +30,8 @@ class Regression {
   double gain_within(const Eigen::VectorXd& column, double least, double most) const;
   // Squares that each column would explain beyond the basis were it alone.
   Eigen::VectorXd each_gain(const Eigen::MatrixXd& columns) const;
+  // Fisher information of the columns' coefficients beyond the basis.
+  Eigen::MatrixXd information(const Eigen::MatrixXd& columns) const;
   // What a column's squares have beyond the basis.
   double own_squares(const Eigen::VectorXd& column) const;
   // The part of the data that `columns` explain beyond the basis.

@@ -26,6 +26,10 @@ struct Estimate {
   double lo = 0;  // 90 % interval
   double hi = 0;
   std::string unit;
+  // Standard deviation that no unbiased estimate could beat on this log (Cramer, Rao), beside base
+  // and nuisances, by slopes at the fit; and what the interval's is over it.
+  std::optional<double> bound = {};
+  std::optional<double> width_over_bound = {};
 };
 
 // An effect that the data show, in the order in which they were found.
@@ -87,6 +91,9 @@ struct Screened {
   std::optional<double> held_out;      // nats a trial gained on held-out trials, when refitted
   std::optional<double> held_out_se;
   std::string note;  // why it cannot be seen in these data, or what it is an alias of
+  // Where it is not named: by parameter, how far from neutral it would have been named with 95 %
+  // power on this log, by slopes at the fit, each alone; empty: not known.
+  std::vector<std::pair<std::string, double>> detectable_from = {};
 };
 
 // What the final model's residuals still depend on, or not.

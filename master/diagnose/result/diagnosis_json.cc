@@ -32,6 +32,8 @@ constexpr auto kEstimate = [](auto& v, auto& e) {
   v.field("lo", e.lo);
   v.field("hi", e.hi);
   v.field("unit", e.unit);
+  v.if_any("bound", e.bound);
+  v.if_any("width_over_bound", e.width_over_bound);
 };
 constexpr auto kSessionGainRow = [](auto& v, auto& s) {
   v.field("session", s.session);
@@ -82,6 +84,7 @@ constexpr auto kScreened = [](auto& v, auto& s) {
   v.if_any("held_out", s.held_out);
   v.if_any("held_out_se", s.held_out_se);
   v.later("note", s.note);
+  v.by_key("detectable_from", s.detectable_from);
 };
 constexpr auto kStep = [](auto& v, auto& step) {
   v.field("explained", step.explained);

@@ -46,4 +46,16 @@ class Competition {
   infer::Space base_;
 };
 
+// Of what was offered beside what is explained, by its marks: of what has a place, there.
+DetectableSizes detectable_by_marks(const DiagnosisRequest& of, const Study& study,
+                                    const Regression& explained,
+                                    const std::vector<EffectCandidate>& offered,
+                                    double explained_nats);
+// Of what is searched, by slopes at a model; nothing of what has a place.
+Result<DetectableSizes> detectable_by_slopes(const DiagnosisRequest& of, const Study& study,
+                                             const Competition& competition,
+                                             const infer::Model& model,
+                                             const std::set<std::string>& without,
+                                             double explained_nats);
+
 }  // namespace gapfarm::steps

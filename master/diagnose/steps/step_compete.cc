@@ -25,6 +25,7 @@ struct Found {
   std::vector<Screened> rows;
   std::vector<SelectionStep> steps;
   std::vector<NearMiss> refused;
+  DetectableSizes detectable;
 };
 
 // Hypotheses that predict as well as the best, as far as anybody can show.
@@ -106,11 +107,12 @@ class Selection {
 
   Result<Found> run() {
     ASSIGN_OR_RETURN(auto base, fitted(competition_.base(), competition_.base().from(study_.base)));
-    found_.emplace(Found{base, base, {}, {}, {}, {}});
+    found_.emplace(Found{base, base, {}, {}, {}, {}, {}});
     while (found_->chosen.size() < kMostEffects) {
       ASSIGN_OR_RETURN(const auto more, add_best());
       if (!more) break;
     }
+    if (Status s = measure_reach(); !s) return s.error();
     std::stable_sort(found_->chosen.begin(), found_->chosen.end(),
                      [](const ChosenEffect& a, const ChosenEffect& b) {
                        return a.candidate.gain > b.candidate.gain;
@@ -127,6 +129,18 @@ class Selection {
                            std::move(fit));
   }
 
+  // What the last contest was offered would have been named from some size on.
+  Status measure_reach() {
+    if (marks_ != nullptr) return {};
+    std::set<std::string> without;
+    for (const ChosenEffect& c : found_->chosen) without.insert(c.candidate.signature.effect);
+    auto sizes =
+        detectable_by_slopes(of_, study_, competition_, found_->model, without, explained());
+    if (!sizes) return sizes.error();
+    found_->detectable = std::move(*sizes);
+    return {};
+  }
+
   double explained() const {
     double sum = 0;
     for (const ChosenEffect& c : found_->chosen) sum += c.candidate.gain;
@@ -138,7 +152,7 @@ class Selection {
   }
 
   // What slopes promise beyond the present model.
-  Result<std::vector<infer::Hypothesis>> proposed() const {
+  Result<std::vector<infer::Hypothesis>> proposed() {
     const std::vector<EffectCandidate> chosen = candidates_of(found_->chosen);
     std::set<std::string> without = not_these_;
     for (const EffectCandidate& c : chosen) without.insert(c.signature.effect);
@@ -148,6 +162,7 @@ class Selection {
     for (const Signature& s : first_) explained.add(s.columns);
     for (const EffectCandidate& c : chosen) explained.add(c.signature.columns);
     ASSIGN_OR_RETURN(auto marks, marks_->candidates(explained, without, chosen));
+    found_->detectable = detectable_by_marks(of_, study_, explained, marks, this->explained());
     std::vector<infer::Hypothesis> hypotheses;
     double best = 0;
     for (const EffectCandidate& mark : marks) {
@@ -334,6 +349,7 @@ Result<Screening> compete(const DiagnosisRequest& of, Explanation found) {
   if (screening.catalogue == nullptr) screening.rows = std::move(selected.rows);
   screening.steps = std::move(selected.steps);
   screening.refused = std::move(selected.refused);
+  screening.detectable = std::move(selected.detectable);
   found.chosen = std::move(selected.chosen);
   found.estimates.reset();
   const std::shared_ptr<const Evidence> before = found.evidence;

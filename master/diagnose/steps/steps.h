@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 #include <algorithm>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -86,6 +87,10 @@ struct Explanation {
   }
 };
 
+// Of each effect that was not chosen: Screened::detectable_from.
+using Sizes = std::vector<std::pair<std::string, double>>;
+using DetectableSizes = std::map<std::string, Sizes>;
+
 struct Screening {
   Explanation found;
   std::vector<Screened> rows;            // of the table
@@ -95,6 +100,7 @@ struct Screening {
   std::optional<SanityFinding> warning;  // why nothing is to be looked for
   std::optional<double> explained;       // nats, held out, where hypotheses competed
   std::vector<NearMiss> refused;         // at their bounds
+  DetectableSizes detectable = {};
 };
 
 // What is to be believed of that.

@@ -156,7 +156,33 @@ Result<Reported> parse_reported(const std::string& text, const std::string& file
     }
     reported.effects.push_back(reported_effect(effect));
   }
+  for (const Json& row : json.value("screening", Json::array())) {
+    if (!row.is_object() || !row.value("detectable_from", Json()).is_object()) continue;
+    const std::string effect = row.value("effect", std::string());
+    for (const auto& [key, size] : row["detectable_from"].items()) {
+      if (size.is_number()) reported.detectable_from[effect + "." + key] = size.get<double>();
+    }
+  }
   return reported;
+}
+
+std::optional<bool> missed_below(const Truth& truth, const Reported& reported) {
+  std::optional<bool> below;
+  for (const TrueEffect& effect : truth.effects) {
+    const bool named = std::any_of(
+        reported.effects.begin(), reported.effects.end(),
+        [&](const ReportedEffect& one) { return family_of(one).count(effect.name) > 0; });
+    const Effect* entry = catalogue_entry(effect.name);
+    if (named || !entry || truth.kind == CaseKind::kOutside) continue;
+    for (std::size_t i = 0; i < entry->strengths; ++i) {
+      const EffectParameter& p = entry->parameters[i];
+      const auto value = effect.parameters.find(p.key);
+      const auto from = reported.detectable_from.find(effect.name + "." + p.key);
+      if (value == effect.parameters.end() || from == reported.detectable_from.end()) continue;
+      below = below.value_or(true) && std::abs(value->second - p.neutral) < from->second;
+    }
+  }
+  return below;
 }
 
 Judgement judge(const Truth& truth, const Reported& reported) {

@@ -1,6 +1,8 @@
 // Is a diagnosis right?  The rules by which every case is judged.
 #pragma once
 
+#include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -28,6 +30,8 @@ struct ReportedEffect {
 struct Reported {
   std::string verdict;  // "effect", "none", "unknown", "effect+unknown"
   std::vector<ReportedEffect> effects;
+  // "floor_tilt.angle": how far from neutral it would have been named (Screened::detectable_from).
+  std::map<std::string, double> detectable_from = {};
 };
 
 // Parameters without numbers and an absent `closed` (as NaN) are let pass: they cost coverage, not
@@ -45,6 +49,10 @@ struct Judgement {
 // naming nothing; a single effect must be the first named or one of its aliases; of a pair both
 // must be named; and nothing else may be.
 Judgement judge(const Truth& truth, const Reported& reported);
+
+// Whether an effect that is there was not named, and all such have every strength nearer to neutral
+// than the diagnosis says that its log shows; none: nothing was missed, or it says of none.
+std::optional<bool> missed_below(const Truth& truth, const Reported& reported);
 
 // The first named effect, or the verdict when none is named.
 std::string first_reported(const Reported& reported);

@@ -45,6 +45,7 @@ std::vector<RateRow> rate_rows(const Tally& sum) {
   rows.push_back(
       {"... of these, model.toml closes half of the truth's", ">= 79 %", sum.outside_closed});
   rows.push_back({"pairs right", ">= 80 %", sum.pairs_right});
+  rows.push_back({"missed effects that lie below what their log shows", "", sum.missed_below});
   rows.push_back({"parameters within their 90 % interval", "85 to 95 %", sum.covered});
   rows.push_back({"... of these, strengths", "", sum.strengths_covered});
   rows.push_back({"... of these, places, directions and the like", "", sum.places_covered});
@@ -268,6 +269,7 @@ std::string format_blind_json(const BlindReport& report) {
                       {"outside_unknown", rate_json(sum.outside_unknown)},
                       {"outside_closed", rate_json(sum.outside_closed)},
                       {"pairs_right", rate_json(sum.pairs_right)},
+                      {"missed_below", rate_json(sum.missed_below)},
                       {"covered", rate_json(sum.covered)},
                       {"strengths_covered", rate_json(sum.strengths_covered)},
                       {"places_covered", rate_json(sum.places_covered)},

@@ -139,6 +139,9 @@ ScoredCase score_case(const Truth& truth, const ChildEnd& end, std::optional<Rep
     return scored;
   }
   scored.judgement = judge(truth, *scored.reported);
+  if (const auto below = missed_below(truth, *scored.reported); below && !scored.judgement.right) {
+    scored.judgement.why += *below ? "; below what this log shows" : "; ours: this log shows it";
+  }
   scored.coverage = coverage_of(truth, *scored.reported);
   const double promised = promised_shrinkage(*scored.reported);
   if (!scored.reported->effects.empty() && std::isfinite(promised)) scored.promised = promised;
@@ -151,6 +154,8 @@ Tally tally(const std::vector<ScoredCase>& cases) {
     if (!c.has_truth) continue;
     sum.right.add(c.judgement.right);
     sum.failed.add(!c.reported);
+    const auto below = c.reported ? missed_below(c.truth, *c.reported) : std::nullopt;
+    if (below && !c.judgement.right) sum.missed_below.add(*below);
     add_kind(c, sum);
     ++sum.confusion[truth_family(c.truth)][c.reported ? first_reported(*c.reported) : "failed"];
     for (const Coverage& coverage : c.coverage) {

@@ -56,8 +56,10 @@ struct Tally {
   Rate outside_unknown;  // effects outside the catalogue called unknown, naming nothing
   Rate outside_closed;   // of these, models that close half of what the truth does
   Rate pairs_right;
-  Rate covered;                               // true parameters within their interval
-  Rate strengths_covered, places_covered;     // of these: Coverage::is_strength, and the others
+  Rate covered;                            // true parameters within their interval
+  Rate strengths_covered, places_covered;  // of these: Coverage::is_strength, and the others
+  Rate
+      missed_below;  // of missed effects of which the diagnosis says it: smaller than its log shows
   Rate promise_kept;                          // |promised - realised| <= kPromiseTolerance
   std::map<std::string, Rate> singles_right;  // by level
   std::map<std::string, Rate> singles_first;  // by level; the true name itself came first

@@ -6,10 +6,10 @@
 #include <map>
 
 #include "common/base/try.h"
-#include "common/math/laws.h"
 #include "common/math/statistics.h"
 #include "common/random/stream.h"
 #include "master/diagnose/subject.h"
+#include "master/infer/certificate.h"
 #include "master/infer/predictor.h"
 
 namespace gapfarm::plan {
@@ -39,14 +39,6 @@ class LogDeterminant {
 
   Eigen::MatrixXd inverse_;  // of I + X'X
 };
-
-// (I + Z Z')^-1 v
-Eigen::VectorXd beyond(const Eigen::VectorXd& v, const Eigen::MatrixXd& nuisances) {
-  if (nuisances.cols() == 0) return v;
-  const Eigen::MatrixXd inner = Eigen::MatrixXd::Identity(nuisances.cols(), nuisances.cols()) +
-                                nuisances.transpose() * nuisances;
-  return v - nuisances * inner.llt().solve(nuisances.transpose() * v);
-}
 
 constexpr double kPower = 0.9;
 constexpr int kMostHalvings = 4;  // where the robot cannot be simulated at the first strength
@@ -210,8 +202,8 @@ std::vector<Visibility> visibility(const Problem& problem, const Signals& signal
   const ParameterTable& table = problem.table();
   std::vector<Visibility> all;
   for (const auto& [effect, shifts] : by_effect(signals)) {
-    const double wanted =
-        noncentrality_for(kPower, threshold_of(problem, effect), freedom_of(problem, effect));
+    const double wanted = infer::noncentrality_for(kPower, threshold_of(problem, effect),
+                                                   freedom_of(problem, effect));
     std::vector<double> strengths, sizes;
     for (const Shift* shift : shifts) {
       const double now = information(shift->rows, signals.nuisances);
@@ -242,8 +234,9 @@ double mean_power(const Problem& problem, const Signals& signals,
     if (wanted == at.end() || wanted->strength > 1) continue;
     for (const Shift* shift : shifts) {
       const double times = wanted->strength / shift->strength;
-      sum += chance_of_exceeding(threshold_of(problem, effect), freedom_of(problem, effect),
-                                 times * times * information(shift->rows, signals.nuisances));
+      sum +=
+          infer::chance_of_exceeding(threshold_of(problem, effect), freedom_of(problem, effect),
+                                     times * times * information(shift->rows, signals.nuisances));
       ++count;
     }
   }
@@ -276,23 +269,15 @@ std::vector<std::size_t> select(const std::vector<Rows>& candidates, Eigen::Inde
 }
 
 double information(const Eigen::VectorXd& shift, const Eigen::MatrixXd& nuisances) {
-  return std::max(0.0, shift.dot(beyond(shift, nuisances)));
+  return std::max(0.0, infer::information(shift, nuisances)(0, 0));
 }
 
 double likeness(const Eigen::VectorXd& a, const Eigen::VectorXd& b,
                 const Eigen::MatrixXd& nuisances) {
   const double lengths = information(a, nuisances) * information(b, nuisances);
-  return lengths > 0 ? std::clamp(a.dot(beyond(b, nuisances)) / std::sqrt(lengths), -1.0, 1.0) : 0;
-}
-
-double chance_of_exceeding(double threshold, double freedom, double noncentrality) {
-  return noncentrality <= 0 ? chi_squared_above(freedom, threshold)
-                            : noncentral_chi_squared_above(freedom, noncentrality, threshold);
-}
-
-double noncentrality_for(double power, double threshold, double freedom) {
-  if (chance_of_exceeding(threshold, freedom, 0) >= power) return 0;
-  return noncentrality_of(freedom, threshold, power);
+  return lengths > 0
+             ? std::clamp(a.dot(infer::beyond(b, nuisances).col(0)) / std::sqrt(lengths), -1.0, 1.0)
+             : 0;
 }
 
 }  // namespace gapfarm::plan

@@ -44,11 +44,6 @@ double information(const Eigen::VectorXd& shift, const Eigen::MatrixXd& nuisance
 double likeness(const Eigen::VectorXd& a, const Eigen::VectorXd& b,
                 const Eigen::MatrixXd& nuisances);
 
-// Chance that a chi-squared of `freedom` degrees of freedom and this noncentrality exceeds
-// `threshold`; and the noncentrality at which it does with chance `power` in (0, 1).
-double chance_of_exceeding(double threshold, double freedom, double noncentrality);
-double noncentrality_for(double power, double threshold, double freedom);
-
 // One way in which an effect may be there, and what it does to every trial.
 struct Shift {
   EffectDraw draw;

@@ -323,6 +323,33 @@ bool looks_like_tum(std::string_view text) {
          });
 }
 
+// Columns between blanks alone, as Octave and NumPy write them, by commas: a '#' or '%' before a
+// header of names is no name, and other lines of comments are blank.  Empty: they are not such.
+std::string with_commas(std::string_view text) {
+  std::string out;
+  bool numbers = false;
+  for (std::size_t at = 0; at < text.size();) {
+    const std::size_t end = std::min(text.find('\n', at), text.size());
+    std::string_view line = text.substr(at, end - at);
+    at = end + 1;
+    if (line.find_first_of(",;\"\t") != line.npos) return "";
+    if (!line.empty() && line.back() == '\r') line.remove_suffix(1);
+    std::vector<std::string_view> tokens = tokens_of(line);
+    if (!tokens.empty() && (tokens[0][0] == '#' || tokens[0][0] == '%')) {
+      tokens[0].remove_prefix(1);
+      if (tokens[0].empty()) tokens.erase(tokens.begin());
+      if (out.find_first_not_of('\n') != out.npos) tokens.clear();
+    }
+    if (tokens.size() == 1) return "";
+    for (std::size_t i = 0; i < tokens.size(); ++i) {
+      numbers = numbers || parse_double(tokens[i]);
+      out += (i == 0 ? "" : ",") + std::string(tokens[i]);
+    }
+    out += '\n';
+  }
+  return numbers ? out : "";
+}
+
 }  // namespace
 
 Result<Recording> parse_text_log(std::string_view text, const std::string& file) {
@@ -332,6 +359,8 @@ Result<Recording> parse_text_log(std::string_view text, const std::string& file)
                      format == TextFormat::kBinary || format == TextFormat::kRunStore;
   if (other) return wrong_format(file, format, "a log of drives");
   if (looks_like_tum(text)) return parse_tum(text, file);
+  const std::string commas = with_commas(text);
+  if (!commas.empty()) text = commas;
   const char separator = find_separator(text);
   Result<std::vector<CsvRow>> rows = parse_separated(text, file, separator);
   if (!rows) return rows.error();

@@ -202,6 +202,21 @@ TEST(Coverage, CountsMissingIntervalsAndSkipsWhatMeansNothing) {
   EXPECT_TRUE(coverage_of(truth, reported_with("floor_nap", {})).empty());
 }
 
+TEST(MissedBelow, IsWhatTheLogCouldNotShow) {
+  const Reported none = *parse_reported(R"({"verdict": "none", "screening": [
+          {"effect": "floor_tilt", "detectable_from": {"angle": 0.02}}, {"effect": "backlash"}]})",
+                                        "d");
+  Truth truth;
+  truth.kind = CaseKind::kSingle;
+  truth.effects = {{"floor_tilt", {{"angle", 0.01}, {"direction", 1}}, 5}};
+  EXPECT_EQ(missed_below(truth, none), true);
+  truth.effects[0].parameters["angle"] = 0.03;
+  EXPECT_EQ(missed_below(truth, none), false);
+  EXPECT_EQ(missed_below(truth, reported_with("floor_tilt", {})), std::nullopt);
+  truth.effects = {{"backlash", {{"travel", 1}}, 5}};
+  EXPECT_EQ(missed_below(truth, none), std::nullopt);  // of which nothing is known
+}
+
 TEST(Wilson, MatchesTheClosedForm) {
   const RateInterval half = wilson_interval({50, 100});
   EXPECT_NEAR(half.lower, 0.4038, 1e-4);

@@ -75,7 +75,7 @@ std::uint64_t needed(OptimiserKind kind, std::string_view name, bool rotated = t
   return all[all.size() / 2];
 }
 
-// Half as many again as the table of docs/evidence/optimisers.md has.
+// With a margin over the table of docs/evidence/optimisers.md, which has other seeds.
 TEST(Searches, NeedNoMoreEvaluationsThanMeasured) {
   using Kind = OptimiserKind;
   EXPECT_LT(needed(Kind::kCmaEs, "sphere"), 1150u);

@@ -8,6 +8,7 @@
 
 #include "common/parameters/push.h"
 #include "common/random/stream.h"
+#include "master/infer/certificate.h"
 #include "master/infer/scope.h"
 
 namespace gapfarm::infer {
@@ -52,9 +53,9 @@ Forward forward() {
   };
 }
 
-Observations observed(const Overrides& truth, bool outliers = false) {
+Observations observed(const Overrides& truth, bool outliers = false, std::uint64_t seed = 7) {
   Observations o;
-  Stream stream({7, Purpose::kStatistics, 0, 0, 0});
+  Stream stream({seed, Purpose::kStatistics, 0, 0, 0});
   for (std::size_t i = 0; i < kObservations; ++i) {
     Pose end = end_of(i, truth);
     end = end * Pose{kNoise * stream.normal(), kNoise * stream.normal(), kNoise * stream.normal()};
@@ -234,6 +235,56 @@ TEST(InferCompete, TurnsWithTheCause) {
     ASSERT_EQ(contest->contenders.size(), 1u) << direction;
     const Model& model = contest->contenders.front().model;
     EXPECT_NEAR(model.space.values(model.fit.u).at(row("table_tilt.direction")), direction, 0.05);
+  }
+}
+
+// A line's offset and rise (x from 0 to 5, noise 0.5), and the rise where the offset is known to
+// 0.1.
+TEST(InferCertificate, BoundIsTheCovarianceOfALine) {
+  Eigen::MatrixXd slopes(6, 2);
+  for (int i = 0; i < 6; ++i) slopes.row(i) << 1 / 0.5, i / 0.5;
+  const Eigen::VectorXd least = least_deviations(information(slopes, Eigen::MatrixXd(6, 0)));
+  EXPECT_NEAR(least[1], 0.5 / std::sqrt(17.5), 1e-12);
+  EXPECT_NEAR(least[0], 0.5 * std::sqrt(1.0 / 6 + 2.5 * 2.5 / 17.5), 1e-12);
+  const auto with = [&](double known) {
+    return least_deviations(information(slopes.col(1), slopes.col(0) * known))[0];
+  };
+  EXPECT_NEAR(with(1e4), 0.5 / std::sqrt(17.5), 1e-6);
+  EXPECT_NEAR(with(1e-6), 0.5 / std::sqrt(55), 1e-6);
+  Eigen::Matrix2d blind = Eigen::Matrix2d::Zero();
+  blind(0, 0) = 4;
+  EXPECT_EQ(least_deviations(blind)[0], 0.5);
+  EXPECT_EQ(least_deviations(blind)[1], INFINITY);
+}
+
+// Each hypothesis by itself, at the size that the slopes of a log without it promise.
+TEST(InferCertificate, NamesWhatItCallsDetectableAsOftenAsPromised) {
+  constexpr int kLogs = 300;
+  constexpr double kLeastGain = 9;  // nats
+  const Forward f = forward();
+  for (const Hypothesis& h : {offset(), tilt()}) {
+    const Observations nothing = observed({{row("finger_friction"), 0.6}});
+    const Model base = base_of(f, nothing);
+    const Space own = base.space.only(h.coordinates);
+    Fit fit = base.fit;
+    fit.u.conservativeResize(1 + own.dimensions());
+    fit.u.tail(own.dimensions()) = own.from({});
+    ASSERT_TRUE(Fitter(f, nothing, base.space.with(h.coordinates)).differentiate(&fit, 1));
+    const Eigen::MatrixXd I =
+        information(fit.slopes.rightCols(own.dimensions()), 100 * fit.slopes.leftCols(1));
+    const double size = std::sqrt(detectable_squares(kLeastGain, own.dimensions()) / I(0, 0));
+    Overrides truth = own.values(own.from({}) + size * Eigen::VectorXd::Unit(own.dimensions(), 0));
+    truth[row("finger_friction")] = 0.6;
+    int named = 0;
+    for (int k = 0; k < kLogs; ++k) {
+      const Observations o = observed(truth, false, 1000 + static_cast<std::uint64_t>(k));
+      const auto contest = compete(f, o, base_of(f, o), {h}, {}, nullptr);
+      ASSERT_TRUE(contest);
+      const std::vector<Contender>& all = contest->contenders;
+      named +=
+          !all.empty() && all[0].gain >= kLeastGain && all[0].gain >= kLeastSure * all[0].gain_se;
+    }
+    EXPECT_NEAR(named, kDetectablePower * kLogs, 0.05 * kLogs) << h.name;
   }
 }
 

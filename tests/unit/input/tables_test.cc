@@ -55,6 +55,15 @@ TEST(Tables, SeparatorsAndDecimalsAreFound) {
   }
 }
 
+TEST(Tables, BlanksMayStandBetweenColumns) {
+  const LogTable named = table_of("# T  left right\n1.5 2 -3\n# pause\n2   4 5e-1\n").tables[0];
+  EXPECT_THAT(named.columns, ElementsAre("T", "left", "right"));
+  EXPECT_THAT(named.values, ElementsAre(1.5, 2, -3, 2, 4, 0.5));
+  const LogTable bare = table_of("  1 2\r\n  3 4\r\n").tables[0];
+  EXPECT_THAT(bare.columns, ElementsAre("column_1", "column_2"));
+  EXPECT_THAT(bare.values, ElementsAre(1, 2, 3, 4));
+}
+
 TEST(Tables, RowsOfUnitsAndOtherNamesStandAboveTheNumbers) {
   const Recording recording = table_of(kCamera);
   const LogTable& table = recording.tables[0];

@@ -6,9 +6,11 @@
 
 #include "common/random/stream.h"
 #include "master/experiments/plan/visibility.h"
+#include "master/infer/certificate.h"
 
 namespace gapfarm::plan::selection_test {
 
+using infer::chance_of_exceeding, infer::noncentrality_for;
 using ::testing::ElementsAre;
 
 Rows row(std::initializer_list<double> values) {
