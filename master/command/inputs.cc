@@ -243,6 +243,7 @@ void show_notes(const TrialLog& log, Console& console) {
   }
   console.note(text);
 }
+
 namespace {
 
 Result<Model> find_model(const std::string& run_or_model, Console& console) {
@@ -272,6 +273,31 @@ Result<Model> find_model(const std::string& run_or_model, Console& console) {
   console.note(run_or_model + ": this run is not finished; taking its best so far, " +
                run.info().fitness + " " + format_number(model->score) + " of generation " +
                std::to_string(model->origin.generation));
+  return model;
+}
+
+}  // namespace
+
+Status check_same_robot(const Model& model, const std::string& path, const Config& config,
+                        const std::string& config_path) {
+  if (model.scenario == config.problem.scenario && model.robot_file == config.problem.robot_file) {
+    return {};
+  }
+  return Error{path + ": is a model of another scenario or robot than " + config_path +
+               "; give the config that it was made with"};
+}
+
+Status check_no_residual(const Model& model, const std::string& path, const std::string& user) {
+  if (model.residual.empty()) return {};
+  return Error{path +
+               ": the model has a [residual], a correction of trials' ends by their places, "
+               "headings and times, which " +
+               user + " does not take along; leave that section out of a copy, or give tuned.toml"};
+}
+
+Result<Model> read_model_of(const std::string& run_or_model, Console& console) {
+  ASSIGN_OR_RETURN(Model model, find_model(run_or_model, console));
+  RETURN_IF_ERROR(check_moves(model.scenario, run_or_model));
   return model;
 }
 
@@ -325,31 +351,6 @@ void report_to(Console& console, SocketFarmOptions& options) {
     if (level_of(event.kind) != LogLevel::kInfo) return console.note("gapfarm: " + text);
     if (console.kept() != nullptr) console.kept()->write(LogLevel::kInfo, text);
   };
-}
-
-}  // namespace
-
-Status check_same_robot(const Model& model, const std::string& path, const Config& config,
-                        const std::string& config_path) {
-  if (model.scenario == config.problem.scenario && model.robot_file == config.problem.robot_file) {
-    return {};
-  }
-  return Error{path + ": is a model of another scenario or robot than " + config_path +
-               "; give the config that it was made with"};
-}
-
-Status check_no_residual(const Model& model, const std::string& path, const std::string& user) {
-  if (model.residual.empty()) return {};
-  return Error{path +
-               ": the model has a [residual], a correction of trials' ends by their places, "
-               "headings and times, which " +
-               user + " does not take along; leave that section out of a copy, or give tuned.toml"};
-}
-
-Result<Model> read_model_of(const std::string& run_or_model, Console& console) {
-  ASSIGN_OR_RETURN(Model model, find_model(run_or_model, console));
-  RETURN_IF_ERROR(check_moves(model.scenario, run_or_model));
-  return model;
 }
 
 }  // namespace gapfarm
