@@ -19,14 +19,15 @@ bool read_external_section(TomlSection& top, const std::string& config_path,
   const bool objective = scenario_form(scenario).objective;
   const std::string example =
       std::string("[\"python3\", \"") + (objective ? "objective.py" : "simulator.py") + "\"]";
-  auto section = top.section(scenario);
+  const std::string name = objective ? "objective" : "external";
+  auto section = top.section(name);
   const auto fail = [&](const std::string& sentence) {
     top.errors().add(section ? section->table().source().begin : top.table().source().begin,
                      sentence);
     return false;
   };
   if (!section) {
-    return fail("scenario " + scenario + " needs its program:\n  [" + scenario +
+    return fail("scenario " + scenario + " needs its program:\n  [" + name +
                 "]\n  program = " + example);
   }
   ExternalCommand command;
@@ -35,7 +36,7 @@ bool read_external_section(TomlSection& top, const std::string& config_path,
   if (objective) read_objective(*section, problem.fitness, problem.spread);
   section->finish();
   if (command.argv.empty() || command.argv[0].empty()) {
-    return fail("[" + scenario + "] program names no program, expected words such as " + example);
+    return fail("[" + name + "] program names no program, expected words such as " + example);
   }
   std::error_code ignored;
   command.folder =
