@@ -98,10 +98,8 @@ class ExternalRuns final : public WindowModel {
       request.commands.assign(commands.begin(), commands.end());
       for (CommandRow& row : request.commands) row.t_s += delay_s;
       request.times_s = times;
-      const Result<ExternalRunAnswer> answer =
-          simulator_->simulate(request, problem_.external->introduction);
+      const auto answer = ask_program(*simulator_, request, *problem_.external, steps);
       if (!answer) throw ExternalFailure(answer.error().message);
-      count_step(steps);
       return motion_of(*answer, start, times);
     };
     return {{at(values, "marker.x"), at(values, "marker.y"), at(values, "marker.yaw")}, run};

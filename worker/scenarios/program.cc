@@ -29,12 +29,4 @@ std::optional<v1::TaskResult> refuse_to_start() {
   return refusal;
 }
 
-Result<ExternalAnswer> ask_program(ExternalSimulator& simulator, ExternalRequest& request,
-                                   const ExternalProgram& program, StepCounter* steps) {
-  simulator.while_waiting([steps] { count_step(steps); });
-  Result<ExternalAnswer> answer = simulator.simulate(request, program.introduction);
-  count_step(steps);
-  return answer;
-}
-
 }  // namespace gapfarm

@@ -17,7 +17,13 @@ std::optional<v1::TaskResult> refuse_to_start();
 
 // ExternalSimulator::simulate().  `steps` advance while the program computes, since it has a limit
 // of its own.
-Result<ExternalAnswer> ask_program(ExternalSimulator& simulator, ExternalRequest& request,
-                                   const ExternalProgram& program, StepCounter* steps);
+template <class Request>
+auto ask_program(ExternalSimulator& simulator, Request& request, const ExternalProgram& program,
+                 StepCounter* steps) {
+  simulator.while_waiting([steps] { count_step(steps); });
+  auto answer = simulator.simulate(request, program.introduction);
+  count_step(steps);
+  return answer;
+}
 
 }  // namespace gapfarm
