@@ -14,7 +14,9 @@
 #include "master/evolve/evolve.h"
 #include "master/ground/diagnose_ground.h"
 #include "master/io/log_checks/finding.h"
+#include "master/io/log_checks/log_checks.h"
 #include "master/io/log_checks/sanity.h"
+#include "master/io/log_checks/window_checks.h"
 #include "master/run/run.h"
 
 namespace gapfarm {
@@ -60,6 +62,16 @@ Status measure_evaluation(const Config& config, CliContext& context, Summary* su
     summary->evaluated = results.front();
     if (summary->evaluation_s > kLong_s) break;
   }
+  if (!config.problem.windows() || config.problem.ground) return {};
+  // Nothing but the program says where its robot should be.
+  v1::Task task;
+  task.mutable_predict()->set_means_only(true);
+  ASSIGN_OR_RETURN(const auto predicted, farm->run(hash, {task}));
+  std::vector<Pose> ends;
+  for (const v1::Predicted& p : predicted.front().predict().predictions()) {
+    ends.push_back(from_proto(p.end()));
+  }
+  check_windows(config.problem.log, ends, &summary->sanity);
   return {};
 }
 
@@ -122,7 +134,10 @@ std::size_t count_conditions(const Problem& problem, unsigned context) {
 std::vector<SanityFinding> warnings(const Config& config) {
   const Problem& problem = config.problem;
   if (!problem.ground) {
-    return problem.windows() ? std::vector<SanityFinding>() : check_sanity(problem);
+    if (!problem.windows()) return check_sanity(problem);
+    std::vector<SanityFinding> findings;
+    check_count(problem.log, &findings);
+    return findings;
   }
   const GroundRobot robot = problem.ground->robot_at(problem.values);
   const auto runs = read_run_folders(config.trial_files, robot.channels);
