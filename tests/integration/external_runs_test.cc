@@ -3,7 +3,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "tests/integration/run_program.h"
+#include "tests/integration/program_runs.h"
 
 namespace gapfarm::external_runs_test {
 
@@ -26,7 +26,7 @@ std::string simulator(const std::string& misbehave) {
          "    print(json.dumps({'id': task['id'], 'pose': [x + extra, 0, 0]}), flush=True)\n";
 }
 
-class ExternalRuns : public ::testing::Test {
+class ExternalRuns : public ProgramRuns {
  protected:
   std::string config(const std::string& misbehave, const std::string& more = "",
                      const std::string& limit = "60") const {
@@ -43,16 +43,6 @@ class ExternalRuns : public ::testing::Test {
                              "[genes]\nspeed = [0.1, 1]\n[evolution]\npopulation = 6\n" +
                              more);
   }
-  Finished evolve(const std::string& config, const std::string& run, const std::string& generations,
-                  const std::string& workers = "2") const {
-    return gapfarm_command({"evolve", config, "--out", folder_ / run, "--generations", generations,
-                            "--workers", workers});
-  }
-  json status(const std::string& run) const {
-    return json::parse(gapfarm_command({"status", folder_ / run, "--json"}).out);
-  }
-
-  const TemporaryFolder folder_;
 };
 
 TEST_F(ExternalRuns, EvolveResumeAndPredict) {

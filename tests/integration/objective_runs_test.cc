@@ -4,7 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "tests/integration/run_program.h"
+#include "tests/integration/program_runs.h"
 
 namespace gapfarm::objective_runs_test {
 
@@ -35,7 +35,7 @@ std::string bowl(const std::string& misbehave) {
          misbehave + "    print(json.dumps(answer), flush=True)\n";
 }
 
-class ObjectiveRuns : public ::testing::Test {
+class ObjectiveRuns : public ProgramRuns {
  protected:
   std::string config(const std::string& misbehave, const std::string& objective = "",
                      const std::string& more = "") const {
@@ -45,19 +45,6 @@ class ObjectiveRuns : public ::testing::Test {
                          "program = [\"python3\", \"bowl.py\"]\n" +
                              objective + "[evolution]\npopulation = 8\n" + more);
   }
-  Finished evolve(const std::string& config, const std::string& run, const std::string& generations,
-                  const std::string& workers = "2") const {
-    return gapfarm_command({"evolve", config, "--out", folder_ / run, "--generations", generations,
-                            "--workers", workers});
-  }
-  json status(const std::string& run) const {
-    return json::parse(gapfarm_command({"status", folder_ / run, "--json"}).out);
-  }
-  std::string screen(const std::string& run) const {
-    return gapfarm_command({"status", folder_ / run}).out;
-  }
-
-  const TemporaryFolder folder_;
 };
 
 TEST_F(ObjectiveRuns, FindTheLeastValueAndLeaveItsModel) {

@@ -1,0 +1,30 @@
+// Runs of a user's program, in a folder of their own.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "tests/integration/run_program.h"
+
+namespace gapfarm {
+
+class ProgramRuns : public ::testing::Test {
+ protected:
+  Finished evolve(const std::string& config, const std::string& run, const std::string& generations,
+                  const std::string& workers = "2") const {
+    return gapfarm_command({"evolve", config, "--out", folder_ / run, "--generations", generations,
+                            "--workers", workers});
+  }
+  std::string screen(const std::string& run) const {
+    return gapfarm_command({"status", folder_ / run}).out;
+  }
+  nlohmann::json status(const std::string& run) const {
+    return nlohmann::json::parse(gapfarm_command({"status", folder_ / run, "--json"}).out);
+  }
+
+  const TemporaryFolder folder_;
+};
+
+}  // namespace gapfarm
