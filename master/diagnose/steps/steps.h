@@ -37,7 +37,7 @@ struct DiagnosisRequest {
   // As asked, or because the scenario's table has no such effect.
   bool excluded(const std::string& effect) const;
   bool looks_for(const std::string& effect, Looks look) const;
-  // Whether there are poses on the way to be had: some programs answer where a drive ends alone.
+  // Whether poses on the way are known: some programs answer where a drive ends alone.
   bool has_paths() const;
   // Of a table key that is a place along a world axis: how far the log's frame lies along it.
   double frame_of(const std::string& key, const Overrides& at) const;

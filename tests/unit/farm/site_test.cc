@@ -115,12 +115,11 @@ TEST(Sites, CondorIsUnderstood) {
   EXPECT_EQ(ids_of(parse_list(site, "gf01234567",
                               "24.0 1 undefined undefined\n24.1 1 undefined undefined\n")),
             "24.0 queued \n24.1 queued \n");
-  const auto jobs =
-      parse_list(site, "gf01234567",
-                 "24.0 7 slot1_1@localhost.vm undefined\n"
-                 "24.1 2 slot1_2@localhost.vm undefined\n"
-                 "25.0 5 undefined Error from slot1_4@localhost.vm: Failed to "
-                 "execute '/home/farm/none': (errno=2: 'No such file or directory')\n");
+  const auto jobs = parse_list(site, "gf01234567",
+                               "24.0 7 slot1_1@localhost.vm undefined\n"
+                               "24.1 2 slot1_2@localhost.vm undefined\n"
+                               "25.0 5 undefined Error from slot1_4@localhost.vm: Failed to "
+                               "execute '/opt/none': (errno=2: 'No such file or directory')\n");
   EXPECT_EQ(ids_of(jobs), "24.0 runs localhost.vm\n24.1 runs localhost.vm\n25.0 stuck \n");
   ASSERT_EQ(jobs.size(), 3u);
   EXPECT_EQ(jobs[0].reason, "");
