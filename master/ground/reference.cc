@@ -7,6 +7,7 @@
 #include <set>
 #include <utility>
 
+#include "common/math/statistics.h"
 #include "common/random/stream.h"
 #include "master/ground/fit/edge.h"
 #include "master/ground/tolerances.h"
@@ -22,6 +23,7 @@ constexpr double kUnshown = 0.7;  // of the prior's deviation: a log that leaves
 // Headings of the tracked point that a fit begins at, and for how many rounds each is followed.
 constexpr int kTurns = 8;
 constexpr int kScanRounds = 3;
+constexpr double kExplained = 0.2;  // of the median way
 
 // A grip that was never reached has no upper end that shows, and none below that does not: half of
 // how far it may fall, in its logarithm, before the log would be two nats less likely.
@@ -118,6 +120,52 @@ Eigen::VectorXd scan_marker(const WindowFitter& fitter, const std::vector<FitRow
   return best->values;
 }
 
+WindowFit open_fit(const WindowFitter& fitter, const GroundRobot& robot,
+                   const std::vector<KinematicRow>& of, const RunLog& log) {
+  std::vector<FitRow> rows = open_rows(robot, of, log);
+  rows = begun_at(rows, scan_delay(fitter, rows, nominals(rows)));
+  if (log.relative) rows = begun_at(rows, scan_marker(fitter, rows));
+  return fitter.fit(rows, {}, nominals(rows));
+}
+
+// Whether values account for where windows end: what is left is small beside the motion.
+bool explains(const WindowFitter& fitter, const WindowFit& fit) {
+  std::vector<double> ways;
+  for (const Trial& t : fitter.windows().trials) {
+    ways.push_back(std::hypot(t.X_WE.x - t.X_WS.x, t.X_WE.y - t.X_WS.y));
+  }
+  return fit.scales.front().head<2>().maxCoeff() < kExplained * median(ways);
+}
+
+// Whether the log is the wrong way round: put right, it fits better than with all values free.  A
+// sensor that looks another way hides another unit from values that are held, so increments that no
+// values explain are fitted in each unit.
+const GroundHypothesis* fault_of(const GroundRobot& robot, const RunLog& log,
+                                 const WindowSettings& settings, const GroundQuestion& question,
+                                 const WindowFitter& as_logged, const WindowFit& fit) {
+  const auto fault = find_ground_fault(robot, log, question, settings);
+  if (fault && fault->objective > fit.objective) return &question.catalogue[fault->hypothesis];
+  if (!log.relative || explains(as_logged, fit)) return nullptr;
+  const GroundHypothesis* best = nullptr;
+  double most = fit.objective + kFaultGain;
+  for (const GroundHypothesis& h : question.catalogue) {
+    if (!h.put_right || h.metres == 1) continue;
+    RunLog right = log;
+    h.put_right(&right);
+    const auto windows = window_set(robot, right, settings);
+    if (!windows) continue;
+    const double stretches =
+        static_cast<double>(windows->trials.size()) / static_cast<double>(windows->horizons);
+    const WindowFitter fitter(robot, *windows, nullptr);
+    const double objective = open_fit(fitter, robot, question.rows, right).objective +
+                             2 * stretches * std::log(h.metres);
+    if (objective <= most) continue;
+    most = objective;
+    best = &h;
+  }
+  return best;
+}
+
 GroundReference reference_of(const WindowFitter& fitter, const WindowFit& fit, std::uint64_t seed) {
   GroundReference reference;
   for (const FitRow& row : fit.rows) reference.names.push_back(row.row.name);
@@ -169,14 +217,9 @@ Result<GroundQuestion> ask_what_changed(const GroundRobot& robot, const RunLog& 
   const auto windows = window_set(robot, reference, settings);
   if (!windows) return Error{"the reference: " + windows.error().message};
   const WindowFitter fitter(robot, *windows, nullptr, memo);
-  std::vector<FitRow> rows = open_rows(robot, question.rows, reference);
-  rows = begun_at(rows, scan_delay(fitter, rows, nominals(rows)));
-  if (reference.relative) rows = begun_at(rows, scan_marker(fitter, rows));
-  WindowFit fit = fitter.fit(rows, {}, nominals(rows));
-  if (const auto fault = find_ground_fault(robot, reference, question, settings);
-      fault && fault->objective > fit.objective) {
-    const GroundHypothesis& h = question.catalogue[fault->hypothesis];
-    return Error{"the reference's log is wrong in " + h.thing + ". " + h.remedy};
+  WindowFit fit = open_fit(fitter, robot, question.rows, reference);
+  if (const GroundHypothesis* h = fault_of(robot, reference, settings, question, fitter, fit)) {
+    return Error{"the reference's log is wrong in " + h->thing + ". " + h->remedy};
   }
   fit = with_traits(fitter, that_can_show(reference, ground_hypotheses(robot)), std::move(fit));
   question.reference = reference_of(fitter, fit, seed);

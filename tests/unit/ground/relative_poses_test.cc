@@ -124,6 +124,18 @@ TEST(RelativePoses, KnowThatTheyLackWhatOnlyTurnsShow) {
   EXPECT_TRUE(said("left").shown);
 }
 
+TEST(RelativePoses, AreNotTakenInAnotherUnitWhicheverWayTheSensorLooks) {
+  RunLog log = driven(6, 31, {0.1, 0.02, 1.2});
+  for (LoggedRun& run : log.runs) {
+    for (PoseRow& row : run.poses)
+      row.X_WM = {1000 * row.X_WM.x, 1000 * row.X_WM.y, row.X_WM.theta};
+  }
+  const auto asked = ask_what_changed(robot_by_its_maker(), log, {{kEachRow_s}, 0}, 1, nullptr);
+  ASSERT_FALSE(asked);
+  EXPECT_NE(asked.error().message.find("positions in millimetres"), std::string::npos)
+      << asked.error().message;
+}
+
 TEST(RelativePoses, AreKeptAsIncrementsByAFolder) {
   RunLog log = driven(2, 7);
   const RunFiles files = format_runs(log);
