@@ -12,6 +12,9 @@ find_package(SQLite3 REQUIRED)
 find_package(Boost REQUIRED)
 pkg_check_modules(bullet REQUIRED IMPORTED_TARGET bullet-float64)
 pkg_check_modules(zmq REQUIRED IMPORTED_TARGET libzmq)
+# zmq.h needs no folders of its own.  Those of what libzmq links are named otherwise by a second
+# configuration than by the first (CMake 3.25 and -isystem), which would compile everything again.
+set_target_properties(PkgConfig::zmq PROPERTIES INTERFACE_INCLUDE_DIRECTORIES "" INTERFACE_COMPILE_OPTIONS "")
 pkg_check_modules(sodium REQUIRED IMPORTED_TARGET libsodium)
 pkg_check_modules(tomlplusplus REQUIRED IMPORTED_TARGET tomlplusplus)
 pkg_check_modules(nlopt REQUIRED IMPORTED_TARGET nlopt)

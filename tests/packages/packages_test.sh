@@ -7,5 +7,9 @@ cd "$2"
 command -v debootstrap >/dev/null || { echo 'not run: debootstrap is not installed (scripts/setup.sh --boxes)'; exit 77; }
 out=$(mktemp -d)
 trap 'rm -rf "$out"' EXIT
+# Other tests run the programs meanwhile: they must stay what and where they are.
+before=$(stat -c '%i %Y' "$build/bin/gapfarm" "$build/bin/gapfarm-worker")
 scripts/package.sh --build "$build" --out "$out"
+[[ $(stat -c '%i %Y' "$build/bin/gapfarm" "$build/bin/gapfarm-worker") == "$before" ]] ||
+  { echo 'FAILED: packaging built again what was built'; exit 1; }
 scripts/try_packages.sh "$out"
