@@ -10,6 +10,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <sstream>
+#include <stdexcept>
 #include <thread>
 
 #include "master/store/run_reader.h"
@@ -91,6 +92,7 @@ TEST_F(Observability, EveryLineOfAJsonLogIsAnObjectWithItsPlace) {
 int port_after(const RunningProgram& program, const std::string& marker) {
   std::size_t at = std::string::npos;
   while (at == std::string::npos || program.err().find('\n', at) == std::string::npos) {
+    if (program.ended()) throw std::runtime_error("ended without a port: " + program.err());
     at = program.err().find(marker);
     std::this_thread::yield();
   }

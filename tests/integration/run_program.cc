@@ -66,6 +66,12 @@ std::string RunningProgram::out() const { return text_of(folder_ / "out"); }
 
 std::string RunningProgram::err() const { return text_of(folder_ / "err"); }
 
+bool RunningProgram::ended() const {
+  siginfo_t info = {};
+  return ::waitid(P_PID, static_cast<id_t>(pid_), &info, WEXITED | WNOHANG | WNOWAIT) != 0 ||
+         info.si_pid != 0;
+}
+
 Finished RunningProgram::wait() {
   int status = 0;
   rusage usage = {};

@@ -32,6 +32,7 @@ class RunningProgram {
   // Everything written to stdout so far.
   std::string out() const;
   std::string err() const;
+  bool ended() const;
   Finished wait();
 
  private:
