@@ -8,6 +8,7 @@
 #include "common/base/try.h"
 #include "common/trials/select.h"
 #include "common/trials/write.h"
+#include "master/cli/diagnosis/plan_drive.h"
 #include "master/cli/subcommand.h"
 #include "master/command/inputs.h"
 #include "master/command/long_command.h"
@@ -30,35 +31,40 @@ struct PlanOptions {
   plan::PlanSettings settings;
   std::optional<unsigned> sessions, chain;
   std::vector<double> levels, durations;
+  DriveOptions drive;  // of a ground robot
   Outputs outputs;
   FarmOptions farm;
   KeepOption keep;
 };
 
-// "2" or "2x2": the width of a square, m.
-Result<double> width_of_place(const std::string& text) {
-  const auto wrong = [&] {
-    return Error{"--place is '" + text +
-                 "', expected the width of a square floor in metres, such as 2 or 2x2"};
-  };
+struct Place {
+  double length_m, width_m;
+};
+
+// "2", "2x2" or "4x3".
+Result<Place> place_of(const std::string& text) {
   const std::size_t x = text.find('x');
-  double width = 0, depth = 0;
+  Place place{};
   const auto read = [](std::string_view part, double* value) {
     const auto [end, error] = std::from_chars(part.data(), part.data() + part.size(), *value);
-    return error == std::errc() && end == part.data() + part.size();
+    return error == std::errc() && end == part.data() + part.size() && *value > 0 && *value <= 1000;
   };
-  if (!read(std::string_view(text).substr(0, x), &width)) return wrong();
-  depth = width;
-  if (x != std::string::npos && !read(std::string_view(text).substr(x + 1), &depth)) return wrong();
-  if (!(width > 0 && width <= 1000) || depth != width) return wrong();
-  return width;
+  const std::string_view first = std::string_view(text).substr(0, x);
+  const std::string_view second =
+      x == std::string::npos ? first : std::string_view(text).substr(x + 1);
+  if (read(first, &place.length_m) && read(second, &place.width_m)) return place;
+  return Error{"--place is '" + text +
+               "', expected the size of a floor in metres, such as 2, 2x2 or 4x3"};
 }
 
 Status apply_options(PlanOptions& options, Config& config) {
   SimulateSettings& s = config.simulate;
   if (!options.place.empty()) {
-    ASSIGN_OR_RETURN(const double width, width_of_place(options.place));
-    s.arena_m = width;
+    ASSIGN_OR_RETURN(const Place place, place_of(options.place));
+    if (place.length_m != place.width_m) {
+      return Error{"--place is '" + options.place + "', expected a square, such as 2x2"};
+    }
+    s.arena_m = place.width_m;
   }
   if (options.sessions) s.sessions = *options.sessions;
   if (options.chain) s.chain = *options.chain;
@@ -152,8 +158,18 @@ Result<int> run_plan(PlanOptions& options, CliContext& context) {
   ASSIGN_OR_RETURN(Source source, read_source(options.source));
   // What a correction would shift is no part of what effects do: it takes none along.
   source.config.problem.residual = {};
-  RETURN_IF_ERROR(apply_options(options, source.config));
   options.outputs.reads(options.source);
+  if (source.config.problem.ground) {
+    DriveTask task{options.source, options.out, options.picture};
+    task.seed = options.settings.seed;
+    if (!options.place.empty()) {
+      ASSIGN_OR_RETURN(const Place place, place_of(options.place));
+      task.length_m = place.length_m;
+      task.width_m = place.width_m;
+    }
+    return run_plan_drive(options.drive, task, source.config, options.outputs, context);
+  }
+  RETURN_IF_ERROR(apply_options(options, source.config));
   RETURN_IF_ERROR(options.outputs.plan({options.out, options.picture}));
   if (context.dry_run) {
     return print_dry_run(fmt::format("plan {} trials for {} into {}", options.settings.trials,
@@ -184,12 +200,14 @@ Result<int> run_plan(PlanOptions& options, CliContext& context) {
 SubcommandRun setup_plan(CLI::App& app) {
   auto options = std::make_shared<PlanOptions>();
   app.add_option("CONFIG|MODEL", options->source, "The robot as far as it is known")->required();
-  app.add_option("--out", options->out, "Trial log to write: what to drive")->required();
+  app.add_option("--out", options->out,
+                 "Trial log (of a ground robot: folder) to write: what to drive")
+      ->required();
   app.add_option("--picture", options->picture, "SVG to write: the floor, and power by trials");
   app.add_option("--trials", options->settings.trials, "In all; rounded up to whole chains")
       ->check(CLI::Range(1, 5000));
   app.add_option("--effects", options->effects, "Names with commas between, or all");
-  app.add_option("--place", options->place, "Square floor to stay on, from the origin, m: 2x2");
+  app.add_option("--place", options->place, "Floor to stay on, round the start, m: 2x2");
   app.add_option("--sessions", options->sessions, "Sessions")->check(CLI::Range(1, 100));
   app.add_option("--chain", options->chain, "Trials before the robot is put down anew")
       ->check(CLI::Range(1, 1000));
@@ -199,6 +217,7 @@ SubcommandRun setup_plan(CLI::App& app) {
   app.add_option("--pool", options->settings.pool, "Chains to choose each one from")
       ->check(CLI::Range(2, 100));
   app.add_option("--seed", options->settings.seed, "Of the chains to choose from");
+  options->drive.declare(app);
   options->outputs.declare(app);
   options->keep.declare(app);
   options->farm.declare(app, false);

@@ -1,0 +1,294 @@
+#include "master/cli/diagnosis/plan_drive.h"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <utility>
+
+#include "common/base/try.h"
+#include "common/parameters/ground.h"
+#include "common/problem/run_files.h"
+#include "common/svg/svg.h"
+#include "master/command/inputs.h"
+#include "master/experiments/plan/drive_plan.h"
+#include "master/io/logs/to_runs.h"
+
+namespace gapfarm {
+namespace {
+
+using plan::DrivePlan;
+using plan::WidthsAt;
+
+constexpr double kUsual = 0.02;  // of a recorded channel's rows lie beyond its limits, each way
+constexpr double kRecordedEvery_s = 1;
+constexpr double kMarks_s[] = {5, 10, 20, 30, 60, 120, 300, 600};
+
+std::optional<double> number_of(std::string text) {
+  double scale = 1;
+  if (!text.empty() && text.back() == '%') {
+    scale = 0.01;
+    text.pop_back();
+  }
+  std::size_t used = 0;
+  try {
+    const double value = std::stod(text, &used);
+    if (used == text.size() && std::isfinite(value)) return scale * value;
+  } catch (const std::exception&) {  // no number
+  }
+  return std::nullopt;
+}
+
+Result<std::vector<plan::Wanted>> wanted_of(const std::vector<std::string>& texts) {
+  std::vector<plan::Wanted> all;
+  for (const std::string& text : texts) {
+    const std::size_t equal = text.find('=');
+    plan::Wanted wanted{text.substr(0, equal), 0};
+    if (equal != std::string::npos) {
+      const auto width = number_of(text.substr(equal + 1));
+      if (!width || *width <= 0) {
+        return Error{"--want is '" + text +
+                     "', expected a value's name and how wide its 90 % interval may be, such as "
+                     "separation=0.5% or delay=0.02"};
+      }
+      wanted.width = *width;
+    }
+    all.push_back(wanted);
+  }
+  return all;
+}
+
+// What the recorded runs command, but for the rarest values.
+std::map<std::string, Interval> recorded_limits(const std::vector<std::string>& channels,
+                                                const RunLog& log) {
+  std::map<std::string, Interval> limits;
+  for (std::size_t c = 0; c < channels.size(); ++c) {
+    std::vector<double> values;
+    for (const LoggedRun& run : log.runs) {
+      for (const CommandRow& row : run.commands) values.push_back(row.values[c]);
+    }
+    if (values.empty()) continue;
+    std::sort(values.begin(), values.end());
+    const auto at = [&](double share) {
+      return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
+    };
+    limits[channels[c]] = {std::min(0.0, at(kUsual)), std::max(0.0, at(1 - kUsual))};
+  }
+  return limits;
+}
+
+Result<std::vector<Interval>> limits_of(const std::vector<std::string>& texts,
+                                        const std::vector<std::string>& channels,
+                                        const RunLog& recorded) {
+  std::map<std::string, Interval> limits = recorded_limits(channels, recorded);
+  for (const std::string& text : texts) {
+    const std::size_t equal = text.find('='), comma = text.find(',');
+    const std::string name = text.substr(0, equal);
+    const auto last = equal == std::string::npos
+                          ? std::nullopt
+                          : number_of(text.substr(
+                                std::max(equal, comma == std::string::npos ? equal : comma) + 1));
+    const auto first = comma == std::string::npos
+                           ? (last ? std::optional(-*last) : last)
+                           : number_of(text.substr(equal + 1, comma - equal - 1));
+    if (!first || !last || *first >= *last ||
+        std::find(channels.begin(), channels.end(), name) == channels.end()) {
+      std::string names;
+      for (const std::string& channel : channels) names += (names.empty() ? "" : ", ") + channel;
+      return Error{"--limit is '" + text + "', expected CHANNEL=MOST or CHANNEL=LEAST,MOST with " +
+                   "one of the robot's channels " + names + ", such as " + channels.front() +
+                   "=0.5"};
+    }
+    limits[name] = {*first, *last};
+  }
+  std::vector<Interval> all;
+  for (const std::string& channel : channels) {
+    if (limits.count(channel) == 0 || limits[channel].lower >= limits[channel].upper) {
+      return Error{"nothing says how much of channel " + channel +
+                   " may be commanded; add --limit " + channel +
+                   "=MOST, or a config with runs, whose limits are taken"};
+    }
+    all.push_back(limits[channel]);
+  }
+  return all;
+}
+
+std::string width_text(const KinematicRow& row, double width) {
+  return row.key == "ratio" ? fmt::format("{:.3g} %", 100 * width)
+                            : fmt::format("{:.3g} {}", width, row.unit);
+}
+
+const WidthsAt& last_before(const std::vector<WidthsAt>& widths, double t_s) {
+  const WidthsAt* last = &widths.front();
+  for (const WidthsAt& at : widths) {
+    if (at.t_s <= t_s + 1e-9) last = &at;
+  }
+  return *last;
+}
+
+struct Comparison {
+  std::string name;  // "recorded", "random moves"
+  std::vector<WidthsAt> widths;
+};
+
+std::string table_text(const DrivePlan& drive, const std::vector<Comparison>& others) {
+  const double end = drive.widths.back().t_s;
+  std::vector<const WidthsAt*> columns;
+  std::string text = fmt::format("{:<16}", "90 % interval");
+  const auto column = [&](const std::vector<WidthsAt>& widths, double t, const std::string& name) {
+    columns.push_back(&last_before(widths, t));
+    text += fmt::format(" {:>15}", fmt::format("{:.0f} s{}", columns.back()->t_s, name));
+  };
+  for (const double mark : kMarks_s) {
+    if (mark < 0.9 * end) column(drive.widths, mark, "");
+  }
+  column(drive.widths, end, "");
+  for (const Comparison& other : others) column(other.widths, end, " " + other.name);
+  text += "\n";
+  for (std::size_t k = 0; k < drive.rows.size(); ++k) {
+    text += fmt::format("{:<16}", drive.rows[k].name);
+    for (const WidthsAt* at : columns) {
+      text += fmt::format(" {:>15}",
+                          width_text(drive.rows[k], at->widths[static_cast<Eigen::Index>(k)]));
+    }
+    text += "\n";
+  }
+  return text;
+}
+
+nlohmann::ordered_json widths_json(const std::vector<WidthsAt>& widths) {
+  nlohmann::ordered_json all = nlohmann::ordered_json::array();
+  for (const WidthsAt& at : widths) {
+    all.push_back(
+        {{"seconds", at.t_s}, {"widths", std::vector<double>(at.widths.begin(), at.widths.end())}});
+  }
+  return all;
+}
+
+// For people, and for programs.
+std::pair<std::string, nlohmann::ordered_json> result_of(const DrivePlan& drive,
+                                                         const std::vector<Comparison>& others,
+                                                         const plan::DriveNoise& noise,
+                                                         const std::vector<plan::Wanted>& wanted,
+                                                         const DriveTask& task) {
+  std::string text =
+      fmt::format(
+          "noise (of the config; a fitted model knows it better): "
+          "{:.2g} m and {:.2g} rad a reading, {:.2g} m and {:.2g} rad after a metre\n",
+          noise.position_m, noise.heading_rad, noise.travel, noise.turn) +
+      table_text(drive, others);
+  nlohmann::ordered_json json = {{"out", task.out}, {"values", nlohmann::ordered_json::array()}};
+  for (const KinematicRow& row : drive.rows) {
+    json["values"].push_back({{"name", row.name}, {"unit", row.unit}});
+  }
+  json["planned"] = widths_json(drive.widths);
+  for (const Comparison& other : others) {
+    json[other.name] = widths_json(other.widths);
+    const WidthsAt& at = last_before(other.widths, drive.widths.back().t_s);
+    const auto seconds = plan::seconds_until(drive, wanted, at.widths);
+    json[other.name + "_reached_after_s"] = nullptr;
+    if (!seconds) continue;
+    json[other.name + "_reached_after_s"] = *seconds;
+    text += fmt::format(
+        "As narrow as after {:.0f} s {}, for the wanted together: after {:.1f} s of this drive\n",
+        at.t_s, other.name, *seconds);
+  }
+  std::size_t commands = 0;
+  for (const LoggedRun& run : drive.drive.runs) commands += run.commands.size();
+  text += fmt::format(
+      "{}/commands.csv: {} commands in {} run(s), {:.1f} s; waypoints.csv: where the marker should "
+      "be as each ends, from the middle of the floor, heading along x\n",
+      task.out, commands, drive.drive.runs.size(), drive.widths.back().t_s);
+  return {text, json};
+}
+
+std::string drive_picture(const DrivePlan& drive, const DriveTask& task) {
+  constexpr double kWidth = 600, kPad = 20;
+  const double per_m = (kWidth - 2 * kPad) / task.length_m;
+  Svg svg(kWidth, task.width_m * per_m + 2 * kPad);
+  const auto at = [&](const Pose& X) {
+    return SvgPoint{kPad + (X.x + task.length_m / 2) * per_m,
+                    kPad + (task.width_m / 2 - X.y) * per_m};
+  };
+  svg.rectangle({kPad, kPad}, kWidth - 2 * kPad, task.width_m * per_m, {"none", "#dddddd"});
+  for (const LoggedRun& run : drive.drive.runs) {
+    std::vector<SvgPoint> points;
+    for (const PoseRow& pose : run.poses) points.push_back(at(pose.X_WM));
+    svg.polyline(points, {"none", "#0072b2", 1.5, {}, 0.9});
+    for (const PoseRow& pose : run.poses) {
+      svg.circle(at(pose.X_WM), 2.5, {"#0072b2", "none"});
+      const Pose ahead = pose.X_WM * Pose{0.03 * task.length_m, 0, 0};
+      svg.line(at(pose.X_WM), at(ahead), {"none", "#d55e00", 1.5});
+    }
+    svg.circle(points.front(), 4, {"#ffffff", "#222222", 1.5});
+  }
+  return svg.finish();
+}
+
+}  // namespace
+
+void DriveOptions::declare(CLI::App& app) {
+  app.add_option("--seconds", seconds, "Of a ground robot's drive, at most")
+      ->check(CLI::Range(2.0, 3600.0))
+      ->capture_default_str();
+  app.add_option("--want", wanted,
+                 "Of a ground robot: a value, and how wide its 90 % interval may be: "
+                 "separation=0.5%");
+  app.add_option("--limit", limits, "Of a ground robot's channel: v=0.5 or throttle=0,0.3");
+}
+
+Result<int> run_plan_drive(const DriveOptions& options, const DriveTask& task, const Config& config,
+                           Outputs& outputs, CliContext& context) {
+  const Problem& problem = config.problem;
+  const GroundRobot robot = problem.ground->robot_at(problem.values);
+  const auto value = [&](const char* key) { return problem.values[problem.table().row(key)]; };
+  const plan::DriveNoise noise{value(kGroundTravelNoise), value(kGroundTurnNoise),
+                               value(kGroundPositionNoise), value(kGroundHeadingNoise)};
+  RunLog recorded;
+  if (!config.trial_files.empty()) {
+    for (const std::string& folder : config.trial_files) {
+      for (const char* file : {"/commands.csv", "/poses.csv", "/wheels.csv"}) {
+        outputs.reads(folder + file);
+      }
+    }
+    ASSIGN_OR_RETURN(recorded, read_run_folders(config.trial_files, robot.channels));
+  }
+  plan::DriveSettings settings;
+  settings.seconds = options.seconds;
+  settings.length_m = task.length_m;
+  settings.width_m = task.width_m;
+  settings.seed = task.seed;
+  ASSIGN_OR_RETURN(settings.wanted, wanted_of(options.wanted));
+  ASSIGN_OR_RETURN(settings.limits, limits_of(options.limits, robot.channels, recorded));
+  RETURN_IF_ERROR(outputs.plan_in(task.out, {"commands.csv", "waypoints.csv"}));
+  RETURN_IF_ERROR(outputs.plan({task.picture}));
+  if (context.dry_run) {
+    return print_dry_run(fmt::format("plan a drive of {:.0f} s for {} into {}", options.seconds,
+                                     task.source, task.out),
+                         {{"out", task.out}, {"seconds", options.seconds}}, {}, config.farm,
+                         context);
+  }
+  ASSIGN_OR_RETURN(DrivePlan drive, plan::plan_drive(robot, noise, settings));
+  std::vector<Comparison> others;
+  settings.random = true;
+  ASSIGN_OR_RETURN(const DrivePlan random, plan::plan_drive(robot, noise, settings));
+  others.push_back({"random", random.widths});
+  if (!recorded.runs.empty()) {
+    others.push_back({"recorded", plan::widths_of(robot, noise, recorded, kRecordedEvery_s)});
+  }
+  drive.drive.channels = robot.channels;
+  const RunFiles files = format_runs(drive.drive);
+  RETURN_IF_ERROR(outputs.write_in(
+      task.out, {{"commands.csv", files.commands}, {"waypoints.csv", files.poses}}));
+  if (!task.picture.empty()) {
+    RETURN_IF_ERROR(outputs.write(task.picture, drive_picture(drive, task)));
+  }
+  const auto [text, json] = result_of(drive, others, noise, settings.wanted, task);
+  context.console.result(text, json);
+  return kExitDone;
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,36 @@
+// gapfarm plan of a ground robot: a drive that shows the values of its kinematics.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "common/config/settings.h"
+#include "master/command/context.h"
+#include "master/command/outputs.h"
+
+namespace gapfarm {
+
+struct DriveOptions {
+  double seconds = 60;
+  std::vector<std::string> wanted;  // NAME or NAME=WIDTH
+  std::vector<std::string> limits;  // CHANNEL=MOST or CHANNEL=LEAST,MOST
+
+  void declare(CLI::App& app);
+};
+
+struct DriveTask {
+  std::string source;  // of the config
+  std::string out;     // folder
+  std::string picture;
+  double length_m = 4, width_m = 4;
+  std::uint64_t seed = 1;
+};
+
+// Writes commands.csv and waypoints.csv.  REQUIRES: `config` has a ground robot, `outputs` knows
+// what is read.
+Result<int> run_plan_drive(const DriveOptions& options, const DriveTask& task, const Config& config,
+                           Outputs& outputs, CliContext& context);
+
+}  // namespace gapfarm

@@ -1,0 +1,115 @@
+#include "master/experiments/plan/drive_knowledge.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/math/algebra.h"
+
+namespace gapfarm::plan {
+namespace {
+
+constexpr double kQuantile90 = 1.6449;  // of the standard normal, on either side
+constexpr double kSlopeStep = 0.1;      // of a tolerance
+
+// How a small motion at the start of X_AB moves its end, in the end's axes.
+Eigen::Matrix3d carry(const Pose& X_AB) {
+  const double c = std::cos(X_AB.theta), s = std::sin(X_AB.theta);
+  Eigen::Matrix3d J;
+  J << c, s, -c * X_AB.y + s * X_AB.x,  //
+      -s, c, s * X_AB.y + c * X_AB.x,   //
+      0, 0, 1;
+  return J;
+}
+
+}  // namespace
+
+Knowledge::Knowledge(const GroundRobot& robot, const std::vector<KinematicRow>& rows,
+                     const DriveNoise& noise)
+    : noise_(noise),
+      P_(Eigen::MatrixXd::Zero(3 + static_cast<Eigen::Index>(rows.size()),
+                               3 + static_cast<Eigen::Index>(rows.size()))) {
+  for (const RobotWheel& wheel : robot.wheels) {
+    reach_m_ = std::max(reach_m_, std::hypot(wheel.x_m.value_or(0), wheel.y_m.value_or(0)));
+  }
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    const auto i = static_cast<Eigen::Index>(3 + k);
+    P_(i, i) = std::pow(rows[k].farthest > 0 ? rows[k].farthest : plausible_error(rows[k]), 2);
+  }
+}
+
+void Knowledge::put_down() {
+  P_.topRows(3).setZero();
+  P_.leftCols(3).setZero();
+  P_.topLeftCorner(3, 3) = reading().asDiagonal();
+}
+
+void Knowledge::learn(const Pose& step, const Eigen::MatrixXd& slopes) {
+  Eigen::MatrixXd F = Eigen::MatrixXd::Identity(P_.rows(), P_.cols());
+  F.topLeftCorner(3, 3) = carry(step);
+  F.topRightCorner(3, slopes.cols()) = slopes;
+  P_ = F * P_ * F.transpose();
+  // The wheels' way: they have one where the robot turns on the spot.
+  const double way = std::max(std::hypot(step.x, step.y), reach_m_ * std::abs(step.theta));
+  const double along = noise_.travel * noise_.travel * way;
+  P_.diagonal().head(3) += Eigen::Vector3d(along, along, noise_.turn * noise_.turn * way);
+  const Eigen::MatrixXd S = P_.topLeftCorner(3, 3) + Eigen::MatrixXd(reading().asDiagonal());
+  const Eigen::MatrixXd K = P_.leftCols(3) * inverse_of_symmetric(S);
+  // In the form of Joseph, which stays positive where readings are far surer than what was known.
+  Eigen::MatrixXd left = Eigen::MatrixXd::Identity(P_.rows(), P_.cols());
+  left.leftCols(3) -= K;
+  P_ = (left * P_ * left.transpose() + K * reading().asDiagonal() * K.transpose()).eval();
+}
+
+Eigen::VectorXd Knowledge::widths() const {
+  return 2 * kQuantile90 * P_.diagonal().tail(P_.rows() - 3).cwiseMax(0).cwiseSqrt();
+}
+
+Eigen::Vector3d Knowledge::reading() const {
+  return {noise_.position_m * noise_.position_m, noise_.position_m * noise_.position_m,
+          noise_.heading_rad * noise_.heading_rad};
+}
+
+Steps::Steps(const GroundRobot& robot, const std::vector<KinematicRow>& rows)
+    : robot_(robot), rows_(rows) {
+  for (const KinematicRow& row : rows) nominal_.names.push_back(row.name);
+  nominal_.values.resize(static_cast<Eigen::Index>(rows.size()));
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    const double least = is_magnitude(rows[k].name) ? rows[k].tolerance : rows[k].nominal;
+    nominal_.values[static_cast<Eigen::Index>(k)] = std::max(rows[k].nominal, least);
+  }
+}
+
+std::vector<Pose> Steps::between(const CommandedRun& run,
+                                 const std::vector<double>& times_s) const {
+  return steps(run, times_s, nominal_);
+}
+
+std::vector<Eigen::MatrixXd> Steps::slopes(const CommandedRun& run,
+                                           const std::vector<double>& times_s,
+                                           const std::vector<Pose>& at) const {
+  const auto n = static_cast<Eigen::Index>(rows_.size());
+  std::vector<Eigen::MatrixXd> slopes(at.size(), Eigen::MatrixXd::Zero(3, n));
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const double h = kSlopeStep * rows_[static_cast<std::size_t>(k)].tolerance;
+    Kinematics moved = nominal_;
+    moved.values[k] += h;
+    const std::vector<Pose> there = steps(run, times_s, moved);
+    for (std::size_t i = 0; i < at.size(); ++i) {
+      slopes[i].col(k) = local_difference(at[i], there[i]) / h;
+    }
+  }
+  return slopes;
+}
+
+std::vector<Pose> Steps::steps(const CommandedRun& run, const std::vector<double>& times_s,
+                               const Kinematics& kinematics) const {
+  std::vector<Trial> trials(times_s.size() - 1);
+  for (std::size_t i = 0; i < trials.size(); ++i) {
+    trials[i].run = 0;
+    trials[i].t_s = times_s[i];
+    trials[i].duration_s = times_s[i + 1] - times_s[i];
+  }
+  return kinematic_ends(robot_, {&run, 1}, trials, kinematics);
+}
+
+}  // namespace gapfarm::plan
