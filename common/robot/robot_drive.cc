@@ -214,6 +214,7 @@ std::span<const WheelMotion> RobotDrive::advance_motors(double t_s, double dt_s,
   const std::vector<double>& commanded = track_.mean(t_s - robot_.motors.delay_s, dt_s);
   if (steered_) {
     double speed = 0;
+    bool steered_traction = false;
     double wanted = angle_of(at(commanded, steering_));
     if (robot_.command == CommandKind::kThrottleSteering) {
       speed = throttle(dead(at(commanded, throttle_)), dt_s, yaw_rate_rad_s);
@@ -227,10 +228,11 @@ std::span<const WheelMotion> RobotDrive::advance_motors(double t_s, double dt_s,
                                        [](const RobotWheel& w) { return w.driven; });
       const double radius = driven == robot_.wheels.end() ? 1 : *driven->radius_m;
       speed = follow(0, dead(at(commanded, speed_)) * radius, dt_s);
-      // The middle of the unsteered axle is slower than a steered traction wheel.
-      if (driven != robot_.wheels.end() && driven->steered) speed *= std::cos(steering_rad_);
+      steered_traction = driven != robot_.wheels.end() && driven->steered;
     }
     steer(wanted, dt_s);
+    // The middle of the unsteered axle is slower than a steered traction wheel.
+    if (steered_traction) speed *= std::cos(steering_rad_);
     const double slow = 1 + robot_.steering.understeer_s2_m2 * speed * speed;
     curvature_ = std::tan(steering_rad_) / *robot_.controller.wheelbase_m / slow;
     traction_m_s_ = speed;
