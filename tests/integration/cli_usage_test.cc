@@ -1,6 +1,8 @@
 // Manners of the command line that every subcommand shares.
 #include <gmock/gmock.h>
 
+#include <nlohmann/json.hpp>
+
 #include "common/base/build_info.h"
 #include "common/trials/files.h"
 #include "tests/integration/demo_config.h"
@@ -8,7 +10,9 @@
 
 namespace gapfarm::cli_usage_test {
 
+using ::testing::AllOf;
 using ::testing::HasSubstr;
+using ::testing::Not;
 using ::testing::StartsWith;
 
 TEST(CliUsage, ReportsWhatItIs) {
@@ -315,6 +319,29 @@ TEST_F(CliCheck, PointsAtWhatIsWrong) {
 
   const std::string no_genes = folder_.write("still.toml", "seed = 1\n");
   EXPECT_EQ(gapfarm_command({"check", no_genes, "--trials", trials_}).exit_code, 2);
+}
+
+// A gene that changes no score is refused, with what would show it.
+TEST(CliUsage, CheckRefusesGenesThatChangeNoScore) {
+  TemporaryFolder folder;
+  const std::string idle = folder.write(
+      "idle.toml",
+      demo_config(8, 0, "pose_noise_heading = \"table\"\n\"floor_tilt.direction\" = \"table\"\n",
+                  "[fitness]\nkind = \"robust_mahalanobis\"\n"));
+  const Finished refused = gapfarm_command({"check", idle});
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_THAT(refused.out, AllOf(HasSubstr("readable, but genes that change no score are searched"),
+                                 HasSubstr("floor_tilt.direction changes no score; its effect is "
+                                           "off: make a gene of floor_tilt.angle"),
+                                 Not(HasSubstr("friction changes no score"))));
+  const Finished json = gapfarm_command({"check", idle, "--json"});
+  EXPECT_EQ(nlohmann::json::parse(json.out)["idle_genes"].back()["parameter"],
+            "floor_tilt.direction");
+  const std::string on = folder.write(
+      "on.toml",
+      demo_config(8, 0,
+                  "\"floor_tilt.direction\" = \"table\"\n\"floor_tilt.angle\" = \"table\"\n"));
+  EXPECT_EQ(gapfarm_command({"check", on}).exit_code, 0);
 }
 
 }  // namespace gapfarm::cli_usage_test

@@ -8,6 +8,7 @@
 #include "common/base/try.h"
 #include "common/problem/run_files.h"
 #include "common/trials/context.h"
+#include "master/cli/data/idle_genes.h"
 #include "master/cli/subcommand.h"
 #include "master/command/inputs.h"
 #include "master/diagnose/result/diagnosis_json.h"
@@ -38,6 +39,7 @@ struct Summary {
   double evaluation_s = 0;           // on one worker here, as measured
   v1::TaskResult evaluated;          // the config's own values
   std::vector<SanityFinding> sanity;
+  std::vector<IdleGene> idle;
 };
 
 // What a run may take at most, as far as its settings say.
@@ -72,6 +74,25 @@ Status measure_evaluation(const Config& config, CliContext& context, Summary* su
     ends.push_back(from_proto(p.end()));
   }
   check_windows(config.problem.log, ends, &summary->sanity);
+  return {};
+}
+
+// Where it takes longer than somebody who checks would wait, nothing is looked for.
+Status find_idle_genes(const Config& config, unsigned workers, CliContext& context,
+                       Summary* summary) {
+  constexpr double kLongest_s = 60;
+  const auto evaluations = static_cast<double>(config.problem.genes.size() + 1);
+  if (summary->evaluated.outcome() == v1::WORKER_FAILED) return {};
+  const double all_s = evaluations * summary->evaluation_s / std::max(1u, workers);
+  if (all_s > kLongest_s) {
+    context.console.note("genes that change no score were not looked for: " +
+                         format_duration(all_s) + " of evaluations");
+    return {};
+  }
+  FarmOptions options;
+  options.workers = workers;
+  ASSIGN_OR_RETURN(auto farm, start_farm(options, {}, context));
+  ASSIGN_OR_RETURN(summary->idle, idle_genes(*farm, config));
   return {};
 }
 
@@ -173,6 +194,10 @@ Json to_json(const Config& config, const Summary& summary, unsigned workers) {
   if (summary.evaluated.outcome() == v1::OK) {
     evaluated["fitness"] = summary.evaluated.evaluate().fitness();
   }
+  Json idle = Json::array();
+  for (const IdleGene& gene : summary.idle) {
+    idle.push_back({{"parameter", gene.key}, {"remedy", gene.remedy}});
+  }
   for (const Gene& gene : config.problem.genes) {
     const Parameter& row = config.problem.table()[gene.row];
     genes.push_back({{"parameter", row.key},
@@ -198,7 +223,8 @@ Json to_json(const Config& config, const Summary& summary, unsigned workers) {
           {"generations", config.evolution.generations},
           {"workers", workers},
           {"seed", config.seed},
-          {"sanity", sanity_json(summary.sanity)}};
+          {"sanity", sanity_json(summary.sanity)},
+          {"idle_genes", idle}};
 }
 
 // Of an objective, at the config's own values.
@@ -222,6 +248,7 @@ std::string standing(const Summary& summary) {
   for (const SanityFinding& f : findings) {
     if (f.severity == Severity::kUnusable) return "readable, but " + finding_phrase(f);
   }
+  if (!summary.idle.empty()) return "readable, but genes that change no score are searched";
   return "fine";
 }
 
@@ -263,6 +290,9 @@ std::string describe(const Config& config, const Summary& summary, unsigned work
     text += std::string(f.severity == Severity::kUnusable ? "doubt" : "note ") + "        " +
             f.name + ": " + f.text + " " + f.remedy + "\n";
   }
+  for (const IdleGene& gene : summary.idle) {
+    text += "idle gene    " + gene.key + " changes no score; " + gene.remedy + ".\n";
+  }
   text += "scenario     " + problem.scenario + ", ";
   if (is_value(problem.fitness.kind)) {
     text += problem.external->table.declaration().name + "\nvalue        " + value_text(summary) +
@@ -303,8 +333,10 @@ Result<int> run_check(const CheckOptions& options, CliContext& context) {
   const unsigned workers = local_workers({}, config.farm);
   Summary summary = summarise(config);
   RETURN_IF_ERROR(measure_evaluation(config, context, &summary));
+  RETURN_IF_ERROR(find_idle_genes(config, workers, context, &summary));
   console.result(describe(config, summary, workers), to_json(config, summary, workers));
-  return summary.evaluated.outcome() == v1::WORKER_FAILED ? kExitQuarantined : kExitDone;
+  if (summary.evaluated.outcome() == v1::WORKER_FAILED) return kExitQuarantined;
+  return summary.idle.empty() ? kExitDone : kExitBadUsage;
 }
 
 }  // namespace
