@@ -160,7 +160,7 @@ TEST(CliUsage, InitOfAURDFWritesTheRobotAndAConfigThatNamesIt) {
   EXPECT_THAT(shown.out, HasSubstr("# QUESTION: where are its runs?"));
   EXPECT_THAT(shown.out, HasSubstr("steering.offset = \"table\""));
   std::filesystem::create_directory(folder / "monday");
-  folder.write("monday/commands.csv", "run,t,speed,steering\na,0,0.2,0\na,2,0,0\n");
+  folder.write("monday/commands.csv", "run,t,speed,steering\na,0,0.2,0\na,2,0.3,0.2\na,4,0,0\n");
   std::string poses = "run,t,x,y,theta\n";
   for (int i = 0; i < 240; ++i) {
     poses += "a," + std::to_string(0.05 * i) + "," + std::to_string(0.01 * i) + ",0,0\n";
