@@ -107,6 +107,11 @@ std::string table_text(const plan::DesignedPlan& plan) {
         fmt::format("On average over effects {:.0f} of these trials name what {} random ones do.\n",
                     *as_good, plan.power.back().trials);
   }
+  text += fmt::format(
+      "No choice of as many such chains, repeats included, shows effects from sizes that are more "
+      "than {:.0f} % smaller "
+      "(geometric mean).\n",
+      std::ceil(100 * (1 - plan.best_share)));
   const auto list = [&](const std::vector<std::string>& names, const std::string& label) {
     for (std::size_t k = 0; k < names.size(); ++k) text += (k == 0 ? "" : ", ") + names[k];
     if (!names.empty()) text += label + "\n";
@@ -137,6 +142,7 @@ nlohmann::ordered_json table_json(const plan::DesignedPlan& plan) {
   }
   return {{"effects", rows},
           {"power", power},
+          {"best_share", plan.best_share},
           {"not_planned_for", plan.not_planned_for},
           {"without_shift", plan.without_shift}};
 }

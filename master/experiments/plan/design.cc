@@ -64,7 +64,7 @@ class Designer {
   Result<Signals> signals_of(const TrialLog& log) {
     return signals(farm_, config_.problem, log, {effects_, 4, settings_.seed});
   }
-  Result<std::vector<Chain>> choose();
+  Result<std::vector<Chain>> choose(double* best_share);
   // Whether all of these trials end within the arena.
   bool stays(const TrialLog& log, std::size_t first, std::size_t count) const;
   unsigned chain() const { return std::max(1U, config_.simulate.chain); }
@@ -151,7 +151,7 @@ bool Designer::stays(const TrialLog& log, std::size_t first, std::size_t count) 
                      [&](const Trial& t) { return within(t.X_WE.x) && within(t.X_WE.y); });
 }
 
-Result<std::vector<Chain>> Designer::choose() {
+Result<std::vector<Chain>> Designer::choose(double* best_share) {
   const Sessions pool = draw(settings_.pool, settings_.seed);
   ASSIGN_OR_RETURN(const auto log, driven(pool));
   ASSIGN_OR_RETURN(auto shown_signals, signals_of(log));
@@ -193,7 +193,9 @@ Result<std::vector<Chain>> Designer::choose() {
         std::to_string(config_.simulate.arena_m) + " m, and " + std::to_string(wanted) +
         " are wanted; give more --place, a shorter --chain or --durations, or a greater --pool"};
   }
-  for (const std::size_t c : select(candidates, nuisances, wanted)) chosen.push_back(chains[c]);
+  const std::vector<std::size_t> selected = select(candidates, nuisances, wanted);
+  for (const std::size_t c : selected) chosen.push_back(chains[c]);
+  *best_share = best_over_plan(candidates, nuisances, selected);
   return chosen;
 }
 
@@ -264,7 +266,7 @@ Result<DesignedPlan> design_plan(Farm& farm, const Config& config, const PlanSet
   Designer designer(farm, config, settings);
   RETURN_IF_ERROR(designer.choose_effects(&plan));
   log_stage("candidates");
-  ASSIGN_OR_RETURN(const auto chains, designer.choose());
+  ASSIGN_OR_RETURN(const auto chains, designer.choose(&plan.best_share));
   log_stage("what the plan shows");
   const SimulateSettings& simulate = config.simulate;
   ASSIGN_OR_RETURN(auto log, designer.driven(dealt(chains, simulate.sessions, simulate.pause_s)));

@@ -41,6 +41,7 @@ struct DesignedPlan {
   std::vector<Visibility> seen;
   std::vector<Visibility> seen_at_random;  // the same effects, in the same order
   std::vector<PowerPoint> power;
+  double best_share = 1;                     // best_over_plan() of the chains that were chosen
   std::vector<std::string> not_planned_for;  // effects on the spread of poses alone
   std::vector<std::string> without_shift;    // that could not be simulated
 };

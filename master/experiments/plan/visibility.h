@@ -35,6 +35,12 @@ using Rows = Eigen::MatrixXd;
 std::vector<std::size_t> select(const std::vector<Rows>& candidates, Eigen::Index nuisances,
                                 std::size_t wanted);
 
+// How small standard errors could be on the geometric mean, as a share of those of the experiments
+// that were chosen, in (0, 1]: no choice of as many experiments of these kinds, repeats included,
+// makes them smaller.  For those unknowns that are no nuisances.
+double best_over_plan(const std::vector<Rows>& candidates, Eigen::Index nuisances,
+                      const std::vector<std::size_t>& chosen);
+
 // Squared length of the whitened `shift` beyond what unit-normal nuisances explain, the
 // noncentrality of the likelihood ratio's chi-squared: s' (I + Z Z')^-1 s.
 // REQUIRES: as many rows.

@@ -36,6 +36,40 @@ TEST(Select, DoesNotCareForWhatOnlyHasToBeAllowedFor) {
   EXPECT_THAT(select({row({2, 9}), row({0, 9})}, 1, 2), ElementsAre(0, 1));
 }
 
+TEST(BestOverPlan, OfOneUnknownIsItsBestExperimentRepeated) {
+  const std::vector<Rows> candidates = {row({2}), row({3}), row({1})};
+  const double best = std::sqrt((1 + 3.0 * 3 + 2 * 2) / (1 + 2 * 3.0 * 3));
+  EXPECT_NEAR(best_over_plan(candidates, 0, {1, 0}), best, 1e-3);
+  EXPECT_NEAR(best_over_plan(candidates, 0, {1}), 1, 1e-3);
+}
+
+// Every choice of so many, repeats included, and the bound lies close above the best of them.
+TEST(BestOverPlan, NoChoiceIsBetter) {
+  for (const std::uint64_t seed : {1, 2, 3, 4}) {
+    Stream stream({.run_seed = seed});
+    std::vector<Rows> candidates;
+    for (int c = 0; c < 7; ++c) {
+      Rows r(2, 3);
+      for (Eigen::Index i = 0; i < r.size(); ++i) r.data()[i] = 2 * stream.normal();
+      candidates.push_back(r);
+    }
+    const auto merit = [&](const std::vector<std::size_t>& of) {
+      Eigen::Matrix3d m = Eigen::Matrix3d::Identity();
+      for (const std::size_t c : of) m += candidates[c].transpose() * candidates[c];
+      return std::log(m.determinant() / m(2, 2));
+    };
+    double most = 0;
+    for (std::size_t code = 0; code < 7 * 7 * 7 * 7; ++code) {
+      most = std::max(most, merit({code % 7, code / 7 % 7, code / 49 % 7, code / 343}));
+    }
+    const auto chosen = select(candidates, 1, 4);
+    const double bound = best_over_plan(candidates, 1, chosen);
+    const double best = std::exp((merit(chosen) - most) / 4);
+    EXPECT_LE(bound, best + 1e-9) << seed;
+    EXPECT_GE(bound, 0.85 * best) << seed;
+  }
+}
+
 TEST(Select, IsTheGreedyChoiceByDeterminants) {
   Stream stream({.run_seed = 5});
   std::vector<Rows> candidates;
