@@ -92,6 +92,7 @@ TEST_F(Diagnose, NamesAnEffectWithAnIntervalAndClosesTheGap) {
   EXPECT_GT(ratio["bound"], 0);
   EXPECT_GT(ratio["width_over_bound"], 0.95);
   EXPECT_LT(ratio["width_over_bound"], 3);
+  EXPECT_NEAR(ratio["sd"].get<double>() / ratio["bound"].get<double>(), 1.05, 0.15);
   for (const Json& row : d["screening"]) {
     const Json& from = row["detectable_from"];
     EXPECT_TRUE(row["effect"] != "motor_asymmetry" || from.empty());

@@ -67,7 +67,9 @@ Estimate reported_estimate(const DiagnosisRequest& of, const Judgement& judged,
   Estimate e{p.key.substr(p.key.find('.') + 1), value, value, value, p.unit};
   double fit_error = 0;
   for (const FittedParameter& fitted : estimates.parameters) {
-    if (fitted.row == row) fit_error = fitted.standard_error * std::sqrt(judged.scale);
+    if (fitted.row != row) continue;
+    fit_error = fitted.standard_error * std::sqrt(judged.scale);
+    e.sd = fit_error;
   }
   // What the base could take over is part of it where both were searched.
   const Overrides& searched = judged.named.searched_error;

@@ -30,6 +30,9 @@ struct Estimate {
   // and nuisances, by slopes at the fit; and what the interval's is over it.
   std::optional<double> bound = {};
   std::optional<double> width_over_bound = {};
+  // Standard deviation of the fit alone: the estimate's own, as far as the simulation moves as the
+  // robot does.  The interval has what it may be off by besides.
+  std::optional<double> sd = {};
 };
 
 // An effect that the data show, in the order in which they were found.

@@ -34,6 +34,7 @@ constexpr auto kEstimate = [](auto& v, auto& e) {
   v.field("unit", e.unit);
   v.if_any("bound", e.bound);
   v.if_any("width_over_bound", e.width_over_bound);
+  v.if_any("sd", e.sd);
 };
 constexpr auto kSessionGainRow = [](auto& v, auto& s) {
   v.field("session", s.session);

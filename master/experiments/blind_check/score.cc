@@ -35,8 +35,12 @@ ReportedEffect reported_effect(const Json& json) {
   if (!parameters.is_object()) return effect;
   for (const auto& [key, value] : parameters.items()) {
     if (!value.is_object()) continue;
-    const ReportedParameter p{key, number_at(value, "value"), number_at(value, "lo"),
-                              number_at(value, "hi")};
+    const ReportedParameter p{key,
+                              number_at(value, "value"),
+                              number_at(value, "lo"),
+                              number_at(value, "hi"),
+                              number_at(value, "sd"),
+                              number_at(value, "bound")};
     if (std::isfinite(p.lo) && std::isfinite(p.hi)) effect.parameters.push_back(p);
   }
   return effect;
@@ -225,8 +229,8 @@ std::vector<Coverage> coverage_of(const Truth& truth, const Reported& reported) 
       const auto value = stated.find(p.key);
       if (value == stated.end() || !p.choices.empty()) continue;
       if (neutral && i >= entry->strengths) continue;
-      Coverage coverage{effect.name, p.key, value->second,       kNone,
-                        kNone,       false, i < entry->strengths};
+      Coverage coverage{effect.name, p.key, value->second, kNone, kNone, false};
+      coverage.is_strength = i < entry->strengths;
       for (const ReportedParameter& s : named->parameters) {
         if (s.key != p.key) continue;
         coverage.lo = s.lo;
@@ -234,6 +238,10 @@ std::vector<Coverage> coverage_of(const Truth& truth, const Reported& reported) 
         // A direction's bounds are a whole turn of it apart.
         const double turn = p.key == "direction" ? p.upper - p.lower : 0;
         coverage.covered = holds(s.lo, s.hi, value->second, turn);
+        if (!(s.sd > 0)) continue;
+        const double half = kNormal90 * s.sd;
+        coverage.covered_by_fit = holds(s.value - half, s.value + half, value->second, turn);
+        if (s.bound > 0) coverage.fit_over_bound = s.sd / s.bound;
       }
       all.push_back(coverage);
     }

@@ -17,6 +17,8 @@ struct ReportedParameter {
   double value = 0;
   double lo = 0;  // 90 % interval
   double hi = 0;
+  double sd = 0;     // of the fit alone; NaN where the diagnosis has none
+  double bound = 0;  // Cramer and Rao's; likewise
 };
 
 struct ReportedEffect {
@@ -66,6 +68,9 @@ struct Coverage {
   double hi = 0;
   bool covered = false;
   bool is_strength = true;  // or a place, a direction, ... that means nothing without one
+  // Of the fit alone: whether its 90 % held it, and how wide it is over the bound; none: it reports none.
+  std::optional<bool> covered_by_fit = {};
+  std::optional<double> fit_over_bound = {};
 };
 
 // One entry a parameter of every true effect that was named by its own name: an alias has other

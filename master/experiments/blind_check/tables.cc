@@ -49,6 +49,9 @@ std::vector<RateRow> rate_rows(const Tally& sum) {
   rows.push_back({"parameters within their 90 % interval", "85 to 95 %", sum.covered});
   rows.push_back({"... of these, strengths", "", sum.strengths_covered});
   rows.push_back({"... of these, places, directions and the like", "", sum.places_covered});
+  rows.push_back({"... by the interval of the fit alone", "88 to 92 %", sum.fits_covered});
+  rows.push_back(
+      {"intervals of fits 0.9 to 1.3 times as wide as the bound", ">= 90 %", sum.fits_at_bound});
   rows.push_back({"promised shrinkage within 0.1 of realised", ">= 90 %", sum.promise_kept});
   rows.push_back({"diagnoses that failed", "0", sum.failed});
   return rows;
@@ -273,6 +276,8 @@ std::string format_blind_json(const BlindReport& report) {
                       {"covered", rate_json(sum.covered)},
                       {"strengths_covered", rate_json(sum.strengths_covered)},
                       {"places_covered", rate_json(sum.places_covered)},
+                      {"fits_covered", rate_json(sum.fits_covered)},
+                      {"fits_at_bound", rate_json(sum.fits_at_bound)},
                       {"promise_kept", rate_json(sum.promise_kept)},
                       {"failed", rate_json(sum.failed)}};
   const Json json = {{"version", 1},

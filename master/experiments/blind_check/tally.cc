@@ -162,6 +162,10 @@ Tally tally(const std::vector<ScoredCase>& cases) {
       sum.covered.add(coverage.covered);
       (coverage.is_strength ? sum.strengths_covered : sum.places_covered).add(coverage.covered);
       sum.covered_by_parameter[coverage.effect + "." + coverage.key].add(coverage.covered);
+      if (coverage.covered_by_fit) sum.fits_covered.add(*coverage.covered_by_fit);
+      if (!coverage.fit_over_bound) continue;
+      sum.fits_at_bound.add(*coverage.fit_over_bound >= kNearBound[0] &&
+                            *coverage.fit_over_bound <= kNearBound[1]);
     }
     if (c.promised && c.realised) {
       sum.promise_kept.add(std::abs(*c.promised - *c.realised) <= kPromiseTolerance);

@@ -47,6 +47,7 @@ struct ScoredCase {
 ScoredCase score_case(const Truth& truth, const ChildEnd& end, std::optional<Reported> reported);
 
 constexpr double kPromiseTolerance = 0.1;
+constexpr double kNearBound[] = {0.9, 1.3};  // of a fit's width, in those of the bound
 
 struct Tally {
   Rate right;            // of all
@@ -58,6 +59,8 @@ struct Tally {
   Rate pairs_right;
   Rate covered;                            // true parameters within their interval
   Rate strengths_covered, places_covered;  // of these: Coverage::is_strength, and the others
+  Rate fits_covered;                       // the same by the fit's own intervals
+  Rate fits_at_bound;                      // which are 0.9 to 1.3 times as wide as the bound
   Rate
       missed_below;  // of missed effects of which the diagnosis says it: smaller than its log shows
   Rate promise_kept;                          // |promised - realised| <= kPromiseTolerance

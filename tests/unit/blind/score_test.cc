@@ -202,6 +202,22 @@ TEST(Coverage, CountsMissingIntervalsAndSkipsWhatMeansNothing) {
   EXPECT_TRUE(coverage_of(truth, reported_with("floor_nap", {})).empty());
 }
 
+// What a simulation may be off by widens the interval of a diagnosis, not that of its fit.
+TEST(Coverage, CountsFitsByThemselves) {
+  Truth truth;
+  truth.kind = CaseKind::kSingle;
+  truth.effects = {{"motor_asymmetry", {{"ratio", 0.06}}, 5}};
+  const auto of = [&](double sd) {
+    return coverage_of(truth,
+                       reported_with("motor_asymmetry", {{"ratio", 0.05, 0.03, 0.07, sd, 0.004}}))
+        .front();
+  };
+  EXPECT_EQ(of(0.005).covered_by_fit, false);
+  EXPECT_NEAR(*of(0.005).fit_over_bound, 1.25, 1e-12);
+  EXPECT_EQ(of(0.0062).covered_by_fit, true);
+  EXPECT_FALSE(of(std::nan("")).covered_by_fit);
+}
+
 TEST(MissedBelow, IsWhatTheLogCouldNotShow) {
   const Reported none = *parse_reported(R"({"verdict": "none", "screening": [
           {"effect": "floor_tilt", "detectable_from": {"angle": 0.02}}, {"effect": "backlash"}]})",
