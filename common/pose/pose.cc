@@ -56,6 +56,15 @@ Eigen::Vector3d local_difference(const Pose& predicted, const Pose& measured) {
   return {d.x, d.y, d.theta};
 }
 
+Eigen::Matrix3d carry(const Pose& X_AB) {
+  const double c = std::cos(X_AB.theta), s = std::sin(X_AB.theta);
+  Eigen::Matrix3d J;
+  J << c, s, -c * X_AB.y + s * X_AB.x,  //
+      -s, c, s * X_AB.y + c * X_AB.x,   //
+      0, 0, 1;
+  return J;
+}
+
 Pose mirrored(const Pose& X) { return {X.x, -X.y, wrap_angle(-X.theta)}; }
 
 }  // namespace gapfarm

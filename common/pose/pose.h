@@ -36,6 +36,9 @@ Twist log(const Pose& X);
 // (m, m, rad) is the density of the measured pose itself, since a rotation keeps volume.
 Eigen::Vector3d local_difference(const Pose& predicted, const Pose& measured);
 
+// How a small motion (m, m, rad) of A in its own axes moves B, in B's axes: the adjoint of X_BA.
+Eigen::Matrix3d carry(const Pose& X_AB);
+
 // The reflection in the robot's own x-z plane: (x, -y, -theta).
 Pose mirrored(const Pose& X);
 

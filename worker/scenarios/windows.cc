@@ -18,16 +18,6 @@ struct DriftNoise {
   double turn = 0;    // rad / sqrt(m)
 };
 
-// How a small motion (x, y, heading) at the start of X_SE moves its end, in the end's axes.
-Eigen::Matrix3d carry(const Pose& X_SE) {
-  const double c = std::cos(X_SE.theta), s = std::sin(X_SE.theta);
-  Eigen::Matrix3d J;
-  J << c, s, -c * X_SE.y + s * X_SE.x,  //
-      -s, c, s * X_SE.y + c * X_SE.x,   //
-      0, 0, 1;
-  return J;
-}
-
 // A random walk along the way: every stretch of wheel travel ds adds variances travel^2 ds and
 // turn^2 ds.  In the axes of the last pose.
 Eigen::Matrix3d drift(std::span<const GroundSample> path, const DriftNoise& noise) {

@@ -68,7 +68,8 @@ struct Coverage {
   double hi = 0;
   bool covered = false;
   bool is_strength = true;  // or a place, a direction, ... that means nothing without one
-  // Of the fit alone: whether its 90 % held it, and how wide it is over the bound; none: it reports none.
+  // Of the fit alone: whether its 90 % held it, and its width over the bound; none: no such
+  // interval.
   std::optional<bool> covered_by_fit = {};
   std::optional<double> fit_over_bound = {};
 };

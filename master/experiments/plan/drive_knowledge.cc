@@ -4,22 +4,12 @@
 #include <cmath>
 
 #include "common/math/algebra.h"
+#include "common/math/laws.h"
 
 namespace gapfarm::plan {
 namespace {
 
-constexpr double kQuantile90 = 1.6449;  // of the standard normal, on either side
-constexpr double kSlopeStep = 0.1;      // of a tolerance
-
-// How a small motion at the start of X_AB moves its end, in the end's axes.
-Eigen::Matrix3d carry(const Pose& X_AB) {
-  const double c = std::cos(X_AB.theta), s = std::sin(X_AB.theta);
-  Eigen::Matrix3d J;
-  J << c, s, -c * X_AB.y + s * X_AB.x,  //
-      -s, c, s * X_AB.y + c * X_AB.x,   //
-      0, 0, 1;
-  return J;
-}
+constexpr double kSlopeStep = 0.1;  // of a tolerance
 
 }  // namespace
 
@@ -61,7 +51,7 @@ void Knowledge::learn(const Pose& step, const Eigen::MatrixXd& slopes) {
 }
 
 Eigen::VectorXd Knowledge::widths() const {
-  return 2 * kQuantile90 * P_.diagonal().tail(P_.rows() - 3).cwiseMax(0).cwiseSqrt();
+  return 2 * kNormal90 * P_.diagonal().tail(P_.rows() - 3).cwiseMax(0).cwiseSqrt();
 }
 
 Eigen::Vector3d Knowledge::reading() const {

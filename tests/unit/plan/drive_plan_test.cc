@@ -17,7 +17,7 @@ using plan::DriveSettings;
 using plan::Knowledge;
 using testing::HasSubstr;
 
-constexpr double kTwoSided90 = 2 * 1.6449;
+constexpr double kTwoSided90 = 2 * 1.645;
 const DriveNoise kNoise = {1e-3, 1e-3, 2e-3, 5e-3};
 
 DriveSettings slow_wheels(double seconds) {
