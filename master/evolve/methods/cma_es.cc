@@ -152,6 +152,17 @@ std::vector<Genome> CmaEs::propose(const StreamOf& stream_of) const {
   return proposed;
 }
 
+// No further from the mean than draws are (Hansen, INRIA RR-7748, 2011).
+Genome CmaEs::taken(const Genome& migrant) const {
+  if (anywhere_) return migrant;
+  const Axes axes = axes_of(covariance_);
+  const Eigen::VectorXd step = (to_vector(migrant) - mean_) / sigma_;
+  const double n = static_cast<double>(step.size());
+  const double length = (axes.directions.transpose() * step).cwiseQuotient(axes.deviations).norm();
+  const double most = std::sqrt(n) + 2 * n / (n + 2);
+  return to_genome(mean_ + sigma_ * std::min(1.0, most / length) * step);
+}
+
 void CmaEs::learn(std::span<const Genome> proposed, std::span<const Standing> standings) {
   assert(proposed.size() == population() && standings.size() == proposed.size());
   if (anywhere_) begin(to_vector(proposed.front()));  // the first proposal was the mean itself

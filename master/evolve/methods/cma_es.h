@@ -27,6 +27,7 @@ class CmaEs final : public SearchMethod {
 
   std::vector<Genome> propose(const StreamOf& stream_of) const override;
   void learn(std::span<const Genome> proposed, std::span<const Standing> standings) override;
+  Genome taken(const Genome& migrant) const override;
   unsigned origin() const override { return kSampled; }
   std::vector<NamedNumber> figures() const override;
   void save(v1::MethodState& message) const override;
