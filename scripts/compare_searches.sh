@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Our searches beside pagmo's on the same functions: the tables of docs/evidence/optimisers.md.
-#   scripts/compare_searches.sh [--seeds 15] [--budget 20000] [--genes 10,20] [--function NAME] [--searches NAME,NAME]
+#   scripts/compare_searches.sh [--seeds 15] [--budget 20000] [--genes 10,20] [--function NAME] [--searches NAME,NAME] [--population N] [--asynchronous]
 # Needs Debian's libpagmo-dev (scripts/setup.sh --bench).  BUILD: a configured build (build/ci).
 set -euo pipefail
 cd "$(dirname "$0")/.."

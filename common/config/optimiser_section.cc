@@ -5,6 +5,7 @@ namespace gapfarm {
 namespace {
 
 const std::vector<std::string> kLocalNames = {"nelder_mead", "subplex", "bobyqa", "cobyla"};
+const std::vector<std::string> kRestartNames = {"ipop", "bipop"};
 
 }  // namespace
 
@@ -35,6 +36,9 @@ void read_optimiser(TomlSection& top, OptimiserSettings& to) {
   }
   section->read("step", to.step, 1e-6, 0.5);
   section->read("local_evaluations", to.local_evaluations, 0, 1000000);
+  if (const auto restarts = section->choice("restarts", kRestartNames)) {
+    to.restarts = static_cast<RestartKind>(*restarts);
+  }
   section->finish();
 }
 

@@ -134,6 +134,8 @@ void read_evolution(TomlSection& top, EvolutionSettings& to) {
   section->read("elite_replicates", to.elite_replicates, 1, 10000);
   section->read("seed_nominal", to.seed_nominal);
   section->read("restart_generations", to.restart_generations, 1);
+  section->read("islands", to.islands, 1, 10000);
+  section->read("asynchronous", to.asynchronous);
   read_stop(*section, to);
   check_evolution(*section, to);
   section->finish();

@@ -26,6 +26,8 @@ enum class OptimiserKind {
 #include "common/config/methods.inc"
 };
 enum class LocalSearchKind { kNelderMead, kSubplex, kBobyqa, kCobyla };
+// What CMA-ES begins again with: a population that doubles, or by turns that and small ones.
+enum class RestartKind { kIpop, kBipop };
 
 // What [optimiser] says.  The genetic algorithm is set up by the rest of EvolutionSettings.
 struct OptimiserSettings {
@@ -41,6 +43,7 @@ struct OptimiserSettings {
   LocalSearchKind local = LocalSearchKind::kNelderMead;
   double step = 0.1;               // local search: first step, share of a gene's range
   unsigned local_evaluations = 0;  // of one local search; 0: 100 a gene
+  RestartKind restarts = RestartKind::kIpop;
 };
 
 struct EvolutionSettings {
@@ -72,6 +75,9 @@ struct EvolutionSettings {
   std::optional<std::uint64_t> stagnation_generations;  // without improvement
   // Restart (keeping the elites) after so many generations without improvement; none: never.
   std::optional<std::uint64_t> restart_generations;
+  // The population in so many islands that wait for nobody else (master/evolve/islands.h).
+  unsigned islands = 1;
+  bool asynchronous = false;  // as many islands as the population has room for
 };
 
 struct FarmSettings {

@@ -47,6 +47,7 @@ constexpr OptionTakes kOptionTakes[] = {
     {"LOG", Takes::kFile},
     {"LOG|URDF", Takes::kFile},
     {"--model", Takes::kModel},
+    {"--from", Takes::kModel},
     {"--effects", Takes::kEffect},
     {"--exclude", Takes::kEffect},
     {"--set", Takes::kSetting},

@@ -2,8 +2,11 @@
 
 #include <algorithm>
 #include <sstream>
+#include <unordered_map>
 
+#include "common/base/try.h"
 #include "common/score/kinematic_start.h"
+#include "master/evolve/islands.h"
 
 namespace gapfarm {
 namespace {
@@ -146,6 +149,105 @@ Error wrong_count(std::size_t candidates, std::size_t scores) {
                std::to_string(scores)};
 }
 
+Status EvaluationBackend::stream(std::vector<Candidate> candidates, const TakeScore& take) {
+  for (std::size_t place = 0; !candidates.empty();) {
+    ASSIGN_OR_RETURN(const auto scores, evaluate(candidates));
+    if (scores.size() != candidates.size()) return wrong_count(candidates.size(), scores.size());
+    candidates.clear();
+    for (const Score& score : scores) {
+      ASSIGN_OR_RETURN(const auto more, take(place++, score));
+      candidates.insert(candidates.end(), more.begin(), more.end());
+    }
+  }
+  return {};
+}
+
+namespace {
+
+// Islands that go on one by one.
+class IslandLoop {
+ public:
+  using Stop = std::pair<StopReason, std::string>;
+
+  IslandLoop(Optimiser& optimiser, GenerationSink& sink, const EvolveOptions& options,
+             std::function<double()> spent_s)
+      : optimiser_(optimiser),
+        islands_(*optimiser.islands()),
+        sink_(sink),
+        options_(options),
+        spent_s_(std::move(spent_s)) {}
+
+  // Begins what may begin and commits what is complete.  Error: the sink's, or one of code kStopped
+  // when stop() has something to say.
+  Result<std::vector<Candidate>> go_on() {
+    std::vector<Candidate> candidates;
+    for (bool advanced = true; advanced;) {
+      stop_ = reason_to_stop(optimiser_, options_, spent_s_(), false);
+      if (stop_) return Error{stop_->second, ErrorCode::kStopped};
+      for (Islands::Lot& lot : islands_.begin(last_worth_beginning())) {
+        Lot& waited = lots_[lot.island];
+        waited.missing = lot.candidates.size();
+        waited.scores.resize(waited.missing);
+        for (std::size_t i = 0; i < waited.missing; ++i) places_[next_place_++] = {lot.island, i};
+        candidates.insert(candidates.end(), lot.candidates.begin(), lot.candidates.end());
+      }
+      ASSIGN_OR_RETURN(advanced, commit_next());
+    }
+    return candidates;
+  }
+
+  Result<std::vector<Candidate>> take(std::size_t place, const Score& score) {
+    const auto [island, index] = places_.extract(place).mapped();
+    Lot& lot = lots_[island];
+    lot.scores[index] = score;
+    if (--lot.missing > 0) return std::vector<Candidate>();
+    islands_.tell_island(island, lot.scores);
+    return go_on();
+  }
+
+  const std::optional<Stop>& stop() const { return stop_; }
+
+ private:
+  struct Lot {
+    std::size_t missing = 0;
+    std::vector<Score> scores;
+  };
+
+  // No generation that the run cannot get to, if there were no duplicates.
+  std::uint64_t last_worth_beginning() const {
+    const EvolutionSettings& settings = options_.settings;
+    std::uint64_t ahead = kMostAhead;
+    if (settings.evaluations) {
+      const std::uint64_t left = *settings.evaluations - optimiser_.evaluations();
+      ahead = std::min(ahead, (left - 1) / islands_.population() + 1);
+    }
+    return std::min(optimiser_.generation() + ahead, settings.generations);
+  }
+
+  Result<bool> commit_next() {
+    if (!islands_.advance()) return false;
+    GenerationRecord record = record_generation(optimiser_);
+    const double now_s = spent_s_();
+    record.wall_s = now_s - committed_s_;
+    committed_s_ = now_s;
+    RETURN_IF_ERROR(sink_.commit(record));
+    return true;
+  }
+
+  Optimiser& optimiser_;
+  Islands& islands_;
+  GenerationSink& sink_;
+  const EvolveOptions& options_;
+  std::function<double()> spent_s_;
+  double committed_s_ = options_.spent_s;
+  std::unordered_map<std::size_t, Lot> lots_;                                    // by island
+  std::unordered_map<std::size_t, std::pair<std::size_t, std::size_t>> places_;  // island, index
+  std::size_t next_place_ = 0;
+  std::optional<Stop> stop_;
+};
+
+}  // namespace
+
 Result<EvolveSummary> evolve(Optimiser& optimiser, EvaluationBackend& backend, GenerationSink& sink,
                              const EvolveClock& clock, const EvolveOptions& options,
                              const std::function<bool()>& stop_requested) {
@@ -153,6 +255,19 @@ Result<EvolveSummary> evolve(Optimiser& optimiser, EvaluationBackend& backend, G
   const auto spent_s = [&] { return options.spent_s + clock.now_s() - began_s; };
   const auto requested = [&] { return stop_requested && stop_requested(); };
 
+  if (optimiser.islands() != nullptr) {
+    IslandLoop loop(optimiser, sink, options, spent_s);
+    const auto run = [&]() -> Status {
+      ASSIGN_OR_RETURN(auto first, loop.go_on());
+      return backend.stream(std::move(first), [&](std::size_t place, const Score& score) {
+        return loop.take(place, score);
+      });
+    };
+    const Status status = run();
+    if (loop.stop()) return summarise(optimiser, *loop.stop(), spent_s());
+    if (!requested()) return status.error();
+    return summarise(optimiser, *reason_to_stop(optimiser, options, spent_s(), true), spent_s());
+  }
   for (;;) {
     auto stop = reason_to_stop(optimiser, options, spent_s(), requested());
     if (stop) return summarise(optimiser, *stop, spent_s());

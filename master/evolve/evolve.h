@@ -27,6 +27,13 @@ class EvaluationBackend {
  public:
   virtual ~EvaluationBackend() = default;
   virtual Result<std::vector<Score>> evaluate(std::span<const Candidate> candidates) = 0;
+
+  // Takes a score by its candidate's place, counted over the call, and says what else to score.
+  using TakeScore =
+      std::function<Result<std::vector<Candidate>>(std::size_t place, const Score& score)>;
+  // Every score goes to `take` when it is there, in any order.  Ends when nothing is left to score,
+  // or with an error of `take`.
+  virtual Status stream(std::vector<Candidate> candidates, const TakeScore& take);
 };
 
 struct GenerationRecord {
@@ -45,6 +52,8 @@ class GenerationSink {
   virtual ~GenerationSink() = default;
   virtual Status commit(const GenerationRecord& record) = 0;
 };
+
+constexpr std::uint64_t kMostAhead = 16;  // generations of an island
 
 // Seconds of a clock that never goes back.
 class EvolveClock {
@@ -85,7 +94,10 @@ std::optional<std::pair<StopReason, std::string>> reason_to_stop(const Optimiser
                                                                  const EvolveOptions& options,
                                                                  double wall_s, bool requested);
 
-// Runs `optimiser` until there is a reason to stop.  `stop_requested` is polled between generations
+// Runs `optimiser` until there is a reason to stop.  Islands go on one by one, no further ahead of
+// the slowest than kMostAhead generations, and to the same generations to the bit as if they
+// waited for one another; what they did ahead of the last commit is lost when the run stops, unless
+// by a number of generations or evaluations.  `stop_requested` is polled between generations
 // (the backend is notified separately).  Errors: of the backend or the sink.
 Result<EvolveSummary> evolve(Optimiser& optimiser, EvaluationBackend& backend, GenerationSink& sink,
                              const EvolveClock& clock, const EvolveOptions& options,

@@ -89,7 +89,7 @@ Status load_seen(const v1::GeneticState& message, SeenGenomes& seen) {
 std::string origin_name(unsigned origin) {
   constexpr std::array kNames = {"one_point",     "uniform", "blend",  "gaussian",
                                  "uniform_reset", "elite",   "random", "nominal",
-                                 "difference",    "sampled", "local"};
+                                 "difference",    "sampled", "local",  "migrant"};
   std::string text;
   for (std::size_t bit = 0; bit < kNames.size(); ++bit) {
     if ((origin & (1U << bit)) == 0) continue;
@@ -149,6 +149,14 @@ Member to_member(const Individual& individual) {
           origin_name(individual.origin)};
 }
 
+Standing standing_of(const Member& member) {
+  return {member.outcome, member.cost, 0, member.scores};
+}
+
+bool better_member(const Member& a, const Member& b) {
+  return better(standing_of(a), standing_of(b));
+}
+
 std::uint64_t SeenGenomes::key(const Genome& genome) {
   Hasher hasher;
   for (double gene : genome) hasher.add(gene);
@@ -169,8 +177,8 @@ void SeenGenomes::restore(std::uint64_t key, const Standing& standing) {
 }
 
 void SeenGenomes::trim() {
-  if (order_.size() <= kLimit) return;
-  const auto end = order_.end() - static_cast<std::ptrdiff_t>(kLimit);
+  if (order_.size() <= limit_) return;
+  const auto end = order_.end() - static_cast<std::ptrdiff_t>(limit_);
   for (auto key = order_.begin(); key != end; ++key) standings_.erase(*key);
   order_.erase(order_.begin(), end);
 }

@@ -26,6 +26,7 @@ enum Origin : unsigned {
   kDifference = 1u << 8,  // a trial vector of differential evolution
   kSampled = 1u << 9,     // from CMA-ES's distribution
   kLocal = 1u << 10,      // a step of a local search
+  kMigrant = 1u << 11,    // the best of another island
 };
 std::string origin_name(unsigned origin);  // "blend+gaussian"
 
@@ -59,6 +60,8 @@ void sort_best_first(std::vector<Individual>& individuals);
 double diversity_of(const std::vector<Individual>& individuals);
 
 Member to_member(const Individual& individual);
+Standing standing_of(const Member& member);  // without the spread of its scores
+bool better_member(const Member& a, const Member& b);
 
 // Genomes scored in this run, so that a duplicate costs nothing.  Keyed by 64 bits of a hash of
 // the genome's bits: with kLimit genomes two differ in less than that with a chance of 1e-11.
@@ -67,11 +70,13 @@ class SeenGenomes {
   // The last so many genomes are kept, which bounds the optimiser's state to some 500 kB.
   static constexpr std::size_t kLimit = 16384;
 
+  explicit SeenGenomes(std::size_t limit = kLimit) : limit_(limit) {}
+
   static std::uint64_t key(const Genome& genome);
 
   const Standing* find(const Genome& genome) const;
   void remember(const Genome& genome, const Standing& standing);
-  // Forgets the oldest beyond kLimit.
+  // Forgets the oldest beyond the limit.
   void trim();
 
   std::size_t size() const { return order_.size(); }
@@ -80,6 +85,7 @@ class SeenGenomes {
   void restore(std::uint64_t key, const Standing& standing);
 
  private:
+  std::size_t limit_;
   std::vector<std::uint64_t> order_;
   std::unordered_map<std::uint64_t, Standing> standings_;
 };

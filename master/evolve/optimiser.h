@@ -43,6 +43,8 @@ struct NamedNumber {
   double value = 0;
 };
 
+class Islands;
+
 class Optimiser {
  public:
   virtual ~Optimiser() = default;
@@ -51,6 +53,12 @@ class Optimiser {
   virtual std::vector<Candidate> ask() = 0;
   // Scores in the order of the last ask().  Completes the generation.
   virtual void tell(std::span<const Score> scores) = 0;
+
+  // A genome from elsewhere that takes the place of one birth of the next generation.
+  // REQUIRES: generation() > 0, and every ask() has had its tell().
+  virtual void inject(const Genome&) {}
+  // Where parts of the search need not wait for one another; null: there are none.
+  virtual Islands* islands() { return nullptr; }
 
   virtual std::uint64_t generation() const = 0;        // completed generations
   virtual std::uint64_t evaluations() const = 0;       // scores given since the start
@@ -77,7 +85,8 @@ struct OptimiserSetup {
   // How unsure that genome is: a covariance in gene units, row by row; empty: unknown.
   std::vector<double> spread;
   std::uint64_t run_seed = 0;
-  bool noisy = false;  // scores differ between replicates (SpreadKind::kSampled)
+  bool noisy = false;              // scores differ between replicates (SpreadKind::kSampled)
+  std::size_t remembered = 16384;  // genomes that are not scored twice (SeenGenomes)
 };
 
 }  // namespace gapfarm

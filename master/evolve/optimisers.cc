@@ -5,6 +5,7 @@
 
 #include "common/base/try.h"
 #include "master/evolve/genetic/genetic.h"
+#include "master/evolve/islands.h"
 #include "master/evolve/methods/search_optimiser.h"
 
 namespace gapfarm {
@@ -76,12 +77,14 @@ std::span<const OptimiserRow> optimisers() {
 }
 
 Result<std::unique_ptr<Optimiser>> make_optimiser(const OptimiserSetup& setup) {
-  return row_of(setup).make(setup);
+  ASSIGN_OR_RETURN(const unsigned islands, island_count(setup));
+  return islands > 1 ? make_islands(setup) : row_of(setup).make(setup);
 }
 
 Result<std::unique_ptr<Optimiser>> restore_optimiser(const OptimiserSetup& setup,
                                                      std::string_view state) {
-  return row_of(setup).restore(setup, state);
+  ASSIGN_OR_RETURN(const unsigned islands, island_count(setup));
+  return islands > 1 ? restore_islands(setup, state) : row_of(setup).restore(setup, state);
 }
 
 }  // namespace gapfarm

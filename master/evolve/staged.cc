@@ -10,10 +10,6 @@
 namespace gapfarm {
 namespace {
 
-bool better(const Member& a, const Member& b) {
-  return better(Standing{a.outcome, a.cost, 0, a.scores}, Standing{b.outcome, b.cost, 0, b.scores});
-}
-
 class StagedOptimiser final : public Optimiser {
  public:
   StagedOptimiser(const OptimiserSetup& setup, std::vector<Stage> stages)
@@ -69,7 +65,7 @@ class StagedOptimiser final : public Optimiser {
     const Member before = best_;
     inner_->tell(scores);
     update_best();
-    if (first || better(best_, before)) last_improvement_ = generation();
+    if (first || better_member(best_, before)) last_improvement_ = generation();
     const bool over = inner_->evaluations() >= stages_[stage_].evaluations;
     if (stage_ + 1 < stages_.size() && over) advance();
   }
@@ -150,7 +146,7 @@ class StagedOptimiser final : public Optimiser {
       return;
     }
     const Member found = completed(inner_->best());
-    best_ = stage_ > 0 && better(kept_best_, found) ? kept_best_ : found;
+    best_ = stage_ > 0 && better_member(kept_best_, found) ? kept_best_ : found;
   }
 
   void advance() {

@@ -1,7 +1,9 @@
 // What the rest of the master sees of the farm: tasks in, results out, in the tasks' order.
 #pragma once
 
+#include <algorithm>
 #include <functional>
+#include <iterator>
 #include <string>
 #include <vector>
 
@@ -38,6 +40,27 @@ class Farm {
   virtual Result<std::vector<v1::TaskResult>> run(
       const std::string& problem_hash, const std::vector<v1::Task>& tasks,
       const std::function<void(const FarmProgress&)>& on_progress = {}) = 0;
+
+  // Takes an answer by its task's place, counted over the call, and says what else to do.
+  using TakeAnswer =
+      std::function<Result<std::vector<v1::Task>>(std::size_t place, const v1::TaskResult& result)>;
+  // As run(), but every answer goes to `take` when it is there, in any order, and the tasks that it
+  // returns are done, too.  Ends when nothing is left to do, or with an error of `take`.
+  virtual Status stream(const std::string& problem_hash, std::vector<v1::Task> tasks,
+                        const TakeAnswer& take,
+                        const std::function<void(const FarmProgress&)>& on_progress = {}) {
+    for (std::size_t place = 0; !tasks.empty();) {
+      const auto results = run(problem_hash, tasks, on_progress);
+      if (!results) return results.error();
+      tasks.clear();
+      for (const v1::TaskResult& result : *results) {
+        auto more = take(place++, result);
+        if (!more) return more.error();
+        std::move(more->begin(), more->end(), std::back_inserter(tasks));
+      }
+    }
+    return {};
+  }
 
   virtual std::vector<WorkerStatus> workers() const = 0;
   // Those whose workers stand on clusters for it.

@@ -39,9 +39,6 @@ bool answers(const v1::Task& task, const v1::TaskResult& result) {
   }
 }
 
-// Attempts of audits are numbered with the others, but belong to no job of the batch.
-constexpr std::size_t kNoJob = static_cast<std::size_t>(-1);
-
 const char* verb(EndCause cause) {
   switch (cause) {
     case EndCause::kHung:
@@ -266,6 +263,7 @@ void JobQueue::note_wall(double wall) {
 void JobQueue::complete(Job& job, Losers* losers) {
   job.done = true;
   ++committed_;
+  fresh_.push_back(index_of(job));
   // It waits when its attempt was given up too early and answered after all.
   leave_line(index_of(job));
   for (std::uint64_t attempt : job.out) {
@@ -358,6 +356,9 @@ void JobQueue::abandon() {
   questions_.clear();
   oldest_ = 0;
   committed_ = 0;
+  fresh_.clear();
+  over_ = 0;
+  forgotten_ = 0;
 }
 
 }  // namespace gapfarm

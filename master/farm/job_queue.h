@@ -71,12 +71,18 @@ class JobQueue {
   void start(std::string problem_hash, std::vector<v1::Task> tasks,
              std::optional<std::uint64_t> shuffle_seed = {});
 
+  // More tasks of the batch; their places count on.  What has long been done is forgotten, so that
+  // a batch may go on for ever.  REQUIRES: take_answers() was called since the last answer.
+  void append(std::vector<v1::Task> tasks, std::optional<std::uint64_t> shuffle_seed = {});
+  // What was completed since the last call, by its place.
+  std::vector<std::pair<std::size_t, v1::TaskResult>> take_answers();
+
   bool has_pending() const {
     return !pending_.empty() || !retries_.empty() || opinions_.has_audits();
   }
   const std::string& problem_hash() const { return problem_hash_; }
-  std::size_t total() const { return jobs_.size(); }
-  std::size_t committed() const { return committed_; }
+  std::size_t total() const { return forgotten_ + jobs_.size(); }
+  std::size_t committed() const { return forgotten_ + committed_; }
   std::size_t unfinished() const { return jobs_.size() - committed_; }
 
   // Gives the next job to `worker`: fills `job` but for its epoch.  A job that has ended workers
@@ -103,7 +109,8 @@ class JobQueue {
   Blamed blame(const WorkerIdentity& worker, std::uint64_t attempt, EndCause cause,
                const std::string& failure = "");
 
-  // The results in the order of the tasks.  REQUIRES: unfinished() == 0.  Ends the batch.
+  // The results in the order of the tasks; after append() of the last of them.  REQUIRES:
+  // unfinished() == 0.  Ends the batch.
   std::vector<v1::TaskResult> finish();
   // Ends the batch without results.
   void abandon();
@@ -118,6 +125,8 @@ class JobQueue {
 
  private:
   static constexpr std::size_t kMostCopies = 2;
+  // Attempts of audits are numbered with the others, but belong to no job of the batch.
+  static constexpr std::size_t kNoJob = static_cast<std::size_t>(-1);
   struct Job {
     v1::Task task;
     v1::TaskResult result;
@@ -146,6 +155,7 @@ class JobQueue {
     return static_cast<std::size_t>(&job - jobs_.data());
   }
   void hand_out(std::size_t index, const WorkerIdentity& worker, double now, v1::Job* job);
+  void forget_done();
   void withdraw(Attempt& attempt, std::uint64_t id);
   bool take_retry(const WorkerIdentity& worker, const HostCounts& hosts, double now, v1::Job* job);
   double patience() const;
@@ -170,7 +180,10 @@ class JobQueue {
   std::unordered_map<std::size_t, std::vector<Fault>> faults_;  // by job
   std::unordered_map<std::string, std::size_t> questions_;      // to job; made when first needed
   std::size_t oldest_ = 0;                                      // no older attempt is live
-  std::size_t committed_ = 0;
+  std::size_t committed_ = 0;                                   // of jobs_
+  std::vector<std::size_t> fresh_;  // completed and not taken by take_answers()
+  std::size_t over_ = 0;            // no earlier job will be looked at again
+  std::size_t forgotten_ = 0;       // jobs of this batch
   double mean_wall_ = -1;
   SecondOpinions opinions_;
   AnswerWatcher watcher_;

@@ -99,8 +99,14 @@ class Scheduler {
     problems_[hash] = std::move(bytes);
   }
 
-  // One batch at a time.
+  // One batch at a time, which append() may make longer; see JobQueue.
   void start(const std::string& problem_hash, std::vector<v1::Task> tasks);
+  void append(std::vector<v1::Task> tasks) {
+    queue_.append(std::move(tasks), options_.shuffle_seed);
+  }
+  std::vector<std::pair<std::size_t, v1::TaskResult>> take_answers() {
+    return queue_.take_answers();
+  }
   bool finished() const { return queue_.unfinished() == 0; }
   FarmProgress progress() const { return {queue_.committed(), queue_.total()}; }
   std::vector<v1::TaskResult> finish();  // REQUIRES: finished()

@@ -65,7 +65,14 @@ struct SocketFarm::Impl {
   void reap(double now);
   Status workers_can_be_had();
   void sleep(double now);
-  Status loop(const std::function<void(const FarmProgress&)>& on_progress);
+  Status check(const std::vector<v1::Task>& tasks) const;
+  // `on_round` (may be empty) is called after messages were taken; true: there are more tasks.
+  Status loop(const std::function<void(const FarmProgress&)>& on_progress,
+              const std::function<Result<bool>()>& on_round);
+  Result<std::vector<v1::TaskResult>> ask(
+      const std::string& problem_hash, const std::vector<v1::Task>& tasks,
+      const std::function<void(const FarmProgress&)>& on_progress,
+      const std::function<Result<bool>()>& on_round = {});
 };
 
 void SocketFarm::Impl::on_event(const FarmEvent& event) {
@@ -147,7 +154,8 @@ void SocketFarm::Impl::sleep(double now) {
   socket->wait(fds, std::max(0.0, until - now));
 }
 
-Status SocketFarm::Impl::loop(const std::function<void(const FarmProgress&)>& on_progress) {
+Status SocketFarm::Impl::loop(const std::function<void(const FarmProgress&)>& on_progress,
+                              const std::function<Result<bool>()>& on_round) {
   double next_progress = 0;
   bool busy = false;
   for (;;) {
@@ -155,6 +163,10 @@ Status SocketFarm::Impl::loop(const std::function<void(const FarmProgress&)>& on
     const double now = monotonic_seconds();
     if (!busy || now >= next_reap) reap(now);
     busy = pump(*socket, *scheduler, now);
+    if (on_round) {
+      ASSIGN_OR_RETURN(const bool more, on_round());
+      busy |= more;
+    }
     if (scheduler->finished()) break;
     if (on_progress && now >= next_progress) {
       on_progress(scheduler->progress());
@@ -204,12 +216,7 @@ std::string SocketFarm::add_problem(const v1::Problem& problem) {
   return hash;
 }
 
-Result<std::vector<v1::TaskResult>> SocketFarm::run(
-    const std::string& problem_hash, const std::vector<v1::Task>& tasks,
-    const std::function<void(const FarmProgress&)>& on_progress) {
-  if (const auto found = impl_->unsendable.find(problem_hash); found != impl_->unsendable.end()) {
-    return Error{found->second};
-  }
+Status SocketFarm::Impl::check(const std::vector<v1::Task>& tasks) const {
   for (std::size_t i = 0; i < tasks.size(); ++i) {
     const std::size_t size = tasks[i].ByteSizeLong();
     if (size <= kMaxMessageBytes / 2) continue;
@@ -217,15 +224,50 @@ Result<std::vector<v1::TaskResult>> SocketFarm::run(
                  " bytes and a message at most " + std::to_string(kMaxMessageBytes / 2) +
                  "; split it"};
   }
-  impl_->scheduler->start(problem_hash, tasks);
-  const Status status = impl_->loop(on_progress);
-  impl_->unanswered = !status;
+  return {};
+}
+
+Result<std::vector<v1::TaskResult>> SocketFarm::Impl::ask(
+    const std::string& problem_hash, const std::vector<v1::Task>& tasks,
+    const std::function<void(const FarmProgress&)>& on_progress,
+    const std::function<Result<bool>()>& on_round) {
+  if (const auto found = unsendable.find(problem_hash); found != unsendable.end()) {
+    return Error{found->second};
+  }
+  RETURN_IF_ERROR(check(tasks));
+  scheduler->start(problem_hash, tasks);
+  const Status status = loop(on_progress, on_round);
+  unanswered = !status;
   if (!status) {
-    impl_->scheduler->abandon();
-    pump(*impl_->socket, *impl_->scheduler, monotonic_seconds());
+    scheduler->abandon();
+    pump(*socket, *scheduler, monotonic_seconds());
     return status.error();
   }
-  return impl_->scheduler->finish();
+  return scheduler->finish();
+}
+
+Result<std::vector<v1::TaskResult>> SocketFarm::run(
+    const std::string& problem_hash, const std::vector<v1::Task>& tasks,
+    const std::function<void(const FarmProgress&)>& on_progress) {
+  return impl_->ask(problem_hash, tasks, on_progress);
+}
+
+Status SocketFarm::stream(const std::string& problem_hash, std::vector<v1::Task> tasks,
+                          const TakeAnswer& take,
+                          const std::function<void(const FarmProgress&)>& on_progress) {
+  const auto on_round = [&]() -> Result<bool> {
+    std::vector<v1::Task> more;
+    for (const auto& [place, result] : impl_->scheduler->take_answers()) {
+      ASSIGN_OR_RETURN(auto next, take(place, result));
+      std::move(next.begin(), next.end(), std::back_inserter(more));
+    }
+    RETURN_IF_ERROR(impl_->check(more));
+    const bool some = !more.empty();
+    if (some) impl_->scheduler->append(std::move(more));
+    return some;
+  };
+  const auto results = impl_->ask(problem_hash, tasks, on_progress, on_round);
+  return results ? Status() : Status(results.error());
 }
 
 void SocketFarm::watch_answers(AnswerWatcher watcher) {

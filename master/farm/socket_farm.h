@@ -57,6 +57,10 @@ class SocketFarm : public Farm, public AnswerSource {
       const std::string& problem_hash, const std::vector<v1::Task>& tasks,
       const std::function<void(const FarmProgress&)>& on_progress = {}) override;
 
+  Status stream(const std::string& problem_hash, std::vector<v1::Task> tasks,
+                const TakeAnswer& take,
+                const std::function<void(const FarmProgress&)>& on_progress = {}) override;
+
   void watch_answers(AnswerWatcher watcher) override;
   std::vector<WorkerStatus> workers() const override;
   std::vector<FleetStatus> fleets() const override;

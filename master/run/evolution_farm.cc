@@ -1,5 +1,8 @@
 #include "master/run/evolution_farm.h"
 
+#include <unordered_map>
+#include <utility>
+
 #include "common/base/try.h"
 #include "common/problem/question.h"
 #include "common/progress/number_text.h"
@@ -235,18 +238,60 @@ FarmBackend::FarmBackend(Farm& farm, const Problem& problem, std::uint64_t seed,
   problem_hash_ = farm.add_problem(to_proto(problem));
 }
 
-Result<std::vector<Score>> FarmBackend::evaluate(std::span<const Candidate> candidates) {
+std::vector<v1::Task> FarmBackend::tasks_of(std::span<const Candidate> candidates) const {
   std::vector<v1::Task> tasks;
   for (const Candidate& candidate : candidates) {
     tasks.push_back(evaluation_task(candidate, seed_));
   }
+  return tasks;
+}
+
+void FarmBackend::note_failures(const std::vector<v1::Task>& tasks,
+                                const std::vector<v1::TaskResult>& results) {
+  if (!problem_.external) return;
+  const std::string failures = failures_among(problem_, tasks, results);
+  if (!failures.empty()) progress_.on_failures(failures);
+}
+
+Status FarmBackend::stream(std::vector<Candidate> candidates, const TakeScore& take) {
+  // What is out, by place, where failures name the task; and what came back since the last note.
+  std::unordered_map<std::size_t, v1::Task> out;
+  std::vector<v1::Task> answered;
+  std::vector<v1::TaskResult> answers;
+  std::size_t next_place = 0;
+  const std::size_t at_once = candidates.size();
+  const auto sent = [&](std::vector<v1::Task> tasks) {
+    for (const v1::Task& task : tasks) {
+      if (problem_.external) out[next_place++] = task;
+    }
+    return tasks;
+  };
+  const auto on_answer = [&](std::size_t place,
+                             const v1::TaskResult& result) -> Result<std::vector<v1::Task>> {
+    if (problem_.external) {
+      answered.push_back(std::move(out.extract(place).mapped()));
+      answers.push_back(result);
+    }
+    if (answers.size() >= at_once) {
+      note_failures(std::exchange(answered, {}), std::exchange(answers, {}));
+    }
+    ASSIGN_OR_RETURN(const Score score, score_of(result, problem_.fitness.kind));
+    ASSIGN_OR_RETURN(const auto next, take(place, score));
+    return sent(tasks_of(next));
+  };
+  const Status status =
+      farm_.stream(problem_hash_, sent(tasks_of(candidates)), on_answer,
+                   [&](const FarmProgress& progress) { progress_.on_stream(progress); });
+  note_failures(answered, answers);
+  return status;
+}
+
+Result<std::vector<Score>> FarmBackend::evaluate(std::span<const Candidate> candidates) {
+  const std::vector<v1::Task> tasks = tasks_of(candidates);
   ASSIGN_OR_RETURN(const auto results, farm_.run(problem_hash_, tasks, [&](const FarmProgress& p) {
     progress_.on_progress(p);
   }));
-  if (problem_.external) {
-    const std::string failures = failures_among(problem_, tasks, results);
-    if (!failures.empty()) progress_.on_failures(failures);
-  }
+  note_failures(tasks, results);
   std::vector<Score> scores;
   for (const v1::TaskResult& result : results) {
     ASSIGN_OR_RETURN(const Score score, score_of(result, problem_.fitness.kind));

@@ -12,6 +12,7 @@
 #include "common/problem/run_files.h"
 #include "common/trials/read.h"
 #include "master/evolve/evolve.h"
+#include "master/evolve/islands.h"
 #include "master/evolve/optimisers.h"
 #include "master/evolve/staged.h"
 #include "master/ground/fit/simulated_start.h"
@@ -205,6 +206,12 @@ Result<std::optional<Problem>> read_validation(const StagePlan& plan, const Conf
 
 Status check_runnable(const Config& config) {
   RETURN_IF_ERROR(check_evolvable(config));
+  OptimiserSetup setup;
+  setup.settings = config.evolution;
+  setup.genes = config.problem.genes;
+  if (const auto islands = island_count(setup); !islands) {
+    return Error{config.path + ": " + islands.error().message};
+  }
   ASSIGN_OR_RETURN(const auto plan, read_stages(config));
   const auto log = read_validation(plan, config);
   return log ? Status() : Status(log.error());

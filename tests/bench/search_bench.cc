@@ -84,11 +84,18 @@ Search pagmo_search(const char* name, bool small) {
           }};
 }
 
-Search our_search(const OptimiserRow& row) {
-  return {row.name, true, [kind = row.kind](Watch& watch, unsigned seed) {
+const std::string kAsynchronous = "asynchronous ";
+
+// `population`: 0: as the method has it.
+Search our_search(const OptimiserRow& row, unsigned population, bool asynchronous) {
+  const std::string name = (asynchronous ? kAsynchronous : std::string()) + row.name;
+  return {name, true, [kind = row.kind, population, asynchronous](Watch& watch, unsigned seed) {
             EvolutionSettings settings;
             settings.optimiser.kind = kind;
             settings.evaluations = watch.budget;
+            settings.asynchronous = asynchronous;
+            if (population > 0) settings.population = population;
+            if (population > 0) settings.optimiser.population = population;
             ToyRun run(toy_of(*watch.function), settings, seed);
             OptimiserSetup setup = run.setup();
             Stream stream({.run_seed = seed, .generation = 1});
@@ -105,14 +112,31 @@ Search our_search(const OptimiserRow& row) {
           }};
 }
 
-std::vector<Search> searches() {
+struct Options {
+  unsigned seeds = 15;
+  std::uint64_t budget = 20000;
+  std::vector<std::size_t> genes = {10, 20};
+  std::string function;               // only those whose name has it in it
+  std::vector<std::string> searches;  // only these
+  unsigned population = 0;            // of ours; 0: as the method has it
+  bool asynchronous = false;          // ours asynchronously, too
+};
+
+std::vector<Search> searches(const Options& options) {
   std::vector<Search> all = {
       pagmo_search<pagmo::sga>("sga", false),    pagmo_search<pagmo::de>("de", false),
       pagmo_search<pagmo::sade>("sade", false),  pagmo_search<pagmo::de1220>("de1220", false),
       pagmo_search<pagmo::pso>("pso", false),    pagmo_search<pagmo::xnes>("xnes", true),
       pagmo_search<pagmo::cmaes>("cmaes", true),
   };
-  for (const OptimiserRow& row : optimisers()) all.push_back(our_search(row));
+  for (const OptimiserRow& row : optimisers()) {
+    all.push_back(our_search(row, options.population, false));
+    const bool split = row.kind == OptimiserKind::kGenetic || row.kind == OptimiserKind::kCmaEs ||
+                       row.kind == OptimiserKind::kDifferentialEvolution;
+    if (options.asynchronous && split) {
+      all.push_back(our_search(row, options.population, true));
+    }
+  }
   return all;
 }
 
@@ -149,14 +173,6 @@ struct Tally {
   std::uint64_t spent = 0;
   unsigned reached = 0;
   double expected() const { return reached > 0 ? static_cast<double>(spent) / reached : HUGE_VAL; }
-};
-
-struct Options {
-  unsigned seeds = 15;
-  std::uint64_t budget = 20000;
-  std::vector<std::size_t> genes = {10, 20};
-  std::string function;               // only those whose name has it in it
-  std::vector<std::string> searches;  // only these
 };
 
 using Row = std::vector<std::array<Tally, kTargets.size()>>;  // by search
@@ -249,6 +265,34 @@ void print_summary(const std::vector<Named>& rows, const std::vector<Search>& al
   }
 }
 
+// What asynchronous search costs: the geometric mean, over functions that both reached, of its
+// expected evaluations over those of one population.
+void print_asynchronous(const std::vector<Named>& rows, const std::vector<Search>& all) {
+  std::printf("\n| asynchronous, over one population |");
+  for (const double target : kTargets)
+    std::printf(" %g: mean | functions | reached, of all runs | by one |", target);
+  std::printf("\n|---|---|---|---|---|---|---|---|---|\n");
+  for (std::size_t s = 1; s < all.size(); ++s) {
+    if (all[s].name != kAsynchronous + all[s - 1].name) continue;
+    std::printf("| %s |", all[s - 1].name.c_str());
+    for (std::size_t t = 0; t < kTargets.size(); ++t) {
+      double logs = 0;
+      unsigned functions = 0, reached = 0, reached_in_one = 0;
+      for (const auto& [name, row] : rows) {
+        const Tally &one = row[s - 1][t], &split = row[s][t];
+        reached += split.reached;
+        reached_in_one += one.reached;
+        if (one.reached == 0 || split.reached == 0) continue;
+        ++functions;
+        logs += std::log(split.expected() / one.expected());
+      }
+      std::printf(" %.2f | %u | %u | %u |", std::exp(logs / std::max(1u, functions)), functions,
+                  reached, reached_in_one);
+    }
+    std::printf("\n");
+  }
+}
+
 }  // namespace
 }  // namespace gapfarm
 
@@ -263,8 +307,10 @@ int main(int argc, char** argv) {
   app.add_option("--searches", options.searches,
                  "Only these; pagmo's and ours have different names")
       ->delimiter(',');
+  app.add_option("--population", options.population, "Of ours, instead of their defaults");
+  app.add_flag("--asynchronous", options.asynchronous, "Ours asynchronously, too");
   CLI11_PARSE(app, argc, argv);
-  std::vector<Search> all = searches();
+  std::vector<Search> all = searches(options);
   if (!options.searches.empty()) {
     std::erase_if(all, [&](const Search& search) {
       return std::find(options.searches.begin(), options.searches.end(), search.name) ==
@@ -282,5 +328,6 @@ int main(int argc, char** argv) {
   }
   for (std::size_t t = 0; t < kTargets.size(); ++t) print(rows, all, t, options);
   print_summary(rows, all);
+  if (options.asynchronous) print_asynchronous(rows, all);
   return 0;
 }

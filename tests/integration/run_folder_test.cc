@@ -75,6 +75,22 @@ TEST_F(RunFolder, ReadOnlyIsReportedAndCanStillBeLookedAt) {
   EXPECT_EQ(resume(run_, "3").exit_code, 0);
 }
 
+TEST_F(RunFolder, WhereOneEndedAnotherBegins) {
+  ASSERT_EQ(evolve(run_, "12").exit_code, 0);
+  const auto begun = [&](const std::string& config, const std::string& from) {
+    return gapfarm_command({"evolve", config, "--out", folder_ / "next", "--from", from,
+                            "--generations", "1", "--seed", "7", "--workers", "1"});
+  };
+  EXPECT_EQ(begun(config_, run_).exit_code, 0);
+  EXPECT_GE(status(folder_ / "next")["best_fitness"], status(run_)["best_fitness"]);
+
+  std::string text = demo_config(6);
+  text.replace(text.find("full_speed = [0.1"), 17, "full_speed = [0.5");
+  const Finished outside = begun(folder_.write("narrow.toml", text), run_);
+  EXPECT_EQ(outside.exit_code, kRefused);
+  EXPECT_THAT(outside.err, AllOf(HasSubstr("full_speed is 0."), HasSubstr("0.5 to 0.6")));
+}
+
 TEST_F(RunFolder, BelowAFileIsNoPlaceForARun) {
   const Finished tried = evolve(config_ + "/run", "2");
   EXPECT_EQ(tried.exit_code, kRefused);

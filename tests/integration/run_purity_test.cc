@@ -186,10 +186,51 @@ TEST_F(RunPurity, HoldsWhenWorkersAreKilled) {
   EXPECT_THAT(digests(folder_ / "run"), ElementsAreArray(whole));
 }
 
-// Each row of the table of optimisers beside the genetic algorithm, with every phase of it.
-class OptimiserPurity : public RunPurity, public testing::WithParamInterface<const char*> {};
+// Islands go on one by one: who is ahead depends on the farm, what they come to does not.
+class AsynchronousPurity : public RunPurity, public testing::WithParamInterface<const char*> {};
 
 std::string kind_name(const testing::TestParamInfo<const char*>& kind) { return kind.param; }
+
+INSTANTIATE_TEST_SUITE_P(Kinds, AsynchronousPurity,
+                         testing::Values("genetic", "differential_evolution", "cma_es"), kind_name);
+
+TEST_P(AsynchronousPurity, HoldsForAnyNumberOfWorkersWhileTheyAreKilled) {
+  std::ofstream(config_) << demo_config(
+      40, 3, kMoreGenes,
+      "asynchronous = true\n[evolution.stop]\ngenerations = " + std::to_string(kGenerations) +
+          "\n[optimiser]\npopulation = 64\nkind = \"" + GetParam() + "\"\n");
+  const Digests one = evolved("one", {"--workers", "1"});
+  ASSERT_THAT(one, SizeIs(kGenerations));
+  EXPECT_THAT(evolved("two", {"--workers", "2", "--shuffle", "5"}), ElementsAreArray(one));
+  // One more often than once a second.
+  {
+    RunningProgram master("gapfarm", evolve("seven", {"--workers", "7"}));
+    int killed = 0;
+    for (std::size_t generation = 1; generation < kGenerations; ++generation) {
+      ASSERT_TRUE(wait_until([&] { return digests(folder_ / "seven").size() >= generation; }));
+      for (const pid_t worker : children(master.pid())) {
+        killed += ::kill(worker, SIGKILL) == 0 ? 1 : 0;
+        break;
+      }
+    }
+    const Finished finished = master.wait();
+    EXPECT_EQ(finished.exit_code, 0) << finished.err;
+    EXPECT_GE(killed, 4);
+    EXPECT_THAT(digests(folder_ / "seven"), ElementsAreArray(one));
+  }
+  {
+    RunningProgram master("gapfarm", evolve("run", {"--generations", "10000", "--workers", "2"}));
+    ASSERT_TRUE(half_way("run"));
+    master.send(SIGKILL);
+    master.wait();
+  }
+  const std::string last = std::to_string(std::min(digests(folder_ / "run").size(), kGenerations));
+  EXPECT_THAT(resumed("run", {"--generation", last, "--generations", std::to_string(kGenerations)}),
+              ElementsAreArray(one));
+}
+
+// Each row of the table of optimisers beside the genetic algorithm, with every phase of it.
+class OptimiserPurity : public RunPurity, public testing::WithParamInterface<const char*> {};
 
 INSTANTIATE_TEST_SUITE_P(Kinds, OptimiserPurity,
                          testing::Values("differential_evolution", "cma_es", "local", "de_simplex",

@@ -1,4 +1,6 @@
 // gapfarm evolve CONFIG: evolve parameters against a trial log.
+#include <spdlog/fmt/fmt.h>
+
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -19,9 +21,35 @@ struct EvolveCommand {
   std::string config;
   TrialOptions trials;
   std::string out;
+  std::string from;
   std::optional<std::uint64_t> seed;
   EvolutionOptions options;
 };
+
+// Gives the config's genes the values of a model, where the search then begins.
+Status begin_at(const EvolveCommand& command, Config& config, Console& console) {
+  if (!config.evolution.seed_nominal) {
+    return Error{
+        "--from needs seed_nominal = true in [evolution]: else the first genomes are drawn"};
+  }
+  if (config.problem.ground) {
+    return Error{"--from: the search of a ground robot begins at what fits its own log; omit it"};
+  }
+  ASSIGN_OR_RETURN(const Model model, read_model_of(command.from, console));
+  RETURN_IF_ERROR(check_same_robot(model, command.from, config, command.config));
+  for (const Gene& gene : config.problem.genes) {
+    const std::string& key = config.problem.table()[gene.row].key;
+    const auto row = model.table().find(key);
+    if (!row) return Error{command.from + ": has no " + key + ", which is a gene"};
+    const double value = model.values[*row];
+    if (value < gene.lower || value > gene.upper) {
+      return Error{fmt::format("{}: {} is {}, outside of its range in [genes], {} to {}; widen it",
+                               command.from, key, value, gene.lower, gene.upper)};
+    }
+    config.problem.values[gene.row] = value;
+  }
+  return {};
+}
 
 std::string what_evolves(const Problem& problem) {
   const std::string parameters = std::to_string(problem.genes.size()) + " parameters ";
@@ -58,6 +86,7 @@ Result<int> run_evolve(EvolveCommand command, CliContext& context) {
         command.options.overrides.apply(read.evolution);
         if (command.seed) read.seed = *command.seed;
         RETURN_IF_ERROR(check_runnable(read));
+        if (!command.from.empty()) RETURN_IF_ERROR(begin_at(command, read, context.console));
         RETURN_IF_ERROR(check_farm(command.options.farm, read.farm));
         return check_folder(command.out, FolderKind::kRun);
       }));
@@ -88,6 +117,8 @@ SubcommandRun setup_evolve(CLI::App& app) {
   command->trials.needed = false;
   app.add_option("--out", command->out, "Run folder to make")->required();
   app.add_option("--seed", command->seed, "In place of the config's");
+  app.add_option("--from", command->from, "Run or model whose values the search begins at")
+      ->type_name("RUN|MODEL");
   command->options.declare(app);
   app.footer(
       "Examples:\n"

@@ -112,7 +112,8 @@ GeneticAlgorithm::GeneticAlgorithm(const OptimiserSetup& setup)
       breeder_(setup.settings, GeneSpace(*setup.table, setup.genes)),
       nominal_(setup.nominal),
       run_seed_(setup.run_seed),
-      noisy_(setup.noisy) {}
+      noisy_(setup.noisy),
+      seen_(setup.remembered) {}
 
 std::vector<Candidate> GeneticAlgorithm::ask() {
   if (!plan_) plan_ = plan_generation();
@@ -140,6 +141,7 @@ GeneticAlgorithm::Plan GeneticAlgorithm::plan_generation() {
     add_first_generation(plan);
   } else {
     plan.elites = choose_elites();
+    add_migrant(plan);
     if (restart_due()) {
       add_random(plan);
       last_restart_ = generation_ + 1;
@@ -168,6 +170,16 @@ void GeneticAlgorithm::add_first_generation(Plan& plan) {
     plan.newborns.push_back(std::move(newborn));
   }
   add_random(plan);
+}
+
+void GeneticAlgorithm::add_migrant(Plan& plan) {
+  if (migrant_.empty()) return;
+  Newborn newborn;
+  newborn.individual.birth_id = next_birth_id_++;
+  newborn.individual.genome = std::move(migrant_);
+  newborn.individual.origin = kMigrant;
+  plan.newborns.push_back(std::move(newborn));
+  migrant_.clear();
 }
 
 void GeneticAlgorithm::add_random(Plan& plan) {

@@ -15,6 +15,7 @@ class GeneticAlgorithm final : public Optimiser {
 
   std::vector<Candidate> ask() override;
   void tell(std::span<const Score> scores) override;
+  void inject(const Genome& genome) override { migrant_ = breeder_.space().snapped(genome); }
 
   std::uint64_t generation() const override { return generation_; }
   std::uint64_t evaluations() const override { return evaluations_; }
@@ -43,6 +44,7 @@ class GeneticAlgorithm final : public Optimiser {
 
   Plan plan_generation();
   void add_first_generation(Plan& plan);
+  void add_migrant(Plan& plan);
   void add_random(Plan& plan);
   void add_children(Plan& plan);
   void add_candidates(Plan& plan) const;
@@ -72,6 +74,7 @@ class GeneticAlgorithm final : public Optimiser {
   Individual best_;
   Member best_member_;
   SeenGenomes seen_;
+  Genome migrant_;            // of the next generation; empty: none
   std::optional<Plan> plan_;  // asked for, without scores yet
 };
 

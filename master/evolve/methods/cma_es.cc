@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <numbers>
 #include <numeric>
 
 #include "common/math/algebra.h"
@@ -47,7 +48,8 @@ CmaEs::CmaEs(const MethodSetup& setup) : setup_(setup) {
 void CmaEs::begin(Eigen::VectorXd mean) {
   const Eigen::Index n = mean.size();
   generation_ = 0;
-  sigma_ = setup_.settings.sigma;
+  sigma_ = first_sigma_ > 0 ? first_sigma_ : setup_.settings.sigma;
+  evaluations_ = 0;
   mean_ = std::move(mean);
   path_sigma_ = Eigen::VectorXd::Zero(n);
   path_c_ = Eigen::VectorXd::Zero(n);
@@ -56,11 +58,34 @@ void CmaEs::begin(Eigen::VectorXd mean) {
   anywhere_ = false;
 }
 
+// Somewhere else, after convergence.
+void CmaEs::begin_again() {
+  const bool first = restarts_ == 0;
+  if (!first) (small_population_ > 0 ? small_evaluations_ : large_evaluations_) += evaluations_;
+  small_population_ = 0;
+  first_sigma_ = 0;
+  const bool by_turns = setup_.settings.restarts == RestartKind::kBipop;
+  if (by_turns && !first && small_evaluations_ < large_evaluations_) {
+    const double large = static_cast<double>(population());
+    const double base = static_cast<double>(
+        setup_.settings.population.value_or(default_population(setup_.space.size())));
+    const double u = std::fmod(static_cast<double>(++small_starts_) * std::numbers::phi, 1);
+    const double small = base * std::pow(std::max(1.0, large / base / 2), u * u);
+    small_population_ = std::max<std::size_t>(4, static_cast<std::size_t>(small));
+    first_sigma_ = setup_.settings.sigma * std::pow(10, -2 * u);
+  } else {
+    ++restarts_;
+  }
+  begin(mean_);
+  anywhere_ = true;
+}
+
 unsigned CmaEs::default_population(std::size_t genes) {
   return static_cast<unsigned>(4 + std::floor(3 * std::log(static_cast<double>(genes))));
 }
 
 std::size_t CmaEs::population() const {
+  if (small_population_ > 0) return small_population_;
   const std::size_t base =
       setup_.settings.population.value_or(default_population(setup_.space.size()));
   return std::max(base,
@@ -127,9 +152,21 @@ std::vector<Genome> CmaEs::propose(const StreamOf& stream_of) const {
   return proposed;
 }
 
+// No further from the mean than draws are (Hansen, INRIA RR-7748, 2011).
+Genome CmaEs::taken(const Genome& migrant) const {
+  if (anywhere_) return migrant;
+  const Axes axes = axes_of(covariance_);
+  const Eigen::VectorXd step = (to_vector(migrant) - mean_) / sigma_;
+  const double n = static_cast<double>(step.size());
+  const double length = (axes.directions.transpose() * step).cwiseQuotient(axes.deviations).norm();
+  const double most = std::sqrt(n) + 2 * n / (n + 2);
+  return to_genome(mean_ + sigma_ * std::min(1.0, most / length) * step);
+}
+
 void CmaEs::learn(std::span<const Genome> proposed, std::span<const Standing> standings) {
   assert(proposed.size() == population() && standings.size() == proposed.size());
   if (anywhere_) begin(to_vector(proposed.front()));  // the first proposal was the mean itself
+  evaluations_ += proposed.size();
   std::vector<std::size_t> order(proposed.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
@@ -152,11 +189,7 @@ void CmaEs::learn(std::span<const Genome> proposed, std::span<const Standing> st
       bests_.size() == span && *std::max_element(bests_.begin(), bests_.end()) -
                                        *std::min_element(bests_.begin(), bests_.end()) <=
                                    kFlatCost;
-  if (flat || converged()) {
-    ++restarts_;
-    begin(mean_);
-    anywhere_ = true;
-  }
+  if (flat || converged()) begin_again();
 }
 
 void CmaEs::adapt(const Eigen::MatrixXd& steps) {
@@ -213,7 +246,7 @@ bool CmaEs::converged() const {
 }
 
 std::vector<NamedNumber> CmaEs::figures() const {
-  return {{"step_size", sigma_}, {"restarts", static_cast<double>(restarts_)}};
+  return {{"step_size", sigma_}, {"restarts", static_cast<double>(restarts_ + small_starts_)}};
 }
 
 void CmaEs::save(v1::MethodState& message) const {
@@ -227,6 +260,12 @@ void CmaEs::save(v1::MethodState& message) const {
   state.mutable_path_c()->Add(path_c_.begin(), path_c_.end());
   state.mutable_covariance()->Add(covariance_.data(), covariance_.data() + covariance_.size());
   state.mutable_bests()->Add(bests_.begin(), bests_.end());
+  state.set_small_population(small_population_);
+  state.set_evaluations(evaluations_);
+  state.set_large_evaluations(large_evaluations_);
+  state.set_small_evaluations(small_evaluations_);
+  state.set_first_sigma(first_sigma_);
+  state.set_small_starts(small_starts_);
 }
 
 Status CmaEs::restore(const v1::MethodState& message) {
@@ -245,6 +284,12 @@ Status CmaEs::restore(const v1::MethodState& message) {
   std::copy(state.path_c().begin(), state.path_c().end(), path_c_.begin());
   std::copy(state.covariance().begin(), state.covariance().end(), covariance_.data());
   bests_.assign(state.bests().begin(), state.bests().end());
+  small_population_ = state.small_population();
+  evaluations_ = state.evaluations();
+  large_evaluations_ = state.large_evaluations();
+  small_evaluations_ = state.small_evaluations();
+  first_sigma_ = state.first_sigma();
+  small_starts_ = state.small_starts();
   return {};
 }
 

@@ -1,7 +1,10 @@
 // CMA-ES: the covariance matrix adaptation evolution strategy with active rank-one and rank-mu
 // updates and cumulative step-size adaptation (Hansen, arXiv:1604.00772, with its default
 // constants), its draws orthogonal (Wang, Emmerich and Baeck, Evolutionary Computation 27, 2019),
-// restarted with twice the population when it has converged (IPOP; Auger and Hansen, CEC 2005).
+// restarted with twice the population when it has converged (IPOP; Auger and Hansen, CEC 2005), or
+// by turns with that and with small populations and steps, so that both are given as many
+// evaluations (BIPOP; Hansen, GECCO 2009; the random numbers in [0, 1] that choose these are those
+// of the golden ratio's multiples).
 //
 // What is drawn beyond [0, 1] is scored where mirrors put it (see placed()).  While steps are wide
 // it is also learned from there: else the method sees a function that repeats beyond each mirror,
@@ -24,6 +27,7 @@ class CmaEs final : public SearchMethod {
 
   std::vector<Genome> propose(const StreamOf& stream_of) const override;
   void learn(std::span<const Genome> proposed, std::span<const Standing> standings) override;
+  Genome taken(const Genome& migrant) const override;
   unsigned origin() const override { return kSampled; }
   std::vector<NamedNumber> figures() const override;
   void save(v1::MethodState& message) const override;
@@ -37,18 +41,24 @@ class CmaEs final : public SearchMethod {
   Weights weights() const;
   std::size_t population() const;
   void begin(Eigen::VectorXd mean);
+  void begin_again();
   void adapt(const Eigen::MatrixXd& steps);
   void keep_levels_alive();
   bool converged() const;
 
   MethodSetup setup_;
   std::uint64_t generation_ = 0;  // since the last restart
-  std::uint64_t restarts_ = 0;
-  bool anywhere_ = false;  // the next generation begins at a random mean
+  std::uint64_t restarts_ = 0;    // with a larger population
+  bool anywhere_ = false;         // the next generation begins at a random mean
   double sigma_ = 0;
   Eigen::VectorXd mean_, path_sigma_, path_c_;
   Eigen::MatrixXd covariance_;
   std::vector<double> bests_;  // least costs of the last generations
+  // Of BIPOP: this start's, and what was spent on the two kinds before.
+  std::size_t small_population_ = 0;  // 0: a growing one
+  double first_sigma_ = 0;            // 0: as set
+  std::uint64_t evaluations_ = 0;
+  std::uint64_t large_evaluations_ = 0, small_evaluations_ = 0, small_starts_ = 0;
 };
 
 }  // namespace gapfarm

@@ -41,6 +41,9 @@ class SearchMethod {
   virtual std::vector<Genome> propose(const StreamOf& stream_of) const = 0;
   virtual void learn(std::span<const Genome> proposed, std::span<const Standing> standings) = 0;
 
+  // What a genome from elsewhere, among the proposals, is learned as.
+  virtual Genome taken(const Genome& migrant) const { return migrant; }
+
   virtual unsigned origin() const = 0;  // of the next proposals
   // For the run store's table of operators: step sizes, phases.
   virtual std::vector<NamedNumber> figures() const { return {}; }

@@ -31,7 +31,8 @@ SearchOptimiser::SearchOptimiser(std::string kind, const OptimiserSetup& setup,
       run_seed_(setup.run_seed),
       noisy_(setup.noisy),
       elite_replicates_(setup.settings.elite_replicates),
-      method_(std::move(method)) {}
+      method_(std::move(method)),
+      seen_(setup.remembered) {}
 
 unsigned SearchOptimiser::full_scores() const {
   return noisy_ ? std::max(1U, elite_replicates_) : 1;
@@ -57,6 +58,11 @@ SearchOptimiser::Plan SearchOptimiser::plan_generation() const {
     individual.birth_id = next_birth_id_ + k;
     individual.genome = placed(space_, plan.proposed[k]);
     individual.origin = method_->origin();
+    if (k + 1 == plan.proposed.size() && !migrant_.empty()) {
+      individual.genome = placed(space_, migrant_);
+      individual.origin = kMigrant;
+      plan.proposed[k] = method_->taken(individual.genome);
+    }
     const bool asked = seen_.find(individual.genome) == nullptr &&
                        siblings.insert(SeenGenomes::key(individual.genome)).second;
     if (asked) plan.candidates.push_back({individual.birth_id, 0, individual.genome});
@@ -84,6 +90,7 @@ void SearchOptimiser::tell(std::span<const Score> scores) {
   assert(plan_ && scores.size() == plan_->candidates.size());
   Plan plan = std::move(*plan_);
   plan_.reset();
+  migrant_.clear();
   auto next = scores.begin();
   for (Individual& individual : plan.rescored) {
     if (individual.standing.outcome != v1::OK) continue;

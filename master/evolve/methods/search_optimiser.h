@@ -24,6 +24,7 @@ class SearchOptimiser final : public Optimiser {
 
   std::vector<Candidate> ask() override;
   void tell(std::span<const Score> scores) override;
+  void inject(const Genome& genome) override { migrant_ = genome; }
 
   std::uint64_t generation() const override { return generation_; }
   std::uint64_t evaluations() const override { return evaluations_; }
@@ -68,6 +69,7 @@ class SearchOptimiser final : public Optimiser {
   Individual best_;
   Member best_member_;
   SeenGenomes seen_;
+  Genome migrant_;            // of the next generation; empty: none
   std::optional<Plan> plan_;  // asked for, without scores yet
 };
 

@@ -286,10 +286,35 @@ TEST_P(EveryOptimiser, ContinuesBitForBitFromEveryGeneration) {
 
 // Restarts and phases are behind a search of some thousand evaluations; they resume as well.
 TEST(Restore, AcrossRestartsOfCmaEs) {
-  const EvolutionSettings settings = settings_for(OptimiserKind::kCmaEs);
-  ToyRun straight(rastrigin(2), settings, 1), interrupted(rastrigin(2), settings, 1);
-  EXPECT_EQ(digests(straight, 400, false).back(), digests(interrupted, 400, true).back());
-  EXPECT_GE(straight.optimiser().operator_probabilities()[1].value, 1) << "restarts";
+  for (const RestartKind kind : {RestartKind::kIpop, RestartKind::kBipop}) {
+    EvolutionSettings settings = settings_for(OptimiserKind::kCmaEs);
+    settings.optimiser.restarts = kind;
+    ToyRun straight(rastrigin(2), settings, 1), interrupted(rastrigin(2), settings, 1);
+    EXPECT_EQ(digests(straight, 400, false).back(), digests(interrupted, 400, true).back());
+    EXPECT_GE(straight.optimiser().operator_probabilities()[1].value, 2) << "restarts";
+  }
+}
+
+TEST(CmaEs, SpendsAsMuchOnSmallStartsAsOnGrowingOnes) {
+  EvolutionSettings settings = settings_for(OptimiserKind::kCmaEs);
+  settings.optimiser.restarts = RestartKind::kBipop;
+  ToyRun run(rastrigin(3), settings, 1);
+  std::vector<std::pair<double, std::size_t>> starts;  // step size at first, evaluations
+  double restarts = -1;
+  for (int i = 0; i < 3000; ++i) {
+    const std::size_t asked = run.generation().size();
+    const double now = run.optimiser().operator_probabilities()[1].value;
+    if (now != restarts) starts.emplace_back(run.optimiser().operator_probabilities()[0].value, 0);
+    restarts = now;
+    starts.back().second += asked;
+  }
+  std::size_t small = 0, large = 0;
+  for (std::size_t i = 1; i + 1 < starts.size(); ++i) {
+    (starts[i].first < settings.optimiser.sigma ? small : large) += starts[i].second;
+  }
+  ASSERT_GE(starts.size(), 6U);
+  EXPECT_GT(small, large / 4);
+  EXPECT_LT(small, 2 * large);
 }
 
 TEST(Restore, AcrossThePhasesOfAutoSearch) {

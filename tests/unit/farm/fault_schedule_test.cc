@@ -72,6 +72,39 @@ std::string trouble_of(std::uint64_t seed) {
   return "";
 }
 
+// The same for tasks that are added one by one as answers come in.
+std::string trouble_of_stream(std::uint64_t seed) {
+  constexpr std::size_t kTasks = 60;
+  FaultPlan faults = faults_for(seed);
+  faults.master_restarts = 0;
+  std::vector<v1::Task> tasks(kTasks);
+  std::mt19937_64 random(seed);
+  for (std::size_t i = 0; i < kTasks; ++i) {
+    tasks[i].mutable_echo()->set_payload(i == 7 && seed % 5 == 0 ? "crash" : std::to_string(i));
+    tasks[i].mutable_echo()->set_busy_us(1000 + random() % 300000);
+  }
+  SimulatedFarm farm(seed, 1 + seed % 4, faults);
+  std::size_t next = 1 + seed % 6;
+  std::vector<unsigned> answers(kTasks);
+  std::string trouble;
+  const auto take = [&](std::size_t place, const v1::TaskResult& result) {
+    const std::string& payload = tasks.at(place).echo().payload();
+    ++answers[place];
+    const bool right =
+        is_fatal(payload) ? result.outcome() == v1::WORKER_FAILED : result.echo() == payload;
+    if (!right) trouble = "wrong result for task " + payload;
+    std::vector<v1::Task> more;
+    for (std::size_t i = random() % 3; i > 0 && next < kTasks; --i) more.push_back(tasks[next++]);
+    if (more.empty() && farm.scheduler().finished() && next < kTasks) more = {tasks[next++]};
+    return Result<std::vector<v1::Task>>(std::move(more));
+  };
+  const auto first = tasks.begin() + static_cast<std::ptrdiff_t>(next);
+  if (!farm.stream({tasks.begin(), first}, take)) return "did not end";
+  if (answers != std::vector<unsigned>(kTasks, 1)) return "not one answer a task";
+  if (farm.scheduler().counts().disagreements != 0) return "a false alarm";
+  return trouble;
+}
+
 std::uint64_t number_from(const char* variable, std::uint64_t otherwise) {
   const char* text = std::getenv(variable);
   return text != nullptr ? std::strtoull(text, nullptr, 10) : otherwise;
@@ -84,6 +117,12 @@ TEST(FaultSchedules, LoseNothingCommitNothingTwiceAndEnd) {
   for (std::uint64_t seed = first; seed <= last; ++seed) {
     ASSERT_EQ(trouble_of(seed), "")
         << "replay: GAPFARM_FARM_SEED=" << seed << " test_farm --gtest_filter=FaultSchedules.*";
+  }
+}
+
+TEST(FaultSchedules, StreamsLoseNothingTakeNothingTwiceAndEnd) {
+  for (std::uint64_t seed = 1; seed <= kSchedules / 10; ++seed) {
+    ASSERT_EQ(trouble_of_stream(seed), "") << "seed " << seed;
   }
 }
 

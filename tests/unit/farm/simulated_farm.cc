@@ -137,9 +137,10 @@ void SimulatedFarm::start_master() {
   SchedulerOptions options;
   options.epoch = ++epoch_;
   options.admittance = {"build", "class", false};
-  options.heartbeat_interval_s = 0.1;
-  options.silence_limit_s = 1;
+  options.heartbeat_interval_s = faults_.heartbeat_s;
+  options.silence_limit_s = 10 * faults_.heartbeat_s;
   options.copies.audit_share = faults_.audit_share;
+  options.window = faults_.window;
   options.on_event = [this](const FarmEvent& event) {
     if (event.kind == FarmEvent::kDisagreement || event.kind == FarmEvent::kQuarantined) {
       alarms_.push_back(event);
@@ -295,6 +296,37 @@ void SimulatedFarm::finish_task(const std::shared_ptr<Worker>& worker, double wa
   step_worker(worker);
 }
 
+// The next event; false: nothing will ever happen.
+bool SimulatedFarm::step() {
+  if (events_.empty()) return false;
+  const Entry entry = events_.top();
+  events_.pop();
+  now_ = entry.time;
+  entry.event();
+  return true;
+}
+
+bool SimulatedFarm::stream(std::vector<v1::Task> tasks, const Farm::TakeAnswer& take,
+                           double limit_s) {
+  at(now_, [this] { master_clock(); });
+  const double limit = now_ + limit_s;
+  scheduler_->start("", std::move(tasks));
+  while (!scheduler_->finished()) {
+    if (now_ > limit || !step()) return false;
+    std::vector<v1::Task> more;
+    for (const auto& [place, result] : scheduler_->take_answers()) {
+      auto next = take(place, result);
+      if (!next) return false;
+      std::move(next->begin(), next->end(), std::back_inserter(more));
+    }
+    if (more.empty()) continue;
+    scheduler_->append(std::move(more));
+    step_master();
+  }
+  scheduler_->finish();
+  return true;
+}
+
 std::vector<v1::TaskResult> SimulatedFarm::run(const std::vector<v1::Task>& tasks,
                                                std::size_t batches, double limit_s) {
   std::vector<v1::TaskResult> all;
@@ -308,11 +340,7 @@ std::vector<v1::TaskResult> SimulatedFarm::run(const std::vector<v1::Task>& task
     scheduler_->start("", batch_);
     const bool last = b + 1 == batches;
     while (!scheduler_->finished() || (last && now_ < faults_.span_s)) {
-      if (now_ > limit || events_.empty()) return {};
-      Entry entry = events_.top();
-      events_.pop();
-      now_ = entry.time;
-      entry.event();
+      if (now_ > limit || !step()) return {};
     }
     for (v1::TaskResult& result : scheduler_->finish()) all.push_back(std::move(result));
   }

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "common/net/envelope.h"
+#include "master/farm/farm.h"
 #include "master/farm/pump.h"
 #include "worker/pump.h"
 
@@ -35,6 +36,8 @@ struct FaultPlan {
   double progress_s = 2;   // after which a supervisor kills a process whose task hangs
   double audit_share = 0;  // see CopyOptions
   double mistaken = 0;     // probability of an answer to name another job than its own
+  unsigned window = SchedulerOptions{}.window;
+  double heartbeat_s = 0.1;  // a tenth of the silence limit
 };
 
 class SimulatedFarm {
@@ -47,6 +50,9 @@ class SimulatedFarm {
   // "hang" never ends.  Empty: not done within `limit_s`.
   std::vector<v1::TaskResult> run(const std::vector<v1::Task>& tasks, std::size_t batches = 1,
                                   double limit_s = 2000);
+  // As Farm::stream().  False: not done within `limit_s`, or `take` returned an error.  The master
+  // must not be restarted.
+  bool stream(std::vector<v1::Task> tasks, const Farm::TakeAnswer& take, double limit_s = 2000);
   // The worker in this place answers every task wrongly.
   void corrupt(unsigned place) { corrupt_ = place; }
 
@@ -74,6 +80,7 @@ class SimulatedFarm {
   bool leaves(const std::shared_ptr<Worker>& worker);
   void finish_task(const std::shared_ptr<Worker>& worker, double wall);
   std::uint64_t taken() const;
+  bool step();
   void step_master();
   void master_clock();
   void step_worker(const std::shared_ptr<Worker>& worker);
