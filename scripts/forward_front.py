@@ -79,7 +79,7 @@ def picture(members, knee, weighted, size=(560, 380)):
                 else ((left - 6, bottom, "end"), (left - 6, bottom - high + 10, "end")))
         for (tx, ty, anchor), value in zip(ends, (lo, hi)):
             parts.append(f'<text x="{tx}" y="{ty}" text-anchor="{anchor}" fill="#5a6068">{value:.2f}</text>')
-    parts.append(f'<text x="{left + wide}" y="20" text-anchor="end">filled: best for some weights; hollow: for none</text></svg>')
+    parts.append(f'<text x="{left + 20}" y="{bottom - high / 2}">filled: best for some weights; hollow: for none</text></svg>')
     return "\n".join(parts) + "\n"
 
 
