@@ -48,6 +48,37 @@ Result<double> mean_energy_score(const Problem& problem, const Prediction& predi
   return energy_score(trials);
 }
 
+// The fitness of position or of heading alone.
+Result<double> marginal_score(const Problem& problem, const Prediction& prediction,
+                              const std::string& objective) {
+  const bool position = objective == "position";
+  const TailedDensity density(prediction.tails);
+  const auto log_density =
+      position ? &TailedDensity::log_position_density : &TailedDensity::log_heading_density;
+  double sum = 0;
+  for (std::size_t i = 0; i < prediction.trials.size(); ++i) {
+    const Pose& X_WM = problem.log.trials[i].X_WE;
+    if (problem.fitness.kind == FitnessKind::kEnergyScore) {
+      const Alternative whole = collapsed(prediction.trials[i]);
+      const Eigen::Vector3d r = local_difference(whole.X_WM, X_WM);
+      sum += position ? energy_score_of(r.head<2>(), whole.cov.topLeftCorner<2, 2>())
+                      : kHeadingLength_m *
+                            energy_score_of(r.tail<1>(), whole.cov.bottomRightCorner<1, 1>());
+      continue;
+    }
+    std::vector<double> terms;
+    for (const Alternative& a : prediction.trials[i].alternatives) {
+      if (a.weight <= 0) continue;
+      ASSIGN_OR_RETURN(const auto term,
+                       (density.*log_density)(local_difference(a.X_WM, X_WM), a.cov, a.reading_cov,
+                                              problem.fitness.outlier_share));
+      terms.push_back(std::log(a.weight) + term);
+    }
+    sum += log_sum_exp(terms);
+  }
+  return sum / static_cast<double>(prediction.trials.size());
+}
+
 double mean_corner_distance(const Problem& problem, const Prediction& prediction) {
   double sum = 0;
   for (std::size_t i = 0; i < prediction.trials.size(); ++i) {
@@ -155,7 +186,13 @@ Result<v1::EvaluateResult> fitness_of(const Problem& problem, const FitnessRefer
       break;
     }
   }
-  if (!std::isfinite(result.fitness())) {
+  bool finite = std::isfinite(result.fitness());
+  for (const SearchedObjective& objective : problem.fitness.objectives) {
+    ASSIGN_OR_RETURN(const auto score, marginal_score(problem, prediction, objective.name));
+    result.add_objectives(score);
+    finite = finite && std::isfinite(score);
+  }
+  if (!finite) {
     return Error{"the fitness is not finite; a pose of the log may lie impossibly far away"};
   }
   return result;

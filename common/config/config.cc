@@ -133,6 +133,14 @@ Result<Config> parse_config(std::string_view text, const std::string& path,
   }
   read_evolution(top, config.evolution);
   read_optimiser(top, config.evolution.optimiser);
+  const bool front = config.evolution.optimiser.kind == OptimiserKind::kNsga2;
+  if (front == problem.fitness.objectives.empty()) {
+    errors.add(parsed->source().begin,
+               front ? "optimiser nsga2 needs several objectives: [fitness] objectives = "
+                       "[\"position\", \"heading\"], or minimise and maximise in [objective]"
+                     : "several objectives need [optimiser] kind = \"nsga2\"; the other kinds "
+                       "search one fitness");
+  }
   read_farm(top, config.farm);
   top.find("stages");  // read by those who look at them: read_stages()
   top.finish();

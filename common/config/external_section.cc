@@ -1,14 +1,45 @@
 #include <filesystem>
+#include <set>
 
 #include "common/config/sections.h"
 #include "common/problem/external_problem.h"
 
 namespace gapfarm {
 
+namespace {
+
+// Several values in place of one.
+void read_objectives(TomlSection& section, std::vector<SearchedObjective>& objectives) {
+  std::set<std::string> names;
+  for (const char* sense : {"minimise", "maximise"}) {
+    for (const std::string& name : section.strings(sense).value_or(std::vector<std::string>())) {
+      if (name.empty() || !names.insert(name).second) {
+        section.fail(sense, "the value '" + name + "' has no name or is named twice");
+      }
+      objectives.push_back({name, sense == std::string("maximise")});
+    }
+  }
+  if (objectives.empty()) return;
+  if (objectives.size() < kLeastObjectives || objectives.size() > kMostObjectives) {
+    section.fail(section.table().contains("minimise") ? "minimise" : "maximise",
+                 "minimise and maximise together name " + std::to_string(kLeastObjectives) +
+                     " to " + std::to_string(kMostObjectives) +
+                     " values; of one value say direction instead");
+  }
+  if (section.table().contains("direction")) {
+    section.fail("direction", "direction is of one value; minimise and maximise say it of several");
+  }
+}
+
+}  // namespace
+
 void read_objective(TomlSection& section, FitnessSettings& fitness, SpreadSettings& spread) {
   static const std::vector<std::string> kDirections = {"minimise", "maximise", "minimize",
                                                        "maximize"};
-  const bool greatest = section.choice("direction", kDirections).value_or(0) % 2 == 1;
+  read_objectives(section, fitness.objectives);
+  const bool greatest = fitness.objectives.empty()
+                            ? section.choice("direction", kDirections).value_or(0) % 2 == 1
+                            : fitness.objectives.front().maximise;
   fitness.kind = greatest ? FitnessKind::kGreatestValue : FitnessKind::kLeastValue;
   if (section.boolean("noisy").value_or(false)) spread.kind = SpreadKind::kSampled;
 }

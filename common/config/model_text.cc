@@ -87,6 +87,24 @@ std::string robot_text(const Model& model) {
   return "robot = '''\n" + model.robot_file + "'''\n";
 }
 
+std::string directions(const FitnessSettings& fitness) {
+  if (fitness.objectives.empty()) {
+    return std::string("\ndirection = ") +
+           (higher_is_better(fitness.kind) ? "\"maximise\"" : "\"minimise\"");
+  }
+  std::string senses[2];
+  for (const SearchedObjective& objective : fitness.objectives) {
+    std::string& names = senses[objective.maximise ? 1 : 0];
+    names += (names.empty() ? "" : ", ") + toml_string(objective.name);
+  }
+  std::string text;
+  for (const int i : {0, 1}) {
+    if (senses[i].empty()) continue;
+    text += (i == 0 ? "\nminimise = [" : "\nmaximise = [") + senses[i] + "]";
+  }
+  return text;
+}
+
 std::string program_section(const Model& model) {
   if (!model.external) return "";
   const ExternalCommand& command = model.external->command;
@@ -94,10 +112,8 @@ std::string program_section(const Model& model) {
   for (const std::string& word : command.argv) {
     argv += (argv.empty() ? "" : ", ") + toml_string(word);
   }
-  const std::string objective =
-      std::string("\ndirection = ") +
-      (higher_is_better(model.fitness.kind) ? "\"maximise\"" : "\"minimise\"") +
-      (model.spread.kind == SpreadKind::kSampled ? "\nnoisy = true" : "");
+  const std::string objective = directions(model.fitness) +
+                                (model.spread.kind == SpreadKind::kSampled ? "\nnoisy = true" : "");
   return "\n[" + model.scenario + "]\nprogram = [" + argv +
          "]\nfolder = " + toml_string(command.folder) +
          "\nanswer_limit = " + toml_number(command.answer_limit_s) +

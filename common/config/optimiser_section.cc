@@ -12,6 +12,7 @@ const std::vector<std::string> kRestartNames = {"ipop", "bipop"};
 const std::vector<std::string>& optimiser_names() {
   static const std::vector<std::string> names = {
       "genetic",
+      "nsga2",
 #define METHOD(name, file, Class, summary) #name,
 #include "common/config/methods.inc"
   };

@@ -1,4 +1,6 @@
 // [commands], [fitness] and [spread]: the rest of the problem.
+#include <set>
+
 #include "common/config/sections.h"
 
 namespace gapfarm {
@@ -46,6 +48,17 @@ void read_fitness_of(TomlSection& section, FitnessSettings& fitness) {
   section.read("heave_penalty", fitness.heave_penalty, 0, kUnbounded, "per m");
   section.read("rest_penalty", fitness.rest_penalty, 0, kUnbounded, "per s");
   section.read("rest_limit", fitness.rest_limit_s, 0, 60, "s");
+  const auto objectives = section.strings("objectives");
+  if (!objectives) return;
+  for (const std::string& name : *objectives) {
+    fitness.objectives.push_back({name, higher_is_better(fitness.kind)});
+  }
+  const std::set<std::string> names(objectives->begin(), objectives->end());
+  if (objectives->size() != 2 || names != std::set<std::string>{"position", "heading"} ||
+      !comes_apart(fitness.kind)) {
+    section.fail("objectives",
+                 "objectives are [\"position\", \"heading\"], of log_score or energy_score");
+  }
 }
 
 void read_spread(TomlSection& top, SpreadSettings& spread) {

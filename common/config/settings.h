@@ -19,9 +19,10 @@ enum class MutationKind { kGaussian, kUniformReset };
 // mutation.
 enum class VariationOrder { kSeparate, kSequence };
 
-// The genetic algorithm, then the rows of methods.inc.
+// The genetic algorithms, then the rows of methods.inc.
 enum class OptimiserKind {
   kGenetic,
+  kNsga2,
 #define METHOD(name, file, Class, summary) k##Class,
 #include "common/config/methods.inc"
 };

@@ -70,6 +70,11 @@ Result<StagePlan> read_stages(const Config& config) {
   StagePlan plan;
   if (const toml::node* node = top.find("stages")) {
     StageReader(config, errors).read(*node, plan.stages);
+    if (!config.problem.fitness.objectives.empty()) {
+      errors.add(*node,
+                 "stages go on from one best, and a search of several objectives has a "
+                 "front; leave [[stages]] out");
+    }
   }
   if (auto validation = top.section("validation")) {
     if (const auto files = validation->strings(config.problem.windows() ? "folders" : "trials")) {

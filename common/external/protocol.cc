@@ -4,10 +4,10 @@
 #include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
-#include <regex>
 
 #include "common/base/suggest.h"
 #include "common/base/try.h"
+#include "common/external/line_json.h"
 #include "common/json/json.h"
 
 namespace gapfarm {
@@ -15,45 +15,9 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr std::size_t kShown = 80;
-
-Error wrong(const std::string& what, const std::string& line) {
-  std::string shown = line.substr(0, kShown);
-  for (char& c : shown) {
-    if (static_cast<unsigned char>(c) < ' ' || c == 127) c = '?';
-  }
-  return Error{what + ": '" + shown + (line.size() > kShown ? "...'" : "'")};
-}
-
-// Python's json and others print what JSON does not have.  `not_a_number`: where to put the first
-// such word, with null in its place; null: that is an error.
-Result<Json> read_object(const std::string& line, const std::string& what,
-                         std::string* not_a_number = nullptr) {
-  Json json = parse_json(line);
-  if (json.is_object()) return json;
-  static const std::regex kNotNumbers("-?\\b(NaN|Infinity|nan|inf)\\b");
-  std::smatch found;
-  if (!std::regex_search(line, found, kNotNumbers)) return wrong(what, line);
-  json = parse_json(std::regex_replace(line, kNotNumbers, "null"));
-  if (!json.is_object()) return wrong(what, line);
-  if (not_a_number == nullptr) {
-    return wrong("printed " + found.str() +
-                     ", which is no number in JSON: print null for a pose "
-                     "that a simulation does not have",
-                 line);
-  }
-  *not_a_number = found.str();
-  return json;
-}
-
-std::string word_of(const Json& json, const char* key) {
-  const auto found = json.find(key);
-  std::string word = found != json.end() && found->is_string() ? found->get<std::string>() : "";
-  for (char& c : word) {  // it goes into one line of models and messages
-    if (static_cast<unsigned char>(c) < ' ' || c == 127) c = ' ';
-  }
-  return word;
-}
+using line_json::read_object;
+using line_json::word_of;
+using line_json::wrong;
 
 double number_of(const Json& json, const char* key, double fallback) {
   const auto found = json.find(key);
@@ -236,8 +200,8 @@ bool has_null(const Json& given) {
 }
 
 // An objective's answer; what is not finite is null here.
-Result<ExternalAnswer> read_value(const Json& json, const std::string& not_a_number,
-                                  const std::string& line) {
+Result<ExternalAnswer> read_value(const Json& json, const std::vector<std::string>& objectives,
+                                  const std::string& not_a_number, const std::string& line) {
   ExternalAnswer answer;
   answer.message = word_of(json, "notes");
   const auto without_value = [&](const std::string& why) {
@@ -256,8 +220,21 @@ Result<ExternalAnswer> read_value(const Json& json, const std::string& not_a_num
     answer.violation += std::max(0.0, violation.get<double>());
     answer.violation = std::min(answer.violation, std::numeric_limits<double>::max());
   }
-  const Json value = json.value("value", Json("none"));
   if (answer.violation > 0) return answer;
+  for (const std::string& name : objectives) {
+    const Json values = json.value("values", Json::object());
+    const Json value = values.is_object() ? values.value(name, Json("none")) : Json("none");
+    if (value.is_null()) return without_value("it answered a " + name + " of null");
+    if (!value.is_number()) {
+      return wrong("did not answer with \"values\": {\"" + name + "\": a number, ...}", line);
+    }
+    answer.values.push_back(value.get<double>());
+  }
+  if (!answer.values.empty()) {
+    answer.value = answer.values.front();
+    return answer;
+  }
+  const Json value = json.value("value", Json("none"));
   if (value.is_null()) return without_value("it answered a value of null");
   if (!value.is_number()) return wrong("did not answer with \"value\": a number", line);
   answer.value = value.get<double>();
@@ -336,7 +313,7 @@ Result<ExternalAnswer> parse_answer(const std::string& line, const ExternalReque
                                                 objective ? &not_a_number : nullptr, &answer));
   const Json& json = read;
   if (answer.diverged) return answer;
-  if (objective) return read_value(json, not_a_number, line);
+  if (objective) return read_value(json, request.objectives, not_a_number, line);
   const Json given = json.value("pose", Json::array());
   if (has_null(given)) {
     answer.diverged = true;

@@ -42,6 +42,7 @@ struct ExternalRequest {
   double interval_s = 0;  // between the poses of the path; 0: none wanted
   ExternalFloor floor;
   std::uint32_t seed = 0;
+  std::vector<std::string> objectives = {};  // what is wanted in place of one value; none: that
 };
 
 // The commands of a run, in the frame of its first pose.
@@ -67,7 +68,8 @@ struct ExternalAnswer {
   std::vector<ExternalSample> path;
   double rest_time_s = 0;
   // Of an objective.
-  double value = 0;
+  double value = 0;            // of several objectives the first
+  std::vector<double> values;  // one an objective that was asked for
   double violation = 0;  // sum of the positive violations; more than 0: the value does not count
 };
 

@@ -44,6 +44,10 @@ bool compares_means(FitnessKind kind) {
   return kind == FitnessKind::kRobustMahalanobis || kind == FitnessKind::kCornerDistance;
 }
 
+bool comes_apart(FitnessKind kind) {
+  return kind == FitnessKind::kLogScore || kind == FitnessKind::kEnergyScore;
+}
+
 const char* fitness_name(FitnessKind kind) {
   switch (kind) {
     case FitnessKind::kLogScore:

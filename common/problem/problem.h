@@ -39,6 +39,15 @@ enum class FitnessKind {
 
 inline constexpr double kMostOutliers = 0.5;
 
+// One of several things that a search trades off.
+struct SearchedObjective {
+  std::string name;
+  bool maximise = false;
+  bool operator==(const SearchedObjective&) const = default;
+};
+// Of any problem; those of trials: "position" and "heading".
+inline constexpr std::size_t kLeastObjectives = 2, kMostObjectives = 8;
+
 struct FitnessSettings {
   FitnessKind kind = FitnessKind::kLogScore;
   double outlier_share = 0.02;  // weight of the density's heavy tail, <= kMostOutliers
@@ -47,6 +56,8 @@ struct FitnessSettings {
   double heave_penalty = 10;    // per m
   double rest_penalty = 1;      // per s beyond rest_limit_s
   double rest_limit_s = 1;      // after the motors stop
+  // None: the fitness alone.  Of scenario `objective` the first is the fitness, too.
+  std::vector<SearchedObjective> objectives = {};
 };
 
 // Whether a greater fitness is the better one.
@@ -55,6 +66,8 @@ bool higher_is_better(FitnessKind kind);
 bool is_value(FitnessKind kind);
 // Whether it compares one nominal motion a trial; spread would only cost time.
 bool compares_means(FitnessKind kind);
+// Whether it can be had of position and of heading apart.
+bool comes_apart(FitnessKind kind);
 const char* fitness_name(FitnessKind kind);
 // Of a fitness value: "m", "nats/trial", "-".
 const char* fitness_unit(FitnessKind kind);

@@ -10,57 +10,16 @@
 #include "common/base/hash.h"
 #include "common/base/suggest.h"
 #include "common/problem/external_problem.h"
+#include "common/problem/fitness_problem.h"
 #include "common/problem/residual_problem.h"
 
 namespace gapfarm {
 namespace {
 
-constexpr unsigned kMostReplicates = 100000;
-
 Error invalid(const std::string& what) { return Error{"problem: " + what}; }
 
 bool finite(const Pose& X) {
   return std::isfinite(X.x) && std::isfinite(X.y) && std::isfinite(X.theta);
-}
-
-void write_fitness(const FitnessSettings& from, v1::Fitness* to) {
-  to->set_kind(static_cast<v1::Fitness::Kind>(from.kind));
-  to->set_outlier_share(from.outlier_share);
-  to->set_roll_penalty(from.roll_penalty);
-  to->set_pitch_penalty(from.pitch_penalty);
-  to->set_heave_penalty(from.heave_penalty);
-  to->set_rest_penalty(from.rest_penalty);
-  to->set_rest_limit(from.rest_limit_s);
-}
-
-FitnessSettings read_fitness(const v1::Fitness& from) {
-  return {static_cast<FitnessKind>(from.kind()),
-          from.outlier_share(),
-          from.roll_penalty(),
-          from.pitch_penalty(),
-          from.heave_penalty(),
-          from.rest_penalty(),
-          from.rest_limit()};
-}
-
-// What config files are held to (common/config/problem_sections.cc); a message may come from
-// anywhere.
-Status check_score(const FitnessSettings& fitness, const SpreadSettings& spread) {
-  if (!(fitness.outlier_share >= 0 && fitness.outlier_share <= kMostOutliers)) {
-    return invalid("the outlier share must be in [0, 0.5]");
-  }
-  for (const double value : {fitness.roll_penalty, fitness.pitch_penalty, fitness.heave_penalty,
-                             fitness.rest_penalty, fitness.rest_limit_s}) {
-    if (!(std::isfinite(value) && value >= 0)) {
-      return invalid("penalties and the rest limit must be finite and not negative");
-    }
-  }
-  if (spread.kind == SpreadKind::kSampled &&
-      !(spread.replicates >= 2 && spread.replicates <= kMostReplicates)) {
-    return invalid("sampled spread needs between 2 and " + std::to_string(kMostReplicates) +
-                   " replicates");
-  }
-  return {};
 }
 
 // Rows that a message must have: those from a second one of a kind on, which are younger, are
@@ -371,7 +330,7 @@ Result<Problem> from_proto(const v1::Problem& message) {
       !v1::Spread::Kind_IsValid(message.spread().kind())) {
     return invalid("unknown kind of fitness or spread; master and worker must be the same build");
   }
-  problem.fitness = read_fitness(message.fitness());
+  problem.fitness = fitness_of_message(message.fitness());
   if (problem.fitness.kind == FitnessKind::kCornerDistance && problem.pieces.empty()) {
     return invalid("fitness corner_distance needs pieces, which scenario '" + problem.scenario +
                    "' does not have; choose another");

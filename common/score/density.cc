@@ -20,9 +20,10 @@ Eigen::Vector3d in_metres(const Eigen::Vector3d& residual) {
 
 }  // namespace
 
-Result<Covariance3> Covariance3::factorise(const Eigen::Matrix3d& covariance) {
-  const Eigen::LLT<Eigen::Matrix3d> factor(covariance);
-  Covariance3 result;
+template <int N>
+Result<FactorisedCovariance<N>> FactorisedCovariance<N>::factorise(const Matrix& covariance) {
+  const Eigen::LLT<Matrix> factor(covariance);
+  FactorisedCovariance result;
   result.lower_ = factor.matrixL();
   if (factor.info() != Eigen::Success || !result.lower_.allFinite() ||
       result.lower_.diagonal().minCoeff() <= 0) {
@@ -35,23 +36,29 @@ Result<Covariance3> Covariance3::factorise(const Eigen::Matrix3d& covariance) {
   return result;
 }
 
-double Covariance3::squared_distance(const Eigen::Vector3d& residual) const {
-  return lower_.triangularView<Eigen::Lower>().solve(residual).squaredNorm();
+template <int N>
+double FactorisedCovariance<N>::squared_distance(const Vector& residual) const {
+  return lower_.template triangularView<Eigen::Lower>().solve(residual).squaredNorm();
 }
 
-double log_normal_density(const Eigen::Vector3d& residual, const Covariance3& covariance) {
+template <int N>
+double log_normal_density(const ResidualOf<N>& residual,
+                          const FactorisedCovariance<N>& covariance) {
   return -0.5 *
-         (3 * kLogTwoPi + covariance.log_determinant() + covariance.squared_distance(residual));
+         (N * kLogTwoPi + covariance.log_determinant() + covariance.squared_distance(residual));
 }
 
-double log_tail_density(const Eigen::Vector3d& residual, const Covariance3& covariance) {
-  // log Gamma((nu + 3) / 2) - log Gamma(nu / 2) for nu = 3: Gamma(3) = 2, Gamma(3/2) = sqrt(pi)/2.
-  static_assert(kTailFreedom == 3);
-  const double log_gammas = std::log(4 / std::sqrt(std::numbers::pi));
+template <int N>
+double log_tail_density(const ResidualOf<N>& residual, const FactorisedCovariance<N>& covariance) {
+  // Gamma((nu + N) / 2) / Gamma(nu / 2) for nu = 3: Gamma(3/2) = sqrt(pi) / 2, Gamma(2) = 1,
+  // Gamma(5/2) = 3/2 Gamma(3/2), Gamma(3) = 2.
+  static_assert(kTailFreedom == 3 && N >= 1 && N <= 3);
+  const double gammas = N == 2 ? 1.5 : (N == 1 ? 2 : 4) / std::sqrt(std::numbers::pi);
+  const double log_gammas = std::log(gammas);
   const double q = covariance.squared_distance(residual) / (kTailScale * kTailFreedom);
-  return log_gammas - 1.5 * std::log(kTailFreedom * std::numbers::pi) -
-         0.5 * (covariance.log_determinant() + 3 * std::log(kTailScale)) -
-         0.5 * (kTailFreedom + 3) * std::log1p(q);
+  return log_gammas - 0.5 * N * std::log(kTailFreedom * std::numbers::pi) -
+         0.5 * (covariance.log_determinant() + N * std::log(kTailScale)) -
+         0.5 * (kTailFreedom + N) * std::log1p(q);
 }
 
 double log_sum_exp(std::span<const double> logarithms) {
@@ -63,8 +70,9 @@ double log_sum_exp(std::span<const double> logarithms) {
   return greatest + std::log(sum);
 }
 
-double log_predictive_density(const Eigen::Vector3d& residual, const Covariance3& covariance,
-                              double outlier_share) {
+template <int N>
+double log_predictive_density(const ResidualOf<N>& residual,
+                              const FactorisedCovariance<N>& covariance, double outlier_share) {
   assert(outlier_share >= 0 && outlier_share < 1);
   const double normal = std::log1p(-outlier_share) + log_normal_density(residual, covariance);
   if (outlier_share == 0) return normal;
@@ -72,6 +80,17 @@ double log_predictive_density(const Eigen::Vector3d& residual, const Covariance3
   const double greater = std::max(normal, tail);
   return greater + std::log1p(std::exp(std::min(normal, tail) - greater));
 }
+
+#define OF_SIZE(N)                                                                                \
+  template class FactorisedCovariance<N>;                                                         \
+  template double log_normal_density<N>(const ResidualOf<N>&, const FactorisedCovariance<N>&);    \
+  template double log_tail_density<N>(const ResidualOf<N>&, const FactorisedCovariance<N>&);      \
+  template double log_predictive_density<N>(const ResidualOf<N>&, const FactorisedCovariance<N>&, \
+                                            double);
+OF_SIZE(1)
+OF_SIZE(2)
+OF_SIZE(3)
+#undef OF_SIZE
 
 double expected_norm(const Eigen::Ref<const Eigen::VectorXd>& mean,
                      const Eigen::Ref<const Eigen::MatrixXd>& covariance) {
@@ -103,12 +122,18 @@ double expected_norm(const Eigen::Ref<const Eigen::VectorXd>& mean,
   return std::sqrt(mean_square) * kStep * sum / (2 * std::sqrt(std::numbers::pi));
 }
 
+double energy_score_of(const Eigen::Ref<const Eigen::VectorXd>& residual,
+                       const Eigen::Ref<const Eigen::MatrixXd>& covariance) {
+  // X - X' ~ N(0, 2 S), and E||X - X'|| / 2 = E||X|| / sqrt(2).
+  return expected_norm(residual, covariance) -
+         expected_norm(Eigen::VectorXd::Zero(residual.size()), covariance) * std::numbers::sqrt2 /
+             2;
+}
+
 double gaussian_energy_score(const Eigen::Vector3d& residual, const Eigen::Matrix3d& covariance) {
   const Eigen::Vector3d units(1, 1, kHeadingLength_m);
   const Eigen::Matrix3d scaled = units.asDiagonal() * covariance * units.asDiagonal();
-  // X - X' ~ N(0, 2 S), and E||X - X'|| / 2 = E||X|| / sqrt(2).
-  return expected_norm(in_metres(residual), scaled) -
-         expected_norm(Eigen::Vector3d::Zero(), scaled) * std::numbers::sqrt2 / 2;
+  return energy_score_of(in_metres(residual), scaled);
 }
 
 }  // namespace gapfarm

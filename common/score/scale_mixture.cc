@@ -66,39 +66,64 @@ double draw_tail_scale(double tail, Stream& stream) {
 TailedDensity::TailedDensity(const NoiseTails& tails)
     : tails_(tails), drive_(tail_scales(tails.drive)), reading_(tail_scales(tails.reading)) {}
 
-Result<double> TailedDensity::log_density(const Eigen::Vector3d& residual,
-                                          const Eigen::Matrix3d& covariance,
-                                          const Eigen::Matrix3d& reading,
-                                          double outlier_share) const {
-  const Result<Covariance3> whole = Covariance3::factorise(covariance);
+template <int N>
+Result<double> TailedDensity::log_density_of(const Eigen::Matrix<double, N, 1>& residual,
+                                             const Eigen::Matrix<double, N, N>& covariance,
+                                             const Eigen::Matrix<double, N, N>& reading,
+                                             double outlier_share) const {
+  using Matrix = Eigen::Matrix<double, N, N>;
+  using Array = Eigen::Array<double, N, 1>;
+  const auto whole = FactorisedCovariance<N>::factorise(covariance);
   if (!whole) return whole.error();
   if (tails_.gaussian()) return log_predictive_density(residual, *whole, outlier_share);
-  const Result<Covariance3> readings = Covariance3::factorise(reading);
+  const auto readings = FactorisedCovariance<N>::factorise(reading);
   if (!readings) return Error{"of the readings: " + readings.error().message};
   // In axes in which the readings' covariance is 1 and the drive's diagonal, every pair of scales
   // is.
-  const auto lower = readings->lower().triangularView<Eigen::Lower>();
-  const Eigen::Matrix3d half = lower.solve(Eigen::Matrix3d(covariance - reading));
-  const Eigen::Matrix3d drive = lower.solve(Eigen::Matrix3d(half.transpose()));
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(drive);
-  const Eigen::Array3d spread = axes.eigenvalues().array().max(0.0);
-  const Eigen::Array3d squares =
-      (axes.eigenvectors().transpose() * lower.solve(residual)).array().square();
+  const auto lower = readings->lower().template triangularView<Eigen::Lower>();
+  const Matrix half = lower.solve(Matrix(covariance - reading));
+  const Matrix drive = lower.solve(Matrix(half.transpose()));
+  const Eigen::SelfAdjointEigenSolver<Matrix> axes(drive);
+  const Array spread = axes.eigenvalues().array().max(0.0);
+  const Array squares = (axes.eigenvectors().transpose() * lower.solve(residual)).array().square();
   std::array<double, kScales * kScales> logs;
   std::size_t count = 0;
   for (const TailScale& a : drive_) {
     for (const TailScale& b : reading_) {
-      const Eigen::Array3d variances = a.scale * spread + b.scale;
+      const Array variances = a.scale * spread + b.scale;
       logs[count++] = std::log(a.weight * b.weight) -
                       0.5 * (std::log(variances.prod()) + (squares / variances).sum());
     }
   }
   const double mixture = log_sum_exp(std::span(logs.data(), count)) -
-                         0.5 * (3 * kLogTwoPi + readings->log_determinant());
+                         0.5 * (N * kLogTwoPi + readings->log_determinant());
   if (outlier_share == 0) return mixture;
   const std::array<double, 2> both = {std::log1p(-outlier_share) + mixture,
                                       std::log(outlier_share) + log_tail_density(residual, *whole)};
   return log_sum_exp(both);
+}
+
+Result<double> TailedDensity::log_density(const Eigen::Vector3d& residual,
+                                          const Eigen::Matrix3d& covariance,
+                                          const Eigen::Matrix3d& reading,
+                                          double outlier_share) const {
+  return log_density_of<3>(residual, covariance, reading, outlier_share);
+}
+
+Result<double> TailedDensity::log_position_density(const Eigen::Vector3d& residual,
+                                                   const Eigen::Matrix3d& covariance,
+                                                   const Eigen::Matrix3d& reading,
+                                                   double outlier_share) const {
+  return log_density_of<2>(residual.head<2>(), covariance.topLeftCorner<2, 2>(),
+                           reading.topLeftCorner<2, 2>(), outlier_share);
+}
+
+Result<double> TailedDensity::log_heading_density(const Eigen::Vector3d& residual,
+                                                  const Eigen::Matrix3d& covariance,
+                                                  const Eigen::Matrix3d& reading,
+                                                  double outlier_share) const {
+  return log_density_of<1>(residual.tail<1>(), covariance.bottomRightCorner<1, 1>(),
+                           reading.bottomRightCorner<1, 1>(), outlier_share);
 }
 
 Result<double> expected_log_density(const TailedDensity& density, const NoiseTails& tails,

@@ -48,8 +48,21 @@ class TailedDensity {
   // not positive definite.
   Result<double> log_density(const Eigen::Vector3d& residual, const Eigen::Matrix3d& covariance,
                              const Eigen::Matrix3d& reading, double outlier_share) const;
+  // The same of the marginals of position and of heading.
+  Result<double> log_position_density(const Eigen::Vector3d& residual,
+                                      const Eigen::Matrix3d& covariance,
+                                      const Eigen::Matrix3d& reading, double outlier_share) const;
+  Result<double> log_heading_density(const Eigen::Vector3d& residual,
+                                     const Eigen::Matrix3d& covariance,
+                                     const Eigen::Matrix3d& reading, double outlier_share) const;
 
  private:
+  template <int N>
+  Result<double> log_density_of(const Eigen::Matrix<double, N, 1>& residual,
+                                const Eigen::Matrix<double, N, N>& covariance,
+                                const Eigen::Matrix<double, N, N>& reading,
+                                double outlier_share) const;
+
   NoiseTails tails_;
   std::vector<TailScale> drive_, reading_;
 };

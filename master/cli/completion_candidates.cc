@@ -66,6 +66,7 @@ constexpr OptionTakes kOptionTakes[] = {
     {"--reference", Takes::kRun},
     {"--trials", Takes::kFile},
     {"--paths", Takes::kFile},
+    {"--history", Takes::kFile},
     {"--mined", Takes::kFile},
     {"--like", Takes::kFile},
     {"--log", Takes::kFile},

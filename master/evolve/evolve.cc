@@ -71,13 +71,24 @@ v1::Task evaluation_task(const Candidate& candidate, std::uint64_t run_seed) {
   return task;
 }
 
-Result<Score> score_of(const v1::TaskResult& result, FitnessKind kind) {
+Result<Score> score_of(const v1::TaskResult& result, const FitnessSettings& fitness) {
   if (result.outcome() == v1::INVALID_REQUEST) {
     return Error{"a worker refused the evaluation: " + result.message()};
   }
   if (result.outcome() == v1::INFEASIBLE) return Score{v1::INFEASIBLE, result.evaluate().penalty()};
-  const bool ok = result.outcome() == v1::OK;
-  return Score{result.outcome(), ok ? cost_of_fitness(kind, result.evaluate().fitness()) : 0};
+  if (result.outcome() != v1::OK) return Score{result.outcome(), 0};
+  const v1::EvaluateResult& answer = result.evaluate();
+  Score score{v1::OK, cost_of_fitness(fitness.kind, answer.fitness())};
+  const std::size_t objectives = fitness.objectives.size();
+  if (static_cast<std::size_t>(answer.objectives_size()) != objectives) {
+    return Error{"a worker answered " + std::to_string(answer.objectives_size()) +
+                 " objectives of " + std::to_string(objectives)};
+  }
+  for (std::size_t i = 0; i < objectives; ++i) {
+    const double value = answer.objectives(static_cast<int>(i));
+    score.costs.push_back(fitness.objectives[i].maximise ? -value : value);
+  }
+  return score;
 }
 
 double cost_of_fitness(FitnessKind kind, double fitness) {

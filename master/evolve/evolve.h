@@ -122,8 +122,8 @@ OptimiserSetup optimiser_setup(const EvolutionSettings& settings, const Problem&
 
 v1::Task evaluation_task(const Candidate& candidate, std::uint64_t run_seed);
 
-// Error: a worker refused the evaluation.
-Result<Score> score_of(const v1::TaskResult& result, FitnessKind kind);
+// Errors: a worker refused the evaluation, or did not answer with a number an objective.
+Result<Score> score_of(const v1::TaskResult& result, const FitnessSettings& fitness);
 
 // How long a run will still take.
 

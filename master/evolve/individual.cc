@@ -35,6 +35,8 @@ void save(const Individual& individual, v1::Individual& message) {
   message.set_outcome(static_cast<std::uint32_t>(individual.standing.outcome));
   message.mutable_parents()->Add(individual.parents.begin(), individual.parents.end());
   message.set_operators(individual.origin);
+  const std::vector<double>& costs = individual.standing.costs;
+  message.mutable_objectives()->Add(costs.begin(), costs.end());
 }
 
 Result<Individual> load(const v1::Individual& message, const GeneSpace& space) {
@@ -54,6 +56,7 @@ Result<Individual> load(const v1::Individual& message, const GeneSpace& space) {
       standing_of(message.outcome(), message.fitness(), message.fitness_m2(), message.scores());
   if (!std::isfinite(individual.standing.cost))
     return Error{name + " has a cost that is not finite"};
+  individual.standing.costs.assign(message.objectives().begin(), message.objectives().end());
   individual.parents.assign(message.parents().begin(), message.parents().end());
   individual.origin = message.operators();
   return individual;
@@ -87,9 +90,10 @@ Status load_seen(const v1::GeneticState& message, SeenGenomes& seen) {
 }
 
 std::string origin_name(unsigned origin) {
-  constexpr std::array kNames = {"one_point",     "uniform", "blend",  "gaussian",
-                                 "uniform_reset", "elite",   "random", "nominal",
-                                 "difference",    "sampled", "local",  "migrant"};
+  constexpr std::array kNames = {"one_point",        "uniform",   "blend",  "gaussian",
+                                 "uniform_reset",    "elite",     "random", "nominal",
+                                 "difference",       "sampled",   "local",  "migrant",
+                                 "simulated_binary", "polynomial"};
   std::string text;
   for (std::size_t bit = 0; bit < kNames.size(); ++bit) {
     if ((origin & (1U << bit)) == 0) continue;
@@ -100,7 +104,10 @@ std::string origin_name(unsigned origin) {
 }
 
 void Standing::add(const Score& score) {
-  const bool broken = has_cost(score.outcome) && !std::isfinite(score.cost);
+  const auto finite = [](double c) { return std::isfinite(c); };
+  const bool all_finite =
+      finite(score.cost) && std::all_of(score.costs.begin(), score.costs.end(), finite);
+  const bool broken = has_cost(score.outcome) && !all_finite;
   const v1::Outcome counted = broken ? v1::DIVERGED : score.outcome;
   const bool worse = scores == 0 || outcome_rank(counted) > outcome_rank(outcome);
   if (worse) outcome = counted;
@@ -109,8 +116,11 @@ void Standing::add(const Score& score) {
     const double before = worse ? 0 : cost;
     cost = counted == v1::INFEASIBLE && outcome == counted ? std::max(before, score.cost) : before;
     m2 = 0;
+    costs.clear();
     return;
   }
+  costs.resize(score.costs.size());
+  for (std::size_t i = 0; i < costs.size(); ++i) costs[i] += (score.costs[i] - costs[i]) / scores;
   const double before = score.cost - cost;  // Welford's running mean
   cost += before / scores;
   m2 += before * (score.cost - cost);
@@ -144,9 +154,14 @@ double diversity_of(const std::vector<Individual>& individuals) {
 }
 
 Member to_member(const Individual& individual) {
-  return {individual.birth_id,           individual.genome,          individual.standing.outcome,
-          individual.standing.cost,      individual.standing.scores, individual.parents,
-          origin_name(individual.origin)};
+  return {individual.birth_id,
+          individual.genome,
+          individual.standing.outcome,
+          individual.standing.cost,
+          individual.standing.scores,
+          individual.parents,
+          origin_name(individual.origin),
+          individual.standing.costs};
 }
 
 Standing standing_of(const Member& member) {

@@ -23,10 +23,12 @@ enum Origin : unsigned {
   kElite = 1u << 5,
   kRandom = 1u << 6,
   kNominal = 1u << 7,
-  kDifference = 1u << 8,  // a trial vector of differential evolution
-  kSampled = 1u << 9,     // from CMA-ES's distribution
-  kLocal = 1u << 10,      // a step of a local search
-  kMigrant = 1u << 11,    // the best of another island
+  kDifference = 1u << 8,        // a trial vector of differential evolution
+  kSampled = 1u << 9,           // from CMA-ES's distribution
+  kLocal = 1u << 10,            // a step of a local search
+  kMigrant = 1u << 11,          // the best of another island
+  kSimulatedBinary = 1u << 12,  // crossover of NSGA-II
+  kPolynomial = 1u << 13,       // mutation of NSGA-II
 };
 std::string origin_name(unsigned origin);  // "blend+gaussian"
 
@@ -36,6 +38,7 @@ struct Standing {
   double cost = 0;                                // mean over OK scores; INFEASIBLE: the greatest
   double m2 = 0;                                  // sum of their squared deviations
   unsigned scores = 0;
+  std::vector<double> costs = {};  // of several objectives, means as `cost`
 
   // Takes one more score.  One with a cost that is not finite counts as DIVERGED.
   void add(const Score& score);

@@ -25,6 +25,7 @@ struct Candidate {
 struct Score {
   v1::Outcome outcome = v1::OUTCOME_UNSPECIFIED;
   double cost = 0;
+  std::vector<double> costs = {};  // one each of several objectives, lower is better
 };
 
 // A member of a committed generation, for the run store and reports.
@@ -35,7 +36,8 @@ struct Member {
   double cost = 0;  // mean over `scores`
   unsigned scores = 0;
   std::vector<std::uint64_t> parents;
-  std::string operators;  // "blend+gaussian", "elite", "random", "nominal"
+  std::string operators;           // "blend+gaussian", "elite", "random", "nominal"
+  std::vector<double> costs = {};  // means, of several objectives
 };
 
 struct NamedNumber {

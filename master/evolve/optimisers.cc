@@ -5,6 +5,7 @@
 
 #include "common/base/try.h"
 #include "master/evolve/genetic/genetic.h"
+#include "master/evolve/genetic/nsga2.h"
 #include "master/evolve/islands.h"
 #include "master/evolve/methods/search_optimiser.h"
 
@@ -70,6 +71,8 @@ std::span<const OptimiserRow> optimisers() {
   static constexpr std::array rows = {
       OptimiserRow{Kind::kGenetic, "genetic", "genetic algorithm with self-adapted operators",
                    make_genetic, restore_genetic},
+      OptimiserRow{Kind::kNsga2, "nsga2", "NSGA-II, the front of several objectives", make_nsga2,
+                   restore_nsga2},
 #define METHOD(name, file, Class, summary) row<make_method_##Class>(Kind::k##Class, #name, summary),
 #include "common/config/methods.inc"
   };

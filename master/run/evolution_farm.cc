@@ -294,7 +294,7 @@ Result<std::vector<Score>> FarmBackend::evaluate(std::span<const Candidate> cand
   note_failures(tasks, results);
   std::vector<Score> scores;
   for (const v1::TaskResult& result : results) {
-    ASSIGN_OR_RETURN(const Score score, score_of(result, problem_.fitness.kind));
+    ASSIGN_OR_RETURN(const Score score, score_of(result, problem_.fitness));
     scores.push_back(score);
   }
   return scores;
@@ -324,6 +324,10 @@ Status StoreSink::commit(const GenerationRecord& record) {
     individual.scores = member.scores;
     individual.parents = member.parents;
     individual.operators = member.operators;
+    for (std::size_t m = 0; m < member.costs.size(); ++m) {
+      const auto& [name, maximise] = problem_.fitness.objectives[m];
+      individual.objectives.emplace_back(name, maximise ? -member.costs[m] : member.costs[m]);
+    }
     stored.individuals.push_back(std::move(individual));
   }
   summarise_fitness(stored, higher_is_better(kind));

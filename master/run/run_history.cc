@@ -7,11 +7,13 @@
 #include <fstream>
 #include <iterator>
 #include <map>
+#include <set>
 #include <utility>
 
 #include "common/base/try.h"
 #include "common/progress/number_text.h"
 #include "master/report/html.h"
+#include "master/run/run_sample.h"
 #include "master/store/run_lock.h"
 #include "master/store/run_reader.h"
 
@@ -24,7 +26,6 @@ constexpr std::size_t kBins = 20;
 constexpr std::size_t kMostDensities = 16;  // genes
 constexpr std::size_t kMostSteps = 400;     // of operators' probabilities
 constexpr std::size_t kMostGenomes = 10;
-constexpr std::size_t kMostElite = 30;
 
 // About `most` of `count` indices, evenly, the last among them.
 std::vector<std::size_t> some_of(std::size_t count, std::size_t most) {
@@ -37,6 +38,7 @@ std::vector<std::size_t> some_of(std::size_t count, std::size_t most) {
 
 void add_operators(const std::vector<StoredGeneration>& generations, RunReport* report) {
   for (const auto& [name, share] : generations.back().operator_probabilities) {
+    if (name == "front" || name == "hypervolume") return;  // no probabilities
     report->operators.push_back(name);
   }
   if (report->operators.empty()) return;
@@ -83,31 +85,6 @@ void add_column(const Problem& problem, std::uint64_t generation,
       decode_gene(problem.table(), problem.genes[gene], std::clamp(best->genome[gene], 0.0, 1.0)));
 }
 
-// Searched by its logarithm, a gene's share of the range is that of the logarithm.
-void add_elite(const Problem& problem, const std::vector<StoredIndividual>& last, RunElite* elite) {
-  const ParameterTable& table = problem.table();
-  const auto value = [&](const Gene& gene, double share) {
-    const Parameter& p = table[gene.row];
-    const double v = decode_gene(table, gene, share);
-    return p.choices.empty() ? number_text(v, 4) : p.choices[static_cast<std::size_t>(v)];
-  };
-  for (const Gene& gene : problem.genes) {
-    const Parameter& p = table[gene.row];
-    elite->axes.push_back({p.key, p.unit, value(gene, 0), value(gene, 1)});
-  }
-  for (const StoredIndividual& one : last) {
-    if (elite->lines.size() == kMostElite) break;
-    if (one.outcome != "OK" || one.genome.size() != problem.genes.size()) continue;
-    RunElite::Line& line = elite->lines.emplace_back();
-    line.birth_id = one.birth_id;
-    line.fitness = one.fitness;
-    for (std::size_t g = 0; g < one.genome.size(); ++g) {
-      line.shares.push_back(std::clamp(one.genome[g], 0.0, 1.0));
-      line.values.push_back(value(problem.genes[g], line.shares.back()));
-    }
-  }
-}
-
 Status add_densities(const RunReader& reader, const Problem& problem,
                      const std::vector<StoredGeneration>& generations, RunReport* report) {
   std::vector<std::size_t> genes;
@@ -115,14 +92,28 @@ Status add_densities(const RunReader& reader, const Problem& problem,
   ASSIGN_OR_RETURN(const auto last, reader.individuals(generations.back().generation));
   const std::size_t columns = std::clamp<std::size_t>(
       kMostMembers / std::max<std::size_t>(1, last.size()), 2, kMostColumns);
+  std::vector<StoredIndividual> sample;
+  std::set<std::uint64_t> known;
   for (const std::size_t i : some_of(generations.size(), columns)) {
     ASSIGN_OR_RETURN(const auto individuals, reader.individuals(generations[i].generation));
+    for (const StoredIndividual& one : individuals) {
+      if (one.fitness && known.insert(one.birth_id).second) sample.push_back(one);
+    }
     for (std::size_t d = 0; d < genes.size(); ++d) {
       add_column(problem, generations[i].generation, individuals, genes[d], &report->densities[d]);
     }
   }
   std::erase_if(report->densities, [](const GeneDensity& d) { return d.generations.empty(); });
-  add_elite(problem, last, &report->elite);
+  // A front is shown as one.
+  std::vector<StoredIndividual> elite = last;
+  ASSIGN_OR_RETURN(const RunFront front, run_front(reader, generations));
+  if (!front.members.empty()) {
+    elite = front.members;
+    std::swap(elite.front(), elite[front.knee]);
+    report->front = front_view(front, generations);
+  }
+  report->elite = run_elite(problem, elite);
+  report->sample = run_sample(problem, sample);
   return {};
 }
 
@@ -349,6 +340,9 @@ RunTimeline timeline_of(const std::vector<StoredWorkerEvent>& events, double hea
     timeline.marks.erase(timeline.marks.begin(),
                          timeline.marks.end() - static_cast<std::ptrdiff_t>(kMostMarks));
   }
+  for (const RunTimeline::Span& span : timeline.spans) {
+    timeline.worker_s += span.to_unix_s - span.from_unix_s;
+  }
   if (timeline.spans.size() > kMostSpans) timeline.spans.clear();
   return timeline;
 }
@@ -361,6 +355,10 @@ Status add_farm(const RunReader& reader, RunReport* report) {
   farm.message = running ? status.progress.waiting : status.stop_reason;
   add_facts(status, &farm);
   RETURN_IF_ERROR(add_workers(reader, running, &farm));
+  farm.facts.emplace_back("wall time", format_duration(status.wall_s));
+  if (farm.timeline.worker_s > 0) {
+    farm.facts.emplace_back("all workers' time together", format_duration(farm.timeline.worker_s));
+  }
   for (auto it = status.incidents.rbegin(); it != status.incidents.rend(); ++it) {
     if (farm.incidents.size() == kMostIncidents) break;
     farm.incidents.push_back(fmt::format("{}, generation {}, {}: {}", day_and_time(it->unix_s),

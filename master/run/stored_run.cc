@@ -71,6 +71,30 @@ Result<Config> stored_config(const RunInfo& info, const EvolutionOverrides& over
   return config;
 }
 
+Result<Model> model_of_member(const RunReader& run, const StoredIndividual& member,
+                              std::uint64_t generation) {
+  const std::string name = run.run().string();
+  ASSIGN_OR_RETURN(const Problem problem, stored_problem(run));
+  if (!member.fitness || member.genome.size() != problem.genes.size()) {
+    return Error{name + ": genome " + std::to_string(member.birth_id) + " did not end well (" +
+                 member.outcome + "), so it makes no model; choose another"};
+  }
+  ASSIGN_OR_RETURN(const auto generations, run.generations());
+  std::uint64_t evaluations = 0;
+  for (const StoredGeneration& g : generations) {
+    if (g.generation == generation) evaluations = g.evaluations;
+  }
+  Model model = model_of_problem(problem, problem.values_of(member.genome));
+  model.score = member.fitness;
+  model.data = {run.info().problem_hash, problem.log.trials.size(), {}};
+  if (const auto config =
+          parse_config(run.info().config_text, run.info().config_path, start_program)) {
+    model.data.files = config->trial_files;
+  }
+  model.origin = {name, run.info().seed, generation, evaluations};
+  return model;
+}
+
 Result<Model> current_best(const RunReader& run) {
   ASSIGN_OR_RETURN(const auto generations, run.generations());
   const std::string name = run.run().string();
@@ -85,17 +109,7 @@ Result<Model> current_best(const RunReader& run) {
   if (members.empty() || !members.front().fitness) {
     return Error{name + ": nothing has ended well yet; see `gapfarm status " + name + "`"};
   }
-  ASSIGN_OR_RETURN(const Problem problem, stored_problem(run));
-  const StoredIndividual& best = members.front();
-  Model model = model_of_problem(problem, problem.values_of(best.genome));
-  model.score = best.fitness;
-  model.data = {run.info().problem_hash, problem.log.trials.size(), {}};
-  if (const auto config =
-          parse_config(run.info().config_text, run.info().config_path, start_program)) {
-    model.data.files = config->trial_files;
-  }
-  model.origin = {name, run.info().seed, last.generation, last.evaluations};
-  return model;
+  return model_of_member(run, members.front(), last.generation);
 }
 
 void EvolutionOverrides::apply(EvolutionSettings& settings) const {

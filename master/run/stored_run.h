@@ -36,8 +36,12 @@ Result<Problem> stored_problem(const RunReader& run);  // the error names the ru
 // The run's config and problem, with its overrides and then these.
 Result<Config> stored_config(const RunInfo& info, const EvolutionOverrides& overrides);
 
-// The best of the last committed generation.  Errors: none was committed, or nothing of it ends
-// well.
+// The values of a member of `generation`.  Errors: it did not end well, or is of other genes.
+Result<Model> model_of_member(const RunReader& run, const StoredIndividual& member,
+                              std::uint64_t generation);
+
+// The best of the last committed generation, of several objectives the knee of its front.  Errors:
+// none was committed, or nothing of it ends well.
 Result<Model> current_best(const RunReader& run);
 
 }  // namespace gapfarm

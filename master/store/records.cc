@@ -131,6 +131,7 @@ std::string generation_digest(const std::string& previous, const StoredGeneratio
     hasher.add(static_cast<std::uint64_t>(individual.fitness.has_value()));
     hasher.add(individual.fitness.value_or(0.0));
     hasher.add(static_cast<std::uint64_t>(individual.scores));
+    for (const auto& [name, value] : individual.objectives) hasher.add(value);
   }
   return hasher.finish();
 }

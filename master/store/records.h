@@ -30,6 +30,8 @@ struct RunInfo {
   bool higher_is_better = true;
 };
 
+using NamedValue = std::pair<std::string, double>;
+
 struct StoredIndividual {
   std::uint64_t birth_id = 0;
   std::vector<double> genome;     // genes in [0, 1]
@@ -39,6 +41,8 @@ struct StoredIndividual {
   unsigned scores = 0;            // evaluations behind `fitness`
   std::vector<std::uint64_t> parents;
   std::string operators;  // "blend+gaussian", "elite", ...
+  // Of several: those of the problem in their own sense; empty unless OK.
+  std::vector<NamedValue> objectives = {};
 };
 
 // One completed generation.  Fitness figures are over its OK individuals; none when it has none.

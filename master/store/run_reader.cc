@@ -19,8 +19,7 @@ constexpr std::int64_t kSchemaWithIncidents = 2;
 constexpr std::int64_t kSchemaWithDocuments = 3;
 constexpr std::int64_t kSchemaWithWorkerEvents = 4;
 
-constexpr const char* kMemberColumns =
-    "birth_id, genome, parameters, outcome, fitness, scores, parents, operators";
+constexpr std::int64_t kSchemaWithObjectives = 5;
 
 std::vector<double> genome_of(const std::string& blob) {
   std::vector<double> genome(blob.size() / sizeof(double));
@@ -35,12 +34,18 @@ RunState state_of(const std::string& name) {
   return RunState::kStopped;
 }
 
-// Of kMemberColumns, the first being column `at`.
+// Of member_columns(), the first being column `at`.
 StoredIndividual individual_of(const SqlStatement& row, int at) {
   StoredIndividual individual;
-  std::string genome, parents;
+  std::string genome, parents, objectives;
   row.read_from(at, individual.birth_id, SqlBlob{genome}, individual.values, individual.outcome,
-                individual.fitness, individual.scores, parents, individual.operators);
+                individual.fitness, individual.scores, parents, individual.operators, objectives);
+  if (!objectives.empty()) {
+    const Json values = parse_json(objectives);
+    for (const auto& [name, value] : values.items()) {
+      if (value.is_number()) individual.objectives.emplace_back(name, value.get<double>());
+    }
+  }
   individual.genome = genome_of(genome);
   for (const Json& parent : parse_json(parents)) {
     if (parent.is_number_unsigned()) individual.parents.push_back(parent.get<std::uint64_t>());
@@ -111,11 +116,16 @@ Result<std::vector<StoredGeneration>> RunReader::generations() const {
       generation_of);
 }
 
+std::string RunReader::member_columns() const {
+  return std::string(
+             "birth_id, genome, parameters, outcome, fitness, scores, parents, operators, ") +
+         (schema_ < kSchemaWithObjectives ? "''" : "objectives");
+}
+
 Result<std::vector<StoredIndividual>> RunReader::individuals(std::uint64_t generation) const {
   return database_.rows(
       "read the individuals",
-      std::string("SELECT ") + kMemberColumns +
-          " FROM individuals WHERE generation = ? ORDER BY rank",
+      "SELECT " + member_columns() + " FROM individuals WHERE generation = ? ORDER BY rank",
       [](const SqlStatement& row) { return individual_of(row, 0); }, generation);
 }
 
@@ -123,7 +133,7 @@ Result<std::vector<RunReader::Member>> RunReader::members(const std::string& whe
                                                           std::int64_t bound) const {
   return database_.rows(
       "read the individuals",
-      "SELECT generation, " + std::string(kMemberColumns) + " FROM individuals " + where,
+      "SELECT generation, " + member_columns() + " FROM individuals " + where,
       [](const SqlStatement& row) {
         return Member{static_cast<std::uint64_t>(row.integer(0)), individual_of(row, 1)};
       },
@@ -250,6 +260,9 @@ Result<RunStatus> run_status(const RunReader& reader, double now_unix_s) {
                    reader.individuals(status.generation));
   if (!members.empty()) status.best_individual = members.front();
 
+  ASSIGN_OR_RETURN(RunFront front, run_front(reader, generations));
+  status.front = std::move(front);
+
   status.state = status.progress.state;
   status.stop_reason = status.progress.stop_reason;
   if (status.state == RunState::kRunning &&
@@ -307,6 +320,7 @@ Json to_json(const RunStatus& status) {
   json["config"] = status.info.config_path;
   json["epoch"] = status.progress.epoch;
   json["heartbeat_age_s"] = status.heartbeat_age_s;
+  if (!status.front.objectives.empty()) json["front"] = to_json(status.front);
   if (status.best_individual) {
     const Json values = parse_json(status.best_individual->values);
     json["best"] = {{"birth_id", status.best_individual->birth_id},

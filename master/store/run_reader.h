@@ -47,6 +47,8 @@ class RunReader {
   Result<Progress> progress() const;
 
  private:
+  std::string member_columns() const;
+
   RunReader(std::filesystem::path run, Database database)
       : run_(std::move(run)), database_(std::move(database)) {}
 
@@ -57,6 +59,25 @@ class RunReader {
   std::int64_t schema_ = 0;
   RunInfo info_;
 };
+
+// What a search of several objectives found: the members of the last generation that no other
+// beats. Numbers are in the objectives' own senses.
+struct RunFront {
+  std::vector<SearchedObjective> objectives;  // empty: the run has one fitness
+  std::vector<StoredIndividual> members;      // in the order of the first objective
+  std::size_t knee = 0;                       // of them: the run's best
+  std::vector<double> ideal, nadir;           // best and worst on the front; empty without members
+  // Worst of each objective in the first generation of which anything ended well: the hypervolume
+  // is measured from there.
+  std::vector<double> reference;
+  std::vector<std::optional<double>> hypervolume;  // by generation
+
+  // Lower is better.  REQUIRES: `member` has objectives.
+  std::vector<double> costs(const StoredIndividual& member) const;
+};
+Result<RunFront> run_front(const RunReader& reader,
+                           const std::vector<StoredGeneration>& generations);
+nlohmann::ordered_json to_json(const RunFront& front);
 
 struct RunStatus {
   RunState state = RunState::kStopped;
@@ -74,6 +95,7 @@ struct RunStatus {
   double heartbeat_age_s = 0;
   std::vector<std::optional<double>> best_by_generation;
   std::optional<StoredIndividual> best_individual;
+  RunFront front;  // of several objectives
   RunInfo info;
 };
 

@@ -45,11 +45,9 @@ std::string_view genome_bytes(const std::vector<double>& genome) {
   return {reinterpret_cast<const char*>(genome.data()), genome.size() * sizeof(double)};
 }
 
-std::string operator_json(const StoredGeneration& generation) {
+std::string named_json(const std::vector<NamedValue>& values) {
   Json json = Json::object();
-  for (const auto& [name, probability] : generation.operator_probabilities) {
-    json[name] = probability;
-  }
+  for (const auto& [name, value] : values) json[name] = value;
   return json_text(json);
 }
 
@@ -225,8 +223,8 @@ Result<std::string> RunStore::commit(const StoredGeneration& generation) {
   RETURN_IF_ERROR(database_.run(
       "commit a generation", "INSERT INTO generations VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
       generation.generation, generation.best, generation.mean, generation.median, generation.worst,
-      generation.diversity, operator_json(generation), generation.evaluations, generation.wall_s,
-      generation.quarantined, SqlBlob{generation.optimiser_state}, digest));
+      generation.diversity, named_json(generation.operator_probabilities), generation.evaluations,
+      generation.wall_s, generation.quarantined, SqlBlob{generation.optimiser_state}, digest));
   RETURN_IF_ERROR(insert_individuals(generation));
   RETURN_IF_ERROR(transaction.commit());
   last_generation_ = generation.generation;
@@ -237,13 +235,14 @@ Result<std::string> RunStore::commit(const StoredGeneration& generation) {
 Status RunStore::insert_individuals(const StoredGeneration& generation) {
   ASSIGN_OR_RETURN(
       SqlStatement insert,
-      database_.prepare("INSERT INTO individuals VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+      database_.prepare("INSERT INTO individuals VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
                         "commit a generation"));
   std::int64_t rank = 0;
   for (const StoredIndividual& i : generation.individuals) {
     const std::string_view genome = genome_bytes(i.genome);
+    const std::string objectives = i.objectives.empty() ? "" : named_json(i.objectives);
     insert.bind_all(generation.generation, rank++, i.birth_id, SqlBlob{genome}, i.values, i.outcome,
-                    i.fitness, i.scores, json_text(Json(i.parents)), i.operators);
+                    i.fitness, i.scores, json_text(Json(i.parents)), i.operators, objectives);
     RETURN_IF_ERROR(insert.run());
   }
   return {};

@@ -96,6 +96,10 @@ CREATE TABLE worker_events (   -- who came and went, and why
   text TEXT NOT NULL
 ) STRICT;
 )sql",
+    R"sql(
+ALTER TABLE individuals ADD COLUMN
+  objectives TEXT NOT NULL DEFAULT '' /* JSON object, of several objectives; else empty */;
+)sql",
 };
 static_assert(std::size(kUpgrades) + 1 == kRunStoreSchema);
 

@@ -11,7 +11,7 @@
 namespace gapfarm {
 
 inline constexpr std::int64_t kRunStoreApplicationId = 0x67617066;  // "gapf"
-inline constexpr std::int64_t kRunStoreSchema = 4;
+inline constexpr std::int64_t kRunStoreSchema = 5;
 
 // `RUN/run.sqlite` of a run folder; a regular file is taken as the store itself.
 std::filesystem::path run_store_file(const std::filesystem::path& run);

@@ -15,8 +15,9 @@ import pandas as pd
 from ._model import Model
 from ._program import Progress, command
 
-_SCHEMA = 4
+_SCHEMA = 5
 _FIRST_WITH_INCIDENTS = 2
+_FIRST_WITH_OBJECTIVES = 5
 
 
 class Run:
@@ -76,19 +77,34 @@ class Run:
     def individuals(self, generation: Optional[int] = None) -> pd.DataFrame:
         """A row a member of a generation (default: the last; 0: of all), best first: rank, birth_id,
         fitness (NaN unless the outcome is OK), outcome, scores, operators, then a column a parameter,
-        SI units."""
+        SI units, and of several objectives a column each, named "objective.NAME"."""
         where, values = "", []  # type: tuple[str, list[int]]
         if generation is None:
             where = "WHERE generation = (SELECT max(generation) FROM generations)"
         elif generation != 0:
             where, values = "WHERE generation = ?", [generation]
         table = self._table(
-            "SELECT generation, rank, birth_id, fitness, outcome, scores, operators, parameters "
-            f"FROM individuals {where} ORDER BY generation, rank",
+            "SELECT generation, rank, birth_id, fitness, outcome, scores, operators, parameters, "
+            f"{self._objectives()} AS objectives FROM individuals {where} ORDER BY generation, rank",
             values,
         )
         parameters = pd.DataFrame([json.loads(p) for p in table.pop("parameters")])
-        return pd.concat([table, parameters], axis=1)
+        objectives = pd.DataFrame([json.loads(o or "{}") for o in table.pop("objectives")])
+        return pd.concat([table, parameters, objectives.add_prefix("objective.")], axis=1)
+
+    def _objectives(self) -> str:
+        with self._open() as db:
+            (schema,) = db.execute("PRAGMA user_version").fetchone()
+        return "''" if schema < _FIRST_WITH_OBJECTIVES else "objectives"
+
+    @property
+    def history(self) -> pd.DataFrame:
+        """A row an individual in the order of birth, as it first appeared, like individuals(), with
+        evaluations and wall_s (s) that the run had spent by the end of its generation."""
+        table = self.individuals(0).drop_duplicates("birth_id").sort_values("birth_id")
+        spent = self.generations[["evaluations", "wall_s"]]
+        spent = spent.assign(wall_s=spent.wall_s.cumsum())
+        return table.join(spent, on="generation").reset_index(drop=True)
 
     def genomes(self, generation: Optional[int] = None) -> npt.NDArray[np.float64]:
         """float64 of shape (individuals, genes), values in [0, 1], best first."""

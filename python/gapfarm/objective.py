@@ -15,8 +15,8 @@ Function = Callable[[Mapping[str, Any], int], Any]
 def answer(function: Function, parameters: Mapping[str, Any], seed: int) -> "dict[str, Any]":
     """What the protocol answers for ``function(parameters, seed)``, without the id.
 
-    The function returns a number, or a mapping with ``value``, and perhaps ``violations`` (a list,
-    above 0: violated) and ``notes`` (a text).  What it raises, and a value that is not finite,
+    The function returns a number, or a mapping with ``value`` (or ``values``, a mapping of several
+    names to numbers), and perhaps ``violations`` (a list, above 0: violated) and ``notes`` (a text).  What it raises, and a value that is not finite,
     is a failed evaluation with its message; the traceback goes to stderr.
     """
     try:
@@ -24,11 +24,18 @@ def answer(function: Function, parameters: Mapping[str, Any], seed: int) -> "dic
         reply: "dict[str, Any]" = dict(given) if isinstance(given, Mapping) else {"value": given}
         if reply.get("value") is not None:
             reply["value"] = float(reply["value"])
+        if "values" in reply:
+            reply["values"] = {str(name): float(value) for name, value in reply["values"].items()}
         reply["violations"] = [float(violation) for violation in reply.get("violations", [])]
     except Exception as error:  # noqa: BLE001 - whatever a user's function raises
         traceback.print_exc()
         return {"outcome": "failed", "message": f"{type(error).__name__}: {error}"}
-    for name, numbers in (("value", [reply.get("value")]), ("violation", reply["violations"])):
+    several = reply.get("values", {})
+    for name, numbers in (
+        ("value", [reply.get("value")]),
+        ("violation", reply["violations"]),
+        *((name, [value]) for name, value in several.items()),
+    ):
         bad = [n for n in numbers if n is not None and not math.isfinite(n)]
         if bad:
             return {"outcome": "failed", "message": f"its {name} is {bad[0]}"}

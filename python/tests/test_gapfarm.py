@@ -189,6 +189,9 @@ def test_what_an_objective_cannot_answer_is_a_failed_evaluation(capsys):
     full = {"value": 2, "violations": (np.float32(0.5), -1), "notes": "as it came"}
     assert json.loads(json.dumps(answer(lambda *_: full))) == {**full, "violations": [0.5, -1]}
     assert answer(lambda *_: float("nan")) == {"outcome": "failed", "message": "its value is nan"}
+    both = {"values": {"loss": np.float32(0.5), "cost": 3}}
+    assert answer(lambda *_: both) == {"values": {"loss": 0.5, "cost": 3.0}, "violations": []}
+    assert answer(lambda *_: {"values": {"loss": np.nan}})["message"] == "its loss is nan"
     assert answer(lambda *_: {"value": 1, "violations": [np.inf]})["message"] == "its violation is inf"
     assert answer(lambda *_: 1 / 0)["message"] == "ZeroDivisionError: division by zero"
     assert "Traceback" in capsys.readouterr().err

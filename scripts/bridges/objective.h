@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <iostream>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace gapfarm {
@@ -14,6 +15,8 @@ namespace gapfarm {
 struct Answer {
   double value = 0;                // not finite: the evaluation failed
   std::vector<double> violations;  // above 0: violated
+  // Of several objectives: their names and values, in place of `value`.
+  std::vector<std::pair<std::string, double>> values = {};
 };
 
 // A line of the protocol.  Keys are letters, digits and _, so none hides in a choice's text.
@@ -60,7 +63,12 @@ int serve(const std::string& name, const std::string& parameters, const Function
     for (std::size_t i = 0; i < answer.violations.size(); ++i) {
       reply += (i == 0 ? "" : ",") + number(answer.violations[i]);
     }
-    std::cout << reply << "]}" << std::endl;
+    reply += "]";
+    for (std::size_t i = 0; i < answer.values.size(); ++i) {
+      reply += (i == 0 ? R"(,"values":{")" : R"(,")") + answer.values[i].first +
+               "\":" + number(answer.values[i].second);
+    }
+    std::cout << reply << (answer.values.empty() ? "}" : "}}") << std::endl;
   }
   return 0;
 }

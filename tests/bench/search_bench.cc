@@ -130,6 +130,7 @@ std::vector<Search> searches(const Options& options) {
       pagmo_search<pagmo::cmaes>("cmaes", true),
   };
   for (const OptimiserRow& row : optimisers()) {
+    if (row.kind == OptimiserKind::kNsga2) continue;  // bench_fronts has it
     all.push_back(our_search(row, options.population, false));
     const bool split = row.kind == OptimiserKind::kGenetic || row.kind == OptimiserKind::kCmaEs ||
                        row.kind == OptimiserKind::kDifferentialEvolution;

@@ -233,4 +233,73 @@ TEST_F(ObjectiveRuns, TheExampleFindsTheEndOfTheValley) {
   EXPECT_NEAR(found["best"]["values"]["x"], 1, 1e-3);
 }
 
+// Near 0 and near 1: the front is x in [0, 1], n = 3; `side` is a matter of a constraint.
+constexpr const char* kTwo =
+    "    answer = {'id': task['id'], 'values': {'near': x * x + abs(n - 3), 'far': -(x - 1) * (x - "
+    "1)\n"
+    "              - abs(n - 3)}, 'violations': [int(side == 'left')]}\n";
+constexpr const char* kTwoOf = "minimise = [\"near\"]\nmaximise = [\"far\"]\n";
+
+TEST_F(ObjectiveRuns, OfSeveralValuesTheFrontIsFoundAndAnyMemberMakesAModel) {
+  const std::string nsga2 = "[optimiser]\nkind = \"nsga2\"\npopulation = 20\n";
+  const Finished finished = evolve(config(kTwo, kTwoOf, nsga2), "run", "25");
+  ASSERT_EQ(finished.exit_code, 0) << finished.err;
+  const json found = status("run"), front = found["front"];
+  ASSERT_GT(front["members"].size(), 10u);
+  for (const json& member : front["members"]) {
+    const double x = member["values"]["x"], near = member["objectives"]["near"];
+    EXPECT_EQ(member["values"]["n"], 3);
+    EXPECT_EQ(member["values"]["side"], "right");
+    EXPECT_DOUBLE_EQ(near, x * x);
+    EXPECT_EQ(member["fitness"], member["objectives"]["near"]) << "the first of them";
+  }
+  EXPECT_FALSE(front["objectives"][0]["maximise"]);
+  EXPECT_TRUE(front["objectives"][1]["maximise"]);
+  EXPECT_LT(front["objectives"][0]["ideal"], 0.02);
+  EXPECT_GT(front["objectives"][1]["ideal"], -0.02);
+  EXPECT_EQ(front["knee"], found["best"]["birth_id"]);
+  EXPECT_NEAR(found["best"]["values"]["x"].get<double>(), 0.5, 0.2) << "the knee";
+  for (std::size_t g = 1; g < front["hypervolume"].size(); ++g) {
+    EXPECT_GE(front["hypervolume"][g].get<double>(),
+              0.99 * front["hypervolume"][g - 1].get<double>());
+  }
+  EXPECT_THAT(screen("run"), AllOf(HasSubstr("members, the best is its knee"),
+                                   HasSubstr("far, higher is better"), HasSubstr("hypervolume")));
+  EXPECT_THAT(text_of(folder_.path() / "run" / "model.toml"), HasSubstr("maximise = [\"far\"]"));
+
+  const json end = front["members"][0];
+  const Finished again = gapfarm_command({"replay", folder_ / "run", "--genome",
+                                          std::to_string(end["birth_id"].get<std::uint64_t>()),
+                                          "--out", folder_ / "end.toml"});
+  EXPECT_THAT(again.out, HasSubstr("the same to the bit")) << again.err;
+  EXPECT_THAT(text_of(folder_.path() / "end.toml"), HasSubstr("[parameters"));
+  EXPECT_EQ(gapfarm_command({"report", folder_ / "run", "--out", folder_ / "page.html", "--history",
+                             folder_ / "history.csv"})
+                .exit_code,
+            0);
+  const std::string history = text_of(folder_.path() / "history.csv");
+  EXPECT_THAT(history.substr(0, history.find('\n')),
+              AllOf(HasSubstr("birth_id,generation,evaluations,wall_s"), HasSubstr(",bend"),
+                    HasSubstr("objective.near,objective.far")));
+  EXPECT_THAT(text_of(folder_.path() / "page.html"), HasSubstr("What is traded off"));
+}
+
+TEST_F(ObjectiveRuns, SeveralValuesNeedTheirNamesAndNsga2) {
+  const struct {
+    const char *objective, *more, *named;
+  } kinds[] = {
+      {kTwoOf, "", "several objectives need [optimiser] kind = \"nsga2\""},
+      {"", "[optimiser]\nkind = \"nsga2\"\n", "nsga2 needs several objectives"},
+      {"minimise = [\"near\"]\n", "[optimiser]\nkind = \"nsga2\"\n", "name 2 to 8 values"},
+      {"minimise = [\"near\", \"near\"]\n", "[optimiser]\nkind = \"nsga2\"\n", "named twice"},
+      {"minimise = [\"near\", \"far\"]\ndirection = \"minimise\"\n",
+       "[optimiser]\nkind = \"nsga2\"\n", "direction is of one value"},
+  };
+  for (const auto& kind : kinds) {
+    const Finished refused = evolve(config(kTwo, kind.objective, kind.more), "refused", "2");
+    EXPECT_EQ(refused.exit_code, 2) << kind.named;
+    EXPECT_THAT(refused.err, HasSubstr(kind.named));
+  }
+}
+
 }  // namespace gapfarm::objective_runs_test

@@ -256,4 +256,32 @@ TEST_P(OptimiserPurity, HoldsForAnyNumberOfWorkersAndWhenKilled) {
               ElementsAreArray(one));
 }
 
+// Of several objectives, the front and its hypervolume, too.
+TEST_F(RunPurity, HoldsOfAFrontForAnyNumberOfWorkersAndKills) {
+  std::ofstream(config_, std::ios::app) << "[fitness]\nobjectives = [\"position\", \"heading\"]\n"
+                                           "[optimiser]\nkind = \"nsga2\"\n";
+  const Digests one = evolved("one", {"--workers", "1"});
+  ASSERT_THAT(one, SizeIs(kGenerations));
+  EXPECT_THAT(evolved("two", {"--workers", "2"}), ElementsAreArray(one));
+  EXPECT_THAT(evolved("seven", {"--workers", "7", "--shuffle", "5"}), ElementsAreArray(one));
+  RunningProgram master("gapfarm", evolve("run", {"--generations", "10000", "--workers", "2"}));
+  for (std::size_t generation = 1; generation <= 3; ++generation) {
+    ASSERT_TRUE(wait_until([&] { return digests(folder_ / "run").size() >= generation; }));
+    for (const pid_t worker : children(master.pid())) ::kill(worker, SIGKILL);
+  }
+  master.send(SIGKILL);
+  master.wait();
+  const std::string last = std::to_string(std::min(digests(folder_ / "run").size(), kGenerations));
+  EXPECT_THAT(resumed("run", {"--generation", last, "--generations", std::to_string(kGenerations)}),
+              ElementsAreArray(one));
+  const auto front = [&](const std::string& run) {
+    const Finished status = gapfarm_command({"status", folder_ / run, "--json"});
+    return nlohmann::json::parse(status.out)["front"];
+  };
+  EXPECT_EQ(front("run"), front("one"));
+  EXPECT_EQ(front("one")["objectives"].size(), 2u);
+  EXPECT_EQ(front("one")["hypervolume"].size(), kGenerations);
+  EXPECT_GT(front("one")["members"].size(), 1u);
+}
+
 }  // namespace gapfarm::run_purity_test

@@ -51,6 +51,21 @@ const saidBy = (child, pattern) => new Promise((resolve) => {
 
 const generation = `Number(/after (\\d+) generations/.exec(document.getElementById("headline").textContent)?.[1] || 0)`;
 const OVERFLOW = "document.documentElement.scrollWidth - document.documentElement.clientWidth";
+const TRADED = `scenario = "srv1"
+trials = ["${source}/configs/demo/trials.csv"]
+[parameters]
+step_rate = 60
+[genes]
+friction = [0.1, 1.5]
+full_speed = [0.1, 0.6]
+pose_noise_position = [0.0005, 0.03]
+[fitness]
+objectives = ["position", "heading"]
+[optimiser]
+kind = "nsga2"
+[evolution]
+population = 16
+`;
 const DIAGNOSED = `scenario = "srv1"
 [parameters]
 step_rate = 60
@@ -238,6 +253,32 @@ async function backAndBroken(address, view) {
   rmSync(join(folder, "broken"), { recursive: true });
 }
 
+// What is traded off, and what the parameters do.
+async function front(page) {
+  await until(page, `document.querySelectorAll("#front-plots figure").length === 2`, "the front and its hypervolume are drawn");
+  const marks = `Math.max(...[...document.querySelectorAll("#front-plots figure:first-child .canvas path")].map((p) => p.getAttribute("d").split("M").length))`;
+  check((await page.run(marks)) > 6, "no front is drawn");
+  check((await page.run(`document.querySelector("#front-plots .canvas").textContent`)).includes("knee"), "the knee is not marked");
+  await page.run(`document.querySelector("#front-plots .canvas").focus()`);
+  await page.call("Input.dispatchKeyEvent", { type: "keyDown", key: "ArrowRight", code: "ArrowRight" });
+  check(/genome \d+: position .*, heading/i.test(await page.run(`document.querySelector("#front-plots .readout").textContent`)), "a member does not say what it is");
+  check(/position/.test(await page.run(`document.querySelector("#elite-plot .canvas").textContent`)), "no objective among the coordinates");
+  check((await page.run(`document.querySelectorAll("#importance-table tbody tr").length`)) === 3, "not every parameter has its importance");
+  const cells = `document.querySelectorAll("#contour-plot .canvas rect").length`;
+  check((await page.run(cells)) > 10, "no contour is drawn");
+  const title = `document.querySelector("#contour-plot h4").textContent`;
+  const before = await page.run(title);
+  await page.run(`(() => { const s = document.querySelectorAll("#contour-controls select")[2]; s.value = "1"; s.dispatchEvent(new Event("change")); })()`);
+  check(/heading over/.test(await page.run(title)) && !/heading over/.test(before), "another objective is not drawn");
+  check((await page.run(OVERFLOW)) <= 0, "the page of a front is wider than the window");
+  await page.run(`document.getElementById("front").scrollIntoView()`);
+  await page.picture("serve-front");
+  await page.run(`document.getElementById("understanding").scrollIntoView()`);
+  await page.picture("serve-understanding");
+  for (const complaint of page.complaints) check(false, `front: ${complaint}`);
+  await page.close();
+}
+
 try {
   rmSync(folder, { recursive: true, force: true });
   mkdirSync(folder, { recursive: true });
@@ -245,11 +286,17 @@ try {
   const config = join(source, "configs/demo.toml");
   const evolve = (out, ...more) => start("evolve", config, "--out", out, "--workers", "1", ...more);
   check((await evolve("short", "--generations", "3").ended) === 0, "the short run did not end well");
+  writeFileSync(join(folder, "front.toml"), TRADED);
+  const traded = start("evolve", "front.toml", "--out", "deep/front", "--generations", "8", "--workers", "1");
+  check((await traded.ended) === 0, "the run of two objectives did not end well");
   let live = evolve("live", "--generations", "400");
   const server = start("serve", ".", "--port", "0");
   const address = (await saidBy(server, /http:\/\/127\.0\.0\.1:\d+\//))?.[0];
   if (!address) throw new Error(`serve said ${server.said}`);
   const view = (name) => `${address}view?of=${name}`;
+
+  await front(await open(await served(view("deep/front")), { may }));
+  rmSync(join(folder, "deep"), { recursive: true });
 
   // From before its first generation to its end.
   const whole = evolve("whole", "--generations", "8");

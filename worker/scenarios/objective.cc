@@ -24,6 +24,9 @@ class ObjectiveModel final : public ScenarioModel {
     ExternalRequest request;
     request.declaration = &problem_.external->table.declaration();
     request.values = values;
+    for (const SearchedObjective& objective : problem_.fitness.objectives) {
+      request.objectives.push_back(objective.name);
+    }
     request.seed = seed_of(task.stream(), problem_.spread.kind == SpreadKind::kSampled);
     const auto answer = ask_program(*program_, request, *problem_.external, steps);
     v1::TaskResult result;
@@ -36,6 +39,8 @@ class ObjectiveModel final : public ScenarioModel {
       result.set_outcome(answer->violation > 0 ? v1::INFEASIBLE : v1::OK);
       result.mutable_evaluate()->set_fitness(answer->value);
       result.mutable_evaluate()->set_penalty(answer->violation);
+      result.mutable_evaluate()->mutable_objectives()->Add(answer->values.begin(),
+                                                           answer->values.end());
       result.mutable_evaluate()->set_conditions(1);
     }
     return result;

@@ -227,13 +227,31 @@ Json to_json(const Config& config, const Summary& summary, unsigned workers) {
           {"idle_genes", idle}};
 }
 
+std::string directions_text(const FitnessSettings& fitness) {
+  if (fitness.objectives.empty()) {
+    return std::string(higher_is_better(fitness.kind) ? "higher" : "lower") + " is better";
+  }
+  std::string text;
+  for (const SearchedObjective& objective : fitness.objectives) {
+    text += (text.empty() ? "" : ", ") + objective.name +
+            (objective.maximise ? " higher is better" : " lower is better");
+  }
+  return text;
+}
+
 // Of an objective, at the config's own values.
-std::string value_text(const Summary& summary) {
+std::string value_text(const FitnessSettings& fitness, const Summary& summary) {
   const v1::TaskResult& result = summary.evaluated;
   const std::string more = result.message().empty() ? "" : "; " + result.message();
+  std::string values;
+  for (int i = 0; i < result.evaluate().objectives_size(); ++i) {
+    values += (i > 0 ? ", " : "") + fitness.objectives[static_cast<std::size_t>(i)].name + " " +
+              format_number(result.evaluate().objectives(i), 10);
+  }
   switch (result.outcome()) {
     case v1::OK:
-      return format_number(result.evaluate().fitness(), 10) + " at the config's own values" + more;
+      return (values.empty() ? format_number(result.evaluate().fitness(), 10) : values) +
+             " at the config's own values" + more;
     case v1::INFEASIBLE:
       return "none that counts: violations sum to " +
              format_number(result.evaluate().penalty(), 10) + " at the config's own values" + more;
@@ -295,10 +313,9 @@ std::string describe(const Config& config, const Summary& summary, unsigned work
   }
   text += "scenario     " + problem.scenario + ", ";
   if (is_value(problem.fitness.kind)) {
-    text += problem.external->table.declaration().name + "\nvalue        " + value_text(summary) +
-            (higher_is_better(problem.fitness.kind) ? "\ndirection    higher"
-                                                    : "\ndirection    lower") +
-            " is better";
+    text += problem.external->table.declaration().name + "\nvalue        " +
+            value_text(problem.fitness, summary) + "\ndirection    " +
+            directions_text(problem.fitness);
     return text + search_text(config, summary, workers);
   }
   // The first row of every other table is the model that is simulated.

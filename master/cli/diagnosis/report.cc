@@ -11,6 +11,7 @@
 #include "master/report/report_html.h"
 #include "master/report/run/run_report.h"
 #include "master/run/run_page.h"
+#include "master/run/run_sample.h"
 
 namespace gapfarm {
 namespace {
@@ -18,13 +19,15 @@ namespace {
 struct ReportCommand {
   std::string from;
   std::string out;
+  std::string history;
   Outputs outputs;
 };
 
 struct Page {
   std::string html;
-  std::filesystem::path from;  // what was read
-  std::filesystem::path out;   // where it goes unless configured otherwise
+  std::filesystem::path from;              // what was read
+  std::filesystem::path out;               // where it goes unless configured otherwise
+  nlohmann::ordered_json importance = {};  // of a run's parameters
 };
 
 Result<Page> page_of_diagnosis(const std::filesystem::path& from) {
@@ -36,7 +39,13 @@ Result<Page> page_of_diagnosis(const std::filesystem::path& from) {
 
 Result<Page> page_of_run(const std::filesystem::path& run) {
   ASSIGN_OR_RETURN(const auto report, read_run_report({run, {}, {}}));
-  return Page{run_html(report), run / "run.sqlite", run / "report.html"};
+  Page page{run_html(report), run / "run.sqlite", run / "report.html"};
+  for (const RunSample::GeneShare& gene : report.sample.genes) {
+    for (std::size_t i = 0; i < gene.importance.size(); ++i) {
+      page.importance[gene.key][report.sample.outputs[i]] = gene.importance[i];
+    }
+  }
+  return page;
 }
 
 Result<Page> page_of(const std::filesystem::path& from) {
@@ -58,9 +67,20 @@ Result<int> run_report(ReportCommand& command, CliContext& context) {
   // Its own page is what it is there to draw again.
   RETURN_IF_ERROR(command.out.empty() ? command.outputs.plan_again(out)
                                       : command.outputs.plan(out));
+  RETURN_IF_ERROR(command.outputs.plan(command.history));
   context.begun = true;
   RETURN_IF_ERROR(command.outputs.write(out, page.html));
-  context.console.result(out + "\n", {{"report", out}});
+  nlohmann::ordered_json json = {{"report", out}};
+  std::string text = out + "\n";
+  if (!command.history.empty()) {
+    ASSIGN_OR_RETURN(const auto reader, RunReader::open(command.from));
+    ASSIGN_OR_RETURN(const auto csv, history_csv(reader));
+    RETURN_IF_ERROR(command.outputs.write(command.history, csv));
+    text += command.history + "\n";
+    json["history"] = command.history;
+  }
+  if (!page.importance.empty()) json["importance"] = page.importance;
+  context.console.result(text, json);
   return kExitDone;
 }
 
@@ -72,10 +92,13 @@ SubcommandRun setup_report(CLI::App& app) {
                  "Folder of a run or of a diagnosis, or a diagnosis.json")
       ->required();
   app.add_option("--out", command->out, "HTML file; default: report.html beside it");
+  app.add_option("--history", command->history,
+                 "Write every individual of a run to this CSV file: parameters, fitness, spent");
   command->outputs.declare(app);
   app.footer(
       "Examples:\n"
       "  gapfarm report run/demo\n"
+      "  gapfarm report run/demo --history history.csv\n"
       "  gapfarm report diagnosis\n"
       "  gapfarm report diagnosis/diagnosis.json --out page.html");
   return [command](CliContext& context) { return run_report(*command, context); };

@@ -52,7 +52,15 @@ Status begin_at(const EvolveCommand& command, Config& config, Console& console) 
 }
 
 std::string what_evolves(const Problem& problem) {
-  const std::string parameters = std::to_string(problem.genes.size()) + " parameters ";
+  std::string parameters = std::to_string(problem.genes.size()) + " parameters ";
+  for (const SearchedObjective& objective : problem.fitness.objectives) {
+    const bool first = &objective == &problem.fitness.objectives.front();
+    parameters += (first ? "to the front of " : "and ") + objective.name + " ";
+  }
+  if (is_value(problem.fitness.kind) && !problem.fitness.objectives.empty()) {
+    parameters.pop_back();
+    return parameters;
+  }
   if (is_value(problem.fitness.kind)) {
     return parameters + "to the " +
            (higher_is_better(problem.fitness.kind) ? "greatest value" : "least value");

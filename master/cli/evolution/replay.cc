@@ -25,6 +25,7 @@ struct ReplayOptions {
   std::string genome;  // a birth id, or "best"
   std::optional<std::uint64_t> generation;
   std::string paths;
+  std::string out;
   double interval_s = 0.05;
   Outputs outputs;
 };
@@ -60,6 +61,10 @@ Result<Found> find_best(const RunReader& reader, std::optional<std::uint64_t> un
     ASSIGN_OR_RETURN(const auto individuals, reader.individuals(g->generation));
     const StoredIndividual* best = nullptr;
     const bool higher = reader.info().higher_is_better;
+    // Of several objectives the first is the knee.
+    if (!individuals.empty() && !individuals.front().objectives.empty()) {
+      return Found{individuals.front(), g->generation};
+    }
     for (const StoredIndividual& other : individuals) {
       if (!other.fitness) continue;
       const bool better = best == nullptr || (higher ? *other.fitness > *best->fitness
@@ -110,7 +115,7 @@ class Replay {
     ASSIGN_OR_RETURN(const auto results, farm_.run(hash_, tasks));
     Standing standing;
     for (const v1::TaskResult& result : results) {
-      ASSIGN_OR_RETURN(const Score score, score_of(result, problem_.fitness.kind));
+      ASSIGN_OR_RETURN(const Score score, score_of(result, problem_.fitness));
       standing.add(score);
     }
     return standing;
@@ -191,6 +196,7 @@ Result<int> run_replay(ReplayOptions& options, CliContext& context) {
 
   options.outputs.reads((std::filesystem::path(options.run) / "run.sqlite").string());
   RETURN_IF_ERROR(options.outputs.plan(options.paths));
+  RETURN_IF_ERROR(options.outputs.plan(options.out));
 
   FarmOptions local;
   local.workers = 1;
@@ -216,6 +222,13 @@ Result<int> run_replay(ReplayOptions& options, CliContext& context) {
         options.paths + ": " + std::to_string(log.trials.size()) + " trials driven by it\n";
     comparison.json["paths"] = options.paths;
   }
+  if (!options.out.empty()) {
+    ASSIGN_OR_RETURN(const Model model,
+                     model_of_member(reader, found.individual, found.generation));
+    RETURN_IF_ERROR(options.outputs.write(options.out, format_model(model)));
+    comparison.text += options.out + ": its values, as a model\n";
+    comparison.json["model"] = options.out;
+  }
   context.console.result(comparison.text, comparison.json);
   return comparison.same ? kExitDone : kExitFailed;
 }
@@ -233,10 +246,11 @@ SubcommandRun setup_replay(CLI::App& app) {
   app.add_option("--interval", options->interval_s, "Between two poses, s")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
+  app.add_option("--out", options->out, "Write its values to this file, a model");
   options->outputs.declare(app);
   app.footer(
       "Examples:\n"
-      "  gapfarm replay run/demo --genome best\n"
+      "  gapfarm replay run/demo --genome best --out best.toml\n"
       "  gapfarm replay run/demo --genome 1284 --paths driven_by_1284.csv --interval 0.02\n"
       "Exit status: 0 the same to the bit, 1 it differs (both values are shown).");
   return [options](CliContext& context) { return run_replay(*options, context); };

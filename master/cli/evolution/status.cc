@@ -180,6 +180,25 @@ std::string sparkline(const std::vector<std::optional<double>>& values, std::siz
   return line;
 }
 
+// Of several objectives.
+std::string front_lines(const RunFront& front, const Console& console) {
+  if (front.members.empty()) return {};
+  std::string text = label(console, "front") + std::to_string(front.members.size()) +
+                     " members, the best is its knee; others: --json, gapfarm replay RUN --genome "
+                     "ID --out MODEL\n";
+  for (std::size_t m = 0; m < front.objectives.size(); ++m) {
+    text += label(console, "") + printable(front.objectives[m].name) +
+            (front.objectives[m].maximise ? ", higher" : ", lower") + " is better: ideal " +
+            format_number(front.ideal[m]) + ", knee " +
+            format_number(front.members[front.knee].objectives[m].second) + ", nadir " +
+            format_number(front.nadir[m]) + "; hypervolume from " +
+            format_number(front.reference[m]) + "\n";
+  }
+  if (!front.hypervolume.back()) return text;
+  return text + label(console, "hypervolume") + format_number(front.hypervolume.back()) + "  " +
+         sparkline(front.hypervolume, 40, true) + console.styled(" by generation", "2") + "\n";
+}
+
 std::string status_screen(const RunStatus& status, const std::string& run, const Console& console) {
   std::string text =
       console.styled(run, "1") + "  " +
@@ -214,7 +233,7 @@ std::string status_screen(const RunStatus& status, const std::string& run, const
             sparkline(status.best_by_generation, columns, status.info.higher_is_better) +
             console.styled(" best by generation", "2");
   }
-  text += "\n";
+  text += "\n" + front_lines(status.front, console);
   text += best_values(status, console) + worker_lines(status.progress.workers, console) +
           fleet_lines(status.progress.fleets, console);
   if (status.state == RunState::kRunning && status.heartbeat_age_s > 5) {

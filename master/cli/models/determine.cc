@@ -41,7 +41,8 @@ Problem problem_at(const Config& config, const Model& model) {
 
 LikelihoodOf farm_likelihood(Farm& farm, const Problem& problem, std::uint64_t seed) {
   const std::string hash = farm.add_problem(to_proto(problem));
-  return [&farm, hash, seed](const std::vector<Genome>& genomes) -> Result<std::vector<double>> {
+  return [&farm, hash, seed, fitness = problem.fitness](
+             const std::vector<Genome>& genomes) -> Result<std::vector<double>> {
     std::vector<v1::Task> tasks;
     for (std::size_t i = 0; i < genomes.size(); ++i) {
       tasks.push_back(evaluation_task({i, 0, genomes[i]}, seed));
@@ -49,7 +50,7 @@ LikelihoodOf farm_likelihood(Farm& farm, const Problem& problem, std::uint64_t s
     ASSIGN_OR_RETURN(const auto results, farm.run(hash, tasks));
     std::vector<double> scores;
     for (const v1::TaskResult& result : results) {
-      ASSIGN_OR_RETURN(const auto score, score_of(result, FitnessKind::kLogScore));
+      ASSIGN_OR_RETURN(const auto score, score_of(result, fitness));
       scores.push_back(score.outcome == v1::OK ? -score.cost : NAN);
     }
     return scores;

@@ -134,13 +134,13 @@ Result<std::vector<ComparedRun>> compare(std::span<const Variant> variants,
 
 CompareScorer farm_scorer(Farm& farm, std::span<const Variant> variants) {
   std::vector<std::string> hashes;
-  std::vector<FitnessKind> kinds;
+  std::vector<FitnessSettings> fitness;
   for (const Variant& variant : variants) {
     hashes.push_back(farm.add_problem(to_proto(variant.config.problem)));
-    kinds.push_back(variant.config.problem.fitness.kind);
+    fitness.push_back(variant.config.problem.fitness);
   }
   return [&farm, hashes,
-          kinds](std::span<const CompareRequest> requests) -> Result<std::vector<Score>> {
+          fitness](std::span<const CompareRequest> requests) -> Result<std::vector<Score>> {
     std::map<std::string, std::vector<std::size_t>> by_problem;
     for (std::size_t i = 0; i < requests.size(); ++i) {
       by_problem[hashes[requests[i].variant]].push_back(i);
@@ -154,7 +154,7 @@ CompareScorer farm_scorer(Farm& farm, std::span<const Variant> variants) {
       ASSIGN_OR_RETURN(const auto results, farm.run(hash, tasks));
       for (std::size_t k = 0; k < members.size(); ++k) {
         ASSIGN_OR_RETURN(const auto score,
-                         score_of(results[k], kinds[requests[members[k]].variant]));
+                         score_of(results[k], fitness[requests[members[k]].variant]));
         scores[members[k]] = score;
       }
     }

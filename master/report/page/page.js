@@ -102,6 +102,8 @@ startProgress();
 startOperators();
 startGenes();
 startElite();
+startFront();
+startUnderstanding();
 startTimeline();
 startCompared();
 startFilter();

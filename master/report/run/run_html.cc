@@ -158,6 +158,8 @@ Json page_json(const RunReport& report) {
                {"operators", operators_json(report)},
                {"genes", densities_json(report)},
                {"elite", elite_json(report)},
+               {"front", front_json(report)},
+               {"sample", sample_json(report)},
                {"timeline", timeline_json(report.farm)},
                {"served", report.served},
                {"run", report.name},
@@ -219,8 +221,10 @@ std::string run_html(const RunReport& report) {
   frame.brand = "run";
   frame.served = report.served;
   frame.places = {{"progress", "Fitness"}, {"parameters", "Parameters"}};
+  if (!report.front.members.empty()) frame.places.emplace_back("front", "Front");
   if (!report.densities.empty()) frame.places.emplace_back("genes", "Genes");
   if (!report.elite.lines.empty()) frame.places.emplace_back("elite", "Elite");
+  if (report.sample.evaluated.size() > 1) frame.places.emplace_back("understanding", "Why");
   if (!report.objective) frame.places.emplace_back("scores", "Held out");
   if (driven) {
     frame.places.emplace_back("floor", "Floor");
@@ -242,7 +246,8 @@ std::string run_html(const RunReport& report) {
          parameters_section(
              report.parameters, {},
              {{"before", "before"}, {"after", "after"}, {"population", "last generation"}}) +
-         densities_section(report) + elite_section(report) + scores(report);
+         front_section(report) + densities_section(report) + elite_section(report) +
+         understanding_section(report) + scores(report);
   if (driven) body += floor_section() + drives_section("before", "after");
   if (poses) body += pose_sections();
   if (watched) body += watch_section(report.windows ? "window" : report.pieces ? "push" : "drive");

@@ -89,6 +89,43 @@ struct RunElite {
   std::vector<Line> lines;
 };
 
+// Of several objectives, each in its own sense: what a search trades off.
+struct RunFrontView {
+  struct Objective {
+    std::string name;
+    bool maximise = false;
+  };
+  struct Member {
+    std::uint64_t birth_id = 0;
+    std::vector<double> values;
+  };
+  std::vector<Objective> objectives;  // empty: the run has one fitness
+  std::vector<Member> members;        // of the last generation's front
+  std::size_t knee = 0;
+  std::vector<double> reference;                              // of the hypervolume
+  std::vector<std::pair<std::uint64_t, double>> hypervolume;  // by generation
+};
+
+// What the evaluations say of the genes.
+struct RunSample {
+  struct GeneShare {
+    std::string key, unit;
+    double lower = 0, upper = 0;
+    bool log = false;                // searched by its logarithm
+    std::vector<double> importance;  // one each of `outputs`, [0, 1]
+  };
+  struct Evaluated {
+    std::uint64_t birth_id = 0;
+    double fitness = 0;
+    std::vector<double> shares;  // of the ranges as they are searched, [0, 1]
+    std::vector<double> objectives;
+  };
+  std::vector<std::string> outputs;  // the fitness, or several objectives
+  std::vector<GeneShare> genes;
+  std::size_t members = 0;           // that the importance was worked out from
+  std::vector<Evaluated> evaluated;  // a thousand of them at most
+};
+
 // Which workers were there, all masters of the run together.  Empty where the store does not show.
 struct RunTimeline {
   struct Count {
@@ -110,6 +147,7 @@ struct RunTimeline {
   std::vector<Mark> marks;  // a few hundred at most, the latest
   std::vector<Span> spans;  // of every worker, when these are few; else empty
   double end_unix_s = 0;    // the last that was heard of the run
+  double worker_s = 0;      // that workers were there, of all together
 };
 
 // The farm as its master last reported it.
@@ -150,6 +188,8 @@ struct RunReport {
   std::optional<RunGenome> looked_up;  // the one that was asked for
   std::string without_looked_up;       // why there is none, when one was asked for
   RunElite elite;
+  RunFrontView front;
+  RunSample sample;
   RunFarm farm;
   std::size_t trials = 0;    // of the log
   bool windows = false;      // trials are windows of runs

@@ -177,13 +177,33 @@ TEST(ObjectiveConfig, NamesWhatIsWrong) {
   EXPECT_THAT(config_of("", "").error().message, HasSubstr("nothing to search"));
 }
 
+constexpr const char* kSeveral = "minimise = [\"loss\"]\nmaximise = [\"speed\"]\n";
+constexpr const char* kNsga2 = "[optimiser]\nkind = \"nsga2\"\n";
+
+TEST(ObjectiveConfig, OfSeveralValuesTheFirstIsTheFitness) {
+  const auto config = config_of(std::string(kSeveral) + kNsga2);
+  ASSERT_TRUE(config.ok()) << config.error().message;
+  const FitnessSettings& fitness = config->problem.fitness;
+  EXPECT_EQ(fitness.objectives, (std::vector<SearchedObjective>{{"loss", false}, {"speed", true}}));
+  EXPECT_FALSE(higher_is_better(fitness.kind));
+  const v1::Problem message = to_proto(config->problem);
+  EXPECT_EQ(problem_hash(to_proto(*from_proto(message))), problem_hash(message));
+  Model model = model_of_problem(config->problem, config->problem.values);
+  const auto read = parse_model(format_model(model), "model.toml");
+  ASSERT_TRUE(read.ok()) << read.error().message;
+  EXPECT_EQ(read->fitness.objectives, fitness.objectives);
+  v1::Problem wrong = message;
+  wrong.mutable_fitness()->mutable_objectives()->RemoveLast();
+  EXPECT_FALSE(from_proto(wrong).ok()) << "one is none of several";
+}
+
 class ObjectiveWorker : public testing::Test {
  protected:
   void SetUp() override { allow_external_programs(true); }
   void TearDown() override { allow_external_programs(false); }
 
-  v1::TaskResult evaluated(const std::string& answer) {
-    auto config = parse_config(config_text(answer), "objective.toml", start_program);
+  v1::TaskResult evaluated(const std::string& answer, const std::string& more = "") {
+    auto config = parse_config(config_text(answer, more), "objective.toml", start_program);
     EXPECT_TRUE(config.ok()) << (config ? "" : config.error().message);
     const auto prepared = prepare(to_proto(config->problem));
     EXPECT_TRUE(prepared.ok()) << (prepared ? "" : prepared.error().message);
@@ -203,6 +223,21 @@ TEST_F(ObjectiveWorker, AnswersWithTheValueAsItCame) {
   EXPECT_EQ(evaluated(R"(echo '{"id":1,"value":null}')").outcome(), v1::DIVERGED);
   EXPECT_EQ(evaluated("exit 3").outcome(), v1::WORKER_FAILED);
   EXPECT_EQ(evaluated("echo rubbish").outcome(), v1::WORKER_FAILED);
+}
+
+TEST_F(ObjectiveWorker, AnswersWithSeveralValuesInTheConfigsOrder) {
+  const std::string more = std::string(kSeveral) + kNsga2;
+  const v1::TaskResult result =
+      evaluated(R"(echo '{"id":1,"values":{"speed":7,"extra":1,"loss":0.5}}')", more);
+  EXPECT_EQ(result.outcome(), v1::OK) << result.message();
+  EXPECT_THAT(result.evaluate().objectives(), testing::ElementsAre(0.5, 7));
+  EXPECT_EQ(result.evaluate().fitness(), 0.5);
+  const auto null = evaluated(R"(echo '{"id":1,"values":{"speed":null,"loss":0.5}}')", more);
+  EXPECT_EQ(null.outcome(), v1::DIVERGED);
+  EXPECT_THAT(null.message(), HasSubstr("a speed of null"));
+  EXPECT_EQ(evaluated(R"(echo '{"id":1,"value":3}')", more).outcome(), v1::WORKER_FAILED);
+  const auto outside = evaluated(R"(echo '{"id":1,"violations":[2]}')", more);
+  EXPECT_EQ(outside.outcome(), v1::INFEASIBLE);
 }
 
 TEST_F(ObjectiveWorker, HasNothingToPredict) {

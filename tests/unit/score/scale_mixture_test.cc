@@ -146,4 +146,27 @@ TEST(TailScale, IsDrawnByItsWeight) {
   EXPECT_EQ(a.bits(), b.bits()) << "a Gaussian draws nothing";
 }
 
+TEST(TailedDensity, MarginalsAreWhatIsLeftWhenTheRestIsIntegratedOut) {
+  const Eigen::Matrix3d R = reading_covariance(), S = drive_covariance() + R;
+  const Eigen::Vector3d r(0.03, -0.01, 0.08);
+  for (const NoiseTails& tails : {NoiseTails{}, NoiseTails{0.3, 0.2}}) {
+    const TailedDensity density(tails);
+    const auto at = [&](double x, double y, double theta) {
+      return std::exp(*density.log_density({x, y, theta}, S, R, 0.02));
+    };
+    double position = 0;
+    constexpr double kStep_rad = 0.004;
+    for (double theta = -8; theta < 8; theta += kStep_rad) {
+      position += kStep_rad * at(r[0], r[1], theta);
+    }
+    EXPECT_NEAR(*density.log_position_density(r, S, R, 0.02), std::log(position), 1e-3);
+    double heading = 0;
+    constexpr double kStep_m = 0.008;
+    for (double x = -1; x < 1; x += kStep_m) {
+      for (double y = -1; y < 1; y += kStep_m) heading += kStep_m * kStep_m * at(x, y, r[2]);
+    }
+    EXPECT_NEAR(*density.log_heading_density(r, S, R, 0.02), std::log(heading), 5e-3);
+  }
+}
+
 }  // namespace gapfarm::scale_mixture_test

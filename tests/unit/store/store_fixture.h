@@ -70,7 +70,7 @@ class StoreTest : public ::testing::Test {
     ASSERT_TRUE(database
                     ->exec("DROP TABLE worker_events; DROP TABLE documents; DROP TABLE incidents; "
                            "ALTER TABLE progress DROP "
-                           "COLUMN farm; "
+                           "COLUMN farm; ALTER TABLE individuals DROP COLUMN objectives; "
                            "PRAGMA user_version = 1",
                            "test")
                     .ok());

@@ -1,0 +1,24 @@
+// Lines of JSON from a program of the user's.  Internal to common/external.
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+
+#include "common/base/result.h"
+
+namespace gapfarm::line_json {
+
+using Json = nlohmann::ordered_json;
+
+// `what`, and the beginning of the line.
+Error wrong(const std::string& what, const std::string& line);
+
+// Python's json and others print what JSON does not have.  `not_a_number`: where to put the first
+// such word, with null in its place; null: that is an error.
+Result<Json> read_object(const std::string& line, const std::string& what,
+                         std::string* not_a_number = nullptr);
+
+// A text without what would break a line; empty: there is none.
+std::string word_of(const Json& json, const char* key);
+
+}  // namespace gapfarm::line_json

@@ -1,0 +1,360 @@
+#include "master/evolve/genetic/nsga2.h"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <optional>
+#include <set>
+
+#include "common/base/try.h"
+#include "common/math/fronts.h"
+#include "master/evolve/individual.h"
+
+namespace gapfarm {
+namespace {
+
+constexpr double kCrossover = 0.9;  // as all of Deb et al. (2002), and the mutation of a gene in n
+constexpr double kCrossoverIndex = 20, kMutationIndex = 20;
+constexpr double kStep = 0.05;   // of integers, s.d., share of the range
+constexpr unsigned kTries = 20;  // to make a child that is not there yet
+
+Costs costs_of(const Standing& standing) {
+  return standing.costs.empty() ? Costs{standing.cost} : standing.costs;
+}
+
+// Constrained domination.
+bool beats(const Standing& a, const Standing& b) {
+  if (a.outcome != v1::OK || b.outcome != v1::OK) return better(a, b);
+  return dominates(costs_of(a), costs_of(b));
+}
+
+// How far a child lies from the middle of its parents, as a share of half their distance;
+// `room`: of the nearer parent to the bound, as a share of their distance.
+double spread_of(double room, double draw) {
+  const double alpha = 2 - std::pow(1 + 2 * room, -(kCrossoverIndex + 1));
+  const double inside = draw * alpha;
+  return std::pow(inside <= 1 ? inside : 1 / (2 - inside), 1 / (kCrossoverIndex + 1));
+}
+
+void cross(const GeneSpace& space, Genome& a, Genome& b, Stream& stream) {
+  for (std::size_t gene = 0; gene < space.size(); ++gene) {
+    if (!stream.bernoulli(0.5) || a[gene] == b[gene]) continue;
+    if (space[gene].shape != GeneShape::kUnordered) {
+      const double low = std::min(a[gene], b[gene]), high = std::max(a[gene], b[gene]);
+      const double gap = high - low, draw = stream.uniform();
+      a[gene] = (low + high - spread_of(low / gap, draw) * gap) / 2;
+      b[gene] = (low + high + spread_of((1 - high) / gap, draw) * gap) / 2;
+    }
+    if (stream.bernoulli(0.5)) std::swap(a[gene], b[gene]);
+  }
+}
+
+double polynomial(double g, double draw) {
+  const double power = kMutationIndex + 1;
+  if (draw < 0.5) {
+    return g + std::pow(2 * draw + (1 - 2 * draw) * std::pow(1 - g, power), 1 / power) - 1;
+  }
+  return g + 1 - std::pow(2 - 2 * draw + (2 * draw - 1) * std::pow(g, power), 1 / power);
+}
+
+class Nsga2 final : public Optimiser {
+ public:
+  explicit Nsga2(const OptimiserSetup& setup)
+      : space_(*setup.table, setup.genes),
+        nominal_(setup.settings.seed_nominal ? setup.nominal : Genome{}),
+        run_seed_(setup.run_seed),
+        size_(
+            std::max(4U, setup.settings.optimiser.population.value_or(setup.settings.population))),
+        full_scores_(setup.noisy ? std::max(1U, setup.settings.elite_replicates) : 1) {}
+
+  std::vector<Candidate> ask() override;
+  void tell(std::span<const Score> scores) override;
+
+  std::uint64_t generation() const override { return generation_; }
+  std::uint64_t evaluations() const override { return evaluations_; }
+  std::uint64_t last_improvement() const override { return last_improvement_; }
+  std::vector<Member> members() const override;
+  const Member& best() const override { return best_; }
+  double diversity() const override { return diversity_of(population_); }
+  std::vector<NamedNumber> operator_probabilities() const override;
+  std::string state() const override;
+  Status restore(std::string_view state);
+
+ private:
+  struct Plan {
+    std::vector<std::size_t> rescored;  // of the population
+    std::vector<Individual> children;
+    std::uint64_t births = 0;
+    std::vector<Candidate> candidates;
+  };
+
+  Plan plan_generation() const;
+  void add_pair(Plan& plan, std::set<Genome>& known) const;
+  void mutate(Individual& child, bool must, Stream& stream) const;
+  std::size_t tournament(Stream& stream) const;
+  void select(std::vector<Individual> all);
+  void take(std::vector<Individual> front);
+  std::vector<Costs> front() const;
+  void note_best();
+
+  GeneSpace space_;
+  Genome nominal_;
+  std::uint64_t run_seed_;
+  std::size_t size_;
+  unsigned full_scores_;
+
+  std::uint64_t generation_ = 0, next_birth_id_ = 0, evaluations_ = 0, last_improvement_ = 0;
+  std::vector<Individual> population_;  // best first
+  std::size_t front_size_ = 0;          // of them, where it ended well
+  Costs reference_;                     // empty: nothing ended well yet
+  Member best_;
+  std::optional<Plan> plan_;
+};
+
+std::vector<Candidate> Nsga2::ask() {
+  if (!plan_) plan_ = plan_generation();
+  return plan_->candidates;
+}
+
+std::size_t Nsga2::tournament(Stream& stream) const {
+  const std::size_t a = stream.below(population_.size());
+  return std::min<std::size_t>(a, stream.below(population_.size()));
+}
+
+void Nsga2::mutate(Individual& child, bool must, Stream& stream) const {
+  const std::size_t certain = must ? stream.below(space_.size()) : space_.size();
+  for (std::size_t gene = 0; gene < space_.size(); ++gene) {
+    if (!stream.bernoulli(1 / static_cast<double>(space_.size())) && gene != certain) continue;
+    double& g = child.genome[gene];
+    g = space_[gene].shape == GeneShape::kReal
+            ? std::clamp(polynomial(g, stream.uniform()), 0.0, 1.0)
+            : space_.stepped(gene, g, kStep, stream);
+    child.origin |= kPolynomial;
+  }
+}
+
+void Nsga2::add_pair(Plan& plan, std::set<Genome>& known) const {
+  const std::uint64_t birth_id = next_birth_id_ + plan.births;
+  Stream stream({.run_seed = run_seed_,
+                 .purpose = Purpose::kEvolution,
+                 .generation = generation_ + 1,
+                 .birth_id = birth_id});
+  Individual pair[2];
+  if (!population_.empty()) {
+    const Individual& a = population_[tournament(stream)];
+    const Individual& b = population_[tournament(stream)];
+    pair[0].genome = a.genome, pair[1].genome = b.genome;
+    pair[0].parents = {a.birth_id}, pair[1].parents = {b.birth_id};
+    if (a.birth_id != b.birth_id && stream.bernoulli(kCrossover)) {
+      cross(space_, pair[0].genome, pair[1].genome, stream);
+      pair[0].parents = pair[1].parents = {a.birth_id, b.birth_id};
+      pair[0].origin = pair[1].origin = kSimulatedBinary;
+    }
+  }
+  for (Individual& child : pair) {
+    child.birth_id = next_birth_id_ + plan.births++;
+    bool fresh = false;
+    for (unsigned t = 0; t < kTries && !fresh; ++t) {
+      if (population_.empty()) {
+        const bool first = child.birth_id == 0 && !nominal_.empty() && t == 0;
+        child.genome = first ? nominal_ : space_.random(stream);
+        child.origin = first ? kNominal : kRandom;
+      } else {
+        mutate(child, t > 0, stream);
+      }
+      child.genome = space_.snapped(child.genome);
+      fresh = known.insert(child.genome).second;
+    }
+    if (fresh && plan.children.size() < size_) plan.children.push_back(std::move(child));
+  }
+}
+
+Nsga2::Plan Nsga2::plan_generation() const {
+  Plan plan;
+  for (std::size_t i = 0; i < front_size_; ++i) {
+    const Individual& member = population_[i];
+    if (member.standing.scores >= full_scores_) continue;
+    plan.rescored.push_back(i);
+    plan.candidates.push_back({member.birth_id, member.standing.scores, member.genome});
+  }
+  std::set<Genome> known;
+  for (const Individual& member : population_) known.insert(member.genome);
+  while (plan.births < size_) add_pair(plan, known);
+  for (const Individual& child : plan.children) {
+    plan.candidates.push_back({child.birth_id, 0, child.genome});
+  }
+  return plan;
+}
+
+void Nsga2::tell(std::span<const Score> scores) {
+  assert(plan_ && scores.size() == plan_->candidates.size());
+  Plan plan = std::move(*plan_);
+  plan_.reset();
+  auto next = scores.begin();
+  for (const std::size_t i : plan.rescored) population_[i].standing.add(*next++);
+  for (Individual& child : plan.children) child.standing.add(*next++);
+  ++generation_;
+  evaluations_ += scores.size();
+  next_birth_id_ += plan.births;
+  // Progress is what beats a member of the front; where there was none, what is best.
+  const std::size_t compared = std::max(front_size_, std::min<std::size_t>(1, population_.size()));
+  const bool first = population_.empty();
+  for (const Individual& child : plan.children) {
+    for (std::size_t i = 0; i < compared; ++i) {
+      if (beats(child.standing, population_[i].standing)) last_improvement_ = generation_;
+    }
+  }
+  if (first) last_improvement_ = generation_;
+  std::vector<Individual> all = std::move(population_);
+  for (Individual& child : plan.children) all.push_back(std::move(child));
+  select(std::move(all));
+}
+
+// The best `size_` by fronts, the last front by crowding.
+void Nsga2::select(std::vector<Individual> all) {
+  const std::vector<std::size_t> numbers = front_numbers(
+      all.size(),
+      [&](std::size_t a, std::size_t b) { return beats(all[a].standing, all[b].standing); });
+  std::vector<std::vector<Individual>> fronts(
+      numbers.empty() ? 0 : *std::max_element(numbers.begin(), numbers.end()) + 1);
+  for (std::size_t i = 0; i < all.size(); ++i) fronts[numbers[i]].push_back(std::move(all[i]));
+  population_.clear();
+  front_size_ = 0;
+  for (std::vector<Individual>& front : fronts) {
+    if (population_.size() == size_) break;
+    take(std::move(front));
+    const bool ended_well = population_.front().standing.outcome == v1::OK;
+    if (front_size_ == 0 && ended_well) front_size_ = population_.size();
+  }
+  note_best();
+}
+
+void Nsga2::take(std::vector<Individual> front) {
+  const auto by_birth = [](const Individual& a, const Individual& b) {
+    return a.birth_id < b.birth_id;
+  };
+  std::sort(front.begin(), front.end(), by_birth);
+  const std::size_t room = size_ - population_.size();
+  std::vector<Costs> costs;
+  for (const Individual& individual : front) costs.push_back(costs_of(individual.standing));
+  std::vector<double> distances = crowding_distances(costs);
+  while (front.size() > room) {
+    const auto least = std::min_element(distances.begin(), distances.end()) - distances.begin();
+    front.erase(front.begin() + least);
+    costs.erase(costs.begin() + least);
+    distances = crowding_distances(costs);
+  }
+  std::vector<std::size_t> order(front.size());
+  for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return distances[a] > distances[b]; });
+  for (const std::size_t i : order) population_.push_back(std::move(front[i]));
+}
+
+std::vector<Costs> Nsga2::front() const {
+  std::vector<Costs> front;
+  for (std::size_t i = 0; i < front_size_; ++i) {
+    front.push_back(costs_of(population_[i].standing));
+  }
+  return front;
+}
+
+void Nsga2::note_best() {
+  const std::vector<Costs> best = front();
+  best_ = to_member(population_[best.empty() ? 0 : knee_of(best)]);
+  if (!reference_.empty() || best.empty()) return;
+  std::vector<Costs> ended_well;
+  for (const Individual& member : population_) {
+    if (member.standing.outcome == v1::OK) ended_well.push_back(costs_of(member.standing));
+  }
+  reference_ = greatest_of(ended_well);
+}
+
+std::vector<Member> Nsga2::members() const {
+  std::vector<Member> members;
+  if (generation_ > 0) members.push_back(best_);
+  for (const Individual& individual : population_) {
+    if (individual.birth_id != best_.birth_id) members.push_back(to_member(individual));
+  }
+  return members;
+}
+
+std::vector<NamedNumber> Nsga2::operator_probabilities() const {
+  std::vector<NamedNumber> figures = {{"front", static_cast<double>(front_size_)}};
+  if (reference_.size() > kMostHypervolumeCosts) return figures;
+  figures.push_back({"hypervolume", reference_.empty() ? 0 : hypervolume(front(), reference_)});
+  return figures;
+}
+
+std::string Nsga2::state() const {
+  assert(!plan_ && "save between tell() and ask()");
+  v1::GeneticState message;
+  message.set_generation(generation_);
+  message.set_next_birth_id(next_birth_id_);
+  message.set_evaluations(evaluations_);
+  message.set_last_improvement(last_improvement_);
+  message.mutable_reference()->Add(reference_.begin(), reference_.end());
+  for (const Individual& individual : population_) save(individual, *message.add_population());
+  return message.SerializeAsString();
+}
+
+Status Nsga2::restore(std::string_view state) {
+  v1::GeneticState message;
+  if (!message.ParseFromArray(state.data(), static_cast<int>(state.size()))) {
+    return Error{"the saved optimiser state is damaged: it cannot be decoded"};
+  }
+  if (message.generation() > 0 && message.population_size() == 0) {
+    return Error{"the saved optimiser state is damaged: it has no population"};
+  }
+  generation_ = message.generation();
+  next_birth_id_ = message.next_birth_id();
+  evaluations_ = message.evaluations();
+  last_improvement_ = message.last_improvement();
+  reference_.assign(message.reference().begin(), message.reference().end());
+  std::vector<Individual> saved;
+  for (const v1::Individual& one : message.population()) {
+    ASSIGN_OR_RETURN(Individual individual, load(one, space_));
+    const bool ended_well = individual.standing.outcome == v1::OK;
+    if (ended_well && costs_of(individual.standing).size() != reference_.size()) {
+      return Error{
+          "the saved optimiser state is damaged or of other objectives; resume with the "
+          "config of the run"};
+    }
+    saved.push_back(std::move(individual));
+  }
+  population_ = std::move(saved);
+  std::vector<Costs> ended_well;
+  for (const Individual& member : population_) {
+    if (member.standing.outcome == v1::OK) ended_well.push_back(costs_of(member.standing));
+  }
+  front_size_ = first_front(ended_well).size();
+  if (!population_.empty()) note_best();
+  return {};
+}
+
+Result<std::unique_ptr<Nsga2>> checked(const OptimiserSetup& setup) {
+  if (setup.genes.empty()) {
+    return Error{"there is nothing to evolve: no gene; give at least one parameter a search range"};
+  }
+  if (!setup.nominal.empty() && setup.nominal.size() != setup.genes.size()) {
+    return Error{"the nominal genome has " + std::to_string(setup.nominal.size()) +
+                 " genes instead of " + std::to_string(setup.genes.size())};
+  }
+  return std::make_unique<Nsga2>(setup);
+}
+
+}  // namespace
+
+Result<std::unique_ptr<Optimiser>> make_nsga2(const OptimiserSetup& setup) {
+  ASSIGN_OR_RETURN(auto made, checked(setup));
+  return std::unique_ptr<Optimiser>(std::move(made));
+}
+
+Result<std::unique_ptr<Optimiser>> restore_nsga2(const OptimiserSetup& setup,
+                                                 std::string_view state) {
+  ASSIGN_OR_RETURN(auto made, checked(setup));
+  RETURN_IF_ERROR(made->restore(state));
+  return std::unique_ptr<Optimiser>(std::move(made));
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,32 @@
+// NSGA-II (Deb, Pratap, Agarwal and Meyarivan, IEEE Trans. Evol. Comp. 6, 2002): a search of
+// several objectives at once.  Its members are a population of as many as differ, in the order of
+// fronts and crowding; the best is the knee of the first front.  Constrained domination: what ended
+// well before what violates constraints less, before what failed.  Without objectives the cost is
+// the only one.
+//
+// Children: simulated binary crossover (Deb and Agrawal 1995) and polynomial mutation (Deb and
+// Goyal 1996) of reals and integers; unordered genes are exchanged and drawn anew.  A
+// front is pruned one by one, distances worked out anew each time (Kukkonen and Deb, CEC 2006).
+//
+// Randomness: each pair of children draws from Stream{run_seed, kEvolution, generation, birth id of
+// the first, 0}.  Noise: members of the first front are scored once more a generation until they
+// have `elite_replicates` scores.
+#pragma once
+
+#include <memory>
+#include <string_view>
+
+#include "common/base/result.h"
+#include "master/evolve/optimiser.h"
+
+namespace gapfarm {
+
+// Errors: no genes, a nominal genome of another length.
+Result<std::unique_ptr<Optimiser>> make_nsga2(const OptimiserSetup& setup);
+
+// The optimiser whose state() gave `state`.  Errors: as above, and a state that is damaged or
+// belongs to other genes.
+Result<std::unique_ptr<Optimiser>> restore_nsga2(const OptimiserSetup& setup,
+                                                 std::string_view state);
+
+}  // namespace gapfarm
