@@ -26,6 +26,13 @@ Result<RunLog> read_run_folders(std::span<const std::string> folders,
     if (std::error_code none; std::filesystem::exists(wheels, none)) {
       RETURN_IF_ERROR(read_wheel_speeds(wheels.string(), &log));
     }
+    for (const auto& [name, read] :
+         {std::pair{"gyro.csv", &read_yaw_rates}, {"returns.csv", &read_returns}}) {
+      const std::filesystem::path beside = path / name;
+      if (std::error_code none; std::filesystem::exists(beside, none)) {
+        RETURN_IF_ERROR(read(beside.string(), &log));
+      }
+    }
     all.wheel_channels = log.wheel_channels;
     all.relative = all.relative || log.relative;
     for (LoggedRun& run : log.runs) {

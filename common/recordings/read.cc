@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numbers>
 #include <utility>
 
+#include "common/recordings/increment_noise.h"
 #include "common/trials/files.h"
 #include "common/trials/text/csv.h"
 
@@ -14,17 +16,21 @@ namespace {
 // A session and a run in it.
 using RunKey = std::pair<std::string, std::string>;
 
+// What is wrong with a row's values; `first`: of its run.
+using RowCheck = std::optional<NoiseFault> (*)(std::span<const double> values, bool first);
+
 // One file of rows "[session,]run,t,NAMES...".
 class RunTable {
  public:
   static Result<RunTable> read(const std::string& path, std::span<const std::string> names,
-                               const char* format) {
+                               const char* format, RowCheck check = nullptr) {
     const auto text = read_text_file(path);
     if (!text) return text.error();
     auto rows = parse_csv(*text, path);
     if (!rows) return rows.error();
     if (rows->empty()) return text_error(path, {}, "an empty file", format);
     RunTable table;
+    table.check_ = check;
     table.names_ = {"run", "t"};
     table.names_.insert(table.names_.end(), names.begin(), names.end());
     auto header = CsvHeader::match(rows->front(), table.names_, path, format);
@@ -59,6 +65,9 @@ class RunTable {
     if (reader.error()) return *reader.error();
     auto [entry, fresh] = rows_.try_emplace(key);
     if (fresh) order_.push_back(key);
+    if (const auto fault = check_ != nullptr ? check_(to.values, fresh) : std::nullopt) {
+      return text_error(path, reader.field(2).place, fault->found, fault->expected, fault->remedy);
+    }
     if (!fresh && to.t_s < entry->second.back().t_s) {
       return text_error(path, reader.field(1).place, reader.field(1).text,
                         "a time of at least " + format_double(entry->second.back().t_s) +
@@ -69,19 +78,52 @@ class RunTable {
     return {};
   }
 
+  RowCheck check_ = nullptr;
   std::vector<std::string> names_;
   std::map<RunKey, std::vector<CommandRow>> rows_;
   std::vector<RunKey> order_;
 };
 
-// Whether its poses are each in the axes of the one before.
-Result<bool> holds_increments(const std::string& path) {
+Result<std::vector<std::string>> header_of(const std::string& path) {
   const auto text = read_text_file(path);
   if (!text) return text.error();
   const auto head = parse_csv(std::string_view(*text).substr(0, text->find('\n')), path);
   if (!head) return head.error();
-  return !head->empty() && std::any_of(head->front().fields.begin(), head->front().fields.end(),
-                                       [](const CsvField& f) { return f.text == "dx"; });
+  std::vector<std::string> names;
+  for (std::size_t c = 0; !head->empty() && c < head->front().fields.size(); ++c) {
+    names.push_back(head->front().fields[c].text);
+  }
+  return names;
+}
+
+// The columns of poses: of increments with those of their noise, where the header has some.
+std::vector<std::string> pose_columns(std::span<const std::string> header) {
+  const auto has = [&](const std::string& name) {
+    return std::find(header.begin(), header.end(), name) != header.end();
+  };
+  if (!has("dx")) return {"x", "y", "theta"};
+  std::vector<std::string> names = {"dx", "dy", "dtheta"};
+  for (const auto* noise : {&kCovarianceColumns, &kDeviationColumns}) {
+    if (names.size() > 3 || std::none_of(noise->begin(), noise->end(), has)) continue;
+    names.insert(names.end(), noise->begin(), noise->end());
+  }
+  return names;
+}
+
+// The first row of a run is from a pose that nobody has.
+std::optional<NoiseFault> fault_of_increment(std::span<const double> values, bool first) {
+  if (first) return {};
+  if (std::abs(values[2]) > std::numbers::pi) {
+    return NoiseFault{"dtheta " + format_double(values[2]),
+                      "a turn of at most half a turn, in rad; degrees times pi / 180 are that"};
+  }
+  return values.size() > 3 ? fault_of_noise(values.subspan(3)) : std::nullopt;
+}
+
+std::optional<NoiseFault> fault_of_return(std::span<const double> values, bool) {
+  auto fault = fault_of_noise(values);
+  if (fault) fault->remedy = "say how far from where it began the robot may have stood";
+  return fault;
 }
 
 // Rows at the time of the one before are omitted, but for what they moved on.
@@ -92,12 +134,21 @@ std::size_t add_poses(const std::vector<CommandRow>& rows, bool increments, Logg
     const Pose read{row.values[0], row.values[1], wrap_angle(row.values[2])};
     // The first one's is from a pose that nobody has.
     X_WM = !increments ? read : run->poses.empty() ? Pose() : X_WM * read;
-    if (run->poses.empty() || row.t_s > run->poses.back().t_s) {
-      run->poses.push_back({row.t_s, X_WM});
-    } else {
-      ++repeated;
-      if (increments) run->poses.back().X_WM = X_WM;
+    std::optional<Eigen::Matrix3d> noise;
+    if (increments && row.values.size() > 3 && !run->poses.empty()) {
+      noise = noise_of(std::span(row.values).subspan(3));
     }
+    if (run->poses.empty() || row.t_s > run->poses.back().t_s) {
+      run->poses.push_back({row.t_s, X_WM, noise});
+      continue;
+    }
+    ++repeated;
+    PoseRow& last = run->poses.back();
+    if (noise && last.noise && run->poses.size() > 1) {
+      const Pose X_AB = between(run->poses[run->poses.size() - 2].X_WM, last.X_WM);
+      last.noise = chained_noise(X_AB, *last.noise, read, *noise);
+    }
+    if (increments) last.X_WM = X_WM;
   }
   return repeated;
 }
@@ -112,14 +163,14 @@ Result<RunLog> read_runs(const std::string& commands_path, const std::string& po
                          std::span<const std::string> channels) {
   const auto commands = RunTable::read(commands_path, channels, "a command log");
   if (!commands) return commands.error();
-  static const std::vector<std::string> kPose = {"x", "y", "theta"};
-  static const std::vector<std::string> kIncrement = {"dx", "dy", "dtheta"};
-  const auto increments = holds_increments(poses_path);
-  if (!increments) return increments.error();
-  const auto poses = RunTable::read(poses_path, *increments ? kIncrement : kPose, "a pose log");
-  if (!poses) return poses.error();
+  const auto header = header_of(poses_path);
+  if (!header) return header.error();
+  const std::vector<std::string> columns = pose_columns(*header);
   RunLog log;
-  log.relative = *increments;
+  log.relative = columns.front() == "dx";
+  const auto poses = RunTable::read(poses_path, columns, "a pose log",
+                                    log.relative ? fault_of_increment : nullptr);
+  if (!poses) return poses.error();
   log.channels.assign(channels.begin(), channels.end());
   for (const RunKey& key : poses->order()) {
     if (!commands->has(key)) {
@@ -146,26 +197,47 @@ Result<RunLog> read_runs(const std::string& commands_path, const std::string& po
   return log;
 }
 
-Status read_wheel_speeds(const std::string& path, RunLog* log) {
-  const auto text = read_text_file(path);
-  if (!text) return text.error();
-  const auto head = parse_csv(std::string_view(*text).substr(0, text->find('\n')), path);
-  if (!head) return head.error();
-  std::vector<std::string> wheels;
-  for (std::size_t c = 0; !head->empty() && c < head->front().fields.size(); ++c) {
-    const std::string& name = head->front().fields[c].text;
-    if (name != "session" && name != "run" && name != "t") wheels.push_back(name);
-  }
-  const auto table = RunTable::read(path, wheels, "a log of wheel speeds");
+namespace {
+
+// Rows of a file beside the log's, for the runs that it names.
+Status read_beside(const std::string& path, std::span<const std::string> names, const char* format,
+                   RowCheck check, std::vector<CommandRow> LoggedRun::*rows, RunLog* log) {
+  const auto table = RunTable::read(path, names, format, check);
   if (!table) return table.error();
-  if (!log->wheel_channels.empty() && log->wheel_channels != wheels) {
-    return Error{path + ": other wheels than the logs before have; give all logs the same columns"};
-  }
-  log->wheel_channels = std::move(wheels);
   for (LoggedRun& run : log->runs) {
     const RunKey key{run.session, run.run};
-    if (table->has(key)) run.wheel_speeds = table->of(key);
+    if (table->has(key)) run.*rows = table->of(key);
   }
+  return {};
+}
+
+}  // namespace
+
+Status read_yaw_rates(const std::string& path, RunLog* log) {
+  const std::vector<std::string> names = {"yaw_rate"};
+  return read_beside(path, names, "a log of yaw rates", nullptr, &LoggedRun::yaw_rates, log);
+}
+
+Status read_returns(const std::string& path, RunLog* log) {
+  return read_beside(path, kDeviationColumns, "a list of returns", fault_of_return,
+                     &LoggedRun::returns, log);
+}
+
+Status read_wheel_speeds(const std::string& path, RunLog* log) {
+  auto wheels = header_of(path);
+  if (!wheels) return wheels.error();
+  std::erase_if(*wheels, [](const std::string& name) {
+    return name == "session" || name == "run" || name == "t";
+  });
+  if (!log->wheel_channels.empty() && log->wheel_channels != *wheels) {
+    return Error{path + ": other wheels than the logs before have; give all logs the same columns"};
+  }
+  if (Status s = read_beside(path, *wheels, "a log of wheel speeds", nullptr,
+                             &LoggedRun::wheel_speeds, log);
+      !s) {
+    return s;
+  }
+  log->wheel_channels = std::move(*wheels);
   return {};
 }
 

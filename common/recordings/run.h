@@ -1,6 +1,8 @@
 // Logged runs of a ground robot: what it was commanded, and where it was (docs/formats.md).
 #pragma once
 
+#include <Eigen/Core>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -17,6 +19,9 @@ struct CommandRow {
 struct PoseRow {
   double t_s = 0;
   Pose X_WM;  // of the marker
+  // Of a pose that was measured against the one before, where its matcher says how well: covariance
+  // in the axes of the pose before, m^2, m rad, rad^2.
+  std::optional<Eigen::Matrix3d> noise = {};
 };
 
 // An uninterrupted stretch.  Both lists ascend in time on clocks that need not agree: command_delay
@@ -26,7 +31,11 @@ struct LoggedRun {
   std::string run;      // its name in the log
   std::vector<CommandRow> commands;
   std::vector<PoseRow> poses;
-  std::vector<CommandRow> wheel_speeds;  // measured, rad/s, one a wheel_channel; often empty
+  std::vector<CommandRow> wheel_speeds;    // measured, rad/s, one a wheel_channel; often empty
+  std::vector<CommandRow> yaw_rates = {};  // of a gyro, rad/s, on the poses' clock; often empty
+  // When the marker stood again where the first pose has it, and how well, as standard deviations
+  // of x, y (m) and heading (rad).
+  std::vector<CommandRow> returns = {};
 };
 
 struct RunLog {

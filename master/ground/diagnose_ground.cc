@@ -39,8 +39,37 @@ class StageClock {
   std::chrono::steady_clock::time_point began_;
 };
 
-GroundQuestion ask_what_is_wrong(const GroundRobot& robot) {
-  return {kinematic_rows(robot), ground_hypotheses(robot), {}};
+GroundQuestion ask_what_is_wrong(const GroundRobot& robot, const RunLog& log) {
+  GroundQuestion question{kinematic_rows(robot), that_can_show(log, ground_hypotheses(robot)), {}};
+  add_gyro_scale(log, &question.rows);
+  return question;
+}
+
+// The robot with the pose that increments give their sensor, and what is asked of it then: all but
+// that pose.
+Result<GroundRobot> sense(const GroundRobot& robot, const GroundDiagnoseOptions& options,
+                          RunLog* log, GroundQuestion* question) {
+  std::erase_if(question->catalogue, [](const GroundHypothesis& h) {
+    return !h.freed.empty() && h.freed[0].name.starts_with("marker_");
+  });
+  ASSIGN_OR_RETURN(auto settled,
+                   settle_sensor(robot, *log, options.windows, *question, options.seed));
+  *log = std::move(settled.log);
+  question->faults = std::move(settled.faults);
+  question->fault_gains = std::move(settled.fault_gains);
+  question->sensor = std::move(settled.pose);
+  GroundRobot sensed = robot;
+  for (const SensorValue& v : question->sensor) {
+    const bool x = v.row.name == "marker_x", y = v.row.name == "marker_y";
+    (x ? sensed.X_RM.x : y ? sensed.X_RM.y : sensed.X_RM.theta) = v.value;
+    for (KinematicRow& row : question->rows) {
+      if (row.name != v.row.name) continue;
+      row.nominal = v.value;
+      // Half of 90 % are 1.64 standard deviations.
+      row.tolerance = std::max(row.tolerance, (v.interval.upper - v.interval.lower) / 3.29);
+    }
+  }
+  return sensed;
 }
 
 Status exclude(const std::vector<std::string>& names, std::vector<GroundHypothesis>* catalogue) {
@@ -67,11 +96,11 @@ void leave_motors_out(Kinematics* values) {
 }
 
 // The file's robot, driven as `driven` is.
-Result<GroundDiagnosis> diagnose_driven(const GroundRobot& file, const GroundRobot& robot,
-                                        const RunLog& log, const GroundDiagnoseOptions& options,
+Result<GroundDiagnosis> diagnose_driven(GroundRobot file, GroundRobot robot, RunLog log,
+                                        const GroundDiagnoseOptions& options,
                                         const std::optional<WheelLoop>& loop) {
   StageClock clock(options.on_stage);
-  GroundQuestion question = ask_what_is_wrong(robot);
+  GroundQuestion question = ask_what_is_wrong(robot, log);
   if (options.reference) {
     clock.begin(kGroundStages[0].name);
     ASSIGN_OR_RETURN(auto asked, ask_what_changed(robot, *options.reference, options.windows,
@@ -79,7 +108,12 @@ Result<GroundDiagnosis> diagnose_driven(const GroundRobot& file, const GroundRob
     question = std::move(asked);
   }
   if (Status s = exclude(options.excluded, &question.catalogue); !s) return s.error();
-  question.catalogue = that_can_show(log, std::move(question.catalogue));
+  if (log.relative && !options.reference) {
+    clock.begin(kFaultStage);
+    ASSIGN_OR_RETURN(auto sensed, sense(robot, options, &log, &question));
+    robot = std::move(sensed);
+    file.X_RM = robot.X_RM;
+  }
   const GroundWork work = {[&](const std::string& stage) { clock.begin(stage); },
                            options.on_progress,
                            options.stopped,
@@ -134,15 +168,25 @@ Result<GroundDiagnosis> diagnose_ground(const GroundRobot& robot, const RunLog& 
 }
 
 std::vector<SanityFinding> check_ground_log(const GroundRobot& robot, const RunLog& log) {
-  const GroundQuestion question = ask_what_is_wrong(robot);
-  const auto fault = find_ground_fault(robot, log, question, {{2}, 0.5});
+  const GroundQuestion question = ask_what_is_wrong(robot, log);
+  const WindowSettings windows = {{2}, 0.5};
+  const auto found = [&](std::size_t hypothesis, const std::string& evidence) {
+    const GroundHypothesis& h = question.catalogue[hypothesis];
+    return std::vector<SanityFinding>{{h.name, "With " + h.thing + " put right, " + evidence,
+                                       h.remedy, Severity::kWarning, true, h.aliases}};
+  };
+  if (log.relative) {
+    const auto settled = settle_sensor(robot, log, windows, question, 1);
+    if (!settled || settled->faults.empty()) return {};
+    return found(settled->faults.front(),
+                 "increments follow the robot's wheels, else they do not.");
+  }
+  const auto fault = find_ground_fault(robot, log, question, windows);
   if (!fault) return {};
-  const GroundHypothesis& h = question.catalogue[fault->hypothesis];
-  return {{h.name,
-           fmt::format("With {} put right, what the robot's file expects is {:.1f} times as near "
-                       "to what was measured.",
-                       h.thing, fault->shrinks),
-           h.remedy, Severity::kWarning, true, h.aliases}};
+  return found(fault->hypothesis,
+               fmt::format("what the robot's file expects is {:.1f} times as near to what was "
+                           "measured.",
+                           fault->shrinks));
 }
 
 void emit_faults(const GroundWork& work, const GroundSearch& search) {

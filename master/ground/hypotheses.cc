@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "master/ground/fit/edge.h"
+#include "master/ground/fit/window_set.h"
 #include "master/ground/tolerances.h"
 
 namespace gapfarm {
@@ -29,7 +30,6 @@ std::vector<std::pair<std::size_t, std::size_t>> channel_pairs(const GroundRobot
 }
 
 using CommandChange = std::function<void(std::vector<double>&)>;
-using PoseChange = std::function<void(Pose&)>;
 
 std::function<void(RunLog*)> change_commands(CommandChange change) {
   return [change = std::move(change)](RunLog* log) {
@@ -38,12 +38,22 @@ std::function<void(RunLog*)> change_commands(CommandChange change) {
     }
   };
 }
-std::function<void(RunLog*)> change_poses(PoseChange change) {
-  return [change = std::move(change)](RunLog* log) {
+// L (x, y, theta), the heading `turn` (rad) less; of relative poses L of each increment, whose
+// noise goes with it.
+std::function<void(RunLog*)> change_poses(const Eigen::Matrix3d& L, double turn = 0) {
+  const auto changed = [L, turn](const Pose& X) {
+    const Eigen::Vector3d v = L * Eigen::Vector3d(X.x, X.y, X.theta);
+    return Pose{v[0], v[1], wrap_angle(v[2] - turn)};
+  };
+  return [L, changed](RunLog* log) {
     for (LoggedRun& run : log->runs) {
+      Pose before, after;
       for (PoseRow& row : run.poses) {
-        change(row.X_WM);
-        row.X_WM.theta = wrap_angle(row.X_WM.theta);
+        const Pose logged = row.X_WM;
+        row.X_WM = log->relative ? after * changed(between(before, logged)) : changed(logged);
+        if (row.noise) *row.noise = (L * *row.noise * L.transpose()).eval();
+        before = logged;
+        after = row.X_WM;
       }
     }
   };
@@ -137,21 +147,30 @@ void Catalogue::wrong_commands() {
 }
 
 void Catalogue::wrong_poses() {
+  const auto diagonal = [](double x, double y, double theta) -> Eigen::Matrix3d {
+    return Eigen::Vector3d(x, y, theta).asDiagonal();
+  };
   fault("heading_flipped", "the sign of the headings", "Turn the sign of theta.",
-        change_poses([](Pose& X) { X.theta = -X.theta; }), 1, {"heading_sign"});
+        change_poses(diagonal(1, 1, -1)), 1, {"heading_sign"});
   fault("axes_mirrored", "a world frame that is left-handed",
         "Turn the sign of y, and that of theta when it follows the robot's turns the wrong way.",
-        change_poses([](Pose& X) { X.y = -X.y; }), 1, {"axes_swapped"});
-  fault("axes_swapped", "x and y of the poses", "Swap the columns x and y.",
-        change_poses([](Pose& X) { std::swap(X.x, X.y); }), 1, {"axes_mirrored"});
+        change_poses(diagonal(1, -1, 1)), 1, {"axes_swapped"});
+  Eigen::Matrix3d swapped = diagonal(0, 0, 1);
+  swapped(0, 1) = swapped(1, 0) = 1;
+  fault("axes_swapped", "x and y of the poses", "Swap the columns x and y.", change_poses(swapped),
+        1, {"axes_mirrored"});
+  // Of increments the same as mirrored ones of a sensor that looks another way.
+  all.back().of_world = true;
   fault("heading_unit", "headings in degrees", "Multiply theta by pi / 180.",
-        change_poses([](Pose& X) { X.theta *= pi / 180; }), 1, {"unit_error"});
+        change_poses(diagonal(1, 1, pi / 180)), 1, {"unit_error"});
+  all.back().radians = pi / 180;
   for (const double turn : {pi / 2, -pi / 2, pi}) {
     fault("heading_turned",
           "headings that count from another axis, " + std::to_string(std::lround(turn * 180 / pi)) +
               " degrees on",
-          "State the marker's yaw.", change_poses([turn](Pose& X) { X.theta -= turn; }), 1,
+          "State the marker's yaw.", change_poses(diagonal(1, 1, 1), turn), 1,
           {"marker_yaw", "heading_offset"});
+    all.back().of_world = true;
   }
   for (const auto& [unit, metres] : {std::pair{"millimetres", 0.001},
                                      {"centimetres", 0.01},
@@ -160,11 +179,7 @@ void Catalogue::wrong_poses() {
                                      {"feet", 0.3048}}) {
     fault("unit_error", std::string("positions in ") + unit,
           "Multiply x and y by " + std::to_string(metres) + ".",
-          change_poses([m = metres](Pose& X) {
-            X.x *= m;
-            X.y *= m;
-          }),
-          metres, {"pose_units", "pose_scale"});
+          change_poses(diagonal(metres, metres, 1)), metres, {"pose_units", "pose_scale"});
   }
 }
 
@@ -329,11 +344,21 @@ std::vector<GroundHypothesis> ground_hypotheses(const GroundRobot& robot) {
 }
 
 std::vector<GroundHypothesis> that_can_show(const RunLog& log, std::vector<GroundHypothesis> all) {
-  if (log.relative) std::erase_if(all, [](const GroundHypothesis& h) { return h.of_world; });
+  if (!log.relative) return all;
+  std::erase_if(all, [](const GroundHypothesis& h) { return h.of_world; });
+  for (GroundHypothesis& h : all) {
+    // Upside down a sensor sees every turn and every step aside the other way, as if the robot's
+    // own had been taken for one another: increments do not distinguish these.
+    if (h.name != "sides_swapped" && h.name != "steering_reversed") continue;
+    h.thing += " (or a sensor that is mounted upside down)";
+    h.remedy += " If the sensor is upside down, turn the signs of y and theta instead.";
+    h.aliases.push_back("sensor_upside_down");
+  }
   return all;
 }
 
 double value_in_file(const GroundRobot& robot, const std::string& name) {
+  if (name == kGyroScale) return 1;
   for (const KinematicRow& row : change_rows(robot)) {
     if (row.name == name) return row.nominal;
   }

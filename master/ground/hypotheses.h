@@ -36,6 +36,7 @@ struct GroundHypothesis {
   bool only_more = false;  // less than 0 has no meaning
   double price = 0;        // nats that it must gain more, having more values than others
   bool of_world = false;   // acts in a place or along an axis of the world
+  double radians = 1;      // logged headings times this are radians
 };
 
 // Standard deviation of a value that is wrong (kPlausibleErrors).
@@ -47,8 +48,8 @@ std::vector<KinematicRow> kinematic_rows(const GroundRobot& robot);
 // In the order in which equals are preferred: simple first.
 std::vector<GroundHypothesis> ground_hypotheses(const GroundRobot& robot);
 
-// Those that a log can show: of relative poses none that acts in a place or along an axis of the
-// world.
+// Those that a log can show, in its words: of relative poses none that acts in a place or along an
+// axis of the world.
 std::vector<GroundHypothesis> that_can_show(const RunLog& log, std::vector<GroundHypothesis> all);
 
 // The same of what may change from one log of a robot to another.  Tolerances are what a robot

@@ -56,8 +56,7 @@ std::optional<GroundFault> find_ground_fault(const GroundRobot& robot, const Run
     catalogue[i].put_right(&fault.log);
     const auto windows = window_set(robot, fault.log, settings);
     if (!windows) continue;
-    const double stretches =
-        static_cast<double>(windows->trials.size()) / static_cast<double>(windows->horizons);
+    const double stretches = windows->stretches();
     // Densities are of what was logged, in its own unit.
     fault.objective =
         WindowFitter(robot, *windows, reference).hold(rows, nominals(rows)).objective +
@@ -109,11 +108,11 @@ void drop_stale_frames(GroundSearch* search) {
 Status search_faults(const GroundRobot& robot, const WindowSettings& settings,
                      const GroundQuestion& question, FitMemo* memo, GroundSearch* search) {
   drop_stale_frames(search);
-  while (search->faults.size() < kMostFaults) {
-    auto fault = find_ground_fault(robot, search->log, question, settings);
-    auto windows = window_set(robot, search->log, settings);
-    if (!windows) return windows.error();
-    search->windows = std::move(*windows);
+  for (;;) {
+    const bool settled = !question.sensor.empty() || search->faults.size() >= kMostFaults;
+    auto fault = settled ? std::nullopt : find_ground_fault(robot, search->log, question, settings);
+    ASSIGN_OR_RETURN(auto windows, window_set(robot, search->log, settings));
+    search->windows = std::move(windows);
     search->rows = held_rows(question);
     const WindowFitter fitter(robot, search->windows, reference_of(question), memo);
     search->fit = fitter.fit(search->rows);
@@ -122,10 +121,12 @@ Status search_faults(const GroundRobot& robot, const WindowSettings& settings,
     search->faults.push_back(fault->hypothesis);
     search->fault_gains.push_back(fault->gain);
     search->log = std::move(fault->log);
-    ASSIGN_OR_RETURN(auto mended, window_set(robot, search->log, settings));
-    search->windows = std::move(mended);
-    const WindowFitter again(robot, search->windows, reference_of(question), memo);
-    search->fit = again.fit(search->rows);
+  }
+  if (!search->windows.noise.empty()) {
+    const WindowFitter as_stated(robot, search->windows, reference_of(question), memo);
+    search->windows.least_noise = as_stated.likeliest_least_noise(search->fit);
+    const WindowFitter fitter(robot, search->windows, reference_of(question), memo);
+    search->fit = fitter.fit(search->rows);
   }
   search->grid = grid_of(search->log);  // in metres by now
   return {};
@@ -159,8 +160,8 @@ std::optional<std::vector<RunClock>> clocks_apart(const WindowFitter& fitter,
     std::vector<double> nats(runs, 0.0);
     double all = 0;
     for (std::size_t i = 0; i < run.size(); ++i) {
-      nats[run[i]] += held.nats[i] / windows.horizons;
-      all += held.nats[i] / windows.horizons;
+      nats[run[i]] += held.nats[i] / windows.lengths;
+      all += held.nats[i] / windows.lengths;
     }
     common = std::max(common, all);
     for (std::size_t r = 0; r < runs; ++r) {

@@ -7,6 +7,7 @@
 #include <set>
 #include <utility>
 
+#include "common/base/try.h"
 #include "common/math/statistics.h"
 #include "common/random/stream.h"
 #include "master/ground/fit/edge.h"
@@ -20,10 +21,16 @@ constexpr double kFarOff = 20;
 // How little a value may be off that no log shows: of its tolerance.
 constexpr double kHeld = 1e-6;
 constexpr double kUnshown = 0.7;  // of the prior's deviation: a log that leaves more says nothing
-// Headings of the tracked point that a fit begins at, and for how many rounds each is followed.
+// Headings of the tracked point that a fit begins at, how many of them are followed, for how many
+// rounds, and for how many more where faults are compared.
 constexpr int kTurns = 8;
+constexpr std::size_t kFollowed = 3;
 constexpr int kScanRounds = 3;
-constexpr double kExplained = 0.2;  // of the median way
+constexpr int kRounds = 40, kFaultRounds = 8;
+// Of the median way and turn: rows may be nearly as unsure as they are long.
+constexpr double kExplained = 0.6;
+constexpr double kMostRatio = 2;                     // to the file's value, either way
+constexpr double kShift_s = 0.05, kMostShift_s = 1;  // between clocks that rows make one
 
 // A grip that was never reached has no upper end that shows, and none below that does not: half of
 // how far it may fall, in its logarithm, before the log would be two nats less likely.
@@ -104,13 +111,22 @@ std::vector<FitRow> begun_at(std::vector<FitRow> rows, const Eigen::VectorXd& va
 // Values from where slopes lead on, whichever way the tracked point heads: of a sensor that was put
 // in sideways or backward none leads there from the file's.
 Eigen::VectorXd scan_marker(const WindowFitter& fitter, const std::vector<FitRow>& rows) {
-  std::optional<WindowFit> best;
-  for (int turn = 0; turn < kTurns; ++turn) {
+  const auto turned_by = [&](int turn) {
     std::vector<FitRow> turned = rows;
     for (FitRow& row : turned) {
       if (row.row.name == "marker_yaw") row.row.nominal += 2 * std::numbers::pi * turn / kTurns;
     }
-    WindowFit fit = fitter.fit(turned, {}, {}, kScanRounds);
+    return turned;
+  };
+  std::vector<std::pair<double, int>> turns;  // of the objective, best first
+  for (int turn = 0; turn < kTurns; ++turn) {
+    const std::vector<FitRow> turned = turned_by(turn);
+    turns.emplace_back(-fitter.hold(turned, nominals(turned)).objective, turn);
+  }
+  std::sort(turns.begin(), turns.end());
+  std::optional<WindowFit> best;
+  for (std::size_t k = 0; k < kFollowed; ++k) {
+    WindowFit fit = fitter.fit(turned_by(turns[k].second), {}, {}, kScanRounds);
     if (!best || fit.objective > best->objective) best = std::move(fit);
   }
   for (std::size_t k = 0; k < rows.size(); ++k) {
@@ -120,50 +136,100 @@ Eigen::VectorXd scan_marker(const WindowFitter& fitter, const std::vector<FitRow
   return best->values;
 }
 
+// Rows that hold both wheels and increments may have read them from clocks that are apart: where a
+// delay explains more than two halves of a log differ by, it is fitted after all.
+WindowFit with_delay(const WindowFitter& fitter, const WindowFit& fit) {
+  const auto row = std::find_if(fit.rows.begin(), fit.rows.end(),
+                                [](const FitRow& r) { return r.row.name == "delay"; });
+  if (row == fit.rows.end() || row->free) return fit;
+  const auto at = row - fit.rows.begin();
+  std::vector<FitRow> rows = fit.rows;
+  rows[static_cast<std::size_t>(at)].free = true;
+  rows[static_cast<std::size_t>(at)].row.tolerance = kDelay_s;
+  Eigen::VectorXd best = fit.values;
+  double most = fit.objective;
+  for (double size = kShift_s; size <= kMostShift_s; size *= 1.5) {
+    for (const double shift : {size, -size}) {
+      Eigen::VectorXd values = fit.values;
+      values[at] += shift;
+      const double objective = fitter.hold(rows, values).objective;
+      if (objective <= most) continue;
+      most = objective;
+      best = values;
+    }
+  }
+  if (best == fit.values) return fit;
+  WindowFit moved = fitter.fit(rows, {}, best);
+  return moved.objective > fit.objective + kLeastChangeGain ? moved : fit;
+}
+
 WindowFit open_fit(const WindowFitter& fitter, const GroundRobot& robot,
-                   const std::vector<KinematicRow>& of, const RunLog& log) {
+                   const std::vector<KinematicRow>& of, const RunLog& log, int rounds = kRounds) {
   std::vector<FitRow> rows = open_rows(robot, of, log);
   rows = begun_at(rows, scan_delay(fitter, rows, nominals(rows)));
   if (log.relative) rows = begun_at(rows, scan_marker(fitter, rows));
-  return fitter.fit(rows, {}, nominals(rows));
+  const WindowFit fit = fitter.fit(rows, {}, nominals(rows), rounds);
+  return log.relative ? with_delay(fitter, fit) : fit;
 }
 
-// Whether values account for where windows end: what is left is small beside the motion.
+// Whether values account for where windows end: what is left is small beside the motion, and no
+// wheel has half or twice its size or turns the other way.
 bool explains(const WindowFitter& fitter, const WindowFit& fit) {
-  std::vector<double> ways;
+  std::vector<double> ways, turns;
   for (const Trial& t : fitter.windows().trials) {
     ways.push_back(std::hypot(t.X_WE.x - t.X_WS.x, t.X_WE.y - t.X_WS.y));
+    turns.push_back(std::abs(wrap_angle(t.X_WE.theta - t.X_WS.theta)));
   }
-  return fit.scales.front().head<2>().maxCoeff() < kExplained * median(ways);
+  for (std::size_t k = 0; k < fit.rows.size(); ++k) {
+    if (fit.rows[k].row.key != "ratio") continue;
+    const double ratio = fit.values[static_cast<Eigen::Index>(k)];
+    if (ratio < 1 / kMostRatio || ratio > kMostRatio) return false;
+  }
+  const Eigen::Vector3d& left = fit.scales.front();
+  return left.head<2>().maxCoeff() < kExplained * median(ways) &&
+         left[2] < kExplained * median(turns);
 }
 
-// Whether the log is the wrong way round: put right, it fits better than with all values free.  A
-// sensor that looks another way hides another unit from values that are held, so increments that no
-// values explain are fitted in each unit.
+// What is wrong with increments that no values explain, whichever way the sensor looks: each fault
+// is put right, and all values are fitted anew.
+std::optional<GroundFault> fault_of_increments(const GroundRobot& robot, const RunLog& log,
+                                               const WindowSettings& settings,
+                                               const GroundQuestion& question,
+                                               const WindowFit& fit) {
+  std::optional<GroundFault> best;
+  for (std::size_t i = 0; i < question.catalogue.size(); ++i) {
+    const GroundHypothesis& h = question.catalogue[i];
+    if (!h.put_right || h.of_world) continue;
+    GroundFault fault;
+    fault.hypothesis = i;
+    fault.log = log;
+    h.put_right(&fault.log);
+    const auto windows = window_set(robot, fault.log, settings);
+    if (!windows) continue;
+    const double stretches = windows->stretches();
+    const WindowFitter fitter(robot, *windows, nullptr);
+    fault.objective = open_fit(fitter, robot, question.rows, fault.log, kFaultRounds).objective +
+                      stretches * std::log(h.metres * h.metres * h.radians);
+    fault.gain = fault.objective - fit.objective;
+    fault.shrinks = std::exp(fault.gain / (3 * stretches));
+    if (fault.gain < kFaultGain || (best && fault.gain <= best->gain)) continue;
+    best = std::move(fault);
+  }
+  return best;
+}
+
+// Whether the log is the wrong way round: put right, it fits better than with all values free.
 const GroundHypothesis* fault_of(const GroundRobot& robot, const RunLog& log,
                                  const WindowSettings& settings, const GroundQuestion& question,
                                  const WindowFitter& as_logged, const WindowFit& fit) {
-  const auto fault = find_ground_fault(robot, log, question, settings);
-  if (fault && fault->objective > fit.objective) return &question.catalogue[fault->hypothesis];
-  if (!log.relative || explains(as_logged, fit)) return nullptr;
-  const GroundHypothesis* best = nullptr;
-  double most = fit.objective + kFaultGain;
-  for (const GroundHypothesis& h : question.catalogue) {
-    if (!h.put_right || h.metres == 1) continue;
-    RunLog right = log;
-    h.put_right(&right);
-    const auto windows = window_set(robot, right, settings);
-    if (!windows) continue;
-    const double stretches =
-        static_cast<double>(windows->trials.size()) / static_cast<double>(windows->horizons);
-    const WindowFitter fitter(robot, *windows, nullptr);
-    const double objective = open_fit(fitter, robot, question.rows, right).objective +
-                             2 * stretches * std::log(h.metres);
-    if (objective <= most) continue;
-    most = objective;
-    best = &h;
+  std::optional<GroundFault> fault;
+  if (!log.relative) {
+    fault = find_ground_fault(robot, log, question, settings);
+    if (fault && fault->objective <= fit.objective) fault.reset();
+  } else if (!explains(as_logged, fit)) {
+    fault = fault_of_increments(robot, log, settings, question, fit);
   }
-  return best;
+  return fault ? &question.catalogue[fault->hypothesis] : nullptr;
 }
 
 GroundReference reference_of(const WindowFitter& fitter, const WindowFit& fit, std::uint64_t seed) {
@@ -213,13 +279,17 @@ Result<GroundQuestion> ask_what_changed(const GroundRobot& robot, const RunLog& 
                                         FitMemo* memo) {
   GroundQuestion question;
   question.rows = change_rows(robot);
-  question.catalogue = change_hypotheses(robot, question.rows);
-  const auto windows = window_set(robot, reference, settings);
+  add_gyro_scale(reference, &question.rows);
+  question.catalogue = that_can_show(reference, change_hypotheses(robot, question.rows));
+  auto windows = window_set(robot, reference, settings);
   if (!windows) return Error{"the reference: " + windows.error().message};
+  const WindowFitter as_stated(robot, *windows, nullptr, memo);
+  WindowFit fit = open_fit(as_stated, robot, question.rows, reference);
+  windows->least_noise = as_stated.likeliest_least_noise(fit);
   const WindowFitter fitter(robot, *windows, nullptr, memo);
-  WindowFit fit = open_fit(fitter, robot, question.rows, reference);
+  if (!windows->noise.empty()) fit = fitter.fit(fit.rows, {}, fit.values);
   if (const GroundHypothesis* h = fault_of(robot, reference, settings, question, fitter, fit)) {
-    return Error{"the reference's log is wrong in " + h->thing + ". " + h->remedy};
+    return Error{"the log that values are fitted to is wrong in " + h->thing + ". " + h->remedy};
   }
   fit = with_traits(fitter, that_can_show(reference, ground_hypotheses(robot)), std::move(fit));
   question.reference = reference_of(fitter, fit, seed);
@@ -233,6 +303,43 @@ Result<GroundQuestion> ask_what_changed(const GroundRobot& robot, const RunLog& 
     }
   }
   return question;
+}
+
+Result<SettledSensor> settle_sensor(const GroundRobot& robot, RunLog log,
+                                    const WindowSettings& settings, const GroundQuestion& question,
+                                    std::uint64_t seed) {
+  SettledSensor settled;
+  for (;;) {
+    ASSIGN_OR_RETURN(const auto windows, window_set(robot, log, settings));
+    const WindowFitter fitter(robot, windows, nullptr);
+    const WindowFit fit = open_fit(fitter, robot, question.rows, log);
+    auto fault = settled.faults.size() < kMostFaults && !explains(fitter, fit)
+                     ? fault_of_increments(robot, log, settings, question, fit)
+                     : std::nullopt;
+    if (fault) {
+      settled.faults.push_back(fault->hypothesis);
+      settled.fault_gains.push_back(fault->gain);
+      log = std::move(fault->log);
+      continue;
+    }
+    const Eigen::MatrixX2d bounds = fitter.intervals(fit, seed);
+    for (std::size_t k = 0; k < fit.rows.size(); ++k) {
+      const KinematicRow& row = question.rows[k];
+      if (!row.name.starts_with("marker_")) continue;
+      const auto i = static_cast<Eigen::Index>(k);
+      const double had = value_in_file(robot, row.name);
+      settled.pose.push_back({row, had, fit.values[i], {bounds(i, 0), bounds(i, 1)}});
+    }
+    break;
+  }
+  settled.log = std::move(log);
+  return settled;
+}
+
+void add_gyro_scale(const RunLog& log, std::vector<KinematicRow>* rows) {
+  const bool any = std::any_of(log.runs.begin(), log.runs.end(),
+                               [](const LoggedRun& run) { return !run.yaw_rates.empty(); });
+  if (any) rows->push_back({kGyroScale, 1, kGyroShare, "ratio", "-"});
 }
 
 }  // namespace gapfarm

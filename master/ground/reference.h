@@ -16,6 +16,22 @@ Result<GroundQuestion> ask_what_changed(const GroundRobot& robot, const RunLog& 
                                         const WindowSettings& settings, std::uint64_t seed,
                                         FitMemo* memo);
 
+// Of increments it is open which way their sensor looks and where it stands: both are fitted with
+// every value, whatever the robot's file has, before anything else is asked.
+struct SettledSensor {
+  RunLog log;  // faults put right
+  std::vector<std::size_t> faults;
+  std::vector<double> fault_gains;
+  std::vector<SensorValue> pose;  // marker_x, marker_y (m), marker_yaw (rad)
+};
+// Errors: no window fits.
+Result<SettledSensor> settle_sensor(const GroundRobot& robot, RunLog log,
+                                    const WindowSettings& settings, const GroundQuestion& question,
+                                    std::uint64_t seed);
+
+// A row for the gyro's scale, where the log has one.
+void add_gyro_scale(const RunLog& log, std::vector<KinematicRow>* rows);
+
 // Whether every pose of a run ends a stretch that one of its commands is about, as rows have it
 // that hold both.
 bool shares_a_clock(const RunLog& log);

@@ -90,8 +90,7 @@ bool chosen_before(const GroundSearch& search, std::size_t index) {
 double least_gain(const GroundSearch& search) {
   if (!search.reference) return kLeastGroundGain;
   // A long log is sure of the smallest of differences, which no model has right.
-  const double stretches = static_cast<double>(search.windows.trials.size()) /
-                           static_cast<double>(search.windows.horizons);
+  const double stretches = search.windows.stretches();
   double least = std::max(kLeastChangeGain, 3 * stretches * std::log(kChangeShrinks));
   if (!search.steps.empty()) least = std::max(least, kShareOfFirst * search.steps.front().gain);
   return least;
@@ -322,6 +321,9 @@ Result<GroundSearch> search_ground(const GroundRobot& robot, const RunLog& log,
   GroundSearch search;
   search.catalogue = question.catalogue;
   search.reference = question.reference;
+  search.sensor = question.sensor;
+  search.faults = question.faults;
+  search.fault_gains = question.fault_gains;
   search.log = log;
   stage(kFaultStage);
   if (Status s = search_faults(robot, settings, question, work.memo, &search); !s) {

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "common/base/interval.h"
 #include "common/base/result.h"
 #include "common/progress/finding.h"
 #include "common/recordings/run.h"
@@ -42,11 +43,23 @@ struct GroundStep {
   std::vector<std::size_t> not_distinguished;
 };
 
+// Of the pose of a sensor that sees increments, fitted beforehand.
+struct SensorValue {
+  KinematicRow row;
+  double had = 0;  // by the robot's file
+  double value = 0;
+  Interval interval;  // 90 %
+};
+
 // What a search is about.
 struct GroundQuestion {
   std::vector<KinematicRow> rows;
   std::vector<GroundHypothesis> catalogue;
   std::optional<GroundReference> reference;  // the log that the rows' nominals are from
+  // Of increments: the sensor's pose as the robot has it by now, and what was put right before.
+  std::vector<SensorValue> sensor = {};
+  std::vector<std::size_t> faults = {};
+  std::vector<double> fault_gains = {};
 };
 
 // Who waits for a search.
@@ -66,6 +79,7 @@ struct GroundSearch {
   std::optional<WheelLoop> loop;    // where speeds were measured beside commands
   std::vector<std::size_t> faults;  // of the log, as found; put right in `log`
   std::vector<double> fault_gains;
+  std::vector<SensorValue> sensor = {};
   PoseGrid grid;      // that the poses are rounded to
   StaleFrames stale;  // taken out of `log`
   RunLog log;

@@ -31,6 +31,7 @@ inline constexpr double kMarkerShare = 0.02;  // of the wheels' reach
 // Where the weight stands, of the wheels' reach: cables and a battery that was put back.
 inline constexpr double kLoadShare = 0.05;
 inline constexpr double kMarkerYaw_rad = 0.01;
+inline constexpr double kGyroShare = 0.01;  // of a gyro's scale: data sheets of MEMS say 1 to 3 %
 inline constexpr double kSteering_rad = 0.003;
 // Tyres that slip sideways move the point that a car turns about, as if its marker stood elsewhere.
 inline constexpr double kCarMarkerShare = 0.3;  // 50 to 80 mm of a car of 0.17 m
@@ -82,6 +83,7 @@ inline constexpr PlausibleError kPlausibleErrors[] = {
     {"marker_x", 0.3, "m"},
     {"marker_y", 0.3, "m"},
     {"marker_yaw", 0.5, "rad"},
+    {"gyro_scale", 0.05, "-"},
     {"pose_scale", 0.05, "-"},
     {"aspect", 0.03, "-"},
 };

@@ -1,5 +1,6 @@
 // gapfarm export ros CONFIG|RUN|DIAGNOSIS: what a log says, in the words of its user's own files.
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -31,6 +32,7 @@ struct ExportCommand {
 };
 
 constexpr double kLow = 0.05, kHigh = 0.95;
+constexpr double kLeastShift_s = 1e-3;
 constexpr double kEachRow_s = 1e-3;  // a horizon that every way between two poses is longer than
 
 struct Reported {
@@ -38,6 +40,15 @@ struct Reported {
   RosFriction friction;
   Eigen::MatrixXd covariance;  // of the values; of a fit
 };
+
+// Whether rows that hold wheels and increments were read at other times after all.
+bool clocks_are_apart(const GroundRobot& robot, const GroundReference& fit) {
+  for (std::size_t k = 0; k < fit.names.size(); ++k) {
+    const double value = fit.values[static_cast<Eigen::Index>(k)];
+    if (fit.names[k] == "delay") return std::abs(value - robot.motors.delay_s) > kLeastShift_s;
+  }
+  return false;
+}
 
 // Every value of the robot's kinematics by a log.
 Result<Reported> fitted_values(const GroundRobot& robot, const std::vector<std::string>& folders,
@@ -52,10 +63,14 @@ Result<Reported> fitted_values(const GroundRobot& robot, const std::vector<std::
   // Increments err each by itself: a window of several knows nothing that they do not, unless
   // wheels were read at other times.
   const bool together = log.relative && shares_a_clock(log);
-  const WindowSettings windows =
-      together ? WindowSettings{{kEachRow_s}, 0.5} : WindowSettings{{0.5, 2, 5}, 0.5};
-  ASSIGN_OR_RETURN(const auto asked,
-                   ask_what_changed(reported_values.given, log, windows, 1, nullptr));
+  const WindowSettings each_row = {{kEachRow_s}, 0.5}, summed = {{0.5, 2, 5}, 0.5};
+  const auto ask = [&](const WindowSettings& windows) {
+    return ask_what_changed(reported_values.given, log, windows, 1, nullptr);
+  };
+  ASSIGN_OR_RETURN(auto asked, ask(together ? each_row : summed));
+  if (together && clocks_are_apart(reported_values.given, *asked.reference)) {
+    ASSIGN_OR_RETURN(asked, ask(summed));
+  }
   const GroundReference& fit = *asked.reference;
   for (std::size_t k = 0; k < fit.names.size(); ++k) {
     const auto i = static_cast<Eigen::Index>(k);

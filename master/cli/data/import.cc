@@ -94,6 +94,7 @@ Status write_files(const std::string& out, const RunFiles& files, const std::str
   const Outputs::NamedTexts all = {{"commands.csv", files.commands},
                                    {"poses.csv", files.poses},
                                    {"wheels.csv", files.wheels},
+                                   {"gyro.csv", files.gyro},
                                    {"map.toml", map}};
   std::vector<std::string> names;
   for (const auto& [name, text] : all) {

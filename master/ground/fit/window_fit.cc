@@ -2,10 +2,11 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <map>
 
 #include "common/math/algebra.h"
-#include "common/recordings/windows.h"
 #include "common/score/kinematic.h"
 #include "master/ground/fit/window_prior.h"
 
@@ -23,19 +24,13 @@ double robust_deviation(std::vector<double>* sizes) {
   return std::max(1.4826 * *middle, 1e-5);
 }
 
-constexpr std::size_t kLeastBlocks = 10;  // fewer runs than this are cut into stretches
-// The same of increments, which know of nothing that lasts: tens of stretches say better how far
-// values scatter.
-constexpr std::size_t kLeastRelativeBlocks = 30;
-constexpr double kMargin_s = 11;  // of commands round a window: clocks may be 10 s apart
+}  // namespace
 
-bool alike(const std::vector<Trial>& a, std::size_t from_a, const std::vector<Trial>& b) {
-  if (a.size() - from_a != b.size()) return false;
-  for (std::size_t i = 0; i < b.size(); ++i) {
-    const Trial& x = a[from_a + i];
-    if (x.run != b[i].run || x.t_s != b[i].t_s || x.duration_s != b[i].duration_s) return false;
-  }
-  return true;
+namespace {
+
+double gyro_ratio(const Kinematics& at) {
+  const auto found = std::find(at.names.begin(), at.names.end(), kGyroScale);
+  return found == at.names.end() ? 1 : at.values[found - at.names.begin()];
 }
 
 }  // namespace
@@ -59,7 +54,11 @@ WindowFitter::WindowFitter(const GroundRobot& robot, const WindowSet& windows,
                            const GroundReference* reference, FitMemo* memo)
     : robot_(robot), windows_(windows), reference_(reference), memo_(memo) {
   if (memo != nullptr) question_ = question_of(robot, windows, reference);
-  if (robot.command == CommandKind::kThrottleSteering) shape_by_speed();
+  if (robot.command == CommandKind::kThrottleSteering) {
+    shape_by_speed();
+  } else if (!windows.noise.empty()) {
+    shapes_ = noise_shapes(windows.least_noise);
+  }
 }
 
 void WindowFitter::shape_by_speed() {
@@ -118,10 +117,38 @@ std::vector<Eigen::Vector3d> WindowFitter::residuals(const std::vector<FitRow>& 
   std::vector<Eigen::Vector3d> r;
   r.reserve(ends.size());
   for (std::size_t i = 0; i < ends.size(); ++i) {
-    r.push_back(local_difference(ends[i], windows_.trials[i].X_WE));
+    const Trial& trial = windows_.trials[i];
+    const Sense sense = windows_.sense_of(i);
+    if (sense == Sense::kGyro) {
+      const double turned = windows_.turned_rad[i] / gyro_ratio(at);
+      r.emplace_back(0, 0, wrap_angle(turned - ends[i].theta + trial.X_WS.theta));
+      continue;
+    }
+    r.push_back(local_difference(ends[i], sense == Sense::kReturn ? trial.X_WS : trial.X_WE));
     if (!shapes_.empty()) r.back() = shapes_[i] * r.back();
   }
+  take_biases_out(&r);
   return r;
+}
+
+// A gyro's bias lasts as long as a run, and is what makes its windows fit best.
+void WindowFitter::take_biases_out(std::vector<Eigen::Vector3d>* r) const {
+  if (windows_.turned_rad.empty()) return;
+  std::map<std::pair<int, std::size_t>, std::array<double, 2>> sums;  // of a horizon and a run
+  const auto key = [&](std::size_t i) {
+    return std::pair(windows_.horizon[i], windows_.run_of[i]);
+  };
+  for (std::size_t i = 0; i < r->size(); ++i) {
+    if (windows_.sense_of(i) != Sense::kGyro) continue;
+    const double T = *windows_.trials[i].duration_s;
+    sums[key(i)][0] += T * (*r)[i][2];
+    sums[key(i)][1] += T * T;
+  }
+  for (std::size_t i = 0; i < r->size(); ++i) {
+    if (windows_.sense_of(i) != Sense::kGyro) continue;
+    const auto& [with, without] = sums[key(i)];
+    (*r)[i][2] -= with / without * *windows_.trials[i].duration_s;
+  }
 }
 
 std::vector<double> WindowFitter::uses(const std::vector<char>& held_out) const {
@@ -129,7 +156,8 @@ std::vector<double> WindowFitter::uses(const std::vector<char>& held_out) const 
   for (std::size_t i = 0; i < use.size(); ++i) {
     const bool out = !held_out.empty() && held_out[static_cast<std::size_t>(windows_.block[i])];
     // Windows of several horizons cover the same stretch.
-    use[i] = out ? 0 : 1.0 / windows_.horizons;
+    const bool once = windows_.sense_of(i) == Sense::kReturn;
+    use[i] = out ? 0 : once ? 1 : 1.0 / windows_.lengths;
   }
   return use;
 }
@@ -171,6 +199,14 @@ void WindowFitter::rescale(WindowFit* fit, const std::vector<double>& use) const
         fit->scales[h][c] = std::max(std::sqrt(sums[h][c] / counts[h]), 1e-5);
       }
     }
+  }
+  // A return is as sure as it is said to be, and as what the way to it adds up: one alone has no
+  // scatter.
+  for (std::size_t k = 0; k < windows_.returns.size(); ++k) {
+    const Return& back = windows_.returns[k];
+    const Eigen::Vector3d squares = fit->scales.front().cwiseAbs2();
+    fit->scales[n - windows_.returns.size() + k] =
+        (back.variance + (back.of_way * squares).cwiseMin(back.of_slip)).cwiseSqrt();
   }
 }
 
@@ -318,62 +354,6 @@ WindowFit WindowFitter::fit_from(const std::vector<FitRow>& rows, const std::vec
   fit.residuals = residuals(rows, fit.values);
   score(&fit, uses(held_out));
   return fit;
-}
-
-Result<WindowSet> window_set(const GroundRobot& robot, const RunLog& log,
-                             const WindowSettings& settings) {
-  WindowSet set;
-  const bool restarts = robot.command == CommandKind::kThrottleSteering;
-  std::vector<std::size_t> run_of;  // of each trial, in the log
-  std::size_t last = 0;
-  for (const double horizon : settings.horizons_s) {
-    auto cut = cut_windows(log, {{horizon}, settings.run_in_s});
-    if (!cut) continue;
-    if (!restarts && set.horizons > 0 && alike(set.trials, last, cut->log.trials)) continue;
-    last = set.trials.size();
-    for (const Trial& trial : cut->log.trials) run_of.push_back(*trial.run);
-    if (restarts) {
-      *cut = restart_at_measured_speed(log, std::move(*cut), settings.run_in_s, kMargin_s);
-      for (Trial& trial : cut->log.trials) *trial.run += static_cast<std::uint32_t>(last);
-      set.runs.insert(set.runs.end(), cut->runs.begin(), cut->runs.end());
-    } else {
-      set.runs = std::move(cut->runs);
-    }
-    for (Trial& trial : cut->log.trials) {
-      set.trials.push_back(std::move(trial));
-      set.horizon.push_back(set.horizons);
-    }
-    ++set.horizons;
-  }
-  if (set.trials.empty()) return Error{"no window of any horizon fits into the runs"};
-  std::vector<double> begin(log.runs.size()), length(log.runs.size());
-  double all = 0;
-  for (std::size_t i = 0; i < log.runs.size(); ++i) {
-    if (log.runs[i].poses.size() < 2) continue;
-    begin[i] = log.runs[i].poses.front().t_s;
-    length[i] = log.runs[i].poses.back().t_s - begin[i];
-    all += length[i];
-  }
-  // Stretches of one length, none over two runs.
-  std::vector<int>& first = set.run_blocks;
-  first.resize(log.runs.size());
-  const std::size_t least = log.relative ? kLeastRelativeBlocks : kLeastBlocks;
-  const bool few = log.runs.size() < least;
-  for (std::size_t i = 0; i < log.runs.size(); ++i) {
-    first[i] = set.blocks;
-    const double pieces =
-        few ? std::ceil(static_cast<double>(least) * length[i] / std::max(all, 1e-9)) : 1;
-    set.blocks += std::max(1, static_cast<int>(pieces));
-  }
-  for (std::size_t i = 0; i < set.trials.size(); ++i) {
-    const Trial& trial = set.trials[i];
-    const std::size_t run = run_of[i];
-    const int pieces = (run + 1 < first.size() ? first[run + 1] : set.blocks) - first[run];
-    const double middle = *trial.t_s + *trial.duration_s / 2 - begin[run];
-    const int piece = static_cast<int>(pieces * middle / std::max(length[run], 1e-9));
-    set.block.push_back(first[run] + std::clamp(piece, 0, pieces - 1));
-  }
-  return set;
 }
 
 }  // namespace gapfarm

@@ -8,28 +8,11 @@
 #include <string>
 #include <vector>
 
-#include "common/base/result.h"
-#include "common/recordings/windows.h"
 #include "common/robot/robot.h"
+#include "master/ground/fit/window_set.h"
 #include "master/ground/hypotheses.h"
 
 namespace gapfarm {
-
-// Windows of several horizons; their residuals share scales by horizon and component.
-struct WindowSet {
-  std::vector<CommandedRun> runs;
-  std::vector<Trial> trials;
-  std::vector<int> horizon;  // of each trial
-  std::vector<int> block;    // of each trial: what is held out or resampled together
-  int horizons = 0;
-  int blocks = 0;
-  std::vector<int> run_blocks;  // of each run: its first block; those of one run follow each other
-};
-
-// Blocks are runs, or stretches of them where there are fewer than ten.  Windows of robots with a
-// throttle restart (common/recordings/windows.h).  Errors: no window fits.
-Result<WindowSet> window_set(const GroundRobot& robot, const RunLog& log,
-                             const WindowSettings& settings);
 
 struct FitRow {
   KinematicRow row;
@@ -105,6 +88,10 @@ class WindowFitter {
   const WindowSet& windows() const { return windows_; }
   const GroundRobot& robot() const { return robot_; }
 
+  // The likeliest WindowSet::least_noise by a fit's residuals, of some; as it is where nothing is
+  // stated.
+  double likeliest_least_noise(const WindowFit& fit) const;
+
   // A fit's residuals as they are: m, m, rad.
   std::vector<Eigen::Vector3d> raw_residuals(const WindowFit& fit) const;
 
@@ -137,14 +124,17 @@ class WindowFitter {
                      const Eigen::VectorXd& start, int rounds) const;
 
   void shape_by_speed();
+  std::vector<Eigen::Matrix3d> noise_shapes(double least) const;
+  void take_biases_out(std::vector<Eigen::Vector3d>* r) const;
 
   const GroundRobot& robot_;
   const WindowSet& windows_;
   const GroundReference* reference_;
   FitMemo* memo_;
   std::string question_;  // hash of robot, windows and reference; empty without a memo
-  // Where a throttle leaves the speed unsure, the ends of a window err along its way above all:
-  // what residuals are multiplied by, a window, so that the way counts less; empty: nothing.
+  // Where a throttle leaves the speed unsure, the ends of a window err along its way above all;
+  // of increments each row may say how sure it is: what residuals are multiplied by, a window;
+  // empty: nothing.
   std::vector<Eigen::Matrix3d> shapes_;
 };
 

@@ -6,6 +6,7 @@
 
 #include "common/base/hash.h"
 #include "common/math/algebra.h"
+#include "common/math/statistics.h"
 #include "common/random/stream.h"
 #include "common/robot/robot_file.h"
 #include "master/ground/fit/held_out.h"
@@ -14,6 +15,8 @@
 namespace gapfarm {
 namespace {
 
+// Of every row's variance, of the middle one's: candidates.
+constexpr double kLeastNoises[] = {0.1, 0.3, 1, 3, 10, 100};
 constexpr double kLeastCurvature = 0.3;  // of the weights; of Student's own residuals 0.71
 
 void add_pose(const Pose& X, Hasher* hasher) { hasher->add(X.x).add(X.y).add(X.theta); }
@@ -36,6 +39,14 @@ std::string question_of(const GroundRobot& robot, const WindowSet& windows,
     hasher.add(*trial.t_s).add(*trial.duration_s).add(std::uint64_t{*trial.run});
     add_pose(trial.X_WS, &hasher);
     add_pose(trial.X_WE, &hasher);
+  }
+  for (const Eigen::Matrix3d& noise : windows.noise) {
+    for (Eigen::Index k = 0; k < noise.size(); ++k) hasher.add(noise(k));
+  }
+  hasher.add(windows.least_noise);
+  for (const double turned : windows.turned_rad) hasher.add(turned);
+  for (const Return& back : windows.returns) {
+    for (const double variance : back.variance) hasher.add(variance);
   }
   for (std::size_t k = 0; reference != nullptr && k < reference->names.size(); ++k) {
     const auto i = static_cast<Eigen::Index>(k);
@@ -179,6 +190,58 @@ Eigen::MatrixX2d WindowFitter::intervals(const WindowFit& fit, std::uint64_t see
     bounds(k, 1) = std::max(row[kGroundDraws - 1 - kGroundDraws / 20], fit.values[k]);
   }
   return bounds;
+}
+
+// What a row states counts as far as it makes it more or less sure than others: common scales stay
+// free, and no row is surer than slip and rounding leave any.
+std::vector<Eigen::Matrix3d> WindowFitter::noise_shapes(double least) const {
+  std::vector<Eigen::Matrix3d> shapes;
+  const std::vector<Eigen::Matrix3d>& noise = windows_.noise;
+  std::vector<std::vector<double>> variances(3 * static_cast<std::size_t>(windows_.horizons));
+  for (std::size_t i = 0; i < noise.size(); ++i) {
+    for (std::size_t c = 0; c < 3; ++c) {
+      const auto k = static_cast<Eigen::Index>(c);
+      variances[3 * static_cast<std::size_t>(windows_.horizon[i]) + c].push_back(noise[i](k, k));
+    }
+  }
+  std::vector<double> middle;
+  for (const std::vector<double>& v : variances) middle.push_back(v.empty() ? 1 : median(v));
+  for (std::size_t i = 0; i < noise.size(); ++i) {
+    const double* m = &middle[3 * static_cast<std::size_t>(windows_.horizon[i])];
+    const Eigen::Vector3d unit = Eigen::Vector3d(m[0], m[1], m[2]).cwiseSqrt();
+    Eigen::Matrix3d C = unit.cwiseInverse().asDiagonal() * noise[i];
+    C = (C * unit.cwiseInverse().asDiagonal()).eval();
+    C = (C + least * Eigen::Matrix3d::Identity()) / (1 + least);
+    const SymmetricAxes axes = axes_of_symmetric(C);
+    const Eigen::Matrix3d root = axes.vectors *
+                                 axes.values.cwiseSqrt().cwiseInverse().asDiagonal() *
+                                 axes.vectors.transpose();
+    shapes.push_back(unit.asDiagonal() * root * unit.cwiseInverse().asDiagonal());
+  }
+  return shapes;
+}
+
+double WindowFitter::likeliest_least_noise(const WindowFit& fit) const {
+  double best = windows_.least_noise, most = -INFINITY;
+  if (windows_.noise.empty() || shapes_.empty()) return best;
+  const std::vector<Eigen::Vector3d> raw = raw_residuals(fit);
+  const std::vector<double> use = uses({});
+  for (const double least : kLeastNoises) {
+    const std::vector<Eigen::Matrix3d> shapes = noise_shapes(least);
+    WindowFit shaped = fit;
+    shaped.scales.clear();
+    double volumes = 0;
+    for (std::size_t i = 0; i < raw.size(); ++i) {
+      shaped.residuals[i] = shapes[i] * raw[i];
+      volumes += use[i] * std::log(shapes[i].determinant());
+    }
+    rescale(&shaped, use);
+    const double objective = score(&shaped, use) + volumes;
+    if (objective <= most) continue;
+    most = objective;
+    best = least;
+  }
+  return best;
 }
 
 }  // namespace gapfarm

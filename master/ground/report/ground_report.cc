@@ -64,10 +64,12 @@ class GroundReport {
 
 double GroundReport::rms_of(const WindowFit& fit, Eigen::Index first, Eigen::Index count) const {
   double sum = 0;
-  for (const Eigen::Vector3d& r : fitter_.raw_residuals(fit)) {
-    sum += r.segment(first, count).squaredNorm();
+  const auto raw = fitter_.raw_residuals(fit);
+  const WindowSet& windows = search_.windows;
+  for (std::size_t i = 0; i < raw.size(); ++i) {
+    if (windows.sense_of(i) == Sense::kPose) sum += raw[i].segment(first, count).squaredNorm();
   }
-  return 1e3 * std::sqrt(sum / static_cast<double>(fit.residuals.size()));
+  return 1e3 * std::sqrt(sum / (windows.stretches() * windows.lengths));
 }
 
 void add_alias(const std::string& name, NamedEffect* effect) {
@@ -125,9 +127,7 @@ void GroundReport::faults() {
     for (const std::string& alias : h.aliases) add_alias(alias, &effect);
     effect.confidence = kAlmostSure;
     effect.closed = effect.closed_hi = 1;
-    const double stretches = static_cast<double>(search_.windows.trials.size()) /
-                             static_cast<double>(search_.windows.horizons);
-    effect.gap_before = search_.fault_gains[k] / stretches;
+    effect.gap_before = search_.fault_gains[k] / search_.windows.stretches();
     const double shrinks = std::exp(effect.gap_before / 3);
     effect.text = fmt::format(
         "The log is wrong in {}: put right, what the robot's file expects is {:.1f} times as near "
@@ -268,6 +268,7 @@ void GroundReport::trials() {
   const auto tuned = fitter_.raw_residuals(search_.chain.front());
   const auto last = fitter_.raw_residuals(search_.chain.back());
   for (std::size_t i = 0; i < search_.windows.trials.size(); ++i) {
+    if (search_.windows.sense_of(i) != Sense::kPose) continue;
     const Trial& from = search_.windows.trials[i];
     DiagnosedTrial t;
     t.session = from.session;
@@ -341,6 +342,10 @@ std::vector<ReportedValue> GroundReport::reported_values() const {
                       search_.fit.values[k],
                       {intervals_(k, 0), intervals_(k, 1)},
                       row.free || search_.reference.has_value()});
+    for (const SensorValue& v : search_.sensor) {
+      if (v.row.name != row.row.name) continue;
+      values.back() = {v.row.name, v.had, v.value, v.interval, true};
+    }
   }
   return values;
 }
@@ -348,6 +353,7 @@ std::vector<ReportedValue> GroundReport::reported_values() const {
 Diagnosis GroundReport::write() {
   faults();
   readings();
+  figures_.faults += report_sensor(search_.sensor, &d_);
   values();
   const std::size_t values_named = d_.effects.size();
   if (search_.loop) report_wheel_loop(*search_.loop, search_.reference.has_value(), &d_);

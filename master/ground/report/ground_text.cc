@@ -102,6 +102,7 @@ std::string change_text(const GroundRobot& robot, const KinematicRow& row, const
 }
 
 constexpr double kLeastShareOfGap = 0.25;
+constexpr double kSensorSure = 0.99;  // outside its interval by far
 constexpr double kMovedTolerances = 2;
 constexpr std::size_t kMostMoved = 4;
 
@@ -164,6 +165,38 @@ std::string text_of_value(const GroundRobot& robot, const GroundHypothesis& h,
     text += (k > 0 ? "; " : "") + in_file(robot, h.freed[k], effect.parameters[k]);
   }
   return capital(text + ".");
+}
+
+int report_sensor(const std::vector<SensorValue>& sensor, Diagnosis* diagnosis) {
+  NamedEffect offset, yaw;
+  offset.name = "marker_offset";
+  yaw.name = "marker_yaw";
+  yaw.aliases = {"heading_offset"};
+  std::string pose;
+  for (const SensorValue& v : sensor) {
+    const auto& [lo, hi] = v.interval;
+    const std::string text = fmt::format(
+        "marker.{} {:.4g} [{:.4g}, {:.4g}] {}; the file has {:.4g}",
+        v.row.name.substr(v.row.name.find('_') + 1), v.value, lo, hi, v.row.unit, v.had);
+    pose += " " + text + ".";
+    const double off = v.value - v.had;
+    if (std::abs(off) < 2 * v.row.tolerance || (lo <= v.had && v.had <= hi)) continue;
+    NamedEffect& effect = v.row.name == "marker_yaw" ? yaw : offset;
+    effect.parameters.push_back({v.row.key, off, lo - v.had, hi - v.had, v.row.unit});
+    effect.text += (effect.text.empty() ? "The sensor's pose on the robot is off: " : "; ") + text;
+  }
+  if (pose.empty()) return 0;
+  diagnosis->cautions.push_back("The sensor's pose was fitted first, with every value free:" +
+                                pose);
+  int off = 0;
+  for (NamedEffect* effect : {&yaw, &offset}) {
+    if (effect->parameters.empty()) continue;
+    effect->text += ".";
+    effect->confidence = kSensorSure;
+    diagnosis->effects.push_back(std::move(*effect));
+    ++off;
+  }
+  return off;
 }
 
 std::string text_of_change(const GroundRobot& robot, const GroundHypothesis& h,
@@ -239,7 +272,7 @@ std::vector<Where> where_left(const WindowFitter& fitter, const GroundSearch& se
       gap.nats += gained;
       gap.by_horizon[h] += gained;
       gap.half[2 * *windows.trials[i].t_s > begin + end ? 1 : 0] += std::max(0.0, gained);
-      if (windows.horizon[i] + 1 != windows.horizons) continue;
+      if (windows.horizon[i] + 1 != windows.lengths) continue;
       gap.offset += raw[i][c];
       gap.squares += raw[i][c] * raw[i][c];
       gap.count += 1;

@@ -19,6 +19,10 @@ Estimate estimate_of(const KinematicRow& row, double value, double lo, double hi
 std::string text_of_value(const GroundRobot& robot, const GroundHypothesis& h,
                           const NamedEffect& effect);
 
+// The pose of a sensor that sees increments: a caution with all of it, and effects where the file's
+// is off by more than twice its tolerance and lies outside the interval.  Returns how many.
+int report_sensor(const std::vector<SensorValue>& sensor, Diagnosis* diagnosis);
+
 // "Friction across the wheels fell by 38 % [33, 43], from 0.71 to 0.44", without a full stop.
 std::string text_of_change(const GroundRobot& robot, const GroundHypothesis& h,
                            const NamedEffect& effect);

@@ -13,6 +13,7 @@
 #include "common/base/try.h"
 #include "common/config/toml_section.h"
 #include "common/pose/pose.h"
+#include "common/recordings/increment_noise.h"
 #include "common/trials/text/csv.h"
 
 namespace gapfarm {
@@ -109,8 +110,10 @@ class MapReader {
     if (const auto up = section->choice("up", kUp)) map.up = kUp[*up];
     section->read("wheel_radius", map.wheel_radius_m, 1e-4, 100, "m");
     section->read("increments", map.increments);
-    static const std::set<std::string_view> kOptions = {"source", "run",          "keep",
-                                                        "up",     "wheel_radius", "increments"};
+    std::string covariance;
+    section->read("covariance", covariance);
+    static const std::set<std::string_view> kOptions = {
+        "source", "run", "keep", "up", "wheel_radius", "increments", "covariance"};
     for (const auto& [key, node] : section->table()) {
       const std::string role(key.str());
       if (kOptions.count(role) != 0) continue;
@@ -122,7 +125,14 @@ class MapReader {
     for (const auto& [line, column, i] : places_) ordered.push_back(map.columns[i]);
     map.columns = std::move(ordered);
     places_.clear();
+    // Of six by six numbers about x, y, z and turns about these, as ROS has them.
+    static constexpr int kPlanar[] = {0, 1, 5, 7, 11, 35};
+    for (std::size_t k = 0; k < kCovarianceColumns.size() && !covariance.empty(); ++k) {
+      map.columns.push_back(
+          {kCovarianceColumns[k], covariance + "[" + std::to_string(kPlanar[k]) + "]", ""});
+    }
     check_times(*section, map);
+    check_noise(*section, map);
   }
 
  private:
@@ -151,6 +161,24 @@ class MapReader {
       refuse(
           " has increments and keep, expected one of them: without its row an increment leads "
           "nowhere");
+    }
+  }
+
+  void check_noise(const TomlSection& section, const TableMap& map) {
+    std::string missing;
+    for (const std::string& role : map.noise()) {
+      if (map.find(role) == nullptr) missing += (missing.empty() ? "" : ", ") + role;
+    }
+    if (!missing.empty()) {
+      errors_.add(section.table().source().begin, section.name() + " has no " + missing +
+                                                      ", expected all of " + map.noise().front() +
+                                                      " to " + map.noise().back() + " or none");
+    }
+    if (!map.noise().empty() && !map.increments) {
+      errors_.add(section.table().source().begin,
+                  section.name() +
+                      " has covariances of poses, expected increments = true: those "
+                      "of poses in the world are read off their scatter");
     }
   }
 
@@ -206,6 +234,15 @@ const MappedColumn* TableMap::find(std::string_view role) const {
   return nullptr;
 }
 
+std::span<const std::string> TableMap::noise() const {
+  for (const auto* roles : {&kCovarianceColumns, &kDeviationColumns}) {
+    for (const std::string& role : *roles) {
+      if (find(role) != nullptr) return *roles;
+    }
+  }
+  return {};
+}
+
 double unit_factor(std::string_view unit) {
   if (unit.empty()) return 1;
   for (const Unit& known : kUnits) {
@@ -228,6 +265,7 @@ std::string format_map(const LogMap& map) {
   write_table("poses", map.poses, out);
   write_table("commands", map.commands, out);
   write_table("wheels", map.wheels, out);
+  write_table("gyro", map.gyro, out);
   return out;
 }
 
@@ -240,6 +278,7 @@ Result<LogMap> parse_map(std::string_view text, const std::string& file) {
   reader.read(root, "poses", map.poses);
   reader.read(root, "commands", map.commands);
   reader.read(root, "wheels", map.wheels);
+  reader.read(root, "gyro", map.gyro);
   root.finish();
   const TableMap& p = map.poses;
   const bool heading =
@@ -249,6 +288,10 @@ Result<LogMap> parse_map(std::string_view text, const std::string& file) {
   if (!p.columns.empty() && (!level || !heading)) {
     errors.add(table.get("poses")->source().begin,
                "[poses] needs x, y and theta, or x, y and qx, qy, qz, qw");
+  }
+  const bool rate = map.gyro.columns.empty() || map.gyro.find("yaw_rate") != nullptr;
+  if (!rate || map.gyro.columns.size() > 2) {
+    errors.add(table.get("gyro")->source().begin, "[gyro] needs t and yaw_rate, and nothing else");
   }
   if (!errors.empty()) return errors.error();
   return map;
@@ -271,7 +314,10 @@ bool to_pose(const TableMap& map, std::vector<double>& values) {
     if (y_up) std::tie(y, z) = std::pair(-z, y);
     theta = std::atan2(2 * (w * z + x * y), w * w + x * x - y * y - z * z);
   }
-  values = {value("t"), value("x"), y_up ? -value("z") : value("y"), wrap_angle(theta)};
+  std::vector<double> pose = {value("t"), value("x"), y_up ? -value("z") : value("y"),
+                              wrap_angle(theta)};
+  for (const std::string& role : map.noise()) pose.push_back(value(role));
+  values = std::move(pose);
   return true;
 }
 

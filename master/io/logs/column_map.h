@@ -35,11 +35,13 @@ struct TableMap {
   std::vector<MappedColumn> columns;
 
   const MappedColumn* find(std::string_view role) const;
+  // The roles of an increment's noise (common/recordings/increment_noise.h); empty: it has none.
+  std::span<const std::string> noise() const;
 };
 
 struct LogMap {
-  TableMap poses, commands, wheels;  // no columns: the recording has none
-  std::vector<std::string> notes;    // why a guess is what it is
+  TableMap poses, commands, wheels, gyro;  // no columns: the recording has none
+  std::vector<std::string> notes;          // why a guess is what it is
 };
 
 // Factor to SI of a unit ("mm", "deg", "ns", "rpm", ...), 0 when nobody knows it.
@@ -49,13 +51,14 @@ std::span<const std::string> known_units();
 // The best guess by names, types and ranges.  Kinds that were not found have no columns.
 LogMap guess_map(const std::vector<Recording>& recordings);
 
-// TOML of [poses], [commands] and [wheels], for `--map`.
+// TOML of [poses], [commands], [wheels] and [gyro], for `--map`.
 std::string format_map(const LogMap& map);
 // Errors with file, line and column: unknown units, kinds without t, poses without x, y and a
 // heading.
 Result<LogMap> parse_map(std::string_view text, const std::string& file);
 
-// {t, x, y, theta} out of the mapped columns; false where nothing was measured.
+// {t, x, y, theta} out of the mapped columns, then those of an increment's noise; false where
+// nothing was measured.
 bool to_pose(const TableMap& map, std::vector<double>& values);
 
 // The values at the time from which on they hold (poses: at which they were measured): of counts,

@@ -170,6 +170,10 @@ class Guess {
     if (map_.poses.columns.empty() || (odometry_ && !odometry)) guess_poses(table, time, odometry);
     if (map_.commands.columns.empty() && !odometry) guess_commands(table, time);
     if (map_.wheels.columns.empty()) guess_wheels(table, time);
+    const std::string rate = column_of(table, {"angular_velocity.z", "yaw_rate", "gyro_z"});
+    if (!map_.gyro.columns.empty() || rate.empty()) return;
+    start(table, time, map_.gyro);
+    map_.gyro.columns.push_back({"yaw_rate", rate, rate_unit(table, rate)});
   }
 
   void start(const LogTable& table, const std::string& time, TableMap& to) const {

@@ -127,6 +127,12 @@ constexpr PrimitiveType kPrimitives[] = {
     {"float64", 8, 'f'}, {"string", 0, 's'}, {"time", 8, 't'},   {"duration", 8, 't'}};
 
 constexpr int kDeepest = 16;
+// Whether it is of x, y and the turn in a covariance of six.
+bool is_planar(std::uint32_t count, std::uint32_t i) {
+  const auto level = [](std::uint32_t k) { return k < 2 || k == 5; };
+  return count == 36 && i % 6 >= i / 6 && level(i / 6) && level(i % 6);
+}
+
 // Elements of one array that become columns; clouds and images do not.
 constexpr std::size_t kMostElements = 64;
 constexpr std::size_t kMostInMessage = 1'000'000;
@@ -285,8 +291,9 @@ class MessageDecoder {
       if (field.fixed == 0 && !take(&count, 4)) return false;
       // Each element takes a byte at least.
       if (count > bytes_.size()) return fail();
-      const bool quiet = count > kMostElements || field.name.find("covariance") != field.name.npos;
+      const bool covariance = field.name.find("covariance") != field.name.npos;
       for (std::uint32_t i = 0; i < count; ++i) {
+        const bool quiet = count > kMostElements || (covariance && !is_planar(count, i));
         if (quiet) ++quiet_;
         const bool fine = element(field, inside + "[" + std::to_string(i) + "]");
         if (quiet) --quiet_;

@@ -2,6 +2,7 @@
 #include <filesystem>
 
 #include "common/base/try.h"
+#include "common/recordings/increment_noise.h"
 #include "common/trials/files.h"
 #include "common/trials/text/csv.h"
 #include "master/io/logs/bags.h"
@@ -21,6 +22,13 @@ std::string digits(double value, int decimals) {
     if (point) break;
   }
   return out == "-0" ? "0" : out;
+}
+
+// Covariances have no digits that count from the point.
+std::string short_number(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.6g", value);
+  return text;
 }
 
 std::string format_commands(const std::vector<std::string>& channels, const RunLog& log,
@@ -80,7 +88,13 @@ RunFiles format_runs(const RunLog& log) {
   RunFiles files;
   files.commands = format_commands(log.channels, log, &LoggedRun::commands);
   files.wheels = format_commands(log.wheel_channels, log, &LoggedRun::wheel_speeds);
-  files.poses = log.relative ? "run,t,dx,dy,dtheta\n" : "run,t,x,y,theta\n";
+  files.gyro = format_commands({"yaw_rate"}, log, &LoggedRun::yaw_rates);
+  const bool noisy = std::any_of(log.runs.begin(), log.runs.end(), [](const LoggedRun& run) {
+    return !run.poses.empty() && run.poses.back().noise;
+  });
+  files.poses = log.relative ? "run,t,dx,dy,dtheta" : "run,t,x,y,theta";
+  for (const std::string& name : kCovarianceColumns) files.poses += noisy ? "," + name : "";
+  files.poses += "\n";
   // Increments add up, and so does what is rounded off.
   const int places = log.relative ? 9 : 6;
   for (const LoggedRun& run : log.runs) {
@@ -88,7 +102,12 @@ RunFiles format_runs(const RunLog& log) {
     for (const PoseRow& row : run.poses) {
       const Pose X = log.relative ? inverse(before) * row.X_WM : row.X_WM;
       files.poses += csv_field(run.run) + "," + digits(row.t_s, 6) + "," + digits(X.x, places) +
-                     "," + digits(X.y, places) + "," + digits(X.theta, places + 1) + "\n";
+                     "," + digits(X.y, places) + "," + digits(X.theta, places + 1);
+      const Eigen::Matrix3d noise = row.noise.value_or(Eigen::Matrix3d::Zero());
+      for (Eigen::Index r = 0; r < 3 && noisy; ++r) {
+        for (Eigen::Index c = r; c < 3; ++c) files.poses += "," + short_number(noise(r, c));
+      }
+      files.poses += "\n";
       before = row.X_WM;
     }
   }

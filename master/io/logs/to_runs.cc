@@ -8,6 +8,7 @@
 
 #include "common/base/suggest.h"
 #include "common/base/try.h"
+#include "common/recordings/increment_noise.h"
 #include "common/trials/text/csv.h"
 #include "master/io/logs/column_map.h"
 
@@ -37,7 +38,7 @@ struct Tally {
 std::string stem_of(const std::string& file) {
   const std::filesystem::path path(file);
   const std::string stem = path.stem().string();
-  const bool plain = stem == "poses" || stem == "commands" || stem == "wheels";
+  const bool plain = stem == "poses" || stem == "commands" || stem == "wheels" || stem == "gyro";
   const std::string folder = path.parent_path().filename().string();
   return plain && !folder.empty() ? folder : stem;
 }
@@ -63,7 +64,10 @@ class Importer {
 
  private:
   std::vector<Kind> kinds() const {
-    return {{"poses", &map_.poses}, {"commands", &map_.commands}, {"wheels", &map_.wheels}};
+    return {{"poses", &map_.poses},
+            {"commands", &map_.commands},
+            {"wheels", &map_.wheels},
+            {"gyro", &map_.gyro}};
   }
 
   static bool has_all(const LogTable& table, const TableMap& map) {
@@ -177,6 +181,13 @@ class Importer {
         continue;
       }
       const std::string name = run_name(table, run, r);
+      if (poses && values.size() > 4 && (map.intervals || before.count(name) != 0)) {
+        if (const auto fault = fault_of_noise(std::span(values).subspan(4))) {
+          return Error{table.source + ": found " + fault->found + " in row " +
+                       std::to_string(r + 1) + ", expected " + fault->expected + "; " +
+                       fault->remedy};
+        }
+      }
       if (!at_its_time(map, poses, before[name], values)) continue;
       put(tally, stretches_[kind.name][recording][name], values);
     }
@@ -216,8 +227,8 @@ class Importer {
     std::vector<std::size_t> only_poses, others;
     for (std::size_t i = 0; i < recordings_.size(); ++i) {
       const bool poses = stretches_["poses"].count(i) != 0;
-      const bool commanded =
-          stretches_["commands"].count(i) != 0 || stretches_["wheels"].count(i) != 0;
+      const bool commanded = stretches_["commands"].count(i) != 0 ||
+                             stretches_["wheels"].count(i) != 0 || stretches_["gyro"].count(i) != 0;
       if (poses && commanded) whole.push_back({i});
       if (poses && !commanded) only_poses.push_back(i);
       if (!poses && commanded) others.push_back(i);
@@ -293,10 +304,15 @@ class Importer {
       const std::vector<double>& row = stretch.rows[i];
       Pose X{row.size() < 3 ? 0 : row[0], row.size() < 3 ? 0 : row[1], row.size() < 3 ? 0 : row[2]};
       // The first one's leads on from a pose that nobody has.
-      if (increments) X = run.poses.empty() ? Pose() : run.poses.back().X_WM * X;
-      if (what == "poses") run.poses.push_back({stretch.t_s[i], X});
+      if (what == "poses") {
+        std::optional<Eigen::Matrix3d> noise;
+        if (row.size() > 3 && !run.poses.empty()) noise = noise_of(std::span(row).subspan(3));
+        if (increments) X = run.poses.empty() ? Pose() : run.poses.back().X_WM * X;
+        run.poses.push_back({stretch.t_s[i], X, noise});
+      }
       if (what == "commands") run.commands.push_back({stretch.t_s[i], row});
       if (what == "wheels") run.wheel_speeds.push_back({stretch.t_s[i], row});
+      if (what == "gyro") run.yaw_rates.push_back({stretch.t_s[i], row});
     }
   }
 
@@ -310,6 +326,7 @@ class Importer {
       for (PoseRow& row : run.poses) row.t_s -= out_.clock_start_s;
       for (CommandRow& row : run.commands) row.t_s -= out_.clock_start_s;
       for (CommandRow& row : run.wheel_speeds) row.t_s -= out_.clock_start_s;
+      for (CommandRow& row : run.yaw_rates) row.t_s -= out_.clock_start_s;
     }
   }
 
@@ -362,7 +379,7 @@ class Importer {
 Result<ImportedRuns> to_runs(const std::vector<Recording>& recordings, const LogMap& map) {
   LogMap ordered = map;
   // The time stands first in every row.
-  for (TableMap* table : {&ordered.poses, &ordered.commands, &ordered.wheels}) {
+  for (TableMap* table : {&ordered.poses, &ordered.commands, &ordered.wheels, &ordered.gyro}) {
     std::stable_partition(table->columns.begin(), table->columns.end(),
                           [](const MappedColumn& c) { return c.role == "t"; });
   }

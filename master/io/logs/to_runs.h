@@ -21,9 +21,9 @@ struct ImportedRuns {
 // that is not there, rims' speeds in m/s without a wheel radius.
 Result<ImportedRuns> to_runs(const std::vector<Recording>& recordings, const LogMap& map);
 
-// commands.csv, poses.csv and wheels.csv (empty: there are none).
+// commands.csv, poses.csv, wheels.csv and gyro.csv (empty: there are none).
 struct RunFiles {
-  std::string commands, poses, wheels;
+  std::string commands, poses, wheels, gyro;
 };
 RunFiles format_runs(const RunLog& log);
 

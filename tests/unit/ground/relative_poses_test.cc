@@ -4,86 +4,16 @@
 
 #include <cmath>
 #include <fstream>
+#include <set>
 
-#include "common/math/statistics.h"
-#include "common/random/stream.h"
 #include "common/recordings/read.h"
-#include "common/robot/robot_file.h"
 #include "master/ground/diagnose_ground.h"
-#include "master/ground/reference.h"
 #include "master/io/logs/to_runs.h"
+#include "tests/unit/ground/scan_matched.h"
 
 namespace gapfarm::relative_poses_test {
 
-// Half a metre a second at most, a sensor 0.1 m ahead that looks a little to the left.
-constexpr double kLeft_m = 0.0515, kRight_m = 0.0492, kSeparation_m = 0.312;
-const Pose kSensor{0.1, 0.02, 0.05};
-constexpr double kEachRow_s = 1e-3;
-
-GroundRobot robot_by_its_maker() {
-  return *parse_robot(
-      "drive = \"differential\"\ncommands = [\"left\", \"right\"]\nmeasured = true\n"
-      "wheel_separation = 0.3\nwheel_radius = 0.05\n[marker]\nx = 0.12\n",
-      "r.toml");
-}
-
-// Stretches of half a second each at wheel speeds of its own; matched scans err by 2 mm and 2 mrad.
-RunLog driven(int runs, std::uint64_t seed, const Pose& X_RS = kSensor, bool turns = true) {
-  Stream stream({seed, Purpose::kTest, 0, 0, 0});
-  RunLog log;
-  log.channels = {"left", "right"};
-  log.relative = true;
-  constexpr double kDt_s = 0.5;
-  for (int r = 0; r < runs; ++r) {
-    LoggedRun run;
-    run.run = std::to_string(r);
-    run.poses.push_back({0, {}});
-    for (int k = 0; k < 120; ++k) {
-      const double left = 2 + 6 * stream.uniform();
-      const double right =
-          turns ? 2 + 6 * stream.uniform() : left * kLeft_m / kRight_m * (1 + 1e-9);
-      run.commands.push_back({k * kDt_s, {left, right}});
-      const double way = (kLeft_m * left + kRight_m * right) / 2 * kDt_s;
-      const double turn = (kRight_m * right - kLeft_m * left) / kSeparation_m * kDt_s;
-      const Pose X_RR{way * std::sin(turn) / turn, way * (1 - std::cos(turn)) / turn, turn};
-      Pose X_SS = inverse(X_RS) * X_RR * X_RS;
-      X_SS.x += 2e-3 * stream.normal();
-      X_SS.y += 2e-3 * stream.normal();
-      X_SS.theta += 2e-3 * stream.normal();
-      run.poses.push_back({(k + 1) * kDt_s, run.poses.back().X_WM * X_SS});
-    }
-    log.runs.push_back(std::move(run));
-  }
-  return log;
-}
-
-// What a fit has of a value: itself, and 90 % about it.
-struct Said {
-  double value = 0, lo = 0, hi = 0;
-  bool shown = false;
-};
-class Calibration {
- public:
-  explicit Calibration(const RunLog& log) {
-    const auto asked = ask_what_changed(robot_by_its_maker(), log, {{kEachRow_s}, 0}, 1, nullptr);
-    EXPECT_TRUE(asked) << asked.error().message;
-    if (asked) fit_ = *asked->reference;
-  }
-  Said operator()(const std::string& name) const {
-    for (std::size_t k = 0; k < fit_.names.size(); ++k) {
-      if (fit_.names[k] != name) continue;
-      const auto i = static_cast<Eigen::Index>(k);
-      const Eigen::VectorXd row = fit_.draws.row(i).array() + fit_.values[i];
-      const std::vector<double> drawn(row.begin(), row.end());
-      return {fit_.values[i], quantile(drawn, 0.05), quantile(drawn, 0.95), fit_.shown[k] != 0};
-    }
-    ADD_FAILURE() << name;
-    return {};
-  }
-
- private:
-  GroundReference fit_;
-};
+using namespace scan_matched;
 
 // Wheel speeds change where poses were taken: each counts on its own side of them.
 TEST(RelativePoses, CalibrateWheelsAndASensorThatLooksAnyWay) {
@@ -100,7 +30,7 @@ TEST(RelativePoses, CalibrateWheelsAndASensorThatLooksAnyWay) {
 
 TEST(RelativePoses, CoverWhatIsTrueNineTimesInTen) {
   int inside = 0, all = 0;
-  for (std::uint64_t seed = 70; seed < 86; ++seed) {
+  for (std::uint64_t seed = 70; seed < 94; ++seed) {
     const Calibration said(driven(2, seed));
     const std::pair<const char*, double> kTrue[] = {
         {"left", kLeft_m / 0.05}, {"right", kRight_m / 0.05}, {"separation", kSeparation_m / 0.3},
@@ -112,7 +42,7 @@ TEST(RelativePoses, CoverWhatIsTrueNineTimesInTen) {
       ++all;
     }
   }
-  // Six of a log err together, as if there were some forty: three standard deviations.
+  // Six of a log err together, as if there were some sixty: three standard deviations.
   EXPECT_GE(inside, all * 75 / 100);
   EXPECT_LT(inside, all);
 }
@@ -150,6 +80,51 @@ TEST(RelativePoses, AreKeptAsIncrementsByAFolder) {
   ASSERT_EQ(read->runs.size(), 2u);
   EXPECT_NEAR(read->runs[1].poses.back().X_WM.x, log.runs[1].poses.back().X_WM.x, 1e-6);
   EXPECT_NEAR(read->runs[1].poses.back().X_WM.theta, log.runs[1].poses.back().X_WM.theta, 1e-6);
+}
+
+// Whichever way the sensor looks, its headings and axes are not at fault: its pose is fitted, and
+// what the file has wrong is named beside it.
+TEST(RelativePoses, DiagnoseARobotWhoseSensorLooksAnyWay) {
+  GroundRobot robot = robot_by_its_maker();
+  for (RobotWheel& wheel : robot.wheels) {
+    if (wheel.side == WheelSide::kLeft) wheel.radius_m = kLeft_m;
+    if (wheel.side == WheelSide::kRight) wheel.radius_m = kRight_m / 1.04;
+  }
+  robot.controller.wheel_separation_m = kSeparation_m;
+  for (const double yaw : {1.6, -3.1, -0.8}) {
+    const auto diagnosis = diagnose_ground(robot, driven(6, 32, {0.1, 0.02, yaw}), {});
+    ASSERT_TRUE(diagnosis) << diagnosis.error().message;
+    std::set<std::string> named;
+    for (const NamedEffect& effect : diagnosis->diagnosis.effects) named.insert(effect.name);
+    EXPECT_EQ(named, (std::set<std::string>{"marker_yaw", "marker_offset", "wheel_radius"})) << yaw;
+    EXPECT_NEAR(diagnosis->corrected.X_RM.theta, yaw, 3e-3);
+    EXPECT_NEAR(diagnosis->corrected.X_RM.x, 0.1, 3e-3);
+    for (const RobotWheel& wheel : diagnosis->corrected.wheels) {
+      const double r = wheel.side == WheelSide::kLeft ? kLeft_m : kRight_m;
+      if (!wheel.driven) continue;
+      EXPECT_NEAR(*wheel.radius_m, r, 3e-3 * r) << yaw;
+    }
+  }
+}
+
+// Upside down it sees what a robot would do whose sides are swapped.
+TEST(RelativePoses, ReportThatTheSensorMayBeUpsideDown) {
+  RunLog log = driven(6, 31, {0.1, 0.02, 1.6});
+  for (LoggedRun& run : log.runs) {
+    Pose before, after;
+    for (PoseRow& row : run.poses) {
+      const Pose step = mirrored(between(before, row.X_WM));
+      before = row.X_WM;
+      row.X_WM = after = after * step;
+    }
+  }
+  const auto asked = ask_what_changed(robot_by_its_maker(), log, {{kEachRow_s}, 0}, 1, nullptr);
+  ASSERT_FALSE(asked);
+  EXPECT_NE(asked.error().message.find("upside down"), std::string::npos) << asked.error().message;
+  const auto found = check_ground_log(robot_by_its_maker(), log);
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_EQ(found[0].name, "sides_swapped");
+  EXPECT_TRUE(check_ground_log(robot_by_its_maker(), driven(6, 31, {0.1, 0.02, 1.6})).empty());
 }
 
 TEST(RelativePoses, NameNothingThatHasAPlace) {

@@ -9,6 +9,7 @@
 
 #include "common/trials/files.h"
 #include "master/io/logs/decompress.h"
+#include "master/io/logs/message.h"
 #include "master/io/logs/to_runs.h"
 
 namespace gapfarm::bags_test {
@@ -66,6 +67,24 @@ INSTANTIATE_TEST_SUITE_P(Formats, Bags, testing::ValuesIn(kFiles), [](const auto
 });
 
 // A file that broke off anywhere is an error with its place; nothing is half-read.
+// Of six by six numbers those of x, y and the turn about z are columns.
+TEST(Messages, GiveTheCovarianceOnTheFloor) {
+  const auto schema = MessageSchema::known("geometry_msgs/PoseWithCovariance");
+  ASSERT_TRUE(schema) << schema.error().message;
+  std::string bytes("\0\1\0\0", 4);
+  for (int k = -7; k < 36; ++k) {
+    const double value = k;
+    bytes.append(reinterpret_cast<const char*>(&value), sizeof value);
+  }
+  const auto content = schema->decode(bytes, MessageWire::kCdr);
+  ASSERT_TRUE(content) << content.error().message;
+  std::vector<double> covariance;
+  for (const auto& [path, value] : content->numbers) {
+    if (path.starts_with("covariance")) covariance.push_back(value);
+  }
+  EXPECT_THAT(covariance, ElementsAre(0, 1, 5, 7, 11, 35));
+}
+
 TEST(BrokenBags, AreErrorsWithTheirPlace) {
   for (const char* name : {"ros1_none.bag", "ros1_bz2.bag", "cdr_zstd.mcap", "cdr_plain.mcap"}) {
     const Result<std::string> whole = read_text_file(data(name));

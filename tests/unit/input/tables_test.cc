@@ -150,6 +150,34 @@ TEST(Tables, IncrementsAreChainedFromWhereEachStretchBegins) {
   EXPECT_FALSE(parse_map("[wheels]\ndt = \"dt\"\nl = { column = \"l\", rate = true }\n", "m.toml"));
 }
 
+TEST(Tables, IncrementsKeepTheirCovariancesAndAGyroItsRates) {
+  const std::string poses = "[poses]\nt = \"t\"\nx = \"x\"\ny = \"y\"\ntheta = \"a\"\n";
+  const std::string rest =
+      "[commands]\nt = \"t\"\nleft = \"l\"\nright = \"l\"\n[gyro]\nt = \"t\"\n"
+      "yaw_rate = { column = \"g\", unit = \"deg/s\" }\n";
+  const auto map = parse_map(poses + "increments = true\ncovariance = \"c\"\n" + rest, "m.toml");
+  ASSERT_TRUE(map) << map.error().message;
+  EXPECT_EQ(format_map(*parse_map(format_map(*map), "m.toml")), format_map(*map));
+  const std::string head = "t,l,g,x,y,a,c[0],c[1],c[5],c[7],c[11],c[35]\n0,1,0,0,0,0,0,0,0,0,0,0\n";
+  const auto runs = to_runs({table_of(head + "1,1,90,1,0,0,4,1,0,9,0,0.25\n")}, *map);
+  ASSERT_TRUE(runs) << runs.error().message;
+  const LoggedRun& run = runs->log.runs.at(0);
+  EXPECT_EQ((*run.poses[1].noise)(1, 1), 9);
+  EXPECT_EQ((*run.poses[1].noise)(1, 0), 1);
+  EXPECT_NEAR(run.yaw_rates[1].values[0], std::numbers::pi / 2, 1e-12);
+  const RunFiles files = format_runs(runs->log);
+  EXPECT_THAT(files.poses, HasSubstr("cov_xx,cov_xy,cov_xt,cov_yy,cov_yt,cov_tt\n"));
+  EXPECT_THAT(files.poses, HasSubstr(",4,1,0,9,0,0.25\n"));
+  EXPECT_THAT(files.gyro, HasSubstr("run,t,yaw_rate\n"));
+  const auto failed = to_runs({table_of(head + "1,1,90,1,0,0,-1,0,0,9,0,0.25\n")}, *map);
+  ASSERT_FALSE(failed);
+  EXPECT_THAT(failed.error().message, HasSubstr("row 2"));
+  EXPECT_THAT(failed.error().message, HasSubstr("cov_xx -1"));
+  EXPECT_FALSE(parse_map(poses + "covariance = \"c\"\n" + rest, "m.toml"));
+  EXPECT_FALSE(parse_map(poses + "increments = true\nsd_x = \"c\"\n" + rest, "m.toml"));
+  EXPECT_FALSE(parse_map(poses + "[gyro]\nt = \"t\"\nrate = \"g\"\n", "m.toml"));
+}
+
 TEST(Tables, ErrorsNamePlaceValueAndRemedy) {
   // Pixels are metres to nobody.
   const auto map =

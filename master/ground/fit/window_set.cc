@@ -1,0 +1,226 @@
+#include "master/ground/fit/window_set.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+
+#include "common/recordings/increment_noise.h"
+#include "master/ground/tolerances.h"
+
+namespace gapfarm {
+namespace {
+
+constexpr std::size_t kLeastBlocks = 10;  // fewer runs than this are cut into stretches
+// The same of increments, which know of nothing that lasts: tens of stretches say better how far
+// values scatter.
+constexpr std::size_t kLeastRelativeBlocks = 30;
+constexpr double kMargin_s = 11;  // of commands round a window: clocks may be 10 s apart
+// Of wheels that roll: what they slip by in the root of a metre of their way, m and rad. OptiOdom's
+// and a Create's whole runs end 0.01 to 0.05 off (docs/evidence/ground.md).
+constexpr double kSlip = 0.03;
+constexpr double kGyroGap_s = 0.25;  // a longer one between two rates shows no turn
+
+bool alike(const std::vector<Trial>& a, std::size_t from_a, const std::vector<Trial>& b) {
+  if (a.size() - from_a != b.size()) return false;
+  for (std::size_t i = 0; i < b.size(); ++i) {
+    const Trial& x = a[from_a + i];
+    if (x.run != b[i].run || x.t_s != b[i].t_s || x.duration_s != b[i].duration_s) return false;
+  }
+  return true;
+}
+
+std::size_t pose_at(const LoggedRun& run, double t_s) {
+  const auto found = std::lower_bound(run.poses.begin(), run.poses.end(), t_s - 1e-9,
+                                      [](const PoseRow& p, double t) { return p.t_s < t; });
+  const auto at = static_cast<std::size_t>(found - run.poses.begin());
+  return std::min(at, run.poses.size() - 1);
+}
+
+// Of a window's end in its axes, by the increments in it; none where one of them does not say.
+std::optional<Eigen::Matrix3d> noise_of_window(const LoggedRun& run, const Trial& trial) {
+  const std::size_t from = pose_at(run, *trial.t_s);
+  const std::size_t end = pose_at(run, *trial.t_s + *trial.duration_s);
+  Pose X;
+  Eigen::Matrix3d noise = Eigen::Matrix3d::Zero();
+  for (std::size_t k = from + 1; k <= end; ++k) {
+    if (!run.poses[k].noise) return {};
+    const Pose step = between(run.poses[k - 1].X_WM, run.poses[k].X_WM);
+    noise = chained_noise(X, noise, step, *run.poses[k].noise);
+    X = X * step;
+  }
+  return turned_noise(noise, X.theta);
+}
+
+// What a gyro turned by between two times, its rates straight on between; none over a gap.
+std::optional<double> turned_between(const std::vector<CommandRow>& rates, double from_s,
+                                     double end_s) {
+  const auto first = std::upper_bound(rates.begin(), rates.end(), from_s,
+                                      [](double t, const CommandRow& r) { return t < r.t_s; });
+  if (first == rates.begin() || rates.empty() || rates.back().t_s < end_s) return {};
+  double turned = 0;
+  for (auto row = first - 1; row + 1 != rates.end() && row->t_s < end_s; ++row) {
+    const double begin = row->t_s, dt = (row + 1)->t_s - begin;
+    if (dt > kGyroGap_s) return {};
+    if (dt <= 0) continue;
+    const double a = std::max(from_s, begin), b = std::min(end_s, begin + dt);
+    const double middle = ((a + b) / 2 - begin) / dt;
+    turned += (b - a) * (row->values[0] + middle * ((row + 1)->values[0] - row->values[0]));
+  }
+  return turned;
+}
+
+void add_gyro(const RunLog& log, WindowSet* set) {
+  const std::size_t count = set->trials.size();
+  bool any = false;
+  for (std::size_t i = 0; i < count; ++i) {
+    const Trial trial = set->trials[i];
+    const auto turned = turned_between(log.runs[set->run_of[i]].yaw_rates, *trial.t_s,
+                                       *trial.t_s + *trial.duration_s);
+    if (!turned) continue;
+    set->turned_rad.resize(set->trials.size());
+    set->turned_rad.push_back(*turned);
+    set->trials.push_back(trial);
+    set->horizon.push_back(set->horizon[i] + set->lengths);
+    set->run_of.push_back(set->run_of[i]);
+    any = true;
+  }
+  if (any) set->horizons += set->lengths;
+}
+
+// How errors of a window's end, in its axes, shift the end of the way: squares of the shares.
+Eigen::Matrix3d squared_shares(const Pose& X_EF) {
+  const Pose back = inverse(X_EF);
+  const double c = std::cos(back.theta), s = std::sin(back.theta);
+  Eigen::Matrix3d J = Eigen::Matrix3d::Identity();
+  J.row(0) = Eigen::RowVector3d(c, -s, back.y);
+  J.row(1) = Eigen::RowVector3d(s, c, -back.x);
+  return J.cwiseAbs2();
+}
+
+void add_returns(const GroundRobot& robot, const RunLog& log, WindowSet* set) {
+  const double arm_m = robot.controller.wheel_separation_m.value_or(0) / 2;
+  const std::size_t count = set->trials.size();
+  for (std::size_t r = 0; r < log.runs.size(); ++r) {
+    const LoggedRun& run = log.runs[r];
+    for (const CommandRow& row : run.returns) {
+      const std::size_t end = run.poses.empty() ? 0 : pose_at(run, row.t_s);
+      if (end == 0 || set->runs.size() != log.runs.size()) continue;
+      Trial trial;
+      trial.session = session_of(run);
+      trial.trial = static_cast<std::int64_t>(set->trials.size());
+      trial.command = kWindowCommand;
+      trial.run = static_cast<std::uint32_t>(r);
+      trial.t_s = run.poses.front().t_s;
+      trial.duration_s = run.poses[end].t_s - *trial.t_s;
+      trial.X_WS = run.poses.front().X_WM;
+      trial.X_WE = run.poses[end].X_WM;
+      Return back;
+      for (Eigen::Index k = 0; k < 3; ++k) {
+        back.variance[k] = std::pow(row.values[static_cast<std::size_t>(k)], 2);
+      }
+      for (std::size_t i = 0; i < count; ++i) {
+        const Trial& part = set->trials[i];
+        const double end_s = *part.t_s + *part.duration_s;
+        if (set->horizon[i] != 0 || set->run_of[i] != r || end_s > run.poses[end].t_s) continue;
+        const Eigen::Matrix3d shares = squared_shares(between(part.X_WE, trial.X_WE));
+        const Pose moved = between(part.X_WS, part.X_WE);
+        const double way_m = std::hypot(moved.x, moved.y) + arm_m * std::abs(moved.theta);
+        back.of_way += shares;
+        back.of_slip += kSlip * kSlip * way_m * shares.rowwise().sum();
+      }
+      if (skids(robot)) back.of_slip.setConstant(std::numeric_limits<double>::infinity());
+      set->trials.push_back(std::move(trial));
+      set->horizon.push_back(set->horizons++);
+      set->run_of.push_back(r);
+      set->returns.push_back(back);
+    }
+  }
+  if (!set->turned_rad.empty()) set->turned_rad.resize(set->trials.size());
+}
+
+void add_noise(const RunLog& log, WindowSet* set) {
+  if (!log.relative) return;
+  for (std::size_t i = 0; i < set->trials.size(); ++i) {
+    const auto noise = noise_of_window(log.runs[set->run_of[i]], set->trials[i]);
+    if (!noise) {
+      set->noise.clear();
+      return;
+    }
+    set->noise.push_back(*noise);
+  }
+}
+
+void add_blocks(const RunLog& log, WindowSet* set) {
+  std::vector<double> begin(log.runs.size()), length(log.runs.size());
+  double all = 0;
+  for (std::size_t i = 0; i < log.runs.size(); ++i) {
+    if (log.runs[i].poses.size() < 2) continue;
+    begin[i] = log.runs[i].poses.front().t_s;
+    length[i] = log.runs[i].poses.back().t_s - begin[i];
+    all += length[i];
+  }
+  // Stretches of one length, none over two runs.
+  std::vector<int>& first = set->run_blocks;
+  first.resize(log.runs.size());
+  const std::size_t least = log.relative ? kLeastRelativeBlocks : kLeastBlocks;
+  const bool few = log.runs.size() < least;
+  for (std::size_t i = 0; i < log.runs.size(); ++i) {
+    first[i] = set->blocks;
+    const double pieces =
+        few ? std::ceil(static_cast<double>(least) * length[i] / std::max(all, 1e-9)) : 1;
+    set->blocks += std::max(1, static_cast<int>(pieces));
+  }
+  for (std::size_t i = 0; i < set->trials.size(); ++i) {
+    const Trial& trial = set->trials[i];
+    const std::size_t run = set->run_of[i];
+    const int pieces = (run + 1 < first.size() ? first[run + 1] : set->blocks) - first[run];
+    const double middle = *trial.t_s + *trial.duration_s / 2 - begin[run];
+    const int piece = static_cast<int>(pieces * middle / std::max(length[run], 1e-9));
+    set->block.push_back(first[run] + std::clamp(piece, 0, pieces - 1));
+  }
+}
+
+}  // namespace
+
+double WindowSet::stretches() const {
+  const auto of_poses =
+      std::count_if(horizon.begin(), horizon.end(), [this](int h) { return h < lengths; });
+  return static_cast<double>(of_poses) / lengths;
+}
+
+Result<WindowSet> window_set(const GroundRobot& robot, const RunLog& log,
+                             const WindowSettings& settings) {
+  WindowSet set;
+  const bool restarts = robot.command == CommandKind::kThrottleSteering;
+  std::size_t last = 0;
+  for (const double horizon : settings.horizons_s) {
+    auto cut = cut_windows(log, {{horizon}, settings.run_in_s});
+    if (!cut) continue;
+    if (!restarts && set.horizons > 0 && alike(set.trials, last, cut->log.trials)) continue;
+    last = set.trials.size();
+    for (const Trial& trial : cut->log.trials) set.run_of.push_back(*trial.run);
+    if (restarts) {
+      *cut = restart_at_measured_speed(log, std::move(*cut), settings.run_in_s, kMargin_s);
+      for (Trial& trial : cut->log.trials) *trial.run += static_cast<std::uint32_t>(last);
+      set.runs.insert(set.runs.end(), cut->runs.begin(), cut->runs.end());
+    } else {
+      set.runs = std::move(cut->runs);
+    }
+    for (Trial& trial : cut->log.trials) {
+      set.trials.push_back(std::move(trial));
+      set.horizon.push_back(set.horizons);
+    }
+    ++set.horizons;
+  }
+  if (set.trials.empty()) return Error{"no window of any horizon fits into the runs"};
+  set.lengths = set.horizons;
+  add_noise(log, &set);
+  add_gyro(log, &set);
+  add_returns(robot, log, &set);
+  if (!set.noise.empty()) set.noise.resize(set.trials.size(), Eigen::Matrix3d::Identity());
+  add_blocks(log, &set);
+  return set;
+}
+
+}  // namespace gapfarm

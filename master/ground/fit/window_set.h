@@ -1,0 +1,62 @@
+// Windows of several horizons, and what else a log holds against a robot's motion: a gyro, returns
+// to where a run began.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "common/base/result.h"
+#include "common/recordings/windows.h"
+#include "common/robot/robot.h"
+
+namespace gapfarm {
+
+// What a window's end is held against.
+enum class Sense : char { kPose, kGyro, kReturn };
+
+// The gyro's ratio to what it should measure, among the rows of a fit.
+inline constexpr const char* kGyroScale = "gyro_scale";
+
+// The marker is back where the first pose of its run has it.
+struct Return {
+  Eigen::Vector3d variance;  // as stated: m^2, m^2, rad^2
+  // What its way adds: these times the squared scales of the first horizon, where wheels that roll
+  // do not slip less.
+  Eigen::Matrix3d of_way = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d of_slip = Eigen::Vector3d::Zero();  // m^2, m^2, rad^2
+};
+
+// Residuals share scales by horizon and component.  The horizons of a gyro lie behind those of the
+// poses, then each return has one of its own.
+struct WindowSet {
+  std::vector<CommandedRun> runs;
+  std::vector<Trial> trials;
+  std::vector<int> horizon;         // of each trial
+  std::vector<int> block;           // of each trial: what is held out or resampled together
+  std::vector<std::size_t> run_of;  // of each trial: its run in the log
+  int horizons = 0;
+  int lengths = 0;  // of the poses' windows: the first horizons
+  int blocks = 0;
+  std::vector<int> run_blocks;  // of each run: its first block; those of one run follow each other
+  // Of each trial, in its end's axes (m^2, m rad, rad^2); empty: the log does not say.
+  std::vector<Eigen::Matrix3d> noise;
+  // What every window errs by beside that (slip, timing), of the middle window's stated variance.
+  double least_noise = 0.1;
+  std::vector<double> turned_rad;  // of each trial by the gyro, its bias in; empty: there is none
+  std::vector<Return> returns;
+
+  Sense sense_of(std::size_t trial) const {
+    if (horizon[trial] < lengths) return Sense::kPose;
+    return horizon[trial] < horizons - static_cast<int>(returns.size()) ? Sense::kGyro
+                                                                        : Sense::kReturn;
+  }
+  // Windows of poses a horizon: how often the log says something anew.
+  double stretches() const;
+};
+
+// Blocks are runs, or stretches of them where there are fewer than ten.  Windows of robots with a
+// throttle restart (common/recordings/windows.h).  Errors: no window fits.
+Result<WindowSet> window_set(const GroundRobot& robot, const RunLog& log,
+                             const WindowSettings& settings);
+
+}  // namespace gapfarm
