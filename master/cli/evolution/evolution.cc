@@ -43,7 +43,7 @@ void declare_overrides(EvolutionOverrides& overrides, CLI::App& app) {
       ->check(CLI::PositiveNumber);
   app.add_option("--target", overrides.target_fitness, "Stop at this fitness");
   app.add_option("--population", overrides.population, "Individuals")
-      ->check(CLI::Range(2, 1000000));
+      ->check(CLI::Range(2, 1000000, "2+"));
 }
 
 Result<std::unique_ptr<FarmOfRun>> open_farm(const RunStore& store, const Config& config,
