@@ -6,9 +6,10 @@
 SETS holds folders with robot.toml and fit/, such as scripts/ground_sets.py makes of public logs. The
 world poses of each are thinned to 5 a second, as a laser scans, and every pose is replaced by its
 increment since the one before with noise (3 mm + 1 % of the way, 2 mrad + 1 % of the turn; Censi et
-al. 2013 print about these for scan matching); nothing else of the poses is kept. Both logs are
-imported, and the kinematics fitted to each (`gapfarm export ros`). The table of docs/ground.md is what
-this prints. BIN: where the programs are (build/release/bin).
+al. 2013 print about these for scan matching) and what a matcher states of it, standard deviations half
+as large; nothing else of the poses is kept. The kinematics are fitted to each log (`gapfarm export
+ros`). The table of docs/ground.md is what this prints: the first of three draws of the noise, and counts over
+all of them. BIN: where the programs are (build/release/bin).
 """
 import json
 import math
@@ -28,6 +29,9 @@ INTERVAL_S = 0.2
 ADDED = {"marker_x": "mm", "marker_y": "mm", "marker_yaw": "mrad", "steering_offset": "mrad",
          "delay": "ms", "lag": "ms", "load_x": "mm", "load_y": "mm"}
 SEED = 20261124
+DRAWS = 3  # of the noise
+STATED = 0.5  # of the noise's deviations
+CLOSE = {"left": 0.01, "right": 0.01, "separation": 0.01, "marker_yaw": 0.003}  # shares, and rad
 
 
 def run(*command):
@@ -52,15 +56,16 @@ def increments(rows, seed):
     draw = random.Random(seed)
     out, before = [], None
     for run_name, t, x, y, theta in rows:
-        d = [0.0, 0.0, 0.0]
+        d = [0.0] * 6
         if before and before[0] == run_name:
             dx, dy = x - before[2], y - before[3]
             c, s = math.cos(before[4]), math.sin(before[4])
             turn = math.remainder(theta - before[4], 2 * math.pi)
             way = math.hypot(dx, dy)
-            d = [c * dx + s * dy + draw.gauss(0, 0.003 + 0.01 * way),
-                 c * dy - s * dx + draw.gauss(0, 0.003 + 0.01 * way),
-                 turn + draw.gauss(0, 0.002 + 0.01 * abs(turn))]
+            sd = [0.003 + 0.01 * way] * 2 + [0.002 + 0.01 * abs(turn)]
+            d = [v + draw.gauss(0, sigma)
+                 for v, sigma in zip((c * dx + s * dy, c * dy - s * dx, turn), sd)]
+            d += [STATED * sigma for sigma in sd]
         out.append((run_name, t, *d))
         before = (run_name, t, x, y, theta)
     return out
@@ -94,26 +99,30 @@ def main():
     sets, out = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2])
     print("| log | value | with world poses | with increments | apart | inside |")
     print("|---|---|---|---|---|---|")
-    inside = all_values = 0
+    inside, close = [], []
     for name in sys.argv[3:] or SETS:
         here, robot = out / name, sets / name / "robot.toml"
         commands = (sets / name / "fit/commands.csv").read_text(encoding="utf-8")
         rows = thinned(sets / name / "fit/poses.csv")
         write(here / "world", commands, "x,y,theta", rows)
-        write(here / "relative", commands, "dx,dy,dtheta", increments(rows, f"{SEED} {name}"))
-        world, relative = (values_of(robot, here / kind, here / f"run_{kind}")
-                           for kind in ("world", "relative"))
-        for a, b in zip(world, relative):
-            if a["name"] in ADDED:
-                text = f"{1000 * (b['says'] - a['says']):+.1f} {ADDED[a['name']]}"
-            else:
-                text = f"{100 * (b['says'] / a['says'] - 1):+.2f} %"
-            holds = b["lo"] <= a["says"] <= b["hi"]
-            inside += holds
-            all_values += 1
-            print(f"| {name} | `{a['name']}` | {a['says']:.4g} | {b['says']:.4g} [{b['lo']:.4g}, "
-                  f"{b['hi']:.4g}] | {text} | {'yes' if holds else 'no'} |")
-    print(f"\n{inside} of {all_values} values lie in the intervals of the increments.")
+        world = values_of(robot, here / "world", here / "run_world")
+        for draw in range(DRAWS):
+            write(here / f"relative{draw}", commands, "dx,dy,dtheta,sd_x,sd_y,sd_theta",
+                  increments(rows, f"{SEED} {draw} {name}"))
+            relative = values_of(robot, here / f"relative{draw}", here / f"run_{draw}")
+            for a, b in zip(world, relative):
+                added = a["name"] in ADDED
+                off = b["says"] - a["says"] if added else b["says"] / a["says"] - 1
+                text = f"{1000 * off:+.1f} {ADDED[a['name']]}" if added else f"{100 * off:+.2f} %"
+                inside.append(b["lo"] <= a["says"] <= b["hi"])
+                if a["name"] in CLOSE:
+                    close.append(abs(off) <= CLOSE[a["name"]])
+                if draw == 0:
+                    print(f"| {name} | `{a['name']}` | {a['says']:.4g} | {b['says']:.4g} "
+                          f"[{b['lo']:.4g}, {b['hi']:.4g}] | {text} | "
+                          f"{'yes' if inside[-1] else 'no'} |", flush=True)
+    print(f"\n{sum(inside)} of {len(inside)} values lie in the intervals of the increments; "
+          f"{sum(close)} of {len(close)} radii, separations and headings are within 1 % and 3 mrad.")
 
 
 if __name__ == "__main__":

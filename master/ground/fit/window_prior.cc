@@ -15,6 +15,7 @@
 namespace gapfarm {
 namespace {
 
+constexpr double kMostTooSmall = 4;  // a deviation that a matcher states
 // Of every row's variance, of the middle one's: candidates.
 constexpr double kLeastNoises[] = {0.1, 0.3, 1, 3, 10, 100};
 constexpr double kLeastCurvature = 0.3;  // of the weights; of Student's own residuals 0.71
@@ -192,20 +193,31 @@ Eigen::MatrixX2d WindowFitter::intervals(const WindowFit& fit, std::uint64_t see
   return bounds;
 }
 
-// What a row states counts as far as it makes it more or less sure than others: common scales stay
-// free, and no row is surer than slip and rounding leave any.
-std::vector<Eigen::Matrix3d> WindowFitter::noise_shapes(double least) const {
-  std::vector<Eigen::Matrix3d> shapes;
-  const std::vector<Eigen::Matrix3d>& noise = windows_.noise;
-  std::vector<std::vector<double>> variances(3 * static_cast<std::size_t>(windows_.horizons));
-  for (std::size_t i = 0; i < noise.size(); ++i) {
+namespace {
+
+// Of what is stated, of each horizon and component.
+std::vector<double> middle_variances(const WindowSet& windows) {
+  std::vector<std::vector<double>> variances(3 * static_cast<std::size_t>(windows.horizons));
+  for (std::size_t i = 0; i < windows.noise.size(); ++i) {
     for (std::size_t c = 0; c < 3; ++c) {
       const auto k = static_cast<Eigen::Index>(c);
-      variances[3 * static_cast<std::size_t>(windows_.horizon[i]) + c].push_back(noise[i](k, k));
+      variances[3 * static_cast<std::size_t>(windows.horizon[i]) + c].push_back(
+          windows.noise[i](k, k));
     }
   }
   std::vector<double> middle;
   for (const std::vector<double>& v : variances) middle.push_back(v.empty() ? 1 : median(v));
+  return middle;
+}
+
+}  // namespace
+
+// What a row states counts as far as it makes it more or less sure than others: common scales stay
+// free, and no row is surer than slip and rounding leave any.
+std::vector<Eigen::Matrix3d> WindowFitter::noise_shapes(double least) const {
+  const std::vector<Eigen::Matrix3d>& noise = windows_.noise;
+  const std::vector<double> middle = middle_variances(windows_);
+  std::vector<Eigen::Matrix3d> shapes;
   for (std::size_t i = 0; i < noise.size(); ++i) {
     const double* m = &middle[3 * static_cast<std::size_t>(windows_.horizon[i])];
     const Eigen::Vector3d unit = Eigen::Vector3d(m[0], m[1], m[2]).cwiseSqrt();
@@ -226,7 +238,20 @@ double WindowFitter::likeliest_least_noise(const WindowFit& fit) const {
   if (windows_.noise.empty() || shapes_.empty()) return best;
   const std::vector<Eigen::Vector3d> raw = raw_residuals(fit);
   const std::vector<double> use = uses({});
-  for (const double least : kLeastNoises) {
+  // What is stated is this factor too small at most: the rest is not the matcher's.
+  WindowFit plain = fit;
+  plain.residuals = raw;
+  plain.scales.clear();
+  rescale(&plain, use);
+  const std::vector<double> middle = middle_variances(windows_);
+  std::vector<double> ratios;
+  for (std::size_t k = 0; k < 3 * static_cast<std::size_t>(windows_.lengths); ++k) {
+    const double scale = plain.scales[k / 3][static_cast<Eigen::Index>(k % 3)];
+    ratios.push_back(scale * scale / (kMostTooSmall * kMostTooSmall * middle[k]));
+  }
+  const double lowest = median(ratios) - 1;
+  for (const double candidate : kLeastNoises) {
+    const double least = std::max(candidate, lowest);
     const std::vector<Eigen::Matrix3d> shapes = noise_shapes(least);
     WindowFit shaped = fit;
     shaped.scales.clear();
