@@ -16,6 +16,11 @@ Result<GroundQuestion> ask_what_changed(const GroundRobot& robot, const RunLog& 
                                         const WindowSettings& settings, std::uint64_t seed,
                                         FitMemo* memo);
 
+// The values of change_rows() and of command_offsets() by one log alone; their covariance is by its
+// own scatter.  Errors: as ask_what_changed(); too few windows.
+Result<OffsetFit> fit_run_values(const GroundRobot& robot, const RunLog& log,
+                                 const WindowSettings& settings);
+
 // Whether every pose of a run ends a stretch that one of its commands is about, as rows have it
 // that hold both.
 bool shares_a_clock(const RunLog& log);
