@@ -13,6 +13,7 @@ enum ExitCode : int {
   kExitFailed = 1,        // the work had begun
   kExitBadUsage = 2,      // wrong usage, config or input: found before the work began
   kExitQuarantined = 3,   // done, but some tasks were given up
+  kExitChanged = 4,       // done: `watch` found that something changed
   kExitResumable = 85,    // stopped; the same command, or `resume`, goes on from there
   kExitSignalBase = 128,  // + the signal, 130 or 143: stopped, and nothing is kept
 };

@@ -20,6 +20,7 @@ namespace {
 constexpr double kFarOff = 20;
 // How little a value may be off that no log shows: of its tolerance.
 constexpr double kHeld = 1e-6;
+constexpr std::size_t kLeastWindows = 10;  // of one length, whose scatter is theirs to show
 constexpr double kUnshown = 0.7;  // of the prior's deviation: a log that leaves more says nothing
 // Headings of the tracked point that a fit begins at, how many of them are followed, for how many
 // rounds, and for how many more where faults are compared.
@@ -272,6 +273,29 @@ bool shares_a_clock(const RunLog& log) {
     return !run.poses.empty() && std::all_of(run.poses.begin(), run.poses.end() - 1,
                                              [&](const PoseRow& p) { return times.count(p.t_s); });
   });
+}
+
+Result<OffsetFit> fit_run_values(const GroundRobot& robot, const RunLog& log,
+                                 const WindowSettings& settings) {
+  GroundQuestion question;
+  question.rows = change_rows(robot);
+  question.catalogue = change_hypotheses(robot, question.rows);
+  WindowSettings kept = settings;
+  std::erase_if(kept.horizons_s, [&](double horizon) {
+    const auto set = window_set(robot, log, {{horizon}, settings.run_in_s});
+    return !set || set->trials.size() < kLeastWindows;
+  });
+  if (kept.horizons_s.empty()) {
+    return Error{"it is too short: fewer than " + std::to_string(kLeastWindows) +
+                 " windows of every length"};
+  }
+  ASSIGN_OR_RETURN(const auto windows, window_set(robot, log, kept));
+  WindowFitter fitter(robot, windows, nullptr);
+  const WindowFit fit = open_fit(fitter, robot, question.rows, log);
+  if (const GroundHypothesis* h = fault_of(robot, log, settings, question, fitter, fit)) {
+    return Error{"its log is wrong in " + h->thing + ". " + h->remedy};
+  }
+  return fitter.fit_with_offsets(fit);
 }
 
 Result<GroundQuestion> ask_what_changed(const GroundRobot& robot, const RunLog& reference,

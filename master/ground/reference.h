@@ -32,6 +32,11 @@ Result<SettledSensor> settle_sensor(const GroundRobot& robot, RunLog log,
 // A row for the gyro's scale, where the log has one.
 void add_gyro_scale(const RunLog& log, std::vector<KinematicRow>* rows);
 
+// The values of change_rows() and of command_offsets() by one log alone; their covariance is by its
+// own scatter.  Errors: as ask_what_changed(); too few windows.
+Result<OffsetFit> fit_run_values(const GroundRobot& robot, const RunLog& log,
+                                 const WindowSettings& settings);
+
 // Whether every pose of a run ends a stretch that one of its commands is about, as rows have it
 // that hold both.
 bool shares_a_clock(const RunLog& log);

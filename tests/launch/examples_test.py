@@ -94,6 +94,9 @@ def make_stand_ins():
     make("evolve", "husky.toml", "--out", "run/husky", "--generations", "1", "--population", "4")
     shutil.copytree("run/husky", "run/warthog")
     make("diagnose", "husky.toml", "--out", "grounded")
+    for day in ("monday", "friday"):
+        shutil.copytree(day, f"fleet/first/{day}")
+    shutil.copy("husky_robot.toml", "fleet/robot.toml")
     make_pushes()
     Path("logs/cases/one").mkdir(parents=True)
     shutil.copy("trials.csv", "logs/cases/one/trials.csv")

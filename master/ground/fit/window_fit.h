@@ -54,6 +54,16 @@ class FitMemo {
   virtual void keep(const std::string& key, const KeptFit& fit) = 0;
 };
 
+// Speeds that commands add to what the kinematics make of them, as shares: ahead and of the rims
+// when turning, by whether a turn is commanded, by its sign, and by how fast it is.  Empty of
+// robots that are not commanded by twists or by two sides.
+std::vector<KinematicRow> command_offsets(const GroundRobot& robot);
+
+struct OffsetFit {
+  Eigen::VectorXd values;
+  Eigen::MatrixXd covariance;
+};
+
 class WindowFitter {
  public:
   // All outlive the fitter.  With a reference its values are in place of the robot's, and rows are
@@ -84,6 +94,12 @@ class WindowFitter {
   // 90 % intervals of them; a row of (lo, hi) for each of the fit's.  With a reference: of how far
   // they are from it, which is not sure either, beside its values.
   Eigen::MatrixX2d intervals(const WindowFit& fit, std::uint64_t seed) const;
+
+  // The values of a fit, and behind them those of command_offsets().  What a robot makes of
+  // commands that its kinematics have no word for is its own, and must not pass for another wheel;
+  // windows count the less the more their commands change and the robot turns: so much less as
+  // makes the residuals likeliest.
+  OffsetFit fit_with_offsets(WindowFit fit);
 
   const WindowSet& windows() const { return windows_; }
   const GroundRobot& robot() const { return robot_; }
@@ -126,6 +142,9 @@ class WindowFitter {
   void shape_by_speed();
   std::vector<Eigen::Matrix3d> noise_shapes(double least) const;
   void take_biases_out(std::vector<Eigen::Vector3d>* r) const;
+  void weigh_by_commands(const WindowFit& fit);
+  // How residuals change with command_offsets(), a column each.
+  std::vector<Eigen::MatrixXd> offset_slopes(const WindowFit& fit) const;
 
   const GroundRobot& robot_;
   const WindowSet& windows_;

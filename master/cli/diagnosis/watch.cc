@@ -1,0 +1,286 @@
+// gapfarm watch DIR: many runs of several robots of one kind: what changed since when, and of
+// which.
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "common/base/hash.h"
+#include "common/base/try.h"
+#include "common/problem/run_files.h"
+#include "common/robot/robot_file.h"
+#include "master/cli/diagnosis/diagnose_command.h"
+#include "master/cli/subcommand.h"
+#include "master/command/outputs.h"
+#include "master/ground/fit/wheel_loop.h"
+#include "master/ground/watch/changes.h"
+#include "master/ground/watch/run_cache.h"
+#include "master/ground/watch/watch_report.h"
+
+namespace gapfarm {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kFits = "runs.jsonl";
+constexpr const char* kRobotFile = "robot.toml";
+constexpr const char* kFitVersion = "1";  // of fit_run_values(): what it gave before is made anew
+constexpr double kEpoch_s = 1e8;          // times from here on are those of a calendar's clock
+
+struct WatchCommand {
+  std::string folder;
+  std::string robot;
+  std::string out;
+  std::uint64_t seed = 1;
+  Outputs outputs;
+};
+
+struct RunFolder {
+  fs::path path;
+  std::string name;
+  RunLog log;
+};
+
+struct RobotFolder {
+  std::string name;
+  fs::path path;
+  GroundRobot robot;
+  std::vector<RunFolder> runs;
+};
+
+bool is_run(const fs::path& folder) {
+  std::error_code ignored;
+  return fs::exists(folder / "commands.csv", ignored) || fs::exists(folder / "poses.csv", ignored);
+}
+
+// "run2" before "run10".
+bool comes_before(const std::string& a, const std::string& b) {
+  const auto digit = [](char c) { return c >= '0' && c <= '9'; };
+  std::size_t i = 0, j = 0;
+  while (i < a.size() && j < b.size()) {
+    if (!digit(a[i]) || !digit(b[j])) {
+      if (a[i] != b[j]) return a[i] < b[j];
+      ++i;
+      ++j;
+      continue;
+    }
+    const auto number = [&](const std::string& text, std::size_t* at) {
+      while (*at < text.size() && text[*at] == '0') ++*at;
+      const std::size_t from = *at;
+      while (*at < text.size() && digit(text[*at])) ++*at;
+      return text.substr(from, *at - from);
+    };
+    const std::string x = number(a, &i), y = number(b, &j);
+    if (x != y) return x.size() != y.size() ? x.size() < y.size() : x < y;
+  }
+  return a.size() - i != b.size() - j ? a.size() - i < b.size() - j : a < b;
+}
+
+std::vector<std::string> folders_in(const fs::path& folder) {
+  std::vector<std::string> names;
+  std::error_code ignored;
+  for (const auto& entry : fs::directory_iterator(folder, ignored)) {
+    if (entry.is_directory(ignored)) names.push_back(entry.path().filename().string());
+  }
+  std::sort(names.begin(), names.end(), comes_before);
+  return names;
+}
+
+// DIR/ROBOT/RUN; of one robot DIR/RUN.
+std::vector<RobotFolder> find_robots(const fs::path& folder) {
+  std::vector<RobotFolder> robots;
+  RobotFolder own{fs::absolute(folder / ".").lexically_normal().parent_path().filename().string(),
+                  folder,
+                  {},
+                  {}};
+  for (const std::string& name : folders_in(folder)) {
+    if (is_run(folder / name)) {
+      own.runs.push_back({folder / name, name, {}});
+      continue;
+    }
+    RobotFolder robot{name, folder / name, {}, {}};
+    for (const std::string& run : folders_in(folder / name)) {
+      if (is_run(folder / name / run)) robot.runs.push_back({folder / name / run, run, {}});
+    }
+    if (!robot.runs.empty()) robots.push_back(std::move(robot));
+  }
+  if (!own.runs.empty()) robots.insert(robots.begin(), std::move(own));
+  return robots;
+}
+
+// Of each robot its own file, else one for all.
+Status read_robots(const WatchCommand& command, std::vector<RobotFolder>* robots) {
+  std::error_code ignored;
+  for (RobotFolder& robot : *robots) {
+    fs::path file = command.robot;
+    if (file.empty()) file = robot.path / kRobotFile;
+    if (!fs::exists(file, ignored)) file = fs::path(command.folder) / kRobotFile;
+    if (command.robot.empty() && !fs::exists(file, ignored)) {
+      return Error{"found no robot file for " + robot.name + ": put robot.toml into " +
+                   command.folder + " (one for all) or " + robot.path.string() +
+                   ", or name it with --robot"};
+    }
+    ASSIGN_OR_RETURN(robot.robot,
+                     read_robot(command.robot.empty() ? file.string() : command.robot));
+  }
+  return {};
+}
+
+std::string kind_of(const GroundRobot& robot) {
+  std::string kind = drive_names()[static_cast<std::size_t>(robot.drive)] + " commanded by";
+  for (const std::string& channel : robot.channels) kind += " " + channel;
+  return kind;
+}
+
+// Robots of another kind than most are omitted.
+void keep_one_kind(std::vector<RobotFolder>* robots, WatchedFleet* fleet) {
+  const auto alike = [&](const std::string& kind) {
+    return std::count_if(robots->begin(), robots->end(),
+                         [&](const RobotFolder& r) { return kind_of(r.robot) == kind; });
+  };
+  std::string most = kind_of(robots->front().robot);
+  for (const RobotFolder& robot : *robots) {
+    if (alike(kind_of(robot.robot)) > alike(most)) most = kind_of(robot.robot);
+  }
+  std::erase_if(*robots, [&](const RobotFolder& robot) {
+    if (kind_of(robot.robot) == most) return false;
+    fleet->skipped.push_back({robot.name, "",
+                              "another kind of robot: " + kind_of(robot.robot) + ", and most are " +
+                                  most + "; watch it by itself"});
+    return true;
+  });
+}
+
+void read_logs(std::vector<RobotFolder>* robots, WatchedFleet* fleet) {
+  for (RobotFolder& robot : *robots) {
+    std::erase_if(robot.runs, [&](RunFolder& run) {
+      const std::vector<std::string> folder = {run.path.string()};
+      auto log = read_run_folders(folder, robot.robot.channels);
+      if (!log) {
+        fleet->skipped.push_back({robot.name, run.name, log.error().message});
+        return true;
+      }
+      for (const std::string& note : log->notes) {
+        fleet->notes.push_back(robot.name + "/" + run.name + ": " + note);
+      }
+      run.log = std::move(*log);
+      return false;
+    });
+    const auto begin = [](const RunFolder& run) { return run.log.runs.front().poses.front().t_s; };
+    const bool dated = std::all_of(robot.runs.begin(), robot.runs.end(),
+                                   [&](const RunFolder& run) { return begin(run) > kEpoch_s; });
+    if (dated) {  // runs at one time stay by name
+      std::stable_sort(robot.runs.begin(), robot.runs.end(),
+                       [&](const RunFolder& a, const RunFolder& b) { return begin(a) < begin(b); });
+    }
+  }
+}
+
+// Fits what is not in the cache.  Errors: stopped.
+Status fit_runs(std::vector<RobotFolder>* robots, const fs::path& cache_file, CliContext& context,
+                WatchedFleet* fleet) {
+  RunCache cache(cache_file);
+  const bool by_wheels = std::all_of(robots->begin(), robots->end(), [](const RobotFolder& robot) {
+    return std::all_of(robot.runs.begin(), robot.runs.end(), [&](const RunFolder& run) {
+      return has_wheel_speeds(robot.robot, run.log);
+    });
+  });
+  std::size_t all = 0, done = 0;
+  for (const RobotFolder& robot : *robots) all += robot.runs.size();
+  for (RobotFolder& robot : *robots) {
+    WatchedRobot& to = fleet->robots.emplace_back(WatchedRobot{robot.name, {}, {}});
+    for (RunFolder& run : robot.runs) {
+      ++done;
+      if (context.stop.requested()) return Error{"stopped", ErrorCode::kStopped};
+      const GroundRobot driven = by_wheels ? driven_by_wheels(robot.robot, run.log) : robot.robot;
+      const RunLog log = by_wheels ? driven_by_wheels(std::move(run.log)) : std::move(run.log);
+      const std::string key =
+          Hasher().add(kFitVersion).add(format_robot(driven)).add(log_hash(log)).finish();
+      const Result<OffsetFit>* fit = cache.find(key);
+      if (fit == nullptr) {
+        context.console.progress(
+            fmt::format("fitting run {} of {}: {}/{}", done, all, robot.name, run.name));
+        fit = &cache.keep(key, fit_run_values(driven, log, {{0.5, 2, 5}, 0.5}));
+        ++fleet->fitted;
+      }
+      if (!*fit) {
+        fleet->skipped.push_back({robot.name, run.name, fit->error().message});
+        continue;
+      }
+      to.runs.push_back(run.name);
+      to.fits.push_back(**fit);
+    }
+  }
+  context.console.clear_progress();
+  std::erase_if(fleet->robots, [](const WatchedRobot& robot) { return robot.runs.empty(); });
+  return {};
+}
+
+Result<int> run_watch(WatchCommand& command, CliContext& context) {
+  const fs::path out(command.out);
+  std::error_code ignored;
+  for (const char* name : {"watch.json", "report.html"}) {
+    const std::string path = (out / name).string();
+    // What it made itself it makes again.
+    RETURN_IF_ERROR(fs::exists(out / kFits, ignored) ? command.outputs.plan_again(path)
+                                                     : command.outputs.plan(path));
+  }
+  std::vector<RobotFolder> robots = find_robots(command.folder);
+  if (robots.empty()) {
+    return Error{command.folder + ": found no runs; a run is a folder ROBOT/RUN in it with " +
+                 "commands.csv and poses.csv"};
+  }
+  RETURN_IF_ERROR(read_robots(command, &robots));
+  WatchedFleet fleet;
+  keep_one_kind(&robots, &fleet);
+  read_logs(&robots, &fleet);
+  fs::create_directories(out, ignored);
+  context.begun = true;
+  if (Status s = fit_runs(&robots, out / kFits, context, &fleet); !s) {
+    if (s.error().code != ErrorCode::kStopped) return s.error();
+    context.console.note("stopped; fits are kept in " + (out / kFits).string() +
+                         ", and the same command goes on");
+    return kExitResumable;
+  }
+  if (fleet.robots.empty()) {
+    for (const WatchedSkip& skip : fleet.skipped) context.console.note(skip_text(skip));
+    return Error{command.folder + ": no run could be fitted"};
+  }
+  fleet.rows = watched_rows(robots.front().robot);
+  std::vector<std::vector<OffsetFit>> fits;
+  for (const WatchedRobot& robot : fleet.robots) fits.push_back(robot.fits);
+  const FleetChanges changes = find_changes(fleet.rows, fits, command.seed);
+  const nlohmann::ordered_json json = watch_json(fleet, changes);
+  RETURN_IF_ERROR(command.outputs.write_in(
+      command.out,
+      {{"watch.json", json.dump(2) + "\n"}, {"report.html", watch_page(fleet, changes)}}));
+  for (const std::string& note : fleet.notes) context.console.note(note);
+  context.console.result(watch_text(fleet, changes), json);
+  context.console.note("wrote: " + command.out + "/watch.json, report.html");
+  return changes.steps.empty() && changes.odd_robots.empty() ? kExitDone : kExitChanged;
+}
+
+}  // namespace
+
+SubcommandRun setup_watch(CLI::App& app) {
+  auto command = std::make_shared<WatchCommand>();
+  app.add_option("DIR", command->folder, "Folders ROBOT/RUN with commands.csv and poses.csv")
+      ->required();
+  app.add_option("--robot", command->robot,
+                 "Robot file of all (default: robot.toml of a robot's folder, else of DIR)");
+  app.add_option("--out", command->out, "Folder for watch.json, report.html and the runs' fits")
+      ->required();
+  app.add_option("--seed", command->seed, "Of the draws behind thresholds")->capture_default_str();
+  command->outputs.declare(app);
+  app.footer(
+      "Each run is fitted once; another call fits what is new. Exit code 0: nothing changed,\n"
+      "4: something did.\n\n"
+      "Examples:\n"
+      "  gapfarm watch fleet --out watched\n"
+      "  gapfarm watch fleet --robot husky_robot.toml --out watched --json");
+  return [command](CliContext& context) { return run_watch(*command, context); };
+}
+
+}  // namespace gapfarm

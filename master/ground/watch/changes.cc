@@ -1,0 +1,390 @@
+#include "master/ground/watch/changes.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "common/math/laws.h"
+#include "common/math/statistics.h"
+#include "common/random/stream.h"
+#include "master/ground/watch/mixed_model.h"
+
+namespace gapfarm {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr int kRounds = 40;      // of EM, from the priors
+constexpr int kWarmRounds = 4;   // from values nearby
+constexpr int kNullDraws = 400;  // of each kind
+constexpr double kTail = 0.1;    // of the draws, whose excess is exponential
+constexpr double kCovered = 0.9;
+constexpr std::size_t kMostSteps = 12;
+constexpr double kOddWeight = 0.25;  // of a run that is off by itself
+
+struct Candidate {
+  std::size_t robot = 0, value = 0, onset = 0;
+  double statistic = 0;
+};
+
+// The fleet in tolerances.
+struct Scaled {
+  std::vector<RobotRuns> robots;
+  std::vector<VectorXd> directions;
+  VectorXd owned;  // variances
+};
+
+Scaled scaled(const WatchedRows& rows, const std::vector<std::vector<OffsetFit>>& robots) {
+  const auto p = static_cast<Index>(rows.rows.size());
+  VectorXd per(p);
+  for (Index k = 0; k < p; ++k) per[k] = 1 / rows.rows[static_cast<std::size_t>(k)].tolerance;
+  Scaled fleet;
+  fleet.owned = rows.owned.cwiseProduct(per).cwiseAbs2();
+  for (const WatchedValue& value : rows.values) {
+    fleet.directions.push_back(value.direction.cwiseProduct(per));
+  }
+  for (const std::vector<OffsetFit>& runs : robots) {
+    RobotRuns& to = fleet.robots.emplace_back();
+    for (const OffsetFit& run : runs) {
+      to.values.push_back(run.values.cwiseProduct(per));
+      to.covariances.emplace_back(per.asDiagonal() * run.covariance * per.asDiagonal());
+    }
+    to.weights.assign(runs.size(), 1);
+  }
+  return fleet;
+}
+
+// The best step in each of the values.
+std::vector<Candidate> best_steps(const Scaled& fleet, const RunVariances& variances) {
+  std::vector<Candidate> best(fleet.directions.size());
+  for (std::size_t k = 0; k < best.size(); ++k) best[k].value = k;
+  for (std::size_t u = 0; u < fleet.robots.size(); ++u) {
+    const RobotFit fit = fit_robot(fleet.robots[u], variances);
+    const auto scores = score_steps(fit, fleet.robots[u], fleet.directions);
+    for (std::size_t k = 0; k < scores.size(); ++k) {
+      for (std::size_t i = 0; i < scores[k].size(); ++i) {
+        const double statistic = scores[k][i].statistic();
+        if (statistic > best[k].statistic) best[k] = {u, k, i, statistic};
+      }
+    }
+  }
+  return best;
+}
+
+// Of steps in each value the one that is farthest beyond its threshold; none: all are 0.
+Candidate best_of(const std::vector<Candidate>& steps, const std::vector<double>& thresholds = {}) {
+  const auto beyond = [&](const Candidate& step) {
+    return step.statistic - (thresholds.empty() ? 0 : thresholds[step.value]);
+  };
+  return *std::max_element(steps.begin(), steps.end(), [&](const Candidate& a, const Candidate& b) {
+    return beyond(a) < beyond(b);
+  });
+}
+
+void add_step(const Candidate& step, Scaled* fleet) {
+  fleet->robots[step.robot].steps.push_back({step.onset, fleet->directions[step.value]});
+}
+
+// The best steps where variances and weights do not count the best one as scatter; both are left
+// so.
+std::vector<Candidate> best_steps_themselves(Scaled* fleet, int rounds, RunVariances* variances) {
+  const Candidate first = best_of(best_steps(*fleet, *variances));
+  if (first.statistic > 0) {
+    add_step(first, fleet);
+    estimate_variances(&fleet->robots, variances, rounds);
+    fleet->robots[first.robot].steps.pop_back();
+  }
+  return best_steps(*fleet, *variances);
+}
+
+// The robot that is farthest from the others in one value.
+OddRobot farthest_robot(const Scaled& fleet, const std::vector<RobotFit>& fits) {
+  OddRobot best;
+  const Index p = fleet.owned.size();
+  for (std::size_t u = 0; u < fits.size(); ++u) {
+    const Shared others = estimate_shared(fits, fleet.owned, static_cast<int>(u));
+    MatrixXd V = fits[u].covariance.topLeftCorner(p, p) + others.covariance;
+    V.diagonal() += others.between;
+    const Eigen::LLT<MatrixXd> factors(V);
+    const VectorXd away = factors.solve(fits[u].beta.head(p) - others.mean);
+    for (std::size_t k = 0; k < fleet.directions.size(); ++k) {
+      const VectorXd& d = fleet.directions[k];
+      const double precision = d.dot(factors.solve(d));
+      const double change = d.dot(away) / precision;
+      if (change * change * precision <= best.statistic) continue;
+      const double half = kNormal90 / std::sqrt(precision);
+      best = {u, k, change, change - half, change + half, change * change * precision};
+    }
+  }
+  return best;
+}
+
+std::vector<RobotFit> fit_robots(const Scaled& fleet, const RunVariances& variances) {
+  std::vector<RobotFit> fits;
+  for (const RobotRuns& robot : fleet.robots) fits.push_back(fit_robot(robot, variances));
+  return fits;
+}
+
+// Runs of robots without changes: normal ones, with the covariances and variances of these; or
+// these themselves, the best step taken out, in another order.
+class NullRuns {
+ public:
+  NullRuns(const Scaled& fleet, const RunVariances& variances, const Candidate& step)
+      : fleet_(fleet), flat_(fleet) {
+    Scaled with = fleet;
+    if (step.statistic > 0) add_step(step, &with);
+    std::vector<RobotFit> fits = fit_robots(with, variances);
+    for (std::size_t u = 0; u < fits.size(); ++u) {
+      flat_.robots[u].values = fits[u].residuals;
+      auto& roots = roots_.emplace_back();
+      for (const MatrixXd& covariance : fleet.robots[u].covariances) {
+        MatrixXd V = variances.dispersion * covariance;
+        V.diagonal() += variances.between;
+        roots.emplace_back(V.llt().matrixL());
+      }
+    }
+    between_ = estimate_shared(fits, fleet.owned, -1).between;
+  }
+
+  Scaled draw(Stream* stream, bool in_order) const {
+    Scaled drawn = flat_;
+    for (std::size_t u = 0; u < drawn.robots.size(); ++u) {
+      RobotRuns& to = drawn.robots[u];
+      const RobotRuns& from = flat_.robots[u];
+      const std::vector<std::size_t> order = stream->permutation(to.values.size());
+      for (std::size_t i = 0; i < order.size(); ++i) {
+        if (in_order) {
+          VectorXd white(fleet_.owned.size());
+          for (double& w : white) w = stream->normal();
+          to.values[i] = roots_[u][i] * white;
+          to.weights[i] = 1;
+        } else {
+          to.values[i] = from.values[order[i]];
+          to.covariances[i] = from.covariances[order[i]];
+          to.weights[i] = from.weights[order[i]];
+        }
+      }
+    }
+    return drawn;
+  }
+
+  // What robots of a kind differ by, into fits of such runs.
+  void differ(Stream* stream, std::vector<RobotFit>* fits) const {
+    for (RobotFit& fit : *fits) {
+      for (Index k = 0; k < between_.size(); ++k) {
+        fit.beta[k] += std::sqrt(between_[k]) * stream->normal();
+      }
+    }
+  }
+
+ private:
+  const Scaled& fleet_;
+  Scaled flat_;  // without what each robot owns
+  std::vector<std::vector<MatrixXd>> roots_;
+  VectorXd between_;
+};
+
+// What a share `alarms` of these maxima exceed, by their tail.
+double threshold_of(const std::vector<double>& maxima, double alarms) {
+  const double from = quantile(maxima, 1 - kTail);
+  double excess = 0, beyond = 0;
+  for (const double m : maxima) {
+    if (m <= from) continue;
+    excess += m - from;
+    beyond += 1;
+  }
+  return from + (beyond > 0 ? excess / beyond : 0) * std::log(kTail / alarms);
+}
+
+WatchThresholds draw_thresholds(const Scaled& fleet, const RunVariances& variances,
+                                const NullRuns& null, std::uint64_t seed, bool in_order) {
+  std::vector<std::vector<double>> steps(fleet.directions.size());
+  std::vector<double> robots;
+  const bool compared = fleet.robots.size() > 2;
+  for (int d = 0; d < kNullDraws; ++d) {
+    Stream stream({seed, Purpose::kStatistics, in_order ? 5U : 6U, static_cast<std::uint64_t>(d)});
+    Scaled drawn = null.draw(&stream, in_order);
+    RunVariances at = variances;
+    estimate_variances(&drawn.robots, &at, kWarmRounds);
+    if (compared) {
+      std::vector<RobotFit> fits = fit_robots(drawn, at);
+      null.differ(&stream, &fits);
+      robots.push_back(farthest_robot(drawn, fits).statistic);
+    }
+    for (const Candidate& step : best_steps_themselves(&drawn, kWarmRounds, &at)) {
+      steps[step.value].push_back(step.statistic);
+    }
+  }
+  const double each = compared ? kFalseAlarms / 2 : kFalseAlarms;
+  WatchThresholds thresholds{{}, compared ? threshold_of(robots, each) : 0};
+  for (const std::vector<double>& of_value : steps) {
+    thresholds.steps.push_back(threshold_of(of_value, each / static_cast<double>(steps.size())));
+  }
+  return thresholds;
+}
+
+// The smallest span of runs that holds these shares' 90 % best.
+std::pair<std::size_t, std::size_t> span_of(const std::vector<double>& shares) {
+  std::vector<std::size_t> order(shares.size());
+  for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return shares[a] > shares[b]; });
+  std::pair<std::size_t, std::size_t> span = {order[0], order[0]};
+  double held = 0;
+  for (const std::size_t i : order) {
+    span = {std::min(span.first, i), std::max(span.second, i)};
+    held += shares[i];
+    if (held >= kCovered) break;
+  }
+  return span;
+}
+
+// A step by its posterior over values and onsets, all equally likely before and its size normal
+// round nothing; the robot's other steps are in the fit.
+ValueStep describe_step(const WatchedRows& rows, const Scaled& fleet, const RunVariances& variances,
+                        const Candidate& found) {
+  const RobotRuns& robot = fleet.robots[found.robot];
+  const auto scores = score_steps(fit_robot(robot, variances), robot, fleet.directions);
+  std::vector<std::vector<double>> weights(scores.size());
+  double all = 0;
+  ValueStep step;
+  step.robot = found.robot;
+  for (std::size_t k = 0; k < scores.size(); ++k) {
+    double sum = 0;
+    for (const StepScore& s : scores[k]) {
+      const double known = s.precision * rows.values[k].plausible * rows.values[k].plausible;
+      const double nats =
+          s.statistic() * known / (1 + known) / 2 - std::log1p(known) / 2 - found.statistic / 2;
+      weights[k].push_back(s.precision > 0 ? std::exp(nats) : 0);
+      sum += weights[k].back();
+    }
+    step.shares.push_back(sum);
+    all += sum;
+  }
+  for (double& share : step.shares) share /= all;
+  step.value = static_cast<std::size_t>(std::max_element(step.shares.begin(), step.shares.end()) -
+                                        step.shares.begin());
+  std::vector<double>& onsets = weights[step.value];
+  for (double& w : onsets) w /= all * step.shares[step.value];
+  double squares = 0;
+  for (std::size_t i = 0; i < onsets.size(); ++i) {
+    const StepScore& s = scores[step.value][i];
+    if (onsets[i] <= 0) continue;
+    step.change += onsets[i] * s.change;
+    squares += onsets[i] * (s.change * s.change + 1 / s.precision);
+    step.statistic = std::max(step.statistic, s.statistic());
+  }
+  step.onset =
+      static_cast<std::size_t>(std::max_element(onsets.begin(), onsets.end()) - onsets.begin());
+  std::tie(step.onset_first, step.onset_last) = span_of(onsets);
+  const double half = kNormal90 * std::sqrt(std::max(0.0, squares - step.change * step.change));
+  step.lo = step.change - half;
+  step.hi = step.change + half;
+  return step;
+}
+
+// Steps as all that was found describes them, each beside the others.
+std::vector<ValueStep> describe_steps(const WatchedRows& rows, const Scaled& fleet,
+                                      const RunVariances& variances,
+                                      const std::vector<Candidate>& found) {
+  std::vector<ValueStep> steps;
+  for (std::size_t s = 0; s < found.size(); ++s) {
+    Scaled without = fleet;
+    for (RobotRuns& robot : without.robots) robot.steps.clear();
+    for (std::size_t t = 0; t < found.size(); ++t) {
+      if (t != s) add_step(found[t], &without);
+    }
+    steps.push_back(describe_step(rows, without, variances, found[s]));
+  }
+  std::stable_sort(steps.begin(), steps.end(), [](const ValueStep& a, const ValueStep& b) {
+    return std::pair(a.robot, a.onset) < std::pair(b.robot, b.onset);
+  });
+  return steps;
+}
+
+std::vector<std::vector<RunReading>> readings_of(const WatchedRows& rows, const Scaled& fleet,
+                                                 const RobotFit& fit, const VectorXd& owned) {
+  std::vector<std::vector<RunReading>> readings;
+  const Index p = owned.size(), q = fit.beta.size();
+  for (std::size_t k = 0; k < fleet.directions.size(); ++k) {
+    const VectorXd& d = fleet.directions[k];
+    const VectorXd& among = rows.values[k].direction;
+    auto& of_value = readings.emplace_back();
+    for (std::size_t i = 0; i < fit.precisions.size(); ++i) {
+      const double precision = d.dot(fit.precisions[i] * d);
+      const VectorXd off =
+          fit.residuals[i] + fit.designs[i].rightCols(q - p) * fit.beta.tail(q - p);
+      of_value.push_back(
+          {among.dot(owned) / among.sum() + d.dot(fit.precisions[i] * off) / precision,
+           1 / std::sqrt(precision)});
+    }
+  }
+  return readings;
+}
+
+}  // namespace
+
+FleetChanges find_changes(const WatchedRows& rows,
+                          const std::vector<std::vector<OffsetFit>>& robots, std::uint64_t seed) {
+  Scaled fleet = scaled(rows, robots);
+  const Index p = fleet.owned.size();
+  RunVariances variances{1, VectorXd::Ones(p)};
+  estimate_variances(&fleet.robots, &variances, kRounds);
+  FleetChanges result;
+  std::vector<Candidate> best = best_steps_themselves(&fleet, kRounds, &variances);
+  const NullRuns null(fleet, variances, best_of(best));
+  WatchThresholds& most = result.thresholds;
+  most = draw_thresholds(fleet, variances, null, seed, true);
+  const WatchThresholds again = draw_thresholds(fleet, variances, null, seed, false);
+  for (std::size_t k = 0; k < most.steps.size(); ++k) {
+    most.steps[k] = std::max(most.steps[k], again.steps[k]);
+  }
+  most.robot = std::max(most.robot, again.robot);
+  std::vector<Candidate> found;
+  while (found.size() < kMostSteps) {
+    const Candidate step = best_of(best, most.steps);
+    if (step.statistic <= most.steps[step.value]) break;
+    add_step(step, &fleet);
+    found.push_back(step);
+    best = best_steps_themselves(&fleet, kRounds, &variances);
+  }
+  estimate_variances(&fleet.robots, &variances, kRounds);
+  result.steps = describe_steps(rows, fleet, variances, found);
+  std::vector<RobotFit> fits = fit_robots(fleet, variances);
+  const Shared shared = estimate_shared(fits, fleet.owned, -1);
+  VectorXd units(p);
+  for (Index k = 0; k < p; ++k) units[k] = rows.rows[static_cast<std::size_t>(k)].tolerance;
+  result.dispersion = variances.dispersion;
+  result.run_deviations = variances.between.cwiseSqrt().cwiseProduct(units);
+  result.robot_deviations = shared.between.cwiseSqrt().cwiseProduct(units);
+  result.shared = shared.mean.cwiseProduct(units);
+  result.shared_errors = shared.covariance.diagonal().cwiseSqrt().cwiseProduct(units);
+  for (const RobotFit& fit : fits) {
+    result.owned.emplace_back(fit.beta.head(p).cwiseProduct(units));
+    result.owned_errors.emplace_back(
+        fit.covariance.diagonal().head(p).cwiseSqrt().cwiseProduct(units));
+    const std::vector<double>& weights = fleet.robots[result.readings.size()].weights;
+    for (std::size_t i = 0; i < weights.size(); ++i) {
+      if (weights[i] < kOddWeight)
+        result.odd_runs.push_back({result.readings.size(), i, weights[i]});
+    }
+    result.readings.push_back(readings_of(rows, fleet, fit, result.owned.back()));
+  }
+  std::vector<std::size_t> names(fits.size());
+  for (std::size_t u = 0; u < names.size(); ++u) names[u] = u;
+  while (fits.size() > 2) {
+    OddRobot odd = farthest_robot(fleet, fits);
+    if (odd.statistic <= most.robot) break;
+    const auto at = static_cast<std::ptrdiff_t>(odd.robot);
+    odd.robot = names[odd.robot];
+    fits.erase(fits.begin() + at);
+    names.erase(names.begin() + at);
+    result.odd_robots.push_back(odd);
+  }
+  return result;
+}
+
+}  // namespace gapfarm

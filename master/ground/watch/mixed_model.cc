@@ -1,0 +1,146 @@
+#include "master/ground/watch/mixed_model.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+
+#include "common/math/algebra.h"
+
+namespace gapfarm {
+namespace {
+
+constexpr double kPriorRuns = 4;  // of the variances from run to run
+// Values of runs, of the dispersion: what scatters is to be a value's own, not all values'.
+constexpr double kPriorDispersion = 1e4;
+constexpr double kPriorRobots = 4;
+constexpr int kSharedRounds = 12;
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+MatrixXd inverse(const MatrixXd& A) {
+  return A.llt().solve(MatrixXd::Identity(A.rows(), A.cols()));
+}
+
+MatrixXd variance_of(const MatrixXd& covariance, const RunVariances& variances) {
+  MatrixXd V = variances.dispersion * covariance;
+  V.diagonal() += variances.between;
+  return V;
+}
+
+}  // namespace
+
+RobotFit fit_robot(const RobotRuns& robot, const RunVariances& variances) {
+  const Index p = variances.between.size();
+  const Index q = p + static_cast<Index>(robot.steps.size());
+  RobotFit fit;
+  MatrixXd N = MatrixXd::Zero(q, q);
+  VectorXd b = VectorXd::Zero(q);
+  for (std::size_t i = 0; i < robot.values.size(); ++i) {
+    MatrixXd X = MatrixXd::Zero(p, q);
+    X.leftCols(p).setIdentity();
+    for (std::size_t s = 0; s < robot.steps.size(); ++s) {
+      if (i >= robot.steps[s].onset) X.col(p + static_cast<Index>(s)) = robot.steps[s].direction;
+    }
+    MatrixXd A = robot.weights[i] * inverse(variance_of(robot.covariances[i], variances));
+    N += X.transpose() * A * X;
+    b += X.transpose() * (A * robot.values[i]);
+    fit.precisions.push_back(std::move(A));
+    fit.designs.push_back(std::move(X));
+  }
+  fit.covariance = inverse(N);
+  fit.beta = fit.covariance * b;
+  for (std::size_t i = 0; i < robot.values.size(); ++i) {
+    fit.residuals.push_back(robot.values[i] - fit.designs[i] * fit.beta);
+  }
+  return fit;
+}
+
+void estimate_variances(std::vector<RobotRuns>* robots, RunVariances* at, int rounds) {
+  const Index p = at->between.size();
+  const auto size = static_cast<double>(p);
+  for (int round = 0; round < rounds; ++round) {
+    double runs = 0, own = 0;
+    VectorXd between = VectorXd::Zero(p);
+    for (RobotRuns& robot : *robots) {
+      const RobotFit fit = fit_robot(robot, *at);
+      for (std::size_t i = 0; i < robot.values.size(); ++i) {
+        const double u = robot.weights[i];
+        const MatrixXd A = fit.precisions[i] / u;
+        const MatrixXd& C = robot.covariances[i];
+        const VectorXd a = A * fit.residuals[i];
+        // A less what the robot's own values take up: the restricted likelihood's.
+        const MatrixXd AX = A * fit.designs[i];
+        const MatrixXd rest = A - u * AX * fit.covariance * AX.transpose();
+        const VectorXd w = at->between.cwiseProduct(a);
+        between += u * w.cwiseProduct(w) + at->between -
+                   at->between.cwiseProduct(at->between).cwiseProduct(rest.diagonal());
+        const double f = at->dispersion;
+        own += u * f * f * a.dot(C * a) + f * size - f * f * rest.cwiseProduct(C).sum();
+        runs += 1;
+        robot.weights[i] = (kRunTail + size) / (kRunTail + fit.residuals[i].dot(a));
+      }
+    }
+    at->between = (between.array() + kPriorRuns) / (runs + kPriorRuns);
+    at->dispersion = (own + kPriorDispersion) / (runs * size + kPriorDispersion);
+  }
+}
+
+std::vector<std::vector<StepScore>> score_steps(const RobotFit& fit, const RobotRuns& robot,
+                                                const std::vector<VectorXd>& directions) {
+  const std::size_t n = robot.values.size();
+  std::vector<std::vector<StepScore>> scores(directions.size(), std::vector<StepScore>(n));
+  const Index p = n == 0 ? 0 : fit.precisions[0].rows();
+  MatrixXd weight = MatrixXd::Zero(p, p), shared = MatrixXd::Zero(fit.beta.size(), p);
+  VectorXd pull = VectorXd::Zero(p);
+  for (std::size_t i = n; i-- > 0;) {
+    weight += fit.precisions[i];
+    shared += fit.designs[i].transpose() * fit.precisions[i];
+    pull += fit.precisions[i] * fit.residuals[i];
+    if (n - i < kLeastRuns || i < kLeastRuns) continue;
+    for (std::size_t k = 0; k < directions.size(); ++k) {
+      const VectorXd& d = directions[k];
+      const VectorXd taken = shared * d;
+      const double alone = d.dot(weight * d);
+      const double precision = alone - taken.dot(fit.covariance * taken);
+      if (precision <= 1e-9 * alone) continue;
+      scores[k][i] = {d.dot(pull) / precision, precision};
+    }
+  }
+  return scores;
+}
+
+Shared estimate_shared(const std::vector<RobotFit>& fits, const VectorXd& prior, int skipped) {
+  const Index p = prior.size();
+  Shared at;
+  at.between = prior;
+  for (int round = 0; round < kSharedRounds; ++round) {
+    MatrixXd N = MatrixXd::Zero(p, p);
+    VectorXd b = VectorXd::Zero(p);
+    std::vector<MatrixXd> weights(fits.size());
+    for (std::size_t u = 0; u < fits.size(); ++u) {
+      if (static_cast<int>(u) == skipped) continue;
+      MatrixXd V = fits[u].covariance.topLeftCorner(p, p);
+      V.diagonal() += at.between;
+      weights[u] = inverse(V);
+      N += weights[u];
+      b += weights[u] * fits[u].beta.head(p);
+    }
+    at.covariance = inverse(N);
+    at.mean = at.covariance * b;
+    VectorXd between = kPriorRobots * prior;
+    double robots = kPriorRobots;
+    for (std::size_t u = 0; u < fits.size(); ++u) {
+      if (static_cast<int>(u) == skipped) continue;
+      const MatrixXd rest = weights[u] - weights[u] * at.covariance * weights[u];
+      const VectorXd w = at.between.cwiseProduct(weights[u] * (fits[u].beta.head(p) - at.mean));
+      between += w.cwiseProduct(w) + at.between -
+                 at.between.cwiseProduct(at.between).cwiseProduct(rest.diagonal());
+      robots += 1;
+    }
+    at.between = between / robots;
+  }
+  return at;
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,286 @@
+#include "master/ground/watch/watch_report.h"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "common/math/laws.h"
+#include "master/ground/watch/mixed_model.h"
+#include "master/report/figures/line_chart.h"
+#include "master/report/page_frame.h"
+
+namespace gapfarm {
+namespace {
+
+constexpr double kShownShare = 0.05;  // of other values that a change may be of
+
+std::string change_text(const WatchedValue& value, double change, double lo, double hi) {
+  if (value.unit == "-") {
+    return fmt::format("{:+.2f} % [{:+.2f}, {:+.2f}]", 100 * change, 100 * lo, 100 * hi);
+  }
+  return fmt::format("{:+.4g} [{:+.4g}, {:+.4g}] {}", change, lo, hi, value.unit);
+}
+
+// Of one finding: robot, since when, between which runs, what, by how much, how sure.
+using Line = std::vector<std::string>;
+const Line kHead = {"robot", "since run", "within runs", "what", "by (90 %)", "chance"};
+
+std::vector<Line> finding_lines(const WatchedFleet& fleet, const FleetChanges& changes) {
+  std::vector<Line> lines;
+  for (const ValueStep& step : changes.steps) {
+    const WatchedRobot& robot = fleet.robots[step.robot];
+    const WatchedValue& value = fleet.rows.values[step.value];
+    std::string what = value.thing;
+    for (std::size_t k = 0; k < step.shares.size(); ++k) {
+      if (k == step.value || step.shares[k] < kShownShare) continue;
+      what += fmt::format("; or {} ({:.0f} %)", fleet.rows.values[k].thing, 100 * step.shares[k]);
+    }
+    lines.push_back({robot.name, robot.runs[step.onset],
+                     robot.runs[step.onset_first] + " to " + robot.runs[step.onset_last], what,
+                     change_text(value, step.change, step.lo, step.hi),
+                     fmt::format("{:.0f} %", 100 * step.shares[step.value])});
+  }
+  for (const OddRobot& odd : changes.odd_robots) {
+    const WatchedValue& value = fleet.rows.values[odd.value];
+    lines.push_back({fleet.robots[odd.robot].name, "the first", "",
+                     value.thing + ", from the others'",
+                     change_text(value, odd.change, odd.lo, odd.hi), ""});
+  }
+  return lines;
+}
+
+std::string run_name(const WatchedFleet& fleet, std::size_t robot, std::size_t run) {
+  return fleet.robots[robot].name + "/" + fleet.robots[robot].runs[run];
+}
+
+std::string odd_run_text(const WatchedFleet& fleet, const OddRun& odd) {
+  const bool last = odd.run + 1 == fleet.robots[odd.robot].runs.size();
+  return run_name(fleet, odd.robot, odd.run) + " is off by itself and counts little" +
+         (last ? "; it is the last one, so the next one shows whether this stays" : "");
+}
+
+std::size_t run_count(const WatchedFleet& fleet) {
+  std::size_t runs = 0;
+  for (const WatchedRobot& robot : fleet.robots) runs += robot.runs.size();
+  return runs;
+}
+
+std::string verdict(const WatchedFleet& fleet, const FleetChanges& changes) {
+  const std::string first = first_to_look_at(fleet, changes);
+  const bool changed = !changes.steps.empty() || !changes.odd_robots.empty();
+  const bool shown = std::any_of(fleet.robots.begin(), fleet.robots.end(), [](const auto& robot) {
+    return robot.runs.size() >= 2 * kLeastRuns;
+  });
+  return std::string(changed ? "Something changed."
+                     : shown ? "Nothing changed that these runs show."
+                             : "Too few runs: a change has three of them before it and three "
+                               "behind it.") +
+         (first.empty() ? "" : " The first run to look at: " + first + ".");
+}
+
+// Where a step of a robot begins and a reading by run, with what was fitted.
+LineChart value_chart(const WatchedFleet& fleet, const FleetChanges& changes, std::size_t value) {
+  const WatchedValue& watched = fleet.rows.values[value];
+  LineChart chart;
+  chart.title = watched.thing;
+  chart.x_title = "run";
+  chart.y_title =
+      watched.value + (watched.unit == "-" ? ", ratio to the file" : ", " + watched.unit);
+  chart.whole_x = true;
+  for (std::size_t u = 0; u < fleet.robots.size(); ++u) {
+    ChartSeries series;
+    series.name = fleet.robots[u].name;
+    const auto& readings = changes.readings[u][value];
+    for (std::size_t i = 0; i < readings.size(); ++i) {
+      const double run = static_cast<double>(i + 1), half = kNormal90 * readings[i].deviation;
+      series.line.push_back({run, readings[i].value});
+      series.lower.push_back({run, readings[i].value - half});
+      series.upper.push_back({run, readings[i].value + half});
+    }
+    chart.series.push_back(std::move(series));
+  }
+  return chart;
+}
+
+}  // namespace
+
+std::string skip_text(const WatchedSkip& skip) {
+  return skip.robot + (skip.run.empty() ? "" : "/" + skip.run) + ": omitted: " + skip.why;
+}
+
+std::string first_to_look_at(const WatchedFleet& fleet, const FleetChanges& changes) {
+  const ValueStep* most = nullptr;
+  for (const ValueStep& step : changes.steps) {
+    if (most == nullptr || step.statistic > most->statistic) most = &step;
+  }
+  if (most != nullptr) return run_name(fleet, most->robot, most->onset);
+  if (!changes.odd_robots.empty()) return run_name(fleet, changes.odd_robots.front().robot, 0);
+  if (changes.odd_runs.empty()) return "";
+  return run_name(fleet, changes.odd_runs.front().robot, changes.odd_runs.front().run);
+}
+
+std::string watch_text(const WatchedFleet& fleet, const FleetChanges& changes) {
+  std::string text = fmt::format("{} robots, {} runs, {} of them fitted now\n", fleet.robots.size(),
+                                 run_count(fleet), fleet.fitted);
+  std::vector<Line> lines = finding_lines(fleet, changes);
+  if (!lines.empty()) lines.insert(lines.begin(), kHead);
+  std::vector<std::size_t> widths(kHead.size());
+  for (const Line& line : lines) {
+    for (std::size_t c = 0; c < line.size(); ++c) widths[c] = std::max(widths[c], line[c].size());
+  }
+  for (const Line& line : lines) {
+    std::string row;
+    for (std::size_t c = 0; c < line.size(); ++c)
+      row += fmt::format("{:<{}}  ", line[c], widths[c]);
+    text += row.substr(0, row.find_last_not_of(' ') + 1) + "\n";
+  }
+  for (const OddRun& odd : changes.odd_runs) text += odd_run_text(fleet, odd) + "\n";
+  for (const WatchedSkip& skip : fleet.skipped) text += skip_text(skip) + "\n";
+  return text + verdict(fleet, changes) + "\n";
+}
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json value_json(const WatchedFleet& fleet, std::size_t robot, std::size_t value) {
+  const WatchedValue& watched = fleet.rows.values[value];
+  return {{"robot", fleet.robots[robot].name},
+          {"effect", watched.effect},
+          {"value", watched.value},
+          {"thing", watched.thing},
+          {"unit", watched.unit}};
+}
+
+Json steps_json(const WatchedFleet& fleet, const FleetChanges& changes) {
+  Json steps = Json::array();
+  for (const ValueStep& step : changes.steps) {
+    const std::vector<std::string>& runs = fleet.robots[step.robot].runs;
+    Json json = value_json(fleet, step.robot, step.value);
+    json.update({{"onset", runs[step.onset]},
+                 {"onset_first", runs[step.onset_first]},
+                 {"onset_last", runs[step.onset_last]},
+                 {"onset_number", step.onset + 1},
+                 {"change", step.change},
+                 {"lo", step.lo},
+                 {"hi", step.hi},
+                 {"statistic", step.statistic}});
+    for (std::size_t k = 0; k < step.shares.size(); ++k) {
+      json["chances"][fleet.rows.values[k].value] = step.shares[k];
+    }
+    steps.push_back(std::move(json));
+  }
+  return steps;
+}
+
+Json shared_json(const WatchedFleet& fleet, const FleetChanges& changes) {
+  Json shared = Json::object();
+  for (std::size_t k = 0; k < fleet.rows.rows.size(); ++k) {
+    const auto i = static_cast<Eigen::Index>(k);
+    shared[fleet.rows.rows[k].name] = {{"value", changes.shared[i]},
+                                       {"error", changes.shared_errors[i]},
+                                       {"between_robots", changes.robot_deviations[i]},
+                                       {"between_runs", changes.run_deviations[i]},
+                                       {"unit", fleet.rows.rows[k].unit}};
+  }
+  return shared;
+}
+
+Json robots_json(const WatchedFleet& fleet, const FleetChanges& changes) {
+  Json robots = Json::array();
+  for (std::size_t u = 0; u < fleet.robots.size(); ++u) {
+    Json values = Json::object(), runs = Json::array();
+    for (std::size_t k = 0; k < fleet.rows.rows.size(); ++k) {
+      const auto i = static_cast<Eigen::Index>(k);
+      values[fleet.rows.rows[k].name] = {{"value", changes.owned[u][i]},
+                                         {"error", changes.owned_errors[u][i]}};
+    }
+    for (std::size_t i = 0; i < fleet.robots[u].runs.size(); ++i) {
+      Json run = {{"run", fleet.robots[u].runs[i]}};
+      for (std::size_t k = 0; k < fleet.rows.values.size(); ++k) {
+        const RunReading& reading = changes.readings[u][k][i];
+        run[fleet.rows.values[k].value] = {reading.value, reading.deviation};
+      }
+      runs.push_back(std::move(run));
+    }
+    robots.push_back({{"robot", fleet.robots[u].name}, {"values", values}, {"runs", runs}});
+  }
+  return robots;
+}
+
+}  // namespace
+
+nlohmann::ordered_json watch_json(const WatchedFleet& fleet, const FleetChanges& changes) {
+  Json odd_robots = Json::array(), odd_runs = Json::array(), skipped = Json::array();
+  for (const OddRobot& odd : changes.odd_robots) {
+    odd_robots.push_back(value_json(fleet, odd.robot, odd.value));
+    odd_robots.back().update(
+        {{"change", odd.change}, {"lo", odd.lo}, {"hi", odd.hi}, {"statistic", odd.statistic}});
+  }
+  for (const OddRun& odd : changes.odd_runs) {
+    odd_runs.push_back({{"robot", fleet.robots[odd.robot].name},
+                        {"run", fleet.robots[odd.robot].runs[odd.run]},
+                        {"weight", odd.weight}});
+  }
+  for (const WatchedSkip& skip : fleet.skipped) {
+    skipped.push_back({{"robot", skip.robot}, {"run", skip.run}, {"why", skip.why}});
+  }
+  Json thresholds = {{"robot", changes.thresholds.robot}};
+  for (std::size_t k = 0; k < fleet.rows.values.size(); ++k) {
+    thresholds[fleet.rows.values[k].value] = changes.thresholds.steps[k];
+  }
+  return {{"version", 1},
+          {"changed", !changes.steps.empty() || !odd_robots.empty()},
+          {"first_run", first_to_look_at(fleet, changes)},
+          {"steps", steps_json(fleet, changes)},
+          {"odd_robots", odd_robots},
+          {"odd_runs", odd_runs},
+          {"skipped", skipped},
+          {"false_alarms", kFalseAlarms},
+          {"thresholds", thresholds},
+          {"dispersion", changes.dispersion},
+          {"shared", shared_json(fleet, changes)},
+          {"robots", robots_json(fleet, changes)}};
+}
+
+std::string watch_page(const WatchedFleet& fleet, const FleetChanges& changes) {
+  PlainPage page("What changed since when");
+  page.paragraph(verdict(fleet, changes));
+  const std::vector<Line> lines = finding_lines(fleet, changes);
+  if (!lines.empty()) page.table(kHead, lines);
+  for (const OddRun& odd : changes.odd_runs) page.paragraph(odd_run_text(fleet, odd));
+  page.heading("Values over runs");
+  page.paragraph(
+      "Each run's value with its 90 % interval, all other values as the robot's own. An interval "
+      "holds what differs from run to run.");
+  // What changed first.
+  std::vector<std::size_t> order;
+  for (const ValueStep& step : changes.steps) order.push_back(step.value);
+  for (const OddRobot& odd : changes.odd_robots) order.push_back(odd.value);
+  for (std::size_t k = 0; k < fleet.rows.values.size(); ++k) order.push_back(k);
+  std::vector<char> drawn(fleet.rows.values.size(), 0);
+  for (const std::size_t k : order) {
+    if (drawn[k]++ != 0) continue;
+    const LineChart chart = value_chart(fleet, changes, k);
+    page.picture(line_chart(chart), chart.title);
+  }
+  page.heading("What all share, and by how much robots and runs differ");
+  std::vector<Line> rows;
+  for (std::size_t k = 0; k < fleet.rows.rows.size(); ++k) {
+    const auto i = static_cast<Eigen::Index>(k);
+    rows.push_back({fleet.rows.rows[k].name, fmt::format("{:.5g}", changes.shared[i]),
+                    fmt::format("{:.2g}", changes.shared_errors[i]),
+                    fmt::format("{:.2g}", changes.robot_deviations[i]),
+                    fmt::format("{:.2g}", changes.run_deviations[i]), fleet.rows.rows[k].unit});
+  }
+  page.table(
+      {"value", "shared", "standard error", "from robot to robot", "from run to run", "unit"},
+      rows);
+  if (!fleet.skipped.empty()) page.heading("Omitted");
+  for (const WatchedSkip& skip : fleet.skipped) page.paragraph(skip_text(skip));
+  return page.finish();
+}
+
+}  // namespace gapfarm

@@ -1,0 +1,39 @@
+// What `gapfarm watch` found, as text, JSON and a page.
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <vector>
+
+#include "master/ground/watch/changes.h"
+
+namespace gapfarm {
+
+struct WatchedRobot {
+  std::string name;
+  std::vector<std::string> runs;  // their names, in order
+  std::vector<OffsetFit> fits;
+};
+
+struct WatchedSkip {
+  std::string robot;
+  std::string run;  // empty: the whole robot
+  std::string why;
+};
+
+struct WatchedFleet {
+  WatchedRows rows;
+  std::vector<WatchedRobot> robots;
+  std::vector<WatchedSkip> skipped;
+  std::vector<std::string> notes;
+  std::size_t fitted = 0;  // runs that were not at hand
+};
+
+std::string skip_text(const WatchedSkip& skip);
+// "robot/run"; empty: nothing is to be looked at.
+std::string first_to_look_at(const WatchedFleet& fleet, const FleetChanges& changes);
+std::string watch_text(const WatchedFleet& fleet, const FleetChanges& changes);
+nlohmann::ordered_json watch_json(const WatchedFleet& fleet, const FleetChanges& changes);
+std::string watch_page(const WatchedFleet& fleet, const FleetChanges& changes);
+
+}  // namespace gapfarm

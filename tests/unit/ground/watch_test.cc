@@ -1,0 +1,155 @@
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <filesystem>
+#include <fstream>
+
+#include "common/random/stream.h"
+#include "common/robot/robot_file.h"
+#include "master/ground/watch/changes.h"
+#include "master/ground/watch/run_cache.h"
+
+namespace gapfarm::watch_test {
+namespace {
+
+constexpr std::size_t kRobots = 4, kRuns = 14;
+
+WatchedRows rows_of_create() {
+  const auto robot = parse_robot(
+      "drive = \"differential\"\ncommands = [\"v\", \"omega\"]\nwheel_separation = 0.258\n"
+      "wheel_radius = 0.033\n",
+      "robot.toml");
+  return watched_rows(*robot);
+}
+
+using Fleet = std::vector<std::vector<OffsetFit>>;
+
+// Radii and separation of a run share errors, as logs leave their sum less sure than their
+// difference.
+Fleet make_fleet(const WatchedRows& rows, std::uint64_t seed) {
+  Stream stream({seed, Purpose::kTest});
+  const auto p = static_cast<Eigen::Index>(rows.rows.size());
+  Eigen::MatrixXd root = Eigen::MatrixXd::Zero(p, p);
+  for (Eigen::Index k = 0; k < p; ++k)
+    root(k, k) = rows.rows[static_cast<std::size_t>(k)].tolerance;
+  root.block(0, 0, 3, 1).setConstant(0.008);
+  Fleet fleet(kRobots);
+  for (auto& robot : fleet) {
+    Eigen::VectorXd owned(p);
+    for (Eigen::Index k = 0; k < p; ++k) owned[k] = 0.5 * rows.owned[k] * stream.normal();
+    for (std::size_t i = 0; i < kRuns; ++i) {
+      Eigen::VectorXd values = owned;
+      Eigen::VectorXd white(p);
+      for (double& w : white) w = stream.normal();
+      for (Eigen::Index k = 0; k < p; ++k) {
+        const KinematicRow& row = rows.rows[static_cast<std::size_t>(k)];
+        values[k] += row.nominal + row.tolerance * stream.normal();
+      }
+      robot.push_back({values + root * white, root * root.transpose()});
+    }
+  }
+  return fleet;
+}
+
+std::size_t value_named(const WatchedRows& rows, const std::string& name) {
+  for (std::size_t k = 0; k < rows.values.size(); ++k) {
+    if (rows.values[k].value == name) return k;
+  }
+  return rows.values.size();
+}
+
+void add(const WatchedRows& rows, const std::string& value, double change, std::size_t from,
+         std::size_t to, std::vector<OffsetFit>* robot) {
+  for (std::size_t i = from; i < to; ++i) {
+    (*robot)[i].values += change * rows.values[value_named(rows, value)].direction;
+  }
+}
+
+TEST(Watch, WatchesEverySizeOfTheRobotAndAllWheelsTogether) {
+  const WatchedRows rows = rows_of_create();
+  for (const char* name : {"left", "right", "separation", "delay", "lag", "marker_yaw", "travel"}) {
+    EXPECT_LT(value_named(rows, name), rows.values.size()) << name;
+  }
+}
+
+TEST(Watch, NamesNothingOfRobotsThatDoNotChange) {
+  const WatchedRows rows = rows_of_create();
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    const FleetChanges changes = find_changes(rows, make_fleet(rows, seed), 1);
+    EXPECT_TRUE(changes.steps.empty()) << seed;
+    EXPECT_TRUE(changes.odd_robots.empty()) << seed;
+  }
+}
+
+TEST(Watch, NamesTheRobotTheWheelAndTheRun) {
+  const WatchedRows rows = rows_of_create();
+  for (const char* wheel : {"left", "right"}) {
+    Fleet fleet = make_fleet(rows, 11);
+    add(rows, wheel, -0.02, 7, kRuns, &fleet[2]);
+    const FleetChanges changes = find_changes(rows, fleet, 1);
+    ASSERT_EQ(changes.steps.size(), 1u) << wheel;
+    const ValueStep& step = changes.steps[0];
+    EXPECT_EQ(step.robot, 2u);
+    EXPECT_EQ(rows.values[step.value].value, wheel);
+    EXPECT_EQ(rows.values[step.value].effect, "wheel_radius");
+    EXPECT_NEAR(static_cast<double>(step.onset), 7, 1);
+    EXPECT_LE(step.onset_first, 7u);
+    EXPECT_GE(step.onset_last, 7u);
+    EXPECT_LE(step.lo, -0.02);
+    EXPECT_GE(step.hi, -0.02);
+  }
+}
+
+TEST(Watch, TakesNoSingleRunForAStep) {
+  const WatchedRows rows = rows_of_create();
+  Fleet fleet = make_fleet(rows, 12);
+  add(rows, "left", -0.1, kRuns - 1, kRuns, &fleet[0]);
+  const FleetChanges changes = find_changes(rows, fleet, 1);
+  EXPECT_TRUE(changes.steps.empty());
+  ASSERT_EQ(changes.odd_runs.size(), 1u);
+  EXPECT_EQ(changes.odd_runs[0].robot, 0u);
+  EXPECT_EQ(changes.odd_runs[0].run, kRuns - 1);
+}
+
+TEST(Watch, NamesARobotThatWasAnotherFromTheStart) {
+  const WatchedRows rows = rows_of_create();
+  Fleet fleet = make_fleet(rows, 13);
+  add(rows, "right", 0.06, 0, kRuns, &fleet[1]);
+  const FleetChanges changes = find_changes(rows, fleet, 1);
+  EXPECT_TRUE(changes.steps.empty());
+  ASSERT_EQ(changes.odd_robots.size(), 1u);
+  EXPECT_EQ(changes.odd_robots[0].robot, 1u);
+  EXPECT_EQ(rows.values[changes.odd_robots[0].value].value, "right");
+}
+
+TEST(Watch, TakesOneRobotAndOneRun) {
+  const WatchedRows rows = rows_of_create();
+  const Fleet fleet = {{make_fleet(rows, 14)[0][0]}};
+  const FleetChanges changes = find_changes(rows, fleet, 1);
+  EXPECT_TRUE(changes.steps.empty());
+  EXPECT_TRUE(changes.owned[0].allFinite());
+}
+
+TEST(RunCache, TakesUpFitsAndReasonsAndLeavesABrokenLine) {
+  const auto file = std::filesystem::temp_directory_path() / "gapfarm_watch_test.jsonl";
+  std::filesystem::remove(file);
+  const OffsetFit fit = make_fleet(rows_of_create(), 15)[0][0];
+  {
+    RunCache cache(file);
+    EXPECT_EQ(cache.find("a"), nullptr);
+    cache.keep("a", fit);
+    cache.keep("b", Error{"too short"});
+  }
+  std::ofstream(file, std::ios::app) << "{\"key\": \"c\", \"val";
+  RunCache again(file);
+  ASSERT_NE(again.find("a"), nullptr);
+  EXPECT_EQ((*again.find("a"))->values, fit.values);
+  EXPECT_EQ((*again.find("a"))->covariance, fit.covariance);
+  ASSERT_NE(again.find("b"), nullptr);
+  EXPECT_EQ(again.find("b")->error().message, "too short");
+  EXPECT_EQ(again.find("c"), nullptr);
+  std::filesystem::remove(file);
+}
+
+}  // namespace
+}  // namespace gapfarm::watch_test
