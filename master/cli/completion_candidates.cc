@@ -75,6 +75,7 @@ constexpr OptionTakes kOptionTakes[] = {
     {"--picture", Takes::kFile},
     {"--urdf", Takes::kFile},
     {"--controllers", Takes::kFile},
+    {"--robot", Takes::kConfig},
     {"--key", Takes::kFile},
     {"--run", Takes::kRun},
     {"--site", Takes::kFile},
