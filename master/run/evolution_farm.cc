@@ -275,7 +275,7 @@ Status FarmBackend::stream(std::vector<Candidate> candidates, const TakeScore& t
     if (answers.size() >= at_once) {
       note_failures(std::exchange(answered, {}), std::exchange(answers, {}));
     }
-    ASSIGN_OR_RETURN(const Score score, score_of(result, problem_.fitness.kind));
+    ASSIGN_OR_RETURN(const Score score, score_of(result, problem_.fitness));
     ASSIGN_OR_RETURN(const auto next, take(place, score));
     return sent(tasks_of(next));
   };
