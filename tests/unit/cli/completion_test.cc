@@ -96,7 +96,8 @@ void expect_candidates(const CLI::App& app, const std::vector<std::string>& argu
       "--only",      "--train", "--test",           "--by",     "--per",       "--repeats",
       "--waypoints", "--start", "--place",          "--listen", "--page-port", "WORDS",
       "--name",      "NAME",    "--session-prefix", "--on-end", "--wall-time", "--master-time",
-      "--connect",   "OPTIONS", "EVOLVE",           "--with",   "--host",      "--wait-limit"};
+      "--connect",   "OPTIONS", "EVOLVE",           "--with",   "--host",      "--wait-limit",
+      "--want",      "--limit"};
   std::size_t positionals = 0;
   for (const CLI::Option* option : app.get_options()) {
     const std::string name = option->get_name(option->get_positional());
