@@ -11,6 +11,7 @@
 #include "common/base/try.h"
 #include "common/config/config.h"
 #include "common/json/fields.h"
+#include "common/problem/run_files.h"
 #include "common/score/constant_velocity.h"
 #include "common/trials/files.h"
 #include "common/trials/read.h"
@@ -78,7 +79,9 @@ Status read_trials(const TrialOptions& given, std::vector<Variant>& variants, Co
     if (config.trial_files.empty()) {
       return Error{config.path + ": no trials; name them in the config or with --trials"};
     }
-    if (before != nullptr && before->config.trial_files == config.trial_files) {
+    if (config.problem.windows()) {
+      RETURN_IF_ERROR(read_problem_runs(config.trial_files, config.windows, &config.problem));
+    } else if (before != nullptr && before->config.trial_files == config.trial_files) {
       config.problem.log = before->config.problem.log;
     } else {
       ASSIGN_OR_RETURN(
