@@ -175,6 +175,11 @@ TEST(CliUsage, InitOfAURDFWritesTheRobotAndAConfigThatNamesIt) {
   const Finished dry = gapfarm_command({"horizons", folder / "car.toml", "--dry-run"});
   EXPECT_EQ(dry.exit_code, 0) << dry.err;
   EXPECT_THAT(dry.out, HasSubstr("would measure horizons of"));
+  const Finished compared =
+      gapfarm_command({"compare", folder / "car.toml", "--seeds", "1", "--evaluations", "3",
+                       "--workers", "1", "--out", folder / "compared"});
+  EXPECT_EQ(compared.exit_code, 0) << compared.err;
+  EXPECT_THAT(compared.out, HasSubstr("random search"));
   EXPECT_EQ(gapfarm_command({"init", urdf, "--out", folder / "car.toml"}).exit_code, 2)
       << "it is there already";
   // `robot` writes the same two files.
