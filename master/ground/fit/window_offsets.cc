@@ -22,9 +22,6 @@ constexpr double kOpenOffset = 1;     // share; standard deviation before the lo
 constexpr int kOffsetRounds = 6;
 constexpr int kOffsetSteps = 8;  // of weights, a round
 constexpr Eigen::Index kFeatures = 3;
-// A speed of the rims below this share of that ahead is no turn: commands that make up for a wheel
-// that is a few per cent off are straight ones.
-constexpr double kStraightShare = 0.05;
 
 struct CommandedTwist {
   double ahead_m_s = 0;
@@ -114,8 +111,7 @@ Eigen::Vector3d exposure(const TwistReader& reader, const CommandedRun& run, dou
     const double end_s = k + 1 < run.commands.size() ? run.commands[k + 1].t_s : to_s;
     const double held_s = std::min(end_s, to_s) - std::max(run.commands[k].t_s, from_s);
     const CommandedTwist twist = reader.read(run.commands[k].values);
-    const bool straight = std::abs(twist.rim_m_s) <= kStraightShare * std::abs(twist.ahead_m_s);
-    if (straight || held_s <= 0) continue;
+    if (twist.rim_m_s == 0 || held_s <= 0) continue;
     const double way = held_s * twist.ahead_m_s;
     sums += Eigen::Vector3d(way, std::copysign(way, way * twist.rim_m_s),
                             held_s * std::abs(twist.rim_m_s));
