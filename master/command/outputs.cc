@@ -117,6 +117,15 @@ void Outputs::reads(const TrialLog& log) {
   for (const std::string& file : log.files) reads(file);
 }
 
+void Outputs::reads_runs(const std::vector<std::string>& folders) {
+  for (const std::string& folder : folders) {
+    for (const char* name :
+         {"commands.csv", "poses.csv", "wheels.csv", "gyro.csv", "returns.csv"}) {
+      reads((fs::path(folder) / name).string());
+    }
+  }
+}
+
 Status Outputs::check(const std::string& path, bool replace) const {
   if (is_in_place(path)) return {};
   const auto input = std::find_if(inputs_.begin(), inputs_.end(),

@@ -29,6 +29,8 @@ class Outputs {
   // An output is never one of these, however it is spelt and even with --force.
   void reads(const std::string& path);
   void reads(const TrialLog& log);
+  // What a run's log may consist of, in each of these folders.
+  void reads_runs(const std::vector<std::string>& folders);
 
   // Errors: the file is read by this command, is there already and --force was not given, is a
   // folder, or lies where nothing can be written.  Empty and "-" (stdout) are fine.  Devices and

@@ -175,6 +175,11 @@ TEST(CliUsage, InitOfAURDFWritesTheRobotAndAConfigThatNamesIt) {
   const Finished dry = gapfarm_command({"horizons", folder / "car.toml", "--dry-run"});
   EXPECT_EQ(dry.exit_code, 0) << dry.err;
   EXPECT_THAT(dry.out, HasSubstr("would measure horizons of"));
+  const Finished onto = gapfarm_command(
+      {"horizons", folder / "car.toml", "--picture", folder / "monday/poses.csv", "--force"});
+  EXPECT_EQ(onto.exit_code, 2);
+  EXPECT_THAT(onto.err, HasSubstr("is read by this command"));
+  EXPECT_EQ(text_of(folder / "monday/poses.csv"), poses);
   const Finished compared =
       gapfarm_command({"compare", folder / "car.toml", "--seeds", "1", "--evaluations", "3",
                        "--workers", "1", "--out", folder / "compared"});

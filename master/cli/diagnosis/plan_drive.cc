@@ -249,11 +249,7 @@ Result<int> run_plan_drive(const DriveOptions& options, const DriveTask& task, c
                                value(kGroundPositionNoise), value(kGroundHeadingNoise)};
   RunLog recorded;
   if (!config.trial_files.empty()) {
-    for (const std::string& folder : config.trial_files) {
-      for (const char* file : {"/commands.csv", "/poses.csv", "/wheels.csv"}) {
-        outputs.reads(folder + file);
-      }
-    }
+    outputs.reads_runs(config.trial_files);
     ASSIGN_OR_RETURN(recorded, read_run_folders(config.trial_files, robot.channels));
   }
   plan::DriveSettings settings;

@@ -58,8 +58,11 @@ Status draw_runs(const HorizonsCommand& command, const Fitted& fitted, const Run
 
 Result<int> run_horizons(HorizonsCommand& command, CliContext& context) {
   Console& console = context.console;
-  RETURN_IF_ERROR(command.outputs.plan({command.picture, command.out}));
   ASSIGN_OR_RETURN(const auto fitted, open_fitted(command.source, console));
+  command.outputs.reads(command.source);
+  command.outputs.reads_runs(fitted.folders);
+  command.outputs.reads_runs(command.runs);
+  RETURN_IF_ERROR(command.outputs.plan({command.picture, command.out}));
   if (!fitted.problem.windows()) {
     return Error{command.source + ": scenario " + fitted.problem.scenario +
                  " has no runs to cut into windows; gapfarm predict compares its trials"};
