@@ -91,6 +91,21 @@ class RunPurity : public ::testing::Test {
     return wait_until([&] { return digests(folder_ / run).size() >= 3; });
   }
 
+  // Of a run whose master was killed half way.
+  Digests resumed_after_a_kill() const {
+    {
+      RunningProgram master("gapfarm", evolve("run", {"--generations", "10000", "--workers", "2"}));
+      EXPECT_TRUE(half_way("run"));
+      master.send(SIGKILL);
+      master.wait();
+    }
+    // Generations of one evaluation go by faster than a signal comes: what was not asked for is
+    // cut.
+    const auto last = std::min(digests(folder_ / "run").size(), kGenerations);
+    return resumed("run", {"--generation", std::to_string(last), "--generations",
+                           std::to_string(kGenerations)});
+  }
+
   std::string status_digest(const std::string& run) const {
     const Finished finished = gapfarm_command({"status", folder_ / run, "--json"});
     return nlohmann::json::parse(finished.out, nullptr, false).value("digest", "");
@@ -218,15 +233,7 @@ TEST_P(AsynchronousPurity, HoldsForAnyNumberOfWorkersWhileTheyAreKilled) {
     EXPECT_GE(killed, 4);
     EXPECT_THAT(digests(folder_ / "seven"), ElementsAreArray(one));
   }
-  {
-    RunningProgram master("gapfarm", evolve("run", {"--generations", "10000", "--workers", "2"}));
-    ASSERT_TRUE(half_way("run"));
-    master.send(SIGKILL);
-    master.wait();
-  }
-  const std::string last = std::to_string(std::min(digests(folder_ / "run").size(), kGenerations));
-  EXPECT_THAT(resumed("run", {"--generation", last, "--generations", std::to_string(kGenerations)}),
-              ElementsAreArray(one));
+  EXPECT_THAT(resumed_after_a_kill(), ElementsAreArray(one));
 }
 
 // Each row of the table of optimisers beside the genetic algorithm, with every phase of it.
@@ -244,16 +251,7 @@ TEST_P(OptimiserPurity, HoldsForAnyNumberOfWorkersAndWhenKilled) {
   ASSERT_THAT(one, SizeIs(kGenerations));
   EXPECT_THAT(evolved("two", {"--workers", "2"}), ElementsAreArray(one));
   EXPECT_THAT(evolved("four", {"--workers", "4", "--shuffle", "5"}), ElementsAreArray(one));
-  {
-    RunningProgram master("gapfarm", evolve("run", {"--generations", "10000", "--workers", "2"}));
-    ASSERT_TRUE(half_way("run"));
-    master.send(SIGKILL);
-    master.wait();
-  }
-  // Generations of one evaluation go by faster than a signal comes: what was not asked for is cut.
-  const std::string last = std::to_string(std::min(digests(folder_ / "run").size(), kGenerations));
-  EXPECT_THAT(resumed("run", {"--generation", last, "--generations", std::to_string(kGenerations)}),
-              ElementsAreArray(one));
+  EXPECT_THAT(resumed_after_a_kill(), ElementsAreArray(one));
 }
 
 // Of several objectives, the front and its hypervolume, too.
