@@ -305,8 +305,8 @@ std::string describe(const Config& config, const Summary& summary, unsigned work
   const Problem& problem = config.problem;
   std::string text = config.path + ": " + standing(summary) + "\n";
   for (const SanityFinding& f : summary.sanity) {
-    text += std::string(f.severity == Severity::kNote ? "note " : "doubt") + "        " +
-            f.name + ": " + f.text + " " + f.remedy + "\n";
+    text += std::string(f.severity == Severity::kNote ? "note " : "doubt") + "        " + f.name +
+            ": " + f.text + " " + f.remedy + "\n";
   }
   for (const IdleGene& gene : summary.idle) {
     text += "idle gene    " + gene.key + " changes no score; " + gene.remedy + ".\n";
