@@ -92,6 +92,7 @@ struct GroundSearch {
   // Predictions of stretches that were held out: the file as it is, with the first thing that was
   // chosen, with the first two, ...
   std::vector<WindowFit> chain;
+  bool moved = false;  // the last of the chain: with all other values moved within tolerances
   // The best such prediction of all that was tried: the chain's last, values within their
   // tolerances, the best of the catalogue that was not named, every value free.  `closable`: what
   // it gains over the chain's last; of a change, over values within what a robot changes by.
