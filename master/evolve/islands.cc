@@ -133,6 +133,10 @@ OptimiserSetup IslandsOptimiser::setup_of(const OptimiserSetup& whole, std::size
   setup.run_seed += 0xbf58476d1ce4e5b9u * island;
   // One look at the config's own values is enough; where distributions begin is another matter.
   if (island > 0 && settings.optimiser.kind != OptimiserKind::kCmaEs) settings.seed_nominal = false;
+  setup.given.clear();
+  for (std::size_t i = 0; i < whole.given.size(); ++i) {
+    if ((i + 1) % count == island) setup.given.push_back(whole.given[i]);
+  }
   return setup;
 }
 

@@ -241,6 +241,13 @@ TEST_P(EveryOptimiser, StartsAtTheConfigsOwnValues) {
   setup.nominal = {0.25, 0.5, 0.75};
   const auto optimiser = make_optimiser(setup).value();
   EXPECT_EQ(optimiser->ask().front().genome, setup.nominal);
+  // And, of a population, at what was given beside.
+  setup.given = {{0.5, 0.25, 0.125}, {0.75, 0.5, 0.25}};
+  const auto candidates = make_optimiser(setup).value()->ask();
+  const bool population = GetParam() != OptimiserKind::kCmaEs && candidates.size() > 1;
+  for (std::size_t k = 0; population && k < setup.given.size(); ++k) {
+    EXPECT_EQ(candidates[k + 1].genome, setup.given[k]);
+  }
   setup.nominal.pop_back();
   EXPECT_THAT(make_optimiser(setup).error().message, testing::HasSubstr("2 genes instead of 3"));
   setup.nominal.clear();
