@@ -8,7 +8,6 @@
 #include <filesystem>
 #include <set>
 
-#include "common/base/suggest.h"
 #include "common/base/try.h"
 #include "common/config/config.h"
 #include "common/config/stages.h"
@@ -174,8 +173,8 @@ Status change_genes(const BranchOptions& options, const std::string& run, Config
     const std::size_t removed = std::erase_if(
         problem.genes, [&](const Gene& gene) { return key_of(problem, gene) == key; });
     if (removed == 0) {
-      return Error{fmt::format("--fix {}: {} is no gene of {}{}; its genes: {}", setting, key, run,
-                               suggestion(key, keys), fmt::join(keys, ", "))};
+      return Error{fmt::format("--fix {}: {} is no gene of {}; its genes: {}", setting, key, run,
+                               fmt::join(keys, ", "))};
     }
   }
   // A gene that was fixed before has the config's range.

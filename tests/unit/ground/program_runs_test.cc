@@ -106,11 +106,11 @@ RunLog driven(const Wrong& wrong) {
       taken.push_back({0.5 * k + wrong.delay_s, {wrong.v_gain * v, wrong.omega_gain * omega}});
     }
     const Pose start{0.3 * r, -0.2, 1.1 * r};
-    for (int k = 0; k < 110; ++k) {
-      Pose X = start * follow(taken, 0, 0.1 * k, kSpeed);
+    for (int k = 0; k < 55; ++k) {
+      Pose X = start * follow(taken, 0, 0.2 * k, kSpeed);
       X = {X.x + 1e-3 * stream.normal(), X.y + 1e-3 * stream.normal(),
            wrap_angle(X.theta + 2e-3 * stream.normal())};
-      run.poses.push_back({0.1 * k, X});
+      run.poses.push_back({0.2 * k, X});
     }
     log.runs.push_back(std::move(run));
   }
