@@ -109,7 +109,7 @@ class Run:
     @property
     def importance(self) -> pd.DataFrame:
         """A row a parameter, a column the fitness or each objective: the share of its variance that
-        the parameter explains alone, [0, 1], among what was evaluated (docs/page.md)."""
+        the parameter explains alone, [0, 1] without a unit, among what was evaluated (docs/page.md)."""
         found = command(["report", self.folder, "--out", os.devnull]).get("importance", {})
         return pd.DataFrame.from_dict(found, orient="index")
 

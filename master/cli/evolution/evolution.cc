@@ -36,10 +36,10 @@ class OnConsole : public RunWatcher {
 void declare_overrides(EvolutionOverrides& overrides, CLI::App& app) {
   constexpr std::uint64_t kMost = std::numeric_limits<std::int64_t>::max();
   app.add_option("--generations", overrides.generations, "Stop after so many generations")
-      ->check(CLI::Range(std::uint64_t{1}, kMost));
+      ->check(CLI::Range(std::uint64_t{1}, kMost, "1+"));
   app.add_option("--evaluations", overrides.evaluations,
                  "Stop after the generation in which so many evaluations are reached")
-      ->check(CLI::Range(std::uint64_t{1}, kMost));
+      ->check(CLI::Range(std::uint64_t{1}, kMost, "1+"));
   app.add_option("--time", overrides.time_s, "Stop after so many seconds")
       ->check(CLI::PositiveNumber);
   app.add_option("--target", overrides.target_fitness, "Stop at this fitness");
