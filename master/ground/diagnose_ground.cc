@@ -201,14 +201,13 @@ void emit_faults(const GroundWork& work, const GroundSearch& search) {
   if (!work.on_finding) return;
   Finding finding;
   finding.about = "faults of the log";
-  finding.text =
-      search.faults.empty()
-          ? "Nothing of the log is the wrong way round or in another unit."
-          : "With this put right, the log is far closer to what the robot's file expects: " +
-                things_of(search, search.faults) + ".";
-  finding.text +=
-      fmt::format(" {} windows of {} stretches are held against the robot's kinematics.",
-                  search.windows.trials.size(), search.windows.blocks);
+  finding.text = search.faults.empty()
+                     ? "Nothing of the log is the wrong way round or in another unit."
+                     : "With this put right, the log is far closer to what is expected: " +
+                           things_of(search, search.faults) + ".";
+  finding.text += fmt::format(" {} windows of {} stretches are held against the {}.",
+                              search.windows.trials.size(), search.windows.blocks,
+                              search.windows.simulated ? "program" : "robot's kinematics");
   work.on_finding(std::move(finding));
 }
 
