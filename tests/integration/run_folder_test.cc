@@ -146,7 +146,7 @@ TEST_F(RunFolder, WhatAHistoryHasBeginsARun) {
   ASSERT_EQ(next.exit_code, 0) << next.err;
   EXPECT_THAT(next.err, AllOf(HasSubstr("history.csv: begins at 6 of 1"),
                               HasSubstr("not used: birth_id, generation")));
-  EXPECT_EQ(status(folder_ / "next")["best_fitness"], status(run_)["best_fitness"]);
+  EXPECT_NEAR(status(folder_ / "next")["best_fitness"], status(run_)["best_fitness"], 1e-9);
   EXPECT_EQ(status(folder_ / "next")["start"]["from"], history);
 
   // As pandas has it; the better row goes first.
