@@ -76,8 +76,9 @@ TEST_F(Overwrite, TheRobotsFileOfAConfigIsAnInput) {
   const std::string config = folder_.write(
       "rover.toml",
       "scenario = \"ground\"\n[robot]\nfile = \"robot.toml\"\n[runs]\nfolders = []\n");
-  refused({"plan", config, "--out", folder_ / "plan.csv", "--picture", robot, "--force"}, robot,
-          "is read by this command");
+  refused({"plan", config, "--limit", "left=10", "--limit", "right=10", "--out",
+           folder_ / "plan.csv", "--picture", robot, "--force"},
+          robot, "is read by this command");
 }
 
 TEST_F(Overwrite, ARunAndADiagnosisDoNotShareAFolder) {

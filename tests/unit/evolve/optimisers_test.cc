@@ -267,7 +267,9 @@ TEST_P(EveryOptimiser, LeavesItsPopulationOrItsWidth) {
   if (population) {
     EXPECT_EQ(carried.population.front(), run.optimiser().best().genome);
   }
-  EXPECT_EQ(carried.spread.size(), GetParam() == Kind::kCmaEs ? 9 : 0);
+  if (GetParam() != Kind::kAutoSearch) {  // which may have got to CMA-ES
+    EXPECT_EQ(carried.spread.size(), GetParam() == Kind::kCmaEs ? 9 : 0);
+  }
   // Narrower than it began by now.
   for (std::size_t k = 0; k < carried.spread.size(); k += 4) {
     EXPECT_GT(carried.spread[k], 0);

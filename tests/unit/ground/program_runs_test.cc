@@ -163,7 +163,6 @@ TEST(ProgramRuns, NothingIsNamedOfACleanLog) {
 
 TEST(ProgramRuns, WhatAParameterOfTheProgramsDoesNoGainMayClaim) {
   const RunLog log = driven({0, 1.25, 1});
-  EXPECT_TRUE(named(diagnose(log), "command_gain"));
   Problem problem = problem_of("[genes]\nspeed = [0.5, 2]\n");
   const std::vector<Gene> tuned = std::move(problem.genes);
   problem.genes.clear();
