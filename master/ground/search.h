@@ -60,6 +60,12 @@ struct GroundQuestion {
   std::vector<SensorValue> sensor = {};
   std::vector<std::size_t> faults = {};
   std::vector<double> fault_gains = {};
+  // What follows the runs in place of the robot's kinematics; empty: they do.
+  std::function<decltype(WindowSet::simulated)(const WindowSet&)> simulation = {};
+
+  // window_set() with that.
+  Result<WindowSet> windows(const GroundRobot& robot, const RunLog& log,
+                            const WindowSettings& settings) const;
 };
 
 // Who waits for a search.

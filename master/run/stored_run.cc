@@ -25,6 +25,38 @@ void each(Visit visit) {
   visit("population", &Ours::population, &Theirs::population);
 }
 
+Json start_json(const SearchStart& start) {
+  Json json = {{"from", start.from}, {"genomes", start.genomes}};
+  if (!start.spread.empty()) json["spread"] = start.spread;
+  if (start.generation > 0) {
+    json["generation"] = start.generation;
+    json["digest"] = start.digest;
+    json["fixed"] = start.fixed;
+    json["freed"] = start.freed;
+  }
+  return json;
+}
+
+// Of a store that was changed by hand: what can be read.
+SearchStart stored_start(const RunInfo& info, std::size_t genes) {
+  SearchStart start;
+  const Json json = search_start(info);
+  if (!json.is_object()) return start;
+  const auto numbers = [](const Json& list) {
+    std::vector<double> values;
+    for (const Json& value : list) {
+      if (value.is_number()) values.push_back(value.get<double>());
+    }
+    return values;
+  };
+  for (const Json& genome : json.value("genomes", Json::array())) {
+    if (genome.size() == genes) start.genomes.push_back(numbers(genome));
+  }
+  start.spread = numbers(json.value("spread", Json::array()));
+  if (start.spread.size() != genes * genes) start.spread.clear();
+  return start;
+}
+
 }  // namespace
 
 RunInfo run_info(const Config& config, const EvolutionOverrides& overrides) {
@@ -33,7 +65,10 @@ RunInfo run_info(const Config& config, const EvolutionOverrides& overrides) {
   RunInfo info;
   info.config_path = config.path;
   info.config_text = config.text;
-  info.overrides = overrides.to_json();
+  Json changes = parse_json(overrides.to_json());
+  const SearchStart& start = config.evolution.start;
+  if (!start.genomes.empty()) changes["start"] = start_json(start);
+  info.overrides = json_text(changes);
   info.problem = serialise(problem);
   info.problem_hash = problem_hash(problem);
   info.seed = config.seed;
@@ -68,6 +103,7 @@ Result<Config> stored_config(const RunInfo& info, const EvolutionOverrides& over
   EvolutionOverrides all = EvolutionOverrides::from_json(info.overrides);
   all.merge(overrides);
   all.apply(config->evolution);
+  config->evolution.start = stored_start(info, config->problem.genes.size());
   return config;
 }
 
