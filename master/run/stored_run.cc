@@ -5,8 +5,10 @@
 
 #include "common/base/try.h"
 #include "common/config/config.h"
+#include "common/config/stages.h"
 #include "common/json/json.h"
 #include "common/problem/problem.h"
+#include "master/evolve/optimisers.h"
 
 namespace gapfarm {
 namespace {
@@ -25,6 +27,10 @@ void each(Visit visit) {
   visit("population", &Ours::population, &Theirs::population);
 }
 
+// Among the overrides: the kind that a config without one got.  Runs from before there was `auto`
+// by default have none, and are the genetic algorithm's.
+constexpr const char* kDefaultKind = "optimiser";
+
 }  // namespace
 
 RunInfo run_info(const Config& config, const EvolutionOverrides& overrides) {
@@ -33,7 +39,12 @@ RunInfo run_info(const Config& config, const EvolutionOverrides& overrides) {
   RunInfo info;
   info.config_path = config.path;
   info.config_text = config.text;
-  info.overrides = overrides.to_json();
+  Json settings = parse_json(overrides.to_json());
+  if (default_optimiser(config.text)) {
+    settings[kDefaultKind] =
+        optimisers()[static_cast<std::size_t>(config.evolution.optimiser.kind)].name;
+  }
+  info.overrides = json_text(settings);
   info.problem = serialise(problem);
   info.problem_hash = problem_hash(problem);
   info.seed = config.seed;
@@ -65,6 +76,9 @@ Result<Config> stored_config(const RunInfo& info, const EvolutionOverrides& over
   ASSIGN_OR_RETURN(Problem problem, stored_problem(info));
   config->problem = std::move(problem);
   config->seed = info.seed;
+  if (default_optimiser(info.config_text) && !parse_json(info.overrides).contains(kDefaultKind)) {
+    config->evolution.optimiser.kind = OptimiserKind::kGenetic;
+  }
   EvolutionOverrides all = EvolutionOverrides::from_json(info.overrides);
   all.merge(overrides);
   all.apply(config->evolution);
