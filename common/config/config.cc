@@ -54,6 +54,7 @@ bool read_robot_section(TomlSection& top, Config& config) {
     top.errors().add(section->table().source().begin, known.error().message);
     return false;
   }
+  config.robot_path = path;
   return true;
 }
 

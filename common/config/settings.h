@@ -47,6 +47,18 @@ struct OptimiserSettings {
   RestartKind restarts = RestartKind::kIpop;
 };
 
+// Where a search begins in place of the config's own values, and where that is from.
+struct SearchStart {
+  std::vector<Genome> genomes;  // best first, of the problem's genes; empty: the config's values
+  std::vector<double> spread;   // of the first, a covariance row by row; empty: unknown
+  std::string from;             // a table, a model, a run
+  // Of a run that another one branches off: its generation, the digest up to there, "GENE=VALUE",
+  // and keys.
+  std::uint64_t generation = 0;
+  std::string digest;
+  std::vector<std::string> fixed, freed;
+};
+
 struct EvolutionSettings {
   OptimiserSettings optimiser;
   unsigned population = 40;
@@ -79,6 +91,7 @@ struct EvolutionSettings {
   // The population in so many islands that wait for nobody else (master/evolve/islands.h).
   unsigned islands = 1;
   bool asynchronous = false;  // as many islands as the population has room for
+  SearchStart start = {};
 };
 
 struct FarmSettings {
@@ -134,6 +147,7 @@ struct Config {
                                          // trials are windows of runs: folders of these
   WindowSettings windows;
   std::uint64_t seed = 1;
+  std::string robot_path = {};  // of the robot's file; empty: there is none
 };
 
 }  // namespace gapfarm

@@ -29,6 +29,7 @@ double quantile(std::span<const double> values, double share) {
   const auto below = static_cast<std::size_t>(position);
   const std::size_t above = std::min(below + 1, sorted.size() - 1);
   const double fraction = position - static_cast<double>(below);
+  if (fraction == 0 || sorted[below] == sorted[above]) return sorted[below];  // either may be inf
   return sorted[below] + fraction * (sorted[above] - sorted[below]);
 }
 

@@ -36,7 +36,7 @@ std::vector<Parameter> noise_rows() {
 constexpr double kReach_m = 0.3;  // of a laboratory's robot: scales the noise that is assumed
 
 // Around a program that follows the commands of runs.
-std::vector<Parameter> run_rows() {
+std::vector<Parameter> run_rows(const std::vector<std::string>& channels) {
   using enum ParameterKind;
   using enum ParameterScale;
   const Parameter rows[] = {
@@ -64,6 +64,30 @@ std::vector<Parameter> run_rows() {
        ""}};
   std::vector<Parameter> all(std::begin(rows), std::end(rows));
   for (const Parameter& noise : window_noise_rows(kReach_m)) all.push_back(noise);
+  for (const std::string& channel : channels) {
+    all.push_back({channel + kChannelGain,
+                   "-",
+                   kReal,
+                   kLinear,
+                   0.1,
+                   10,
+                   1,
+                   "what " + channel + " is multiplied by before the program gets it",
+                   {},
+                   ""});
+  }
+  for (const std::string& channel : channels) {
+    all.push_back({channel + kChannelOffset,
+                   "-",
+                   kReal,
+                   kLinear,
+                   -100,
+                   100,
+                   0,
+                   "what is added to " + channel + " then",
+                   {},
+                   ""});
+  }
   return all;
 }
 
@@ -88,7 +112,7 @@ bool is_key(const std::string& key) {
 }
 
 bool is_taken(const std::string& key, bool runs) {
-  for (const Parameter& row : runs ? run_rows() : noise_rows()) {
+  for (const Parameter& row : runs ? run_rows({}) : noise_rows()) {
     if (row.key == key) return true;
   }
   const std::span<const Effect> known = srv1_effects_and_seconds();
@@ -178,7 +202,9 @@ ExternalTable::ExternalTable(ExternalDeclaration declaration)
     return;
   }
   const bool runs = !declaration_.channels.empty();
-  for (const Parameter& row : runs ? run_rows() : noise_rows()) rows.push_back(row);
+  for (const Parameter& row : runs ? run_rows(declaration_.channels) : noise_rows()) {
+    rows.push_back(row);
+  }
   for (const Effect& effect : srv1_effects_and_seconds()) {
     if (!runs && can_be_applied(effect, declaration_.inputs)) effects_.push_back(effect);
   }
@@ -191,7 +217,7 @@ const ParameterTable& external_table() {
 }
 
 const ParameterTable& external_runs_table() {
-  static const ParameterTable table(run_rows(), {});
+  static const ParameterTable table(run_rows({}), {});
   return table;
 }
 

@@ -50,6 +50,10 @@ struct ExternalDeclaration {
   std::vector<bool> present(const ParameterValues& values) const;
 };
 
+// Rows of a program's channels: what a command becomes before the program gets it.
+inline constexpr const char* kChannelGain = ".gain";
+inline constexpr const char* kChannelOffset = ".offset";
+
 // How it is started.
 struct ExternalCommand {
   std::vector<std::string> argv;  // program and arguments, found by PATH

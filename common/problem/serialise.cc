@@ -22,10 +22,12 @@ bool finite(const Pose& X) {
   return std::isfinite(X.x) && std::isfinite(X.y) && std::isfinite(X.theta);
 }
 
-// Rows that a message must have: those from a second one of a kind on, which are younger, are
-// omitted where they do nothing, so that problems without them are, to the byte, what they were
-// before there were any.
-std::size_t least_rows(const ParameterTable& table) {
+// Rows that a message must have: those from a second one of a kind on, and those of a program's
+// channels, which are younger, are omitted where they do nothing, so that problems without them
+// are, to the byte, what they were before there were any.
+std::size_t least_rows(const Problem& problem) {
+  const ParameterTable& table = problem.table();
+  if (problem.external && problem.windows()) return table.size() - 2 * problem.channels().size();
   for (std::size_t e = 0; e < table.effects().size(); ++e) {
     if (!table.effects()[e].repeats.empty()) return table.effect_row(e);
   }
@@ -34,17 +36,16 @@ std::size_t least_rows(const ParameterTable& table) {
 
 std::size_t rows_to_write(const Problem& problem) {
   std::size_t rows = problem.values.size();
-  const auto found = parameter_table(problem.scenario);
-  if (!found || rows != (*found)->size()) return rows;
-  const ParameterTable& table = **found;
-  while (rows > least_rows(table) && problem.values[rows - 1] == table[rows - 1].nominal) --rows;
+  const ParameterTable& table = problem.table();
+  if (rows != table.size()) return rows;
+  while (rows > least_rows(problem) && problem.values[rows - 1] == table[rows - 1].nominal) --rows;
   return rows;
 }
 
 Status read_values(const v1::Problem& message, Problem* problem) {
   const ParameterTable& table = problem->table();
   const auto count = static_cast<std::size_t>(message.values_size());
-  if (count < least_rows(table) || count > table.size()) {
+  if (count < least_rows(*problem) || count > table.size()) {
     return invalid(std::to_string(message.values_size()) + " parameter values, but scenario '" +
                    problem->scenario + "' has " + std::to_string(table.size()) +
                    "; master and worker must be the same build");

@@ -117,6 +117,12 @@ void Outputs::reads(const TrialLog& log) {
   for (const std::string& file : log.files) reads(file);
 }
 
+void Outputs::reads(const Config& config) {
+  reads(config.path);
+  reads(config.robot_path);
+  reads(config.problem.log);
+}
+
 void Outputs::reads_runs(const std::vector<std::string>& folders) {
   for (const std::string& folder : folders) {
     for (const char* name :

@@ -29,6 +29,7 @@ class Outputs {
   // An output is never one of these, however it is spelt and even with --force.
   void reads(const std::string& path);
   void reads(const TrialLog& log);
+  void reads(const Config& config);  // with its robot and its log
   // What a run's log may consist of, in each of these folders.
   void reads_runs(const std::vector<std::string>& folders);
 

@@ -52,6 +52,13 @@ OptimiserSetup optimiser_setup(const EvolutionSettings& settings, const Problem&
   setup.run_seed = seed;
   setup.noisy =
       problem.spread.kind == SpreadKind::kSampled && !compares_means(problem.fitness.kind);
+  if (const SearchStart& start = settings.start; !start.genomes.empty()) {
+    setup.settings.seed_nominal = true;
+    setup.nominal = start.genomes.front();
+    setup.given.assign(start.genomes.begin() + 1, start.genomes.end());
+    setup.spread = start.spread;
+    return setup;
+  }
   // Where kinematics show a value, no generation need look for it.
   const ParameterValues start = settings.seed_nominal ? kinematic_start(problem) : problem.values;
   for (const Gene& gene : setup.genes) {

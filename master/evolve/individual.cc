@@ -90,10 +90,10 @@ Status load_seen(const v1::GeneticState& message, SeenGenomes& seen) {
 }
 
 std::string origin_name(unsigned origin) {
-  constexpr std::array kNames = {"one_point",        "uniform",   "blend",  "gaussian",
-                                 "uniform_reset",    "elite",     "random", "nominal",
-                                 "difference",       "sampled",   "local",  "migrant",
-                                 "simulated_binary", "polynomial"};
+  constexpr std::array kNames = {"one_point",        "uniform",    "blend",  "gaussian",
+                                 "uniform_reset",    "elite",      "random", "nominal",
+                                 "difference",       "sampled",    "local",  "migrant",
+                                 "simulated_binary", "polynomial", "given"};
   std::string text;
   for (std::size_t bit = 0; bit < kNames.size(); ++bit) {
     if ((origin & (1U << bit)) == 0) continue;

@@ -29,6 +29,7 @@ enum Origin : unsigned {
   kMigrant = 1u << 11,          // the best of another island
   kSimulatedBinary = 1u << 12,  // crossover of NSGA-II
   kPolynomial = 1u << 13,       // mutation of NSGA-II
+  kGiven = 1u << 14,            // begun with (SearchStart)
 };
 std::string origin_name(unsigned origin);  // "blend+gaussian"
 

@@ -119,8 +119,16 @@ OptimiserSetup IslandsOptimiser::setup_of(const OptimiserSetup& whole, std::size
   setup.remembered = std::max<std::size_t>(setup.remembered / count, 4 * settings.population);
   // Draws of its own.
   setup.run_seed += 0xbf58476d1ce4e5b9u * island;
+  setup.given.clear();
+  for (std::size_t i = 0; i < whole.given.size(); ++i) {
+    if ((i + 1) % count == island) setup.given.push_back(whole.given[i]);
+  }
   // One look at the config's own values is enough; where distributions begin is another matter.
-  if (island > 0 && settings.optimiser.kind != OptimiserKind::kCmaEs) settings.seed_nominal = false;
+  if (island == 0 || settings.optimiser.kind == OptimiserKind::kCmaEs) return setup;
+  settings.seed_nominal = !setup.given.empty();
+  if (setup.given.empty()) return setup;
+  setup.nominal = setup.given.front();
+  setup.given.erase(setup.given.begin());
   return setup;
 }
 

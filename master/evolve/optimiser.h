@@ -89,6 +89,8 @@ struct OptimiserSetup {
   std::uint64_t run_seed = 0;
   bool noisy = false;              // scores differ between replicates (SpreadKind::kSampled)
   std::size_t remembered = 16384;  // genomes that are not scored twice (SeenGenomes)
+  // Members of the first generation beside the nominal one, best first.
+  std::vector<Genome> given = {};
 };
 
 }  // namespace gapfarm

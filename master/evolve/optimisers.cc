@@ -38,7 +38,8 @@ Result<std::unique_ptr<SearchOptimiser>> wrapped(const OptimiserSetup& setup,
                            settings.seed_nominal ? setup.nominal : Genome{},
                            settings.seed_nominal ? setup.spread : std::vector<double>{},
                            setup.noisy,
-                           most_evaluations(settings, setup.genes.size())};
+                           most_evaluations(settings, setup.genes.size()),
+                           setup.given};
   const auto row = static_cast<std::size_t>(settings.optimiser.kind);
   return std::make_unique<SearchOptimiser>(optimisers()[row].name, setup, make_method(method));
 }

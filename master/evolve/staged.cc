@@ -120,6 +120,7 @@ class StagedOptimiser final : public Optimiser {
     setup.genes.clear();
     setup.nominal.clear();
     setup.spread.clear();
+    setup.given.clear();
     for (const std::size_t gene : stages_[stage_].genes) {
       setup.genes.push_back(setup_.genes[gene]);
       setup.nominal.push_back(base()[gene]);

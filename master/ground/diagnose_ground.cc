@@ -98,9 +98,9 @@ void leave_motors_out(Kinematics* values) {
 // The file's robot, driven as `driven` is.
 Result<GroundDiagnosis> diagnose_driven(GroundRobot file, GroundRobot robot, RunLog log,
                                         const GroundDiagnoseOptions& options,
-                                        const std::optional<WheelLoop>& loop) {
+                                        const std::optional<WheelLoop>& loop,
+                                        GroundQuestion question) {
   StageClock clock(options.on_stage);
-  GroundQuestion question = ask_what_is_wrong(robot, log);
   if (options.reference) {
     clock.begin(kGroundStages[0].name);
     ASSIGN_OR_RETURN(auto asked, ask_what_changed(robot, *options.reference, options.windows,
@@ -153,17 +153,25 @@ std::string nats_text(double nats) { return fmt::format("{:.1f}", nats); }
 
 }  // namespace
 
+Result<GroundDiagnosis> diagnose_by(const GroundRobot& robot, const RunLog& log,
+                                    const GroundDiagnoseOptions& options, GroundQuestion question) {
+  return diagnose_driven(robot, robot, log, options, {}, std::move(question));
+}
+
 Result<GroundDiagnosis> diagnose_ground(const GroundRobot& robot, const RunLog& log,
                                         const GroundDiagnoseOptions& options) {
   return guarded([&]() -> Result<GroundDiagnosis> {
     const RunLog* reference = options.reference ? &*options.reference : nullptr;
     const bool measured = has_wheel_speeds(robot, log) &&
                           (reference == nullptr || has_wheel_speeds(robot, *reference));
-    if (!measured) return diagnose_driven(robot, robot, log, options, {});
+    if (!measured) return diagnose_by(robot, log, options, ask_what_is_wrong(robot, log));
     GroundDiagnoseOptions of_slip = options;
     if (reference != nullptr) of_slip.reference = driven_by_wheels(*reference);
-    return diagnose_driven(robot, driven_by_wheels(robot, log), driven_by_wheels(log), of_slip,
-                           measure_wheel_loop(robot, log, reference, options.seed));
+    const GroundRobot driven = driven_by_wheels(robot, log);
+    const RunLog wheels = driven_by_wheels(log);
+    return diagnose_driven(robot, driven, wheels, of_slip,
+                           measure_wheel_loop(robot, log, reference, options.seed),
+                           ask_what_is_wrong(driven, wheels));
   });
 }
 
@@ -193,14 +201,13 @@ void emit_faults(const GroundWork& work, const GroundSearch& search) {
   if (!work.on_finding) return;
   Finding finding;
   finding.about = "faults of the log";
-  finding.text =
-      search.faults.empty()
-          ? "Nothing of the log is the wrong way round or in another unit."
-          : "With this put right, the log is far closer to what the robot's file expects: " +
-                things_of(search, search.faults) + ".";
-  finding.text +=
-      fmt::format(" {} windows of {} stretches are held against the robot's kinematics.",
-                  search.windows.trials.size(), search.windows.blocks);
+  finding.text = search.faults.empty()
+                     ? "Nothing of the log is the wrong way round or in another unit."
+                     : "With this put right, the log is far closer to what is expected: " +
+                           things_of(search, search.faults) + ".";
+  finding.text += fmt::format(" {} windows of {} stretches are held against the {}.",
+                              search.windows.trials.size(), search.windows.blocks,
+                              search.windows.simulated ? "program" : "robot's kinematics");
   work.on_finding(std::move(finding));
 }
 

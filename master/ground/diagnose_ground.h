@@ -56,6 +56,10 @@ struct GroundDiagnosis {
 Result<GroundDiagnosis> diagnose_ground(const GroundRobot& robot, const RunLog& log,
                                         const GroundDiagnoseOptions& options);
 
+// The same of another question; measured wheel speeds are not looked at.
+Result<GroundDiagnosis> diagnose_by(const GroundRobot& robot, const RunLog& log,
+                                    const GroundDiagnoseOptions& options, GroundQuestion question);
+
 // What a log has the wrong way round or in another unit, in seconds, nothing fitted.
 std::vector<SanityFinding> check_ground_log(const GroundRobot& robot, const RunLog& log);
 

@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
+#include <optional>
 #include <span>
 
 #include "common/base/try.h"
@@ -168,6 +170,30 @@ std::vector<std::vector<std::size_t>> groups_of(std::span<const std::size_t> run
   return groups;
 }
 
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr WindowError kFar = {kInfinity, kInfinity};
+
+// Of each trial, nothing where its run's simulation did not end well: each run is a task, so that
+// one that falls over takes no other with it.  Error: none ended well.
+Result<std::vector<std::optional<v1::Predicted>>> predict_runs(Farm& farm, const Problem& asked,
+                                                               std::size_t* unfinished) {
+  std::vector<v1::Task> tasks(asked.runs.size());
+  for (std::size_t i = 0; i < asked.log.trials.size(); ++i) {
+    tasks[*asked.log.trials[i].run].mutable_predict()->add_trials(static_cast<std::uint32_t>(i));
+  }
+  std::erase_if(tasks, [](const v1::Task& task) { return !task.has_predict(); });
+  ASSIGN_OR_RETURN(const auto results, farm.run(farm.add_problem(to_proto(asked)), tasks));
+  std::vector<std::optional<v1::Predicted>> predicted(asked.log.trials.size());
+  for (const v1::TaskResult& result : results) {
+    *unfinished += result.outcome() != v1::OK;
+    for (const v1::Predicted& p : result.predict().predictions()) predicted[p.trial()] = p;
+  }
+  if (*unfinished < results.size()) return predicted;
+  const v1::TaskResult& first = results.front();
+  return Error{"the simulation ended with " + v1::Outcome_Name(first.outcome()) + " (" +
+               first.message() + ")"};
+}
+
 }  // namespace
 
 Result<Horizons> measure_horizons(Farm& farm, const Problem& fitted, const ParameterValues& values,
@@ -197,15 +223,8 @@ Result<Horizons> measure_horizons(Farm& farm, const Problem& fitted, const Param
     }
   }
   if (tiles.empty()) return Error{"no window of any horizon fits into the runs"};
-  v1::Task task;
-  task.mutable_predict();
-  ASSIGN_OR_RETURN(const auto results, farm.run(farm.add_problem(to_proto(asked)), {task}));
-  const v1::TaskResult& result = results.front();
-  if (result.outcome() != v1::OK) {
-    return Error{"the simulation ended with " + v1::Outcome_Name(result.outcome()) + " (" +
-                 result.message() + ")"};
-  }
   Horizons horizons;
+  ASSIGN_OR_RETURN(const auto predicted, predict_runs(farm, asked, &horizons.unfinished_runs));
   std::vector<Pose> kinematic;
   if (fitted.ground) {
     ASSIGN_OR_RETURN(horizons.kinematics, fit_kinematics(fitted));
@@ -214,15 +233,15 @@ Result<Horizons> measure_horizons(Farm& farm, const Problem& fitted, const Param
   for (const Tiles& t : tiles) {
     double log_score = 0;
     for (std::size_t i = t.first; i < t.first + t.count; ++i) {
-      const v1::Predicted& simulated = result.predict().predictions(static_cast<int>(i));
+      const std::optional<v1::Predicted>& simulated = predicted[i];
       const Trial& trial = asked.log.trials[i];
       const LoggedRun& run = runs.runs[run_of[i]];
       const WindowError constant = error_of(constant_end(run, trial), trial);
       horizons.windows.push_back(
           {t.horizon_s, run.session, run.run, *trial.t_s, *trial.duration_s, travel_of(run, trial),
-           error_of(from_proto(simulated.end()), trial),
+           simulated ? error_of(from_proto(simulated->end()), trial) : kFar,
            kinematic.empty() ? constant : error_of(kinematic[i], trial), constant});
-      log_score += simulated.log_score() / static_cast<double>(t.count);
+      log_score += simulated ? simulated->log_score() / static_cast<double>(t.count) : -kInfinity;
     }
     horizons.rows.push_back(row_of(std::span(horizons.windows).subspan(t.first, t.count),
                                    std::span(run_of).subspan(t.first, t.count)));
@@ -253,6 +272,12 @@ std::string format_horizons(const Horizons& horizons) {
                         ratio_cell(row.heading));
   }
   text += significantly_apart(horizons);
+  if (horizons.unfinished_runs > 0) {
+    text += fmt::format(
+        "{} runs could not be simulated to their end (the robot fell over or left "
+        "bounds); their windows count as infinitely far off\n",
+        horizons.unfinished_runs);
+  }
   if (!kinematics) return text;
   text += "kinematics:";
   for (std::size_t i = 0; i < horizons.kinematics.names.size(); ++i) {

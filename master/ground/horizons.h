@@ -65,12 +65,14 @@ struct Horizons {
   Kinematics
       kinematics;  // fitted to the fitted windows; without names where there is no robot file
   std::vector<HorizonRow> rows;
-  std::vector<WindowRow> windows;  // horizon by horizon, in driving order
+  std::vector<WindowRow> windows;   // horizon by horizon, in driving order
+  std::size_t unfinished_runs = 0;  // whose simulation failed: their windows are infinitely far off
 };
 
 // `fitted` holds the windows that were fitted to, `values` what the simulation is to be measured
 // at, `runs` what is predicted.  Constant velocity is that of the half second of poses before a
-// window.  Errors: no window fits, the simulation did not end well.
+// window.  Errors: no window fits, no
+// run's simulation ended well.
 Result<Horizons> measure_horizons(Farm& farm, const Problem& fitted, const ParameterValues& values,
                                   const RunLog& runs, const WindowSettings& windows);
 

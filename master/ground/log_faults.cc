@@ -37,13 +37,20 @@ std::vector<std::size_t> runs_of(const WindowSet& windows) {
 
 }  // namespace
 
+Result<WindowSet> GroundQuestion::windows(const GroundRobot& robot, const RunLog& log,
+                                          const WindowSettings& settings) const {
+  auto set = window_set(robot, log, settings);
+  if (set && simulation) set->simulated = simulation(*set);
+  return set;
+}
+
 std::optional<GroundFault> find_ground_fault(const GroundRobot& robot, const RunLog& log,
                                              const GroundQuestion& question,
                                              const WindowSettings& settings) {
   const std::vector<GroundHypothesis>& catalogue = question.catalogue;
   const GroundReference* reference = reference_of(question);
   const std::vector<FitRow> rows = held_rows(question);
-  const auto as_logged = window_set(robot, log, settings);
+  const auto as_logged = question.windows(robot, log, settings);
   if (!as_logged) return std::nullopt;
   const double before =
       WindowFitter(robot, *as_logged, reference).hold(rows, nominals(rows)).objective;
@@ -54,7 +61,7 @@ std::optional<GroundFault> find_ground_fault(const GroundRobot& robot, const Run
     fault.hypothesis = i;
     fault.log = log;
     catalogue[i].put_right(&fault.log);
-    const auto windows = window_set(robot, fault.log, settings);
+    const auto windows = question.windows(robot, fault.log, settings);
     if (!windows) continue;
     const double stretches = windows->stretches();
     // Densities are of what was logged, in its own unit.
@@ -111,7 +118,7 @@ Status search_faults(const GroundRobot& robot, const WindowSettings& settings,
   for (;;) {
     const bool settled = !question.sensor.empty() || search->faults.size() >= kMostFaults;
     auto fault = settled ? std::nullopt : find_ground_fault(robot, search->log, question, settings);
-    ASSIGN_OR_RETURN(auto windows, window_set(robot, search->log, settings));
+    ASSIGN_OR_RETURN(auto windows, question.windows(robot, search->log, settings));
     search->windows = std::move(windows);
     search->rows = held_rows(question);
     const WindowFitter fitter(robot, search->windows, reference_of(question), memo);

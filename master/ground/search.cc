@@ -97,13 +97,14 @@ double least_gain(const GroundSearch& search) {
 }
 
 // An offer, and how well it predicts what was not fitted: the file with what is named and this put
-// right, and nothing else moved.
+// right.
 struct Candidate {
   Offer offer;
   WindowFit fit;
   WindowFit held_out;
   WindowFit before;  // that it is compared with
   HeldOutGain held_out_gain;
+  bool moved = false;  // both with all other values moved within their tolerances
 };
 
 Candidate predict_held_out(const WindowFitter& fitter, const GroundWork& work,
@@ -120,18 +121,40 @@ Candidate predict_held_out(const WindowFitter& fitter, const GroundWork& work,
     const Eigen::Index j = row_index(fit.rows, rows[i].row.name);
     if (j >= 0) start[static_cast<Eigen::Index>(i)] = fit.values[j];
   }
-  Candidate candidate{
-      offer, std::move(fit), fit_held_out(fitter, rows, start), search.chain.back(), {}};
   const WindowSet& windows = fitter.windows();
-  candidate.held_out_gain = held_out_gain(windows, candidate.held_out, candidate.before, work.seed);
+  Candidate candidate{offer, std::move(fit), {}, search.chain.back(), {}, search.moved};
+  const auto measure = [&](Candidate& c) {
+    c.held_out = c.moved ? fit_held_out(fitter, c.fit.rows, c.fit.values)
+                         : fit_held_out(fitter, rows, start);
+    c.held_out_gain = held_out_gain(windows, c.held_out, c.before, work.seed);
+  };
+  measure(candidate);
   const bool first = offer.hypothesis == search.offers.back().front().hypothesis;
-  if (!first || may_be_named(candidate.held_out_gain)) return candidate;
+  if (search.moved || !first || may_be_named(candidate.held_out_gain)) return candidate;
   // What gains most may show only once the others have moved a little.
   Candidate beside = candidate;
+  beside.moved = true;
   beside.before = fit_held_out(fitter, search.rows, search.fit.values);
-  beside.held_out = fit_held_out(fitter, beside.fit.rows, beside.fit.values);
-  beside.held_out_gain = held_out_gain(windows, beside.held_out, beside.before, work.seed);
+  measure(beside);
   return may_be_named(beside.held_out_gain) ? beside : candidate;
+}
+
+// What a candidate gains, held out, in the windows where it is no trace of the names before it.
+HeldOutGain gain_beyond_traces(const WindowSet& windows, const GroundWork& work,
+                               const GroundSearch& search, const Candidate& candidate) {
+  const WindowFit& file = search.chain.front();
+  const WindowFit& named = search.chain.back();
+  const auto moved = [&](const WindowFit& from, const WindowFit& to, std::size_t i) {
+    const Eigen::Vector3d& scale = named.scales[static_cast<std::size_t>(windows.horizon[i])];
+    return (from.residuals[i] - to.residuals[i]).cwiseQuotient(scale).norm();
+  };
+  WindowFit counted = candidate.held_out;
+  for (std::size_t i = 0; i < counted.nats.size(); ++i) {
+    if (moved(candidate.before, candidate.held_out, i) < kTraceShare * moved(file, named, i)) {
+      counted.nats[i] = candidate.before.nats[i];
+    }
+  }
+  return held_out_gain(windows, counted, candidate.before, work.seed);
 }
 
 double mean_nats(const WindowFit& fit) {
@@ -171,6 +194,7 @@ void name_candidate(const WindowSet& windows, const GroundWork& work,
   search->fit = chosen.fit;
   search->rows = chosen.fit.rows;
   search->chain.push_back(chosen.held_out);
+  search->moved = chosen.moved;
 }
 
 bool frees_part_of(const GroundHypothesis& part, const GroundHypothesis& whole) {
@@ -190,10 +214,24 @@ const Candidate& simplest_of(const std::vector<GroundHypothesis>& catalogue,
   for (const Candidate& c : candidates) {
     const bool part =
         frees_part_of(catalogue[c.offer.hypothesis], catalogue[simplest->offer.hypothesis]);
-    const bool alike = (1 + kShareOfBestName) * c.offer.gain >= chosen.offer.gain;
+    const bool alike = (1 + kTraceShare) * c.offer.gain >= chosen.offer.gain;
     if (part && alike && may_be_named(c.held_out_gain)) simplest = &c;
   }
   return *simplest;
+}
+
+// Of candidates that predict no worse than the chosen one with 95 % confidence, the one that gains
+// clearly most where all is fitted.
+const Candidate& likeliest_of(const WindowSet& windows, const GroundWork& work,
+                              const std::vector<Candidate>& candidates, const Candidate& chosen) {
+  const Candidate* likeliest = &chosen;
+  for (const Candidate& c : candidates) {
+    if (c.offer.gain < likeliest->offer.gain + kNotDistinguished) continue;
+    if (!may_be_named(c.held_out_gain) || c.moved != chosen.moved) continue;
+    const HeldOutGain over = held_out_gain(windows, chosen.held_out, c.held_out, work.seed);
+    if (over.lo <= 0) likeliest = &c;
+  }
+  return *likeliest;
 }
 
 // The best of the catalogue, when it is worth its name.
@@ -233,11 +271,9 @@ bool take_step(const WindowFitter& fitter, const GroundWork& work, GroundSearch*
   std::stable_sort(candidates.begin(), candidates.end(), [](const auto& a, const auto& b) {
     return a.held_out_gain.mean > b.held_out_gain.mean;
   });
-  double named = 0;
-  for (const GroundStep& step : search->steps) named = std::max(named, step.held_out.mean);
   const auto chosen = std::find_if(candidates.begin(), candidates.end(), [&](const Candidate& c) {
     return may_be_named(c.held_out_gain) && c.offer.gain >= kShareOfBest * most &&
-           c.held_out_gain.mean >= kShareOfBestName * named;
+           may_be_named(gain_beyond_traces(fitter.windows(), work, *search, c));
   });
   if (chosen == candidates.end()) {
     if (!candidates.empty()) {
@@ -246,8 +282,9 @@ bool take_step(const WindowFitter& fitter, const GroundWork& work, GroundSearch*
     }
     return false;
   }
+  const Candidate& likeliest = likeliest_of(fitter.windows(), work, candidates, *chosen);
   name_candidate(fitter.windows(), work, offers, candidates,
-                 simplest_of(search->catalogue, candidates, *chosen), search);
+                 simplest_of(search->catalogue, candidates, likeliest), search);
   emit_steps(work, *search);
   return true;
 }

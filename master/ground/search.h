@@ -60,6 +60,12 @@ struct GroundQuestion {
   std::vector<SensorValue> sensor = {};
   std::vector<std::size_t> faults = {};
   std::vector<double> fault_gains = {};
+  // What follows the runs in place of the robot's kinematics; empty: they do.
+  std::function<decltype(WindowSet::simulated)(const WindowSet&)> simulation = {};
+
+  // window_set() with that.
+  Result<WindowSet> windows(const GroundRobot& robot, const RunLog& log,
+                            const WindowSettings& settings) const;
 };
 
 // Who waits for a search.
@@ -92,6 +98,7 @@ struct GroundSearch {
   // Predictions of stretches that were held out: the file as it is, with the first thing that was
   // chosen, with the first two, ...
   std::vector<WindowFit> chain;
+  bool moved = false;  // the last of the chain: with all other values moved within tolerances
   // The best such prediction of all that was tried: the chain's last, values within their
   // tolerances, the best of the catalogue that was not named, every value free.  `closable`: what
   // it gains over the chain's last; of a change, over values within what a robot changes by.

@@ -105,10 +105,10 @@ inline constexpr double kPriceOfAValue = 2;  // nats that a second value of one 
 // looked for (their logarithm).
 inline constexpr double kPriceOfAnEdge = 2 * kPriceOfAValue + 4;
 inline constexpr double kShareOfBest = 0.5;  // of the best gain, for an offer to compete held out
-// A further name must gain this share, held out, of what the best name gains: a robot is rarely
-// wrong in two ways, and a model that is wrong by some share leaves traces of the first.  Chosen:
-// traces in the cases come to 0.2.
-inline constexpr double kShareOfBestName = 0.25;
+// What a name leaves of itself to others, whose form is never quite right: windows that a further
+// name moves by less than this share of what the names before moved them by do not count for it,
+// and a simpler word may gain this much less.  Chosen: traces in the cases come to 0.2.
+inline constexpr double kTraceShare = 0.25;
 inline constexpr double kNotDistinguished = 2;  // nats: Bayes factors of 7 hardly show
 // nats a window that may be left unexplained for "none": residuals 10 % smaller, 3 ln 1.1.
 inline constexpr double kToleratedGap = 0.286;

@@ -48,7 +48,9 @@ Result<RunInputs> read_inputs(const RunStore& store, const Config& config) {
 // where there is no beginning.
 Result<std::optional<SimulatedStart>> start_of(const RunInputs& inputs, const RunRequest& run,
                                                Farm& farm, RunWatcher& watcher) {
-  const bool own = !run.config.evolution.seed_nominal || !inputs.plan.stages.empty();
+  const EvolutionSettings& settings = run.config.evolution;
+  const bool own =
+      !settings.seed_nominal || !inputs.plan.stages.empty() || !settings.start.genomes.empty();
   if (inputs.checkpoint || own || !run.problem.ground || run.problem.log.trials.empty()) {
     return std::optional<SimulatedStart>();
   }

@@ -212,6 +212,9 @@ void add_facts(const RunStatus& status, RunFarm* farm) {
     farm->facts.emplace_back(label, value);
   };
   const Progress& progress = status.progress;
+  if (const std::string start = search_start_text(status.info); !start.empty()) {
+    add("began at", start);
+  }
   add("evaluations", std::to_string(status.evaluations));
   if (status.state == RunState::kRunning) {
     add("rate", fmt::format("{:.3g} evaluations/s", status.rate_per_s));

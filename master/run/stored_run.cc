@@ -31,6 +31,38 @@ void each(Visit visit) {
 // by default have none, and are the genetic algorithm's.
 constexpr const char* kDefaultKind = "optimiser";
 
+Json start_json(const SearchStart& start) {
+  Json json = {{"from", start.from}, {"genomes", start.genomes}};
+  if (!start.spread.empty()) json["spread"] = start.spread;
+  if (start.generation > 0) {
+    json["generation"] = start.generation;
+    json["digest"] = start.digest;
+    json["fixed"] = start.fixed;
+    json["freed"] = start.freed;
+  }
+  return json;
+}
+
+// Of a store that was changed by hand: what can be read.
+SearchStart stored_start(const RunInfo& info, std::size_t genes) {
+  SearchStart start;
+  const Json json = search_start(info);
+  if (!json.is_object()) return start;
+  const auto numbers = [](const Json& list) {
+    std::vector<double> values;
+    for (const Json& value : list) {
+      if (value.is_number()) values.push_back(value.get<double>());
+    }
+    return values;
+  };
+  for (const Json& genome : json.value("genomes", Json::array())) {
+    if (genome.size() == genes) start.genomes.push_back(numbers(genome));
+  }
+  start.spread = numbers(json.value("spread", Json::array()));
+  if (start.spread.size() != genes * genes) start.spread.clear();
+  return start;
+}
+
 }  // namespace
 
 RunInfo run_info(const Config& config, const EvolutionOverrides& overrides) {
@@ -39,12 +71,14 @@ RunInfo run_info(const Config& config, const EvolutionOverrides& overrides) {
   RunInfo info;
   info.config_path = config.path;
   info.config_text = config.text;
-  Json settings = parse_json(overrides.to_json());
+  Json changes = parse_json(overrides.to_json());
   if (default_optimiser(config.text)) {
-    settings[kDefaultKind] =
+    changes[kDefaultKind] =
         optimisers()[static_cast<std::size_t>(config.evolution.optimiser.kind)].name;
   }
-  info.overrides = json_text(settings);
+  const SearchStart& start = config.evolution.start;
+  if (!start.genomes.empty()) changes["start"] = start_json(start);
+  info.overrides = json_text(changes);
   info.problem = serialise(problem);
   info.problem_hash = problem_hash(problem);
   info.seed = config.seed;
@@ -82,6 +116,7 @@ Result<Config> stored_config(const RunInfo& info, const EvolutionOverrides& over
   EvolutionOverrides all = EvolutionOverrides::from_json(info.overrides);
   all.merge(overrides);
   all.apply(config->evolution);
+  config->evolution.start = stored_start(info, config->problem.genes.size());
   return config;
 }
 

@@ -116,6 +116,20 @@ Result<std::vector<StoredGeneration>> RunReader::generations() const {
       generation_of);
 }
 
+Result<std::string> RunReader::optimiser_state(std::uint64_t generation) const {
+  ASSIGN_OR_RETURN(
+      const auto state,
+      database_.row(
+          "read the search's state", "SELECT optimiser_state FROM generations WHERE generation = ?",
+          [](const SqlStatement& row) {
+            std::string blob;
+            row.read_all(SqlBlob{blob});
+            return blob;
+          },
+          generation));
+  return state.value_or(std::string());
+}
+
 std::string RunReader::member_columns() const {
   return std::string(
              "birth_id, genome, parameters, outcome, fitness, scores, parents, operators, ") +
@@ -285,6 +299,30 @@ Result<RunStatus> run_status(const RunReader& reader, double now_unix_s) {
   return status;
 }
 
+Json search_start(const RunInfo& info) {
+  const Json overrides = parse_json(info.overrides);
+  const bool has = overrides.is_object() && overrides.contains("start");
+  return has && overrides["start"].is_object() ? overrides["start"] : Json();
+}
+
+std::string search_start_text(const RunInfo& info) {
+  const Json start = search_start(info);
+  if (start.is_null()) return {};
+  const auto list = [&](const char* key) { return start.value(key, Json::array()); };
+  const auto word = [](const Json& json) {
+    return json.is_string() ? json.get<std::string>() : json_text(json);
+  };
+  std::string text = word(start.value("from", Json("")));
+  if (!start.contains("generation")) {
+    return text + ", genomes: " + std::to_string(list("genomes").size());
+  }
+  text += " after generation " + json_text(start["generation"]);
+  std::string changes;
+  for (const Json& fixed : list("fixed")) changes += ", " + word(fixed) + " fixed";
+  for (const Json& freed : list("freed")) changes += ", " + word(freed) + " freed";
+  return text + (changes.empty() ? "" : ":" + changes.substr(1));
+}
+
 Json to_json(const RunStatus& status) {
   Json json;
   json["state"] = run_state_name(status.state);
@@ -318,6 +356,11 @@ Json to_json(const RunStatus& status) {
   json["fingerprint"] = status.info.fingerprint;
   json["created"] = status.info.created;
   json["config"] = status.info.config_path;
+  if (Json start = search_start(status.info); !start.is_null()) {
+    start.erase("genomes");
+    start.erase("spread");
+    json["start"] = std::move(start);
+  }
   json["epoch"] = status.progress.epoch;
   json["heartbeat_age_s"] = status.heartbeat_age_s;
   if (!status.front.objectives.empty()) json["front"] = to_json(status.front);

@@ -25,6 +25,8 @@ class RunReader {
 
   // Every generation in order, without individuals and optimiser states.
   Result<std::vector<StoredGeneration>> generations() const;
+  // After a generation; empty when there is no such generation.
+  Result<std::string> optimiser_state(std::uint64_t generation) const;
   // Best first; empty when there is no such generation.
   Result<std::vector<StoredIndividual>> individuals(std::uint64_t generation) const;
   // The best of the last generation; none when nothing was committed yet.
@@ -102,6 +104,11 @@ struct RunStatus {
 // "running" needs a master that holds the run's lock or, where this machine cannot see the lock
 // (another host, a mount without locks), a heartbeat younger than 30 s.  `now_unix_s`: the clock.
 Result<RunStatus> run_status(const RunReader& reader, double now_unix_s);
+
+// Where the search began, if not at the config's own values, as the run keeps it; else null.
+nlohmann::ordered_json search_start(const RunInfo& info);
+// "run/a after generation 12: friction fixed at 0.4"; empty: at the config's own values.
+std::string search_start_text(const RunInfo& info);
 
 // docs/formats.md, "Status".
 nlohmann::ordered_json workers_json(const std::vector<StoredWorker>& workers);

@@ -106,6 +106,13 @@ class Run:
         spent = spent.assign(wall_s=spent.wall_s.cumsum())
         return table.join(spent, on="generation").reset_index(drop=True)
 
+    @property
+    def importance(self) -> pd.DataFrame:
+        """A row a parameter, a column the fitness or each objective: the share of its variance that
+        the parameter explains alone, [0, 1] without a unit, among what was evaluated (docs/page.md)."""
+        found = command(["report", self.folder, "--out", os.devnull]).get("importance", {})
+        return pd.DataFrame.from_dict(found, orient="index")
+
     def genomes(self, generation: Optional[int] = None) -> npt.NDArray[np.float64]:
         """float64 of shape (individuals, genes), values in [0, 1], best first."""
         which = "(SELECT max(generation) FROM generations)" if generation is None else "?"

@@ -62,6 +62,11 @@ def test_individuals_have_parameters_and_genomes(run):
     assert run.best.fitness == run.generations.best.iloc[-1]
 
 
+def test_importance_has_a_row_a_gene(run):
+    assert run.importance.shape == (7, 1)
+    assert run.importance.loc["friction"].between(0, 1).all()
+
+
 def test_the_model_holds_the_best(run):
     assert run.model.parameters["full_speed"] == pytest.approx(run.best.full_speed, rel=1e-12)
     assert run.model.parameters["robot"] == "treads"

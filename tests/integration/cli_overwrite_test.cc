@@ -68,6 +68,19 @@ TEST_F(Overwrite, NoCommandTakesAMeasuredFile) {
   EXPECT_THAT(text_of(other), HasSubstr("# log: new.csv "));
 }
 
+TEST_F(Overwrite, TheRobotsFileOfAConfigIsAnInput) {
+  const std::string robot = folder_.write(
+      "robot.toml",
+      "drive = \"differential\"\ncommands = [\"left\", \"right\"]\nwheel_separation = 0.3\n"
+      "[wheels.left]\nradius = 0.05\n[wheels.right]\nradius = 0.05\n");
+  const std::string config = folder_.write(
+      "rover.toml",
+      "scenario = \"ground\"\n[robot]\nfile = \"robot.toml\"\n[runs]\nfolders = []\n");
+  refused({"plan", config, "--limit", "left=10", "--limit", "right=10", "--out",
+           folder_ / "plan.csv", "--picture", robot, "--force"},
+          robot, "is read by this command");
+}
+
 TEST_F(Overwrite, ARunAndADiagnosisDoNotShareAFolder) {
   ASSERT_EQ(gapfarm_command({"evolve", config_, "--trials", log_, "--out", folder_ / "run",
                              "--generations", "1", "--workers", "1"})

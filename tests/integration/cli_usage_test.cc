@@ -172,6 +172,7 @@ TEST(CliUsage, InitOfAURDFWritesTheRobotAndAConfigThatNamesIt) {
   EXPECT_TRUE(std::filesystem::exists(folder / "car_robot.toml"));
   const Finished checked = gapfarm_command({"check", folder / "car.toml"});
   EXPECT_EQ(checked.exit_code, 0) << checked.err;
+  EXPECT_THAT(checked.out, HasSubstr("car.toml: fine\n"));
   const Finished dry = gapfarm_command({"horizons", folder / "car.toml", "--dry-run"});
   EXPECT_EQ(dry.exit_code, 0) << dry.err;
   EXPECT_THAT(dry.out, HasSubstr("would measure horizons of"));

@@ -91,6 +91,75 @@ TEST_F(RunFolder, WhereOneEndedAnotherBegins) {
   EXPECT_THAT(outside.err, AllOf(HasSubstr("full_speed is 0."), HasSubstr("0.5 to 0.6")));
 }
 
+TEST_F(RunFolder, ABranchGoesOnWithAGeneFixedAndLeavesItsRunAlone) {
+  ASSERT_EQ(evolve(run_, "2").exit_code, 0);
+  const std::string digest = status(run_)["digest"], bytes = text_of(file_);
+  const auto branch = [&](const std::string& from, const std::vector<std::string>& changes,
+                          const std::string& out, const std::string& generations) {
+    std::vector<std::string> arguments = {"resume",        from,        "--out",     folder_ / out,
+                                          "--generations", generations, "--workers", "1"};
+    arguments.insert(arguments.end(), changes.begin(), changes.end());
+    return gapfarm_command(arguments);
+  };
+  const std::vector<std::string> fixed = {"--fix", "friction=0.5"};
+  const Finished whole = branch(run_, fixed, "whole", "3");
+  ASSERT_EQ(whole.exit_code, 0) << whole.err;
+  EXPECT_EQ(text_of(file_), bytes);
+  const nlohmann::json found = status(folder_ / "whole");
+  EXPECT_EQ(found["start"]["generation"], 2);
+  EXPECT_EQ(found["start"]["digest"], digest);
+  EXPECT_FALSE(found["best"]["values"].contains("friction"));
+  EXPECT_THAT(gapfarm_command({"status", folder_ / "whole"}).out,
+              HasSubstr(run_ + " after generation 2: friction=0.5 fixed"));
+  // In parts it goes the same way, and once the gene is free again it is searched.
+  ASSERT_EQ(branch(run_, fixed, "parts", "1").exit_code, 0);
+  ASSERT_EQ(resume(folder_ / "parts", "3").exit_code, 0);
+  EXPECT_EQ(status(folder_ / "parts")["digest"], found["digest"]);
+  ASSERT_EQ(branch(folder_ / "whole", {"--free", "friction"}, "free", "1").exit_code, 0);
+  const nlohmann::json free = status(folder_ / "free");
+  EXPECT_TRUE(free["best"]["values"].contains("friction"));
+  EXPECT_GE(free["best_fitness"], found["best_fitness"].get<double>() - 1e-9);
+
+  const auto refused = [&](const std::vector<std::string>& changes) {
+    const Finished tried = branch(run_, changes, "none", "1");
+    EXPECT_EQ(tried.exit_code, kRefused);
+    EXPECT_FALSE(std::filesystem::exists(folder_ / "none"));
+    return tried.err;
+  };
+  EXPECT_THAT(refused({"--fix", "frction=1"}), HasSubstr("did you mean 'friction'"));
+  EXPECT_THAT(refused({"--fix", "friction=1e9"}), HasSubstr("--fix friction=1e9: friction"));
+  EXPECT_THAT(refused({"--fix", "step_rate=60"}), HasSubstr("its genes: friction, full_speed"));
+  EXPECT_THAT(refused({"--free", "friction"}), HasSubstr("is a gene of " + run_ + " already"));
+  EXPECT_THAT(refused({"--generation", "9"}), HasSubstr("no generation 9"));
+  EXPECT_THAT(gapfarm_command({"resume", run_, "--fix", "friction=1"}).err, HasSubstr("--out"));
+}
+
+TEST_F(RunFolder, WhatAHistoryHasBeginsARun) {
+  ASSERT_EQ(evolve(run_, "2").exit_code, 0);
+  const auto begun = [&](const std::string& table) {
+    return gapfarm_command({"evolve", config_, "--out", folder_ / "next", "--from", table,
+                            "--generations", "1", "--seed", "7", "--workers", "1"});
+  };
+  const std::string history = folder_ / "history.csv";
+  ASSERT_EQ(gapfarm_command({"report", run_, "--history", history}).exit_code, 0);
+  const Finished next = begun(history);
+  ASSERT_EQ(next.exit_code, 0) << next.err;
+  EXPECT_THAT(next.err, AllOf(HasSubstr("history.csv: begins at 6 of 1"),
+                              HasSubstr("not used: birth_id, generation")));
+  EXPECT_NEAR(status(folder_ / "next")["best_fitness"], status(run_)["best_fitness"], 1e-9);
+  EXPECT_EQ(status(folder_ / "next")["start"]["from"], history);
+
+  // As pandas has it; the better row goes first.
+  const std::string outside =
+      folder_.write("outside.csv", ",full_speed,score\n0,0.3,-5\n1,0.9,-4\n");
+  const Finished wide = begun(outside);
+  EXPECT_EQ(wide.exit_code, kRefused);
+  EXPECT_THAT(wide.err, AllOf(HasSubstr("outside.csv:3:3: "), HasSubstr("full_speed '0.9'"),
+                              HasSubstr("0.1 to 0.6"), HasSubstr("has no friction")));
+  EXPECT_THAT(begun(folder_.write("none.csv", "speed\n0.3\n")).err,
+              AllOf(HasSubstr("columns speed"), HasSubstr("friction, full_speed")));
+}
+
 TEST_F(RunFolder, BelowAFileIsNoPlaceForARun) {
   const Finished tried = evolve(config_ + "/run", "2");
   EXPECT_EQ(tried.exit_code, kRefused);

@@ -89,14 +89,24 @@ class ExternalRuns final : public WindowModel {
     request.values.assign(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(
                                                                declaration.parameters.size()));
     const double delay_s = at(values, "delay");
-    const auto run = [this, request, delay_s, steps = options.steps](
+    std::vector<double> gains, offsets;
+    for (const std::string& channel : declaration.channels) {
+      gains.push_back(at(values, (channel + kChannelGain).c_str()));
+      offsets.push_back(at(values, (channel + kChannelOffset).c_str()));
+    }
+    const auto run = [this, request, delay_s, gains, offsets, steps = options.steps](
                          std::span<const CommandRow> commands, const GroundStart& start,
                          std::span<const double> times) mutable {
       request.start_s = start.t_s;
       request.speed_m_s = start.twist.vx_m_s;
       request.turn_rad_s = start.twist.omega_rad_s;
       request.commands.assign(commands.begin(), commands.end());
-      for (CommandRow& row : request.commands) row.t_s += delay_s;
+      for (CommandRow& row : request.commands) {
+        row.t_s += delay_s;
+        for (std::size_t c = 0; c < gains.size(); ++c) {
+          row.values[c] = gains[c] * row.values[c] + offsets[c];
+        }
+      }
       request.times_s = times;
       const auto answer = ask_program(*simulator_, request, *problem_.external, steps);
       if (!answer) throw ExternalFailure(answer.error().message);

@@ -259,7 +259,7 @@ std::string standing(const Summary& summary) {
   if (summary.evaluated.outcome() == v1::WORKER_FAILED) return "readable, but the program failed";
   const std::vector<SanityFinding>& findings = summary.sanity;
   for (const SanityFinding& f : findings) {
-    if (f.severity == Severity::kUnusable) return "readable, but " + finding_phrase(f);
+    if (f.severity != Severity::kNote) return "readable, but " + finding_phrase(f);
   }
   if (!summary.idle.empty()) return "readable, but genes that change no score are searched";
   return "fine";
@@ -304,8 +304,8 @@ std::string describe(const Config& config, const Summary& summary, unsigned work
   const Problem& problem = config.problem;
   std::string text = config.path + ": " + standing(summary) + "\n";
   for (const SanityFinding& f : summary.sanity) {
-    text += std::string(f.severity == Severity::kUnusable ? "doubt" : "note ") + "        " +
-            f.name + ": " + f.text + " " + f.remedy + "\n";
+    text += std::string(f.severity == Severity::kNote ? "note " : "doubt") + "        " + f.name +
+            ": " + f.text + " " + f.remedy + "\n";
   }
   for (const IdleGene& gene : summary.idle) {
     text += "idle gene    " + gene.key + " changes no score; " + gene.remedy + ".\n";

@@ -161,15 +161,17 @@ Provenance stamp_of(const Config& config, const DiagnoseCommand& command,
 Status plan_outputs(DiagnoseCommand& command, const Config& config, const Provenance& stamp) {
   Outputs& outputs = command.outputs;
   RETURN_IF_ERROR(check_folder(command.out, FolderKind::kDiagnosis));
-  outputs.reads(config.problem.log);
-  outputs.reads(command.config);
+  outputs.reads(config);
   outputs.reads(command.model);
   ASSIGN_OR_RETURN(const auto state,
                    compare_stamp(command.out, kDiagnosisFile, stamp, outputs.force()));
   std::vector<const char*> names = {kStampFile, "model.toml", "tuned.toml", "report.html",
                                     kDiagnosisFile};
-  if (config.problem.ground)
+  if (config.problem.ground) {
     names = {kStampFile, "robot.toml", "values.json", "report.html", kDiagnosisFile};
+  } else if (config.problem.windows()) {
+    names = {kStampFile, "model.toml", "report.html", kDiagnosisFile};
+  }
   for (const char* name : names) {
     const std::string path = (std::filesystem::path(command.out) / name).string();
     const Status s = state == FolderState::kNew ? outputs.plan(path) : outputs.plan_again(path);
@@ -219,8 +221,8 @@ Result<int> run_diagnose(DiagnoseCommand& command, CliContext& context) {
         {{"out", command.out}, {"trials", trials}, {"seed", config.seed}}, command.farm,
         config.farm, context);
   }
-  if (config.problem.ground) {
-    return run_diagnose_ground(command, config, format_stamp(stamp), context);
+  if (config.problem.windows()) {
+    return run_diagnose_runs(command, config, options.genes, format_stamp(stamp), context);
   }
   // Every simulation goes into the folder: what a figure rests on can be looked up.
   RETURN_IF_ERROR(LongCommand::begin("diagnose", {command.out}, diagnosis_stages(), context));

@@ -43,9 +43,11 @@ nlohmann::ordered_json diagnosis_summary_json(const Diagnosis& diagnosis,
 Status read_reference(DiagnoseCommand* command, const Config& config, Console& console);
 std::string log_hash(const RunLog& log);
 
-// A ground robot: its file and its runs, by its kinematics.  Nothing is simulated.  `stamp`: the
+// A ground robot: its file and its runs, by its kinematics, and nothing is simulated; or runs that
+// a program follows, which is asked for every motion.  `searched`: the config's genes; `stamp`: the
 // text of question.json.
-Result<int> run_diagnose_ground(DiagnoseCommand& command, const Config& config,
-                                const std::string& stamp, CliContext& context);
+Result<int> run_diagnose_runs(DiagnoseCommand& command, const Config& config,
+                              const std::vector<Gene>& searched, const std::string& stamp,
+                              CliContext& context);
 
 }  // namespace gapfarm

@@ -239,7 +239,7 @@ Result<int> draw_figures(EffectsOptions& options, CliContext& context) {
   std::vector<std::string> names;
   const ParameterTable& table = config.problem.table();
   for (const std::size_t e : pictured(table)) names.push_back(table.effects()[e].name + ".svg");
-  if (!options.config.empty()) options.outputs.reads(options.config);
+  options.outputs.reads(config);
   RETURN_IF_ERROR(options.outputs.plan_in(options.figures, names));
   if (context.dry_run) {
     return print_dry_run(

@@ -12,6 +12,7 @@
 #include "master/diagnose/result/diagnosis_json.h"
 #include "master/ground/diagnose_ground.h"
 #include "master/ground/fit/fit_file.h"
+#include "master/ground/program_runs.h"
 #include "master/report/report_html.h"
 
 namespace gapfarm {
@@ -89,18 +90,18 @@ std::string log_hash(const RunLog& log) {
   return hasher.finish();
 }
 
-Result<int> run_diagnose_ground(DiagnoseCommand& command, const Config& config,
-                                const std::string& stamp, CliContext& context) {
+Result<int> run_diagnose_runs(DiagnoseCommand& command, const Config& config,
+                              const std::vector<Gene>& searched, const std::string& stamp,
+                              CliContext& context) {
   context.begun = true;
-  const GroundRobot robot = config.problem.ground->robot_at(config.problem.values);
-  ASSIGN_OR_RETURN(const auto runs, read_run_folders(config.trial_files, robot.channels));
+  const bool kinematic = config.problem.ground != nullptr;
+  Problem problem = config.problem;
+  ASSIGN_OR_RETURN(const auto runs, read_run_folders(config.trial_files, problem.channels()));
   RETURN_IF_ERROR(LongCommand::begin("diagnose", {command.out}, ground_stages(), context));
   ASSIGN_OR_RETURN(const auto page, open_page(command.page, command.out, context));
   const fs::path out(command.out);
   RETURN_IF_ERROR(command.outputs.write((out / kStampFile).string(), stamp));
   LongCommand& work = *context.work;
-  FitFile fits(out / kFits);
-  work.keeps_also("fitted", out / kFits);
   GroundDiagnoseOptions options;
   options.excluded = command.exclude;
   options.seed = config.seed;
@@ -110,24 +111,41 @@ Result<int> run_diagnose_ground(DiagnoseCommand& command, const Config& config,
   options.on_finding = [&](Finding finding) { work.found(std::move(finding)); };
   options.on_progress = [&](std::size_t done, std::size_t total) { work.advance(done, total); };
   options.stopped = [&] { return context.stop.requested(); };
-  options.memo = &fits;
-  ASSIGN_OR_RETURN(auto result, diagnose_ground(robot, runs, options));
-  add_diagnosis_provenance(config, command, &result.diagnosis);
-  for (const std::string& name : command.reference) {
-    result.diagnosis.provenance.emplace_back("reference", name);
+  std::optional<FitFile> fits;
+  Outputs::NamedTexts files;
+  std::string left;
+  std::optional<GroundDiagnosis> result;
+  if (kinematic) {
+    const GroundRobot robot = problem.ground->robot_at(problem.values);
+    fits.emplace(out / kFits);
+    work.keeps_also("fitted", out / kFits);
+    options.memo = &*fits;
+    ASSIGN_OR_RETURN(result, diagnose_ground(robot, runs, options));
+    files = {{"robot.toml", format_robot(result->corrected)},
+             {"values.json", format_values({robot, config.trial_files, result->values})}};
+    left = "robot.toml with what was named put in; next: gapfarm export ros " + command.out;
+  } else {
+    ASSIGN_OR_RETURN(const auto farm, start_recorded(command.farm, config.farm, context));
+    const std::vector<Gene> tuned = command.model.empty() ? searched : std::vector<Gene>();
+    ASSIGN_OR_RETURN(result, diagnose_program_runs(*farm, tuned, runs, options, &problem));
+    Model model = model_of_problem(problem, problem.values);
+    model.kind = "diagnosed";
+    model.data = {problem_hash(to_proto(config.problem)), problem.log.trials.size(),
+                  config.trial_files};
+    files = {{"model.toml", format_model(model)}};
+    left = "model.toml with what was tuned and named put in";
   }
-  RETURN_IF_ERROR(command.outputs.write_in(
-      command.out, {{"robot.toml", format_robot(result.corrected)},
-                    {"values.json", format_values({robot, config.trial_files, result.values})},
-                    {"report.html", report_html(result.diagnosis)},
-                    {kDiagnosisFile, to_json(result.diagnosis)}}));
-  fits.remove();
-  context.console.result(diagnosis_summary(result.diagnosis),
-                         diagnosis_summary_json(result.diagnosis, command));
-  context.console.note("wrote: " + command.out +
-                       "/report.html, diagnosis.json, and robot.toml with what was named put in; "
-                       "next: gapfarm export ros " +
-                       command.out);
+  add_diagnosis_provenance(config, command, &result->diagnosis);
+  for (const std::string& name : command.reference) {
+    result->diagnosis.provenance.emplace_back("reference", name);
+  }
+  files.push_back({"report.html", report_html(result->diagnosis)});
+  files.push_back({kDiagnosisFile, to_json(result->diagnosis)});
+  RETURN_IF_ERROR(command.outputs.write_in(command.out, files));
+  if (fits) fits->remove();
+  context.console.result(diagnosis_summary(result->diagnosis),
+                         diagnosis_summary_json(result->diagnosis, command));
+  context.console.note("wrote: " + command.out + "/report.html, diagnosis.json, and " + left);
   return kExitDone;
 }
 

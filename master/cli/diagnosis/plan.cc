@@ -165,6 +165,7 @@ Result<int> run_plan(PlanOptions& options, CliContext& context) {
   // What a correction would shift is no part of what effects do: it takes none along.
   source.config.problem.residual = {};
   options.outputs.reads(options.source);
+  options.outputs.reads(source.config);
   if (source.config.problem.ground) {
     DriveTask task{options.source, options.out, options.picture};
     task.seed = options.settings.seed;

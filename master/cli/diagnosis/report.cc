@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "common/base/try.h"
+#include "common/progress/number_text.h"
 #include "common/trials/files.h"
 #include "master/cli/subcommand.h"
 #include "master/command/outputs.h"
@@ -29,6 +30,20 @@ struct Page {
   std::filesystem::path out;               // where it goes unless configured otherwise
   nlohmann::ordered_json importance = {};  // of a run's parameters
 };
+
+// "fitness, explained by each alone: friction 0.42, full_speed 0.1"
+std::string importance_text(const nlohmann::ordered_json& importance) {
+  std::string text;
+  for (const auto& [output, ignored] : importance.begin().value().items()) {
+    text += (text.empty() ? "" : "; ") + output + ", explained by each alone:";
+    const char* comma = " ";
+    for (const auto& [key, shares] : importance.items()) {
+      text += comma + key + " " + format_number(shares.value(output, 0.0), 2);
+      comma = ", ";
+    }
+  }
+  return text;
+}
 
 Result<Page> page_of_diagnosis(const std::filesystem::path& from) {
   ASSIGN_OR_RETURN(const std::string text, read_text_file(from.string()));
@@ -80,6 +95,7 @@ Result<int> run_report(ReportCommand& command, CliContext& context) {
     json["history"] = command.history;
   }
   if (!page.importance.empty()) json["importance"] = page.importance;
+  if (!page.importance.empty()) context.console.note(importance_text(page.importance));
   context.console.result(text, json);
   return kExitDone;
 }

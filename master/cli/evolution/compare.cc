@@ -186,7 +186,7 @@ nlohmann::ordered_json to_json(const ComparisonSummary& summary) {
 
 Status plan_outputs(CompareCommand& command, const Inputs& inputs) {
   for (const std::string& file : command.files) command.outputs.reads(file);
-  for (const Variant& variant : inputs.variants) command.outputs.reads(variant.config.problem.log);
+  for (const Variant& variant : inputs.variants) command.outputs.reads(variant.config);
   return command.outputs.plan_in(command.out, {std::begin(kFiles), std::end(kFiles)});
 }
 

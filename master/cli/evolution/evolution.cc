@@ -2,6 +2,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include <filesystem>
 #include <limits>
 #include <nlohmann/json.hpp>
 
@@ -35,10 +36,10 @@ class OnConsole : public RunWatcher {
 void declare_overrides(EvolutionOverrides& overrides, CLI::App& app) {
   constexpr std::uint64_t kMost = std::numeric_limits<std::int64_t>::max();
   app.add_option("--generations", overrides.generations, "Stop after so many generations")
-      ->check(CLI::Range(std::uint64_t{1}, kMost));
+      ->check(CLI::Range(std::uint64_t{1}, kMost, "1+"));
   app.add_option("--evaluations", overrides.evaluations,
                  "Stop after the generation in which so many evaluations are reached")
-      ->check(CLI::Range(std::uint64_t{1}, kMost));
+      ->check(CLI::Range(std::uint64_t{1}, kMost, "1+"));
   app.add_option("--time", overrides.time_s, "Stop after so many seconds")
       ->check(CLI::PositiveNumber);
   app.add_option("--target", overrides.target_fitness, "Stop at this fitness");
@@ -137,6 +138,21 @@ Status EvolutionOptions::complete() {
     farm.listen = {fleet.system == "local" ? "tcp://127.0.0.1:*" : "tcp://*:*"};
   }
   return {};
+}
+
+Result<int> begin_run(const std::string& out, const Config& config, const EvolutionOptions& options,
+                      const EvolutionOverrides& overrides, Log& log, CliContext& context) {
+  std::error_code ignored;
+  const bool folder_was_there = std::filesystem::exists(out, ignored);
+  ASSIGN_OR_RETURN(RunStore store, RunStore::create(out, run_info(config, overrides)));
+  const int code = run_evolution(store, config, options, log, context);
+  const auto checkpoint = store.checkpoint();
+  if (code == kExitFailed && checkpoint && !*checkpoint) {
+    if (Status s = RunStore::discard(std::move(store), !folder_was_there); !s) {
+      context.console.error(s.error());
+    }
+  }
+  return code;
 }
 
 int run_evolution(RunStore& store, const Config& config, const EvolutionOptions& options, Log& log,

@@ -24,6 +24,11 @@ struct EvolutionOptions {
   Status complete();
 };
 
+// Makes a run folder and evolves in it.  What failed before its first generation is taken away
+// again, so that it is not in the way of the next attempt.
+Result<int> begin_run(const std::string& out, const Config& config, const EvolutionOptions& options,
+                      const EvolutionOverrides& overrides, Log& log, CliContext& context);
+
 // Evolves (evolve_run()) and shows what comes of it.  `config`: overrides applied.  Returns an
 // ExitCode.
 int run_evolution(RunStore& store, const Config& config, const EvolutionOptions& options, Log& log,

@@ -8,6 +8,7 @@
 #include "common/base/try.h"
 #include "common/config/config.h"
 #include "master/cli/evolution/evolution.h"
+#include "master/cli/evolution/search_start.h"
 #include "master/cli/subcommand.h"
 #include "master/command/long_command.h"
 #include "master/command/outputs.h"
@@ -25,31 +26,6 @@ struct EvolveCommand {
   std::optional<std::uint64_t> seed;
   EvolutionOptions options;
 };
-
-// Gives the config's genes the values of a model, where the search then begins.
-Status begin_at(const EvolveCommand& command, Config& config, Console& console) {
-  if (!config.evolution.seed_nominal) {
-    return Error{
-        "--from needs seed_nominal = true in [evolution]: else the first genomes are drawn"};
-  }
-  if (config.problem.ground) {
-    return Error{"--from: the search of a ground robot begins at what fits its own log; omit it"};
-  }
-  ASSIGN_OR_RETURN(const Model model, read_model_of(command.from, console));
-  RETURN_IF_ERROR(check_same_robot(model, command.from, config, command.config));
-  for (const Gene& gene : config.problem.genes) {
-    const std::string& key = config.problem.table()[gene.row].key;
-    const auto row = model.table().find(key);
-    if (!row) return Error{command.from + ": has no " + key + ", which is a gene"};
-    const double value = model.values[*row];
-    if (value < gene.lower || value > gene.upper) {
-      return Error{fmt::format("{}: {} is {}, outside of its range in [genes], {} to {}; widen it",
-                               command.from, key, value, gene.lower, gene.upper)};
-    }
-    config.problem.values[gene.row] = value;
-  }
-  return {};
-}
 
 std::string what_evolves(const Problem& problem) {
   std::string parameters = std::to_string(problem.genes.size()) + " parameters ";
@@ -94,26 +70,15 @@ Result<int> run_evolve(EvolveCommand command, CliContext& context) {
         command.options.overrides.apply(read.evolution);
         if (command.seed) read.seed = *command.seed;
         RETURN_IF_ERROR(check_runnable(read));
-        if (!command.from.empty()) RETURN_IF_ERROR(begin_at(command, read, context.console));
+        if (!command.from.empty())
+          RETURN_IF_ERROR(begin_at(command.from, read, command.config, context.console));
         RETURN_IF_ERROR(check_farm(command.options.farm, read.farm));
         return check_folder(command.out, FolderKind::kRun);
       }));
   if (context.dry_run) return print_plan(command, config, context);
-  std::error_code ignored;
-  const bool folder_was_there = std::filesystem::exists(command.out, ignored);
-  ASSIGN_OR_RETURN(RunStore store,
-                   RunStore::create(command.out, run_info(config, command.options.overrides)));
   context.console.note(command.out + ": evolving " + what_evolves(config.problem) + ", seed " +
                        std::to_string(config.seed));
-  const int code = run_evolution(store, config, command.options, *log, context);
-  // What failed before its first generation is not to be in the way of the next attempt.
-  const auto checkpoint = store.checkpoint();
-  if (code == kExitFailed && checkpoint && !*checkpoint) {
-    if (Status s = RunStore::discard(std::move(store), !folder_was_there); !s) {
-      context.console.error(s.error());
-    }
-  }
-  return code;
+  return begin_run(command.out, config, command.options, command.options.overrides, *log, context);
 }
 
 }  // namespace
@@ -125,13 +90,15 @@ SubcommandRun setup_evolve(CLI::App& app) {
   command->trials.needed = false;
   app.add_option("--out", command->out, "Run folder to make")->required();
   app.add_option("--seed", command->seed, "In place of the config's");
-  app.add_option("--from", command->from, "Run or model whose values the search begins at")
-      ->type_name("RUN|MODEL");
+  app.add_option("--from", command->from,
+                 "Run, model or CSV table of genes whose values the search begins at")
+      ->type_name("RUN|MODEL|TABLE");
   command->options.declare(app);
   app.footer(
       "Examples:\n"
       "  gapfarm evolve configs/demo.toml --out run/demo\n"
       "  gapfarm evolve configs/srv1.toml --trials monday.csv tuesday.csv --out run/srv1\n"
+      "  gapfarm evolve configs/demo.toml --from history.csv --out run/again\n"
       "  gapfarm evolve configs/demo.toml --out run/big --workers-on slurm --max 200 --wall-time "
       "4:00:00");
   return [command](CliContext& context) { return run_evolve(*command, context); };

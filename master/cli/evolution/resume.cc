@@ -5,8 +5,10 @@
 
 #include "common/base/try.h"
 #include "master/cli/evolution/evolution.h"
+#include "master/cli/evolution/search_start.h"
 #include "master/cli/subcommand.h"
 #include "master/command/long_command.h"
+#include "master/command/outputs.h"
 #include "master/run/run.h"
 #include "master/run/stored_run.h"
 #include "master/store/run_reader.h"
@@ -16,7 +18,8 @@ namespace {
 
 struct ResumeCommand {
   std::string run;
-  std::optional<std::uint64_t> generation;
+  std::string out;  // of a branch; empty: the run itself goes on
+  BranchOptions branch;
   EvolutionOptions options;
 };
 
@@ -26,7 +29,7 @@ Result<int> print_resume(const ResumeCommand& command, CliContext& context) {
   ASSIGN_OR_RETURN(const auto generations, reader.generations());
   ASSIGN_OR_RETURN(const Config config, stored_config(reader.info(), command.options.overrides));
   const std::uint64_t last = generations.empty() ? 0 : generations.back().generation;
-  const std::uint64_t from = std::min(command.generation.value_or(last), last);
+  const std::uint64_t from = std::min(command.branch.generation.value_or(last), last);
   return print_dry_run(
       "go on with " + command.run + " after generation " + std::to_string(from) + " to at most " +
           std::to_string(config.evolution.generations),
@@ -34,8 +37,40 @@ Result<int> print_resume(const ResumeCommand& command, CliContext& context) {
       command.options.farm, config.farm, context);
 }
 
+Result<int> run_branch(const ResumeCommand& command, CliContext& context) {
+  const std::unique_ptr<Log> log = command.options.farm.log.open();
+  const NotesGoTo notes(*log, context.console);
+  ASSIGN_OR_RETURN(const auto reader, RunReader::open(command.run));
+  EvolutionOverrides overrides = EvolutionOverrides::from_json(reader.info().overrides);
+  overrides.merge(command.options.overrides);
+  ASSIGN_OR_RETURN(Config config, stored_config(reader.info(), overrides));
+  RETURN_IF_ERROR(branch_off(reader, command.branch, config));
+  RETURN_IF_ERROR(check_runnable(config));
+  RETURN_IF_ERROR(check_farm(command.options.farm, config.farm));
+  RETURN_IF_ERROR(check_folder(command.out, FolderKind::kRun));
+  const std::string does = "branch off " + search_start_text(run_info(config, overrides)) +
+                           " into " + command.out + ", at most " +
+                           std::to_string(config.evolution.generations) + " generations";
+  if (context.dry_run) {
+    return print_dry_run(does,
+                         {{"run", command.run},
+                          {"out", command.out},
+                          {"generation", config.evolution.start.generation},
+                          {"genes", config.problem.genes.size()},
+                          {"generations", config.evolution.generations}},
+                         command.options.farm, config.farm, context);
+  }
+  context.console.note(command.out + ": " + does);
+  return begin_run(command.out, config, command.options, overrides, *log, context);
+}
+
 Result<int> run_resume(ResumeCommand command, CliContext& context) {
   RETURN_IF_ERROR(command.options.complete());
+  if (!command.out.empty()) return run_branch(command, context);
+  if (!command.branch.fixed.empty() || !command.branch.freed.empty()) {
+    return Error{"--fix and --free make a run of its own and leave " + command.run +
+                 " as it is; name its folder by --out"};
+  }
   if (context.dry_run) return print_resume(command, context);
   const std::unique_ptr<Log> log = command.options.farm.log.open();
   const NotesGoTo notes(*log, context.console);
@@ -43,8 +78,8 @@ Result<int> run_resume(ResumeCommand command, CliContext& context) {
   context.begun = true;
   const Result<Config> config = stored_config(store.info(), command.options.overrides);
   if (!config) return stopped_by(store, {command.run + ": " + config.error().message});
-  if (command.generation) {
-    const auto kept = store.truncate_after(*command.generation);
+  if (command.branch.generation) {
+    const auto kept = store.truncate_after(*command.branch.generation);
     if (!kept) return stopped_by(store, kept.error());
     if (!kept->empty()) context.console.note("later generations are kept in " + kept->string());
   }
@@ -56,14 +91,23 @@ Result<int> run_resume(ResumeCommand command, CliContext& context) {
 SubcommandRun setup_resume(CLI::App& app) {
   auto command = std::make_shared<ResumeCommand>();
   app.add_option("RUN", command->run, "Folder of the run")->required();
-  app.add_option("--generation", command->generation,
+  app.add_option("--generation", command->branch.generation,
                  "Continue after this generation; later ones are moved to a file of their own");
+  app.add_option("--fix", command->branch.fixed,
+                 "GENE=VALUE: go on in --out with this gene fixed; may repeat")
+      ->type_name("GENE=VALUE");
+  app.add_option("--free", command->branch.freed,
+                 "KEY or KEY=LOWER,UPPER: go on in --out with this parameter a gene; may repeat")
+      ->type_name("KEY");
+  app.add_option("--out", command->out,
+                 "Go on in this new run folder, from the run's population; RUN stays as it is");
   command->options.declare(app);
   app.footer(
       "Examples:\n"
       "  gapfarm resume run/demo\n"
       "  gapfarm resume run/demo --generations 200    # evolve a finished run further\n"
-      "  gapfarm resume run/demo --generation 20      # from an earlier generation");
+      "  gapfarm resume run/demo --generation 20      # from an earlier generation\n"
+      "  gapfarm resume run/demo --fix friction=0.5 --out run/fixed");
   return [command](CliContext& context) { return run_resume(*command, context); };
 }
 

@@ -240,6 +240,9 @@ std::string status_screen(const RunStatus& status, const std::string& run, const
     text += label(console, "heartbeat") + format_duration(status.heartbeat_age_s) + " ago\n";
   }
   text += trouble(status, console);
+  if (const std::string start = search_start_text(status.info); !start.empty()) {
+    text += label(console, "began at") + printable(start) + "\n";
+  }
   text += label(console, "seed") + std::to_string(status.info.seed) + "\n";
   if (!status.digest.empty()) text += label(console, "digest") + status.digest + "\n";
   if (status.state == RunState::kStopped) {

@@ -88,8 +88,7 @@ nlohmann::ordered_json to_json(const DetermineReport& report, const ParameterTab
 Result<Problem> open_problem(DetermineCommand& command, const Config& config, Console& console) {
   ASSIGN_OR_RETURN(const Model model, read_model_of(command.model, console));
   RETURN_IF_ERROR(check_no_residual(model, command.model, "determine"));
-  command.outputs.reads(config.problem.log);
-  command.outputs.reads(command.config);
+  command.outputs.reads(config);
   command.outputs.reads(command.model);
   command.outputs.reads((std::filesystem::path(command.model) / "model.toml").string());
   RETURN_IF_ERROR(command.outputs.plan(command.out));

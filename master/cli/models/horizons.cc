@@ -32,13 +32,15 @@ struct Fitted {
   ParameterValues values;
   WindowSettings windows;
   std::vector<std::string> folders;
+  std::string robot_path = {};
 };
 
 Result<Fitted> open_fitted(const std::string& source, Console& console) {
   std::error_code ignored;
   if (!std::filesystem::is_directory(source, ignored)) {
     ASSIGN_OR_RETURN(auto config, read_config_and_trials(source, {}));
-    return Fitted{config.problem, config.problem.values, config.windows, config.trial_files};
+    return Fitted{config.problem, config.problem.values, config.windows, config.trial_files,
+                  config.robot_path};
   }
   ASSIGN_OR_RETURN(const auto reader, RunReader::open(source));
   ASSIGN_OR_RETURN(auto problem, stored_problem(reader));
@@ -60,6 +62,7 @@ Result<int> run_horizons(HorizonsCommand& command, CliContext& context) {
   Console& console = context.console;
   ASSIGN_OR_RETURN(const auto fitted, open_fitted(command.source, console));
   command.outputs.reads(command.source);
+  command.outputs.reads(fitted.robot_path);
   command.outputs.reads_runs(fitted.folders);
   command.outputs.reads_runs(command.runs);
   RETURN_IF_ERROR(command.outputs.plan({command.picture, command.out}));

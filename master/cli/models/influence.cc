@@ -48,8 +48,7 @@ nlohmann::ordered_json to_json(const InfluenceReport& report, const ParameterTab
 Result<int> run_influence(InfluenceCommand command, CliContext& context) {
   ASSIGN_OR_RETURN(const Config config,
                    command.traced.open(command.config, &command.settings.trace));
-  command.outputs.reads(command.config);
-  command.outputs.reads(config.problem.log);
+  command.outputs.reads(config);
   RETURN_IF_ERROR(
       command.outputs.plan_in(command.out, {"influence.csv", "influence.html", "genes.toml"}));
   show_notes(config.problem.log, context.console);

@@ -16,14 +16,14 @@ std::vector<std::string> keys_of(const ParameterTable& table) {
 
 }  // namespace
 
-Status apply_setting(const std::string& setting, Problem& problem) {
+Status apply_setting(const std::string& setting, Problem& problem, const std::string& option) {
   const ParameterTable& table = problem.table();
   const std::size_t equals = setting.find('=');
   const std::string key = setting.substr(0, equals);
   const std::vector<std::string> known = keys_of(table);
   const auto row = table.find(key);
   if (!row || equals == std::string::npos) {
-    return Error{"--set " + setting + ": expected PARAMETER=VALUE" +
+    return Error{option + " " + setting + ": expected PARAMETER=VALUE" +
                  (row ? "" : ", and there is no parameter '" + key + "'" + suggestion(key, known))};
   }
   const std::string text = setting.substr(equals + 1);
@@ -31,11 +31,11 @@ Status apply_setting(const std::string& setting, Problem& problem) {
   const auto choice = std::find(choices.begin(), choices.end(), text);
   double value = static_cast<double>(choice - choices.begin());
   if (choice == choices.end() && !CLI::detail::lexical_cast(text, value)) {
-    return Error{"--set " + setting + ": '" + text + "' is not a number" +
+    return Error{option + " " + setting + ": '" + text + "' is not a number" +
                  (choices.empty() ? "" : suggestion(text, choices))};
   }
   if (Status s = table.check(*row, value); !s)
-    return Error{"--set " + setting + ": " + s.error().message};
+    return Error{option + " " + setting + ": " + s.error().message};
   problem.values[*row] = value;
   return {};
 }

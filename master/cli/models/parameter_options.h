@@ -10,8 +10,9 @@
 namespace gapfarm {
 
 // "battery_sag.rate=0.01", "robot=wheels" into the problem's values.  Errors: no such parameter, a
-// value that it does not accept.
-Status apply_setting(const std::string& setting, Problem& problem);
+// value that it does not accept; they name the option.
+Status apply_setting(const std::string& setting, Problem& problem,
+                     const std::string& option = "--set");
 
 // "KEY", with the table's range, or "KEY=LOWER,UPPER", as the problem's genes.  Errors as above, an
 // empty range, a key twice; they name the option.

@@ -80,6 +80,7 @@ Result<Plan> plan_and_outputs(SimulateOptions& options, const Source& source, Cl
     plan = plan_of(config.problem, shifted(log, -source.frame_x_m, -source.frame_y_m));
   }
   outputs.reads(options.source);
+  outputs.reads(source.config);
   if (options.out == "-") {
     if (context.console.json()) {
       return Error{"--json and --out - both want standard output; name a file"};

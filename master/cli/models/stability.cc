@@ -60,8 +60,7 @@ Result<int> run_stability(StabilityCommand command, CliContext& context) {
   ASSIGN_OR_RETURN(const Config config,
                    command.traced.open(command.config, &command.settings.trace));
   RETURN_IF_ERROR(check_evolvable(config));
-  command.outputs.reads(command.config);
-  command.outputs.reads(config.problem.log);
+  command.outputs.reads(config);
   RETURN_IF_ERROR(command.outputs.plan_in(command.out, {"model.toml", "stability.csv"}));
   show_notes(config.problem.log, context.console);
   command.settings.evolution = config.evolution;

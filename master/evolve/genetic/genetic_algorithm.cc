@@ -111,6 +111,7 @@ GeneticAlgorithm::GeneticAlgorithm(const OptimiserSetup& setup)
     : settings_(setup.settings),
       breeder_(setup.settings, GeneSpace(*setup.table, setup.genes)),
       nominal_(setup.nominal),
+      given_(setup.given),
       run_seed_(setup.run_seed),
       noisy_(setup.noisy),
       seen_(setup.remembered) {}
@@ -162,13 +163,16 @@ Stream GeneticAlgorithm::stream_of(std::uint64_t birth_id) const {
 }
 
 void GeneticAlgorithm::add_first_generation(Plan& plan) {
-  if (settings_.seed_nominal && !nominal_.empty()) {
+  const auto add = [&](const Genome& genome, unsigned origin) {
+    if (genome.empty() || plan.newborns.size() >= settings_.population) return;
     Newborn newborn;
     newborn.individual.birth_id = next_birth_id_++;
-    newborn.individual.genome = breeder_.space().snapped(nominal_);
-    newborn.individual.origin = kNominal;
+    newborn.individual.genome = breeder_.space().snapped(genome);
+    newborn.individual.origin = origin;
     plan.newborns.push_back(std::move(newborn));
-  }
+  };
+  if (settings_.seed_nominal) add(nominal_, kNominal);
+  for (const Genome& genome : given_) add(genome, kGiven);
   add_random(plan);
 }
 

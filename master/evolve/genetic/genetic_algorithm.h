@@ -61,6 +61,7 @@ class GeneticAlgorithm final : public Optimiser {
   EvolutionSettings settings_;
   Breeder breeder_;
   Genome nominal_;
+  std::vector<Genome> given_;
   std::uint64_t run_seed_;
   bool noisy_;
 

@@ -61,11 +61,15 @@ class Nsga2 final : public Optimiser {
  public:
   explicit Nsga2(const OptimiserSetup& setup)
       : space_(*setup.table, setup.genes),
-        nominal_(setup.settings.seed_nominal ? setup.nominal : Genome{}),
+        given_(setup.given),
         run_seed_(setup.run_seed),
         size_(
             std::max(4U, setup.settings.optimiser.population.value_or(setup.settings.population))),
-        full_scores_(setup.noisy ? std::max(1U, setup.settings.elite_replicates) : 1) {}
+        full_scores_(setup.noisy ? std::max(1U, setup.settings.elite_replicates) : 1) {
+    if (setup.settings.seed_nominal && !setup.nominal.empty()) {
+      given_.insert(given_.begin(), setup.nominal);
+    }
+  }
 
   std::vector<Candidate> ask() override;
   void tell(std::span<const Score> scores) override;
@@ -98,7 +102,7 @@ class Nsga2 final : public Optimiser {
   void note_best();
 
   GeneSpace space_;
-  Genome nominal_;
+  std::vector<Genome> given_;  // of the first generation
   std::uint64_t run_seed_;
   std::size_t size_;
   unsigned full_scores_;
@@ -156,9 +160,9 @@ void Nsga2::add_pair(Plan& plan, std::set<Genome>& known) const {
     bool fresh = false;
     for (unsigned t = 0; t < kTries && !fresh; ++t) {
       if (population_.empty()) {
-        const bool first = child.birth_id == 0 && !nominal_.empty() && t == 0;
-        child.genome = first ? nominal_ : space_.random(stream);
-        child.origin = first ? kNominal : kRandom;
+        const bool given = child.birth_id < given_.size() && t == 0;
+        child.genome = given ? given_[child.birth_id] : space_.random(stream);
+        child.origin = !given ? kRandom : child.birth_id == 0 ? kNominal : kGiven;
       } else {
         mutate(child, t > 0, stream);
       }

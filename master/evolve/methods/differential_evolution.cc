@@ -36,6 +36,11 @@ std::vector<Genome> DifferentialEvolution::propose(const StreamOf& stream_of) co
   std::vector<Genome> proposed;
   drawn_.clear();
   if (population_.empty() && !keep_.empty()) proposed.push_back(keep_);
+  if (iterations_ == 0 && !keep_.empty()) {
+    for (const Genome& genome : setup_.given) {
+      if (proposed.size() < size_) proposed.push_back(genome);
+    }
+  }
   while (proposed.size() < size_) {
     Stream stream = stream_of(proposed.size());
     if (population_.empty()) {

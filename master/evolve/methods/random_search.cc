@@ -4,8 +4,12 @@ namespace gapfarm {
 
 std::vector<Genome> RandomSearch::propose(const StreamOf& stream_of) const {
   std::vector<Genome> proposed;
+  const std::size_t size = setup_.settings.population.value_or(setup_.population);
   if (!begun_ && !setup_.start.empty()) proposed.push_back(setup_.start);
-  while (proposed.size() < setup_.settings.population.value_or(setup_.population)) {
+  for (const Genome& genome : setup_.given) {
+    if (!begun_ && proposed.size() < size) proposed.push_back(genome);
+  }
+  while (proposed.size() < size) {
     Stream stream = stream_of(proposed.size());
     proposed.push_back(setup_.space.random(stream));
   }

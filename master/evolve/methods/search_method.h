@@ -27,6 +27,7 @@ struct MethodSetup {
   std::vector<double> spread;  // of the start, a covariance row by row; empty: unknown
   bool noisy = false;          // scores differ between replicates
   std::uint64_t evaluations = ~std::uint64_t{0};  // when the run ends
+  std::vector<Genome> given = {};  // members of the first population beside the start
 };
 
 // The stream of a generation's k-th proposal.

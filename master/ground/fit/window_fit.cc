@@ -101,8 +101,8 @@ std::vector<Eigen::Vector3d> WindowFitter::raw_residuals(const WindowFit& fit) c
   return raw;
 }
 
-std::vector<Eigen::Vector3d> WindowFitter::residuals(const std::vector<FitRow>& rows,
-                                                     const Eigen::VectorXd& values) const {
+Kinematics WindowFitter::kinematics(const std::vector<FitRow>& rows,
+                                    const Eigen::VectorXd& values) const {
   Kinematics at;
   at.values = values;
   for (const FitRow& row : rows) at.names.push_back(row.row.name);
@@ -113,7 +113,18 @@ std::vector<Eigen::Vector3d> WindowFitter::residuals(const std::vector<FitRow>& 
     at.values.conservativeResize(at.values.size() + 1);
     at.values[at.values.size() - 1] = reference_->values[static_cast<Eigen::Index>(k)];
   }
-  const std::vector<Pose> ends = kinematic_ends(robot_, windows_.runs, windows_.trials, at);
+  return at;
+}
+
+std::vector<Eigen::Vector3d> WindowFitter::residuals(const std::vector<FitRow>& rows,
+                                                     const Eigen::VectorXd& values) const {
+  const Kinematics at = kinematics(rows, values);
+  if (windows_.simulated) return residuals(at, windows_.simulated({at}).front());
+  return residuals(at, kinematic_ends(robot_, windows_.runs, windows_.trials, at));
+}
+
+std::vector<Eigen::Vector3d> WindowFitter::residuals(const Kinematics& at,
+                                                     const std::vector<Pose>& ends) const {
   std::vector<Eigen::Vector3d> r;
   r.reserve(ends.size());
   for (std::size_t i = 0; i < ends.size(); ++i) {
@@ -223,18 +234,37 @@ double WindowFitter::score(WindowFit* fit, const std::vector<double>& use) const
   return fit->objective;
 }
 
-void WindowFitter::slope(const WindowFit& fit, Eigen::Index k,
-                         std::vector<Eigen::MatrixXd>* J) const {
-  const double step = kStepShare * fit.rows[static_cast<std::size_t>(k)].row.tolerance;
-  Eigen::VectorXd moved = fit.values;
-  moved[k] += step;
-  const auto r = residuals(fit.rows, moved);
-  for (std::size_t i = 0; i < r.size(); ++i) (*J)[i].col(k) = (r[i] - fit.residuals[i]) / step;
+void WindowFitter::add_slopes(const WindowFit& fit, Eigen::Index first,
+                              std::vector<Eigen::MatrixXd>* J) const {
+  const auto step = [&](Eigen::Index k) {
+    return kStepShare * fit.rows[static_cast<std::size_t>(k)].row.tolerance;
+  };
+  const auto moved = [&](Eigen::Index k) {
+    Eigen::VectorXd values = fit.values;
+    values[k] += step(k);
+    return values;
+  };
+  std::vector<std::vector<Pose>> ends;  // of a simulation, all at once
+  if (windows_.simulated) {
+    std::vector<Kinematics> points;
+    for (Eigen::Index k = first; k < fit.values.size(); ++k) {
+      points.push_back(kinematics(fit.rows, moved(k)));
+    }
+    ends = windows_.simulated(points);
+  }
+  for (Eigen::Index k = first; k < fit.values.size(); ++k) {
+    const auto r = windows_.simulated ? residuals(kinematics(fit.rows, moved(k)),
+                                                  ends[static_cast<std::size_t>(k - first)])
+                                      : residuals(fit.rows, moved(k));
+    for (std::size_t i = 0; i < r.size(); ++i) {
+      (*J)[i].col(k) = (r[i] - fit.residuals[i]) / step(k);
+    }
+  }
 }
 
 std::vector<Eigen::MatrixXd> WindowFitter::slopes(const WindowFit& fit) const {
   std::vector<Eigen::MatrixXd> J(fit.residuals.size(), Eigen::MatrixXd(3, fit.values.size()));
-  for (Eigen::Index k = 0; k < fit.values.size(); ++k) slope(fit, k, &J);
+  add_slopes(fit, 0, &J);
   return J;
 }
 
@@ -265,7 +295,7 @@ double WindowFitter::promise(const WindowFit& fit, const std::vector<Eigen::Matr
   moved.values = values;
   std::vector<Eigen::MatrixXd> J(fit_slopes.size(), Eigen::MatrixXd(3, values.size()));
   for (std::size_t i = 0; i < J.size(); ++i) J[i].leftCols(fit.values.size()) = fit_slopes[i];
-  for (Eigen::Index k = fit.values.size(); k < values.size(); ++k) slope(moved, k, &J);
+  add_slopes(moved, fit.values.size(), &J);
   Eigen::MatrixXd H;
   Eigen::VectorXd g;
   normal_equations(moved, J, uses({}), &H, &g);

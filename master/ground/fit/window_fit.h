@@ -114,10 +114,13 @@ class WindowFitter {
  private:
   std::vector<Eigen::Vector3d> residuals(const std::vector<FitRow>& rows,
                                          const Eigen::VectorXd& values) const;
+  std::vector<Eigen::Vector3d> residuals(const Kinematics& at, const std::vector<Pose>& ends) const;
+  // Of the rows and the reference.
+  Kinematics kinematics(const std::vector<FitRow>& rows, const Eigen::VectorXd& values) const;
   void rescale(WindowFit* fit, const std::vector<double>& use) const;
   double score(WindowFit* fit, const std::vector<double>& use) const;
-  // The column of slopes that belongs to row k.
-  void slope(const WindowFit& fit, Eigen::Index k, std::vector<Eigen::MatrixXd>* J) const;
+  // The columns of slopes that belong to rows from `first` on.
+  void add_slopes(const WindowFit& fit, Eigen::Index first, std::vector<Eigen::MatrixXd>* J) const;
   // Equations of one step: weighted squares of slopes, and of slopes with residuals, priors in.
   void normal_equations(const WindowFit& fit, const std::vector<Eigen::MatrixXd>& J,
                         const std::vector<double>& use, Eigen::MatrixXd* H,

@@ -3,11 +3,13 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <functional>
 #include <vector>
 
 #include "common/base/result.h"
 #include "common/recordings/windows.h"
 #include "common/robot/robot.h"
+#include "common/score/kinematic.h"
 
 namespace gapfarm {
 
@@ -44,6 +46,9 @@ struct WindowSet {
   double least_noise = 0.1;
   std::vector<double> turned_rad;  // of each trial by the gyro, its bias in; empty: there is none
   std::vector<Return> returns;
+  // The trials' measured ends as a simulation expects them, at each of some values; empty: as the
+  // robot's kinematics do.
+  std::function<std::vector<std::vector<Pose>>(const std::vector<Kinematics>&)> simulated = {};
 
   Sense sense_of(std::size_t trial) const {
     if (horizon[trial] < lengths) return Sense::kPose;

@@ -130,9 +130,9 @@ void GroundReport::faults() {
     effect.gap_before = search_.fault_gains[k] / search_.windows.stretches();
     const double shrinks = std::exp(effect.gap_before / 3);
     effect.text = fmt::format(
-        "The log is wrong in {}: put right, what the robot's file expects is {:.1f} times as near "
-        "to what was measured. {}",
-        h.thing, shrinks, h.remedy);
+        "The log is wrong in {}: put right, what {} expects is {:.1f} times as near to what was "
+        "measured. {}",
+        h.thing, source_of(robot_), shrinks, h.remedy);
     d_.sanity.push_back({h.name, effect.text, h.remedy, Severity::kNote, true, effect.aliases});
     d_.effects.push_back(std::move(effect));
   }
@@ -307,8 +307,7 @@ void GroundReport::name_headline() {
     d_.headline =
         changes   ? (nothing ? "Nothing changed by more than a robot does from log to log."
                              : "Something changed that nothing of the catalogue explains alone.")
-        : nothing ? "Nothing of the robot's file or log is wrong by more than a well-kept file's "
-                    "values are."
+        : nothing ? nothing_wrong(robot_)
         : figures_.closable.lo > 0
             ? "Something is wrong that nothing of the catalogue explains alone."
             : "Nothing is significantly wrong, but these runs do not exclude it.";

@@ -45,8 +45,9 @@ std::string in_file(const GroundRobot& robot, const KinematicRow& row, const Est
     return fmt::format("{:+.4g} [{:+.4g}, {:+.4g}] {}", e.value, e.lo, e.hi,
                        e.unit == "-" ? "of what the file has" : e.unit);
   }
-  return fmt::format("{} {:.5g} [{:.5g}, {:.5g}] {}; the file has {:.5g}", row.name, base + e.value,
-                     base + e.lo, base + e.hi, e.unit, base);
+  return fmt::format("{} {:.5g} [{:.5g}, {:.5g}] {}; the {} has {:.5g}", row.name, base + e.value,
+                     base + e.lo, base + e.hi, e.unit, robot.wheels.empty() ? "config" : "file",
+                     base);
 }
 
 std::string capital(std::string text) {
@@ -156,6 +157,17 @@ Estimate estimate_of(const KinematicRow& row, double value, double lo, double hi
             std::expm1(hi - row.nominal), row.unit};
   }
   return {row.key, value - row.nominal, lo - row.nominal, hi - row.nominal, row.unit};
+}
+
+const char* source_of(const GroundRobot& robot) {
+  return robot.wheels.empty() ? "the program" : "the robot's file";
+}
+
+const char* nothing_wrong(const GroundRobot& robot) {
+  return robot.wheels.empty()
+             ? "Nothing of the commands or readings is wrong by more than well-kept ones are."
+             : "Nothing of the robot's file or log is wrong by more than a well-kept file's values "
+               "are.";
 }
 
 std::string text_of_value(const GroundRobot& robot, const GroundHypothesis& h,

@@ -14,6 +14,11 @@ namespace gapfarm {
 // nominal.
 Estimate estimate_of(const KinematicRow& row, double value, double lo, double hi);
 
+// What expects motions: "the robot's file", or of a robot that a program follows, "the program".
+const char* source_of(const GroundRobot& robot);
+// The headline where nothing is named and nothing left.
+const char* nothing_wrong(const GroundRobot& robot);
+
 // "The distance between the sides, as they roll, is off: wheel_separation 0.52 [...] m; the file
 // has 0.5", a full sentence.
 std::string text_of_value(const GroundRobot& robot, const GroundHypothesis& h,

@@ -1,5 +1,6 @@
 #include "master/io/log_checks/finding.h"
 
+#include <algorithm>
 #include <map>
 
 namespace gapfarm {
@@ -25,7 +26,10 @@ std::string finding_phrase(const SanityFinding& finding) {
       {"frames_apart", "finger and pieces are not in one frame"},
       {"impossible_rows", "some rows cannot be"}};
   const auto found = phrases.find(finding.name);
-  return found == phrases.end() ? finding.name : found->second;
+  if (found != phrases.end()) return found->second;
+  std::string words = finding.name;
+  std::replace(words.begin(), words.end(), '_', ' ');
+  return words;
 }
 
 const char* severity_name(Severity severity) {

@@ -7,6 +7,7 @@
 
 #include "common/config/sections.h"
 #include "common/random/stream.h"
+#include "master/evolve/carried.h"
 #include "master/evolve/evolve.h"
 #include "tests/unit/evolve/members_digest.h"
 #include "tests/unit/evolve/search_functions.h"
@@ -226,11 +227,40 @@ TEST_P(EveryOptimiser, StartsAtTheConfigsOwnValues) {
   setup.nominal = {0.25, 0.5, 0.75};
   const auto optimiser = make_optimiser(setup).value();
   EXPECT_EQ(optimiser->ask().front().genome, setup.nominal);
+  // And, of a population, at what was given beside.
+  setup.given = {{0.5, 0.25, 0.125}, {0.75, 0.5, 0.25}};
+  const auto candidates = make_optimiser(setup).value()->ask();
+  const bool population = GetParam() != OptimiserKind::kCmaEs && candidates.size() > 1;
+  for (std::size_t k = 0; population && k < setup.given.size(); ++k) {
+    EXPECT_EQ(candidates[k + 1].genome, setup.given[k]);
+  }
   setup.nominal.pop_back();
   EXPECT_THAT(make_optimiser(setup).error().message, testing::HasSubstr("2 genes instead of 3"));
   setup.nominal.clear();
   setup.genes.clear();
   EXPECT_THAT(make_optimiser(setup).error().message, testing::HasSubstr("search range"));
+}
+
+TEST_P(EveryOptimiser, LeavesItsPopulationOrItsWidth) {
+  ToyRun run(sphere(3), settings(), 5);
+  for (int i = 0; i < 30; ++i) run.generation();
+  const Carried carried = carried_by(run.optimiser().state(), 3);
+  using Kind = OptimiserKind;
+  const bool population = GetParam() == Kind::kGenetic || GetParam() == Kind::kDeSimplex ||
+                          GetParam() == Kind::kDifferentialEvolution;
+  EXPECT_EQ(carried.population.empty(), !population);
+  if (population) {
+    EXPECT_EQ(carried.population.front(), run.optimiser().best().genome);
+  }
+  if (GetParam() != Kind::kAutoSearch) {  // which may have got to CMA-ES
+    EXPECT_EQ(carried.spread.size(), GetParam() == Kind::kCmaEs ? 9 : 0);
+  }
+  // Narrower than it began by now.
+  for (std::size_t k = 0; k < carried.spread.size(); k += 4) {
+    EXPECT_GT(carried.spread[k], 0);
+    EXPECT_LT(carried.spread[k], 0.3 * 0.3);
+  }
+  EXPECT_TRUE(carried_by("damaged", 3).population.empty());
 }
 
 TEST_P(EveryOptimiser, SurvivesFailures) {

@@ -92,6 +92,16 @@ TEST_F(ExternalRunsScenario, CommandsComeLaterByTheDelayAndMarkersSeeTheTurn) {
   EXPECT_NEAR(turned.predict().predictions(0).end().y(), 3, 1e-9);
 }
 
+TEST_F(ExternalRunsScenario, ChannelsAreScaledAndShiftedAndAtRestNotEvenStored) {
+  const Problem changed = config("[parameters]\nv.gain = 2\nv.offset = 0.1\n").problem;
+  // Half a second at 0.1, half at 0.5.
+  EXPECT_NEAR(predicted(changed).predict().predictions(0).end().y(), 3.3, 1e-9);
+  EXPECT_EQ(to_proto(changed).values_size(), static_cast<int>(changed.table().size()));
+  const Problem plain = config().problem;
+  EXPECT_EQ(to_proto(plain).values_size(), static_cast<int>(plain.table().size()) - 2);
+  EXPECT_EQ(from_proto(to_proto(plain)).value().values, plain.values);
+}
+
 TEST_F(ExternalRunsScenario, NoiseGrowsWithTheRootOfTheWay) {
   const v1::TaskResult result =
       predicted(config("[parameters]\npose_noise_position = 1e-5\npose_noise_heading = 1e-5\n"

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "tests/unit/blind/worker_farm.h"
 #include "tests/unit/worker/ground_problem.h"
@@ -43,6 +44,46 @@ TEST(Horizons, ReportEveryWindowBesideTheMedians) {
   const std::string table = windows_csv(*horizons);
   EXPECT_EQ(std::count(table.begin(), table.end(), '\n'), static_cast<long>(windows + 3));
   EXPECT_NE(table.find("\n0,,b,"), std::string::npos) << table;
+}
+
+// A farm in which the robot falls over where a task holds the trial.
+class FallsOver : public tests::WorkerFarm {
+ public:
+  explicit FallsOver(std::uint32_t trial) : trial_(trial) {}
+  Result<std::vector<v1::TaskResult>> run(
+      const std::string& hash, const std::vector<v1::Task>& tasks,
+      const std::function<void(const FarmProgress&)>& progress) override {
+    auto results = tests::WorkerFarm::run(hash, tasks, progress);
+    for (std::size_t i = 0; i < tasks.size(); ++i) {
+      const auto& trials = tasks[i].predict().trials();
+      if (std::count(trials.begin(), trials.end(), trial_) == 0) continue;
+      (*results)[i].Clear();
+      (*results)[i].set_outcome(v1::DIVERGED);
+    }
+    return results;
+  }
+
+ private:
+  std::uint32_t trial_;
+};
+
+TEST(Horizons, CountARunThatFallsOverAsInfinitelyFarOff) {
+  Problem problem = tests::ground_problem();
+  const RunLog log{problem.ground->robot().channels,
+                   {},
+                   {tests::driven_run(problem, problem.values, 12, "a"),
+                    tests::driven_run(problem, problem.values, 4, "b")},
+                   {}};
+  tests::take_runs(problem, log.runs);
+  FallsOver farm(0);
+  const auto horizons = measure_horizons(farm, problem, problem.values, log, {{2}, 0.5});
+  ASSERT_TRUE(horizons.ok()) << horizons.error().message;
+  EXPECT_EQ(horizons->unfinished_runs, 1u);
+  EXPECT_TRUE(std::isinf(horizons->windows.front().simulation.position_m));
+  EXPECT_TRUE(std::isfinite(horizons->windows.back().simulation.position_m));
+  EXPECT_TRUE(std::isinf(horizons->rows[0].simulation.position_m));  // most of the windows
+  EXPECT_TRUE(std::isfinite(horizons->rows[0].kinematics.position_m));
+  EXPECT_NE(format_horizons(*horizons).find("1 runs could not be simulated"), std::string::npos);
 }
 
 }  // namespace

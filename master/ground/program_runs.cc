@@ -1,0 +1,350 @@
+#include "master/ground/program_runs.h"
+
+#include <algorithm>
+#include <cmath>
+#include <deque>
+#include <memory>
+#include <utility>
+
+#include "common/base/guarded.h"
+#include "common/base/try.h"
+#include "master/ground/reference.h"
+#include "master/ground/tolerances.h"
+
+namespace gapfarm {
+namespace {
+
+constexpr std::size_t kKept = 32;              // motions at values of commands
+constexpr double kFar_m = 1e6;                 // where a program that diverges is held to be
+constexpr double kReach_m = 0.3;               // of a robot whose size nobody knows
+constexpr double kChannelOffsetShare = 0.005;  // of a channel's root mean square
+constexpr double kTunedShare = 0.25;           // of a gene's range, as a standard deviation
+constexpr const char* kMarkers[] = {"marker_x", "marker_y", "marker_yaw"};
+constexpr const char* kMarkerRows[] = {"marker.x", "marker.y", "marker.yaw"};
+// Of the kinematics' rows, those that say how a program is asked and read.
+constexpr const char* kAround[] = {"delay",      "marker_x",   "marker_y",
+                                   "marker_yaw", "pose_scale", "aspect"};
+
+// What a tracker makes of a motion between two poses of the robot.
+class TrackerReading {
+ public:
+  TrackerReading(const Kinematics& at, const Pose& X_RM) : X_RM_(X_RM) {
+    for (std::size_t k = 0; k < at.names.size(); ++k) {
+      const double value = at.values[static_cast<Eigen::Index>(k)];
+      if (at.names[k] == "marker_x") X_RM_.x = value;
+      if (at.names[k] == "marker_y") X_RM_.y = value;
+      if (at.names[k] == "marker_yaw") X_RM_.theta = value;
+      if (at.names[k] == "pose_scale") scale_ = value;
+      if (at.names[k] == "aspect") aspect_ = value;
+    }
+  }
+  Pose end(const Pose& X_WS, const Pose& X_SE) const {
+    const Pose X_true{X_WS.x / scale_, X_WS.y / scale_ / aspect_, X_WS.theta};
+    const Pose X = X_true * inverse(X_RM_) * X_SE * X_RM_;
+    return {scale_ * X.x, scale_ * aspect_ * X.y, X.theta};
+  }
+
+ private:
+  Pose X_RM_;
+  double scale_ = 1, aspect_ = 1;
+};
+
+// A program, asked for whole runs at many values at once.
+class ProgramFarm {
+ public:
+  ProgramFarm(Farm& farm, const Problem& problem) : farm_(farm), problem_(problem) {
+    const auto value = [&](const char* key) { return problem.values[problem.table().row(key)]; };
+    X_RM_ = {value(kMarkerRows[0]), value(kMarkerRows[1]), value(kMarkerRows[2])};
+  }
+
+  const Pose& X_RM() const { return X_RM_; }
+  const Status& failure() const { return failure_; }
+
+  // Of one set of windows.
+  decltype(WindowSet::simulated) simulation(const WindowSet& windows) {
+    Problem asked = problem_;
+    asked.genes.clear();
+    asked.runs = windows.runs;
+    asked.log.trials = windows.trials;
+    auto known = std::make_shared<Known>();
+    known->problem = farm_.add_problem(to_proto(asked));
+    for (const Trial& trial : windows.trials) known->starts.push_back(trial.X_WS);
+    return [this, known](const std::vector<Kinematics>& points) { return ends(points, *known); };
+  }
+
+ private:
+  using Motions = std::shared_ptr<const std::vector<Pose>>;  // X_SE, one a window
+  struct Known {
+    std::string problem;
+    std::vector<Pose> starts;
+    std::deque<std::pair<std::vector<double>, Motions>> motions;
+  };
+
+  std::vector<double> asked_values(const Kinematics& at) const {
+    std::vector<double> values = problem_.values;
+    for (const char* row : kMarkerRows) values[problem_.table().row(row)] = 0;
+    for (std::size_t k = 0; k < at.names.size(); ++k) {
+      const auto row = problem_.table().find(at.names[k]);
+      if (!row) continue;
+      const Parameter& p = problem_.table()[*row];
+      values[*row] = std::clamp(at.values[static_cast<Eigen::Index>(k)], p.lower, p.upper);
+    }
+    return values;
+  }
+
+  static Motions find(const Known& known, const std::vector<double>& values) {
+    for (const auto& [at, motions] : known.motions) {
+      if (at == values) return motions;
+    }
+    return nullptr;
+  }
+
+  v1::Task task_at(const std::vector<double>& values) const {
+    v1::Task task;
+    v1::PredictTask* predict = task.mutable_predict();
+    for (std::size_t row = 0; row < values.size(); ++row) {
+      if (values[row] == problem_.values[row]) continue;
+      v1::Override* override = predict->mutable_point()->add_overrides();
+      override->set_parameter(static_cast<std::uint32_t>(row));
+      override->set_value(values[row]);
+    }
+    predict->set_means_only(true);
+    return task;
+  }
+
+  Motions motions_of(const v1::TaskResult& result, const Known& known) {
+    auto motions = std::make_shared<std::vector<Pose>>(known.starts.size(), Pose{kFar_m, 0, 0});
+    if (result.outcome() == v1::OK) {
+      for (std::size_t i = 0; i < motions->size(); ++i) {
+        const auto& end = result.predict().predictions(static_cast<int>(i)).end();
+        (*motions)[i] = between(known.starts[i], from_proto(end));
+      }
+    } else if (result.outcome() == v1::WORKER_FAILED || result.outcome() == v1::INVALID_REQUEST) {
+      failure_ = Error{"the program: " + result.message(), ErrorCode::kSimulation};
+    }
+    return motions;
+  }
+
+  // What fails is far away, and ends the diagnosis where it is looked at next.
+  std::vector<std::vector<Pose>> ends(const std::vector<Kinematics>& points, Known& known) {
+    std::vector<std::vector<double>> missing;
+    for (const Kinematics& at : points) {
+      auto values = asked_values(at);
+      const bool there = find(known, values) != nullptr ||
+                         std::find(missing.begin(), missing.end(), values) != missing.end();
+      if (!there) missing.push_back(std::move(values));
+    }
+    std::vector<v1::Task> tasks;
+    for (const auto& values : missing) tasks.push_back(task_at(values));
+    if (failure_ && !tasks.empty()) {
+      const auto results = farm_.run(known.problem, tasks);
+      if (!results) failure_ = results.error();
+      for (std::size_t k = 0; results && k < missing.size(); ++k) {
+        known.motions.emplace_back(missing[k], motions_of((*results)[k], known));
+      }
+    }
+    std::vector<std::vector<Pose>> all;
+    for (const Kinematics& at : points) {
+      const Motions motions = find(known, asked_values(at));
+      const TrackerReading reading(at, X_RM_);
+      std::vector<Pose>& there = all.emplace_back();
+      for (std::size_t i = 0; i < known.starts.size(); ++i) {
+        there.push_back(reading.end(known.starts[i], motions ? (*motions)[i] : Pose{kFar_m, 0, 0}));
+      }
+    }
+    while (known.motions.size() > kKept) known.motions.pop_front();
+    return all;
+  }
+
+  Farm& farm_;
+  const Problem& problem_;
+  Pose X_RM_;
+  Status failure_;
+};
+
+// As far as commands and readings go: it has no wheels.
+GroundRobot robot_of(const Problem& problem, const Pose& X_RM) {
+  GroundRobot robot;
+  robot.name = problem.external->table.declaration().name;
+  robot.command = CommandKind::kTwist;
+  robot.channels.assign(problem.channels().begin(), problem.channels().end());
+  robot.motors.delay_s = problem.values[problem.table().row("delay")];
+  robot.X_RM = X_RM;
+  return robot;
+}
+
+bool is_around(const KinematicRow& row) {
+  return std::find(std::begin(kAround), std::end(kAround), row.name) != std::end(kAround);
+}
+
+KinematicRow channel_row(const Problem& problem, const std::string& channel, const char* of,
+                         double tolerance) {
+  const std::string name = channel + of;
+  return {name, problem.values[problem.table().row(name)], tolerance, of + 1, "-"};
+}
+
+double root_mean_square(const RunLog& log, std::size_t channel) {
+  double sum = 0, count = 1e-9;
+  for (const LoggedRun& run : log.runs) {
+    for (const CommandRow& row : run.commands) {
+      sum += row.values[channel] * row.values[channel];
+      count += 1;
+    }
+  }
+  return std::sqrt(sum / count);
+}
+
+GroundHypothesis exchanged(const std::string& a, const std::string& b, std::size_t i,
+                           std::size_t k) {
+  return {"channels_swapped",
+          {"sides_swapped"},
+          a + " and " + b + " of the commands",
+          {},
+          [i, k](RunLog* log) {
+            for (LoggedRun& run : log->runs) {
+              for (CommandRow& row : run.commands) std::swap(row.values[i], row.values[k]);
+            }
+          },
+          1,
+          "Swap these two columns of the commands."};
+}
+
+GroundQuestion question_of_program(const Problem& problem, const GroundRobot& robot,
+                                   const std::vector<KinematicRow>& tuned, const RunLog& log) {
+  GroundQuestion question;
+  question.rows = tuned;
+  for (KinematicRow row : kinematic_rows(robot)) {
+    if (!is_around(row)) continue;
+    // That of a robot without wheels has no reach.
+    if (row.name == "marker_x" || row.name == "marker_y") row.tolerance = kMarkerShare * kReach_m;
+    question.rows.push_back(std::move(row));
+  }
+  add_gyro_scale(log, &question.rows);
+  for (GroundHypothesis& h : that_can_show(log, ground_hypotheses(robot))) {
+    if (std::all_of(h.freed.begin(), h.freed.end(), is_around)) {
+      question.catalogue.push_back(std::move(h));
+    }
+  }
+  const std::vector<std::string>& channels = robot.channels;
+  for (std::size_t c = 0; c < channels.size(); ++c) {
+    const KinematicRow gain = channel_row(problem, channels[c], kChannelGain, kGainShare);
+    const double size = std::max(root_mean_square(log, c), 1e-6);
+    const KinematicRow offset =
+        channel_row(problem, channels[c], kChannelOffset, kChannelOffsetShare * size);
+    question.rows.push_back(gain);
+    question.catalogue.push_back({"command_gain",
+                                  {"command_units"},
+                                  "the gain of " + channels[c] + " of the commands",
+                                  {gain},
+                                  {},
+                                  1,
+                                  ""});
+    question.catalogue.push_back({"command_offset",
+                                  {},
+                                  "what is added to " + channels[c] + " of the commands",
+                                  {offset},
+                                  {},
+                                  1,
+                                  ""});
+    for (std::size_t k = c + 1; k < channels.size(); ++k) {
+      question.catalogue.push_back(exchanged(channels[c], channels[k], c, k));
+    }
+  }
+  // The rows of one value are the same to the digit wherever they stand.
+  for (GroundHypothesis& h : question.catalogue) {
+    for (KinematicRow& freed : h.freed) {
+      for (const KinematicRow& row : question.rows) {
+        if (row.name == freed.name) freed = row;
+      }
+    }
+  }
+  return question;
+}
+
+// The program's own parameters among the genes.
+std::vector<KinematicRow> tuned_rows(const Problem& problem, const std::vector<Gene>& genes) {
+  std::vector<KinematicRow> rows;
+  const std::size_t own = problem.external->table.declaration().parameters.size();
+  for (const Gene& gene : genes) {
+    const Parameter& p = problem.table()[gene.row];
+    if (gene.row >= own || p.kind != ParameterKind::kReal || !(gene.lower < gene.upper)) continue;
+    rows.push_back({p.key, problem.values[gene.row], kTunedShare * (gene.upper - gene.lower),
+                    "value", p.unit});
+  }
+  return rows;
+}
+
+void put_value(const std::string& name, double value, Problem* problem) {
+  std::string key = name;
+  for (std::size_t m = 0; m < std::size(kMarkers); ++m) {
+    if (name == kMarkers[m]) key = kMarkerRows[m];
+  }
+  const auto row = problem->table().find(key);
+  if (!row) return;
+  const Parameter& p = problem->table()[*row];
+  problem->values[*row] = std::clamp(value, p.lower, p.upper);
+}
+
+// Fits the program's own parameters, everything else as it is.
+Status tune_program(Farm& farm, const RunLog& log, const WindowSettings& settings,
+                    std::vector<KinematicRow>* rows, Problem* problem) {
+  ProgramFarm program(farm, *problem);
+  GroundQuestion question;
+  question.simulation = [&](const WindowSet& windows) { return program.simulation(windows); };
+  const GroundRobot robot = robot_of(*problem, program.X_RM());
+  ASSIGN_OR_RETURN(const auto windows, question.windows(robot, log, settings));
+  std::vector<FitRow> free;
+  for (const KinematicRow& row : *rows) free.push_back({row, false});
+  const WindowFit fit = WindowFitter(robot, windows).fit(free);
+  RETURN_IF_ERROR(program.failure());
+  for (std::size_t k = 0; k < rows->size(); ++k) {
+    KinematicRow& row = (*rows)[k];
+    put_value(row.name, fit.values[static_cast<Eigen::Index>(k)], problem);
+    row.nominal = problem->values[problem->table().row(row.name)];
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<GroundDiagnosis> diagnose_program_runs(Farm& farm, const std::vector<Gene>& tuned,
+                                              const RunLog& log,
+                                              const GroundDiagnoseOptions& options,
+                                              Problem* problem) {
+  if (options.reference) {
+    return Error{
+        "--reference: asks what changed of a ground robot, and a program's is not known; "
+        "diagnose both logs"};
+  }
+  if (log.relative) {
+    return Error{
+        "poses are relative, each to the one before, which the diagnosis of a program "
+        "does not take; give poses in a frame of the world"};
+  }
+  return guarded([&]() -> Result<GroundDiagnosis> {
+    std::vector<KinematicRow> rows = tuned_rows(*problem, tuned);
+    if (!rows.empty()) {
+      if (options.on_stage) options.on_stage(kGroundStages[0].name);
+      RETURN_IF_ERROR(tune_program(farm, log, options.windows, &rows, problem));
+    }
+    ProgramFarm program(farm, *problem);
+    const GroundRobot robot = robot_of(*problem, program.X_RM());
+    GroundQuestion question = question_of_program(*problem, robot, rows, log);
+    question.simulation = [&](const WindowSet& windows) { return program.simulation(windows); };
+    GroundDiagnoseOptions watched = options;
+    watched.stopped = [&] { return !program.failure() || (options.stopped && options.stopped()); };
+    watched.memo = nullptr;
+    auto found = diagnose_by(robot, log, watched, std::move(question));
+    RETURN_IF_ERROR(program.failure());
+    if (!found) return found;
+    for (const ReportedValue& value : found->values) {
+      const bool is_tuned = std::any_of(rows.begin(), rows.end(), [&](const KinematicRow& row) {
+        return row.name == value.name;
+      });
+      if (value.named || is_tuned) put_value(value.name, value.reported, problem);
+    }
+    return found;
+  });
+}
+
+}  // namespace gapfarm
