@@ -1,9 +1,11 @@
-// Stages of a config: some genes first, then others (Laue and Hebbel 2009), and trials held out
-// to validate what comes of it.
+// Stages of a config: some genes first, then others (Laue and Hebbel 2009), trials held out
+// to validate what comes of it, and who searches where the config does not say.
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "common/base/result.h"
@@ -33,5 +35,14 @@ struct StagePlan {
 // Read from the config's own text.  Errors, with places: a name that is no gene, a gene in no
 // stage, a stage before the last without evaluations.
 Result<StagePlan> read_stages(const Config& config);
+
+struct DefaultOptimiser {
+  OptimiserKind kind = OptimiserKind::kAutoSearch;
+  std::string reason;  // for the log; empty: that of the optimiser itself
+};
+
+// `auto`; or the genetic algorithm, where [evolution] sets what only that has.  None: the text has
+// an [optimiser] kind, or is no config.
+std::optional<DefaultOptimiser> default_optimiser(std::string_view config_text);
 
 }  // namespace gapfarm

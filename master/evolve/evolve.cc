@@ -291,15 +291,20 @@ Result<EvolveSummary> evolve(Optimiser& optimiser, EvaluationBackend& backend, G
     if (stop) return summarise(optimiser, *stop, spent_s());
 
     const double generation_began_s = clock.now_s();
-    const std::vector<Candidate> candidates = optimiser.ask();
-    const Result<std::vector<Score>> scores = backend.evaluate(candidates);
-    if (!scores && requested()) {
-      stop = reason_to_stop(optimiser, options, spent_s(), true);
-      return summarise(optimiser, *stop, spent_s());
+    const std::uint64_t generation = optimiser.generation();
+    while (optimiser.generation() == generation) {
+      const std::vector<Candidate> candidates = optimiser.ask();
+      const Result<std::vector<Score>> scores = backend.evaluate(candidates);
+      if (!scores && requested()) {
+        stop = reason_to_stop(optimiser, options, spent_s(), true);
+        return summarise(optimiser, *stop, spent_s());
+      }
+      if (!scores) return scores.error();
+      if (scores->size() != candidates.size()) {
+        return wrong_count(candidates.size(), scores->size());
+      }
+      optimiser.tell(*scores);
     }
-    if (!scores) return scores.error();
-    if (scores->size() != candidates.size()) return wrong_count(candidates.size(), scores->size());
-    optimiser.tell(*scores);
 
     GenerationRecord record = record_generation(optimiser);
     record.wall_s = clock.now_s() - generation_began_s;

@@ -30,18 +30,6 @@ bool can_be_split(OptimiserKind kind) {
 }
 
 // Of all islands.
-unsigned whole_population(const OptimiserSetup& setup) {
-  const EvolutionSettings& settings = setup.settings;
-  switch (settings.optimiser.kind) {
-    case OptimiserKind::kGenetic:
-      return settings.population;
-    case OptimiserKind::kCmaEs:
-      return settings.optimiser.population.value_or(CmaEs::default_population(setup.genes.size()));
-    default:
-      return settings.optimiser.population.value_or(30);
-  }
-}
-
 unsigned island_size(const OptimiserSetup& setup) {
   if (setup.settings.optimiser.kind != OptimiserKind::kCmaEs) return kIsland;
   return kIslandOfCmaEs_defaults * CmaEs::default_population(setup.genes.size());
@@ -66,7 +54,7 @@ struct Island {
 class IslandsOptimiser final : public Optimiser, public Islands {
  public:
   IslandsOptimiser(const OptimiserSetup& setup, unsigned count)
-      : whole_(whole_population(setup)), islands_(count) {}
+      : whole_(population_of(setup.settings, setup.genes.size())), islands_(count) {}
 
   Status begin_all(const OptimiserSetup& setup) {
     for (std::size_t i = 0; i < islands_.size(); ++i) {
@@ -206,9 +194,11 @@ Look IslandsOptimiser::look_at(std::size_t island) const {
 
 void IslandsOptimiser::tell_island(std::size_t i, std::span<const Score> scores) {
   Island& island = islands_[i];
+  const std::uint64_t before = island.optimiser->generation();
   island.optimiser->tell(scores);
   island.under_way = false;
   const std::uint64_t completed = island.optimiser->generation();
+  if (completed == before) return;
   island.ahead.push_back(look_at(i));
   if (completed % kExchange != 0) return;
   Bests& bests = exchanges_[completed / kExchange];
@@ -341,7 +331,8 @@ Result<unsigned> island_count(const OptimiserSetup& setup) {
                  "\" has no populations that could go on by themselves; asynchronous search and "
                  "islands are for \"genetic\", \"differential_evolution\" and \"cma_es\""};
   }
-  const unsigned whole = whole_population(setup), size = island_size(setup);
+  const unsigned whole = population_of(setup.settings, setup.genes.size()),
+                 size = island_size(setup);
   const unsigned count = settings.islands > 1 ? settings.islands : whole / size;
   const bool genetic = kind == OptimiserKind::kGenetic;
   const char* key = genetic ? "evolution.population" : "optimiser.population";

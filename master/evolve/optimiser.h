@@ -53,7 +53,7 @@ class Optimiser {
 
   // The next generation's evaluations; may be empty when every child is a duplicate.
   virtual std::vector<Candidate> ask() = 0;
-  // Scores in the order of the last ask().  Completes the generation.
+  // Scores in the order of the last ask().  Completes the generation, unless generation() stays.
   virtual void tell(std::span<const Score> scores) = 0;
 
   // A genome from elsewhere that takes the place of one birth of the next generation.
@@ -74,7 +74,7 @@ class Optimiser {
   virtual std::string reason() const { return {}; }
 
   // Everything ask() and tell() depend on; restoring it continues bit for bit.
-  // REQUIRES: every ask() has had its tell().
+  // REQUIRES: every ask() has had its tell(), and the generation is complete.
   virtual std::string state() const = 0;
 };
 

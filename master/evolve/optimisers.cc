@@ -7,6 +7,8 @@
 #include "master/evolve/genetic/genetic.h"
 #include "master/evolve/genetic/nsga2.h"
 #include "master/evolve/islands.h"
+#include "master/evolve/methods/cma_es.h"
+#include "master/evolve/methods/differential_evolution.h"
 #include "master/evolve/methods/search_optimiser.h"
 
 namespace gapfarm {
@@ -36,7 +38,7 @@ Result<std::unique_ptr<SearchOptimiser>> wrapped(const OptimiserSetup& setup,
                            settings.seed_nominal ? setup.nominal : Genome{},
                            settings.seed_nominal ? setup.spread : std::vector<double>{},
                            setup.noisy,
-                           settings.evaluations,
+                           most_evaluations(settings, setup.genes.size()),
                            setup.given};
   const auto row = static_cast<std::size_t>(settings.optimiser.kind);
   return std::make_unique<SearchOptimiser>(optimisers()[row].name, setup, make_method(method));
@@ -78,6 +80,30 @@ std::span<const OptimiserRow> optimisers() {
 #include "common/config/methods.inc"
   };
   return rows;
+}
+
+unsigned population_of(const EvolutionSettings& settings, std::size_t genes) {
+  const std::optional<unsigned>& given = settings.optimiser.population;
+  switch (settings.optimiser.kind) {
+    case OptimiserKind::kGenetic:
+      return settings.population;
+    case OptimiserKind::kAutoSearch:
+    case OptimiserKind::kCmaEs:
+      return given.value_or(CmaEs::default_population(genes));
+    case OptimiserKind::kLocalSearch:
+      return 1;
+    case OptimiserKind::kDifferentialEvolution:
+    case OptimiserKind::kDeSimplex:
+      return given.value_or(DifferentialEvolution::kPopulation);
+    default:
+      return given.value_or(settings.population);
+  }
+}
+
+std::uint64_t most_evaluations(const EvolutionSettings& settings, std::size_t genes) {
+  const std::uint64_t population = population_of(settings, genes);
+  const std::uint64_t most = settings.evaluations.value_or(~std::uint64_t{0});
+  return settings.generations > most / population ? most : settings.generations * population;
 }
 
 Result<std::unique_ptr<Optimiser>> make_optimiser(const OptimiserSetup& setup) {

@@ -23,6 +23,12 @@ struct OptimiserRow {
 // One row a kind, in the enum's order.
 std::span<const OptimiserRow> optimisers();
 
+// Of a generation, or of all islands together.
+unsigned population_of(const EvolutionSettings& settings, std::size_t genes);
+
+// That a run can come to at most, by its limits in evaluations and generations.
+std::uint64_t most_evaluations(const EvolutionSettings& settings, std::size_t genes);
+
 // The optimiser that the setup's settings name.  Errors: no genes, a nominal genome of another
 // length, and what the optimiser itself has to say (genetic.h).
 Result<std::unique_ptr<Optimiser>> make_optimiser(const OptimiserSetup& setup);

@@ -61,9 +61,11 @@ class StagedOptimiser final : public Optimiser {
   }
 
   void tell(std::span<const Score> scores) override {
+    const std::uint64_t was = inner_->generation();
     const bool first = generation() == 0;
     const Member before = best_;
     inner_->tell(scores);
+    if (inner_->generation() == was) return;
     update_best();
     if (first || better_member(best_, before)) last_improvement_ = generation();
     const bool over = inner_->evaluations() >= stages_[stage_].evaluations;

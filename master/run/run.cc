@@ -150,7 +150,11 @@ Result<RunSummary> evolve_run(RunStore& store, const RunRequest& request, RunWat
     last.farm = (*farm)->tally();
     return stopped_by(store, optimiser.error(), last);
   }
-  if (const std::string reason = (*optimiser)->reason(); !reason.empty()) watcher.note(reason);
+  std::string reason = (*optimiser)->reason();
+  if (reason.empty() && request.config.evolution.optimiser.kind == OptimiserKind::kGenetic) {
+    reason = default_optimiser(request.config.text).value_or(DefaultOptimiser{}).reason;
+  }
+  if (!reason.empty()) watcher.note(reason);
 
   const SteadyClock clock;
   FarmProgressWriter progress(store, **farm, request.config.evolution, inputs->checkpoint, clock,

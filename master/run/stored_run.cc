@@ -5,8 +5,10 @@
 
 #include "common/base/try.h"
 #include "common/config/config.h"
+#include "common/config/stages.h"
 #include "common/json/json.h"
 #include "common/problem/problem.h"
+#include "master/evolve/optimisers.h"
 
 namespace gapfarm {
 namespace {
@@ -24,6 +26,10 @@ void each(Visit visit) {
   visit("target_fitness", &Ours::target_fitness, &Theirs::target_fitness);
   visit("population", &Ours::population, &Theirs::population);
 }
+
+// Among the overrides: the kind that a config without one got.  Runs from before there was `auto`
+// by default have none, and are the genetic algorithm's.
+constexpr const char* kDefaultKind = "optimiser";
 
 Json start_json(const SearchStart& start) {
   Json json = {{"from", start.from}, {"genomes", start.genomes}};
@@ -66,6 +72,10 @@ RunInfo run_info(const Config& config, const EvolutionOverrides& overrides) {
   info.config_path = config.path;
   info.config_text = config.text;
   Json changes = parse_json(overrides.to_json());
+  if (default_optimiser(config.text)) {
+    changes[kDefaultKind] =
+        optimisers()[static_cast<std::size_t>(config.evolution.optimiser.kind)].name;
+  }
   const SearchStart& start = config.evolution.start;
   if (!start.genomes.empty()) changes["start"] = start_json(start);
   info.overrides = json_text(changes);
@@ -100,6 +110,9 @@ Result<Config> stored_config(const RunInfo& info, const EvolutionOverrides& over
   ASSIGN_OR_RETURN(Problem problem, stored_problem(info));
   config->problem = std::move(problem);
   config->seed = info.seed;
+  if (default_optimiser(info.config_text) && !parse_json(info.overrides).contains(kDefaultKind)) {
+    config->evolution.optimiser.kind = OptimiserKind::kGenetic;
+  }
   EvolutionOverrides all = EvolutionOverrides::from_json(info.overrides);
   all.merge(overrides);
   all.apply(config->evolution);

@@ -93,6 +93,7 @@ Search our_search(const OptimiserRow& row, unsigned population, bool asynchronou
             EvolutionSettings settings;
             settings.optimiser.kind = kind;
             settings.evaluations = watch.budget;
+            settings.generations = watch.budget;
             settings.asynchronous = asynchronous;
             if (population > 0) settings.population = population;
             if (population > 0) settings.optimiser.population = population;

@@ -13,6 +13,7 @@
 #include "master/command/inputs.h"
 #include "master/diagnose/result/diagnosis_json.h"
 #include "master/evolve/evolve.h"
+#include "master/evolve/optimisers.h"
 #include "master/ground/diagnose_ground.h"
 #include "master/io/log_checks/finding.h"
 #include "master/io/log_checks/log_checks.h"
@@ -41,12 +42,6 @@ struct Summary {
   std::vector<SanityFinding> sanity;
   std::vector<IdleGene> idle;
 };
-
-// What a run may take at most, as far as its settings say.
-std::uint64_t most_evaluations(const Config& config) {
-  const std::uint64_t all = config.evolution.generations * config.evolution.population;
-  return config.evolution.evaluations ? std::min(all, *config.evolution.evaluations) : all;
-}
 
 // The config's own values by one worker, and the seconds that takes once it knows the problem.
 Status measure_evaluation(const Config& config, CliContext& context, Summary* summary) {
@@ -216,7 +211,7 @@ Json to_json(const Config& config, const Summary& summary, unsigned workers) {
           {"conditions", summary.conditions},
           {"evaluation_s", summary.evaluation_s},
           {"evaluated", evaluated},
-          {"most_evaluations", most_evaluations(config)},
+          {"most_evaluations", most_evaluations(config.evolution, config.problem.genes.size())},
           {"effects", summary.effects},
           {"genes", genes},
           {"population", config.evolution.population},
@@ -285,10 +280,14 @@ std::string search_text(const Config& config, const Summary& summary, unsigned w
             ", " + problem.table().format(gene.row, gene.upper) + "]" +
             (gene.scale == ParameterScale::kLog ? ", log scale" : "") + "\n";
   }
-  text += "evolution    " + std::to_string(config.evolution.population) + " individuals, at most " +
-          std::to_string(config.evolution.generations) + " generations, seed " +
+  const OptimiserKind kind = config.evolution.optimiser.kind;
+  text += "evolution    " +
+          (kind == OptimiserKind::kGenetic
+               ? std::to_string(config.evolution.population) + " individuals"
+               : "by " + std::string(optimisers()[static_cast<std::size_t>(kind)].name)) +
+          ", at most " + std::to_string(config.evolution.generations) + " generations, seed " +
           std::to_string(config.seed) + "\n";
-  const auto most = most_evaluations(config);
+  const auto most = most_evaluations(config.evolution, config.problem.genes.size());
   const double all_s = summary.evaluation_s * static_cast<double>(most);
   const double one_s = summary.evaluation_s;
   text += "cost         " + (one_s < 1 ? format_number(one_s, 2) + " s" : format_duration(one_s)) +

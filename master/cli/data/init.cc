@@ -152,8 +152,7 @@ std::string config_of_log(const LogFigures& figures, const TrialLog& log,
          "pose_noise_position = [0.0005, 0.03]   # m\npose_noise_heading = [0.002, 0.15]     # "
          "rad\n" +
          command_text(figures, known) +
-         "\n[fitness]\nkind = \"log_score\"\n\n[evolution]\npopulation = 24\n\n[evolution.stop]\n"
-         "generations = 60\nstagnation_generations = 20\n";
+         "\n[fitness]\nkind = \"log_score\"\n\n[evolution.stop]\nevaluations = 600\n";
 }
 
 Result<int> run_init(InitOptions& options, CliContext& context) {

@@ -10,7 +10,14 @@ namespace {
 
 // Read off docs/evidence/optimisers.md: where BOBYQA has not arrived after so many evaluations a
 // gene, CMA-ES gets there sooner.
-constexpr std::size_t kDescent_perGene = 40;
+constexpr std::size_t kDescent_perGene = 40, kRoomyDescent_perGene = 10;
+// Of the points after its first model this share is better than all before, or it does not pay.
+// Where functions are smooth half of them are; on many small minima, a sixth.  Judged from so many
+// on.
+constexpr double kLeastShare = 0.3;
+constexpr std::size_t kLeastPoints = 6;
+// What CMA-ES needs, with some margin, on the same functions.
+constexpr std::uint64_t kRoomy_perGene = 500;
 // Not measured beyond.
 constexpr std::size_t kMostGenesOfDescent = 40;
 
@@ -34,12 +41,14 @@ MethodSetup for_descent(MethodSetup setup) {
 }  // namespace
 
 AutoSearch::AutoSearch(const MethodSetup& setup)
-    : setup_(setup), probe_(for_descent(setup)), descent_(for_descent(setup), false) {
+    : setup_(setup),
+      roomy_(setup.evaluations / kRoomy_perGene >= setup.space.size()),
+      probe_(for_descent(setup)),
+      descent_(for_descent(setup), false) {
   const std::size_t n = setup.space.size();
   const std::string genes = std::to_string(n) + " genes";
-  const unsigned limit = for_descent(setup).settings.local_evaluations;
   // A generation to begin with, 2 n + 1 points, and some that use what these show.
-  const bool too_short = setup.evaluations && *setup.evaluations < 4 * n + 10;
+  const bool too_short = setup.evaluations < 4 * n + 10;
   if (setup.noisy) {
     reason_ = "CMA-ES, because scores are noisy";
   } else if (has(setup.space, GeneShape::kUnordered)) {
@@ -53,19 +62,31 @@ AutoSearch::AutoSearch(const MethodSetup& setup)
   } else if (too_short) {
     reason_ = "CMA-ES, because the evaluations are too few for BOBYQA's model of " + genes;
   } else {
-    reason_ = "BOBYQA, at most " + std::to_string(limit) + " evaluations one at a time, because " +
-              "all genes are real and scores free of noise; then CMA-ES";
+    reason_ = "BOBYQA while it pays, at most " + std::to_string(descent_limit()) +
+              " evaluations, because all genes are real and scores free of noise; then by CMA-ES " +
+              "from " +
+              (roomy_ ? "the start, because there are evaluations enough for both"
+                      : "the best, because evaluations are few");
     phase_ = kProbing;
   }
   reason_ = "kind = \"auto\": searches by " + reason_;
   begin_global();
 }
 
+std::size_t AutoSearch::descent_limit() const {
+  const std::size_t given = setup_.settings.local_evaluations;
+  return given > 0 ? given
+                   : setup_.space.size() * (roomy_ ? kRoomyDescent_perGene : kDescent_perGene);
+}
+
 void AutoSearch::begin_global() {
+  // Where one start ends in the worse of few minima, as on Rosenbrock's function, small ones help.
+  MethodSetup setup = setup_;
+  if (roomy_) setup.settings.restarts = RestartKind::kBipop;
   if (!setup_.noisy && has(setup_.space, GeneShape::kUnordered)) {
-    global_ = std::make_unique<DifferentialEvolution>(setup_);
+    global_ = std::make_unique<DifferentialEvolution>(setup);
   } else {
-    global_ = std::make_unique<CmaEs>(setup_);
+    global_ = std::make_unique<CmaEs>(setup);
   }
 }
 
@@ -88,12 +109,25 @@ void AutoSearch::learn(std::span<const Genome> proposed, std::span<const Standin
     phase_ = kDescending;
   } else {
     descent_.learn(proposed, standings);
-    if (!descent_.converged()) return;
+    if (!descent_.converged() && pays()) return;
     phase_ = kGlobal;
-    setup_.start = descent_.best();
-    setup_.spread.clear();
+    if (!roomy_) setup_.start = descent_.best();
     begin_global();
   }
+}
+
+bool AutoSearch::pays() const {
+  const std::size_t n = setup_.space.size(), model = 2 * n + 1;
+  if (descent_.known() >= descent_limit()) return false;
+  if (descent_.known() < model + std::max(kLeastPoints, n)) return true;
+  const std::size_t since = descent_.known() - model;
+  return static_cast<double>(descent_.improvements(since)) >=
+         kLeastShare * static_cast<double>(since);
+}
+
+// As many as one of CMA-ES, so that limits in generations mean the same all along.
+std::size_t AutoSearch::generation_size() const {
+  return phase_ == kDescending ? *for_descent(setup_).settings.population : 1;
 }
 
 std::vector<NamedNumber> AutoSearch::figures() const {
@@ -105,6 +139,7 @@ std::vector<NamedNumber> AutoSearch::figures() const {
 void AutoSearch::save(v1::MethodState& message) const {
   v1::AutoSearchState& state = *message.mutable_auto_search();
   state.set_phase(phase_);
+  state.set_roomy(roomy_);
   state.mutable_start()->Add(setup_.start.begin(), setup_.start.end());
   if (phase_ != kProbing) current().save(*state.mutable_method());
 }
@@ -117,6 +152,7 @@ Status AutoSearch::restore(const v1::MethodState& message) {
     return damaged_method_state("auto");
   }
   phase_ = static_cast<Phase>(state.phase());
+  roomy_ = state.roomy();
   if (phase_ == kProbing) return {};
   if (phase_ == kDescending) return descent_.restore(state.method());
   setup_.start.assign(state.start().begin(), state.start().end());

@@ -1,7 +1,8 @@
 // Chooses what searches, and says why.  Where scores are free of noise and all genes are real: a
 // generation of random points beside the start, BOBYQA from the best of them for as long as it
-// pays, then CMA-ES from where it ended.  Else CMA-ES, or differential evolution where genes are
-// unordered.
+// pays, then CMA-ES: from where that ended, or with evaluations enough to find the minimum again,
+// from the start, because BOBYQA may have ended in another one.  Else CMA-ES, or differential
+// evolution where genes are unordered.
 #pragma once
 
 #include "master/evolve/methods/local_search.h"
@@ -16,6 +17,7 @@ class AutoSearch final : public SearchMethod {
   std::vector<Genome> propose(const StreamOf& stream_of) const override;
   void learn(std::span<const Genome> proposed, std::span<const Standing> standings) override;
   unsigned origin() const override { return current().origin(); }
+  std::size_t generation_size() const override;
   std::vector<NamedNumber> figures() const override;
   std::string reason() const override { return reason_; }
   void save(v1::MethodState& message) const override;
@@ -26,8 +28,11 @@ class AutoSearch final : public SearchMethod {
 
   const SearchMethod& current() const;
   void begin_global();
+  bool pays() const;
+  std::size_t descent_limit() const;
 
   MethodSetup setup_;  // of the global search
+  bool roomy_;         // evaluations enough for CMA-ES to begin anew
   std::string reason_;
   Phase phase_ = kGlobal;
   RandomSearch probe_;

@@ -18,6 +18,14 @@ class DeSimplex final : public SearchMethod {
   void learn(std::span<const Genome> proposed, std::span<const Standing> standings) override;
   unsigned origin() const override { return current().origin(); }
   std::vector<NamedNumber> figures() const override;
+  bool compares_scores() const override { return true; }
+  std::vector<Standing> compared() const override { return current().compared(); }
+  void settle() override {
+    if (polishing_) simplex_.settle();
+  }
+  std::span<Individual> incumbents() override {
+    return polishing_ ? simplex_.incumbents() : differential_.incumbents();
+  }
   void save(v1::MethodState& message) const override;
   Status restore(const v1::MethodState& message) override;
 

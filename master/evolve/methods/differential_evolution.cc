@@ -13,7 +13,6 @@
 namespace gapfarm {
 namespace {
 
-constexpr unsigned kPopulation = 30;  // of Weitnauer, Haschke and Ritter (2010)
 constexpr double kOnePoint_share = 1e-9;
 // Of Tanabe and Fukunaga (CEC 2014).
 constexpr double kBestShare = 0.11;
@@ -148,6 +147,12 @@ void DifferentialEvolution::remember(const std::vector<Rates>& of_use) {
   };
   if (of_use.empty()) return;
   memory_[remembered_++ % memory_.size()] = {mean(&Rates::weight), mean(&Rates::crossover)};
+}
+
+std::vector<Standing> DifferentialEvolution::compared() const {
+  std::vector<Standing> standings;
+  for (const Individual& individual : population_) standings.push_back(individual.standing);
+  return standings;
 }
 
 std::vector<NamedNumber> DifferentialEvolution::figures() const {

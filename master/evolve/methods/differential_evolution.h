@@ -16,6 +16,7 @@ namespace gapfarm {
 
 class DifferentialEvolution final : public SearchMethod {
  public:
+  static constexpr unsigned kPopulation = 30;  // of Weitnauer, Haschke and Ritter (2010)
   static constexpr double kWeight = 0.8, kCrossover = 0.9;  // of Storn and Price
 
   explicit DifferentialEvolution(const MethodSetup& setup);
@@ -24,6 +25,9 @@ class DifferentialEvolution final : public SearchMethod {
   void learn(std::span<const Genome> proposed, std::span<const Standing> standings) override;
   unsigned origin() const override { return population_.empty() ? kRandom : kDifference; }
   std::vector<NamedNumber> figures() const override;
+  bool compares_scores() const override { return true; }
+  std::vector<Standing> compared() const override;
+  std::span<Individual> incumbents() override { return population_; }
   void save(v1::MethodState& message) const override;
   Status restore(const v1::MethodState& message) override;
 

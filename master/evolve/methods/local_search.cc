@@ -108,18 +108,31 @@ void LocalSearch::begin(const Genome& start, const Standing& standing) {
   costs_.clear();
   run_.reset();
   converged_ = false;
+  const std::vector<Genome> first = next_points();
   add_cost(standing);
   best_cost_ = costs_.front();
+  // BOBYQA begins no closer to a bound than its first step is long: this is the cost of another
+  // point.
+  for (std::size_t i = 0; i < start.size() && !first.empty(); ++i) {
+    if (std::abs(first.front()[i] - start[i]) > kPrecision_share) costs_.clear();
+  }
 }
 
-// Where NLopt wants to look next; none when it is content.
-std::optional<Genome> LocalSearch::next_point() const {
+std::vector<Genome> LocalSearch::next_points() const {
   if (!run_) run_ = begin_run();
   while (run_->given() < costs_.size() && !run_->ended()) run_->give(costs_[run_->given()]);
-  if (run_->ended()) return std::nullopt;
-  Genome point = start_;
-  for (std::size_t i = 0; i < moving_.size(); ++i) point[moving_[i]] = run_->point()[i];
-  return point;
+  const bool first_model = algorithm() == nlopt::LN_BOBYQA && costs_.size() == 1;
+  // Any costs do to see them all.
+  const std::unique_ptr<Run> rehearsal = first_model ? begin_run() : nullptr;
+  if (rehearsal && !rehearsal->ended()) rehearsal->give(0);
+  Run& run = rehearsal ? *rehearsal : *run_;
+  std::vector<Genome> points;
+  while (points.size() < (first_model ? 2 * moving_.size() : 1) && !run.ended()) {
+    points.push_back(start_);
+    for (std::size_t i = 0; i < moving_.size(); ++i) points.back()[moving_[i]] = run.point()[i];
+    if (first_model) run.give(0);
+  }
+  return points;
 }
 
 std::unique_ptr<LocalSearch::Run> LocalSearch::begin_run() const {
@@ -142,10 +155,10 @@ std::vector<Genome> LocalSearch::propose(const StreamOf& stream_of) const {
     Stream stream = stream_of(0);
     return {setup_.space.random(stream)};
   }
-  if (costs_.empty()) return {start_};
+  if (best_.empty()) return {start_};
   if (converged_) return {best_};
-  const std::optional<Genome> point = next_point();
-  return {point ? *point : best_};
+  const std::vector<Genome> points = next_points();
+  return points.empty() ? std::vector<Genome>{best_} : points;
 }
 
 void LocalSearch::add_cost(const Standing& standing) {
@@ -164,15 +177,23 @@ void LocalSearch::add_cost(const Standing& standing) {
 }
 
 void LocalSearch::learn(std::span<const Genome> proposed, std::span<const Standing> standings) {
-  assert(proposed.size() == 1);
   if (converged_) return;
-  if (start_.empty()) start_ = proposed[0];
-  add_cost(standings[0]);
-  if (costs_.size() == 1 || costs_.back() < best_cost_) {
-    best_ = proposed[0];
+  const bool first = start_.empty() || best_.empty();
+  if (first) begin(proposed[0], standings[0]);
+  for (std::size_t i = first ? 1 : 0; i < proposed.size(); ++i) {
+    add_cost(standings[i]);
+    if (costs_.back() >= best_cost_) continue;
+    best_ = proposed[i];
     best_cost_ = costs_.back();
   }
-  if (next_point()) return;
+  if (next_points().empty()) end_search();
+}
+
+void LocalSearch::settle() {
+  if (!converged_ && costs_.size() > 2 * moving_.size()) end_search();
+}
+
+void LocalSearch::end_search() {
   ++searches_;
   if (!restarts_) {
     converged_ = true;
@@ -181,6 +202,26 @@ void LocalSearch::learn(std::span<const Genome> proposed, std::span<const Standi
   start_.clear();
   costs_.clear();
   run_.reset();
+}
+
+std::size_t LocalSearch::improvements(std::size_t span) const {
+  std::size_t count = 0;
+  double least = HUGE_VAL;
+  for (std::size_t i = 0; i < costs_.size(); ++i) {
+    if (costs_[i] < least && i + span >= costs_.size()) ++count;
+    least = std::min(least, costs_[i]);
+  }
+  return count;
+}
+
+// As many as a quadratic model is made of.
+std::vector<Standing> LocalSearch::compared() const {
+  const std::size_t last = std::min(costs_.size(), 2 * moving_.size() + 1);
+  std::vector<Standing> standings;
+  for (std::size_t i = costs_.size() - last; i < costs_.size(); ++i) {
+    standings.push_back({v1::OK, costs_[i], 0, 1});
+  }
+  return standings;
 }
 
 std::vector<NamedNumber> LocalSearch::figures() const {

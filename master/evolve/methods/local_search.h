@@ -1,5 +1,5 @@
 // A local search within bounds by NLopt, turned inside out: NLopt calls a function, the farm wants
-// to be asked.
+// to be asked: for one point at a time, but for BOBYQA's first 2 n, which follow from the start.
 //
 // NLopt's local algorithms are deterministic, so what one asks for next follows from the costs so
 // far.  The algorithm runs in a thread of its own, which waits for a cost whenever it needs one,
@@ -26,19 +26,26 @@ class LocalSearch final : public SearchMethod {
   void learn(std::span<const Genome> proposed, std::span<const Standing> standings) override;
   unsigned origin() const override { return kLocal; }
   std::vector<NamedNumber> figures() const override;
+  bool compares_scores() const override { return true; }
+  std::vector<Standing> compared() const override;
+  void settle() override;
   void save(v1::MethodState& message) const override;
   Status restore(const v1::MethodState& message) override;
 
   // Begins at `start`, known to stand at `standing`.
   void begin(const Genome& start, const Standing& standing);
   bool converged() const { return converged_; }
+  // Costs known, and how many of the last `span` were less than all before them.
+  std::size_t known() const { return costs_.size(); }
+  std::size_t improvements(std::size_t span) const;
   const Genome& best() const { return best_; }
 
  private:
   class Run;
   std::unique_ptr<Run> begin_run() const;
-  std::optional<Genome> next_point() const;
+  std::vector<Genome> next_points() const;  // none: NLopt is content
   void add_cost(const Standing& standing);
+  void end_search();
   nlopt::algorithm algorithm() const;
 
   MethodSetup setup_;

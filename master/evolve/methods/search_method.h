@@ -26,7 +26,7 @@ struct MethodSetup {
   Genome start;                // where to begin; empty: anywhere
   std::vector<double> spread;  // of the start, a covariance row by row; empty: unknown
   bool noisy = false;          // scores differ between replicates
-  std::optional<std::uint64_t> evaluations = {};  // when the run ends; none: unknown
+  std::uint64_t evaluations = ~std::uint64_t{0};  // when the run ends
   std::vector<Genome> given = {};  // members of the first population beside the start
 };
 
@@ -46,9 +46,20 @@ class SearchMethod {
   virtual Genome taken(const Genome& migrant) const { return migrant; }
 
   virtual unsigned origin() const = 0;  // of the next proposals
+  // A generation lasts until so many points were proposed: one point alone is none.
+  virtual std::size_t generation_size() const { return 1; }
   // For the run store's table of operators: step sizes, phases.
   virtual std::vector<NamedNumber> figures() const { return {}; }
   virtual std::string reason() const { return {}; }  // as Optimiser::reason()
+
+  // Of a method that compares scores one by one, so that under noise it needs more than one each:
+  virtual bool compares_scores() const { return false; }
+  // what the next proposals are compared with, and where proposal k is compared with the k-th of
+  // these alone, they themselves.
+  virtual std::vector<Standing> compared() const { return {}; }
+  virtual std::span<Individual> incumbents() { return {}; }
+  // What is compared differs by no more than noise: a search that refines has converged.
+  virtual void settle() {}
 
   virtual void save(v1::MethodState& message) const = 0;
   // Error: the message is not one that save() made for this setup.

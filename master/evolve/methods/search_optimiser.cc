@@ -52,6 +52,13 @@ SearchOptimiser::Plan SearchOptimiser::plan_generation() const {
                    .generation = generation_ + 1,
                    .birth_id = next_birth_id_ + k});
   });
+  const unsigned wanted = replicates() ? wanted_scores() : 1;
+  const std::span<Individual> incumbents = method_->incumbents();
+  for (std::size_t i = 0; i < incumbents.size() && replicates(); ++i) {
+    if (incumbents[i].standing.outcome != v1::OK || incumbents[i].standing.scores >= wanted)
+      continue;
+    request(plan, {Whose::kIncumbent, i}, 1);
+  }
   std::unordered_set<std::uint64_t> siblings;
   for (std::size_t k = 0; k < plan.proposed.size(); ++k) {
     Individual individual;
@@ -65,9 +72,9 @@ SearchOptimiser::Plan SearchOptimiser::plan_generation() const {
     }
     const bool asked = seen_.find(individual.genome) == nullptr &&
                        siblings.insert(SeenGenomes::key(individual.genome)).second;
-    if (asked) plan.candidates.push_back({individual.birth_id, 0, individual.genome});
     plan.asked.push_back(asked);
     plan.individuals.push_back(std::move(individual));
+    if (asked) request(plan, {Whose::kProposal, k}, incumbents.empty() ? wanted : 1);
   }
   return plan;
 }
@@ -78,49 +85,136 @@ void SearchOptimiser::add_rescored(Plan& plan) const {
   if (!round_.empty() && round_.front().genome != best_.genome) {
     plan.rescored.push_back(round_.front());
   }
-  for (const Individual& individual : plan.rescored) {
-    if (individual.standing.outcome != v1::OK) continue;
-    for (unsigned k = individual.standing.scores; k < full_scores(); ++k) {
-      plan.candidates.push_back({individual.birth_id, k, individual.genome});
+  for (std::size_t i = 0; i < plan.rescored.size(); ++i) {
+    const Standing& standing = plan.rescored[i].standing;
+    if (standing.outcome != v1::OK || standing.scores >= full_scores()) continue;
+    request(plan, {Whose::kTitle, i}, full_scores() - standing.scores);
+  }
+}
+
+Individual& SearchOptimiser::individual_of(Plan& plan, Requested whom) const {
+  if (whom.whose == Whose::kTitle) return plan.rescored[whom.index];
+  if (whom.whose == Whose::kProposal) return plan.individuals[whom.index];
+  return method_->incumbents()[whom.index];
+}
+
+void SearchOptimiser::request(Plan& plan, Requested whom, unsigned scores) const {
+  const Individual& individual = individual_of(plan, whom);
+  const Genome genome = placed(space_, individual.genome);
+  for (unsigned k = 0; k < scores; ++k) {
+    plan.candidates.push_back({individual.birth_id, individual.standing.scores + k, genome});
+    plan.requested.push_back(whom);
+  }
+}
+
+// Pooled over what was scored more than once; 0: unknown.
+double SearchOptimiser::noise_variance() const {
+  double squares = 0, freedom = 0;
+  const auto pool = [&](const Individual& individual) {
+    const Standing& standing = individual.standing;
+    if (standing.outcome != v1::OK || standing.scores < 2) return;
+    squares += standing.m2;
+    freedom += standing.scores - 1;
+  };
+  for (const Individual& individual : method_->incumbents()) pool(individual);
+  for (const Individual& individual : round_) pool(individual);
+  if (generation_ > 0) pool(best_);
+  return freedom > 0 ? squares / freedom : 0;
+}
+
+SearchOptimiser::Spread SearchOptimiser::spread_of_compared() const {
+  double count = 0, mean = 0, squares = 0, of_noise = 0;
+  const double noise = noise_variance();
+  for (const Standing& standing : method_->compared()) {
+    if (standing.outcome != v1::OK) continue;
+    const double step = standing.cost - mean;
+    mean += step / ++count;
+    squares += step * (standing.cost - mean);
+    of_noise += noise / standing.scores;
+  }
+  if (count < 2) return {};
+  return {count, squares / (count - 1), of_noise / count};
+}
+
+unsigned SearchOptimiser::wanted_scores() const {
+  const Spread spread = spread_of_compared();
+  if (spread.count < 2) return std::min(2U, full_scores());
+  const double between = spread.variance - spread.of_noise, noise = noise_variance();
+  const double most = full_scores();
+  if (4 * noise >= most * between) return full_scores();
+  return std::max(1U, static_cast<unsigned>(std::ceil(4 * noise / between)));
+}
+
+void SearchOptimiser::race(Plan& plan) const {
+  const std::span<Individual> incumbents = method_->incumbents();
+  if (!replicates() || incumbents.empty()) return;
+  const double noise = noise_variance();
+  for (std::size_t k = 0; k < plan.individuals.size(); ++k) {
+    const Standing &challenger = plan.individuals[k].standing, &holder = incumbents[k].standing;
+    if (challenger.outcome != v1::OK || holder.outcome != v1::OK) continue;
+    if (challenger.scores >= holder.scores || better(holder, challenger)) continue;
+    const double error_2 = noise * (1.0 / challenger.scores + 1.0 / holder.scores);
+    const double ahead = holder.cost - challenger.cost;
+    if (noise > 0 && ahead * ahead > 4 * error_2) continue;
+    request(plan, {Whose::kProposal, k},
+            std::min(challenger.scores, holder.scores - challenger.scores));
+  }
+}
+
+// The plan's scores to whom they belong; nothing is requested any more.
+void SearchOptimiser::add_scores(Plan& plan, std::span<const Score> scores) {
+  for (std::size_t i = 0; i < scores.size(); ++i) {
+    Individual& individual = individual_of(plan, plan.requested[i]);
+    individual.standing.add(scores[i]);
+    const bool last =
+        i + 1 == scores.size() || plan.candidates[i + 1].birth_id != individual.birth_id;
+    if (last) seen_.remember(placed(space_, individual.genome), individual.standing);
+    if (individual.birth_id == best_.birth_id && plan.requested[i].whose == Whose::kTitle) {
+      best_.standing = individual.standing;
     }
+  }
+  evaluations_ += scores.size();
+  plan.candidates.clear();
+  plan.requested.clear();
+  for (Individual& individual : plan.individuals) {
+    if (individual.standing.scores == 0) individual.standing = *seen_.find(individual.genome);
   }
 }
 
 void SearchOptimiser::tell(std::span<const Score> scores) {
   assert(plan_ && scores.size() == plan_->candidates.size());
+  add_scores(*plan_, scores);
+  race(*plan_);
+  if (!plan_->candidates.empty()) return;
   Plan plan = std::move(*plan_);
   plan_.reset();
   migrant_.clear();
-  auto next = scores.begin();
-  for (Individual& individual : plan.rescored) {
-    if (individual.standing.outcome != v1::OK) continue;
-    for (unsigned k = individual.standing.scores; k < full_scores(); ++k) {
-      individual.standing.add(*next++);
-    }
-    seen_.remember(individual.genome, individual.standing);
-    if (individual.birth_id == best_.birth_id) best_.standing = individual.standing;
-  }
   std::vector<Standing> standings;
-  for (std::size_t k = 0; k < plan.individuals.size(); ++k) {
-    Individual& individual = plan.individuals[k];
-    if (plan.asked[k]) {
-      individual.standing.add(*next++);
-      seen_.remember(individual.genome, individual.standing);
-    } else {
-      individual.standing = *seen_.find(individual.genome);
-    }
-    standings.push_back(individual.standing);
-  }
-  assert(next == scores.end());
+  for (const Individual& individual : plan.individuals) standings.push_back(individual.standing);
   method_->learn(plan.proposed, standings);
-  ++generation_;
-  evaluations_ += scores.size();
+  const double indistinct = 1.5 * noise_variance() / full_scores();
+  if (const Spread spread = spread_of_compared();
+      replicates() && spread.count > 1 && spread.variance <= indistinct) {
+    method_->settle();
+  }
+  const std::span<Individual> incumbents = method_->incumbents();
+  for (std::size_t k = 0; k < incumbents.size() && replicates(); ++k) {
+    // The proposal's scores are its own from now on.
+    if (incumbents[k].genome == plan.proposed[k])
+      incumbents[k].birth_id = plan.individuals[k].birth_id;
+  }
   next_birth_id_ += plan.individuals.size();
-  round_ = std::move(plan.individuals);
+  if (proposed_ == 0) round_.clear();
+  proposed_ += plan.individuals.size();
+  for (Individual& individual : plan.individuals) round_.push_back(std::move(individual));
   for (Individual& individual : plan.rescored) round_.push_back(std::move(individual));
   sort_best_first(round_);
   seen_.trim();
   update_best();
+  if (proposed_ < method_->generation_size()) return;
+  ++generation_;
+  proposed_ = 0;
+  best_member_ = to_member(best_);
 }
 
 bool SearchOptimiser::preferred(const Standing& a, const Standing& b) const {
@@ -132,14 +226,26 @@ bool SearchOptimiser::preferred(const Standing& a, const Standing& b) const {
 }
 
 void SearchOptimiser::update_best() {
-  const bool first = generation_ == 1;
+  const bool first = best_.genome.empty();
   if (first) best_ = round_.front();
   const Standing before = best_.standing;
   for (const Individual& individual : round_) {
     if (preferred(individual.standing, best_.standing)) best_ = individual;
   }
-  if (first || better(best_.standing, before)) last_improvement_ = generation_;
-  best_member_ = to_member(best_);
+  if (first || better(best_.standing, before)) last_improvement_ = generation_ + 1;
+}
+
+std::vector<NamedNumber> SearchOptimiser::operator_probabilities() const {
+  std::vector<NamedNumber> figures = method_->figures();
+  if (replicates()) figures.push_back({"noise", std::sqrt(noise_variance())});
+  if (replicates()) figures.push_back({"scores_each", static_cast<double>(wanted_scores())});
+  return figures;
+}
+
+std::string SearchOptimiser::reason() const {
+  if (!replicates() || !method_->reason().empty()) return method_->reason();
+  return "scores are noisy: what \"" + kind_ + "\" compares is scored again where the difference " +
+         "may be noise, up to " + std::to_string(full_scores()) + " times (elite_replicates)";
 }
 
 std::vector<Member> SearchOptimiser::members() const {
@@ -157,7 +263,7 @@ const Member& SearchOptimiser::best() const {
 }
 
 std::string SearchOptimiser::state() const {
-  assert(!plan_ && "save between tell() and ask()");
+  assert(!plan_ && proposed_ == 0 && "save between tell() and ask()");
   v1::SearchState message;
   message.set_kind(kind_);
   v1::GeneticState& ledger = *message.mutable_ledger();

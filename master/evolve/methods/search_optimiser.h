@@ -4,8 +4,14 @@
 // with its own birth id.  A genome that was scored before is not scored again.
 //
 // Noise: the best so far and the best of the last generation are scored until they have
-// `elite_replicates` scores; only then can one take the title.  The method itself learns from the
-// first scores.
+// `elite_replicates` scores; only then can one take the title.  CMA-ES, which learns from many
+// ranks, learns from first scores.  For methods that compare score with score the noise is
+// estimated from what was scored more than once, pooled:
+// - What proposals are compared with is scored again, once a generation, until the variance of its
+//   mean is a quarter of the variance between such means, or it has `elite_replicates` scores.
+// - A proposal that looks better than its incumbent is scored again, until it does not, until the
+//   difference exceeds two of its standard errors, or it has as many scores: a race.
+// - Where there is no incumbent, a proposal gets as many scores at once.
 #pragma once
 
 #include <memory>
@@ -24,7 +30,9 @@ class SearchOptimiser final : public Optimiser {
 
   std::vector<Candidate> ask() override;
   void tell(std::span<const Score> scores) override;
-  void inject(const Genome& genome) override { migrant_ = genome; }
+  void inject(const Genome& genome) override {
+    if (!plan_) migrant_ = genome;
+  }
 
   std::uint64_t generation() const override { return generation_; }
   std::uint64_t evaluations() const override { return evaluations_; }
@@ -32,24 +40,41 @@ class SearchOptimiser final : public Optimiser {
   std::vector<Member> members() const override;  // the generation's proposals and the best
   const Member& best() const override;
   double diversity() const override { return diversity_of(round_); }
-  std::vector<NamedNumber> operator_probabilities() const override { return method_->figures(); }
-  std::string reason() const override { return method_->reason(); }
+  std::vector<NamedNumber> operator_probabilities() const override;
+  std::string reason() const override;
   std::string state() const override;
 
   // Errors: a state of another kind or of other genes, or damaged.
   Status restore(std::string_view state);
 
  private:
+  enum class Whose { kTitle, kProposal, kIncumbent };
+  struct Requested {
+    Whose whose;
+    std::size_t index;
+  };
   struct Plan {
     std::vector<Individual> rescored;
     std::vector<Genome> proposed;
     std::vector<Individual> individuals;  // one a proposal
     std::vector<bool> asked;              // one a proposal
     std::vector<Candidate> candidates;
+    std::vector<Requested> requested;  // one a candidate
   };
 
   Plan plan_generation() const;
   void add_rescored(Plan& plan) const;
+  void request(Plan& plan, Requested whom, unsigned scores) const;
+  Individual& individual_of(Plan& plan, Requested whom) const;
+  void add_scores(Plan& plan, std::span<const Score> scores);
+  void race(Plan& plan) const;
+  bool replicates() const { return noisy_ && method_->compares_scores(); }
+  double noise_variance() const;
+  struct Spread {
+    double count = 0, variance = 0, of_noise = 0;  // the variance of means, and noise's part of it
+  };
+  Spread spread_of_compared() const;
+  unsigned wanted_scores() const;
   unsigned full_scores() const;
   bool preferred(const Standing& a, const Standing& b) const;
   void update_best();
@@ -65,7 +90,8 @@ class SearchOptimiser final : public Optimiser {
   std::uint64_t next_birth_id_ = 0;
   std::uint64_t evaluations_ = 0;
   std::uint64_t last_improvement_ = 0;
-  std::vector<Individual> round_;  // the last generation's, best first
+  std::vector<Individual> round_;  // the last generation's or this one's so far, best first
+  std::size_t proposed_ = 0;       // of a generation that is not complete
   Individual best_;
   Member best_member_;
   SeenGenomes seen_;

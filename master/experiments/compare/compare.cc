@@ -17,8 +17,9 @@ class Lane {
  public:
   static Result<Lane> create(const Variant& variant, std::size_t index, std::uint64_t seed,
                              std::uint64_t evaluations) {
-    const OptimiserSetup setup =
-        optimiser_setup(variant.config.evolution, variant.config.problem, seed);
+    EvolutionSettings settings = variant.config.evolution;
+    settings.evaluations = settings.generations = evaluations;
+    const OptimiserSetup setup = optimiser_setup(settings, variant.config.problem, seed);
     ASSIGN_OR_RETURN(const auto plan, read_stages(variant.config));
     auto optimiser = plan.stages.empty() ? make_optimiser(setup) : make_staged(setup, plan.stages);
     if (!optimiser) return Error{"variant \"" + variant.name + "\": " + optimiser.error().message};

@@ -167,8 +167,8 @@ class Crossfit {
 
 // A stage each group: its evaluations, its sets, its sweeps.
 std::vector<ProgressStage> stages_of(const std::vector<std::string>& groups,
-                                     const CrossfitPlan& plan) {
-  const std::uint64_t tasks = expected_evaluations(plan.tuning.evolution) +
+                                     const CrossfitPlan& plan, std::size_t genes) {
+  const std::uint64_t tasks = most_evaluations(plan.tuning.evolution, genes) +
                               2 * (1 + plan.tests.size()) +
                               2 * plan.sweeps.size() * plan.sweep_points;
   std::vector<ProgressStage> stages;
@@ -258,7 +258,7 @@ Result<std::vector<CrossfitGroup>> crossfit(const Problem& problem, const Crossf
   Crossfit fit(problem, plan, farm);
   std::vector<CrossfitGroup> groups;
   if (plan.by.empty()) {
-    plan.hooks.planned(stages_of({""}, plan));
+    plan.hooks.planned(stages_of({""}, plan, problem.genes.size()));
     plan.hooks.began(0);
     ASSIGN_OR_RETURN(auto group, fit.group("", problem.log));
     groups.push_back(std::move(group));
@@ -266,7 +266,7 @@ Result<std::vector<CrossfitGroup>> crossfit(const Problem& problem, const Crossf
   }
   ASSIGN_OR_RETURN(const auto by, trial_column_reader(problem.log, plan.by));
   const std::vector<std::string> values = values_in(problem.log, by);
-  plan.hooks.planned(stages_of(values, plan));
+  plan.hooks.planned(stages_of(values, plan, problem.genes.size()));
   for (const std::string& value : values) {
     plan.hooks.began(groups.size());
     const std::string filter = plan.by + "=" + value;
@@ -276,11 +276,6 @@ Result<std::vector<CrossfitGroup>> crossfit(const Problem& problem, const Crossf
     groups.push_back(std::move(*group));
   }
   return groups;
-}
-
-std::uint64_t expected_evaluations(const EvolutionSettings& settings) {
-  const std::uint64_t all = settings.generations * settings.population;
-  return settings.evaluations ? std::min(*settings.evaluations, all) : all;
 }
 
 Result<Tuned> tune(const Problem& problem, Farm& farm, const TuningSettings& settings) {

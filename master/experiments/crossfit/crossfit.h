@@ -24,9 +24,6 @@ struct Tuned {
   std::uint64_t evaluations = 0;
 };
 
-// How many evaluations such a fit takes, if the search neither stagnates nor overshoots.
-std::uint64_t expected_evaluations(const EvolutionSettings& settings);
-
 // Errors: of the farm, and a problem whose every genome fails.
 Result<Tuned> tune(const Problem& problem, Farm& farm, const TuningSettings& settings);
 

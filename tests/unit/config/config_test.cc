@@ -5,6 +5,7 @@
 
 #include <filesystem>
 
+#include "common/config/stages.h"
 #include "common/trials/files.h"
 
 namespace gapfarm::config_test {
@@ -37,6 +38,18 @@ TEST(Config, HeldOutKeysKeepTheirDefaults) {
   EXPECT_EQ(config.seed, 1u);
   EXPECT_EQ(config.evolution.population, EvolutionSettings{}.population);
   EXPECT_FALSE(check_evolvable(config).ok());
+}
+
+TEST(Config, WhoSearchesByDefaultFollowsFromWhatIsSet) {
+  const auto kind = [](const char* text) { return config_of(text).evolution.optimiser.kind; };
+  EXPECT_EQ(kind(""), OptimiserKind::kAutoSearch);
+  EXPECT_EQ(kind("[evolution]\nelite_replicates = 4\n[evolution.stop]\ngenerations = 9\n"),
+            OptimiserKind::kAutoSearch);
+  EXPECT_EQ(kind("[optimiser]\nsigma = 0.2\n"), OptimiserKind::kAutoSearch);
+  const char* operators = "[evolution]\nselection = \"rank\"\n";
+  EXPECT_EQ(kind(operators), OptimiserKind::kGenetic);
+  EXPECT_THAT(default_optimiser(operators)->reason, HasSubstr("sets its 'selection'"));
+  EXPECT_FALSE(default_optimiser("[optimiser]\nkind = \"cma_es\"\n"));
 }
 
 TEST(Config, AFreePlanHasRangesAndAGridHasLevels) {

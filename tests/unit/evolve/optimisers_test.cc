@@ -109,21 +109,6 @@ TEST(Searches, ThatLearnFromRanksSeeNoMoreThanRanks) {
   }
 }
 
-TEST(AutoSearch, SaysWhatSearchesAndWhy) {
-  const auto reason = [](const Toy& toy, bool noisy, std::optional<std::uint64_t> evaluations) {
-    EvolutionSettings settings = settings_for(OptimiserKind::kAutoSearch);
-    settings.evaluations = evaluations;
-    return ToyRun(toy, settings, 1, noisy).optimiser().reason();
-  };
-  using testing::HasSubstr;
-  EXPECT_THAT(reason(sphere(10), false, {}), HasSubstr("BOBYQA, at most 400 evaluations"));
-  EXPECT_THAT(reason(sphere(10), true, {}), HasSubstr("CMA-ES, because scores are noisy"));
-  EXPECT_THAT(reason(sphere(10), false, 30), HasSubstr("too few"));
-  EXPECT_THAT(reason(sphere(60), false, {}), HasSubstr("CMA-ES, because 60 genes"));
-  EXPECT_THAT(reason(mixed(), false, {}), HasSubstr("differential evolution, because"));
-  EXPECT_EQ(ToyRun(sphere(2), {}, 1).optimiser().reason(), "");
-}
-
 TEST(DifferentialEvolution, FindsTheMinima) {
   const EvolutionSettings settings = settings_for(OptimiserKind::kDifferentialEvolution);
   EXPECT_LT(reached(sphere(5), settings, 6000), 1e-4);
@@ -345,16 +330,6 @@ TEST(CmaEs, SpendsAsMuchOnSmallStartsAsOnGrowingOnes) {
   ASSERT_GE(starts.size(), 6U);
   EXPECT_GT(small, large / 4);
   EXPECT_LT(small, 2 * large);
-}
-
-TEST(Restore, AcrossThePhasesOfAutoSearch) {
-  EvolutionSettings settings = settings_for(OptimiserKind::kAutoSearch);
-  settings.optimiser.local_evaluations = 40;
-  settings.seed_nominal = false;
-  ToyRun straight(rosenbrock(3), settings, 1), interrupted(rosenbrock(3), settings, 1);
-  const auto all = digests(straight, 100, false), again = digests(interrupted, 100, true);
-  for (std::size_t i = 0; i < all.size(); ++i) ASSERT_TRUE(all[i] == again[i]) << i;
-  EXPECT_EQ(straight.optimiser().operator_probabilities()[0].value, 2) << "phase";
 }
 
 TEST_P(EveryOptimiser, RefusesForeignAndDamagedStates) {

@@ -119,11 +119,16 @@ class ToyRun {
   }
 
   std::vector<Candidate> generation() {
-    const std::vector<Candidate> candidates = optimiser_->ask();
-    std::vector<Score> scores;
-    for (const Candidate& candidate : candidates) scores.push_back(score(candidate));
-    optimiser_->tell(scores);
-    return candidates;
+    std::vector<Candidate> all;
+    for (const auto before = optimiser_->generation(); optimiser_->generation() == before;) {
+      std::vector<Score> scores;
+      for (const Candidate& candidate : optimiser_->ask()) {
+        scores.push_back(score(candidate));
+        all.push_back(candidate);
+      }
+      optimiser_->tell(scores);
+    }
+    return all;
   }
 
   void until(std::uint64_t evaluations) {

@@ -254,6 +254,17 @@ TEST_F(RunTest, HoldsItsBestAgainstTrialsHeldOut) {
   EXPECT_THAT(names, ElementsAre("the config's own values", "the best"));
 }
 
+TEST_F(RunTest, OfBeforeThereWasAnotherDefaultGoesOnByTheGeneticAlgorithm) {
+  Config silent = config();
+  const std::size_t section = silent.text.find("population = 4\n");
+  silent.text.erase(section, std::string("population = 4\n").size());
+  silent.evolution.optimiser.kind = OptimiserKind::kAutoSearch;
+  RunInfo info = run_info(silent, {});
+  EXPECT_EQ(stored_config(info, {})->evolution.optimiser.kind, OptimiserKind::kAutoSearch);
+  info.overrides = "{}";
+  EXPECT_EQ(stored_config(info, {})->evolution.optimiser.kind, OptimiserKind::kGenetic);
+}
+
 TEST(Overrides, OutrankWhatWasStoredAndComeBackFromJson) {
   EvolutionOverrides first, later;
   first.generations = 5;
