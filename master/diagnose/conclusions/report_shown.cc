@@ -40,9 +40,8 @@ Eigen::MatrixXd covariance_of(const Study& study, const JointFit& fit) {
   return inverse_of_symmetric(normal);
 }
 
-std::vector<ParameterCorrelation> correlations_of(const ParameterTable& table,
-                                                      const JointFit& fit,
-                                                      const Eigen::MatrixXd& cov) {
+std::vector<ParameterCorrelation> correlations_of(const ParameterTable& table, const JointFit& fit,
+                                                  const Eigen::MatrixXd& cov) {
   std::vector<ParameterCorrelation> all;
   for (Eigen::Index i = 0; i < cov.rows(); ++i) {
     for (Eigen::Index j = i + 1; j < cov.cols(); ++j) {

@@ -54,7 +54,7 @@ std::string written(WrittenOp op, std::string_view content) {
          std::string(content);
 }
 
-// Checksums are left out as the format allows (0).
+// No checksums, as the format allows (0).
 constexpr U32 kNoChecksum = 0;
 
 struct ChunkSpan {
