@@ -14,6 +14,7 @@
 #include "common/trials/read.h"
 #include "master/command/console.h"
 #include "master/command/long_command.h"
+#include "master/store/run_reader.h"
 #include "master/store/schema.h"
 
 namespace gapfarm {
@@ -351,6 +352,19 @@ void report_to(Console& console, SocketFarmOptions& options) {
     if (level_of(event.kind) != LogLevel::kInfo) return console.note("gapfarm: " + text);
     if (console.kept() != nullptr) console.kept()->write(LogLevel::kInfo, text);
   };
+}
+
+Result<FittedRuns> open_fitted(const std::string& source, Console& console) {
+  std::error_code ignored;
+  if (!std::filesystem::is_directory(source, ignored)) {
+    ASSIGN_OR_RETURN(auto config, read_config_and_trials(source, {}));
+    return FittedRuns{config.problem, config.problem.values, config.windows, config.trial_files,
+                      config.robot_path};
+  }
+  ASSIGN_OR_RETURN(const auto reader, RunReader::open(source));
+  ASSIGN_OR_RETURN(auto problem, stored_problem(reader));
+  ASSIGN_OR_RETURN(const auto model, read_model_of(source, console));
+  return FittedRuns{problem, model.values, {}, model.data.files};
 }
 
 }  // namespace gapfarm

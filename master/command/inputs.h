@@ -134,6 +134,18 @@ int failed(const Error& error, CliContext& context);
 // has gone further than that says or left none, its best so far, of which a note shows.
 Result<Model> read_model_of(const std::string& run_or_model, Console& console);
 
+// What was fitted to, and at which values a simulation is driven.
+struct FittedRuns {
+  Problem problem;
+  ParameterValues values;
+  WindowSettings windows;
+  std::vector<std::string> folders;
+  std::string robot_path = {};  // of a config
+};
+
+// A finished run's, or a config's own.
+Result<FittedRuns> open_fitted(const std::string& source, Console& console);
+
 // An error where the model is one of another scenario or robot than the config's.
 Status check_same_robot(const Model& model, const std::string& path, const Config& config,
                         const std::string& config_path);

@@ -12,23 +12,22 @@
 namespace gapfarm {
 namespace {
 
-constexpr double kEvery_s = 0.2;  // of a path's points
 constexpr const char* kLogged = "#888888";
 constexpr const char* kBefore = "#d55e00";
 constexpr const char* kAfter = "#0072b2";
 constexpr double kPanel = 300, kPad = 34, kLegend = 46;
 
 // Trials that all begin with their run and end further and further on.
-Status put_stretches(const RunLog& runs, Problem* to, DrivenPaths* paths) {
+Status put_stretches(const RunLog& runs, double every_s, Problem* to, DrivenPaths* paths) {
   ASSIGN_OR_RETURN(const auto whole, cut_windows(runs, {{0}, 0}));
   to->runs = whole.runs;
   to->log = {};
   for (const Trial& run : whole.log.trials) {
     const LoggedRun& logged = runs.runs[*run.run];
-    DrivenPath path{run.session, {run.X_WS}, {run.X_WS}, {run.X_WS}};
+    DrivenPath path{run.session, {run.X_WS}, {run.X_WS}, {run.X_WS}, {*run.t_s}, *run.run};
     double last_s = *run.t_s;
     for (const PoseRow& pose : logged.poses) {
-      if (pose.t_s < last_s + kEvery_s && &pose != &logged.poses.back()) continue;
+      if (pose.t_s < last_s + every_s && &pose != &logged.poses.back()) continue;
       if (pose.t_s <= *run.t_s) continue;
       last_s = pose.t_s;
       Trial stretch = run;
@@ -37,6 +36,7 @@ Status put_stretches(const RunLog& runs, Problem* to, DrivenPaths* paths) {
       stretch.trial = static_cast<std::int64_t>(to->log.trials.size());
       to->log.trials.push_back(std::move(stretch));
       path.logged.push_back(pose.X_WM);
+      path.t_s.push_back(pose.t_s);
     }
     paths->runs.push_back(std::move(path));
   }
@@ -117,11 +117,11 @@ void draw_panel(const DrivenPath& path, SvgPoint corner, Svg* svg) {
 }  // namespace
 
 Result<DrivenPaths> drive_paths(Farm& farm, const Problem& fitted, const ParameterValues& values,
-                                const RunLog& runs) {
+                                const RunLog& runs, double every_s) {
   Problem asked = fitted;
   asked.fitness.kind = FitnessKind::kLogScore;
   DrivenPaths paths;
-  if (Status s = put_stretches(runs, &asked, &paths); !s) return s.error();
+  if (Status s = put_stretches(runs, every_s, &asked, &paths); !s) return s.error();
   const auto before = simulated_ends(farm, asked);
   if (!before) return before.error();
   asked.values = values;

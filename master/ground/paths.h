@@ -14,6 +14,8 @@ namespace gapfarm {
 struct DrivenPath {
   std::string run;
   std::vector<Pose> logged, before, after;  // of the marker, world frame; a pose at each logged one
+  std::vector<double> t_s = {};             // of each, by the log
+  std::size_t in_log = 0;                   // its run
 };
 
 struct DrivenPaths {
@@ -23,10 +25,10 @@ struct DrivenPaths {
 };
 
 // Every run from its first pose on, by its commands alone, with the values of the problem's file
-// (before) and with `values` (after).  Errors: no run has two poses, a simulation that did not end
-// well.
+// (before) and with `values` (after), at poses that are so far apart or more.  Errors: no run has
+// two poses, a simulation that did not end well.
 Result<DrivenPaths> drive_paths(Farm& farm, const Problem& fitted, const ParameterValues& values,
-                                const RunLog& runs);
+                                const RunLog& runs, double every_s = 0.2);
 
 // One window of `problem` as a simulation drives it, from its measured start.
 struct SimulatedWindow {

@@ -235,8 +235,12 @@ const GroundHypothesis* fault_of(const GroundRobot& robot, const RunLog& log,
 
 GroundReference reference_of(const WindowFitter& fitter, const WindowFit& fit, std::uint64_t seed) {
   GroundReference reference;
-  for (const FitRow& row : fit.rows) reference.names.push_back(row.row.name);
+  for (const FitRow& row : fit.rows) {
+    reference.names.push_back(row.row.name);
+    reference.units.push_back(row.row.unit);
+  }
   reference.values = fit.values;
+  reference.windows = fitter.ended_windows(fit);
   reference.draws = fitter.draws(fit, seed).colwise() - fit.values;
   for (std::size_t k = 0; k < fit.rows.size(); ++k) {
     if (fit.rows[k].row.name != "grip") continue;

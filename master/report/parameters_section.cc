@@ -2,6 +2,8 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include <cmath>
+
 #include "master/report/glossary.h"
 #include "master/report/html.h"
 
@@ -63,12 +65,13 @@ std::string warnings(const std::vector<ParameterRow>& rows) {
 }
 
 std::string correlations_html(const std::vector<ParameterCorrelation>& correlations) {
-  if (correlations.empty()) return "";
   std::string items;
   for (const ParameterCorrelation& c : correlations) {
+    if (!(std::abs(c.r) >= kStrongCorrelation)) continue;
     items += fmt::format("<li><code>{}</code> and <code>{}</code>: {}</li>", html_escaped(c.a),
                          html_escaped(c.b), number_text(c.r, 2));
   }
+  if (items.empty()) return "";
   return "<h3>What makes up for what</h3><p>Strong " + term("correlation", "correlations") +
          ": the log shows a combination of the two better than either.</p><ul "
          "class=\"correlations\">" +

@@ -1,39 +1,17 @@
-// gapfarm export ros CONFIG|RUN|DIAGNOSIS: what a log says, in the words of its user's own files.
-#include <algorithm>
-#include <cmath>
-#include <filesystem>
+// gapfarm export ros|ranges|runs: what a log says, in the words of its user's own tools.
 #include <memory>
 #include <nlohmann/json.hpp>
 
 #include "common/base/try.h"
-#include "common/problem/run_files.h"
 #include "common/trials/files.h"
+#include "master/cli/data/export_source.h"
 #include "master/cli/subcommand.h"
-#include "master/command/inputs.h"
-#include "master/command/outputs.h"
-#include "master/ground/reference.h"
-#include "master/ground/report/ros_export.h"
+#include "master/ground/report/ranges.h"
 #include "master/io/robot_files/controllers.h"
 #include "master/io/robot_files/understand.h"
-#include "master/store/run_reader.h"
 
 namespace gapfarm {
 namespace {
-
-namespace fs = std::filesystem;
-
-struct ExportCommand {
-  std::string format;
-  std::string source;
-  std::string controllers;
-  std::string urdf;
-  std::string out;
-  Outputs outputs;
-};
-
-constexpr double kLow = 0.05, kHigh = 0.95;
-constexpr double kLeastShift_s = 1e-3;
-constexpr double kEachRow_s = 1e-3;  // a horizon that every way between two poses is longer than
 
 struct Reported {
   ReportedValues values;
@@ -41,107 +19,22 @@ struct Reported {
   Eigen::MatrixXd covariance;  // of the values; of a fit
 };
 
-// Whether rows that hold wheels and increments were read at other times after all.
-bool clocks_are_apart(const GroundRobot& robot, const GroundReference& fit) {
-  for (std::size_t k = 0; k < fit.names.size(); ++k) {
-    const double value = fit.values[static_cast<Eigen::Index>(k)];
-    if (fit.names[k] == "delay") return std::abs(value - robot.motors.delay_s) > kLeastShift_s;
+Result<Reported> read_source_of_export(const std::string& source, Console& console) {
+  if (const auto path = values_of(source)) {
+    ASSIGN_OR_RETURN(auto values, read_values(*path));
+    const RosFriction friction = ros_friction(values);
+    return Reported{std::move(values), friction, {}};
   }
-  return false;
-}
-
-// Every value of the robot's kinematics by a log.
-Result<Reported> fitted_values(const GroundRobot& robot, const std::vector<std::string>& folders,
-                               Console& console) {
-  Reported fitted;
-  ReportedValues& reported_values = fitted.values;
-  reported_values.given = robot;
-  reported_values.logs = folders;
-  ASSIGN_OR_RETURN(const auto log,
-                   read_run_folders(reported_values.logs, reported_values.given.channels));
-  console.note("fitting the robot's kinematics to the log");
-  // Increments err each by itself: a window of several knows nothing that they do not, unless
-  // wheels were read at other times.
-  const bool together = log.relative && shares_a_clock(log);
-  const WindowSettings each_row = {{kEachRow_s}, 0.5}, summed = {{0.5, 2, 5}, 0.5};
-  const auto ask = [&](const WindowSettings& windows) {
-    return ask_what_changed(reported_values.given, log, windows, 1, nullptr);
-  };
-  ASSIGN_OR_RETURN(auto asked, ask(together ? each_row : summed));
-  if (together && clocks_are_apart(reported_values.given, *asked.reference)) {
-    ASSIGN_OR_RETURN(asked, ask(summed));
-  }
-  const GroundReference& fit = *asked.reference;
+  ASSIGN_OR_RETURN(const auto ground, read_ground_source(source, console));
+  ASSIGN_OR_RETURN(const auto fit, fit_source(ground, console));
+  ReportedValues values = {ground.robot, ground.logs, {}};
   for (std::size_t k = 0; k < fit.names.size(); ++k) {
     const auto i = static_cast<Eigen::Index>(k);
-    std::vector<double> drawn;
-    for (Eigen::Index d = 0; d < fit.draws.cols(); ++d) {
-      drawn.push_back(fit.values[i] + fit.draws(i, d));
-    }
-    std::sort(drawn.begin(), drawn.end());
-    const auto at = [&](double share) {
-      return drawn[static_cast<std::size_t>(share * static_cast<double>(drawn.size() - 1))];
-    };
-    reported_values.values.push_back({fit.names[k],
-                                      value_in_file(reported_values.given, fit.names[k]),
-                                      fit.values[i],
-                                      {at(kLow), at(kHigh)},
-                                      fit.shown[k] != 0});
+    values.values.push_back({fit.names[k], value_in_file(ground.robot, fit.names[k]), fit.values[i],
+                             interval_of(fit, i), fit.shown[k] != 0});
   }
-  fitted.covariance = fit.covariance;
-  return fitted;
-}
-
-// Friction as the run has it, where the run searched for it.
-RosFriction simulated_friction(const Problem& problem, const Model& model) {
-  RosFriction friction;
-  for (const Gene& gene : problem.genes) {
-    const std::string& key = problem.table()[gene.row].key;
-    if (key != "friction" && key != "friction_ratio") continue;
-    const GroundRobot robot = problem.ground->robot_at(model.values);
-    friction.along = robot.friction;
-    friction.across = robot.friction * robot.friction_ratio;
-    friction.from = "as evolved; other values may explain the motion as well";
-  }
-  return friction;
-}
-
-Status check_ground(const Problem& problem, const std::string& source) {
-  if (problem.ground) return {};
-  return Error{source + ": scenario " + problem.scenario +
-               " has no robot file whose values could go back; only ground robots have"};
-}
-
-Result<Reported> read_source_of_export(const std::string& source, Console& console) {
-  const fs::path values = fs::path(source) / "values.json";
-  std::error_code ignored;
-  if (fs::exists(values, ignored)) {
-    ASSIGN_OR_RETURN(const auto text, read_text_file(values.string()));
-    ASSIGN_OR_RETURN(auto reported_values, parse_values(text, values.string()));
-    const RosFriction friction = ros_friction(reported_values);
-    return Reported{std::move(reported_values), friction, {}};
-  }
-  if (fs::is_regular_file(source, ignored)) {
-    ASSIGN_OR_RETURN(const auto config,
-                     open_config(source, {}, console, [](Config&) { return Status(); }));
-    RETURN_IF_ERROR(check_ground(config.problem, source));
-    const GroundRobot robot = config.problem.ground->robot_at(config.problem.values);
-    ASSIGN_OR_RETURN(auto fitted, fitted_values(robot, config.trial_files, console));
-    fitted.friction = ros_friction(fitted.values);
-    return fitted;
-  }
-  const auto reader = RunReader::open(source);
-  if (!reader) {
-    return Error{source + ": neither a config nor the diagnosis of a ground robot nor a run (" +
-                 reader.error().message + ")"};
-  }
-  ASSIGN_OR_RETURN(const auto problem, stored_problem(*reader));
-  RETURN_IF_ERROR(check_ground(problem, source));
-  ASSIGN_OR_RETURN(const auto model, read_model_of(source, console));
-  ASSIGN_OR_RETURN(auto fitted, fitted_values(problem.ground->robot(), model.data.files, console));
-  fitted.friction = simulated_friction(problem, model);
-  if (!fitted.friction.across) fitted.friction = ros_friction(fitted.values);
-  return fitted;
+  const RosFriction friction = ground.friction.across ? ground.friction : ros_friction(values);
+  return Reported{std::move(values), friction, fit.covariance};
 }
 
 std::string usual_controller(DriveKind drive) {
@@ -227,7 +120,7 @@ nlohmann::ordered_json export_json(const RosExport& data) {
   return json;
 }
 
-Result<int> run_export(ExportCommand& command, CliContext& context) {
+Result<int> export_ros(ExportCommand& command, CliContext& context) {
   Console& console = context.console;
   for (const std::string* path : {&command.controllers, &command.urdf}) {
     if (!path->empty()) command.outputs.reads(*path);
@@ -252,26 +145,68 @@ Result<int> run_export(ExportCommand& command, CliContext& context) {
   return kExitDone;
 }
 
+// Of options that one tool alone has.
+Status check_options_of(const std::string& tool, const CLI::App& app) {
+  constexpr std::pair<const char*, const char*> kOf[] = {{"--controllers", "ros"},
+                                                         {"--urdf", "ros"},
+                                                         {"--samples", "ranges"},
+                                                         {"--seed", "ranges"},
+                                                         {"--trials", "runs"}};
+  for (const auto& [option, of] : kOf) {
+    if (tool != of && app.count(option) > 0) {
+      return Error{std::string(option) + " is of export " + of + ", not of export " + tool +
+                   "; omit it"};
+    }
+  }
+  return {};
+}
+
 }  // namespace
 
 SubcommandRun setup_export(CLI::App& app) {
   auto command = std::make_shared<ExportCommand>();
-  app.add_option("TOOLS", command->format, "ros: controllers.yaml and <gazebo> tags")
+  app.add_option("TOOLS", command->format,
+                 "ros: controllers.yaml and <gazebo> tags; ranges: of every value with their "
+                 "covariance (TOML, YAML) and models for MuJoCo and Gazebo; runs: simulated beside "
+                 "measured poses (MCAP, CSV)")
       ->required()
-      ->check(CLI::IsMember({"ros"}));
+      ->check(CLI::IsMember({"ros", "ranges", "runs"}));
   app.add_option("CONFIG|RUN|DIAGNOSIS", command->source,
-                 "Of a ground robot: a config's log is fitted to, a run's was")
+                 "Of a ground robot: a config's log is fitted to, a run's was; ranges: any "
+                 "diagnosis; runs: a config or run")
       ->required();
   app.add_option("--controllers", command->controllers,
-                 "Your controller file: its controller's name is taken");
-  app.add_option("--urdf", command->urdf, "Your URDF: its wheels' links and friction are taken");
+                 "ros: your controller file, whose controller's name is taken");
+  app.add_option("--urdf", command->urdf,
+                 "ros: your URDF, whose wheels' links and friction are taken");
+  app.add_option("--samples", command->samples,
+                 "ranges: so many draws, in samples.csv and as models robot_0001.xml ...")
+      ->check(CLI::Range(1, kMostSamplesOut));
+  app.add_option("--seed", command->seed, "ranges: of the draws")->capture_default_str();
+  app.add_option("--trials", command->runs,
+                 "runs: folders with commands.csv and poses.csv (default: those fitted to)");
   app.add_option("--out", command->out, "Folder to write to (default: all is printed)");
   command->outputs.declare(app);
+  command->farm.declare(app, false);
+  declare_long_command(app);
   app.footer(
       "Examples:\n"
       "  gapfarm export ros run/husky\n"
-      "  gapfarm export ros diagnosis --controllers control.yaml --urdf husky.urdf --out ros");
-  return [command](CliContext& context) { return run_export(*command, context); };
+      "  gapfarm export ros diagnosis --controllers control.yaml --urdf husky.urdf --out ros\n"
+      "  gapfarm export ranges run/husky --samples 100 --seed 1 --out ranges\n"
+      "  gapfarm export runs run/husky --trials tuesday --out foxglove");
+  return [command, &app](CliContext& context) -> Result<int> {
+    RETURN_IF_ERROR(check_options_of(command->format, app));
+    if (context.dry_run && command->format != "runs") {
+      context.console.result("dry run: nothing was fitted or written\nwould export " +
+                                 command->format + " of " + command->source + "\n",
+                             {{"dry_run", true}, {"out", command->out}});
+      return kExitDone;
+    }
+    return command->format == "ros"      ? export_ros(*command, context)
+           : command->format == "ranges" ? export_ranges(*command, context)
+                                         : export_runs(*command, context);
+  };
 }
 
 }  // namespace gapfarm

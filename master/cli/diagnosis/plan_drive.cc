@@ -196,6 +196,11 @@ std::pair<std::string, nlohmann::ordered_json> result_of(const DrivePlan& drive,
         "As narrow as after {:.0f} s {}, for the wanted together: after {:.1f} s of this drive\n",
         at.t_s, other.name, *seconds);
   }
+  json["best_share"] = drive.best_share;
+  text += fmt::format(
+      "No drive of as many seconds of such moves makes them more than {:.0f} % narrower, for the "
+      "wanted together, even if the pose were known between moves\n",
+      std::ceil(100 * (1 - drive.best_share)));
   std::size_t commands = 0;
   for (const LoggedRun& run : drive.drive.runs) commands += run.commands.size();
   text += fmt::format(

@@ -1,7 +1,6 @@
 // gapfarm horizons RUN|CONFIG: how far off a ground robot's simulation is at several horizons.
 #include "master/ground/horizons.h"
 
-#include <filesystem>
 #include <memory>
 
 #include "common/base/try.h"
@@ -11,7 +10,6 @@
 #include "master/command/inputs.h"
 #include "master/command/outputs.h"
 #include "master/ground/paths.h"
-#include "master/store/run_reader.h"
 
 namespace gapfarm {
 namespace {
@@ -26,30 +24,8 @@ struct HorizonsCommand {
   FarmOptions farm;
 };
 
-// What was fitted to, and at which values the simulation is measured.
-struct Fitted {
-  Problem problem;
-  ParameterValues values;
-  WindowSettings windows;
-  std::vector<std::string> folders;
-  std::string robot_path = {};
-};
-
-Result<Fitted> open_fitted(const std::string& source, Console& console) {
-  std::error_code ignored;
-  if (!std::filesystem::is_directory(source, ignored)) {
-    ASSIGN_OR_RETURN(auto config, read_config_and_trials(source, {}));
-    return Fitted{config.problem, config.problem.values, config.windows, config.trial_files,
-                  config.robot_path};
-  }
-  ASSIGN_OR_RETURN(const auto reader, RunReader::open(source));
-  ASSIGN_OR_RETURN(auto problem, stored_problem(reader));
-  ASSIGN_OR_RETURN(const auto model, read_model_of(source, console));
-  return Fitted{problem, model.values, {}, model.data.files};
-}
-
 // Whole runs, before and after, as a picture.
-Status draw_runs(const HorizonsCommand& command, const Fitted& fitted, const RunLog& runs,
+Status draw_runs(const HorizonsCommand& command, const FittedRuns& fitted, const RunLog& runs,
                  Farm& farm, Console& console) {
   if (command.picture.empty()) return {};
   ASSIGN_OR_RETURN(const auto paths, drive_paths(farm, fitted.problem, fitted.values, runs));

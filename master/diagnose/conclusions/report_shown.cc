@@ -40,23 +40,22 @@ Eigen::MatrixXd covariance_of(const Study& study, const JointFit& fit) {
   return inverse_of_symmetric(normal);
 }
 
-std::vector<ParameterCorrelation> strong_correlations(const ParameterTable& table,
-                                                      const JointFit& fit,
-                                                      const Eigen::MatrixXd& cov) {
-  std::vector<ParameterCorrelation> strong;
+std::vector<ParameterCorrelation> correlations_of(const ParameterTable& table, const JointFit& fit,
+                                                  const Eigen::MatrixXd& cov) {
+  std::vector<ParameterCorrelation> all;
   for (Eigen::Index i = 0; i < cov.rows(); ++i) {
     for (Eigen::Index j = i + 1; j < cov.cols(); ++j) {
       const double r = cov(i, j) / std::sqrt(cov(i, i) * cov(j, j));
-      if (!(std::abs(r) >= kStrongCorrelation)) continue;
+      if (!std::isfinite(r)) continue;
       const auto key = [&](Eigen::Index k) {
         return table[fit.parameters[static_cast<std::size_t>(k)].row].key;
       };
-      strong.push_back({key(i), key(j), std::clamp(r, -1.0, 1.0)});
+      all.push_back({key(i), key(j), std::clamp(r, -1.0, 1.0)});
     }
   }
-  std::stable_sort(strong.begin(), strong.end(),
+  std::stable_sort(all.begin(), all.end(),
                    [](const auto& a, const auto& b) { return std::abs(a.r) > std::abs(b.r); });
-  return strong;
+  return all;
 }
 
 ParameterRow row_of(const Parameter& p, double before, double after) {
@@ -232,7 +231,7 @@ void fill_parameters(const DiagnosisRequest& of, const Refit& refit, DiagnosisRe
     }
   }
   const Eigen::MatrixXd cov = covariance_of(study, fit);
-  if (cov.size() > 0) d.correlations = strong_correlations(table, fit, cov);
+  if (cov.size() > 0) d.correlations = correlations_of(table, fit, cov);
 }
 
 Result<std::vector<ShownDrive>> shown_drives(const DiagnosisRequest& of,

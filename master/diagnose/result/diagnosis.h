@@ -199,7 +199,7 @@ struct Diagnosis {
   std::vector<NextExperiment> next;
   std::vector<std::string> cautions;               // thin data and the like, one sentence each
   std::vector<ParameterRow> parameters;            // what was tuned, and of the named effects
-  std::vector<ParameterCorrelation> correlations;  // strong ones, strongest first
+  std::vector<ParameterCorrelation> correlations;  // of the last fit, strongest first
   std::vector<ShownDrive> drives;
   std::vector<DiagnosedTrial> trials;
   std::vector<ShownCovariate> shown;

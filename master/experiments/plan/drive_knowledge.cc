@@ -10,21 +10,24 @@ namespace gapfarm::plan {
 namespace {
 
 constexpr double kSlopeStep = 0.1;  // of a tolerance
+constexpr double kKnown = 1e-4;     // of a reading's variance: as good as none
 
 }  // namespace
 
 Knowledge::Knowledge(const GroundRobot& robot, const std::vector<KinematicRow>& rows,
                      const DriveNoise& noise)
     : noise_(noise),
+      prior_(static_cast<Eigen::Index>(rows.size())),
       P_(Eigen::MatrixXd::Zero(3 + static_cast<Eigen::Index>(rows.size()),
                                3 + static_cast<Eigen::Index>(rows.size()))) {
   for (const RobotWheel& wheel : robot.wheels) {
     reach_m_ = std::max(reach_m_, std::hypot(wheel.x_m.value_or(0), wheel.y_m.value_or(0)));
   }
   for (std::size_t k = 0; k < rows.size(); ++k) {
-    const auto i = static_cast<Eigen::Index>(3 + k);
-    P_(i, i) = std::pow(rows[k].farthest > 0 ? rows[k].farthest : plausible_error(rows[k]), 2);
+    const auto i = static_cast<Eigen::Index>(k);
+    prior_[i] = rows[k].farthest > 0 ? rows[k].farthest : plausible_error(rows[k]);
   }
+  P_.diagonal().tail(prior_.size()) = prior_.array().square();
 }
 
 void Knowledge::put_down() {
@@ -52,6 +55,29 @@ void Knowledge::learn(const Pose& step, const Eigen::MatrixXd& slopes) {
 
 Eigen::VectorXd Knowledge::widths() const {
   return 2 * kNormal90 * P_.diagonal().tail(P_.rows() - 3).cwiseMax(0).cwiseSqrt();
+}
+
+Eigen::VectorXd Knowledge::remaining() const {
+  return P_.diagonal().tail(prior_.size()).array().max(0) / prior_.array().square();
+}
+
+Eigen::MatrixXd Knowledge::most_of(const std::vector<Pose>& steps,
+                                   const std::vector<Eigen::MatrixXd>& slopes) const {
+  Knowledge known = *this;
+  const Eigen::Index n = prior_.size();
+  known.P_.setZero();
+  known.P_.diagonal().tail(n) = prior_.array().square();
+  for (std::size_t i = 0; i < steps.size(); ++i) known.learn(steps[i], slopes[i]);
+  const Eigen::MatrixXd& P = known.P_;
+  const Eigen::MatrixXd end =
+      P.topLeftCorner(3, 3) + Eigen::MatrixXd((kKnown * reading()).asDiagonal());
+  const Eigen::MatrixXd left = P.bottomRightCorner(n, n) - P.bottomLeftCorner(n, 3) *
+                                                               inverse_of_symmetric(end) *
+                                                               P.topRightCorner(3, n);
+  const auto D = prior_.cwiseInverse().asDiagonal();
+  const SymmetricAxes axes =
+      axes_of_symmetric(inverse_of_symmetric(D * left * D) - Eigen::MatrixXd::Identity(n, n));
+  return axes.values.cwiseMax(0).cwiseSqrt().asDiagonal() * axes.vectors.transpose();
 }
 
 Eigen::Vector3d Knowledge::reading() const {

@@ -34,12 +34,19 @@ class Knowledge {
   void learn(const Pose& step, const Eigen::MatrixXd& slopes);
   // Of 90 % intervals, one a row.
   Eigen::VectorXd widths() const;
+  // The rows' variances as shares of what they were before anything was driven.
+  Eigen::VectorXd remaining() const;
+  // What steps would tell of the rows, in units of their priors, if the pose were known before the
+  // first and after the last: more than within any drive.  A root R of that information, R'R.
+  Eigen::MatrixXd most_of(const std::vector<Pose>& steps,
+                          const std::vector<Eigen::MatrixXd>& slopes) const;
 
  private:
   Eigen::Vector3d reading() const;
 
   DriveNoise noise_;
-  double reach_m_ = 0;  // of the wheels
+  double reach_m_ = 0;     // of the wheels
+  Eigen::VectorXd prior_;  // standard deviations of the rows
   Eigen::MatrixXd P_;
 };
 

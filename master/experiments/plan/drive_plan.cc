@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
+#include <utility>
 
 #include "common/base/try.h"
 #include "common/random/stream.h"
 #include "master/experiments/plan/drive_knowledge.h"
+#include "master/experiments/plan/visibility.h"
 
 namespace gapfarm::plan {
 namespace {
@@ -45,7 +47,7 @@ class Planner {
       const std::optional<Chosen> next = choose(left_s());
       if (!next && t_s_ > 0) {
         take(learned({{still_, kRest_s}}), &plan);
-        if (left_s() < kMoves_s[0]) return plan;
+        if (left_s() < kMoves_s[0]) return judged(std::move(plan));
         put_down(&plan);
         continue;
       }
@@ -57,7 +59,7 @@ class Planner {
       take(*next, &plan);
     }
     take(learned({{still_, kRest_s}}), &plan);
-    return plan;
+    return judged(std::move(plan));
   }
 
  private:
@@ -209,7 +211,33 @@ class Planner {
     return best;
   }
 
+  // A root of what these moves would tell a second from here on.
+  Rows rate_of(const std::vector<Move>& moves) const {
+    const Path path = path_of(moves);
+    const double seconds = path.times_s.back() - path.times_s.front();
+    return known_.most_of(path.at, steps_.slopes(path.run, path.times_s, path.at)) /
+           std::sqrt(seconds);
+  }
+
+  // By the moves that were taken and others, each behind moves of its own.
+  DrivePlan judged(DrivePlan plan) {
+    if (settings_.random) return plan;
+    const double seconds = before_s_ + t_s_;
+    for (unsigned i = 0; i < settings_.pool; ++i) {
+      commands_.clear();
+      for (t_s_ = 0; t_s_ < kMemory_s;) {
+        const Move before = draw(kMemory_s);
+        commands_.push_back({t_s_, before.command});
+        t_s_ += before.seconds;
+      }
+      rates_.push_back(rate_of({draw(kMemory_s), draw(kMemory_s)}));
+    }
+    plan.best_share = best_over_drive(rates_, seconds, index_, known_.remaining());
+    return plan;
+  }
+
   void take(const Chosen& chosen, DrivePlan* plan) {
+    if (!settings_.random) rates_.push_back(rate_of(chosen.moves));
     LoggedRun& run = plan->drive.runs.back();
     for (std::size_t i = 0; i < chosen.moves.size(); ++i) {
       const Move& move = chosen.moves[i];
@@ -233,6 +261,7 @@ class Planner {
   Knowledge known_;
   Stream stream_;
   std::vector<double> still_;
+  std::vector<Rows> rates_;
   std::vector<CommandRow> commands_;
   Pose X_WM_;
   double before_s_ = 0;  // of driving, in runs before

@@ -41,6 +41,10 @@ struct DrivePlan {
   std::vector<KinematicRow> rows;
   RunLog drive;                  // commands, and as poses where the moves should end (waypoints)
   std::vector<WidthsAt> widths;  // by every move
+  // How narrow the wanted could be at best after as many seconds, on the geometric mean, as a share
+  // of this plan's: made of any moves of those that were drawn, and if the pose were known exactly
+  // between them (best_over_drive()).  1 of random moves, for which it is not asked.
+  double best_share = 1;
 };
 
 // Chooses moves two at a time: each channel at an end of its limits, half of it or 0, held for half

@@ -41,6 +41,12 @@ std::vector<std::size_t> select(const std::vector<Rows>& candidates, Eigen::Inde
 double best_over_plan(const std::vector<Rows>& candidates, Eigen::Index nuisances,
                       const std::vector<std::size_t>& chosen);
 
+// The same of an information that grows by `rates` a second, in units of priors: how narrow the
+// `wanted` could be on the geometric mean after so many seconds, as a share of what a plan leaves
+// of their variances; others are estimated with them.
+double best_over_drive(const std::vector<Rows>& rates, double seconds,
+                       const std::vector<std::ptrdiff_t>& wanted, const Eigen::VectorXd& variances);
+
 // Squared length of the whitened `shift` beyond what unit-normal nuisances explain, the
 // noncentrality of the likelihood ratio's chi-squared: s' (I + Z Z')^-1 s.
 // REQUIRES: as many rows.

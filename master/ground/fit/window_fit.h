@@ -22,6 +22,15 @@ struct FitRow {
 // Where they stand as long as no log has its say.
 Eigen::VectorXd nominals(const std::vector<FitRow>& rows);
 
+// How a window of poses ended beside a fit: along and across the end's heading, m, and of it, rad.
+struct EndedWindow {
+  std::size_t length = 0;  // which of the settings' lengths
+  double seconds = 0;
+  std::size_t run = 0;       // in the log
+  Eigen::Vector3d residual;  // as it is
+  Eigen::MatrixXd slopes;    // how that changes with the values
+};
+
 // What a fit to another log says of the values, and how sure that is.
 struct GroundReference {
   std::vector<std::string> names;
@@ -29,6 +38,8 @@ struct GroundReference {
   Eigen::MatrixXd draws;         // a column each: how far off the values may be, all at once
   std::vector<char> shown = {};  // of each: whether its log knows it better than its prior
   Eigen::MatrixXd covariance;
+  std::vector<std::string> units = {};  // of each, of its difference from what it was
+  std::vector<EndedWindow> windows = {};
 };
 
 struct WindowFit {
@@ -110,6 +121,8 @@ class WindowFitter {
 
   // A fit's residuals as they are: m, m, rad.
   std::vector<Eigen::Vector3d> raw_residuals(const WindowFit& fit) const;
+  // Of poses; gyros and returns are omitted.
+  std::vector<EndedWindow> ended_windows(const WindowFit& fit) const;
 
  private:
   std::vector<Eigen::Vector3d> residuals(const std::vector<FitRow>& rows,

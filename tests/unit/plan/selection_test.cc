@@ -43,6 +43,19 @@ TEST(BestOverPlan, OfOneUnknownIsItsBestExperimentRepeated) {
   EXPECT_NEAR(best_over_plan(candidates, 0, {1}), 1, 1e-3);
 }
 
+TEST(BestOverDrive, OfOneUnknownIsItsBestRateAllTheTime) {
+  const double planned = 1 / (1 + 10 * 2.0 * 2);  // ten seconds of the worse one
+  EXPECT_NEAR(best_over_drive({row({2}), row({3})}, 10, {0}, Eigen::VectorXd::Constant(1, planned)),
+              std::sqrt(1 / (1 + 10 * 3.0 * 3) / planned), 1e-3);
+}
+
+TEST(BestOverDrive, SharesTheTimeBetweenUnknowns) {
+  // Each shows one of two: half of the time for each is best.
+  const double half = 1 / (1 + 5 * 4.0);
+  EXPECT_NEAR(best_over_drive({row({2, 0}), row({0, 2})}, 10, {0, 1}, Eigen::Vector2d(half, half)),
+              1, 2e-3);
+}
+
 // Every choice of so many, repeats included, and the bound lies close above the best of them.
 TEST(BestOverPlan, NoChoiceIsBetter) {
   for (const std::uint64_t seed : {1, 2, 3, 4}) {

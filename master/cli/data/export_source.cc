@@ -1,0 +1,100 @@
+#include "master/cli/data/export_source.h"
+
+#include <cmath>
+#include <filesystem>
+
+#include "common/base/try.h"
+#include "common/problem/run_files.h"
+#include "common/trials/files.h"
+#include "master/ground/reference.h"
+#include "master/store/run_reader.h"
+
+namespace gapfarm {
+namespace {
+
+constexpr double kLeastShift_s = 1e-3;
+constexpr double kEachRow_s = 1e-3;  // a horizon that every way between two poses is longer than
+
+// Whether rows that hold wheels and increments were read at other times after all.
+bool clocks_are_apart(const GroundRobot& robot, const GroundReference& fit) {
+  for (std::size_t k = 0; k < fit.names.size(); ++k) {
+    const double value = fit.values[static_cast<Eigen::Index>(k)];
+    if (fit.names[k] == "delay") return std::abs(value - robot.motors.delay_s) > kLeastShift_s;
+  }
+  return false;
+}
+
+// Friction as the run has it, where the run searched for it.
+RosFriction simulated_friction(const Problem& problem, const Model& model) {
+  RosFriction friction;
+  for (const Gene& gene : problem.genes) {
+    const std::string& key = problem.table()[gene.row].key;
+    if (key != "friction" && key != "friction_ratio") continue;
+    const GroundRobot robot = problem.ground->robot_at(model.values);
+    friction.along = robot.friction;
+    friction.across = robot.friction * robot.friction_ratio;
+    friction.from = "as evolved; other values may explain the motion as well";
+  }
+  return friction;
+}
+
+Status check_ground(const Problem& problem, const std::string& source) {
+  if (problem.ground) return {};
+  return Error{source + ": scenario " + problem.scenario +
+               " has no robot file whose values could go back; only ground robots have"};
+}
+
+}  // namespace
+
+Result<GroundReference> fit_source(const GroundSource& source, Console& console) {
+  const GroundRobot& robot = source.robot;
+  ASSIGN_OR_RETURN(const auto log, read_run_folders(source.logs, robot.channels));
+  console.note("fitting the robot's kinematics to the log");
+  // Increments err each by itself: a window of several knows nothing that they do not, unless
+  // wheels were read at other times.
+  const bool together = log.relative && shares_a_clock(log);
+  const WindowSettings each_row = {{kEachRow_s}, 0.5}, summed = {{0.5, 2, 5}, 0.5};
+  const auto ask = [&](const WindowSettings& windows) {
+    return ask_what_changed(robot, log, windows, 1, nullptr);
+  };
+  ASSIGN_OR_RETURN(auto asked, ask(together ? each_row : summed));
+  if (together && clocks_are_apart(robot, *asked.reference)) {
+    ASSIGN_OR_RETURN(asked, ask(summed));
+  }
+  return *std::move(asked.reference);
+}
+
+std::optional<std::string> values_of(const std::string& folder) {
+  const auto values = std::filesystem::path(folder) / "values.json";
+  std::error_code ignored;
+  if (!std::filesystem::exists(values, ignored)) return {};
+  return values.string();
+}
+
+Result<ReportedValues> read_values(const std::string& path) {
+  ASSIGN_OR_RETURN(const auto text, read_text_file(path));
+  return parse_values(text, path);
+}
+
+Result<GroundSource> read_ground_source(const std::string& source, Console& console) {
+  std::error_code ignored;
+  if (std::filesystem::is_regular_file(source, ignored)) {
+    ASSIGN_OR_RETURN(const auto config,
+                     open_config(source, {}, console, [](Config&) { return Status(); }));
+    RETURN_IF_ERROR(check_ground(config.problem, source));
+    return GroundSource{
+        config.problem.ground->robot_at(config.problem.values), config.trial_files, {}};
+  }
+  const auto reader = RunReader::open(source);
+  if (!reader) {
+    return Error{source + ": neither a config nor the diagnosis of a ground robot nor a run (" +
+                 reader.error().message + ")"};
+  }
+  ASSIGN_OR_RETURN(const auto problem, stored_problem(*reader));
+  RETURN_IF_ERROR(check_ground(problem, source));
+  ASSIGN_OR_RETURN(const auto model, read_model_of(source, console));
+  return GroundSource{problem.ground->robot(), model.data.files,
+                      simulated_friction(problem, model)};
+}
+
+}  // namespace gapfarm
