@@ -7,6 +7,7 @@
 #include <random>
 #include <set>
 
+#include "common/random/stream.h"
 #include "master/evolve/evolve.h"
 #include "tests/unit/evolve/members_digest.h"
 #include "tests/unit/evolve/toy_problems.h"
