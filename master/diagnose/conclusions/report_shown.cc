@@ -30,8 +30,7 @@ Eigen::MatrixXd covariance_of(const Study& study, const JointFit& fit) {
   Eigen::MatrixXd normal = fit.jacobian.transpose() * fit.jacobian;
   for (std::size_t k = 0; k < fit.base_parameters; ++k) {
     const double sd = prior_sd(study, k);
-    const auto i = static_cast<Eigen::Index>(k);
-    if (sd > 0) normal(i, i) += 1 / (sd * sd);
+    if (sd > 0) normal(k, k) += 1 / (sd * sd);
   }
   const Eigen::VectorXd curvatures = axes_of_symmetric(normal).values;
   const double rounding = std::numeric_limits<double>::epsilon() *
@@ -48,9 +47,7 @@ std::vector<ParameterCorrelation> strong_correlations(const ParameterTable& tabl
     for (Eigen::Index j = i + 1; j < cov.cols(); ++j) {
       const double r = cov(i, j) / std::sqrt(cov(i, i) * cov(j, j));
       if (!(std::abs(r) >= kStrongCorrelation)) continue;
-      const auto key = [&](Eigen::Index k) {
-        return table[fit.parameters[static_cast<std::size_t>(k)].row].key;
-      };
+      const auto key = [&](Eigen::Index k) { return table[fit.parameters[k].row].key; };
       strong.push_back({key(i), key(j), std::clamp(r, -1.0, 1.0)});
     }
   }
@@ -138,17 +135,9 @@ std::vector<v1::Override> without_chance(const DiagnosisRequest& of, ParameterVa
     values[noise.row] = table[noise.row].lower;
   }
   table.without_chance(&values);
-  std::vector<v1::Override> overrides;
-  for (std::size_t row = 0; row < values.size(); ++row) {
-    if (values[row] == of.problem.values[row]) continue;
-    v1::Override& to = overrides.emplace_back();
-    to.set_parameter(static_cast<std::uint32_t>(row));
-    to.set_value(values[row]);
-  }
-  return overrides;
+  return overrides_of(of.problem.values, values);
 }
 
-// Rows of the table that are reported: noise, base, and named effects.
 std::set<std::size_t> reported_rows(const DiagnosisRequest& of, const JointFit& fit,
                                     const std::vector<NamedEffect>& effects) {
   std::set<std::size_t> reported;
