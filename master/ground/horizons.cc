@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <span>
 
 #include "common/base/try.h"
 #include "common/math/statistics.h"
@@ -201,10 +200,7 @@ Result<Horizons> measure_horizons(Farm& farm, const Problem& fitted, const Param
   task.mutable_predict();
   ASSIGN_OR_RETURN(const auto results, farm.run(farm.add_problem(to_proto(asked)), {task}));
   const v1::TaskResult& result = results.front();
-  if (result.outcome() != v1::OK) {
-    return Error{"the simulation ended with " + v1::Outcome_Name(result.outcome()) + " (" +
-                 result.message() + ")"};
-  }
+  RETURN_IF_ERROR(ended_well(result));
   Horizons horizons;
   std::vector<Pose> kinematic;
   if (fitted.ground) {
@@ -256,8 +252,7 @@ std::string format_horizons(const Horizons& horizons) {
   if (!kinematics) return text;
   text += "kinematics:";
   for (std::size_t i = 0; i < horizons.kinematics.names.size(); ++i) {
-    text += fmt::format(" {} {:.4g}", horizons.kinematics.names[i],
-                        horizons.kinematics.values[static_cast<Eigen::Index>(i)]);
+    text += fmt::format(" {} {:.4g}", horizons.kinematics.names[i], horizons.kinematics.values[i]);
   }
   return text + "\n";
 }

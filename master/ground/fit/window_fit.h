@@ -116,7 +116,6 @@ class WindowFitter {
                                          const Eigen::VectorXd& values) const;
   void rescale(WindowFit* fit, const std::vector<double>& use) const;
   double score(WindowFit* fit, const std::vector<double>& use) const;
-  // The column of slopes that belongs to row k.
   void slope(const WindowFit& fit, Eigen::Index k, std::vector<Eigen::MatrixXd>* J) const;
   // Equations of one step: weighted squares of slopes, and of slopes with residuals, priors in.
   void normal_equations(const WindowFit& fit, const std::vector<Eigen::MatrixXd>& J,
