@@ -5,6 +5,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "common/base/ranges.h"
 #include "common/base/try.h"
 #include "common/problem/run_files.h"
 #include "common/trials/files.h"
@@ -44,7 +45,7 @@ struct Reported {
 // Whether rows that hold wheels and increments were read at other times after all.
 bool clocks_are_apart(const GroundRobot& robot, const GroundReference& fit) {
   for (std::size_t k = 0; k < fit.names.size(); ++k) {
-    const double value = fit.values[static_cast<Eigen::Index>(k)];
+    const double value = fit.values[k];
     if (fit.names[k] == "delay") return std::abs(value - robot.motors.delay_s) > kLeastShift_s;
   }
   return false;
@@ -73,10 +74,9 @@ Result<Reported> fitted_values(const GroundRobot& robot, const std::vector<std::
   }
   const GroundReference& fit = *asked.reference;
   for (std::size_t k = 0; k < fit.names.size(); ++k) {
-    const auto i = static_cast<Eigen::Index>(k);
     std::vector<double> drawn;
     for (Eigen::Index d = 0; d < fit.draws.cols(); ++d) {
-      drawn.push_back(fit.values[i] + fit.draws(i, d));
+      drawn.push_back(fit.values[k] + fit.draws(k, d));
     }
     std::sort(drawn.begin(), drawn.end());
     const auto at = [&](double share) {
@@ -84,7 +84,7 @@ Result<Reported> fitted_values(const GroundRobot& robot, const std::vector<std::
     };
     reported_values.values.push_back({fit.names[k],
                                       value_in_file(reported_values.given, fit.names[k]),
-                                      fit.values[i],
+                                      fit.values[k],
                                       {at(kLow), at(kHigh)},
                                       fit.shown[k] != 0});
   }
@@ -199,28 +199,22 @@ Result<RosExport> export_of(const ExportCommand& command, Console& console) {
   return data;
 }
 
-nlohmann::ordered_json rows_json(const std::vector<RosValue>& values) {
-  nlohmann::ordered_json rows = nlohmann::ordered_json::array();
-  for (const RosValue& row : values) {
-    rows.push_back({{"key", row.key},
-                    {"had", row.had},
-                    {"says", row.reported},
-                    {"lo", row.interval.lower},
-                    {"hi", row.interval.upper},
-                    {"known", row.known}});
-  }
+Json rows_json(const std::vector<RosValue>& values) {
+  Json rows = mapped(values, [&](const RosValue& row) -> Json {
+    return {{"key", row.key},           {"had", row.had},           {"says", row.reported},
+            {"lo", row.interval.lower}, {"hi", row.interval.upper}, {"known", row.known}};
+  });
   return rows;
 }
 
-nlohmann::ordered_json export_json(const RosExport& data) {
-  nlohmann::ordered_json json = {{"controller", data.controller},
-                                 {"values", rows_json(data.values)},
-                                 {"robot", rows_json(data.sizes)},
-                                 {"kinematics", values_json(data.kinematics)}};
-  nlohmann::ordered_json covariance = nlohmann::ordered_json::array();
-  for (const auto& row : data.covariance.rowwise()) {
-    covariance.push_back(std::vector<double>(row.begin(), row.end()));
-  }
+Json export_json(const RosExport& data) {
+  Json json = {{"controller", data.controller},
+               {"values", rows_json(data.values)},
+               {"robot", rows_json(data.sizes)},
+               {"kinematics", values_json(data.kinematics)}};
+  Json covariance = mapped(data.covariance.rowwise(), [&](const auto& row) -> Json {
+    return std::vector<double>(row.begin(), row.end());
+  });
   if (!covariance.empty()) json["covariance"] = covariance;
   if (data.friction.across) json["mu1"] = *data.friction.along;
   if (data.friction.across) json["mu2"] = *data.friction.across;

@@ -25,9 +25,9 @@ struct ReportCommand {
 
 struct Page {
   std::string html;
-  std::filesystem::path from;              // what was read
-  std::filesystem::path out;               // where it goes unless configured otherwise
-  nlohmann::ordered_json importance = {};  // of a run's parameters
+  std::filesystem::path from;  // what was read
+  std::filesystem::path out;   // where it goes unless configured otherwise
+  Json importance = {};        // of a run's parameters
 };
 
 Result<Page> page_of_diagnosis(const std::filesystem::path& from) {
@@ -70,7 +70,7 @@ Result<int> run_report(ReportCommand& command, CliContext& context) {
   RETURN_IF_ERROR(command.outputs.plan(command.history));
   context.begun = true;
   RETURN_IF_ERROR(command.outputs.write(out, page.html));
-  nlohmann::ordered_json json = {{"report", out}};
+  Json json = {{"report", out}};
   std::string text = out + "\n";
   if (!command.history.empty()) {
     ASSIGN_OR_RETURN(const auto reader, RunReader::open(command.from));

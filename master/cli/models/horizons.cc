@@ -6,7 +6,6 @@
 
 #include "common/base/try.h"
 #include "common/problem/run_files.h"
-#include "common/recordings/read.h"
 #include "master/cli/subcommand.h"
 #include "master/command/inputs.h"
 #include "master/command/outputs.h"
@@ -26,7 +25,6 @@ struct HorizonsCommand {
   FarmOptions farm;
 };
 
-// What was fitted to, and at which values the simulation is measured.
 struct Fitted {
   Problem problem;
   ParameterValues values;
@@ -46,7 +44,6 @@ Result<Fitted> open_fitted(const std::string& source, Console& console) {
   return Fitted{problem, model.values, {}, model.data.files};
 }
 
-// Whole runs, before and after, as a picture.
 Status draw_runs(const HorizonsCommand& command, const Fitted& fitted, const RunLog& runs,
                  Farm& farm, Console& console) {
   if (command.picture.empty()) return {};
